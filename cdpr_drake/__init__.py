@@ -14,7 +14,7 @@ The rooms of this folder take arrays, small dataclasses and RigidTransforms, nev
 Compiled kernels are cached in the user's cache folder, or where NUMBA_CACHE_DIR says.
 """
 
-from cdpr_drake.kernel_cache import use_kernel_cache
+from cdpr_drake.kernel_cache.folder import use_kernel_cache
 
 __all__: list[str] = []
 

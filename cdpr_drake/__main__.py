@@ -1,5 +1,5 @@
 """`python -m cdpr_drake` is the command `cdpr`."""
 
-from cdpr_drake.cli import main
+from cdpr_drake.cli.app import main
 
 main()

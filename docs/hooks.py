@@ -8,7 +8,6 @@ import html
 import json
 import logging
 import re
-import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -92,16 +91,13 @@ def inline_math(source: str, *_: Any, **__: Any) -> str:
 
 
 def rooms() -> list[str]:
-    """Packages with a face: what a user may import."""
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-    found = []
-    for name in project["tool"]["setuptools"]["packages"]:
-        face = ROOT.joinpath(*name.split(".")) / "__init__.py"
-        if name.startswith(HIDDEN_ROOMS) or name == "cdpr_drake" or not face.is_file():
-            continue
-        if "__all__" in face.read_text(encoding="utf-8"):
-            found.append(name)
-    return found
+    """Packages with a face: what a user may import; each has a stub that names it."""
+    stubs = (ROOT / "cdpr_drake").glob("*/__init__.pyi")
+    found = [f"cdpr_drake.{stub.parent.name}" for stub in stubs]
+    for top in ("models", "systems", "analyses"):
+        for stub in (ROOT / top).rglob("*/__init__.pyi"):
+            found.append(".".join(("cdpr_drake", *stub.parent.relative_to(ROOT).parts)))
+    return sorted({*found} - {*HIDDEN_ROOMS})
 
 
 def room_page(room: str) -> str:

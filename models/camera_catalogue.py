@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from cdpr_drake.errors import RobotFileError
-from cdpr_drake.schema import array, closest, load_typed, number, text, whole
-from cdpr_drake.vision import Pinhole
+from cdpr_drake.schema.fields import array, number, text, whole
+from cdpr_drake.schema.typed_yaml import closest, load_typed
+from cdpr_drake.vision.pinhole import Pinhole
 
 _FOLDER = Path(__file__).parent / "cameras"
 

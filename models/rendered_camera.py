@@ -27,7 +27,7 @@ from pydrake.systems.sensors import CameraInfo, ImageRgba8U, RgbdSensor
 
 from cdpr_drake.errors import RenderingError
 from cdpr_drake.models.scene import FLOOR_COLOR
-from cdpr_drake.vision import Pinhole
+from cdpr_drake.vision.pinhole import Pinhole
 
 RENDERER = "cdpr_vtk"
 
@@ -47,7 +47,7 @@ COPY_TIMEOUT = 5.0
 PROBE_TIMEOUT = 120.0
 """A machine that needs longer than this for its first image is of no use [s]."""
 
-_PROBE_PROGRAM = "from cdpr_drake.models import render_once; render_once()"
+_PROBE_PROGRAM = "from cdpr_drake.models.rendered_camera import render_once; render_once()"
 
 
 def check_rendering() -> None:

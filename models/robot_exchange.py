@@ -8,25 +8,19 @@ from pathlib import Path
 import numpy as np
 
 from cdpr_drake.errors import RobotFileError
-from cdpr_drake.models.formats import (
-    CompletedDraft,
-    DraftCable,
-    RobotDraft,
-    complete_draft,
-    read_foreign,
-    write_caspr,
-    write_gazebo_yaml,
-    write_mjcf,
-    write_sdformat,
-    write_urdf,
-    write_wirex,
-)
-from cdpr_drake.models.hardware import given_material
-from cdpr_drake.models.placement import gravity_turn, turned_robot, world_turn
+from cdpr_drake.models.formats.assumptions import CompletedDraft, complete_draft
+from cdpr_drake.models.formats.caspr_writer import write_caspr
+from cdpr_drake.models.formats.detection import read_foreign
+from cdpr_drake.models.formats.draft import DraftCable, RobotDraft
+from cdpr_drake.models.formats.gazebo_yaml import write_gazebo_yaml
+from cdpr_drake.models.formats.joint_chains import write_sdformat, write_urdf
+from cdpr_drake.models.formats.mjcf import write_mjcf
+from cdpr_drake.models.formats.wirex import write_wirex
+from cdpr_drake.models.materials import given_material
 from cdpr_drake.models.robot_exports import check_format, names_in_file, xml_words
 from cdpr_drake.models.robot_holding import lengths_at_home
 from cdpr_drake.models.robot_in_plant import platform_inertia
-from cdpr_drake.models.robot_loader import parse_robot
+from cdpr_drake.models.robot_loader import gravity_turn, parse_robot, turned_robot, world_turn
 from cdpr_drake.models.robot_schema import Robot
 
 

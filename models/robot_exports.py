@@ -15,16 +15,13 @@ import numpy as np
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import RobotFileError
-from cdpr_drake.models.formats import (
-    DraftCable,
-    RobotDraft,
-    complete_draft,
-    is_frame_name,
-    robot_name,
-    short_name,
-)
-from cdpr_drake.models.placement import gravity_turn, turned_robot, world_turn
+from cdpr_drake.models.formats.assumptions import complete_draft
+from cdpr_drake.models.formats.caspr import short_name
+from cdpr_drake.models.formats.draft import DraftCable, RobotDraft
+from cdpr_drake.models.formats.named_frames import is_frame_name
+from cdpr_drake.models.formats.reading import robot_name
 from cdpr_drake.models.robot_holding import lengths_at_home
+from cdpr_drake.models.robot_loader import gravity_turn, turned_robot, world_turn
 from cdpr_drake.models.robot_schema import Robot
 
 EXPORTS = {

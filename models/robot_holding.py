@@ -8,18 +8,16 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables import CABLE_MODELS, cable_state, check_breaking
+from cdpr_drake.cables.models import CABLE_MODELS, cable_state, check_breaking
 from cdpr_drake.errors import CableGeometryError, CdprError, InfeasibleTensionError
-from cdpr_drake.geometry import CableSet, cable_lengths, cable_paths, gravity_wrench
+from cdpr_drake.geometry.cable_paths import cable_paths
+from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.geometry.straight_cables import cable_lengths, gravity_wrench
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import check_pose, rigid_platform, wrench_balance
-from cdpr_drake.statics import (
-    LEAST_TENSION_WEIGHTS,
-    Holding,
-    combination_words,
-    equilibrium_near,
-    hold,
-)
+from cdpr_drake.statics.controlled_wrenches import combination_words
+from cdpr_drake.statics.equilibrium import equilibrium_near
+from cdpr_drake.statics.static_tensions import LEAST_TENSION_WEIGHTS, Holding, hold
 
 TRIMMED = 0.01
 """By how much of its length a cable is trimmed against the others on its winch at the start."""

@@ -27,7 +27,7 @@ from pydrake.multibody.tree import (
 from pydrake.systems.framework import Context
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.geometry import PlatformJoint
+from cdpr_drake.geometry.platform_joint import PlatformJoint
 from cdpr_drake.models.robot_schema import SHAPE_INERTIA, Robot
 
 _PLATFORM_COLOR = np.array([0.25, 0.45, 0.75, 1.0])

@@ -9,28 +9,18 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables import axial_stiffness
+from cdpr_drake.cables.elastic_law import axial_stiffness
 from cdpr_drake.errors import RobotFileError
-from cdpr_drake.geometry import (
-    ALL_ROWS,
-    MOTION_TYPES,
-    PLANAR_ROWS,
-    CableSet,
-    MotionType,
-    PlatformJoint,
-)
-from cdpr_drake.models.hardware import (
-    CableMaterial,
-    Frame,
-    OwnMaterial,
-    PlatformPulley,
-    PlatformShape,
-    Pulley,
-    Rail,
-    Winch,
-    own_material,
-)
-from cdpr_drake.schema import (
+from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.geometry.motion_type import MOTION_TYPES, MotionType
+from cdpr_drake.geometry.platform_joint import PlatformJoint
+from cdpr_drake.geometry.poses import pose_from_angles
+from cdpr_drake.geometry.straight_cables import ALL_ROWS, PLANAR_ROWS
+from cdpr_drake.models.exit_points import PlatformPulley, Pulley, Rail
+from cdpr_drake.models.materials import CableMaterial, OwnMaterial, own_material
+from cdpr_drake.models.shapes import Frame, PlatformShape
+from cdpr_drake.models.winch_schema import Winch
+from cdpr_drake.schema.fields import (
     array,
     file_name,
     number,
@@ -39,8 +29,9 @@ from cdpr_drake.schema import (
     sections,
     text,
 )
-from cdpr_drake.spatial import pose_from_angles
-from cdpr_drake.winches import Drum, WinchGroups, WinchLaw
+from cdpr_drake.winches.drum import Drum
+from cdpr_drake.winches.groups import WinchGroups
+from cdpr_drake.winches.motor import WinchLaw
 
 BOX_INERTIA, SHAPE_INERTIA = "box", "shape"
 

@@ -8,14 +8,17 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.equilibria import HangingPlatform
 from cdpr_drake.errors import TensionProblemError
-from cdpr_drake.geometry import CableSet, cable_jacobian, gravity_wrench
+from cdpr_drake.geometry.cable_paths import cable_jacobian
+from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.geometry.poses import angles_from_rotation, pose_error
+from cdpr_drake.geometry.straight_cables import gravity_wrench
 from cdpr_drake.models.robot_in_plant import platform_inertia
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.spatial import angles_from_rotation, pose_error
-from cdpr_drake.statics import RigidPlatform, WrenchControl, wrench_control
-from cdpr_drake.tensions import TensionProblem
+from cdpr_drake.statics.controlled_wrenches import WrenchControl, wrench_control
+from cdpr_drake.statics.inextensible_problem import HangingPlatform
+from cdpr_drake.statics.rigid_platform import RigidPlatform
+from cdpr_drake.tensions.problem import TensionProblem
 
 OFF_JOINT = 1e-6
 """How far a pose may be off what the motion type lets the platform have [m, rad]."""

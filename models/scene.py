@@ -21,7 +21,8 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import RigidBody
 
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.vision import Plate, tag_plate
+from cdpr_drake.vision.apriltags import tag_plate
+from cdpr_drake.vision.target import Plate
 
 FLOOR_COLOR = np.array([0.62, 0.62, 0.60, 1.0])
 _BEAM_COLOR = np.array([0.30, 0.32, 0.35, 1.0])

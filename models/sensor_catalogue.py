@@ -8,7 +8,8 @@ from typing import Any, TypeVar
 import numpy as np
 
 from cdpr_drake.errors import RobotFileError
-from cdpr_drake.schema import FASTEST, array, closest, load_typed, number, text, whole
+from cdpr_drake.schema.fields import FASTEST, array, number, text, whole
+from cdpr_drake.schema.typed_yaml import closest, load_typed
 
 _FOLDER = Path(__file__).parent / "sensors"
 

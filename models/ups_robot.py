@@ -29,7 +29,7 @@ from pydrake.systems.framework import Context
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CableModelError, RobotFileError
-from cdpr_drake.geometry import cable_lengths
+from cdpr_drake.geometry.straight_cables import cable_lengths
 from cdpr_drake.models.robot_in_plant import RobotInPlant, add_robot
 from cdpr_drake.models.robot_schema import Robot
 

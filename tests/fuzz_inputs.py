@@ -29,10 +29,10 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-from cdpr_drake.analyses import catalogue as studies
-from cdpr_drake.analyses.benchmarks import BENCH_GROUPS
+from cdpr_drake.analyses.benchmarks.groups import BENCH_GROUPS
+from cdpr_drake.analyses.studies import catalogue as studies
 from cdpr_drake.cli import app, doctor, simulate, stability, view
-from cdpr_drake.cli import repetitions as seeds
+from cdpr_drake.cli import simulate as seeds
 from cdpr_drake.models import camera_catalogue, sensor_catalogue
 from tests.fuzz_cases import COMMANDS as GOOD
 from tests.fuzz_cases import Case, draw_case, lay_out

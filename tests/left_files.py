@@ -10,8 +10,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from cdpr_drake.analyses.reporting import MARKER, PARTS
-from cdpr_drake.analyses.reporting.written_files import others_in
+from cdpr_drake.analyses.reporting.log_on_disk import PARTS
+from cdpr_drake.analyses.reporting.written_files import MARKER, others_in
 
 TOLD = re.compile(
     r"/(by_earlier_sessions|note|taken_over|seconds|wall_time_s|microseconds|processor time [^/]*)$"

@@ -14,8 +14,9 @@ import sys
 import tempfile
 from pathlib import Path
 
-from cdpr_drake.cli.first_use import DEFAULT, GROUPS
-from cdpr_drake.kernel_cache import kernel_list, signature_words
+from cdpr_drake.cli.process import DEFAULT, GROUPS
+from cdpr_drake.kernel_cache import kernel_list
+from cdpr_drake.kernel_cache.signatures import signature_words
 
 UNOPTIMISED = {
     "CDPR_COMPILE_HELPERS": "0", "NUMBA_OPT": "0", "NUMBA_LOOP_VECTORIZE": "0",
@@ -67,7 +68,7 @@ def kept_kernels(asked):
 
 def simulate():
     """The default simulation as the command does it, with its figures, with both cameras."""
-    from cdpr_drake.cli import main
+    from cdpr_drake.cli.app import main
 
     for camera in ("projected", "rendered"):
         with tempfile.TemporaryDirectory() as folder:
@@ -80,7 +81,7 @@ def simulate():
 
 def do(group):
     """What a group of kernels is for."""
-    from cdpr_drake.analyses.compilation import compilation_steps
+    from cdpr_drake.analyses.installation import compilation_steps
 
     if group == DEFAULT:
         simulate()

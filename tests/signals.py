@@ -39,7 +39,7 @@ from dataclasses import dataclass, field
 from importlib.resources import files
 from pathlib import Path
 
-from cdpr_drake.analyses.reporting import PARTS
+from cdpr_drake.analyses.reporting.log_on_disk import PARTS
 from tests.left_files import Reference, broken_files, unknown_files
 
 SIGNALS = {"SIGTERM": signal.SIGTERM, "SIGINT": signal.SIGINT, "SIGKILL": signal.SIGKILL}
@@ -156,7 +156,7 @@ JOB = """
 import signal, sys
 signal.signal(signal.SIGINT, signal.SIG_DFL)
 from pathlib import Path
-from cdpr_drake.studio.jobs import CommandJob
+from cdpr_drake.studio.workbench.command_job import CommandJob
 job = CommandJob("a job", sys.argv[2:], Path.cwd())
 job.begin()
 Path(sys.argv[1]).write_text(str(job.process_id))

@@ -4,7 +4,7 @@ import os
 
 from numba.core.dispatcher import Dispatcher
 
-from cdpr_drake.analyses.sweeps import default_workers
+from cdpr_drake.analyses.sweeps.worker_pool import default_workers
 
 
 def test_numba_asks_first():

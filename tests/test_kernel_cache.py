@@ -11,8 +11,8 @@ from tests.messages import messages
 
 ASK = "import cdpr_drake, os; print(os.environ['NUMBA_CACHE_DIR'])"
 COMPILE = (
-    "import os, numpy as np, cdpr_drake; from cdpr_drake.geometry import cable_lengths, "
-    "length_jacobian; from pydrake.math import RigidTransform as X; "
+    "import os, numpy as np, cdpr_drake; from cdpr_drake.geometry.straight_cables import "
+    "cable_lengths, length_jacobian; from pydrake.math import RigidTransform as X; "
     "length_jacobian(X(), np.ones((3, 2)), np.zeros((3, 2))); "
     "print(sum(len(f) for _, _, f in os.walk(os.environ['NUMBA_CACHE_DIR'])))"
 )

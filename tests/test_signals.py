@@ -7,7 +7,9 @@ import sys
 
 import pytest
 
-from cdpr_drake.analyses.reporting import continued_folder, mark, write_whole
+from cdpr_drake.analyses.reporting.log_files import write_whole
+from cdpr_drake.analyses.reporting.output_folder import continued_folder
+from cdpr_drake.analyses.reporting.written_files import mark
 from tests import signals
 from tests.left_files import Reference, broken_files, unknown_files
 from tests.signals import COMMANDS, ROOT

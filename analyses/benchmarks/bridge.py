@@ -16,13 +16,15 @@ from contextlib import contextmanager
 import numpy as np
 
 from cdpr_drake.analyses.benchmarks.dynamic_loops import SCENARIO
-from cdpr_drake.analyses.reporting import TimingRow, interleaved
-from cdpr_drake.analyses.runs import make_control
-from cdpr_drake.bridge import Driver, Pace, ServerSocket, encode
-from cdpr_drake.systems.diagrams import load_scenario
-from cdpr_drake.systems.loops import RemoteTensionLoop
-from cdpr_drake.systems.remote import tension_service
-from cdpr_drake.systems.robots import COMPILED
+from cdpr_drake.analyses.reporting.timing import TimingRow, interleaved
+from cdpr_drake.analyses.simulation.tension_control_run import make_control
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.loops.remote_tension_loop import RemoteTensionLoop
+from cdpr_drake.systems.remote.messages import encode
+from cdpr_drake.systems.remote.remote_driver import Driver, Pace
+from cdpr_drake.systems.remote.server_socket import ServerSocket
+from cdpr_drake.systems.remote.service import tension_service
+from cdpr_drake.systems.robots.settings import COMPILED
 
 WARM = 200
 """Exchanges that do not count."""
@@ -44,7 +46,7 @@ for _ in range(int(sys.argv[3])):
 
 CLIENT = """
 import sys
-from cdpr_drake.bridge import Client
+from cdpr_drake.systems.remote.remote_client import Client
 with Client(sys.argv[1], timeout=float(sys.argv[3])) as client:
     now = client.start(sys.argv[2].split(","))
     tensions = client.distribute(now.outputs["platform_state"][:7])[0]

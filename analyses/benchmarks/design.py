@@ -5,13 +5,18 @@ from __future__ import annotations
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.design import DesignSettings, GoalSettings, make_candidates
-from cdpr_drake.analyses.reporting import TimingRow, interleaved, seconds_per_call
-from cdpr_drake.analyses.workspaces import Asked, ConditionsTask, pose_conditions
-from cdpr_drake.equilibria import HangingPlatform, all_rests, sampled_rests
-from cdpr_drake.geometry import CableSet
-from cdpr_drake.models import load_robot
-from cdpr_drake.workspaces import SpatialSet, grid_by_count
+from cdpr_drake.analyses.design.candidates import make_candidates
+from cdpr_drake.analyses.design.settings import DesignSettings, GoalSettings
+from cdpr_drake.analyses.reporting.timing import TimingRow, interleaved, seconds_per_call
+from cdpr_drake.analyses.workspaces.conditions import ConditionsTask
+from cdpr_drake.analyses.workspaces.workspace_question import Asked, pose_conditions
+from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.statics.equilibrium_enumeration import all_rests
+from cdpr_drake.statics.equilibrium_search import sampled_rests
+from cdpr_drake.statics.inextensible_problem import HangingPlatform
+from cdpr_drake.workspaces.demanded_wrenches import SpatialSet
+from cdpr_drake.workspaces.pose_grid import grid_by_count
 
 ROBOT = "acrobot_large"
 

@@ -11,17 +11,18 @@ from collections.abc import Callable
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
 from cdpr_drake.analyses.benchmarks.tendon_loop import TendonLoop, has_tendons
-from cdpr_drake.analyses.reporting import TimingRow, interleaved, processor_seconds
-from cdpr_drake.models import load_robot, tension_problem
-from cdpr_drake.systems.diagrams import (
+from cdpr_drake.analyses.reporting.timing import TimingRow, interleaved, processor_seconds
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_statics import tension_problem
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.diagrams.tension_control import (
     TensionControl,
     TensionControlSettings,
-    TensionLoop,
     build_tension_control,
-    load_scenario,
 )
-from cdpr_drake.systems.robots import COMPILED, PLANT
-from cdpr_drake.systems.scenarios import TensionScenario
+from cdpr_drake.systems.diagrams.tension_loop import TensionLoop
+from cdpr_drake.systems.robots.settings import COMPILED, PLANT
+from cdpr_drake.systems.scenarios.tension_control_scenario import TensionScenario
 
 SCENARIO = "caroca_computed_torque"
 

@@ -13,7 +13,7 @@ from cdpr_drake.analyses.benchmarks.stability import stability_rows
 from cdpr_drake.analyses.benchmarks.statics import physics_rows
 from cdpr_drake.analyses.benchmarks.tensions import tension_rows
 from cdpr_drake.analyses.benchmarks.workspaces import workspace_rows
-from cdpr_drake.analyses.reporting import TimingRow
+from cdpr_drake.analyses.reporting.timing import TimingRow
 
 BENCH_GROUPS: dict[str, Callable[[bool], list[TimingRow]]] = {
     "calibration": calibration_rows,

@@ -9,22 +9,21 @@ from pydrake.math import RigidTransform
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from cdpr_drake.analyses.calibration import calibration_model, rest_poses
-from cdpr_drake.analyses.identification import dynamic_model, platform_size
-from cdpr_drake.analyses.reporting import TimingRow, interleaved, processor_seconds
+from cdpr_drake.analyses.calibration.calibrated_robots import calibration_model
+from cdpr_drake.analyses.calibration.candidate_poses import rest_poses
+from cdpr_drake.analyses.calibration.identified_robots import dynamic_model, platform_size
+from cdpr_drake.analyses.reporting.timing import TimingRow, interleaved, processor_seconds
 from cdpr_drake.arrays import Array
-from cdpr_drake.calibration import (
-    CalibrationProgram,
-    Point,
-    Stations,
-    simulated_lengths,
-    simulated_poses,
-)
-from cdpr_drake.geometry import cable_jacobian
-from cdpr_drake.identification import IdentificationProgram, inertia_regressor, sample_motion
-from cdpr_drake.models import load_robot
-from cdpr_drake.spatial import cross_matrix, pose_row
-from cdpr_drake.trajectories import PoseTrajectory
+from cdpr_drake.calibration.measurements import simulated_lengths, simulated_poses
+from cdpr_drake.calibration.program import CalibrationProgram
+from cdpr_drake.calibration.stations import Point, Stations
+from cdpr_drake.geometry.cable_paths import cable_jacobian
+from cdpr_drake.geometry.poses import cross_matrix, pose_row
+from cdpr_drake.identification.program import IdentificationProgram
+from cdpr_drake.identification.regressor import inertia_regressor
+from cdpr_drake.identification.samples import sample_motion
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
 
 ROBOT = "acrobot_large"
 ROWS, RATE, BANDWIDTH = 10_000, 250.0, 8.0

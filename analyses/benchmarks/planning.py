@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import linprog
 
-from cdpr_drake.analyses.plans import LimitSettings, make_path, path_task
-from cdpr_drake.analyses.reporting import TimingRow, interleaved, processor_seconds
+from cdpr_drake.analyses.planning.robot_limits import LimitSettings, make_path, path_task
+from cdpr_drake.analyses.reporting.timing import TimingRow, interleaved, processor_seconds
 from cdpr_drake.arrays import Array
-from cdpr_drake.models import load_robot
-from cdpr_drake.planning import PathTask, plan_along_path
-from cdpr_drake.spatial import pose_from_angles
-from cdpr_drake.trajectories import PosePath
+from cdpr_drake.geometry.poses import pose_from_angles
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.planning.path_task import PathTask
+from cdpr_drake.planning.path_timing import plan_along_path
+from cdpr_drake.trajectories.pose_path import PosePath
 
 ROBOT, TENSIONS = "acrobot_large", (1.0, 60.0)
 

@@ -8,24 +8,28 @@ from collections.abc import Callable
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.reporting import TimingRow, interleaved, seconds_per_call
+from cdpr_drake.analyses.reporting.timing import TimingRow, interleaved, seconds_per_call
 from cdpr_drake.arrays import Array
-from cdpr_drake.geometry import cable_paths, length_jacobian
-from cdpr_drake.models import load_camera, load_robot
-from cdpr_drake.servoing import AdaptiveGain, ServoController
-from cdpr_drake.spatial import adjoint
-from cdpr_drake.systems.diagrams import (
-    believed_robot,
-    correction_law,
-    load_scenario,
-    make_controller,
-    torque_law,
-)
-from cdpr_drake.systems.scenarios import Scenario
-from cdpr_drake.systems.servos import control_step
-from cdpr_drake.systems.tension_control import CorrectionReadings
-from cdpr_drake.textures import TexturedTarget, drawn_image
-from cdpr_drake.vision import Pinhole, PointTarget, TagTarget, Target
+from cdpr_drake.geometry.cable_paths import cable_paths
+from cdpr_drake.geometry.poses import adjoint
+from cdpr_drake.geometry.straight_cables import length_jacobian
+from cdpr_drake.models.camera_catalogue import load_camera
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.servoing.controller import ServoController
+from cdpr_drake.servoing.servo_law import AdaptiveGain
+from cdpr_drake.systems.controllers.correction_laws import CorrectionReadings
+from cdpr_drake.systems.controllers.feature_servo import control_step
+from cdpr_drake.systems.diagrams.beliefs import believed_robot
+from cdpr_drake.systems.diagrams.controller import make_controller
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.diagrams.tension_management import correction_law
+from cdpr_drake.systems.diagrams.torque_control import torque_law
+from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
+from cdpr_drake.vision.apriltags import TagTarget
+from cdpr_drake.vision.pinhole import Pinhole
+from cdpr_drake.vision.target import PointTarget, Target
+from cdpr_drake.vision.texture_pictures import drawn_image
+from cdpr_drake.vision.textured_target import TexturedTarget
 
 BUDGET_US = 60.0
 """What one control step may take [us]."""
@@ -48,7 +52,7 @@ CORRECTIONS = {
     "distribution": "{kind: distribution, integral: 0.01}",
     "length": "{kind: length}",
 }
-"""Sections `tension_management` of which a step is timed."""
+"""Sections `tensions` of which a step is timed."""
 
 
 def servo_rows(quick: bool) -> list[TimingRow]:

@@ -12,33 +12,31 @@ from pydrake.systems.framework import BasicVector, Context, DiagramBuilder, Leaf
 
 from cdpr_drake.analyses.benchmarks.bridge import bridge_rows
 from cdpr_drake.analyses.benchmarks.dynamic_loops import dynamic_rows
-from cdpr_drake.analyses.repetitions import run_many
-from cdpr_drake.analyses.reporting import (
+from cdpr_drake.analyses.reporting.timing import (
     TimingRow,
     interleaved,
     processor_seconds,
     real_time_row,
     seconds_per_call,
 )
-from cdpr_drake.analyses.runs import run_scenario
+from cdpr_drake.analyses.simulation.monte_carlo import run_many
+from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables import floating_force, unstrained_lengths
-from cdpr_drake.geometry import cable_lengths
-from cdpr_drake.models import RobotInPlant, add_robot, load_robot
-from cdpr_drake.systems.cameras import REGION
-from cdpr_drake.systems.diagrams import load_scenario
-from cdpr_drake.systems.loops import looped
-from cdpr_drake.systems.robots import (
-    COMPILED,
-    SEMI_IMPLICIT,
-    CableForces,
-    CompiledCableRobot,
-    StepRule,
-    VelocityWinch,
-    automatic_step,
-    holding_tensions,
-)
-from cdpr_drake.systems.scenarios import Scenario
+from cdpr_drake.cables.elastic_law import unstrained_lengths
+from cdpr_drake.cables.straight_kernel import floating_force
+from cdpr_drake.geometry.straight_cables import cable_lengths
+from cdpr_drake.models.robot_in_plant import RobotInPlant, add_robot
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.systems.cameras.camera_settings import REGION
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.loops.loop_choice import looped
+from cdpr_drake.systems.robots.cable_forces import CableForces
+from cdpr_drake.systems.robots.cable_robot import SEMI_IMPLICIT, automatic_step, holding_tensions
+from cdpr_drake.systems.robots.compiled_cable_robot import CompiledCableRobot
+from cdpr_drake.systems.robots.compiled_step import StepRule
+from cdpr_drake.systems.robots.settings import COMPILED
+from cdpr_drake.systems.robots.winches import VelocityWinch
+from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
 
 ROBOT = "acrobot_small"
 SCENARIO = "acrobot_pbvs"

@@ -9,22 +9,22 @@ from dataclasses import replace
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.published import DRAWS, TABLES, recipe_bounds, recipe_case, recipe_grid
-from cdpr_drake.analyses.reporting import TimingRow, interleaved, seconds_per_call
-from cdpr_drake.arrays import Array
-from cdpr_drake.features import theta_u_interaction
-from cdpr_drake.spatial import cross_matrix, rotation_from_vector
-from cdpr_drake.stability import (
-    BASELINE,
-    VERDICTS,
-    ModelAtPose,
-    PerturbationBounds,
-    StabilityCase,
-    VerdictOptions,
-    draw_perturbations,
-    judge_stability,
-    stability_matrix,
+from cdpr_drake.analyses.reporting.timing import TimingRow, interleaved, seconds_per_call
+from cdpr_drake.analyses.studies.published.stability_recipe import (
+    DRAWS,
+    recipe_bounds,
+    recipe_case,
+    recipe_grid,
 )
+from cdpr_drake.analyses.studies.published.stability_tables import TABLES
+from cdpr_drake.arrays import Array
+from cdpr_drake.geometry.poses import cross_matrix, rotation_from_vector
+from cdpr_drake.servoing.pose_features import theta_u_interaction
+from cdpr_drake.stability.criterion import ModelAtPose, stability_matrix
+from cdpr_drake.stability.perturbation_bounds import BASELINE, PerturbationBounds
+from cdpr_drake.stability.perturbation_samples_kernel import draw_perturbations
+from cdpr_drake.stability.stability_case import StabilityCase
+from cdpr_drake.stability.verdict import VERDICTS, VerdictOptions, judge_stability
 
 ROBOT = "acrobot_large"
 

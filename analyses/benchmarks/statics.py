@@ -11,34 +11,33 @@ from numba import njit
 from pydrake.math import RigidTransform
 from scipy.optimize import least_squares, leastsq
 
-from cdpr_drake.analyses.reporting import TimingRow, interleaved, seconds_per_call
+from cdpr_drake.analyses.reporting.timing import TimingRow, interleaved, seconds_per_call
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables import (
-    CATENARY,
-    DERIVATIVES,
-    ELASTIC,
-    HANGING,
-    STRAIGHT,
-    all_responses,
-    cable_state,
+from cdpr_drake.cables.dispatch_kernel import HANGING, STRAIGHT, all_responses
+from cdpr_drake.cables.models import CATENARY, ELASTIC, cable_state
+from cdpr_drake.cables.response_kernel import DERIVATIVES
+from cdpr_drake.geometry.cable_paths import motion_of
+from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.geometry.motion_kernel import floating_motion
+from cdpr_drake.geometry.motion_type import FREE
+from cdpr_drake.geometry.poses import (
+    pose_from_angles,
+    pose_from_row,
+    pose_row,
+    rotation_from_vector,
 )
-from cdpr_drake.geometry import (
-    FREE,
-    CableSet,
-    floating_motion,
-    motion_of,
-    pulley_jacobian,
-    pulley_line,
-)
-from cdpr_drake.kinematics import WORK_SHAPE, ForwardKinematics, fit_pose
-from cdpr_drake.models import hold_robot, load_robot, rigid_platform
-from cdpr_drake.spatial import pose_from_angles, pose_from_row, pose_row, rotation_from_vector
-from cdpr_drake.statics import (
-    equilibrium_near,
+from cdpr_drake.geometry.pulley_kernel import pulley_jacobian, pulley_line
+from cdpr_drake.models.robot_holding import hold_robot
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_statics import rigid_platform
+from cdpr_drake.statics.equilibrium import equilibrium_near
+from cdpr_drake.statics.equilibrium_program import (
     make_equilibrium_program,
-    platform_stiffness,
     solve_equilibrium_program,
 )
+from cdpr_drake.statics.forward_kinematics import ForwardKinematics
+from cdpr_drake.statics.pose_fit_kernel import WORK_SHAPE, fit_pose
+from cdpr_drake.statics.stiffness import platform_stiffness
 
 ROBOT = "acrobot_large"
 

@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.models import Robot, platform_inertia
-from cdpr_drake.systems.scenarios import TensionScenario
-from cdpr_drake.tensions import TensionProblem
-from cdpr_drake.trajectories import MOTION_SIZE, write_motion
+from cdpr_drake.models.robot_in_plant import platform_inertia
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.systems.scenarios.tension_control_scenario import TensionScenario
+from cdpr_drake.tensions.problem import TensionProblem
+from cdpr_drake.trajectories.pose_trajectory import MOTION_SIZE, write_motion
 
 LOG_STEPS = 10
 """Control steps from row to row of the log."""

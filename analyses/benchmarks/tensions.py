@@ -9,29 +9,25 @@ import numpy as np
 from pydrake.solvers import ClarabelSolver, OsqpSolver
 
 from cdpr_drake.analyses.benchmarks.tendon_loop import DaqpLoop
-from cdpr_drake.analyses.reporting import (
+from cdpr_drake.analyses.reporting.timing import (
     TimingRow,
     interleaved,
     real_time_row,
     seconds_each,
     seconds_per_call,
 )
-from cdpr_drake.analyses.runs import run_tension_scenario
+from cdpr_drake.analyses.simulation.tension_control_run import run_tension_scenario
 from cdpr_drake.errors import CdprError
-from cdpr_drake.models import load_robot, tension_problem
-from cdpr_drake.spatial import pose_from_angles
-from cdpr_drake.systems.diagrams import load_scenario
-from cdpr_drake.tensions import (
-    METHODS,
-    Distributor,
-    TensionProblem,
-    closed_form,
-    distribute,
-    distribute_batch,
-    nearest_tensions,
-    program_tensions,
-    workspace_shape,
-)
+from cdpr_drake.geometry.poses import pose_from_angles
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_statics import tension_problem
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.tensions.batch import distribute_batch
+from cdpr_drake.tensions.closed_form_kernel import closed_form
+from cdpr_drake.tensions.methods import METHODS, Distributor, distribute
+from cdpr_drake.tensions.problem import TensionProblem
+from cdpr_drake.tensions.program import program_tensions
+from cdpr_drake.tensions.quadratic_program_kernel import nearest_tensions, workspace_shape
 
 ROBOT = "acrobot_large"
 

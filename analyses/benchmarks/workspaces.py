@@ -9,32 +9,27 @@ import numba
 import numpy as np
 from pydrake.geometry import Box, Capsule
 from pydrake.math import RigidTransform, RotationMatrix
-from pydrake.multibody.plant import (
-    AddMultibodyPlantSceneGraph,
-    CoulombFriction,
-    MultibodyPlant,
-)
+from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, CoulombFriction, MultibodyPlant
 from pydrake.multibody.tree import SpatialInertia
 from pydrake.systems.framework import DiagramBuilder
 from scipy.optimize import linprog
 from scipy.spatial import ConvexHull
 
-from cdpr_drake.analyses.reporting import TimingRow, interleaved, seconds_each, seconds_per_call
-from cdpr_drake.analyses.stability import static_case
-from cdpr_drake.arrays import Array
-from cdpr_drake.models import load_robot
-from cdpr_drake.workspaces import (
-    StaticCase,
-    Surroundings,
-    box_row,
-    capacity_margins,
-    clearances,
-    grid_by_count,
-    scaled_matrices,
-    statically_feasible,
-    weight_wrenches,
-    workspace_hull,
+from cdpr_drake.analyses.reporting.timing import (
+    TimingRow,
+    interleaved,
+    seconds_each,
+    seconds_per_call,
 )
+from cdpr_drake.analyses.workspaces.static_feasible import static_case
+from cdpr_drake.arrays import Array
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.workspaces.cable_interference import Surroundings, box_row, clearances
+from cdpr_drake.workspaces.demanded_wrenches import weight_wrenches
+from cdpr_drake.workspaces.hull import workspace_hull
+from cdpr_drake.workspaces.pose_grid import grid_by_count
+from cdpr_drake.workspaces.static_feasibility import StaticCase, statically_feasible
+from cdpr_drake.workspaces.wrench_capacity import capacity_margins, scaled_matrices
 
 ROBOT = "acrobot_large"
 

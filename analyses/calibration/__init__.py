@@ -4,32 +4,16 @@ A log is text with columns that bear their names and units, see `read_log`. What
 robot file that scenarios take as `perturbations.believed_robot`, and all numbers as JSON.
 
 Source: see `cdpr_drake.calibration`.
+
+Identification of a robot's dynamics from a log: reads, asks, validates, reports, writes a robot.
+
+A log is text with columns that bear their names and units, see `analyses.calibration.read_log`;
+those that `cdpr simulate` writes are such. What comes out is a robot file that scenarios take as
+what the controller believes, and all numbers as JSON.
+
+Source: see `cdpr_drake.identification`.
 """
 
-from cdpr_drake.analyses.calibration.asked import CalibrationTask, Sigmas, TagPlace
-from cdpr_drake.analyses.calibration.campaign import (
-    Campaign,
-    calibrated_scenario,
-    run_campaign,
-    servo_again,
-)
-from cdpr_drake.analyses.calibration.held_poses import rest_poses
-from cdpr_drake.analyses.calibration.log_file import CalibrationLog, read_log
-from cdpr_drake.analyses.calibration.proposal import NextPoses, next_poses
-from cdpr_drake.analyses.calibration.report import (
-    calibration_dict,
-    calibration_drawings,
-    calibration_tables,
-    write_calibration,
-)
-from cdpr_drake.analyses.calibration.robots import calibrated_robot, calibration_model
-from cdpr_drake.analyses.calibration.tag_file import read_tags
-from cdpr_drake.analyses.calibration.task import Calibration, calibrate
-from cdpr_drake.analyses.calibration.tracker import shifted_log
+import lazy_loader
 
-__all__ = [
-    "Calibration", "CalibrationLog", "CalibrationTask", "Campaign", "NextPoses", "Sigmas",
-    "TagPlace", "calibrate", "calibrated_robot", "calibrated_scenario", "calibration_dict",
-    "calibration_drawings", "calibration_model", "calibration_tables", "next_poses", "read_log",
-    "read_tags", "rest_poses", "run_campaign", "servo_again", "shifted_log", "write_calibration",
-]  # fmt: skip
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

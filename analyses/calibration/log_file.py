@@ -35,7 +35,7 @@ from cdpr_drake.analyses.calibration.columns import (
 )
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CalibrationError
-from cdpr_drake.spatial import rotation_from_angles, rotation_from_vector
+from cdpr_drake.geometry.poses import rotation_from_angles, rotation_from_vector
 
 Found = dict[str, dict[int | tuple[int, int, int], Array]]
 """Columns in SI units, by what they hold and by cable, part or corner."""

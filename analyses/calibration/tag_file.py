@@ -7,14 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from cdpr_drake.analyses.calibration.asked import TagPlace
+from cdpr_drake.analyses.calibration.calibration_request import TagPlace
 from cdpr_drake.analyses.calibration.columns import UNITS, Column, read_header, split_unit
-from cdpr_drake.analyses.calibration.log_file import (
-    Found,
-    parse_numbers,
-    parse_poses,
-    split_cells,
-)
+from cdpr_drake.analyses.calibration.log_file import Found, parse_numbers, parse_poses, split_cells
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CalibrationError
 

@@ -8,11 +8,12 @@ from dataclasses import replace
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.calibration.asked import Prepared, unknown_frames
+from cdpr_drake.analyses.calibration.calibration_request import Prepared, unknown_frames
 from cdpr_drake.analyses.calibration.log_file import CalibrationLog
-from cdpr_drake.calibration import Point, Stations, guessed_tracker
+from cdpr_drake.calibration.guesses import guessed_tracker
+from cdpr_drake.calibration.stations import Point, Stations
 from cdpr_drake.errors import CalibrationError
-from cdpr_drake.numerics import WORSE, tracker_shift
+from cdpr_drake.numerics.time_shift import WORSE, tracker_shift
 
 
 def with_tracker(prepared: Prepared, poses: Sequence[RigidTransform]) -> Prepared:

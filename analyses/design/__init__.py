@@ -6,43 +6,20 @@ steer the search only. What was gained is said by `confirm`, which knows nothing
 boxes proven inside the workspace, or poses proven stable on another grid.
 
 Source: kinds and measures of workspaces as `analyses.workspaces`; control stability as
-`analyses.stability`.
+`analyses.workspaces`.
+
+Searching a design: coordinates that symmetries tie together, evolution, what dominates what.
+
+A design is a vector of numbers in [0, 1], one a free coordinate. `MovedPoints` makes displacements
+of points of it; `EvolutionSearch` seeks the vector of the largest score by CMA-ES, which needs no
+gradients: shares of poses are steps of the coordinates. `SlopeSearch` seeks the largest least of
+smooth functions by their slopes, which takes far fewer designs where a goal is such a least. All
+they know can be replayed from the scores, so that a search goes on where it was killed.
+
+Source: Hansen and Ostermeier, Completely derandomized self-adaptation in evolution strategies,
+2001, by the package cmaes; Deb, Multi-objective optimization using evolutionary algorithms, 2001.
 """
 
-from typing import TYPE_CHECKING, Any
+import lazy_loader
 
-from cdpr_drake.analyses.design.candidates import Candidates, make_candidates
-from cdpr_drake.analyses.design.confirmation import Confirmation, confirm
-from cdpr_drake.analyses.design.goals import GOALS, Goal
-from cdpr_drake.analyses.design.results import DesignResult, write_design
-from cdpr_drake.analyses.design.search import (
-    DesignSearch,
-    judge_original,
-    judging_of,
-    search_design,
-)
-from cdpr_drake.analyses.design.settings import (
-    SEARCHES,
-    DesignSettings,
-    GoalSettings,
-    MirrorSettings,
-    load_design_settings,
-)
-
-if TYPE_CHECKING:
-    from cdpr_drake.analyses.design.figures import design_figures
-
-__all__ = [
-    "GOALS", "SEARCHES", "Candidates", "Confirmation", "DesignResult", "DesignSearch",
-    "DesignSettings", "Goal",
-    "GoalSettings", "MirrorSettings", "confirm", "design_figures", "judge_original",
-    "judging_of", "load_design_settings", "make_candidates", "search_design", "write_design",
-]  # fmt: skip
-
-
-def __getattr__(name: str) -> Any:
-    if name == "design_figures":
-        from cdpr_drake.analyses.design import figures
-
-        return figures.design_figures
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

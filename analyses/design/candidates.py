@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 import yaml
 
+from cdpr_drake.analyses.design.moved_points import AXES, Mirror, MovedPoints
 from cdpr_drake.analyses.design.settings import DesignSettings, MovedSettings
 from cdpr_drake.arrays import Array
-from cdpr_drake.design import AXES, Mirror, MovedPoints
 from cdpr_drake.errors import DesignError
-from cdpr_drake.models import Robot, load_robot, parse_robot, robot_text
-from cdpr_drake.schema import closest
+from cdpr_drake.models.robot_loader import load_robot, parse_robot, robot_text
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.schema.typed_yaml import closest
 
 LEAST_CABLES, MOST_CABLES = 4, 8
 

@@ -10,15 +10,14 @@ from typing import Any
 import numpy as np
 
 from cdpr_drake.analyses.design.goals import GOALS, Judging, servo_stable
-from cdpr_drake.analyses.workspaces import (
+from cdpr_drake.analyses.workspaces.certified_boxes import box_search, certified_boxes
+from cdpr_drake.analyses.workspaces.workspace_question import (
     Asked,
-    box_search,
-    certified_boxes,
     make_workspace_question,
     surroundings,
 )
-from cdpr_drake.models import load_robot
-from cdpr_drake.workspaces import WorkspaceGrid, grid_by_count
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.workspaces.pose_grid import WorkspaceGrid, grid_by_count
 
 BOXES = 200_000
 """Boxes that are judged for each robot."""

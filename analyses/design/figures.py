@@ -13,12 +13,9 @@ from matplotlib.figure import Figure
 
 from cdpr_drake.analyses.design.goals import GOALS
 from cdpr_drake.analyses.design.search import DesignSearch
-from cdpr_drake.analyses.pictures import (
-    few_ticks,
-    line_style,
-    new_figure,
-)
-from cdpr_drake.models import Robot, parse_robot
+from cdpr_drake.analyses.visualization.figure_style import few_ticks, line_style, new_figure
+from cdpr_drake.models.robot_loader import parse_robot
+from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.palette import IDEAL, PLATFORM, nth_look
 
 

@@ -8,15 +8,21 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
-from cdpr_drake.analyses.stability import stability_case
-from cdpr_drake.analyses.workspaces import KINDS, MEASURES, Asked, ConditionsTask, pose_conditions
+from cdpr_drake.analyses.workspaces.conditions import KINDS, MEASURES, ConditionsTask
+from cdpr_drake.analyses.workspaces.stability_question import stability_case
+from cdpr_drake.analyses.workspaces.workspace_question import Asked, pose_conditions
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables import ELASTIC
+from cdpr_drake.cables.models import ELASTIC
 from cdpr_drake.errors import CdprError
-from cdpr_drake.models import Robot, hold_robot, rigid_platform
-from cdpr_drake.stability import PerturbationBounds, VerdictOptions, judge_stability
-from cdpr_drake.statics import pose_sensitivity
-from cdpr_drake.workspaces import SpatialSet, WorkspaceGrid, statically_feasible
+from cdpr_drake.models.robot_holding import hold_robot
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.models.robot_statics import rigid_platform
+from cdpr_drake.stability.perturbation_bounds import PerturbationBounds
+from cdpr_drake.stability.verdict import VerdictOptions, judge_stability
+from cdpr_drake.statics.sensitivity import pose_sensitivity
+from cdpr_drake.workspaces.demanded_wrenches import SpatialSet
+from cdpr_drake.workspaces.pose_grid import WorkspaceGrid
+from cdpr_drake.workspaces.static_feasibility import statically_feasible
 
 EXIT_ERROR = 1e-3
 """Accuracy is that of exit points which are off by so much, in one coordinate each [m]."""

@@ -15,12 +15,14 @@ from rich.table import Table
 from cdpr_drake.analyses.design.confirmation import Confirmation, design_file
 from cdpr_drake.analyses.design.goals import GOALS
 from cdpr_drake.analyses.design.search import DesignSearch
-from cdpr_drake.analyses.pictures import DEFAULT_FORMATS, write_figures
-from cdpr_drake.analyses.pose_grids import plain
-from cdpr_drake.analyses.reporting import package_versions, whole_file, write_json, write_whole
+from cdpr_drake.analyses.reporting.log_files import write_json, write_whole
+from cdpr_drake.analyses.reporting.provenance import package_versions
+from cdpr_drake.analyses.reporting.written_files import whole_file
+from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS, write_figures
+from cdpr_drake.analyses.workspaces.pose_grid import plain
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import DesignError
-from cdpr_drake.models import load_robot
+from cdpr_drake.models.robot_loader import load_robot
 
 TABLE = "designs.csv"
 """All designs that were judged, in the order of the search."""

@@ -10,18 +10,22 @@ from typing import Any
 import numpy as np
 
 from cdpr_drake.analyses.design.candidates import Candidates
+from cdpr_drake.analyses.design.evolution import EvolutionSearch, default_population, undominated
 from cdpr_drake.analyses.design.goals import Judging, judged
+from cdpr_drake.analyses.design.maximin import SLOPES, Slopes, SlopeSearch
 from cdpr_drake.analyses.design.settings import BY_SLOPES, DesignSettings, PosesSettings
-from cdpr_drake.analyses.design.slopes import SLOPES, Slopes
-from cdpr_drake.analyses.pose_grids import plain
-from cdpr_drake.analyses.reporting import ALONE, StudySession, WorkProgress, code_version
-from cdpr_drake.analyses.stability import workspace_defaults
-from cdpr_drake.analyses.sweeps import STARTING, StandingPool, SweepFolder, run_sweep
+from cdpr_drake.analyses.reporting.progress import ALONE, StudySession, WorkProgress
+from cdpr_drake.analyses.reporting.provenance import code_version
+from cdpr_drake.analyses.sweeps.folder import SweepFolder
+from cdpr_drake.analyses.sweeps.sweep import STARTING, run_sweep
+from cdpr_drake.analyses.sweeps.worker_pool import StandingPool
+from cdpr_drake.analyses.workspaces.pose_grid import plain
+from cdpr_drake.analyses.workspaces.stability_defaults import workspace_defaults
 from cdpr_drake.arrays import Array
-from cdpr_drake.design import EvolutionSearch, SlopeSearch, default_population, undominated
 from cdpr_drake.errors import CdprError, DesignError
-from cdpr_drake.models import load_robot, parse_robot
-from cdpr_drake.workspaces import SpatialSet, grid_by_count
+from cdpr_drake.models.robot_loader import load_robot, parse_robot
+from cdpr_drake.workspaces.demanded_wrenches import SpatialSet
+from cdpr_drake.workspaces.pose_grid import grid_by_count
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from cdpr_drake.analyses.design.goals import GOALS
-from cdpr_drake.design import AXES
+from cdpr_drake.analyses.design.moved_points import AXES
 from cdpr_drake.errors import DesignError
-from cdpr_drake.schema import array, load_typed, number, section, sections, text, texts, whole
+from cdpr_drake.schema.fields import array, number, section, sections, text, texts, whole
+from cdpr_drake.schema.typed_yaml import load_typed
 
 EVOLUTION, BY_SLOPES = "evolution", "slopes"
 SEARCHES = (EVOLUTION, BY_SLOPES)

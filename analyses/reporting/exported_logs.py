@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cdpr_drake.analyses.reporting.pictures import Pictures
+from cdpr_drake.analyses.reporting.deferred_figures import Pictures
 from cdpr_drake.analyses.reporting.written_files import whole_file
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import OutputFormatError

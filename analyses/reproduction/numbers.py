@@ -6,8 +6,7 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-from cdpr_drake.analyses.case_studies import PublishedNumber
-from cdpr_drake.analyses.reporting import (
+from cdpr_drake.analyses.reporting.statements import (
     CONFIRMED,
     IN_PART,
     NOT_CONFIRMED,
@@ -15,6 +14,7 @@ from cdpr_drake.analyses.reporting import (
     NOT_TESTABLE,
     verdict,
 )
+from cdpr_drake.analyses.studies.framework.case_definition import PublishedNumber
 
 CLOSE, FACTOR = 0.1, 2.0
 """A number agrees within this share of the printed one, and in part within this factor."""

@@ -7,17 +7,19 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from cdpr_drake.analyses.catalogue import StudyEntry
-from cdpr_drake.analyses.published import PublishedItem, PublishedSection, Register
-from cdpr_drake.analyses.reporting import (
-    CONFIRMED,
-    IN_PART,
-    NOT_CONFIRMED,
-    NOT_IN_QUICK,
-)
+from cdpr_drake.analyses.reporting.statements import CONFIRMED, IN_PART, NOT_CONFIRMED, NOT_IN_QUICK
 from cdpr_drake.analyses.reproduction.numbers import judge_number
-from cdpr_drake.analyses.reproduction.states import FAILED as STUDY_FAILED
-from cdpr_drake.analyses.reproduction.states import FINISHED, StudyState, read_results, study_folder
+from cdpr_drake.analyses.reproduction.states import (
+    FAILED as STUDY_FAILED,
+)
+from cdpr_drake.analyses.reproduction.states import (
+    FINISHED,
+    StudyState,
+    read_results,
+    study_folder,
+)
+from cdpr_drake.analyses.studies.catalogue import StudyEntry
+from cdpr_drake.analyses.studies.published.register import PublishedItem, PublishedSection, Register
 
 SHOWN = "shown"
 """A figure that is drawn here, too, and of which nothing is judged."""

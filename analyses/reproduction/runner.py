@@ -11,17 +11,11 @@ from typing import Any
 
 from rich.table import Table
 
-from cdpr_drake.analyses.catalogue import StudyEntry, StudyResult, write_study
-from cdpr_drake.analyses.pictures import DEFAULT_FORMATS
-from cdpr_drake.analyses.reporting import (
-    StudySession,
-    WorkProgress,
-    claim,
-    code_version,
-    continued_folder,
-    results_folder,
-    write_whole,
-)
+from cdpr_drake.analyses.reporting.log_files import write_whole
+from cdpr_drake.analyses.reporting.output_folder import continued_folder, results_folder
+from cdpr_drake.analyses.reporting.progress import StudySession, WorkProgress
+from cdpr_drake.analyses.reporting.provenance import code_version
+from cdpr_drake.analyses.reporting.written_files import claim
 from cdpr_drake.analyses.reproduction.states import (
     BEGUN,
     FAILED,
@@ -34,7 +28,9 @@ from cdpr_drake.analyses.reproduction.states import (
     study_folder,
     write_state,
 )
-from cdpr_drake.analyses.sweeps import default_workers
+from cdpr_drake.analyses.studies.catalogue import StudyEntry, StudyResult, write_study
+from cdpr_drake.analyses.sweeps.worker_pool import default_workers
+from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from cdpr_drake.analyses.reporting import (
+from cdpr_drake.analyses.reporting.statements import (
     CONFIRMED,
     IN_PART,
     NOT_CONFIRMED,

@@ -7,16 +7,9 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from cdpr_drake.analyses.catalogue import RESULTS
-from cdpr_drake.analyses.reporting import (
-    JOURNAL,
-    MARKER,
-    claim,
-    finite,
-    mark,
-    part_of,
-    write_json,
-)
+from cdpr_drake.analyses.reporting.log_files import finite, write_json
+from cdpr_drake.analyses.reporting.written_files import JOURNAL, MARKER, claim, mark, part_of
+from cdpr_drake.analyses.studies.catalogue import RESULTS
 from cdpr_drake.errors import OutputFolderError
 
 STUDIES, STATES, ABOUT = "studies", "states", "reproduction.json"

@@ -15,11 +15,13 @@ import numpy as np
 import yaml
 from pydrake.common.yaml import yaml_dump_typed
 
-from cdpr_drake.analyses.reporting import CHECKPOINT, UNWRITTEN_CHECKPOINT, claim, code_version
-from cdpr_drake.analyses.sweeps import differences
+from cdpr_drake.analyses.reporting.log_on_disk import CHECKPOINT, UNWRITTEN_CHECKPOINT
+from cdpr_drake.analyses.reporting.provenance import code_version
+from cdpr_drake.analyses.reporting.written_files import claim
+from cdpr_drake.analyses.sweeps.folder import differences
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CheckpointError
-from cdpr_drake.models import load_robot
+from cdpr_drake.models.robot_loader import load_robot
 
 _ABOUT, _STATE = "about", "state."
 NAMED = 3

@@ -11,15 +11,11 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from cdpr_drake.analyses.reporting import Log, LogOnDisk
-from cdpr_drake.analyses.simulation.checkpoints import (
-    Checkpoint,
-    read_checkpoint,
-    write_checkpoint,
-)
+from cdpr_drake.analyses.reporting.log_on_disk import Log, LogOnDisk
+from cdpr_drake.analyses.simulation.checkpoints import Checkpoint, read_checkpoint, write_checkpoint
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CheckpointError
-from cdpr_drake.systems.monitoring import has_arrays_only, restore_state, state_arrays
+from cdpr_drake.systems.monitoring.context_state import has_arrays_only, restore_state, state_arrays
 
 MOST_ROWS = 2000
 """Rows that are in memory at most, but for those of one report period."""

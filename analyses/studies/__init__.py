@@ -1,4 +1,4 @@
 """Studies that repeat what was published, one room each; they do not know each other.
 
-`cdpr_drake.analyses.catalogue` is their table.
+`cdpr_drake.analyses.studies.catalogue` is their table.
 """

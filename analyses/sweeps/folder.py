@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from cdpr_drake.analyses.reporting import JOURNAL, MARKER, mark, part_of, whole_file, write_whole
+from cdpr_drake.analyses.reporting.log_files import write_whole
+from cdpr_drake.analyses.reporting.written_files import JOURNAL, MARKER, mark, part_of, whole_file
 from cdpr_drake.errors import OutputFolderError
 
 ARGUMENTS = "arguments.json"

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from cdpr_drake.analyses.reporting import StudySession, WorkProgress
+from cdpr_drake.analyses.reporting.progress import StudySession, WorkProgress
 from cdpr_drake.analyses.sweeps.folder import SweepFolder
 from cdpr_drake.analyses.sweeps.worker_pool import StandingPool
 from cdpr_drake.analyses.sweeps.workers import SweepChunk, SweepTask, check_scheduler, computed
@@ -142,7 +142,8 @@ def run_study_sweep(
 ) -> SweepResult:
     """As `run_sweep`, by whom a study's session says, in its folder.
 
-    A study that uses it and says so in `analyses.catalogue.STUDIES` continues when it is run again:
+    A study that uses it and says so in `analyses.studies.catalogue.STUDIES` continues when it is
+    run again:
     its folder is opened for `arguments`, all that the numbers depend on, for JSON. All chunks are
     in one file in the end.
 

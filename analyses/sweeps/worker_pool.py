@@ -11,7 +11,7 @@ from concurrent.futures.process import BrokenProcessPool
 from multiprocessing.context import SpawnContext, SpawnProcess
 from typing import Any, Self, TypeVar
 
-from cdpr_drake.kernel_cache import share_compilation
+from cdpr_drake.kernel_cache.locks import share_compilation
 from cdpr_drake.worker_process import become_worker
 
 Job = TypeVar("Job")

@@ -12,10 +12,10 @@ from typing import Any, Protocol, TypeVar
 import numba
 import numpy as np
 
-from cdpr_drake.analyses.reporting import code_version
+from cdpr_drake.analyses.reporting.provenance import code_version
 from cdpr_drake.analyses.sweeps.worker_pool import StandingPool, run_jobs
 from cdpr_drake.errors import SweepError
-from cdpr_drake.kernel_cache import share_compilation
+from cdpr_drake.kernel_cache.locks import share_compilation
 
 POLL = 0.1
 """Time between looks at a request to stop [s]."""

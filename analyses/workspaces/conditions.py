@@ -8,28 +8,26 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
-from cdpr_drake.analyses.stability import StabilityTask
+from cdpr_drake.analyses.workspaces.stability_tasks import StabilityTask
 from cdpr_drake.arrays import Array
-from cdpr_drake.vision import Pinhole, Target
-from cdpr_drake.workspaces import (
-    REGULAR,
+from cdpr_drake.vision.pinhole import Pinhole
+from cdpr_drake.vision.target import Target
+from cdpr_drake.workspaces.cable_interference import Surroundings, clearances
+from cdpr_drake.workspaces.demanded_wrenches import (
     MotionDemand,
     SpatialSet,
-    StaticCase,
-    Surroundings,
-    WorkspaceGrid,
     accelerating,
-    capacity_margins,
-    clearances,
-    closure_margins,
-    dexterities,
-    first_frequencies,
-    held_by_method,
-    largest_payloads,
     resisting,
-    statically_feasible,
-    stiffness_at,
-    tension_factors,
+)
+from cdpr_drake.workspaces.method_feasibility import held_by_method
+from cdpr_drake.workspaces.pose_grid import WorkspaceGrid
+from cdpr_drake.workspaces.static_feasibility import StaticCase, statically_feasible
+from cdpr_drake.workspaces.stiffness import first_frequencies, stiffness_at
+from cdpr_drake.workspaces.tension_factor import REGULAR, dexterities, tension_factors
+from cdpr_drake.workspaces.wrench_capacity import (
+    capacity_margins,
+    closure_margins,
+    largest_payloads,
 )
 
 

@@ -15,7 +15,8 @@ from typing import Any
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.geometry import Motion, joint_motion, pulley_line
+from cdpr_drake.geometry.motion_kernel import Motion, joint_motion
+from cdpr_drake.geometry.pulley_kernel import pulley_line
 
 
 @njit(cache=True)

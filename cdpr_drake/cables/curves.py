@@ -9,7 +9,8 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.cables.catenary_kernel import VERTICAL, free_part
 from cdpr_drake.cables.hanging_kernel import SENSITIVITIES, hang, sagging_cable
 from cdpr_drake.cables.models import CABLE_MODELS
-from cdpr_drake.geometry import CableSet, cable_paths
+from cdpr_drake.geometry.cable_paths import cable_paths
+from cdpr_drake.geometry.cable_set import CableSet
 
 GROOVE_POINTS = 5
 """Points of the part of a cable that lies in the groove of its pulley."""

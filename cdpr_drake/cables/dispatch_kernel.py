@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables.energy_kernel import sagging_energy, straight_energy
+from cdpr_drake.cables.elastic_law import sagging_energy, straight_energy
 from cdpr_drake.cables.hanging_kernel import SENSITIVITIES
 from cdpr_drake.cables.response_kernel import (
     sagging_motion,
@@ -22,7 +22,7 @@ from cdpr_drake.cables.response_kernel import (
     straight_motion,
     straight_response,
 )
-from cdpr_drake.geometry import Motion
+from cdpr_drake.geometry.motion_kernel import Motion
 
 STRAIGHT, HANGING = range(2)
 """Laws: a straight spring that only pulls, an elastic cable that sags under its own weight. A

@@ -1,10 +1,21 @@
-"""The elastic cable law in its static form: unstrained lengths, elastic energy, stiffness."""
+"""The elastic cable law in its static form: unstrained lengths, elastic energy, stiffness.
+
+Numba kernel for the potential energy of one cable at rest: stretch, and weight where it sags.
+
+Its derivative by the anchor point p_WB is the pull of `dispatch_kernel.cable_response`.
+"""
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+from numba import njit
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.cables.catenary_kernel import VERTICAL, free_part, stored_energy
+from cdpr_drake.geometry.motion_kernel import Motion
+from cdpr_drake.geometry.pulley_kernel import pulley_line
 
 
 def axial_stiffness(youngs_modulus: float, diameter: float) -> float:
@@ -61,3 +72,57 @@ def cable_stiffness_matrix(J: Array, stiffness: Array, l0: Array) -> Array:
     Source: Gazebo thesis (2.28).
     """
     return np.asarray(J.T @ ((stiffness / l0)[:, np.newaxis] * J), float)
+
+
+_NODES = (0.5 - 0.5 * np.sqrt(0.6), 0.5, 0.5 + 0.5 * np.sqrt(0.6))
+_WEIGHTS = (5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0)
+
+
+@njit(cache=True, error_model="numpy")
+def straight_energy(X: Motion, cable: Array, l0: float) -> float:
+    """Energy of a spring that only pulls [J]; see `dispatch_kernel.cable_energy`."""
+    length, _, _, _, _, _, _ = pulley_line(X, cable)
+    stretch = length - l0
+    return 0.5 * cable[6] * stretch * stretch / l0 if stretch > 0.0 else 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def _groove_energy(alpha: float, T_A: float, r: float, sigma: float, ES: float, w: float) -> Any:
+    """Energy of what lies in the groove, heights from A [J], and its unstrained length [m].
+
+    Three points for an integrand that is nearly a sine over less than half a turn.
+    """
+    q = 1.0 + T_A / ES
+    sine, span = np.sin(alpha), np.pi - alpha
+    energy = length = 0.0
+    for k in range(3):
+        height = sigma * r * np.sin(alpha + _NODES[k] * span)
+        root = np.sqrt(max(q * q - 2.0 * w / ES * (sigma * r * sine - height), 0.25))
+        T = ES * (root - 1.0)
+        energy += _WEIGHTS[k] * (T * T / (2.0 * ES)) / root
+        length += _WEIGHTS[k] / root
+    # The weight's part in closed form, but for the stretch, which varies by a millionth.
+    per_stretch = length
+    energy = energy * r * span + w * sigma * r * r * (1.0 + np.cos(alpha)) * per_stretch
+    return energy, length * r * span
+
+
+@njit(cache=True, error_model="numpy")
+def sagging_energy(X: Motion, cable: Array, l0: float, solved: Array) -> float:
+    """Energy of an elastic cable that sags [J]; see `dispatch_kernel.cable_energy`."""
+    _, _, _, _, rx, ry, rz = pulley_line(X, cable)
+    ES, w, r, sigma = cable[6], cable[9], cable[8], cable[12]
+    H, V_A = solved[0], solved[1]
+    dx, dy = X[9] + rx - cable[0], X[10] + ry - cable[1]
+    x, z = max(np.sqrt(dx * dx + dy * dy), VERTICAL * l0), X[11] + rz - cable[2]
+    energy, s, height = 0.0, l0, 0.0
+    if r > 0.0:
+        T = np.hypot(H, V_A)
+        sine, cosine = H / T, -sigma * V_A / T
+        energy, wound = _groove_energy(np.arctan2(sine, cosine), T, r, sigma, ES, w)
+        s = l0 - wound
+        height = sigma * r * sine
+        x -= r * (1.0 + cosine)
+        z -= height
+    _, _, _, _, _, _, _, V, S, phi = free_part(H, V_A, s, ES, w)
+    return energy + w * s * height + stored_energy(x, z, s, ES, w, H, V, S, phi)

@@ -25,7 +25,7 @@ from numba import njit
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.catenary_kernel import first_guess, free_part, sag_of, stretched_length
-from cdpr_drake.geometry import tangent
+from cdpr_drake.geometry.pulley_kernel import tangent
 
 STEPS = 100
 """Newton steps after which a cable is given up."""

@@ -11,13 +11,9 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.cables.dispatch_kernel import HANGING, SLACK_WEIGHTS, STRAIGHT, all_responses
 from cdpr_drake.cables.response_kernel import DERIVATIVES, damping_tension
 from cdpr_drake.errors import CableGeometryError, CableModelError
-from cdpr_drake.geometry import (
-    CableSet,
-    add_platform_turning,
-    cable_paths,
-    impossible_cable,
-    motion_of,
-)
+from cdpr_drake.geometry.cable_paths import cable_paths, impossible_cable, motion_of
+from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.geometry.two_pulleys_kernel import add_platform_turning
 
 INEXTENSIBLE, ELASTIC, KELVIN_VOIGT, CATENARY = (
     "inextensible",

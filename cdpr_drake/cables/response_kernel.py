@@ -20,7 +20,8 @@ from numba import njit
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.catenary_kernel import VERTICAL
 from cdpr_drake.cables.hanging_kernel import hang, sagging_cable
-from cdpr_drake.geometry import Motion, pulley_line, unit_vector_derivative
+from cdpr_drake.geometry.motion_kernel import Motion
+from cdpr_drake.geometry.pulley_kernel import pulley_line, unit_vector_derivative
 
 DERIVATIVES = 8
 """Rows of a cable's derivatives by (p_WB, l0): pull (3), tension at the platform, tension at the

@@ -11,8 +11,8 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.cables import simulation_kernel as cable_force_kernel
 from cdpr_drake.cables.hanging_kernel import equations, hang
 from cdpr_drake.cables.simulation_kernel import OUTPUTS, make_room
-from cdpr_drake.geometry import begin_swivels
-from cdpr_drake.numerics import any_scalar
+from cdpr_drake.geometry.two_pulleys_kernel import begin_swivels
+from cdpr_drake.numerics.kernel_calls import any_scalar
 
 _equations = any_scalar(equations)
 

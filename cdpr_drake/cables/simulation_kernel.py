@@ -16,7 +16,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.cables.dispatch_kernel import STRAIGHT, cable_motion, slack_tension
 from cdpr_drake.cables.hanging_kernel import SENSITIVITIES
 from cdpr_drake.cables.response_kernel import DERIVATIVES, straight_motion
-from cdpr_drake.geometry import Motion, joint_motion
+from cdpr_drake.geometry.motion_kernel import Motion, joint_motion
 
 OUTPUTS = 6
 """Rows of `model_outputs`: tension at the platform, tension at the exit point, length, slack flag,

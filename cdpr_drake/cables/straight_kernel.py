@@ -19,7 +19,13 @@ from typing import Any
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.geometry import Motion, cable_line, floating_motion, line_motion, planar_motion
+from cdpr_drake.geometry.motion_kernel import (
+    Motion,
+    cable_line,
+    floating_motion,
+    line_motion,
+    planar_motion,
+)
 
 
 @njit(cache=True)

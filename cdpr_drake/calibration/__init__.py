@@ -14,50 +14,6 @@ cable-driven robot with self-calibration capabilities, 2009; Ida, Merlet, Carric
 self-calibration of suspended under-actuated cable-driven parallel robot, 2019.
 """
 
-from cdpr_drake.calibration.guesses import (
-    guessed_tags,
-    guessed_tracker,
-    poses_by_tags,
-    with_tags,
-)
-from cdpr_drake.calibration.identifiability import Identifiability
-from cdpr_drake.calibration.measurements import (
-    simulated_corners,
-    simulated_lengths,
-    simulated_poses,
-    simulated_swivels,
-)
-from cdpr_drake.calibration.parameters import (
-    GROUPS,
-    CalibrationModel,
-    ParameterGroup,
-    ParameterLayout,
-    model_difference,
-    moved_frames,
-    moved_model,
-    parameter_layout,
-)
-from cdpr_drake.calibration.pose_design import choose_poses, expected_std, informing_rows
-from cdpr_drake.calibration.pose_search import (
-    HUBER,
-    OUTLIER,
-    FoundPoses,
-    guessed_from,
-    guessed_stations,
-    robust_costs,
-    robust_poses,
-    turned_starts,
-)
-from cdpr_drake.calibration.program import CalibrationProgram, first_readings
-from cdpr_drake.calibration.result import CalibrationResult, Fit, Outlier
-from cdpr_drake.calibration.stations import Point, Stations
+import lazy_loader
 
-__all__ = [
-    "GROUPS", "HUBER", "OUTLIER", "CalibrationModel", "CalibrationProgram", "CalibrationResult",
-    "Fit", "FoundPoses", "Identifiability", "Outlier", "ParameterGroup", "ParameterLayout",
-    "Point", "Stations", "choose_poses", "expected_std", "first_readings", "guessed_from",
-    "guessed_stations", "guessed_tags", "guessed_tracker", "informing_rows", "model_difference",
-    "moved_frames", "moved_model", "parameter_layout", "poses_by_tags", "robust_costs",
-    "robust_poses", "simulated_corners", "simulated_lengths", "simulated_poses",
-    "simulated_swivels", "turned_starts", "with_tags",
-]  # fmt: skip
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

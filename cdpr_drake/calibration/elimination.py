@@ -23,7 +23,7 @@ from cdpr_drake.calibration.parameters import CalibrationModel, model_difference
 from cdpr_drake.calibration.stations import POSE, Point, inverse_turn_slope
 from cdpr_drake.calibration.terms import Term
 from cdpr_drake.errors import CableModelError, CalibrationError
-from cdpr_drake.geometry import ALL_ROWS, PLANAR_ROWS
+from cdpr_drake.geometry.straight_cables import ALL_ROWS, PLANAR_ROWS
 
 UNTOLD = 1e-3
 """A direction of parameters whose standard deviation is above a thousand times what is typical

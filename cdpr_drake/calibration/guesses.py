@@ -11,8 +11,9 @@ from pydrake.math import RigidTransform, RotationMatrix
 from cdpr_drake.arrays import Array
 from cdpr_drake.calibration.parameters import CalibrationModel
 from cdpr_drake.errors import CalibrationError
-from cdpr_drake.spatial import pose_error
-from cdpr_drake.vision import Pinhole, PointTarget
+from cdpr_drake.geometry.poses import pose_error
+from cdpr_drake.vision.pinhole import Pinhole
+from cdpr_drake.vision.target import PointTarget
 
 FAR, FAR_TURNED = 0.08, 0.4
 """Poses by lengths and by images differ by less, in places [m] and turns [rad] together, where

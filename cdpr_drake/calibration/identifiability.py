@@ -11,8 +11,8 @@ from scipy.linalg import eigh, null_space
 from cdpr_drake.arrays import Array
 from cdpr_drake.calibration.elimination import UNTOLD
 from cdpr_drake.calibration.stations import Point
-from cdpr_drake.numerics import SHARE, named_direction, sparse_basis
-from cdpr_drake.spatial import cross_matrix
+from cdpr_drake.geometry.poses import cross_matrix
+from cdpr_drake.numerics.null_directions import SHARE, named_direction, sparse_basis
 
 FRAMES = tuple(
     f"{what} of the {frame} frame {how} {axis}"

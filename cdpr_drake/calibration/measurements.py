@@ -11,8 +11,9 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.calibration.parameters import CalibrationModel
 from cdpr_drake.calibration.station_kernel import LENGTH, SWIVEL_ANGLE
 from cdpr_drake.calibration.stations import Point, Stations
-from cdpr_drake.spatial import rotation_from_vector
-from cdpr_drake.vision import Pinhole, PointTarget
+from cdpr_drake.geometry.poses import rotation_from_vector
+from cdpr_drake.vision.pinhole import Pinhole
+from cdpr_drake.vision.target import PointTarget
 
 
 def simulated_lengths(

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from cdpr_drake.arrays import Array
 from cdpr_drake.calibration.stations import POSE, Point, crosses
 from cdpr_drake.calibration.terms import Evaluated, Term, weighted
-from cdpr_drake.vision import Pinhole
+from cdpr_drake.vision.pinhole import Pinhole
 
 NEAREST = 1e-6
 """A point this close to the focal plane, or behind it, has no image [m]."""

@@ -12,8 +12,8 @@ from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CalibrationError
-from cdpr_drake.geometry import CableSet
-from cdpr_drake.spatial import rotation_from_vector, rotation_vector
+from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.geometry.poses import rotation_from_vector, rotation_vector
 
 
 @dataclass(frozen=True)

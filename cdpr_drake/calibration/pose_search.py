@@ -21,7 +21,7 @@ from cdpr_drake.calibration.parameters import CalibrationModel, parameter_layout
 from cdpr_drake.calibration.stations import POSE, Point, Stations, turns_of_vectors
 from cdpr_drake.calibration.terms import Term
 from cdpr_drake.errors import CalibrationError
-from cdpr_drake.geometry import ALL_ROWS, PLANAR_ROWS
+from cdpr_drake.geometry.straight_cables import ALL_ROWS, PLANAR_ROWS
 
 OUTLIER = 4.0
 """A residual of more sigmas is an outlier: one of 16 thousand normal ones is."""

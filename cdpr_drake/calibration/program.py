@@ -13,28 +13,17 @@ from pydrake.solvers import MathematicalProgram
 from pydrake.symbolic import Variable
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.calibration.elimination import (
-    MOST_STEPS,
-    LeastSquares,
-    Minimum,
-    Prior,
-    minimize,
-)
+from cdpr_drake.calibration.elimination import MOST_STEPS, LeastSquares, Minimum, Prior, minimize
 from cdpr_drake.calibration.identifiability import Identifiability, identifiability
 from cdpr_drake.calibration.onboard_terms import TagCorners, Tilts
 from cdpr_drake.calibration.parameters import CalibrationModel, parameter_layout
 from cdpr_drake.calibration.pose_search import HUBER
 from cdpr_drake.calibration.program_costs import PriorCost, StationCost
-from cdpr_drake.calibration.result import (
-    CalibrationResult,
-    make_result,
-    outlying_rows,
-    robust_cost,
-)
+from cdpr_drake.calibration.result import CalibrationResult, make_result, outlying_rows, robust_cost
 from cdpr_drake.calibration.stations import POSE, Point, Stations
 from cdpr_drake.calibration.terms import Lengths, Rest, Swivels, Tensions, Term, TrackedPoses
 from cdpr_drake.errors import CalibrationError
-from cdpr_drake.vision import Pinhole
+from cdpr_drake.vision.pinhole import Pinhole
 
 NO_WORSE = 1e-6
 """Share of a cost by which rounding may make an end worse than its start."""

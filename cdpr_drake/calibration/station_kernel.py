@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.geometry import LINEAR_WEIGHT, PULLEY_RADIUS, tangent
+from cdpr_drake.geometry.pulley_kernel import LINEAR_WEIGHT, PULLEY_RADIUS, tangent
 
 SWIVEL = LINEAR_WEIGHT + 1
 """Column of a packed cable at which its swivel axis begins."""

@@ -17,7 +17,7 @@ from cdpr_drake.calibration.parameters import (
     parameter_layout,
 )
 from cdpr_drake.calibration.station_kernel import cable_terms
-from cdpr_drake.spatial import rotation_vector_of_matrix
+from cdpr_drake.geometry.poses import rotation_vector_of_matrix
 
 POSE = 6
 """Coordinates of a pose: turn about the axes of W [rad], then translation [m]."""

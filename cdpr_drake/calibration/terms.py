@@ -25,13 +25,7 @@ from cdpr_drake.calibration.station_kernel import (
     SWIVEL_ANGLE,
     U,
 )
-from cdpr_drake.calibration.stations import (
-    POSE,
-    Point,
-    crosses,
-    inverse_turn_slope,
-    turn_vectors,
-)
+from cdpr_drake.calibration.stations import POSE, Point, crosses, inverse_turn_slope, turn_vectors
 
 Evaluated = tuple[Array, Array, Array]
 

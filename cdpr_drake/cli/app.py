@@ -22,11 +22,9 @@ import typer
 from typer.core import TyperGroup
 
 from cdpr_drake.cli.completion import PROGRAM, asked_words, stand_in
-from cdpr_drake.cli.first_use import compile_ahead
-from cdpr_drake.cli.lifeline import hold_lifeline
-from cdpr_drake.cli.stop_request import INTERRUPTED, SIGNALS
+from cdpr_drake.cli.process import INTERRUPTED, SIGNALS, compile_ahead, hold_lifeline
 from cdpr_drake.errors import CdprError
-from cdpr_drake.kernel_cache import share_compilation
+from cdpr_drake.kernel_cache.locks import share_compilation
 
 TRACEBACK = "CDPR_TRACEBACK"
 """Environment variable that lets errors through which Drake or Python raised."""

@@ -7,13 +7,13 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
-from cdpr_drake.analyses.benchmarks import BENCH_GROUPS
-from cdpr_drake.analyses.reporting import TimingRow
+from cdpr_drake.analyses.benchmarks.groups import BENCH_GROUPS
+from cdpr_drake.analyses.reporting.timing import TimingRow
 from cdpr_drake.cli.completion import words_among
 from cdpr_drake.cli.options import AsJson
 from cdpr_drake.cli.terminal import message_console, print_json, wide_console
 from cdpr_drake.errors import CdprError
-from cdpr_drake.schema import closest
+from cdpr_drake.schema.typed_yaml import closest
 
 
 def bench(

@@ -11,32 +11,32 @@ import typer
 from pydrake.math import RigidTransform
 from rich.table import Table
 
-from cdpr_drake.analyses.calibration import (
-    Calibration,
-    CalibrationTask,
-    Sigmas,
-    TagPlace,
+from cdpr_drake.analyses.calibration.calibration_campaign import (
     calibrated_scenario,
+    run_campaign,
+    servo_again,
+)
+from cdpr_drake.analyses.calibration.calibration_report import (
     calibration_dict,
     calibration_drawings,
     calibration_tables,
-    next_poses,
-    read_log,
-    read_tags,
-    run_campaign,
-    servo_again,
-    shifted_log,
     write_calibration,
 )
-from cdpr_drake.analyses.calibration import calibrate as run_calibration
-from cdpr_drake.analyses.plans import read_path
-from cdpr_drake.analyses.reporting import (
-    BELIEVED_FILE,
-    new_table,
-    write_run_inputs,
+from cdpr_drake.analyses.calibration.calibration_request import CalibrationTask, Sigmas, TagPlace
+from cdpr_drake.analyses.calibration.calibration_task import (
+    Calibration,
 )
-from cdpr_drake.calibration import GROUPS
-from cdpr_drake.cli.endings import MISFIT
+from cdpr_drake.analyses.calibration.calibration_task import (
+    calibrate as run_calibration,
+)
+from cdpr_drake.analyses.calibration.log_file import read_log
+from cdpr_drake.analyses.calibration.next_poses import next_poses
+from cdpr_drake.analyses.calibration.tag_file import read_tags
+from cdpr_drake.analyses.calibration.tracker import shifted_log
+from cdpr_drake.analyses.planning.path_files import read_path
+from cdpr_drake.analyses.reporting.provenance import BELIEVED_FILE, write_run_inputs
+from cdpr_drake.analyses.reporting.statements import new_table
+from cdpr_drake.calibration.parameters import GROUPS
 from cdpr_drake.cli.log_options import (
     Ending,
     LogOrCampaign,
@@ -58,10 +58,11 @@ from cdpr_drake.cli.options import (
     parse_formats,
     parse_pose,
 )
+from cdpr_drake.cli.run_endings import MISFIT
 from cdpr_drake.errors import CdprError
-from cdpr_drake.models import load_robot
-from cdpr_drake.systems.diagrams import load_scenario
-from cdpr_drake.systems.scenarios import Scenario
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
 
 UNKNOWN = "exit_points,anchor_points"
 """What is asked for where nothing else is said."""

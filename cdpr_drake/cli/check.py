@@ -11,8 +11,11 @@ import yaml
 from cdpr_drake.cli.options import AsJson
 from cdpr_drake.cli.terminal import print_json
 from cdpr_drake.errors import CdprError
-from cdpr_drake.models import hold_robot, import_robot, is_foreign, load_robot
-from cdpr_drake.systems.diagrams import load_scenario
+from cdpr_drake.models.formats.detection import is_foreign
+from cdpr_drake.models.robot_exchange import import_robot
+from cdpr_drake.models.robot_holding import hold_robot
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.systems.diagrams.load import load_scenario
 
 WRONG = 2
 

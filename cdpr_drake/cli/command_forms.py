@@ -12,7 +12,7 @@ from typer.models import OptionInfo
 from cdpr_drake.cli.stability import stability
 from cdpr_drake.cli.study import study
 from cdpr_drake.cli.workspace import workspace
-from cdpr_drake.studio.commands import CommandForm, CommandOption, OptionKind
+from cdpr_drake.studio.workbench.command_form import CommandForm, CommandOption, OptionKind
 
 OFFERED: dict[str, Callable[..., Any]] = {
     "workspace": workspace,

@@ -9,7 +9,8 @@ import time
 from pathlib import Path
 from typing import Any
 
-from cdpr_drake.kernel_cache import compilation_waits, helpers_started
+from cdpr_drake.kernel_cache.beside import helpers_started
+from cdpr_drake.kernel_cache.locks import compilation_waits
 
 LINGER = 1.0
 """Between two kernels that are compiled there may pass so much time [s]."""

@@ -10,28 +10,28 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from cdpr_drake.analyses.design import (
-    GOALS,
+from cdpr_drake.analyses.design.candidates import make_candidates
+from cdpr_drake.analyses.design.confirmation import confirm
+from cdpr_drake.analyses.design.goals import GOALS
+from cdpr_drake.analyses.design.results import DesignResult, write_design
+from cdpr_drake.analyses.design.search import search_design
+from cdpr_drake.analyses.design.settings import (
     SEARCHES,
-    DesignResult,
     DesignSettings,
     GoalSettings,
-    confirm,
     load_design_settings,
-    make_candidates,
-    search_design,
-    write_design,
 )
-from cdpr_drake.analyses.reporting import StudySession, WorkProgress, continued_folder
+from cdpr_drake.analyses.reporting.output_folder import continued_folder
+from cdpr_drake.analyses.reporting.progress import StudySession, WorkProgress
 from cdpr_drake.cli.completion import words_among
-from cdpr_drake.cli.endings import SayContinued, say_failed, shown_path
+from cdpr_drake.cli.grid_options import ForceToResist, MomentToResist, default_folder
 from cdpr_drake.cli.options import FigureFormats, ResultsAsJson, RobotName, Scheduler, parse_formats
-from cdpr_drake.cli.pose_options import ForceToResist, MomentToResist, default_folder
-from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
+from cdpr_drake.cli.process import INTERRUPTED, StopRequest
+from cdpr_drake.cli.run_endings import SayContinued, say_failed, shown_path
 from cdpr_drake.cli.terminal import message_console, print_json, progress_bar, wide_console, working
 from cdpr_drake.errors import CdprError
-from cdpr_drake.models import load_robot
-from cdpr_drake.schema import closest
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.schema.typed_yaml import closest
 
 STOPPING = "Stopping after the designs under way, which are kept; Ctrl-C again drops them"
 """Answer to the first Ctrl-C."""

@@ -10,9 +10,8 @@ import typer
 from rich.table import Table
 from rich.text import Text
 
-from cdpr_drake.analyses.compilation import LISTED, compilation_steps, compile_step
-from cdpr_drake.analyses.doctor import examine
-from cdpr_drake.analyses.sweeps import run_jobs
+from cdpr_drake.analyses.installation import LISTED, compilation_steps, compile_step, examine
+from cdpr_drake.analyses.sweeps.worker_pool import run_jobs
 from cdpr_drake.cli.options import AsJson
 from cdpr_drake.cli.terminal import message_console, print_json, progress_bar, wide_console
 

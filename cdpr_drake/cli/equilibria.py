@@ -9,7 +9,7 @@ import typer
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from cdpr_drake.analyses.queries import (
+from cdpr_drake.analyses.statics.equilibria_query import (
     EquilibriaReport,
     rests_at_lengths,
     rests_at_position,
@@ -20,9 +20,10 @@ from cdpr_drake.cli.completion import words_among
 from cdpr_drake.cli.options import AsJson, RobotName, parse_numbers
 from cdpr_drake.cli.terminal import message_console, print_json, wide_console, working
 from cdpr_drake.errors import CdprError
-from cdpr_drake.models import Robot, load_robot
-from cdpr_drake.schema import closest
-from cdpr_drake.spatial import angles_from_rotation
+from cdpr_drake.geometry.poses import angles_from_rotation
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.schema.typed_yaml import closest
 
 MODELS = ("inextensible", "elastic")
 

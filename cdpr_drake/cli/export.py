@@ -11,7 +11,9 @@ from cdpr_drake.cli.completion import words_among
 from cdpr_drake.cli.options import AsJson, RobotName
 from cdpr_drake.cli.robot_folder import write_files
 from cdpr_drake.cli.terminal import print_json
-from cdpr_drake.models import EXPORTS, load_robot, not_written, not_written_words, write_robot
+from cdpr_drake.models.robot_exchange import write_robot
+from cdpr_drake.models.robot_exports import EXPORTS, not_written, not_written_words
+from cdpr_drake.models.robot_loader import load_robot
 
 
 def help_words() -> str:

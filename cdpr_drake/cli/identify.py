@@ -8,22 +8,36 @@ from typing import Annotated
 
 import typer
 
-from cdpr_drake.analyses.calibration import read_log, shifted_log
-from cdpr_drake.analyses.identification import (
+from cdpr_drake.analyses.calibration.identification_campaign import (
     CAMPAIGN_UNKNOWN,
-    UNKNOWN,
-    IdentificationTask,
-    campaign_drawings,
-    identification_drawings,
     run_dynamic_campaign,
+)
+from cdpr_drake.analyses.calibration.identification_campaign_files import (
+    campaign_drawings,
     tracking_table,
     write_dynamic_campaign,
 )
-from cdpr_drake.analyses.identification import identification_dict as as_dict
-from cdpr_drake.analyses.identification import identification_tables as tables
-from cdpr_drake.analyses.identification import identify as run_identification
-from cdpr_drake.analyses.identification import write_identification as write
-from cdpr_drake.cli.endings import MISFIT
+from cdpr_drake.analyses.calibration.identification_report import (
+    identification_dict as as_dict,
+)
+from cdpr_drake.analyses.calibration.identification_report import (
+    identification_drawings,
+)
+from cdpr_drake.analyses.calibration.identification_report import (
+    identification_tables as tables,
+)
+from cdpr_drake.analyses.calibration.identification_report import (
+    write_identification as write,
+)
+from cdpr_drake.analyses.calibration.identification_task import (
+    UNKNOWN,
+    IdentificationTask,
+)
+from cdpr_drake.analyses.calibration.identification_task import (
+    identify as run_identification,
+)
+from cdpr_drake.analyses.calibration.log_file import read_log
+from cdpr_drake.analyses.calibration.tracker import shifted_log
 from cdpr_drake.cli.log_options import (
     Ending,
     LogOrCampaign,
@@ -44,12 +58,14 @@ from cdpr_drake.cli.options import (
     named_values,
     parse_formats,
 )
+from cdpr_drake.cli.run_endings import MISFIT
 from cdpr_drake.errors import CdprError
-from cdpr_drake.identification import GROUPS, MISFIT_FACTOR, IdentificationResult
-from cdpr_drake.identification import MISFIT as NO_FIT
-from cdpr_drake.models import load_robot
-from cdpr_drake.systems.diagrams import load_scenario
-from cdpr_drake.systems.scenarios import TensionScenario
+from cdpr_drake.identification.parameters import GROUPS
+from cdpr_drake.identification.result import MISFIT as NO_FIT
+from cdpr_drake.identification.result import MISFIT_FACTOR, IdentificationResult
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.scenarios.tension_control_scenario import TensionScenario
 
 
 def help_words() -> str:

@@ -10,7 +10,7 @@ import typer
 from cdpr_drake.cli.options import AsJson
 from cdpr_drake.cli.robot_folder import write_files
 from cdpr_drake.cli.terminal import print_json
-from cdpr_drake.models import import_robot
+from cdpr_drake.models.robot_exchange import import_robot
 
 
 def import_(

@@ -12,16 +12,13 @@ import yaml
 from cdpr_drake.cli.completion import words_among
 from cdpr_drake.cli.robot_folder import write_files
 from cdpr_drake.errors import CdprError
-from cdpr_drake.models import Robot, load_robot, robot_text
-from cdpr_drake.schema import commented_yaml
-from cdpr_drake.systems.diagrams import SCENARIO_SCHEMAS, load_scenario
-from cdpr_drake.systems.scenarios import (
-    DEFAULT_SCENARIO,
-    robot_beside,
-    scenario_file,
-    scenario_kind,
-)
-from cdpr_drake.systems.worlds import found_file
+from cdpr_drake.models.robot_loader import load_robot, robot_text
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.schema.templates import commented_yaml
+from cdpr_drake.systems.diagrams.load import SCENARIO_SCHEMAS, load_scenario
+from cdpr_drake.systems.scenarios.files import robot_beside, scenario_file, scenario_kind
+from cdpr_drake.systems.scenarios.visual_servo_scenario import DEFAULT_SCENARIO
+from cdpr_drake.systems.worlds.settings import found_file
 
 ROBOT, SCENARIO = "robot", "scenario"
 EXAMPLE = "acrobot_large"

@@ -13,7 +13,7 @@ from pydrake.math import RigidTransform
 from cdpr_drake.arrays import Array
 from cdpr_drake.cli.completion import robot_words
 from cdpr_drake.errors import CdprError, OutputFolderError
-from cdpr_drake.spatial import pose_from_angles
+from cdpr_drake.geometry.poses import pose_from_angles
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -116,7 +116,7 @@ def save_plot(figure: Figure, path: Path) -> None:
     Raises:
         OutputFolderError: It cannot be written.
     """
-    from cdpr_drake.analyses.pictures import save_figure
+    from cdpr_drake.analyses.visualization.figure_files import save_figure
 
     try:
         save_figure(figure, path)

@@ -11,40 +11,25 @@ from typing import Annotated, Any
 import typer
 from rich.console import Console
 
-from cdpr_drake.analyses.catalogue import STUDIES, StudyEntry
-from cdpr_drake.analyses.published import published_registers
-from cdpr_drake.analyses.reporting import (
-    WorkProgress,
-    code_version,
-    continued_folder,
-    new_table,
-    package_versions,
-    write_json,
-)
-from cdpr_drake.analyses.reproduction import (
-    FAILED,
-    ReportRow,
-    RunSettings,
-    Scorecard,
-    StudyState,
-    check_folder,
-    report_rows,
-    run_studies,
-    write_report,
-)
+from cdpr_drake.analyses.reporting.log_files import write_json
+from cdpr_drake.analyses.reporting.output_folder import continued_folder
+from cdpr_drake.analyses.reporting.progress import WorkProgress
+from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
+from cdpr_drake.analyses.reporting.statements import new_table
+from cdpr_drake.analyses.reproduction.page import write_report
+from cdpr_drake.analyses.reproduction.rows import FAILED, ReportRow, report_rows
+from cdpr_drake.analyses.reproduction.runner import RunSettings, run_studies
+from cdpr_drake.analyses.reproduction.scorecard import Scorecard
+from cdpr_drake.analyses.reproduction.states import StudyState, check_folder
+from cdpr_drake.analyses.studies.catalogue import STUDIES, StudyEntry
+from cdpr_drake.analyses.studies.published.register import published_registers
 from cdpr_drake.cli.completion import words_among
-from cdpr_drake.cli.endings import INCOMPLETE, STUDY_FAILED, say_kept, shown_path
 from cdpr_drake.cli.options import FigureFormats, Overwrite, ResultsAsJson, parse_formats
-from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
-from cdpr_drake.cli.terminal import (
-    message_console,
-    print_json,
-    progress_bar,
-    wide_console,
-    working,
-)
+from cdpr_drake.cli.process import INTERRUPTED, StopRequest
+from cdpr_drake.cli.run_endings import INCOMPLETE, STUDY_FAILED, say_kept, shown_path
+from cdpr_drake.cli.terminal import message_console, print_json, progress_bar, wide_console, working
 from cdpr_drake.errors import CdprError
-from cdpr_drake.schema import closest
+from cdpr_drake.schema.typed_yaml import closest
 
 STOPPING = (
     "Stopping: waits for what the study has begun, then writes the report; Ctrl-C again ends the "

@@ -16,7 +16,8 @@ from cdpr_drake.cli.options import AsJson
 from cdpr_drake.cli.robot_folder import write_files
 from cdpr_drake.cli.terminal import print_json, wide_console
 from cdpr_drake.errors import CdprError, OutputFolderError
-from cdpr_drake.models import Robot, load_robot, robot_names
+from cdpr_drake.models.robot_loader import load_robot, robot_names
+from cdpr_drake.models.robot_schema import Robot
 
 PAGES = (".html", ".htm")
 
@@ -165,7 +166,7 @@ def _check_page(page: Path) -> None:
 
 
 def _write_gallery(page: Path, loaded: list[Robot]) -> None:
-    from cdpr_drake.analyses.pictures import gallery_page  # heavy, and only asked for here
+    from cdpr_drake.analyses.visualization.robot_gallery import gallery_page
 
     write_files(page.parent, {page.name: gallery_page(loaded)}, overwrite=True)
 

@@ -10,8 +10,10 @@ from rich.table import Table
 
 from cdpr_drake.cli.options import AsJson
 from cdpr_drake.cli.terminal import print_json, wide_console
-from cdpr_drake.systems.diagrams import load_scenario
-from cdpr_drake.systems.scenarios import Scenario, ScenarioHeader, all_scenario_names
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.scenarios.files import all_scenario_names
+from cdpr_drake.systems.scenarios.run_settings import ScenarioHeader
+from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
 
 
 def scenario_facts(scenario: ScenarioHeader) -> dict[str, Any]:

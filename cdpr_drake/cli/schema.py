@@ -9,9 +9,9 @@ import typer
 
 from cdpr_drake.cli.completion import words_among
 from cdpr_drake.errors import CdprError
-from cdpr_drake.models import Robot
-from cdpr_drake.schema import json_schema
-from cdpr_drake.systems.diagrams import SCENARIO_SCHEMAS
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.schema.json_schemas import json_schema
+from cdpr_drake.systems.diagrams.load import SCENARIO_SCHEMAS
 
 ROBOT, SCENARIO = "robot", "scenario"
 FILES = (ROBOT, SCENARIO)

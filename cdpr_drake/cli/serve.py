@@ -7,35 +7,27 @@ from typing import Annotated, Any
 
 import typer
 
-from cdpr_drake.analyses.reporting import free_folder
-from cdpr_drake.analyses.runs import SCENARIO_KINDS
-from cdpr_drake.bridge import (
-    LOCAL_HOST,
-    PROTOCOL,
-    USUAL_PORT,
-    Driver,
-    Pace,
-    check_available,
-    is_loopback,
-)
-from cdpr_drake.bridge import ServerSocket as Socket
+from cdpr_drake.analyses.reporting.folder_lock import free_folder
+from cdpr_drake.analyses.simulation.scenario_kinds import SCENARIO_KINDS
 from cdpr_drake.cli.completion import scenario_words, words_among
-from cdpr_drake.cli.endings import CLIENT_ENDED
 from cdpr_drake.cli.options import FigureFormats, Overwrite, parse_formats
+from cdpr_drake.cli.process import StopRequest
+from cdpr_drake.cli.run_endings import CLIENT_ENDED
 from cdpr_drake.cli.simulate import Wanted, simulate_once
-from cdpr_drake.cli.stop_request import StopRequest
 from cdpr_drake.cli.terminal import message_console
 from cdpr_drake.errors import ClientEndedError
-from cdpr_drake.models import load_robot
-from cdpr_drake.systems.diagrams import load_scenario
-from cdpr_drake.systems.loops import with_loop
-from cdpr_drake.systems.remote import (
-    SERVO_PLACES,
-    TENSION_PLACES,
-    Remote,
-    tension_service,
-)
-from cdpr_drake.systems.scenarios import TensionScenario, scenario_kind
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.loops.loop_choice import with_loop
+from cdpr_drake.systems.remote.messages import PROTOCOL, check_available
+from cdpr_drake.systems.remote.remote_client import LOCAL_HOST, USUAL_PORT
+from cdpr_drake.systems.remote.remote_driver import Driver, Pace
+from cdpr_drake.systems.remote.remote_place import SERVO_PLACES, TENSION_PLACES, Remote
+from cdpr_drake.systems.remote.server_socket import ServerSocket as Socket
+from cdpr_drake.systems.remote.server_socket import is_loopback
+from cdpr_drake.systems.remote.service import tension_service
+from cdpr_drake.systems.scenarios.files import scenario_kind
+from cdpr_drake.systems.scenarios.tension_control_scenario import TensionScenario
 
 
 def serve(

@@ -1,7 +1,11 @@
-"""`cdpr stability`: where a robot's visual servo is stable in spite of perturbations."""
+"""`cdpr stability`: where a robot's visual servo is stable in spite of perturbations.
+
+`cdpr stability --along`: the stability criterion along a run that was made.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
@@ -11,22 +15,35 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
-from cdpr_drake.analyses.reporting import continued_folder, write_json, write_pictures
-from cdpr_drake.analyses.stability import (
+from cdpr_drake.analyses.reporting.deferred_figures import write_pictures
+from cdpr_drake.analyses.reporting.log_files import write_json
+from cdpr_drake.analyses.reporting.output_folder import continued_folder
+from cdpr_drake.analyses.simulation.stability_files import stability_of_folder
+from cdpr_drake.analyses.workspaces.stability_defaults import load_bounds, workspace_defaults
+from cdpr_drake.analyses.workspaces.stability_figures import stability_pictures
+from cdpr_drake.analyses.workspaces.stability_question import make_question, scenario_task
+from cdpr_drake.analyses.workspaces.stability_scene import scene_page
+from cdpr_drake.analyses.workspaces.stability_workspaces import (
     KINDS,
     StabilityRun,
     StabilityWorkspaces,
-    load_bounds,
-    make_question,
-    scenario_task,
-    scene_page,
-    stability_pictures,
     stability_workspaces,
-    static_case,
-    workspace_defaults,
 )
+from cdpr_drake.analyses.workspaces.static_feasible import static_case
 from cdpr_drake.cli.completion import robot_words, scenario_words
-from cdpr_drake.cli.endings import say_failed, shown_path
+from cdpr_drake.cli.grid_options import (
+    GridWords,
+    Orientations,
+    Out,
+    Workers,
+    check_mass,
+    check_workers,
+    default_folder,
+    interrupted,
+    parse_grid,
+    parse_turns,
+    watched,
+)
 from cdpr_drake.cli.options import (
     FigureFormats,
     Limits,
@@ -39,22 +56,56 @@ from cdpr_drake.cli.options import (
     parse_numbers,
     parse_wrench,
 )
-from cdpr_drake.cli.pose_grid import parse_grid, parse_turns
-from cdpr_drake.cli.pose_options import (
-    GridWords,
-    Orientations,
-    Out,
-    Workers,
-    check_mass,
-    check_workers,
-    default_folder,
-)
-from cdpr_drake.cli.stability_along import show_stability_along
-from cdpr_drake.cli.sweep_watch import interrupted, watched
+from cdpr_drake.cli.run_endings import say_failed, shown_path
 from cdpr_drake.cli.terminal import message_console, print_json, wide_console, working
-from cdpr_drake.errors import CdprError
-from cdpr_drake.models import Robot, load_robot
-from cdpr_drake.stability import VerdictOptions
+from cdpr_drake.errors import CdprError, OutputFolderError
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.stability.verdict import VerdictOptions
+
+
+def show_stability_along(
+    run: Path, threshold: float | None, out: Path | None, formats: Sequence[str], as_json: bool
+) -> int:
+    """Judges a run's log; writes and prints what was found.
+
+    Args:
+        run: Folder of the run.
+        threshold: Tension from which a cable counts as taut [N]; None: one that is not slack.
+        out: Where to write; None: into the run's folder.
+        formats: Of the figure.
+        as_json: Whether to print JSON.
+    """
+    if threshold is not None and not (math.isfinite(threshold) and threshold >= 0.0):
+        raise CdprError(f"--threshold: found {threshold:g}; accepted: >= 0 [N]")
+    folder = run if out is None else out
+    with working(message_console(), f"{run}: reading the log") as say:
+        found = stability_of_folder(run, threshold)
+        say("Writing results")
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            failed = found.write(folder, formats)
+        except OSError as problem:
+            raise OutputFolderError(f"{folder}: cannot be written: {problem}") from problem
+    numbers = found.as_dict()
+    code = say_failed(message_console(), failed, folder, None)
+    if as_json:
+        print_json(numbers)
+        return code
+    margin, taut = numbers["least_stability_margin"], numbers["taut_cables"]
+    table = Table(title=f"{run}: stability along the run", show_header=False)
+    for label, words in (
+        ("cables that pull", f"at least {taut['min']}, {taut['end']} at the end"),
+        ("rank of the Jacobian", f"at least {numbers['least_jacobian_rank']}"),
+        ("rank below " + str(numbers["freedom"]), f"{numbers['underactuated_s']:.2f} s"),
+        ("least eigenvalue of sym(Pi)", "unknown" if margin is None else f"{margin:.3f}"),
+        ("not stable", f"{numbers['unstable_s']:.2f} s"),
+        ("results", str(folder)),
+    ):
+        table.add_row(label, words)
+    wide_console().print(table)
+    return code
+
 
 RESULTS = "results.json"
 """Arguments, versions and volumes."""

@@ -10,16 +10,16 @@ import typer
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from cdpr_drake.analyses.queries import StaticReport, at_lengths, at_pose
+from cdpr_drake.analyses.statics.static_query import StaticReport, at_lengths, at_pose
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables import CABLE_MODELS
+from cdpr_drake.cables.models import CABLE_MODELS
 from cdpr_drake.cli.completion import words_among
 from cdpr_drake.cli.options import POSE, AsJson, RobotName, parse_numbers, parse_pose, save_plot
 from cdpr_drake.cli.terminal import message_console, print_json, wide_console, working
 from cdpr_drake.errors import CdprError
-from cdpr_drake.models import load_robot
-from cdpr_drake.schema import closest
-from cdpr_drake.spatial import angles_from_rotation
+from cdpr_drake.geometry.poses import angles_from_rotation
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.schema.typed_yaml import closest
 
 
 def static(
@@ -62,7 +62,7 @@ def static(
         with busy:
             report = at_lengths(loaded, np.array(numbers), cable_model, pulleys)
     if plot is not None:
-        from cdpr_drake.analyses.queries import static_figure
+        from cdpr_drake.analyses.statics.static_figures import static_figure
 
         save_plot(static_figure(report, f"{loaded.name} at rest, {cable_model} cables"), plot)
     if as_json:

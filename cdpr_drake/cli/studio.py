@@ -64,7 +64,7 @@ def studio(
         raise CdprError("cdpr studio needs NiceGUI; pip install 'cdpr_drake[studio]'")
     print("cdpr studio: starting, Drake and the page are loaded", file=sys.stderr, flush=True)
     from cdpr_drake.cli.command_forms import command_forms
-    from cdpr_drake.studio import StudioOptions, serve
+    from cdpr_drake.studio.server import StudioOptions, serve
 
     serve(
         StudioOptions(

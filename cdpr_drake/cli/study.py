@@ -10,23 +10,19 @@ from typing import Annotated
 
 import typer
 
-from cdpr_drake.analyses.catalogue import STUDIES, StudyEntry, studies_that, write_study
-from cdpr_drake.analyses.pictures import DEFAULT_FORMATS
-from cdpr_drake.analyses.reporting import (
-    StudySession,
-    WorkProgress,
-    continued_folder,
-    free_folder,
-    results_folder,
-)
-from cdpr_drake.analyses.sweeps import check_scheduler
+from cdpr_drake.analyses.reporting.folder_lock import free_folder
+from cdpr_drake.analyses.reporting.output_folder import continued_folder, results_folder
+from cdpr_drake.analyses.reporting.progress import StudySession, WorkProgress
+from cdpr_drake.analyses.studies.catalogue import STUDIES, StudyEntry, studies_that, write_study
+from cdpr_drake.analyses.sweeps.workers import check_scheduler
+from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
 from cdpr_drake.cli.completion import words_among
-from cdpr_drake.cli.endings import SayContinued, say_failed, say_kept, say_recovered, shown_path
 from cdpr_drake.cli.options import FigureFormats, Overwrite, ResultsAsJson, Scheduler, parse_formats
-from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
+from cdpr_drake.cli.process import INTERRUPTED, StopRequest
+from cdpr_drake.cli.run_endings import SayContinued, say_failed, say_kept, say_recovered, shown_path
 from cdpr_drake.cli.terminal import message_console, print_json, progress_bar, wide_console, working
 from cdpr_drake.errors import CdprError
-from cdpr_drake.schema import closest
+from cdpr_drake.schema.typed_yaml import closest
 
 RECIPES = sorted({recipe for entry in STUDIES.values() for recipe in entry.recipes})
 """Names of recipes of all studies."""

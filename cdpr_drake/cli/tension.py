@@ -10,7 +10,7 @@ import typer
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from cdpr_drake.analyses.queries import (
+from cdpr_drake.analyses.statics.tension_query import (
     as_dict,
     polygon_tensions,
     solve_all,
@@ -31,9 +31,11 @@ from cdpr_drake.cli.options import (
 )
 from cdpr_drake.cli.terminal import message_console, print_json, wide_console, working
 from cdpr_drake.errors import CdprError
-from cdpr_drake.models import load_robot, tension_problem, wrench_balance
-from cdpr_drake.tensions import METHODS, TensionSolution, distribute
-from cdpr_drake.workspaces import available_wrenches
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_statics import tension_problem, wrench_balance
+from cdpr_drake.tensions.methods import METHODS, distribute
+from cdpr_drake.tensions.problem import TensionSolution
+from cdpr_drake.workspaces.available_wrenches import available_wrenches
 
 
 def tension(
@@ -107,11 +109,11 @@ def tension(
     with working(message_console(), f"Distributing tensions of {loaded.name}"):
         solutions = solve_all(problem) if every else [distribute(problem, method)]
     if plot is not None:
-        from cdpr_drake.analyses.queries import polygon_figure
+        from cdpr_drake.analyses.statics.static_figures import polygon_figure
 
         save_plot(polygon_figure(problem, f"{loaded.name} at ({pose})"), plot)
     if wrench_set_plot is not None:
-        from cdpr_drake.analyses.workspaces import wrench_set_figure
+        from cdpr_drake.analyses.workspaces.workspace_figures import wrench_set_figure
 
         wrenches = available_wrenches(problem.W, problem.lower, problem.upper, problem.row_scale)
         title = f"{loaded.name} at ({pose}): what the cables can give"

@@ -9,12 +9,13 @@ from typing import Annotated
 
 import typer
 
-from cdpr_drake.analyses.pictures import LOCAL, open_meshcat, page_address, robot_picture
+from cdpr_drake.analyses.visualization.meshcat_window import LOCAL, open_meshcat, page_address
+from cdpr_drake.analyses.visualization.replay import robot_picture
 from cdpr_drake.cli.options import Host, Port, RobotName
 from cdpr_drake.cli.robot_folder import write_files
 from cdpr_drake.cli.terminal import message_console, working
 from cdpr_drake.errors import CdprError, OutputFolderError
-from cdpr_drake.models import load_robot
+from cdpr_drake.models.robot_loader import load_robot
 
 PAGES = (".html", ".htm")
 

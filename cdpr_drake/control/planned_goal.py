@@ -11,7 +11,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.spatial import rotation_vector
+from cdpr_drake.geometry.poses import rotation_vector
 
 QUINTIC_PEAK = 15.0 / 8.0
 """Largest speed of a way by the quintic time law from rest to rest, per its mean speed."""

@@ -28,8 +28,8 @@ from __future__ import annotations
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.geometry import Motion
-from cdpr_drake.numerics import eliminate, substitute
+from cdpr_drake.geometry.motion_kernel import Motion
+from cdpr_drake.numerics.linear_algebra_kernel import eliminate, substitute
 
 ROTATION_PRIOR, TRANSLATION_PRIOR = 1e-6, 1e-4
 """Weight [m^2, -] of the believed twist beside one cable's speed, in the fit of a twist: what six

@@ -11,10 +11,11 @@ from pydrake.multibody.tree import SpatialInertia
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import ControlGainError
-from cdpr_drake.geometry import ALL_ROWS, Motion, floating_motion, planar_motion
-from cdpr_drake.numerics import array_addresses, matrix_at, vector_at
-from cdpr_drake.spatial import pose_row
-from cdpr_drake.trajectories import MOTION_SIZE, motion_row, write_motion
+from cdpr_drake.geometry.motion_kernel import Motion, floating_motion, planar_motion
+from cdpr_drake.geometry.poses import pose_row
+from cdpr_drake.geometry.straight_cables import ALL_ROWS
+from cdpr_drake.numerics.kernel_calls import array_addresses, matrix_at, vector_at
+from cdpr_drake.trajectories.pose_trajectory import MOTION_SIZE, motion_row, write_motion
 
 
 @dataclass(frozen=True)

@@ -10,13 +10,7 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.control.task_space import PlatformDynamics
-from cdpr_drake.control.tension_controller_kernel import (
-    COULOMB,
-    LOOP_SIZE,
-    RADIUS,
-    STATIC,
-    VISCOUS,
-)
+from cdpr_drake.control.tension_controller_kernel import COULOMB, LOOP_SIZE, RADIUS, STATIC, VISCOUS
 from cdpr_drake.control.torque_step_kernel import (
     CABLES,
     GATHERED,
@@ -30,10 +24,11 @@ from cdpr_drake.control.torque_step_kernel import (
     torque_step,
 )
 from cdpr_drake.errors import ControlGainError
-from cdpr_drake.geometry import CableSet
-from cdpr_drake.spatial import pose_row
-from cdpr_drake.tensions import method_for, workspace_shape
-from cdpr_drake.winches import FrictionLaw
+from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.geometry.poses import pose_row
+from cdpr_drake.tensions.methods import method_for
+from cdpr_drake.tensions.quadratic_program_kernel import workspace_shape
+from cdpr_drake.winches.friction import FrictionLaw
 
 FALLBACK = "slack_relaxed"
 """The method that answers where no tensions within the limits give a wrench."""

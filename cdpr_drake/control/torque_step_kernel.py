@@ -21,8 +21,9 @@ from cdpr_drake.control.tension_controller_kernel import (
     take_over,
     winch_torque,
 )
-from cdpr_drake.geometry import floating_motion
-from cdpr_drake.tensions import FEASIBLE, update_tensions, wrench_matrix_at
+from cdpr_drake.geometry.motion_kernel import floating_motion
+from cdpr_drake.tensions.control_step_kernel import update_tensions, wrench_matrix_at
+from cdpr_drake.tensions.quadratic_program_kernel import FEASIBLE
 
 PERIOD, SERVO_PERIOD, MU, KAPPA, HEIGHT = range(5)
 """Numbers of a step: time between steps, and between those of the servo [s]; mu [1/s] and kappa
@@ -93,7 +94,7 @@ def torque_step(
         bounds: Smallest, largest and reference tensions, shape (3, m) [N].
         row_scale: As `TensionMethod.kernel`, shape (n,).
         work: Work space of `tensions.workspace_shape`.
-        pose: Believed X_WP as `spatial.pose_row`, shape (7,) [-, m].
+        pose: Believed X_WP as `geometry.pose_row`, shape (7,) [-, m].
         wanted: The servo's last twist (w, v) of P in P, shape (6,) [rad/s, m/s].
         measured: Tensions, shape (m,) [N].
         rates: Of the unstrained lengths, shape (m,) [m/s].

@@ -6,12 +6,8 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables import cable_energy, cable_response
-from cdpr_drake.dynamics.explicit_kernel import (
-    SEMI_IMPLICIT,
-    explicit_step,
-    pose_distance,
-)
+from cdpr_drake.cables.dispatch_kernel import cable_energy, cable_response
+from cdpr_drake.dynamics.explicit_kernel import SEMI_IMPLICIT, explicit_step, pose_distance
 from cdpr_drake.dynamics.platform_kernel import mass_in_world
 from cdpr_drake.dynamics.robot_arrays import (
     COM,
@@ -25,7 +21,7 @@ from cdpr_drake.dynamics.robot_arrays import (
 )
 from cdpr_drake.dynamics.robot_kernel import GOOD, LOST, is_plain
 from cdpr_drake.dynamics.semi_implicit_kernel import semi_implicit_step
-from cdpr_drake.geometry import joint_motion
+from cdpr_drake.geometry.motion_kernel import joint_motion
 
 HALVINGS = 12
 """How often a step may be halved for the sake of the error."""

@@ -20,7 +20,7 @@ from numba import njit
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.dynamics.robot_arrays import COM, DAMPING, GRAVITY, INERTIA, INVERSE
-from cdpr_drake.geometry import floating_motion
+from cdpr_drake.geometry.motion_kernel import floating_motion
 
 
 @njit(cache=True)

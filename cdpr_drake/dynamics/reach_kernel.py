@@ -13,7 +13,13 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.dynamics.advance_kernel import advance_explicitly, advance_semi_implicitly
 from cdpr_drake.dynamics.robot_arrays import RobotArrays
 from cdpr_drake.dynamics.robot_kernel import GOOD
-from cdpr_drake.numerics import array_addresses, cube_at, integers_at, matrix_at, vector_at
+from cdpr_drake.numerics.kernel_calls import (
+    array_addresses,
+    cube_at,
+    integers_at,
+    matrix_at,
+    vector_at,
+)
 
 METHOD, MAX_STEP, BOUND = range(3)
 """Entries of a rule: number of a method, largest step [s], largest estimated error of a step [m

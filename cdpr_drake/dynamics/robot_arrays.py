@@ -8,10 +8,16 @@ from typing import NamedTuple
 import numpy as np
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables import CABLE_MODELS, DERIVATIVES, SENSITIVITIES, check_model, make_room
-from cdpr_drake.geometry import CableSet, PlatformJoint
-from cdpr_drake.statics import RigidPlatform
-from cdpr_drake.winches import MODES, TORQUE, WinchGroups, WinchLaw, pack_winch
+from cdpr_drake.cables.hanging_kernel import SENSITIVITIES
+from cdpr_drake.cables.models import CABLE_MODELS, check_model
+from cdpr_drake.cables.response_kernel import DERIVATIVES
+from cdpr_drake.cables.simulation_kernel import make_room
+from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.geometry.platform_joint import PlatformJoint
+from cdpr_drake.statics.rigid_platform import RigidPlatform
+from cdpr_drake.winches.groups import WinchGroups
+from cdpr_drake.winches.motor import MODES, TORQUE, WinchLaw
+from cdpr_drake.winches.motor_kernel import pack_winch
 
 IDEAL, MOTORS, TENSIONS = range(3)
 """What drives the cables: winches that follow velocities at once, motors, or tensions as such."""

@@ -10,14 +10,10 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables import (
-    STRAIGHT,
-    floating_force,
-    line_force,
-    model_force_and_drums,
-    planar_force,
-    tension_force,
-)
+from cdpr_drake.cables.commanded_tension_kernel import tension_force
+from cdpr_drake.cables.dispatch_kernel import STRAIGHT
+from cdpr_drake.cables.simulation_kernel import model_force_and_drums
+from cdpr_drake.cables.straight_kernel import floating_force, line_force, planar_force
 from cdpr_drake.dynamics.platform_kernel import floating_rates, line_rates, planar_rates
 from cdpr_drake.dynamics.robot_arrays import (
     DRIVE,
@@ -31,9 +27,10 @@ from cdpr_drake.dynamics.robot_arrays import (
     TENSIONS,
     RobotArrays,
 )
-from cdpr_drake.geometry import ANCHOR_RADIUS, PULLEY_RADIUS
-from cdpr_drake.numerics import as_number
-from cdpr_drake.winches import winch_rates
+from cdpr_drake.geometry.pulley_kernel import PULLEY_RADIUS
+from cdpr_drake.geometry.two_pulleys_kernel import ANCHOR_RADIUS
+from cdpr_drake.numerics.kernel_calls import as_number
+from cdpr_drake.winches.motor_kernel import winch_rates
 
 GOOD, LOST = -1, -2
 """Results of kernels where all went well, and where numbers are not finite; else a cable."""

@@ -26,7 +26,7 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables import cable_response
+from cdpr_drake.cables.dispatch_kernel import cable_response
 from cdpr_drake.dynamics.explicit_kernel import command_at
 from cdpr_drake.dynamics.platform_kernel import mass_in_world
 from cdpr_drake.dynamics.robot_arrays import (
@@ -42,10 +42,10 @@ from cdpr_drake.dynamics.robot_arrays import (
     RobotArrays,
 )
 from cdpr_drake.dynamics.robot_kernel import GOOD, robot_rates
-from cdpr_drake.geometry import Motion, joint_motion
-from cdpr_drake.numerics import eliminate, substitute
-from cdpr_drake.spatial import turn_pose
-from cdpr_drake.winches import winch_rates
+from cdpr_drake.geometry.motion_kernel import Motion, joint_motion
+from cdpr_drake.geometry.rotation_kernel import turn_pose
+from cdpr_drake.numerics.linear_algebra_kernel import eliminate, substitute
+from cdpr_drake.winches.motor_kernel import winch_rates
 
 GAMMA = 1.0 + np.sqrt(0.5)
 

@@ -15,12 +15,13 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.control import tracking_wrench_at
+from cdpr_drake.control.task_space import tracking_wrench_at
 from cdpr_drake.dynamics.advance_kernel import advance_explicitly
 from cdpr_drake.dynamics.reach_kernel import BOUND, MAX_STEP, METHOD, robot_at
 from cdpr_drake.dynamics.robot_kernel import GOOD
-from cdpr_drake.numerics import vector_at
-from cdpr_drake.tensions import FEASIBLE, update_tensions_at
+from cdpr_drake.numerics.kernel_calls import vector_at
+from cdpr_drake.tensions.control_step_kernel import update_tensions_at
+from cdpr_drake.tensions.quadratic_program_kernel import FEASIBLE
 
 TIME, STEPS, ROWS = range(3)
 """Entries of `TrackingMemory.clock`: time [s], control steps and rows of the log so far."""

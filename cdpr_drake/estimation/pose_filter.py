@@ -36,7 +36,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.spatial import adjoint, cross_matrix, exponential, logarithm
+from cdpr_drake.geometry.poses import adjoint, cross_matrix, exponential, logarithm
 
 POSE = slice(0, 6)
 OBJECT = slice(6, 12)

@@ -39,7 +39,7 @@ import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.spatial import adjoint, cross_matrix, exponential, logarithm
+from cdpr_drake.geometry.poses import adjoint, cross_matrix, exponential, logarithm
 
 POSE, VELOCITY, OBJECT = slice(0, 6), slice(6, 9), slice(9, 15)
 ON_BOARD, EXTERNAL = slice(15, 21), slice(21, 27)

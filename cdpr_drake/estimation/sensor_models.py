@@ -26,7 +26,7 @@ from cdpr_drake.estimation.sensor_filter import (
     pose_at,
     to_platform,
 )
-from cdpr_drake.spatial import adjoint, cross_matrix, exponential, logarithm
+from cdpr_drake.geometry.poses import adjoint, cross_matrix, exponential, logarithm
 
 ITERATIONS = 3
 """Of an update by an image: from errors of some degrees on, more change nothing that is seen."""

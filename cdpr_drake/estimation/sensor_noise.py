@@ -9,7 +9,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.spatial import rotation_from_vector, rotation_vector
+from cdpr_drake.geometry.poses import rotation_from_vector, rotation_vector
 
 BLOCK = 64
 """Samples whose noise is drawn at once: a generator takes longer to make than to use."""

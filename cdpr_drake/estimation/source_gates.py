@@ -14,12 +14,7 @@ import numpy as np
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.estimation.sensor_filter import COUNTED, FusedBelief, correct, forget
-from cdpr_drake.estimation.sensor_models import (
-    Sight,
-    depth_innovation,
-    gate,
-    normalized_innovation,
-)
+from cdpr_drake.estimation.sensor_models import Sight, depth_innovation, gate, normalized_innovation
 
 USED, NOTHING, REJECTED = 1.0, 0.0, -1.0
 """What became of a source; of depths and lengths, the share that was used."""

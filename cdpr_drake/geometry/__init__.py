@@ -8,71 +8,24 @@ work the tensions t load the platform with W t, W = -J'. A = exit point, B = anc
 
 Source: servoing thesis 1.1.2, (1.9) with the sign of the tangent point put right, (1.19); Pott,
 Cable-Driven Parallel Robots, 2018, for pulleys.
+
+Rays and the first surface on each: boxes, spheres, cylinders, capsules, ellipsoids, meshes.
+
+Frames: W the world, G of a shape, S of a sensor (x ahead, y to the left). Distances are along the
+ray [m], infinite where it meets nothing. Drake's SceneGraph answers distances and contact, but no
+rays; `systems.sensors` packs its shapes for these kernels.
+
+Source: Ericson, Real-Time Collision Detection, 2005.
+
+Poses, twists and rotations, and what is measured of them.
+
+Angles (phi, theta, psi) mean R = Rx(phi) Ry(theta) Rz(psi), which is not Drake's RollPitchYaw.
+Twists and adjoints are ordered (rotation, translation). A pose as numbers is a row of seven:
+quaternion (w, x, y, z) with w >= 0, then position [m], made and read by `rows` alone.
+
+Source: Gazebo thesis (2.1); servoing thesis 1.4 and (2.1).
 """
 
-from cdpr_drake.geometry.cable_rates import (
-    base_adjoint,
-    cable_rates_from_base_twist,
-    cable_rates_from_platform_twist,
-)
-from cdpr_drake.geometry.cable_set import CableSet
-from cdpr_drake.geometry.motion_kernel import (
-    Motion,
-    cable_line,
-    floating_motion,
-    joint_motion,
-    line_motion,
-    pack_cables,
-    planar_motion,
-)
-from cdpr_drake.geometry.motion_type import (
-    FREE,
-    LEVEL,
-    MOTION_TYPES,
-    MotionType,
-    across,
-    keep_free,
-    write_projection,
-)
-from cdpr_drake.geometry.paths import (
-    SHORTEST,
-    CablePaths,
-    cable_jacobian,
-    cable_paths,
-    impossible_cable,
-    motion_of,
-)
-from cdpr_drake.geometry.platform_joint import PlatformJoint
-from cdpr_drake.geometry.pulley_kernel import (
-    LINEAR_WEIGHT,
-    PULLEY_RADIUS,
-    pulley_geometry,
-    pulley_jacobian,
-    pulley_line,
-    tangent,
-    unit_vector_derivative,
-)
-from cdpr_drake.geometry.straight_cables import (
-    ALL_ROWS,
-    PLANAR_ROWS,
-    cable_lengths,
-    gravity_wrench,
-    length_jacobian,
-    wrench_matrix,
-)
-from cdpr_drake.geometry.two_pulleys_kernel import (
-    ANCHOR_RADIUS,
-    add_platform_turning,
-    begin_swivels,
-)
+import lazy_loader
 
-__all__ = [
-    "ALL_ROWS", "ANCHOR_RADIUS", "FREE", "LEVEL", "LINEAR_WEIGHT", "MOTION_TYPES", "PLANAR_ROWS",
-    "PULLEY_RADIUS", "SHORTEST", "CablePaths", "CableSet", "Motion", "MotionType", "PlatformJoint",
-    "across", "add_platform_turning", "base_adjoint", "begin_swivels", "cable_jacobian",
-    "cable_lengths", "cable_line", "cable_paths", "cable_rates_from_base_twist",
-    "cable_rates_from_platform_twist", "floating_motion", "gravity_wrench", "impossible_cable",
-    "joint_motion", "keep_free", "length_jacobian", "line_motion", "motion_of", "pack_cables",
-    "planar_motion", "pulley_geometry", "pulley_jacobian", "pulley_line", "tangent",
-    "unit_vector_derivative", "wrench_matrix", "write_projection",
-]  # fmt: skip
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -6,9 +6,9 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.geometry.poses import adjoint_of_arrays
 from cdpr_drake.geometry.pulley_kernel import PULLEY_RADIUS, pulley_line
 from cdpr_drake.geometry.two_pulleys_kernel import ANCHOR_RADIUS
-from cdpr_drake.spatial import adjoint_of_arrays
 
 
 @njit(cache=True)

@@ -15,37 +15,6 @@ parameter identification, 2018; Swevers et al., Optimal robot excitation and ide
 servoing thesis (2.6), (5.7).
 """
 
-from cdpr_drake.identification.excitation import Excitation, ExcitationTask, design_excitation
-from cdpr_drake.identification.parameters import GROUPS, DynamicModel
-from cdpr_drake.identification.program import IdentificationProgram
-from cdpr_drake.identification.regressor import (
-    central_parameters,
-    inertia_regressor,
-    inertial_parameters,
-    pseudo_inertia,
-)
-from cdpr_drake.identification.result import (
-    MISFIT,
-    MISFIT_FACTOR,
-    IdentificationResult,
-    Residual,
-    TermFit,
-)
-from cdpr_drake.identification.samples import (
-    LEAST_POSE,
-    LEAST_TENSION,
-    MotionSamples,
-    WinchSamples,
-    pose_shift,
-    sample_motion,
-    sample_winches,
-)
-from cdpr_drake.identification.smoothing import Smoother
+import lazy_loader
 
-__all__ = [
-    "GROUPS", "LEAST_POSE", "LEAST_TENSION", "MISFIT", "MISFIT_FACTOR", "DynamicModel",
-    "Excitation", "ExcitationTask", "IdentificationProgram", "IdentificationResult",
-    "MotionSamples", "Residual", "Smoother", "TermFit", "WinchSamples", "central_parameters",
-    "design_excitation", "inertia_regressor", "inertial_parameters", "pose_shift",
-    "pseudo_inertia", "sample_motion", "sample_winches",
-]  # fmt: skip
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

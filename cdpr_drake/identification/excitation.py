@@ -18,20 +18,17 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables import cable_motions
+from cdpr_drake.cables.commanded_tension_kernel import cable_motions
 from cdpr_drake.errors import IdentificationError
-from cdpr_drake.geometry import CableSet
+from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.geometry.poses import rotation_from_vector
+from cdpr_drake.geometry.rotation_kernel import rotations_of_quaternions
 from cdpr_drake.identification.regressor import SIZE, inertia_regressor
 from cdpr_drake.identification.samples import wrench_matrices
-from cdpr_drake.spatial import rotation_from_vector, rotations_of_quaternions
-from cdpr_drake.tensions import (
-    FEASIBLE,
-    TensionStep,
-    method_for,
-    update_tensions_at,
-    workspace_shape,
-)
-from cdpr_drake.trajectories import PoseTrajectory
+from cdpr_drake.tensions.control_step_kernel import TensionStep, update_tensions_at
+from cdpr_drake.tensions.methods import method_for
+from cdpr_drake.tensions.quadratic_program_kernel import FEASIBLE, workspace_shape
+from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
 
 POINTS = 16
 """Instants of a stretch at which limits are kept and information is counted."""

@@ -10,7 +10,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.identification.motion_term import MotionTerm
 from cdpr_drake.identification.parameters import Layout
 from cdpr_drake.identification.terms import Term
-from cdpr_drake.numerics import named_direction, sparse_basis
+from cdpr_drake.numerics.null_directions import named_direction, sparse_basis
 
 UNTOLD = 1.0
 """A direction is told where its standard deviation is below this many typical sizes."""

@@ -14,14 +14,8 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.errors import IdentificationError
 from cdpr_drake.identification.identifiability import untold_words
 from cdpr_drake.identification.motion_term import MotionTerm
-from cdpr_drake.identification.parameters import (
-    GROUPS,
-    DynamicModel,
-    Layout,
-    offsets_needed,
-)
-from cdpr_drake.identification.physical import make_program, violated
-from cdpr_drake.identification.priors import Prior, prior_rows
+from cdpr_drake.identification.parameters import GROUPS, DynamicModel, Layout, offsets_needed
+from cdpr_drake.identification.physical_bounds import make_program, violated
 from cdpr_drake.identification.result import (
     AT_THE_RIM,
     MISFIT,
@@ -30,9 +24,9 @@ from cdpr_drake.identification.result import (
     IdentificationResult,
     TermFit,
 )
-from cdpr_drake.identification.robust import huber_cost, huber_limit, huber_weights
+from cdpr_drake.identification.robust_cost import huber_cost, huber_limit, huber_weights
 from cdpr_drake.identification.samples import MotionSamples, WinchSamples
-from cdpr_drake.identification.terms import CableTerm, Rows, Term, WinchTerm
+from cdpr_drake.identification.terms import CableTerm, Prior, Rows, Term, WinchTerm, prior_rows
 
 MOST_STEPS = 30
 CLOSE, SETTLED = 1e-9, 1e-5

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.spatial import cross_matrix
+from cdpr_drake.geometry.poses import cross_matrix
 
 MASS, MOMENT, INERTIA = 0, slice(1, 4), slice(4, 10)
 """Where the vector of ten has mass [kg], mass times p_PPcm [kg m], and moments (xx, yy, zz) and

@@ -8,13 +8,13 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables import cable_motions
+from cdpr_drake.cables.commanded_tension_kernel import cable_motions
 from cdpr_drake.errors import IdentificationError
-from cdpr_drake.geometry import CableSet
+from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.geometry.rotation_kernel import rotations_of_quaternions
 from cdpr_drake.identification.regressor import SIZE, inertia_regressor
 from cdpr_drake.identification.smoothing import Smoothed, Smoother
-from cdpr_drake.spatial import rotations_of_quaternions
-from cdpr_drake.tensions import wrench_matrix_at
+from cdpr_drake.tensions.control_step_kernel import wrench_matrix_at
 
 BLOCK = 24
 """Samples whose noise counts as correlated; it is so over two or three."""

@@ -10,40 +10,6 @@ Nothing is started or hooked at import, and nothing heavy is imported; only disp
 package's own kernels are touched.
 """
 
-from cdpr_drake.kernel_cache.beside import HELPERS, compile_beside, helpers_started
-from cdpr_drake.kernel_cache.folder import use_kernel_cache
-from cdpr_drake.kernel_cache.helper import compile_listed, compile_needed
-from cdpr_drake.kernel_cache.kernel_list import (
-    ListedKernel,
-    group_names,
-    is_complete,
-    needed_kernels,
-    note_complete,
-)
-from cdpr_drake.kernel_cache.locks import (
-    CompilationLocks,
-    compilation_waits,
-    share_compilation,
-    shared_locks,
-)
-from cdpr_drake.kernel_cache.signatures import signature_of, signature_words
+import lazy_loader
 
-__all__ = [
-    "HELPERS",
-    "CompilationLocks",
-    "ListedKernel",
-    "compilation_waits",
-    "compile_beside",
-    "compile_listed",
-    "compile_needed",
-    "group_names",
-    "helpers_started",
-    "is_complete",
-    "needed_kernels",
-    "note_complete",
-    "share_compilation",
-    "shared_locks",
-    "signature_of",
-    "signature_words",
-    "use_kernel_cache",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -65,7 +65,7 @@ def _read() -> tuple[tuple[str, ...], tuple[ListedKernel, ...]]:
 
 
 def group_names() -> tuple[str, ...]:
-    """What kernels are listed for, see `cli.first_use`."""
+    """What kernels are listed for, see `cli.process`."""
     return _read()[0]
 
 

@@ -9,25 +9,6 @@ Source: Bobrow, Dubowsky and Gibson, 1985; Pham and Stasse, 2015; Pham and Pham,
 al., Time-optimal path tracking for robots: a convex optimization approach, 2009, in tests.
 """
 
-from cdpr_drake.planning.failures import check_held, stuck
-from cdpr_drake.planning.free_path import KNOTS, FreePathProgram
-from cdpr_drake.planning.free_path_solution import FreePathSolution
-from cdpr_drake.planning.free_path_terms import Capsule
-from cdpr_drake.planning.horizon import Horizon, View
-from cdpr_drake.planning.input_shaping import (
-    NO_SHAPER,
-    SHAPERS,
-    Shaper,
-    make_shaper,
-    shaped_share,
-)
-from cdpr_drake.planning.limits import MotionLimits
-from cdpr_drake.planning.path_task import MotionSamples, PathTask, sample_motion
-from cdpr_drake.planning.path_timing import STATIONS, PathPlan, plan_along_path
+import lazy_loader
 
-__all__ = [
-    "KNOTS", "NO_SHAPER", "SHAPERS", "STATIONS", "Capsule", "FreePathProgram",
-    "FreePathSolution", "Horizon", "MotionLimits", "MotionSamples", "PathPlan", "PathTask",
-    "Shaper", "View", "check_held", "make_shaper", "plan_along_path", "sample_motion",
-    "shaped_share", "stuck",
-]  # fmt: skip
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

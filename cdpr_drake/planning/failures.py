@@ -7,13 +7,13 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import PlanningError
+from cdpr_drake.geometry.poses import pose_row
 from cdpr_drake.planning.limits import MotionLimits
 from cdpr_drake.planning.margin_kernel import ROUNDING, rest_margins
 from cdpr_drake.planning.path_task import PathTask, pose_words, samples_at
 from cdpr_drake.planning.reachability_kernel import feasible_point, row_count, write_program
 from cdpr_drake.planning.station_kernel import BASIS
-from cdpr_drake.spatial import pose_row
-from cdpr_drake.trajectories import POINT_SIZE
+from cdpr_drake.trajectories.pose_path import POINT_SIZE
 
 ABOUT = 1e-3
 """Limits that are missed by nearly as much as the worst, relative to it, are named with it."""

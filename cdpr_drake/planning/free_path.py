@@ -23,7 +23,8 @@ from cdpr_drake.planning.free_path_solution import (
 from cdpr_drake.planning.free_path_surroundings import cable_gaps, obstacle_gaps, view_gaps
 from cdpr_drake.planning.free_path_terms import Capsule, FreeTerms
 from cdpr_drake.planning.path_task import PathTask, pose_words
-from cdpr_drake.trajectories import PIECE_NUMBERS, PosePath, TimedPath
+from cdpr_drake.trajectories.pose_path import PIECE_NUMBERS, PosePath
+from cdpr_drake.trajectories.timed_path import TimedPath
 
 KNOTS = 16
 """Usual number of knots."""

@@ -20,7 +20,7 @@ from pydrake.solvers import (
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import PlanningError
 from cdpr_drake.planning.path_task import MotionSamples, PathTask, sample_motion
-from cdpr_drake.trajectories import TimedPath
+from cdpr_drake.trajectories.timed_path import TimedPath
 
 SOLVERS = (SnoptSolver, IpoptSolver, NloptSolver)
 """In the order in which they are taken."""

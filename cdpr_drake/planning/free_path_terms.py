@@ -15,14 +15,16 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.control import floating_wrench
+from cdpr_drake.control.task_space import floating_wrench
 from cdpr_drake.errors import PlanningError
-from cdpr_drake.geometry import CableSet, floating_motion, pulley_line
-from cdpr_drake.numerics import any_scalar
+from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.geometry.motion_kernel import floating_motion
+from cdpr_drake.geometry.poses import pose_row, rotation_vector
+from cdpr_drake.geometry.pulley_kernel import pulley_line
+from cdpr_drake.numerics.kernel_calls import any_scalar
 from cdpr_drake.planning.path_task import PathTask
-from cdpr_drake.spatial import pose_row, rotation_vector
-from cdpr_drake.trajectories import PIECE_NUMBERS, POINT_SIZE, path_point
-from cdpr_drake.workspaces import segments_shares
+from cdpr_drake.trajectories.pose_path import PIECE_NUMBERS, POINT_SIZE, path_point
+from cdpr_drake.workspaces.cable_distance_kernel import segments_shares
 
 LARGEST_TURN = 3.0
 """Of a goal from its start: g grows without end towards half a turn [rad]."""

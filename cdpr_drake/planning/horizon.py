@@ -18,12 +18,12 @@ from pydrake.math import RigidTransform
 from pydrake.solvers import ClarabelSolver, MathematicalProgram, OsqpSolver
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.control import floating_wrench
+from cdpr_drake.control.task_space import floating_wrench
 from cdpr_drake.errors import PlanningError
-from cdpr_drake.geometry import cable_jacobian
+from cdpr_drake.geometry.cable_paths import cable_jacobian
+from cdpr_drake.geometry.poses import cross_matrix, pose_row, rotation_vector
 from cdpr_drake.planning.path_task import PathTask
-from cdpr_drake.spatial import cross_matrix, pose_row, rotation_vector
-from cdpr_drake.trajectories import MOTION_SIZE, PoseTrajectory
+from cdpr_drake.trajectories.pose_trajectory import MOTION_SIZE, PoseTrajectory
 
 FEWEST, MOST = 2, 100
 """Numbers of steps that are accepted."""

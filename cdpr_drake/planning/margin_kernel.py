@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.numerics import lowest_point
+from cdpr_drake.numerics.linear_program_kernel import lowest_point
 from cdpr_drake.planning.limits import (
     CABLE_ACCELERATION,
     CABLE_SPEED,

@@ -8,14 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.control import PlatformDynamics
+from cdpr_drake.control.task_space import PlatformDynamics
 from cdpr_drake.errors import PlanningError
-from cdpr_drake.geometry import PLANAR_ROWS, CableSet, impossible_cable
+from cdpr_drake.geometry.cable_paths import impossible_cable
+from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.geometry.poses import angles_from_rotation, pose_from_row
+from cdpr_drake.geometry.straight_cables import PLANAR_ROWS
 from cdpr_drake.planning.limits import MotionLimits
 from cdpr_drake.planning.margin_kernel import uses_of
 from cdpr_drake.planning.station_kernel import BASIS, NO_CABLE, SINGULAR, stations_of
-from cdpr_drake.spatial import angles_from_rotation, pose_from_row
-from cdpr_drake.trajectories import TimedPath
+from cdpr_drake.trajectories.timed_path import TimedPath
 
 ACTIVE = 2e-3
 """A limit is reached where less than this share of its range is left: between stations a plan keeps

@@ -27,7 +27,8 @@ from cdpr_drake.planning.reachability_kernel import (
     largest_speeds,
 )
 from cdpr_drake.planning.station_kernel import BASIS, RATE
-from cdpr_drake.trajectories import PosePath, TimedPath
+from cdpr_drake.trajectories.pose_path import PosePath
+from cdpr_drake.trajectories.timed_path import TimedPath
 
 STATIONS = 500
 """Usual number of stations."""

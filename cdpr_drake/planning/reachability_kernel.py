@@ -22,15 +22,8 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.numerics import lowest_point
-from cdpr_drake.planning.limits import (
-    CABLE_ACCELERATION,
-    INERTIA,
-    LOWER,
-    RATIO,
-    TORQUE,
-    UPPER,
-)
+from cdpr_drake.numerics.linear_program_kernel import lowest_point
+from cdpr_drake.planning.limits import CABLE_ACCELERATION, INERTIA, LOWER, RATIO, TORQUE, UPPER
 from cdpr_drake.planning.margin_kernel import ROUNDING
 from cdpr_drake.planning.station_kernel import BASIS, BEND, RATE, T_0, T_U, T_X
 

@@ -20,9 +20,7 @@ import yaml
 
 from cdpr_drake.errors import DataFileError, Problems
 from cdpr_drake.schema.fields import FieldRule
-from cdpr_drake.schema.file_kinds import other_kind
-from cdpr_drake.schema.kept_files import known_yaml
-from cdpr_drake.schema.sizes import too_many_bytes, too_many_nodes
+from cdpr_drake.schema.yaml_files import known_yaml, other_kind, too_many_bytes, too_many_nodes
 
 
 def printable(words: str) -> str:

@@ -6,36 +6,17 @@ a plan. `ServoLaw.partition` takes the optical axis first, `ServoLaw.switching` 
 and image.
 
 Source: servoing thesis 1.4 and 4.2, (4.2) for (1.60) and (1.61), whose sign is wrong.
+
+Visual features and their interaction matrices.
+
+A feature vector s has the interaction matrix L with ds/dt = L V_C, V_C = (w, v) the camera's twist
+in C against an object at rest. Rows of mixed features come rotation first. Every interaction
+matrix has one home, `interaction_kernel`, which control and the analysis of stability both call.
+
+Source: servoing thesis 1.4; Chaumette and Hutchinson, Visual servo control I, 2006, from which the
+exact forms are taken where the thesis' differ; ellipses: Chaumette, 2004.
 """
 
-from cdpr_drake.servoing.believed_robot import BelievedRobot
-from cdpr_drake.servoing.camera_mounting import CameraMounting
-from cdpr_drake.servoing.controller import Command, ServoController
-from cdpr_drake.servoing.feature_plan import PROFILES, FeaturePlan
-from cdpr_drake.servoing.gain import AdaptiveGain, saturation_share
-from cdpr_drake.servoing.law_numbers import GOALS, MODES
-from cdpr_drake.servoing.servo_law import (
-    FRAMES,
-    AxisPartition,
-    EdgeField,
-    ModeSwitching,
-    ServoLaw,
-    YawTask,
-)
-from cdpr_drake.servoing.step_kernel import (
-    look_and_step,
-    look_and_step_at,
-    servo_step,
-    step_addresses,
-    task_at,
-)
-from cdpr_drake.servoing.target_motion import KINDS, MotionFilter
-from cdpr_drake.servoing.task import INTERACTIONS, ServoTask, make_task
+import lazy_loader
 
-__all__ = [
-    "FRAMES", "GOALS", "INTERACTIONS", "KINDS", "MODES", "PROFILES", "AdaptiveGain",
-    "AxisPartition", "BelievedRobot", "CameraMounting", "Command", "EdgeField", "FeaturePlan",
-    "ModeSwitching", "MotionFilter", "ServoController", "ServoLaw", "ServoTask", "YawTask",
-    "look_and_step", "look_and_step_at", "make_task", "saturation_share", "servo_step",
-    "step_addresses", "task_at",
-]  # fmt: skip
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -9,10 +9,8 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.features import Sighting, columns, feature_kernel, packed_sighting
-from cdpr_drake.servoing.believed_robot import BelievedRobot
-from cdpr_drake.servoing.camera_mounting import CameraMounting
-from cdpr_drake.servoing.law_numbers import (
+from cdpr_drake.servoing.packed_features_kernel import feature_kernel
+from cdpr_drake.servoing.servo_law import (
     AHEAD,
     AXIS_GAIN,
     BEGUN,
@@ -47,16 +45,17 @@ from cdpr_drake.servoing.law_numbers import (
     Y_HIGHEST,
     YAW_ANGLE,
     YAW_GAIN,
+    ServoLaw,
 )
-from cdpr_drake.servoing.servo_law import ServoLaw
-from cdpr_drake.servoing.step_kernel import (
+from cdpr_drake.servoing.servo_step_kernel import (
     look_and_step_at,
     servo_step,
     step_addresses,
     task_at,
 )
+from cdpr_drake.servoing.servo_task import INTERACTIONS, BelievedRobot, CameraMounting, ServoTask
 from cdpr_drake.servoing.target_motion import MotionFilter, feature_drift
-from cdpr_drake.servoing.task import INTERACTIONS, ServoTask
+from cdpr_drake.servoing.visual_features import Sighting, columns, packed_sighting
 
 
 class Command(NamedTuple):
@@ -259,8 +258,8 @@ class ServoController:
 
         Args:
             memory: As in `step`.
-            seen: What is seen, as `features.packed_kernel` says.
-            X_WP: Estimated pose of the platform as `features.columns`, shape (12,) [-, m].
+            seen: What is seen, as `servoing.packed_features_kernel` says.
+            X_WP: Estimated pose of the platform as `servoing.columns`, shape (12,) [-, m].
             time: Time [s].
         """
         memory = np.array(memory)

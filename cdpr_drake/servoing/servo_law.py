@@ -1,12 +1,63 @@
-"""How a visual servo moves, as data: gain, continuous start, filters, partition, switching."""
+"""How a visual servo moves, as data: gain, continuous start, filters, partition, switching.
+
+Pieces of the laws of visual servoing: adaptive gain, least squares, saturation.
+
+Where the numbers of a law and of a servo's memory stand, for the kernels of this room.
+"""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
+from numba import njit
+
 from cdpr_drake.arrays import Array
-from cdpr_drake.servoing.gain import AdaptiveGain
 from cdpr_drake.servoing.target_motion import MotionFilter
+
+
+@dataclass(frozen=True)
+class AdaptiveGain:
+    """Gain that falls from `at_zero` to `at_infinity` as the error grows.
+
+    Attributes:
+        at_zero: lambda(0) [1/s].
+        at_infinity: lambda(infinity) [1/s]; equal to `at_zero` for a constant gain.
+        slope: Fall of lambda at 0, per unit of the error's 2-norm [1/s].
+
+    Source: servoing thesis (1.31).
+    """
+
+    at_zero: float
+    at_infinity: float
+    slope: float
+
+    def __call__(self, error: Array) -> float:
+        """lambda [1/s] for an error, any shape (n,), its components as they come (m and rad)."""
+        size = math.sqrt(float(error @ error))
+        return float(adaptive_gain(self.at_zero, self.at_infinity, self.slope, size))
+
+
+@njit(cache=True)
+def adaptive_gain(at_zero: float, at_infinity: float, slope: float, size: float) -> float:
+    """lambda [1/s] for an error of this 2-norm; see `AdaptiveGain`."""
+    span = at_zero - at_infinity
+    if span == 0.0:
+        return at_zero
+    return span * math.exp(-slope / span * size) + at_infinity
+
+
+@njit(cache=True)
+def saturation_share(rates: Array, limit: float) -> float:
+    """Largest share in (0, 1] of rates, shape (m,), that keeps all within +-limit, same unit.
+
+    Scaling by one share keeps the direction of motion.
+    """
+    largest = 0.0
+    for rate in rates:
+        largest = max(largest, abs(rate))
+    return 1.0 if largest <= limit else limit / largest
+
 
 FRAMES = ("platform", "base")
 
@@ -100,3 +151,49 @@ class ServoLaw:
     def uses_all_features(self) -> bool:
         """Whether a step solves for all features at once, as the analysis of stability takes it."""
         return self.partition is None and self.switching is None
+
+
+(
+    GAIN_AT_ZERO, GAIN_AT_INFINITY, GAIN_SLOPE, SIGMA, YAW_GAIN, YAW_ANGLE, IN_BASE_FRAME,
+    CABLE_SPEED, SIGN, KIND, AXIS_GAIN, EDGE_GAIN, EDGE_DISTANCE, X_LOWEST, X_HIGHEST, Y_LOWEST,
+    Y_HIGHEST, POSE_BOUND, IMAGE_BOUND, BOUND_RATIO, DWELL, AHEAD, FIRST_MODE, GOAL,
+) = range(24)  # fmt: skip
+"""Numbers of a law: lambda(0), lambda(infinity) [1/s], its slope; sigma [1/s], NaN for an abrupt
+start; gain [1/s] and angle [rad] of the secondary task, NaN for none; 1 if twists become cable
+velocities in W; largest cable speed [m/s]; 1, or -1 if the camera stands in the world; how features
+become a twist, `WHOLE`, `PARTITIONED` or `SWITCHING`. Then those of `AxisPartition`: gain about and
+along the axis as a share of lambda; of its field, NaN for none, gain [1/s], width and the image's
+edges at unit focal length. Then those of `ModeSwitching`: bounds of the two functions, NaN for a
+ratio times what they are when the task begins; that ratio; least time between two switches [s]; how
+far ahead they are foreseen [s]; the mode of the start. Last the `GOALS` of a partition."""
+
+LAW_SIZE = 24
+
+WHOLE, PARTITIONED, SWITCHING = range(3)
+"""All features at once; axis before the rest; pose or image."""
+
+FIXED, TURNED = range(2)
+"""Where a partition wants its points."""
+
+GOALS = ("fixed", "turned")
+"""Their names, in that order."""
+
+POSE_MODE, IMAGE_MODE = range(2)
+"""Which features a switching servo uses."""
+
+MODES = ("pose", "image")
+"""Their names, in that order."""
+
+POSE_ROWS = 6
+"""Features of a switching servo that are the pose; the rest is the image."""
+
+BEGUN, TASK, TWIST, BEFORE, TOWARD, SWITCH, FEATURES = 0, 1, 2, 8, 14, 20, 27
+"""Where a memory begins to hold: when the task began (negative: it has not), its number, V_C of the
+step before, V_0, -U_0 / lambda_0, the seven numbers of `SWITCH_NUMBERS`, and s of the step before,
+which L V_C of that step follows."""
+
+(
+    MODE, SWITCHED_AT, SWITCHES, OF_POSE, OF_IMAGE, BOUND_OF_POSE, BOUND_OF_IMAGE,
+) = range(SWITCH, FEATURES)  # fmt: skip
+"""Of a switching servo: mode, time of the last switch [s], switches since the run began, both
+functions of the step before, and their bounds in this task."""

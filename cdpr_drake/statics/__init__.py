@@ -5,41 +5,26 @@ resists it. A pose of rest is a minimum of the potential energy of cables and we
 is judged by the Hessian.
 
 Source: servoing thesis 1.2.4 and 2.2; Pott, 2018.
+
+All poses of rest of a platform on cables, stable or not, with any cables slack.
+
+Inextensible cables: the poses at which a set of cables is taut are the real solutions of a system
+of polynomials, of which all complex ones are followed along paths from constants that have been
+solved once; each is then proven by interval arithmetic, and judged by the Hessian of the potential
+energy along the motions that taut cables leave. Points are in closed form. Elastic cables: searches
+from random poses, until an estimate says that few more would be found.
+
+Source: Carricato and Merlet, Stability analysis of underconstrained cable-driven parallel robots,
+2013; Abbasnejad and Carricato, 2015; Sommese and Wampler, 2005; Boender and Rinnooy Kan, Bayesian
+stopping rules for multistart global optimization methods, 1987.
+
+Forward kinematics: the pose that fits cable lengths, near a guess.
+
+An answer is a pose that reproduces the lengths, or an error; never the nearest pose alone.
+
+Source: servoing thesis 2.3; Pott, 2018.
 """
 
-from cdpr_drake.kinematics import ForwardKinematics
-from cdpr_drake.statics.controlled_wrenches import WrenchControl, combination_words, wrench_control
-from cdpr_drake.statics.equilibrium import (
-    Equilibrium,
-    Stability,
-    anchor_arm,
-    equilibria,
-    equilibrium_near,
-    judge_equilibrium,
-    principal_stiffnesses,
-    random_starts,
-)
-from cdpr_drake.statics.equilibrium_program import (
-    make_equilibrium_program,
-    solve_equilibrium_program,
-)
-from cdpr_drake.statics.inextensible_equilibrium import tension_stiffness
-from cdpr_drake.statics.rest_tensions import LEAST_TENSION_WEIGHTS, Holding, hold
-from cdpr_drake.statics.rigid_platform import RigidPlatform
-from cdpr_drake.statics.sensitivity import pose_sensitivity
-from cdpr_drake.statics.stiffness import (
-    NaturalModes,
-    PlatformStiffness,
-    inextensible_modes,
-    natural_modes,
-    platform_stiffness,
-)
+import lazy_loader
 
-__all__ = [
-    "LEAST_TENSION_WEIGHTS", "Equilibrium", "ForwardKinematics", "Holding", "NaturalModes",
-    "PlatformStiffness", "RigidPlatform", "Stability", "WrenchControl", "anchor_arm",
-    "combination_words", "equilibria", "equilibrium_near", "hold", "inextensible_modes",
-    "judge_equilibrium", "make_equilibrium_program", "natural_modes", "platform_stiffness",
-    "pose_sensitivity", "principal_stiffnesses", "random_starts", "solve_equilibrium_program",
-    "tension_stiffness", "wrench_control",
-]  # fmt: skip
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -15,7 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.tensions import TensionProblem, exact_tensions
+from cdpr_drake.tensions.methods import exact_tensions
+from cdpr_drake.tensions.problem import TensionProblem
 
 RANK_TOLERANCE = 1e-10
 """Singular values of W below this share of the largest are none."""

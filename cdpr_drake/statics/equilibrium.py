@@ -10,11 +10,13 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables import CABLE_MODELS, ELASTIC, TOO_SHORT, cable_state, check_model
+from cdpr_drake.cables.models import CABLE_MODELS, ELASTIC, TOO_SHORT, cable_state, check_model
 from cdpr_drake.errors import EquilibriumError
-from cdpr_drake.geometry import FREE, CableSet, MotionType, cable_paths, motion_of
-from cdpr_drake.numerics import over_rows
-from cdpr_drake.spatial import pose_error, pose_from_row, pose_row, rotation_from_vector
+from cdpr_drake.geometry.cable_paths import cable_paths, motion_of
+from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.geometry.motion_type import FREE, MotionType
+from cdpr_drake.geometry.poses import pose_error, pose_from_row, pose_row, rotation_from_vector
+from cdpr_drake.numerics.kernel_calls import over_rows
 from cdpr_drake.statics.equilibrium_kernel import RESTS, SOFTENING, energy_at, settle, settle_many
 from cdpr_drake.statics.inextensible_equilibrium import rigid_cables_rest
 from cdpr_drake.statics.rigid_platform import RigidPlatform
@@ -136,7 +138,7 @@ def equilibrium_poses(
         model: One of the elastic models.
         platform: The platform.
         l0: Unstrained lengths, shape (k, m) [m].
-        guesses: (Quaternion wxyz, position), shape (k, 7), see `spatial.pose_row`.
+        guesses: (Quaternion wxyz, position), shape (k, 7), see `geometry.pose_row`.
         soften: As in `equilibrium_near`.
 
     Returns:

@@ -13,15 +13,13 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables import DERIVATIVES, SENSITIVITIES, cable_energy, cable_response
-from cdpr_drake.geometry import (
-    ANCHOR_RADIUS,
-    Motion,
-    add_platform_turning,
-    floating_motion,
-    keep_free,
-)
-from cdpr_drake.spatial import solve_damped, turn_pose
+from cdpr_drake.cables.dispatch_kernel import cable_energy, cable_response
+from cdpr_drake.cables.hanging_kernel import SENSITIVITIES
+from cdpr_drake.cables.response_kernel import DERIVATIVES
+from cdpr_drake.geometry.motion_kernel import Motion, floating_motion
+from cdpr_drake.geometry.motion_type import keep_free
+from cdpr_drake.geometry.rotation_kernel import solve_damped, turn_pose
+from cdpr_drake.geometry.two_pulleys_kernel import ANCHOR_RADIUS, add_platform_turning
 
 RESTS, STUCK = 1, 0
 """What `settle` returns: all forces balance, or the search got stuck before."""

@@ -10,10 +10,13 @@ from pydrake.math import RigidTransform
 from pydrake.solvers import MathematicalProgram, SnoptSolver, SolverOptions
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables import CABLE_MODELS, STRAIGHT, check_model
+from cdpr_drake.cables.dispatch_kernel import STRAIGHT
+from cdpr_drake.cables.models import CABLE_MODELS, check_model
 from cdpr_drake.errors import EquilibriumError
-from cdpr_drake.geometry import FREE, CableSet, cable_paths, motion_of
-from cdpr_drake.spatial import cross_matrix, rotation_from_vector
+from cdpr_drake.geometry.cable_paths import cable_paths, motion_of
+from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.geometry.motion_type import FREE
+from cdpr_drake.geometry.poses import cross_matrix, rotation_from_vector
 from cdpr_drake.statics.equilibrium_kernel import energy_at
 from cdpr_drake.statics.rigid_platform import RigidPlatform
 

@@ -7,18 +7,14 @@ from pydrake.math import RigidTransform
 from scipy.optimize import nnls
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables import INEXTENSIBLE, TOO_SHORT
+from cdpr_drake.cables.models import INEXTENSIBLE, TOO_SHORT
 from cdpr_drake.errors import EquilibriumError
-from cdpr_drake.geometry import (
-    CablePaths,
-    CableSet,
-    MotionType,
-    add_platform_turning,
-    cable_paths,
-    motion_of,
-    unit_vector_derivative,
-)
-from cdpr_drake.spatial import cross_matrix
+from cdpr_drake.geometry.cable_paths import CablePaths, cable_paths, motion_of
+from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.geometry.motion_type import MotionType
+from cdpr_drake.geometry.poses import cross_matrix
+from cdpr_drake.geometry.pulley_kernel import unit_vector_derivative
+from cdpr_drake.geometry.two_pulleys_kernel import add_platform_turning
 from cdpr_drake.statics.equilibrium_program import (
     displaced,
     make_equilibrium_program,

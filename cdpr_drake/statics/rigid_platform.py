@@ -8,8 +8,9 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.geometry import FREE, MotionType, gravity_wrench
-from cdpr_drake.spatial import cross_matrix
+from cdpr_drake.geometry.motion_type import FREE, MotionType
+from cdpr_drake.geometry.poses import cross_matrix
+from cdpr_drake.geometry.straight_cables import gravity_wrench
 
 DOWN = (0.0, 0.0, -1.0)
 

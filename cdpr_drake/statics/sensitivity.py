@@ -8,24 +8,15 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables import (
-    CABLE_MODELS,
-    DERIVATIVES,
-    STRAIGHT,
-    all_responses,
-    cable_derivatives,
-    check_model,
-)
+from cdpr_drake.cables.dispatch_kernel import STRAIGHT, all_responses
+from cdpr_drake.cables.models import CABLE_MODELS, cable_derivatives, check_model
+from cdpr_drake.cables.response_kernel import DERIVATIVES
 from cdpr_drake.errors import CableGeometryError, CableModelError, EquilibriumError
-from cdpr_drake.geometry import (
-    LINEAR_WEIGHT,
-    PULLEY_RADIUS,
-    CableSet,
-    add_platform_turning,
-    impossible_cable,
-    motion_of,
-)
-from cdpr_drake.spatial import cross_matrix
+from cdpr_drake.geometry.cable_paths import impossible_cable, motion_of
+from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.geometry.poses import cross_matrix
+from cdpr_drake.geometry.pulley_kernel import LINEAR_WEIGHT, PULLEY_RADIUS
+from cdpr_drake.geometry.two_pulleys_kernel import add_platform_turning
 from cdpr_drake.statics.rigid_platform import RigidPlatform
 
 RADIUS_STEP = 1e-6

@@ -9,9 +9,11 @@ from pydrake.math import RigidTransform
 from scipy.linalg import eigh
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables import CABLE_MODELS, STRAIGHT, check_lengths, check_model
+from cdpr_drake.cables.dispatch_kernel import STRAIGHT
+from cdpr_drake.cables.models import CABLE_MODELS, check_lengths, check_model
 from cdpr_drake.errors import CableGeometryError, CableModelError
-from cdpr_drake.geometry import CableSet, cable_paths, impossible_cable
+from cdpr_drake.geometry.cable_paths import cable_paths, impossible_cable
+from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.statics.inextensible_equilibrium import tension_stiffness
 from cdpr_drake.statics.rigid_platform import RigidPlatform
 from cdpr_drake.statics.stiffness_kernel import (

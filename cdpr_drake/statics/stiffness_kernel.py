@@ -6,8 +6,11 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables import DERIVATIVES, STRAIGHT, all_responses
-from cdpr_drake.geometry import SHORTEST, add_platform_turning, pulley_line, unit_vector_derivative
+from cdpr_drake.cables.dispatch_kernel import STRAIGHT, all_responses
+from cdpr_drake.cables.response_kernel import DERIVATIVES
+from cdpr_drake.geometry.cable_paths import SHORTEST
+from cdpr_drake.geometry.pulley_kernel import pulley_line, unit_vector_derivative
+from cdpr_drake.geometry.two_pulleys_kernel import add_platform_turning
 
 TOTAL, CABLES, WEIGHT, ELASTIC, TENSION = range(5)
 """Rows of what `stiffness_into` writes."""

@@ -6,7 +6,6 @@ panels). Only this room, `widgets` and `panels` know NiceGUI. Every session has 
 own; all sessions share the server's jobs, so that a reload or a second tab loses no run.
 """
 
-from cdpr_drake.studio.options import StudioOptions
-from cdpr_drake.studio.server import serve
+import lazy_loader
 
-__all__ = ["StudioOptions", "serve"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,4 +1,7 @@
-"""The page: header with tabs, panels, and beside them the scene."""
+"""The page: header with tabs, panels, and beside them the scene.
+
+How the page looks, beside Quasar: the layout, which is narrow on a phone, and its colours.
+"""
 
 from __future__ import annotations
 
@@ -8,13 +11,113 @@ from contextlib import suppress
 from fastapi import Request
 from nicegui import ui
 
+from cdpr_drake.palette import COLORS, SLACK
 from cdpr_drake.studio.guard import SESSION
-from cdpr_drake.studio.look import STYLE
-from cdpr_drake.studio.panels import PANELS, place_remarks
+from cdpr_drake.studio.panels.panel import message, place_remarks, quietly
+from cdpr_drake.studio.panels.table import PANELS
 from cdpr_drake.studio.scene_relay import SCENE
 from cdpr_drake.studio.sessions import Sessions
-from cdpr_drake.studio.widgets import message, quietly
-from cdpr_drake.studio.workbench import Workbench
+from cdpr_drake.studio.workbench.session import Workbench
+
+STYLE = f"""
+:root {{ --studio-line: #c8ccd2; --studio-soft: #5a6068; --studio-problem: {SLACK};
+  --studio-track: #e6e9ed; }}
+body {{ --q-primary: {COLORS[0]} !important; }}
+body.body--dark {{ --q-primary: {COLORS[4]} !important;
+  --studio-line: #43484f; --studio-soft: #a9b0b8; --studio-problem: #ff7b72;
+  --studio-track: #969ca3; }}
+.nicegui-content {{ padding: 0 !important; }}
+.studio-header {{ padding: 0 0.8rem; gap: 0.6rem; align-items: center; flex-wrap: nowrap;
+  min-height: 2.8rem; background: #24476b !important; }}
+.studio-name {{ font-weight: 600; white-space: nowrap; }}
+.studio-main {{ display: grid; grid-template-columns: minmax(0, 1.2fr) minmax(0, 1fr);
+  width: 100%;
+  height: calc(100vh - 2.8rem); }}
+.studio-scene {{ order: 2; border-left: 1px solid var(--studio-line); }}
+.studio-scene iframe {{ width: 100%; height: 100%; border: 0; display: block; }}
+.studio-panels {{ order: 1; overflow: auto; background: transparent; }}
+.studio-problem {{ color: var(--studio-problem); white-space: pre-line; padding: 1rem; }}
+.studio-notice .q-notification__message {{ white-space: pre-line; overflow-wrap: anywhere; }}
+.studio-panels .q-tab-panel {{ padding: 0.6rem 0.8rem; gap: 0.35rem; }}
+.studio-group .q-item {{ padding: 0.2rem 0.2rem; }}
+.studio-form .q-field__suffix, .studio-number .q-field__suffix {{ padding: 0; line-height: 2rem; }}
+.studio-stale {{ color: var(--studio-problem); font-size: 0.86rem; min-height: 1.3rem; }}
+.studio-stale:empty:not(.studio-kept) {{ display: none; }}
+.studio-soft {{ color: var(--studio-soft); }}
+.studio-row {{ width: 100%; gap: 0.6rem; flex-wrap: wrap; margin: 0.4rem 0; }}
+.studio-sliders {{ display: grid; width: 100%; grid-template-columns: 1.2rem minmax(0, 1fr) 8.2rem;
+  gap: 0.15rem 0.8rem; align-items: center; }}
+.studio-axis {{ font-weight: 600; text-align: right; }}
+.studio-cables, .studio-facts {{ width: 100%; border-collapse: collapse; font-size: 0.86rem;
+  font-variant-numeric: tabular-nums; margin: 0.4rem 0; }}
+.studio-cables th, .studio-cables td, .studio-facts th, .studio-facts td {{
+  padding: 0.16rem 0.5rem; text-align: right; border-bottom: 1px solid var(--studio-line); }}
+.studio-cables thead th {{ font-weight: 500; color: var(--studio-soft); }}
+.studio-cables th:first-child, .studio-cables th:nth-child(2), .studio-facts th,
+.studio-facts td {{ text-align: left; }}
+.studio-facts th {{ font-weight: 500; color: var(--studio-soft); white-space: nowrap; }}
+.studio-facts td {{ overflow-wrap: anywhere; }}
+.studio-cables .swatch {{ display: inline-block; width: 0.75rem; height: 0.75rem;
+  border-radius: 50%; margin-right: 0.4rem; vertical-align: -1px;
+  outline: 1px solid var(--studio-line); }}
+.studio-cables th {{ white-space: nowrap; }}
+.studio-cables thead th {{ white-space: normal; }}
+.studio-cables td.bar {{ width: 34%; padding-right: 0; }}
+.studio-cables td.bar div {{ position: relative; height: 0.85rem;
+  background: var(--studio-track); }}
+.studio-cables td.bar b {{ position: absolute; left: 0; top: 0; height: 100%; min-width: 2px; }}
+.body--dark .studio-swatch, .body--dark .studio-cables .swatch,
+.body--dark .studio-cables td.bar b {{ outline: 1px solid #b4bac1; }}
+.studio-cables caption {{ text-align: left; color: var(--studio-soft); padding: 0.2rem 0.5rem; }}
+.studio-cables td.bar .tick {{ position: absolute; top: -2px; bottom: -2px; width: 2px;
+  background: currentColor; }}
+.studio-cables tr.slack td, .studio-cables tr.slack th {{ color: var(--studio-problem);
+  font-weight: 600; }}
+.studio-form {{ display: grid; grid-template-columns: 11rem minmax(0, 1fr);
+  gap: 0.2rem 0.8rem; align-items: center; width: 100%; }}
+.studio-label {{ color: var(--studio-soft); }}
+.studio-parts {{ display: flex; gap: 0.25rem; min-width: 0; }}
+.studio-field {{ width: 100%; max-width: 26rem; }}
+.studio-cell {{ flex: 1; min-width: 0; max-width: 9rem; }}
+.studio-cell .q-field__control, .studio-table .studio-field .q-field__control {{
+  padding: 0 0.4rem; }}
+.studio-form .q-field--dense .q-field__control, .studio-table .q-field--dense .q-field__control,
+.studio-number .q-field__control, .studio-form .q-field--dense .q-field__marginal,
+.studio-table .q-field--dense .q-field__marginal, .studio-number .q-field__marginal {{
+  height: 2rem; min-height: 2rem; font-size: 0.86rem; }}
+.studio-form .q-field__native, .studio-table .q-field__native, .studio-number .q-field__native {{
+  min-height: 2rem; padding: 0; font-variant-numeric: tabular-nums; }}
+.studio-field-problem, .studio-row-problem {{ grid-column: 1 / -1; white-space: pre-line;
+  color: var(--studio-problem); font-size: 0.82rem; overflow-wrap: anywhere; }}
+.studio-group {{ border-bottom: 1px solid var(--studio-line); }}
+.studio-group .q-expansion-item__content {{ padding: 0.1rem 0.2rem 0.5rem;
+  gap: 0.3rem; }}
+.studio-subtitle {{ font-weight: 600; margin-top: 0.5rem; }}
+.studio-inner {{ padding-left: 0.8rem; border-left: 2px solid var(--studio-line); width: 100%; }}
+.studio-table {{ display: grid; gap: 0.2rem 0.5rem; align-items: center; width: 100%; }}
+.studio-head {{ color: var(--studio-soft); font-size: 0.82rem; }}
+.studio-swatch {{ width: 0.8rem; height: 0.8rem; border-radius: 50%;
+  outline: 1px solid var(--studio-line); }}
+.studio-tools {{ gap: 0; flex-wrap: nowrap; }}
+.studio-bar {{ width: 100%; gap: 0.15rem; align-items: center; padding: 0.2rem 0 0.4rem; }}
+.studio-title {{ font-weight: 600; overflow-wrap: anywhere; }}
+.studio-dialog {{ width: min(46rem, 94vw); max-width: 94vw; }}
+.studio-drop {{ width: 100%; }}
+@media (min-width: 1700px) {{
+  .studio-main {{ grid-template-columns: minmax(0, 860px) minmax(0, 1fr); }}
+}}
+@media (max-width: 860px) {{
+  .studio-main {{ display: block; height: auto; }}
+  .studio-scene {{ height: 38vh; border-left: 0; border-bottom: 1px solid var(--studio-line); }}
+  .studio-name {{ display: none; }}
+  .studio-form {{ grid-template-columns: minmax(0, 1fr); }}
+  .studio-table {{ overflow-x: auto; }}
+  .studio-cables th, .studio-cables td, .studio-facts th, .studio-facts td {{
+    padding: 0.16rem 0.25rem; }}
+  .studio-facts th {{ white-space: normal; }}
+}}
+"""
+
 
 PREFERS_DARK = "return window.matchMedia('(prefers-color-scheme: dark)').matches"
 

@@ -15,7 +15,7 @@ import aiohttp
 from fastapi import FastAPI, Request, Response, WebSocket, WebSocketDisconnect
 
 from cdpr_drake.studio.guard import SESSION
-from cdpr_drake.studio.workbench import Workbench
+from cdpr_drake.studio.workbench.session import Workbench
 
 SCENE = "/scene/"
 LARGEST_MESSAGE = 64_000_000

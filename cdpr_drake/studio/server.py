@@ -1,31 +1,66 @@
-"""Starts the studio's server."""
+"""Starts the studio's server.
+
+How the studio is started.
+"""
 
 from __future__ import annotations
 
 import asyncio
 import secrets
 import socket
+from collections.abc import Callable, Mapping
 from contextlib import closing
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import yaml
 from nicegui import app, background_tasks, ui
 from nicegui.server import Server
 
-from cdpr_drake.bridge import is_loopback
 from cdpr_drake.errors import CdprError
-from cdpr_drake.models import robot_names
-from cdpr_drake.schema import too_many_bytes
+from cdpr_drake.models.robot_loader import robot_names
+from cdpr_drake.schema.yaml_files import too_many_bytes
 from cdpr_drake.studio.entrance import Entrance, is_token, token_words
 from cdpr_drake.studio.guard import EVERYWHERE, TOKEN, Guard
-from cdpr_drake.studio.jobs import JobManager
-from cdpr_drake.studio.options import StudioOptions
 from cdpr_drake.studio.page import make_page
 from cdpr_drake.studio.scene_relay import add_scene_relay
 from cdpr_drake.studio.sessions import Sessions
-from cdpr_drake.studio.workbench import USUAL_ROBOT, Calculator, Workbench, WorkingFolder
-from cdpr_drake.systems.diagrams import load_scenario
-from cdpr_drake.systems.scenarios import all_scenario_names
+from cdpr_drake.studio.workbench.calculator import Calculator
+from cdpr_drake.studio.workbench.command_form import CommandForm
+from cdpr_drake.studio.workbench.job_manager import JobManager
+from cdpr_drake.studio.workbench.session import USUAL_ROBOT, Workbench
+from cdpr_drake.studio.workbench.working_folder import WorkingFolder
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.remote.server_socket import is_loopback
+from cdpr_drake.systems.scenarios.files import all_scenario_names
+
+LOOPBACK = "127.0.0.1"
+USUAL_PORT = 8642
+
+
+@dataclass(frozen=True, kw_only=True)
+class StudioOptions:
+    """How the studio is started.
+
+    Attributes:
+        opened: Robot or scenario by name, or the path of a file; None: the usual robot.
+        folder: Working folder: no file outside of it is read or written by the page.
+        host: Address of this machine to listen at, `*` for all.
+        port: Port; 0: a free one.
+        token: Who opens the page has to know it; None: a random one, that is printed; empty: nobody
+            is asked, which is accepted where this machine alone reaches the page.
+        ready: Called with the page's address, with the token, when the server starts.
+        commands: Forms of the commands that the page offers, by name.
+    """
+
+    opened: str | None = None
+    folder: Path = field(default_factory=Path.cwd)
+    host: str = LOOPBACK
+    port: int = USUAL_PORT
+    token: str | None = None
+    ready: Callable[[str], None] | None = None
+    commands: Mapping[str, CommandForm] = field(default_factory=dict)
+
 
 LONGEST_ABSENCE = 30.0
 """Time for which a page that says nothing is kept, as where a machine is busy [s]."""

@@ -6,45 +6,27 @@ and a row of it. A solution's status is judged and never believed: feasible tens
 wrench within the bounds, infeasible is a proof.
 
 Source: Gazebo thesis 6.2; servoing thesis 1.2.2, (1.27) with its minus sign; Pott, 2018.
+
+Tension management beside a visual servo: cable velocities that take up slack.
+
+A servo moves the platform to where the camera wants it, and nobody looks after the tensions. The
+laws here add to its cable velocities, negative ones shorten a cable. They are pure functions of
+readings; `systems.controllers.TensionCorrector` is their block.
+
+* `tension_correction`, (5.1): a cable below its threshold is wound up. The threshold is constant,
+  grows with how short the cable is (`length_thresholds`), or comes from a tension distribution at
+  the believed pose, which `TensionFollower` follows from both sides. The gain is constant or, by
+  `adaptive_gains`, (5.3), proportional to what the cable is too long by.
+* `length_correction`, (5.5): the cables of least tension are wound up to the length that the
+  believed pose asks for.
+* `polygon_correction`: tensions that leave the feasible polygon of the believed pose, or come near
+  its edges, are brought back by velocities that change tensions and do not move the platform.
+
+Source: Zake, servoing thesis, 5.2. Different from print: (5.3) is clamped at zero, as a cable that
+is shorter than expected would be paid out; its gain has another unit than that of (5.1) and
+another name here.
 """
 
-from cdpr_drake.tensions.batch import distribute_batch
-from cdpr_drake.tensions.closed_form_kernel import closed_form
-from cdpr_drake.tensions.control_step_kernel import (
-    TensionStep,
-    update_tensions,
-    update_tensions_at,
-    wrench_matrix_at,
-)
-from cdpr_drake.tensions.methods import (
-    METHODS,
-    Distributor,
-    TensionMethod,
-    distribute,
-    exact_tensions,
-    feasible_polygon,
-    method_for,
-    solution_space,
-)
-from cdpr_drake.tensions.null_space_kernel import null_space
-from cdpr_drake.tensions.problem import (
-    TensionProblem,
-    TensionSolution,
-    TensionStatus,
-    judge_tensions,
-)
-from cdpr_drake.tensions.program import make_program, program_tensions
-from cdpr_drake.tensions.quadratic_program_kernel import (
-    FEASIBLE,
-    nearest_tensions,
-    nearest_tensions_in,
-    workspace_shape,
-)
+import lazy_loader
 
-__all__ = [
-    "FEASIBLE", "METHODS", "Distributor", "TensionMethod", "TensionProblem", "TensionSolution",
-    "TensionStatus", "TensionStep", "closed_form", "distribute", "distribute_batch",
-    "exact_tensions", "feasible_polygon", "judge_tensions", "make_program", "method_for",
-    "nearest_tensions", "nearest_tensions_in", "null_space", "program_tensions", "solution_space",
-    "update_tensions", "update_tensions_at", "workspace_shape", "wrench_matrix_at",
-]  # fmt: skip
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

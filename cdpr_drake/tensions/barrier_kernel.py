@@ -38,11 +38,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.tensions.closed_form_kernel import MISSED
 from cdpr_drake.tensions.null_space_kernel import factor
 from cdpr_drake.tensions.problem import RESIDUAL_TOLERANCE, balance
-from cdpr_drake.tensions.quadratic_program_kernel import (
-    FEASIBLE,
-    SINGULAR,
-    nearest_tensions_in,
-)
+from cdpr_drake.tensions.quadratic_program_kernel import FEASIBLE, SINGULAR, nearest_tensions_in
 
 BARRIER = 1e-4
 """Weight of the barrier. Around the fourth root of it, a tenth of the range, barrier and 4-norm

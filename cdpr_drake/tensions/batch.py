@@ -7,7 +7,7 @@ from numba import njit
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import TensionProblemError
-from cdpr_drake.numerics import over_rows
+from cdpr_drake.numerics.kernel_calls import over_rows
 from cdpr_drake.tensions.closed_form_kernel import MISSED
 from cdpr_drake.tensions.dispatch_kernel import judged, solve_one
 from cdpr_drake.tensions.methods import method_for

@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.numerics import as_number
+from cdpr_drake.numerics.kernel_calls import as_number
 from cdpr_drake.tensions.null_space_kernel import balance, factor, null_space
 from cdpr_drake.tensions.problem import VERDICT_ROUNDING
 from cdpr_drake.tensions.quadratic_program_kernel import FEASIBLE, SINGULAR

@@ -6,8 +6,9 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.geometry import Motion, floating_motion, planar_motion, pulley_line
-from cdpr_drake.numerics import array_addresses, integers_at, matrix_at, vector_at
+from cdpr_drake.geometry.motion_kernel import Motion, floating_motion, planar_motion
+from cdpr_drake.geometry.pulley_kernel import pulley_line
+from cdpr_drake.numerics.kernel_calls import array_addresses, integers_at, matrix_at, vector_at
 from cdpr_drake.tensions.closed_form_kernel import within
 from cdpr_drake.tensions.dispatch_kernel import judged, solve_one
 from cdpr_drake.tensions.quadratic_program_kernel import FEASIBLE, SINGULAR

@@ -9,8 +9,8 @@ from numba import njit, types
 from numba.extending import intrinsic
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.numerics import call_at_address
-from cdpr_drake.numerics import kernel_address as address
+from cdpr_drake.numerics.kernel_calls import call_at_address
+from cdpr_drake.numerics.kernel_calls import kernel_address as address
 from cdpr_drake.tensions.closed_form_kernel import MISSED
 from cdpr_drake.tensions.problem import RESIDUAL_TOLERANCE, balance, judge_into
 from cdpr_drake.tensions.quadratic_program_kernel import (

@@ -9,7 +9,7 @@ import numpy as np
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import TensionProblemError
-from cdpr_drake.tensions import goals
+from cdpr_drake.tensions import objectives as goals
 from cdpr_drake.tensions.barrier_kernel import log_barrier
 from cdpr_drake.tensions.closed_form_kernel import (
     MISSED,
@@ -21,9 +21,9 @@ from cdpr_drake.tensions.closed_form_kernel import (
     puncture,
 )
 from cdpr_drake.tensions.dispatch_kernel import NOT_FINITE, kernel_address, solve_and_judge
-from cdpr_drake.tensions.goals import Addition
 from cdpr_drake.tensions.linear_goals_kernel import infinity_norm, linear_program, optimally_safe
 from cdpr_drake.tensions.null_space_kernel import null_space
+from cdpr_drake.tensions.objectives import Addition
 from cdpr_drake.tensions.polygon_kernel import (
     barycenter,
     polygon_1_norm,

@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.numerics import append_column
+from cdpr_drake.numerics.linear_program_kernel import append_column
 from cdpr_drake.tensions.quadratic_program_kernel import INFEASIBLE, nearest_tensions_in
 
 GRADIENT_ROUNDING = 1e-13

@@ -9,8 +9,7 @@ import numpy as np
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import TrajectoryError
-from cdpr_drake.trajectories.path_kernel import PIECE_NUMBERS
-from cdpr_drake.trajectories.pose_path import PosePath, hermite
+from cdpr_drake.trajectories.pose_path import PIECE_NUMBERS, PosePath, hermite
 from cdpr_drake.trajectories.pose_trajectory import MOTION_SIZE
 from cdpr_drake.trajectories.timed_path import TimedPath
 

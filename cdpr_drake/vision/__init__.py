@@ -5,29 +5,25 @@ that it leaves in an image, and how to get X_CO back from them. Pixels are (u ri
 the centre of the first pixel; the camera frame C has z forward, x right, y down.
 
 Source: Olson, AprilTag, 2011; OpenCV for detection and pose from points.
+
+Cables as a camera in the world sees them: images of their curves, and slack read from those.
+
+Image points are pixels (u, v), NaN where a point is not in the image. A cable hangs in the vertical
+plane through its ends; surplus length is length less the distance of the ends [m].
+
+Source: servoing thesis, perspectives (slack seen by cameras); Irvine, Cable Structures, 1981, 1.1.
+
+Objects without tags: a textured plane, known by a picture of it, found in images as it is.
+
+Its model is the picture: features of it find it anywhere in an image, and the whole picture, warped
+and laid over the image, says where it is to hundredths of a pixel. `TexturedTarget` gives the
+corners of the textured square, as if they were those of a tag, so that all servos and estimators
+take them.
+
+Sources: Lowe, Distinctive image features from scale-invariant keypoints, 2004; Fischler and Bolles,
+RANSAC, 1981; Lucas and Kanade, 1981, by OpenCV; Baker and Matthews, Lucas-Kanade 20 years on, 2004.
 """
 
-from cdpr_drake.vision.apriltag import TAG_COUNT, tag_corners
-from cdpr_drake.vision.brightness import gray_image
-from cdpr_drake.vision.dots import DotTarget
-from cdpr_drake.vision.image_window import (
-    ImageWindow,
-    expected_window,
-    target_box,
-    union,
-    whole_image,
-    window_round,
-    with_principal_point,
-)
-from cdpr_drake.vision.pinhole import Pinhole
-from cdpr_drake.vision.plates import Plate, picture_png
-from cdpr_drake.vision.rings import CircleTarget
-from cdpr_drake.vision.tags import TagBundle, TagTarget, tag_plate
-from cdpr_drake.vision.target import PointTarget, Target
+import lazy_loader
 
-__all__ = [
-    "TAG_COUNT", "CircleTarget", "DotTarget", "ImageWindow", "Pinhole", "Plate", "PointTarget",
-    "TagBundle", "TagTarget", "Target", "expected_window", "gray_image", "picture_png",
-    "tag_corners", "tag_plate", "target_box", "union", "whole_image", "window_round",
-    "with_principal_point",
-]  # fmt: skip
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

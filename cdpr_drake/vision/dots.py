@@ -8,12 +8,10 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.vision.apriltag import tag_corners
-from cdpr_drake.vision.dark_blobs import Blob, find_dark_blobs
-from cdpr_drake.vision.marks_kernel import crossing_diagonals
-from cdpr_drake.vision.pinhole import Pinhole
-from cdpr_drake.vision.plates import Plate, blank_picture, draw_disc, picture_png
-from cdpr_drake.vision.target import PointTarget
+from cdpr_drake.vision.apriltags import tag_corners
+from cdpr_drake.vision.blob_detection import Blob, find_dark_blobs
+from cdpr_drake.vision.pinhole import Pinhole, crossing_diagonals
+from cdpr_drake.vision.target import Plate, PointTarget, blank_picture, draw_disc, picture_png
 
 DOT_SHARE = 0.13
 """Radius of three dots, per edge of the square."""

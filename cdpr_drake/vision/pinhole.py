@@ -1,4 +1,14 @@
-"""The pinhole camera: intrinsic parameters, projection, field of view."""
+"""The pinhole camera: intrinsic parameters, projection, field of view.
+
+Numba kernels of the pinhole camera: images of points, and whether they are in the picture.
+
+A pose X_CO comes as its matrix (3, 4), column by column, shape (12,) [-, m], a camera as
+`Pinhole.numbers`.
+
+Numba kernels that bring marks of targets to unit focal length.
+
+A camera is given by the numbers of its pinhole: fx, fy, cx, cy [px].
+"""
 
 from __future__ import annotations
 
@@ -6,8 +16,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numba import njit
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.servoing.circle_features import ELLIPSE_SIZE
 
 
 @dataclass(frozen=True)
@@ -72,3 +84,106 @@ class Pinhole:
             & (uv[1] < self.height - 0.5 - border)
         )
         return bool(np.all(inside))
+
+
+FX, FY, CX, CY, WIDTH, HEIGHT = range(6)
+"""Numbers of a camera [px]."""
+
+
+@njit(cache=True)
+def images_of(points: Array, X: Array, camera: Array, uv: Array) -> None:
+    """Writes images of points, shape (3, k) [m], to uv, shape (2, k) [px]; NaN behind the camera.
+
+    Source: servoing thesis (1.41).
+    """
+    for k in range(points.shape[1]):
+        a, b, c = points[0, k], points[1, k], points[2, k]
+        z = X[2] * a + X[5] * b + X[8] * c + X[11]
+        if z > 0.0:
+            uv[0, k] = camera[CX] + camera[FX] * (X[0] * a + X[3] * b + X[6] * c + X[9]) / z
+            uv[1, k] = camera[CY] + camera[FY] * (X[1] * a + X[4] * b + X[7] * c + X[10]) / z
+        else:
+            uv[0, k] = uv[1, k] = np.nan
+
+
+@njit(cache=True)
+def is_faced(X: Array) -> bool:
+    """Whether z of O points to the camera's side of its plane."""
+    return X[6] * X[9] + X[7] * X[10] + X[8] * X[11] < 0.0
+
+
+@njit(cache=True)
+def is_pictured(points: Array, X: Array, camera: Array, border: float) -> bool:
+    """Whether O turns its face to the camera, with all points, shape (3, k) [m], in the picture, a
+    border [px] off its rim."""
+    if not is_faced(X):
+        return False
+    uv = np.empty((2, points.shape[1]))
+    images_of(points, X, camera, uv)
+    low = -0.5 + border
+    for k in range(points.shape[1]):
+        u, v = uv[0, k], uv[1, k]
+        if not (low < u < camera[WIDTH] - 0.5 - border):
+            return False
+        if not (low < v < camera[HEIGHT] - 0.5 - border):
+            return False
+    return True
+
+
+@njit(cache=True)
+def normalize_points(marks: Array, camera: Array, out: Array) -> None:
+    """Points (u, v), one after the other, shape (2 n,) [px], to all x and then all y, shape (2 n,).
+
+    Args:
+        marks: The points.
+        camera: Shape (4,).
+        out: Overwritten [-].
+    """
+    n = marks.shape[0] // 2
+    for k in range(n):
+        out[k] = (marks[2 * k] - camera[2]) / camera[0]
+        out[n + k] = (marks[2 * k + 1] - camera[3]) / camera[1]
+
+
+@njit(cache=True)
+def normalize_ellipses(marks: Array, camera: Array, out: Array) -> None:
+    """Ellipses (u, v, n20, n11, n02), one after the other, shape (5 n,) [px, px^2], the same.
+
+    Args:
+        marks: The ellipses.
+        camera: Shape (4,).
+        out: Overwritten, shape (5 n,) [-].
+    """
+    fx, fy = camera[0], camera[1]
+    for k in range(marks.shape[0] // ELLIPSE_SIZE):
+        at = ELLIPSE_SIZE * k
+        out[at] = (marks[at] - camera[2]) / fx
+        out[at + 1] = (marks[at + 1] - camera[3]) / fy
+        out[at + 2] = marks[at + 2] / (fx * fx)
+        out[at + 3] = marks[at + 3] / (fx * fy)
+        out[at + 4] = marks[at + 4] / (fy * fy)
+
+
+@njit(cache=True)
+def crossing_diagonals(marks: Array, camera: Array, out: Array) -> None:
+    """Where the diagonals of four corners meet.
+
+    Args:
+        marks: Corners (u, v) around a square, shape (8,) [px].
+        camera: Shape (4,).
+        out: Overwritten, shape (2,) [-].
+    """
+    a, b, c, d = marks[0], marks[2], marks[4], marks[6]
+    e, f, g, h = marks[1], marks[3], marks[5], marks[7]
+    # (a, e) + share (c - a, g - e) lies on the line through (b, f) and (d, h).
+    along_u, along_v, across_u, across_v = c - a, g - e, d - b, h - f
+    share = ((b - a) * across_v - (f - e) * across_u) / (along_u * across_v - along_v * across_u)
+    out[0] = (a + share * along_u - camera[2]) / camera[0]
+    out[1] = (e + share * along_v - camera[3]) / camera[1]
+
+
+@njit(cache=True)
+def crossings_of_diagonals(marks: Array, camera: Array, out: Array) -> None:
+    """`crossing_diagonals` of many images, marks shape (n, 8) [px], out shape (n, 2) [-]."""
+    for k in range(marks.shape[0]):
+        crossing_diagonals(marks[k], camera, out[k])

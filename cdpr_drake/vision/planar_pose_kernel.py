@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.numerics import eliminate, substitute
+from cdpr_drake.numerics.linear_algebra_kernel import eliminate, substitute
 
 STEPS = 300
 """Largest number of steps of the least squares; about five are needed, more where both minima are

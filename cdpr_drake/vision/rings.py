@@ -7,14 +7,25 @@ import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.features import ELLIPSE_SIZE, circle_images, ellipses_interaction, plane_of
-from cdpr_drake.numerics import least_squares
-from cdpr_drake.spatial import exponential
-from cdpr_drake.vision.dark_blobs import find_dark_blobs
-from cdpr_drake.vision.marks_kernel import normalize_ellipses
-from cdpr_drake.vision.pinhole import Pinhole
-from cdpr_drake.vision.plates import Plate, blank_picture, draw_disc, picture_png
-from cdpr_drake.vision.target import NormalNumbers, Target, faces_camera
+from cdpr_drake.geometry.poses import exponential
+from cdpr_drake.numerics.linear_algebra_kernel import least_squares
+from cdpr_drake.servoing.circle_features import (
+    ELLIPSE_SIZE,
+    circle_images,
+    ellipses_interaction,
+    plane_of,
+)
+from cdpr_drake.vision.blob_detection import find_dark_blobs
+from cdpr_drake.vision.pinhole import Pinhole, normalize_ellipses
+from cdpr_drake.vision.target import (
+    NormalNumbers,
+    Plate,
+    Target,
+    blank_picture,
+    draw_disc,
+    faces_camera,
+    picture_png,
+)
 
 INNER_SHARE = 0.5
 """Radius of the inner circle, per radius of the outer one."""

@@ -1,8 +1,12 @@
-"""What a camera looks at: one interface for tags, bundles of tags, dots and circles."""
+"""What a camera looks at: one interface for tags, bundles of tags, dots and circles.
+
+The pictures that targets carry.
+"""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 import cv2
@@ -10,11 +14,43 @@ import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.vision.marks_kernel import normalize_points
-from cdpr_drake.vision.pinhole import Pinhole
+from cdpr_drake.vision.pinhole import Pinhole, images_of, is_faced, is_pictured, normalize_points
 from cdpr_drake.vision.planar_pose_kernel import planar_pose
-from cdpr_drake.vision.plates import Plate
-from cdpr_drake.vision.projection_kernel import images_of, is_faced, is_pictured
+
+PICTURE_PIXELS = 640
+
+
+@dataclass(frozen=True)
+class Plate:
+    """A square with a picture on it.
+
+    Attributes:
+        X_OT: Pose of its frame T in the object: x right, y up, z out of the picture.
+        png: The picture, a PNG file.
+        width: Edge [m].
+    """
+
+    X_OT: RigidTransform
+    png: bytes
+    width: float
+
+
+def blank_picture() -> np.ndarray:
+    """A white picture, 8 bits, grey."""
+    return np.full((PICTURE_PIXELS, PICTURE_PIXELS), 255, np.uint8)
+
+
+def draw_disc(picture: np.ndarray, middle: tuple[float, float], radius: float, gray: int) -> None:
+    """Draws a disc with smooth edges; positions are from the picture's upper left corner [px]."""
+    v, u = np.mgrid[: picture.shape[0], : picture.shape[1]] + 0.5
+    share = np.clip(radius + 0.5 - np.hypot(u - middle[0], v - middle[1]), 0.0, 1.0)
+    picture[:] = np.round((1.0 - share) * picture + share * gray)
+
+
+def picture_png(picture: np.ndarray) -> bytes:
+    """The PNG file of a picture."""
+    return bytes(cv2.imencode(".png", picture)[1].tobytes())
+
 
 VISIBLE_BORDER = 1.0
 """What is seen must lie this far inside the image [px]."""

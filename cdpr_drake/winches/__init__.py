@@ -7,20 +7,6 @@ torque.
 Source: servoing thesis 2.3 and 5.2.3; friction after Coulomb, Stribeck and LuGre's static part.
 """
 
-from cdpr_drake.winches.drum import Drum
-from cdpr_drake.winches.friction import FrictionLaw
-from cdpr_drake.winches.groups import WinchGroups
-from cdpr_drake.winches.motor import (
-    MODES,
-    TORQUE,
-    WinchLaw,
-    WinchMotion,
-    resting_motors,
-    winch_motion,
-)
-from cdpr_drake.winches.motor_kernel import pack_winch, winch_rates, winch_torques
+import lazy_loader
 
-__all__ = [
-    "MODES", "TORQUE", "Drum", "FrictionLaw", "WinchGroups", "WinchLaw", "WinchMotion",
-    "pack_winch", "resting_motors", "winch_motion", "winch_rates", "winch_torques",
-]  # fmt: skip
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -16,7 +16,7 @@ from cdpr_drake.models.formats.mjcf import is_mjcf, read_mjcf
 from cdpr_drake.models.formats.named_frames import is_sdformat, is_urdf, read_named_frames
 from cdpr_drake.models.formats.reading import fail, read_text, read_xml
 from cdpr_drake.models.formats.wirex import is_wirex, read_wirex
-from cdpr_drake.schema import too_many_bytes
+from cdpr_drake.schema.yaml_files import too_many_bytes
 
 YAML_SUFFIXES = (".yaml", ".yml")
 XML_SUFFIXES = (".xml", ".wcrfx", ".sdf", ".world", ".urdf", ".mjcf", ".model")

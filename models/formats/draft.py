@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.geometry import MotionType
+from cdpr_drake.geometry.motion_type import MotionType
 
 
 @dataclass(kw_only=True)

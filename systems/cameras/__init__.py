@@ -4,20 +4,6 @@ Every camera gives X_CO, found, and the target's marks, whether it detects them 
 window of it, or projects them. `TARGETS` is the table of kinds of targets.
 """
 
-from cdpr_drake.systems.cameras.cable_camera import CableCamera
-from cdpr_drake.systems.cameras.camera_checks import check_camera
-from cdpr_drake.systems.cameras.projected_camera import ProjectedCamera
-from cdpr_drake.systems.cameras.region_camera import RegionCamera
-from cdpr_drake.systems.cameras.scene_picture import SceneCamera
-from cdpr_drake.systems.cameras.scene_target import SceneTarget
-from cdpr_drake.systems.cameras.settings import PROJECTED, REGION, RENDERED, CameraSettings
-from cdpr_drake.systems.cameras.target_detector import TargetDetector
-from cdpr_drake.systems.cameras.target_measurement import TargetMeasurement
-from cdpr_drake.systems.cameras.target_settings import TargetSettings
-from cdpr_drake.systems.cameras.targets import TARGETS, TargetPattern
+import lazy_loader
 
-__all__ = [
-    "PROJECTED", "REGION", "RENDERED", "TARGETS", "CableCamera", "CameraSettings",
-    "ProjectedCamera", "RegionCamera", "SceneCamera", "SceneTarget", "TargetDetector",
-    "TargetMeasurement", "TargetPattern", "TargetSettings", "check_camera",
-]  # fmt: skip
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

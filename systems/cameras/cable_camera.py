@@ -10,10 +10,10 @@ from pydrake.math import RigidTransform
 from pydrake.systems.framework import BasicVector, Context, LeafSystem, State
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cable_sight import cable_images
-from cdpr_drake.cables import cable_curves
-from cdpr_drake.geometry import CableSet
-from cdpr_drake.vision import Pinhole
+from cdpr_drake.cables.curves import cable_curves
+from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.vision.cable_images import cable_images
+from cdpr_drake.vision.pinhole import Pinhole
 
 CURVE_POINTS = 33
 """Of a hanging cable's curve, from which the points in the image are taken."""

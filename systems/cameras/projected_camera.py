@@ -13,11 +13,12 @@ from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.models import DEAD, FROZEN, CameraFault
-from cdpr_drake.servoing import CameraMounting
-from cdpr_drake.spatial import pose_from_angles
+from cdpr_drake.geometry.poses import pose_from_angles
+from cdpr_drake.models.camera_catalogue import DEAD, FROZEN, CameraFault
+from cdpr_drake.servoing.servo_task import CameraMounting
 from cdpr_drake.systems.cameras.target_measurement import TargetMeasurement, shifted_marks
-from cdpr_drake.vision import Pinhole, Target
+from cdpr_drake.vision.pinhole import Pinhole
+from cdpr_drake.vision.target import Target
 
 
 class ProjectedCamera(TargetMeasurement):

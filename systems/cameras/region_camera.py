@@ -11,14 +11,9 @@ from pydrake.systems.framework import Context, State
 from cdpr_drake.arrays import Array
 from cdpr_drake.systems.cameras.scene_picture import draw_image, draw_window
 from cdpr_drake.systems.cameras.target_measurement import TargetMeasurement, shifted_marks
-from cdpr_drake.vision import (
-    ImageWindow,
-    Pinhole,
-    Target,
-    expected_window,
-    target_box,
-    whole_image,
-)
+from cdpr_drake.vision.image_window import ImageWindow, expected_window, target_box, whole_image
+from cdpr_drake.vision.pinhole import Pinhole
+from cdpr_drake.vision.target import Target
 
 _IMAGES, _WHOLE = 0, 1
 _BOX = slice(2, 6)

@@ -18,15 +18,15 @@ from pydrake.systems.framework import Context, LeafSystem
 from pydrake.systems.sensors import ImageRgba8U
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.models import BACKGROUND, NEAR, color_camera
-from cdpr_drake.vision import (
+from cdpr_drake.models.rendered_camera import BACKGROUND, NEAR, color_camera
+from cdpr_drake.vision.image_window import (
     ImageWindow,
-    Pinhole,
     union,
     whole_image,
     window_round,
     with_principal_point,
 )
+from cdpr_drake.vision.pinhole import Pinhole
 
 SMOOTHED = 4
 """Pixels round a bounding box that smoothing of its edges may reach."""

@@ -9,9 +9,9 @@ from pydrake.geometry import FramePoseVector, GeometryFrame, SceneGraph
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, LeafSystem
 
-from cdpr_drake.models import plate_geometry
-from cdpr_drake.trajectories import MovingPose
-from cdpr_drake.vision import Plate
+from cdpr_drake.models.scene import plate_geometry
+from cdpr_drake.trajectories.pose_trajectory import MovingPose
+from cdpr_drake.vision.target import Plate
 
 NAME = "target"
 

@@ -1,4 +1,7 @@
-"""What cameras report about a target: the ports and the delay line that they share."""
+"""What cameras report about a target: the ports and the delay line that they share.
+
+Finds a target in the images of a camera.
+"""
 
 from __future__ import annotations
 
@@ -8,10 +11,12 @@ import numpy as np
 from pydrake.common.value import AbstractValue, Value
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.framework import BasicVector, Context, LeafSystem, State
+from pydrake.systems.sensors import ImageRgba8U
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.features import ELLIPSE_SIZE
-from cdpr_drake.vision import Pinhole, Target
+from cdpr_drake.servoing.circle_features import ELLIPSE_SIZE
+from cdpr_drake.vision.pinhole import Pinhole
+from cdpr_drake.vision.target import Target
 
 
 class TargetMeasurement(LeafSystem):
@@ -170,3 +175,36 @@ def shifted_marks(target: Target, marks: Array, shift: Array) -> Array:
     each = moved[: target.size].reshape(-1, 2 if target.mark == "corners" else ELLIPSE_SIZE)
     each[:, :2] += shift
     return moved
+
+
+class TargetDetector(TargetMeasurement):
+    """Finds a target in images by OpenCV, to fractions of a pixel, and its pose.
+
+    A target that is followed is looked for where the newest image had it, and then everywhere.
+
+    =========== ============== ==== ===================================================
+    port        type           unit meaning
+    =========== ============== ==== ===================================================
+    color_image ImageRgba8U    -    in, as from `SceneCamera` or Drake's RgbdSensor
+    corners     vector(2 n)    px   out, or `ellipses`: as `TargetMeasurement`
+    X_CO        RigidTransform m    out, as `TargetMeasurement`
+    found       vector(1)      -    out, as `TargetMeasurement`
+    quality     vector(k)      -    out, as `TargetMeasurement`
+    =========== ============== ==== ===================================================
+    """
+
+    def __init__(
+        self,
+        target: Target,
+        pinhole: Pinhole,
+        rate: float,
+        latency_frames: int = 0,
+        image_bias: Array | None = None,
+    ) -> None:
+        """For one target, images at `rate` [Hz], latency in whole frames, bias as the base's."""
+        super().__init__(target, pinhole, rate, latency_frames, image_bias)
+        self._image = self.DeclareAbstractInputPort("color_image", Value(ImageRgba8U()))
+
+    def find_marks(self, context: Context) -> Array | None:
+        """The target's marks in the image at the input, or None."""
+        return self.target.follow(self._image.Eval(context).data, self.newest_marks(context))

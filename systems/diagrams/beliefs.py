@@ -8,12 +8,13 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.geometry import PLANAR_ROWS
-from cdpr_drake.models import Robot, load_robot
-from cdpr_drake.servoing import BelievedRobot
-from cdpr_drake.spatial import rotation_from_vector
-from cdpr_drake.systems.scenarios import VisualServoSettings
-from cdpr_drake.systems.servos import PoseShift
+from cdpr_drake.geometry.poses import rotation_from_vector
+from cdpr_drake.geometry.straight_cables import PLANAR_ROWS
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.servoing.servo_task import BelievedRobot
+from cdpr_drake.systems.controllers.perturbation_settings import PoseShift
+from cdpr_drake.systems.scenarios.visual_servo_scenario import VisualServoSettings
 
 _POINTS, _INITIAL_POSE, _CAMERA, _WINCHES, _EXTERNAL_CAMERA, _TOLD_OBJECT = 1, 2, 3, 4, 5, 6
 """Streams of random numbers of one seed, so that one perturbation does not change another."""

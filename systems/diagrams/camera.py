@@ -8,24 +8,25 @@ from pydrake.geometry import FrameId, SceneGraph
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.models import Robot, RobotInPlant, add_plates, add_renderer
-from cdpr_drake.servoing import CameraMounting
-from cdpr_drake.systems.cameras import (
-    PROJECTED,
-    REGION,
-    CameraSettings,
-    ProjectedCamera,
-    RegionCamera,
-    SceneCamera,
-    SceneTarget,
-    TargetDetector,
-    TargetMeasurement,
-    TargetSettings,
-)
-from cdpr_drake.systems.robots import CableRobot, RobotBlock, SceneAdder
-from cdpr_drake.systems.scenarios import Scenario, VisualServoSettings
-from cdpr_drake.systems.worlds import WorldInScene, WorldSettings
-from cdpr_drake.vision import Pinhole, Target
+from cdpr_drake.models.rendered_camera import add_renderer
+from cdpr_drake.models.robot_in_plant import RobotInPlant
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.models.scene import add_plates
+from cdpr_drake.servoing.servo_task import CameraMounting
+from cdpr_drake.systems.cameras.camera_settings import PROJECTED, REGION, CameraSettings
+from cdpr_drake.systems.cameras.projected_camera import ProjectedCamera
+from cdpr_drake.systems.cameras.region_camera import RegionCamera
+from cdpr_drake.systems.cameras.scene_picture import SceneCamera
+from cdpr_drake.systems.cameras.scene_target import SceneTarget
+from cdpr_drake.systems.cameras.target_measurement import TargetDetector, TargetMeasurement
+from cdpr_drake.systems.cameras.targets import TargetSettings
+from cdpr_drake.systems.robots.assembly import RobotBlock, SceneAdder
+from cdpr_drake.systems.robots.cable_robot import CableRobot
+from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario, VisualServoSettings
+from cdpr_drake.systems.worlds.adding import WorldInScene
+from cdpr_drake.systems.worlds.settings import WorldSettings
+from cdpr_drake.vision.pinhole import Pinhole
+from cdpr_drake.vision.target import Target
 
 
 def scene_adder(

@@ -7,30 +7,26 @@ from dataclasses import replace
 import numpy as np
 
 from cdpr_drake.errors import VisualFeatureError
-from cdpr_drake.features import Sighting, VisualFeatures
-from cdpr_drake.models import Robot, load_camera
-from cdpr_drake.servoing import (
+from cdpr_drake.models.camera_catalogue import load_camera
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.servoing.controller import ServoController
+from cdpr_drake.servoing.feature_plan import FeaturePlan
+from cdpr_drake.servoing.servo_law import (
     AdaptiveGain,
     AxisPartition,
-    BelievedRobot,
     EdgeField,
-    FeaturePlan,
     ModeSwitching,
-    MotionFilter,
-    ServoController,
     ServoLaw,
-    ServoTask,
     YawTask,
-    make_task,
 )
-from cdpr_drake.systems.scenarios import Scenario, VisualServoSettings
-from cdpr_drake.systems.servos import (
-    PartitionSettings,
-    SwitchSettings,
-    ideal_sighting,
-    make_features,
-)
-from cdpr_drake.vision import Pinhole, PointTarget, Target
+from cdpr_drake.servoing.servo_task import BelievedRobot, ServoTask, make_task
+from cdpr_drake.servoing.target_motion import MotionFilter
+from cdpr_drake.servoing.visual_features import Sighting, VisualFeatures
+from cdpr_drake.systems.controllers.schemes import ideal_sighting, make_features
+from cdpr_drake.systems.controllers.servo_settings import PartitionSettings, SwitchSettings
+from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario, VisualServoSettings
+from cdpr_drake.vision.pinhole import Pinhole
+from cdpr_drake.vision.target import PointTarget, Target
 
 
 def _plan(

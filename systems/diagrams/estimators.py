@@ -9,16 +9,19 @@ from pydrake.common.value import Value
 from pydrake.systems.framework import DiagramBuilder, OutputPort, System
 from pydrake.systems.primitives import ConstantValueSource
 
-from cdpr_drake.models import Robot
-from cdpr_drake.servoing import CameraMounting
-from cdpr_drake.systems.cameras import PROJECTED, REGION, ProjectedCamera, TargetDetector
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.servoing.servo_task import CameraMounting
+from cdpr_drake.systems.cameras.camera_settings import PROJECTED, REGION
+from cdpr_drake.systems.cameras.projected_camera import ProjectedCamera
+from cdpr_drake.systems.cameras.target_measurement import TargetDetector
 from cdpr_drake.systems.diagrams.camera import add_region_camera, projected_camera
-from cdpr_drake.systems.estimators import ESTIMATORS, EstimatorTask
-from cdpr_drake.systems.fusion import FusionReadings, platform_camera
-from cdpr_drake.systems.robots import RobotBlock
-from cdpr_drake.systems.scenarios import VisualServoSettings
-from cdpr_drake.systems.sensors import SENSORS, SensorReadings
-from cdpr_drake.vision import Pinhole
+from cdpr_drake.systems.diagrams.fusion_readings import FusionReadings, platform_camera
+from cdpr_drake.systems.estimators.estimator_kinds import ESTIMATORS, EstimatorTask
+from cdpr_drake.systems.robots.assembly import RobotBlock
+from cdpr_drake.systems.scenarios.visual_servo_scenario import VisualServoSettings
+from cdpr_drake.systems.sensors.sensor_kinds import SENSORS
+from cdpr_drake.systems.sensors.sensor_readings import SensorReadings
+from cdpr_drake.vision.pinhole import Pinhole
 
 KNOWN_TAG_SEED = 7919
 """Added to the seed, so that the pixel noise of the known tag is not that of the target."""

@@ -18,24 +18,29 @@ from cdpr_drake.errors import (
     TensionProblemError,
     TrajectoryError,
 )
-from cdpr_drake.models import Robot, check_pose, check_pulleys, tension_problem
+from cdpr_drake.models.robot_holding import check_pulleys
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.models.robot_statics import check_pose, tension_problem
 from cdpr_drake.systems.diagrams.scenario_checks import check_scenario
-from cdpr_drake.systems.remote import TENSION_PLACES, check_place
-from cdpr_drake.systems.robots import COMPILED
-from cdpr_drake.systems.scenarios import (
+from cdpr_drake.systems.remote.remote_place import TENSION_PLACES
+from cdpr_drake.systems.remote.settings import check_place
+from cdpr_drake.systems.robots.settings import COMPILED
+from cdpr_drake.systems.scenarios.files import (
     PICK_AND_PLACE,
     TENSION_CONTROL,
     VISUAL_SERVO,
-    PickAndPlaceScenario,
-    Scenario,
-    TensionScenario,
-    check_pick_and_place,
     load_with_robot,
     scenario_file,
     scenario_kind,
 )
-from cdpr_drake.systems.worlds import check_world
-from cdpr_drake.tensions import distribute
+from cdpr_drake.systems.scenarios.pick_and_place_scenario import (
+    PickAndPlaceScenario,
+    check_pick_and_place,
+)
+from cdpr_drake.systems.scenarios.tension_control_scenario import TensionScenario
+from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
+from cdpr_drake.systems.worlds.checks import check_world
+from cdpr_drake.tensions.methods import distribute
 
 FILE_LOOKS = 101
 """Instants at which the poses of a motion from a file are looked at."""

@@ -16,28 +16,31 @@ from cdpr_drake.errors import (
     ScenarioError,
     VisualFeatureError,
 )
-from cdpr_drake.features import interaction_rank
-from cdpr_drake.models import Pose, Robot, check_pulleys
-from cdpr_drake.numerics import explicit_integrators
-from cdpr_drake.schema import closest
-from cdpr_drake.spatial import adjoint
-from cdpr_drake.systems.cameras import check_camera
+from cdpr_drake.geometry.poses import adjoint
+from cdpr_drake.models.robot_holding import check_pulleys
+from cdpr_drake.models.robot_schema import Pose, Robot
+from cdpr_drake.numerics.explicit_integration import explicit_integrators
+from cdpr_drake.schema.typed_yaml import closest
+from cdpr_drake.servoing.point_features import interaction_rank
+from cdpr_drake.systems.cameras.camera_settings import check_camera
 from cdpr_drake.systems.diagrams.controller import check_scheme, make_tasks
+from cdpr_drake.systems.diagrams.fusion_checks import check_sensor_fusion
 from cdpr_drake.systems.diagrams.tension_management import check_tension_management
 from cdpr_drake.systems.diagrams.torque_control import (
     check_pose_plan,
     check_torque_control,
     check_winch_groups,
 )
-from cdpr_drake.systems.estimators import ESTIMATORS
-from cdpr_drake.systems.fusion import check_sensor_fusion
-from cdpr_drake.systems.remote import check_servo_place
-from cdpr_drake.systems.robots import COMPILED, SEMI_IMPLICIT, simulated_cables
-from cdpr_drake.systems.sensors import SENSORS
-from cdpr_drake.systems.worlds import check_world
+from cdpr_drake.systems.estimators.estimator_kinds import ESTIMATORS
+from cdpr_drake.systems.remote.settings import check_servo_place
+from cdpr_drake.systems.robots.cable_forces import simulated_cables
+from cdpr_drake.systems.robots.cable_robot import SEMI_IMPLICIT
+from cdpr_drake.systems.robots.settings import COMPILED
+from cdpr_drake.systems.sensors.sensor_kinds import SENSORS
+from cdpr_drake.systems.worlds.checks import check_world
 
 if TYPE_CHECKING:
-    from cdpr_drake.systems.scenarios import Scenario
+    from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
 
 
 def check_perturbations(scenario: Scenario, robot: Robot, path: Path) -> None:

@@ -8,24 +8,25 @@ from pydrake.systems.framework import Context, DiagramBuilder, OutputPort, Syste
 from pydrake.systems.primitives import Adder, ConstantVectorSource, Integrator, MatrixGain
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.systems.cameras import TargetMeasurement
+from cdpr_drake.systems.cameras.target_measurement import TargetMeasurement
+from cdpr_drake.systems.controllers.feature_servo import FeatureServo
+from cdpr_drake.systems.controllers.tension_corrector import TensionCorrector
+from cdpr_drake.systems.controllers.torque_controller import TorqueController
 from cdpr_drake.systems.diagrams.beliefs import winch_offsets
 from cdpr_drake.systems.diagrams.camera import add_camera, add_target
 from cdpr_drake.systems.diagrams.estimators import EstimatorInputs, add_estimator
+from cdpr_drake.systems.diagrams.fusion_models import steers
 from cdpr_drake.systems.diagrams.servo_models import ServoModel, servo_model
 from cdpr_drake.systems.diagrams.tension_management import add_tension_corrector
 from cdpr_drake.systems.diagrams.torque_control import (
     add_torque_controller,
     connect_torque_controller,
 )
-from cdpr_drake.systems.estimators import EstimatorSettings, EstimatorTask
-from cdpr_drake.systems.fusion import steers
-from cdpr_drake.systems.remote import RemoteServo
-from cdpr_drake.systems.robots import RobotBlock
-from cdpr_drake.systems.scenarios import VisualServoSettings
-from cdpr_drake.systems.sensors import SensorReadings
-from cdpr_drake.systems.servos import FeatureServo
-from cdpr_drake.systems.tension_control import TensionCorrector, TorqueController
+from cdpr_drake.systems.estimators.estimator_kinds import EstimatorSettings, EstimatorTask
+from cdpr_drake.systems.remote.remote_servo import RemoteServo
+from cdpr_drake.systems.robots.assembly import RobotBlock
+from cdpr_drake.systems.scenarios.visual_servo_scenario import VisualServoSettings
+from cdpr_drake.systems.sensors.sensor_readings import SensorReadings
 
 
 @dataclass(frozen=True, kw_only=True)

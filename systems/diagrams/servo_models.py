@@ -6,22 +6,27 @@ from dataclasses import dataclass
 
 from pydrake.math import RigidTransform
 
-from cdpr_drake.features import seen_pose_error
-from cdpr_drake.models import Robot, load_camera
-from cdpr_drake.servoing import BelievedRobot, CameraMounting, ServoController
+from cdpr_drake.models.camera_catalogue import load_camera
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.servoing.controller import ServoController
+from cdpr_drake.servoing.pose_features import seen_pose_error
+from cdpr_drake.servoing.servo_task import BelievedRobot, CameraMounting
+from cdpr_drake.systems.controllers.feature_servo import FeatureServo
+from cdpr_drake.systems.controllers.open_loop_servo import OpenLoopServo, open_loop_plan
+from cdpr_drake.systems.controllers.planned_pose_servo import PlannedPoseServo
 from cdpr_drake.systems.diagrams.beliefs import (
     believed_external_camera,
     believed_robot,
     told_object,
 )
 from cdpr_drake.systems.diagrams.controller import make_controller
-from cdpr_drake.systems.estimators import EstimatorTask
-from cdpr_drake.systems.fusion import fusion_task
-from cdpr_drake.systems.remote import RemoteServo
-from cdpr_drake.systems.scenarios import Scenario, VisualServoSettings
-from cdpr_drake.systems.servos import FeatureServo, OpenLoopServo, PlannedPoseServo, open_loop_plan
-from cdpr_drake.trajectories import MovingPose, PoseTrajectory
-from cdpr_drake.vision import Pinhole, Target
+from cdpr_drake.systems.diagrams.fusion_models import fusion_task
+from cdpr_drake.systems.estimators.estimator_kinds import EstimatorTask
+from cdpr_drake.systems.remote.remote_servo import RemoteServo
+from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario, VisualServoSettings
+from cdpr_drake.trajectories.pose_trajectory import MovingPose, PoseTrajectory
+from cdpr_drake.vision.pinhole import Pinhole
+from cdpr_drake.vision.target import Target
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,27 +7,24 @@ from dataclasses import dataclass, replace
 import numpy as np
 from pydrake.systems.framework import DiagramBuilder
 
-from cdpr_drake.geometry import CableSet
-from cdpr_drake.systems.cameras import RENDERED
+from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.systems.cameras.camera_settings import RENDERED
+from cdpr_drake.systems.diagrams.fusion_readings import fusion_ports
 from cdpr_drake.systems.diagrams.servo_blocks import VisualServoBlocks, seen_ports
 from cdpr_drake.systems.diagrams.servo_models import ServoModel
 from cdpr_drake.systems.diagrams.torque_control import tension_limits
-from cdpr_drake.systems.fusion import fusion_ports
-from cdpr_drake.systems.monitoring import (
-    BreakingLoadWatch,
-    RunLog,
-    RunMonitor,
+from cdpr_drake.systems.monitoring.log_row import RunLog, add_log
+from cdpr_drake.systems.monitoring.run_monitor import RunMonitor, StopRules
+from cdpr_drake.systems.monitoring.stability_watch import (
     ServoCriterion,
     StabilitySettings,
     StabilityWatch,
-    StopRules,
-    TensionRange,
-    add_log,
 )
-from cdpr_drake.systems.perception import LookingSensors
-from cdpr_drake.systems.scenarios import Scenario
-from cdpr_drake.systems.sensors import SENSORS
-from cdpr_drake.systems.worlds import (
+from cdpr_drake.systems.monitoring.tension_watch import BreakingLoadWatch, TensionRange
+from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
+from cdpr_drake.systems.sensors.perception_sensors import LookingSensors
+from cdpr_drake.systems.sensors.sensor_kinds import SENSORS
+from cdpr_drake.systems.worlds.adding import (
     CONTACT_RESULTS,
     WorldInScene,
     WorldMeters,

@@ -12,37 +12,31 @@ from pydrake.systems.framework import Context, Diagram, DiagramBuilder, LeafSyst
 from pydrake.systems.primitives import Demultiplexer
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables import cable_motions
-from cdpr_drake.control import PlatformDynamics, TaskGains
-from cdpr_drake.geometry import CableSet
-from cdpr_drake.models import Robot, RobotInPlant, add_robot, pose_on_joint
-from cdpr_drake.spatial import pose_error, pose_from_row, pose_row
-from cdpr_drake.systems.monitoring import RunLog, add_log
-from cdpr_drake.systems.remote import (
-    DISTRIBUTOR,
-    TRAJECTORY,
-    Remote,
-    RemoteDistributor,
-    RemoteTracking,
-)
-from cdpr_drake.systems.robots import (
-    MEMORY,
-    CompiledMotion,
-    StepRule,
-    TensionDrivenCables,
-    apply_force,
-    motion_by_tensions,
-)
-from cdpr_drake.systems.tension_control import PoseTracking, TensionDistributor
-from cdpr_drake.systems.worlds import (
+from cdpr_drake.cables.commanded_tension_kernel import cable_motions
+from cdpr_drake.control.task_space import PlatformDynamics, TaskGains
+from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.geometry.poses import pose_error, pose_from_row, pose_row
+from cdpr_drake.models.robot_in_plant import RobotInPlant, add_robot, pose_on_joint
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.systems.controllers.computed_torque import PoseTracking
+from cdpr_drake.systems.controllers.tension_distributor import TensionDistributor
+from cdpr_drake.systems.monitoring.log_row import RunLog, add_log
+from cdpr_drake.systems.remote.remote_place import DISTRIBUTOR, TRAJECTORY, Remote
+from cdpr_drake.systems.remote.remote_tensions import RemoteDistributor, RemoteTracking
+from cdpr_drake.systems.robots.assembly import apply_force
+from cdpr_drake.systems.robots.compiled_cable_robot import motion_by_tensions
+from cdpr_drake.systems.robots.compiled_motion import MEMORY, CompiledMotion
+from cdpr_drake.systems.robots.compiled_step import StepRule
+from cdpr_drake.systems.robots.tension_driven_cables import TensionDrivenCables
+from cdpr_drake.systems.worlds.adding import (
     CLEARANCES,
     CONTACTS,
     WorldInScene,
     WorldMeters,
-    WorldSettings,
     add_world_meters,
 )
-from cdpr_drake.trajectories import PoseTrajectory
+from cdpr_drake.systems.worlds.settings import WorldSettings
+from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
 
 
 @dataclass(frozen=True)

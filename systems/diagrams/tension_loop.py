@@ -6,13 +6,16 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.dynamics import GOOD, TIME, robot_addresses, start_tracking, track
+from cdpr_drake.dynamics.reach_kernel import robot_addresses
+from cdpr_drake.dynamics.robot_kernel import GOOD
+from cdpr_drake.dynamics.tracking_kernel import TIME, start_tracking, track
 from cdpr_drake.errors import CdprError
-from cdpr_drake.models import pose_on_joint
-from cdpr_drake.spatial import pose_error
+from cdpr_drake.geometry.poses import pose_error
+from cdpr_drake.models.robot_in_plant import pose_on_joint
+from cdpr_drake.systems.controllers.computed_torque import PoseTracking
+from cdpr_drake.systems.controllers.tension_distributor import TensionDistributor
 from cdpr_drake.systems.diagrams.tension_control import TensionControl
-from cdpr_drake.systems.robots import PackedRule, motion_problem
-from cdpr_drake.systems.tension_control import PoseTracking, TensionDistributor
+from cdpr_drake.systems.robots.compiled_step import PackedRule, motion_problem
 
 
 class TensionRows:

@@ -1,4 +1,4 @@
-"""Checks the section `tension_management` and puts its block between a servo and the winches."""
+"""Checks the section `tensions` and puts its block between a servo and the winches."""
 
 from __future__ import annotations
 
@@ -11,20 +11,12 @@ from pydrake.systems.framework import DiagramBuilder, OutputPort, System
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import ScenarioError, TensionProblemError
-from cdpr_drake.geometry import CableSet
-from cdpr_drake.models import Robot, load_camera
-from cdpr_drake.servoing import BelievedRobot
-from cdpr_drake.systems.cameras import CableCamera
-from cdpr_drake.systems.robots import RobotBlock
-from cdpr_drake.systems.scenarios import VisualServoSettings
-from cdpr_drake.systems.sensors import SensorReadings
-from cdpr_drake.systems.tension_control import (
-    ADAPTIVE,
-    BY_LENGTH,
-    CONSTANT,
-    DISTRIBUTION,
-    IMAGE,
-    POLYGON,
+from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.models.camera_catalogue import load_camera
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.servoing.servo_task import BelievedRobot
+from cdpr_drake.systems.cameras.cable_camera import CableCamera
+from cdpr_drake.systems.controllers.correction_laws import (
     AdaptiveGain,
     ConstantThreshold,
     CorrectionLaw,
@@ -33,15 +25,26 @@ from cdpr_drake.systems.tension_control import (
     InsidePolygon,
     LengthThreshold,
     SeenSlackRate,
-    TensionCorrector,
+)
+from cdpr_drake.systems.controllers.tension_corrector import TensionCorrector
+from cdpr_drake.systems.controllers.tension_management_settings import (
+    ADAPTIVE,
+    BY_LENGTH,
+    CONSTANT,
+    DISTRIBUTION,
+    IMAGE,
+    POLYGON,
     TensionManagement,
 )
-from cdpr_drake.tension_management import TensionFollower
-from cdpr_drake.tensions import method_for
-from cdpr_drake.vision import Pinhole
+from cdpr_drake.systems.robots.assembly import RobotBlock
+from cdpr_drake.systems.scenarios.visual_servo_scenario import VisualServoSettings
+from cdpr_drake.systems.sensors.sensor_readings import SensorReadings
+from cdpr_drake.tensions.methods import method_for
+from cdpr_drake.tensions.slack_correction import TensionFollower
+from cdpr_drake.vision.pinhole import Pinhole
 
 if TYPE_CHECKING:
-    from cdpr_drake.systems.scenarios import Scenario
+    from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
 
 SEEN_POINTS = 15
 """Points of each cable that are looked for in an image."""

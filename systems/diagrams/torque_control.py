@@ -11,25 +11,25 @@ import numpy as np
 from pydrake.systems.framework import DiagramBuilder, System
 from pydrake.systems.primitives import MatrixGain
 
-from cdpr_drake.control import TorqueServoLaw
+from cdpr_drake.control.torque_law import TorqueServoLaw
 from cdpr_drake.errors import Problems, ScenarioError, TensionProblemError
-from cdpr_drake.geometry import cable_paths
-from cdpr_drake.models import Robot, load_robot, tension_problem
-from cdpr_drake.numerics import explicit_integrators
-from cdpr_drake.servoing import BelievedRobot
-from cdpr_drake.systems.robots import SEMI_IMPLICIT, RobotBlock
-from cdpr_drake.systems.scenarios import VisualServoSettings
-from cdpr_drake.systems.sensors import SensorReadings
-from cdpr_drake.systems.tension_control import (
-    SMALLEST_SLACK,
-    TorqueControl,
-    TorqueController,
-    platform_dynamics,
-)
-from cdpr_drake.tensions import method_for
+from cdpr_drake.geometry.cable_paths import cable_paths
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.models.robot_statics import tension_problem
+from cdpr_drake.numerics.explicit_integration import explicit_integrators
+from cdpr_drake.servoing.servo_task import BelievedRobot
+from cdpr_drake.systems.controllers.computed_torque import platform_dynamics
+from cdpr_drake.systems.controllers.torque_controller import TorqueController
+from cdpr_drake.systems.controllers.torque_settings import SMALLEST_SLACK, TorqueControl
+from cdpr_drake.systems.robots.assembly import RobotBlock
+from cdpr_drake.systems.robots.cable_robot import SEMI_IMPLICIT
+from cdpr_drake.systems.scenarios.visual_servo_scenario import VisualServoSettings
+from cdpr_drake.systems.sensors.sensor_readings import SensorReadings
+from cdpr_drake.tensions.methods import method_for
 
 if TYPE_CHECKING:
-    from cdpr_drake.systems.scenarios import Scenario
+    from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
 
 TORQUE = "torque"
 """The mode of winches that this is about."""

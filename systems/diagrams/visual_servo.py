@@ -11,8 +11,10 @@ from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import ScenarioError
-from cdpr_drake.models import Robot, load_robot
-from cdpr_drake.systems.cameras import RegionCamera
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.systems.cameras.region_camera import RegionCamera
+from cdpr_drake.systems.controllers.torque_settings import TorqueControl
 from cdpr_drake.systems.diagrams.camera import scene_adder
 from cdpr_drake.systems.diagrams.servo_blocks import VisualServoBlocks, add_visual_servo
 from cdpr_drake.systems.diagrams.servo_models import ServoModel
@@ -22,20 +24,20 @@ from cdpr_drake.systems.diagrams.servo_watches import (
     add_servo_watches,
     add_stability_watch,
 )
-from cdpr_drake.systems.monitoring import BreakingLoadWatch, RunLog, RunMonitor, TensionRange
-from cdpr_drake.systems.perception import LookingSensors, add_looking_sensors
-from cdpr_drake.systems.remote import Remote, RemoteServo
-from cdpr_drake.systems.robots import (
-    COMPILED,
-    STEP_SHARE,
-    CableRobot,
-    CompiledCableRobot,
-    StepRule,
-    automatic_step,
-)
-from cdpr_drake.systems.scenarios import VISUAL_SERVO, Scenario
-from cdpr_drake.systems.tension_control import TorqueControl
-from cdpr_drake.systems.worlds import WorldInScene, WorldMeters, contact_law, contact_step
+from cdpr_drake.systems.monitoring.log_row import RunLog
+from cdpr_drake.systems.monitoring.run_monitor import RunMonitor
+from cdpr_drake.systems.monitoring.tension_watch import BreakingLoadWatch, TensionRange
+from cdpr_drake.systems.remote.remote_place import Remote
+from cdpr_drake.systems.remote.remote_servo import RemoteServo
+from cdpr_drake.systems.robots.cable_robot import STEP_SHARE, CableRobot, automatic_step
+from cdpr_drake.systems.robots.compiled_cable_robot import CompiledCableRobot
+from cdpr_drake.systems.robots.compiled_step import StepRule
+from cdpr_drake.systems.robots.settings import COMPILED
+from cdpr_drake.systems.scenarios.files import VISUAL_SERVO
+from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
+from cdpr_drake.systems.sensors.perception_sensors import LookingSensors, add_looking_sensors
+from cdpr_drake.systems.worlds.adding import WorldInScene, WorldMeters
+from cdpr_drake.systems.worlds.contact import contact_law, contact_step
 
 WATCH_PERIOD = 1e-3
 """Time between looks for broken cables at a robot that the compiled engine moves [s]; a plant's are

@@ -8,14 +8,15 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.estimation import EXTERNAL, ON_BOARD, Calibration, Prior
-from cdpr_drake.models import DepthSensorModel, InertialSensorModel
-from cdpr_drake.systems.estimators.encoder_lengths import EncoderLengths
+from cdpr_drake.estimation.camera_miscalibration import Calibration
+from cdpr_drake.estimation.sensor_filter import EXTERNAL, ON_BOARD, Prior
+from cdpr_drake.models.sensor_catalogue import DepthSensorModel, InertialSensorModel
+from cdpr_drake.systems.estimators.length_estimator import EncoderLengths
 from cdpr_drake.systems.estimators.sensor_fusion_settings import (
     CalibrationDoubt,
     SensorFusionSettings,
 )
-from cdpr_drake.vision import Pinhole
+from cdpr_drake.vision.pinhole import Pinhole
 
 SUREST_DEPTH = 1e-5
 """No depth is trusted further than this standard deviation [m]."""

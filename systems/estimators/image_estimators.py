@@ -9,7 +9,11 @@ from pydrake.common.value import Value
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.estimation import object_from_pose, pose_from_images, pose_from_object
+from cdpr_drake.estimation.pose_from_images import (
+    object_from_pose,
+    pose_from_images,
+    pose_from_object,
+)
 from cdpr_drake.systems.estimators.pose_estimator import (
     KnownTag,
     PoseEstimator,

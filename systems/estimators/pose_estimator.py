@@ -13,7 +13,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.framework import Context, DiscreteValues, LeafSystem, ValueProducer
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.estimation import pose_from_object
+from cdpr_drake.estimation.pose_from_images import pose_from_object
 
 NOW = 1e-9
 """Times that differ by less are the same instant [s]."""

@@ -10,7 +10,7 @@ from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.estimation import (
+from cdpr_drake.estimation.pose_filter import (
     LENGTHS,
     PoseBelief,
     error_size,
@@ -21,9 +21,9 @@ from cdpr_drake.estimation import (
     update_known_object,
     update_lengths,
 )
-from cdpr_drake.geometry import cable_paths
-from cdpr_drake.spatial import exponential
-from cdpr_drake.systems.estimators.encoder_lengths import EncoderLengths
+from cdpr_drake.geometry.cable_paths import cable_paths
+from cdpr_drake.geometry.poses import exponential
+from cdpr_drake.systems.estimators.length_estimator import EncoderLengths
 from cdpr_drake.systems.estimators.pose_estimator import PoseEstimator, Read, pack_pose, unpack_pose
 from cdpr_drake.systems.estimators.tuning import FusionSettings
 

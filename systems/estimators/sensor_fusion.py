@@ -11,47 +11,44 @@ from pydrake.math import RigidTransform
 from pydrake.systems.framework import BasicVector, Context
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.estimation import (
-    ACCEPTED,
+from cdpr_drake.estimation.camera_miscalibration import Answer, answers, judged, mixed
+from cdpr_drake.estimation.pose_filter import image_covariance
+from cdpr_drake.estimation.sensor_filter import (
     COUNTED,
     EXTERNAL,
-    NOTHING,
     ON_BOARD,
-    REJECTED,
-    USED,
-    Answer,
     FusedBelief,
-    Gates,
-    Look,
-    answers,
     correct,
     drift_lengths,
-    image_covariance,
-    image_innovation,
-    judged,
     know_object,
-    length_innovation,
-    mixed,
-    motion_between,
     move,
     move_inertially,
-    object_of_image,
     remember_pose,
+    start_fusion,
+)
+from cdpr_drake.estimation.sensor_models import (
+    Look,
+    image_innovation,
+    length_innovation,
+    motion_between,
+    object_of_image,
     sight_external,
     sight_on_board,
-    start_fusion,
+    velocity_innovation,
+)
+from cdpr_drake.estimation.source_gates import (
+    ACCEPTED,
+    NOTHING,
+    REJECTED,
+    USED,
+    Gates,
     take_depths,
     take_image,
     take_lengths,
-    velocity_innovation,
 )
-from cdpr_drake.geometry import cable_paths
-from cdpr_drake.spatial import exponential
-from cdpr_drake.systems.estimators.fusion_task import (
-    FusionTask,
-    inertial_variances,
-    spread,
-)
+from cdpr_drake.geometry.cable_paths import cable_paths
+from cdpr_drake.geometry.poses import exponential
+from cdpr_drake.systems.estimators.fusion_task import FusionTask, inertial_variances, spread
 from cdpr_drake.systems.estimators.pose_estimator import PoseEstimator, Read, pack_pose, unpack_pose
 
 SOURCES = ("on_board", "external", "lengths", "on_board_depth", "external_depth")
@@ -106,7 +103,8 @@ class SensorFusion(PoseEstimator):
     to be out of calibration, which is then found anew with what the others say.
 
     Where a camera's calibration is doubted, poses are means over all answers to which cameras are
-    worse than told, and covariances have what these differ by, see `estimation.calibration_doubt`.
+    worse than told, and covariances have what these differ by, see
+    `estimation.camera_miscalibration`.
     """
 
     def __init__(self, task: FusionTask) -> None:

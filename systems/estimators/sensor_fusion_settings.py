@@ -5,8 +5,8 @@ Drake's YAML loader reads the annotations themselves, so they are not postponed 
 
 from dataclasses import dataclass
 
-from cdpr_drake.models import depth_sensor_names
-from cdpr_drake.schema import number, optional_section, switch, text
+from cdpr_drake.models.sensor_catalogue import depth_sensor_names
+from cdpr_drake.schema.fields import number, optional_section, switch, text
 
 
 @dataclass(kw_only=True)

@@ -5,9 +5,10 @@ Drake's YAML loader reads the annotations themselves, so they are not postponed 
 
 from dataclasses import dataclass
 
-from cdpr_drake.models import CameraFault, Pose
-from cdpr_drake.schema import FASTEST, number, optional_section, section, switch, text, whole
-from cdpr_drake.vision import TAG_COUNT, TagTarget
+from cdpr_drake.models.camera_catalogue import CameraFault
+from cdpr_drake.models.robot_schema import Pose
+from cdpr_drake.schema.fields import FASTEST, number, optional_section, section, switch, text, whole
+from cdpr_drake.vision.apriltags import TAG_COUNT, TagTarget
 
 
 @dataclass(kw_only=True)

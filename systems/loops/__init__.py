@@ -7,21 +7,6 @@ chooses. `MotorTracking` tracks a trajectory by motors, and
 `RemoteTensionLoop` steps dynamic control that a process outside closes.
 """
 
-from cdpr_drake.systems.loops.loop_choice import (
-    check_loop,
-    is_looped,
-    looped,
-    why_diagram,
-    with_loop,
-)
-from cdpr_drake.systems.loops.loop_log import LoopLog
-from cdpr_drake.systems.loops.motor_tracking import MotorTracking, TrackingSettings
-from cdpr_drake.systems.loops.remote_tension_loop import RemoteTensionLoop, can_be_stepped
-from cdpr_drake.systems.loops.robot_motion import RobotMotion
-from cdpr_drake.systems.loops.servo_loop import ServoLoop
+import lazy_loader
 
-__all__ = [
-    "LoopLog", "MotorTracking", "RemoteTensionLoop", "RobotMotion", "ServoLoop",
-    "TrackingSettings", "can_be_stepped", "check_loop",
-    "is_looped", "looped", "why_diagram", "with_loop",
-]  # fmt: skip
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

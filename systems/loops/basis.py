@@ -8,11 +8,13 @@ from functools import lru_cache
 from pathlib import Path
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.models import Robot, load_robot, robot_file
-from cdpr_drake.systems.diagrams import integration_step, servo_model
+from cdpr_drake.models.robot_loader import load_robot, robot_file
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.systems.diagrams.servo_models import servo_model
+from cdpr_drake.systems.diagrams.visual_servo import integration_step
 from cdpr_drake.systems.loops.robot_motion import RobotMotion
-from cdpr_drake.systems.robots import StepRule
-from cdpr_drake.systems.scenarios import Scenario
+from cdpr_drake.systems.robots.compiled_step import StepRule
+from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
 
 
 @dataclass(frozen=True, eq=False)

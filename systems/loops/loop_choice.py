@@ -6,22 +6,23 @@ from dataclasses import fields, replace
 from typing import Any
 
 from cdpr_drake.errors import ScenarioError
-from cdpr_drake.models import load_robot
-from cdpr_drake.systems.cameras import PROJECTED
-from cdpr_drake.systems.diagrams import Addition, servo_model
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.systems.cameras.camera_settings import PROJECTED
+from cdpr_drake.systems.controllers.tension_management_settings import IMAGE
+from cdpr_drake.systems.diagrams.servo_models import servo_model
+from cdpr_drake.systems.diagrams.visual_servo import Addition
 from cdpr_drake.systems.loops.basis import loop_basis
 from cdpr_drake.systems.loops.parts import checked_estimator, checked_sensor
-from cdpr_drake.systems.robots import AUTOMATIC, COMPILED, PLANT
-from cdpr_drake.systems.scenarios import (
+from cdpr_drake.systems.robots.settings import AUTOMATIC, COMPILED, PLANT
+from cdpr_drake.systems.scenarios.run_settings import (
     DIAGRAM,
     AnyScenario,
-    Scenario,
     has_contact,
     why_many_steps,
     with_engine,
 )
-from cdpr_drake.systems.sensors import SENSORS
-from cdpr_drake.systems.tension_control import IMAGE
+from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
+from cdpr_drake.systems.sensors.sensor_kinds import SENSORS
 
 
 def why_diagram(scenario: Any) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.spatial import pose_rows_of
+from cdpr_drake.geometry.poses import pose_rows_of
 
 FIRST_ROWS = 512
 """Rows for which there is room at the start."""

@@ -8,16 +8,23 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables import cable_motions
-from cdpr_drake.control import TaskGains, tracking_wrench_at, winch_torque
-from cdpr_drake.models import Robot
-from cdpr_drake.spatial import pose_row
-from cdpr_drake.systems.diagrams import TensionControlSettings, build_tension_control
+from cdpr_drake.cables.commanded_tension_kernel import cable_motions
+from cdpr_drake.control.task_space import TaskGains, tracking_wrench_at
+from cdpr_drake.control.tension_controller_kernel import winch_torque
+from cdpr_drake.geometry.poses import pose_row
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.systems.controllers.computed_torque import platform_dynamics
+from cdpr_drake.systems.controllers.torque_settings import TorqueControl
+from cdpr_drake.systems.diagrams.tension_control import (
+    TensionControlSettings,
+    build_tension_control,
+)
 from cdpr_drake.systems.loops.robot_motion import DRUM_TENSIONS, LENGTHS, TENSIONS, RobotMotion
-from cdpr_drake.systems.robots import CableRobotSettings, StepRule
-from cdpr_drake.systems.tension_control import TorqueControl, platform_dynamics
-from cdpr_drake.tensions import FEASIBLE, update_tensions_at
-from cdpr_drake.trajectories import MOTION_SIZE, PoseTrajectory
+from cdpr_drake.systems.robots.compiled_step import StepRule
+from cdpr_drake.systems.robots.settings import CableRobotSettings
+from cdpr_drake.tensions.control_step_kernel import update_tensions_at
+from cdpr_drake.tensions.quadratic_program_kernel import FEASIBLE
+from cdpr_drake.trajectories.pose_trajectory import MOTION_SIZE, PoseTrajectory
 
 
 @dataclass(frozen=True, kw_only=True)

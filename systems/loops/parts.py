@@ -10,17 +10,14 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import ScenarioError
-from cdpr_drake.models import Robot
-from cdpr_drake.systems.cameras import ProjectedCamera
-from cdpr_drake.systems.estimators import (
-    ESTIMATORS,
-    EstimatorTask,
-    MeasuredPose,
-    PoseEstimator,
-    ShiftedPose,
-)
-from cdpr_drake.systems.scenarios import Scenario
-from cdpr_drake.systems.sensors import SampledSensor, make_sensor
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.systems.cameras.projected_camera import ProjectedCamera
+from cdpr_drake.systems.estimators.basic_estimators import MeasuredPose, ShiftedPose
+from cdpr_drake.systems.estimators.estimator_kinds import ESTIMATORS, EstimatorTask
+from cdpr_drake.systems.estimators.pose_estimator import PoseEstimator
+from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
+from cdpr_drake.systems.sensors.sampled_sensor import SampledSensor
+from cdpr_drake.systems.sensors.sensor_readings import make_sensor
 
 Read = Callable[[str], Any]
 """Gives what stands at an input, by its name."""

@@ -6,12 +6,13 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables import cable_motions
-from cdpr_drake.control import tracking_wrench_at
-from cdpr_drake.dynamics import (
+from cdpr_drake.cables.commanded_tension_kernel import cable_motions
+from cdpr_drake.control.task_space import tracking_wrench_at
+from cdpr_drake.dynamics.reach_kernel import robot_addresses
+from cdpr_drake.dynamics.robot_kernel import GOOD
+from cdpr_drake.dynamics.tracking_kernel import (
     ACTS,
     ENDS,
-    GOOD,
     LOGS,
     MET,
     MISSED,
@@ -19,19 +20,21 @@ from cdpr_drake.dynamics import (
     STEPS,
     TIME,
     due,
-    robot_addresses,
     start_tracking,
     track_on,
 )
 from cdpr_drake.errors import CdprError
-from cdpr_drake.models import pose_from_state
-from cdpr_drake.numerics import array_addresses
-from cdpr_drake.spatial import pose_error, pose_from_row
-from cdpr_drake.systems.diagrams import TensionControl, TensionRows
-from cdpr_drake.systems.remote import TRAJECTORY, RemoteDistributor, RemoteTracking
-from cdpr_drake.systems.robots import PackedRule, motion_problem
-from cdpr_drake.tensions import FEASIBLE, update_tensions_at
-from cdpr_drake.trajectories import MOTION_SIZE
+from cdpr_drake.geometry.poses import pose_error, pose_from_row
+from cdpr_drake.models.robot_in_plant import pose_from_state
+from cdpr_drake.numerics.kernel_calls import array_addresses
+from cdpr_drake.systems.diagrams.tension_control import TensionControl
+from cdpr_drake.systems.diagrams.tension_loop import TensionRows
+from cdpr_drake.systems.remote.remote_place import TRAJECTORY
+from cdpr_drake.systems.remote.remote_tensions import RemoteDistributor, RemoteTracking
+from cdpr_drake.systems.robots.compiled_step import PackedRule, motion_problem
+from cdpr_drake.tensions.control_step_kernel import update_tensions_at
+from cdpr_drake.tensions.quadratic_program_kernel import FEASIBLE
+from cdpr_drake.trajectories.pose_trajectory import MOTION_SIZE
 
 NEVER = -1.0
 """A time before all others [s]."""

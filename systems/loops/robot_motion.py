@@ -6,30 +6,29 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables import CABLE_MODELS, OUTPUTS, make_room, outputs_kernel
-from cdpr_drake.dynamics import (
-    GOOD,
-    MOTORS,
-    REPORTED,
-    fresh_memory,
-    ideal_rates,
-    pack_robot,
-    robot_addresses,
-)
-from cdpr_drake.geometry import cable_paths
-from cdpr_drake.models import Robot, pose_on_joint, rigid_platform
+from cdpr_drake.cables.models import CABLE_MODELS
+from cdpr_drake.cables.simulation_kernel import OUTPUTS, make_room, outputs_kernel
+from cdpr_drake.dynamics.advance_kernel import REPORTED
+from cdpr_drake.dynamics.reach_kernel import fresh_memory, robot_addresses
+from cdpr_drake.dynamics.robot_arrays import MOTORS, pack_robot
+from cdpr_drake.dynamics.robot_kernel import GOOD, ideal_rates
+from cdpr_drake.geometry.cable_paths import cable_paths
+from cdpr_drake.models.robot_in_plant import pose_on_joint
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.models.robot_statics import rigid_platform
 from cdpr_drake.systems.loops.loop_state import Part, held
-from cdpr_drake.systems.robots import (
-    CableRobotSettings,
+from cdpr_drake.systems.robots.assembly import held_start
+from cdpr_drake.systems.robots.cable_forces import simulated_cables
+from cdpr_drake.systems.robots.compiled_cable_robot import winch_drive
+from cdpr_drake.systems.robots.compiled_step import (
     PackedRule,
     StepRule,
-    held_start,
     motion_problem,
     resting_state,
-    simulated_cables,
-    winch_drive,
 )
-from cdpr_drake.winches import MODES, pack_winch, winch_torques
+from cdpr_drake.systems.robots.settings import CableRobotSettings
+from cdpr_drake.winches.motor import MODES
+from cdpr_drake.winches.motor_kernel import pack_winch, winch_torques
 
 TENSIONS, DRUM_TENSIONS, LENGTHS, SLACK, SURPLUS = range(5)
 """Rows of `RobotMotion.cables`, in the order of `cables.model_outputs`."""

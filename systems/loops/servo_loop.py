@@ -10,25 +10,22 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.models import Robot
-from cdpr_drake.systems.diagrams import (
-    LOGGED_OF_CABLES,
-    LoopServo,
-    known_tag_camera,
-    make_corrector,
-    make_monitor,
-    projected_camera,
-    servo_model,
-    winch_offsets,
-)
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.systems.diagrams.beliefs import winch_offsets
+from cdpr_drake.systems.diagrams.camera import projected_camera
+from cdpr_drake.systems.diagrams.estimators import known_tag_camera
+from cdpr_drake.systems.diagrams.servo_models import LoopServo, servo_model
+from cdpr_drake.systems.diagrams.servo_watches import LOGGED_OF_CABLES, make_monitor
+from cdpr_drake.systems.diagrams.tension_management import make_corrector
 from cdpr_drake.systems.loops.basis import loop_basis
-from cdpr_drake.systems.loops.clock import Clock, first_time
 from cdpr_drake.systems.loops.loop_log import LoopLog, RowOf
 from cdpr_drake.systems.loops.loop_state import (
+    Clock,
     Part,
     arrays_of,
     attribute,
     entry,
+    first_time,
     restore_arrays,
 )
 from cdpr_drake.systems.loops.parts import (
@@ -40,10 +37,11 @@ from cdpr_drake.systems.loops.parts import (
     checked_sensor,
 )
 from cdpr_drake.systems.loops.robot_motion import LENGTHS, SLACK, SURPLUS, TENSIONS, RobotMotion
-from cdpr_drake.systems.monitoring import NOT_YET, Outcome
-from cdpr_drake.systems.robots import StepRule
-from cdpr_drake.systems.scenarios import Scenario
-from cdpr_drake.systems.sensors import SENSORS, check_rate
+from cdpr_drake.systems.monitoring.run_monitor import NOT_YET, Outcome
+from cdpr_drake.systems.robots.compiled_step import StepRule
+from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
+from cdpr_drake.systems.sensors.sensor_kinds import SENSORS
+from cdpr_drake.systems.sensors.sensor_readings import check_rate
 
 _ROWS = {"tensions": TENSIONS, "lengths": LENGTHS, "slack": SLACK, "surplus_lengths": SURPLUS}
 

@@ -20,7 +20,7 @@ from pydrake.systems.framework import (
 from pydrake.systems.primitives import LogVectorOutput, Multiplexer, VectorLogSink
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.spatial import pose_row
+from cdpr_drake.geometry.poses import pose_row
 
 POSE_SIZE = 7
 """Numbers of a pose in a row: qw, qx, qy, qz with qw not negative, x, y, z [-, m]."""

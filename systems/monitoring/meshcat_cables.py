@@ -12,10 +12,11 @@ from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.framework import Context, LeafSystem
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables import ELASTIC, cable_curves, slack_tensions
-from cdpr_drake.models import Robot
+from cdpr_drake.cables.curves import cable_curves
+from cdpr_drake.cables.models import ELASTIC, slack_tensions
+from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.palette import SLACK, TENSIONS, UNKNOWN, rgb
-from cdpr_drake.systems.robots import CableSettings
+from cdpr_drake.systems.robots.settings import CableSettings
 
 SLACK_COLOR = Rgba(*rgb(SLACK))
 

@@ -14,8 +14,8 @@ from pydrake.math import RigidTransform
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, EventStatus, LeafSystem
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.features import seen_pose_error
-from cdpr_drake.spatial import place_error
+from cdpr_drake.geometry.poses import place_error
+from cdpr_drake.servoing.pose_features import seen_pose_error
 
 NOT_YET = (-1.0, -1.0)
 """Times since when the pose is reached and the target lost, where neither is [s]."""

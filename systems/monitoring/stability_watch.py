@@ -1,6 +1,9 @@
-"""The stability criterion at moments of a servo, with the cables that are slack left out."""
+"""The stability criterion at moments of a servo, with the cables that are slack left out.
 
-from __future__ import annotations
+Scenario section `stability`: the stability criterion along a run, as signals of its log.
+
+Drake's YAML loader reads the annotations themselves, so they are not postponed here.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,12 +15,15 @@ from pydrake.systems.framework import BasicVector, CacheEntry, Context, LeafSyst
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CableGeometryError
-from cdpr_drake.features import VisualFeatures
-from cdpr_drake.geometry import PLANAR_ROWS, CableSet, cable_jacobian
-from cdpr_drake.servoing import BelievedRobot
-from cdpr_drake.stability import ModelAtPose, stability_margin, stability_matrix
-from cdpr_drake.systems.servos import ideal_sighting
-from cdpr_drake.vision import Target
+from cdpr_drake.geometry.cable_paths import cable_jacobian
+from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.geometry.straight_cables import PLANAR_ROWS
+from cdpr_drake.schema.fields import number
+from cdpr_drake.servoing.servo_task import BelievedRobot
+from cdpr_drake.servoing.visual_features import VisualFeatures
+from cdpr_drake.stability.criterion import ModelAtPose, stability_margin, stability_matrix
+from cdpr_drake.systems.controllers.schemes import ideal_sighting
+from cdpr_drake.vision.target import Target
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -156,3 +162,15 @@ class StabilityWatch(LeafSystem):
         except CableGeometryError:
             return np.array([count, 0.0, np.nan])
         return np.array([count, float(rank), margin])
+
+
+@dataclass(kw_only=True)
+class StabilitySettings:
+    """Logs how many cables pull, the rank of their Jacobian, and the criterion's margin."""
+
+    threshold: float | None = number(
+        "Tension from which a cable counts as taut; null: one that is not slack.",
+        "N",
+        None,
+        at_least=0.0,
+    )

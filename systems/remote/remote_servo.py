@@ -9,14 +9,14 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.geometry import cable_rates_from_platform_twist
-from cdpr_drake.models import Robot
-from cdpr_drake.servoing import ServoController
-from cdpr_drake.spatial import pose_row
-from cdpr_drake.systems.remote.ports import TWIST, servo_ports
-from cdpr_drake.systems.remote.remote import Remote
-from cdpr_drake.systems.servos import FeatureServo
-from cdpr_drake.vision import Pinhole, Target
+from cdpr_drake.geometry.cable_rates import cable_rates_from_platform_twist
+from cdpr_drake.geometry.poses import pose_row
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.servoing.controller import ServoController
+from cdpr_drake.systems.controllers.feature_servo import FeatureServo
+from cdpr_drake.systems.remote.remote_place import TWIST, Remote, servo_ports
+from cdpr_drake.vision.pinhole import Pinhole
+from cdpr_drake.vision.target import Target
 
 
 class RemoteServo(FeatureServo):

@@ -11,15 +11,23 @@ from pydrake.common.value import AbstractValue
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.control import TaskGains, floating_wrench, planar_wrench
+from cdpr_drake.control.task_space import TaskGains, floating_wrench, planar_wrench
 from cdpr_drake.errors import ClientEndedError
-from cdpr_drake.geometry import gravity_wrench
-from cdpr_drake.models import Robot, RobotInPlant, pose_from_state
-from cdpr_drake.spatial import pose_from_row, pose_row
-from cdpr_drake.systems.remote.ports import CONTROLLER, DISTRIBUTOR, TRAJECTORY, tension_ports
-from cdpr_drake.systems.remote.remote import Read, Remote
-from cdpr_drake.systems.tension_control import PoseTracking, TensionDistributor, platform_dynamics
-from cdpr_drake.trajectories import MOTION_SIZE, PoseTrajectory, write_motion
+from cdpr_drake.geometry.poses import pose_from_row, pose_row
+from cdpr_drake.geometry.straight_cables import gravity_wrench
+from cdpr_drake.models.robot_in_plant import RobotInPlant, pose_from_state
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.systems.controllers.computed_torque import PoseTracking, platform_dynamics
+from cdpr_drake.systems.controllers.tension_distributor import TensionDistributor
+from cdpr_drake.systems.remote.remote_place import (
+    CONTROLLER,
+    DISTRIBUTOR,
+    TRAJECTORY,
+    Read,
+    Remote,
+    tension_ports,
+)
+from cdpr_drake.trajectories.pose_trajectory import MOTION_SIZE, PoseTrajectory, write_motion
 
 LEAST_NORM = 1e-6
 """Of a quaternion that is scaled to norm 1, and the inverse of the largest one."""

@@ -7,12 +7,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
-from cdpr_drake.bridge import shown, vector
 from cdpr_drake.errors import BridgeError
-from cdpr_drake.geometry import CableSet
-from cdpr_drake.models import Robot, tension_problem
-from cdpr_drake.spatial import pose_from_row
-from cdpr_drake.tensions import distribute
+from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.geometry.poses import pose_from_row
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.models.robot_statics import tension_problem
+from cdpr_drake.systems.remote.messages import shown, vector
+from cdpr_drake.tensions.methods import distribute
 
 UNIT = 1e-6
 """How far the norm of a quaternion may be from 1: single precision has passed."""
@@ -30,7 +31,7 @@ def tension_service(
     method: str,
     cables: CableSet | None = None,
 ) -> Callable[[Mapping[str, Any]], dict[str, Any]]:
-    """What answers the request "distribute" of `cdpr_drake.bridge`.
+    """What answers the request "distribute" of `cdpr_drake.systems.remote`.
 
     Args:
         robot: The robot.

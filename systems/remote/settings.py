@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from cdpr_drake.bridge import Pace
 from cdpr_drake.errors import ScenarioError
-from cdpr_drake.models import Robot
-from cdpr_drake.schema import number, text
-from cdpr_drake.systems.remote.ports import SERVO_PLACES, TENSION_PLACES, TWIST
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.schema.fields import number, text
+from cdpr_drake.systems.remote.remote_driver import Pace
+from cdpr_drake.systems.remote.remote_place import SERVO_PLACES, TENSION_PLACES, TWIST
 
 PLACES = (*TENSION_PLACES, *SERVO_PLACES)
 

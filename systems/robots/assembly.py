@@ -13,19 +13,13 @@ from pydrake.systems.framework import Context, DiagramBuilder, InputPort, Output
 from pydrake.systems.primitives import Adder, Demultiplexer
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.geometry import CableSet, cable_paths
-from cdpr_drake.models import (
-    Robot,
-    RobotInPlant,
-    add_frame,
-    add_ground,
-    add_robot,
-    check_bundles,
-    hold_robot,
-    rest_as_long,
-    rest_with_slack,
-)
-from cdpr_drake.statics import Holding
+from cdpr_drake.geometry.cable_paths import cable_paths
+from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.models.robot_holding import check_bundles, hold_robot, rest_as_long, rest_with_slack
+from cdpr_drake.models.robot_in_plant import RobotInPlant, add_robot
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.models.scene import add_frame, add_ground
+from cdpr_drake.statics.static_tensions import Holding
 from cdpr_drake.systems.robots.cable_forces import PORTS, CableForces
 from cdpr_drake.systems.robots.platform_pose import PlatformPose
 from cdpr_drake.systems.robots.settings import CableRobotSettings

@@ -14,26 +14,26 @@ from pydrake.systems.framework import BasicVector, Context, InputPortIndex, Leaf
 from pydrake.systems.scalar_conversion import TemplateSystem
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables import (
-    CABLE_MODELS,
-    KELVIN_VOIGT,
-    OUTPUTS,
-    STRAIGHT,
-    check_model,
-    floating_force,
-    line_force,
-    make_room,
-    model_force,
-    model_force_and_drums,
+from cdpr_drake.cables.dispatch_kernel import STRAIGHT
+from cdpr_drake.cables.models import CABLE_MODELS, KELVIN_VOIGT, check_model
+from cdpr_drake.cables.simulation_autodiff import (
     model_force_and_drums_array,
     model_force_array,
     model_outputs_array,
-    outputs_kernel,
-    planar_force,
 )
+from cdpr_drake.cables.simulation_kernel import (
+    OUTPUTS,
+    make_room,
+    model_force,
+    model_force_and_drums,
+    outputs_kernel,
+)
+from cdpr_drake.cables.straight_kernel import floating_force, line_force, planar_force
 from cdpr_drake.errors import CableGeometryError, CableModelError
-from cdpr_drake.geometry import CableSet, PlatformJoint, impossible_cable
-from cdpr_drake.models import RobotInPlant, pose_on_joint
+from cdpr_drake.geometry.cable_paths import impossible_cable
+from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.geometry.platform_joint import PlatformJoint
+from cdpr_drake.models.robot_in_plant import RobotInPlant, pose_on_joint
 from cdpr_drake.systems.robots.templates import class_for_floats
 
 PULLS = ("tensions", "drum_tensions", "slack")

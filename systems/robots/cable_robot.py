@@ -12,16 +12,14 @@ from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables import ELASTIC, cable_stiffness_matrix
+from cdpr_drake.cables.elastic_law import cable_stiffness_matrix
+from cdpr_drake.cables.models import ELASTIC
 from cdpr_drake.errors import InfeasibleTensionError
-from cdpr_drake.geometry import cable_paths
-from cdpr_drake.models import (
-    Robot,
-    RobotInPlant,
-    platform_inertia,
-    tension_problem,
-)
-from cdpr_drake.numerics import largest_stable_step, vibration_eigenvalues
+from cdpr_drake.geometry.cable_paths import cable_paths
+from cdpr_drake.models.robot_in_plant import RobotInPlant, platform_inertia
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.models.robot_statics import tension_problem
+from cdpr_drake.numerics.explicit_integration import largest_stable_step, vibration_eigenvalues
 from cdpr_drake.systems.robots.assembly import (
     SceneAdder,
     add_cable_robot,
@@ -31,8 +29,8 @@ from cdpr_drake.systems.robots.assembly import (
 )
 from cdpr_drake.systems.robots.cable_forces import CableForces
 from cdpr_drake.systems.robots.settings import CableRobotSettings
-from cdpr_drake.tensions import exact_tensions
-from cdpr_drake.winches import MODES
+from cdpr_drake.tensions.methods import exact_tensions
+from cdpr_drake.winches.motor import MODES
 
 STEP_SHARE = 0.8
 """Share of the largest stable step that an automatic step takes; stiffness changes on the way."""

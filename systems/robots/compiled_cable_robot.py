@@ -8,14 +8,12 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables import CABLE_MODELS, KELVIN_VOIGT
-from cdpr_drake.dynamics import IDEAL, MOTORS, TENSIONS, Drive
+from cdpr_drake.cables.models import CABLE_MODELS, KELVIN_VOIGT
+from cdpr_drake.dynamics.robot_arrays import IDEAL, MOTORS, TENSIONS, Drive
 from cdpr_drake.errors import CdprError
-from cdpr_drake.geometry import CableSet
-from cdpr_drake.models import (
-    Robot,
-    RobotInPlant,
-)
+from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.models.robot_in_plant import RobotInPlant
+from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.systems.robots.assembly import SceneAdder, fill_scene, held_start
 from cdpr_drake.systems.robots.cable_forces import simulated_cables
 from cdpr_drake.systems.robots.compiled_motion import MEMORY, CompiledMotion

@@ -18,23 +18,18 @@ from pydrake.systems.framework import (
 )
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables import CABLE_MODELS, OUTPUTS, cable_motions, make_room, outputs_kernel
-from cdpr_drake.dynamics import (
-    BACKWARD,
-    GOOD,
-    MOTORS,
-    REPORTED,
-    TENSIONS,
-    Drive,
-    RobotArrays,
-    fresh_memory,
-    ideal_rates,
-    pack_robot,
-    robot_addresses,
-    robot_energy,
-)
-from cdpr_drake.geometry import CableSet, cable_paths
-from cdpr_drake.models import Robot, pose_on_joint, rigid_platform
+from cdpr_drake.cables.commanded_tension_kernel import cable_motions
+from cdpr_drake.cables.models import CABLE_MODELS
+from cdpr_drake.cables.simulation_kernel import OUTPUTS, make_room, outputs_kernel
+from cdpr_drake.dynamics.advance_kernel import REPORTED, robot_energy
+from cdpr_drake.dynamics.reach_kernel import BACKWARD, fresh_memory, robot_addresses
+from cdpr_drake.dynamics.robot_arrays import MOTORS, TENSIONS, Drive, RobotArrays, pack_robot
+from cdpr_drake.dynamics.robot_kernel import GOOD, ideal_rates
+from cdpr_drake.geometry.cable_paths import cable_paths
+from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.models.robot_in_plant import pose_on_joint
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.models.robot_statics import rigid_platform
 from cdpr_drake.systems.robots.cable_forces import PORTS
 from cdpr_drake.systems.robots.compiled_step import (
     PackedRule,
@@ -44,7 +39,8 @@ from cdpr_drake.systems.robots.compiled_step import (
     resting_state,
 )
 from cdpr_drake.systems.robots.motor_winch import COMMAND_PORTS
-from cdpr_drake.winches import MODES, pack_winch, winch_torques
+from cdpr_drake.winches.motor import MODES
+from cdpr_drake.winches.motor_kernel import pack_winch, winch_torques
 
 MEMORY = "motion_memory"
 """Name of the port from which blocks without Python can read, see `CompiledMotion.parts`."""

@@ -12,27 +12,20 @@ from pydrake.multibody.math import SpatialAcceleration, SpatialVelocity
 from pydrake.systems.framework import Context, LeafSystem
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables import make_room, model_force_and_drums
-from cdpr_drake.dynamics import (
-    IDEAL,
-    LOST,
-    METHODS,
-    MOTORS,
-    PLATFORM,
-    SPEEDS,
-    Drive,
-    RobotArrays,
-    floating_rates,
-    line_rates,
-    planar_rates,
-    reach_explicitly,
-    reach_semi_implicitly,
-)
+from cdpr_drake.cables.simulation_kernel import make_room, model_force_and_drums
+from cdpr_drake.dynamics.explicit_kernel import METHODS
+from cdpr_drake.dynamics.platform_kernel import floating_rates, line_rates, planar_rates
+from cdpr_drake.dynamics.reach_kernel import reach_explicitly, reach_semi_implicitly
+from cdpr_drake.dynamics.robot_arrays import IDEAL, MOTORS, PLATFORM, SPEEDS, Drive, RobotArrays
+from cdpr_drake.dynamics.robot_kernel import LOST
 from cdpr_drake.errors import CableGeometryError, CdprError, DivergedError
-from cdpr_drake.geometry import CableSet, PlatformJoint, cable_paths, impossible_cable
-from cdpr_drake.models import Robot, pose_from_state
-from cdpr_drake.spatial import pose_row
-from cdpr_drake.winches import MODES, resting_motors
+from cdpr_drake.geometry.cable_paths import cable_paths, impossible_cable
+from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.geometry.platform_joint import PlatformJoint
+from cdpr_drake.geometry.poses import pose_row
+from cdpr_drake.models.robot_in_plant import pose_from_state
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.winches.motor import MODES, resting_motors
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -22,18 +22,16 @@ from pydrake.systems.scalar_conversion import TemplateSystem
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.systems.robots.templates import class_for_floats
-from cdpr_drake.winches import (
+from cdpr_drake.winches.groups import WinchGroups
+from cdpr_drake.winches.motor import (
     MODES,
     TORQUE,
-    WinchGroups,
     WinchLaw,
     WinchMotion,
-    pack_winch,
     resting_motors,
     winch_motion,
-    winch_rates,
-    winch_torques,
 )
+from cdpr_drake.winches.motor_kernel import pack_winch, winch_rates, winch_torques
 
 COMMAND_PORTS = {
     "torque": "motor_torques",

@@ -11,8 +11,8 @@ from pydrake.math import RigidTransform_
 from pydrake.systems.framework import Context, LeafSystem, LeafSystem_
 from pydrake.systems.scalar_conversion import TemplateSystem
 
-from cdpr_drake.geometry import PlatformJoint
-from cdpr_drake.models import RobotInPlant, pose_on_joint
+from cdpr_drake.geometry.platform_joint import PlatformJoint
+from cdpr_drake.models.robot_in_plant import RobotInPlant, pose_on_joint
 from cdpr_drake.systems.robots.templates import class_for_floats
 
 

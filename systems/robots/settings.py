@@ -8,10 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from pydrake.systems.primitives import MatrixGain
 
-from cdpr_drake.cables import CABLE_MODELS, KELVIN_VOIGT
-from cdpr_drake.geometry import CableSet
-from cdpr_drake.models import Robot, RobotInPlant
-from cdpr_drake.schema import number, section, switch, text
+from cdpr_drake.cables.models import CABLE_MODELS, KELVIN_VOIGT
+from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.models.robot_in_plant import RobotInPlant
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.schema.fields import number, section, switch, text
 from cdpr_drake.systems.robots.motor_winch import COMMAND_PORTS
 
 

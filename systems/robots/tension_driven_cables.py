@@ -7,10 +7,11 @@ from collections.abc import Callable
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
-from cdpr_drake.cables import cable_motions, tension_force
+from cdpr_drake.cables.commanded_tension_kernel import cable_motions, tension_force
 from cdpr_drake.errors import CableGeometryError
-from cdpr_drake.geometry import CableSet, cable_paths
-from cdpr_drake.models import RobotInPlant, pose_on_joint
+from cdpr_drake.geometry.cable_paths import cable_paths
+from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.models.robot_in_plant import RobotInPlant, pose_on_joint
 
 
 class TensionDrivenCables(LeafSystem):

@@ -9,7 +9,8 @@ from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 from pydrake.systems.primitives import MatrixGain
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.models import Robot, UpsInPlant, add_ups_robot
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.models.ups_robot import UpsInPlant, add_ups_robot
 from cdpr_drake.systems.robots.platform_pose import PlatformPose
 
 

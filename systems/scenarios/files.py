@@ -9,9 +9,13 @@ from typing import Any, Protocol, TypeVar
 import yaml
 
 from cdpr_drake.errors import RobotFileError, ScenarioError
-from cdpr_drake.models import RAILS_MARK, ROBOT_SUFFIXES, Robot, load_robot, robot_file
-from cdpr_drake.schema import closest, load_typed, too_many_bytes
-from cdpr_drake.systems.worlds import WorldSettings
+from cdpr_drake.models.exit_points import MARK as RAILS_MARK
+from cdpr_drake.models.formats.detection import SUFFIXES as ROBOT_SUFFIXES
+from cdpr_drake.models.robot_loader import load_robot, robot_file
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.schema.typed_yaml import closest, load_typed
+from cdpr_drake.schema.yaml_files import too_many_bytes
+from cdpr_drake.systems.worlds.settings import WorldSettings
 
 _FOLDER = Path(__file__).parent
 

@@ -11,10 +11,11 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.errors import Problems, ScenarioError
-from cdpr_drake.models import Pose, Robot
-from cdpr_drake.numerics import explicit_integrators
-from cdpr_drake.schema import FASTEST, closest, number, optional_section, section, text
-from cdpr_drake.systems.robots import PLANT, CableRobotSettings
+from cdpr_drake.models.robot_schema import Pose, Robot
+from cdpr_drake.numerics.explicit_integration import explicit_integrators
+from cdpr_drake.schema.fields import FASTEST, number, optional_section, section, text
+from cdpr_drake.schema.typed_yaml import closest
+from cdpr_drake.systems.robots.settings import PLANT, CableRobotSettings
 from cdpr_drake.systems.scenarios.files import PICK_AND_PLACE
 from cdpr_drake.systems.scenarios.pick_and_place_settings import (
     BoxCameraSettings,
@@ -28,8 +29,8 @@ from cdpr_drake.systems.scenarios.pick_and_place_settings import (
     WorkpieceSettings,
 )
 from cdpr_drake.systems.scenarios.run_settings import ScenarioHeader
-from cdpr_drake.systems.sensors import SensorSettings
-from cdpr_drake.systems.worlds import check_world
+from cdpr_drake.systems.sensors.sensor_kinds import SensorSettings
+from cdpr_drake.systems.worlds.checks import check_world
 
 DEAD_RECKONING = (
     "control_integration", "cable_lengths", "cable_lengths_elastic", "cable_lengths_pulleys",

@@ -7,11 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdpr_drake.models import Pose, camera_names
-from cdpr_drake.schema import FASTEST, array, number, section, text, whole
-from cdpr_drake.systems.cameras import PROJECTED, RENDERED
-from cdpr_drake.systems.servos import PoseShift
-from cdpr_drake.vision import TAG_COUNT, TagTarget
+from cdpr_drake.models.camera_catalogue import camera_names
+from cdpr_drake.models.robot_schema import Pose
+from cdpr_drake.schema.fields import FASTEST, array, number, section, text, whole
+from cdpr_drake.systems.cameras.camera_settings import PROJECTED, RENDERED
+from cdpr_drake.systems.controllers.perturbation_settings import PoseShift
+from cdpr_drake.vision.apriltags import TAG_COUNT, TagTarget
 
 OBJECT_TAG, GOAL_TAG = "object", "goal"
 COVERED_IN = {

@@ -2,17 +2,17 @@
 
 `SENSORS` is their table. Readings carry bias, noise, resolution and rate of a type of the
 catalogue, repeatable by a seed.
+
+Sensors that look at the world and at motion, as Drake blocks.
+
+Laser scanners and beams, an inertial measurement unit, a depth camera, a head on two joints,
+odometry of the mobile robot; `add_looking_sensors` adds those of a scenario's section `sensors`.
+Each has its own rate and its own stream of random numbers, repeatable by a seed. Frames: S of a
+sensor (x ahead, y to the left), C of a camera (z ahead, y down), H of a head, B of what carries it.
+
+Source: each block names its own.
 """
 
-from cdpr_drake.systems.sensors.kinds import IDEAL, SENSORS, SensorKind
-from cdpr_drake.systems.sensors.motor_encoders import MotorEncoders
-from cdpr_drake.systems.sensors.pose_sensor import PoseSensor
-from cdpr_drake.systems.sensors.readings import SensorReadings, check_rate, make_sensor
-from cdpr_drake.systems.sensors.sampled_sensor import SampledSensor
-from cdpr_drake.systems.sensors.settings import SensorSettings
-from cdpr_drake.systems.sensors.tension_sensor import TensionSensor
+import lazy_loader
 
-__all__ = [
-    "IDEAL", "SENSORS", "MotorEncoders", "PoseSensor", "SampledSensor", "SensorKind",
-    "SensorReadings", "SensorSettings", "TensionSensor", "check_rate", "make_sensor",
-]  # fmt: skip
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

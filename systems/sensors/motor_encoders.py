@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.estimation import encoder_readings
-from cdpr_drake.models import EncoderModel
+from cdpr_drake.estimation.sensor_noise import encoder_readings
+from cdpr_drake.models.sensor_catalogue import EncoderModel
 from cdpr_drake.systems.sensors.sampled_sensor import SampledSensor
-from cdpr_drake.winches import Drum, WinchGroups
+from cdpr_drake.winches.drum import Drum
+from cdpr_drake.winches.groups import WinchGroups
 
 
 class MotorEncoders(SampledSensor):

@@ -8,7 +8,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.framework import Context
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.estimation import (
+from cdpr_drake.estimation.sensor_noise import (
     PoseBias,
     moved_pose,
     random_direction,
@@ -16,7 +16,7 @@ from cdpr_drake.estimation import (
     sample_noise,
     sensor_random,
 )
-from cdpr_drake.models import PoseSensorModel
+from cdpr_drake.models.sensor_catalogue import PoseSensorModel
 from cdpr_drake.systems.sensors.sampled_sensor import SampledSensor
 
 STREAM = 103

@@ -1,7 +1,11 @@
-"""A sensor that reads its input at a fixed rate: the event and the state that all share."""
+"""A sensor that reads its input at a fixed rate: the event and the state that all share.
+
+Random numbers of sensors of which a robot can have several: a stream for each name.
+"""
 
 from __future__ import annotations
 
+import zlib
 from abc import abstractmethod
 from typing import Any
 
@@ -10,6 +14,7 @@ from pydrake.systems.framework import BasicVector, Context, LeafSystem, State
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import SensorError
+from cdpr_drake.estimation.sensor_noise import sensor_random
 
 
 class SampledSensor(LeafSystem):
@@ -73,3 +78,17 @@ class SampledSensor(LeafSystem):
             output.SetFromVector(self.sample(context)[start : start + size])
 
         self.DeclareVectorOutputPort(name, size, write, {self.discrete_state_ticket(self._sample)})
+
+
+RANGES, INERTIAL, DEPTH, ODOMETRY, PAN_TILT, DEPTH_POINTS = 211, 223, 227, 229, 233, 239
+"""Tell the random numbers of sensors of one kind from those of others."""
+
+
+def named_stream(kind: int, name: str) -> int:
+    """The stream of a sensor by its kind and its name, whatever other sensors there are."""
+    return (kind << 32) + zlib.crc32(name.encode())
+
+
+def large_noise(seed: int, stream: int, number: int, size: int) -> Array:
+    """As `estimation.sample_noise`, for samples of so many numbers that none are kept."""
+    return np.asarray(sensor_random(seed, stream, number).standard_normal(size))

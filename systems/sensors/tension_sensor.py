@@ -6,8 +6,8 @@ import numpy as np
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import SensorError
-from cdpr_drake.estimation import sample_noise, sensor_random, tension_readings
-from cdpr_drake.models import TensionSensorModel
+from cdpr_drake.estimation.sensor_noise import sample_noise, sensor_random, tension_readings
+from cdpr_drake.models.sensor_catalogue import TensionSensorModel
 from cdpr_drake.systems.sensors.sampled_sensor import SampledSensor
 
 STREAM = 101

@@ -9,9 +9,10 @@ from pydrake.geometry import SceneGraph
 from pydrake.multibody.tree import RigidBody
 from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
 
-from cdpr_drake.geometry import CableSet
-from cdpr_drake.models import Robot, RobotInPlant
-from cdpr_drake.systems.robots import apply_force
+from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.models.robot_in_plant import RobotInPlant
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.systems.robots.assembly import apply_force
 from cdpr_drake.systems.worlds.body_driver import BodyDriver
 from cdpr_drake.systems.worlds.clearances import WorldClearances
 from cdpr_drake.systems.worlds.contact import MODEL_INSTANCE, ContactLaw, add_contact, contact_law

@@ -12,7 +12,7 @@ from pydrake.multibody.tree import RigidBody
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.spatial import rotation_vector
+from cdpr_drake.geometry.poses import rotation_vector
 from cdpr_drake.systems.worlds.contact import DRIVEN_MASS, MODEL_INSTANCE
 from cdpr_drake.systems.worlds.world import WorldBody
 

@@ -9,8 +9,8 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.errors import Problems, ScenarioError, WorldError
-from cdpr_drake.models import Robot
-from cdpr_drake.spatial import pose_error
+from cdpr_drake.geometry.poses import pose_error
+from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.systems.worlds.clearances import WorldClearances
 from cdpr_drake.systems.worlds.settings import (
     DIMENSIONS,

@@ -29,10 +29,13 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CableGeometryError
-from cdpr_drake.geometry import CableSet, cable_paths
-from cdpr_drake.models import Robot, platform_box
+from cdpr_drake.geometry.cable_paths import cable_paths
+from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.models.robot_in_plant import platform_box
+from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.systems.worlds.world import World, WorldBody
-from cdpr_drake.workspaces import box_row, segment_box_distance
+from cdpr_drake.workspaces.cable_distance_kernel import segment_box_distance
+from cdpr_drake.workspaces.cable_interference import box_row
 
 COMPARED = (Box, Sphere, Cylinder)
 """Shapes that cables are compared with."""

@@ -40,8 +40,9 @@ from pydrake.multibody.plant import ContactModel, CoulombFriction
 from pydrake.multibody.tree import RigidBody, SpatialInertia, UnitInertia
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.models import Robot, RobotInPlant, platform_box, platform_inertia
-from cdpr_drake.numerics import largest_stable_step
+from cdpr_drake.models.robot_in_plant import RobotInPlant, platform_box, platform_inertia
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.numerics.explicit_integration import largest_stable_step
 from cdpr_drake.systems.worlds.settings import HYDROELASTIC, ContactSettings
 from cdpr_drake.systems.worlds.world import World, WorldBody
 

@@ -10,7 +10,7 @@ from pydrake.multibody.plant import ContactResults
 from pydrake.systems.framework import BasicVector, Context, EventStatus, LeafSystem
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.models import RobotInPlant
+from cdpr_drake.models.robot_in_plant import RobotInPlant
 from cdpr_drake.systems.worlds.clearances import WorldClearances
 
 

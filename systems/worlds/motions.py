@@ -8,8 +8,13 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.spatial import rotation_from_vector
-from cdpr_drake.trajectories import MovingPose, PoseTrajectory, SteadyMotion, motion_row
+from cdpr_drake.geometry.poses import rotation_from_vector
+from cdpr_drake.trajectories.pose_trajectory import (
+    MovingPose,
+    PoseTrajectory,
+    SteadyMotion,
+    motion_row,
+)
 
 
 class BodyMotion(MovingPose, Protocol):

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cdpr_drake.models import Pose
-from cdpr_drake.schema import (
+from cdpr_drake.models.robot_schema import Pose
+from cdpr_drake.schema.fields import (
     array,
     file_name,
     number,
@@ -21,7 +21,7 @@ from cdpr_drake.schema import (
     text,
 )
 from cdpr_drake.systems.worlds.motions import BodyMotion, JointedBody, PathBody, SteadyBody
-from cdpr_drake.trajectories import PoseTrajectory
+from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
 
 BOX, CYLINDER, SPHERE, MESH, SDFORMAT = "box", "cylinder", "sphere", "mesh", "sdformat"
 

@@ -10,7 +10,8 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import WorldError
-from cdpr_drake.models import FLOOR_COLOR, Robot
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.models.scene import FLOOR_COLOR
 from cdpr_drake.systems.worlds.model_files import Part, mesh_parts, model_parts
 from cdpr_drake.systems.worlds.motions import BodyMotion, SteadyBody
 from cdpr_drake.systems.worlds.settings import (

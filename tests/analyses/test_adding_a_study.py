@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import pytest
 from rich.table import Table
 
-from cdpr_drake.analyses.catalogue import STUDIES, StudyEntry
+from cdpr_drake.analyses.studies.catalogue import STUDIES, StudyEntry
 from cdpr_drake.cli.app import main
 from tests.messages import printed
 

@@ -1,6 +1,6 @@
 """The doctor finds what is missing and says the remedy."""
 
-from cdpr_drake.analyses import doctor
+from cdpr_drake.analyses import installation as doctor
 from cdpr_drake.errors import RenderingError
 
 

@@ -6,9 +6,12 @@ import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
 
-from cdpr_drake.cables import CABLE_MODELS, HANGING, CableModel, cable_state
-from cdpr_drake.models import hold_robot, load_robot
-from cdpr_drake.systems.robots import CableRobot, CableRobotSettings, CableSettings
+from cdpr_drake.cables.dispatch_kernel import HANGING
+from cdpr_drake.cables.models import CABLE_MODELS, CableModel, cable_state
+from cdpr_drake.models.robot_holding import hold_robot
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.systems.robots.cable_robot import CableRobot
+from cdpr_drake.systems.robots.settings import CableRobotSettings, CableSettings
 
 ROBOT = load_robot("acrobot_large")
 HOME = ROBOT.home.transform()

@@ -7,8 +7,8 @@ import pytest
 
 from cdpr_drake.cables.curves import GROOVE_POINTS, cable_curves
 from cdpr_drake.cables.models import cable_state
-from cdpr_drake.geometry import cable_paths
-from cdpr_drake.models import load_robot
+from cdpr_drake.geometry.cable_paths import cable_paths
+from cdpr_drake.models.robot_loader import load_robot
 
 ROUNDING = 1e-9
 """Of the catenary's Newton steps, whose last is 1e-8 of the tension and squares [m]."""

@@ -23,9 +23,11 @@ from cdpr_drake.cables.simulation_kernel import (
     model_outputs,
     outputs_kernel,
 )
-from cdpr_drake.geometry import cable_line, cable_paths
-from cdpr_drake.models import load_robot, pose_from_state
-from cdpr_drake.numerics import any_scalar
+from cdpr_drake.geometry.cable_paths import cable_paths
+from cdpr_drake.geometry.motion_kernel import cable_line
+from cdpr_drake.models.robot_in_plant import pose_from_state
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.numerics.kernel_calls import any_scalar
 
 ROUNDING = 1e-9  # [N], of tensions near 300 N and a stiffness of 1 MN/m
 STEP = 1e-7

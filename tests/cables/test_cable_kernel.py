@@ -14,8 +14,8 @@ from cdpr_drake.cables.straight_kernel import (
     planar_cables,
     planar_force,
 )
-from cdpr_drake.geometry import floating_motion, pack_cables, wrench_matrix
-from cdpr_drake.geometry.motion_kernel import CABLE_COLUMNS
+from cdpr_drake.geometry.motion_kernel import CABLE_COLUMNS, floating_motion, pack_cables
+from cdpr_drake.geometry.straight_cables import wrench_matrix
 
 STIFFNESS = 1.0e4  # [N]
 ROUNDING = 1e-13  # a few dozen operations on numbers of size one

@@ -14,8 +14,9 @@ from cdpr_drake.cables.elastic_law import (
     unstrained_lengths,
 )
 from cdpr_drake.cables.straight_kernel import floating_cables, floating_force
-from cdpr_drake.geometry import cable_lengths, length_jacobian, pack_cables
-from cdpr_drake.spatial import exponential, rotation_from_angles
+from cdpr_drake.geometry.motion_kernel import pack_cables
+from cdpr_drake.geometry.poses import exponential, rotation_from_angles
+from cdpr_drake.geometry.straight_cables import cable_lengths, length_jacobian
 
 STIFFNESS = np.array([1.0e4, 2.0e4, 3.0e5, 5.0e4, 1.0e4, 2.0e4, 3.0e5, 5.0e4])  # [N]
 TENSION_TOLERANCE = 1e-9  # [N]; 3e5 N of stiffness times a strain rounded at 4e-16, several times

@@ -17,9 +17,10 @@ from cdpr_drake.cables.models import (
 )
 from cdpr_drake.cables.straight_kernel import floating_cables, floating_force
 from cdpr_drake.errors import CableGeometryError, CableModelError
-from cdpr_drake.geometry import CableSet, cable_paths
-from cdpr_drake.models import load_robot
-from cdpr_drake.spatial import exponential, rotation_from_angles
+from cdpr_drake.geometry.cable_paths import cable_paths
+from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.geometry.poses import exponential, rotation_from_angles
+from cdpr_drake.models.robot_loader import load_robot
 
 LIMIT = 1e-12
 """What a limit may differ from the simple model, relative to lengths and to E S."""

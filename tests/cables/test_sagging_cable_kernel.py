@@ -7,7 +7,7 @@ from scipy.integrate import solve_ivp
 
 from cdpr_drake.cables.catenary_kernel import free_part
 from cdpr_drake.cables.hanging_kernel import SENSITIVITIES, hang, sagging_cable
-from cdpr_drake.geometry import tangent
+from cdpr_drake.geometry.pulley_kernel import tangent
 
 ES, W = 2.9e6, 2.18
 INTEGRATION = 1e-6  # a slack string turns far for little force: 1e-11 of the solver grows

@@ -6,9 +6,9 @@ from hypothesis import strategies as st
 from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.cables.commanded_tension_kernel import cable_motions, tension_force
-from cdpr_drake.geometry import cable_paths
-from cdpr_drake.models import load_robot
-from cdpr_drake.spatial import rotation_from_vector
+from cdpr_drake.geometry.cable_paths import cable_paths
+from cdpr_drake.geometry.poses import rotation_from_vector
+from cdpr_drake.models.robot_loader import load_robot
 
 ROUNDING = 1e-12
 """Sums of eight products of order one, times tensions of at most a hundred, relative to these."""

@@ -5,17 +5,14 @@ from dataclasses import replace
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cdpr_drake.calibration import (
-    CalibrationModel,
-    CalibrationProgram,
-    Point,
-    Stations,
-    simulated_corners,
-    simulated_lengths,
-)
-from cdpr_drake.geometry import CableSet
-from cdpr_drake.spatial import pose_from_angles, rotation_from_vector
-from cdpr_drake.vision import Pinhole, TagTarget
+from cdpr_drake.calibration.measurements import simulated_corners, simulated_lengths
+from cdpr_drake.calibration.parameters import CalibrationModel
+from cdpr_drake.calibration.program import CalibrationProgram
+from cdpr_drake.calibration.stations import Point, Stations
+from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.geometry.poses import pose_from_angles, rotation_from_vector
+from cdpr_drake.vision.apriltags import TagTarget
+from cdpr_drake.vision.pinhole import Pinhole
 
 PINHOLE = Pinhole.from_view_angles(640, 480, np.radians(79.0), np.radians(59.4))
 TAG_PLACES = [(x, y) for x in (-0.2, 0.0, 0.2) for y in (-0.15, 0.15)]

@@ -3,15 +3,14 @@
 import numpy as np
 import pytest
 
-from cdpr_drake.calibration import (
-    Point,
-    Stations,
+from cdpr_drake.calibration.identifiability import frame_motions
+from cdpr_drake.calibration.parameters import (
     model_difference,
     moved_frames,
     moved_model,
     parameter_layout,
 )
-from cdpr_drake.calibration.identifiability import frame_motions
+from cdpr_drake.calibration.stations import Point, Stations
 from tests.calibration.bench import camera_program, poses, true_model
 
 ROUNDING = 1e-10

@@ -3,8 +3,7 @@ from itertools import combinations, product
 import numpy as np
 import pytest
 
-from cdpr_drake.calibration import choose_poses, informing_rows
-from cdpr_drake.calibration.pose_design import LEAST_GAIN
+from cdpr_drake.calibration.pose_design import LEAST_GAIN, choose_poses, informing_rows
 from cdpr_drake.errors import CalibrationError
 from tests.calibration.bench import camera_program, true_model
 

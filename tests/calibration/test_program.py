@@ -4,15 +4,11 @@ from pydrake.autodiffutils import AutoDiffXd, InitializeAutoDiff
 from pydrake.solvers import SnoptSolver
 from scipy.stats import chi2
 
-from cdpr_drake.calibration import (
-    CalibrationProgram,
-    model_difference,
-    moved_model,
-    robust_costs,
-    simulated_lengths,
-    simulated_poses,
-)
 from cdpr_drake.calibration.elimination import Minimum
+from cdpr_drake.calibration.measurements import simulated_lengths, simulated_poses
+from cdpr_drake.calibration.parameters import model_difference, moved_model
+from cdpr_drake.calibration.pose_search import robust_costs
+from cdpr_drake.calibration.program import CalibrationProgram
 from cdpr_drake.errors import CalibrationError
 from tests.calibration.bench import (
     camera_program,

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from cdpr_drake.calibration import (
-    CalibrationProgram,
-    Point,
+from cdpr_drake.calibration.measurements import (
     simulated_corners,
     simulated_poses,
     simulated_swivels,
 )
-from cdpr_drake.geometry import cable_jacobian, cable_paths
+from cdpr_drake.calibration.program import CalibrationProgram
+from cdpr_drake.calibration.stations import Point
+from cdpr_drake.geometry.cable_paths import cable_jacobian, cable_paths
 from tests.calibration.bench import (
     PINHOLE,
     TARGETS,

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from matplotlib.figure import Figure
 
-from cdpr_drake.analyses.reporting import write_pictures
+from cdpr_drake.analyses.reporting.deferred_figures import write_pictures
 from cdpr_drake.cli import plan, simulate
 
 

@@ -11,7 +11,7 @@ def killed_after(chunks, setup):
     return f"""
 import os, signal, sys
 from cdpr_drake.analyses.sweeps.folder import SweepFolder
-from cdpr_drake.cli import main
+from cdpr_drake.cli.app import main
 {setup}
 store, left = SweepFolder.store, list(range({chunks}))
 

@@ -4,21 +4,22 @@ import numpy as np
 import pytest
 from pydrake.common.yaml import yaml_dump_typed
 
-from cdpr_drake.analyses.calibration import calibrated_robot, calibration_model
-from cdpr_drake.calibration import (
-    Point,
-    Stations,
+from cdpr_drake.analyses.calibration.calibrated_robots import calibrated_robot, calibration_model
+from cdpr_drake.calibration.guesses import with_tags
+from cdpr_drake.calibration.measurements import (
     simulated_corners,
     simulated_lengths,
     simulated_poses,
     simulated_swivels,
-    with_tags,
 )
-from cdpr_drake.cli import main
-from cdpr_drake.models import load_camera, load_robot
-from cdpr_drake.spatial import pose_error, pose_from_angles, pose_from_row, pose_row
-from cdpr_drake.systems.diagrams import believed_robot, load_scenario
-from cdpr_drake.vision import TagTarget
+from cdpr_drake.calibration.stations import Point, Stations
+from cdpr_drake.cli.app import main
+from cdpr_drake.geometry.poses import pose_error, pose_from_angles, pose_from_row, pose_row
+from cdpr_drake.models.camera_catalogue import load_camera
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.systems.diagrams.beliefs import believed_robot
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.vision.apriltags import TagTarget
 from tests.messages import printed
 
 COUNT = 20

@@ -11,9 +11,10 @@ from pathlib import Path
 import pytest
 
 from cdpr_drake.cli.app import main
-from cdpr_drake.kernel_cache import needed_kernels
-from cdpr_drake.models import robot_names
-from cdpr_drake.systems.scenarios import DEFAULT_SCENARIO, scenario_file
+from cdpr_drake.kernel_cache.kernel_list import needed_kernels
+from cdpr_drake.models.robot_loader import robot_names
+from cdpr_drake.systems.scenarios.files import scenario_file
+from cdpr_drake.systems.scenarios.visual_servo_scenario import DEFAULT_SCENARIO
 from tests.messages import messages, printed
 from tests.record_kernels import kept_kernels
 
@@ -195,8 +196,8 @@ from numba.core.dispatcher import Dispatcher
 sys.path.append(sys.argv[1])
 from tests.record_kernels import recorded
 asked = recorded(Dispatcher)
-from cdpr_drake.analyses.simulation import LogKeeper
-from cdpr_drake.cli import main
+from cdpr_drake.analyses.simulation.log_keeper import LogKeeper
+from cdpr_drake.cli.app import main
 keep = LogKeeper.__call__
 
 def marked(self):
@@ -247,7 +248,7 @@ def test_a_figure_that_fails_is_named_and_the_rest_is_kept(capsys, tmp_path, mon
     def broken(result):
         raise RuntimeError("no font")
 
-    monkeypatch.setattr("cdpr_drake.analyses.runs.figures.error_figure", broken)
+    monkeypatch.setattr("cdpr_drake.analyses.simulation.run_figures.error_figure", broken)
     code, out, err = run(capsys, "simulate", *QUICK, "--out", "out", "--json")
     assert code == 3
     assert "error.png: not written: no font" in err

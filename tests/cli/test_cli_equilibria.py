@@ -6,7 +6,7 @@ import pytest
 import yaml
 
 from cdpr_drake.cli.app import main
-from cdpr_drake.models import robot_text
+from cdpr_drake.models.robot_loader import robot_text
 from tests.messages import printed
 
 

@@ -6,8 +6,8 @@ import json
 
 import pytest
 
-from cdpr_drake.analyses.catalogue import STUDIES, StudyEntry
-from cdpr_drake.cli import main
+from cdpr_drake.analyses.studies.catalogue import STUDIES, StudyEntry
+from cdpr_drake.cli.app import main
 from tests.messages import printed
 
 NAMES = ("case-8", "case-4", "worked-examples")

@@ -13,17 +13,13 @@ from typing import Annotated, get_origin, get_type_hints
 import pytest
 import yaml
 
-from cdpr_drake.analyses.stability import (
-    load_workspaces,
-    make_question,
-    planes_figure,
-    workspace_defaults,
-)
-from cdpr_drake.analyses.stability.figures import curves
-from cdpr_drake.analyses.stability.workspaces import CHUNK_POSES
+from cdpr_drake.analyses.workspaces.stability_defaults import workspace_defaults
+from cdpr_drake.analyses.workspaces.stability_figures import curves, planes_figure
+from cdpr_drake.analyses.workspaces.stability_question import make_question
+from cdpr_drake.analyses.workspaces.stability_workspaces import CHUNK_POSES, load_workspaces
 from cdpr_drake.cli.app import main
-from cdpr_drake.cli.pose_grid import parse_grid
-from cdpr_drake.models import load_robot, robot_file
+from cdpr_drake.cli.grid_options import parse_grid
+from cdpr_drake.models.robot_loader import load_robot, robot_file
 from tests.cli.killed import killed_after
 from tests.messages import messages, printed
 from tests.models.representative_robots import REPRESENTATIVE_ROBOTS
@@ -109,7 +105,7 @@ def test_the_same_arguments_find_their_folder_again(capsys, tmp_path):
 def test_an_interrupted_sweep_says_how_to_continue(capsys, monkeypatch):
     asked = ["planar", *SMALL, "--grid", "5,5,1", "--out", "o"]
     with monkeypatch.context() as patch:
-        patch.setattr("cdpr_drake.cli.sweep_watch.StopRequest.__call__", lambda self: True)
+        patch.setattr("cdpr_drake.cli.grid_options.StopRequest.__call__", lambda self: True)
         code, out, err = run(capsys, *asked)
     assert code == 130
     assert out == ""
@@ -126,7 +122,7 @@ CHUNK, KEPT, POSES = 64, 3, 2 * 9 * 9 * 5
 KILLED = killed_after(
     KEPT,
     f"""
-from cdpr_drake.analyses.stability import workspaces as module
+from cdpr_drake.analyses.workspaces import stability_workspaces as workspaces as module
 module.CHUNK_POSES["sampled"] = {CHUNK}
 """,
 )
@@ -209,8 +205,8 @@ def test_help_has_units(capsys, monkeypatch, command):
 SLOW = """
 import sys, time
 from pathlib import Path
-from cdpr_drake.analyses.stability.static_feasible import StaticTask
-from cdpr_drake.cli import main
+from cdpr_drake.analyses.workspaces.static_feasible import StaticTask
+from cdpr_drake.cli.app import main
 
 look = StaticTask.__call__
 

@@ -9,11 +9,11 @@ from dataclasses import replace
 
 import pytest
 
-from cdpr_drake.analyses.published import TABLES
-from cdpr_drake.analyses.reporting import StudySession
+from cdpr_drake.analyses.reporting.progress import StudySession
 from cdpr_drake.analyses.studies.control_stability import study as module
+from cdpr_drake.analyses.studies.published.stability_tables import TABLES
 from cdpr_drake.cli.app import main
-from cdpr_drake.cli.stop_request import StopRequest
+from cdpr_drake.cli.process import StopRequest
 from tests.cli.killed import killed_after
 from tests.messages import printed
 

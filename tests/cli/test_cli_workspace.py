@@ -11,17 +11,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.workspaces import (
-    box_search,
-    boxes,
-    certified_boxes,
-    load_robot_workspace,
-    make_workspace_question,
-    question_hull,
-)
-from cdpr_drake.cli import main
-from cdpr_drake.models import load_robot
-from cdpr_drake.workspaces import INSIDE, OUTSIDE, grid_by_count, hull_agreement
+from cdpr_drake.analyses.workspaces import certified_boxes as boxes
+from cdpr_drake.analyses.workspaces.certified_boxes import box_search, certified_boxes
+from cdpr_drake.analyses.workspaces.workspace_hulls import question_hull
+from cdpr_drake.analyses.workspaces.workspace_question import make_workspace_question
+from cdpr_drake.analyses.workspaces.workspace_results import load_robot_workspace
+from cdpr_drake.cli.app import main
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.workspaces.box_expansion_kernel import INSIDE, OUTSIDE
+from cdpr_drake.workspaces.box_grid_agreement import hull_agreement
+from cdpr_drake.workspaces.pose_grid import grid_by_count
 from tests.messages import printed
 
 
@@ -235,7 +234,7 @@ STATIC = [*PLANAR, "--kind", "static", "--certify", "--json"]
 
 def test_more_boxes_continue_a_search_for_fewer(tmp_path, capsys, monkeypatch):
     """The result is the same, and what was judged is not judged again."""
-    from cdpr_drake.workspaces.certificate import boxes as module
+    from cdpr_drake.workspaces import certified_boxes as module
 
     assert ended([*STATIC, "--boxes", "900", "--out", str(tmp_path / "whole")]) == 0
     whole = json.loads(printed(capsys).out)["certified"]
@@ -289,7 +288,7 @@ def killed_search(folder):
 
 def test_a_broken_proof_is_reported_loudly(tmp_path, capsys, monkeypatch):
     """A proof that calls every box inside contradicts the grid at each pose outside."""
-    from cdpr_drake.workspaces.certificate import boxes as module
+    from cdpr_drake.workspaces import certified_boxes as module
 
     def wrong(task, poses, halves):
         return np.full(len(poses), INSIDE), halves

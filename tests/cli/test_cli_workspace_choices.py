@@ -5,11 +5,12 @@ import json
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.stability import static_case
-from cdpr_drake.analyses.workspaces import load_robot_workspace
-from cdpr_drake.cli import main
-from cdpr_drake.models import import_robot, load_robot
-from cdpr_drake.workspaces import statically_feasible
+from cdpr_drake.analyses.workspaces.static_feasible import static_case
+from cdpr_drake.analyses.workspaces.workspace_results import load_robot_workspace
+from cdpr_drake.cli.app import main
+from cdpr_drake.models.robot_exchange import import_robot
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.workspaces.static_feasibility import statically_feasible
 from tests.messages import printed
 from tests.models.formats import foreign_files
 

@@ -7,9 +7,10 @@ import pytest
 import yaml
 from scipy.optimize import linprog
 
-from cdpr_drake.analyses.workspaces import load_robot_workspace, workspace_page
-from cdpr_drake.cli import main
-from cdpr_drake.models import load_robot
+from cdpr_drake.analyses.workspaces.workspace_results import load_robot_workspace
+from cdpr_drake.analyses.workspaces.workspace_scene import workspace_page
+from cdpr_drake.cli.app import main
+from cdpr_drake.models.robot_loader import load_robot
 from tests.messages import printed
 from tests.models.formats import foreign_files
 from tests.motion.small_robots import content, small_robot

@@ -8,13 +8,13 @@ import pytest
 
 from cdpr_drake.cli.app import SUBCOMMANDS, main
 from cdpr_drake.cli.completion import asked_words, robot_words, scenario_words
-from cdpr_drake.models import robot_names
-from cdpr_drake.systems.scenarios import all_scenario_names
+from cdpr_drake.models.robot_loader import robot_names
+from cdpr_drake.systems.scenarios.files import all_scenario_names
 from tests.messages import printed
 
 WORDS = """
 import sys
-from cdpr_drake.cli import main
+from cdpr_drake.cli.app import main
 try:
     main()
 except SystemExit:

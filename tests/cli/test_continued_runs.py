@@ -9,12 +9,14 @@ from dataclasses import replace
 
 import pytest
 
-from cdpr_drake.analyses.reporting import CHECKPOINT, PARTS
-from cdpr_drake.analyses.runs import SCENARIO_KINDS, RunSession
-from cdpr_drake.analyses.simulation import log_keeper, loop
-from cdpr_drake.cli import main
-from cdpr_drake.systems.diagrams import load_scenario
-from cdpr_drake.systems.scenarios import scenario_kind
+from cdpr_drake.analyses.reporting.log_on_disk import CHECKPOINT, PARTS
+from cdpr_drake.analyses.simulation import advance as loop
+from cdpr_drake.analyses.simulation import log_keeper
+from cdpr_drake.analyses.simulation.scenario_kinds import SCENARIO_KINDS
+from cdpr_drake.analyses.simulation.session import RunSession
+from cdpr_drake.cli.app import main
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.scenarios.files import scenario_kind
 from tests.cli.test_cli import refuse, run
 
 RUN = ("simulate", "acrobot_mobile_robot", "--log-rate", "25")
@@ -63,7 +65,7 @@ def same_files(one, other):
 
 def test_a_run_that_is_killed_comes_to_the_same_bytes(capsys, tmp_path, undisturbed):
     wait = "from cdpr_drake.analyses.simulation import log_keeper; log_keeper.CHECKPOINT_WAIT = 0.0"
-    cli = "from cdpr_drake.cli import main; import sys; sys.exit(main(sys.argv[1:]))"
+    cli = "from cdpr_drake.cli.app import main; import sys; sys.exit(main(sys.argv[1:]))"
     command = [sys.executable, "-c", f"{wait}\n{cli}", *RUN, *LENGTH, "--out", "out"]
     with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.DEVNULL) as process:
         while not any(tmp_path.glob(f".out-work-*/{PARTS}/{CHECKPOINT}")):
@@ -88,7 +90,7 @@ def interrupt_at(monkeypatch, sim_time):
         session = replace(session, should_stop=asked)
         return advance(simulator, duration, outcome_after, errors, session, keeper)
 
-    monkeypatch.setattr("cdpr_drake.analyses.runs.visual_servo_run.advance", stopped)
+    monkeypatch.setattr("cdpr_drake.analyses.simulation.visual_servo_run.advance", stopped)
 
 
 def test_a_run_that_is_interrupted_goes_on_in_its_folder(

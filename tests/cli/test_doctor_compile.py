@@ -5,9 +5,9 @@ import json
 import pytest
 
 from cdpr_drake import cli
-from cdpr_drake.analyses.compilation import LISTED, compilation_steps
-from cdpr_drake.kernel_cache import group_names
-from cdpr_drake.systems.scenarios import all_scenario_names
+from cdpr_drake.analyses.installation import LISTED, compilation_steps
+from cdpr_drake.kernel_cache.kernel_list import group_names
+from cdpr_drake.systems.scenarios.files import all_scenario_names
 from tests.messages import printed
 
 
@@ -22,7 +22,7 @@ def test_every_step_is_done_and_named(capsys, monkeypatch):
     steps = [(name, lambda name=name: done.append(name)) for name in ("one", "two")]
     for module in ("analyses.compilation", "cli.doctor"):
         monkeypatch.setattr(f"cdpr_drake.{module}.compilation_steps", lambda: steps)
-    monkeypatch.setattr("cdpr_drake.analyses.compilation.compile_needed", done.append)
+    monkeypatch.setattr("cdpr_drake.analyses.installation.compile_needed", done.append)
     assert code_of(["doctor", "--compile", "--json"]) == 0
     found = json.loads(printed(capsys).out)
     assert done == [group_names(), "one", "two"]

@@ -22,7 +22,7 @@ import cdpr_drake.cli
 
 PLANNING = """
 import signal, sys
-from cdpr_drake.cli import main, plan
+from cdpr_drake.cli.app import main; from cdpr_drake.cli import plan
 number = int(sys.argv.pop(1))
 plan.plan_along_path = lambda *_: signal.raise_signal(number)
 main()
@@ -30,7 +30,7 @@ main()
 
 IMPORTING = """
 import signal, sys
-from cdpr_drake.cli import main
+from cdpr_drake.cli.app import main
 name, number = sys.argv.pop(1), int(sys.argv.pop(1))
 
 class Hook:
@@ -45,7 +45,7 @@ main()
 
 WRAPPED = """
 import builtins, sys
-from cdpr_drake.cli import main, plan
+from cdpr_drake.cli.app import main; from cdpr_drake.cli import plan
 kind = getattr(builtins, sys.argv.pop(1))
 
 def wraps(*_):
@@ -60,7 +60,7 @@ main()
 
 MAKING = """
 import signal, sys
-from cdpr_drake.cli import main, plan
+from cdpr_drake.cli.app import main; from cdpr_drake.cli import plan
 number = int(sys.argv.pop(1))
 
 class Late:
@@ -74,7 +74,7 @@ main()
 OVER = """
 import atexit, os, signal, sys
 atexit.register(os.kill, os.getpid(), signal.SIGINT)
-from cdpr_drake.cli import main
+from cdpr_drake.cli.app import main
 main()
 """
 

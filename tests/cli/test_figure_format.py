@@ -4,7 +4,7 @@ import os
 
 import pytest
 
-from cdpr_drake.analyses.catalogue import STUDIES, StudyEntry
+from cdpr_drake.analyses.studies.catalogue import STUDIES, StudyEntry
 from cdpr_drake.cli.app import main
 from cdpr_drake.cli.options import parse_formats
 from cdpr_drake.cli.study import _command

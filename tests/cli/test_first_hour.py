@@ -9,12 +9,12 @@ import pytest
 import yaml
 from scipy.io import loadmat
 
-from cdpr_drake.analyses.pictures.live_view import LiveView
-from cdpr_drake.analyses.pictures.meshcat_window import open_meshcat, page_address
+from cdpr_drake.analyses.visualization.live_view import LiveView
+from cdpr_drake.analyses.visualization.meshcat_window import open_meshcat, page_address
 from cdpr_drake.cli import notebooks as notebook_command
 from cdpr_drake.errors import MeshcatError
-from cdpr_drake.models import robot_file
-from cdpr_drake.systems.scenarios import all_scenario_names
+from cdpr_drake.models.robot_loader import robot_file
+from cdpr_drake.systems.scenarios.files import all_scenario_names
 from tests.cli.test_cli import QUICK, refuse, run
 
 pytestmark = pytest.mark.usefixtures("_in_a_folder_of_its_own")

@@ -3,9 +3,9 @@ import json
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.identification import dynamic_model
-from cdpr_drake.cli import main
-from cdpr_drake.models import load_robot
+from cdpr_drake.analyses.calibration.identified_robots import dynamic_model
+from cdpr_drake.cli.app import main
+from cdpr_drake.models.robot_loader import load_robot
 from tests.identification.logs import TRUE, log
 from tests.messages import printed
 

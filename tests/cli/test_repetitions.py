@@ -9,10 +9,10 @@ import time
 import pytest
 
 from cdpr_drake.cli.app import main
-from cdpr_drake.cli.repetitions import parse_seeds
+from cdpr_drake.cli.simulate import parse_seeds
 from cdpr_drake.errors import ScenarioError
-from cdpr_drake.models import robot_file
-from cdpr_drake.systems.scenarios import DEFAULT_SCENARIO
+from cdpr_drake.models.robot_loader import robot_file
+from cdpr_drake.systems.scenarios.visual_servo_scenario import DEFAULT_SCENARIO
 from tests.messages import printed
 
 

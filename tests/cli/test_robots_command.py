@@ -9,9 +9,9 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.pictures import thumbnail
+from cdpr_drake.analyses.visualization.robot_gallery import thumbnail
 from cdpr_drake.cli.app import main
-from cdpr_drake.models import load_robot, robot_names
+from cdpr_drake.models.robot_loader import load_robot, robot_names
 from tests.messages import printed
 
 

@@ -14,10 +14,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cdpr_drake.bridge import Client
 from cdpr_drake.cli.app import main
-from cdpr_drake.cli.endings import CLIENT_ENDED
-from cdpr_drake.cli.stop_request import INTERRUPTED
+from cdpr_drake.cli.process import INTERRUPTED
+from cdpr_drake.cli.run_endings import CLIENT_ENDED
+from cdpr_drake.systems.remote.remote_client import Client
 from tests.messages import printed
 
 PLAIN_CLIENT = Path(str(files("cdpr_drake").joinpath("notebooks/plain_client.py")))

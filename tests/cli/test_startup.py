@@ -12,7 +12,7 @@ from tests.messages import messages, printed
 
 WORDS = """
 import sys
-from cdpr_drake.cli import main
+from cdpr_drake.cli.app import main
 try:
     main({arguments!r})
 except SystemExit:

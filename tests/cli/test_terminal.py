@@ -19,7 +19,7 @@ from cdpr_drake.cli import compiling as compiling_module
 from cdpr_drake.cli import terminal
 from cdpr_drake.cli.compiling import _compilations, compiling
 from cdpr_drake.cli.terminal import PROGRESS
-from cdpr_drake.studio.jobs import child
+from cdpr_drake.studio.workbench import job_process as child
 from tests.messages import messages, printed
 
 

@@ -9,7 +9,7 @@ import time
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.reporting import PARTS, LogOnDisk
+from cdpr_drake.analyses.reporting.log_on_disk import PARTS, LogOnDisk
 from cdpr_drake.analyses.simulation import log_keeper
 from cdpr_drake.errors import OutputFolderError
 from tests.cli.test_cli import refuse, run

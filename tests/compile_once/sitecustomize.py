@@ -45,7 +45,7 @@ def share(module):
 
     module.Dispatcher.compile = compile_unsearched
     with suppress(ImportError):  # in a process that has nothing of this package
-        from cdpr_drake.kernel_cache import share_compilation
+        from cdpr_drake.kernel_cache.locks import share_compilation
 
         share_compilation()
 

@@ -15,10 +15,11 @@ from cdpr_drake.control.task_space import (
     planar_wrench,
 )
 from cdpr_drake.errors import ControlGainError
-from cdpr_drake.geometry import PLANAR_ROWS, gravity_wrench
-from cdpr_drake.models import add_robot, load_robot, platform_inertia
-from cdpr_drake.spatial import rotation_from_vector, rotation_vector
-from cdpr_drake.trajectories import motion_row
+from cdpr_drake.geometry.poses import rotation_from_vector, rotation_vector
+from cdpr_drake.geometry.straight_cables import PLANAR_ROWS, gravity_wrench
+from cdpr_drake.models.robot_in_plant import add_robot, platform_inertia
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.trajectories.pose_trajectory import motion_row
 
 ORACLE = 1e-10
 """Difference from Drake's inverse dynamics, relative to the largest component: some hundred

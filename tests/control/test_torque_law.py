@@ -9,21 +9,22 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import MultibodyForces
 
 from cdpr_drake.control.planned_goal import GoalPlan, goal_offset, goal_pose
-from cdpr_drake.control.servo_wrench_kernel import (
-    to_world,
-    twist_from_winches,
-    wanted_acceleration,
-)
+from cdpr_drake.control.servo_wrench_kernel import to_world, twist_from_winches, wanted_acceleration
 from cdpr_drake.control.tension_controller_kernel import friction_torque, winch_torque
 from cdpr_drake.control.torque_law import ServoWrench, TensionController, TorqueServoLaw
 from cdpr_drake.errors import ControlGainError, TensionProblemError
-from cdpr_drake.geometry import CableSet, cable_jacobian, floating_motion
-from cdpr_drake.models import add_robot, load_robot, tension_problem
-from cdpr_drake.spatial import exponential, pose_from_angles, pose_row, rotation_from_vector
-from cdpr_drake.systems.tension_control import platform_dynamics
-from cdpr_drake.tensions import METHODS, TensionProblem, distribute, exact_tensions
-from cdpr_drake.trajectories import PoseTrajectory
-from cdpr_drake.winches import FrictionLaw
+from cdpr_drake.geometry.cable_paths import cable_jacobian
+from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.geometry.motion_kernel import floating_motion
+from cdpr_drake.geometry.poses import exponential, pose_from_angles, pose_row, rotation_from_vector
+from cdpr_drake.models.robot_in_plant import add_robot
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_statics import tension_problem
+from cdpr_drake.systems.controllers.computed_torque import platform_dynamics
+from cdpr_drake.tensions.methods import METHODS, distribute, exact_tensions
+from cdpr_drake.tensions.problem import TensionProblem
+from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
+from cdpr_drake.winches.friction import FrictionLaw
 
 ORACLE = 1e-9
 """Difference from Drake's inverse dynamics, relative: products in another order."""

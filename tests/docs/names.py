@@ -5,17 +5,18 @@ from __future__ import annotations
 import importlib
 import inspect
 import re
-import tomllib
 from collections.abc import Iterator, Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any
 
-from cdpr_drake.analyses.repetitions import ManyRuns
+from setuptools import find_packages
+
+from cdpr_drake.analyses.simulation.monte_carlo import ManyRuns
 from cdpr_drake.cli.schema import FILES, file_schema
-from cdpr_drake.geometry import CableSet
-from cdpr_drake.models import Robot
-from cdpr_drake.studio.workbench import Workbench
+from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.studio.workbench.session import Workbench
 
 ROOT = Path(__file__).parents[2]
 
@@ -116,9 +117,8 @@ def _has(owner: Any, names: list[str]) -> bool:
 @cache
 def public_names() -> dict[str, Any]:
     """What rooms export, by name."""
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     found: dict[str, Any] = {}
-    for name in project["tool"]["setuptools"]["packages"]:
+    for name in find_packages(str(ROOT), include=["cdpr_drake", "cdpr_drake.*"]):
         room = importlib.import_module(name)
         found |= {word: getattr(room, word) for word in getattr(room, "__all__", ())}
     return found

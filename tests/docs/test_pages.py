@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from cdpr_drake.cli import main
-from cdpr_drake.systems.estimators import ESTIMATORS
-from cdpr_drake.tensions import METHODS
+from cdpr_drake.cli.app import main
+from cdpr_drake.systems.estimators.estimator_kinds import ESTIMATORS
+from cdpr_drake.tensions.methods import METHODS
 from tests.cli.conftest import only
 
 ROOT = Path(__file__).parents[2]

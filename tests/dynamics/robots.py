@@ -4,10 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from cdpr_drake.dynamics import Drive, pack_robot
-from cdpr_drake.geometry import CableSet, cable_paths
-from cdpr_drake.models import load_robot, rigid_platform
-from cdpr_drake.spatial import pose_row
+from cdpr_drake.dynamics.robot_arrays import Drive, pack_robot
+from cdpr_drake.geometry.cable_paths import cable_paths
+from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.geometry.poses import pose_row
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_statics import rigid_platform
 
 
 def robot_arrays(

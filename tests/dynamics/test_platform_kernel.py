@@ -7,10 +7,13 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import PlanarJoint, RotationalInertia, SpatialInertia, UnitInertia
 
-from cdpr_drake.dynamics import Drive, floating_rates, mass_in_world, pack_robot, planar_rates
-from cdpr_drake.geometry import FREE, LEVEL, CableSet, PlatformJoint
-from cdpr_drake.models import pose_on_joint
-from cdpr_drake.statics import RigidPlatform
+from cdpr_drake.dynamics.platform_kernel import floating_rates, mass_in_world, planar_rates
+from cdpr_drake.dynamics.robot_arrays import Drive, pack_robot
+from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.geometry.motion_type import FREE, LEVEL
+from cdpr_drake.geometry.platform_joint import PlatformJoint
+from cdpr_drake.models.robot_in_plant import pose_on_joint
+from cdpr_drake.statics.rigid_platform import RigidPlatform
 
 ROUNDING = 1e-10
 """Relative difference of accelerations; both solve the same 6 x 6 system, not in the same order."""

@@ -4,23 +4,13 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from cdpr_drake.cables import cable_motions
-from cdpr_drake.dynamics import (
-    GOOD,
-    LOST,
-    METHODS,
-    MOTORS,
-    REPORTED,
-    TENSIONS,
-    Drive,
-    advance_robot,
-    is_plain,
-    linearise,
-    robot_energy,
-    robot_rates,
-)
-from cdpr_drake.dynamics.robot_arrays import GRAVITY
-from cdpr_drake.models import load_robot
+from cdpr_drake.cables.commanded_tension_kernel import cable_motions
+from cdpr_drake.dynamics.advance_kernel import REPORTED, advance_robot, robot_energy
+from cdpr_drake.dynamics.explicit_kernel import METHODS
+from cdpr_drake.dynamics.robot_arrays import GRAVITY, MOTORS, TENSIONS, Drive
+from cdpr_drake.dynamics.robot_kernel import GOOD, LOST, is_plain, robot_rates
+from cdpr_drake.dynamics.semi_implicit_kernel import linearise
+from cdpr_drake.models.robot_loader import load_robot
 from tests.dynamics.robots import robot_arrays
 
 ORDERS = {"runge_kutta2": 2.0, "runge_kutta3": 3.0, "semi_implicit": 2.0}

@@ -2,21 +2,24 @@
 
 import numpy as np
 
-from cdpr_drake.estimation import (
+from cdpr_drake.estimation.sensor_filter import (
     COUNTED,
     EXTERNAL,
+    OBJECT,
     ON_BOARD,
+    POSE,
+    VELOCITY,
     FusedBelief,
     Prior,
     know_object,
     move,
+    past_columns,
     remember_pose,
     start_fusion,
 )
-from cdpr_drake.estimation.sensor_filter import OBJECT, POSE, VELOCITY, past_columns
-from cdpr_drake.geometry import cable_paths
-from cdpr_drake.models import load_robot
-from cdpr_drake.spatial import exponential, logarithm, pose_from_angles
+from cdpr_drake.geometry.cable_paths import cable_paths
+from cdpr_drake.geometry.poses import exponential, logarithm, pose_from_angles
+from cdpr_drake.models.robot_loader import load_robot
 
 STEP = 1e-6
 """Of central differences [rad, m]."""

@@ -6,25 +6,28 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cdpr_drake.estimation import (
-    EXTERNAL,
-    ON_BOARD,
+from cdpr_drake.estimation.camera_miscalibration import (
     Calibration,
-    Prior,
     answers,
-    correct,
     judged,
-    know_object,
     learnt_shares,
     mixed,
-    sight_external,
-    sight_on_board,
+    surprise_of,
+)
+from cdpr_drake.estimation.sensor_filter import (
+    EXTERNAL,
+    ON_BOARD,
+    POSE,
+    Prior,
+    apart,
+    correct,
+    know_object,
+    moved_by,
     start_fusion,
 )
-from cdpr_drake.estimation.calibration_doubt import surprise_of
-from cdpr_drake.estimation.sensor_filter import POSE, apart, moved_by
-from cdpr_drake.geometry import cable_paths
-from cdpr_drake.spatial import exponential, logarithm
+from cdpr_drake.estimation.sensor_models import sight_external, sight_on_board
+from cdpr_drake.geometry.cable_paths import cable_paths
+from cdpr_drake.geometry.poses import exponential, logarithm
 from tests.estimation.fused_beliefs import (
     CABLES,
     X_PC,

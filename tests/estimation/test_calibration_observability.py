@@ -9,11 +9,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cdpr_drake.estimation import COUNTED, EXTERNAL, ON_BOARD, Increments, move_inertially
-from cdpr_drake.estimation.sensor_filter import OBJECT, POSE, VELOCITY
+from cdpr_drake.estimation.sensor_filter import (
+    COUNTED,
+    EXTERNAL,
+    OBJECT,
+    ON_BOARD,
+    POSE,
+    VELOCITY,
+    Increments,
+    move_inertially,
+)
 from cdpr_drake.estimation.sensor_models import sight_external, sight_on_board
-from cdpr_drake.geometry import cable_paths
-from cdpr_drake.spatial import adjoint, exponential, logarithm
+from cdpr_drake.geometry.cable_paths import cable_paths
+from cdpr_drake.geometry.poses import adjoint, exponential, logarithm
 from tests.estimation.fused_beliefs import (
     CABLES,
     GRAVITY,

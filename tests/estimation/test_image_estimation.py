@@ -6,8 +6,12 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cdpr_drake.estimation.from_images import object_from_pose, pose_from_images, pose_from_object
-from cdpr_drake.spatial import exponential, pose_error, pose_from_angles
+from cdpr_drake.estimation.pose_from_images import (
+    object_from_pose,
+    pose_from_images,
+    pose_from_object,
+)
+from cdpr_drake.geometry.poses import exponential, pose_error, pose_from_angles
 
 ROUND_OFF = 1e-12  # products of some poses with entries of order one
 

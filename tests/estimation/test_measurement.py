@@ -16,7 +16,7 @@ from cdpr_drake.estimation.sensor_noise import (
     sample_noise,
     tension_readings,
 )
-from cdpr_drake.spatial import rotation_vector
+from cdpr_drake.geometry.poses import rotation_vector
 
 EXACT = 1e-12
 """Rotation matrices and vectors of order one."""

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from cdpr_drake.estimation.from_images import object_from_pose, pose_from_object
 from cdpr_drake.estimation.pose_filter import (
     image_covariance,
     normalized_error,
@@ -16,11 +15,12 @@ from cdpr_drake.estimation.pose_filter import (
     update_known_object,
     update_lengths,
 )
-from cdpr_drake.geometry import cable_lengths, length_jacobian
-from cdpr_drake.spatial import exponential, logarithm, pose_error, pose_from_angles
-from cdpr_drake.trajectories import PoseTrajectory
-from cdpr_drake.vision import Pinhole
-from cdpr_drake.vision.apriltag import tag_corners
+from cdpr_drake.estimation.pose_from_images import object_from_pose, pose_from_object
+from cdpr_drake.geometry.poses import exponential, logarithm, pose_error, pose_from_angles
+from cdpr_drake.geometry.straight_cables import cable_lengths, length_jacobian
+from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
+from cdpr_drake.vision.apriltags import tag_corners
+from cdpr_drake.vision.pinhole import Pinhole
 from cdpr_drake.vision.target import pose_from_points
 
 ROUND_OFF = 1e-9

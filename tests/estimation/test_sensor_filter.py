@@ -4,17 +4,18 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from cdpr_drake.estimation import (
+from cdpr_drake.estimation.pose_filter import image_covariance
+from cdpr_drake.estimation.sensor_filter import (
     EXTERNAL,
+    POSE,
     FusedBelief,
     Increments,
     Prior,
     correct,
-    image_covariance,
     move_inertially,
+    pose_at,
     start_fusion,
 )
-from cdpr_drake.estimation.sensor_filter import POSE, pose_at
 from cdpr_drake.estimation.sensor_models import (
     Look,
     depth_innovation,
@@ -36,9 +37,9 @@ from cdpr_drake.estimation.source_gates import (
     take_image,
     take_lengths,
 )
-from cdpr_drake.geometry import cable_paths
-from cdpr_drake.models import load_camera
-from cdpr_drake.spatial import exponential, logarithm, pose_error
+from cdpr_drake.geometry.cable_paths import cable_paths
+from cdpr_drake.geometry.poses import exponential, logarithm, pose_error
+from cdpr_drake.models.camera_catalogue import load_camera
 from cdpr_drake.vision.target import pose_from_points
 from tests.estimation.fused_beliefs import (
     BEFORE,

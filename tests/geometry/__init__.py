@@ -1,1 +1,3 @@
 """Tests of `cdpr_drake.geometry`."""
+
+"""Tests of `cdpr_drake.geometry`."""

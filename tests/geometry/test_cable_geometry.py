@@ -5,6 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydrake.math import RigidTransform, RotationMatrix
 
+from cdpr_drake.geometry.poses import exponential, rotation_from_angles
 from cdpr_drake.geometry.straight_cables import (
     PLANAR_ROWS,
     cable_lengths,
@@ -13,7 +14,6 @@ from cdpr_drake.geometry.straight_cables import (
     length_jacobian,
     wrench_matrix,
 )
-from cdpr_drake.spatial import exponential, rotation_from_angles
 
 ROUNDING = 1e-13  # a dozen products of numbers of size one
 STEP = 1e-6  # central differences

@@ -5,15 +5,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydrake.math import RigidTransform
 
+from cdpr_drake.geometry.cable_paths import cable_jacobian
 from cdpr_drake.geometry.cable_rates import (
     base_adjoint,
     cable_rates_from_base_twist,
     cable_rates_from_platform_twist,
 )
 from cdpr_drake.geometry.cable_set import CableSet
-from cdpr_drake.geometry.paths import cable_jacobian
+from cdpr_drake.geometry.poses import adjoint, rotation_from_vector
 from cdpr_drake.geometry.straight_cables import length_jacobian
-from cdpr_drake.spatial import adjoint, rotation_from_vector
 
 ROUND_OFF = 1e-12
 """Of rates of order one."""

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from cdpr_drake.errors import CableModelError, RobotFileError
-from cdpr_drake.geometry import CableSet, pack_cables
-from cdpr_drake.models import load_robot
+from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.geometry.motion_kernel import pack_cables
+from cdpr_drake.models.robot_loader import load_robot
 from tests.models.representative_robots import REPRESENTATIVE_ROBOTS
 
 P_WA = np.array([[1.0, -1.0], [0.0, 0.1], [2.0, 2.1]])
@@ -76,7 +77,7 @@ def test_no_cables_are_refused():
 
 
 def test_a_swivel_axis_of_length_zero_is_refused_in_a_file(tmp_path):
-    from cdpr_drake.models import robot_file
+    from cdpr_drake.models.robot_loader import robot_file
 
     text = robot_file("planar").read_text()
     path = tmp_path / "planar.yaml"

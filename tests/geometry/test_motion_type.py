@@ -2,18 +2,17 @@ import numpy as np
 import pytest
 
 from cdpr_drake.errors import CableGeometryError
-from cdpr_drake.geometry import (
-    ALL_ROWS,
+from cdpr_drake.geometry.cable_paths import motion_of
+from cdpr_drake.geometry.motion_type import (
     FREE,
     LEVEL,
     MOTION_TYPES,
-    PLANAR_ROWS,
     MotionType,
     keep_free,
-    motion_of,
     write_projection,
 )
-from cdpr_drake.spatial import pose_from_angles
+from cdpr_drake.geometry.poses import pose_from_angles
+from cdpr_drake.geometry.straight_cables import ALL_ROWS, PLANAR_ROWS
 
 X_WP = pose_from_angles([0.1, 0.2, 0.3], [0.4, -0.3, 0.7])
 R = X_WP.rotation().matrix()

@@ -7,10 +7,10 @@ import pytest
 from pydrake.math import RigidTransform
 
 from cdpr_drake.errors import CableGeometryError
-from cdpr_drake.geometry.paths import cable_paths
+from cdpr_drake.geometry.cable_paths import cable_paths
+from cdpr_drake.geometry.poses import exponential
 from cdpr_drake.geometry.straight_cables import cable_lengths, length_jacobian
-from cdpr_drake.models import load_robot
-from cdpr_drake.spatial import exponential
+from cdpr_drake.models.robot_loader import load_robot
 from tests.models.representative_robots import REPRESENTATIVE_ROBOTS
 
 ROUNDING = 1e-12

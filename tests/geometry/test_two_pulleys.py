@@ -10,10 +10,11 @@ from pydrake.math import RigidTransform, RollPitchYaw
 from scipy.optimize import minimize, root
 
 from cdpr_drake.errors import CableGeometryError
-from cdpr_drake.geometry import CableSet, cable_jacobian, cable_paths, motion_of
+from cdpr_drake.geometry.cable_paths import cable_jacobian, cable_paths, motion_of
+from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.geometry.poses import rotation_from_vector
 from cdpr_drake.geometry.pulley_kernel import pulley_geometry, pulley_line, unit_vector_derivative
 from cdpr_drake.geometry.two_pulleys_kernel import add_platform_turning, free_line, line_by_pose
-from cdpr_drake.spatial import rotation_from_vector
 
 RATE = 1e-8
 """Central differences over 1e-5 of lengths of metres that bend over centimetres."""

@@ -5,10 +5,11 @@ from functools import cache
 
 import numpy as np
 
-from cdpr_drake.geometry import CableSet
-from cdpr_drake.identification import DynamicModel
-from cdpr_drake.spatial import cross_matrix, rotations_of_quaternions
-from cdpr_drake.tensions import wrench_matrix_at
+from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.geometry.poses import cross_matrix
+from cdpr_drake.geometry.rotation_kernel import rotations_of_quaternions
+from cdpr_drake.identification.parameters import DynamicModel
+from cdpr_drake.tensions.control_step_kernel import wrench_matrix_at
 
 G = np.array([0.0, 0.0, -9.81])
 RATE, SPAN = 250.0, 8.0

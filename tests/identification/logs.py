@@ -5,14 +5,13 @@ from dataclasses import replace
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cdpr_drake.identification import (
-    DynamicModel,
-    inertia_regressor,
-    sample_motion,
-)
-from cdpr_drake.models import load_robot, rigid_platform
-from cdpr_drake.spatial import cross_matrix, pose_row, rotation_from_vector
-from cdpr_drake.tensions import wrench_matrix_at
+from cdpr_drake.geometry.poses import cross_matrix, pose_row, rotation_from_vector
+from cdpr_drake.identification.parameters import DynamicModel
+from cdpr_drake.identification.regressor import inertia_regressor
+from cdpr_drake.identification.samples import sample_motion
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_statics import rigid_platform
+from cdpr_drake.tensions.control_step_kernel import wrench_matrix_at
 
 ROBOT = load_robot("acrobot_large")
 CABLES = ROBOT.cable_set().without_pulleys()

@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 from cdpr_drake.errors import IdentificationError
-from cdpr_drake.geometry import cable_jacobian
-from cdpr_drake.identification import ExcitationTask, design_excitation, inertia_regressor
-from cdpr_drake.tensions import TensionProblem, exact_tensions
+from cdpr_drake.geometry.cable_paths import cable_jacobian
+from cdpr_drake.identification.excitation import ExcitationTask, design_excitation
+from cdpr_drake.identification.regressor import inertia_regressor
+from cdpr_drake.tensions.methods import exact_tensions
+from cdpr_drake.tensions.problem import TensionProblem
 from tests.identification.logs import CABLES, ROBOT, G, believed
 
 TASK = ExcitationTask(

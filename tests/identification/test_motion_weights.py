@@ -7,20 +7,18 @@ import pytest
 from scipy.stats import chi2
 
 from cdpr_drake.errors import IdentificationError
-from cdpr_drake.identification import (
+from cdpr_drake.geometry.poses import rotation_from_vector
+from cdpr_drake.identification.program import IdentificationProgram
+from cdpr_drake.identification.regressor import inertia_regressor, regressor_slopes
+from cdpr_drake.identification.result import MISFIT, MISFIT_FACTOR
+from cdpr_drake.identification.robust_cost import huber_cost, huber_limit, huber_weights
+from cdpr_drake.identification.samples import (
     LEAST_POSE,
     LEAST_TENSION,
-    MISFIT,
-    MISFIT_FACTOR,
-    IdentificationProgram,
-    inertia_regressor,
     sample_motion,
+    wrench_matrix_slopes,
 )
-from cdpr_drake.identification.regressor import regressor_slopes
-from cdpr_drake.identification.robust import huber_cost, huber_limit, huber_weights
-from cdpr_drake.identification.samples import wrench_matrix_slopes
 from cdpr_drake.identification.terms import over_others
-from cdpr_drake.spatial import rotation_from_vector
 from tests.identification import free_motions
 from tests.identification.free_motions import CASES, NOISE, G, believed, body, cables, log
 

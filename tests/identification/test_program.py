@@ -6,13 +6,10 @@ from pydrake.solvers import Solve
 from scipy.stats import chi2
 
 from cdpr_drake.errors import IdentificationError
-from cdpr_drake.identification import (
-    IdentificationProgram,
-    Smoother,
-    pseudo_inertia,
-    sample_motion,
-    sample_winches,
-)
+from cdpr_drake.identification.program import IdentificationProgram
+from cdpr_drake.identification.regressor import pseudo_inertia
+from cdpr_drake.identification.samples import sample_motion, sample_winches
+from cdpr_drake.identification.smoothing import Smoother
 from tests.identification.logs import BANDWIDTH, CABLES, RATE, TRUE, believed, log, samples
 
 PLATFORM = ("mass", "center_of_mass", "inertia")

@@ -5,14 +5,14 @@ from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import MultibodyForces, SpatialInertia, UnitInertia
 
-from cdpr_drake.identification import (
+from cdpr_drake.geometry.poses import rotation_from_vector
+from cdpr_drake.identification import regressor as room
+from cdpr_drake.identification.regressor import (
     central_parameters,
     inertia_regressor,
     inertial_parameters,
     pseudo_inertia,
 )
-from cdpr_drake.identification import regressor as room
-from cdpr_drake.spatial import rotation_from_vector
 
 G = np.array([0.0, 0.0, -9.81])
 PI = inertial_parameters(

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cdpr_drake.identification.robust import HUBER, huber_cost, huber_limit, huber_weights
+from cdpr_drake.identification.robust_cost import HUBER, huber_cost, huber_limit, huber_weights
 
 STEP = 1e-6
 DIFFERENCE = 1e-8

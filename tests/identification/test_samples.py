@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from cdpr_drake.errors import IdentificationError
-from cdpr_drake.geometry import CableSet
+from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.identification.samples import (
     BLOCK,
     _one_side,

@@ -2,10 +2,11 @@
 
 import pytest
 
-from cdpr_drake.analyses.compilation import compilation_steps
-from cdpr_drake.cli import first_use
-from cdpr_drake.kernel_cache import group_names, needed_kernels, signature_of, signature_words
-from cdpr_drake.systems.scenarios import DEFAULT_SCENARIO
+from cdpr_drake.analyses.installation import compilation_steps
+from cdpr_drake.cli import process as first_use
+from cdpr_drake.kernel_cache.kernel_list import group_names, needed_kernels
+from cdpr_drake.kernel_cache.signatures import signature_of, signature_words
+from cdpr_drake.systems.scenarios.visual_servo_scenario import DEFAULT_SCENARIO
 
 DEFAULT = [DEFAULT_SCENARIO]
 

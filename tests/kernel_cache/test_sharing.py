@@ -12,23 +12,22 @@ import numba
 import pytest
 from numba.core import event
 
-from cdpr_drake.kernel_cache import (
+from cdpr_drake.kernel_cache import locks as locks_module
+from cdpr_drake.kernel_cache.beside import compile_beside
+from cdpr_drake.kernel_cache.helper import compile_listed
+from cdpr_drake.kernel_cache.kernel_list import ListedKernel, is_complete, note_complete
+from cdpr_drake.kernel_cache.locks import (
+    LOCK_FILE,
     CompilationLocks,
-    ListedKernel,
-    compile_beside,
-    compile_listed,
-    is_complete,
-    note_complete,
+    kernel_lock,
     share_compilation,
     shared_locks,
 )
-from cdpr_drake.kernel_cache import locks as locks_module
-from cdpr_drake.kernel_cache.locks import LOCK_FILE, kernel_lock
 
 HOLD = """
 import sys
 from pathlib import Path
-from cdpr_drake.kernel_cache import CompilationLocks
+from cdpr_drake.kernel_cache.locks import CompilationLocks
 with CompilationLocks(Path(sys.argv[1])).held(sys.argv[2], wait=False) as mine:
     print(mine, flush=True)
     sys.stdin.read()

@@ -9,9 +9,11 @@ import yaml
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
 from cdpr_drake.errors import RobotFileError
-from cdpr_drake.models import EXPORTS, load_robot, robot_names, write_robot
-from cdpr_drake.spatial import pose_error
-from cdpr_drake.systems.robots import CableRobot, automatic_step
+from cdpr_drake.geometry.poses import pose_error
+from cdpr_drake.models.robot_exchange import write_robot
+from cdpr_drake.models.robot_exports import EXPORTS
+from cdpr_drake.models.robot_loader import load_robot, robot_names
+from cdpr_drake.systems.robots.cable_robot import CableRobot, automatic_step
 
 STILL = 1e-6
 """A robot in equilibrium moves by round-off only; a micrometre and a microradian."""

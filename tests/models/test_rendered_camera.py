@@ -13,6 +13,7 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantValueSource
 
 from cdpr_drake.errors import RenderingError
+from cdpr_drake.geometry.poses import pose_error, pose_from_angles
 from cdpr_drake.models import rendered_camera
 from cdpr_drake.models.camera_catalogue import load_camera
 from cdpr_drake.models.rendered_camera import (
@@ -23,11 +24,11 @@ from cdpr_drake.models.rendered_camera import (
 )
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.scene import add_tag
-from cdpr_drake.servoing import CameraMounting
-from cdpr_drake.spatial import pose_error, pose_from_angles
-from cdpr_drake.systems.cameras import ProjectedCamera, TargetDetector
-from cdpr_drake.systems.robots import CableRobot
-from cdpr_drake.vision import TagTarget
+from cdpr_drake.servoing.servo_task import CameraMounting
+from cdpr_drake.systems.cameras.projected_camera import ProjectedCamera
+from cdpr_drake.systems.cameras.target_measurement import TargetDetector
+from cdpr_drake.systems.robots.cable_robot import CableRobot
+from cdpr_drake.vision.apriltags import TagTarget
 
 MEAN_OFFSET = 0.1
 """Mean over all corners of all poses [px]. Drake and OpenCV count pixels from different places,

@@ -8,14 +8,10 @@ from pydrake.systems.analysis import Simulator
 from cdpr_drake.errors import CableGeometryError, CdprError, InfeasibleTensionError
 from cdpr_drake.models.robot_holding import check_pulleys, hold_robot
 from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.systems.robots import (
-    CableRobot,
-    CableRobotSettings,
-    CableSettings,
-    CompiledCableRobot,
-    StepRule,
-    holding_tensions,
-)
+from cdpr_drake.systems.robots.cable_robot import CableRobot, holding_tensions
+from cdpr_drake.systems.robots.compiled_cable_robot import CompiledCableRobot
+from cdpr_drake.systems.robots.compiled_step import StepRule
+from cdpr_drake.systems.robots.settings import CableRobotSettings, CableSettings
 from tests.models.representative_robots import REPRESENTATIVE_ROBOTS
 
 STILL = 1e-6

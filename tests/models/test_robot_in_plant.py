@@ -7,6 +7,7 @@ from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
 from pydrake.multibody.tree import SpatialInertia, default_model_instance
 from pydrake.systems.framework import DiagramBuilder
 
+from cdpr_drake.geometry.poses import pose_error, pose_from_angles, rotation_from_angles
 from cdpr_drake.models.robot_in_plant import (
     add_robot,
     platform_box,
@@ -14,8 +15,7 @@ from cdpr_drake.models.robot_in_plant import (
     pose_from_state,
 )
 from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.spatial import pose_error, pose_from_angles, rotation_from_angles
-from cdpr_drake.systems.robots import CableForces
+from cdpr_drake.systems.robots.cable_forces import CableForces
 from tests.models.representative_robots import REPRESENTATIVE_ROBOTS
 
 ROUND_OFF = 1e-12

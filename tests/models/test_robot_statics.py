@@ -7,7 +7,7 @@ import pytest
 from pydrake.math import RigidTransform
 
 from cdpr_drake.errors import CableGeometryError, TensionProblemError
-from cdpr_drake.geometry import PLANAR_ROWS, gravity_wrench, wrench_matrix
+from cdpr_drake.geometry.straight_cables import PLANAR_ROWS, gravity_wrench, wrench_matrix
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_statics import tension_problem
 from tests.models.representative_robots import REPRESENTATIVE_ROBOTS

@@ -9,12 +9,12 @@ import yaml
 from pydrake.math import RigidTransform
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
-from cdpr_drake.geometry import gravity_wrench, wrench_matrix
+from cdpr_drake.geometry.poses import pose_error
+from cdpr_drake.geometry.straight_cables import gravity_wrench, wrench_matrix
 from cdpr_drake.models.camera_catalogue import camera_names, load_camera
 from cdpr_drake.models.robot_in_plant import platform_inertia
 from cdpr_drake.models.robot_loader import load_robot, robot_names
-from cdpr_drake.spatial import pose_error
-from cdpr_drake.systems.robots import CableRobot, automatic_step
+from cdpr_drake.systems.robots.cable_robot import CableRobot, automatic_step
 from tests.models.published_points import LARGE_ANCHORS
 from tests.models.representative_robots import REPRESENTATIVE_ROBOTS
 

@@ -8,12 +8,12 @@ from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.multibody.tree import SpatialInertia
 from pydrake.systems.framework import DiagramBuilder
 
+from cdpr_drake.geometry.poses import pose_from_angles
 from cdpr_drake.models.rendered_camera import add_renderer, make_rgbd_sensor
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.scene import GROUND_DEPTH, add_frame, add_ground, add_tag, tag_mesh
-from cdpr_drake.spatial import pose_from_angles
-from cdpr_drake.vision import Pinhole
-from cdpr_drake.vision.apriltag import TagFinder, tag_corners
+from cdpr_drake.vision.apriltags import TagFinder, tag_corners
+from cdpr_drake.vision.pinhole import Pinhole
 
 CORNER_OFFSET = 0.6
 """A detected corner [px] lies this near to its projection; measured 0.1 to 0.5 px."""

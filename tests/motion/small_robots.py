@@ -4,7 +4,8 @@ from pathlib import Path
 
 import yaml
 
-from cdpr_drake.models import Robot, parse_robot
+from cdpr_drake.models.robot_loader import parse_robot
+from cdpr_drake.models.robot_schema import Robot
 
 SHARED = """\
 title: A small robot for tests

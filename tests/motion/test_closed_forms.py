@@ -4,18 +4,14 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.queries import at_lengths, at_pose
+from cdpr_drake.analyses.statics.static_query import at_lengths, at_pose
 from cdpr_drake.errors import ForwardKinematicsError
-from cdpr_drake.geometry import cable_paths
-from cdpr_drake.kinematics import ForwardKinematics
-from cdpr_drake.models import rigid_platform, wrench_balance
-from cdpr_drake.spatial import rotation_from_vector
-from cdpr_drake.statics import (
-    equilibrium_near,
-    inextensible_modes,
-    natural_modes,
-    platform_stiffness,
-)
+from cdpr_drake.geometry.cable_paths import cable_paths
+from cdpr_drake.geometry.poses import rotation_from_vector
+from cdpr_drake.models.robot_statics import rigid_platform, wrench_balance
+from cdpr_drake.statics.equilibrium import equilibrium_near
+from cdpr_drake.statics.forward_kinematics import ForwardKinematics
+from cdpr_drake.statics.stiffness import inextensible_modes, natural_modes, platform_stiffness
 from tests.motion.small_robots import BEAM, MOTIONS, small_robot
 
 G = 9.81

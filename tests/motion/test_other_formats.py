@@ -8,9 +8,10 @@ from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake import models
 from cdpr_drake.errors import RobotFileError
-from cdpr_drake.geometry import cable_paths
-from cdpr_drake.models.hardware import FrameBeam, Rail
-from cdpr_drake.spatial import pose_error
+from cdpr_drake.geometry.cable_paths import cable_paths
+from cdpr_drake.geometry.poses import pose_error
+from cdpr_drake.models.exit_points import Rail
+from cdpr_drake.models.shapes import FrameBeam
 from tests.motion.small_robots import small_robot
 
 EXACT = 1e-9

@@ -6,19 +6,17 @@ from pydrake.autodiffutils import AutoDiffXd
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.analysis import Simulator
 
-from cdpr_drake.geometry import cable_paths
-from cdpr_drake.models import add_robot, pose_from_state, rigid_platform
-from cdpr_drake.spatial import pose_error
-from cdpr_drake.statics import equilibrium_near
-from cdpr_drake.systems.robots import (
-    CableForces,
-    CableRobot,
-    CableRobotSettings,
-    CableSettings,
-    CompiledCableRobot,
-    StepRule,
-    TensionDrivenCables,
-)
+from cdpr_drake.geometry.cable_paths import cable_paths
+from cdpr_drake.geometry.poses import pose_error
+from cdpr_drake.models.robot_in_plant import add_robot, pose_from_state
+from cdpr_drake.models.robot_statics import rigid_platform
+from cdpr_drake.statics.equilibrium import equilibrium_near
+from cdpr_drake.systems.robots.cable_forces import CableForces
+from cdpr_drake.systems.robots.cable_robot import CableRobot
+from cdpr_drake.systems.robots.compiled_cable_robot import CompiledCableRobot
+from cdpr_drake.systems.robots.compiled_step import StepRule
+from cdpr_drake.systems.robots.settings import CableRobotSettings, CableSettings
+from cdpr_drake.systems.robots.tension_driven_cables import TensionDrivenCables
 from tests.motion.small_robots import MOTIONS, small_robot
 
 ROUNDING = 1e-12

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from cdpr_drake.errors import RobotFileError
-from cdpr_drake.models import load_robot
+from cdpr_drake.models.robot_loader import load_robot
 from tests.motion.small_robots import BEAM, MOTIONS, POINT, small_robot
 
 

@@ -12,8 +12,8 @@ from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import MatrixGain
 
-from cdpr_drake.analyses.pose_grids import check_grid
-from cdpr_drake.analyses.queries import at_lengths, at_pose
+from cdpr_drake.analyses.statics.static_query import at_lengths, at_pose
+from cdpr_drake.analyses.workspaces.pose_grid import check_grid
 from cdpr_drake.cli.app import main
 from cdpr_drake.errors import (
     CableModelError,
@@ -22,19 +22,19 @@ from cdpr_drake.errors import (
     StabilityError,
     TensionProblemError,
 )
-from cdpr_drake.geometry import cable_paths
-from cdpr_drake.models import add_robot, rest_as_long, rigid_platform, wrench_balance
-from cdpr_drake.spatial import pose_error, rotation_from_vector
-from cdpr_drake.statics import combination_words, equilibrium_near
-from cdpr_drake.systems.robots import (
-    CableRobot,
-    CableRobotSettings,
-    CableSettings,
-    CompiledCableRobot,
-    StepRule,
-    simulated_cables,
-)
-from cdpr_drake.workspaces import grid_by_count
+from cdpr_drake.geometry.cable_paths import cable_paths
+from cdpr_drake.geometry.poses import pose_error, rotation_from_vector
+from cdpr_drake.models.robot_holding import rest_as_long
+from cdpr_drake.models.robot_in_plant import add_robot
+from cdpr_drake.models.robot_statics import rigid_platform, wrench_balance
+from cdpr_drake.statics.controlled_wrenches import combination_words
+from cdpr_drake.statics.equilibrium import equilibrium_near
+from cdpr_drake.systems.robots.cable_forces import simulated_cables
+from cdpr_drake.systems.robots.cable_robot import CableRobot
+from cdpr_drake.systems.robots.compiled_cable_robot import CompiledCableRobot
+from cdpr_drake.systems.robots.compiled_step import StepRule
+from cdpr_drake.systems.robots.settings import CableRobotSettings, CableSettings
+from cdpr_drake.workspaces.pose_grid import grid_by_count
 from tests.messages import printed
 from tests.motion.small_robots import content, small_robot
 
@@ -299,7 +299,7 @@ def test_sagging_cables_need_gravity_along_minus_z_of_their_frame(name):
 
 
 def test_computed_torque_refuses_by_name():
-    from cdpr_drake.systems.tension_control import platform_dynamics
+    from cdpr_drake.systems.controllers.computed_torque import platform_dynamics
 
     for name in ("tripod", "upright_body", "tilted_gravity"):
         with pytest.raises(RobotFileError, match="accepted by computed torque"):

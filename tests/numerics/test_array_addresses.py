@@ -4,14 +4,17 @@ import numpy as np
 import pytest
 from numba import njit, types
 
-from cdpr_drake.numerics import (
+from cdpr_drake.numerics.kernel_calls import (
+    _cube,
+    _matrix,
+    _vector,
+    _whole_numbers,
     array_addresses,
     cube_at,
     integers_at,
     matrix_at,
     vector_at,
 )
-from cdpr_drake.numerics.arrays_by_address import _cube, _matrix, _vector, _whole_numbers
 
 
 @njit

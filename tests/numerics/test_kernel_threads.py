@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from numba import get_num_threads, njit, set_num_threads
 
-from cdpr_drake.numerics.copies_kernel import copy_matrix, copy_vector
-from cdpr_drake.numerics.threads import over_rows
+from cdpr_drake.numerics.kernel_calls import over_rows
+from cdpr_drake.numerics.linear_algebra_kernel import copy_matrix, copy_vector
 
 
 @njit(nogil=True)

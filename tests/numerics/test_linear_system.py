@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cdpr_drake.numerics import eliminate, substitute
+from cdpr_drake.numerics.linear_algebra_kernel import eliminate, substitute
 
 BACKWARD = 1e-9
 """Residual relative to the right hand side of well conditioned systems."""

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.numerics.smallest_eigenpair_kernel import (
+from cdpr_drake.numerics.linear_algebra_kernel import (
     factor,
     smallest_eigenpair,
     smallest_eigenvalue,

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from cdpr_drake.numerics import WORSE, tracker_shift
+from cdpr_drake.numerics.time_shift import WORSE, tracker_shift
 
 TIME = np.linspace(0.0, 10.0, 201)
 

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.plans import LimitSettings, path_task
-from cdpr_drake.models import load_robot
-from cdpr_drake.planning import MotionLimits
+from cdpr_drake.analyses.planning.robot_limits import LimitSettings, path_task
+from cdpr_drake.geometry.poses import pose_from_angles, pose_row
+from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.planning.failures import not_held
+from cdpr_drake.planning.limits import MotionLimits
 from cdpr_drake.planning.path_task import ACTIVE, MotionSamples
-from cdpr_drake.spatial import pose_from_angles, pose_row
-from cdpr_drake.trajectories import POINT_SIZE
+from cdpr_drake.trajectories.pose_path import POINT_SIZE
 
 OUTSIDE = pose_from_angles(np.array([-0.2, -0.42, 0.3]), np.zeros(3))
 """Where the nearest tensions are above the limits in one cable and below them in another."""

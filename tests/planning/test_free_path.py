@@ -7,14 +7,16 @@ import pytest
 from pydrake.autodiffutils import ExtractGradient, InitializeAutoDiff
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.plans import LimitSettings, make_path, path_task
-from cdpr_drake.control import TaskGains, computed_torque
+from cdpr_drake.analyses.planning.robot_limits import LimitSettings, make_path, path_task
+from cdpr_drake.control.task_space import TaskGains, computed_torque
 from cdpr_drake.errors import PlanningError
-from cdpr_drake.geometry import cable_jacobian
-from cdpr_drake.models import load_robot
-from cdpr_drake.planning import Capsule, FreePathProgram, plan_along_path
-from cdpr_drake.spatial import pose_error, pose_from_angles, pose_from_row
-from cdpr_drake.workspaces import Surroundings, box_row, clearances
+from cdpr_drake.geometry.cable_paths import cable_jacobian
+from cdpr_drake.geometry.poses import pose_error, pose_from_angles, pose_from_row
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.planning.free_path import FreePathProgram
+from cdpr_drake.planning.free_path_terms import Capsule
+from cdpr_drake.planning.path_timing import plan_along_path
+from cdpr_drake.workspaces.cable_interference import Surroundings, box_row, clearances
 
 BETWEEN = 0.02  # of a limit: between knots the motion keeps it about
 START, GOAL = RigidTransform([-0.2, 0.0, 0.35]), RigidTransform([0.2, 0.0, 0.35])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from cdpr_drake.errors import PlanningError
-from cdpr_drake.planning import SHAPERS, make_shaper, shaped_share
+from cdpr_drake.planning.input_shaping import SHAPERS, make_shaper, shaped_share
 
 W = 7.0  # rad/s
 

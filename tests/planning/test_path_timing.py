@@ -13,20 +13,23 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import PrismaticJoint, SpatialInertia
 from pydrake.trajectories import PiecewisePolynomial
 
-from cdpr_drake.analyses.plans import (
+from cdpr_drake.analyses.planning.plan_tracking import track_plan
+from cdpr_drake.analyses.planning.robot_limits import (
     LimitSettings,
     make_path,
     path_task,
     robot_limits,
-    track_plan,
 )
-from cdpr_drake.analyses.studies.planning import convex_time
-from cdpr_drake.control import TaskGains, computed_torque
+from cdpr_drake.analyses.studies.planning.convex_timing import convex_time
+from cdpr_drake.control.task_space import TaskGains, computed_torque
 from cdpr_drake.errors import PlanningError
-from cdpr_drake.geometry import cable_jacobian, cable_paths
-from cdpr_drake.models import load_robot
-from cdpr_drake.planning import MotionLimits, PathTask, plan_along_path, stuck
-from cdpr_drake.spatial import pose_from_angles
+from cdpr_drake.geometry.cable_paths import cable_jacobian, cable_paths
+from cdpr_drake.geometry.poses import pose_from_angles
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.planning.failures import stuck
+from cdpr_drake.planning.limits import MotionLimits
+from cdpr_drake.planning.path_task import PathTask
+from cdpr_drake.planning.path_timing import plan_along_path
 
 BETWEEN = 2e-3  # of a limit, by which a plan may miss it between two of 500 stations
 AGREEMENT = 0.01  # of the time, as the planner promises against a fine program

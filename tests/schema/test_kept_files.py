@@ -5,9 +5,9 @@ import pytest
 import yaml
 
 from cdpr_drake.errors import RobotFileError
-from cdpr_drake.models import load_robot, robot_file
-from cdpr_drake.schema import kept_files
-from cdpr_drake.systems.diagrams import load_scenario
+from cdpr_drake.models.robot_loader import load_robot, robot_file
+from cdpr_drake.schema import yaml_files as kept_files
+from cdpr_drake.systems.diagrams.load import load_scenario
 
 
 @pytest.fixture(autouse=True)

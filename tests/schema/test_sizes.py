@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 
 from cdpr_drake.errors import DataFileError, RobotFileError, ScenarioError
-from cdpr_drake.models import load_robot
-from cdpr_drake.models.robot_loader import robot_file
-from cdpr_drake.schema import load_typed
-from cdpr_drake.systems.diagrams import load_scenario
-from cdpr_drake.systems.scenarios import scenario_kind
+from cdpr_drake.models.robot_loader import load_robot, robot_file
+from cdpr_drake.schema.typed_yaml import load_typed
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.scenarios.files import scenario_kind
 
 
 def bomb(levels=12, width=10):

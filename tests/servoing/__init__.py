@@ -1,1 +1,3 @@
 """Tests of `cdpr_drake.servoing`."""
+
+"""Tests of `cdpr_drake.servoing`."""

@@ -7,28 +7,22 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydrake.math import RigidTransform
 
-from cdpr_drake.features import (
-    CameraPoseFeatures,
-    PartitionedFeatures,
-    PointFeatures,
-    SwitchedFeatures,
-    sighting,
-)
-from cdpr_drake.models import load_robot
-from cdpr_drake.servoing import (
+from cdpr_drake.geometry.poses import exponential, pose_error, pose_from_angles
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.servoing.combined_features import PartitionedFeatures, SwitchedFeatures
+from cdpr_drake.servoing.controller import ServoController
+from cdpr_drake.servoing.partitioned_law_kernel import STEEPEST, edge_push
+from cdpr_drake.servoing.servo_law import (
     GOALS,
     AdaptiveGain,
     AxisPartition,
-    BelievedRobot,
     EdgeField,
     ModeSwitching,
-    ServoController,
     ServoLaw,
-    make_task,
 )
-from cdpr_drake.servoing.partition_kernel import STEEPEST, edge_push
-from cdpr_drake.spatial import exponential, pose_error, pose_from_angles
-from cdpr_drake.vision import DotTarget
+from cdpr_drake.servoing.servo_task import BelievedRobot, make_task
+from cdpr_drake.servoing.visual_features import CameraPoseFeatures, PointFeatures, sighting
+from cdpr_drake.vision.dots import DotTarget
 
 PERIOD = 0.04
 ROUNDING = 1e-10

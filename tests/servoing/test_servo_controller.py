@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from cdpr_drake.features import (
+from cdpr_drake.geometry.pose_accuracy import distances_from_line
+from cdpr_drake.geometry.poses import exponential, pose_error, pose_from_angles
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.servoing.controller import ServoController
+from cdpr_drake.servoing.feature_plan import FeaturePlan
+from cdpr_drake.servoing.servo_law import AdaptiveGain, ServoLaw, YawTask
+from cdpr_drake.servoing.servo_task import BelievedRobot, make_task
+from cdpr_drake.servoing.target_motion import MotionFilter
+from cdpr_drake.servoing.visual_features import (
     CameraPoseFeatures,
     CircleFeatures,
     HybridFeatures,
@@ -15,17 +23,9 @@ from cdpr_drake.features import (
     WithoutFeature,
     sighting,
 )
-from cdpr_drake.models import load_robot
-from cdpr_drake.servoing.believed_robot import BelievedRobot
-from cdpr_drake.servoing.controller import ServoController
-from cdpr_drake.servoing.feature_plan import FeaturePlan
-from cdpr_drake.servoing.gain import AdaptiveGain
-from cdpr_drake.servoing.servo_law import ServoLaw, YawTask
-from cdpr_drake.servoing.target_motion import MotionFilter
-from cdpr_drake.servoing.task import make_task
-from cdpr_drake.spatial import distances_from_line, exponential, pose_error, pose_from_angles
-from cdpr_drake.trajectories import SteadyMotion
-from cdpr_drake.vision import CircleTarget, DotTarget
+from cdpr_drake.trajectories.pose_trajectory import SteadyMotion
+from cdpr_drake.vision.dots import DotTarget
+from cdpr_drake.vision.rings import CircleTarget
 
 PERIOD = 0.04
 

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cdpr_drake.numerics import least_squares
-from cdpr_drake.servoing.gain import AdaptiveGain, saturation_share
+from cdpr_drake.numerics.linear_algebra_kernel import least_squares
+from cdpr_drake.servoing.servo_law import AdaptiveGain, saturation_share
 
 STEP = 1e-6  # forward difference at 0, where the norm has no derivative on the other side
 SLOPE_TOLERANCE = 1e-4  # relative; the step times the curvature, which is slope / span

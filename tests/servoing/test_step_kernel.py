@@ -6,9 +6,16 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from cdpr_drake.features import (
-    CENTER,
-    MARKS,
+from cdpr_drake.geometry.cable_paths import cable_jacobian
+from cdpr_drake.geometry.poses import adjoint, pose_from_angles
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.servoing.controller import ServoController
+from cdpr_drake.servoing.feature_plan import FeaturePlan
+from cdpr_drake.servoing.packed_features_kernel import CENTER, MARKS, call_features, feature_kernel
+from cdpr_drake.servoing.servo_law import AdaptiveGain, ServoLaw, YawTask
+from cdpr_drake.servoing.servo_task import BelievedRobot, make_task
+from cdpr_drake.servoing.target_motion import MotionFilter
+from cdpr_drake.servoing.visual_features import (
     CameraPoseFeatures,
     CircleFeatures,
     DepthRule,
@@ -20,18 +27,8 @@ from cdpr_drake.features import (
     packed_sighting,
     sighting,
 )
-from cdpr_drake.features.packed_kernel import call_features, feature_kernel
-from cdpr_drake.geometry import cable_jacobian
-from cdpr_drake.models import load_robot
-from cdpr_drake.servoing.believed_robot import BelievedRobot
-from cdpr_drake.servoing.controller import ServoController
-from cdpr_drake.servoing.feature_plan import FeaturePlan
-from cdpr_drake.servoing.gain import AdaptiveGain
-from cdpr_drake.servoing.servo_law import ServoLaw, YawTask
-from cdpr_drake.servoing.target_motion import MotionFilter
-from cdpr_drake.servoing.task import make_task
-from cdpr_drake.spatial import adjoint, pose_from_angles
-from cdpr_drake.vision import CircleTarget, DotTarget
+from cdpr_drake.vision.dots import DotTarget
+from cdpr_drake.vision.rings import CircleTarget
 
 ROUNDING = 1e-10
 """Sums and factors in another order, times the condition of interaction matrices of 1e4; relative

@@ -1,1 +1,7 @@
 """Tests of `cdpr_drake.stability`."""
+
+"""Tests of `cdpr_drake.stability`."""
+
+"""Tests of `cdpr_drake.stability`."""
+
+"""Tests of `cdpr_drake.stability`."""

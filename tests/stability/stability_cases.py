@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from cdpr_drake.models import load_robot
-from cdpr_drake.stability.criterion import FixedObject, OppositeCorner, StabilityCase
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.stability.desired_view import FixedObject, OppositeCorner
+from cdpr_drake.stability.stability_case import StabilityCase
 
 
 def spatial_case(scheme: str, **changes: object) -> StabilityCase:

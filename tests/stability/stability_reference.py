@@ -10,15 +10,16 @@ from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.features import theta_u_interaction
-from cdpr_drake.spatial import cross_matrix, rotation_from_vector, rotation_vector
-from cdpr_drake.stability.criterion import ModelAtPose, StabilityCase, stability_matrix
+from cdpr_drake.geometry.poses import cross_matrix, rotation_from_vector, rotation_vector
+from cdpr_drake.servoing.pose_features import theta_u_interaction
+from cdpr_drake.stability.criterion import ModelAtPose, stability_matrix
+from cdpr_drake.stability.stability_case import StabilityCase
 
 
 def reference_interaction(
     case: StabilityCase, theta_u: Array, error: Array, p_CO: Array, R_CO: Array
 ) -> Array:
-    """L of every scheme, rows as in `features.interaction_kernel`."""
+    """L of every scheme, rows as in `servoing.interaction_matrix_kernel`."""
     if case.scheme == "ibvs":
         if case.p_OK is None:
             return np.eye(6)

@@ -1,1 +1,5 @@
 """Tests of `cdpr_drake.statics`."""
+
+"""Tests of `cdpr_drake.statics`."""
+
+"""Tests of `cdpr_drake.statics`."""

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cdpr_drake.statics import wrench_control
+from cdpr_drake.statics.controlled_wrenches import wrench_control
 
 RANDOM = np.random.default_rng(4)
 W = RANDOM.normal(size=(6, 3))

@@ -7,12 +7,13 @@ import pytest
 from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator
 
-from cdpr_drake.cables import CABLE_MODELS, cable_state, unstrained_lengths
+from cdpr_drake.cables.elastic_law import unstrained_lengths
+from cdpr_drake.cables.models import CABLE_MODELS, cable_state
 from cdpr_drake.errors import CableModelError, EquilibriumError
-from cdpr_drake.geometry import CableSet
-from cdpr_drake.kinematics import ForwardKinematics
-from cdpr_drake.models import load_robot, rigid_platform
-from cdpr_drake.spatial import pose_error, pose_from_angles, pose_from_row, pose_row
+from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.geometry.poses import pose_error, pose_from_angles, pose_from_row, pose_row
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_statics import rigid_platform
 from cdpr_drake.statics import equilibrium
 from cdpr_drake.statics.equilibrium import (
     Equilibrium,
@@ -22,8 +23,9 @@ from cdpr_drake.statics.equilibrium import (
     equilibrium_poses,
     random_starts,
 )
+from cdpr_drake.statics.forward_kinematics import ForwardKinematics
 from cdpr_drake.statics.rigid_platform import RigidPlatform
-from cdpr_drake.systems.robots import CableRobot, holding_tensions
+from cdpr_drake.systems.robots.cable_robot import CableRobot, holding_tensions
 
 SETTLED = 1e-8
 """Closed forms: the search stops at forces of 1e-10 of the weight, on E S / l of 1e5 N/m."""

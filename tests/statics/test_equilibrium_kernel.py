@@ -3,9 +3,13 @@
 import numpy as np
 import pytest
 
-from cdpr_drake.cables import STRAIGHT, cable_derivatives, cable_state
-from cdpr_drake.geometry import FREE, LEVEL, CableSet, floating_motion
-from cdpr_drake.spatial import pose_from_angles, turn_pose
+from cdpr_drake.cables.dispatch_kernel import STRAIGHT
+from cdpr_drake.cables.models import cable_derivatives, cable_state
+from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.geometry.motion_kernel import floating_motion
+from cdpr_drake.geometry.motion_type import FREE, LEVEL
+from cdpr_drake.geometry.poses import pose_from_angles
+from cdpr_drake.geometry.rotation_kernel import turn_pose
 from cdpr_drake.statics.equilibrium_kernel import RESTS, STUCK, energy_at, settle
 from cdpr_drake.statics.rigid_platform import RigidPlatform
 

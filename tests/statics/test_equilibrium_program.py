@@ -5,19 +5,21 @@ import pytest
 from pydrake.autodiffutils import ExtractGradient, InitializeAutoDiff
 from pydrake.math import RigidTransform
 
-from cdpr_drake.cables import cable_state, unstrained_lengths
+from cdpr_drake.cables.elastic_law import unstrained_lengths
+from cdpr_drake.cables.models import cable_state
 from cdpr_drake.errors import EquilibriumError
-from cdpr_drake.kinematics import ForwardKinematics
-from cdpr_drake.models import load_robot, rigid_platform
-from cdpr_drake.spatial import pose_error, pose_from_angles
+from cdpr_drake.geometry.poses import pose_error, pose_from_angles
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_statics import rigid_platform
 from cdpr_drake.statics.equilibrium import equilibrium_near
 from cdpr_drake.statics.equilibrium_program import (
     displaced,
     make_equilibrium_program,
     solve_equilibrium_program,
 )
+from cdpr_drake.statics.forward_kinematics import ForwardKinematics
 from cdpr_drake.statics.rigid_platform import RigidPlatform
-from cdpr_drake.systems.robots import holding_tensions
+from cdpr_drake.systems.robots.cable_robot import holding_tensions
 
 AGREE = {"inextensible": 1e-6, "elastic": 1e-5, "catenary": 1e-4}
 """How near SNOPT comes [m, rad]: its tolerance over the stiffness in weights per metre; a gradient

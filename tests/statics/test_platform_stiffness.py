@@ -5,22 +5,21 @@ import pytest
 from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator
 
-from cdpr_drake.cables import (
-    cable_derivatives,
-    cable_state,
-    cable_stiffness_matrix,
-    unstrained_lengths,
-)
+from cdpr_drake.cables.elastic_law import cable_stiffness_matrix, unstrained_lengths
+from cdpr_drake.cables.models import cable_derivatives, cable_state
 from cdpr_drake.errors import CableGeometryError, CableModelError
-from cdpr_drake.geometry import CableSet, MotionType, cable_paths
-from cdpr_drake.kinematics import ForwardKinematics
-from cdpr_drake.models import load_robot, rigid_platform
-from cdpr_drake.spatial import pose_from_angles, rotation_from_vector
+from cdpr_drake.geometry.cable_paths import cable_paths
+from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.geometry.motion_type import MotionType
+from cdpr_drake.geometry.poses import pose_from_angles, rotation_from_vector
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_statics import rigid_platform
 from cdpr_drake.statics.equilibrium import equilibrium_near, principal_stiffnesses
+from cdpr_drake.statics.forward_kinematics import ForwardKinematics
 from cdpr_drake.statics.inextensible_equilibrium import tension_stiffness
 from cdpr_drake.statics.rigid_platform import RigidPlatform
 from cdpr_drake.statics.stiffness import inextensible_modes, natural_modes, platform_stiffness
-from cdpr_drake.systems.robots import CableRobot, holding_tensions
+from cdpr_drake.systems.robots.cable_robot import CableRobot, holding_tensions
 
 STEP = 1e-7
 DIFFERENCE = 1e-5
@@ -122,7 +121,7 @@ def test_tensions_stiffen():
 
 def test_a_pendulum_swings_at_its_frequency():
     """Simple pendulum: one cable on the centre of mass, plus the stretching mode."""
-    from cdpr_drake.geometry import CableSet
+    from cdpr_drake.geometry.cable_set import CableSet
     from cdpr_drake.statics.rigid_platform import RigidPlatform
 
     cables = CableSet.make(np.array([[0.0], [0.0], [2.0]]), np.zeros((3, 1)), 1e5)

@@ -6,16 +6,17 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from cdpr_drake.cables import unstrained_lengths
+from cdpr_drake.cables.elastic_law import unstrained_lengths
 from cdpr_drake.errors import CableModelError, EquilibriumError
-from cdpr_drake.geometry import CableSet
-from cdpr_drake.kinematics import ForwardKinematics
-from cdpr_drake.models import load_robot, rigid_platform
-from cdpr_drake.spatial import pose_from_angles, rotation_vector
+from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.geometry.poses import pose_from_angles, rotation_vector
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_statics import rigid_platform
 from cdpr_drake.statics.equilibrium import equilibrium_near
+from cdpr_drake.statics.forward_kinematics import ForwardKinematics
 from cdpr_drake.statics.rigid_platform import RigidPlatform
 from cdpr_drake.statics.sensitivity import pose_sensitivity
-from cdpr_drake.systems.robots import holding_tensions
+from cdpr_drake.systems.robots.cable_robot import holding_tensions
 
 AGREE = 2e-4
 """Differences of poses of rest, relative to the largest entry: steps small enough to keep cables

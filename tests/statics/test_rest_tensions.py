@@ -6,11 +6,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydrake.math import RigidTransform
 
-from cdpr_drake.cables import cable_state
-from cdpr_drake.geometry import cable_paths, gravity_wrench
-from cdpr_drake.models import load_robot
-from cdpr_drake.spatial import rotation_from_angles
-from cdpr_drake.statics.rest_tensions import hold, lengths_for_tensions
+from cdpr_drake.cables.models import cable_state
+from cdpr_drake.geometry.cable_paths import cable_paths
+from cdpr_drake.geometry.poses import rotation_from_angles
+from cdpr_drake.geometry.straight_cables import gravity_wrench
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.statics.static_tensions import hold, lengths_for_tensions
 
 BALANCE = 1e-6
 """Force [N] and moment [N m] left of 1.5 kN: lengths of 4 m are rounded to 4e-16 m, times a

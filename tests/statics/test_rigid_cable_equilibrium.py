@@ -2,11 +2,13 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from cdpr_drake.cables import unstrained_lengths
-from cdpr_drake.geometry import FREE, cable_paths
-from cdpr_drake.kinematics import ForwardKinematics
-from cdpr_drake.models import load_robot, rigid_platform
-from cdpr_drake.spatial import pose_error, pose_from_angles, rotation_from_vector
+from cdpr_drake.cables.elastic_law import unstrained_lengths
+from cdpr_drake.geometry.cable_paths import cable_paths
+from cdpr_drake.geometry.motion_type import FREE
+from cdpr_drake.geometry.poses import pose_error, pose_from_angles, rotation_from_vector
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_statics import rigid_platform
+from cdpr_drake.statics.forward_kinematics import ForwardKinematics
 from cdpr_drake.statics.inextensible_equilibrium import (
     rigid_cables_rest,
     taut_tensions,

@@ -2,9 +2,11 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from cdpr_drake.geometry import FREE, LEVEL
-from cdpr_drake.models import load_robot, platform_inertia, rigid_platform
-from cdpr_drake.spatial import pose_from_angles, rotation_from_vector
+from cdpr_drake.geometry.motion_type import FREE, LEVEL
+from cdpr_drake.geometry.poses import pose_from_angles, rotation_from_vector
+from cdpr_drake.models.robot_in_plant import platform_inertia
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_statics import rigid_platform
 from cdpr_drake.statics.rigid_platform import RigidPlatform
 
 STEP = 1e-6

@@ -6,7 +6,7 @@ from io import StringIO
 
 import pytest
 
-from cdpr_drake.cli import main
+from cdpr_drake.cli.app import main
 from tests.studio.served import served
 
 RUN_SETTINGS = ("camera.kind=projected", "duration=0.2")

@@ -3,7 +3,7 @@
 import json
 import time
 
-from cdpr_drake.systems.scenarios import scenario_file
+from cdpr_drake.systems.scenarios.files import scenario_file
 from tests.chromium import wait_for
 
 FRAMES = """(() => {

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from cdpr_drake.cli import main
+from cdpr_drake.cli.app import main
 from tests.chromium import cleared, complaints, wait_for
 from tests.models.formats.foreign_files import caspr
 

@@ -6,26 +6,28 @@ import sys
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.pictures import open_meshcat
-from cdpr_drake.cli import main
+from cdpr_drake.analyses.visualization.meshcat_window import open_meshcat
+from cdpr_drake.cli.app import main
 from cdpr_drake.cli.command_forms import LEFT_OUT, command_forms
 from cdpr_drake.cli.workspace import workspace
 from cdpr_drake.errors import CdprError
 from cdpr_drake.palette import TENSIONS, rgb
-from cdpr_drake.studio.commands import (
+from cdpr_drake.studio.workbench.command_board import CommandBoard
+from cdpr_drake.studio.workbench.command_form import FieldProblem, OptionKind
+from cdpr_drake.studio.workbench.command_job import CommandJob
+from cdpr_drake.studio.workbench.finished_studies import study_folder
+from cdpr_drake.studio.workbench.job import JobState
+from cdpr_drake.studio.workbench.job_manager import JobManager
+from cdpr_drake.studio.workbench.working_folder import WorkingFolder
+from cdpr_drake.studio.workbench.workspace_regions import (
     PLANE,
-    CommandBoard,
-    FieldProblem,
-    OptionKind,
+    UNKNOWN,
     Plane,
+    colors_of,
     draw_plane,
     read_regions,
     show_regions,
-    study_folder,
 )
-from cdpr_drake.studio.commands.regions import UNKNOWN, colors_of
-from cdpr_drake.studio.jobs import CommandJob, JobManager, JobState
-from cdpr_drake.studio.workbench import WorkingFolder
 
 
 @pytest.fixture(scope="module")

@@ -18,7 +18,9 @@ from cdpr_drake.studio.page import make_page
 from cdpr_drake.studio.scene_relay import SCENE
 from cdpr_drake.studio.server import _put_before_all
 from cdpr_drake.studio.sessions import Sessions
-from cdpr_drake.studio.workbench import Calculator, Workbench, WorkingFolder
+from cdpr_drake.studio.workbench.calculator import Calculator
+from cdpr_drake.studio.workbench.session import Workbench
+from cdpr_drake.studio.workbench.working_folder import WorkingFolder
 from tests.messages import messages
 from tests.studio.served import served
 

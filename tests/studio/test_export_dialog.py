@@ -2,7 +2,8 @@
 
 import asyncio
 
-from cdpr_drake.models import load_robot, not_written, not_written_words
+from cdpr_drake.models.robot_exports import not_written, not_written_words
+from cdpr_drake.models.robot_loader import load_robot
 from tests.studio.pages import field, opened_page, until
 
 

@@ -5,10 +5,9 @@ import asyncio
 import pytest
 
 from cdpr_drake.errors import CdprError
-from cdpr_drake.studio import StudioOptions
 from cdpr_drake.studio.entrance import Entrance, is_token
 from cdpr_drake.studio.guard import SESSION, Guard
-from cdpr_drake.studio.server import serve
+from cdpr_drake.studio.server import StudioOptions, serve
 
 TOKEN = "secret-token-of-a-test"
 ENTRANCE = Entrance(TOKEN, 80)

@@ -10,9 +10,12 @@ from contextlib import suppress
 import pytest
 from nicegui.testing.user_simulation import user_simulation
 
-from cdpr_drake.studio.jobs import JobManager, JobState, RunJob
 from cdpr_drake.studio.panels.run import run_panel
-from cdpr_drake.studio.workbench import Workbench, WorkingFolder
+from cdpr_drake.studio.workbench.job import JobState
+from cdpr_drake.studio.workbench.job_manager import JobManager
+from cdpr_drake.studio.workbench.run_job import RunJob
+from cdpr_drake.studio.workbench.session import Workbench
+from cdpr_drake.studio.workbench.working_folder import WorkingFolder
 
 LONGEST = 1200.0
 """Nothing here takes as long, unless it hangs [s]."""

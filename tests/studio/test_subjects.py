@@ -7,10 +7,11 @@ from contextlib import asynccontextmanager
 
 import pytest
 
-from cdpr_drake.studio.panels import PANELS
 from cdpr_drake.studio.panels.run import _boards, _scenes
+from cdpr_drake.studio.panels.table import PANELS
 from cdpr_drake.studio.panels.workspace import _views
-from cdpr_drake.studio.workbench import Subject, subject_of, with_value
+from cdpr_drake.studio.workbench.result_subject import Subject, subject_of
+from cdpr_drake.studio.workbench.yaml_edit import with_value
 from tests.studio.pages import field, opened_page, problems, until
 
 ROBOT, OTHER = "acrobot_small", "planar"
@@ -204,7 +205,7 @@ def test_a_run_is_of_the_robot_that_is_open(folder):
 
 
 def test_subjects_tell_every_change_of_a_robot(folder):
-    from cdpr_drake.models import load_robot
+    from cdpr_drake.models.robot_loader import load_robot
 
     robot, other = load_robot(ROBOT), load_robot(ROBOT)
     assert subject_of(robot) == subject_of(other)

@@ -4,8 +4,8 @@ import json
 
 import pytest
 
-from cdpr_drake.cli import main
-from cdpr_drake.studio.workbench import USUAL_ROBOT
+from cdpr_drake.cli.app import main
+from cdpr_drake.studio.workbench.session import USUAL_ROBOT
 from tests.chromium import cleared, complaints, wait_for
 from tests.studio.test_browser import press, type_into
 

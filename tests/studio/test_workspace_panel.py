@@ -6,8 +6,8 @@ import shutil
 
 import pytest
 
-from cdpr_drake.studio.jobs import JobState
 from cdpr_drake.studio.panels.workspace import _views
+from cdpr_drake.studio.workbench.job import JobState
 from tests.studio.pages import field, opened_page, problems, until
 
 

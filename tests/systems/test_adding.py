@@ -8,23 +8,19 @@ from pydrake.common.value import Value
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import LeafSystem
 
-from cdpr_drake.analyses.reporting import write_log
-from cdpr_drake.analyses.runs import run_scenario
+from cdpr_drake.analyses.reporting.log_files import write_log
+from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
 from cdpr_drake.errors import ScenarioError
-from cdpr_drake.features import ObjectPoseFeatures
-from cdpr_drake.schema import number, section
-from cdpr_drake.systems import (
-    ESTIMATORS,
-    SCHEMES,
-    SENSORS,
-    TARGETS,
-    EstimatorKind,
-    Scenario,
-    build_visual_servo,
-    load_scenario,
-)
-from cdpr_drake.systems.sensors import SensorKind
-from cdpr_drake.vision import TagTarget
+from cdpr_drake.schema.fields import number, section
+from cdpr_drake.servoing.visual_features import ObjectPoseFeatures
+from cdpr_drake.systems.cameras.targets import TARGETS
+from cdpr_drake.systems.controllers.schemes import SCHEMES
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.diagrams.visual_servo import build_visual_servo
+from cdpr_drake.systems.estimators.estimator_kinds import ESTIMATORS, EstimatorKind
+from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
+from cdpr_drake.systems.sensors.sensor_kinds import SENSORS, SensorKind
+from cdpr_drake.vision.apriltags import TagTarget
 
 QUICK = ["camera.kind=projected", "duration=0.2"]
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from cdpr_drake.geometry import gravity_wrench, wrench_matrix
-from cdpr_drake.models import load_robot
+from cdpr_drake.geometry.straight_cables import gravity_wrench, wrench_matrix
+from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.tensions.problem import TensionProblem
 
 

@@ -7,12 +7,15 @@ import pytest
 from numba import njit
 from pydrake.multibody.plant import MultibodyPlant
 
-from cdpr_drake.cli import main
-from cdpr_drake.models import add_robot, load_robot, tension_problem
-from cdpr_drake.systems.diagrams import load_scenario
-from cdpr_drake.systems.tension_control import TensionDistributor
-from cdpr_drake.tensions import METHODS, TensionMethod, distribute, distribute_batch
+from cdpr_drake.cli.app import main
+from cdpr_drake.models.robot_in_plant import add_robot
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_statics import tension_problem
+from cdpr_drake.systems.controllers.tension_distributor import TensionDistributor
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.tensions.batch import distribute_batch
 from cdpr_drake.tensions.closed_form_kernel import toward, within
+from cdpr_drake.tensions.methods import METHODS, TensionMethod, distribute
 from tests.messages import printed
 
 SAME = 1e-9

@@ -8,15 +8,12 @@ from pydrake.math import log
 from pydrake.solvers import IpoptSolver, MathematicalProgram, SolverOptions
 
 from cdpr_drake.errors import TensionProblemError
-from cdpr_drake.models import load_robot, tension_problem
-from cdpr_drake.spatial import pose_from_angles
-from cdpr_drake.tensions import Distributor, TensionProblem, TensionStatus, distribute
-from cdpr_drake.tensions.barrier_kernel import (
-    BARRIER,
-    LEAST_SHARE,
-    SOFTNESS,
-    minimize_barrier,
-)
+from cdpr_drake.geometry.poses import pose_from_angles
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_statics import tension_problem
+from cdpr_drake.tensions.barrier_kernel import BARRIER, LEAST_SHARE, SOFTNESS, minimize_barrier
+from cdpr_drake.tensions.methods import Distributor, distribute
+from cdpr_drake.tensions.problem import TensionProblem, TensionStatus
 from cdpr_drake.tensions.quadratic_program_kernel import workspace_shape
 from tests.tensions.tension_cases import random_problem
 

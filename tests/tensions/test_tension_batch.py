@@ -5,10 +5,10 @@ import pytest
 from numba import get_num_threads
 
 from cdpr_drake.errors import TensionProblemError
-from cdpr_drake.geometry import gravity_wrench, wrench_matrix
-from cdpr_drake.models import load_robot
-from cdpr_drake.numerics.threads import SHARES
-from cdpr_drake.spatial import pose_from_angles
+from cdpr_drake.geometry.poses import pose_from_angles
+from cdpr_drake.geometry.straight_cables import gravity_wrench, wrench_matrix
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.numerics.kernel_calls import SHARES
 from cdpr_drake.tensions.batch import distribute_batch
 from cdpr_drake.tensions.methods import METHODS, distribute, exact_tensions
 from cdpr_drake.tensions.problem import RESIDUAL_TOLERANCE, TensionProblem, TensionStatus

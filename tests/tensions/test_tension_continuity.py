@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from cdpr_drake.models import load_robot
-from cdpr_drake.spatial import pose_from_angles
+from cdpr_drake.geometry.poses import pose_from_angles
+from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.tensions.methods import distribute
 from cdpr_drake.tensions.problem import TensionStatus
 from tests.tensions.tension_cases import acrobot

@@ -8,8 +8,8 @@ from pydrake.math import RigidTransform
 from pydrake.solvers import ClarabelSolver, ClpSolver, OsqpSolver
 
 from cdpr_drake.errors import TensionProblemError
-from cdpr_drake.geometry import gravity_wrench, wrench_matrix
-from cdpr_drake.spatial import rotation_from_angles
+from cdpr_drake.geometry.poses import rotation_from_angles
+from cdpr_drake.geometry.straight_cables import gravity_wrench, wrench_matrix
 from cdpr_drake.tensions.methods import METHODS, distribute
 from cdpr_drake.tensions.problem import TensionProblem, TensionStatus
 from cdpr_drake.tensions.program import make_program, program_tensions

@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import linprog, lsq_linear
 
-from cdpr_drake.geometry import gravity_wrench, wrench_matrix
-from cdpr_drake.models import load_robot
-from cdpr_drake.spatial import pose_from_angles
+from cdpr_drake.geometry.poses import pose_from_angles
+from cdpr_drake.geometry.straight_cables import gravity_wrench, wrench_matrix
+from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.tensions.methods import distribute
 from cdpr_drake.tensions.problem import TensionProblem
 from cdpr_drake.tensions.quadratic_program_kernel import (

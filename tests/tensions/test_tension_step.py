@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
-from cdpr_drake.geometry import PLANAR_ROWS, cable_paths
-from cdpr_drake.models import load_robot, pose_from_state
+from cdpr_drake.geometry.cable_paths import cable_paths
+from cdpr_drake.geometry.straight_cables import PLANAR_ROWS
+from cdpr_drake.models.robot_in_plant import pose_from_state
+from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.tensions.batch import distribute_batch
 from cdpr_drake.tensions.closed_form_kernel import MISSED
 from cdpr_drake.tensions.control_step_kernel import update_tensions, wrench_matrix_at

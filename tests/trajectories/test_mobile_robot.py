@@ -7,9 +7,9 @@ from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import LeafSystem
 
 from cdpr_drake.errors import ScenarioError
-from cdpr_drake.spatial import pose_error, pose_from_angles
-from cdpr_drake.systems.diagrams import load_scenario
-from cdpr_drake.trajectories import MobileRobotMotion, RoundedTrack
+from cdpr_drake.geometry.poses import pose_error, pose_from_angles
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.trajectories.mobile_robot import MobileRobotMotion, RoundedTrack
 
 ROUND_OFF = 1e-12
 INTEGRATED = 1e-5

@@ -5,11 +5,12 @@ import pytest
 from pydrake.geometry import SceneGraph
 from pydrake.math import RigidTransform
 
-from cdpr_drake.spatial import exponential, pose_error, pose_from_angles
-from cdpr_drake.systems.cameras import SceneTarget
-from cdpr_drake.systems.diagrams import build_visual_servo, load_scenario
-from cdpr_drake.trajectories.moving_pose import SteadyMotion, WaypointMotion
-from cdpr_drake.vision import TagTarget
+from cdpr_drake.geometry.poses import exponential, pose_error, pose_from_angles
+from cdpr_drake.systems.cameras.scene_target import SceneTarget
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.diagrams.visual_servo import build_visual_servo
+from cdpr_drake.trajectories.pose_trajectory import SteadyMotion, WaypointMotion
+from cdpr_drake.vision.apriltags import TagTarget
 
 ROUND_OFF = 1e-12
 

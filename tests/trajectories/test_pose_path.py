@@ -5,8 +5,9 @@ import pytest
 from pydrake.math import RigidTransform, RollPitchYaw
 
 from cdpr_drake.errors import TrajectoryError
-from cdpr_drake.spatial import pose_error, rotation_vector
-from cdpr_drake.trajectories import PosePath, TimedPath, smooth_path, straight_path
+from cdpr_drake.geometry.poses import pose_error, rotation_vector
+from cdpr_drake.trajectories.pose_path import PosePath, smooth_path, straight_path
+from cdpr_drake.trajectories.timed_path import TimedPath
 
 SCALE = 0.1
 STEP = 1e-5

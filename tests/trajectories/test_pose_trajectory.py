@@ -10,7 +10,7 @@ from pydrake.trajectories import PiecewisePolynomial
 from scipy.interpolate import BPoly
 
 from cdpr_drake.errors import TrajectoryError
-from cdpr_drake.spatial import pose_from_angles, rotation_from_vector, rotation_vector
+from cdpr_drake.geometry.poses import pose_from_angles, rotation_from_vector, rotation_vector
 from cdpr_drake.trajectories.pose_trajectory import (
     MOTION_SIZE,
     PoseTrajectory,

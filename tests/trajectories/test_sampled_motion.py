@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from cdpr_drake.errors import TrajectoryError
-from cdpr_drake.spatial import pose_from_angles
-from cdpr_drake.trajectories import (
+from cdpr_drake.geometry.poses import pose_from_angles
+from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
+from cdpr_drake.trajectories.sampled_motion import (
     MOTION_COLUMNS,
     TIME_COLUMN,
-    PoseTrajectory,
     read_motion,
     sampled_motion,
 )

@@ -1,1 +1,3 @@
 """Tests of `cdpr_drake.vision`."""
+
+"""Tests of `cdpr_drake.vision`."""

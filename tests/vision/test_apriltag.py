@@ -9,19 +9,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydrake.math import RigidTransform, RotationMatrix
 
-from cdpr_drake.spatial import pose_error, rotation_from_vector
-from cdpr_drake.vision.apriltag import (
+from cdpr_drake.geometry.poses import pose_error, rotation_from_vector
+from cdpr_drake.vision.apriltags import (
     BORDERED_CELLS,
     TAG_CELLS,
     TAG_COUNT,
     TagFinder,
+    TagTarget,
     tag_center,
     tag_corners,
     tag_png,
 )
-from cdpr_drake.vision.brightness import gray_image
+from cdpr_drake.vision.blob_detection import gray_image
 from cdpr_drake.vision.pinhole import Pinhole
-from cdpr_drake.vision.tags import TagTarget
 
 MEAN_OFFSET = 0.05  # [px]; what is left of the detector's constant offset
 CORNER_OFFSET = 0.5  # [px]; a single corner on a tag drawn with pixels averaged

@@ -4,17 +4,20 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from cdpr_drake.spatial import pose_from_angles
-from cdpr_drake.vision import (
+from cdpr_drake.geometry.poses import pose_from_angles
+from cdpr_drake.vision.apriltags import TagTarget
+from cdpr_drake.vision.image_window import (
+    EDGE_SHARE,
+    GRID,
+    MARGIN,
     ImageWindow,
-    Pinhole,
-    TagTarget,
     expected_window,
     target_box,
+    union,
     whole_image,
     with_principal_point,
 )
-from cdpr_drake.vision.image_window import EDGE_SHARE, GRID, MARGIN, union
+from cdpr_drake.vision.pinhole import Pinhole
 
 PINHOLE = Pinhole.from_view_angles(640, 480, np.radians(60.0), np.radians(46.8))
 NOWHERE = np.full(4, np.nan)

@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform, RotationMatrix
 
-from cdpr_drake.models import Pose
-from cdpr_drake.spatial import exponential, pose_error
-from cdpr_drake.systems.cameras import TARGETS, TargetSettings
-from cdpr_drake.vision import Pinhole
+from cdpr_drake.geometry.poses import exponential, pose_error
+from cdpr_drake.models.robot_schema import Pose
+from cdpr_drake.systems.cameras.targets import TARGETS, TargetSettings
+from cdpr_drake.vision.pinhole import Pinhole
 from cdpr_drake.vision.target import pose_from_points
 
 CAMERA = Pinhole(640, 480, 600.0, 610.0, 319.5, 239.5)

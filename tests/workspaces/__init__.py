@@ -1,1 +1,11 @@
 """Tests of `cdpr_drake.workspaces`."""
+
+"""Tests of `cdpr_drake.workspaces`."""
+
+"""Tests of `cdpr_drake.workspaces`."""
+
+"""Tests of `cdpr_drake.workspaces`."""
+
+"""Tests of `cdpr_drake.workspaces`."""
+
+"""Tests of `cdpr_drake.workspaces`."""

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from cdpr_drake.analyses.stability import static_case
-from cdpr_drake.models import load_robot
-from cdpr_drake.spatial import rotation_from_angles
+from cdpr_drake.analyses.workspaces.static_feasible import static_case
+from cdpr_drake.geometry.poses import rotation_from_angles
+from cdpr_drake.models.robot_loader import load_robot
 
 
 def robot_case(name, limits=None, **more):

@@ -3,7 +3,3 @@
 `study_calibration` repeats simulated calibrations over seeds: errors beside the Cramer-Rao bound,
 beside the covariance that each reports, and what a visual servo gains from a calibrated robot.
 """
-
-from cdpr_drake.analyses.studies.calibration.study import CalibrationStudy, study_calibration
-
-__all__ = ["CalibrationStudy", "study_calibration"]

@@ -9,8 +9,9 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from pydrake.common.yaml import yaml_dump_typed
 
-from cdpr_drake.analyses.calibration import calibrated_robot
-from cdpr_drake.analyses.runs import camera_path, run_scenario
+from cdpr_drake.analyses.calibration.calibrated_robots import calibrated_robot
+from cdpr_drake.analyses.simulation.run_summary import camera_path
+from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
 from cdpr_drake.analyses.studies.calibration.trials import (
     LENGTH_SIGMA,
     MOUNT,
@@ -18,10 +19,14 @@ from cdpr_drake.analyses.studies.calibration.trials import (
     CameraTrial,
     robot_lengths,
 )
-from cdpr_drake.calibration import CalibrationModel, CalibrationProgram, guessed_stations
-from cdpr_drake.models import Pose, load_robot
-from cdpr_drake.spatial import angles_from_rotation, distances_from_line
-from cdpr_drake.systems.diagrams import load_scenario
+from cdpr_drake.calibration.parameters import CalibrationModel
+from cdpr_drake.calibration.pose_search import guessed_stations
+from cdpr_drake.calibration.program import CalibrationProgram
+from cdpr_drake.geometry.pose_accuracy import distances_from_line
+from cdpr_drake.geometry.poses import angles_from_rotation
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_schema import Pose
+from cdpr_drake.systems.diagrams.load import load_scenario
 
 SCENARIO = "acrobot_pbvs_line"
 CHANGES = ("camera.kind=projected", "camera.pixel_noise=0.0", "integration.engine=compiled")

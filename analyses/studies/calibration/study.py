@@ -11,29 +11,22 @@ from matplotlib.figure import Figure
 from rich.table import Table
 from scipy.stats import chi2
 
-from cdpr_drake.analyses.case_studies import DrawnStudy
-from cdpr_drake.analyses.pictures import (
-    line_style,
-    new_figure,
-)
-from cdpr_drake.analyses.reporting import (
-    ALONE,
+from cdpr_drake.analyses.reporting.log_files import finite
+from cdpr_drake.analyses.reporting.progress import ALONE, StoppableStudy, StudySession, WorkProgress
+from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
+from cdpr_drake.analyses.reporting.statements import (
     NOT_IN_QUICK,
     Statement,
-    StoppableStudy,
-    StudySession,
-    WorkProgress,
-    code_version,
-    finite,
     new_table,
-    package_versions,
     statement_table,
     verdict,
 )
 from cdpr_drake.analyses.studies.calibration import trials
 from cdpr_drake.analyses.studies.calibration.servo import CHANGES, MODELS, SCENARIO
 from cdpr_drake.analyses.studies.calibration.tasks import TrialTask
-from cdpr_drake.analyses.sweeps import run_study_sweep
+from cdpr_drake.analyses.studies.framework.seeded_study import DrawnStudy
+from cdpr_drake.analyses.sweeps.sweep import run_study_sweep
+from cdpr_drake.analyses.visualization.figure_style import line_style, new_figure
 from cdpr_drake.palette import BOUND, nth_look
 
 SEEDS, QUICK_SEEDS = 100, 2

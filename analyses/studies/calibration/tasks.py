@@ -8,11 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdpr_drake.analyses.studies.calibration.servo import MODELS, straightness
-from cdpr_drake.analyses.studies.calibration.trials import (
-    camera_trial,
-    start_trial,
-    tracker_trial,
-)
+from cdpr_drake.analyses.studies.calibration.trials import camera_trial, start_trial, tracker_trial
 from cdpr_drake.arrays import Array
 
 

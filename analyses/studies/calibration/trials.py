@@ -10,35 +10,31 @@ import numpy as np
 import numpy.typing as npt
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.calibration import (
-    CalibrationLog,
-    CalibrationTask,
-    Sigmas,
-    calibrate,
-    calibration_model,
-    rest_poses,
-)
+from cdpr_drake.analyses.calibration.calibrated_robots import calibration_model
+from cdpr_drake.analyses.calibration.calibration_request import CalibrationTask, Sigmas
+from cdpr_drake.analyses.calibration.calibration_task import calibrate
+from cdpr_drake.analyses.calibration.candidate_poses import rest_poses
+from cdpr_drake.analyses.calibration.log_file import CalibrationLog
 from cdpr_drake.arrays import Array
-from cdpr_drake.calibration import (
-    CalibrationModel,
-    CalibrationProgram,
-    CalibrationResult,
-    Point,
-    Stations,
-    choose_poses,
-    guessed_stations,
-    guessed_tags,
-    informing_rows,
-    model_difference,
-    poses_by_tags,
+from cdpr_drake.calibration.guesses import guessed_tags, poses_by_tags, with_tags
+from cdpr_drake.calibration.measurements import (
     simulated_corners,
     simulated_lengths,
     simulated_poses,
-    with_tags,
 )
-from cdpr_drake.models import Robot, load_camera, load_robot
-from cdpr_drake.spatial import pose_error, pose_from_angles, rotation_from_vector
-from cdpr_drake.vision import Pinhole, PointTarget, TagTarget
+from cdpr_drake.calibration.parameters import CalibrationModel, model_difference
+from cdpr_drake.calibration.pose_design import choose_poses, informing_rows
+from cdpr_drake.calibration.pose_search import guessed_stations
+from cdpr_drake.calibration.program import CalibrationProgram
+from cdpr_drake.calibration.result import CalibrationResult
+from cdpr_drake.calibration.stations import Point, Stations
+from cdpr_drake.geometry.poses import pose_error, pose_from_angles, rotation_from_vector
+from cdpr_drake.models.camera_catalogue import load_camera
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.vision.apriltags import TagTarget
+from cdpr_drake.vision.pinhole import Pinhole
+from cdpr_drake.vision.target import PointTarget
 
 ROBOT, MOUNT = "acrobot_small", "onboard"
 POSES, CANDIDATES, START_POSES = 40, 150, 60

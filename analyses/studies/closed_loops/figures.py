@@ -8,10 +8,10 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from cdpr_drake.analyses.pictures import line_style, new_figure
+from cdpr_drake.analyses.visualization.figure_style import line_style, new_figure
 from cdpr_drake.arrays import Array
 from cdpr_drake.palette import OTHER_OUTCOME, OUTCOMES, Look
-from cdpr_drake.systems.monitoring import Outcome
+from cdpr_drake.systems.monitoring.run_monitor import Outcome
 
 LEAST_DRAWN_SHARE = 1e-4
 """Smaller errors are not drawn."""

@@ -9,9 +9,9 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.studies.closed_loops.servo_models import PerturbedServo
 from cdpr_drake.arrays import Array
-from cdpr_drake.models import load_camera
-from cdpr_drake.spatial import exponential
-from cdpr_drake.systems.monitoring import Outcome
+from cdpr_drake.geometry.poses import exponential
+from cdpr_drake.models.camera_catalogue import load_camera
+from cdpr_drake.systems.monitoring.run_monitor import Outcome
 
 STEP = 0.02
 """Step, times the gain [-]."""

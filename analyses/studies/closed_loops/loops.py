@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.runs import RunResult, run_scenario
+from cdpr_drake.analyses.simulation.visual_servo_run import RunResult, run_scenario
 from cdpr_drake.analyses.studies.closed_loops.kinematic_servo import STEP, kinematic_path
 from cdpr_drake.analyses.studies.closed_loops.servo_models import (
     Perturbation,
@@ -16,25 +16,21 @@ from cdpr_drake.analyses.studies.closed_loops.servo_models import (
     perturbed_servo,
 )
 from cdpr_drake.arrays import Array
-from cdpr_drake.models import load_camera
-from cdpr_drake.spatial import (
+from cdpr_drake.geometry.poses import (
     pose_error,
     pose_from_angles,
     pose_from_row,
     pose_row,
     pose_rows_distance,
 )
-from cdpr_drake.stability import (
-    PerturbationBounds,
-    StabilityCase,
-    VerdictOptions,
-    draw_perturbations,
-    judge_stability,
-    worst_perturbations,
-)
-from cdpr_drake.systems.loops import looped
-from cdpr_drake.systems.scenarios import Scenario
-from cdpr_drake.workspaces import StaticCase, statically_feasible
+from cdpr_drake.models.camera_catalogue import load_camera
+from cdpr_drake.stability.perturbation_bounds import PerturbationBounds
+from cdpr_drake.stability.perturbation_samples_kernel import draw_perturbations
+from cdpr_drake.stability.stability_case import StabilityCase
+from cdpr_drake.stability.verdict import VerdictOptions, judge_stability, worst_perturbations
+from cdpr_drake.systems.loops.loop_choice import looped
+from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
+from cdpr_drake.workspaces.static_feasibility import StaticCase, statically_feasible
 
 LOOPS = ("kinematic", "shifted", "control_integration")
 """How the loop is closed: kinematics alone, or the simulated robot with an estimator."""

@@ -9,18 +9,20 @@ import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.features import VisualFeatures
-from cdpr_drake.models import Pose, Robot, load_robot
-from cdpr_drake.spatial import angles_from_rotation, rotation_from_vector
-from cdpr_drake.stability import POSE_BLOCKS, ModelAtPose, stability_margin, stability_matrix
-from cdpr_drake.systems.scenarios import Scenario
-from cdpr_drake.systems.servos import ideal_sighting, make_features
-from cdpr_drake.vision import Target
+from cdpr_drake.geometry.poses import angles_from_rotation, rotation_from_vector
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_schema import Pose, Robot
+from cdpr_drake.servoing.visual_features import VisualFeatures
+from cdpr_drake.stability.criterion import ModelAtPose, stability_margin, stability_matrix
+from cdpr_drake.stability.perturbation_bounds import POSE_BLOCKS
+from cdpr_drake.systems.controllers.schemes import ideal_sighting, make_features
+from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
+from cdpr_drake.vision.target import Target
 
 
 @dataclass(frozen=True)
 class Perturbation:
-    """What a servo believes wrongly, in parts; see `stability.perturbations.bounds`.
+    """What a servo believes wrongly, in parts; see `stability.perturbation_bounds`.
 
     Attributes:
         turn: Rotation of the platform's pose, in P.

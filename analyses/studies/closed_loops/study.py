@@ -12,23 +12,15 @@ import numpy as np
 from matplotlib.figure import Figure
 from rich.table import Table
 
-from cdpr_drake.analyses.case_studies import DrawnStudy
-from cdpr_drake.analyses.pictures import DEFAULT_FORMATS
-from cdpr_drake.analyses.pose_grids import plain
-from cdpr_drake.analyses.reporting import (
-    ALONE,
+from cdpr_drake.analyses.reporting.progress import ALONE, StoppableStudy, StudySession, WorkProgress
+from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
+from cdpr_drake.analyses.reporting.statements import (
     NOT_TESTABLE,
     Statement,
-    StoppableStudy,
-    StudySession,
-    WorkProgress,
-    code_version,
     judged_statements,
-    package_versions,
     statement_table,
     verdict,
 )
-from cdpr_drake.analyses.stability import static_case, workspace_defaults
 from cdpr_drake.analyses.studies.closed_loops.figures import error_figure, way_figure
 from cdpr_drake.analyses.studies.closed_loops.loops import (
     COLUMNS,
@@ -44,23 +36,26 @@ from cdpr_drake.analyses.studies.closed_loops.loops import (
     stable_starts,
 )
 from cdpr_drake.analyses.studies.closed_loops.servo_models import Perturbation, perturbed_servo
-from cdpr_drake.analyses.sweeps import run_study_sweep, store_arrays
+from cdpr_drake.analyses.studies.framework.seeded_study import DrawnStudy
+from cdpr_drake.analyses.sweeps.folder import store_arrays
+from cdpr_drake.analyses.sweeps.sweep import run_study_sweep
+from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
+from cdpr_drake.analyses.workspaces.pose_grid import plain
+from cdpr_drake.analyses.workspaces.stability_defaults import workspace_defaults
+from cdpr_drake.analyses.workspaces.static_feasible import static_case
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import StabilityError
-from cdpr_drake.models import load_robot
-from cdpr_drake.spatial import pose_row
-from cdpr_drake.stability import (
-    FixedObject,
-    StabilityCase,
-    VerdictOptions,
-    judge_stability,
-    vector_size,
-)
-from cdpr_drake.systems.diagrams import load_scenario
-from cdpr_drake.systems.loops import looped
-from cdpr_drake.systems.monitoring import Outcome
-from cdpr_drake.systems.scenarios import Scenario
-from cdpr_drake.workspaces import statically_feasible
+from cdpr_drake.geometry.poses import pose_row
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.stability.desired_view import FixedObject
+from cdpr_drake.stability.perturbation_bounds import vector_size
+from cdpr_drake.stability.stability_case import StabilityCase
+from cdpr_drake.stability.verdict import VerdictOptions, judge_stability
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.loops.loop_choice import looped
+from cdpr_drake.systems.monitoring.run_monitor import Outcome
+from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
+from cdpr_drake.workspaces.static_feasibility import statically_feasible
 
 ROBOT = "acrobot_large"
 VERDICT = "searched"

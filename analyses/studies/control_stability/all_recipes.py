@@ -10,34 +10,10 @@ from typing import Any
 import numpy as np
 from rich.table import Table
 
-from cdpr_drake.analyses.pictures import DEFAULT_FORMATS
-from cdpr_drake.analyses.pose_grids import plain
-from cdpr_drake.analyses.published import (
-    FULLY_CONSTRAINED,
-    OTHER_ANCHORS,
-    PRESENT,
-    RECIPES,
-    TABLES,
-    PublishedTable,
-    Recipe,
-    arranged_anchors,
-    recipe_bounds,
-    recipe_case,
-    recipe_grid,
-    recipe_options,
-)
-from cdpr_drake.analyses.reporting import (
-    ALONE,
-    Statement,
-    StudySession,
-    WorkProgress,
-    code_version,
-    new_table,
-    package_versions,
-    statement_table,
-    write_json,
-)
-from cdpr_drake.analyses.stability import SampledTask
+from cdpr_drake.analyses.reporting.log_files import write_json
+from cdpr_drake.analyses.reporting.progress import ALONE, StudySession, WorkProgress
+from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
+from cdpr_drake.analyses.reporting.statements import Statement, new_table, statement_table
 from cdpr_drake.analyses.studies.control_stability.exchanges import (
     ExchangeRow,
     exchange_rows,
@@ -60,8 +36,28 @@ from cdpr_drake.analyses.studies.control_stability.recipes import (
     RecipeStudy,
 )
 from cdpr_drake.analyses.studies.control_stability.table_reasons import LimitRow, reasons_table
-from cdpr_drake.analyses.sweeps import SweepTask, run_study_sweep
-from cdpr_drake.workspaces import WorkspaceGrid, cell_hull_share, workspace_volume
+from cdpr_drake.analyses.studies.published.recipe_variants import (
+    FULLY_CONSTRAINED,
+    OTHER_ANCHORS,
+    PRESENT,
+    RECIPES,
+    Recipe,
+    arranged_anchors,
+)
+from cdpr_drake.analyses.studies.published.stability_recipe import (
+    recipe_bounds,
+    recipe_case,
+    recipe_grid,
+    recipe_options,
+)
+from cdpr_drake.analyses.studies.published.stability_tables import TABLES, PublishedTable
+from cdpr_drake.analyses.sweeps.sweep import run_study_sweep
+from cdpr_drake.analyses.sweeps.workers import SweepTask
+from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
+from cdpr_drake.analyses.workspaces.pose_grid import plain
+from cdpr_drake.analyses.workspaces.stability_tasks import SampledTask
+from cdpr_drake.workspaces.pose_grid import WorkspaceGrid
+from cdpr_drake.workspaces.volume import cell_hull_share, workspace_volume
 
 POINT_BOUNDS = ("r_A", "r_B")
 """Bounds whose rows are held against what any target leaves."""

@@ -12,21 +12,22 @@ from itertools import combinations
 
 import numpy as np
 
-from cdpr_drake.analyses.published import (
-    BASELINE_VALUES,
+from cdpr_drake.analyses.studies.control_stability.recipes import RULES, RecipeStudy
+from cdpr_drake.analyses.studies.published.recipe_variants import (
     EXCHANGED_CABLES,
     FULLY_CONSTRAINED,
-    TABLES,
     exchanged_anchors,
+)
+from cdpr_drake.analyses.studies.published.stability_recipe import (
     recipe_bounds,
     recipe_case,
     recipe_grid,
     recipe_options,
 )
-from cdpr_drake.analyses.stability import SampledTask
-from cdpr_drake.analyses.studies.control_stability.recipes import RULES, RecipeStudy
-from cdpr_drake.models import load_robot
-from cdpr_drake.workspaces import workspace_volume
+from cdpr_drake.analyses.studies.published.stability_tables import BASELINE_VALUES, TABLES
+from cdpr_drake.analyses.workspaces.stability_tasks import SampledTask
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.workspaces.volume import workspace_volume
 
 CHOOSING_BOUND = "r_bp"
 """Its rows choose; it concerns no single point, so it does not matter how points are wrong."""

@@ -9,17 +9,18 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from cdpr_drake.analyses.pictures import (
+from cdpr_drake.analyses.studies.control_stability.tables import StabilityRow, rows_covered, rows_of
+from cdpr_drake.analyses.studies.published.stability_recipe import recipe_grid
+from cdpr_drake.analyses.studies.published.stability_tables import TABLES, PublishedTable
+from cdpr_drake.analyses.visualization.figure_style import (
     COVERED_LINE,
     few_ticks,
     line_style,
     new_figure,
 )
-from cdpr_drake.analyses.published import TABLES, PublishedTable, recipe_grid
-from cdpr_drake.analyses.studies.control_stability.tables import StabilityRow, rows_covered, rows_of
 from cdpr_drake.palette import PUBLISHED
 from cdpr_drake.palette import VERDICTS as SEEN
-from cdpr_drake.stability import VERDICTS
+from cdpr_drake.stability.verdict import VERDICTS
 
 COLUMNS = 3
 """Panels side by side."""

@@ -18,10 +18,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from cdpr_drake.analyses.published import BASELINE_VALUES, PublishedTable
-from cdpr_drake.geometry import CableSet
-from cdpr_drake.stability import PerturbationBounds, some_target_possible
-from cdpr_drake.workspaces import WorkspaceGrid
+from cdpr_drake.analyses.studies.published.stability_tables import BASELINE_VALUES, PublishedTable
+from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.stability.no_stable_target import some_target_possible
+from cdpr_drake.stability.perturbation_bounds import PerturbationBounds
+from cdpr_drake.workspaces.pose_grid import WorkspaceGrid
 
 DIGIT = 0.15
 """Printed shares that differ by less may differ in their last digit alone [points]."""

@@ -12,15 +12,7 @@ from itertools import product
 
 import numpy as np
 
-from cdpr_drake.analyses.published import (
-    EXCHANGE,
-    EXCHANGED_CABLES,
-    IN_USE,
-    PRESENT,
-    RECIPES,
-    TABLES,
-)
-from cdpr_drake.analyses.reporting import Statement, judged_statements, verdict
+from cdpr_drake.analyses.reporting.statements import Statement, judged_statements, verdict
 from cdpr_drake.analyses.studies.control_stability.exchanges import (
     CHOOSING_BOUND,
     PRINTED,
@@ -41,7 +33,15 @@ from cdpr_drake.analyses.studies.control_stability.table_reasons import (
     TableReason,
     table_reasons,
 )
-from cdpr_drake.stability import DIRECTIONS
+from cdpr_drake.analyses.studies.published.recipe_variants import (
+    EXCHANGE,
+    EXCHANGED_CABLES,
+    IN_USE,
+    PRESENT,
+    RECIPES,
+)
+from cdpr_drake.analyses.studies.published.stability_tables import TABLES
+from cdpr_drake.stability.perturbation_bounds import DIRECTIONS
 
 NEARLY_WHOLE = 90.0
 """An arrangement of anchor points that leaves more at the baseline may be that of A.11 [%]."""

@@ -14,33 +14,26 @@ from typing import Any
 import numpy as np
 from rich.table import Table
 
-from cdpr_drake.analyses.pictures import DEFAULT_FORMATS
-from cdpr_drake.analyses.pose_grids import plain
-from cdpr_drake.analyses.published import (
-    IN_USE,
-    RECIPES,
-    TABLES,
-    PublishedTable,
-    Recipe,
-    chosen_on,
+from cdpr_drake.analyses.reporting.log_files import write_json
+from cdpr_drake.analyses.reporting.progress import ALONE, StudySession, WorkProgress
+from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
+from cdpr_drake.analyses.reporting.statements import new_table
+from cdpr_drake.analyses.studies.published.recipe_choices import chosen_on
+from cdpr_drake.analyses.studies.published.recipe_variants import IN_USE, RECIPES, Recipe
+from cdpr_drake.analyses.studies.published.stability_recipe import (
     recipe_bounds,
     recipe_case,
     recipe_grid,
     recipe_options,
 )
-from cdpr_drake.analyses.reporting import (
-    ALONE,
-    StudySession,
-    WorkProgress,
-    code_version,
-    new_table,
-    package_versions,
-    write_json,
-)
-from cdpr_drake.analyses.stability import SampledTask
-from cdpr_drake.analyses.sweeps import run_study_sweep
-from cdpr_drake.stability import PerturbationBounds
-from cdpr_drake.workspaces import WorkspaceGrid, cell_hull_share, workspace_volume
+from cdpr_drake.analyses.studies.published.stability_tables import TABLES, PublishedTable
+from cdpr_drake.analyses.sweeps.sweep import run_study_sweep
+from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
+from cdpr_drake.analyses.workspaces.pose_grid import plain
+from cdpr_drake.analyses.workspaces.stability_tasks import SampledTask
+from cdpr_drake.stability.perturbation_bounds import PerturbationBounds
+from cdpr_drake.workspaces.pose_grid import WorkspaceGrid
+from cdpr_drake.workspaces.volume import cell_hull_share, workspace_volume
 
 CHUNK = 2000
 """Poses per chunk, about a second's work."""

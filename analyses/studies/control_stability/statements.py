@@ -12,13 +12,14 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from cdpr_drake.analyses.published import TABLES, PublishedTable, chosen_on
-from cdpr_drake.analyses.reporting import Statement, judged_statements, verdict
+from cdpr_drake.analyses.reporting.statements import Statement, judged_statements, verdict
 from cdpr_drake.analyses.studies.control_stability.tables import (
     StabilityRow,
     mean_difference,
     rows_of,
 )
+from cdpr_drake.analyses.studies.published.recipe_choices import chosen_on
+from cdpr_drake.analyses.studies.published.stability_tables import TABLES, PublishedTable
 
 MET = 5.0
 """A table whose mean absolute difference is not larger counts as met [points]."""

@@ -10,31 +10,9 @@ import numpy as np
 from matplotlib.figure import Figure
 from rich.table import Table
 
-from cdpr_drake.analyses.case_studies import DrawnStudy
-from cdpr_drake.analyses.pose_grids import plain
-from cdpr_drake.analyses.published import (
-    BASELINE_VALUES,
-    CHOICES,
-    RECIPE,
-    TABLES,
-    PublishedTable,
-    recipe_bounds,
-    recipe_case,
-    recipe_grid,
-    recipe_options,
-    single_bounds,
-)
-from cdpr_drake.analyses.reporting import (
-    ALONE,
-    Statement,
-    StoppableStudy,
-    StudySession,
-    WorkProgress,
-    code_version,
-    package_versions,
-    statement_table,
-)
-from cdpr_drake.analyses.stability import VerdictsTask
+from cdpr_drake.analyses.reporting.progress import ALONE, StoppableStudy, StudySession, WorkProgress
+from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
+from cdpr_drake.analyses.reporting.statements import Statement, statement_table
 from cdpr_drake.analyses.studies.control_stability.figures import control_stability_drawings
 from cdpr_drake.analyses.studies.control_stability.statements import control_stability_statements
 from cdpr_drake.analyses.studies.control_stability.tables import (
@@ -42,12 +20,28 @@ from cdpr_drake.analyses.studies.control_stability.tables import (
     control_stability_tables,
     rows_of,
 )
-from cdpr_drake.analyses.sweeps import run_study_sweep
-from cdpr_drake.stability import (
-    VERDICTS,
-    PerturbationBounds,
+from cdpr_drake.analyses.studies.framework.seeded_study import DrawnStudy
+from cdpr_drake.analyses.studies.published.recipe_choices import CHOICES
+from cdpr_drake.analyses.studies.published.stability_recipe import (
+    RECIPE,
+    recipe_bounds,
+    recipe_case,
+    recipe_grid,
+    recipe_options,
+    single_bounds,
 )
-from cdpr_drake.workspaces import VolumeRule, WorkspaceGrid, workspace_volume
+from cdpr_drake.analyses.studies.published.stability_tables import (
+    BASELINE_VALUES,
+    TABLES,
+    PublishedTable,
+)
+from cdpr_drake.analyses.sweeps.sweep import run_study_sweep
+from cdpr_drake.analyses.workspaces.pose_grid import plain
+from cdpr_drake.analyses.workspaces.stability_tasks import VerdictsTask
+from cdpr_drake.stability.perturbation_bounds import PerturbationBounds
+from cdpr_drake.stability.verdict import VERDICTS
+from cdpr_drake.workspaces.pose_grid import WorkspaceGrid
+from cdpr_drake.workspaces.volume import VolumeRule, workspace_volume
 
 CHUNK = 500
 """Poses per chunk, a second's work or less, a few in rows of coverage."""

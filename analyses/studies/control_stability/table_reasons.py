@@ -18,8 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from rich.table import Table
 
-from cdpr_drake.analyses.published import FULLY_CONSTRAINED, RECIPES, PublishedTable, Recipe
-from cdpr_drake.analyses.reporting import new_table
+from cdpr_drake.analyses.reporting.statements import new_table
 from cdpr_drake.analyses.studies.control_stability.printed_limits import (
     DIGIT,
     NestedPair,
@@ -27,6 +26,8 @@ from cdpr_drake.analyses.studies.control_stability.printed_limits import (
     nested_pairs,
 )
 from cdpr_drake.analyses.studies.control_stability.recipes import RULES, RecipeStudy
+from cdpr_drake.analyses.studies.published.recipe_variants import FULLY_CONSTRAINED, RECIPES, Recipe
+from cdpr_drake.analyses.studies.published.stability_tables import PublishedTable
 
 MET = 5.0
 """A table whose mean absolute difference is not larger counts as met [points]."""

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from rich.table import Table
 
-from cdpr_drake.analyses.published import PublishedTable
-from cdpr_drake.analyses.reporting import new_table
-from cdpr_drake.stability import VERDICTS
+from cdpr_drake.analyses.reporting.statements import new_table
+from cdpr_drake.analyses.studies.published.stability_tables import PublishedTable
+from cdpr_drake.stability.verdict import VERDICTS
 
 LARGE_CAMERA_TURN = 30.0
 """From this error of the camera's orientation on, no recipe meets the tables of PBVS [deg]."""

@@ -5,7 +5,6 @@ with cables that go slack and catch; it measures orders of convergence, and the 
 put in or take out. The plant is the reference.
 """
 
-from cdpr_drake.analyses.studies.engines.statements import JUDGES
-from cdpr_drake.analyses.studies.engines.study import EnginesStudy, study_engines
+import lazy_loader
 
-__all__ = ["JUDGES", "EnginesStudy", "study_engines"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

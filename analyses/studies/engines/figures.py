@@ -7,14 +7,14 @@ from collections.abc import Mapping
 import numpy as np
 from matplotlib.figure import Figure
 
-from cdpr_drake.analyses.pictures import bar_style, line_style, new_figure
-from cdpr_drake.analyses.studies.engines.statements import column, scenario_names_in
-from cdpr_drake.analyses.studies.engines.tasks import (
+from cdpr_drake.analyses.studies.engines.pairs import (
     CATCHING_ORDERS,
     ENERGY_STEPS,
     METHODS,
     TAUT_ORDERS,
 )
+from cdpr_drake.analyses.studies.engines.statements import column, scenario_names_in
+from cdpr_drake.analyses.visualization.figure_style import bar_style, line_style, new_figure
 from cdpr_drake.arrays import Array
 from cdpr_drake.palette import DASHED, SOLID, nth_look
 

@@ -1,27 +1,30 @@
-"""Runs of one servo, or of one command, by both engines, and how far they part."""
+"""Runs of one servo, or of one command, by both engines, and how far they part.
+
+What the study runs, as tasks of a sweep; each item is a pair of runs or a row of them.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from pydrake.math import RigidTransform
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
-from cdpr_drake.analyses.runs import RunResult, TensionRun, run_scenario, run_tension_scenario
+from cdpr_drake.analyses.simulation.tension_control_run import TensionRun, run_tension_scenario
+from cdpr_drake.analyses.simulation.visual_servo_run import RunResult, run_scenario
 from cdpr_drake.arrays import Array
-from cdpr_drake.models import Robot
-from cdpr_drake.spatial import pose_rows_distance
-from cdpr_drake.systems.diagrams import load_scenario
-from cdpr_drake.systems.robots import (
-    COMPILED,
-    PLANT,
-    CableRobot,
-    CableRobotSettings,
-    CompiledCableRobot,
-    StepRule,
-)
-from cdpr_drake.systems.scenarios import TENSION_CONTROL, scenario_kind
+from cdpr_drake.geometry.cable_paths import cable_paths
+from cdpr_drake.geometry.poses import pose_rows_distance
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.robots.cable_robot import SEMI_IMPLICIT, CableRobot, automatic_step
+from cdpr_drake.systems.robots.compiled_cable_robot import CompiledCableRobot
+from cdpr_drake.systems.robots.compiled_step import StepRule
+from cdpr_drake.systems.robots.settings import COMPILED, PLANT, CableRobotSettings, CableSettings
+from cdpr_drake.systems.scenarios.files import TENSION_CONTROL, scenario_kind
 
 COLUMNS = (
     "outcome_plant",
@@ -135,3 +138,238 @@ def state_distance(one: Array, other: Array) -> tuple[Array, Array]:
 
 def _unit(quaternions: Array) -> Array:
     return np.asarray(quaternions / np.linalg.norm(quaternions, axis=1)[:, None], float)
+
+
+IMPACTS = "acrobot_pbvs"
+"""The servo whose cables are paid out at random at its start, so that they catch on the way."""
+
+MOST_SLACK = 5e-3
+"""Largest length that is paid out [m]."""
+
+DRAWN = ("acrobot_small", "acrobot_large", "planar")
+"""Robots whose cables, points and masses are varied."""
+
+TAUT_DURATION, TAUT_PERIOD = 10.0, 0.02
+"""Of a taut motion, and of a command in it [s]."""
+
+AMPLITUDE = 0.02
+"""Of a taut motion [m]."""
+
+TAUT_SHARE = 0.5
+"""Share of the automatic step that taut motions are integrated with: close to the largest stable
+step the engines would show the errors of their common method, taken at other times."""
+
+SOFTER = 1e3
+"""How much softer than ACROBOT's are the cables of a motion that can be followed for long. Real
+ones catch within half a millisecond, and what comes after some impacts is chaotic: half the step
+gives another path, by either engine."""
+
+STEPS = 5
+"""Steps at which orders are measured, each half of the one before."""
+
+EXPLICIT = "runge_kutta3"
+METHODS = ("runge_kutta2", EXPLICIT, SEMI_IMPLICIT)
+
+ENERGY_DURATION = 5.0
+"""How long an undamped robot bounces on its real cables [s]."""
+
+ENERGY_STEPS = (1e-4, 5e-5, 2.5e-5)
+"""Steps of that [s]; the largest stable one with all cables taut is about 1e-3."""
+
+ENERGY_SLACK = 5e-4
+"""Length paid out on all cables at its start: it falls into them [m]."""
+
+
+@dataclass(frozen=True)
+class ScenarioTask:
+    """A shipped scenario by both engines; one item."""
+
+    name: str
+    overrides: tuple[str, ...] = ()
+
+    def __call__(self, start: int, stop: int) -> dict[str, Array]:
+        """`COLUMNS` of the pairs, shape (n, len(COLUMNS))."""
+        return {
+            "pairs": np.array([run_pair(self.name, self.overrides) for _ in range(start, stop)])
+        }
+
+
+@dataclass(frozen=True)
+class ImpactTask:
+    """The servo with cables paid out at random; the item is the seed."""
+
+    def __call__(self, start: int, stop: int) -> dict[str, Array]:
+        """`COLUMNS` of the pairs, shape (n, len(COLUMNS))."""
+        return {
+            "pairs": np.array([
+                run_pair(IMPACTS, [slack_override(seed), f"seed={seed}"])
+                for seed in range(start, stop)
+            ])
+        }  # fmt: skip
+
+
+def slack_override(seed: int) -> str:
+    """Lengths that are paid out at the start, by a seed, as an override of a scenario."""
+    slack = np.random.default_rng(seed).uniform(0.0, MOST_SLACK, 8)
+    return f"perturbations.slack=[{', '.join(f'{x:.6f}' for x in slack)}]"
+
+
+def drawn_robot(seed: int) -> tuple[Robot, CableRobotSettings]:
+    """A robot with other masses, cables and exit points, and whether it has pulleys."""
+    random = np.random.default_rng(seed)
+    robot = load_robot(DRAWN[random.integers(len(DRAWN))])
+    robot.cable.youngs_modulus *= 10.0 ** random.uniform(-3.0, 0.0)
+    robot.cable.retardation_time = random.uniform(5e-5, 1e-3)
+    robot.platform.mass *= random.uniform(0.7, 2.0)
+    flat = np.array([1.0, 1.0, 0.0 if robot.motion_type().is_horizontal_body else 1.0])
+    for cable in robot.cables:
+        cable.exit_point = cable.exit_point + random.uniform(-0.03, 0.03, 3) * flat
+    pulleys = bool(random.integers(2)) and not robot.motion_type().is_horizontal_body
+    return robot, CableRobotSettings(cables=CableSettings(pulleys=pulleys))
+
+
+def taut_velocities(robot: Robot, settings: CableRobotSettings, seed: int) -> Array:
+    """Cable velocities that lead the platform on a slow loop and back, shape (k, m) [m/s]."""
+    random = np.random.default_rng(seed)
+    cables, home = settings.cables.cable_set(robot), robot.home.transform()
+    flat = np.array([1.0, 1.0, 0.0 if robot.motion_type().is_horizontal_body else 1.0])
+    size = AMPLITUDE * random.uniform(-1.0, 1.0, (2, 3)) * flat
+    times = np.arange(round(TAUT_DURATION / TAUT_PERIOD) + 1) * TAUT_PERIOD
+    phase = 2.0 * np.pi * times / TAUT_DURATION
+    lengths = []
+    for p in phase:
+        away = size[0] * (1.0 - np.cos(p)) / 2.0 + size[1] * (1.0 - np.cos(2.0 * p)) / 2.0
+        X_WP = RigidTransform(home.rotation(), home.translation() + away)
+        lengths.append(cable_paths(X_WP, cables).lengths)
+    return np.asarray(np.diff(lengths, axis=0) / TAUT_PERIOD)
+
+
+@dataclass(frozen=True)
+class TautTask:
+    """Robots that are drawn, on slow loops with cables taut; the item is the seed."""
+
+    def __call__(self, start: int, stop: int) -> dict[str, Array]:
+        """Largest distance [m], angle [rad] and relative energy difference, and least tension [N],
+        shape (n, 4)."""
+        return {"taut": np.array([self._one(seed) for seed in range(start, stop)])}
+
+    def _one(self, seed: int) -> list[float]:
+        robot, settings = drawn_robot(seed)
+        home = robot.home.transform()
+        velocities = taut_velocities(robot, settings, seed)
+        step = TAUT_SHARE * automatic_step(robot, home, "runge_kutta3", settings)
+        found = [
+            commanded_path(
+                kind, robot, settings, home, velocities, TAUT_PERIOD, rule=StepRule(max_step=step)
+            )
+            for kind in (CableRobot, CompiledCableRobot)
+        ]
+        (one, l0, tensions), (other, l0_other, _) = found
+        distance, angle = state_distance(one, other)
+        motion = CompiledCableRobot(robot, settings).motion
+        energies = [
+            np.array([motion.energy_of(np.concatenate(row)) for row in zip(*rows, strict=True)])
+            for rows in ((one, l0), (other, l0_other))
+        ]
+        size = robot.platform.mass * 9.81 * AMPLITUDE
+        difference = np.max(np.abs(energies[0] - energies[1])) / size
+        return [
+            float(np.max(distance)), float(np.max(angle)), float(difference),
+            float(np.min(tensions)),
+        ]  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class OrderTask:
+    """ACROBOT by each method at one step after the other; all of it is one item.
+
+    It stands at home, and its winches run.
+
+    Attributes:
+        softer: How much softer than the robot's its cables are.
+        model: Their model.
+        slack: Length that all are paid out by at the start, so that the platform falls and they
+            catch [m].
+        duration: For how long [s].
+        largest: Largest of `STEPS` steps, each half of the one before [s].
+        reference: Step of the plant to which they are compared [s].
+    """
+
+    softer: float = SOFTER
+    model: str = "elastic"
+    slack: float = 0.0
+    duration: float = 0.4
+    largest: float = 4e-3
+    reference: float = 2e-5
+
+    def steps(self) -> list[float]:
+        """The steps [s]."""
+        return [self.largest / 2**k for k in range(STEPS)]
+
+    def __call__(self, start: int, stop: int) -> dict[str, Array]:
+        """Distance to the plant at a small step, by step and `METHODS`, shape (1, 5, 3) [m]."""
+        rule = StepRule(method=EXPLICIT, max_step=self.reference)
+        reference, rows = self._path(CableRobot, rule), []
+        for step in self.steps():
+            row = []
+            for method in METHODS:
+                found = self._path(CompiledCableRobot, StepRule(method=method, max_step=step))
+                row.append(float(np.max(state_distance(found, reference)[0])))
+            rows.append(row)
+        return {"distance": np.array([rows])[: stop - start]}
+
+    def _path(self, kind: type[CableRobot | CompiledCableRobot], rule: StepRule) -> Array:
+        robot = load_robot("acrobot_small")
+        robot.cable.youngs_modulus /= self.softer
+        settings = CableRobotSettings(cables=CableSettings(model=self.model))
+        velocities = np.tile(np.linspace(-0.05, 0.0, 8), (4, 1))
+        states, _, _ = commanded_path(
+            kind, robot, settings, robot.home.transform(), velocities, self.duration / 4,
+            rule=rule, slack=np.full(8, self.slack) if self.slack > 0.0 else None,
+        )  # fmt: skip
+        return states
+
+
+TAUT_ORDERS = OrderTask()
+CATCHING_ORDERS = OrderTask(slack=2e-2)
+REAL_ORDERS = OrderTask(
+    softer=1.0, model="kelvin_voigt", slack=5e-4, duration=0.04, largest=4e-4, reference=2e-6
+)
+"""A fall of half a millimetre into the real cables, and the first impacts."""
+
+
+@dataclass(frozen=True)
+class EnergyTask:
+    """ACROBOT on its real cables, undamped and slack at the start, halted; the item is the step.
+
+    Attributes:
+        duration: For how long [s].
+    """
+
+    duration: float
+
+    def __call__(self, start: int, stop: int) -> dict[str, Array]:
+        """Changes of the energy over that of the fall, shape (n, 5): the largest and the least by
+        runge_kutta3, the largest by semi_implicit; most cables slack, largest tension [N]."""
+        return {"energy": np.array([self._one(step) for step in ENERGY_STEPS[start:stop]])}
+
+    def _one(self, step: float) -> list[float]:
+        robot = load_robot("acrobot_small")
+        settings = CableRobotSettings(cables=CableSettings(model="elastic"))
+        motion = CompiledCableRobot(robot, settings).motion
+        fall = robot.platform.mass * robot.gravity * ENERGY_SLACK
+        row: list[float] = []
+        slack = tension = 0.0
+        for method in (EXPLICIT, SEMI_IMPLICIT):
+            states, l0, tensions = commanded_path(
+                CompiledCableRobot, robot, settings, robot.home.transform(),
+                np.zeros((round(self.duration / 0.01), 8)), 0.01,
+                rule=StepRule(method=method, max_step=step), slack=np.full(8, ENERGY_SLACK),
+            )  # fmt: skip
+            energies = [motion.energy_of(np.concatenate(r)) for r in zip(states, l0, strict=True)]
+            row.append(float(np.max(np.array(energies) - energies[0]) / fall))
+            if method == EXPLICIT:
+                row.append(float(np.min(np.array(energies) - energies[0]) / fall))
+                slack = float(np.max(np.sum(tensions == 0.0, axis=1)))
+                tension = float(np.max(tensions))
+        return [*row, slack, tension]

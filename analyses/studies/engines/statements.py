@@ -6,11 +6,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from cdpr_drake.analyses.reporting import Statement, judged_statements, verdict
-from cdpr_drake.analyses.studies.engines.pairs import COLUMNS
-from cdpr_drake.analyses.studies.engines.tasks import METHODS
+from cdpr_drake.analyses.reporting.statements import Statement, judged_statements, verdict
+from cdpr_drake.analyses.studies.engines.pairs import COLUMNS, METHODS
 from cdpr_drake.arrays import Array
-from cdpr_drake.systems.monitoring import Outcome
+from cdpr_drake.systems.monitoring.run_monitor import Outcome
 
 Arrays = Mapping[str, Mapping[str, Array]]
 

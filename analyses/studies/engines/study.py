@@ -11,27 +11,13 @@ import numpy as np
 from matplotlib.figure import Figure
 from rich.table import Table
 
-from cdpr_drake.analyses.case_studies import DrawnStudy
-from cdpr_drake.analyses.reporting import (
-    ALONE,
-    Statement,
-    StoppableStudy,
-    StudySession,
-    WorkProgress,
-    code_version,
-    new_table,
-    package_versions,
-    statement_table,
-)
+from cdpr_drake.analyses.reporting.progress import ALONE, StoppableStudy, StudySession, WorkProgress
+from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
+from cdpr_drake.analyses.reporting.statements import Statement, new_table, statement_table
 from cdpr_drake.analyses.studies.engines.figures import engine_figure
-from cdpr_drake.analyses.studies.engines.pairs import COLUMNS
-from cdpr_drake.analyses.studies.engines.statements import (
-    column,
-    engine_statements,
-    scenario_names_in,
-)
-from cdpr_drake.analyses.studies.engines.tasks import (
+from cdpr_drake.analyses.studies.engines.pairs import (
     CATCHING_ORDERS,
+    COLUMNS,
     ENERGY_DURATION,
     ENERGY_STEPS,
     METHODS,
@@ -42,16 +28,18 @@ from cdpr_drake.analyses.studies.engines.tasks import (
     ScenarioTask,
     TautTask,
 )
-from cdpr_drake.analyses.sweeps import run_study_sweep
-from cdpr_drake.arrays import Array
-from cdpr_drake.systems.diagrams import load_scenario
-from cdpr_drake.systems.monitoring import Outcome
-from cdpr_drake.systems.scenarios import (
-    TENSION_CONTROL,
-    all_scenario_names,
-    has_contact,
-    scenario_kind,
+from cdpr_drake.analyses.studies.engines.statements import (
+    column,
+    engine_statements,
+    scenario_names_in,
 )
+from cdpr_drake.analyses.studies.framework.seeded_study import DrawnStudy
+from cdpr_drake.analyses.sweeps.sweep import run_study_sweep
+from cdpr_drake.arrays import Array
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.monitoring.run_monitor import Outcome
+from cdpr_drake.systems.scenarios.files import TENSION_CONTROL, all_scenario_names, scenario_kind
+from cdpr_drake.systems.scenarios.run_settings import has_contact
 
 RUNS, QUICK_RUNS = 200, 2
 """Servos with impacts, full and quick."""

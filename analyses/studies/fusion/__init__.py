@@ -3,7 +3,6 @@
 Source: servoing thesis, perspectives: an onboard and an external camera, sensor fusion.
 """
 
-from cdpr_drake.analyses.studies.fusion.statements import JUDGES
-from cdpr_drake.analyses.studies.fusion.study import FusionStudy, study_fusion
+import lazy_loader
 
-__all__ = ["JUDGES", "FusionStudy", "study_fusion"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -8,14 +8,10 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from cdpr_drake.analyses.case_studies import Found
-from cdpr_drake.analyses.pictures import (
-    bar_style,
-    line_style,
-    new_figure,
-)
+from cdpr_drake.analyses.studies.framework.seeded_study import Found
 from cdpr_drake.analyses.studies.fusion.configurations import Configuration
 from cdpr_drake.analyses.studies.fusion.trials import COLUMNS, RATE
+from cdpr_drake.analyses.visualization.figure_style import bar_style, line_style, new_figure
 from cdpr_drake.palette import BOUND, SHADED, nth_look
 
 SHOWN = ("on_board", "external", "both")

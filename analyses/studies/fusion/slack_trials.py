@@ -6,15 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdpr_drake.analyses.runs import RunResult, run_scenario
+from cdpr_drake.analyses.simulation.visual_servo_run import RunResult, run_scenario
 from cdpr_drake.arrays import Array
-from cdpr_drake.cable_sight import seen_slack
 from cdpr_drake.errors import CableGeometryError
-from cdpr_drake.models import load_camera
-from cdpr_drake.spatial import pose_from_row
-from cdpr_drake.systems.cameras import CableCamera
-from cdpr_drake.systems.diagrams import load_scenario
-from cdpr_drake.systems.robots import CompiledCableRobot
+from cdpr_drake.geometry.poses import pose_from_row
+from cdpr_drake.models.camera_catalogue import load_camera
+from cdpr_drake.systems.cameras.cable_camera import CableCamera
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.robots.compiled_cable_robot import CompiledCableRobot
+from cdpr_drake.vision.cable_images import seen_slack
 
 SLACK_SCENARIO = "acrobot_slack_start_tca"
 

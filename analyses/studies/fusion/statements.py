@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from cdpr_drake.analyses.case_studies import Found
-from cdpr_drake.analyses.reporting import Statement, verdict
+from cdpr_drake.analyses.reporting.statements import Statement, verdict
+from cdpr_drake.analyses.studies.framework.seeded_study import Found
 from cdpr_drake.analyses.studies.fusion.slack_trials import KINDS, SLACK_COLUMNS, SURPLUSES_CM
 from cdpr_drake.analyses.studies.fusion.trials import COLUMNS
 from cdpr_drake.arrays import Array

@@ -11,14 +11,9 @@ import numpy as np
 from matplotlib.figure import Figure
 from rich.table import Table
 
-from cdpr_drake.analyses.case_studies import SeededStudy
-from cdpr_drake.analyses.reporting import (
-    ALONE,
-    Statement,
-    StudySession,
-    judged_statements,
-    new_table,
-)
+from cdpr_drake.analyses.reporting.progress import ALONE, StudySession
+from cdpr_drake.analyses.reporting.statements import Statement, judged_statements, new_table
+from cdpr_drake.analyses.studies.framework.seeded_study import SeededStudy
 from cdpr_drake.analyses.studies.fusion.configurations import (
     QUICK_SEEDS,
     SEEDS,
@@ -29,7 +24,7 @@ from cdpr_drake.analyses.studies.fusion.figures import fusion_figure
 from cdpr_drake.analyses.studies.fusion.slack_trials import SLACK_COLUMNS, slack_trials
 from cdpr_drake.analyses.studies.fusion.statements import JUDGES, column
 from cdpr_drake.analyses.studies.fusion.trials import COLUMNS, SCENARIO
-from cdpr_drake.analyses.sweeps import SweepTask
+from cdpr_drake.analyses.sweeps.workers import SweepTask
 
 ASSUMPTIONS = (
     "Nothing of this is printed but that it could be done. Where the tag on the platform is, its "

@@ -7,12 +7,12 @@ from functools import partial
 
 import numpy as np
 
-from cdpr_drake.analyses.case_studies import over_seeds
-from cdpr_drake.analyses.runs import RunResult, run_scenario
+from cdpr_drake.analyses.simulation.visual_servo_run import RunResult, run_scenario
+from cdpr_drake.analyses.studies.framework.seeded_study import over_seeds
 from cdpr_drake.arrays import Array
-from cdpr_drake.spatial import logarithm, pose_from_row, pose_rows_distance
-from cdpr_drake.systems.diagrams import load_scenario
-from cdpr_drake.systems.scenarios import Scenario
+from cdpr_drake.geometry.poses import logarithm, pose_from_row, pose_rows_distance
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
 
 SCENARIO = "acrobot_fusion"
 

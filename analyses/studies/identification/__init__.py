@@ -4,10 +4,3 @@
 reports and beside the Cramer-Rao bound, designed excitations beside random ones, and simulated
 campaigns whose robot tracks a motion with what was found.
 """
-
-from cdpr_drake.analyses.studies.identification.study import (
-    IdentificationStudy,
-    study_identification,
-)
-
-__all__ = ["IdentificationStudy", "study_identification"]

@@ -11,28 +11,16 @@ from matplotlib.figure import Figure
 from rich.table import Table
 from scipy.stats import chi2
 
-from cdpr_drake.analyses.case_studies import DrawnStudy
-from cdpr_drake.analyses.pictures import (
-    bar_style,
-    line_style,
-    new_figure,
-)
-from cdpr_drake.analyses.reporting import (
-    ALONE,
-    Statement,
-    StoppableStudy,
-    StudySession,
-    WorkProgress,
-    code_version,
-    finite,
-    new_table,
-    package_versions,
-    statement_table,
-    verdict,
-)
+from cdpr_drake.analyses.reporting.log_files import finite
+from cdpr_drake.analyses.reporting.progress import ALONE, StoppableStudy, StudySession, WorkProgress
+from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
+from cdpr_drake.analyses.reporting.statements import Statement, new_table, statement_table, verdict
+from cdpr_drake.analyses.studies.framework.seeded_study import DrawnStudy
 from cdpr_drake.analyses.studies.identification import trials
 from cdpr_drake.analyses.studies.identification.trials import MISFITS, CampaignTask, NoiseTask
-from cdpr_drake.analyses.sweeps import SweepTask, run_study_sweep
+from cdpr_drake.analyses.sweeps.sweep import run_study_sweep
+from cdpr_drake.analyses.sweeps.workers import SweepTask
+from cdpr_drake.analyses.visualization.figure_style import bar_style, line_style, new_figure
 from cdpr_drake.arrays import Array
 from cdpr_drake.palette import BOUND, nth_look
 

@@ -7,28 +7,25 @@ from dataclasses import dataclass, replace
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.identification import (
+from cdpr_drake.analyses.calibration.identification_campaign import (
     campaign_robots,
-    dynamic_model,
     excitation_task,
-    platform_size,
     run_dynamic_campaign,
 )
+from cdpr_drake.analyses.calibration.identified_robots import dynamic_model, platform_size
 from cdpr_drake.arrays import Array
-from cdpr_drake.geometry import CableSet, cable_jacobian
-from cdpr_drake.identification import (
-    DynamicModel,
-    IdentificationProgram,
-    MotionSamples,
-    design_excitation,
-    inertia_regressor,
-    sample_motion,
-)
-from cdpr_drake.models import Robot
-from cdpr_drake.spatial import pose_row, rotation_from_vector
-from cdpr_drake.systems.diagrams import load_scenario
-from cdpr_drake.systems.scenarios import TensionScenario
-from cdpr_drake.trajectories import PoseTrajectory
+from cdpr_drake.geometry.cable_paths import cable_jacobian
+from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.geometry.poses import pose_row, rotation_from_vector
+from cdpr_drake.identification.excitation import design_excitation
+from cdpr_drake.identification.parameters import DynamicModel
+from cdpr_drake.identification.program import IdentificationProgram
+from cdpr_drake.identification.regressor import inertia_regressor
+from cdpr_drake.identification.samples import MotionSamples, sample_motion
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.scenarios.tension_control_scenario import TensionScenario
+from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
 
 SCENARIO = "acrobot_computed_torque"
 UNKNOWN = ("mass", "center_of_mass", "inertia")

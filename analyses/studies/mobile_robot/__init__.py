@@ -4,8 +4,6 @@ Every estimator of the platform's pose without a known tag (servoing thesis 2.3.
 known tag once a lap, without and with tension correction (5.3.1).
 """
 
-from cdpr_drake.analyses.studies.mobile_robot.figures import FIGURES
-from cdpr_drake.analyses.studies.mobile_robot.judges import JUDGES
-from cdpr_drake.analyses.studies.mobile_robot.study import MobileRobotStudy, study_mobile_robot
+import lazy_loader
 
-__all__ = ["FIGURES", "JUDGES", "MobileRobotStudy", "study_mobile_robot"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

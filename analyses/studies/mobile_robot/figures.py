@@ -9,13 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from cdpr_drake.analyses.case_studies import Found
-from cdpr_drake.analyses.pictures import (
-    bar_style,
-    line_style,
-    new_figure,
-    plain_numbers,
-)
+from cdpr_drake.analyses.studies.framework.seeded_study import Found
 from cdpr_drake.analyses.studies.mobile_robot.configurations import (
     NUMBERS,
     PUBLISHED_LAPS,
@@ -25,8 +19,18 @@ from cdpr_drake.analyses.studies.mobile_robot.configurations import (
 )
 from cdpr_drake.analyses.studies.mobile_robot.lap_figures import LENGTHS, PATHS, lap_drawings
 from cdpr_drake.analyses.studies.mobile_robot.laps import COLUMNS, FREE, PHASES, SHOWN
-from cdpr_drake.analyses.studies.mobile_robot.tension_figures import SHOWN as TENSIONS
-from cdpr_drake.analyses.studies.mobile_robot.tension_figures import tension_drawings
+from cdpr_drake.analyses.studies.mobile_robot.tension_figures import (
+    SHOWN as TENSIONS,
+)
+from cdpr_drake.analyses.studies.mobile_robot.tension_figures import (
+    tension_drawings,
+)
+from cdpr_drake.analyses.visualization.figure_style import (
+    bar_style,
+    line_style,
+    new_figure,
+    plain_numbers,
+)
 from cdpr_drake.palette import SHADED, nth_look
 
 BOTH = ("plain", "corrected")

@@ -8,8 +8,9 @@ from functools import partial
 import numpy as np
 from matplotlib.figure import Figure
 
-from cdpr_drake.analyses.pictures import draw_curve, line_style, new_figure, phase_of
 from cdpr_drake.analyses.studies.mobile_robot.laps import PHASES, SHOWN
+from cdpr_drake.analyses.visualization.curves import draw_curve, phase_of
+from cdpr_drake.analyses.visualization.figure_style import line_style, new_figure
 from cdpr_drake.arrays import Array
 from cdpr_drake.palette import nth_look
 

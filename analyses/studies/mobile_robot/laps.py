@@ -10,14 +10,15 @@ from pathlib import Path
 import numpy as np
 from pydrake.common.yaml import yaml_dump_typed
 
-from cdpr_drake.analyses.case_studies import over_seeds
-from cdpr_drake.analyses.runs import RunResult, run_scenario
+from cdpr_drake.analyses.simulation.visual_servo_run import RunResult, run_scenario
+from cdpr_drake.analyses.studies.framework.seeded_study import over_seeds
 from cdpr_drake.arrays import Array
-from cdpr_drake.models import Robot, load_robot
-from cdpr_drake.spatial import pose_rows_distance
-from cdpr_drake.systems.diagrams import load_scenario
-from cdpr_drake.systems.loops import looped
-from cdpr_drake.systems.monitoring import Outcome
+from cdpr_drake.geometry.poses import pose_rows_distance
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.loops.loop_choice import looped
+from cdpr_drake.systems.monitoring.run_monitor import Outcome
 
 SCENARIO = "acrobot_mobile_robot"
 

@@ -10,8 +10,9 @@ import numpy as np
 from matplotlib.figure import Figure
 from rich.table import Table
 
-from cdpr_drake.analyses.case_studies import SeededStudy
-from cdpr_drake.analyses.reporting import ALONE, StudySession, new_table
+from cdpr_drake.analyses.reporting.progress import ALONE, StudySession
+from cdpr_drake.analyses.reporting.statements import new_table
+from cdpr_drake.analyses.studies.framework.seeded_study import SeededStudy
 from cdpr_drake.analyses.studies.mobile_robot.configurations import (
     QUICK_SEEDS,
     SEEDS,
@@ -22,7 +23,7 @@ from cdpr_drake.analyses.studies.mobile_robot.figures import mobile_robot_drawin
 from cdpr_drake.analyses.studies.mobile_robot.judges import JUDGES
 from cdpr_drake.analyses.studies.mobile_robot.laps import COLUMNS, SCENARIO, failed
 from cdpr_drake.analyses.studies.mobile_robot.statements import column, laps_words
-from cdpr_drake.analyses.sweeps import SweepTask
+from cdpr_drake.analyses.sweeps.workers import SweepTask
 
 ASSUMPTIONS = (
     "The track is not printed: a rectangle of 0.26 x 0.16 m with rounded corners, as fast as the "

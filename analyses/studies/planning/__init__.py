@@ -2,8 +2,3 @@
 
 The convex program shares nothing with the planner but the limits.
 """
-
-from cdpr_drake.analyses.studies.planning.convex_timing import convex_time
-from cdpr_drake.analyses.studies.planning.study import PlanningStudy, study_planning
-
-__all__ = ["PlanningStudy", "convex_time", "study_planning"]

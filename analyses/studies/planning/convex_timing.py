@@ -15,11 +15,12 @@ from pydrake.solvers import ClarabelSolver, MathematicalProgram
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import PlanningError
-from cdpr_drake.geometry import cable_jacobian
-from cdpr_drake.models import Robot, rigid_platform
-from cdpr_drake.planning import PathTask
-from cdpr_drake.spatial import rotation_vector
-from cdpr_drake.trajectories import PosePath
+from cdpr_drake.geometry.cable_paths import cable_jacobian
+from cdpr_drake.geometry.poses import rotation_vector
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.models.robot_statics import rigid_platform
+from cdpr_drake.planning.path_task import PathTask
+from cdpr_drake.trajectories.pose_path import PosePath
 
 STEP = 1e-4
 """Of differences along the path, relative to its length."""

@@ -8,18 +8,18 @@ from typing import Any
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.plans import (
+from cdpr_drake.analyses.planning.plan_tracking import track_plan
+from cdpr_drake.analyses.planning.robot_limits import (
     LimitSettings,
     make_path,
     path_task,
     robot_limits,
-    track_plan,
 )
 from cdpr_drake.analyses.studies.planning.convex_timing import convex_time
 from cdpr_drake.arrays import Array
-from cdpr_drake.models import load_robot
-from cdpr_drake.planning import plan_along_path
-from cdpr_drake.spatial import pose_from_angles
+from cdpr_drake.geometry.poses import pose_from_angles
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.planning.path_timing import plan_along_path
 
 WAYPOINTS = 4
 """Poses of each path."""

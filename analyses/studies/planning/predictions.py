@@ -9,13 +9,17 @@ import numpy as np
 from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator
 
-from cdpr_drake.control import TaskGains
-from cdpr_drake.models import load_robot
-from cdpr_drake.spatial import pose_rows_distance
-from cdpr_drake.systems.diagrams import TensionControlSettings, build_tension_control
-from cdpr_drake.systems.robots import StepRule
-from cdpr_drake.systems.tension_control import PredictiveTensions, TensionDistributor
-from cdpr_drake.trajectories import PoseTrajectory
+from cdpr_drake.control.task_space import TaskGains
+from cdpr_drake.geometry.poses import pose_rows_distance
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.systems.controllers.predictive_tensions import PredictiveTensions
+from cdpr_drake.systems.controllers.tension_distributor import TensionDistributor
+from cdpr_drake.systems.diagrams.tension_control import (
+    TensionControlSettings,
+    build_tension_control,
+)
+from cdpr_drake.systems.robots.compiled_step import StepRule
+from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
 
 ROBOT, LIMITS = "acrobot_large", (1.0, 60.0)
 START, GOAL = (0.0, 0.0, 0.2), (0.15, -0.1, 0.4)

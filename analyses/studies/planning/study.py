@@ -18,22 +18,12 @@ import numpy as np
 from matplotlib.figure import Figure
 from rich.table import Table
 
-from cdpr_drake.analyses.case_studies import DrawnStudy
-from cdpr_drake.analyses.pictures import line_style, new_figure
-from cdpr_drake.analyses.plans import RESERVE
-from cdpr_drake.analyses.reporting import (
-    ALONE,
-    Statement,
-    StoppableStudy,
-    StudySession,
-    WorkProgress,
-    code_version,
-    finite,
-    new_table,
-    package_versions,
-    statement_table,
-    verdict,
-)
+from cdpr_drake.analyses.planning.robot_limits import RESERVE
+from cdpr_drake.analyses.reporting.log_files import finite
+from cdpr_drake.analyses.reporting.progress import ALONE, StoppableStudy, StudySession, WorkProgress
+from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
+from cdpr_drake.analyses.reporting.statements import Statement, new_table, statement_table, verdict
+from cdpr_drake.analyses.studies.framework.seeded_study import DrawnStudy
 from cdpr_drake.analyses.studies.planning.motions import (
     PathMotion,
     SwingMotion,
@@ -44,10 +34,11 @@ from cdpr_drake.analyses.studies.planning.motions import (
 from cdpr_drake.analyses.studies.planning.paths import PATHS, REACHED, PathResult
 from cdpr_drake.analyses.studies.planning.predictions import FAST, HORIZONS, SLOW, TrackResult
 from cdpr_drake.analyses.studies.planning.swings import CASES, SHOTS, SwingResult
-from cdpr_drake.analyses.sweeps import run_study_sweep
+from cdpr_drake.analyses.sweeps.sweep import run_study_sweep
+from cdpr_drake.analyses.visualization.figure_style import line_style, new_figure
 from cdpr_drake.arrays import Array
 from cdpr_drake.palette import BOUND, DISTANCE
-from cdpr_drake.planning import SHAPERS
+from cdpr_drake.planning.input_shaping import SHAPERS
 
 INTERVALS, QUICK_INTERVALS = 600, 120
 """Of the convex program."""

@@ -9,16 +9,14 @@ from typing import Any
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.trajectories import (
-    example_robot,
-    plan_shaped_rest,
-    plan_shot_rest,
-    simulate_swing,
-)
+from cdpr_drake.analyses.planning.input_shaping import plan_shaped_rest, simulate_swing
+from cdpr_drake.analyses.planning.rest_to_rest import example_robot
+from cdpr_drake.analyses.planning.shooting import plan_shot_rest
 from cdpr_drake.errors import PlanningError
-from cdpr_drake.models import Robot, load_robot
-from cdpr_drake.planning import SHAPERS
-from cdpr_drake.systems.robots import CableSettings
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.planning.input_shaping import SHAPERS
+from cdpr_drake.systems.robots.settings import CableSettings
 
 WATCH = 2.0
 """How long the platform is looked at after the command [s]."""

@@ -4,11 +4,6 @@ The full form takes each file as it stands, with rendered images where it says s
 projects targets and cuts what is long.
 """
 
-from cdpr_drake.analyses.studies.scenarios.statements import JUDGES
-from cdpr_drake.analyses.studies.scenarios.study import (
-    FIGURES,
-    ScenariosStudy,
-    study_scenarios,
-)
+import lazy_loader
 
-__all__ = ["FIGURES", "JUDGES", "ScenariosStudy", "study_scenarios"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

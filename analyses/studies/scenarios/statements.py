@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdpr_drake.analyses.reporting import Statement, verdict
+from cdpr_drake.analyses.reporting.statements import Statement, verdict
 from cdpr_drake.analyses.studies.scenarios.task import COLUMNS
 from cdpr_drake.arrays import Array
-from cdpr_drake.systems.diagrams import load_scenario
-from cdpr_drake.systems.monitoring import Outcome
-from cdpr_drake.systems.scenarios import ExpectedEnd
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.monitoring.run_monitor import Outcome
+from cdpr_drake.systems.scenarios.run_settings import ExpectedEnd
 
 Found = Mapping[str, Mapping[str, Array]]
 

@@ -10,28 +10,24 @@ import numpy as np
 from matplotlib.figure import Figure
 from rich.table import Table
 
-from cdpr_drake.analyses.case_studies import DrawnStudy
-from cdpr_drake.analyses.pictures import new_figure
-from cdpr_drake.analyses.reporting import (
-    ALONE,
-    NothingToDraw,
+from cdpr_drake.analyses.reporting.deferred_figures import NothingToDraw
+from cdpr_drake.analyses.reporting.log_files import finite
+from cdpr_drake.analyses.reporting.progress import ALONE, StoppableStudy, StudySession, WorkProgress
+from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
+from cdpr_drake.analyses.reporting.statements import (
     Statement,
-    StoppableStudy,
-    StudySession,
-    WorkProgress,
-    code_version,
-    finite,
     judged_statements,
     new_table,
-    package_versions,
     statement_table,
 )
+from cdpr_drake.analyses.studies.framework.seeded_study import DrawnStudy
 from cdpr_drake.analyses.studies.scenarios.statements import JUDGES, Ending, endings
 from cdpr_drake.analyses.studies.scenarios.task import COLUMNS, ScenarioRun
-from cdpr_drake.analyses.sweeps import run_study_sweep
+from cdpr_drake.analyses.sweeps.sweep import run_study_sweep
+from cdpr_drake.analyses.visualization.figure_style import new_figure
 from cdpr_drake.arrays import Array
 from cdpr_drake.palette import nth_look
-from cdpr_drake.systems.scenarios import all_scenario_names
+from cdpr_drake.systems.scenarios.files import all_scenario_names
 
 FIGURES = ("endings",)
 """Names of the figures that it can write."""

@@ -9,14 +9,15 @@ from typing import Any
 
 import numpy as np
 
-from cdpr_drake.analyses.runs import SCENARIO_KINDS, RunSession
+from cdpr_drake.analyses.simulation.scenario_kinds import SCENARIO_KINDS
+from cdpr_drake.analyses.simulation.session import RunSession
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CdprError
-from cdpr_drake.systems.cameras import PROJECTED, RENDERED
-from cdpr_drake.systems.diagrams import load_scenario
-from cdpr_drake.systems.loops import is_looped, looped, with_loop
-from cdpr_drake.systems.monitoring import Outcome
-from cdpr_drake.systems.scenarios import scenario_kind
+from cdpr_drake.systems.cameras.camera_settings import PROJECTED, RENDERED
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.loops.loop_choice import is_looped, looped, with_loop
+from cdpr_drake.systems.monitoring.run_monitor import Outcome
+from cdpr_drake.systems.scenarios.files import scenario_kind
 
 QUICK_LOOP, QUICK_DIAGRAM = 100.0, 1.0
 """Simulated time of the quick form at most, of what the compiled loop does and of what only a

@@ -5,8 +5,6 @@ about the optical axis and drawn starts of a camera that moves as it is told, an
 ACROBOT with a wrong model. Servoing thesis 1.4.1 says of each what it is good for.
 """
 
-from cdpr_drake.analyses.studies.schemes.statements import JUDGES
-from cdpr_drake.analyses.studies.schemes.study import SchemesStudy, study_schemes
-from cdpr_drake.analyses.studies.schemes.trials import FreeCamera, RunNumbers, turned
+import lazy_loader
 
-__all__ = ["JUDGES", "FreeCamera", "RunNumbers", "SchemesStudy", "study_schemes", "turned"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from cdpr_drake.analyses.reporting import Statement, judged_statements, verdict
+from cdpr_drake.analyses.reporting.statements import Statement, judged_statements, verdict
 from cdpr_drake.analyses.studies.schemes.trials import COLUMNS, TURNS
 from cdpr_drake.arrays import Array
 

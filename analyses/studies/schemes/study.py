@@ -12,9 +12,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from rich.table import Table
 
-from cdpr_drake.analyses.case_studies import SeededStudy, constants_of
-from cdpr_drake.analyses.pictures import line_style, new_figure
-from cdpr_drake.analyses.reporting import ALONE, StudySession, new_table, package_versions
+from cdpr_drake.analyses.reporting.progress import ALONE, StudySession
+from cdpr_drake.analyses.reporting.provenance import package_versions
+from cdpr_drake.analyses.reporting.statements import new_table
+from cdpr_drake.analyses.studies.framework.seeded_study import SeededStudy, constants_of
 from cdpr_drake.analyses.studies.schemes import trials
 from cdpr_drake.analyses.studies.schemes.statements import (
     FREE,
@@ -35,10 +36,11 @@ from cdpr_drake.analyses.studies.schemes.trials import (
     free_starts,
     robot_starts,
 )
-from cdpr_drake.analyses.sweeps import SweepTask
+from cdpr_drake.analyses.sweeps.workers import SweepTask
+from cdpr_drake.analyses.visualization.figure_style import line_style, new_figure
 from cdpr_drake.arrays import Array
+from cdpr_drake.geometry.poses import pose_row
 from cdpr_drake.palette import nth_look
-from cdpr_drake.spatial import pose_row
 
 STARTS, QUICK_STARTS = 100, 8
 """Drawn starts of a free camera and of ACROBOT, each."""

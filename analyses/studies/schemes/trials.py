@@ -9,17 +9,21 @@ from typing import NamedTuple
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.runs import RunResult, run_scenario
+from cdpr_drake.analyses.simulation.visual_servo_run import RunResult, run_scenario
 from cdpr_drake.arrays import Array
-from cdpr_drake.features import seen_pose_error
-from cdpr_drake.models import Pose, load_robot
-from cdpr_drake.servoing import ServoController
-from cdpr_drake.spatial import exponential, pose_from_angles, pose_from_row
-from cdpr_drake.systems.diagrams import load_scenario, make_controller, servo_model
-from cdpr_drake.systems.monitoring import Outcome
-from cdpr_drake.systems.scenarios import Scenario
-from cdpr_drake.systems.servos import control_step
-from cdpr_drake.vision import Pinhole, PointTarget
+from cdpr_drake.geometry.poses import exponential, pose_from_angles, pose_from_row
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_schema import Pose
+from cdpr_drake.servoing.controller import ServoController
+from cdpr_drake.servoing.pose_features import seen_pose_error
+from cdpr_drake.systems.controllers.feature_servo import control_step
+from cdpr_drake.systems.diagrams.controller import make_controller
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.diagrams.servo_models import servo_model
+from cdpr_drake.systems.monitoring.run_monitor import Outcome
+from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
+from cdpr_drake.vision.pinhole import Pinhole
+from cdpr_drake.vision.target import PointTarget
 
 SCENARIO = "acrobot_ibvs"
 """Its camera of 640 x 480 px and its four dots, a square of 60 mm."""

@@ -5,7 +5,6 @@ Every item is one question with its own name, depends on no other, and answers w
 Source: servoing thesis 3.2 and 3.4.2.
 """
 
-from cdpr_drake.analyses.studies.stability_ranges.figures import FIGURES
-from cdpr_drake.analyses.studies.stability_ranges.study import JUDGES, study_stability_ranges
+import lazy_loader
 
-__all__ = ["FIGURES", "JUDGES", "study_stability_ranges"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -9,11 +9,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from cdpr_drake.analyses.pictures import (
-    bar_style,
-    line_style,
-    new_figure,
-)
 from cdpr_drake.analyses.studies.stability_ranges.item import (
     PLANAR_ROBOT,
     PLANAR_VISION,
@@ -31,6 +26,7 @@ from cdpr_drake.analyses.studies.stability_ranges.single_errors import (
     ROBOT,
 )
 from cdpr_drake.analyses.studies.stability_ranges.vision import PUBLISHED_OBJECT
+from cdpr_drake.analyses.visualization.figure_style import bar_style, line_style, new_figure
 from cdpr_drake.palette import BOUND, IDEAL, OUTCOMES, PUBLISHED, VERDICTS, Look, nth_look
 
 LENGTHS = {

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from cdpr_drake.analyses.pose_grids import plain
+from cdpr_drake.analyses.workspaces.pose_grid import plain
 
 PLANAR_VISION = "3.2.1, planar: analyses I and II"
 PLANAR_ROBOT = "3.2.1, planar: analysis III"

@@ -13,15 +13,13 @@ from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.analyses.studies.stability_ranges.item import bisected
 from cdpr_drake.arrays import Array
-from cdpr_drake.models import Robot, load_robot
-from cdpr_drake.spatial import pose_from_angles, pose_rows
-from cdpr_drake.stability import (
-    PerturbationBounds,
-    StabilityCase,
-    TargetRows,
-    VerdictOptions,
-    judge_stability,
-)
+from cdpr_drake.geometry.poses import pose_from_angles, pose_rows
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.stability.desired_view import TargetRows
+from cdpr_drake.stability.perturbation_bounds import PerturbationBounds
+from cdpr_drake.stability.stability_case import StabilityCase
+from cdpr_drake.stability.verdict import VerdictOptions, judge_stability
 
 CHUNK = 100
 """Poses judged at once; a question ends with the first chunk that is not stable throughout."""

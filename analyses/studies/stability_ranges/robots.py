@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from cdpr_drake.analyses.published import DRAWS, recipe_case, recipe_grid
+from cdpr_drake.analyses.studies.published.stability_recipe import DRAWS, recipe_case, recipe_grid
 from cdpr_drake.analyses.studies.stability_ranges.item import PLANAR_ROBOT, SPATIAL_ROBOT, RangeItem
 from cdpr_drake.analyses.studies.stability_ranges.robot_limits import (
     LimitedRobot,
@@ -16,8 +16,8 @@ from cdpr_drake.analyses.studies.stability_ranges.robot_limits import (
     RobotLimits,
     camera_at,
 )
-from cdpr_drake.stability import VerdictOptions, judge_stability
-from cdpr_drake.workspaces import VolumeRule, workspace_volume
+from cdpr_drake.stability.verdict import VerdictOptions, judge_stability
+from cdpr_drake.workspaces.volume import VolumeRule, workspace_volume
 
 PLANAR, SPATIAL = "planar", "acrobot_small"
 """Robots; the thesis does not say which of ACROBOT's platforms, this one is of its first

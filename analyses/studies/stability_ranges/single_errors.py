@@ -14,19 +14,23 @@ from functools import partial
 
 import numpy as np
 
-from cdpr_drake.analyses.published import DRAWS, recipe_case, recipe_grid, single_bounds
+from cdpr_drake.analyses.studies.published.stability_recipe import (
+    DRAWS,
+    recipe_case,
+    recipe_grid,
+    single_bounds,
+)
 from cdpr_drake.analyses.studies.stability_ranges.item import SINGLE, RangeItem
-from cdpr_drake.stability import (
+from cdpr_drake.stability.desired_view import OppositeCorner, ServoTarget
+from cdpr_drake.stability.perturbation_bounds import PerturbationBounds
+from cdpr_drake.stability.stability_case import StabilityCase
+from cdpr_drake.stability.verdict import (
     VERDICTS,
-    OppositeCorner,
-    PerturbationBounds,
-    ServoTarget,
-    StabilityCase,
     VerdictOptions,
     judge_all_verdicts,
     judge_stability,
 )
-from cdpr_drake.workspaces import VolumeRule, workspace_volume
+from cdpr_drake.workspaces.volume import VolumeRule, workspace_volume
 
 ROBOT, FULL_VOLUME = "acrobot_small", 1.014
 """Robot of 3.4.2, and its full workspace [m^3]."""

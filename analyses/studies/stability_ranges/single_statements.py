@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cdpr_drake.analyses.reporting import Statement, verdict
+from cdpr_drake.analyses.reporting.statements import Statement, verdict
 from cdpr_drake.analyses.studies.stability_ranges.answers import FoundRows
 from cdpr_drake.analyses.studies.stability_ranges.item import SINGLE, RangeRow
 from cdpr_drake.analyses.studies.stability_ranges.single_errors import (

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cdpr_drake.analyses.reporting import Statement, verdict
+from cdpr_drake.analyses.reporting.statements import Statement, verdict
 from cdpr_drake.analyses.studies.stability_ranges.answers import (
     NESTED,
     FoundRows,

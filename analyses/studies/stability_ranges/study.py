@@ -9,18 +9,11 @@ from typing import Any
 from matplotlib.figure import Figure
 from rich.table import Table
 
-from cdpr_drake.analyses.case_studies import DrawnStudy
-from cdpr_drake.analyses.published import DRAWS
-from cdpr_drake.analyses.reporting import (
-    ALONE,
-    Statement,
-    StoppableStudy,
-    StudySession,
-    WorkProgress,
-    code_version,
-    judged_statements,
-    package_versions,
-)
+from cdpr_drake.analyses.reporting.progress import ALONE, StoppableStudy, StudySession, WorkProgress
+from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
+from cdpr_drake.analyses.reporting.statements import Statement, judged_statements
+from cdpr_drake.analyses.studies.framework.seeded_study import DrawnStudy
+from cdpr_drake.analyses.studies.published.stability_recipe import DRAWS
 from cdpr_drake.analyses.studies.stability_ranges import (
     planar_statements,
     robot_limits,
@@ -34,7 +27,7 @@ from cdpr_drake.analyses.studies.stability_ranges.figures import range_drawings
 from cdpr_drake.analyses.studies.stability_ranges.item import RangeItem, RangeRow
 from cdpr_drake.analyses.studies.stability_ranges.tables import range_tables
 from cdpr_drake.analyses.studies.stability_ranges.vision import vision_items
-from cdpr_drake.analyses.sweeps import run_study_sweep
+from cdpr_drake.analyses.sweeps.sweep import run_study_sweep
 
 
 @dataclass(frozen=True, eq=False)

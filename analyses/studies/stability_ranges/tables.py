@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from rich.table import Table
 
-from cdpr_drake.analyses.reporting import Statement, new_table, statement_table
+from cdpr_drake.analyses.reporting.statements import Statement, new_table, statement_table
 from cdpr_drake.analyses.studies.stability_ranges.item import (
     PLANAR_ROBOT,
     PLANAR_VISION,

@@ -19,7 +19,11 @@ from cdpr_drake.analyses.studies.stability_ranges.robot_limits import (
     RangeSearch,
     RobotLimits,
 )
-from cdpr_drake.stability import PlanarVisionLimits, planar_margin, worst_object_error
+from cdpr_drake.stability.criterion_closed_forms import (
+    PlanarVisionLimits,
+    planar_margin,
+    worst_object_error,
+)
 
 PLANAR_PUBLISHED = {(5.0, 0.5, 0.3): 6.0, (0.5, 0.3, 0.2): 61.0}
 """Combinations 2 and 13 of figure 3.1: limits of each component of e, of its error and of the

@@ -4,8 +4,6 @@ Source: servoing thesis 3.3, 3.4.2 and 4.3.1, figures 3.8, 3.10, 3.13, 3.15, 3.1
 3.27, 3.32, 4.2.
 """
 
-from cdpr_drake.analyses.studies.stability_shapes.figures import FIGURES
-from cdpr_drake.analyses.studies.stability_shapes.statements import JUDGES
-from cdpr_drake.analyses.studies.stability_shapes.study import study_stability_shapes
+import lazy_loader
 
-__all__ = ["FIGURES", "JUDGES", "study_stability_shapes"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

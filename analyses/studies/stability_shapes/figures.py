@@ -9,11 +9,6 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from cdpr_drake.analyses.pictures import (
-    bare_figure,
-    draw_solid,
-    new_figure,
-)
 from cdpr_drake.analyses.studies.stability_shapes.items import (
     BASELINE,
     NESTED,
@@ -22,9 +17,11 @@ from cdpr_drake.analyses.studies.stability_shapes.items import (
     Shape,
     shape_items,
 )
-from cdpr_drake.models import load_robot
+from cdpr_drake.analyses.visualization.figure_style import bare_figure, new_figure
+from cdpr_drake.analyses.visualization.solids import draw_solid
+from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.palette import DESIRED, IDEAL, PLATFORM, WORKSPACES, nth_look
-from cdpr_drake.workspaces import surface_quads
+from cdpr_drake.workspaces.volume import surface_quads
 
 COLUMNS = 4
 """Panels side by side."""

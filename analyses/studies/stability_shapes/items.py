@@ -9,24 +9,24 @@ from functools import cached_property
 
 import numpy as np
 
-from cdpr_drake.analyses.published import (
-    BASELINE_VALUES,
-    TABLES,
-    PublishedTable,
+from cdpr_drake.analyses.studies.published.stability_recipe import (
     recipe_bounds,
     recipe_case,
     recipe_grid,
     recipe_options,
 )
-from cdpr_drake.analyses.stability import SampledTask
-from cdpr_drake.arrays import Array
-from cdpr_drake.stability import (
-    OppositeCorner,
-    PerturbationBounds,
-    ServoTarget,
-    StabilityCase,
+from cdpr_drake.analyses.studies.published.stability_tables import (
+    BASELINE_VALUES,
+    TABLES,
+    PublishedTable,
 )
-from cdpr_drake.workspaces import VolumeRule, WorkspaceGrid, workspace_volume
+from cdpr_drake.analyses.workspaces.stability_tasks import SampledTask
+from cdpr_drake.arrays import Array
+from cdpr_drake.stability.desired_view import OppositeCorner, ServoTarget
+from cdpr_drake.stability.perturbation_bounds import PerturbationBounds
+from cdpr_drake.stability.stability_case import StabilityCase
+from cdpr_drake.workspaces.pose_grid import WorkspaceGrid
+from cdpr_drake.workspaces.volume import VolumeRule, workspace_volume
 
 PANELS: dict[str, tuple[str, tuple[tuple[str, float], ...]]] = {
     "3.13": ("A.10", (("r_bp", 0.1), ("r_bp", 0.5), ("d_theta_bp_deg", 10.0),

@@ -6,7 +6,12 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from cdpr_drake.analyses.reporting import NOT_TESTABLE, Statement, judged_statements, verdict
+from cdpr_drake.analyses.reporting.statements import (
+    NOT_TESTABLE,
+    Statement,
+    judged_statements,
+    verdict,
+)
 from cdpr_drake.analyses.studies.stability_shapes.items import (
     BASELINE,
     COMBINATIONS,

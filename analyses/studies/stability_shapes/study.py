@@ -9,20 +9,11 @@ from typing import Any
 from matplotlib.figure import Figure
 from rich.table import Table
 
-from cdpr_drake.analyses.case_studies import DrawnStudy
-from cdpr_drake.analyses.pose_grids import grid_arguments, plain
-from cdpr_drake.analyses.published import RECIPE, recipe_options
-from cdpr_drake.analyses.reporting import (
-    ALONE,
-    Statement,
-    StoppableStudy,
-    StudySession,
-    WorkProgress,
-    code_version,
-    new_table,
-    package_versions,
-    statement_table,
-)
+from cdpr_drake.analyses.reporting.progress import ALONE, StoppableStudy, StudySession, WorkProgress
+from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
+from cdpr_drake.analyses.reporting.statements import Statement, new_table, statement_table
+from cdpr_drake.analyses.studies.framework.seeded_study import DrawnStudy
+from cdpr_drake.analyses.studies.published.stability_recipe import RECIPE, recipe_options
 from cdpr_drake.analyses.studies.stability_shapes.figures import shape_drawings
 from cdpr_drake.analyses.studies.stability_shapes.items import (
     Shape,
@@ -31,7 +22,8 @@ from cdpr_drake.analyses.studies.stability_shapes.items import (
     shape_task,
 )
 from cdpr_drake.analyses.studies.stability_shapes.statements import shape_statements
-from cdpr_drake.analyses.sweeps import run_study_sweep
+from cdpr_drake.analyses.sweeps.sweep import run_study_sweep
+from cdpr_drake.analyses.workspaces.pose_grid import grid_arguments, plain
 
 CHUNK = 2000
 """Poses per chunk."""

@@ -5,7 +5,6 @@ on each texture, by three schemes, and compares where the platform comes to rest
 should be.
 """
 
-from cdpr_drake.analyses.studies.tagless.statements import JUDGES
-from cdpr_drake.analyses.studies.tagless.study import TaglessStudy, study_tagless
+import lazy_loader
 
-__all__ = ["JUDGES", "TaglessStudy", "study_tagless"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from cdpr_drake.analyses.case_studies import Found
-from cdpr_drake.analyses.reporting import Statement, verdict
+from cdpr_drake.analyses.reporting.statements import Statement, verdict
+from cdpr_drake.analyses.studies.framework.seeded_study import Found
 from cdpr_drake.analyses.studies.tagless.trials import COLUMNS, SCHEMES, TAG, is_lost
 from cdpr_drake.arrays import Array
-from cdpr_drake.textures import TEXTURES
+from cdpr_drake.vision.texture_pictures import TEXTURES
 
 WITHIN = 3.0
 """Times the final error with a tag that a textured square may have."""

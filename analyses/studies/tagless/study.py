@@ -11,16 +11,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from rich.table import Table
 
-from cdpr_drake.analyses.case_studies import SeededStudy, constants_of
-from cdpr_drake.analyses.pictures import line_style, new_figure
-from cdpr_drake.analyses.reporting import ALONE, StudySession, new_table, package_versions
+from cdpr_drake.analyses.reporting.progress import ALONE, StudySession
+from cdpr_drake.analyses.reporting.provenance import package_versions
+from cdpr_drake.analyses.reporting.statements import new_table
+from cdpr_drake.analyses.studies.framework.seeded_study import SeededStudy, constants_of
 from cdpr_drake.analyses.studies.tagless import trials
-from cdpr_drake.analyses.studies.tagless.statements import (
-    JUDGES,
-    medians,
-    runs_of,
-    task_name,
-)
+from cdpr_drake.analyses.studies.tagless.statements import JUDGES, medians, runs_of, task_name
 from cdpr_drake.analyses.studies.tagless.trials import (
     COLUMNS,
     RATE,
@@ -30,7 +26,8 @@ from cdpr_drake.analyses.studies.tagless.trials import (
     is_lost,
     starts,
 )
-from cdpr_drake.analyses.sweeps import SweepTask
+from cdpr_drake.analyses.sweeps.workers import SweepTask
+from cdpr_drake.analyses.visualization.figure_style import line_style, new_figure
 from cdpr_drake.palette import nth_look
 
 STARTS, QUICK_STARTS = 20, 1

@@ -9,14 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.runs import RunResult, run_scenario
+from cdpr_drake.analyses.simulation.visual_servo_run import RunResult, run_scenario
 from cdpr_drake.arrays import Array
-from cdpr_drake.models import Pose
-from cdpr_drake.spatial import pose_rows_distance
-from cdpr_drake.systems.diagrams import build_visual_servo, load_scenario
-from cdpr_drake.systems.monitoring import Outcome
-from cdpr_drake.textures import TEXTURES
-from cdpr_drake.vision import TagTarget
+from cdpr_drake.geometry.poses import pose_rows_distance
+from cdpr_drake.models.robot_schema import Pose
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.diagrams.visual_servo import build_visual_servo
+from cdpr_drake.systems.monitoring.run_monitor import Outcome
+from cdpr_drake.vision.apriltags import TagTarget
+from cdpr_drake.vision.texture_pictures import TEXTURES
 
 SCENARIO = "acrobot_pbvs"
 """Its target, a tag of 60 mm, is that of all others."""

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cdpr_drake.analyses.case_studies import CaseStudy, Configuration
+from cdpr_drake.analyses.studies.framework.case_definition import CaseStudy, Configuration
 from cdpr_drake.analyses.studies.tension_cases.case_10_estimates import ESTIMATES
 from cdpr_drake.analyses.studies.tension_cases.case_10_statements import (
     METRICS,

@@ -7,8 +7,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from cdpr_drake.analyses.case_studies import CaseRuns
-from cdpr_drake.analyses.reporting import Statement, verdict
+from cdpr_drake.analyses.reporting.statements import Statement, verdict
+from cdpr_drake.analyses.studies.framework.case_run import CaseRuns
 from cdpr_drake.analyses.studies.tension_cases.case_10_statements import SAME_PX, THRESHOLDS
 from cdpr_drake.analyses.studies.tension_cases.slack_experiments import (
     CORRECTED,

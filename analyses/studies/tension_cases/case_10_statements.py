@@ -7,8 +7,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from cdpr_drake.analyses.case_studies import CaseRuns, OwnMetric
-from cdpr_drake.analyses.reporting import NOT_TESTABLE, Statement, verdict
+from cdpr_drake.analyses.reporting.statements import NOT_TESTABLE, Statement, verdict
+from cdpr_drake.analyses.studies.framework.case_run import CaseRuns, OwnMetric
 from cdpr_drake.analyses.studies.tension_cases.slack_experiments import (
     CORRECTED,
     FACTOR,

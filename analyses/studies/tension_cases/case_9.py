@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from cdpr_drake.analyses.case_studies import CaseRuns, CaseStudy, Configuration
-from cdpr_drake.analyses.reporting import Statement, verdict
+from cdpr_drake.analyses.reporting.statements import Statement, verdict
+from cdpr_drake.analyses.studies.framework.case_definition import CaseStudy, Configuration
+from cdpr_drake.analyses.studies.framework.case_run import CaseRuns
 from cdpr_drake.analyses.studies.tension_cases.case_9_figures import DRAWINGS, sensor_accuracy
 from cdpr_drake.analyses.studies.tension_cases.case_9_statements import (
     PUBLISHED_TIMES,

@@ -8,20 +8,22 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.optimize import lsq_linear
 
-from cdpr_drake.analyses.case_studies import CaseRuns
-from cdpr_drake.analyses.pictures import bar_style, new_figure
-from cdpr_drake.analyses.reporting import Statement, verdict
+from cdpr_drake.analyses.reporting.statements import Statement, verdict
+from cdpr_drake.analyses.studies.framework.case_run import CaseRuns
 from cdpr_drake.analyses.studies.tension_cases.case_9_statements import (
     PUBLISHED_TENSIONS,
     THRESHOLD,
     final_tensions,
 )
 from cdpr_drake.analyses.studies.tension_cases.slack_experiments import CORRECTED, there
+from cdpr_drake.analyses.visualization.figure_style import bar_style, new_figure
 from cdpr_drake.arrays import Array
-from cdpr_drake.models import load_robot, tension_problem
+from cdpr_drake.geometry.poses import pose_from_row
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_statics import tension_problem
 from cdpr_drake.palette import PLATFORM, PUBLISHED, SOLID, nth_look
-from cdpr_drake.spatial import pose_from_row
-from cdpr_drake.tensions import TensionProblem, distribute, feasible_polygon, solution_space
+from cdpr_drake.tensions.methods import distribute, feasible_polygon, solution_space
+from cdpr_drake.tensions.problem import TensionProblem
 
 ACCURACY = 0.3
 """Accuracy of the sensors by which figure 5.15 varies readings [N]."""

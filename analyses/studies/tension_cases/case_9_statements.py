@@ -7,8 +7,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from cdpr_drake.analyses.case_studies import CaseRun, CaseRuns
-from cdpr_drake.analyses.reporting import NOT_TESTABLE, Statement, verdict
+from cdpr_drake.analyses.reporting.statements import NOT_TESTABLE, Statement, verdict
+from cdpr_drake.analyses.studies.framework.case_run import CaseRun, CaseRuns
 from cdpr_drake.analyses.studies.tension_cases.slack_experiments import (
     CORRECTED,
     FACTOR,
@@ -22,10 +22,11 @@ from cdpr_drake.analyses.studies.tension_cases.slack_experiments import (
 )
 from cdpr_drake.analyses.studies.tension_cases.slack_metrics import SETTLED
 from cdpr_drake.arrays import Array
-from cdpr_drake.geometry import cable_jacobian
-from cdpr_drake.models import load_robot, tension_problem
-from cdpr_drake.spatial import pose_from_row
-from cdpr_drake.tensions import solution_space
+from cdpr_drake.geometry.cable_paths import cable_jacobian
+from cdpr_drake.geometry.poses import pose_from_row
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_statics import tension_problem
+from cdpr_drake.tensions.methods import solution_space
 
 THRESHOLD = 1.0
 """Tension below which the thesis counts a cable as slack [N]."""

@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from cdpr_drake.analyses.case_studies import CaseRuns, CaseStudy, Configuration, OwnMetric
-from cdpr_drake.analyses.reporting import Statement, verdict
+from cdpr_drake.analyses.reporting.statements import Statement, verdict
+from cdpr_drake.analyses.studies.framework.case_definition import CaseStudy, Configuration
+from cdpr_drake.analyses.studies.framework.case_run import CaseRuns, OwnMetric
 from cdpr_drake.analyses.studies.tension_cases.slack_metrics import (
     chatter,
     estimate_at_end,

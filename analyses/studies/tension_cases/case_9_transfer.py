@@ -8,8 +8,8 @@ from itertools import pairwise
 import numpy as np
 from scipy.signal import find_peaks
 
-from cdpr_drake.analyses.case_studies import CaseRun, CaseRuns
-from cdpr_drake.analyses.reporting import Statement, verdict
+from cdpr_drake.analyses.reporting.statements import Statement, verdict
+from cdpr_drake.analyses.studies.framework.case_run import CaseRun, CaseRuns
 from cdpr_drake.analyses.studies.tension_cases.case_9_statements import (
     SLACK_PLAIN,
     THRESHOLD,
@@ -26,9 +26,10 @@ from cdpr_drake.analyses.studies.tension_cases.slack_experiments import (
     there,
 )
 from cdpr_drake.arrays import Array
-from cdpr_drake.models import load_robot, tension_problem
-from cdpr_drake.spatial import pose_from_row
-from cdpr_drake.tensions import distribute, solution_space
+from cdpr_drake.geometry.poses import pose_from_row
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_statics import tension_problem
+from cdpr_drake.tensions.methods import distribute, solution_space
 
 SAME_LENGTH = 0.005
 """Lengths that differ by less lie upon each other in figure 5.11 [m]."""

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from cdpr_drake.analyses.case_studies import CaseRuns, Configuration
+from cdpr_drake.analyses.studies.framework.case_definition import Configuration
+from cdpr_drake.analyses.studies.framework.case_run import CaseRuns
 
 SLACKS_CM = (0, 2, 4, 6, 8)
 """Surplus of two cables at the start of E1 and E2, E3 and E4, ... [cm]."""

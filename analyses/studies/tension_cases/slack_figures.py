@@ -4,25 +4,23 @@ from __future__ import annotations
 
 import numpy as np
 
-from cdpr_drake.analyses.case_studies import (
+from cdpr_drake.analyses.studies.framework.case_layouts import (
     CableLayout,
     Layout,
     Panel,
     PanelLayout,
+    paths_layout,
+)
+from cdpr_drake.analyses.studies.framework.case_panels import (
     bars,
     draw_image_deviation,
     draw_image_paths,
     draw_stable,
     draw_taut,
     last,
-    paths_layout,
     trace,
 )
-from cdpr_drake.analyses.studies.tension_cases.slack_experiments import (
-    CORRECTED,
-    PLAIN,
-    SLACKS_CM,
-)
+from cdpr_drake.analyses.studies.tension_cases.slack_experiments import CORRECTED, PLAIN, SLACKS_CM
 
 ALL = tuple(f"E{k}" for k in range(1, 11))
 

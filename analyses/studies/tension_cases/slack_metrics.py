@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from cdpr_drake.analyses.case_studies import OwnMetric
+from cdpr_drake.analyses.studies.framework.case_run import OwnMetric
 from cdpr_drake.arrays import Array
 
 SETTLED = 2.0

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 from rich.table import Table
 
-from cdpr_drake.analyses.case_studies import CaseRuns, Configuration
-from cdpr_drake.analyses.reporting import Statement, new_table, verdict
+from cdpr_drake.analyses.reporting.statements import Statement, new_table, verdict
+from cdpr_drake.analyses.studies.framework.case_definition import Configuration
+from cdpr_drake.analyses.studies.framework.case_run import CaseRuns
 from cdpr_drake.analyses.studies.tension_cases.slack_experiments import slack_change, there
 from cdpr_drake.arrays import Array
 

@@ -10,17 +10,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from cdpr_drake.analyses.case_studies import (
-    PULLEYS,
-    SETS,
-    SETUP,
-    TRACKING,
-    CaseRuns,
-    CaseStudy,
-    Configuration,
-    OwnMetric,
-)
-from cdpr_drake.analyses.reporting import Statement, verdict
+from cdpr_drake.analyses.reporting.statements import Statement, verdict
+from cdpr_drake.analyses.studies.framework.case_definition import PULLEYS, CaseStudy, Configuration
+from cdpr_drake.analyses.studies.framework.case_run import CaseRuns, OwnMetric
+from cdpr_drake.analyses.studies.framework.experiments import SETS, SETUP, TRACKING
 from cdpr_drake.analyses.studies.tension_cases.slack_metrics import (
     cable_power,
     chatter,
@@ -57,7 +50,7 @@ VARIANTS: dict[str, tuple[str, str]] = {
         f"{{kind: polygon, threshold: [{BOUND:g}], margin: 20, gain: 0.02, rate: {RATE}}}",
     ),
 }
-"""Ways to manage tensions: words, and what to set `tension_management` to."""
+"""Ways to manage tensions: words, and what to set `tensions` to."""
 
 DISTURBED = tuple(name for name in SETS if name != "none")
 """The sets d1 to d4."""

@@ -8,13 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from cdpr_drake.analyses.queries import applicable_methods
-from cdpr_drake.analyses.reporting import interleaved, seconds_each, seconds_per_call
+from cdpr_drake.analyses.reporting.timing import interleaved, seconds_each, seconds_per_call
+from cdpr_drake.analyses.statics.tension_query import applicable_methods
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import TensionProblemError
-from cdpr_drake.models import load_robot, tension_problem
-from cdpr_drake.spatial import pose_from_angles
-from cdpr_drake.tensions import TensionProblem, TensionStatus, distribute, distribute_batch
+from cdpr_drake.geometry.poses import pose_from_angles
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_statics import tension_problem
+from cdpr_drake.tensions.batch import distribute_batch
+from cdpr_drake.tensions.methods import distribute
+from cdpr_drake.tensions.problem import TensionProblem, TensionStatus
 
 TURNS_DEG = ((0.0, 0.0, 0.0), (5.0, -5.0, 10.0))
 """Angles of the platform at every position of the grid [deg]."""

@@ -6,12 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdpr_drake.analyses.queries import applicable_methods
+from cdpr_drake.analyses.statics.tension_query import applicable_methods
 from cdpr_drake.analyses.studies.tension_methods.feasible_path import HeldPath, held_path
 from cdpr_drake.analyses.studies.tension_methods.trial import Applied, TensionTrial
-from cdpr_drake.models import load_robot, tension_problem
-from cdpr_drake.spatial import pose_from_angles
-from cdpr_drake.trajectories import PoseTrajectory
+from cdpr_drake.geometry.poses import pose_from_angles
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_statics import tension_problem
+from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
 
 THESIS_ROBOT = "caroca_gazebo"
 OTHER_ROBOT = "acrobot_large"

@@ -8,9 +8,10 @@ import numpy as np
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import InfeasibleTensionError
-from cdpr_drake.models import Robot, tension_problem
-from cdpr_drake.spatial import pose_from_angles
-from cdpr_drake.tensions import exact_tensions
+from cdpr_drake.geometry.poses import pose_from_angles
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.models.robot_statics import tension_problem
+from cdpr_drake.tensions.methods import exact_tensions
 
 STEPS = 1000
 """Poses of a straight path that are tried, beside its end."""

@@ -9,13 +9,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from cdpr_drake.analyses.pictures import (
-    bar_style,
-    draw_curve,
-    line_style,
-    new_figure,
-    phase_of,
-)
 from cdpr_drake.analyses.studies.tension_methods.coverage import MethodCoverage
 from cdpr_drake.analyses.studies.tension_methods.experiments import (
     EXPERIMENTS,
@@ -25,7 +18,9 @@ from cdpr_drake.analyses.studies.tension_methods.experiments import (
 )
 from cdpr_drake.analyses.studies.tension_methods.gain_figures import gain_figures, gains_name
 from cdpr_drake.analyses.studies.tension_methods.trial import Applied, TrialResult
-from cdpr_drake.models import load_robot
+from cdpr_drake.analyses.visualization.curves import draw_curve, phase_of
+from cdpr_drake.analyses.visualization.figure_style import bar_style, line_style, new_figure
+from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.palette import BOUND, DASHED, DOTTED, SOLID, Look, look_of, nth_look
 
 COLUMNS = 3

@@ -8,10 +8,11 @@ from functools import partial
 import numpy as np
 from matplotlib.figure import Figure
 
-from cdpr_drake.analyses.pictures import draw_curve, line_style, new_figure, phase_of
 from cdpr_drake.analyses.studies.tension_methods.experiments import THESIS_GAINS, UNCHECKED
 from cdpr_drake.analyses.studies.tension_methods.trial import TrialResult
-from cdpr_drake.models import load_robot
+from cdpr_drake.analyses.visualization.curves import draw_curve, phase_of
+from cdpr_drake.analyses.visualization.figure_style import line_style, new_figure
+from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.palette import BOUND, nth_look
 
 NUMBERS: dict[str, tuple[int, ...]] = {

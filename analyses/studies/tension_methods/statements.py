@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 
-from cdpr_drake.analyses.reporting import Statement, judged_statements, verdict
+from cdpr_drake.analyses.reporting.statements import Statement, judged_statements, verdict
 from cdpr_drake.analyses.studies.tension_methods.trial import Applied, TrialResult
 
 JUMP = 0.1

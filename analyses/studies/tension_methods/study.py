@@ -9,17 +9,11 @@ from typing import Any
 from matplotlib.figure import Figure
 from rich.table import Table
 
-from cdpr_drake.analyses.case_studies import DrawnStudy
-from cdpr_drake.analyses.queries import applicable_methods
-from cdpr_drake.analyses.reporting import (
-    ALONE,
-    Statement,
-    StoppableStudy,
-    StudySession,
-    WorkProgress,
-    code_version,
-    package_versions,
-)
+from cdpr_drake.analyses.reporting.progress import ALONE, StoppableStudy, StudySession, WorkProgress
+from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
+from cdpr_drake.analyses.reporting.statements import Statement
+from cdpr_drake.analyses.statics.tension_query import applicable_methods
+from cdpr_drake.analyses.studies.framework.seeded_study import DrawnStudy
 from cdpr_drake.analyses.studies.tension_methods.coverage import (
     TURNS_DEG,
     CoverageTask,
@@ -38,8 +32,10 @@ from cdpr_drake.analyses.studies.tension_methods.figures import study_drawings
 from cdpr_drake.analyses.studies.tension_methods.statements import judge_statements
 from cdpr_drake.analyses.studies.tension_methods.tables import study_tables
 from cdpr_drake.analyses.studies.tension_methods.trial import STEP, TrialResult, TrialTask
-from cdpr_drake.analyses.sweeps import SweepTask, run_study_sweep
-from cdpr_drake.models import load_robot, tension_problem
+from cdpr_drake.analyses.sweeps.sweep import run_study_sweep
+from cdpr_drake.analyses.sweeps.workers import SweepTask
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_statics import tension_problem
 
 RUN, GRID = "run ", "grid of "
 """What the names of tasks begin with."""

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from rich.table import Table
 
-from cdpr_drake.analyses.reporting import Statement, new_table, statement_table
+from cdpr_drake.analyses.reporting.statements import Statement, new_table, statement_table
 from cdpr_drake.analyses.studies.tension_methods.coverage import MethodCoverage
 from cdpr_drake.analyses.studies.tension_methods.experiments import (
     EXPERIMENTS,

@@ -14,20 +14,21 @@ import numpy as np
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator, SimulatorStatus
 from pydrake.systems.framework import Context, DiscreteValues, EventStatus
 
-from cdpr_drake.analyses.runs import RunSession, advance
+from cdpr_drake.analyses.simulation.advance import advance
+from cdpr_drake.analyses.simulation.session import RunSession
 from cdpr_drake.arrays import Array
-from cdpr_drake.control import TaskGains
-from cdpr_drake.models import load_robot
-from cdpr_drake.spatial import pose_row
-from cdpr_drake.systems.diagrams import (
+from cdpr_drake.control.task_space import TaskGains
+from cdpr_drake.geometry.poses import pose_row
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.systems.controllers.tension_distributor import TensionDistributor
+from cdpr_drake.systems.diagrams.tension_control import (
     TensionControl,
     TensionControlSettings,
     build_tension_control,
 )
-from cdpr_drake.systems.monitoring import Outcome
-from cdpr_drake.systems.tension_control import TensionDistributor
-from cdpr_drake.tensions import METHODS
-from cdpr_drake.trajectories import PoseTrajectory
+from cdpr_drake.systems.monitoring.run_monitor import Outcome
+from cdpr_drake.tensions.methods import METHODS
+from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
 
 STEP = 1e-3
 """Step of the integrator, Runge-Kutta of third order [s]."""

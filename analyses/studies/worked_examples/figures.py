@@ -8,14 +8,11 @@ from functools import partial
 import numpy as np
 from matplotlib.figure import Figure
 
-from cdpr_drake.analyses.pictures import (
-    draw_curve,
-    new_figure,
-    phase_of,
-)
 from cdpr_drake.analyses.studies.worked_examples.motion import SampledMotion
 from cdpr_drake.analyses.studies.worked_examples.statements import FoundExamples
 from cdpr_drake.analyses.studies.worked_examples.tensions import POSES, SHOWN, ExamplePolygon
+from cdpr_drake.analyses.visualization.curves import draw_curve, phase_of
+from cdpr_drake.analyses.visualization.figure_style import new_figure
 from cdpr_drake.palette import PLATFORM, SOLID, nth_look
 
 PROGRAMS = {"class": "trajectory class", "conditions": "second program"}

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.spatial import pose_from_angles
-from cdpr_drake.trajectories import PoseTrajectory
+from cdpr_drake.geometry.poses import pose_from_angles
+from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
 
 START, END = np.array([0.0, -2.0, 2.0]), np.array([3.0, 1.0, 3.0])
 """Gazebo thesis 6.2, at rest in both, platform unturned [m]."""

@@ -7,13 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdpr_drake.analyses.reporting import Statement, judged_statements, verdict
-from cdpr_drake.analyses.studies.worked_examples.motion import (
-    DURATION,
-    END,
-    START,
-    SampledMotion,
-)
+from cdpr_drake.analyses.reporting.statements import Statement, judged_statements, verdict
+from cdpr_drake.analyses.studies.worked_examples.motion import DURATION, END, START, SampledMotion
 from cdpr_drake.analyses.studies.worked_examples.tensions import (
     POTT,
     PRINTED,

@@ -10,16 +10,10 @@ from typing import Any
 from matplotlib.figure import Figure
 from rich.table import Table
 
-from cdpr_drake.analyses.case_studies import DrawnStudy
-from cdpr_drake.analyses.reporting import (
-    ALONE,
-    Statement,
-    StudySession,
-    WorkProgress,
-    new_table,
-    package_versions,
-    statement_table,
-)
+from cdpr_drake.analyses.reporting.progress import ALONE, StudySession, WorkProgress
+from cdpr_drake.analyses.reporting.provenance import package_versions
+from cdpr_drake.analyses.reporting.statements import Statement, new_table, statement_table
+from cdpr_drake.analyses.studies.framework.seeded_study import DrawnStudy
 from cdpr_drake.analyses.studies.worked_examples.figures import example_drawings
 from cdpr_drake.analyses.studies.worked_examples.motion import (
     DURATION,
@@ -29,10 +23,7 @@ from cdpr_drake.analyses.studies.worked_examples.motion import (
     by_printed_coefficients,
     by_trajectory,
 )
-from cdpr_drake.analyses.studies.worked_examples.statements import (
-    FoundExamples,
-    example_statements,
-)
+from cdpr_drake.analyses.studies.worked_examples.statements import FoundExamples, example_statements
 from cdpr_drake.analyses.studies.worked_examples.tensions import (
     LEAST,
     POSES,

@@ -6,19 +6,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdpr_drake.analyses.reporting import interleaved, processor_seconds
+from cdpr_drake.analyses.reporting.timing import interleaved, processor_seconds
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import TensionProblemError
-from cdpr_drake.models import Robot, load_robot, tension_problem
-from cdpr_drake.spatial import pose_from_angles
-from cdpr_drake.tensions import (
-    TensionProblem,
-    TensionStatus,
-    distribute,
-    distribute_batch,
-    feasible_polygon,
-    solution_space,
-)
+from cdpr_drake.geometry.poses import pose_from_angles
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.models.robot_statics import tension_problem
+from cdpr_drake.tensions.batch import distribute_batch
+from cdpr_drake.tensions.methods import distribute, feasible_polygon, solution_space
+from cdpr_drake.tensions.problem import TensionProblem, TensionStatus
 
 ROBOT = "acrobot_large"
 

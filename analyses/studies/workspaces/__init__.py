@@ -3,8 +3,6 @@
 Source: servoing thesis 1.3.3, figures 1.17 and 1.18; Gazebo thesis 2.6.
 """
 
-from cdpr_drake.analyses.studies.workspaces.figures import FIGURES
-from cdpr_drake.analyses.studies.workspaces.statements import JUDGES
-from cdpr_drake.analyses.studies.workspaces.study import study_workspaces
+import lazy_loader
 
-__all__ = ["FIGURES", "JUDGES", "study_workspaces"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -22,11 +22,11 @@ from pydrake.geometry import (
 from pydrake.math import RigidTransform, RotationMatrix
 from scipy.optimize import lsq_linear
 
-from cdpr_drake.analyses.workspaces import surroundings
+from cdpr_drake.analyses.workspaces.workspace_question import surroundings
 from cdpr_drake.arrays import Array
-from cdpr_drake.models import load_robot
-from cdpr_drake.spatial import rotation_from_angles
-from cdpr_drake.workspaces import Surroundings, clearances
+from cdpr_drake.geometry.poses import rotation_from_angles
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.workspaces.cable_interference import Surroundings, clearances
 
 ROBOTS = ("acrobot_large", "caroca")
 """Whose poses are compared, as many of each."""

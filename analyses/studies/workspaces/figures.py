@@ -9,22 +9,14 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from cdpr_drake.analyses.pictures import (
-    bar_style,
-    bare_figure,
-    draw_solid,
-    new_figure,
-)
 from cdpr_drake.analyses.studies.workspaces.items import EVERY, FIGURE, FoundWorkspace
-from cdpr_drake.analyses.studies.workspaces.tables import (
-    ALL,
-    ALL_BUT_CLOSURE,
-    shares_of,
-)
-from cdpr_drake.analyses.workspaces import KINDS
-from cdpr_drake.models import load_robot
+from cdpr_drake.analyses.studies.workspaces.tables import ALL, ALL_BUT_CLOSURE, shares_of
+from cdpr_drake.analyses.visualization.figure_style import bar_style, bare_figure, new_figure
+from cdpr_drake.analyses.visualization.solids import draw_solid
+from cdpr_drake.analyses.workspaces.conditions import KINDS
+from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.palette import WORKSPACES, look_of
-from cdpr_drake.workspaces import surface_quads
+from cdpr_drake.workspaces.volume import surface_quads
 
 PUBLISHED_FIGURES = {
     "static_acrobot": ("1.17", ("acrobot_small", "acrobot_large")),

@@ -8,22 +8,18 @@ from pathlib import Path
 
 import numpy as np
 
-from cdpr_drake.analyses.workspaces import (
-    KINDS,
+from cdpr_drake.analyses.workspaces.conditions import KINDS
+from cdpr_drake.analyses.workspaces.workspace_question import (
     Asked,
     WorkspaceQuestion,
     make_workspace_question,
 )
 from cdpr_drake.errors import CdprError
-from cdpr_drake.models import Robot, load_robot
-from cdpr_drake.workspaces import (
-    SpatialSet,
-    VolumeRule,
-    WorkspaceGrid,
-    WorkspaceVolume,
-    grid_by_count,
-    workspace_volume,
-)
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.workspaces.demanded_wrenches import SpatialSet
+from cdpr_drake.workspaces.pose_grid import WorkspaceGrid, grid_by_count
+from cdpr_drake.workspaces.volume import VolumeRule, WorkspaceVolume, workspace_volume
 
 PUBLISHED_LOWER = {
     "acrobot_small": (0.0, 1.0),

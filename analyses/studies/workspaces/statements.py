@@ -8,7 +8,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from cdpr_drake.analyses.reporting import Statement, judged_statements, verdict
+from cdpr_drake.analyses.reporting.statements import Statement, judged_statements, verdict
 from cdpr_drake.analyses.studies.workspaces.distances import SAME
 from cdpr_drake.analyses.studies.workspaces.items import (
     ALONE,

@@ -10,16 +10,10 @@ import numpy as np
 from matplotlib.figure import Figure
 from rich.table import Table
 
-from cdpr_drake.analyses.case_studies import DrawnStudy
-from cdpr_drake.analyses.reporting import (
-    ALONE,
-    Statement,
-    StoppableStudy,
-    StudySession,
-    WorkProgress,
-    code_version,
-    package_versions,
-)
+from cdpr_drake.analyses.reporting.progress import ALONE, StoppableStudy, StudySession, WorkProgress
+from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
+from cdpr_drake.analyses.reporting.statements import Statement
+from cdpr_drake.analyses.studies.framework.seeded_study import DrawnStudy
 from cdpr_drake.analyses.studies.workspaces.distances import (
     POSES,
     QUICK_POSES,
@@ -40,7 +34,7 @@ from cdpr_drake.analyses.studies.workspaces.items import (
 )
 from cdpr_drake.analyses.studies.workspaces.statements import workspace_statements
 from cdpr_drake.analyses.studies.workspaces.tables import shares_of, workspace_tables
-from cdpr_drake.analyses.sweeps import run_study_sweep
+from cdpr_drake.analyses.sweeps.sweep import run_study_sweep
 
 CHUNK_POSES = 4096
 """Poses per chunk; seconds of work with stability, else milliseconds."""

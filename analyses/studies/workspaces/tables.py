@@ -7,14 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from rich.table import Table
 
-from cdpr_drake.analyses.reporting import Statement, new_table, statement_table
-from cdpr_drake.analyses.studies.workspaces.items import (
-    EVERY,
-    FIGURE,
-    FoundWorkspace,
-    LeftOut,
-)
-from cdpr_drake.analyses.workspaces import KINDS
+from cdpr_drake.analyses.reporting.statements import Statement, new_table, statement_table
+from cdpr_drake.analyses.studies.workspaces.items import EVERY, FIGURE, FoundWorkspace, LeftOut
+from cdpr_drake.analyses.workspaces.conditions import KINDS
 
 ALL = "all"
 """What all kinds of a robot have in common."""

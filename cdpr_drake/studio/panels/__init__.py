@@ -2,9 +2,16 @@
 
 A panel's `build` places its elements into the current slot of NiceGUI. It connects to signals of
 the workbench by `on_page`, which ends the connection when the page is closed.
+
+Parts of the run panel: the scenario's form, plots that move, and what is looked at.
+
+What several panels are made of: messages, forms from schemas, tables with bars.
+
+`SchemaGroups` is the form of a document, made from its schema: units, ranges, errors beside the
+fields. `cable_table` and `fact_table` are HTML, one element for many numbers. `quietly` shows what
+a handler raises as a message in the page.
 """
 
-from cdpr_drake.studio.panels.panel import Panel, on_page, place_remarks
-from cdpr_drake.studio.panels.table import PANELS
+import lazy_loader
 
-__all__ = ["PANELS", "Panel", "on_page", "place_remarks"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -6,9 +6,9 @@ from collections.abc import Callable, Sequence
 
 from nicegui import ui
 
-from cdpr_drake.studio.commands import CommandBoard, Computed
-from cdpr_drake.studio.jobs import JobState
-from cdpr_drake.studio.widgets import quietly
+from cdpr_drake.studio.panels.panel import quietly
+from cdpr_drake.studio.workbench.command_board import CommandBoard, Computed
+from cdpr_drake.studio.workbench.job import JobState
 
 
 class JobBar:

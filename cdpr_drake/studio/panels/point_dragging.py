@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from nicegui import events, ui
 
-from cdpr_drake.studio.widgets import quietly, shown
-from cdpr_drake.studio.workbench import Workbench
+from cdpr_drake.studio.panels.panel import quietly, shown
+from cdpr_drake.studio.workbench.session import Workbench
 
 MOVED = "studio_point"
 

@@ -8,17 +8,13 @@ from typing import Any
 import numpy as np
 from nicegui import ui
 
-from cdpr_drake.spatial import angles_from_rotation
-from cdpr_drake.studio.panels.panel import on_page
-from cdpr_drake.studio.widgets import (
-    cable_table,
-    fact_table,
-    message,
-    number_words,
-    quietly,
-)
-from cdpr_drake.studio.workbench import PoseAnswer, PoseAxis, Workbench
-from cdpr_drake.tensions import METHODS
+from cdpr_drake.geometry.poses import angles_from_rotation
+from cdpr_drake.studio.panels.numbers import cable_table, fact_table, number_words
+from cdpr_drake.studio.panels.panel import message, on_page, quietly
+from cdpr_drake.studio.workbench.pose_answer import PoseAnswer
+from cdpr_drake.studio.workbench.pose_axes import PoseAxis
+from cdpr_drake.studio.workbench.session import Workbench
+from cdpr_drake.tensions.methods import METHODS
 
 THROTTLE = 0.03
 """Least time between two messages of a slider that is dragged [s]."""

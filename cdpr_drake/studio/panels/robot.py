@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from nicegui import events, ui
 
-from cdpr_drake.models import Robot
-from cdpr_drake.studio.panels.panel import on_page
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.studio.panels.panel import on_page, quietly
 from cdpr_drake.studio.panels.point_dragging import add_point_dragging
 from cdpr_drake.studio.panels.robot_dialogs import (
     export_dialog,
@@ -14,8 +14,8 @@ from cdpr_drake.studio.panels.robot_dialogs import (
     save_to,
     text_dialog,
 )
-from cdpr_drake.studio.widgets import SchemaGroups, quietly
-from cdpr_drake.studio.workbench import Workbench
+from cdpr_drake.studio.panels.schema_tables import SchemaGroups
+from cdpr_drake.studio.workbench.session import Workbench
 
 FIRST = ("cables", "platform", "tension_bounds")
 OPENED = ("cables", "tension_bounds")

@@ -11,17 +11,17 @@ from typing import Any
 from nicegui import events, ui
 
 from cdpr_drake.errors import CdprError
-from cdpr_drake.models import robot_names
-from cdpr_drake.studio.widgets import message, quietly, shown
-from cdpr_drake.studio.workbench import (
+from cdpr_drake.models.robot_loader import robot_names
+from cdpr_drake.studio.panels.panel import message, quietly, shown
+from cdpr_drake.studio.workbench.robot_files import (
     LARGEST_UPLOAD,
     MOST_UPLOADS,
     UPLOADS,
     OpenedRobot,
-    Workbench,
     export_formats,
     exported,
 )
+from cdpr_drake.studio.workbench.session import Workbench
 
 
 @contextmanager

@@ -13,14 +13,22 @@ from weakref import WeakKeyDictionary, ref
 from nicegui import run, ui
 
 from cdpr_drake.errors import CdprError
-from cdpr_drake.models import Robot, load_robot
-from cdpr_drake.studio.jobs import JobState, RunJob
-from cdpr_drake.studio.panels.panel import on_page, robot_argument
-from cdpr_drake.studio.panels.run_parts import RUN_STYLE, RunWatch, ScenarioForm, SteeringBar
-from cdpr_drake.studio.runs import ROBOT, RunBoard, RunScene, Shown, zipped
-from cdpr_drake.studio.widgets import quietly
-from cdpr_drake.studio.workbench import RobotScene, Workbench, subject_of
-from cdpr_drake.systems.scenarios import DEFAULT_SCENARIO, all_scenario_names
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.studio.panels.live_bar import SteeringBar
+from cdpr_drake.studio.panels.panel import on_page, quietly, robot_argument
+from cdpr_drake.studio.panels.run_watch import RUN_STYLE, RunWatch
+from cdpr_drake.studio.panels.scenario_form import ScenarioForm
+from cdpr_drake.studio.workbench.finished_run import zipped
+from cdpr_drake.studio.workbench.job import JobState
+from cdpr_drake.studio.workbench.result_subject import subject_of
+from cdpr_drake.studio.workbench.run_board import RunBoard, Shown
+from cdpr_drake.studio.workbench.run_job import RunJob
+from cdpr_drake.studio.workbench.scenario_draft import ROBOT
+from cdpr_drake.studio.workbench.scene import RobotScene, RunScene
+from cdpr_drake.studio.workbench.session import Workbench
+from cdpr_drake.systems.scenarios.files import all_scenario_names
+from cdpr_drake.systems.scenarios.visual_servo_scenario import DEFAULT_SCENARIO
 
 TICK = 1.0 / 30.0
 """Time between looks at a run [s]."""

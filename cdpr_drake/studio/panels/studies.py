@@ -10,19 +10,21 @@ from weakref import WeakKeyDictionary
 
 from nicegui import run, ui
 
-from cdpr_drake.analyses.catalogue import STUDIES
-from cdpr_drake.studio.commands import (
+from cdpr_drake.analyses.studies.catalogue import STUDIES
+from cdpr_drake.studio.panels.command_fields import CommandFields, Filled
+from cdpr_drake.studio.panels.job_bar import JobBar
+from cdpr_drake.studio.panels.numbers import fact_table
+from cdpr_drake.studio.panels.panel import quietly, shown
+from cdpr_drake.studio.workbench.command_board import CommandBoard
+from cdpr_drake.studio.workbench.command_form import FieldProblem
+from cdpr_drake.studio.workbench.finished_studies import (
     STUDY_RESULTS,
-    CommandBoard,
-    FieldProblem,
     StudyFolder,
     study_folder,
     study_folders,
 )
-from cdpr_drake.studio.panels.command_fields import CommandFields, Filled
-from cdpr_drake.studio.panels.job_bar import JobBar
-from cdpr_drake.studio.widgets import fact_table, quietly, shown
-from cdpr_drake.studio.workbench import Subject, Workbench
+from cdpr_drake.studio.workbench.result_subject import Subject
+from cdpr_drake.studio.workbench.session import Workbench
 
 TICK = 0.5
 """Time between looks at jobs and folders [s]."""

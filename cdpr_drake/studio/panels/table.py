@@ -8,7 +8,7 @@ from cdpr_drake.studio.panels.robot import robot_panel
 from cdpr_drake.studio.panels.run import COMPARED, RUN, run_panel
 from cdpr_drake.studio.panels.studies import STUDY, studies_panel
 from cdpr_drake.studio.panels.workspace import WORKSPACES, workspace_panel
-from cdpr_drake.studio.workbench import POSE_NUMBERS
+from cdpr_drake.studio.workbench.session import POSE_NUMBERS
 
 PANELS = {
     panel.name: panel

@@ -9,12 +9,20 @@ from weakref import WeakKeyDictionary, ref
 import numpy as np
 from nicegui import run, ui
 
-from cdpr_drake.analyses.workspaces import KINDS, MEASURES
+from cdpr_drake.analyses.workspaces.conditions import KINDS, MEASURES
 from cdpr_drake.palette import TENSIONS
-from cdpr_drake.stability import SCHEMES, VERDICTS
-from cdpr_drake.studio.commands import (
-    CommandBoard,
-    FieldProblem,
+from cdpr_drake.stability.stability_case import SCHEMES
+from cdpr_drake.stability.verdict import VERDICTS
+from cdpr_drake.studio.panels.command_fields import Choices, CommandFields, Filled
+from cdpr_drake.studio.panels.job_bar import JobBar
+from cdpr_drake.studio.panels.panel import message, on_page, quietly, robot_argument, shown
+from cdpr_drake.studio.workbench.calculator import Signal
+from cdpr_drake.studio.workbench.command_board import CommandBoard
+from cdpr_drake.studio.workbench.command_form import FieldProblem
+from cdpr_drake.studio.workbench.job import JobState
+from cdpr_drake.studio.workbench.result_subject import Subject
+from cdpr_drake.studio.workbench.session import Workbench
+from cdpr_drake.studio.workbench.workspace_regions import (
     Layer,
     Plane,
     Regions,
@@ -22,13 +30,7 @@ from cdpr_drake.studio.commands import (
     read_regions,
     show_regions,
 )
-from cdpr_drake.studio.jobs import JobState
-from cdpr_drake.studio.panels.command_fields import Choices, CommandFields, Filled
-from cdpr_drake.studio.panels.job_bar import JobBar
-from cdpr_drake.studio.panels.panel import on_page, robot_argument
-from cdpr_drake.studio.widgets import message, quietly, shown
-from cdpr_drake.studio.workbench import Signal, Subject, Workbench
-from cdpr_drake.systems.scenarios import all_scenario_names
+from cdpr_drake.systems.scenarios.files import all_scenario_names
 
 TICK = 0.5
 """Time between looks at jobs and folders [s]."""

@@ -7,58 +7,31 @@ what has changed. Numbers and the scene belong to one thread, the `Calculator`'s
 `bench.draw(lambda scene: ...)` and gets a `RobotScene`, whose `meshcat` takes calls there only.
 Every result that a panel shows has a `Subject`, the robot and pose that it is about:
 `bench.results` knows all of them, and says which are about something else than what is open now.
+
+Commands that the studio runs for a page, without the page: their forms, and what they left.
+
+A `CommandForm` says which options a command takes; the command line makes it from its own
+functions, so that there is no second list of them. `CommandBoard` starts commands in the working
+folder, each as a job. `Regions` are workspaces that were computed, as solids and planes for the
+scene; `StudyFolder` is what a study left.
+
+Jobs: work that the studio's server has, in processes of their own.
+
+A job belongs to the server, not to a page: whoever closes or reloads a page, or opens another,
+finds it as it is. A process of its own, since Drake and numba hold Python's lock, and since what
+kills a run must not kill the server. Nothing here knows of pages.
+
+`CommandJob` is any `cdpr` subcommand, `RunJob` a `cdpr simulate` that is followed and steered, see
+`analyses.simulation`. `JobManager` lets a few of them run at a time. Threads of any kind may call
+everything here.
+
+Runs as the studio shows them, without the page: what is asked for, and what came out.
+
+`ScenarioDraft` is a scenario with changed fields, checked as `cdpr simulate` does. `FinishedRun` is
+the results folder of a run, to be looked at from row to row; `RunScene` draws a run into Meshcat.
+Live samples and the rows of a log become the same rows of plots.
 """
 
-from cdpr_drake.studio.workbench.calculator import Calculator
-from cdpr_drake.studio.workbench.document import Document
-from cdpr_drake.studio.workbench.pose_answer import PoseAnswer, RobotQuestions
-from cdpr_drake.studio.workbench.pose_axes import PoseAxis, axis_values, pose_at, pose_axes
-from cdpr_drake.studio.workbench.robot_files import (
-    LARGEST_UPLOAD,
-    MOST_UPLOADS,
-    UPLOADS,
-    OpenedRobot,
-    RobotFiles,
-    export_formats,
-    exported,
-)
-from cdpr_drake.studio.workbench.scene import ANCHORS, EXITS, RobotScene
-from cdpr_drake.studio.workbench.session import POSE_NUMBERS, USUAL_ROBOT, Workbench
-from cdpr_drake.studio.workbench.signal import Signal
-from cdpr_drake.studio.workbench.subject import Results, Subject, subject_of
-from cdpr_drake.studio.workbench.working_folder import WorkingFolder
-from cdpr_drake.studio.workbench.yaml_edit import flow, has, with_item, with_value, without_item
+import lazy_loader
 
-__all__ = [
-    "ANCHORS",
-    "EXITS",
-    "LARGEST_UPLOAD",
-    "MOST_UPLOADS",
-    "POSE_NUMBERS",
-    "UPLOADS",
-    "USUAL_ROBOT",
-    "Calculator",
-    "Document",
-    "OpenedRobot",
-    "PoseAnswer",
-    "PoseAxis",
-    "Results",
-    "RobotFiles",
-    "RobotQuestions",
-    "RobotScene",
-    "Signal",
-    "Subject",
-    "Workbench",
-    "WorkingFolder",
-    "axis_values",
-    "export_formats",
-    "exported",
-    "flow",
-    "has",
-    "pose_at",
-    "pose_axes",
-    "subject_of",
-    "with_item",
-    "with_value",
-    "without_item",
-]  # fmt: skip
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -3,6 +3,8 @@
 Compiled kernels are compiled under one lock, a minute long at the first use, and Drake's Meshcat
 takes calls from the thread only that made it. So all of that happens in one thread beside that of
 the server, which answers pages.
+
+Tells who listens that something has changed.
 """
 
 from __future__ import annotations
@@ -50,3 +52,33 @@ class Calculator:
 def _post(loop: asyncio.AbstractEventLoop, done: Callable[..., Any], future: Future[Any]) -> None:
     if not loop.is_closed() and not future.cancelled():
         loop.call_soon_threadsafe(done, future)
+
+
+Listener = Callable[[], None]
+
+
+class Signal:
+    """Callbacks that are called when something has changed."""
+
+    def __init__(self) -> None:
+        """Without any."""
+        self._listeners: dict[int, Listener] = {}
+        self._next = 0
+
+    def connect(self, listener: Listener) -> Callable[[], None]:
+        """Calls `listener` from now on; what is returned ends that, also when called twice."""
+        number, self._next = self._next, self._next + 1
+        self._listeners[number] = listener
+
+        def disconnect() -> None:
+            self._listeners.pop(number, None)
+
+        return disconnect
+
+    def emit(self) -> None:
+        """Calls all of them, in the order in which they came."""
+        for listener in list(self._listeners.values()):
+            listener()
+
+    def __len__(self) -> int:
+        return len(self._listeners)

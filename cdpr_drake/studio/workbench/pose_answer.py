@@ -9,21 +9,19 @@ from typing import Any
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.queries import (
-    StaticReport,
-    applicable_methods,
-    at_pose,
-    underactuated_answer,
-)
-from cdpr_drake.analyses.workspaces import MEASURES, PoseConditions, Poses, pose_conditions
+from cdpr_drake.analyses.statics.static_query import StaticReport, at_pose
+from cdpr_drake.analyses.statics.tension_query import applicable_methods, underactuated_answer
+from cdpr_drake.analyses.workspaces.conditions import MEASURES, PoseConditions, Poses
+from cdpr_drake.analyses.workspaces.workspace_question import pose_conditions
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables import ELASTIC
+from cdpr_drake.cables.models import ELASTIC
 from cdpr_drake.errors import CdprError
-from cdpr_drake.geometry import cable_paths
-from cdpr_drake.models import Robot, tension_problem, wrench_balance
+from cdpr_drake.geometry.cable_paths import cable_paths
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.models.robot_statics import tension_problem, wrench_balance
 from cdpr_drake.studio.workbench.pose_axes import pose_axes
-from cdpr_drake.tensions import METHODS, distribute
-from cdpr_drake.workspaces import PART_NAMES, clearances
+from cdpr_drake.tensions.methods import METHODS, distribute
+from cdpr_drake.workspaces.cable_interference import PART_NAMES, clearances
 
 USUAL_METHOD = "quadratic_program"
 

@@ -9,8 +9,8 @@ from itertools import product
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cdpr_drake.models import Robot
-from cdpr_drake.spatial import angles_from_rotation, pose_from_angles
+from cdpr_drake.geometry.poses import angles_from_rotation, pose_from_angles
+from cdpr_drake.models.robot_schema import Robot
 
 ANGLES = ("φ", "θ", "ψ")
 

@@ -16,20 +16,12 @@ from xml.etree import ElementTree
 import yaml
 
 from cdpr_drake.errors import CdprError, RobotFileError
-from cdpr_drake.models import (
-    EXPORTS,
-    ROBOT_SUFFIXES,
-    Robot,
-    import_robot,
-    is_foreign,
-    not_written,
-    not_written_words,
-    parse_robot,
-    robot_file,
-    robot_names,
-    robot_text,
-    write_robot,
-)
+from cdpr_drake.models.formats.detection import SUFFIXES as ROBOT_SUFFIXES
+from cdpr_drake.models.formats.detection import is_foreign
+from cdpr_drake.models.robot_exchange import import_robot, write_robot
+from cdpr_drake.models.robot_exports import EXPORTS, not_written, not_written_words
+from cdpr_drake.models.robot_loader import parse_robot, robot_file, robot_names, robot_text
+from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.studio.workbench.working_folder import WorkingFolder
 
 LARGEST_TEXT = 262_144

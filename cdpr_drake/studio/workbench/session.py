@@ -14,18 +14,19 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CdprError
-from cdpr_drake.models import Robot, is_foreign, robot_file, robot_names, robot_text
-from cdpr_drake.spatial import pose_row
-from cdpr_drake.studio.commands import CommandForm
-from cdpr_drake.studio.jobs import JobManager
-from cdpr_drake.studio.workbench.calculator import Calculator
+from cdpr_drake.geometry.poses import pose_row
+from cdpr_drake.models.formats.detection import is_foreign
+from cdpr_drake.models.robot_loader import robot_file, robot_names, robot_text
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.studio.workbench.calculator import Calculator, Signal
+from cdpr_drake.studio.workbench.command_form import CommandForm
 from cdpr_drake.studio.workbench.document import Document
+from cdpr_drake.studio.workbench.job_manager import JobManager
 from cdpr_drake.studio.workbench.pose_answer import USUAL_METHOD, PoseAnswer, RobotQuestions
 from cdpr_drake.studio.workbench.pose_axes import axis_values, pose_at
+from cdpr_drake.studio.workbench.result_subject import Results, Subject, subject_of
 from cdpr_drake.studio.workbench.robot_files import OpenedRobot, RobotFiles
 from cdpr_drake.studio.workbench.scene import Draw, RobotScene
-from cdpr_drake.studio.workbench.signal import Signal
-from cdpr_drake.studio.workbench.subject import Results, Subject, subject_of
 from cdpr_drake.studio.workbench.working_folder import WorkingFolder
 from cdpr_drake.studio.workbench.yaml_edit import with_value
 

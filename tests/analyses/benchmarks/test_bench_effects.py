@@ -1,7 +1,7 @@
 """The closed loops with physical effects run, and their rows say what they measured."""
 
 from cdpr_drake.analyses.benchmarks.simulation import EFFECTS, effect_rows
-from cdpr_drake.systems.diagrams import load_scenario
+from cdpr_drake.systems.diagrams.load import load_scenario
 
 
 def test_rows_are_real_time_factors():

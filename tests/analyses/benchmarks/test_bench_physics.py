@@ -5,9 +5,9 @@ import pytest
 from scipy.optimize import leastsq
 
 from cdpr_drake.analyses.benchmarks.statics import _starts, length_residuals, physics_rows
-from cdpr_drake.kinematics import ForwardKinematics
-from cdpr_drake.models import load_robot
-from cdpr_drake.spatial import pose_error, pose_from_row, pose_row
+from cdpr_drake.geometry.poses import pose_error, pose_from_row, pose_row
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.statics.forward_kinematics import ForwardKinematics
 
 
 def test_scipy_finds_the_same_pose_from_the_same_residual():

@@ -11,8 +11,8 @@ from cdpr_drake.analyses.benchmarks.servo import (
     numpy_step,
     texture_rows,
 )
-from cdpr_drake.systems.diagrams import load_scenario
-from cdpr_drake.systems.servos import SCHEMES
+from cdpr_drake.systems.controllers.schemes import SCHEMES
+from cdpr_drake.systems.diagrams.load import load_scenario
 
 ROUND_OFF = 1e-10
 """Of cable velocities below 1 m/s, after two pseudo-inverses."""

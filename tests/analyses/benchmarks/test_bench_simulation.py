@@ -12,9 +12,9 @@ from cdpr_drake.analyses.benchmarks.simulation import (
     plant_simulator,
     region_row,
 )
-from cdpr_drake.cables import floating_force
-from cdpr_drake.models import load_robot
-from cdpr_drake.systems.robots import CableForces
+from cdpr_drake.cables.straight_kernel import floating_force
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.systems.robots.cable_forces import CableForces
 
 ROUNDING = 1e-9
 """Relative to forces of thousands of newtons."""

@@ -5,10 +5,12 @@ from pathlib import Path
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.calibration import CalibrationLog, CalibrationTask, Sigmas
-from cdpr_drake.calibration import Point, Stations, simulated_lengths, simulated_poses
-from cdpr_drake.models import load_robot
-from cdpr_drake.spatial import pose_from_angles
+from cdpr_drake.analyses.calibration.calibration_request import CalibrationTask, Sigmas
+from cdpr_drake.analyses.calibration.log_file import CalibrationLog
+from cdpr_drake.calibration.measurements import simulated_lengths, simulated_poses
+from cdpr_drake.calibration.stations import Point, Stations
+from cdpr_drake.geometry.poses import pose_from_angles
+from cdpr_drake.models.robot_loader import load_robot
 
 ROBOT, SIGMAS = load_robot("acrobot_small"), Sigmas(lengths=1e-4, place=2e-4, turn=5e-4)
 COUNT = 16

@@ -12,17 +12,14 @@ from pathlib import Path
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.calibration import (
-    CalibrationLog,
-    CalibrationTask,
-    Sigmas,
-    calibrate,
-    calibration_model,
-)
-from cdpr_drake.calibration import Point, Stations
+from cdpr_drake.analyses.calibration.calibrated_robots import calibration_model
+from cdpr_drake.analyses.calibration.calibration_request import CalibrationTask, Sigmas
+from cdpr_drake.analyses.calibration.calibration_task import calibrate
+from cdpr_drake.analyses.calibration.log_file import CalibrationLog
+from cdpr_drake.calibration.stations import Point, Stations
 from cdpr_drake.errors import CdprError
-from cdpr_drake.models import load_robot
-from cdpr_drake.spatial import pose_error, pose_from_angles
+from cdpr_drake.geometry.poses import pose_error, pose_from_angles
+from cdpr_drake.models.robot_loader import load_robot
 
 ROBOT = load_robot("acrobot_small")
 SIGMAS = Sigmas(lengths=2e-4, swivels=3e-3)

@@ -1,11 +1,13 @@
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.calibration import calibrated_scenario, rest_poses, run_campaign
-from cdpr_drake.analyses.reporting import BELIEVED_FILE, write_run_inputs
+from cdpr_drake.analyses.calibration.calibration_campaign import calibrated_scenario, run_campaign
+from cdpr_drake.analyses.calibration.candidate_poses import rest_poses
+from cdpr_drake.analyses.reporting.provenance import BELIEVED_FILE, write_run_inputs
 from cdpr_drake.errors import CalibrationError
-from cdpr_drake.models import load_robot
-from cdpr_drake.systems.diagrams import believed_robot, load_scenario
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.systems.diagrams.beliefs import believed_robot
+from cdpr_drake.systems.diagrams.load import load_scenario
 
 CHANGES = ("camera.kind=projected", "perturbations.exit_points=0.01")
 

@@ -1,9 +1,10 @@
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.calibration import read_log, read_tags
+from cdpr_drake.analyses.calibration.log_file import read_log
+from cdpr_drake.analyses.calibration.tag_file import read_tags
 from cdpr_drake.errors import CalibrationError
-from cdpr_drake.spatial import pose_from_angles
+from cdpr_drake.geometry.poses import pose_from_angles
 
 CABLES = ("C1", "C2")
 

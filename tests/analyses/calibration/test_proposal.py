@@ -5,10 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.calibration import calibrate, calibration_model, next_poses, rest_poses
-from cdpr_drake.analyses.plans import read_path
-from cdpr_drake.calibration import expected_std, simulated_lengths, simulated_poses
-from cdpr_drake.spatial import pose_error
+from cdpr_drake.analyses.calibration.calibrated_robots import calibration_model
+from cdpr_drake.analyses.calibration.calibration_task import calibrate
+from cdpr_drake.analyses.calibration.candidate_poses import rest_poses
+from cdpr_drake.analyses.calibration.next_poses import next_poses
+from cdpr_drake.analyses.planning.path_files import read_path
+from cdpr_drake.calibration.measurements import simulated_lengths, simulated_poses
+from cdpr_drake.calibration.pose_design import expected_std
+from cdpr_drake.geometry.poses import pose_error
 from tests.analyses.calibration.logs import ROBOT, SIGMAS, asked, recorded
 
 COUNT = 5

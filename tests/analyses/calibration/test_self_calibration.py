@@ -5,17 +5,15 @@ from pathlib import Path
 
 import numpy as np
 
-from cdpr_drake.analyses.calibration import (
-    CalibrationLog,
-    CalibrationTask,
-    Sigmas,
-    calibrate,
-    calibration_model,
-)
-from cdpr_drake.calibration import Point, Stations
-from cdpr_drake.models import load_robot, rigid_platform
-from cdpr_drake.spatial import pose_error, pose_from_angles
-from cdpr_drake.statics import equilibrium_near
+from cdpr_drake.analyses.calibration.calibrated_robots import calibration_model
+from cdpr_drake.analyses.calibration.calibration_request import CalibrationTask, Sigmas
+from cdpr_drake.analyses.calibration.calibration_task import calibrate
+from cdpr_drake.analyses.calibration.log_file import CalibrationLog
+from cdpr_drake.calibration.stations import Point, Stations
+from cdpr_drake.geometry.poses import pose_error, pose_from_angles
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_statics import rigid_platform
+from cdpr_drake.statics.equilibrium import equilibrium_near
 
 SIGMAS = Sigmas(lengths=5e-4, swivels=3e-3, moments=0.02, forces=0.1)
 TAUT = 0.1

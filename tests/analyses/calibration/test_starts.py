@@ -7,18 +7,14 @@ import numpy as np
 import pytest
 from pydrake.math import RollPitchYaw
 
-from cdpr_drake.analyses.calibration import (
-    CalibrationLog,
-    CalibrationTask,
-    Sigmas,
-    calibrate,
-    calibration_dict,
-    calibration_model,
-    read_log,
-)
-from cdpr_drake.calibration import Point, Stations
-from cdpr_drake.models import load_robot
-from cdpr_drake.spatial import pose_error, pose_from_angles
+from cdpr_drake.analyses.calibration.calibrated_robots import calibration_model
+from cdpr_drake.analyses.calibration.calibration_report import calibration_dict
+from cdpr_drake.analyses.calibration.calibration_request import CalibrationTask, Sigmas
+from cdpr_drake.analyses.calibration.calibration_task import calibrate
+from cdpr_drake.analyses.calibration.log_file import CalibrationLog, read_log
+from cdpr_drake.calibration.stations import Point, Stations
+from cdpr_drake.geometry.poses import pose_error, pose_from_angles
+from cdpr_drake.models.robot_loader import load_robot
 from tests.analyses.calibration import logs, spoiled_log
 
 

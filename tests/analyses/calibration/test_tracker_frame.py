@@ -5,23 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.calibration import (
-    TagPlace,
-    calibrate,
-    calibration_dict,
-    calibration_model,
-    read_tags,
-)
-from cdpr_drake.calibration import (
-    model_difference,
-    parameter_layout,
-    simulated_corners,
-    with_tags,
-)
+from cdpr_drake.analyses.calibration.calibrated_robots import calibration_model
+from cdpr_drake.analyses.calibration.calibration_report import calibration_dict
+from cdpr_drake.analyses.calibration.calibration_request import TagPlace
+from cdpr_drake.analyses.calibration.calibration_task import calibrate
+from cdpr_drake.analyses.calibration.tag_file import read_tags
+from cdpr_drake.calibration.guesses import with_tags
+from cdpr_drake.calibration.measurements import simulated_corners
+from cdpr_drake.calibration.parameters import model_difference, parameter_layout
 from cdpr_drake.errors import CalibrationError
-from cdpr_drake.models import load_camera
-from cdpr_drake.spatial import pose_error, pose_from_angles
-from cdpr_drake.vision import TagTarget
+from cdpr_drake.geometry.poses import pose_error, pose_from_angles
+from cdpr_drake.models.camera_catalogue import load_camera
+from cdpr_drake.vision.apriltags import TagTarget
 from tests.analyses.calibration.logs import ROBOT, asked, poses, recorded
 
 FAR = pose_from_angles(np.array([1.5, -0.7, 0.4]), np.radians([20.0, -35.0, 110.0]))

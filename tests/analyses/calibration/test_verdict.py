@@ -4,9 +4,8 @@ from dataclasses import fields
 
 import pytest
 
-from cdpr_drake.analyses.calibration.verdict import bad_sensors, doubts, misfits
-from cdpr_drake.calibration import CalibrationResult
-from cdpr_drake.calibration.result import Fit, Outlier
+from cdpr_drake.analyses.calibration.fit_verdict import bad_sensors, doubts, misfits
+from cdpr_drake.calibration.result import CalibrationResult, Fit, Outlier
 
 
 def outlier(number, what="length of cable 2"):

@@ -1,1 +1,3 @@
 """Tests of `cdpr_drake.analyses.design`."""
+
+"""Tests of `cdpr_drake.analyses.design`."""

@@ -9,27 +9,19 @@ import pytest
 import yaml
 from matplotlib.figure import Figure
 
-from cdpr_drake.analyses.catalogue import STUDIES
-from cdpr_drake.analyses.design import (
-    GOALS,
-    DesignResult,
-    DesignSettings,
-    GoalSettings,
-    confirm,
-    judge_original,
-    load_design_settings,
-    make_candidates,
-    search_design,
-    write_design,
-)
-from cdpr_drake.analyses.design.goals import judged
-from cdpr_drake.analyses.design.search import judging_of
-from cdpr_drake.analyses.design.slopes import SLOPES
-from cdpr_drake.analyses.reporting import StudySession, WorkProgress
-from cdpr_drake.analyses.studies.design import study
+from cdpr_drake.analyses.design.candidates import make_candidates
+from cdpr_drake.analyses.design.confirmation import confirm
+from cdpr_drake.analyses.design.goals import GOALS, judged
+from cdpr_drake.analyses.design.maximin import SLOPES
+from cdpr_drake.analyses.design.results import DesignResult, write_design
+from cdpr_drake.analyses.design.search import judge_original, judging_of, search_design
+from cdpr_drake.analyses.design.settings import DesignSettings, GoalSettings, load_design_settings
+from cdpr_drake.analyses.reporting.progress import StudySession, WorkProgress
+from cdpr_drake.analyses.studies import design as study
+from cdpr_drake.analyses.studies.catalogue import STUDIES
 from cdpr_drake.cli.app import main
 from cdpr_drake.errors import CdprError, DesignError
-from cdpr_drake.models import load_robot
+from cdpr_drake.models.robot_loader import load_robot
 from tests.messages import printed
 
 ROBOT = "acrobot_large"

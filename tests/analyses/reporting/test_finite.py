@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.reporting import finite, write_json
+from cdpr_drake.analyses.reporting.log_files import finite, write_json
 
 
 def test_lists_and_dicts_are_searched(tmp_path):

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cdpr_drake.analyses.reporting import LogOnDisk, log_block
 from cdpr_drake.analyses.reporting.log_files import write_log
+from cdpr_drake.analyses.reporting.log_on_disk import LogOnDisk, log_block
 from cdpr_drake.errors import OutputFolderError
 
 

@@ -8,18 +8,17 @@ from pathlib import Path
 
 import pytest
 
-from cdpr_drake.analyses.reporting import output_folder, write_json, write_whole
+from cdpr_drake.analyses.reporting import output_folder
+from cdpr_drake.analyses.reporting.folder_lock import free_folder
+from cdpr_drake.analyses.reporting.log_files import write_json, write_whole
 from cdpr_drake.analyses.reporting.log_on_disk import LAYOUT, PARTS
 from cdpr_drake.analyses.reporting.output_folder import (
-    MARKER,
     continued_folder,
-    free_folder,
-    mark,
     results_folder,
     resumed_folder,
     unfinished_folder,
 )
-from cdpr_drake.analyses.reporting.written_files import list_all
+from cdpr_drake.analyses.reporting.written_files import MARKER, list_all, mark
 from cdpr_drake.errors import OutputFolderError
 
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from cdpr_drake.analyses.benchmarks import BENCH_GROUPS
+from cdpr_drake.analyses.benchmarks.groups import BENCH_GROUPS
 from cdpr_drake.analyses.reporting.timing import interleaved, seconds_per_call
 
 

@@ -6,19 +6,19 @@ import os
 
 import pytest
 
-from cdpr_drake.analyses.reporting import (
+from cdpr_drake.analyses.reporting.deferred_figures import write_pictures
+from cdpr_drake.analyses.reporting.log_files import write_json, write_whole
+from cdpr_drake.analyses.reporting.output_folder import continued_folder, results_folder
+from cdpr_drake.analyses.reporting.written_files import (
     JOURNAL,
     MARKER,
     claim,
-    continued_folder,
+    list_all,
     mark,
-    results_folder,
+    others_in,
+    remove_written,
     whole_file,
-    write_json,
-    write_pictures,
-    write_whole,
 )
-from cdpr_drake.analyses.reporting.written_files import list_all, others_in, remove_written
 from cdpr_drake.errors import OutputFolderError
 
 

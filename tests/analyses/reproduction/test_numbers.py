@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from cdpr_drake.analyses.case_studies import PublishedNumber
 from cdpr_drake.analyses.reproduction.numbers import judge_number
+from cdpr_drake.analyses.studies.framework.case_definition import PublishedNumber
 
 
 def judged(printed, metric="x", **ours):

@@ -16,29 +16,20 @@ import numpy as np
 import pytest
 from rich.table import Table
 
-from cdpr_drake.analyses.case_studies import PublishedNumber
-from cdpr_drake.analyses.catalogue import StudyEntry
-from cdpr_drake.analyses.published import read_register
-from cdpr_drake.analyses.reporting import (
-    NOT_IN_QUICK,
-    Statement,
-    continued_folder,
-    judged_statements,
-    mark,
-    write_json,
-    write_pictures,
-)
-from cdpr_drake.analyses.reporting.written_files import MARKER, others_in
-from cdpr_drake.analyses.reproduction import (
-    RunSettings,
-    Scorecard,
-    check_folder,
-    report_rows,
-    run_studies,
-    runner,
-    write_report,
-)
-from cdpr_drake.analyses.reproduction.states import read_state, write_state
+from cdpr_drake.analyses.reporting.deferred_figures import write_pictures
+from cdpr_drake.analyses.reporting.log_files import write_json
+from cdpr_drake.analyses.reporting.output_folder import continued_folder
+from cdpr_drake.analyses.reporting.statements import NOT_IN_QUICK, Statement, judged_statements
+from cdpr_drake.analyses.reporting.written_files import MARKER, mark, others_in
+from cdpr_drake.analyses.reproduction import runner
+from cdpr_drake.analyses.reproduction.page import write_report
+from cdpr_drake.analyses.reproduction.rows import report_rows
+from cdpr_drake.analyses.reproduction.runner import RunSettings, run_studies
+from cdpr_drake.analyses.reproduction.scorecard import Scorecard
+from cdpr_drake.analyses.reproduction.states import check_folder, read_state, write_state
+from cdpr_drake.analyses.studies.catalogue import StudyEntry
+from cdpr_drake.analyses.studies.framework.case_definition import PublishedNumber
+from cdpr_drake.analyses.studies.published.register import read_register
 from cdpr_drake.errors import OutputFolderError
 
 NUMBER = PublishedNumber(

@@ -1,0 +1,3 @@
+"""Tests of `cdpr_drake.analyses.simulation`."""
+
+"""Tests of `cdpr_drake.analyses.simulation`."""

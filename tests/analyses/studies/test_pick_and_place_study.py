@@ -5,17 +5,19 @@ import json
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.catalogue import STUDIES
-from cdpr_drake.analyses.reporting import ALONE, CONFIRMED, NOT_CONFIRMED, judged_statements
-from cdpr_drake.analyses.studies.pick_and_place import study_pick_and_place
-from cdpr_drake.analyses.studies.pick_and_place.statements import JUDGES, within
-from cdpr_drake.analyses.studies.pick_and_place.trials import (
+from cdpr_drake.analyses.reporting.progress import ALONE
+from cdpr_drake.analyses.reporting.statements import CONFIRMED, NOT_CONFIRMED, judged_statements
+from cdpr_drake.analyses.studies.catalogue import STUDIES
+from cdpr_drake.analyses.studies.pick_and_place import (
     COLUMNS,
     CONDITIONS,
+    JUDGES,
     HandlingTrial,
+    study_pick_and_place,
+    within,
 )
-from cdpr_drake.systems.handling import Failure, Phase
-from cdpr_drake.systems.monitoring import Outcome
+from cdpr_drake.systems.monitoring.run_monitor import Outcome
+from cdpr_drake.systems.pick_and_place.handling_task import Failure, Phase
 
 
 def row(distance=1e-3, angle_deg=0.5, failed_in=None, failure=Failure.NONE):

@@ -7,13 +7,13 @@ from scipy.optimize import linprog
 
 from cdpr_drake.analyses.benchmarks.groups import BENCH_GROUPS
 from cdpr_drake.analyses.benchmarks.planning import station_programs
-from cdpr_drake.analyses.catalogue import STUDIES
-from cdpr_drake.analyses.plans import LimitSettings, make_path, path_task
-from cdpr_drake.analyses.reporting import StudySession
-from cdpr_drake.analyses.studies.planning import study_planning
-from cdpr_drake.models import load_robot
-from cdpr_drake.planning import plan_along_path
-from cdpr_drake.spatial import pose_from_angles
+from cdpr_drake.analyses.planning.robot_limits import LimitSettings, make_path, path_task
+from cdpr_drake.analyses.reporting.progress import StudySession
+from cdpr_drake.analyses.studies.catalogue import STUDIES
+from cdpr_drake.analyses.studies.planning.study import study_planning
+from cdpr_drake.geometry.poses import pose_from_angles
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.planning.path_timing import plan_along_path
 
 
 def test_the_quick_study_confirms_what_is_said(tmp_path):

@@ -12,17 +12,16 @@ from contextlib import suppress
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.repetitions import run_many, with_seeds
-from cdpr_drake.analyses.reporting import MARKER, mark, part_of
-from cdpr_drake.analyses.stability import static_case
-from cdpr_drake.analyses.stability.static_feasible import StaticTask
+from cdpr_drake.analyses.reporting.written_files import MARKER, mark, part_of
+from cdpr_drake.analyses.simulation.monte_carlo import run_many, with_seeds
 from cdpr_drake.analyses.sweeps import workers as sweep_workers
 from cdpr_drake.analyses.sweeps.folder import SweepFolder, differences
 from cdpr_drake.analyses.sweeps.sweep import run_sweep
+from cdpr_drake.analyses.workspaces.static_feasible import StaticTask, static_case
 from cdpr_drake.errors import OutputFolderError, SweepError
-from cdpr_drake.models import load_robot
-from cdpr_drake.systems.diagrams import load_scenario
-from cdpr_drake.workspaces import grid_by_count
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.workspaces.pose_grid import grid_by_count
 
 PATIENCE = 1800.0
 """So long may Dask take for what is quick on an idle machine [s]."""

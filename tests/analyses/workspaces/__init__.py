@@ -1,1 +1,3 @@
 """Tests of `cdpr_drake.analyses.workspaces`."""
+
+"""Tests of `cdpr_drake.analyses.workspaces`."""

@@ -6,16 +6,13 @@ import re
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.pictures import robot_picture
-from cdpr_drake.analyses.workspaces import (
-    Asked,
-    make_workspace_question,
-    planes_figure,
-    robot_workspace,
-    workspace_page,
-)
-from cdpr_drake.models import load_robot
-from cdpr_drake.workspaces import grid_by_count
+from cdpr_drake.analyses.visualization.replay import robot_picture
+from cdpr_drake.analyses.workspaces.workspace_figures import planes_figure
+from cdpr_drake.analyses.workspaces.workspace_question import Asked, make_workspace_question
+from cdpr_drake.analyses.workspaces.workspace_results import robot_workspace
+from cdpr_drake.analyses.workspaces.workspace_scene import workspace_page
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.workspaces.pose_grid import grid_by_count
 
 
 def small_workspace(robot, counts=(3, 2, 2), **asked):

@@ -6,7 +6,10 @@ import numpy as np
 import pytest
 
 from cdpr_drake.errors import InfeasibleTensionError
-from cdpr_drake.models import hold_robot, load_robot, not_written, robot_names, write_robot
+from cdpr_drake.models.robot_exchange import write_robot
+from cdpr_drake.models.robot_exports import not_written
+from cdpr_drake.models.robot_holding import hold_robot
+from cdpr_drake.models.robot_loader import load_robot, robot_names
 from tests.models.formats.unusual_robots import UNUSUAL
 from tests.motion.small_robots import MOTIONS, small_robot
 

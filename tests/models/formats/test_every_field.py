@@ -11,10 +11,12 @@ import numpy as np
 import pytest
 
 from cdpr_drake import models
-from cdpr_drake.cli import main
+from cdpr_drake.cli.app import main
 from cdpr_drake.errors import RobotFileError
-from cdpr_drake.models import EXPORTS, HELD, Robot, not_written, write_robot
-from cdpr_drake.schema import text
+from cdpr_drake.models.robot_exchange import write_robot
+from cdpr_drake.models.robot_exports import EXPORTS, HELD, not_written
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.schema.fields import text
 from tests.messages import printed
 from tests.models.formats.meanings import fields_that_differ, meaning, same, schema_keys
 from tests.models.formats.unusual_robots import NAMES, UNUSUAL, planar_robot, robot_with_everything

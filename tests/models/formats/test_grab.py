@@ -9,9 +9,9 @@ import pytest
 
 from cdpr_drake import models
 from cdpr_drake.errors import RobotFileError
-from cdpr_drake.geometry import cable_paths
+from cdpr_drake.geometry.cable_paths import cable_paths
+from cdpr_drake.geometry.poses import pose_from_angles
 from cdpr_drake.models.formats.reading import read_json
-from cdpr_drake.spatial import pose_from_angles
 from tests.models.formats import foreign_files as files
 
 EXACT = 1e-12

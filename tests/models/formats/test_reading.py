@@ -8,8 +8,9 @@ from pydrake.math import RigidTransform, RollPitchYaw
 
 from cdpr_drake import models
 from cdpr_drake.errors import RobotFileError
-from cdpr_drake.geometry import cable_jacobian, cable_lengths, cable_paths
-from cdpr_drake.spatial import pose_from_angles
+from cdpr_drake.geometry.cable_paths import cable_jacobian, cable_paths
+from cdpr_drake.geometry.poses import pose_from_angles
+from cdpr_drake.geometry.straight_cables import cable_lengths
 from tests.models.formats import foreign_files as files
 
 EXACT = 1e-12

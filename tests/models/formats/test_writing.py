@@ -15,9 +15,10 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.analysis import Simulator
 
 from cdpr_drake import models
-from cdpr_drake.cli import main
+from cdpr_drake.cli.app import main
 from cdpr_drake.errors import RobotFileError
-from cdpr_drake.geometry import cable_lengths, cable_paths
+from cdpr_drake.geometry.cable_paths import cable_paths
+from cdpr_drake.geometry.straight_cables import cable_lengths
 from tests.messages import printed
 
 EXACT = 1e-12

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import yaml
 
-from cdpr_drake.models import Robot, robot_text
-from tests.models.hardware.robots import robot_of
+from cdpr_drake.models.robot_loader import robot_text
+from cdpr_drake.models.robot_schema import Robot
+from tests.models.robots import robot_of
 
 NAMES = [
     "left winch",

@@ -10,14 +10,13 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder, LeafSystem, PortDataType
 
 from cdpr_drake.errors import ScenarioError
-from cdpr_drake.models import CameraFault
-from cdpr_drake.servoing import CameraMounting
-from cdpr_drake.spatial import pose_error, pose_from_angles
-from cdpr_drake.systems.cameras.camera_checks import check_camera
+from cdpr_drake.geometry.poses import pose_error, pose_from_angles
+from cdpr_drake.models.camera_catalogue import CameraFault
+from cdpr_drake.servoing.servo_task import CameraMounting
+from cdpr_drake.systems.cameras.camera_settings import CameraSettings, check_camera
 from cdpr_drake.systems.cameras.projected_camera import ProjectedCamera
-from cdpr_drake.systems.cameras.settings import CameraSettings
-from cdpr_drake.vision import Pinhole, TagTarget
-from cdpr_drake.vision.apriltag import tag_corners
+from cdpr_drake.vision.apriltags import TagTarget, tag_corners
+from cdpr_drake.vision.pinhole import Pinhole
 
 SOLVER = 1e-5
 """Distance [m] and angle [rad] that the iterative pose solver leaves on exact corners."""

@@ -7,13 +7,14 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
 from cdpr_drake.errors import ScenarioError
-from cdpr_drake.models import add_renderer, make_rgbd_sensor
-from cdpr_drake.spatial import pose_from_angles
-from cdpr_drake.systems.cameras import SceneCamera
-from cdpr_drake.systems.cameras.scene_picture import draw_window, occupied_window
-from cdpr_drake.systems.diagrams import build_visual_servo, load_scenario, scene_adder
-from cdpr_drake.systems.robots import CableRobot
-from cdpr_drake.vision import expected_window, target_box, whole_image
+from cdpr_drake.geometry.poses import pose_from_angles
+from cdpr_drake.models.rendered_camera import add_renderer, make_rgbd_sensor
+from cdpr_drake.systems.cameras.scene_picture import SceneCamera, draw_window, occupied_window
+from cdpr_drake.systems.diagrams.camera import scene_adder
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.diagrams.visual_servo import build_visual_servo
+from cdpr_drake.systems.robots.cable_robot import CableRobot
+from cdpr_drake.vision.image_window import expected_window, target_box, whole_image
 
 REGION = ["camera.kind=rendered", "camera.region=target"]
 

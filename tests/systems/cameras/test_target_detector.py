@@ -9,12 +9,12 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import PortDataType
 from pydrake.systems.sensors import ImageRgba8U
 
-from cdpr_drake.servoing import CameraMounting
-from cdpr_drake.spatial import pose_error, pose_from_angles
+from cdpr_drake.geometry.poses import pose_error, pose_from_angles
+from cdpr_drake.servoing.servo_task import CameraMounting
 from cdpr_drake.systems.cameras.projected_camera import ProjectedCamera
-from cdpr_drake.systems.cameras.target_detector import TargetDetector
-from cdpr_drake.vision import Pinhole, TagTarget
-from cdpr_drake.vision.apriltag import BORDERED_CELLS, TAG_CELLS, tag_corners, tag_png
+from cdpr_drake.systems.cameras.target_measurement import TargetDetector
+from cdpr_drake.vision.apriltags import BORDERED_CELLS, TAG_CELLS, TagTarget, tag_corners, tag_png
+from cdpr_drake.vision.pinhole import Pinhole
 
 CORNER_OFFSET = 0.5
 """A corner found in a drawn image [px]; OpenCV's refinement leaves a tenth, at times three."""

@@ -7,12 +7,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydrake.math import RigidTransform
 
-from cdpr_drake.features import seen_pose_error
-from cdpr_drake.spatial import pose_error, pose_from_angles
-from cdpr_drake.vision import CircleTarget, DotTarget, Pinhole, TagBundle, TagTarget
-from cdpr_drake.vision.apriltag import tag_corners
-from cdpr_drake.vision.dark_blobs import find_dark_blobs
-from cdpr_drake.vision.rings import to_pixels
+from cdpr_drake.geometry.poses import pose_error, pose_from_angles
+from cdpr_drake.servoing.pose_features import seen_pose_error
+from cdpr_drake.vision.apriltags import TagBundle, TagTarget, tag_corners
+from cdpr_drake.vision.blob_detection import find_dark_blobs
+from cdpr_drake.vision.dots import DotTarget
+from cdpr_drake.vision.pinhole import Pinhole
+from cdpr_drake.vision.rings import CircleTarget, to_pixels
 
 CAMERA = Pinhole.from_view_angles(640, 480, np.radians(60.0), np.radians(46.8))
 SIZE = 0.1

@@ -8,13 +8,15 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantValueSource
 from pydrake.systems.sensors import ImageRgba8U
 
-from cdpr_drake.analyses.runs import run_scenario
+from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
 from cdpr_drake.errors import ScenarioError
-from cdpr_drake.spatial import pose_from_angles
-from cdpr_drake.systems import build_visual_servo, load_scenario
-from cdpr_drake.systems.cameras import TargetDetector
-from cdpr_drake.textures import TexturedTarget, drawn_image
-from cdpr_drake.vision import Pinhole
+from cdpr_drake.geometry.poses import pose_from_angles
+from cdpr_drake.systems.cameras.target_measurement import TargetDetector
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.diagrams.visual_servo import build_visual_servo
+from cdpr_drake.vision.pinhole import Pinhole
+from cdpr_drake.vision.texture_pictures import drawn_image
+from cdpr_drake.vision.textured_target import TexturedTarget
 
 CAMERA = Pinhole.from_view_angles(320, 240, np.radians(60.0), np.radians(46.8))
 X_CO = pose_from_angles(np.array([0.0, 0.005, 0.15]), np.array([np.pi, 0.1, 0.3]))

@@ -10,11 +10,14 @@ from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import Adder, ConstantVectorSource, MatrixGain
 
-from cdpr_drake.control import TaskGains
-from cdpr_drake.models import add_robot, load_robot, moved_robot
-from cdpr_drake.systems import CableRobot, CableRobotSettings, CableSettings, add_cable_robot
+from cdpr_drake.control.task_space import TaskGains
+from cdpr_drake.models.robot_in_plant import add_robot
+from cdpr_drake.models.robot_loader import load_robot, moved_robot
 from cdpr_drake.systems.diagrams.tension_control import TensionControlSettings, add_tension_control
-from cdpr_drake.trajectories import PoseTrajectory
+from cdpr_drake.systems.robots.assembly import add_cable_robot
+from cdpr_drake.systems.robots.cable_robot import CableRobot
+from cdpr_drake.systems.robots.settings import CableRobotSettings, CableSettings
+from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
 from tests.messages import printed
 
 ROOT = Path(__file__).parents[3]

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.runs.visual_servo_run import make_simulator
+from cdpr_drake.analyses.simulation.visual_servo_run import make_simulator
 from cdpr_drake.errors import ScenarioError
-from cdpr_drake.spatial import pose_rows_distance
+from cdpr_drake.geometry.poses import pose_rows_distance
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.diagrams.visual_servo import build_visual_servo
-from cdpr_drake.systems.estimators import ESTIMATORS
+from cdpr_drake.systems.estimators.estimator_kinds import ESTIMATORS
 
 STEP = 0.4
 """Simulated time of a short look [s]: ten control steps."""

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.runs import run_scenario
+from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
 from cdpr_drake.errors import ScenarioError
-from cdpr_drake.systems.diagrams import load_scenario
-from cdpr_drake.systems.loops import why_diagram
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.loops.loop_choice import why_diagram
 
 SLACK = 0.04
 TAUT = 1e-3

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 import yaml
 
-from cdpr_drake.analyses.runs import run_scenario
+from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
 from cdpr_drake.errors import ScenarioError
-from cdpr_drake.geometry import cable_paths
-from cdpr_drake.spatial import pose_from_row
-from cdpr_drake.systems.diagrams import load_scenario
-from cdpr_drake.systems.loops import why_diagram
-from tests.models.hardware.robots import content_of
-from tests.models.hardware.test_platform_pulleys import robot_content
+from cdpr_drake.geometry.cable_paths import cable_paths
+from cdpr_drake.geometry.poses import pose_from_row
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.loops.loop_choice import why_diagram
+from tests.models.robots import content_of
+from tests.models.test_platform_pulleys import robot_content
 from tests.systems.robots.test_bundles import parallelograms
 
 SOFT = "cables={stiffness_ratio: 0.01, retardation_time: 0.002}"

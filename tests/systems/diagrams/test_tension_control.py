@@ -4,13 +4,15 @@ import numpy as np
 import pytest
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
-from cdpr_drake.control import TaskGains
-from cdpr_drake.geometry import cable_paths
-from cdpr_drake.models import load_robot
-from cdpr_drake.spatial import pose_from_angles, pose_from_row, pose_row
-from cdpr_drake.systems.diagrams import TensionControlSettings
-from cdpr_drake.systems.diagrams.tension_control import build_tension_control
-from cdpr_drake.trajectories import PoseTrajectory
+from cdpr_drake.control.task_space import TaskGains
+from cdpr_drake.geometry.cable_paths import cable_paths
+from cdpr_drake.geometry.poses import pose_from_angles, pose_from_row, pose_row
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.systems.diagrams.tension_control import (
+    TensionControlSettings,
+    build_tension_control,
+)
+from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
 
 TRACKING = 1e-4
 """Promised distance from the trajectory with the exact model [m]; a wrench that is held for a

@@ -5,16 +5,15 @@ import pytest
 from pydrake.systems.analysis import Simulator
 
 from cdpr_drake.errors import CdprError
-from cdpr_drake.models import load_robot
-from cdpr_drake.systems.diagrams import (
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.systems.controllers.tension_distributor import TensionDistributor
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.diagrams.tension_control import (
     TensionControlSettings,
-    TensionLoop,
     build_tension_control,
-    can_be_compiled,
-    load_scenario,
 )
-from cdpr_drake.systems.robots import StepRule
-from cdpr_drake.systems.tension_control import TensionDistributor
+from cdpr_drake.systems.diagrams.tension_loop import TensionLoop, can_be_compiled
+from cdpr_drake.systems.robots.compiled_step import StepRule
 
 SAME = 1e-13
 """Of largest numbers: the same kernels in the same order, compiled together and apart."""

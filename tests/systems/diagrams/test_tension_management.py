@@ -6,20 +6,23 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.runs import run_scenario, stability_along, stability_at, summarize
+from cdpr_drake.analyses.simulation.run_stability import stability_along, stability_at
+from cdpr_drake.analyses.simulation.run_summary import summarize
+from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
 from cdpr_drake.errors import ScenarioError
-from cdpr_drake.models import load_robot
-from cdpr_drake.spatial import pose_from_row
-from cdpr_drake.systems.diagrams import build_visual_servo, load_scenario
-from cdpr_drake.systems.tension_control import (
+from cdpr_drake.geometry.poses import pose_from_row
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.systems.controllers.correction_laws import (
     ConstantThreshold,
     CorrectionReadings,
     ExpectedLength,
     FollowedDistribution,
     InsidePolygon,
-    TensionCorrector,
 )
-from cdpr_drake.tension_management import TensionFollower
+from cdpr_drake.systems.controllers.tension_corrector import TensionCorrector
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.diagrams.visual_servo import build_visual_servo
+from cdpr_drake.tensions.slack_correction import TensionFollower
 
 PROJECTED = "camera.kind=projected"
 SLACK_START = "acrobot_slack_start_tca"

@@ -5,13 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.runs import run_scenario, summarize
-from cdpr_drake.analyses.runs.figures import run_figures
-from cdpr_drake.cli import main
+from cdpr_drake.analyses.simulation.run_figures import run_figures
+from cdpr_drake.analyses.simulation.run_summary import summarize
+from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
+from cdpr_drake.cli.app import main
 from cdpr_drake.errors import ScenarioError
-from cdpr_drake.models import load_robot, robot_file
-from cdpr_drake.spatial import pose_error, pose_from_row
-from cdpr_drake.systems.diagrams import load_scenario, loop_warnings
+from cdpr_drake.geometry.poses import pose_error, pose_from_row
+from cdpr_drake.models.robot_loader import load_robot, robot_file
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.diagrams.torque_control import loop_warnings
 from tests.messages import printed
 
 PROJECTED, COMPILED = "camera.kind=projected", "integration.engine=compiled"

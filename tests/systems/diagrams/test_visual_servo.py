@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
-from cdpr_drake.models import load_robot
-from cdpr_drake.spatial import pose_error, pose_from_row
+from cdpr_drake.geometry.poses import pose_error, pose_from_row
+from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.diagrams.beliefs import believed_robot, random_shifts
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.diagrams.visual_servo import build_visual_servo
-from cdpr_drake.systems.monitoring import Outcome
-from cdpr_drake.systems.robots import automatic_step
+from cdpr_drake.systems.monitoring.run_monitor import Outcome
+from cdpr_drake.systems.robots.cable_robot import automatic_step
 
 REACHED_DISTANCE = 0.5e-3
 """True distance from the desired pose at the end of a run [m]: ACROBOT's stop rule asks for 0.3 mm

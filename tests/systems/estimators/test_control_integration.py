@@ -6,8 +6,8 @@ from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder, LeafSystem
 
-from cdpr_drake.spatial import exponential, pose_error, pose_from_angles
-from cdpr_drake.systems.estimators.control_integration import ControlIntegration
+from cdpr_drake.geometry.poses import exponential, pose_error, pose_from_angles
+from cdpr_drake.systems.estimators.basic_estimators import ControlIntegration
 
 ROUND_OFF = 1e-12
 """Products of some ten poses with entries of order one."""

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.runs import run_scenario
-from cdpr_drake.spatial import pose_rows_distance
-from cdpr_drake.systems.diagrams import load_scenario
+from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
+from cdpr_drake.geometry.poses import pose_rows_distance
+from cdpr_drake.systems.diagrams.load import load_scenario
 
 
 def run(name, *overrides):

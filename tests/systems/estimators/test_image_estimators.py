@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from cdpr_drake.spatial import exponential, pose_error, pose_from_angles
+from cdpr_drake.geometry.poses import exponential, pose_error, pose_from_angles
 from cdpr_drake.systems.estimators.image_estimators import (
     ConsecutiveImages,
     FirstImage,

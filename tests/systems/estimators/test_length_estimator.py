@@ -3,14 +3,13 @@
 import numpy as np
 import pytest
 
-from cdpr_drake.cables import unstrained_lengths
-from cdpr_drake.geometry import cable_paths
-from cdpr_drake.models import load_robot
-from cdpr_drake.spatial import exponential, pose_error, pose_from_angles
-from cdpr_drake.systems.estimators.encoder_lengths import EncoderLengths
-from cdpr_drake.systems.estimators.length_estimator import LengthEstimator
+from cdpr_drake.cables.elastic_law import unstrained_lengths
+from cdpr_drake.geometry.cable_paths import cable_paths
+from cdpr_drake.geometry.poses import exponential, pose_error, pose_from_angles
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.systems.estimators.length_estimator import EncoderLengths, LengthEstimator
 from cdpr_drake.systems.estimators.pose_estimator import KnownTag
-from cdpr_drake.trajectories import PoseTrajectory
+from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
 from tests.systems.estimators.estimator_bench import PERIOD, RATE, EstimatorBench
 
 EXACT = 1e-8  # m, rad: tolerance of the search for a pose, with lengths of order one

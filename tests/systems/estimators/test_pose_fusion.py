@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from cdpr_drake.geometry import cable_paths
-from cdpr_drake.models import load_robot
-from cdpr_drake.spatial import exponential, logarithm, pose_error, pose_from_angles
-from cdpr_drake.systems.estimators.encoder_lengths import EncoderLengths
+from cdpr_drake.geometry.cable_paths import cable_paths
+from cdpr_drake.geometry.poses import exponential, logarithm, pose_error, pose_from_angles
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.systems.estimators.length_estimator import EncoderLengths
 from cdpr_drake.systems.estimators.pose_fusion import Landmark, PoseFusion, SeenObject
 from cdpr_drake.systems.estimators.tuning import FusionSettings
-from cdpr_drake.trajectories import PoseTrajectory
-from cdpr_drake.vision.apriltag import tag_corners
+from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
+from cdpr_drake.vision.apriltags import tag_corners
 from tests.systems.estimators.estimator_bench import PERIOD, RATE, EstimatorBench
 
 ROUND_OFF = 1e-9

@@ -4,20 +4,18 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from cdpr_drake.estimation import motion_between
-from cdpr_drake.geometry import cable_paths
-from cdpr_drake.models import load_camera, load_inertial_sensor, load_robot
-from cdpr_drake.spatial import exponential, logarithm, pose_error, pose_from_angles
-from cdpr_drake.systems.estimators import (
-    EncoderLengths,
-    Eye,
-    FusionTask,
-    SensorFusion,
-    SensorFusionSettings,
-)
-from cdpr_drake.systems.estimators.sensor_fusion_settings import ToldObject
-from cdpr_drake.trajectories import PoseTrajectory
-from cdpr_drake.vision.apriltag import tag_corners
+from cdpr_drake.estimation.sensor_models import motion_between
+from cdpr_drake.geometry.cable_paths import cable_paths
+from cdpr_drake.geometry.poses import exponential, logarithm, pose_error, pose_from_angles
+from cdpr_drake.models.camera_catalogue import load_camera
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.sensor_catalogue import load_inertial_sensor
+from cdpr_drake.systems.estimators.fusion_task import Eye, FusionTask
+from cdpr_drake.systems.estimators.length_estimator import EncoderLengths
+from cdpr_drake.systems.estimators.sensor_fusion import SensorFusion
+from cdpr_drake.systems.estimators.sensor_fusion_settings import SensorFusionSettings, ToldObject
+from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
+from cdpr_drake.vision.apriltags import tag_corners
 from tests.systems.estimators.estimator_bench import PERIOD, RATE, EstimatorBench
 
 ROUND_OFF = 1e-8

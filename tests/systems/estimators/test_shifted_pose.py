@@ -3,7 +3,7 @@
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
-from cdpr_drake.systems.estimators.measured_pose import ShiftedPose
+from cdpr_drake.systems.estimators.basic_estimators import ShiftedPose
 
 ROUNDING = 1e-12
 

@@ -4,11 +4,13 @@ import pytest
 from pydrake.common.value import Value
 from pydrake.systems.framework import LeafSystem
 
-from cdpr_drake.analyses.runs import run_scenario, summarize
+from cdpr_drake.analyses.simulation.run_summary import summarize
+from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
 from cdpr_drake.errors import ScenarioError
-from cdpr_drake.systems import ESTIMATORS, EstimatorKind
-from cdpr_drake.systems.diagrams import load_scenario
-from cdpr_drake.systems.loops import ServoLoop, is_looped, looped, why_diagram, with_loop
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.estimators.estimator_kinds import ESTIMATORS, EstimatorKind
+from cdpr_drake.systems.loops.loop_choice import is_looped, looped, why_diagram, with_loop
+from cdpr_drake.systems.loops.servo_loop import ServoLoop
 
 PROJECTED = "camera.kind=projected"
 

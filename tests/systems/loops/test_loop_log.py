@@ -3,8 +3,8 @@
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cdpr_drake.systems.loops.clock import Clock, first_time
 from cdpr_drake.systems.loops.loop_log import FIRST_ROWS, LoopLog, RowOf
+from cdpr_drake.systems.loops.loop_state import Clock, first_time
 
 
 def test_rows_are_what_stood_there_when_they_were_written():

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from cdpr_drake.systems.diagrams import load_scenario
-from cdpr_drake.systems.loops import ServoLoop, check_loop
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.loops.loop_choice import check_loop
 from cdpr_drake.systems.loops.loop_state import arrays_of, entry, held, restore_arrays
+from cdpr_drake.systems.loops.servo_loop import ServoLoop
 
 
 def test_parts_are_copied_and_put_back():

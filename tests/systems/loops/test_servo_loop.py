@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.runs import run_scenario
-from cdpr_drake.systems.diagrams import load_scenario
-from cdpr_drake.systems.estimators import ESTIMATORS
-from cdpr_drake.systems.loops.clock import Clock, next_time
-from cdpr_drake.systems.monitoring import Outcome
+from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.estimators.estimator_kinds import ESTIMATORS
+from cdpr_drake.systems.loops.loop_state import Clock, next_time
+from cdpr_drake.systems.monitoring.run_monitor import Outcome
 
 ROUNDING = 1e-15
 """The loop's quaternions are computed from matrices by another kernel than Drake's; no other number

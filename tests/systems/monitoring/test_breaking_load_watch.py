@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.runs import run_scenario, summarize
+from cdpr_drake.analyses.simulation.run_summary import summarize
+from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
 from cdpr_drake.errors import ScenarioError
-from cdpr_drake.models import robot_file
-from cdpr_drake.systems.diagrams import load_scenario
-from cdpr_drake.systems.monitoring.breaking_load_watch import BreakingLoadWatch
+from cdpr_drake.models.robot_loader import robot_file
+from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
+from cdpr_drake.systems.monitoring.tension_watch import BreakingLoadWatch
 
 PROJECTED = ["camera.kind=projected", "duration=0.4"]
 

@@ -7,7 +7,7 @@ from pydrake.common.value import Value
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import LeafSystem
 
-from cdpr_drake.spatial import pose_error, pose_from_angles, pose_from_row, pose_row
+from cdpr_drake.geometry.poses import pose_error, pose_from_angles, pose_from_row, pose_row
 from cdpr_drake.systems.monitoring.log_row import POSE_SIZE, LogRow
 
 ROUND_OFF = 1e-12

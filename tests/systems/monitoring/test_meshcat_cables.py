@@ -7,10 +7,11 @@ from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
-from cdpr_drake.geometry import cable_lengths
-from cdpr_drake.models import load_robot
+from cdpr_drake.geometry.straight_cables import cable_lengths
+from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.monitoring.meshcat_cables import CablePictures, MeshcatCables
-from cdpr_drake.systems.robots import CableRobot, CableSettings
+from cdpr_drake.systems.robots.cable_robot import CableRobot
+from cdpr_drake.systems.robots.settings import CableSettings
 
 ROUNDING = 1e-9
 """Of ends of rods, whose lengths and poses are given apart [m]."""

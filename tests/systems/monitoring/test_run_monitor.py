@@ -6,7 +6,7 @@ from pydrake.common.value import Value
 from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator, SimulatorStatus
 
-from cdpr_drake.spatial import pose_from_angles
+from cdpr_drake.geometry.poses import pose_from_angles
 from cdpr_drake.systems.monitoring.run_monitor import Outcome, RunMonitor, StopRules
 
 RATE = 25.0

@@ -7,15 +7,19 @@ import pytest
 from matplotlib.figure import Figure
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.reporting import write_log, write_run_inputs
-from cdpr_drake.analyses.runs import run_scenario, stability_along, stability_of_folder, summarize
-from cdpr_drake.analyses.runs.figures import run_figures
-from cdpr_drake.analyses.runs.run_stability import StabilityAlong
-from cdpr_drake.analyses.runs.stability_files import stability_figure
-from cdpr_drake.cli import main
+from cdpr_drake.analyses.reporting.log_files import write_log
+from cdpr_drake.analyses.reporting.provenance import write_run_inputs
+from cdpr_drake.analyses.simulation.run_figures import run_figures
+from cdpr_drake.analyses.simulation.run_stability import StabilityAlong, stability_along
+from cdpr_drake.analyses.simulation.run_summary import summarize
+from cdpr_drake.analyses.simulation.stability_files import stability_figure, stability_of_folder
+from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
+from cdpr_drake.cli.app import main
 from cdpr_drake.errors import OutputFolderError, ScenarioError
-from cdpr_drake.systems.diagrams import build_visual_servo, criterion_of, load_scenario
-from cdpr_drake.systems.monitoring import StabilityWatch
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.diagrams.servo_watches import criterion_of
+from cdpr_drake.systems.diagrams.visual_servo import build_visual_servo
+from cdpr_drake.systems.monitoring.stability_watch import StabilityWatch
 from tests.messages import printed
 
 SAME = 1e-9

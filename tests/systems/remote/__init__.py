@@ -1,1 +1,3 @@
 """Tests of `cdpr_drake.systems.remote`."""
+
+"""Tests of `cdpr_drake.systems.remote`."""

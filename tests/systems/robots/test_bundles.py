@@ -7,25 +7,24 @@ import pytest
 from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
-from cdpr_drake.analyses.stability.question import stability_case
+from cdpr_drake.analyses.workspaces.stability_question import stability_case
 from cdpr_drake.errors import CableGeometryError, CdprError, RobotFileError, StabilityError
-from cdpr_drake.geometry import cable_paths
-from cdpr_drake.models import check_bundles, load_encoder, not_written
-from cdpr_drake.systems.robots import (
-    CableRobot,
-    CableRobotSettings,
-    CompiledCableRobot,
-    DampingSettings,
-    MotorWinch,
-    StepRule,
-    VelocityWinch,
-    WinchSettings,
-    automatic_step,
-)
-from cdpr_drake.systems.sensors import SENSORS
-from cdpr_drake.winches import MODES, WinchGroups, pack_winch, winch_rates
-from cdpr_drake.workspaces.regions import WorkspaceGrid
-from tests.models.hardware.robots import content_of, robot_of
+from cdpr_drake.geometry.cable_paths import cable_paths
+from cdpr_drake.models.robot_exports import not_written
+from cdpr_drake.models.robot_holding import check_bundles
+from cdpr_drake.models.sensor_catalogue import load_encoder
+from cdpr_drake.systems.robots.cable_robot import CableRobot, automatic_step
+from cdpr_drake.systems.robots.compiled_cable_robot import CompiledCableRobot
+from cdpr_drake.systems.robots.compiled_step import StepRule
+from cdpr_drake.systems.robots.motor_winch import MotorWinch
+from cdpr_drake.systems.robots.settings import CableRobotSettings, DampingSettings, WinchSettings
+from cdpr_drake.systems.robots.winches import VelocityWinch
+from cdpr_drake.systems.sensors.sensor_kinds import SENSORS
+from cdpr_drake.winches.groups import WinchGroups
+from cdpr_drake.winches.motor import MODES
+from cdpr_drake.winches.motor_kernel import pack_winch, winch_rates
+from cdpr_drake.workspaces.pose_grid import WorkspaceGrid
+from tests.models.robots import content_of, robot_of
 
 SAME_STEPS = 1e-8
 """Of states after the same steps by both engines: rounding, times what motors make of it."""

@@ -8,11 +8,10 @@ from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from cdpr_drake.cables.catenary_kernel import free_part, stored_energy
 from cdpr_drake.cables.elastic_law import elastic_energy
 from cdpr_drake.cables.hanging_kernel import hang
-from cdpr_drake.models import load_robot
-from cdpr_drake.spatial import rotation_from_angles
-from cdpr_drake.systems.robots import CableRobotSettings
+from cdpr_drake.geometry.poses import rotation_from_angles
+from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.robots.cable_robot import CableRobot
-from cdpr_drake.systems.robots.settings import CableSettings
+from cdpr_drake.systems.robots.settings import CableRobotSettings, CableSettings
 
 ENERGY_DRIFT = 1e-6
 """Change of the energy in 2 s, relative to that of the motion; steps are 1/200 of the fastest

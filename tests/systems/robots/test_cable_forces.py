@@ -6,11 +6,11 @@ import scipy.linalg
 from pydrake.math import RigidTransform
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
-from cdpr_drake.cables import cable_stiffness_matrix
-from cdpr_drake.cables.elastic_law import elastic_energy
-from cdpr_drake.geometry import length_jacobian
-from cdpr_drake.models import load_robot, platform_inertia
-from cdpr_drake.spatial import pose_error, rotation_from_vector
+from cdpr_drake.cables.elastic_law import cable_stiffness_matrix, elastic_energy
+from cdpr_drake.geometry.poses import pose_error, rotation_from_vector
+from cdpr_drake.geometry.straight_cables import length_jacobian
+from cdpr_drake.models.robot_in_plant import platform_inertia
+from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.robots.cable_forces import CableForces
 from cdpr_drake.systems.robots.cable_robot import CableRobot
 from tests.models.representative_robots import REPRESENTATIVE_ROBOTS

@@ -6,12 +6,11 @@ from pydrake.math import RigidTransform
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
 from cdpr_drake.errors import InfeasibleTensionError, RobotFileError
-from cdpr_drake.geometry import cable_lengths
-from cdpr_drake.models import load_robot
-from cdpr_drake.spatial import pose_error
-from cdpr_drake.systems.robots import CableRobotSettings
+from cdpr_drake.geometry.poses import pose_error
+from cdpr_drake.geometry.straight_cables import cable_lengths
+from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.robots.cable_robot import CableRobot, automatic_step, holding_tensions
-from cdpr_drake.systems.robots.settings import WinchSettings
+from cdpr_drake.systems.robots.settings import CableRobotSettings, WinchSettings
 from tests.models.representative_robots import REPRESENTATIVE_ROBOTS
 
 SETTLED = 2e-5

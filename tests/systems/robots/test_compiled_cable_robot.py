@@ -13,18 +13,16 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource, Sine
 
 from cdpr_drake.errors import CableGeometryError, CdprError, DivergedError
-from cdpr_drake.models import load_robot
-from cdpr_drake.spatial import pose_error
-from cdpr_drake.systems.robots import (
-    CableRobot,
+from cdpr_drake.geometry.poses import pose_error
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.systems.robots.cable_robot import CableRobot, automatic_step
+from cdpr_drake.systems.robots.compiled_cable_robot import CompiledCableRobot, motion_by_tensions
+from cdpr_drake.systems.robots.compiled_step import StepRule
+from cdpr_drake.systems.robots.settings import (
     CableRobotSettings,
     CableSettings,
-    CompiledCableRobot,
     DampingSettings,
-    StepRule,
     WinchSettings,
-    automatic_step,
-    motion_by_tensions,
 )
 
 SAME_STEPS = 1e-9

@@ -6,11 +6,11 @@ from pydrake.math import RigidTransform
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.primitives import Linearize
 
-from cdpr_drake.models import load_robot, rigid_platform
-from cdpr_drake.statics import natural_modes, platform_stiffness
-from cdpr_drake.systems.robots import CableRobotSettings
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_statics import rigid_platform
+from cdpr_drake.statics.stiffness import natural_modes, platform_stiffness
 from cdpr_drake.systems.robots.cable_robot import CableRobot
-from cdpr_drake.systems.robots.settings import CableSettings
+from cdpr_drake.systems.robots.settings import CableRobotSettings, CableSettings
 
 FREQUENCY = 5e-3
 """Relative difference of a frequency of the linear model from the one measured in time."""

@@ -8,7 +8,9 @@ from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.primitives import Linearize
 
 from cdpr_drake.systems.robots.motor_winch import COMMAND_PORTS, MotorWinch
-from cdpr_drake.winches import Drum, FrictionLaw, WinchLaw
+from cdpr_drake.winches.drum import Drum
+from cdpr_drake.winches.friction import FrictionLaw
+from cdpr_drake.winches.motor import WinchLaw
 
 FRICTION = FrictionLaw(coulomb=0.02, static=0.03, viscous=1e-4, stribeck_speed=5.0)
 LAW = WinchLaw(

@@ -5,11 +5,10 @@ import pytest
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.primitives import Linearize
 
-from cdpr_drake.geometry import cable_lengths
-from cdpr_drake.models import load_robot
-from cdpr_drake.systems.robots import CableRobotSettings
+from cdpr_drake.geometry.straight_cables import cable_lengths
+from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.robots.cable_robot import CableRobot
-from cdpr_drake.systems.robots.settings import WinchSettings
+from cdpr_drake.systems.robots.settings import CableRobotSettings, WinchSettings
 
 ENERGY = 1e-5
 """Change of the energy in a quarter of a second, relative to what the motors put in."""

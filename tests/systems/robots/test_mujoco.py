@@ -17,11 +17,10 @@ from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RigidTransform
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
-from cdpr_drake.models import load_robot
-from cdpr_drake.spatial import pose_error, rotation_from_angles
-from cdpr_drake.systems.robots import CableRobotSettings
+from cdpr_drake.geometry.poses import pose_error, rotation_from_angles
+from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.robots.cable_robot import CableRobot
-from cdpr_drake.systems.robots.settings import CableSettings
+from cdpr_drake.systems.robots.settings import CableRobotSettings, CableSettings
 
 DISTANCE, ANGLE = 1e-4, np.radians(0.01)
 """How far the engines may part in 2 s [m, rad]. Found: 0.5 um and 8e-4 deg with soft cables, 0.3 um

@@ -5,8 +5,9 @@ import pytest
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
 
-from cdpr_drake.models import add_robot, load_robot
-from cdpr_drake.spatial import pose_error, pose_from_angles
+from cdpr_drake.geometry.poses import pose_error, pose_from_angles
+from cdpr_drake.models.robot_in_plant import add_robot
+from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.robots.cable_robot import CableRobot
 from cdpr_drake.systems.robots.platform_pose import PlatformPose
 

@@ -5,12 +5,12 @@ import pytest
 from pydrake.systems.analysis import Simulator
 
 from cdpr_drake.errors import CableGeometryError, CableModelError, ScenarioError
-from cdpr_drake.models import load_robot
-from cdpr_drake.systems.diagrams import build_visual_servo, load_scenario
-from cdpr_drake.systems.robots import CableRobotSettings
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.diagrams.visual_servo import build_visual_servo
 from cdpr_drake.systems.robots.cable_forces import CableForces
 from cdpr_drake.systems.robots.cable_robot import CableRobot
-from cdpr_drake.systems.robots.settings import CableSettings
+from cdpr_drake.systems.robots.settings import CableRobotSettings, CableSettings
 
 PROJECTED = ("camera.kind=projected", "duration=0.2")
 
@@ -52,7 +52,7 @@ def test_unknown_and_undetermined_models_are_refused():
 
 
 def test_a_pulley_in_the_platform_is_refused(tmp_path):
-    from cdpr_drake.models import robot_file
+    from cdpr_drake.models.robot_loader import robot_file
 
     text = robot_file("acrobot_small").read_text().replace("radius: 0.0045", "radius: 0.9")
     (tmp_path / "acrobot_small.yaml").write_text(text)

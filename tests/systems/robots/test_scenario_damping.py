@@ -5,10 +5,10 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
-from cdpr_drake.models import add_robot, load_robot
-from cdpr_drake.systems.robots import CableRobotSettings
+from cdpr_drake.models.robot_in_plant import add_robot
+from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.robots.cable_robot import CableRobot
-from cdpr_drake.systems.robots.settings import DampingSettings
+from cdpr_drake.systems.robots.settings import CableRobotSettings, DampingSettings
 
 DECAY = 1e-6
 """Relative; the integrator is asked for an accuracy of 1e-9."""

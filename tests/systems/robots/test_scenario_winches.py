@@ -5,12 +5,13 @@ import pytest
 import yaml
 
 from cdpr_drake.analyses.reporting.log_files import column_names
-from cdpr_drake.analyses.runs import run_scenario
+from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
 from cdpr_drake.errors import ScenarioError
-from cdpr_drake.models import robot_file
-from cdpr_drake.systems.diagrams import build_visual_servo, load_scenario
+from cdpr_drake.models.robot_loader import robot_file
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.diagrams.visual_servo import build_visual_servo
 from cdpr_drake.systems.robots.motor_winch import MotorWinch
-from cdpr_drake.systems.robots.velocity_winch import VelocityWinch
+from cdpr_drake.systems.robots.winches import VelocityWinch
 
 QUICK = "camera.kind=projected"
 CABLES = [f"C{i}" for i in range(1, 9)]

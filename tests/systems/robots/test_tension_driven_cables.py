@@ -9,10 +9,12 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
 
 from cdpr_drake.errors import CableGeometryError
-from cdpr_drake.models import add_robot, load_robot, tension_problem
+from cdpr_drake.models.robot_in_plant import add_robot
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_statics import tension_problem
 from cdpr_drake.systems.robots.cable_robot import holding_tensions
 from cdpr_drake.systems.robots.tension_driven_cables import TensionDrivenCables
-from cdpr_drake.tensions import exact_tensions
+from cdpr_drake.tensions.methods import exact_tensions
 from tests.models.representative_robots import REPRESENTATIVE_ROBOTS
 
 BALANCE = 1e-9

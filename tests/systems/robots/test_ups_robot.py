@@ -9,9 +9,11 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.analysis import Simulator
 
 from cdpr_drake.errors import CableModelError, RobotFileError
-from cdpr_drake.geometry import cable_lengths, length_jacobian
-from cdpr_drake.models import add_ups_robot, load_robot, platform_inertia, rod_masses
-from cdpr_drake.spatial import cross_matrix, pose_from_angles
+from cdpr_drake.geometry.poses import cross_matrix, pose_from_angles
+from cdpr_drake.geometry.straight_cables import cable_lengths, length_jacobian
+from cdpr_drake.models.robot_in_plant import platform_inertia
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.ups_robot import add_ups_robot, rod_masses
 from cdpr_drake.systems.robots.cable_robot import holding_tensions
 from cdpr_drake.systems.robots.ups_robot import UpsRobot
 

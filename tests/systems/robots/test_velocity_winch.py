@@ -3,7 +3,7 @@
 import numpy as np
 from pydrake.systems.analysis import Simulator
 
-from cdpr_drake.systems.robots.velocity_winch import VelocityWinch
+from cdpr_drake.systems.robots.winches import VelocityWinch
 
 ROUND_OFF = 1e-12
 """Of an integral of constants over half a second [m]."""

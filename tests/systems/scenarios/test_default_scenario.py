@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.runs import run_scenario, summarize
-from cdpr_drake.systems.diagrams import load_scenario
-from cdpr_drake.systems.scenarios import DEFAULT_SCENARIO
+from cdpr_drake.analyses.simulation.run_summary import summarize
+from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.scenarios.visual_servo_scenario import DEFAULT_SCENARIO
 
 QUICK = ["camera.kind=projected", "integration.engine=compiled"]
 SAME_ERROR = 1e-5

@@ -2,8 +2,8 @@
 
 import pytest
 
-from cdpr_drake.systems.diagrams import load_scenario
-from cdpr_drake.systems.scenarios import engine_of, with_engine
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.scenarios.run_settings import engine_of, with_engine
 
 
 @pytest.mark.parametrize("name", ["acrobot_pbvs", "planar_computed_torque"])

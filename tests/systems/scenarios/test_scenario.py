@@ -7,9 +7,10 @@ import pytest
 import yaml
 
 from cdpr_drake.errors import InfeasibleTensionError, RobotFileError, ScenarioError
-from cdpr_drake.models import load_robot
-from cdpr_drake.spatial import pose_error, pose_from_angles
-from cdpr_drake.systems.diagrams import build_visual_servo, load_scenario
+from cdpr_drake.geometry.poses import pose_error, pose_from_angles
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.diagrams.visual_servo import build_visual_servo
 from cdpr_drake.systems.scenarios.files import scenario_names
 
 ROUND_OFF = 1e-12

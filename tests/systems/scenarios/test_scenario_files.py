@@ -3,12 +3,12 @@
 import pytest
 import yaml
 
-from cdpr_drake.analyses.runs import run_scenario, run_tension_scenario
-from cdpr_drake.analyses.stability import load_bounds
+from cdpr_drake.analyses.simulation.tension_control_run import run_tension_scenario
+from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
+from cdpr_drake.analyses.workspaces.stability_defaults import load_bounds
 from cdpr_drake.errors import DataFileError, ScenarioError
-from cdpr_drake.models import load_robot, robot_file
-from cdpr_drake.systems.diagrams import load_scenario
-from cdpr_drake.systems.scenarios import Scenario
+from cdpr_drake.models.robot_loader import load_robot, robot_file
+from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.scenarios.files import (
     KINDS,
     all_scenario_names,
@@ -16,6 +16,7 @@ from cdpr_drake.systems.scenarios.files import (
     scenario_kind,
     scenario_names,
 )
+from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
 
 
 def test_every_scenario_has_one_kind():

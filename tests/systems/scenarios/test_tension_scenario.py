@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from cdpr_drake.errors import ScenarioError
-from cdpr_drake.models import load_robot
-from cdpr_drake.systems.diagrams import load_scenario
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.scenarios.files import scenario_names
 from cdpr_drake.systems.scenarios.tension_control_scenario import TensionScenario
 from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario

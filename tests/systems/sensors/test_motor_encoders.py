@@ -5,9 +5,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydrake.systems.analysis import Simulator
 
-from cdpr_drake.models import EncoderModel
+from cdpr_drake.models.sensor_catalogue import EncoderModel
 from cdpr_drake.systems.sensors.motor_encoders import MotorEncoders
-from cdpr_drake.winches import Drum
+from cdpr_drake.winches.drum import Drum
 
 REFERENCE = np.array([1.0, 1.5, 0.8])
 DRUM = Drum(radius=0.041, gear_ratio=10.0, layer_turns=4.0, layer_height=0.002, wound=1.2)

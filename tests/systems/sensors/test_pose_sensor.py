@@ -5,8 +5,8 @@ from pydrake.common.value import Value
 from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.systems.analysis import Simulator
 
-from cdpr_drake.models import load_pose_sensor
-from cdpr_drake.spatial import rotation_vector
+from cdpr_drake.geometry.poses import rotation_vector
+from cdpr_drake.models.sensor_catalogue import load_pose_sensor
 from cdpr_drake.systems.sensors.pose_sensor import PoseSensor
 
 X_WP = RigidTransform(RollPitchYaw(0.2, -0.1, 0.3), [0.3, -0.2, 0.4])

@@ -5,11 +5,13 @@ import pytest
 import yaml
 
 from cdpr_drake.analyses.reporting.log_files import column_names
-from cdpr_drake.analyses.runs import run_scenario
+from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
 from cdpr_drake.errors import RobotFileError, ScenarioError
-from cdpr_drake.models import load_robot, load_tension_sensor, robot_file
-from cdpr_drake.spatial import pose_rows_distance
-from cdpr_drake.systems.diagrams import build_visual_servo, load_scenario
+from cdpr_drake.geometry.poses import pose_rows_distance
+from cdpr_drake.models.robot_loader import load_robot, robot_file
+from cdpr_drake.models.sensor_catalogue import load_tension_sensor
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.diagrams.visual_servo import build_visual_servo
 
 QUICK = ("camera.kind=projected", "duration=1.0", "log_rate=100", "sensors.metrology_rate=80")
 

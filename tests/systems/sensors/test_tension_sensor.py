@@ -5,7 +5,7 @@ import pytest
 from pydrake.systems.analysis import Simulator
 
 from cdpr_drake.errors import SensorError
-from cdpr_drake.models import load_tension_sensor
+from cdpr_drake.models.sensor_catalogue import load_tension_sensor
 from cdpr_drake.systems.sensors.tension_sensor import TensionSensor
 
 TENSIONS = np.array([2.0, 10.0, 60.0, 0.0])

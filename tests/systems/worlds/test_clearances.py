@@ -4,12 +4,14 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from cdpr_drake.geometry import cable_paths
-from cdpr_drake.models import load_robot, platform_box
-from cdpr_drake.systems.worlds import WorldClearances, make_world
+from cdpr_drake.geometry.cable_paths import cable_paths
+from cdpr_drake.models.robot_in_plant import platform_box
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.systems.worlds.clearances import WorldClearances
 from cdpr_drake.systems.worlds.settings import ObstacleMotion
-from cdpr_drake.workspaces import box_row
-from cdpr_drake.workspaces.interference import boxes_distance
+from cdpr_drake.systems.worlds.world import make_world
+from cdpr_drake.workspaces.cable_distance_kernel import boxes_distance
+from cdpr_drake.workspaces.cable_interference import box_row
 from tests.systems.worlds.world_bench import obstacle, world_of
 
 CLOSEST = 2e-6

@@ -4,8 +4,11 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from cdpr_drake.models import Pose, load_robot, platform_inertia
-from cdpr_drake.systems.worlds import ContactMeter, contact_law, contact_step
+from cdpr_drake.models.robot_in_plant import platform_inertia
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_schema import Pose
+from cdpr_drake.systems.worlds.contact import contact_law, contact_step
+from cdpr_drake.systems.worlds.meters import ContactMeter
 from cdpr_drake.systems.worlds.settings import ObstacleJoint, ObstacleMotion, ObstacleWaypoint
 from tests.systems.worlds.world_bench import ContactSettings, FreePlatform, obstacle, world_of
 

@@ -6,8 +6,10 @@ from pydrake.geometry import Box, Mesh
 from pydrake.math import RigidTransform
 
 from cdpr_drake.errors import WorldError
-from cdpr_drake.models import load_robot
-from cdpr_drake.systems.worlds import WorldClearances, make_world, mesh_parts, model_parts
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.systems.worlds.clearances import WorldClearances
+from cdpr_drake.systems.worlds.model_files import mesh_parts, model_parts
+from cdpr_drake.systems.worlds.world import make_world
 from tests.systems.worlds.world_bench import obstacle, world_of
 
 GREY = np.array([0.5, 0.5, 0.5, 1.0])

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from cdpr_drake.spatial import rotation_vector
-from cdpr_drake.systems.worlds import JointedBody, PathBody, SteadyBody
-from cdpr_drake.trajectories import PoseTrajectory
+from cdpr_drake.geometry.poses import rotation_vector
+from cdpr_drake.systems.worlds.motions import JointedBody, PathBody, SteadyBody
+from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
 
 STEP = 1e-4
 """Of central differences [s]; their error is its square times third derivatives of order 100."""

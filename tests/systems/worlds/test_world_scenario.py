@@ -7,17 +7,21 @@ import numpy as np
 import pytest
 from pydrake.geometry import Role
 
-from cdpr_drake.analyses.pictures import RobotPicture
-from cdpr_drake.analyses.runs import SCENARIO_KINDS, run_scenario, run_tension_scenario
+from cdpr_drake.analyses.simulation.scenario_kinds import SCENARIO_KINDS
+from cdpr_drake.analyses.simulation.tension_control_run import run_tension_scenario
+from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
+from cdpr_drake.analyses.visualization.replay import RobotPicture
 from cdpr_drake.cli.schema import file_schema
 from cdpr_drake.errors import ScenarioError
-from cdpr_drake.models import load_robot
-from cdpr_drake.spatial import pose_from_row
-from cdpr_drake.systems.diagrams import build_visual_servo, load_scenario
-from cdpr_drake.systems.loops import why_diagram, with_loop
-from cdpr_drake.systems.monitoring import Outcome
-from cdpr_drake.systems.perception import SceneShapes
-from cdpr_drake.systems.scenarios import all_scenario_names, engine_of, has_contact
+from cdpr_drake.geometry.poses import pose_from_row
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.diagrams.visual_servo import build_visual_servo
+from cdpr_drake.systems.loops.loop_choice import why_diagram, with_loop
+from cdpr_drake.systems.monitoring.run_monitor import Outcome
+from cdpr_drake.systems.scenarios.files import all_scenario_names
+from cdpr_drake.systems.scenarios.run_settings import engine_of, has_contact
+from cdpr_drake.systems.sensors.scene_shapes import SceneShapes
 
 TABLE = 0.1
 """Height of the table of acrobot_set_down [m]."""

@@ -5,14 +5,15 @@ from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import DiagramBuilder
 
-from cdpr_drake.models import Pose, add_robot
-from cdpr_drake.systems.worlds import (
+from cdpr_drake.models.robot_in_plant import add_robot
+from cdpr_drake.models.robot_schema import Pose
+from cdpr_drake.systems.worlds.adding import WorldInScene
+from cdpr_drake.systems.worlds.contact import contact_step
+from cdpr_drake.systems.worlds.settings import (
     ContactSettings,
     GroundSettings,
     ObstacleSettings,
-    WorldInScene,
     WorldSettings,
-    contact_step,
 )
 
 

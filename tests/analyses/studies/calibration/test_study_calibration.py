@@ -5,13 +5,14 @@ import json
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.calibration import rest_poses
-from cdpr_drake.analyses.catalogue import STUDIES
-from cdpr_drake.analyses.reporting import StudySession
+from cdpr_drake.analyses.calibration.candidate_poses import rest_poses
+from cdpr_drake.analyses.reporting.progress import StudySession
 from cdpr_drake.analyses.studies.calibration import study as module
-from cdpr_drake.analyses.studies.calibration import study_calibration, tasks, trials
+from cdpr_drake.analyses.studies.calibration import tasks, trials
+from cdpr_drake.analyses.studies.calibration.study import study_calibration
+from cdpr_drake.analyses.studies.catalogue import STUDIES
 from cdpr_drake.errors import OutputFolderError
-from cdpr_drake.models import load_robot
+from cdpr_drake.models.robot_loader import load_robot
 
 STRAIGHT = {"true": 2.8e-4, "believed before": 5e-3, "calibrated": 2.9e-4}
 

@@ -3,24 +3,22 @@
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.runs import run_scenario, stability_along
-from cdpr_drake.analyses.stability import workspace_defaults
-from cdpr_drake.analyses.studies.closed_loops import (
+from cdpr_drake.analyses.simulation.run_stability import stability_along
+from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
+from cdpr_drake.analyses.studies.closed_loops.servo_models import (
     Perturbation,
     perturbed_scenario,
     perturbed_servo,
 )
 from cdpr_drake.analyses.studies.closed_loops.study import ROBOT, SEED, SETTINGS
-from cdpr_drake.models import load_robot
-from cdpr_drake.spatial import pose_from_angles, pose_row
-from cdpr_drake.stability import (
-    FixedObject,
-    StabilityCase,
-    VerdictOptions,
-    vector_size,
-    worst_perturbations,
-)
-from cdpr_drake.systems.diagrams import load_scenario
+from cdpr_drake.analyses.workspaces.stability_defaults import workspace_defaults
+from cdpr_drake.geometry.poses import pose_from_angles, pose_row
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.stability.desired_view import FixedObject
+from cdpr_drake.stability.perturbation_bounds import vector_size
+from cdpr_drake.stability.stability_case import StabilityCase
+from cdpr_drake.stability.verdict import VerdictOptions, worst_perturbations
+from cdpr_drake.systems.diagrams.load import load_scenario
 
 SCHEME = "pbvs-line"
 START = pose_from_angles(

@@ -10,19 +10,16 @@ from cdpr_drake.analyses.studies.closed_loops.servo_models import (
     perturbed_scenario,
     perturbed_servo,
 )
-from cdpr_drake.models import load_robot
-from cdpr_drake.spatial import pose_from_angles, pose_row
-from cdpr_drake.stability import (
-    BASELINE,
-    FixedObject,
-    StabilityCase,
-    VerdictOptions,
-    draw_perturbations,
-    judge_stability,
-    vector_size,
-)
-from cdpr_drake.systems.diagrams import believed_robot, load_scenario
-from cdpr_drake.systems.monitoring import Outcome
+from cdpr_drake.geometry.poses import pose_from_angles, pose_row
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.stability.desired_view import FixedObject
+from cdpr_drake.stability.perturbation_bounds import BASELINE, vector_size
+from cdpr_drake.stability.perturbation_samples_kernel import draw_perturbations
+from cdpr_drake.stability.stability_case import StabilityCase
+from cdpr_drake.stability.verdict import VerdictOptions, judge_stability
+from cdpr_drake.systems.diagrams.beliefs import believed_robot
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.monitoring.run_monitor import Outcome
 
 ROUNDING = 1e-9
 SETTINGS = [

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from cdpr_drake.analyses.catalogue import STUDIES
-from cdpr_drake.analyses.reporting import StudySession
-from cdpr_drake.analyses.stability import workspace_defaults
+from cdpr_drake.analyses.reporting.progress import StudySession
+from cdpr_drake.analyses.studies.catalogue import STUDIES
 from cdpr_drake.analyses.studies.closed_loops.loops import (
     COLUMNS,
     MANAGED,
@@ -24,10 +23,11 @@ from cdpr_drake.analyses.studies.closed_loops.study import (
     managed,
     study_closed_loop,
 )
+from cdpr_drake.analyses.workspaces.stability_defaults import workspace_defaults
 from cdpr_drake.errors import OutputFolderError
-from cdpr_drake.models import load_robot
-from cdpr_drake.stability import VerdictOptions
-from cdpr_drake.systems.monitoring import Outcome
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.stability.verdict import VerdictOptions
+from cdpr_drake.systems.monitoring.run_monitor import Outcome
 
 ROUNDING = 1e-12
 """Of a quotient of the same two numbers."""

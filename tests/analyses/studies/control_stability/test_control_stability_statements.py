@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from cdpr_drake.analyses.published import TABLES, chosen_on
-from cdpr_drake.analyses.reporting import CONFIRMED, IN_PART, NOT_CONFIRMED, NOT_IN_QUICK
+from cdpr_drake.analyses.reporting.statements import CONFIRMED, IN_PART, NOT_CONFIRMED, NOT_IN_QUICK
 from cdpr_drake.analyses.studies.control_stability.statements import (
     JUDGES,
     control_stability_statements,
 )
 from cdpr_drake.analyses.studies.control_stability.tables import StabilityRow
+from cdpr_drake.analyses.studies.published.recipe_choices import chosen_on
+from cdpr_drake.analyses.studies.published.stability_tables import TABLES
 
 
 def printed_rows(change=lambda share: share):

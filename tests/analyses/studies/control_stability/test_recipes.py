@@ -9,19 +9,7 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.published import (
-    EXCHANGE,
-    IN_USE,
-    PRESENT,
-    RECIPES,
-    TABLES,
-    exchanged_anchors,
-    recipe_bounds,
-    recipe_case,
-    recipe_grid,
-    recipe_options,
-)
-from cdpr_drake.analyses.reporting import StudySession
+from cdpr_drake.analyses.reporting.progress import StudySession
 from cdpr_drake.analyses.studies.control_stability import all_recipes as together
 from cdpr_drake.analyses.studies.control_stability import exchanges
 from cdpr_drake.analyses.studies.control_stability import recipes as module
@@ -32,11 +20,26 @@ from cdpr_drake.analyses.studies.control_stability.printed_limits import (
     rising_rows,
 )
 from cdpr_drake.analyses.studies.control_stability.table_reasons import LimitRow, table_reasons
-from cdpr_drake.cli import main
-from cdpr_drake.geometry import cable_jacobian
-from cdpr_drake.models import load_robot
-from cdpr_drake.stability import OppositeCorner, judge_stability
-from cdpr_drake.workspaces import grid_by_count
+from cdpr_drake.analyses.studies.published.recipe_variants import (
+    EXCHANGE,
+    IN_USE,
+    PRESENT,
+    RECIPES,
+    exchanged_anchors,
+)
+from cdpr_drake.analyses.studies.published.stability_recipe import (
+    recipe_bounds,
+    recipe_case,
+    recipe_grid,
+    recipe_options,
+)
+from cdpr_drake.analyses.studies.published.stability_tables import TABLES
+from cdpr_drake.cli.app import main
+from cdpr_drake.geometry.cable_paths import cable_jacobian
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.stability.desired_view import OppositeCorner
+from cdpr_drake.stability.verdict import judge_stability
+from cdpr_drake.workspaces.pose_grid import grid_by_count
 from tests.messages import printed
 
 FULLY = "acrobot_fully_constrained"

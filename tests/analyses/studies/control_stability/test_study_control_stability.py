@@ -10,15 +10,7 @@ import numpy as np
 import pytest
 
 from cdpr_drake.analyses.benchmarks.stability import plain_pairs
-from cdpr_drake.analyses.published import (
-    TABLES,
-    recipe_bounds,
-    recipe_case,
-    recipe_grid,
-    recipe_options,
-    single_bounds,
-)
-from cdpr_drake.analyses.reporting import StudySession, WorkProgress
+from cdpr_drake.analyses.reporting.progress import StudySession, WorkProgress
 from cdpr_drake.analyses.studies.control_stability import study as module
 from cdpr_drake.analyses.studies.control_stability.figures import FIGURES
 from cdpr_drake.analyses.studies.control_stability.tables import (
@@ -26,15 +18,18 @@ from cdpr_drake.analyses.studies.control_stability.tables import (
     control_stability_tables,
     mean_difference,
 )
-from cdpr_drake.errors import OutputFolderError, StabilityError
-from cdpr_drake.stability import (
-    BASELINE,
-    VERDICTS,
-    PerturbationBounds,
-    VerdictOptions,
-    judge_stability,
+from cdpr_drake.analyses.studies.published.stability_recipe import (
+    recipe_bounds,
+    recipe_case,
+    recipe_grid,
+    recipe_options,
+    single_bounds,
 )
-from cdpr_drake.workspaces import VolumeRule, workspace_volume
+from cdpr_drake.analyses.studies.published.stability_tables import TABLES
+from cdpr_drake.errors import OutputFolderError, StabilityError
+from cdpr_drake.stability.perturbation_bounds import BASELINE, PerturbationBounds
+from cdpr_drake.stability.verdict import VERDICTS, VerdictOptions, judge_stability
+from cdpr_drake.workspaces.volume import VolumeRule, workspace_volume
 
 POINTS = 4.0
 """Difference of a single row to the published one that the recipe keeps here [points of per cent];

@@ -5,18 +5,13 @@ import json
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.reporting import StudySession
+from cdpr_drake.analyses.reporting.progress import StudySession
 from cdpr_drake.analyses.reporting.statements import CONFIRMED, NOT_CONFIRMED
 from cdpr_drake.analyses.studies.engines import study as module
-from cdpr_drake.analyses.studies.engines.pairs import COLUMNS
+from cdpr_drake.analyses.studies.engines.pairs import COLUMNS, OrderTask, TautTask, slack_override
 from cdpr_drake.analyses.studies.engines.statements import engine_statements, orders
 from cdpr_drake.analyses.studies.engines.study import study_engines
-from cdpr_drake.analyses.studies.engines.tasks import (
-    OrderTask,
-    TautTask,
-    slack_override,
-)
-from cdpr_drake.systems.monitoring import Outcome
+from cdpr_drake.systems.monitoring.run_monitor import Outcome
 
 
 @pytest.fixture(scope="module")

@@ -5,12 +5,12 @@ import json
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.reporting import StudySession, judged_statements
-from cdpr_drake.analyses.reporting.statements import CONFIRMED, NOT_CONFIRMED
-from cdpr_drake.analyses.studies.fusion import study_fusion
+from cdpr_drake.analyses.reporting.progress import StudySession
+from cdpr_drake.analyses.reporting.statements import CONFIRMED, NOT_CONFIRMED, judged_statements
 from cdpr_drake.analyses.studies.fusion.configurations import ALL, QUICK, configurations
 from cdpr_drake.analyses.studies.fusion.slack_trials import SLACK_COLUMNS, slack_trials
 from cdpr_drake.analyses.studies.fusion.statements import JUDGES
+from cdpr_drake.analyses.studies.fusion.study import study_fusion
 from cdpr_drake.analyses.studies.fusion.trials import COLUMNS, FusionTrial, trial_scenario
 
 

@@ -5,9 +5,10 @@ import json
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.catalogue import STUDIES
-from cdpr_drake.analyses.reporting import StudySession
-from cdpr_drake.analyses.studies.identification import study_identification, trials
+from cdpr_drake.analyses.reporting.progress import StudySession
+from cdpr_drake.analyses.studies.catalogue import STUDIES
+from cdpr_drake.analyses.studies.identification import trials
+from cdpr_drake.analyses.studies.identification.study import study_identification
 
 TRACKING = np.array([[0.02, 0.1], [8e-5, 1e-3], [7.5e-5, 1e-3]])
 

@@ -5,9 +5,13 @@ import json
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.reporting import NOT_CONFIRMED, StudySession, judged_statements
-from cdpr_drake.analyses.reporting.statements import CONFIRMED, IN_PART
-from cdpr_drake.analyses.studies.mobile_robot import study_mobile_robot
+from cdpr_drake.analyses.reporting.progress import StudySession
+from cdpr_drake.analyses.reporting.statements import (
+    CONFIRMED,
+    IN_PART,
+    NOT_CONFIRMED,
+    judged_statements,
+)
 from cdpr_drake.analyses.studies.mobile_robot.configurations import (
     PUBLISHED_LAPS,
     VARIED,
@@ -25,10 +29,11 @@ from cdpr_drake.analyses.studies.mobile_robot.laps import (
 )
 from cdpr_drake.analyses.studies.mobile_robot.slack_statements import CORNERS, at_one_place
 from cdpr_drake.analyses.studies.mobile_robot.statements import laps_words, rises
-from cdpr_drake.cli import main
-from cdpr_drake.models import load_robot
-from cdpr_drake.systems.diagrams import load_scenario
-from cdpr_drake.systems.monitoring import Outcome
+from cdpr_drake.analyses.studies.mobile_robot.study import study_mobile_robot
+from cdpr_drake.cli.app import main
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.monitoring.run_monitor import Outcome
 from tests.messages import printed
 
 

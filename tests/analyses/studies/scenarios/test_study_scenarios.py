@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from pydrake.common.yaml import yaml_dump_typed
 
-from cdpr_drake.analyses.catalogue import STUDIES
-from cdpr_drake.analyses.reporting import StudySession
-from cdpr_drake.analyses.studies.scenarios import study_scenarios, task
+from cdpr_drake.analyses.reporting.progress import StudySession
+from cdpr_drake.analyses.studies.catalogue import STUDIES
+from cdpr_drake.analyses.studies.scenarios import task
 from cdpr_drake.analyses.studies.scenarios.statements import OVER, endings
-from cdpr_drake.analyses.studies.scenarios.study import ending_figure
+from cdpr_drake.analyses.studies.scenarios.study import ending_figure, study_scenarios
 from cdpr_drake.analyses.studies.scenarios.task import (
     COLUMNS,
     QUICK_DIAGRAM,
@@ -21,9 +21,9 @@ from cdpr_drake.analyses.studies.scenarios.task import (
     quick_overrides,
 )
 from cdpr_drake.errors import ScenarioError
-from cdpr_drake.systems import load_scenario
-from cdpr_drake.systems.monitoring import Outcome
-from cdpr_drake.systems.scenarios import all_scenario_names, scenario_file
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.monitoring.run_monitor import Outcome
+from cdpr_drake.systems.scenarios.files import all_scenario_names, scenario_file
 
 LOST = "acrobot_partitioned"
 

@@ -5,10 +5,10 @@ import json
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.case_studies import seeded_study
-from cdpr_drake.analyses.catalogue import STUDIES
-from cdpr_drake.analyses.reporting import StudySession, WorkProgress
-from cdpr_drake.analyses.studies.schemes import study_schemes, trials
+from cdpr_drake.analyses.reporting.progress import StudySession, WorkProgress
+from cdpr_drake.analyses.studies.catalogue import STUDIES
+from cdpr_drake.analyses.studies.framework import seeded_study
+from cdpr_drake.analyses.studies.schemes import trials
 from cdpr_drake.analyses.studies.schemes.statements import (
     FREE,
     ROBOT,
@@ -16,6 +16,7 @@ from cdpr_drake.analyses.studies.schemes.statements import (
     schemes_statements,
     task_name,
 )
+from cdpr_drake.analyses.studies.schemes.study import study_schemes
 from cdpr_drake.analyses.studies.schemes.trials import (
     COLUMNS,
     DESIRED,
@@ -30,7 +31,7 @@ from cdpr_drake.analyses.studies.schemes.trials import (
     robot_starts,
     turned,
 )
-from cdpr_drake.systems import load_scenario
+from cdpr_drake.systems.diagrams.load import load_scenario
 
 BY_HAND = 1e-9
 

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.reporting import NOT_CONFIRMED, StudySession, WorkProgress
-from cdpr_drake.analyses.reporting.statements import CONFIRMED, IN_PART
+from cdpr_drake.analyses.reporting.progress import StudySession, WorkProgress
+from cdpr_drake.analyses.reporting.statements import CONFIRMED, IN_PART, NOT_CONFIRMED
 from cdpr_drake.analyses.studies.stability_ranges import robot_limits
 from cdpr_drake.analyses.studies.stability_ranges import study as module
 from cdpr_drake.analyses.studies.stability_ranges.answers import NESTED, falls
@@ -41,7 +41,7 @@ from cdpr_drake.analyses.studies.stability_ranges.study import (
     study_stability_ranges,
 )
 from cdpr_drake.errors import OutputFolderError
-from cdpr_drake.stability import planar_margin
+from cdpr_drake.stability.criterion_closed_forms import planar_margin
 
 STEP = 0.01
 """Resolution of the limits that these tests look for [m]."""

@@ -6,8 +6,9 @@ from functools import cache
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.published import TABLES
-from cdpr_drake.analyses.reporting import CONFIRMED, IN_PART, NOT_CONFIRMED, StudySession
+from cdpr_drake.analyses.reporting.progress import StudySession
+from cdpr_drake.analyses.reporting.statements import CONFIRMED, IN_PART, NOT_CONFIRMED
+from cdpr_drake.analyses.studies.published.stability_tables import TABLES
 from cdpr_drake.analyses.studies.stability_shapes import statements as said
 from cdpr_drake.analyses.studies.stability_shapes import study as study_module
 from cdpr_drake.analyses.studies.stability_shapes.figures import (

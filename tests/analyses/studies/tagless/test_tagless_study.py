@@ -5,10 +5,12 @@ import json
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.catalogue import STUDIES
-from cdpr_drake.analyses.reporting import StudySession, judged_statements
-from cdpr_drake.analyses.studies.tagless import study_tagless, trials
+from cdpr_drake.analyses.reporting.progress import StudySession
+from cdpr_drake.analyses.reporting.statements import judged_statements
+from cdpr_drake.analyses.studies.catalogue import STUDIES
+from cdpr_drake.analyses.studies.tagless import trials
 from cdpr_drake.analyses.studies.tagless.statements import JUDGES, task_name
+from cdpr_drake.analyses.studies.tagless.study import study_tagless
 from cdpr_drake.analyses.studies.tagless.trials import (
     DURATION,
     RATE,
@@ -18,8 +20,8 @@ from cdpr_drake.analyses.studies.tagless.trials import (
     is_lost,
     starts,
 )
-from cdpr_drake.systems import load_scenario
-from cdpr_drake.systems.monitoring import Outcome
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.monitoring.run_monitor import Outcome
 
 ROWS = round(DURATION * RATE) + 1
 

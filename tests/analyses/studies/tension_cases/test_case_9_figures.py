@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.case_studies.cable_figures import cable_panels
-from cdpr_drake.analyses.case_studies.definition import Configuration
-from cdpr_drake.analyses.case_studies.run import CaseRuns
+from cdpr_drake.analyses.studies.framework.cable_figures import cable_panels
+from cdpr_drake.analyses.studies.framework.case_definition import Configuration
+from cdpr_drake.analyses.studies.framework.case_run import CaseRuns
 from cdpr_drake.analyses.studies.tension_cases.case_9_figures import (
     ACCURACY,
     EXPERIMENTS,
@@ -18,10 +18,11 @@ from cdpr_drake.analyses.studies.tension_cases.case_9_figures import (
     sensor_accuracy,
 )
 from cdpr_drake.analyses.studies.tension_cases.case_9_statements import PUBLISHED_TENSIONS
-from cdpr_drake.models import load_robot, tension_problem
+from cdpr_drake.geometry.poses import pose_row
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_statics import tension_problem
 from cdpr_drake.palette import nth_look
-from cdpr_drake.spatial import pose_row
-from cdpr_drake.tensions import solution_space
+from cdpr_drake.tensions.methods import solution_space
 
 POSE = RigidTransform([-0.11, -0.20, 0.366])
 """The printed last position."""

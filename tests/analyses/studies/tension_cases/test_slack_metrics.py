@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.case_studies.run import CaseJob, CaseRun, CaseRuns
+from cdpr_drake.analyses.studies.framework.case_run import CaseJob, CaseRun, CaseRuns
 from cdpr_drake.analyses.studies.tension_cases import case_9_statements as case_9
 from cdpr_drake.analyses.studies.tension_cases import case_10_statements as case_10
 from cdpr_drake.analyses.studies.tension_cases.case_9 import CASE_9, stiffness
@@ -28,9 +28,10 @@ from cdpr_drake.analyses.studies.tension_cases.slack_metrics import (
     winch_work,
 )
 from cdpr_drake.analyses.studies.tension_cases.slack_variants import COMPARED, advice, which_to_take
-from cdpr_drake.models import load_robot, tension_problem
-from cdpr_drake.spatial import pose_row
-from cdpr_drake.tensions import distribute
+from cdpr_drake.geometry.poses import pose_row
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_statics import tension_problem
+from cdpr_drake.tensions.methods import distribute
 
 TIME = np.arange(0.0, 4.01, 0.5)
 

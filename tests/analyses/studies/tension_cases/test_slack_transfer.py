@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.case_studies.run import CaseJob, CaseRun, CaseRuns
+from cdpr_drake.analyses.studies.framework.case_run import CaseJob, CaseRun, CaseRuns
 from cdpr_drake.analyses.studies.tension_cases import case_9_transfer as nine
 from cdpr_drake.analyses.studies.tension_cases.case_10_estimates import (
     ESTIMATES,

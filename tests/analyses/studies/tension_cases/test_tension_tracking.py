@@ -2,7 +2,7 @@
 
 import pytest
 
-from cdpr_drake.analyses.case_studies.run import CaseJob, CaseRun, CaseRuns
+from cdpr_drake.analyses.studies.framework.case_run import CaseJob, CaseRun, CaseRuns
 from cdpr_drake.analyses.studies.tension_cases import tension_tracking
 from cdpr_drake.analyses.studies.tension_cases.tension_tracking import (
     DISTURBED,

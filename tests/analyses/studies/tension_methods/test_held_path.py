@@ -12,8 +12,9 @@ from cdpr_drake.analyses.studies.tension_methods.feasible_path import (
     held_path,
 )
 from cdpr_drake.errors import InfeasibleTensionError
-from cdpr_drake.models import load_robot, tension_problem
-from cdpr_drake.spatial import pose_from_angles
+from cdpr_drake.geometry.poses import pose_from_angles
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_statics import tension_problem
 
 MIDDLE = np.array([0.0, 0.0, 0.2])
 """Middle of the platform in P [m]."""

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.catalogue import STUDIES, StudyEntry
-from cdpr_drake.analyses.reporting import StudySession, WorkProgress
+from cdpr_drake.analyses.reporting.progress import StudySession, WorkProgress
+from cdpr_drake.analyses.studies.catalogue import STUDIES, StudyEntry
 from cdpr_drake.analyses.studies.tension_methods.experiments import (
     EXPERIMENTS,
     THESIS_GAINS,

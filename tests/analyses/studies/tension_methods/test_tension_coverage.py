@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cdpr_drake.analyses.studies.tension_methods.coverage import CoverageTask, cover, grid_problems
-from cdpr_drake.tensions import METHODS
+from cdpr_drake.tensions.methods import METHODS
 
 
 @pytest.mark.parametrize("name", ["caroca_gazebo", "planar"])

@@ -4,12 +4,11 @@ from dataclasses import replace
 
 import pytest
 
-from cdpr_drake.analyses.reporting import NOT_CONFIRMED
-from cdpr_drake.analyses.reporting.statements import CONFIRMED, IN_PART
+from cdpr_drake.analyses.reporting.statements import CONFIRMED, IN_PART, NOT_CONFIRMED
 from cdpr_drake.analyses.studies.tension_methods.statements import judge_statements
 from cdpr_drake.analyses.studies.tension_methods.trial import Applied, TensionTrial, run_trial
-from cdpr_drake.models import load_robot
-from cdpr_drake.trajectories import PoseTrajectory
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
 
 
 @pytest.fixture(scope="module")

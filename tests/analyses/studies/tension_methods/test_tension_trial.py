@@ -13,8 +13,8 @@ from cdpr_drake.analyses.studies.tension_methods.trial import (
     TensionTrial,
     run_trial,
 )
-from cdpr_drake.models import load_robot
-from cdpr_drake.trajectories import PoseTrajectory
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
 
 TRACKING = 1e-6
 """A platform at rest with the exact model stays where it is [m]."""

@@ -4,12 +4,15 @@ import numpy as np
 import pytest
 
 from cdpr_drake.analyses.studies.tension_methods.trial import UncheckedDistributor
-from cdpr_drake.control import TaskGains
-from cdpr_drake.geometry import wrench_matrix
-from cdpr_drake.models import load_robot
-from cdpr_drake.spatial import pose_from_angles
-from cdpr_drake.systems.diagrams import TensionControlSettings, build_tension_control
-from cdpr_drake.trajectories import PoseTrajectory
+from cdpr_drake.control.task_space import TaskGains
+from cdpr_drake.geometry.poses import pose_from_angles
+from cdpr_drake.geometry.straight_cables import wrench_matrix
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.systems.diagrams.tension_control import (
+    TensionControlSettings,
+    build_tension_control,
+)
+from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
 
 ROUND_OFF = 1e-9
 """Of forces of some hundred newtons [N, N m]."""

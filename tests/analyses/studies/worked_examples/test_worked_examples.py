@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.reporting import CONFIRMED, IN_PART, NOT_CONFIRMED, StudySession
+from cdpr_drake.analyses.reporting.progress import StudySession
+from cdpr_drake.analyses.reporting.statements import CONFIRMED, IN_PART, NOT_CONFIRMED
 from cdpr_drake.analyses.studies.worked_examples import study as study_module
 from cdpr_drake.analyses.studies.worked_examples.motion import (
     DURATION,

@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.catalogue import STUDIES
-from cdpr_drake.analyses.reporting import NOT_CONFIRMED, StudySession
-from cdpr_drake.analyses.reporting.statements import CONFIRMED
+from cdpr_drake.analyses.reporting.progress import StudySession
+from cdpr_drake.analyses.reporting.statements import CONFIRMED, NOT_CONFIRMED
+from cdpr_drake.analyses.studies.catalogue import STUDIES
 from cdpr_drake.analyses.studies.workspaces import distances
 from cdpr_drake.analyses.studies.workspaces import items as items_module
 from cdpr_drake.analyses.studies.workspaces import study as study_module
@@ -25,9 +25,9 @@ from cdpr_drake.analyses.studies.workspaces.items import (
 from cdpr_drake.analyses.studies.workspaces.statements import JUDGES, workspace_statements
 from cdpr_drake.analyses.studies.workspaces.study import study_workspaces
 from cdpr_drake.analyses.studies.workspaces.tables import ALL, shares_of
-from cdpr_drake.analyses.workspaces import KINDS
+from cdpr_drake.analyses.workspaces.conditions import KINDS
 from cdpr_drake.errors import OutputFolderError
-from cdpr_drake.models import load_robot
+from cdpr_drake.models.robot_loader import load_robot
 
 ROBOTS = ("caroca_gazebo", "planar")
 """One that hangs, without the scenario's camera, and one that is planar."""

@@ -1,0 +1,98 @@
+"""Robots as calibrations see them, and robot files of what was found."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from cdpr_drake.calibration.parameters import CalibrationModel
+from cdpr_drake.calibration.result import CalibrationResult
+from cdpr_drake.errors import CalibrationError
+from cdpr_drake.geometry.poses import angles_from_rotation
+from cdpr_drake.models.robot_schema import CameraMount, Pose, Robot
+
+
+def calibration_model(robot: Robot, mount: str | None = None) -> CalibrationModel:
+    """A robot as its file says, with the camera of a mounting, if one is named.
+
+    Raises:
+        CalibrationError: There is no such mounting on the platform.
+        RobotFileError: The platform moves otherwise than in space or in a horizontal plane.
+    """
+    robot.servo_rows("a calibration")
+    model = CalibrationModel(tuple(cable.name for cable in robot.cables), robot.cable_set())
+    if mount is None:
+        return model
+    return replace(model, X_PC=find_mount(robot, mount).pose.transform())
+
+
+def find_mount(robot: Robot, name: str) -> CameraMount:
+    """A camera on the platform by the name of its mounting.
+
+    Raises:
+        CalibrationError: There is none.
+    """
+    mounts = {m.name: m for m in robot.cameras if m.parent == "platform"}
+    if name not in mounts:
+        raise CalibrationError(
+            f"mount: found {name!r}; accepted: {', '.join(mounts) or 'none'}, on the platform of "
+            f"{robot.name}"
+        )
+    return mounts[name]
+
+
+def calibrated_robot(
+    robot: Robot, result: CalibrationResult, mount: str | None = None
+) -> tuple[Robot, tuple[str, ...]]:
+    """A robot with what was found, and in words what its file has no place for.
+
+    Args:
+        robot: The robot as it was believed.
+        result: What was found of it.
+        mount: The camera's mounting that was calibrated.
+    """
+    model, moved = result.model, set(result.names)
+    cables = []
+    for k, cable in enumerate(robot.cables):
+        radius = float(model.cables.pulley_radius[k])
+        own = f"{cable.name}.pulley_radius" in moved
+        cables.append(
+            replace(
+                cable,
+                exit_point=cable.base_of(model.cables.p_WA[:, k]),
+                anchor_point=np.array(model.cables.p_PB[:, k]),
+                pulley_radius=radius if own else cable.pulley_radius,
+            )
+        )
+    cameras = [
+        replace(
+            one,
+            pose=Pose(
+                position=np.array(model.X_PC.translation()),
+                angles_deg=np.degrees(angles_from_rotation(model.X_PC.rotation())),
+            ),
+        )
+        if one.name == mount and one.parent == "platform"
+        else one
+        for one in robot.cameras
+    ]
+    winch, left = robot.winch, []
+    scales = model.length_scale
+    if any(name.endswith(".length_scale") for name in moved):
+        mean = float(np.mean(scales))
+        winch = replace(winch, drum_radius=winch.drum_radius * mean)
+        left.append(
+            f"drum radii: the file has one for all, their mean; each over it: "
+            f"{', '.join(f'{s / mean:.5f}' for s in scales)}"
+        )
+    for group in ("length_offset", "swivel_offset"):
+        if any(name.endswith(group) for name in moved):
+            left.append(f"{group.replace('_', ' ')}s belong to the log; they are in results.json")
+    frames = [key for key in ("tracker", "marker") if any(n.startswith(f"{key}.") for n in moved)]
+    if frames:
+        left.append(f"the {' and the '.join(frames)} belong to the log; they are in results.json")
+    words = f"Calibrated: {result.status}, {len(result.names)} parameters."
+    assumptions = f"{robot.assumptions} {words}".strip()
+    made = replace(robot, cables=cables, cameras=cameras, winch=winch, assumptions=assumptions)
+    return made, tuple(left)

@@ -1,0 +1,267 @@
+"""What a calibration says: numbers for JSON, tables, figures, files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from pydrake.common.yaml import yaml_dump_typed
+from rich.table import Table
+
+from cdpr_drake.analyses.calibration.calibrated_robots import calibrated_robot
+from cdpr_drake.analyses.calibration.calibration_task import Calibration
+from cdpr_drake.analyses.calibration.fit_verdict import MISFIT_FACTOR
+from cdpr_drake.analyses.reporting.log_files import finite, write_json, write_whole
+from cdpr_drake.analyses.reporting.provenance import package_versions
+from cdpr_drake.analyses.reporting.statements import new_table
+from cdpr_drake.analyses.visualization.figure_style import bar_style, new_figure
+from cdpr_drake.calibration.parameters import GROUPS
+from cdpr_drake.calibration.result import Outlier
+from cdpr_drake.geometry.poses import pose_row
+from cdpr_drake.palette import nth_look
+
+ROBOT, RESULTS = "robot.yaml", "results.json"
+"""Files of a results folder: the robot as it is believed now, and all numbers."""
+
+SIGNED = 0.2
+"""Negative correlations that are larger bear a sign in the figure."""
+
+MOST_OUTLIERS = 10
+"""Outliers that the terminal names; results.json has all."""
+
+
+def calibration_dict(
+    calibration: Calibration, more: Mapping[str, Any] | None = None
+) -> dict[str, Any]:
+    """Everything for JSON, and more that belongs to it."""
+    result, task = calibration.result, calibration.task
+    model = result.model
+    _, left = calibrated_robot(task.robot, result, calibration.mount)
+    return {
+        "robot": task.robot.name,
+        "log": str(calibration.log.path),
+        "status": result.status,
+        "misfit": list(calibration.misfit),
+        "misfit_factor": MISFIT_FACTOR,
+        "robust_cost": finite(result.robust_cost),
+        "largest_residuals": [residual_row(one) for one in result.largest],
+        "ties": [
+            {
+                "row": tie.pose + 1,
+                "X_WP": pose_row(tie.X_WP).tolist(),
+                "distance_m": tie.distance,
+                "angle_rad": tie.angle,
+                "cost_more": tie.more,
+            }
+            for tie in calibration.ties
+        ],
+        "unknown": list(task.unknown),
+        "priors": dict(task.priors),
+        "sigmas": vars(task.sigmas),
+        "poses": calibration.log.count,
+        "chi_square": finite(result.chi_square),
+        "degrees_of_freedom": result.degrees,
+        "residuals_over_sigma": finite(result.spread()),
+        "residuals": {
+            kind: {
+                "count": fit.count,
+                "rms_sigmas": fit.rms,
+                "largest_sigmas": fit.largest,
+                "dropped": fit.dropped,
+            }
+            for kind, fit in result.residuals.items()
+        },
+        "gauge": list(result.gauge),
+        "frames_hardly_told": list(result.loose),
+        "known_from_priors_alone": list(result.prior_only),
+        "parameters": [
+            {"name": name, "unit": unit, "change": float(value), "std": finite(float(std))}
+            for name, unit, value, std in zip(
+                result.names, result.units, result.values, result.std, strict=True
+            )
+        ],
+        "length_offsets_m": model.length_offset.tolist(),
+        "length_scales": model.length_scale.tolist(),
+        "swivel_offsets_rad": model.swivel_offset.tolist(),
+        "tracker_X_WK": pose_row(model.X_WK).tolist(),
+        "marker_X_PM": pose_row(model.X_PM).tolist(),
+        "camera_X_PC": pose_row(model.X_PC).tolist(),
+        "tags_X_WT": {str(tag): pose_row(X).tolist() for tag, X in model.tags.items()},
+        "poses_X_WP": [pose_row(X).tolist() for X in result.stations.poses()],
+        "covariance": result.covariance.tolist(),
+        "correlation": result.correlation.tolist(),
+        "outliers": [
+            {"pose": one.pose, "what": one.what, "residual": one.residual, "sigmas": one.sigmas}
+            for one in result.outliers
+        ],
+        "remarks": [*calibration.remarks, *left],
+        "steps": result.steps,
+        "seconds": result.seconds,
+        "versions": package_versions(),
+        **(more or {}),
+    }
+
+
+def residual_row(one: Outlier) -> dict[str, Any]:
+    """A measurement that does not fit, for JSON; rows count from 1."""
+    return {
+        "row": one.pose + 1, "measurement": one.what, "residual": one.residual, "unit": one.unit,
+        "sigmas": one.sigmas,
+    }  # fmt: skip
+
+
+def calibration_tables(calibration: Calibration) -> list[Table]:
+    """Tables for the terminal: fit, parameters by group, what cannot be told, outliers."""
+    result = calibration.result
+    fit = new_table(
+        f"{calibration.task.robot.name}: {result.status}, {calibration.log.count} poses, residuals "
+        f"{result.spread():.2f} sigmas",
+        ("measured",),
+        ("numbers", "rms [sigmas]", "largest [sigmas]", "dropped"),
+    )
+    for kind, one in result.residuals.items():
+        fit.add_row(kind, str(one.count), f"{one.rms:.2f}", f"{one.largest:.2f}", str(one.dropped))
+    tables = [fit]
+    if calibration.misfit:
+        tables.append(_misfit_table(calibration))
+    groups = new_table(
+        "Parameters", ("group", "unit"), ("change, rms", "std, median", "std, largest")
+    )
+    for group, unit, values, std in grouped(calibration):
+        groups.add_row(
+            group, unit, f"{np.sqrt(np.mean(values**2)):.3g}", f"{np.median(std):.2g}",
+            f"{np.max(std):.2g}",
+        )  # fmt: skip
+    tables.append(groups)
+    said = [("frames are not told", words) for words in result.gauge]
+    said += [("frames are hardly told", words) for words in result.loose]
+    said += [("from the prior alone", words) for words in result.prior_only]
+    said += [("remark", words) for words in calibration_dict(calibration)["remarks"]]
+    if said:
+        notes = new_table("To know", ("what", "which"), ())
+        for what, words in said:
+            notes.add_row(what, words)
+        tables.append(notes)
+    if result.outliers:
+        title = f"Outliers, {len(result.outliers)}, which did not count"
+        outliers = new_table(title, ("row", "measurement"), ("off by", "sigmas"))
+        for out in result.outliers[:MOST_OUTLIERS]:
+            outliers.add_row(
+                str(out.pose + 1), out.what, f"{out.residual:.4g} {out.unit}", f"{out.sigmas:.3g}"
+            )
+        tables.append(outliers)
+    if calibration.ties:
+        title = f"Other poses of rows that fit as well, {len(calibration.ties)}"
+        ties = new_table(title, ("row",), ("away [mm]", "turned [deg]", "cost more"))
+        for tie in calibration.ties[:MOST_OUTLIERS]:
+            ties.add_row(
+                str(tie.pose + 1), f"{1e3 * tie.distance:.3g}", f"{np.degrees(tie.angle):.3g}",
+                f"{tie.more:.2g}",
+            )  # fmt: skip
+        tables.append(ties)
+    return tables
+
+
+def _misfit_table(calibration: Calibration) -> Table:
+    """Why it is no fit, and the largest residuals."""
+    title = "Does not fit: " + "; ".join(calibration.misfit[:-1])
+    table = new_table(title, ("row", "measurement"), ("off by", "sigmas"))
+    for one in calibration.result.largest:
+        table.add_row(
+            str(one.pose + 1), one.what, f"{one.residual:.4g} {one.unit}", f"{one.sigmas:.3g}"
+        )
+    return table
+
+
+def grouped(calibration: Calibration) -> list[tuple[str, str, np.ndarray, np.ndarray]]:
+    """Group, unit, changes and standard deviations of the unknown parameters."""
+    result = calibration.result
+    rows = []
+    for key, group in GROUPS.items():
+        for unit in dict.fromkeys(group.units):
+            mine = [
+                k
+                for k, name in enumerate(result.names)
+                if group.single in name.split(".") and result.units[k] == unit
+                and (group.owner == "tag") == name.startswith("tag")
+            ]  # fmt: skip
+            if mine:
+                rows.append((key, unit, result.values[mine], result.std[mine]))
+    return rows
+
+
+def calibration_drawings(calibration: Calibration) -> dict[str, Callable[[], Figure]]:
+    """What draws the figures, by name: how measurements fit and what was found; correlations."""
+    return {
+        "calibration": partial(_fit_figure, calibration),
+        "correlation": partial(_correlation_figure, calibration),
+    }
+
+
+def _fit_figure(calibration: Calibration) -> Figure:
+    """Residuals over sigma by kind, and changes beside standard deviations."""
+    result = calibration.result
+    name = f"Calibration of {calibration.task.robot.name}"
+    title = f"{name}: does not fit what was measured" if calibration.misfit else name
+    figure, axes = new_figure(1, 2, (13.0, 5.0), title)
+    kinds = [kind for kind, fit in result.residuals.items() if fit.count + fit.dropped]
+    places = np.arange(len(kinds))
+    for offset, what, k in ((-0.2, "rms", 0), (0.2, "largest", 1)):
+        heights = [getattr(result.residuals[kind], what) for kind in kinds]
+        axes[0].bar(places + offset, heights, 0.4, label=what, **bar_style(nth_look(k)))
+    axes[0].axhline(1.0, color="#202020", linestyle="--", linewidth=1.0)
+    labels = [
+        f"{kind}\n{fit.dropped} of {fit.count + fit.dropped} dropped" if fit.dropped else kind
+        for kind, fit in result.residuals.items()
+        if kind in kinds
+    ]
+    axes[0].set_xticks(places, labels)
+    axes[0].set(ylabel="residual over its sigma [-]", title="how measurements fit")
+    axes[0].legend()
+    groups = grouped(calibration)
+    places = np.arange(len(groups))
+    for offset, label, k in ((-0.2, "change, rms", 2), (0.2, "standard deviation, median", 3)):
+        heights = [
+            np.sqrt(np.mean(values**2)) if k == 2 else np.median(std)
+            for _, _, values, std in groups
+        ]
+        shown = np.where(np.isfinite(heights) & (np.array(heights) > 0.0), heights, np.nan)
+        axes[1].bar(places + offset, shown, 0.4, label=label, **bar_style(nth_look(k)))
+    axes[1].set_yscale("log")
+    low, high = axes[1].get_ylim()  # whole decades, so that a bar's height says something
+    axes[1].set_ylim(10.0 ** np.floor(np.log10(low)), 10.0 ** np.ceil(np.log10(high)))
+    names = [f"{group.replace('_', ' ')} [{unit}]" for group, unit, _, _ in groups]
+    axes[1].set_xticks(places, names, rotation=25, ha="right")
+    axes[1].set(title="what was found", ylabel="in the unit that is named below")
+    axes[1].legend()
+    return figure
+
+
+def _correlation_figure(calibration: Calibration) -> Figure:
+    result = calibration.result
+    size = max(5.0, min(14.0, 0.09 * len(result.names) + 3.0))
+    matrix, plane = new_figure(1, 1, (size + 1.0, size), "Correlation of the unknown parameters")
+    shown = plane.imshow(result.correlation, cmap="PuOr", vmin=-1.0, vmax=1.0)
+    plane.grid(False)
+    # In grey both signs look alike: negative ones bear their sign.
+    rows, columns = np.nonzero(result.correlation < -SIGNED)
+    plane.scatter(columns, rows, marker="_", color="black", s=20, linewidths=1.0)
+    every = max(1, len(result.names) // 40)
+    ticks = np.arange(0, len(result.names), every)
+    plane.set_xticks(ticks, [result.names[k] for k in ticks], rotation=90, fontsize=7)
+    plane.set_yticks(ticks, [result.names[k] for k in ticks], fontsize=7)
+    matrix.colorbar(shown, ax=plane, label="correlation [-], - where it is negative", shrink=0.8)
+    return matrix
+
+
+def write_calibration(
+    calibration: Calibration, folder: Path, more: Mapping[str, Any] | None = None
+) -> None:
+    """Writes `results.json`, with more numbers, and `robot.yaml` into a folder."""
+    write_json(folder / RESULTS, calibration_dict(calibration, more))
+    robot, _ = calibrated_robot(calibration.task.robot, calibration.result, calibration.mount)
+    write_whole(folder / ROBOT, yaml_dump_typed(robot))

@@ -1,0 +1,232 @@
+"""What is asked of a log, and the log and the robot checked against it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
+
+import numpy as np
+from pydrake.math import RigidTransform
+
+from cdpr_drake.analyses.calibration.calibrated_robots import calibration_model, find_mount
+from cdpr_drake.analyses.calibration.log_file import CalibrationLog
+from cdpr_drake.arrays import Array
+from cdpr_drake.calibration.guesses import with_tags
+from cdpr_drake.calibration.parameters import CalibrationModel, parameter_layout
+from cdpr_drake.calibration.program import first_readings
+from cdpr_drake.calibration.stations import Point, Stations
+from cdpr_drake.errors import CalibrationError
+from cdpr_drake.models.camera_catalogue import load_camera
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.vision.apriltags import TagTarget
+from cdpr_drake.vision.pinhole import Pinhole
+from cdpr_drake.vision.target import PointTarget
+
+
+class TagPlace(NamedTuple):
+    """What is known of a tag beforehand.
+
+    Attributes:
+        size: Its edge [m].
+        X_WT: Where it is [m]; None: nothing is known.
+        sigma_place: Standard deviation of each coordinate of that [m]; 0: it is exact.
+        sigma_turn: Of its turn about each axis [rad].
+    """
+
+    size: float
+    X_WT: RigidTransform | None = None
+    sigma_place: float = 0.0
+    sigma_turn: float = 0.0
+
+
+TagPlaces = dict[int, TagPlace]
+
+
+@dataclass(frozen=True)
+class Sigmas:
+    """Standard deviations of what is measured.
+
+    Attributes:
+        lengths: Of a cable's length [m].
+        lengths_share: Of it, besides, over the length [-].
+        place: Of a coordinate of a tracked position [m].
+        turn: Of a tracked rotation about each axis [rad].
+        corners: Of a coordinate of a corner [px].
+        tensions: Of a tension [N].
+        tensions_share: Of it, besides, over the tension [-].
+        swivels: Of a swivel angle [rad].
+        tilt: Of roll and pitch by an inclinometer or IMU [rad].
+        yaw: Of yaw by an IMU [rad].
+        moments: What moments may miss of the balance at rest [N m].
+        forces: What forces may miss of it [N].
+    """
+
+    lengths: float = 1e-3
+    lengths_share: float = 0.0
+    place: float = 1e-3
+    turn: float = 2e-3
+    corners: float = 0.2
+    tensions: float = 1.0
+    tensions_share: float = 0.0
+    swivels: float = 2e-3
+    tilt: float = 5e-3
+    yaw: float = 2e-2
+    moments: float = 0.05
+    forces: float = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class CalibrationTask:
+    """What is asked of a log.
+
+    Attributes:
+        robot: The robot as it is believed.
+        unknown: Groups and names of parameters; the poses of tags whose place is unknown or has a
+            deviation, and zeros of swivel angles, are unknown in any case.
+        priors: Standard deviations by group or name, in their units.
+        sigmas: Of what was measured.
+        tags: What is known of tags, by their numbers.
+        mount: The camera's mounting; None: the first on the platform.
+        image_size: Width and height [px]; None: those of the camera's data sheet.
+        start: Pose where the platform is believed to have been in the first row; None: home.
+        rest: Whether the platform rested in all rows; None: where tensions or swivel angles, and
+            neither tracker nor tags, were measured.
+        outliers: Whether outliers are sought.
+    """
+
+    robot: Robot
+    unknown: tuple[str, ...]
+    priors: dict[str, float] = field(default_factory=dict)
+    sigmas: Sigmas = field(default_factory=Sigmas)
+    tags: TagPlaces = field(default_factory=dict)
+    mount: str | None = None
+    image_size: tuple[int, int] | None = None
+    start: RigidTransform | None = None
+    rest: bool | None = None
+    outliers: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """A log and a task, checked.
+
+    Attributes:
+        task, log: What was asked of what.
+        model: The robot as it is believed, with the tags whose place is known.
+        lengths, sigma: Readings of winches and their deviations, shape (k, m) [m]; or None.
+        first: Where the platform is believed to have been in the first row, X_WP [m].
+        rest: Whether it rested in all rows.
+        mount, pinhole: The camera's mounting, and the camera, if there are images.
+        targets: The tags that are seen.
+        unknown: Groups and names of all that is unknown.
+        priors: Standard deviations by group or name, those of tags included.
+        tracked: Poses X_WP as the tracker tells them by the model; None where it has none, or
+            while nothing is known of its frame or marker.
+    """
+
+    task: CalibrationTask
+    log: CalibrationLog
+    model: CalibrationModel
+    lengths: Array | None
+    sigma: Array | None
+    first: RigidTransform
+    rest: bool
+    mount: str | None
+    pinhole: Pinhole | None
+    targets: dict[int, PointTarget]
+    unknown: tuple[str, ...]
+    priors: dict[str, float]
+    tracked: list[RigidTransform | None] | None
+
+    def unknown_of_robot(self) -> list[str]:
+        """Names of what is unknown but tags, which the model may not have yet."""
+        return [name for name in self.unknown if not name.startswith("tag")]
+
+
+def prepare(task: CalibrationTask, log: CalibrationLog) -> Prepared:
+    """Checks a log and a task.
+
+    Raises:
+        CalibrationError: The log does not hold what is asked; names it.
+    """
+    robot, sigmas = task.robot, task.sigmas
+    lengths = log.lengths
+    if lengths is None and log.angles is not None:
+        lengths = robot.drum().paid_out(log.angles)
+    if lengths is None and log.swivels is None:
+        raise CalibrationError(
+            f"{log.path}: cable lengths: found none; accepted: columns such as C1_length_m, or "
+            "motor angles such as C1_motor_angle_rad"
+        )
+    mount, pinhole = None, None
+    targets: dict[int, PointTarget] = {}
+    if log.corners:
+        mount = task.mount or next((m.name for m in robot.cameras if m.parent == "platform"), None)
+        if mount is None:
+            raise CalibrationError(f"mount: found none on the platform of {robot.name}")
+        camera = load_camera(find_mount(robot, mount).model)
+        width, height = task.image_size or (camera.width, camera.height)
+        pinhole = camera.pinhole(width, height)
+        _check_images(log, width, height)
+        missing = [str(tag) for tag in log.corners if tag not in task.tags]
+        if missing:
+            raise CalibrationError(
+                f"tags: found no size of tag {', '.join(missing)}, which {log.path} shows; "
+                "accepted: --tag-size, or --tags with a row for each"
+            )
+        targets = {tag: TagTarget(tag, task.tags[tag].size) for tag in log.corners}
+    model = calibration_model(robot, mount)
+    unknown = list(task.unknown)
+    places = {tag: task.tags[tag] for tag in targets}
+    known = {tag: place.X_WT for tag, place in places.items() if place.X_WT is not None}
+    priors, measured = dict(task.priors), set()
+    for tag, place in places.items():
+        if tag in known and place.sigma_place > 0.0:
+            measured.add(tag)
+            priors[f"tag{tag}.pose.[xyz]"] = place.sigma_place
+            priors[f"tag{tag}.pose.r?"] = place.sigma_turn
+    sure = set(known) - measured
+    unknown += [f"tag{tag}.*" for tag in places if tag not in sure and "tags" not in unknown]
+    if log.swivels is not None and "swivel_offsets" not in unknown:
+        unknown.append("swivel_offsets")
+    blind = log.poses is None and not targets
+    rest = task.rest
+    if rest is None:
+        rest = blind and (log.tensions is not None or log.swivels is not None)
+    first = task.start or robot.home.transform()
+    made = Prepared(
+        task, log, with_tags(model, known), lengths, None, first, rest, mount, pinhole, targets,
+        tuple(unknown), priors, None if log.poses is None else list(log.poses),
+    )  # fmt: skip
+    if unknown_frames(made):
+        made = replace(made, tracked=None)
+    seed = next((X for X in made.tracked or () if X is not None), first)
+    if lengths is None:
+        return made
+    # Readings may count from anything: lengths are those at the first pose and what came since.
+    whole = Point(model, Stations.at([seed])).numbers[0, :, 0]
+    whole = np.abs(whole + lengths - first_readings(lengths))
+    return replace(made, sigma=np.hypot(sigmas.lengths, sigmas.lengths_share * whole))
+
+
+def unknown_frames(prepared: Prepared) -> tuple[str, ...]:
+    """Which of a tracker's frame and marker are unknown without any prior."""
+    layout = parameter_layout(prepared.model)
+    free = layout.select(prepared.unknown_of_robot())
+    known = layout.select([n for n in prepared.task.priors if not n.startswith("tag")])
+    open_now = free & ~known
+    return tuple(key for key in ("tracker", "marker") if open_now[layout.slices[key]].any())
+
+
+def _check_images(log: CalibrationLog, width: int, height: int) -> None:
+    for tag, uv in log.corners.items():
+        outside = (
+            (uv[..., 0] > width - 0.5) | (uv[..., 1] > height - 0.5) | np.any(uv < -0.5, axis=-1)
+        )
+        if np.any(outside):
+            k = int(np.argmax(np.any(outside, axis=1)))
+            u, v = uv[k][outside[k]][0]
+            raise CalibrationError(
+                f"{log.path}: row {k + 1}: tag {tag}: found a corner at ({u:g}, {v:g}) px; "
+                f"accepted: within the image of {width} x {height} px, see --image-size"
+            )

@@ -1,0 +1,171 @@
+"""From a log that was checked to programs, one for each place where the platform may have begun."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from pydrake.math import RigidTransform
+
+from cdpr_drake.analyses.calibration.calibration_request import Prepared
+from cdpr_drake.arrays import Array
+from cdpr_drake.calibration.guesses import guessed_tags, poses_by_tags, with_tags
+from cdpr_drake.calibration.parameters import CalibrationModel
+from cdpr_drake.calibration.pose_search import guessed_from
+from cdpr_drake.calibration.program import CalibrationProgram, first_readings
+from cdpr_drake.calibration.stations import Point, Stations
+from cdpr_drake.errors import CdprError
+from cdpr_drake.models.robot_statics import tension_problem
+from cdpr_drake.tensions.methods import distribute
+
+
+@dataclass(frozen=True, eq=False)
+class Begun:
+    """Where a search begins.
+
+    Attributes:
+        model: The model with guesses of what readings count from.
+        poses: Guesses of the poses X_WP [m].
+    """
+
+    model: CalibrationModel
+    poses: list[RigidTransform]
+
+
+def begun_from(prepared: Prepared, firsts: Sequence[RigidTransform]) -> list[Begun]:
+    """Guesses of what readings count from, and of the poses that follow, for each first pose.
+
+    Where all poses are tracked, those; else one after the other from the first.
+
+    Raises:
+        CalibrationError: A start is impossible.
+    """
+    log, robot, tracked = prepared.log, prepared.task.robot, prepared.tracked
+    seen = next((X for X in tracked or () if X is not None), None)
+    seeds = list(firsts) if seen is None else [seen] * len(firsts)
+    counting = [_counting(prepared, seed) for seed in seeds]
+    models = [model for model, _ in counting]
+    if tracked is not None and all(X is not None for X in tracked):
+        known = [X for X in tracked if X is not None]
+        return [Begun(model, known) for model in models]
+    count, planar, m = log.count, robot.is_planar(), prepared.model.cables.count
+    # Balance is hard to follow from afar; it is asked where lengths and the like are too few.
+    told = m * ((prepared.lengths is not None) + (log.swivels is not None))
+    rest = prepared.rest and told < (3 if planar else 6)
+    tensions = None
+    if rest:
+        tensions = np.array([guessed_tensions(prepared, [seed] * count) for seed in seeds])
+    first = None if tensions is None else tensions[0]
+    trial = CalibrationProgram(models[0], [seeds[0]] * count, (), planar)
+    add_winches(prepared, trial, first)
+    found = guessed_from(
+        models, trial.terms, seeds, count=count, tensions=tensions, planar=planar,
+        sure=not counting[0][1],
+    )  # fmt: skip
+    return [Begun(model, stations.poses()) for model, stations in zip(models, found, strict=True)]
+
+
+def _counting(prepared: Prepared, seed: RigidTransform) -> tuple[CalibrationModel, bool]:
+    """The model with guesses of what readings count from, and whether lengths are unsure by it."""
+    task, log, model = prepared.task, prepared.log, prepared.model
+    asked = CalibrationProgram(model, [seed], (), task.robot.is_planar())
+    free = asked.layout.select(prepared.unknown_of_robot())
+    offsets = free[asked.layout.slices["length_offsets"]]
+    unsure = bool(offsets.any()) and "length_offsets" not in task.priors
+    at = Point(model, Stations.at([seed])).numbers[0]
+    if prepared.lengths is not None and unsure:
+        # Where winches began to count is not known: as if that had been at the first pose.
+        guess = np.where(offsets, at[:, 0] - first_readings(prepared.lengths), 0.0)
+        model = replace(model, length_offset=guess)
+    if log.swivels is not None:
+        model = replace(model, swivel_offset=at[:, 2] - first_readings(log.swivels))
+    return model, unsure
+
+
+def add_winches(prepared: Prepared, program: CalibrationProgram, tensions: Array | None) -> None:
+    """Adds what robots measure of themselves.
+
+    Args:
+        prepared: The log.
+        program: Gets it.
+        tensions: Guesses, shape (k, m) [N]; None where balance is left out.
+    """
+    task, log, robot = prepared.task, prepared.log, prepared.task.robot
+    sigmas = task.sigmas
+    if prepared.lengths is not None and prepared.sigma is not None:
+        strain = None
+        if log.tensions is not None:
+            strain = np.nan_to_num(log.tensions) / robot.stiffness()
+        start = first_readings(prepared.lengths)
+        program.AddLengths(prepared.lengths, prepared.sigma, start, strain)
+    if log.swivels is not None:
+        program.AddSwivels(log.swivels, sigmas.swivels)
+    if log.tilts is not None:
+        program.AddTilts(log.tilts, sigmas.tilt, sigmas.yaw)
+    if tensions is not None:
+        weight = robot.platform.mass * robot.gravity_vector()
+        com = robot.center_of_mass()
+        program.AddRest(weight, com, sigmas.moments, sigmas.forces, tensions)
+        if log.tensions is not None:
+            share = sigmas.tensions_share * np.nan_to_num(np.abs(log.tensions))
+            program.AddTensions(log.tensions, np.hypot(sigmas.tensions, share))
+
+
+def guessed_tensions(prepared: Prepared, poses: Sequence[RigidTransform]) -> Array:
+    """Tensions where they were measured, else those that hold the platform nearly, (k, m) [N]."""
+    robot, log = prepared.task.robot, prepared.log
+    count, m = len(poses), prepared.model.cables.count
+    share = robot.platform.mass * robot.gravity / m
+    guess = np.full((count, m), share)
+    held: Array | None = None
+    for k, X_WP in enumerate(poses):
+        if k == 0 or X_WP is not poses[k - 1]:
+            held = _held(prepared, X_WP)
+        if held is not None:
+            guess[k] = np.maximum(held, 0.01 * share)
+    if log.tensions is not None:
+        guess = np.where(np.isfinite(log.tensions), log.tensions, guess)
+    return guess
+
+
+def _held(prepared: Prepared, X_WP: RigidTransform) -> Array | None:
+    """Tensions that hold the platform; None outside of the frame, or where it is singular."""
+    try:
+        problem = tension_problem(prepared.task.robot, X_WP)
+        found = distribute(problem, "quadratic_program").tensions
+    except CdprError:
+        return None
+    return np.asarray(found, float) if np.isfinite(found).all() else None
+
+
+def program_from(prepared: Prepared, begun: Begun) -> CalibrationProgram:
+    """The program, with poses and tags guessed from where a search begins."""
+    task, log, poses = prepared.task, prepared.log, prepared.tracked
+    sigmas, planar = task.sigmas, task.robot.is_planar()
+    model, at_rows = begun.model, begun.poses
+    if poses is not None:
+        at_rows = [g if X is None else X for g, X in zip(at_rows, poses, strict=True)]
+    if prepared.targets:
+        assert prepared.pinhole is not None
+        missing = {t: T for t, T in prepared.targets.items() if t not in model.tags}
+        if missing:
+            uv = np.stack([log.corners[tag] for tag in missing], axis=1)
+            model = with_tags(model, guessed_tags(model, at_rows, missing, uv, prepared.pinhole))
+        if poses is None:
+            targets = {tag: prepared.targets[tag] for tag in log.corners}
+            uv = np.stack([log.corners[tag] for tag in targets], axis=1)
+            at_rows = poses_by_tags(model, at_rows, targets, uv, prepared.pinhole)
+    program = CalibrationProgram(model, at_rows, prepared.unknown, planar)
+    add_winches(prepared, program, guessed_tensions(prepared, at_rows) if prepared.rest else None)
+    if log.poses is not None:
+        program.AddTrackedPoses(log.poses, sigmas.turn, sigmas.place)
+    if prepared.targets:
+        assert prepared.pinhole is not None
+        order = [tag for tag in model.tags if tag in prepared.targets]
+        uv = np.stack([log.corners[tag] for tag in order], axis=1)
+        points = {tag: prepared.targets[tag].points for tag in order}
+        program.AddTagCorners(points, uv, sigmas.corners, prepared.pinhole)
+    for name, std in prepared.priors.items():
+        program.AddPrior([name], std)
+    return program

@@ -1,0 +1,111 @@
+"""Whether what was found fits what was measured, and what of the log nothing was made of."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+from cdpr_drake.analyses.calibration.calibration_request import Prepared
+from cdpr_drake.analyses.calibration.columns import (
+    ANGLES,
+    QUATERNION,
+    RPY,
+    TAIT,
+    TENSIONS,
+    TIME,
+    TORQUES,
+    TURN,
+)
+from cdpr_drake.calibration.result import CalibrationResult
+
+MISFIT = "misfit"
+"""Status of a result that does not fit what was measured."""
+
+MISFIT_FACTOR = 3.0
+"""Residuals of so many sigmas, root mean square, are no fit."""
+
+MOST_DROPPED = 1.0 / 3.0
+"""A kind of measurement of which a larger share does not fit is not what it is taken for."""
+
+FEWEST_DROPPED = 3
+"""So many have to be dropped for that."""
+
+MOST_OF_ONE, FEWEST_OF_ONE = 0.5, 4
+"""One sensor of which a larger share does not fit, of so many readings at least, is remarked."""
+
+MOST_OUTLYING = 0.1
+"""Outliers are many where they are a larger share of what was measured beyond what is unknown."""
+
+HINTS = {
+    "lengths": "sign, unit or zero?",
+    "swivel angles": "sign or zero?",
+    "tensions": "sign or unit?",
+    "inclination": "sign, unit or axes?",
+    "tracked poses": "frame, unit or clock?",
+    "tag corners": "order of corners, or the tag's size?",
+    "equilibrium": "did the platform rest, and is its mass right?",
+}
+"""What to look at first where measurements of a kind do not fit."""
+
+
+def misfits(result: CalibrationResult) -> tuple[str, ...]:
+    """Why a result does not fit what was measured, in words; empty where it does."""
+    why = []
+    if result.degrees > 0 and result.spread() > MISFIT_FACTOR:
+        why.append(
+            f"residuals are {result.spread():.3g} sigmas, root mean square; accepted: at most "
+            f"{MISFIT_FACTOR:g}"
+        )
+    for kind, fit in result.residuals.items():
+        whole = fit.count + fit.dropped
+        if fit.dropped >= FEWEST_DROPPED and fit.dropped > MOST_DROPPED * whole:
+            why.append(f"{fit.dropped} of {whole} {kind} do not fit: {HINTS.get(kind, '')}")
+    if why:
+        worst = result.largest[0]
+        why.append(
+            f"largest: row {worst.pose + 1}, {worst.what}, off by {worst.residual:.4g} "
+            f"{worst.unit}, {abs(worst.sigmas):.3g} sigmas"
+        )
+    return tuple(why)
+
+
+def bad_sensors(result: CalibrationResult) -> tuple[str, ...]:
+    """Single sensors most of whose readings do not fit, in words."""
+    dropped = Counter((one.kind, one.what) for one in result.outliers)
+    return tuple(
+        f"{count} of {result.readings[what]} readings of {what} do not fit: {HINTS.get(kind, '')}"
+        for (kind, what), count in dropped.items()
+        if result.readings[what] >= FEWEST_OF_ONE and count > MOST_OF_ONE * result.readings[what]
+    )
+
+
+def doubts(result: CalibrationResult, minima: int) -> tuple[str, ...]:
+    """That another minimum may fit better, in words: more outliers than a right one has."""
+    count = len(result.outliers)
+    if result.degrees <= 0 or count <= MOST_OUTLYING * result.degrees:
+        return ()
+    ends = f"; starts ended in {minima} minima, of which this is the best" if minima > 1 else ""
+    return (
+        f"{count} outliers beside {result.degrees} degrees of freedom are many: another minimum "
+        f"may fit better, from a --start nearer to the truth{ends}",
+    )
+
+
+def unused_columns(prepared: Prepared) -> tuple[str, ...]:
+    """Columns of the log that were read and of which nothing was made, in words."""
+    log, headers = prepared.log, prepared.log.headers
+    rotations = [kind for kind in (QUATERNION, TAIT, TURN, RPY) if kind in headers]
+    first = rotations if log.poses is not None else sorted(rotations, key=lambda k: k != RPY)
+    why = {TORQUES: "a calibration has no use of motor torques"}
+    for kind in first[1:]:
+        why[kind] = f"{headers[first[0]][0]} and the like tell the rotation"
+    if log.lengths is not None:
+        why[ANGLES] = "there are cable lengths"
+    if log.poses is None or prepared.lengths is None:
+        why[TIME] = "without a tracker and lengths no clock is checked"
+    if not prepared.rest:
+        why[TENSIONS] = "the platform is not taken to rest, see --rest; strain of cables alone"
+    return tuple(
+        f"not used: {', '.join(headers[kind])}: {words}"
+        for kind, words in why.items()
+        if kind in headers
+    )

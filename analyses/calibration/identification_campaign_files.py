@@ -1,0 +1,124 @@
+"""What a campaign leaves: logs, robots, the excitation as a scenario, a table and a figure."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from pydrake.common.yaml import yaml_dump_typed
+from rich.table import Table
+
+from cdpr_drake.analyses.calibration.identification_campaign import DynamicCampaign
+from cdpr_drake.analyses.calibration.identification_report import (
+    ROBOT,
+    identification_drawings,
+    write_identification,
+)
+from cdpr_drake.analyses.reporting.exported_logs import write_columns
+from cdpr_drake.analyses.reporting.log_files import column_names, write_scenario, write_whole
+from cdpr_drake.analyses.reporting.provenance import BELIEVED_FILE
+from cdpr_drake.analyses.reporting.statements import new_table
+from cdpr_drake.analyses.visualization.figure_style import bar_style, new_figure
+from cdpr_drake.geometry.poses import angles_from_rotation
+from cdpr_drake.models.robot_schema import Pose
+from cdpr_drake.palette import nth_look
+from cdpr_drake.systems.scenarios.tension_control_scenario import Stretch, TensionScenario
+from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
+
+TRUE_FILE = "true_robot.yaml"
+"""The robot as it is, in a campaign's folder."""
+
+
+def write_dynamic_campaign(campaign: DynamicCampaign, folder: Path) -> None:
+    """Writes what `write_identification` does, and logs, robots and scenario.
+
+    `excitation.csv` and `validation.csv` are logs as `cdpr identify` reads them;
+    `scenario.yaml` has the true robot follow the excitation, believed to be the one that was found.
+    """
+    write_identification(campaign.identification, folder, campaign.as_dict(), campaign.truth)
+    for name, robot in ((TRUE_FILE, campaign.true), (BELIEVED_FILE, campaign.believed)):
+        write_whole(folder / name, yaml_dump_typed(robot))
+    names = [cable.name for cable in campaign.true.cables]
+    for name, log in campaign.logs.items():
+        table = np.column_stack(list(log.values()))
+        columns = dict(zip(column_names(log, names), table.T, strict=True))
+        write_columns(folder / f"{name}.csv", columns)
+    write_scenario(folder / "scenario.yaml", excitation_scenario(campaign))
+
+
+def campaign_drawings(campaign: DynamicCampaign) -> dict[str, Callable[[], Figure]]:
+    """What draws the figures, by name: those of `identification_drawings`, and tracking."""
+    drawings = identification_drawings(campaign.identification, campaign.truth)
+    return {**drawings, "tracking": partial(tracking_figure, campaign)}
+
+
+def excitation_scenario(campaign: DynamicCampaign) -> TensionScenario:
+    """The excitation as a scenario of the true robot, which is believed to be what was found."""
+    motion = campaign.excitation.trajectory
+    own = campaign.scenario
+    return replace(
+        own, name="excitation", title=f"Excitation for the robot of {own.name}",
+        robot=TRUE_FILE, duration=motion.end_time + 0.2,
+        trajectory=_settings(own, motion),
+        perturbations=replace(own.perturbations, believed_robot=ROBOT),
+    )  # fmt: skip
+
+
+def _settings(scenario: TensionScenario, motion: PoseTrajectory) -> Any:
+    """A motion through poses as the section of a scenario."""
+    poses = [
+        Pose(
+            position=np.array(X.translation()),
+            angles_deg=np.degrees(angles_from_rotation(X.rotation())),
+        )
+        for X in motion.poses
+    ]
+    stretches = [
+        Stretch(pose=pose, duration=duration)
+        for pose, duration in zip(poses[1:], motion.durations, strict=True)
+    ]
+    return replace(
+        scenario.trajectory,
+        start=poses[0],
+        pause=motion.start_time,
+        stretches=stretches,
+        file=None,
+    )
+
+
+def tracking_table(campaign: DynamicCampaign) -> Table:
+    """How far the platform is from where it should be, by what is believed in."""
+    table = new_table(
+        f"Tracking of {campaign.scenario.name}, not fitted", ("robot believed in",),
+        ("largest [mm]", "mean [mm]", "largest [deg]", "mean [deg]"),
+    )  # fmt: skip
+    for who, row in campaign.tracking.items():
+        numbers = [1e3 * row["largest_m"], 1e3 * row["mean_m"]]
+        numbers += [float(np.degrees(row[f"{which}_rad"])) for which in ("largest", "mean")]
+        table.add_row(who, *(f"{value:.3f}" for value in numbers))
+    return table
+
+
+def tracking_figure(campaign: DynamicCampaign) -> Any:
+    """Mean and largest errors of tracking, by what is believed in."""
+    figure, axes = new_figure(
+        1, 2, (12.0, 5.0), f"Tracking of {campaign.scenario.name}, a motion that was not fitted"
+    )
+    whos = list(campaign.tracking)
+    places = np.arange(len(whos))
+    for ax, (key, scale, words) in zip(
+        axes, (("m", 1e3, "distance [mm]"), ("rad", 180.0 / np.pi, "angle [deg]")), strict=True
+    ):
+        for shift, which, k in ((-0.2, "mean", 0), (0.2, "largest", 1)):
+            heights = [scale * campaign.tracking[who][f"{which}_{key}"] for who in whos]
+            ax.bar(places + shift, heights, 0.4, label=which, **bar_style(nth_look(k)))
+        ax.set_yscale("log")
+        ax.set_xticks(places, whos)
+        ax.set(ylabel=words, xlabel="robot believed in")
+    axes[0].legend()
+    return figure

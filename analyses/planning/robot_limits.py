@@ -1,0 +1,138 @@
+"""A robot's limits as those of a motion, and the path that users ask for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.math import RigidTransform
+
+from cdpr_drake.errors import PlanningError, TensionProblemError
+from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.models.robot_statics import check_pose
+from cdpr_drake.planning.limits import MotionLimits
+from cdpr_drake.planning.path_task import PathTask
+from cdpr_drake.systems.controllers.computed_torque import platform_dynamics
+from cdpr_drake.trajectories.pose_path import PosePath, smooth_path, straight_path
+
+CORNERS = ("smooth", "blend", "rest")
+"""What a path does at its poses: a spline through them, straight lines with rounded corners, or
+straight lines with a rest in each corner."""
+
+RESERVE = 0.05
+"""Share of the limits that a plan leaves to the feedback that tracks it."""
+
+TOLERANCE = 5e-3
+"""How far rounded corners may pass from a pose, where nobody says [m]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LimitSettings:
+    """Limits beside those of the robot file; None: the robot's, or none where it has none.
+
+    Attributes:
+        tensions: Smallest and largest tension [N].
+        cable_speed: Largest speed of a cable; None: at the motor's rated speed [m/s].
+        cable_acceleration: Largest acceleration of a cable [m/s^2].
+        speed: Largest speed of Po [m/s].
+        reserve: Share of all limits that the plan leaves to feedback, see `MotionLimits.within`.
+    """
+
+    tensions: tuple[float, float] | None = None
+    cable_speed: float | None = None
+    cable_acceleration: float | None = None
+    speed: float | None = None
+    reserve: float = RESERVE
+
+
+def robot_limits(robot: Robot, given: LimitSettings) -> MotionLimits:
+    """The limits of a robot, without reserve.
+
+    Of the rated torque friction takes its largest part first: the static one, and the viscous one
+    at the largest cable speed. Layers of cable on the drum are left out: rho is that of the first.
+
+    Raises:
+        PlanningError: A limit is not accepted.
+    """
+    lower, upper = robot.tension_limits(given.tensions)
+    winch = robot.winch
+    radii = robot.drum().radii(len(robot.cables))
+    if robot.winch_groups().are_shared() or np.ptp(radii) > 0.0:
+        raise PlanningError(
+            f"robot {robot.name}: found several cables on a winch, or cables of several diameters "
+            "on their drums; accepted for a plan: a winch for each cable, all alike"
+        )
+    ratio = float(radii[0])
+    cable_speed = winch.rated_cable_speed() if given.cable_speed is None else given.cable_speed
+    torque = np.inf
+    if winch.motor_torque is not None:
+        torque = winch.motor_torque
+        if winch.friction is not None:
+            torque -= winch.friction.static + winch.friction.viscous * cable_speed / ratio
+        if torque <= 0.0:
+            raise PlanningError(
+                f"robot {robot.name}: winch.motor_torque: found {winch.motor_torque:g} N m, which "
+                "is less than the friction; accepted: more"
+            )
+    return MotionLimits(
+        lower=lower, upper=upper, cable_speed=cable_speed, torque=torque,
+        cable_acceleration=np.inf if given.cable_acceleration is None else given.cable_acceleration,
+        inertia=winch.inertia or 0.0, ratio=ratio,
+        speed=np.inf if given.speed is None else given.speed,
+    )  # fmt: skip
+
+
+def path_task(robot: Robot, given: LimitSettings, cables: CableSet | None = None) -> PathTask:
+    """A robot for planning, with its limits less the reserve.
+
+    Args:
+        robot: The robot.
+        given: Limits beside its own.
+        cables: Its cables; None: over its pulleys.
+
+    Raises:
+        PlanningError: A limit is not accepted, or there are too few cables.
+    """
+    weight = 0.0 if robot.is_planar() else robot.platform.mass * robot.gravity
+    limits = robot_limits(robot, given).within(given.reserve, weight)
+    cables = robot.cable_set() if cables is None else cables
+    names = [cable.name for cable in robot.cables]
+    return PathTask(cables, platform_dynamics(robot), limits, names)
+
+
+def length_scale(robot: Robot) -> float:
+    """By which turns count as lengths: root mean square distance of the anchor points [m]."""
+    squares = np.sum(robot.cable_set().p_PB ** 2, axis=0)
+    return float(np.sqrt(np.mean(squares))) or 1.0
+
+
+def make_path(
+    robot: Robot, poses: Sequence[RigidTransform], corners: str, tolerance: float = TOLERANCE
+) -> PosePath:
+    """The path of a robot through poses.
+
+    Args:
+        robot: The robot.
+        poses: X_WP, at least two [m].
+        corners: One of `CORNERS`.
+        tolerance: How far `blend` may pass from a corner, above 0 [m].
+
+    Raises:
+        PlanningError: The name or the tolerance is not accepted, or a pose lies outside the robot's
+            frame or is one that its platform cannot have.
+        TrajectoryError: The poses make no path.
+    """
+    if corners not in CORNERS:
+        raise PlanningError(f"corners: found {corners!r}; accepted: {', '.join(CORNERS)}")
+    if not (np.isfinite(tolerance) and tolerance > 0.0):
+        raise PlanningError(f"tolerance: found {tolerance:g}; accepted: above 0 [m]")
+    for number, X in enumerate(poses, 1):
+        try:
+            check_pose(robot, X)
+        except TensionProblemError as problem:
+            raise PlanningError(f"path: {number} of {len(poses)} poses: {problem}") from problem
+    if corners == "smooth":
+        return smooth_path(poses, length_scale(robot))
+    return straight_path(poses, length_scale(robot), tolerance if corners == "blend" else 0.0)

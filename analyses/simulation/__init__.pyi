@@ -1,0 +1,16 @@
+from .advance import advance as advance
+from .advance import ended as ended
+from .hardware_figures import motor_figure as motor_figure
+from .hardware_figures import reading_figure as reading_figure
+from .live_messages import send as send
+from .monte_carlo import run_many as run_many
+from .monte_carlo import with_seeds as with_seeds
+from .perception_figures import looking_figures as looking_figures
+from .run_stability import stability_along as stability_along
+from .run_summary import camera_path as camera_path
+from .run_summary import image_path as image_path
+from .run_summary import summarize as summarize
+from .scenario_kinds import SCENARIO_KINDS as SCENARIO_KINDS
+from .session import Connect as Connect
+from .stability_files import stability_figure as stability_figure
+from .visual_servo_run import run_scenario as run_scenario

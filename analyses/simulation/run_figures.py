@@ -1,0 +1,250 @@
+"""The figures of a run, as the servoing thesis draws them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from cdpr_drake.analyses.reporting.deferred_figures import Pictures
+from cdpr_drake.analyses.simulation.hardware_figures import (
+    motor_figure,
+    reading_figure,
+    tension_loop_figure,
+)
+from cdpr_drake.analyses.simulation.perception_figures import looking_figures
+from cdpr_drake.analyses.simulation.run_stability import stability_of_run
+from cdpr_drake.analyses.simulation.run_summary import camera_line, image_path
+from cdpr_drake.analyses.simulation.stability_files import stability_figure
+from cdpr_drake.analyses.simulation.visual_servo_run import RunResult
+from cdpr_drake.analyses.simulation.worlds import world_figure, world_words
+from cdpr_drake.analyses.visualization.cable_figures import cable_figure
+from cdpr_drake.analyses.visualization.curves import (
+    by_pieces,
+    draw_curve,
+    path_rows,
+    phase_of,
+    shade,
+)
+from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS, figure_writers
+from cdpr_drake.analyses.visualization.figure_style import line_style, new_figure
+from cdpr_drake.analyses.visualization.path_figures import Path3D, path_figure
+from cdpr_drake.arrays import Array
+from cdpr_drake.geometry.pose_accuracy import distances_from_line
+from cdpr_drake.geometry.poses import pose_from_row, pose_rows_distance
+from cdpr_drake.palette import (
+    ANGLE,
+    CAMERA,
+    DESIRED,
+    DISTANCE,
+    ESTIMATED,
+    IDEAL,
+    PLATFORM,
+    TARGET,
+    nth_look,
+)
+from cdpr_drake.systems.diagrams.torque_control import tension_limits
+
+
+def run_figures(result: RunResult, formats: Sequence[str] = DEFAULT_FORMATS) -> Pictures:
+    """What draws the figures of a run, by the names of their files."""
+    robot, log = result.servo.robot, result.log
+    drawn: dict[str, Callable[[], Figure]] = {
+        "image_path": lambda: image_path_figure(result),
+        "error": lambda: error_figure(result),
+        "cable_velocities": lambda: cable_curves_figure(result, "cable_velocities"),
+        "cable_lengths": lambda: cable_curves_figure(result, "lengths"),
+        "tensions": lambda: cable_curves_figure(result, "tensions"),
+        "platform_path": lambda: platform_path_figure(result),
+    }
+    if "applied_torques" in log:
+        torques = _title(result, "Torques of the motors and of their friction")
+        drawn["motor_torques"] = lambda: motor_figure(torques, robot, log)
+    if "wanted_tensions" in log:
+        loop = _title(
+            result, "Tensions that a servo by torque wants, and what there is beyond them"
+        )
+        limits = tension_limits(result.servo.scenario, robot)
+        drawn["tension_loop"] = lambda: tension_loop_figure(loop, robot, log, limits)
+    sensors = result.servo.scenario.sensors
+    if sensors.log:
+        readings = _title(result, "What the sensors read beyond the truth")
+        drawn["readings"] = lambda: reading_figure(readings, robot, log, sensors)
+    if sensors.looks_round():
+        drawn |= looking_figures(
+            lambda words: _title(result, words), sensors, log, result.servo.motion,
+            result.depth_image,
+        )  # fmt: skip
+    world = result.servo.scenario.world
+    if world is not None:
+        around = _title(result, world_words(world))
+        drawn["world"] = lambda: world_figure(around, world, log)
+    along = stability_of_run(result)
+    if along is not None:
+        words = _title(result, "Cables that pull, and stability of the servo")
+        drawn["stability"] = lambda: stability_figure(words, along)
+    return dict(figure_writers(drawn, formats))
+
+
+def _title(result: RunResult, words: str) -> str:
+    """What the figure shows, and below what the run was."""
+    scenario = result.servo.scenario
+    run = f"{scenario.name}, {scenario.camera.kind} camera, seed {scenario.seed}"
+    return f"{words}\n{scenario.title}\n({run})"
+
+
+def image_path_figure(result: RunResult) -> Figure:
+    """Path of the target's middle in the image, and how far it is off its line or its goal.
+
+    Where the target was never found, only the image with the desired point.
+    """
+    pinhole = result.servo.pinhole
+    times, path, line = image_path(result)
+    seen, moving = len(path) > 0, result.servo.motion.is_moving()
+    words = "Path of the target's centre in the image"
+    if not seen:
+        words = "Image of the camera: the target was never found"
+    figure, panels = new_figure(1, 1 + seen, (12.0 if seen else 7.0, 5.6), _title(result, words))
+    image = panels[0] if seen else panels
+    if seen:
+        if not moving:
+            image.plot(*line.T, **line_style(IDEAL), label="straight line")
+        shown = path[path_rows(path)]
+        image.plot(*shown.T, **line_style(TARGET), label="target's centre, measured")
+        image.plot(*path[0], "o", color=TARGET.color, label="start")
+    image.plot(*line[1], DESIRED.marker, color=DESIRED.color, markersize=14, label="desired")
+    image.set(
+        xlim=(0, pinhole.width),
+        ylim=(pinhole.height, 0),
+        xlabel="u [px]",
+        ylabel="v [px]",
+        aspect=pinhole.fx / pinhole.fy,
+    )
+    image.set_title(f"image of {pinhole.width} x {pinhole.height} px", fontsize=11)
+    image.legend(loc="best")
+    if seen:
+        what = "desired point" if moving else "straight line"
+        off = np.linalg.norm(path - line[1], axis=1) if moving else distances_from_line(path, *line)
+        draw_curve(panels[1], times, off, DISTANCE)
+        panels[1].set(xlabel="time [s]", ylabel=f"distance from the {what} [px]", ylim=(0, None))
+    return figure
+
+
+_UNITS = {
+    "m": ("position error [mm]", 1e3),
+    "rad": ("rotation error [deg]", 180.0 / np.pi),
+    "": ("error in the image [-]", 1.0),
+}
+"""Label and factor of the axis of features by their unit."""
+
+
+def error_figure(result: RunResult) -> Figure:
+    """Errors of the features and of the pose estimate over time; no panel without a curve."""
+    log, features = result.log, result.servo.controller.tasks[-1].features
+    time, gain = log["time"], log["gain"][:, 0]
+    units = features.units()
+    shown = [unit for unit in _UNITS if unit in units]
+    # No gain, no error: the target was not seen, or nobody looked.
+    looked = bool(np.any(gain > 0.0))
+    above = (len(shown) + (len(shown) == 1)) if looked else 0
+    columns = max(2, above)
+    words = "Errors of the features, and of the estimated pose of the platform"
+    if not looked:
+        words = "Errors of the estimated pose of the platform; no feature was controlled"
+    figure, grid = new_figure(
+        1 + looked, columns, (6.0 * columns, 8.0 if looked else 4.8), _title(result, words)
+    )
+    grid = np.reshape(grid, (1 + looked, columns))
+    for axes, unit in zip(grid[0], shown if looked else (), strict=False):
+        label, factor = _UNITS[unit]
+        mine = [k for k in range(len(units)) if units[k] == unit]
+        for place, k in enumerate(mine):
+            error = np.where(gain > 0.0, log["error"][:, k], np.nan)
+            name = features.names[k].removesuffix(f"_{unit}")
+            draw_curve(
+                axes, time, error, nth_look(k), name,
+                scale=factor, phase=phase_of(place, len(mine)),
+            )  # fmt: skip
+        shade(axes, time, gain <= 0.0, "target not seen")
+        axes.set(ylabel=label)
+        axes.legend(loc="best", ncols=1 + len(mine) // 6)
+    if looked and len(shown) == 1:
+        label, factor = _UNITS[shown[0]]
+        norm = by_pieces(
+            lambda g, e: np.where(g > 0.0, np.linalg.norm(e, axis=1), np.nan), gain, log["error"]
+        )
+        draw_curve(grid[0, 1], time, norm, DISTANCE, scale=factor)
+        grid[0, 1].set(ylabel=f"norm of the {label}", yscale="log")
+    distance, angle = by_pieces(pose_rows_distance, log["X_WP"], log["X_WP_estimated"])
+    last = grid[-1]
+    for axes, values, look, label in (
+        (last[0], 1e3 * distance, DISTANCE, "estimate, position error [mm]"),
+        (last[1], np.degrees(angle), ANGLE, "estimate, rotation error [deg]"),
+    ):
+        draw_curve(axes, time, values, look)
+        axes.set(ylabel=label)
+    for axes in last[2:]:
+        axes.remove()
+    for axes in figure.axes:
+        axes.set(xlabel="time [s]")
+    return figure
+
+
+CABLE_CURVES = {
+    "cable_velocities": ("Commanded velocities of the cables", "cable velocity [mm/s]", 1e3),
+    "lengths": ("Lengths of the cables", "cable length [m]", 1.0),
+    "tensions": ("Tensions of the cables", "tension [N]", 1.0),
+}
+"""Title, label and factor of the axis by quantity of the log."""
+
+
+def cable_curves_figure(result: RunResult, quantity: str) -> Figure:
+    """One of `CABLE_CURVES` over time; velocities are those commanded, tensions have bounds."""
+    words, label, factor = CABLE_CURVES[quantity]
+    robot = result.servo.robot
+    return cable_figure(
+        _title(result, words), robot, result.log, quantity, label,
+        scale=factor, bounds=robot.tension_limits() if quantity == "tensions" else None,
+    )  # fmt: skip
+
+
+def platform_path_figure(result: RunResult) -> Figure:
+    """Paths of platform and camera: with the whole robot, and close up."""
+    servo, log = result.servo, result.log
+    rows, estimated = path_rows(log["X_WP"][:, 4:]), path_rows(log["X_WP_estimated"][:, 4:])
+    X_WPs = [pose_from_row(row) for row in log["X_WP"][rows]]
+    target = np.array(
+        [
+            (servo.mounting.X_WC(X_WP) @ servo.X_CO(X_WP, time)).translation()
+            for X_WP, time in zip(X_WPs, log["time"][rows], strict=True)
+        ]
+    )
+    camera = np.array([servo.mounting.X_WC(X_WP).translation() for X_WP in X_WPs])
+    paths = [
+        Path3D(np.array([X_WP.translation() for X_WP in X_WPs]), "platform, Po", PLATFORM),
+        Path3D(_positions(log["X_WP_estimated"], estimated), "platform, Po, estimated", ESTIMATED),
+    ]
+    if servo.mounting.is_eye_to_hand():
+        paths += [
+            Path3D(target, "target, Oo", TARGET),
+            Path3D(camera[:1], "camera, Co", CAMERA),
+        ]
+    elif servo.motion.is_moving():
+        paths += [
+            Path3D(camera, "camera, Co", CAMERA),
+            Path3D(target, "target, Oo", TARGET),
+        ]
+    else:
+        paths += [
+            Path3D(camera, "camera, Co", CAMERA),
+            Path3D(camera_line(result), "camera, straight line", IDEAL),
+            Path3D(target[:1], "target, Oo", TARGET),
+        ]
+    cables = servo.scenario.cables.cable_set(servo.robot)
+    words = "Paths of platform P, camera C and target O in the world frame W"
+    return path_figure(_title(result, words), servo.robot, cables, log, paths)
+
+
+def _positions(rows_of_poses: Array, rows: Array) -> Array:
+    return np.asarray(rows_of_poses[rows][:, 4:])

@@ -1,0 +1,166 @@
+"""Stability along a run: its figure, and the same from the log in a folder of a run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from cdpr_drake.analyses.reporting.left_folders import holds_log
+from cdpr_drake.analyses.reporting.log_files import finite, write_json
+from cdpr_drake.analyses.reporting.log_on_disk import PARTS, Log, LogOnDisk
+from cdpr_drake.analyses.reporting.written_files import whole_file
+from cdpr_drake.analyses.simulation.run_stability import StabilityAlong, stability_along
+from cdpr_drake.analyses.simulation.visual_servo_run import unfinished_run
+from cdpr_drake.analyses.visualization.curves import draw_curve, shade
+from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS, write_figures
+from cdpr_drake.analyses.visualization.figure_style import line_style, new_figure
+from cdpr_drake.arrays import Array
+from cdpr_drake.errors import OutputFolderError
+from cdpr_drake.palette import BOUND, DISTANCE, LOST, PLATFORM
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
+
+DEEPEST = -1.5
+"""Least margin that is drawn to scale [-]: nearly singular rows make it as low as one likes."""
+
+
+def stability_figure(title: str, along: StabilityAlong) -> Figure:
+    """Number of cables that pull, rank of the Jacobian and margin of the criterion over time; red
+    and hatched where the rank is less than the platform's degrees of freedom."""
+    figure, axes = new_figure(3, 1, (10.0, 9.0), title)
+    lost = along.rank < along.freedom
+    needed = f"holds the platform: {along.freedom}"
+    most = max(float(np.max(along.taut)), along.freedom) + 0.5
+    for panel, values, label in (
+        (axes[0], along.taut, "cables that pull [-]"),
+        (axes[1], along.rank, "rank of the Jacobian [-]"),
+    ):
+        draw_steps(panel, along.time, values, lost)
+        panel.axhline(along.freedom, label=needed, **line_style(BOUND))
+        panel.set(ylabel=label, ylim=(-0.2, most), yticks=range(int(most) + 1))
+    shown = np.maximum(along.margin, DEEPEST)
+    draw_curve(axes[2], along.time, shown, DISTANCE, "margin")
+    axes[2].axhline(0.0, label="stable above 0", **line_style(BOUND))
+    axes[2].set(ylabel="least eigenvalue of sym(Pi) [-]")
+    if np.nanmin(along.margin, initial=np.inf) < DEEPEST:
+        axes[2].set_title(
+            f"least {np.nanmin(along.margin):.2f}, cut off at {DEEPEST:g}", fontsize=9
+        )
+    for panel in axes:
+        shade(panel, along.time, lost, f"rank below {along.freedom}", LOST)
+        panel.set(xlim=(along.time[0], along.time[-1]))
+        panel.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
+    axes[-1].set(xlabel="time [s]")
+    return figure
+
+
+def draw_steps(axes: Any, times: Array, values: Array, lost: np.ndarray) -> None:
+    """A whole number over time, shape (n,), thick and red where the rank is lost."""
+    axes.step(times, values, where="post", **line_style(PLATFORM) | {"marker": ""})
+    red = np.where(lost, values, np.nan)
+    axes.step(times, red, where="post", color=LOST.color, linewidth=3.0)
+
+
+NEEDED = ("time", "X_WP", "X_WP_estimated", "tensions", "slack")
+"""Quantities of a log that tell how stable the servo was."""
+
+
+@dataclass(frozen=True, eq=False)
+class StabilityOfFolder:
+    """Stability along the run of a folder.
+
+    Attributes:
+        folder: The run's.
+        title: What the run was.
+        threshold: Tension from which a cable counted as taut [N]; None: one that was not slack.
+        along: What was found.
+    """
+
+    folder: Path
+    title: str
+    threshold: float | None
+    along: StabilityAlong
+
+    def as_dict(self) -> dict[str, Any]:
+        """Its numbers, for JSON."""
+        along = self.along
+        found = {
+            "run": str(self.folder),
+            "threshold_n": self.threshold,
+            "rows": len(along.time),
+            "freedom": along.freedom,
+            "taut_cables": {"min": int(np.min(along.taut)), "end": int(along.taut[-1])},
+            "least_jacobian_rank": int(np.min(along.rank)),
+            "underactuated_s": along.underactuated_time(),
+            "least_stability_margin": along.least_margin(),
+            "unstable_s": along.unstable_time(),
+        }
+        cleaned: dict[str, Any] = finite(found)
+        return cleaned
+
+    def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> dict[str, str]:
+        """Writes `stability.json`, `stability.npz`, then the figure into a folder that exists.
+
+        Returns:
+            Of each figure that could not be written, the file and why, in one line.
+        """
+        along = self.along
+        write_json(folder / "stability.json", self.as_dict())
+        with whole_file(folder / "stability.npz") as part:
+            np.savez_compressed(
+                part, time=along.time, taut_cables=along.taut,
+                jacobian_rank=along.rank, stability_margin=along.margin,
+            )  # fmt: skip
+        words = f"Cables that pull, and stability of the servo\n{self.title}"
+        return write_figures(
+            folder, {"stability": partial(stability_figure, words, along)}, formats
+        )
+
+
+def stability_of_folder(folder: Path, threshold: float | None = None) -> StabilityOfFolder:
+    """The stability criterion along the run that a folder holds.
+
+    Args:
+        folder: A folder that `cdpr simulate` wrote, or what a killed run left.
+        threshold: Tension from which a cable counts as taut [N]; None: one that is not slack.
+
+    Raises:
+        OutputFolderError: It holds no log of a visual servo.
+        ScenarioError: Its scenario is not accepted.
+    """
+    log = _needed(folder)
+    # Only poses and tensions of the log count: nothing is rendered.
+    scenario = load_scenario(str(folder / "scenario.yaml"), ())
+    if not isinstance(scenario, Scenario):
+        raise OutputFolderError(
+            f"{folder}: found a run of kind {scenario.kind}; accepted: one of a visual servo"
+        )
+    scenario.camera.kind = "projected"
+    along = stability_along(unfinished_run(scenario, log), threshold)
+    title = f"{scenario.title}\n({scenario.name}, seed {scenario.seed})"
+    return StabilityOfFolder(folder, title, threshold, along)
+
+
+def _needed(folder: Path) -> Log:
+    """Those quantities of a folder's log."""
+    accepted = "accepted: a folder of a visual servo that cdpr simulate wrote"
+    if holds_log(folder):
+        stored: Log = LogOnDisk.open(folder / PARTS)
+    elif (folder / "log.npz").is_file() and (folder / "scenario.yaml").is_file():
+        try:
+            with np.load(folder / "log.npz", allow_pickle=False) as arrays:
+                stored = {name: arrays[name] for name in NEEDED if name in arrays}
+        except (OSError, ValueError, EOFError) as problem:
+            raise OutputFolderError(f"{folder}: log.npz cannot be read: {problem}") from problem
+    else:
+        raise OutputFolderError(f"{folder}: found no log; {accepted}")
+    missing = [name for name in NEEDED if name not in stored]
+    if missing:
+        raise OutputFolderError(f"{folder}: found a log without {', '.join(missing)}; {accepted}")
+    return stored

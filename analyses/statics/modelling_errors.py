@@ -1,0 +1,244 @@
+"""What wrong models of the cables do to the platform: its pose at rest, and which cables go slack.
+
+A controller commands unstrained lengths for a wanted pose by the model that it believes in; the
+platform comes to rest where the true cables let it. Winches count lengths from the home pose, where
+they were set right, so that only differences from there are wrong.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from matplotlib.figure import Figure
+from pydrake.math import RigidTransform
+
+from cdpr_drake.analyses.visualization.figure_style import new_figure
+from cdpr_drake.arrays import Array
+from cdpr_drake.cables.models import CATENARY, ELASTIC, INEXTENSIBLE
+from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.geometry.poses import pose_error, pose_from_angles
+from cdpr_drake.models.robot_holding import hold_robot
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.models.robot_statics import rigid_platform
+from cdpr_drake.palette import ANGLE, DISTANCE, SOLID, nth_look
+from cdpr_drake.statics.equilibrium import equilibrium_near
+
+RIGID = 1e4
+"""Factor on E S of a controller that believes in sagging cables that do not stretch."""
+
+
+@dataclass(frozen=True)
+class Belief:
+    """What a controller takes the cables for.
+
+    Attributes:
+        name: What it gets wrong, for tables.
+        model: Name of its cable model.
+        cables: Its constants.
+    """
+
+    name: str
+    model: str
+    cables: CableSet
+
+
+def usual_beliefs(robot: Robot) -> list[Belief]:
+    """One wrong thing each, and the straight inextensible cable that is usual in control."""
+    true = robot.cable_set()
+    return [
+        Belief("no pulleys", CATENARY, true.without_pulleys()),
+        Belief("no stretch", CATENARY, replace(true, stiffness=RIGID * true.stiffness)),
+        Belief("no sag", ELASTIC, true),
+        Belief("none of them", INEXTENSIBLE, true.without_pulleys()),
+    ]
+
+
+def wrong_geometry(robot: Robot, size: float, seed: int) -> Belief:
+    """All models right, but exit and anchor points off by `size` [m] each, in random directions."""
+    true, random = robot.cable_set(), np.random.default_rng(seed)
+
+    def off(points: Array) -> Array:
+        d = random.normal(size=points.shape)
+        return points + size * d / np.linalg.norm(d, axis=0)
+
+    name = f"points off by {1e3 * size:g} mm"
+    return Belief(name, CATENARY, replace(true, p_WA=off(true.p_WA), p_PB=off(true.p_PB)))
+
+
+def poses_in(robot: Robot, count: int, seed: int = 0) -> list[RigidTransform]:
+    """Seeded poses in the middle half of the frame, a little turned."""
+    random = np.random.default_rng(seed)
+    lower, upper = np.array(robot.frame.lower), np.array(robot.frame.upper)
+    middle, half = 0.5 * (lower + upper), 0.25 * (upper - lower)
+    return [
+        pose_from_angles(random.uniform(middle - half, middle + half), random.uniform(-0.1, 0.1, 3))
+        for _ in range(count)
+    ]
+
+
+def commanded_lengths(
+    robot: Robot, belief: Belief, poses: list[RigidTransform], upset: Array | None = None
+) -> Array:
+    """Unstrained lengths that a controller commands for poses, shape (k, m) [m].
+
+    Args:
+        robot: The robot; its own cables sag, stretch and run over its pulleys.
+        belief: The controller's model.
+        poses: Wanted poses.
+        upset: What the lengths err by at home, shape (m,) [m]; None: nothing.
+    """
+    home = robot.home.transform()
+    right = hold_robot(robot, home, robot.cable_set(), CATENARY).unstrained_lengths
+    if upset is not None:
+        right = right + upset
+    believed = [
+        hold_robot(robot, X_WP, belief.cables, belief.model).unstrained_lengths
+        for X_WP in (home, *poses)
+    ]
+    return np.array([right + each - believed[0] for each in believed[1:]])
+
+
+@dataclass(frozen=True, eq=False)
+class PoseErrors:
+    """Where the platform comes to rest instead.
+
+    Attributes:
+        name: What the controller gets wrong.
+        distances: From the wanted poses, shape (k,) [m].
+        angles: Shape (k,) [rad].
+        taut: How many cables are taut, shape (k,).
+    """
+
+    name: str
+    distances: Array
+    angles: Array
+    taut: np.ndarray
+
+
+def pose_errors(robot: Robot, belief: Belief, poses: list[RigidTransform]) -> PoseErrors:
+    """Errors of the pose at rest on the robot's own cables, which sag, stretch and have pulleys.
+
+    Taut are cables that are not slack: that pull on the platform with more than their weight.
+    """
+    true, platform = robot.cable_set(), rigid_platform(robot)
+    distances, angles, taut = [], [], []
+    for X_WP, l0 in zip(poses, commanded_lengths(robot, belief, poses), strict=True):
+        rest = equilibrium_near(true, CATENARY, platform, l0, X_WP)
+        distance, angle = pose_error(rest.X_WP, X_WP)
+        distances.append(distance)
+        angles.append(angle)
+        taut.append(int(np.sum(~rest.slack)))
+    return PoseErrors(belief.name, np.array(distances), np.array(angles), np.array(taut))
+
+
+def errors_figure(found: dict[str, list[PoseErrors]]) -> Figure:
+    """Median and largest error of position and rotation, by robot and belief."""
+    figure, panels = new_figure(
+        2,
+        len(found),
+        (6.0 * len(found), 8.0),
+        "Pose errors at rest, by what the controller gets wrong",
+    )
+    panels = np.reshape(panels, (2, -1))
+    for column, (robot, errors) in enumerate(found.items()):
+        places = np.arange(len(errors))
+        for row, (unit, factor) in enumerate((("mm", 1e3), ("deg", 180.0 / np.pi))):
+            values = [factor * (e.distances if row == 0 else e.angles) for e in errors]
+            axes = panels[row, column]
+            median, largest = [np.median(v) for v in values], [np.max(v) for v in values]
+            color = DISTANCE.color if row == 0 else ANGLE.color
+            axes.hlines(places, median, largest, color=color, linewidth=3.0, alpha=0.35)
+            axes.plot(median, places, "o", color=color, markersize=8, label="median")
+            axes.plot(largest, places, "|", color=color, markersize=12, label="largest")
+            axes.set_yticks(places, [e.name for e in errors])
+            axes.invert_yaxis()
+            axes.set(xlabel=f"{'distance' if row == 0 else 'angle'} [{unit}]", xscale="log")
+            if row == 0:
+                axes.set_title(robot)
+    panels[0, -1].legend()
+    return figure
+
+
+@dataclass(frozen=True, eq=False)
+class SlackPath:
+    """Cables along a path of poses.
+
+    Attributes:
+        share: Share of the path, shape (k,).
+        tensions: Shape (k, m) [N].
+        distances: From the wanted poses, shape (k,) [m].
+        names: Names of the cables.
+    """
+
+    share: Array
+    tensions: Array
+    distances: Array
+    names: list[str]
+
+    @property
+    def taut(self) -> np.typing.NDArray[np.bool_]:
+        """Which cables pull, shape (k, m)."""
+        return self.tensions > 0.0
+
+    @property
+    def most_six(self) -> float:
+        """Share of the path with at most six taut cables."""
+        return float(np.mean(np.sum(self.taut, axis=1) <= 6))
+
+    @property
+    def transfers(self) -> int:
+        """How often another set of six cables or fewer takes over."""
+        few = self.taut[np.sum(self.taut, axis=1) <= 6]
+        return int(np.sum(np.any(few[1:] != few[:-1], axis=1)))
+
+
+def slack_along_path(robot: Robot, start: Array, end: Array, count: int, upset: Array) -> SlackPath:
+    """Rests an elastic robot along a straight path on lengths that are a little wrong.
+
+    The controller believes in straight inextensible cables from fixed exit points; the robot's own
+    are straight and elastic, over its pulleys. Each search starts at the pose before.
+
+    Args:
+        robot: The robot.
+        start: Po where the path starts, shape (3,) [m].
+        end: Po where it ends, shape (3,) [m].
+        count: Number of poses.
+        upset: What the lengths err by at home, shape (m,) [m].
+    """
+    share = np.linspace(0.0, 1.0, count)
+    poses = [pose_from_angles(start + s * (end - start), np.zeros(3)) for s in share]
+    believed = Belief("", INEXTENSIBLE, robot.cable_set().without_pulleys())
+    lengths = commanded_lengths(robot, believed, poses, upset)
+    true, platform = robot.cable_set(), rigid_platform(robot)
+    tensions, distances, guess = [], [], poses[0]
+    for X_WP, l0 in zip(poses, lengths, strict=True):
+        rest = equilibrium_near(true, ELASTIC, platform, l0, guess)
+        guess = rest.X_WP
+        tensions.append(rest.tensions)
+        distances.append(pose_error(rest.X_WP, X_WP)[0])
+    names = [cable.name for cable in robot.cables]
+    return SlackPath(share, np.array(tensions), np.array(distances), names)
+
+
+def slack_figure(path: SlackPath, title: str) -> Figure:
+    """Which cables are taut along the path, and how far the platform is from it."""
+    figure, (above, below) = new_figure(2, 1, (10.0, 7.0), title)
+    for i, name in enumerate(path.names):
+        taut = np.where(path.taut[:, i], float(i), np.nan)
+        above.plot(
+            path.share,
+            taut,
+            linewidth=6.0,
+            color=nth_look(i).color,
+            linestyle=SOLID,
+            solid_capstyle="butt",
+        )
+        above.axhline(i, color="0.8", linewidth=0.8, zorder=0)
+        above.text(1.01, i, name, va="center")
+    above.set(
+        ylabel="taut cables [-]", yticks=[], xlim=(0.0, 1.0), ylim=(len(path.names) - 0.5, -0.5)
+    )
+    below.plot(path.share, 1e3 * path.distances)
+    below.set(xlabel="share of the path [-]", ylabel="distance from it [mm]", xlim=(0.0, 1.0))
+    return figure

@@ -1,0 +1,162 @@
+"""A robot at rest, and the polygon of its feasible tensions, as pictures."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from scipy.spatial import ConvexHull, QhullError
+
+from cdpr_drake.analyses.statics.static_query import StaticReport
+from cdpr_drake.analyses.statics.tension_query import solve_all
+from cdpr_drake.analyses.visualization.figure_style import (
+    bar_style,
+    bare_figure,
+    line_style,
+    new_figure,
+    styled,
+)
+from cdpr_drake.arrays import Array
+from cdpr_drake.cables.curves import cable_curves
+from cdpr_drake.errors import TensionProblemError
+from cdpr_drake.palette import BOUND, DOTTED, OUTLINE, PLATFORM, SOLID, look_of, nth_look
+from cdpr_drake.tensions.methods import METHODS, feasible_polygon, solution_space
+from cdpr_drake.tensions.problem import TensionProblem, TensionSolution, TensionStatus
+
+CURVE_POINTS = 40
+"""Points of a drawn cable."""
+
+
+def static_figure(report: StaticReport, title: str) -> Figure:
+    """The cables from the side and from above, tensions, and natural frequencies."""
+    vibrates = report.frequencies is not None
+    words = f"{title}\ncables in the world frame W, tensions" + ", vibrations" * vibrates
+    figure = bare_figure((12.0, 9.5), words)
+    mosaic: list[Any] = [["side", "above"], ["tensions", "modes" if vibrates else "tensions"]]
+    with styled():
+        axes = figure.subplot_mosaic(mosaic)
+    curves = cable_curves(report.cables, report.model, report.X_WP, report.l0, CURVE_POINTS)
+    anchors = report.X_WP.rotation().matrix() @ report.cables.p_PB
+    anchors = anchors + report.X_WP.translation()[:, np.newaxis]
+    for place, (i, j), words, view in (
+        (axes["side"], (0, 2), "xz", "from the side; dotted: slack"),
+        (axes["above"], (0, 1), "xy", "from above; dotted: slack"),
+    ):
+        for k, curve in enumerate(curves):
+            slack = report.slack[k]
+            look = nth_look(k)
+            dash = DOTTED if slack else SOLID
+            place.plot(curve[i], curve[j], linestyle=dash, color=look.color)
+            place.plot(
+                curve[i, 0], curve[j, 0], look.marker, color=look.color, label=report.names[k]
+            )
+        outline = _outline(anchors[[i, j]])
+        place.plot(*outline, color=OUTLINE.color, linestyle=SOLID, linewidth=2.0)
+        place.set_title(view)
+        place.set(xlabel=f"{words[0]} in W [m]", ylabel=f"{words[1]} in W [m]", aspect="equal")
+    axes["above"].legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
+    place = axes["tensions"]
+    places = np.arange(len(report.l0))
+    for k, tension in enumerate(report.tensions):
+        place.bar(k, tension, **bar_style(nth_look(k)))
+    place.set_xticks(places, report.names)
+    place.set(ylabel="tension at the platform [N]")
+    low, high = report.bounds
+    for bound in (low, high):
+        if 0.0 < bound <= 2.0 * np.max(report.tensions, initial=1e-9):
+            place.axhline(bound, label=f"bound {bound:g} N", **line_style(BOUND))
+            place.legend()
+    if report.frequencies is None:  # inextensible cables
+        return figure
+    place = axes["modes"]
+    places = np.arange(len(report.frequencies)) + 1
+    place.bar(places, report.frequencies, color=PLATFORM.color)
+    place.set(xlabel="mode", ylabel="natural frequency [Hz]", xticks=places)
+    return figure
+
+
+def _outline(points: Array) -> Array:
+    """Closed convex outline of points in a plane, shape (2, n); the points where there is none."""
+    try:
+        around = ConvexHull(points.T).vertices
+    except QhullError:
+        return points
+    return points[:, np.append(around, around[0])]
+
+
+def polygon_figure(problem: TensionProblem, title: str) -> Figure:
+    """The feasible polygon in the null space with the point of each method.
+
+    Raises:
+        TensionProblemError: The redundancy is not 2, or the polygon is empty.
+
+    Source: servoing thesis, figure 1.19.
+    """
+    vertices = feasible_polygon(problem)
+    if vertices.shape[1] == 0:
+        raise TensionProblemError("feasible polygon: found none to draw, the problem is infeasible")
+    t, N = solution_space(problem)
+    figure, axes = new_figure(1, 1, (10.5, 6.5), title)
+    closed = np.column_stack([vertices, vertices[:, 0]])
+    axes.fill(*vertices, color=PLATFORM.color, alpha=0.15, label="feasible")
+    axes.plot(*closed, color=PLATFORM.color, linestyle=SOLID)
+    solutions = [s for s in solve_all(problem) if np.all(np.isfinite(s.tensions))]
+    extent = float(np.max(np.ptp(vertices, axis=1)))
+    for eta, labels, filled in _places(solutions, N, extent):
+        # A method keeps its look in all polygons; where several meet, it is that of the first.
+        look = look_of(labels[0].partition(" ")[0], list(METHODS))
+        axes.plot(
+            *eta,
+            look.marker,
+            color=look.color,
+            markersize=9,
+            fillstyle="full" if filled else "none",
+            label="\n".join(labels),
+        )
+    points = np.column_stack([vertices, *[(N.T @ s.tensions)[:, None] for s in solutions]])
+    low, high = points.min(axis=1), points.max(axis=1)
+    room = 0.12 * max(float(np.max(high - low)), 1e-9)
+    axes.set(xlim=(low[0] - room, high[0] + room), ylim=(low[1] - room, high[1] + room))
+    _draw_bounds(axes, problem, t, N)
+    axes.set(xlabel=r"$\eta_1$ [N]", ylabel=r"$\eta_2$ [N]", aspect="equal")
+    axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
+    return figure
+
+
+def _places(
+    solutions: list[TensionSolution], N: Array, extent: float
+) -> list[tuple[Array, list[str], bool]]:
+    """Points of the plane with the methods that meet there, and whether they are feasible."""
+    places: list[tuple[Array, list[str], bool]] = []
+    for solution in solutions:
+        eta = N.T @ solution.tensions
+        feasible = solution.status == TensionStatus.FEASIBLE
+        label = solution.method + ("" if feasible else " (missed)")
+        for place, labels, _ in places:
+            if np.linalg.norm(place - eta) <= 1e-6 * max(extent, 1e-9):
+                labels.append(label)
+                break
+        else:
+            places.append((eta, [label], feasible))
+    return places
+
+
+def _draw_bounds(axes: Any, problem: TensionProblem, t: Array, N: Array) -> None:
+    """The lines on which one tension is at a bound, with the cable's number where they leave."""
+    x_low, x_high = axes.get_xlim()
+    y_low, y_high = axes.get_ylim()
+    for i in range(len(t)):
+        for bound, style in ((problem.lower[i], "-"), (problem.upper[i], "--")):
+            a, b, c = N[i, 0], N[i, 1], bound - t[i]
+            ends = []
+            for x in (x_low, x_high):
+                if abs(b) > 1e-12 and y_low <= (c - a * x) / b <= y_high:
+                    ends.append((x, (c - a * x) / b))
+            for y in (y_low, y_high):
+                if abs(a) > 1e-12 and x_low <= (c - b * y) / a <= x_high:
+                    ends.append(((c - b * y) / a, y))
+            if len(ends) >= 2:
+                axes.plot(*np.array(ends[:2]).T, style, color="0.6", linewidth=0.8)
+                word = f"cable {i + 1} at {bound:g} N"
+                axes.annotate(word, ends[0], color="0.4", fontsize=9, clip_on=True)

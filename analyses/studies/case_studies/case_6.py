@@ -1,0 +1,115 @@
+"""Case study VI: image-based visual servoing on ACROBOT, its first pose badly known.
+
+What case study VI and its appendix share: image-based servoing on four points, on ACROBOT.
+"""
+
+from __future__ import annotations
+
+from cdpr_drake.analyses.reporting.statements import Statement, verdict
+from cdpr_drake.analyses.studies.case_studies.path_figures import four_layouts
+from cdpr_drake.analyses.studies.framework.case_definition import PULLEYS, CaseStudy, Configuration
+from cdpr_drake.analyses.studies.framework.case_run import CaseRuns
+from cdpr_drake.analyses.studies.framework.case_statements import same_accuracy
+from cdpr_drake.analyses.studies.framework.experiments import as_transform, pose_item
+
+START = as_transform(((0.118, -0.104, 0.459), (16.0, 13.8, 20.6)))
+"""Printed initial pose of the platform in W."""
+
+EDGE = 0.0854
+"""Edge of the square of points [m]."""
+
+DESIRED_COORDINATE = 0.167
+"""Printed desired coordinates of the points are +- this, at unit focal length [-]."""
+
+DEPTH = EDGE / 2.0 / DESIRED_COORDINATE
+"""Desired distance of the points from the camera [m]."""
+
+SETUP = (
+    "controller.scheme=ibvs",
+    "controller.lambda_0=1.0",
+    "controller.lambda_infinity=0.2",
+    "controller.lambda_slope=30",
+    "target.kind=dots",
+    f"target.size={EDGE}",
+    "target.pose={position: [0.0735, -0.03, 0]}",
+    pose_item("initial_pose", START),
+    f"desired={{position: [0, 0, {DEPTH:.6g}], angles_deg: [180, 0, 180]}}",
+    "duration=60",
+)
+
+ASSUMPTIONS = (
+    "The printed poses of the platform and the printed features do not fit each other. The pattern "
+    "lies on the ground where the initial features and the initial pose put its middle; that also "
+    "gives its size, and with the desired features the desired distance.",
+    "Directions of perturbations are not printed; each run draws its own from its seed.",
+    "Stop rules and sigma are those of case study I.",
+)
+
+
+NAMES = ("E1", "E2", "E3", "E4")
+
+
+def _shifted(name: str, distance: float, angle_deg: float, outcome: str) -> Configuration:
+    return Configuration(
+        name,
+        f"{name}: {distance:g} m, {angle_deg:g} deg",
+        (f"perturbations.initial_pose_shift={{distance: {distance:g}, angle_deg: {angle_deg:g}}}",),
+        published={"outcome": outcome},
+    )
+
+
+def _tolerates(runs: CaseRuns) -> Statement:
+    good = [runs.converged(name) for name in NAMES[:3]]
+    return Statement(
+        "IBVS ends its task under the perturbations of E1 to E3.",
+        "figures 3.41 to 3.44",
+        "; ".join(f"{name}: {runs.outcomes(name)}" for name in NAMES[:3]),
+        verdict(all(good), any(good)),
+    )
+
+
+def _not_all(runs: CaseRuns) -> Statement:
+    return Statement(
+        "Under that of E4 it does not end: it swings about the goal.",
+        "figures 3.41d to 3.43d",
+        f"E4: {runs.outcomes('E4')}",
+        verdict(
+            not any(run.outcome == "converged" for run in runs.of("E4")), not runs.converged("E4")
+        ),
+        "The direction counts as much as the size, and is not printed.",
+    )
+
+
+def _curved(runs: CaseRuns) -> Statement:
+    image = [runs.mean(name, "image_max_px") for name in NAMES]
+    return Statement(
+        "The larger the perturbation, the more the paths curve.",
+        "figure 3.41",
+        "largest distance of the pattern's middle from its straight line "
+        + ", ".join(f"{value:.0f}" for value in image)
+        + " px",
+        verdict(image == sorted(image), image[0] < min(image[1:])),
+    )
+
+
+def _accuracy(runs: CaseRuns) -> Statement:
+    return same_accuracy(runs, NAMES, "section 3.4.5")
+
+
+CASE_6 = CaseStudy(
+    name="case-6",
+    title="IBVS on ACROBOT",
+    source="servoing thesis 3.4.5, figures 3.41 to 3.44",
+    scenario="acrobot_pbvs",
+    changes=(*SETUP, PULLEYS),
+    configurations=(
+        Configuration("E1", "E1: no perturbation", published={"outcome": "converged"}),
+        _shifted("E2", 0.08, 10.0, "converged"),
+        _shifted("E3", 0.145, 19.0, "converged, 4 s later"),
+        _shifted("E4", 0.28, 37.0, "swings about the goal"),
+    ),
+    rendered=("E1",),
+    assumptions=ASSUMPTIONS,
+    judges=(_tolerates, _not_all, _curved, _accuracy),
+    layouts=four_layouts("3", 41, NAMES, "first pose wrong"),
+)

@@ -1,0 +1,178 @@
+"""Case study VII: planning and tracking the path of the features, on ACROBOT."""
+
+from __future__ import annotations
+
+from cdpr_drake.analyses.reporting.statements import Statement, verdict
+from cdpr_drake.analyses.studies.case_studies.path_figures import TRACKING_LAYOUTS
+from cdpr_drake.analyses.studies.framework.case_definition import PULLEYS, CaseStudy, Configuration
+from cdpr_drake.analyses.studies.framework.case_run import CaseRuns
+from cdpr_drake.analyses.studies.framework.case_statements import same_accuracy
+from cdpr_drake.analyses.studies.framework.experiments import SETS, SETUP, TIME, TRACKING
+
+
+def _why(name: str) -> str:
+    """What is known of how far runs with a perturbation set may be off."""
+    if name == "none":
+        return ""
+    if name == "d1":
+        return (
+            "d1 is printed whole, so that its directions are no reason; by what the prototype's "
+            f"path in the image is straighter is not known. The way is planned for {TIME:g} s here"
+        )
+    return (
+        "directions of the shifts are not printed and drawn for each run, and how far a path is "
+        "off depends on them"
+    )
+
+
+def _pairs() -> tuple[Configuration, ...]:
+    made = []
+    for name, changes in SETS.items():
+        words = "no perturbation" if name == "none" else name
+        clean = {"image_max_px": "10", "camera_max_m": "10"} if name == "none" else {}
+        shown = {} if name == "none" else {"image_max_px": "18 or less"}
+        made += [
+            Configuration(f"{name}_servo", f"{words}, 2 1/2 D", changes, published=clean),
+            Configuration(
+                f"{name}_tracking",
+                f"{words}, tracking",
+                (*changes, *TRACKING),
+                published=clean or shown,
+                why=_why(name),
+            ),
+        ]
+    return tuple(made)
+
+
+PAIRS = _pairs()
+
+FACTOR = 2.0
+"""A number within this factor of the printed one, below or above, counts as met."""
+
+SIMULATED = "simulated"
+"""Group of the runs without pulleys, as the simulation of the thesis has none."""
+
+SIMULATED_SETS = ("none", "d2")
+
+
+def _simulated() -> tuple[Configuration, ...]:
+    printed = {
+        "none_servo": {"image_max_px": "at most 5", "camera_max_m": "at most 7"},
+        "none_tracking": {"image_max_px": "at most 5", "camera_max_m": "at most 7"},
+        "d2_servo": {"image_max_px": "below 20", "camera_max_m": "60"},
+        "d2_tracking": {"image_max_px": "at most 5", "camera_max_m": "at most 10"},
+    }
+    return tuple(
+        Configuration(
+            f"simulated_{pair.name}",
+            f"{pair.label}, no pulleys",
+            (*pair.changes, "cables.pulleys=false"),
+            group=SIMULATED,
+            published=printed[pair.name],
+        )
+        for pair in PAIRS
+        if pair.name in printed
+    )
+
+
+def simulation(runs: CaseRuns) -> Statement:
+    """Section 4.3.2, figure 4.3."""
+    names = [
+        f"simulated_{name}_{kind}" for name in SIMULATED_SETS for kind in ("servo", "tracking")
+    ]
+    image = {name: runs.mean(name, "image_max_px") for name in names}
+    camera = {name: 1e3 * runs.mean(name, "camera_max_m") for name in names}
+    clean, far, near = names[:2], names[2], names[3]
+    good = [
+        max(image[name] for name in clean) <= 5.0,
+        max(camera[name] for name in clean) <= 7.0,
+        image[far] < 20.0,
+        60.0 / FACTOR <= camera[far] <= 60.0 * FACTOR,
+        image[near] <= 5.0,
+        camera[near] <= 10.0,
+    ]
+    return Statement(
+        "Simulated without pulleys: straight without perturbation; with d2 the camera's path "
+        "deviates, and with tracking it does not.",
+        "at most 5 px and 7 mm; with d2 below 20 px, almost 60 mm; with tracking at most 5 px and "
+        "10 mm",
+        "; ".join(f"{name} {image[name]:.1f} px, {camera[name]:.1f} mm" for name in names),
+        verdict(all(good), any(good)),
+        f"Almost 60 mm: within a factor {FACTOR:g}. Its camera is pixelated; ours has noise of 0.1 "
+        "px in the corners.",
+    )
+
+
+def _ratio(runs: CaseRuns, name: str, metric: str) -> float:
+    return runs.mean(f"{name}_servo", metric) / runs.mean(f"{name}_tracking", metric)
+
+
+def _better(runs: CaseRuns) -> Statement:
+    names = ("d1", "d2", "d3", "d4")
+    image = [_ratio(runs, name, "image_max_px") for name in names]
+    camera = [_ratio(runs, name, "camera_max_m") for name in names]
+    return Statement(
+        "With tracking, the deviations under d1 to d4 are two to three times smaller, or better.",
+        "figure 4.6",
+        "image "
+        + ", ".join(f"{r:.1f}" for r in image)
+        + " times, camera "
+        + ", ".join(f"{r:.1f}" for r in camera)
+        + " times smaller",
+        verdict(min(image + camera) >= 2.0, max(min(image), min(camera)) >= 2.0),
+        "Confirmed: two times at least in all eight; in part: in all four of the image or of the "
+        "camera. How far the path is off without tracking depends on the directions of the "
+        "perturbations, of which only those of d1 are printed.",
+    )
+
+
+def _same_without(runs: CaseRuns) -> Statement:
+    image = [runs.largest(f"none_{kind}", "image_max_px") for kind in ("servo", "tracking")]
+    camera = [1e3 * runs.largest(f"none_{kind}", "camera_max_m") for kind in ("servo", "tracking")]
+    return Statement(
+        "Without perturbation, both stay close to the straight lines.",
+        "at most 10 px and 10 mm",
+        f"at most {image[0]:.1f} and {image[1]:.1f} px, {camera[0]:.1f} and {camera[1]:.1f} mm",
+        verdict(max(image) <= 10.0 and max(camera) <= 10.0, min(image) <= 10.0),
+    )
+
+
+def _space(runs: CaseRuns) -> Statement:
+    found = [1e3 * runs.mean(f"{name}_tracking", "camera_max_m") for name in SETS]
+    return Statement(
+        "With tracking, the camera's path stays about as without perturbation, whatever the set.",
+        "figures 4.4c, 4.5c",
+        ", ".join(f"{name} {value:.1f}" for name, value in zip(SETS, found, strict=True)) + " mm",
+        verdict(max(found) < 2.0 * found[0], max(found) < 10.0),
+        "About the same: less than twice that without perturbation; in part: below the 10 mm that "
+        "are printed for runs without perturbation. Ours without perturbation are straighter, "
+        "which makes twice of it less.",
+    )
+
+
+def _accuracy(runs: CaseRuns) -> Statement:
+    return same_accuracy(runs, [pair.name for pair in PAIRS], "chapter 4")
+
+
+CASE_7 = CaseStudy(
+    name="case-7",
+    title="Trajectory planning and tracking on ACROBOT",
+    source="servoing thesis 4.3, figures 4.3 to 4.6",
+    scenario="acrobot_pbvs",
+    changes=(*SETUP, PULLEYS),
+    configurations=(*PAIRS, *_simulated()),
+    repetitions=15,
+    rendered=("none_tracking", "d2_tracking"),
+    assumptions=(
+        "The tag is put where the printed desired poses put it, 0.04 m above the ground.",
+        "Axes of rotations are in W for the platform and in P for the camera, and the turn leads "
+        "from the belief to the truth: the printed assumed pose of d1 says so.",
+        "Directions of the shifts of platform, camera and points are not printed, but for d1; each "
+        "run draws its own from its seed.",
+        f"The way is planned for {TIME:g} s; the thesis takes the time of the run without.",
+        "Controller and camera run at 20 Hz, the printed time step of 0.05 s.",
+        "Figure 4.3: elastic cables as in the robot's file, no pulleys, a projected camera.",
+    ),
+    judges=(_better, _same_without, _space, _accuracy, simulation),
+    layouts=TRACKING_LAYOUTS,
+)

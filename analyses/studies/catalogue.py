@@ -1,0 +1,266 @@
+"""The studies that `cdpr study` knows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any, Protocol
+
+from rich.table import Table
+
+from cdpr_drake.analyses.reporting.progress import StudySession
+from cdpr_drake.analyses.reporting.statements import judge_names
+from cdpr_drake.analyses.studies import (
+    closed_loops,
+    control_stability,
+    engines,
+    fusion,
+    mobile_robot,
+    pick_and_place,
+    scenarios,
+    schemes,
+    stability_ranges,
+    stability_shapes,
+    tagless,
+    tension_methods,
+    worked_examples,
+    workspaces,
+)
+from cdpr_drake.analyses.studies.calibration.study import study_calibration
+from cdpr_drake.analyses.studies.case_studies import CASE_STUDIES
+from cdpr_drake.analyses.studies.design import study_design
+from cdpr_drake.analyses.studies.framework.case_definition import PublishedNumber
+from cdpr_drake.analyses.studies.framework.case_study import run_case_study
+from cdpr_drake.analyses.studies.identification.study import study_identification
+from cdpr_drake.analyses.studies.planning.study import study_planning
+from cdpr_drake.analyses.studies.published.recipe_variants import RECIPES
+from cdpr_drake.analyses.studies.tension_cases import TENSION_CASES
+from cdpr_drake.stability.stability_case import SCHEMES
+
+
+class StudyResult(Protocol):
+    """What a study returns."""
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether it was stopped before the end."""
+
+    def as_dict(self) -> dict[str, Any]:
+        """Everything for JSON."""
+
+    def tables(self) -> list[Table]:
+        """Tables for the terminal."""
+
+    def write(self, folder: Path, formats: Sequence[str] = ...) -> Mapping[str, str] | None:
+        """Writes numbers, and after them figures in these formats, into a folder that exists.
+
+        Returns:
+            Of each figure that could not be written, the file and why, in one line; None where
+            there is none.
+        """
+
+
+class Study(Protocol):
+    """What runs a study."""
+
+    def __call__(self, quick: bool, session: StudySession) -> StudyResult:
+        """Runs it."""
+
+
+@dataclass(frozen=True)
+class StudyEntry:
+    """A study and how it uses its folder.
+
+    Attributes:
+        run: What runs it.
+        continues: Whether it works in its folder from the start, by `run_study_sweep`, and
+            continues when it is run again; otherwise the folder appears at the end.
+        spreads: Whether workers of a cluster can do its work.
+        repeats: Whether it repeats runs over as many seeds as its session says.
+        judges: Names of the statements that it can judge, as its results have them.
+        numbers: Printed numbers that it puts beside its own.
+        figures: Names of the figures that it can write, without endings.
+        recipes: Other recipes by name, each a study of its own, of which only some ask.
+    """
+
+    run: Study
+    continues: bool = False
+    spreads: bool = True
+    repeats: bool = False
+    judges: tuple[str, ...] = ()
+    numbers: tuple[PublishedNumber, ...] = ()
+    figures: tuple[str, ...] = ()
+    recipes: Mapping[str, Study] = field(default_factory=dict)
+
+
+STUDIES: dict[str, StudyEntry] = {
+    "tension-methods": StudyEntry(
+        tension_methods.study_tension_methods,
+        continues=True,
+        judges=judge_names(tension_methods.JUDGES),
+        figures=tension_methods.FIGURES,
+    ),
+    "worked-examples": StudyEntry(
+        worked_examples.study_worked_examples,
+        spreads=False,
+        judges=judge_names(worked_examples.JUDGES),
+        figures=("trajectory", "feasible_polygons"),
+    ),
+    "stability-closed-loop": StudyEntry(
+        closed_loops.study_closed_loop,
+        continues=True,
+        judges=judge_names(closed_loops.JUDGES),
+        figures=("errors", "ways"),
+    ),
+    **{
+        f"stability-closed-loop-{scheme}": StudyEntry(
+            partial(closed_loops.study_closed_loop, scheme=scheme),
+            continues=True,
+            judges=judge_names(closed_loops.JUDGES),
+            figures=("errors", "ways"),
+        )
+        for scheme in SCHEMES
+        if scheme != "pbvs"
+    },
+    "control-stability": StudyEntry(
+        control_stability.study_control_stability,
+        continues=True,
+        judges=judge_names(control_stability.JUDGES),
+        figures=control_stability.FIGURES,
+        recipes={name: partial(control_stability.study_recipe, recipe=name) for name in RECIPES},
+    ),
+    "stability-recipes": StudyEntry(
+        control_stability.study_recipes,
+        continues=True,
+        judges=judge_names(control_stability.RECIPE_JUDGES),
+    ),
+    "stability-ranges": StudyEntry(
+        stability_ranges.study_stability_ranges,
+        continues=True,
+        judges=judge_names(stability_ranges.JUDGES),
+        figures=stability_ranges.FIGURES,
+    ),
+    "stability-shapes": StudyEntry(
+        stability_shapes.study_stability_shapes,
+        continues=True,
+        judges=judge_names(stability_shapes.JUDGES),
+        figures=stability_shapes.FIGURES,
+    ),
+    "workspaces": StudyEntry(
+        workspaces.study_workspaces,
+        continues=True,
+        judges=judge_names(workspaces.JUDGES),
+        figures=workspaces.FIGURES,
+    ),
+    "design": StudyEntry(study_design, continues=True),
+    "engines": StudyEntry(
+        engines.study_engines,
+        continues=True,
+        judges=judge_names(engines.JUDGES),
+        figures=("engines",),
+    ),
+    "scenarios": StudyEntry(
+        scenarios.study_scenarios,
+        continues=True,
+        judges=judge_names(scenarios.JUDGES),
+        figures=scenarios.FIGURES,
+    ),
+    "planning": StudyEntry(study_planning, continues=True, figures=("phase_planes",)),
+    "mobile-robot": StudyEntry(
+        mobile_robot.study_mobile_robot,
+        continues=True,
+        repeats=True,
+        judges=judge_names(mobile_robot.JUDGES),
+        figures=mobile_robot.FIGURES,
+    ),
+    "pick-and-place": StudyEntry(
+        pick_and_place.study_pick_and_place,
+        continues=True,
+        repeats=True,
+        judges=judge_names(pick_and_place.JUDGES),
+        figures=("set_down",),
+    ),
+    "fusion": StudyEntry(
+        fusion.study_fusion,
+        continues=True,
+        repeats=True,
+        judges=judge_names(fusion.JUDGES),
+        figures=("fusion",),
+    ),
+    "schemes": StudyEntry(
+        schemes.study_schemes,
+        continues=True,
+        repeats=True,
+        judges=judge_names(schemes.JUDGES),
+        figures=("schemes",),
+    ),
+    "tagless": StudyEntry(
+        tagless.study_tagless,
+        continues=True,
+        repeats=True,
+        judges=judge_names(tagless.JUDGES),
+        figures=("tagless",),
+    ),
+    "calibration": StudyEntry(
+        study_calibration, continues=True, repeats=True, figures=("calibration",)
+    ),
+    "identification": StudyEntry(
+        study_identification, continues=True, repeats=True, figures=("identification",)
+    ),
+    **{
+        case.name: StudyEntry(
+            partial(run_case_study, case),
+            continues=True,
+            repeats=True,
+            judges=judge_names(case.judges),
+            numbers=case.published(),
+            figures=case.figures(),
+        )
+        for case in (*CASE_STUDIES, *TENSION_CASES)
+    },
+}
+"""Studies by name, in the order in which the command line lists them."""
+
+
+RESULTS = "results.json"
+"""A study's numbers."""
+
+
+def write_study(result: StudyResult, folder: Path, formats: Sequence[str]) -> dict[str, str]:
+    """Writes a study; what fails once its numbers are written is named, and they are kept.
+
+    Returns:
+        Of each figure that could not be written, the file and why, in one line.
+
+    Raises:
+        Whatever kept the numbers from being written: those of an earlier session that are there
+        do not stand for them.
+    """
+    earlier = _written(folder)
+    try:
+        return dict(result.write(folder, formats) or {})
+    except Exception as problem:
+        if _written(folder) in (None, earlier):
+            raise
+        return {"figures": (str(problem) or type(problem).__name__).splitlines()[0][:300]}
+
+
+def _written(folder: Path) -> tuple[int, int] | None:
+    """Tells one writing of a study's numbers from another; None where there are none."""
+    try:
+        found = (folder / RESULTS).stat()
+    except OSError:
+        return None
+    return found.st_ino, found.st_mtime_ns
+
+
+def studies_that(able: Callable[[StudyEntry], bool]) -> str:
+    """Names of the studies of which something is so, in words; cases are a family."""
+    names = [name for name, entry in STUDIES.items() if able(entry)]
+    cases = [name for name in STUDIES if name.startswith("case-")]
+    if cases and all(name in names for name in cases):
+        names = [*(name for name in names if name not in cases), "case-*"]
+    *most, last = names or ["no study"]
+    return f"{', '.join(most)} and {last}" if most else last

@@ -1,0 +1,7 @@
+from .kinematic_servo import kinematic_path as kinematic_path
+from .loops import seen_errors as seen_errors
+from .servo_models import Perturbation as Perturbation
+from .servo_models import perturbed_scenario as perturbed_scenario
+from .servo_models import perturbed_servo as perturbed_servo
+from .study import JUDGES as JUDGES
+from .study import study_closed_loop as study_closed_loop

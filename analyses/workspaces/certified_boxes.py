@@ -1,0 +1,266 @@
+"""Boxes of a question that are proven inside or outside: found, kept, compared with the rest."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cdpr_drake.analyses.reporting.provenance import code_version
+from cdpr_drake.analyses.sweeps.folder import load_arrays, store_arrays
+from cdpr_drake.analyses.workspaces.pose_grid import plain
+from cdpr_drake.analyses.workspaces.workspace_question import WorkspaceQuestion
+from cdpr_drake.analyses.workspaces.workspace_results import ALL, RobotWorkspace
+from cdpr_drake.arrays import Array
+from cdpr_drake.errors import DataFileError, OutputFolderError, WorkspaceError
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.workspaces.box_grid_agreement import BoxAgreement, grid_agreement, hull_agreement
+from cdpr_drake.workspaces.certified_boxes import (
+    BoxJournal,
+    CertifiedBoxes,
+    CertifiedKind,
+    CertifyTask,
+    PoseBox,
+    certify,
+)
+from cdpr_drake.workspaces.demanded_wrenches import SpatialSet
+from cdpr_drake.workspaces.hull import WorkspaceHull
+from cdpr_drake.workspaces.mesh_files import write_cells
+
+BOX_ARRAYS, JOURNAL = "boxes.npz", "boxes_journal.npz"
+"""Files of the boxes, and of what a search that is continued begins with."""
+
+SAVE_SECONDS = 5.0
+"""Between two times that the journal is written."""
+
+NAMED = 5
+"""So many poses at which boxes are wrong are written out."""
+
+
+@dataclass(frozen=True, eq=False)
+class BoxSearch:
+    """What is to be proven, and where.
+
+    Attributes:
+        task: What is to be proven.
+        box: The poses.
+    """
+
+    task: CertifyTask
+    box: PoseBox
+
+    def words(self) -> dict[str, Any]:
+        """Of which cables and which poses verdicts are, for JSON."""
+        task = self.task
+        cables = task.case.cables
+        if task.kind == CertifiedKind.INTERFERENCE_FREE and task.around is not None:
+            cables = task.around.cables
+        return {
+            "cables": "over pulleys" if cables.has_pulleys() else "from fixed exit points",
+            "lower_m_rad": self.box.lower.tolist(),
+            "upper_m_rad": self.box.upper.tolist(),
+        }
+
+    def arguments(self) -> dict[str, Any]:
+        """All that verdicts depend on, for JSON."""
+        found: dict[str, Any] = plain(
+            {"cdpr_drake": code_version(), "task": self.task, "box": self.box}
+        )
+        return found
+
+
+def box_search(
+    question: WorkspaceQuestion,
+    robot: Robot,
+    errors: tuple[float, float] = (0.0, 0.0),
+    region: tuple[Array, Array] | None = None,
+) -> BoxSearch:
+    """A region of positions, to be cut into boxes inside or outside the workspace of a question.
+
+    Args:
+        question: The question, of one kind; the orientations of its grid are a range, from the
+            least to the largest of each angle, all of which are proven.
+        robot: The robot, for its frame and motion.
+        errors: How far exit points and anchor points may be off [m].
+        region: Corners of the region, shape (3,) each [m]; None: the robot's frame. As far as the
+            motion type lets Po go.
+
+    Raises:
+        WorkspaceError: There are several kinds, one that cannot be proven, or a method of tensions,
+            of which a proof says nothing.
+    """
+    known = [kind.value for kind in CertifiedKind]
+    if len(question.kinds) != 1 or question.kinds[0] not in known or question.rule != "all":
+        raise WorkspaceError(
+            f"--certify: found --kind {','.join(question.kinds)}, --orientations {question.rule}; "
+            f"accepted: one of {', '.join(known)}, and all"
+        )
+    about = question.about
+    if about.method is not None:
+        raise WorkspaceError(
+            f"--certify: found --method {about.method}; accepted: no method, for it is proven that "
+            "there are tensions, not that a method finds them"
+        )
+    task = CertifyTask(
+        CertifiedKind(question.kinds[0]),
+        about.case,
+        about.required or SpatialSet(),
+        about.around,
+        about.clearance,
+        *errors,
+    )
+    lower, upper = robot.reach()
+    if region is not None:
+        free = lower < upper
+        lower, upper = np.where(free, region[0], lower), np.where(free, region[1], upper)
+    angles = question.grid.angles
+    box = PoseBox(
+        np.concatenate([lower, angles.min(axis=0)]), np.concatenate([upper, angles.max(axis=0)])
+    )
+    return BoxSearch(task, box)
+
+
+def certified_boxes(
+    search: BoxSearch,
+    most_boxes: int = 200_000,
+    folder: Path | None = None,
+    *,
+    on_progress: Callable[[int, float], None] | None = None,
+    should_stop: Callable[[], bool] | None = None,
+) -> CertifiedBoxes:
+    """Boxes proven inside or outside; with a folder it continues where it was stopped or killed.
+
+    Args:
+        search: What is to be proven, and where.
+        most_boxes: How many boxes are judged, at most; more of them continue a search for fewer.
+        folder: A folder that exists, for `JOURNAL`; None: nothing is kept.
+        on_progress: As `workspaces.certify`.
+        should_stop: As `workspaces.certify`.
+
+    Raises:
+        WorkspaceError: most_boxes < 1.
+        OutputFolderError: The folder cannot be written.
+    """
+    words = json.dumps(search.arguments(), sort_keys=True)
+    known, saved = None, time.monotonic()
+
+    def save(journal: BoxJournal) -> None:
+        if folder is None:
+            return
+        verdicts, axes = journal.arrays()
+        arrays = {"about": np.array(words), "verdicts": verdicts, "axes": axes}
+        try:
+            store_arrays(folder / JOURNAL, arrays)
+        except OSError as problem:
+            raise OutputFolderError(f"{folder}: cannot be written: {problem.strerror}") from problem
+
+    last: list[BoxJournal] = []
+
+    def keep(journal: BoxJournal) -> None:
+        nonlocal saved
+        last[:] = [journal]
+        if time.monotonic() - saved > SAVE_SECONDS:
+            save(journal)
+            saved = time.monotonic()
+
+    if folder is not None:
+        stored = load_arrays(folder / JOURNAL)
+        if stored is not None and str(stored["about"]) == words:
+            known = BoxJournal(stored["verdicts"], stored["axes"])
+    found = certify(
+        search.task, search.box, most_boxes, on_progress=on_progress, should_stop=should_stop,
+        known=known, on_journal=keep,
+    )  # fmt: skip
+    if last:
+        save(last[0])
+    return found
+
+
+def box_numbers(found: CertifiedBoxes, search: BoxSearch | None = None) -> dict[str, Any]:
+    """What was cut into boxes, shares and the curve for JSON."""
+    return {
+        **({} if search is None else search.words()),
+        "boxes_judged": int(found.curve[-1, 0]),
+        "inside_share": found.inside,
+        "outside_share": found.outside,
+        "open_share": found.open,
+        "finished": found.finished,
+        "curve": [
+            {"boxes": int(n), "inside": a, "outside": b, "open": c}
+            for n, a, b, c in found.curve.tolist()
+        ],
+    }
+
+
+def save_boxes(found: CertifiedBoxes, folder: Path) -> Path:
+    """Writes `boxes.npz` into a folder that exists, and returns its path."""
+    path = folder / BOX_ARRAYS
+    arrays = {name: getattr(found, name) for name in ("poses", "halves", "verdicts", "curve")}
+    store_arrays(path, arrays)
+    return path
+
+
+def load_boxes(folder: Path, finished: bool) -> CertifiedBoxes:
+    """Reads what `save_boxes` wrote.
+
+    Args:
+        folder: Its folder.
+        finished: What `box_numbers` says of that.
+
+    Raises:
+        DataFileError: There is no such file, or it is damaged.
+    """
+    arrays, names = load_arrays(folder / BOX_ARRAYS), ("poses", "halves", "verdicts", "curve")
+    if arrays is None or not set(names) <= set(arrays):
+        raise DataFileError(f"{folder / BOX_ARRAYS}: found no boxes; accepted: a whole file")
+    poses, halves, verdicts, curve = (arrays[name] for name in names)
+    return CertifiedBoxes(poses, halves, verdicts, curve, finished)
+
+
+def write_boxes(found: CertifiedBoxes, path: Path) -> Path:
+    """Writes the positions of the boxes as cells of VTK, with verdict and half angles.
+
+    Raises:
+        WorkspaceError: The file's ending is none of `workspaces.GRID_ENDINGS`, or meshio is not
+            installed.
+    """
+    numbers: dict[str, np.ndarray] = {"verdict": found.verdicts.astype(np.int32)}
+    if np.any(found.halves[:, 3:]):
+        for k, name in enumerate(("phi", "theta", "psi"), 3):
+            numbers[name], numbers[f"half_{name}"] = found.poses[:, k], found.halves[:, k]
+    return write_cells(path, found.poses[:, :3], found.halves[:, :3], numbers)
+
+
+def agreements(
+    workspace: RobotWorkspace, hull: WorkspaceHull | None, boxes: CertifiedBoxes
+) -> dict[str, BoxAgreement]:
+    """What boxes say of every pose of the grid, and of the ends of a hull's rays.
+
+    Each is inside a proven box only if it belongs to the workspace by itself, and inside one that
+    is proven outside only if it does not.
+    """
+    found = {"grid": grid_agreement(boxes, workspace.grid, workspace.inside(ALL))}
+    angles = workspace.grid.angles
+    if hull is not None and len(angles) == 1:
+        found["hull"] = hull_agreement(boxes, hull, angles[0])
+    return found
+
+
+def agreement_numbers(found: Mapping[str, BoxAgreement]) -> dict[str, Any]:
+    """Counts, and the first poses at which boxes are wrong, for JSON."""
+    return {
+        name: {
+            "poses": one.poses,
+            "in_boxes_proven_inside": one.inside,
+            "in_boxes_proven_outside": one.outside,
+            "in_open_boxes_or_none": one.poses - one.inside - one.outside,
+            "contradictions": len(one.broken),
+            "first_contradictions_m_rad": one.broken[:NAMED].tolist(),
+        }
+        for name, one in found.items()
+    }

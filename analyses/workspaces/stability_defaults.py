@@ -1,0 +1,156 @@
+"""Where a robot's stability is asked for, and under which perturbations, as data.
+
+Drake's YAML loader reads the annotations themselves, so they are not postponed here.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.errors import BoundsFileError
+from cdpr_drake.models.robot_loader import robot_file, robot_names
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.schema.fields import array, number, section, text
+from cdpr_drake.schema.typed_yaml import load_typed
+from cdpr_drake.stability.perturbation_bounds import (
+    BASELINE,
+    DIRECTIONS,
+    PLANAR_BASELINE,
+    PerturbationBounds,
+)
+
+FILE = "workspace.yaml"
+"""In a robot's folder: its grid and bounds in the servoing thesis."""
+
+INSET = 0.1
+"""Without such a file the grid leaves this share of the frame free on every side but the floor."""
+
+COUNTS = (17, 17, 9)
+"""Without such a file the grid has so many points along x, y, z."""
+
+
+@dataclass(kw_only=True)
+class BoundsSettings:
+    """Bounds on the error between true and believed model; what is left out is known exactly."""
+
+    source: str = text("Where the values stand.", "")
+    r_bp: float = number("Position of the platform.", "m", 0.0, at_least=0.0)
+    d_theta_bp_deg: float = number(
+        "Orientation of the platform.", "deg", 0.0, at_least=0.0, at_most=180.0
+    )
+    r_pc: float = number("Position of the camera on the platform.", "m", 0.0, at_least=0.0)
+    d_theta_pc_deg: float = number(
+        "Orientation of the camera on the platform.", "deg", 0.0, at_least=0.0, at_most=180.0
+    )
+    r_A: float = number("Exit points.", "m", 0.0, at_least=0.0)
+    r_B: float = number("Anchor points.", "m", 0.0, at_least=0.0)
+    r_s: float = number("Position of the object seen by the camera.", "m", 0.0, at_least=0.0)
+    d_theta_s_deg: float = number(
+        "Orientation of the object seen by the camera.", "deg", 0.0, at_least=0.0, at_most=180.0
+    )
+    exits: str = text(
+        "How exit points are wrong: each by itself in a ball, all by one common shift, or each in "
+        "a cube.",
+        "independent",
+        choices=DIRECTIONS,
+    )
+    anchors: str = text("The same for anchor points.", "independent", choices=DIRECTIONS)
+
+    def bounds(self) -> PerturbationBounds:
+        """The bounds in SI units."""
+        return PerturbationBounds(
+            r_bp=self.r_bp,
+            r_pc=self.r_pc,
+            r_A=self.r_A,
+            r_B=self.r_B,
+            r_s=self.r_s,
+            d_theta_bp=float(np.radians(self.d_theta_bp_deg)),
+            d_theta_pc=float(np.radians(self.d_theta_pc_deg)),
+            d_theta_s=float(np.radians(self.d_theta_s_deg)),
+            exits=self.exits,
+            anchors=self.anchors,
+        )
+
+
+@dataclass(kw_only=True)
+class GridSettings:
+    """A box of positions of the platform."""
+
+    lower: np.ndarray = array("Lower corner in W.", "m", (3,))
+    upper: np.ndarray = array("Upper corner in W.", "m", (3,))
+    step: np.ndarray = array("Distance between neighbours along x, y, z.", "m", (3,), above=0.0)
+
+
+@dataclass(kw_only=True)
+class WorkspaceSettings:
+    """Grid and bounds of a robot."""
+
+    source: str = text("Where the values stand.", "")
+    grid: GridSettings = section("Places of the platform.", GridSettings)
+    bounds: BoundsSettings = section("Perturbation bounds.", BoundsSettings)
+
+
+@dataclass(frozen=True, eq=False)
+class WorkspaceDefaults:
+    """Grid and bounds of a robot.
+
+    Attributes:
+        lower: Lower corner of the grid, shape (3,) [m].
+        upper: Upper corner, shape (3,) [m].
+        step: Distance between neighbours, shape (3,) [m].
+        bounds: Perturbation bounds.
+        source: Where they come from.
+    """
+
+    lower: Array
+    upper: Array
+    step: Array
+    bounds: PerturbationBounds
+    source: str
+
+
+def load_bounds(path: Path) -> PerturbationBounds:
+    """Reads a file of perturbation bounds; its keys are those of `BoundsSettings`.
+
+    Raises:
+        BoundsFileError: The file cannot be read, or a value is not accepted.
+    """
+    if not path.is_file():
+        raise BoundsFileError(f"{path}: there is no such file of perturbation bounds")
+    return load_typed(BoundsSettings, path, error=BoundsFileError).bounds()
+
+
+def workspace_defaults(robot: Robot, name: str) -> WorkspaceDefaults:
+    """The servoing thesis' grid and bounds for a robot.
+
+    A robot that the thesis does not have gets a grid in its frame and the bounds of the spatial or
+    planar robots there, which were chosen for a frame of 1.2 m.
+
+    Args:
+        robot: The robot.
+        name: Its name in the catalogue, or the path of its file.
+    """
+    path = robot_file(name).parent / FILE
+    if name in robot_names() and path.is_file():
+        settings = load_typed(WorkspaceSettings, path, error=BoundsFileError)
+        grid = settings.grid
+        return WorkspaceDefaults(
+            grid.lower, grid.upper, grid.step, settings.bounds.bounds(), settings.source
+        )
+    size = robot.frame.upper - robot.frame.lower
+    lower, upper = robot.frame.lower + INSET * size, robot.frame.upper - INSET * size
+    lower[2] = robot.frame.lower[2]
+    near, far = robot.reach()
+    still = near == far
+    lower[still] = upper[still] = near[still]
+    step = (upper - lower) / (np.array(COUNTS) - 1)
+    step[step == 0.0] = 1.0  # one point along z
+    return WorkspaceDefaults(
+        lower,
+        upper,
+        step,
+        PLANAR_BASELINE if robot.motion_type().is_horizontal_body else BASELINE,
+        "grid from the robot's frame; bounds of the servoing thesis' robots, frame 1.2 m",
+    )

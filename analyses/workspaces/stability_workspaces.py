@@ -1,0 +1,206 @@
+"""Control stability workspaces, the static feasible workspace, and what they have in common."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cdpr_drake.analyses.reporting.progress import WorkProgress
+from cdpr_drake.analyses.reporting.provenance import package_versions
+from cdpr_drake.analyses.workspaces.grid_results import load_grid, region_numbers, save_grid
+from cdpr_drake.analyses.workspaces.grid_runs import SweepOptions, run_poses
+from cdpr_drake.analyses.workspaces.stability_question import StabilityQuestion
+from cdpr_drake.analyses.workspaces.static_feasible import StaticTask
+from cdpr_drake.stability.perturbation_bounds import PerturbationBounds
+from cdpr_drake.workspaces.pose_grid import WorkspaceGrid
+from cdpr_drake.workspaces.volume import VolumeRule, WorkspaceVolume, workspace_volume
+
+KINDS = {
+    "Z": "control stability workspace",
+    "S": "static feasible workspace",
+    "SZ": "both",
+}
+"""Kinds of workspaces by name. Source: servoing thesis (1.25), (3.27), (3.28)."""
+
+CHUNK_POSES = {"sampled": 1024, "searched": 256, "certified": 64}
+"""Poses per chunk for each verdict, seconds of work: what Ctrl-C waits for, or loses. Chunks that
+were kept under other numbers are not found, and computed again."""
+
+STATIC = "static"
+"""Name of the static feasible workspace among the tasks of the sweep."""
+
+
+LEVERS_IN_WORDS = {
+    "error": "L_s with [e_t]x, (1.47) as printed",
+    "object": "L_s with [s_t]x, exact",
+}
+"""What PBVS' interaction matrix has in its rotational columns, by `StabilityCase.lever`."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class StabilityWorkspaces:
+    """Workspaces of one robot and scheme under one or several perturbation bounds.
+
+    Attributes:
+        arguments: All that the numbers depend on, see `StabilityQuestion.arguments`.
+        grid: The poses.
+        names: Names of the perturbation bounds, as in arguments["bounds"].
+        stable: Whether the servo is stable under each bounds, shape (b, k, nx, ny, nz).
+        margin: Smallest eigenvalue of the symmetric part of Pi, as the verdict knows it, same
+            shape [-]; minus infinity where Pi does not exist or nothing was proven.
+        feasible: Whether the platform can be held, shape (k, nx, ny, nz).
+        versions: Versions of what computed them.
+    """
+
+    arguments: dict[str, Any]
+    grid: WorkspaceGrid
+    names: tuple[str, ...]
+    stable: np.ndarray
+    margin: np.ndarray
+    feasible: np.ndarray
+    versions: dict[str, str]
+
+    def inside(self, kind: str, bounds: str | None = None) -> np.ndarray:
+        """Which poses belong to a workspace, shape (k, nx, ny, nz).
+
+        Args:
+            kind: One of `KINDS`.
+            bounds: Name of the perturbation bounds; None: the first.
+        """
+        index = 0 if bounds is None else self.names.index(bounds)
+        masks = {"Z": self.stable[index], "S": self.feasible}
+        return masks["Z"] & masks["S"] if kind == "SZ" else masks[kind]
+
+    def places(self, kind: str, bounds: str | None = None) -> np.ndarray:
+        """Which positions belong to it in every orientation of the grid, shape (nx, ny, nz)."""
+        return np.all(self.inside(kind, bounds), axis=0)
+
+    def volume(
+        self, kind: str, rule: VolumeRule | str = VolumeRule.CORNERS, bounds: str | None = None
+    ) -> WorkspaceVolume:
+        """Volume of the positions that belong to a workspace in every orientation."""
+        return workspace_volume(self.places(kind, bounds), self.grid.axes, rule)
+
+    @property
+    def interaction_matrix(self) -> str:
+        """Which interaction matrix was used, in words; empty where a scheme has but one."""
+        asked = self.arguments
+        return LEVERS_IN_WORDS[asked["case"]["lever"]] if asked["scheme"] == "pbvs" else ""
+
+    def as_dict(self) -> dict[str, Any]:
+        """Arguments, versions and volumes for JSON."""
+        return {
+            **self.arguments,
+            "interaction_matrix": self.interaction_matrix or None,
+            "versions": self.versions,
+            "workspaces": [
+                {"bounds": name, **{kind: self._numbers(kind, name) for kind in KINDS}}
+                for name in self.names
+            ],
+        }
+
+    def _numbers(self, kind: str, name: str) -> dict[str, Any]:
+        return region_numbers(self.inside(kind, name), self.places(kind, name), self.grid.axes)
+
+    def save(self, folder: Path) -> Path:
+        """Writes `workspace.npz` into a folder that exists, and returns its path."""
+        about = {"arguments": self.arguments, "versions": self.versions, "bounds": self.names}
+        names = ("stable", "margin", "feasible")
+        return save_grid(folder, about, self.grid, {name: getattr(self, name) for name in names})
+
+
+def load_workspaces(path: Path | str) -> StabilityWorkspaces:
+    """Reads what `StabilityWorkspaces.save` wrote, from its file or folder.
+
+    Raises:
+        DataFileError: There is no such file, or it is not of that kind.
+    """
+    about, grid, arrays = load_grid(path, "stable", "workspaces", "cdpr stability")
+    return StabilityWorkspaces(
+        arguments=about["arguments"],
+        grid=grid,
+        names=tuple(about["bounds"]),
+        stable=arrays["stable"],
+        margin=arrays["margin"],
+        feasible=arrays["feasible"],
+        versions=about["versions"],
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class StabilityRun:
+    """What came of a question.
+
+    Attributes:
+        workspaces: The workspaces; None if the sweep was stopped before the end.
+        progress: Where the sweep stood at the end.
+    """
+
+    workspaces: StabilityWorkspaces | None
+    progress: WorkProgress
+
+
+def stability_workspaces(
+    question: StabilityQuestion,
+    folder: Path | None = None,
+    workers: int | None = 1,
+    scheduler: str | None = None,
+    on_progress: Callable[[WorkProgress], None] | None = None,
+    should_stop: Callable[[], bool] | None = None,
+) -> StabilityRun:
+    """Computes the workspaces of a question; arguments as `run_sweep`.
+
+    Args:
+        question: What to compute.
+        folder: Where finished chunks are kept and found, and the result; None: nowhere.
+        workers: Number of local processes, with one this process does it; None: one for each
+            processor.
+        scheduler: Address of a Dask scheduler, whose workers compute instead.
+        on_progress: Called after every chunk.
+        should_stop: Asked often; True ends the sweep once the chunks under way are finished.
+
+    Raises:
+        OutputFolderError: The folder belongs to other arguments, or cannot be written.
+        SweepError: The scheduler does not answer or got lost, or a local process died.
+    """
+    arguments, count = question.arguments(), question.grid.size
+    tasks: dict[str, Any] = {STATIC: (StaticTask(question.statics, question.grid), count)}
+    tasks |= {name: (question.task(name), count) for name in _different(question).values()}
+    run = run_poses(
+        arguments,
+        tasks,
+        CHUNK_POSES[question.verdict],
+        lambda arrays: _assembled(question, arguments, arrays),
+        load_workspaces,
+        SweepOptions(folder, workers, scheduler, on_progress, should_stop),
+    )
+    return StabilityRun(run.result, run.progress)
+
+
+def _different(question: StabilityQuestion) -> dict[str, str]:
+    """For every name of bounds the first name of the same bounds; they are computed once."""
+    first: dict[PerturbationBounds, str] = {}
+    return {name: first.setdefault(bounds, name) for name, bounds in question.bounds.items()}
+
+
+def _assembled(
+    question: StabilityQuestion,
+    arguments: dict[str, Any],
+    arrays: Mapping[str, Mapping[str, np.ndarray]],
+) -> StabilityWorkspaces:
+    shape = question.grid.shape
+    names = tuple(question.bounds)
+    computed = [arrays[name] for name in _different(question).values()]
+    return StabilityWorkspaces(
+        arguments=arguments,
+        grid=question.grid,
+        names=names,
+        stable=np.array([part["stable"].reshape(shape) for part in computed]),
+        margin=np.array([part["margin"].reshape(shape) for part in computed]),
+        feasible=arrays[STATIC]["feasible"].reshape(shape),
+        versions=package_versions(),
+    )

@@ -1,0 +1,204 @@
+"""Figures of workspaces: planes coloured by a measure or by what holds, and wrench sets."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from textwrap import wrap
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import ListedColormap
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator
+
+from cdpr_drake.analyses.reporting.deferred_figures import Pictures
+from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS, figure_writers
+from cdpr_drake.analyses.visualization.figure_style import line_style, new_figure, plain_numbers
+from cdpr_drake.analyses.workspaces.conditions import MEASURES
+from cdpr_drake.analyses.workspaces.stability_figures import cell_edges, even_choice, plane_axes
+from cdpr_drake.analyses.workspaces.workspace_question import RULES
+from cdpr_drake.analyses.workspaces.workspace_results import ALL, RobotWorkspace
+from cdpr_drake.arrays import Array
+from cdpr_drake.palette import nth_look
+from cdpr_drake.workspaces.available_wrenches import AvailableWrenches
+from cdpr_drake.workspaces.certified_boxes import CertifiedBoxes
+
+OUTSIDE, SOME, INSIDE = "#e8e8e8", "#f0c27b", "#3f8f5f"
+"""Of cells where no kind holds, where some do, and where all do."""
+
+MOST_PLANES = 12
+COLUMNS = 4
+
+LINE = 60
+"""Characters in a line of a title."""
+
+CONTOURS = 6
+"""Contour lines of a measure, about."""
+
+
+def workspace_pictures(
+    workspace: RobotWorkspace,
+    formats: Sequence[str] = DEFAULT_FORMATS,
+    boxes: CertifiedBoxes | None = None,
+) -> Pictures:
+    """What draws the figures that a result suffices for, by the names of their files."""
+    drawn: dict[str, Callable[[], Figure]] = {"planes": lambda: planes_figure(workspace)}
+    for name in workspace.values:
+        drawn[name] = partial(planes_figure, workspace, name)
+    if boxes is not None:
+        drawn["open_share"] = partial(
+            boxes_figure, boxes, workspace.arguments["robot"], workspace.arguments["cables"]
+        )
+    return dict(figure_writers(drawn, formats))
+
+
+def planes_figure(workspace: RobotWorkspace, measure: str | None = None) -> Figure:
+    """Planes of a grid, coloured by what holds, or by a measure where all kinds hold.
+
+    Planes are horizontal, but where the grid has one point along x or y and several along z. With
+    several orientations a measure is its least over them.
+
+    Args:
+        workspace: The result.
+        measure: Name of a measure of the result; None: what holds.
+    """
+    normal, u, v = plane_axes(workspace.grid.shape[1:])
+    places = workspace.grid.axes[normal]
+    chosen = even_choice(len(places), MOST_PLANES)
+    edges = cell_edges(workspace.grid.axes, (u, v))
+    rows = -(-len(chosen) // COLUMNS)
+    columns = -(-len(chosen) // rows)
+    extents = np.array([float(np.ptp(e)) for e in edges])
+    width, height = extents * (3.0 if columns > 1 else 5.5) / np.max(extents)
+    figure, grid = new_figure(
+        rows,
+        columns,
+        (max(1.6 + (width + 0.3) * columns, 6.5), 2.2 + (height + 0.4) * rows),
+        _title(workspace, measure),
+    )
+    panels: list[Axes] = list(np.ravel(grid))
+    inside = workspace.places(ALL)
+    if measure is None:
+        kinds = [workspace.places(kind) for kind in workspace.holds]
+        cells = np.sum(kinds, axis=0) > 0
+        shown: Array = np.where(inside, 2.0, np.where(cells, 1.0, 0.0))
+        limits = (-0.5, 2.5)
+        colors = ListedColormap([OUTSIDE, SOME, INSIDE])
+    else:
+        shown = _least(workspace.values[measure], workspace.inside())
+        known = shown[np.isfinite(shown)]
+        limits = (float(np.min(known)), float(np.max(known))) if len(known) else (0.0, 1.0)
+        colors = None
+    mesh = None
+    for number, (axes, k) in enumerate(zip(panels, chosen, strict=False)):
+        plane = np.take(shown, k, normal).T
+        mesh = axes.pcolormesh(*edges, plane, cmap=colors, vmin=limits[0], vmax=limits[1])
+        if measure is not None and min(plane.shape) > 1 and np.ptp(limits) > 0.0:
+            _contours(axes, [workspace.grid.axes[k] for k in (u, v)], plane, limits)
+        axes.set_aspect("equal")
+        axes.grid(False)
+        axes.set_title(f"{'xyz'[normal]} = {places[k]:.3g} m", fontsize=11)
+        axes.tick_params(labelsize=10)
+        plain_numbers(axes.xaxis)
+        plain_numbers(axes.yaxis)
+        first, lowest = number % columns == 0, number + columns >= len(chosen)
+        axes.tick_params(labelleft=first, labelbottom=lowest)
+        axes.set_ylabel(f"{'xyz'[v]} [m]" if first else "")
+        axes.set_xlabel(f"{'xyz'[u]} [m]" if lowest else "")
+    for axes in panels[len(chosen) :]:
+        axes.remove()
+    if measure is None:
+        labels = {OUTSIDE: "outside", SOME: "some of the kinds", INSIDE: "inside"}
+        if len(workspace.holds) == 1:
+            del labels[SOME]
+        figure.legend(
+            handles=[Patch(facecolor=color, label=label) for color, label in labels.items()],
+            loc="outside lower center",
+            ncols=3,
+            title="Each point of the grid colours the cell around it.",
+            title_fontsize=10,
+        )
+    elif mesh is not None:
+        about = MEASURES[measure]
+        figure.colorbar(mesh, ax=panels[: len(chosen)], label=f"{about.title} [{about.unit}]")
+    return figure
+
+
+def boxes_figure(found: CertifiedBoxes, robot: str, cables: str = "") -> Figure:
+    """Shares that are proven, and what is open, against the number of boxes.
+
+    Args:
+        found: The boxes.
+        robot: Name of the robot.
+        cables: How its cables run, in words; empty: nothing is said.
+    """
+    words = wrap(f"{robot}: boxes that are proven" + (f"; cables {cables}" if cables else ""), LINE)
+    figure, axes = new_figure(
+        1, 1, (7.0, 4.6), "\n".join(words) + f"\n{found.open:.2%} of the box open"
+    )
+    names = ("proven inside", "proven outside", "open")
+    for number, (name, share) in enumerate(zip(names, found.curve[:, 1:].T, strict=True)):
+        look = nth_look(number)
+        shown = share > 0.0  # on a logarithmic axis
+        axes.plot(
+            found.curve[shown, 0], 100.0 * share[shown], label=name, **line_style(look),
+            marker=look.marker, markersize=4,
+        )  # fmt: skip
+    axes.set(xscale="log", yscale="log", xlabel="boxes judged", ylabel="share of the box [%]")
+    figure.legend(loc="outside lower center", ncols=3)
+    return figure
+
+
+def _least(values: Array, inside: np.ndarray) -> Array:
+    """Least value over the orientations where all holds; NaN where none does."""
+    some = np.where(inside & np.isfinite(values), values, np.inf)
+    least = np.min(some, axis=0)
+    return np.where(np.isfinite(least), least, np.nan)
+
+
+def _contours(axes: Axes, along: list[Array], plane: Array, limits: tuple[float, float]) -> None:
+    known = plane[np.isfinite(plane)]
+    levels = MaxNLocator(CONTOURS).tick_values(*limits)
+    if len(known) == 0 or not np.any((levels > known.min()) & (levels < known.max())):
+        return
+    lines = axes.contour(
+        *along, np.ma.masked_invalid(plane), levels, colors="black", linewidths=0.6
+    )
+    axes.clabel(lines, fmt="%.3g", fontsize=8)
+
+
+def _title(workspace: RobotWorkspace, measure: str | None) -> str:
+    about = workspace.arguments
+    volume = workspace.volume()
+    what = ", ".join(workspace.holds) if measure is None else MEASURES[measure].title
+    turns = len(workspace.grid.angles)
+    rule = f"\n{RULES[about['orientations']]}, {turns} orientations" if turns > 1 else ""
+    share = f"cells inside: {100.0 * volume.share:.1f} % of the grid's box"
+    words = wrap(f"{about['robot']}: {what}; cables {about['cables']}", LINE)
+    return "\n".join(words) + f"\n{share}{rule}"
+
+
+def wrench_set_figure(found: AvailableWrenches, at: Array, title: str) -> Figure:
+    """Sections through what cables can give: forces at the moments of `at`, and the other way.
+
+    Args:
+        found: The wrenches, of six rows or of those of a planar platform, (moment, f_x, f_y).
+        at: A wrench W t that is marked, such as what the weight demands, shape (n,) [N m, N].
+        title: Title of the figure.
+    """
+    if len(found.row_scale) == 6:
+        panels = [(3, 4), (3, 5), (4, 5), (0, 1), (0, 2), (1, 2)]
+        names = ["m_x", "m_y", "m_z", "f_x", "f_y", "f_z"]
+    else:
+        panels, names = [(1, 2), (0, 1), (0, 2)], ["m_z", "f_x", "f_y"]
+    units = [f"${name}$ [{'N m' if name[0] == 'm' else 'N'}]" for name in names]
+    figure, grid = new_figure(-(-len(panels) // 3), 3, (11.0, 4.2 * -(-len(panels) // 3)), title)
+    for axes, rows in zip(np.ravel(grid), panels, strict=True):
+        corners = found.section(rows, at)
+        if len(corners):
+            axes.fill(*corners.T, facecolor=INSIDE, alpha=0.35, edgecolor=INSIDE, linewidth=1.5)
+        axes.plot(at[rows[0]], at[rows[1]], "k+", markersize=10)
+        axes.set(xlabel=units[rows[0]], ylabel=units[rows[1]])
+    return figure

@@ -1,0 +1,342 @@
+"""What a workspace is asked for: all that its numbers depend on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from cdpr_drake.analyses.reporting.provenance import code_version
+from cdpr_drake.analyses.workspaces.conditions import (
+    KINDS,
+    MEASURES,
+    CameraView,
+    ConditionsTask,
+    PoseConditions,
+)
+from cdpr_drake.analyses.workspaces.pose_grid import check_grid, grid_arguments, plain
+from cdpr_drake.analyses.workspaces.stability_question import make_question, scenario_task
+from cdpr_drake.analyses.workspaces.static_feasible import static_case
+from cdpr_drake.arrays import Array
+from cdpr_drake.errors import WorkspaceError
+from cdpr_drake.models.camera_catalogue import load_camera
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.models.robot_statics import rigid_platform
+from cdpr_drake.schema.typed_yaml import closest
+from cdpr_drake.systems.cameras.targets import TARGETS
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.tensions.methods import method_for
+from cdpr_drake.workspaces.cable_interference import Surroundings, beams, box_row
+from cdpr_drake.workspaces.demanded_wrenches import MotionDemand, SpatialSet
+from cdpr_drake.workspaces.pose_grid import WorkspaceGrid
+
+ANCHOR_DIAMETERS = 10.0
+"""Next to its anchor point a cable is not compared with the platform over so many diameters, and
+as far as the deepest anchor point lies within the platform's box."""
+
+RULES = {"all": "in every orientation (inclusion)", "any": "in some orientation (maximal)"}
+"""Which positions belong to the workspace, with several orientations."""
+
+
+@dataclass(frozen=True, eq=False)
+class WorkspaceQuestion:
+    """Where do some kinds hold, and how well?
+
+    Attributes:
+        robot: Name of the robot.
+        kinds: Names of `KINDS`; the workspace is what they have in common.
+        measures: Names of `MEASURES`.
+        rule: One of `RULES`.
+        grid: Poses of the platform.
+        about: What the kinds need.
+        scenario: Name of the scenario with the camera's target; empty: none.
+        cables: Whether cables run over pulleys, in words.
+    """
+
+    robot: str
+    kinds: tuple[str, ...]
+    measures: tuple[str, ...]
+    rule: str
+    grid: WorkspaceGrid
+    about: PoseConditions
+    scenario: str
+    cables: str
+
+    def task(self) -> ConditionsTask:
+        """The sweep task."""
+        return ConditionsTask(self.about, self.grid, self.kinds, self.measures)
+
+    def arguments(self) -> dict[str, Any]:
+        """All that the numbers depend on, for JSON; two questions with the same are the same."""
+        about = self.about
+        cables = about.case.cables
+        found: dict[str, Any] = plain(
+            {
+                "cables": self.cables,
+                "cdpr_drake": code_version(),
+                "robot": self.robot,
+                "kinds": self.kinds,
+                "measures": self.measures,
+                "orientations": self.rule,
+                "method": about.method,
+                "grid": grid_arguments(self.grid),
+                "statics": about.case,
+                "elasticity_n": cables.stiffness,
+                "body": about.body,
+                "gravity": about.gravity,
+                "clearance_m": about.clearance,
+                "surroundings": about.around,
+                "required": about.required,
+                "motion": about.motion,
+                "scenario": self.scenario,
+                "view": None
+                if about.view is None
+                else {"X_WO": about.view.X_WO, "X_PC": about.view.X_PC},
+                "stable": None
+                if about.stable is None
+                else {
+                    "case": about.stable.case,
+                    "bounds": about.stable.bounds.as_dict(),
+                    "verdict": about.stable.verdict,
+                },
+            }
+        )
+        return found
+
+
+def surroundings(
+    robot: Robot,
+    obstacles: Array | None = None,
+    exit_free: float | None = None,
+    anchor_free: float | None = None,
+    pulleys: bool = False,
+) -> Surroundings:
+    """What a robot's cables and platform may meet: the platform's box, beams and obstacles.
+
+    Args:
+        robot: The robot.
+        obstacles: Boxes, shape (o, 15); None: none.
+        exit_free: Length next to exit points that is not compared with the frame [m]; None: the
+            thickness of the beams.
+        anchor_free: Length next to anchor points that is not compared with the platform [m]; None:
+            as `ANCHOR_DIAMETERS` says.
+        pulleys: Whether cables run over the robot's pulleys; else from fixed exit points.
+
+    Raises:
+        WorkspaceError: A length is negative.
+    """
+    body = box_row(robot.box_center(), robot.platform.size)
+    if anchor_free is None:
+        inside = body[12:, np.newaxis] - np.abs(robot.cable_set().p_PB - body[9:12, np.newaxis])
+        deepest = float(np.max(np.min(inside, axis=0)))
+        anchor_free = max(deepest, 0.0) + ANCHOR_DIAMETERS * float(np.max(robot.diameters()))
+    cables = robot.cable_set()
+    return Surroundings(
+        cables if pulleys else cables.without_pulleys(),
+        robot.diameters() / 2.0,
+        body[np.newaxis],
+        _fixtures(robot),
+        np.zeros((0, 15)) if obstacles is None else obstacles,
+        robot.frame.beam_width() if exit_free is None else exit_free,
+        anchor_free,
+    )
+
+
+def _fixtures(robot: Robot) -> Array:
+    """The frame's beams as boxes in W, shape (f, 15): its own, or those on the edges of its box."""
+    frame, width = robot.frame, robot.frame.beam_width()
+    if not frame.beams:
+        return beams(frame.lower, frame.upper, width)
+    rows = [
+        box_row((beam.start + beam.end) / 2.0, beam.size(width), beam.axes())
+        for beam in frame.beams
+    ]
+    return np.array(rows)
+
+
+@dataclass(frozen=True, eq=False)
+class Asked:
+    """Options of a question; None where nothing was said.
+
+    Attributes:
+        limits: Smallest and largest tension [N]; the robot's.
+        mass: Mass of the platform [kg]; the robot's.
+        wrench: External wrench beside the weight, shape (6,) [N m, N].
+        required: Wrenches to resist.
+        accelerations: Accelerations to have (angular, linear) [rad/s^2, m/s^2].
+        velocities: Velocities at which, shape (k, 6) [rad/s, m/s].
+        clearance: Least clearance [m].
+        around: What cables and platform may meet.
+        scenario: Whose camera shall see its target.
+        pulleys: Whether cables run over the robot's pulleys; else from fixed exit points.
+        method: Name of the method whose tensions must hold the weight, of `tensions.METHODS`, for
+            the kind `static`; None: any tensions.
+    """
+
+    limits: tuple[float, float] | None = None
+    mass: float | None = None
+    wrench: Array | None = None
+    required: SpatialSet | None = None
+    accelerations: SpatialSet | None = None
+    velocities: Array | None = None
+    clearance: float = 0.0
+    around: Surroundings | None = None
+    scenario: str | None = None
+    pulleys: bool = False
+    method: str | None = None
+
+
+NOTHING_ASKED = Asked()
+
+HINTS = {
+    "required": "--wrench-set, --force or --moment",
+    "motion": "--acceleration",
+    "view": "--scenario",
+}
+"""Which option gives what a kind needs."""
+
+
+def make_workspace_question(
+    robot_name: str,
+    kinds: Sequence[str],
+    grid: WorkspaceGrid,
+    measures: Sequence[str] = (),
+    rule: str = "all",
+    asked: Asked = NOTHING_ASKED,
+) -> WorkspaceQuestion:
+    """The question for a robot.
+
+    Args:
+        robot_name: Robot by name, or path of a robot file.
+        kinds: Names of `KINDS`, at least one.
+        grid: Poses of the platform.
+        measures: Names of `MEASURES`.
+        rule: One of `RULES`.
+        asked: What the kinds shall be asked for.
+
+    Raises:
+        CdprError: Something is unknown, missing, out of range, or not possible for the robot.
+    """
+    for name in kinds:
+        if name not in KINDS:
+            raise WorkspaceError(f"--kind {name!r} is unknown; {closest(name, KINDS)}")
+    for name in measures:
+        if name not in MEASURES:
+            raise WorkspaceError(f"--measure {name!r} is unknown; {closest(name, MEASURES)}")
+    if rule not in RULES:
+        raise WorkspaceError(f"--orientations {rule!r} is unknown; {closest(rule, RULES)}")
+    if not kinds:
+        raise WorkspaceError(f"--kind: found none; accepted: {', '.join(KINDS)}")
+    if not (np.isfinite(asked.clearance) and asked.clearance >= 0.0):
+        raise WorkspaceError(f"--clearance: found {asked.clearance:g}; accepted: >= 0 [m]")
+    robot = load_robot(robot_name)
+    check_grid(robot, grid)
+    about = pose_conditions(robot, asked)
+    if "stable" in kinds:
+        task = None if asked.scenario is None else scenario_task(robot_name, asked.scenario)
+        stability = make_question(robot_name, grid=grid, task=task)
+        about = replace(about, stable=stability.task(next(iter(stability.bounds))))
+    for name in kinds:
+        needs = KINDS[name].needs
+        if needs and getattr(about, needs) is None:
+            raise WorkspaceError(f"--kind {name}: needs {HINTS[needs]}")
+    if asked.method is not None and "static" not in kinds:
+        raise WorkspaceError(
+            f"--method {asked.method}: found --kind {','.join(kinds)}; accepted: static among them"
+        )
+    n, m = len(about.case.rows), about.case.cables.count
+    if "wrench-closure" in kinds and m <= n:
+        raise WorkspaceError(
+            f"--kind wrench-closure: found {m} cables of {robot.name} for {n} degrees of freedom; "
+            f"accepted: robots with more than {n}"
+        )
+    moved = [row - 3 for row in about.case.rows if row >= 3]
+    if "payload" in measures and not np.any(np.array(about.case.down)[moved]):
+        raise WorkspaceError(
+            f"--measure payload: found the planar {robot.name}, whose plane carries the weight; "
+            "accepted: robots that hold it by their cables"
+        )
+    return WorkspaceQuestion(
+        robot.name,
+        tuple(dict.fromkeys(kinds)),
+        tuple(dict.fromkeys(measures)),
+        rule,
+        grid,
+        about,
+        asked.scenario or "",
+        _cable_words(robot, about.case.cables.has_pulleys(), "stable" in kinds),
+    )
+
+
+def _cable_words(robot: Robot, pulleys: bool, stable: bool) -> str:
+    """Whether cables run over pulleys; the criterion of stability knows none."""
+    if not robot.cable_set().has_pulleys():
+        return "from fixed exit points, as the robot has no pulleys"
+    if not pulleys:
+        return "without pulleys: from fixed exit points"
+    return "over pulleys" + (", but for the kind stable: from fixed exit points" * stable)
+
+
+def pose_conditions(robot: Robot, asked: Asked = NOTHING_ASKED) -> PoseConditions:
+    """What kinds and measures know of a robot, but for stability.
+
+    Args:
+        robot: The robot.
+        asked: What the kinds shall be asked for.
+
+    Raises:
+        CdprError: Something asked for makes no sense for the robot.
+    """
+    case = static_case(robot, asked.limits, asked.mass, asked.wrench, asked.pulleys)
+    if asked.method is not None:
+        method_for(asked.method, case.cables.count - len(case.rows), False)
+    platform = rigid_platform(robot)
+    mass = robot.platform.mass if asked.mass is None else asked.mass
+    # A mass that was given is spread as the robot's.
+    inertia = platform.I_PPo * (mass / platform.mass)
+    motion = None
+    if asked.accelerations is not None or asked.velocities is not None:
+        motion = MotionDemand(
+            mass,
+            platform.p_PCo,
+            inertia,
+            asked.accelerations or SpatialSet(),
+            np.zeros((1, 6)) if asked.velocities is None else asked.velocities,
+        )
+    return PoseConditions(
+        case,
+        asked.around or surroundings(robot, pulleys=asked.pulleys),
+        robot.gravity,
+        (mass, platform.p_PCo, inertia),
+        asked.clearance,
+        asked.required,
+        motion,
+        None if asked.scenario is None else camera_view(robot, asked.scenario),
+        method=asked.method,
+    )
+
+
+def camera_view(robot: Robot, scenario: str) -> CameraView:
+    """What the camera of a visual servo's scenario shall see.
+
+    Args:
+        robot: The robot, in the place of the scenario's.
+        scenario: Name or path of a visual servo's scenario.
+
+    Raises:
+        WorkspaceError: The camera is not on the platform, or the target does not rest.
+        ScenarioError: There is no such scenario, or the robot does not fit into it.
+    """
+    loaded = load_scenario(scenario, [f"robot={robot.name}"])
+    if loaded.target.carrier != "world" or loaded.target.motion is not None:
+        raise WorkspaceError(
+            f"--scenario {scenario}: found a target that moves; accepted: one that rests in the "
+            "world, seen by a camera on the platform"
+        )
+    mount = robot.camera_mount(loaded.camera.mount)
+    pinhole = load_camera(mount.model).pinhole(loaded.camera.width, loaded.camera.height)
+    target = TARGETS[loaded.target.kind](loaded.target)
+    return CameraView(target, loaded.target.pose.transform(), mount.pose.transform(), pinhole)

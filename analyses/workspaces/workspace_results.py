@@ -1,0 +1,198 @@
+"""Workspaces of a robot over a grid: computed, kept, and read again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cdpr_drake.analyses.reporting.log_files import finite
+from cdpr_drake.analyses.reporting.progress import WorkProgress
+from cdpr_drake.analyses.reporting.provenance import package_versions
+from cdpr_drake.analyses.workspaces.conditions import KINDS, MEASURES
+from cdpr_drake.analyses.workspaces.grid_results import load_grid, region_numbers, save_grid
+from cdpr_drake.analyses.workspaces.grid_runs import SweepOptions, run_poses
+from cdpr_drake.analyses.workspaces.workspace_question import WorkspaceQuestion
+from cdpr_drake.workspaces.pose_grid import WorkspaceGrid
+from cdpr_drake.workspaces.volume import VolumeRule, WorkspaceVolume, workspace_volume
+
+ALL = "all"
+"""Name of what all kinds have in common."""
+
+TASK = "poses"
+"""Name of the sweep's only task."""
+
+CHUNK_POSES = 4096
+"""Poses per chunk; a tenth of a second, or with cameras or stability seconds of work."""
+
+SLOW_CHUNK_POSES = 256
+"""With kinds that take about a millisecond a pose."""
+
+SLOW = {"stable", "target-visible"}
+
+
+@dataclass(frozen=True, eq=False)
+class RobotWorkspace:
+    """Where kinds hold on a grid, and measures there.
+
+    Attributes:
+        arguments: All that the numbers depend on, see `WorkspaceQuestion.arguments`.
+        grid: The poses.
+        holds: By kind, shape (k, nx, ny, nz).
+        values: By measure, same shape, in its unit.
+        versions: Versions of what computed them.
+    """
+
+    arguments: dict[str, Any]
+    grid: WorkspaceGrid
+    holds: dict[str, np.ndarray]
+    values: dict[str, np.ndarray]
+    versions: dict[str, str]
+
+    def inside(self, kind: str = ALL) -> np.ndarray:
+        """Which poses belong to a kind, or to all of them, shape (k, nx, ny, nz)."""
+        if kind == ALL:
+            return np.asarray(np.logical_and.reduce(list(self.holds.values())))
+        return self.holds[kind]
+
+    def places(self, kind: str = ALL) -> np.ndarray:
+        """Which positions belong to it, in every or in some orientation, shape (nx, ny, nz)."""
+        inside = self.inside(kind)
+        return np.asarray(
+            (np.all if self.arguments["orientations"] == "all" else np.any)(inside, 0)
+        )
+
+    def volume(
+        self, kind: str = ALL, rule: VolumeRule | str = VolumeRule.CORNERS
+    ) -> WorkspaceVolume:
+        """Volume of the positions that belong to it."""
+        return workspace_volume(self.places(kind), self.grid.axes, rule)
+
+    def is_tilted(self) -> bool:
+        """Whether there is a weight that does not pull along -z of W."""
+        return self._down() != [0.0, 0.0, -1.0] and self.arguments["statics"]["weight"] > 0.0
+
+    def axes_words(self) -> str:
+        """Of which world all coordinates are, and where the weight pulls in it."""
+        x, y, z = self._down()
+        if not self.is_tilted():
+            return "those of W; the weight pulls along -z"
+        tilt = np.degrees(np.arctan2(np.hypot(x, y), -z))
+        return (
+            "those of W, which was not turned; the weight pulls along "
+            f"({x:.6g}, {y:.6g}, {z:.6g}), {tilt:.4g} deg off -z"
+        )
+
+    def _down(self) -> list[float]:
+        found: list[float] = self.arguments["statics"]["down"]
+        return found
+
+    def as_dict(self) -> dict[str, Any]:
+        """Arguments, axes, versions, shares, volumes and ranges of the measures for JSON."""
+        names = [*self.holds, ALL] if len(self.holds) > 1 else list(self.holds)
+        return {
+            **self.arguments,
+            "axes": self.axes_words(),
+            "versions": self.versions,
+            "workspaces": {name: self._numbers(name) for name in names},
+            "measured": {name: self._range(name) for name in self.values},
+        }
+
+    def _numbers(self, kind: str) -> dict[str, Any]:
+        inside = self.inside(kind)
+        return {
+            "title": KINDS[kind].title if kind in KINDS else "all of these",
+            "pose_share": float(np.mean(inside)),
+            **region_numbers(inside, self.places(kind), self.grid.axes),
+        }
+
+    def _range(self, name: str) -> dict[str, Any]:
+        """Least, median and largest finite value within the workspace."""
+        values = self.values[name][self.inside()]
+        values = values[np.isfinite(values)]
+        some = len(values) > 0
+        return {
+            "title": MEASURES[name].title,
+            "unit": MEASURES[name].unit,
+            "least": finite(float(np.min(values))) if some else None,
+            "median": finite(float(np.median(values))) if some else None,
+            "largest": finite(float(np.max(values))) if some else None,
+        }
+
+    def save(self, folder: Path) -> Path:
+        """Writes `workspace.npz` into a folder that exists, and returns its path."""
+        arrays = {
+            **{f"kind/{name}": array for name, array in self.holds.items()},
+            **{f"measure/{name}": array for name, array in self.values.items()},
+        }
+        about = {"arguments": self.arguments, "versions": self.versions}
+        return save_grid(folder, about, self.grid, arrays)
+
+
+def load_robot_workspace(path: Path | str) -> RobotWorkspace:
+    """Reads what `RobotWorkspace.save` wrote, from its file or folder.
+
+    Raises:
+        DataFileError: There is no such file, or it is not of that kind.
+    """
+    about, grid, arrays = load_grid(path, "kind/", "workspace", "cdpr workspace")
+    groups: dict[str, dict[str, np.ndarray]] = {"kind": {}, "measure": {}}
+    for key, array in arrays.items():
+        group, _, name = key.partition("/")
+        groups[group][name] = array
+    return RobotWorkspace(
+        about["arguments"], grid, groups["kind"], groups["measure"], about["versions"]
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class WorkspaceRun:
+    """What came of a question: the workspace, None if it was stopped; where the sweep stood."""
+
+    workspace: RobotWorkspace | None
+    progress: WorkProgress
+
+
+def robot_workspace(
+    question: WorkspaceQuestion,
+    folder: Path | None = None,
+    workers: int | None = 1,
+    scheduler: str | None = None,
+    on_progress: Callable[[WorkProgress], None] | None = None,
+    should_stop: Callable[[], bool] | None = None,
+) -> WorkspaceRun:
+    """Computes a workspace; arguments as `sweeps.run_sweep`.
+
+    Args:
+        question: What to compute.
+        folder: Where finished chunks are kept and found, and the result; None: nowhere.
+        workers: Number of local processes, with one this process does it; None: one for each
+            processor.
+        scheduler: Address of a Dask scheduler, whose workers compute instead.
+        on_progress: Called after every chunk.
+        should_stop: Asked often; True ends the sweep once the chunks under way are finished.
+
+    Raises:
+        OutputFolderError: The folder belongs to other arguments, or cannot be written.
+        SweepError: The scheduler does not answer or got lost, or a local process died.
+    """
+    arguments, shape = question.arguments(), question.grid.shape
+
+    def assemble(arrays: Mapping[str, Mapping[str, np.ndarray]]) -> RobotWorkspace:
+        found = {name: array.reshape(shape) for name, array in arrays[TASK].items()}
+        return RobotWorkspace(
+            arguments,
+            question.grid,
+            {name: found[name] for name in question.kinds},
+            {name: found[name] for name in question.measures},
+            package_versions(),
+        )
+
+    size = SLOW_CHUNK_POSES if SLOW & {*question.kinds} else CHUNK_POSES
+    tasks = {TASK: (question.task(), question.grid.size)}
+    how = SweepOptions(folder, workers, scheduler, on_progress, should_stop)
+    run = run_poses(arguments, tasks, size, assemble, load_robot_workspace, how)
+    return WorkspaceRun(run.result, run.progress)

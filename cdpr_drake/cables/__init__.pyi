@@ -1,0 +1,2 @@
+from .elastic_law import unstrained_lengths as unstrained_lengths
+from .models import CABLE_MODELS as CABLE_MODELS

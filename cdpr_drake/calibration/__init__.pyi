@@ -1,0 +1,2 @@
+from .program import CalibrationProgram as CalibrationProgram
+from .result import CalibrationResult as CalibrationResult

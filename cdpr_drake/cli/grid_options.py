@@ -1,0 +1,276 @@
+"""Options of questions over a grid of poses, and what their words mean: one set for all of them.
+
+Grids of poses on the command line.
+
+A sweep over poses on the command line: where it stands, and how Ctrl-C ends it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+from typing import Annotated, Any, Protocol, TypeVar
+
+import numpy as np
+import typer
+from rich.console import Console
+
+from cdpr_drake.analyses.reporting.progress import WorkProgress
+from cdpr_drake.analyses.sweeps.sweep import STARTING
+from cdpr_drake.cli.options import parse_numbers
+from cdpr_drake.cli.process import INTERRUPTED, StopRequest
+from cdpr_drake.cli.terminal import progress_bar
+from cdpr_drake.errors import CdprError, WorkspaceError, WorkspaceGridError
+from cdpr_drake.workspaces.pose_grid import WorkspaceGrid, axis_by_count, axis_by_step
+
+GridWords = Annotated[
+    str | None,
+    typer.Option(
+        "--grid",
+        help="x,y,z, each a number of points in the default box, or lower:upper:step [m].",
+    ),
+]
+Orientations = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--orientation",
+        help="Angles phi,theta,psi of the platform, each a number or lower:upper:step [deg]; may "
+        "be repeated.",
+    ),
+]
+Out = Annotated[
+    Path | None,
+    typer.Option(
+        help="Results folder; without, one named by the arguments below a folder named as the "
+        "command."
+    ),
+]
+ForceToResist = Annotated[
+    float | None, typer.Option(help="Forces to resist, up to so much along each axis [N].")
+]
+MomentToResist = Annotated[
+    float | None, typer.Option(help="Moments to resist, up to so much about each axis [N m].")
+]
+Workers = Annotated[int | None, typer.Option(help="Local processes; all processors.")]
+
+
+def check_workers(workers: int | None) -> None:
+    """Raises a CdprError unless there is at least one."""
+    if workers is not None and workers < 1:
+        raise CdprError(f"--workers: found {workers}; accepted: at least 1")
+
+
+def check_mass(mass: float | None, *, zero: bool) -> None:
+    """Raises a CdprError unless a mass is positive, or with `zero` not negative."""
+    if mass is None or (math.isfinite(mass) and (mass > 0.0 or (zero and mass == 0.0))):
+        return
+    raise CdprError(f"--mass: found {mass:g}; accepted: {'>=' if zero else '>'} 0 [kg]")
+
+
+def default_folder(command: str, name: str, arguments: dict[str, Any]) -> Path:
+    """A folder below the command's that the same arguments find again."""
+    digest = hashlib.sha256(json.dumps(arguments, sort_keys=True).encode()).hexdigest()
+    return Path(command) / f"{name}-{digest[:8]}"
+
+
+MOST_POSES = 10_000_000
+"""Largest grid: its results are some 100 MB for each bounds, and take hours at least."""
+
+
+MOST_TURNS = 10_000
+"""Orientations of one grid."""
+
+
+def parse_grid(
+    words: str | None,
+    orientations: list[str],
+    lower: np.ndarray,
+    upper: np.ndarray,
+    step: np.ndarray,
+) -> WorkspaceGrid:
+    """The grid of --grid and --orientation.
+
+    Args:
+        words: x,y,z, each a number of points in the box, or lower:upper:step; None: the box.
+        orientations: Angles phi,theta,psi [deg]; none: unturned.
+        lower: Lower corner of the default box, shape (3,) [m].
+        upper: Upper corner, shape (3,) [m].
+        step: Default step, shape (3,) [m].
+
+    Raises:
+        WorkspaceGridError: The words make no sense, or the grid is empty or too large.
+    """
+    turns = [
+        np.radians(parse_numbers("--orientation", one, (3,), "phi,theta,psi [deg]"))
+        for one in orientations
+    ] or [np.zeros(3)]
+    parts = [None] * 3 if words is None else words.split(",")
+    if len(parts) != 3:
+        raise _grid_error(words)
+    spans = []
+    for part, name, low, high, by in zip(parts, "xyz", lower, upper, step, strict=True):
+        spans.append(_span(words, part, name, float(low), float(high), float(by)))
+    # Looked at before any axis is made, which may not fit into memory.
+    poses = math.prod((span.points for span in spans), start=float(len(turns)))
+    if poses > MOST_POSES:
+        raise WorkspaceGridError(
+            f"--grid: found {poses:.4g} poses; accepted: at most {MOST_POSES:g}"
+        )
+    x, y, z = (span.axis() for span in spans)
+    return WorkspaceGrid((x, y, z), np.array(turns))
+
+
+@dataclass(frozen=True)
+class _Span:
+    """An axis of a grid that is not made yet: `points` of them, or `step` apart."""
+
+    name: str
+    lower: float
+    upper: float
+    points: float
+    step: float | None
+
+    def axis(self) -> np.ndarray:
+        if self.step is None:
+            return axis_by_count(self.lower, self.upper, int(self.points), self.name)
+        return axis_by_step(self.lower, self.upper, self.step, self.name)
+
+
+def _span(
+    words: str | None, part: str | None, name: str, low: float, high: float, by: float
+) -> _Span:
+    try:
+        numbers = [low, high, by] if part is None else [float(one) for one in part.split(":")]
+    except ValueError:
+        raise _grid_error(words) from None
+    if len(numbers) == 3:
+        low, high, by = numbers
+        # What makes no sense is left to `axis_by_step`.
+        sense = all(map(math.isfinite, numbers)) and by > 0.0 and high >= low
+        return _Span(name, low, high, (high - low) / by + 1.0 if sense else 1.0, by)
+    if len(numbers) != 1 or not numbers[0].is_integer():
+        raise _grid_error(words)
+    if numbers[0] > 1.0 and low == high:
+        raise WorkspaceGridError(
+            f"--grid: found {numbers[0]:g} points along {name}, where the default box is flat; "
+            f"accepted: 1, at {name} = {low:g} [m]"
+        )
+    return _Span(name, low, high, numbers[0], None)
+
+
+def _grid_error(words: str | None) -> WorkspaceGridError:
+    return WorkspaceGridError(
+        f"--grid: found {words!r}; accepted: x,y,z, each a number of points or lower:upper:step "
+        "[m], as in 33,33,12 or -0.4:0.4:0.1,-0.4:0.4:0.1,0:1:0.2"
+    )
+
+
+def parse_turns(items: list[str]) -> list[str]:
+    """Every orientation of --orientation with its ranges, as `parse_grid` takes them.
+
+    Raises:
+        CdprError: The words make no sense, or there are too many orientations.
+    """
+    found: list[str] = []
+    for item in items:
+        axes = []
+        for name, part in zip(("phi", "theta", "psi"), item.split(","), strict=False):
+            numbers = part.split(":")
+            if len(numbers) == 1:
+                axes.append([part])
+                continue
+            low, high, step = parse_numbers(
+                "--orientation", ",".join(numbers), (3,), "lower:upper:step [deg]"
+            )
+            if step > 0.0 and (high - low) / step > MOST_TURNS:
+                raise WorkspaceError(
+                    f"--orientation: found {item!r}; accepted: at most {MOST_TURNS} orientations"
+                )
+            axes.append([repr(float(a)) for a in axis_by_step(low, high, step, name)])
+        if len(item.split(",")) != 3:
+            axes = [[part] for part in item.split(",")]  # refused by `parse_grid`
+        if len(found) + math.prod(len(axis) for axis in axes) > MOST_TURNS:
+            raise WorkspaceError(
+                f"--orientation: found {item!r}; accepted: at most {MOST_TURNS} orientations"
+            )
+        found += [",".join(words) for words in product(*axes)]
+    return found
+
+
+STOPPING = "Stopping after the chunks under way; Ctrl-C again drops them"
+"""Answer to the first Ctrl-C."""
+
+
+class _Run(Protocol):
+    @property
+    def progress(self) -> WorkProgress: ...
+
+
+Run = TypeVar("Run", bound=_Run)
+
+
+def watched(
+    title: str,
+    folder: Path,
+    console: Console,
+    run: Callable[[Callable[[WorkProgress], None], StopRequest], Run],
+    dropped: Callable[[WorkProgress], Run],
+) -> Run:
+    """Runs a sweep, shows how far it is, and leaves what is finished to Ctrl-C.
+
+    Args:
+        title: Words before the progress.
+        folder: Where finished chunks are kept.
+        console: Where to show it.
+        run: Takes a function to be told where the sweep stands, and a request to stop to ask.
+        dropped: What came of a sweep of which nothing but its last progress is known.
+    """
+    stop = StopRequest(STOPPING)
+    with stop.listening(), progress_bar(console) as bar:
+        task = bar.add_task(title, total=None, state=STARTING)
+        said: list[str] = []
+        seen: list[WorkProgress] = []
+
+        def show(progress: WorkProgress) -> None:
+            seen[:] = [progress]
+            if not said:
+                said.append(_continues(progress, folder))
+                if said[0]:
+                    bar.console.print(said[0])
+            state = f"{progress.done}/{progress.total} poses, {progress.speed:.0f} per s"
+            bar.update(
+                task,
+                completed=progress.done,
+                total=progress.total,
+                state=STARTING if progress.done == progress.found else state,
+            )
+
+        try:
+            result = run(show, stop)
+        except KeyboardInterrupt:  # the second one; what is under way is lost
+            if not seen:
+                raise
+            result = dropped(seen[0])
+    if not said and result.progress.found:
+        console.print(f"{folder}: complete already, nothing was computed")
+    return result
+
+
+def interrupted(progress: WorkProgress, folder: Path, console: Console) -> int:
+    """Says how a sweep that was stopped goes on; returns the exit code."""
+    console.print(
+        f"Interrupted after {progress.done} of {progress.total} poses; run again with "
+        f"the same arguments to continue in {folder}"
+    )
+    return INTERRUPTED
+
+
+def _continues(progress: WorkProgress, folder: Path) -> str:
+    if not progress.found:
+        return ""
+    return f"Continuing in {folder}: {progress.found} of {progress.total} poses were there already"

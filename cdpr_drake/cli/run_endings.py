@@ -1,0 +1,101 @@
+"""How runs end: what was kept, what is missing, and the exit code."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from rich.console import Console
+
+from cdpr_drake.analyses.reporting.left_folders import Kept, holds_log
+from cdpr_drake.analyses.reporting.output_folder import ResultsFolder
+from cdpr_drake.analyses.reporting.progress import WorkProgress
+from cdpr_drake.cli.process import INTERRUPTED, StopRequest
+
+INCOMPLETE = 3
+"""Exit code where the data is complete and something that is made of it is missing."""
+
+CLIENT_ENDED = 4
+"""Exit code of a run that ended early because of the process outside that closes its loop."""
+
+
+STUDY_FAILED = 5
+"""Exit code of a reproduction of which a study failed; the report says which."""
+
+MISFIT = 6
+"""Exit code of a calibration or an identification that does not fit what was measured."""
+
+
+def shown_path(folder: Path) -> Path:
+    """A path as it is shown: from the working folder, where it lies below it."""
+    here = Path.cwd().resolve()
+    return folder.relative_to(here) if folder.is_relative_to(here) else folder
+
+
+def say_recovered(console: Console, results: ResultsFolder) -> None:
+    """Says where results of killed runs went that nobody had seen yet."""
+    for folder in results.recovered:
+        where = shown_path(folder)
+        words = f"Found finished results of a run that was killed; they are in {where}"
+        if holds_log(folder):
+            words = (
+                f"Found what a run had simulated that was killed; it is in {where}; cdpr simulate "
+                f"--finish {where} makes log, summary and figures of it, --continue goes on"
+            )
+        console.print(
+            words,
+            soft_wrap=True, markup=False, highlight=False,
+        )  # fmt: skip
+
+
+NAMED = 3
+"""So many files that are kept are named."""
+
+
+def say_kept(console: Console, kept: Iterable[Kept]) -> None:
+    """Says which files of a folder whose results were replaced are not of this program, and where
+    they are."""
+    for names, folder in kept:
+        more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
+        console.print(
+            f"Kept in {shown_path(folder)}: {', '.join(names[:NAMED])}{more}: not written by cdpr "
+            "as far as is known, or changed since",
+            soft_wrap=True, markup=False, highlight=False,
+        )  # fmt: skip
+
+
+def say_failed(
+    console: Console, failed: dict[str, str], folder: Path, stop: StopRequest | None
+) -> int:
+    """Names what could not be written, one line each; returns the exit code."""
+    for name, why in failed.items():
+        console.print(
+            f"cdpr: {folder / name}: not written: {why}",
+            soft_wrap=True, markup=False, highlight=False,
+        )  # fmt: skip
+    if failed:
+        console.print(f"The data is complete in {folder}", markup=False, highlight=False)
+    if stop is not None and stop.asked:
+        return INTERRUPTED
+    return INCOMPLETE if failed else 0
+
+
+class SayContinued:
+    """Says once, of work of which earlier sessions left some in the folder, that it goes on."""
+
+    def __init__(self, console: Console, folder: Path) -> None:
+        """To a console, before anything was said."""
+        self._console, self._folder, self._said = console, folder, False
+
+    def __call__(self, progress: WorkProgress) -> None:
+        """Says so where there is something, the first time."""
+        if not progress.found or self._said:
+            return
+        self._said = True
+        words = f"{self._folder}: complete already, nothing was computed"
+        if progress.found != progress.total:
+            words = (
+                f"Continuing in {self._folder}: {progress.found:.0f} of {progress.total:.0f} "
+                f"{progress.items} were there already"
+            )
+        self._console.print(words)

@@ -1,0 +1,258 @@
+"""Small linear systems by Gauss' elimination with row pivots, as kernels without allocation.
+
+Source: Golub and Van Loan, Matrix Computations, 3.4.
+
+Least squares of limited rank, and what it leaves free, as a numba kernel.
+
+Smallest eigenvalue of a small symmetric matrix and its vector, as kernels without allocation.
+
+Householder reflections make the matrix tridiagonal; Sturm's sign count brackets the eigenvalue, and
+bisection closes the bracket to rounding. The vector comes by inverse iteration with a Cholesky
+factor shifted below it. For matrices of six rows this takes about a tenth of LAPACK's time.
+
+Source: Golub and Van Loan, Matrix Computations, 8.3 and 8.4.
+
+Copies between arrays inside kernels, as loops.
+
+An assignment of one array to a slice of another compiles much more: messages about shapes that do
+not fit, and strings to write them with, in every kernel that is linked above it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from cdpr_drake.arrays import Array
+
+
+@njit(cache=True, error_model="numpy")
+def eliminate(A: Array, n: int, pivots: Array) -> None:
+    """Overwrites `A[:n, :n]` by its triangular factors, for `substitute`.
+
+    Args:
+        A: Matrix, shape (n, n) or larger; a singular one leaves infinite or NaN numbers.
+        n: Its size.
+        pivots: Where the rows' exchanges are written, shape (n,), whole numbers as floats.
+    """
+    for k in range(n):
+        best = k
+        for i in range(k + 1, n):
+            if abs(A[i, k]) > abs(A[best, k]):
+                best = i
+        pivots[k] = best
+        if best != k:
+            for j in range(n):
+                A[k, j], A[best, j] = A[best, j], A[k, j]
+        for i in range(k + 1, n):
+            A[i, k] /= A[k, k]
+            for j in range(k + 1, n):
+                A[i, j] -= A[i, k] * A[k, j]
+
+
+@njit(cache=True, error_model="numpy")
+def substitute(A: Array, n: int, pivots: Array, x: Array) -> None:
+    """Overwrites a right hand side, `x[:n]`, by the solution; other arguments from `eliminate`."""
+    for k in range(n):
+        best = int(pivots[k])
+        x[k], x[best] = x[best], x[k]
+    for i in range(n):
+        for j in range(i):
+            x[i] -= A[i, j] * x[j]
+    for i in range(n - 1, -1, -1):
+        for j in range(i + 1, n):
+            x[i] -= A[i, j] * x[j]
+        x[i] /= A[i, i]
+
+
+@njit(cache=True)
+def least_squares(L: Array, rate: Array, rank: int) -> tuple[Array, Array]:
+    """v of least norm that brings L @ v nearest to a rate, and the projector on L's null space.
+
+    Args:
+        L: Interaction matrix, shape (n, k).
+        rate: Wanted rate of the features, shape (n,).
+        rank: Singular values beyond this many, or below 1e-9 of the largest, count as zero: where
+            features leave a motion free, image noise must not move it.
+
+    Returns:
+        v, shape (k,), and 1 - L^+ L, shape (k, k).
+    """
+    U, S, Vt = np.linalg.svd(L, full_matrices=False)
+    n, k = L.shape
+    v = np.zeros(k)
+    free = np.eye(k)
+    for i in range(min(rank, S.shape[0])):
+        if S[i] <= 1e-9 * S[0]:
+            break
+        share = 0.0
+        for j in range(n):
+            share += U[j, i] * rate[j]
+        share /= S[i]
+        for a in range(k):
+            v[a] += Vt[i, a] * share
+            for b in range(k):
+                free[a, b] -= Vt[i, a] * Vt[i, b]
+    return v, free
+
+
+SHIFT = 1e-7
+"""How far below the eigenvalue the factor for its vector is shifted, relative to the largest
+element or 1: far above rounding, so that the factor exists."""
+
+
+NEGLIGIBLE = 1e-280
+"""A column whose squares sum to less is zero already; reflecting it would only lose digits."""
+
+
+@njit(cache=True, error_model="numpy")
+def factor(S: Array, shift: float, F: Array) -> bool:
+    """F <- lower Cholesky factor of S - shift I; False, and F unfinished, if not positive."""
+    n = S.shape[0]
+    for j in range(n):
+        x = S[j, j] - shift
+        for k in range(j):
+            x -= F[j, k] * F[j, k]
+        if not x > 0.0:
+            return False
+        x = np.sqrt(x)
+        F[j, j] = x
+        for i in range(j + 1, n):
+            y = S[i, j]
+            for k in range(j):
+                y -= F[i, k] * F[j, k]
+            F[i, j] = y / x
+    return True
+
+
+@njit(cache=True, error_model="numpy")
+def smallest_eigenvalue(S: Array, T: Array) -> float:
+    """Smallest eigenvalue of S; minus infinity where a number is not finite.
+
+    Args:
+        S: Symmetric, shape (n, n).
+        T: Work space, shape (n, n).
+    """
+    n = S.shape[0]
+    for i in range(n):
+        for j in range(n):
+            T[i, j] = S[i, j]
+            if not np.isfinite(S[i, j]):
+                return -np.inf
+    for k in range(n - 2):  # reflections leave row k with two elements; v lies in column k
+        square = 0.0
+        for i in range(k + 1, n):
+            square += T[i, k] * T[i, k]
+        length = np.sqrt(square)
+        if square < NEGLIGIBLE:
+            continue
+        if T[k + 1, k] > 0.0:
+            length = -length
+        first = T[k + 1, k] - length
+        below = square - T[k + 1, k] * length  # v'v / 2
+        if below == 0.0:
+            continue
+        T[k + 1, k] = first
+        share = 0.0
+        for i in range(k + 1, n):  # p = T v / below, in row k
+            x = 0.0
+            for j in range(k + 1, n):
+                x += T[i, j] * T[j, k]
+            T[k, i] = x / below
+            share += T[k, i] * T[i, k]
+        share /= 2.0 * below
+        for i in range(k + 1, n):
+            T[k, i] -= share * T[i, k]
+        for i in range(k + 1, n):
+            for j in range(k + 1, n):
+                T[i, j] -= T[i, k] * T[k, j] + T[k, i] * T[j, k]
+        T[k + 1, k] = length
+    low, high = np.inf, -np.inf
+    for i in range(n):  # Gershgorin's circles
+        reach = 0.0
+        if i > 0:
+            reach += abs(T[i, i - 1])
+        if i < n - 1:
+            reach += abs(T[i + 1, i])
+        low, high = min(low, T[i, i] - reach), max(high, T[i, i] + reach)
+    size = max(abs(low), abs(high))
+    high = min(high, T[0, 0])
+    for i in range(n):
+        high = min(high, T[i, i])  # the smallest eigenvalue is below every diagonal element
+    tiny = 1e-300 + 1e-30 * size
+    while high - low > 4e-16 * size:
+        middle = 0.5 * (low + high)
+        if middle <= low or middle >= high:
+            break
+        x, below_middle = T[0, 0] - middle, False
+        for i in range(n):
+            if i > 0:
+                if abs(x) < tiny:
+                    x = tiny
+                x = T[i, i] - middle - T[i, i - 1] * T[i, i - 1] / x
+            if x < 0.0:
+                below_middle = True
+                break
+        if below_middle:
+            high = middle
+        else:
+            low = middle
+    return 0.5 * (low + high)
+
+
+@njit(cache=True, error_model="numpy")
+def smallest_eigenpair(S: Array, T: Array, F: Array, v: Array) -> float:
+    """Smallest eigenvalue of S, as `smallest_eigenvalue`; v <- a unit vector of it.
+
+    Args:
+        S: Symmetric, shape (n, n).
+        T: Work space, shape (n, n).
+        F: Work space, shape (n, n).
+        v: Output, shape (n,).
+    """
+    n = S.shape[0]
+    value = smallest_eigenvalue(S, T)
+    if value == -np.inf:
+        return value
+    size = 1.0
+    for i in range(n):
+        for j in range(n):
+            size = max(size, abs(S[i, j]))
+    shift = SHIFT * size
+    while not factor(S, value - shift, F):
+        shift *= 10.0
+    for i in range(n):
+        v[i] = 1.0 + 0.1 * i * i - 0.3 * i  # any vector that symmetries are not orthogonal to
+    for _ in range(3):
+        for i in range(n):
+            x = v[i]
+            for j in range(i):
+                x -= F[i, j] * v[j]
+            v[i] = x / F[i, i]
+        for i in range(n - 1, -1, -1):
+            x = v[i]
+            for j in range(i + 1, n):
+                x -= F[j, i] * v[j]
+            v[i] = x / F[i, i]
+        norm = 0.0
+        for i in range(n):
+            norm += v[i] * v[i]
+        norm = np.sqrt(norm)
+        for i in range(n):
+            v[i] /= norm
+    return value
+
+
+@njit(cache=True)
+def copy_vector(a: Array, out: Array) -> None:
+    """out <- a, both of shape (n,)."""
+    for i in range(a.shape[0]):
+        out[i] = a[i]
+
+
+@njit(cache=True)
+def copy_matrix(a: Array, out: Array) -> None:
+    """out <- a, both of shape (n, k)."""
+    for i in range(a.shape[0]):
+        for j in range(a.shape[1]):
+            out[i, j] = a[i, j]

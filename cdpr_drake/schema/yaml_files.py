@@ -1,0 +1,151 @@
+"""Tells a file that was given to the wrong loader, from the keys at its top.
+
+How large a YAML file may be: files of this package are small, and a bomb is told at once.
+
+YAML that was parsed before: the same small files are read again and again.
+
+A run reads its robot five times and a study hundreds of times, and PyYAML takes 5 ms each time in
+each of three passes. What a file says is checked every time all the same, as that may change.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections import OrderedDict
+from collections.abc import Collection
+from pathlib import Path
+from threading import Lock
+from typing import Any
+
+import yaml
+from pydrake.common.yaml import yaml_load_typed
+
+FILE_KINDS: dict[str, tuple[frozenset[str], str]] = {
+    "a robot": (frozenset({"platform", "winch", "tension_bounds"}), "cdpr_drake.models.load_robot"),
+    "a scenario": (frozenset({"robot", "duration"}), "cdpr_drake.systems.load_scenario"),
+    "a camera": (
+        frozenset({"view_angle_horizontal_deg", "view_angle_vertical_deg"}),
+        "cdpr_drake.models.load_camera",
+    ),
+    "perturbation bounds": (
+        frozenset({"r_bp", "r_A"}),
+        "cdpr_drake.analyses.workspaces.load_bounds",
+    ),
+}
+"""What files describe: keys that only those have, all of them, and what loads them."""
+
+
+def other_kind(keys: Collection[str], accepted: Collection[str]) -> str:
+    """Words for a file of another kind, with its loader; empty where nothing speaks for one.
+
+    Args:
+        keys: Those at the top of the file.
+        accepted: Those that the loader knows.
+    """
+    for what, (marks, loader) in FILE_KINDS.items():
+        if marks <= set(keys) and not marks & set(accepted):
+            return f"found {what}; use {loader}"
+    return ""
+
+
+MOST_BYTES = 262_144
+"""Of a file; the largest of this package's own has 20 kB, and more would take seconds to parse."""
+
+MOST_NODES = 100_000
+"""Keys and values of a file, those that an alias repeats counted again."""
+
+
+def too_many_bytes(path: Path) -> str:
+    """Words for a file that is too large to be read, or empty ones; raises OSError."""
+    size = path.stat().st_size
+    if size <= MOST_BYTES:
+        return ""
+    return f"found {size:,} bytes; accepted: at most {MOST_BYTES:,}"
+
+
+def too_many_nodes(root: yaml.Node | None) -> str:
+    """Words for a document that is too large with its aliases expanded, or empty ones."""
+    sizes: dict[int, int] = {}
+    found = 0 if root is None else _size(root, sizes)
+    if found <= MOST_NODES:
+        return ""
+    return (
+        f"found more than {MOST_NODES:,} keys and values, those behind aliases counted each time; "
+        "accepted: fewer"
+    )
+
+
+def _size(node: yaml.Node, sizes: dict[int, int]) -> int:
+    """Number of nodes below and with one; each is looked at once.
+
+    An anchor that contains itself counts as more than is accepted.
+    """
+    known = sizes.get(id(node))
+    if known is not None:
+        return known
+    sizes[id(node)] = MOST_NODES + 1  # until it is known, should it lie within itself
+    total = 1
+    if isinstance(node, yaml.SequenceNode):
+        total += sum(_size(child, sizes) for child in node.value)
+    elif isinstance(node, yaml.MappingNode):
+        total += sum(_size(key, sizes) + _size(value, sizes) for key, value in node.value)
+    sizes[id(node)] = total
+    return total
+
+
+SMALL, MOST = 20_000, 32
+"""Letters of files that are kept, and how many of them."""
+
+
+class KnownYaml:
+    """Nodes of a text, and the instance of a schema that they make.
+
+    Who checks the nodes writes numbers and words plainly into them, which changes nothing when it
+    is done again. What is refused has to be forgotten, since its nodes may be changed by half.
+    """
+
+    def __init__(self, schema: type, content: str) -> None:
+        self._schema, self._content = schema, content
+        self._root: yaml.Node | None = None
+        self._made: Any = None
+
+    def nodes(self) -> yaml.Node | None:
+        """Its nodes; raises what PyYAML does."""
+        if self._root is None:
+            self._root = yaml.compose(self._content, Loader=yaml.SafeLoader)
+        return self._root
+
+    def instance(self) -> Any:
+        """An instance of the schema of one's own, by the nodes as they are at the first call."""
+        if self._made is None:
+            self._made = yaml_load_typed(schema=self._schema, data=yaml.serialize(self._root))
+        return copy.deepcopy(self._made)
+
+    def forget(self) -> None:
+        """Lets the next one begin anew."""
+        with _CHANGING:
+            _KEPT.pop((self._schema, self._content), None)
+
+
+_KEPT: OrderedDict[tuple[type, str], KnownYaml] = OrderedDict()
+_CHANGING = Lock()
+
+
+def known_yaml(schema: type, content: str, edited: bool) -> KnownYaml:
+    """A text that was read before, or one anew.
+
+    Args:
+        schema: Dataclass.
+        content: YAML.
+        edited: Whether nodes will be changed beyond what a check does; such a one is not kept.
+    """
+    found = None if edited else _KEPT.get((schema, content))
+    if found is None:
+        found = KnownYaml(schema, content)
+    if not edited and len(content) <= SMALL:
+        with _CHANGING:
+            _KEPT[schema, content] = found
+            _KEPT.move_to_end((schema, content))
+            while len(_KEPT) > MOST:
+                _KEPT.popitem(last=False)
+    return found

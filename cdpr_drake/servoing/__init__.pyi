@@ -1,0 +1,6 @@
+from .controller import ServoController as ServoController
+from .servo_law import GOALS as GOALS
+from .target_motion import KINDS as KINDS
+from .visual_features import VisualFeatures as VisualFeatures
+from .visual_features import columns as columns
+from .visual_features import sighting as sighting

@@ -1,0 +1,13 @@
+from .criterion_at_pose_kernel import evaluate as evaluate
+from .desired_view import FixedObject as FixedObject
+from .desired_view import OppositeCorner as OppositeCorner
+from .no_stable_target import some_target_possible as some_target_possible
+from .perturbation_bounds import BASELINE as BASELINE
+from .perturbation_samples_kernel import mixed as mixed
+from .quadratic_bounds_kernel import Blocks as Blocks
+from .stability_case import IBVS as IBVS
+from .stability_case import PBVS as PBVS
+from .stability_case import SCHEMES as SCHEMES
+from .stability_case import StabilityCase as StabilityCase
+from .verdict import judge_stability as judge_stability
+from .verdict import worst_perturbations as worst_perturbations

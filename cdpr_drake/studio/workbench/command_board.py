@@ -1,0 +1,192 @@
+"""Starts commands in the working folder, and knows what they left there."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from cdpr_drake.models.robot_loader import robot_names
+from cdpr_drake.studio.workbench.command_form import CommandForm
+from cdpr_drake.studio.workbench.command_job import CommandJob
+from cdpr_drake.studio.workbench.job_manager import JobManager
+
+MOST_FOLDERS = 200
+"""Results folders that are offered, the newest ones."""
+
+ASKED = ".asked.json"
+"""Ending of the file beside a results folder that says how it was asked for, so that it can go on
+when the server was started anew; gone when the work is done."""
+
+ABOUT = ".about.json"
+"""Ending of the file beside a results folder that says which robot it is about, as it was then."""
+
+LARGEST_ASKED = 100_000
+"""Of such a file that is read [bytes]."""
+
+
+@dataclass(frozen=True)
+class Computed:
+    """What a command computes or has computed.
+
+    Attributes:
+        name: What people see.
+        job: The newest job that works in the folder, as long as the server has it.
+        folder: Its results folder.
+        asked: Arguments by which it goes on, without --out and --json; empty: nobody knows them,
+            or it is done.
+        about: Name and digest of the robot that it is about; empty: not known.
+    """
+
+    name: str
+    job: CommandJob | None
+    folder: Path
+    asked: tuple[str, ...] = ()
+    about: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def key(self) -> str:
+        """For lists of choices."""
+        return self.folder.name
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether all results are there."""
+        return (self.folder / "results.json").is_file()
+
+
+class CommandBoard:
+    """Commands of one kind of a server, with results below one folder.
+
+    Attributes:
+        name: Of the folder that all results are below.
+        shown: Key of what is looked at, of `choices`; empty: nothing.
+    """
+
+    def __init__(
+        self, jobs: JobManager, root: Path, below: str, forms: Mapping[str, CommandForm]
+    ) -> None:
+        """With the server's jobs, the working folder, and the name of a folder in it.
+
+        Args:
+            jobs: The jobs.
+            root: The working folder.
+            below: The name.
+            forms: Of the commands that may go on; what a file asks for beyond them is not run.
+        """
+        self._jobs, self._root, self.name, self._forms = jobs, root, below, forms
+        self.shown = ""
+
+    @property
+    def folder(self) -> Path:
+        """What all results are below."""
+        return self._root / self.name
+
+    def start(
+        self, name: str, arguments: Sequence[str], about: Mapping[str, str] | None = None
+    ) -> CommandJob:
+        """Begins a command with results in a new folder, and looks at it.
+
+        Args:
+            name: Of the folder.
+            arguments: Of the command, without --out and --json.
+            about: Name and digest of the robot that it is about; None: no robot.
+        """
+        folder = self._jobs.free_folder(self.folder / name)
+        with suppress(OSError):  # a full disk, say: the command will tell
+            self.folder.mkdir(parents=True, exist_ok=True)
+            self._asked(folder).write_text(json.dumps(list(arguments)), encoding="utf-8")
+            if about is not None:
+                self._about_file(folder).write_text(json.dumps(dict(about)), encoding="utf-8")
+        return self._submit(folder, arguments)
+
+    def go_on(self, computed: Computed) -> CommandJob | None:
+        """Begins a command anew where it was stopped; None: it works, or nobody knows how it was
+        asked for."""
+        if not computed.asked or (computed.job is not None and not computed.job.state.is_over):
+            return None
+        return self._submit(computed.folder, computed.asked)
+
+    def _submit(self, folder: Path, arguments: Sequence[str]) -> CommandJob:
+        job = CommandJob(
+            folder.name, [*arguments, f"--out={folder}", "--json"], self._root, folder,
+            done_with=self._asked(folder),
+        )  # fmt: skip
+        self._jobs.submit(job)
+        self.shown = folder.name
+        return job
+
+    def _asked(self, folder: Path) -> Path:
+        return self.folder / f".{folder.name}{ASKED}"
+
+    def _about_file(self, folder: Path) -> Path:
+        return self.folder / f".{folder.name}{ABOUT}"
+
+    def _about(self, folder: Path) -> dict[str, str]:
+        told = _told(self._about_file(folder))
+        fits = isinstance(told, dict) and all(isinstance(value, str) for value in told.values())
+        return told if fits else {}
+
+    def _how(self, folder: Path) -> tuple[str, ...]:
+        """How a folder was asked for; empty where that is not known, or nothing to be run."""
+        told = _told(self._asked(folder))
+        fits = isinstance(told, list) and all(isinstance(word, str) for word in told)
+        return tuple(told) if fits and self._may_run(told) else ()
+
+    def _may_run(self, words: Sequence[str]) -> bool:
+        """Whether arguments from a file are such as a page would make."""
+        form = self._forms.get(words[0]) if words else None
+        if form is None or len(words) < 2 or words[1].startswith("-"):
+            return False
+        known = words[0] == "study" or words[1] in robot_names() or self._is_inside(words[1])
+        return known and form.allows(words[2:], self._is_inside)
+
+    def _is_inside(self, name: str) -> bool:
+        """Whether a path leads to something in the working folder, also by links."""
+        try:
+            return (self._root / name).resolve().is_relative_to(self._root.resolve())
+        except (OSError, RuntimeError, ValueError):
+            return False
+
+    def choices(self) -> dict[str, Computed]:
+        """What there is, the newest first: jobs of the server, then folders."""
+        found: dict[str, Computed] = {}
+        for job in reversed(self._jobs.jobs):
+            if isinstance(job, CommandJob) and job.folder is not None:
+                key = job.folder.name
+                if job.folder.parent == self.folder and key not in found:
+                    words = f"{key}, {job.state.value}"
+                    over = job.state.is_over
+                    asked = self._how(job.folder) if over else ()
+                    found[key] = Computed(words, job, job.folder, asked, self._about(job.folder))
+        for folder in self._results():
+            if folder.name not in found:
+                asked = self._how(folder)
+                words = f"{folder.name}, stopped" if asked else folder.name
+                found[folder.name] = Computed(words, None, folder, asked, self._about(folder))
+        return found
+
+    def _results(self) -> list[Path]:
+        """Folders with results, whole or not, the newest first; none that a link leads to."""
+        if not self.folder.is_dir() or self.folder.is_symlink():
+            return []
+        some = [
+            path for path in self.folder.iterdir()
+            if not path.is_symlink() and not path.name.startswith(".")
+            and path.is_dir()
+            and ((path / "results.json").is_file() or self._asked(path).is_file())
+        ]  # fmt: skip
+        return sorted(some, key=lambda path: -path.stat().st_mtime)[:MOST_FOLDERS]
+
+
+def _told(path: Path) -> Any:
+    """What a file of JSON beside a folder says; None: nothing that can be read."""
+    try:
+        if path.is_symlink() or path.stat().st_size > LARGEST_ASKED:
+            return None
+        return json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
+        return None

@@ -1,0 +1,99 @@
+"""What a result is about: a robot as it was, and perhaps a pose; and whether that is still open."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from pydrake.math import RigidTransform
+
+from cdpr_drake.geometry.poses import pose_row
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.studio.workbench.calculator import Signal
+
+
+@dataclass(frozen=True)
+class Subject:
+    """What a result is about.
+
+    Attributes:
+        robot: Name of the robot; empty: robots of its own, whatever is open.
+        digest: Of all data of the robot; empty: not known.
+        pose: X_WP as (qw, qx, qy, qz, x, y, z) [-, m]; None: it belongs to no pose.
+    """
+
+    robot: str
+    digest: str = ""
+    pose: tuple[float, ...] | None = None
+
+    def differs(self, now: Subject) -> str:
+        """By what it is about something else than what is open now, in words; empty: it is not."""
+        if not self.robot:
+            return "of robots of their own, not of the robot that is open"
+        if self.robot != now.robot:
+            return f"of {self.robot}, not of {now.robot}, which is open"
+        if not self.digest:
+            return f"of a robot named {self.robot}; whether it was as it is now is not known"
+        if self.digest != now.digest:
+            return f"of {self.robot} as it was before, not as it is now"
+        if self.pose is not None and self.pose != now.pose:
+            return "of the pose before, not of this one"
+        return ""
+
+    def is_another(self, now: Subject) -> bool:
+        """Whether it is known to be about another robot, or the robot as it was before."""
+        return self.robot != now.robot or bool(self.digest and self.digest != now.digest)
+
+
+def subject_of(robot: Robot, X_WP: RigidTransform | None = None) -> Subject:
+    """What a result about a robot is about, at a pose if there is one."""
+    data = json.dumps(dataclasses.asdict(robot), default=_plain, sort_keys=True)
+    digest = hashlib.sha256(data.encode()).hexdigest()
+    pose = None if X_WP is None else tuple(float(value) for value in pose_row(X_WP))
+    return Subject(robot.name, digest, pose)
+
+
+def _plain(value: Any) -> Any:
+    return value.tolist() if isinstance(value, np.ndarray | np.generic) else repr(value)
+
+
+class Results:
+    """The results that a session's panels show, by name, each with what it is about.
+
+    Attributes:
+        changed: Called when a result, the robot or the pose has changed.
+    """
+
+    def __init__(self, now: Callable[[], Subject]) -> None:
+        """Of a workbench; `now` says what is open there."""
+        self._now, self.changed = now, Signal()
+        self._shown: dict[str, Subject] = {}
+
+    def show(self, name: str, subject: Subject | None) -> None:
+        """Says what the result of a name is about from now on; None: there is none any more."""
+        if self._shown.get(name) == subject:
+            return
+        if subject is None:
+            del self._shown[name]
+        else:
+            self._shown[name] = subject
+        self.changed.emit()
+
+    def subject(self, name: str) -> Subject | None:
+        """What a result is about; None: there is none."""
+        return self._shown.get(name)
+
+    def differs(self, name: str) -> str:
+        """By what a result is about something else than what is open; empty: it is not."""
+        subject = self._shown.get(name)
+        return "" if subject is None else subject.differs(self._now())
+
+    def is_another(self, name: str) -> bool:
+        """Whether a result is known to be about another robot than the one that is open."""
+        subject = self._shown.get(name)
+        return subject is not None and subject.is_another(self._now())

@@ -1,0 +1,238 @@
+"""Computed workspaces as solids and planes of a scene."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydrake.geometry import Meshcat, Rgba
+
+from cdpr_drake.analyses.visualization.solids import add_solid
+from cdpr_drake.analyses.workspaces.certified_boxes import load_boxes
+from cdpr_drake.analyses.workspaces.conditions import MEASURES
+from cdpr_drake.analyses.workspaces.stability_scene import stability_solids
+from cdpr_drake.analyses.workspaces.stability_workspaces import KINDS, load_workspaces
+from cdpr_drake.analyses.workspaces.workspace_hulls import load_hull
+from cdpr_drake.analyses.workspaces.workspace_results import load_robot_workspace
+from cdpr_drake.analyses.workspaces.workspace_scene import box_solids, hull_solid, workspace_solids
+from cdpr_drake.arrays import Array
+from cdpr_drake.errors import CdprError
+from cdpr_drake.palette import TENSIONS, rgb
+from cdpr_drake.workspaces.volume import WorkspaceVolume
+
+REGIONS = "workspaces"
+"""Path of all of it in the scene."""
+
+PLANE = f"{REGIONS}/plane"
+"""Path of the plane with colours."""
+
+UNKNOWN = (0.6, 0.6, 0.6)
+"""Colour of poses without a finite value."""
+
+RESULTS = "results.json"
+
+
+@dataclass(frozen=True, eq=False)
+class Layer:
+    """One workspace that can be shown.
+
+    Attributes:
+        name: Of the workspace.
+        title: What it is, in words.
+        volume: Of the cells whose corners are all inside, of the hull, or of the boxes, as the
+            command prints it; None of boxes that are proven for a range of orientations.
+        unit: Of the volume.
+        share: Of the grid's volume, or of the poses that boxes fill; None of a hull.
+        solid: Vertices, shape (n, 3) [m], and triangles, shape (k, 3); None: it is empty.
+        color: Of the solid.
+    """
+
+    name: str
+    title: str
+    volume: float | None
+    unit: str
+    share: float | None
+    solid: tuple[Array, np.ndarray] | None
+    color: Rgba
+
+
+@dataclass(frozen=True)
+class Plane:
+    """Where a coloured plane stands.
+
+    Attributes:
+        name: Of what is coloured.
+        along: Axis that it is normal to, 0 to 2.
+        index: Number of the grid's plane along that axis.
+    """
+
+    name: str
+    along: int
+    index: int
+
+
+@dataclass(frozen=True, eq=False)
+class Regions:
+    """What a results folder has.
+
+    Attributes:
+        folder: The folder.
+        robot: Name of the robot.
+        axes: Coordinates of the grid, shape (n,) each [m].
+        layers: Workspaces.
+        values: Least value over the orientations by name, shape (nx, ny, nz).
+        units: Of the values.
+    """
+
+    folder: Path
+    robot: str
+    axes: tuple[Array, Array, Array]
+    layers: tuple[Layer, ...]
+    values: dict[str, Array]
+    units: dict[str, str]
+
+    def range(self, name: str) -> tuple[float, float]:
+        """Least and largest finite value; NaN where there is none."""
+        values = self.values[name][np.isfinite(self.values[name])]
+        return (float(values.min()), float(values.max())) if len(values) else (np.nan, np.nan)
+
+    def normals(self) -> list[int]:
+        """Axes along which a plane may be moved: the other two have an extent."""
+        sizes = [len(axis) for axis in self.axes]
+        return [k for k in range(3) if all(sizes[j] > 1 for j in range(3) if j != k)]
+
+
+def read_regions(folder: Path) -> Regions:
+    """Reads the results of `cdpr workspace` or `cdpr stability`.
+
+    Raises:
+        CdprError: There are none that can be read.
+    """
+    try:
+        told = json.loads((folder / RESULTS).read_text(encoding="utf-8"))
+        of_stability = isinstance(told["workspaces"], list)
+    except (OSError, ValueError, KeyError, TypeError) as problem:
+        raise CdprError(f"{folder.name}: {RESULTS} cannot be read: {problem}") from problem
+    return _of_stability(folder, told) if of_stability else _of_workspace(folder, told)
+
+
+def _of_workspace(folder: Path, told: dict[str, Any]) -> Regions:
+    found = load_robot_workspace(folder)
+    layers = [
+        _layer(name, told["workspaces"][name]["title"], found.volume(name), solid, color)
+        for name, solid, color in workspace_solids(found)
+    ]
+    if "hull" in told:
+        hull = load_hull(folder)
+        solid, color = hull_solid(hull)
+        title = "what is seen of it from a centre, by rays"
+        layers.append(Layer("hull", title, hull.volume, "m^3", None, solid, color))
+    if "certified" in told:
+        layers += _box_layers(folder, bool(told["certified"]["finished"]))
+    return Regions(
+        folder, str(told["robot"]), found.grid.axes, tuple(layers),
+        {name: _least(values) for name, values in found.values.items()},
+        {name: MEASURES[name].unit for name in found.values},
+    )  # fmt: skip
+
+
+def _box_layers(folder: Path, finished: bool) -> list[Layer]:
+    """Boxes by what is proven of them."""
+    boxes = load_boxes(folder, finished)
+    shares = {"inside": boxes.inside, "outside": boxes.outside, "open": boxes.open}
+    words = {"inside": "proven inside", "outside": "proven outside", "open": "nothing is proven"}
+    sizes = np.ptp(np.concatenate([boxes.poses - boxes.halves, boxes.poses + boxes.halves]), axis=0)
+    # Boxes of several orientations lie upon each other: what they fill is no volume of positions.
+    whole = None if np.any(sizes[3:] > 0.0) else float(np.prod(sizes[:3]))
+    return [
+        Layer(
+            f"boxes {name}", f"{words[name]}, {count}",
+            None if whole is None else shares[name] * whole, "m^3", shares[name], solid, color,
+        )
+        for name, count, solid, color in box_solids(boxes)
+    ]  # fmt: skip
+
+
+def _of_stability(folder: Path, told: dict[str, Any]) -> Regions:
+    found = load_workspaces(folder)
+    layers = []
+    for bounds, kind, solid, color in stability_solids(found):
+        title = KINDS[kind] if kind == "S" else f"{KINDS[kind]}, bounds {bounds}"
+        volume = found.volume(kind, bounds=bounds)
+        layers.append(_layer(f"{bounds} {kind}", title, volume, solid, color))
+    margins = {
+        f"margin, bounds {name}": _least(found.margin[k]) for k, name in enumerate(found.names)
+    }
+    return Regions(
+        folder, str(told["robot"]), found.grid.axes, tuple(layers), margins,
+        dict.fromkeys(margins, "-"),
+    )  # fmt: skip
+
+
+def _layer(name: str, title: str, volume: WorkspaceVolume, solid: Any, color: Rgba) -> Layer:
+    shown = solid if len(solid[1]) else None
+    return Layer(name, title, volume.value, volume.unit, volume.share, shown, color)
+
+
+def _least(values: np.ndarray) -> Array:
+    return np.asarray(np.min(values, axis=0), float)
+
+
+def show_regions(meshcat: Meshcat, regions: Regions | None, shown: set[str]) -> None:
+    """Takes out what was there, and puts solids into a scene.
+
+    Args:
+        meshcat: Its thread's.
+        regions: None: nothing more is shown.
+        shown: Names of the layers that are visible.
+    """
+    meshcat.Delete(REGIONS)
+    if regions is None:
+        return
+    for layer in regions.layers:
+        if layer.solid is not None:
+            path = f"{REGIONS}/{layer.name}"
+            add_solid(meshcat, path, *layer.solid, layer.color, visible=layer.name in shown)
+
+
+def draw_plane(meshcat: Meshcat, regions: Regions, plane: Plane | None) -> None:
+    """Puts the coloured plane into a scene, or takes it out."""
+    if plane is None:
+        meshcat.Delete(PLANE)
+        return
+    u, v = (k for k in range(3) if k != plane.along)
+    axes = regions.axes
+    first, second = np.meshgrid(axes[u], axes[v], indexing="ij")
+    vertices = np.empty((first.size, 3))
+    vertices[:, u], vertices[:, v] = first.ravel(), second.ravel()
+    vertices[:, plane.along] = axes[plane.along][plane.index]
+    values = np.take(regions.values[plane.name], plane.index, plane.along).ravel()
+    corner = np.arange(first.size).reshape(first.shape)
+    a, b = corner[:-1, :-1].ravel(), corner[1:, :-1].ravel()
+    c, d = corner[1:, 1:].ravel(), corner[:-1, 1:].ravel()
+    faces = np.concatenate([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
+    colors = colors_of(values, regions.range(plane.name))
+    meshcat.SetTriangleColorMesh(
+        PLANE, np.asfortranarray(vertices.T), np.asfortranarray(faces.T.astype(np.int32)),
+        np.asfortranarray(colors.T),
+    )  # fmt: skip
+    # Colours mean numbers: no shadow darkens them, nor a solid before them: they are drawn last.
+    for name in ("castShadow", "receiveShadow"):
+        meshcat.SetProperty(f"{PLANE}/<object>", name, False)
+    meshcat.SetProperty(f"{PLANE}/<object>", "material.transparent", True)
+    meshcat.SetProperty(f"{PLANE}/<object>", "renderOrder", 1.0)
+
+
+def colors_of(values: Array, span: tuple[float, float]) -> Array:
+    """Red, green, blue of values, shape (n, 3), from `palette.TENSIONS`; grey where not finite."""
+    low, high = span
+    table = np.array([rgb(color) for color in TENSIONS])
+    share = (values - low) / max(high - low, 1e-300) if np.isfinite(low) else values
+    known = np.isfinite(share)
+    place = np.clip(np.where(known, share, 0.0), 0.0, 1.0) * (len(table) - 1)
+    colors = np.column_stack([np.interp(place, range(len(table)), column) for column in table.T])
+    colors[~known] = UNKNOWN
+    return np.asarray(colors)

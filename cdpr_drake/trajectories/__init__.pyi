@@ -1,0 +1,1 @@
+from .pose_trajectory import PoseTrajectory as PoseTrajectory

@@ -1,0 +1,1 @@
+from .drum import Drum as Drum

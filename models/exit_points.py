@@ -1,0 +1,109 @@
+"""Exit points on rails: where a reconfigurable robot's cables leave the frame in a configuration.
+
+Drake's YAML loader reads the annotations themselves, so they are not postponed here.
+
+Pulleys at both ends of cables.
+
+Drake's YAML loader reads the annotations themselves, so they are not postponed here.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.errors import RobotFileError
+from cdpr_drake.schema.fields import array, number
+
+MARK = "@"
+"""Between the name of a robot and where its exit points stand on their rails."""
+
+
+@dataclass(kw_only=True)
+class Rail:
+    """A straight rail on which an exit point can be put; it stands still while the robot moves."""
+
+    axis: np.ndarray = array(
+        "Direction in W in which the coordinate grows; of any length.", "-", (3,)
+    )
+    lower: float = number("Smallest coordinate.", "m")
+    upper: float = number("Largest coordinate.", "m")
+    at: float = number("Coordinate, counted from `exit_point`.", "m", 0.0)
+
+    def shift(self) -> Array:
+        """From `exit_point` to where the cable leaves, shape (3,) [m]."""
+        return np.asarray(self.at * self.axis / np.linalg.norm(self.axis), float)
+
+
+def split_name(words: str) -> tuple[str, dict[str, float]]:
+    """Name of a robot, and coordinates by cables, of words such as `name@C1=0.3,C2=-0.1`.
+
+    Raises:
+        RobotFileError: What stands behind the mark are no coordinates.
+    """
+    name, mark, rest = words.rpartition(MARK)
+    if not mark or "/" in rest or Path(words).exists():  # a path may have the mark in it
+        return words, {}
+    found: dict[str, float] = {}
+    for item in rest.split(","):
+        cable, equals, value = item.partition("=")
+        try:
+            number_ = float(value)
+        except ValueError:
+            number_ = np.nan
+        if not (cable.strip() and equals and np.isfinite(number_)) or cable.strip() in found:
+            raise RobotFileError(
+                f"robot {words}: found {item!r} behind {MARK}; accepted: coordinates of exit "
+                f"points on rails, each cable once, as in {name}{MARK}C1=0.3,C2=-0.1 [m]"
+            )
+        found[cable.strip()] = number_
+    return name, found
+
+
+def check_rail(index: int, rail: Rail | None, fail: Callable[[str, object, str], None]) -> bool:
+    """Checks one rail; whether it has a direction."""
+    if rail is None:
+        return True
+    key = f"cables[{index}].rail"
+    if not np.any(rail.axis):
+        fail(
+            f"{key}.axis",
+            "(" + ", ".join(f"{x:g}" for x in rail.axis) + ")",
+            "a direction, not zero",
+        )
+        return False
+    if not rail.lower < rail.upper:
+        fail(key, f"lower {rail.lower:g}, upper {rail.upper:g}", "lower < upper")
+    elif not rail.lower <= rail.at <= rail.upper:
+        fail(f"{key}.at", f"{rail.at:g}", f"{rail.lower:g} to {rail.upper:g} [m]")
+    return True
+
+
+@dataclass(kw_only=True)
+class Pulley:
+    """The swivelling pulleys at the exit points."""
+
+    radius: float = number("Radius of the groove.", "m", at_least=0.0)
+    swivel_axis: np.ndarray = array(
+        "Direction in W in which the cable arrives at the exit point from its winch, and about "
+        "which the pulley swivels; of any length.",
+        "-",
+        (3,),
+        (0.0, 0.0, 1.0),
+    )
+
+
+@dataclass(kw_only=True)
+class PlatformPulley:
+    """Swivelling pulleys at the anchor points, where the platform has them."""
+
+    radius: float = number("Radius of the groove.", "m", at_least=0.0)
+    swivel_axis: np.ndarray = array(
+        "Direction in P in which the cable arrives at the anchor point from where it is fixed, and "
+        "about which the pulley swivels; of any length.",
+        "-",
+        (3,),
+        (0.0, 0.0, 1.0),
+    )

@@ -1,0 +1,75 @@
+"""Materials of cables: one for all of a robot, and what single cables have of their own.
+
+Drake's YAML loader reads the annotations themselves, so they are not postponed here.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, fields, replace
+
+from cdpr_drake.schema.fields import number
+
+
+@dataclass(kw_only=True)
+class CableMaterial:
+    """What the cables are made of; a cable's own `material` goes before it, key by key."""
+
+    youngs_modulus: float = number("Young's modulus.", "Pa", above=0.0)
+    diameter: float = number("Diameter.", "m", above=0.0)
+    linear_density: float = number("Mass per length.", "kg/m", above=0.0)
+    retardation_time: float = number(
+        "Time T of the viscous damping, tension = E S (strain + T strain rate).",
+        "s",
+        at_least=0.0,
+        at_most=1.0,  # creep rather than damping; and steps would be nanoseconds
+    )
+    breaking_load: float | None = number(
+        "Tension at which a cable breaks; null where unpublished.", "N", None, above=0.0
+    )
+
+
+@dataclass(kw_only=True)
+class OwnMaterial:
+    """What one cable is made of where that differs from the section `cable` of its robot."""
+
+    youngs_modulus: float | None = number("Young's modulus.", "Pa", None, above=0.0)
+    diameter: float | None = number("Diameter.", "m", None, above=0.0)
+    linear_density: float | None = number("Mass per length.", "kg/m", None, above=0.0)
+    retardation_time: float | None = number(
+        "Time T of the viscous damping.", "s", None, at_least=0.0, at_most=1.0
+    )
+    breaking_load: float | None = number("Tension at which the cable breaks.", "N", None, above=0.0)
+
+
+def given_material(own: OwnMaterial | None) -> dict[str, float]:
+    """What a cable gives of its own, by key, in SI units."""
+    if own is None:
+        return {}
+    values = {field.name: getattr(own, field.name) for field in fields(own)}
+    return {key: float(value) for key, value in values.items() if value is not None}
+
+
+def own_material(common: CableMaterial, own: OwnMaterial | None) -> CableMaterial:
+    """The material of one cable: its own values, and the common one's where it gives none."""
+    return replace(common, **given_material(own))
+
+
+_MOST = {
+    "youngs_modulus": (1e13, "Pa"), "diameter": (1.0, "m"), "linear_density": (1e4, "kg/m"),
+    "retardation_time": (1e3, "s"),
+}  # fmt: skip
+"""Largest values of a material that make sense."""
+
+
+def check_materials(
+    common: CableMaterial,
+    own: Sequence[OwnMaterial | None],
+    fail: Callable[[str, object, str], None],
+) -> None:
+    """Refuses values that no cable has, by `fail`: field, what was found, what is accepted."""
+    given = {"cable": asdict(common)} | {
+        f"cables[{index}].material": given_material(material) for index, material in enumerate(own)
+    }
+    for where, values in given.items():
+        for key, (most, unit) in _MOST.items():
+            if values.get(key, 0.0) > most:
+                fail(f"{where}.{key}", f"{values[key]:g}", f"at most {most:g} [{unit}]")

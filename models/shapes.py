@@ -1,0 +1,316 @@
+"""What platform and frame look like where they are no boxes: spheres, cylinders, meshes, beams.
+
+Drake's YAML loader reads the annotations themselves, so they are not postponed here.
+
+What a robot file says of shapes, held against its box and its folder.
+"""
+
+import json
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+from pydrake.geometry import Box, Cylinder, Mesh, ReadObjToTriangleSurfaceMesh, Shape, Sphere
+from pydrake.math import RigidTransform
+from pydrake.multibody.tree import CalcSpatialInertia, SpatialInertia
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.errors import Problems, RobotFileError
+from cdpr_drake.geometry.poses import pose_from_angles
+from cdpr_drake.schema.fields import array, number, sections, switch, text
+
+BOX, SPHERE, CYLINDER, MESH = "box", "sphere", "cylinder", "mesh"
+
+MESH_SUFFIXES = (".obj", ".gltf")
+"""Files that Drake draws, renders and integrates over."""
+
+_NEEDS = {BOX: "size", SPHERE: "radius", CYLINDER: "radius", MESH: "file"}
+
+
+@dataclass(kw_only=True)
+class PlatformShape:
+    """The platform's shape within its box, with which pulleys and clearances reckon."""
+
+    kind: str = text("What it is.", choices=(BOX, SPHERE, CYLINDER, MESH))
+    size: np.ndarray | None = array("Edges of a box.", "m", (3,), None, above=0.0)
+    radius: float | None = number("Of a sphere or cylinder.", "m", None, above=0.0)
+    height: float | None = number("Of a cylinder, along its z axis.", "m", None, above=0.0)
+    file: str | None = text(
+        "File of a mesh, from the robot file's folder: Wavefront OBJ or glTF; its triangles must "
+        "enclose a volume where the inertia follows from it.",
+        None,
+    )
+    scale: float = number("Scale of a mesh, to metres.", "-", 1.0, above=0.0)
+    position: np.ndarray | None = array(
+        "Its middle, or a mesh's origin, in P; null: the middle of the platform's box.",
+        "m",
+        (3,),
+        None,
+    )
+    angles_deg: np.ndarray = array(
+        "Angles (phi, theta, psi) of its axes, as of a pose.", "deg", (3,), (0.0, 0.0, 0.0)
+    )
+
+    def missing(self) -> str:
+        """The key that its kind needs and that is not there; empty: none."""
+        if getattr(self, _NEEDS[self.kind]) is None:
+            return _NEEDS[self.kind]
+        return "height" if self.kind == CYLINDER and self.height is None else ""
+
+    def pose(self, middle: Array) -> RigidTransform:
+        """X_PS of the shape [m]; `middle` is that of the platform's box."""
+        place = middle if self.position is None else self.position
+        return pose_from_angles(np.asarray(place, float), np.radians(self.angles_deg))
+
+    def shape(self) -> Shape:
+        """The shape in its own frame, as Drake has it."""
+        if self.kind == BOX:
+            assert self.size is not None
+            return Box(*(float(edge) for edge in self.size))
+        if self.kind == MESH:
+            assert self.file is not None
+            return Mesh(self.file, self.scale)
+        assert self.radius is not None
+        if self.kind == SPHERE:
+            return Sphere(self.radius)
+        assert self.height is not None
+        return Cylinder(self.radius, self.height)
+
+    def extent(self, middle: Array) -> tuple[Array, Array]:
+        """Lower and upper corner in P of the box round it, axes along those of P, (3,) [m].
+
+        Raises:
+            RobotFileError: The mesh cannot be read.
+        """
+        X_PS, size = self.pose(middle), np.zeros(3)
+        R = X_PS.rotation().matrix()
+        if self.kind == MESH:
+            shape = self.shape()
+            assert isinstance(shape, Mesh)
+            try:
+                hull = shape.GetConvexHull()
+            except RuntimeError as problem:
+                words = " ".join(str(problem).split())[:200]
+                raise RobotFileError(f"{self.file}: cannot be read as a mesh: {words}") from problem
+            corners = np.array([hull.vertex(i) for i in range(hull.num_vertices())]).T
+            points = R @ corners + X_PS.translation()[:, np.newaxis]
+            return points.min(axis=1), points.max(axis=1)
+        if self.kind == BOX:
+            size = np.abs(R) @ np.asarray(self.size, float) / 2.0
+        elif self.kind == SPHERE:
+            size = np.full(3, self.radius)
+        else:
+            assert self.radius is not None
+            assert self.height is not None
+            axis = R[:, 2]
+            size = self.radius * np.sqrt(np.maximum(1.0 - axis**2, 0.0))
+            size = size + self.height / 2.0 * np.abs(axis)
+        return X_PS.translation() - size, X_PS.translation() + size
+
+    def inertia(self, mass: float, middle: Array) -> SpatialInertia:
+        """Spatial inertia about Po in P of a homogeneous body of this shape and mass [kg, m].
+
+        Raises:
+            RobotFileError: The mesh encloses no volume.
+        """
+        X_PS = self.pose(middle)
+        if self.kind == MESH:
+            unit = _mesh_inertia(
+                str(self.file), self.scale, Path(str(self.file)).stat().st_mtime_ns
+            )
+        else:
+            unit = CalcSpatialInertia(self.shape(), 1.0)
+        whole = SpatialInertia(mass, unit.get_com(), unit.get_unit_inertia())
+        return whole.ReExpress(X_PS.rotation()).Shift(-X_PS.translation())
+
+
+_NO_INERTIA = (
+    "found no volume that its triangles enclose; accepted where platform.inertia_of is shape: an "
+    ".obj file of closed surfaces, wound so that their normals point outward"
+)
+
+
+def _check_closed(file: str) -> None:
+    """Checks that each edge of a mesh has a triangle on either side, wound alike.
+
+    Drake takes the volume of any triangles, whether they enclose one or not.
+
+    Raises:
+        RobotFileError: Otherwise, or the mesh is no OBJ.
+    """
+    if not file.lower().endswith(".obj"):
+        raise RobotFileError(f"{file}: {_NO_INERTIA}")
+    mesh = ReadObjToTriangleSurfaceMesh(file)
+    corners = np.array([mesh.vertex(i) for i in range(mesh.num_vertices())])
+    # Files may repeat corners, once for each texture.
+    _, same = np.unique(corners.round(12), axis=0, return_inverse=True)
+    edges: set[tuple[int, int]] = set()
+    count = 0
+    for k in range(mesh.num_triangles()):
+        triangle = [int(same.ravel()[mesh.element(k).vertex(j)]) for j in range(3)]
+        edges |= {(triangle[j], triangle[(j + 1) % 3]) for j in range(3)}
+        count += 3
+    if len(edges) != count or any((b, a) not in edges for a, b in edges):
+        raise RobotFileError(f"{file}: {_NO_INERTIA}")
+
+
+@lru_cache(maxsize=8)
+def _mesh_inertia(file: str, scale: float, changed: int) -> SpatialInertia:
+    """Of a mesh with a density of 1 kg/m^3, read once for each state of its file.
+
+    Raises:
+        RobotFileError: It encloses no volume.
+    """
+    _check_closed(file)
+    try:
+        return CalcSpatialInertia(Mesh(file, scale), 1.0)
+    except (RuntimeError, ValueError) as problem:
+        raise RobotFileError(f"{file}: {_NO_INERTIA}") from problem
+
+
+def mesh_files(file: Path) -> list[Path]:
+    """A mesh and the files beside it that it names: materials of an OBJ, parts of a glTF."""
+    words = file.read_text(encoding="utf-8", errors="replace")
+    if file.suffix.lower() == ".obj":
+        named = [line.split(maxsplit=1)[1].strip() for line in words.splitlines()
+                 if line.startswith("mtllib ")]  # fmt: skip
+    else:
+        content = json.loads(words)
+        items = [*content.get("buffers", []), *content.get("images", [])]
+        named = [item["uri"] for item in items if not item.get("uri", "data:").startswith("data:")]
+    return [file, *(file.parent / name for name in named if (file.parent / name).is_file())]
+
+
+def mesh_path(file: str, folder: Path) -> Path | None:
+    """Where the file of a mesh is; None: it is not there, or no file that Drake reads."""
+    path = (folder / file).resolve()
+    return path if path.is_file() and path.suffix.lower() in MESH_SUFFIXES else None
+
+
+@dataclass(kw_only=True)
+class FrameBeam:
+    """A beam of the frame, of square section."""
+
+    start: np.ndarray = array("One end of its middle line in W.", "m", (3,))
+    end: np.ndarray = array("The other end.", "m", (3,))
+    width: float | None = number(
+        "Width; null: the thickness of the frame's beams.", "m", None, above=0.0
+    )
+
+    def length(self) -> float:
+        """From end to end [m]."""
+        return float(np.linalg.norm(self.end - self.start))
+
+    def axes(self) -> Array:
+        """Its axes in W as columns, the last one along it, shape (3, 3)."""
+        z = (self.end - self.start) / self.length()
+        other = np.array([0.0, 0.0, 1.0]) if abs(z[2]) < 0.9 else np.array([1.0, 0.0, 0.0])
+        x = np.cross(other, z)
+        x /= np.linalg.norm(x)
+        return np.column_stack([x, np.cross(z, x), z])
+
+    def size(self, width: float) -> Array:
+        """Edges along its axes, shape (3,) [m]; with a width for those that give none."""
+        wide = width if self.width is None else self.width
+        return np.array([wide, wide, self.length()])
+
+
+BEAM_SHARE = 1.0 / 30.0
+"""Thickness of a beam of the longest edge, as of ACROBOT, where a file does not give it."""
+
+
+@dataclass(kw_only=True)
+class Frame:
+    """The robot's frame, a box of beams that the platform must stay in."""
+
+    lower: np.ndarray = array("Lower corner in W.", "m", (3,))
+    upper: np.ndarray = array("Upper corner in W.", "m", (3,))
+    beam: float | None = number(
+        "Thickness of the beams, for drawing; null: a share of the longest edge.",
+        "m",
+        None,
+        above=0.0,
+    )
+    beams: list[FrameBeam] = sections(
+        "Its beams, in the place of those on the edges of the box.", required=False
+    )
+    assumed: bool = switch(
+        "Whether its corners were assumed, since the file that the robot came from has no frame; "
+        "such a frame bounds no hull of a workspace.",
+        False,
+    )
+
+    def beam_width(self) -> float:
+        """Thickness of the beams that are drawn [m]."""
+        if self.beam is not None:
+            return self.beam
+        return BEAM_SHARE * float(np.max(self.upper - self.lower))
+
+
+FITS = 1e-6
+"""Share of its longest edge by which a shape may reach out of the platform's box: rounding."""
+
+
+def check_shapes(
+    path: Path,
+    shape: PlatformShape | None,
+    beams: list[FrameBeam],
+    *,
+    box: tuple[Array, Array],
+    mass: float | None,
+) -> None:
+    """Checks shapes, and makes the file of a mesh a path of its own.
+
+    Args:
+        path: The robot file.
+        shape: The platform's shape; None: its box.
+        beams: The frame's own beams.
+        box: Middle of the platform's box in P and its edges, shape (3,) each [m].
+        mass: The platform's [kg], where its inertia shall be that of the shape; None: it shall not.
+
+    Raises:
+        RobotFileError: Something is missing, not there, or reaches out of the platform's box.
+    """
+    problems = Problems(RobotFileError)
+
+    def fail(field: str, found: object, accepted: str) -> None:
+        problems.add(f"{path}: {field}: found {found}; accepted: {accepted}")
+
+    for index, beam in enumerate(beams):
+        if not beam.length() > 0.0:
+            fail(f"frame.beams[{index}]", "both ends in one point", "ends apart")
+    if shape is None:
+        if mass is not None:
+            fail("platform.inertia_of", "shape", "box, or a section platform.shape")
+        problems.raise_any()
+        return
+    missing = shape.missing()
+    if missing:
+        fail(f"platform.shape.{missing}", "null", f"a value, for the kind {shape.kind}")
+        problems.raise_any()
+    if shape.kind == MESH:
+        file = mesh_path(str(shape.file), path.parent)
+        if file is None:
+            accepted = f"an .obj or .gltf file, from {path.parent}"
+            fail("platform.shape.file", shape.file, accepted)
+            problems.raise_any()
+        shape.file = str(file)
+    lowest, highest = box[0] - box[1] / 2.0, box[0] + box[1] / 2.0
+    slack = FITS * float(np.max(box[1]))
+    with problems.collected():
+        lower, upper = shape.extent(box[0])
+        if np.any(lower < lowest - slack) or np.any(upper > highest + slack):
+            fail(
+                "platform.shape",
+                f"reaching from {_words(lower)} to {_words(upper)} m",
+                f"within the platform's box, {_words(lowest)} to {_words(highest)} m, with which "
+                "pulleys and clearances reckon",
+            )
+        if mass is not None:
+            shape.inertia(mass, box[0])
+    problems.raise_any()
+
+
+def _words(values: Array) -> str:
+    return "(" + ", ".join(f"{value:.4g}" for value in values) + ")"

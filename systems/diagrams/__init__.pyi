@@ -1,0 +1,12 @@
+from .beliefs import believed_robot as believed_robot
+from .camera import add_camera as add_camera
+from .camera import add_target as add_target
+from .estimators import EstimatorInputs as EstimatorInputs
+from .estimators import add_estimator as add_estimator
+from .load import SCENARIO_SCHEMAS as SCENARIO_SCHEMAS
+from .load import load_scenario as load_scenario
+from .servo_blocks import VisualServoBlocks as VisualServoBlocks
+from .servo_blocks import add_visual_servo as add_visual_servo
+from .tension_control import add_tension_control as add_tension_control
+from .tension_management import correction_law as correction_law
+from .visual_servo import build_visual_servo as build_visual_servo

@@ -1,0 +1,10 @@
+from .assembly import add_cable_robot as add_cable_robot
+from .cable_forces import CableForces as CableForces
+from .cable_robot import CableRobot as CableRobot
+from .compiled_cable_robot import CompiledCableRobot as CompiledCableRobot
+from .compiled_motion import CompiledMotion as CompiledMotion
+from .motor_winch import MotorWinch as MotorWinch
+from .platform_pose import PlatformPose as PlatformPose
+from .settings import CableRobotSettings as CableRobotSettings
+from .settings import CableSettings as CableSettings
+from .ups_robot import UpsRobot as UpsRobot

@@ -1,0 +1,6 @@
+from .files import all_scenario_names as all_scenario_names
+from .files import scenario_file as scenario_file
+from .run_settings import ScenarioHeader as ScenarioHeader
+from .tension_control_scenario import Stretch as Stretch
+from .visual_servo_scenario import Scenario as Scenario
+from .visual_servo_scenario import VisualServoSettings as VisualServoSettings

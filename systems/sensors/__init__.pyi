@@ -1,0 +1,8 @@
+from .perception_sensors import add_looking_sensors as add_looking_sensors
+from .sampled_sensor import SampledSensor as SampledSensor
+from .scene_shapes import SceneShapes as SceneShapes
+from .sensor_kinds import SENSORS as SENSORS
+from .sensor_kinds import SensorSettings as SensorSettings
+from .sensor_settings import SensorSuite as SensorSuite
+from .wheel_odometry import WheelModel as WheelModel
+from .wheel_odometry import WheelOdometry as WheelOdometry

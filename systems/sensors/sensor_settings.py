@@ -1,0 +1,334 @@
+"""Scenario section `sensors`: all of it, with the sensors that look at the world and at motion.
+
+Drake's YAML loader reads the annotations themselves, so they are not postponed here.
+"""
+
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cdpr_drake.models.robot_schema import Pose
+from cdpr_drake.models.sensor_catalogue import (
+    DepthSensorModel,
+    InertialSensorModel,
+    RangeSensorModel,
+    depth_sensor_names,
+    inertial_sensor_names,
+    load_depth_sensor,
+    load_inertial_sensor,
+    load_range_sensor,
+    range_sensor_names,
+)
+from cdpr_drake.schema.fields import (
+    FASTEST,
+    array,
+    file_name,
+    number,
+    optional_section,
+    section,
+    sections,
+    text,
+    whole,
+)
+from cdpr_drake.systems.sensors.depth_sensor import binned
+from cdpr_drake.systems.sensors.pan_tilt import MODES, PanTiltJoints
+from cdpr_drake.systems.sensors.scene_shapes import ROLES
+from cdpr_drake.systems.sensors.sensor_kinds import SensorSettings
+from cdpr_drake.systems.sensors.sensor_readings import check_rate
+from cdpr_drake.systems.sensors.wheel_odometry import WheelModel
+
+PLATFORM, WORLD, HEAD = "platform", "world", "pan_tilt"
+"""What carries a sensor."""
+
+
+def _origin() -> Pose:
+    return Pose(position=np.zeros(3))
+
+
+@dataclass(kw_only=True)
+class RangeSettings:
+    """A laser scanner or a single beam; it is logged as scan_NAME."""
+
+    name: str = file_name("Name, which also tells its noise from that of others.")
+    type: str = text("Type of the catalogue.", "hokuyo", choices=range_sensor_names())
+    carrier: str = text(
+        "What carries it: platform, world, pan_tilt, target, or an obstacle that moves.",
+        PLATFORM,
+    )
+    pose: Pose = section(
+        "Pose of its frame S in the carrier: x ahead, y to the left, beams in the plane z = 0.",
+        _origin,
+        required=False,
+    )
+    rate: float | None = number("Scans; null: the type's.", "Hz", None, above=0.0)
+    beams: int | None = whole(
+        "Beams, over the same angles; null: the type's.", None, at_least=1, at_most=10_000
+    )
+    noise: float | None = number(
+        "Standard deviation of a reading, whatever its range; null: as the type has it.",
+        "m",
+        None,
+        at_least=0.0,
+    )
+    sees: str = text(
+        "What beams end on: what cameras see, or what things bump into.",
+        "perception",
+        choices=tuple(ROLES),
+    )
+
+    def model(self) -> RangeSensorModel:
+        """The type, with what is set here."""
+        found = load_range_sensor(self.type)
+        if self.beams is not None:
+            found = replace(found, beams=self.beams)
+        if self.noise is not None:
+            found = replace(found, noise=self.noise, noise_share=0.0)
+        return found if self.rate is None else replace(found, rate_hz=self.rate)
+
+    def largest_rate(self) -> float:
+        """The most scans per second that the type makes [Hz]."""
+        return load_range_sensor(self.type).rate_hz
+
+
+@dataclass(kw_only=True)
+class InertialSettings:
+    """An inertial measurement unit on the platform, logged as specific_force, angular_velocity."""
+
+    type: str = text("Type of the catalogue.", "adis16448", choices=inertial_sensor_names())
+    pose: Pose = section("Pose of its frame S on the platform.", _origin, required=False)
+    rate: float | None = number("Readings; null: the type's.", "Hz", None, above=0.0)
+
+    def model(self) -> InertialSensorModel:
+        """The type, with what is set here."""
+        found = load_inertial_sensor(self.type)
+        return found if self.rate is None else replace(found, rate_hz=self.rate)
+
+    def largest_rate(self) -> float:
+        """The most readings per second that the type makes [Hz]."""
+        return load_inertial_sensor(self.type).rate_hz
+
+
+@dataclass(kw_only=True)
+class DepthSettings:
+    """A depth camera, rendered; the middle row of its images is logged as depth_row."""
+
+    type: str = text("Type of the catalogue.", "kinect", choices=depth_sensor_names())
+    carrier: str = text(
+        "What carries it: platform, world, target, or an obstacle that moves.", PLATFORM
+    )
+    pose: Pose = section(
+        "Pose of its frame C in the carrier: z ahead, x to the right, y down.",
+        _origin,
+        required=False,
+    )
+    rate: float | None = number("Images; null: the type's.", "Hz", None, above=0.0)
+    binning: int = whole(
+        "Pixels of the type's image, across and down, for which one is rendered.",
+        4,
+        at_least=1,
+        at_most=64,
+    )
+    noise: float | None = number(
+        "Standard deviation of a depth, whatever its size; null: as the type has it.",
+        "m",
+        None,
+        at_least=0.0,
+    )
+
+    def model(self) -> DepthSensorModel:
+        """The type, with what is set here."""
+        found = binned(load_depth_sensor(self.type), self.binning)
+        if self.noise is not None:
+            found = replace(found, noise=self.noise, noise_per_square=0.0)
+        return found if self.rate is None else replace(found, rate_hz=self.rate)
+
+    def largest_rate(self) -> float:
+        """The most images per second that the type takes [Hz]."""
+        return load_depth_sensor(self.type).rate_hz
+
+
+@dataclass(kw_only=True)
+class PanTiltSettings:
+    """A head on two joints, which swings and carries range sensors; its angles are logged."""
+
+    carrier: str = text(
+        "What carries it: platform, world, target, or an obstacle that moves.", PLATFORM
+    )
+    pose: Pose = section(
+        "Pose of the joints' frame M in the carrier: z ahead, x to the right, y down; pan turns "
+        "to the right about y, then tilt upwards about x.",
+        _origin,
+        required=False,
+    )
+    arm: np.ndarray = array(
+        "Position of the head's origin from where the axes meet.", "m", (3,), (0.0, 0.0, 0.0)
+    )
+    lower_deg: np.ndarray = array("Smallest angles, pan and tilt.", "deg", (2,), (-160.0, -45.0))
+    upper_deg: np.ndarray = array("Largest angles.", "deg", (2,), (160.0, 90.0))
+    speed_deg: np.ndarray = array("Largest speeds.", "deg/s", (2,), (120.0, 120.0), above=0.0)
+    mode: str = text("What its commands are.", "position", choices=MODES)
+    rate: float = number("Looks at the command.", "Hz", 100.0, above=0.0, at_most=FASTEST)
+    swing_deg: np.ndarray = array(
+        "How far the commands swing to either side, pan and tilt.", "deg", (2,), (0.0, 0.0)
+    )
+    swing_period: np.ndarray = array("Periods of these sines.", "s", (2,), (4.0, 4.0), above=0.0)
+    counts_per_turn: int = whole("Counts of an encoder per turn.", 4096, at_least=4)
+    zero_error_deg: float = number(
+        "Standard deviation of an encoder's zero.", "deg", 0.0, at_least=0.0
+    )
+
+    def joints(self) -> PanTiltJoints:
+        """The joints."""
+        return PanTiltJoints(
+            lower=np.radians(self.lower_deg),
+            upper=np.radians(self.upper_deg),
+            speed=np.radians(self.speed_deg),
+            counts_per_turn=self.counts_per_turn,
+            zero_error=float(np.radians(self.zero_error_deg)),
+        )
+
+
+@dataclass(kw_only=True)
+class OdometrySettings:
+    """Odometry of the mobile robot that carries the target, logged as X_WO_odometry."""
+
+    rate: float = number("Samples.", "Hz", 50.0, above=0.0, at_most=FASTEST)
+    wheel_radius: float = number("Radius of the wheels.", "m", 0.02, above=0.0)
+    counts_per_turn: int = whole("Counts of an encoder per turn of a wheel.", 4096, at_least=4)
+    scale_error: float = number(
+        "Standard deviation of the relative error of a wheel's radius.", "-", 0.0, at_least=0.0
+    )
+    base_error: float = number(
+        "Standard deviation of the relative error of the wheels' distance.",
+        "-",
+        0.0,
+        at_least=0.0,
+        below=0.2,
+    )
+    slip: float = number(
+        "Standard deviation of what a wheel turns too much on one metre, growing with the root of "
+        "the way.",
+        "m/sqrt(m)",
+        0.0,
+        at_least=0.0,
+    )
+
+    def wheels(self) -> WheelModel:
+        """The wheels."""
+        return WheelModel(
+            radius=self.wheel_radius,
+            counts_per_turn=self.counts_per_turn,
+            scale_error=self.scale_error,
+            base_error=self.base_error,
+            slip=self.slip,
+        )
+
+
+@dataclass(kw_only=True)
+class SensorSuite(SensorSettings):
+    """Sensors of the robot: those that estimators read, and such as look round, which are logged.
+
+    What looks round has its own rate, at most that of its type, and at most one reading per
+    integration step.
+    """
+
+    range_sensors: list[RangeSettings] = sections(
+        "Laser scanners and single beams.", required=False
+    )
+    imu: InertialSettings | None = optional_section("Inertial measurement unit; null: none.")
+    depth: DepthSettings | None = optional_section("Depth camera; null: none.")
+    pan_tilt: PanTiltSettings | None = optional_section("A head on two joints; null: none.")
+    odometry: OdometrySettings | None = optional_section(
+        "Odometry of the mobile robot that carries the target; null: none."
+    )
+
+    def looks_round(self) -> bool:
+        """Whether there is a sensor that looks at the world or at motion."""
+        others = (self.imu, self.depth, self.pan_tilt, self.odometry)
+        return bool(self.range_sensors) or any(other is not None for other in others)
+
+    def problems(self, on_wheels: bool, bodies: Collection[str] = ()) -> list[str]:
+        """What is wrong with these sensors, one line each that begins with the field.
+
+        Args:
+            on_wheels: Whether a mobile robot carries the target.
+            bodies: Names of what moves round the robot and may carry a sensor.
+        """
+        found = self._carrier_problems(bodies)
+        for field, settings in self._typed().items():
+            rate, largest = settings.rate, settings.largest_rate()
+            if rate is not None and rate > largest:
+                found.append(
+                    f"{field}.rate: found {rate:g}; accepted: at most {largest:g} [Hz], that of "
+                    f"{settings.type}"
+                )
+        names = [sensor.name for sensor in self.range_sensors]
+        for k, sensor in enumerate(self.range_sensors):
+            if sensor.name in names[:k]:
+                found.append(
+                    f"range_sensors[{k}].name: found {sensor.name} twice; accepted: each once"
+                )
+        head = self.pan_tilt
+        if head is not None and not np.all(head.lower_deg <= head.upper_deg):
+            found.append("pan_tilt.lower_deg: accepted: at most upper_deg, of both joints [deg]")
+        if self.odometry is not None and not on_wheels:
+            found.append(
+                "odometry: found a target that no mobile robot carries; accepted: null, or "
+                "target.motion.mobile_robot"
+            )
+        return found
+
+    def _carrier_problems(self, bodies: Collection[str]) -> list[str]:
+        """Sensors on what is not there, one line each."""
+        carried: dict[str, RangeSettings | DepthSettings | PanTiltSettings] = {
+            f"range_sensors[{k}]": sensor for k, sensor in enumerate(self.range_sensors)
+        }
+        if self.depth is not None:
+            carried["depth"] = self.depth
+        if self.pan_tilt is not None:
+            carried["pan_tilt"] = self.pan_tilt
+        found = []
+        for name, sensor in carried.items():
+            there = [PLATFORM, WORLD, *bodies]
+            if isinstance(sensor, RangeSettings) and self.pan_tilt is not None:
+                there.append(HEAD)
+            if sensor.carrier not in there:
+                found.append(
+                    f"{name}.carrier: found {sensor.carrier}, which is not there; accepted: "
+                    + ", ".join(there)[:200]
+                )
+        return found
+
+    def _typed(self) -> dict[str, RangeSettings | InertialSettings | DepthSettings]:
+        """Those that are of a type of the catalogue, by their place in the section."""
+        found: dict[str, RangeSettings | InertialSettings | DepthSettings] = {
+            f"range_sensors[{k}]": sensor for k, sensor in enumerate(self.range_sensors)
+        }
+        if self.imu is not None:
+            found["imu"] = self.imu
+        if self.depth is not None:
+            found["depth"] = self.depth
+        return found
+
+    def own_period(self) -> float:
+        """Time between readings of the fastest of these sensors [s]; infinite without any."""
+        return min((1.0 / rate for rate in self.own_rates().values()), default=float("inf"))
+
+    def check_step(self, max_step: float) -> None:
+        """Refuses such of these sensors as read more often than the simulation steps [s].
+
+        Raises:
+            ScenarioError: Names the field, its rate and the largest one.
+        """
+        for field, rate in self.own_rates().items():
+            check_rate(field, rate, max_step)
+
+    def own_rates(self) -> dict[str, float]:
+        """Readings per second of these sensors by their place in the section [Hz]."""
+        rates = {f"{field}.rate": found.model().rate_hz for field, found in self._typed().items()}
+        if self.pan_tilt is not None:
+            rates["pan_tilt.rate"] = self.pan_tilt.rate
+        if self.odometry is not None:
+            rates["odometry.rate"] = self.odometry.rate
+        return rates

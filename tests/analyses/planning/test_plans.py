@@ -1,0 +1,178 @@
+"""Paths from files, plans on the simulated robot, and the command that does both."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+
+from cdpr_drake.analyses.planning.path_files import read_path
+from cdpr_drake.analyses.planning.plan_tracking import track_plan
+from cdpr_drake.analyses.planning.robot_limits import (
+    LimitSettings,
+    make_path,
+    path_task,
+    robot_limits,
+)
+from cdpr_drake.cli.app import main
+from cdpr_drake.errors import CdprError, DataFileError, PlanningError
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.planning.path_timing import plan_along_path
+from tests.messages import printed
+
+G_CODE = """%
+(a square) G21 G90
+G0 X0 Y0 Z300 ; begin
+N20 G1 X100 F1200
+Y100 A2.5
+G91 X-100
+G20 G90 X0 Y0 Z11.811024
+M30
+"""
+
+
+def write(path, words):
+    path.write_text(words)
+    return path
+
+
+def test_a_table_of_poses(tmp_path):
+    found = read_path(
+        write(tmp_path / "a.csv", "# mine\nx,y,z,phi,theta,psi\n0,0,1,0,0,0\n1,2,3,0,0,90\n")
+    )
+    np.testing.assert_allclose(found.poses[1].translation(), [1, 2, 3])
+    np.testing.assert_allclose(
+        found.poses[1].rotation().matrix()[:2, :2], [[0, -1], [1, 0]], atol=1e-12
+    )
+    assert len(read_path(write(tmp_path / "b.csv", "0,0,1\n\n0,0,2\n0,1,2\n")).poses) == 3
+
+
+def test_g_code(tmp_path):
+    found = read_path(write(tmp_path / "a.nc", G_CODE))
+    places = [np.round(X.translation(), 6).tolist() for X in found.poses]
+    assert places == [[0, 0, 0.3], [0.1, 0, 0.3], [0.1, 0.1, 0.3], [0, 0.1, 0.3], [0, 0, 0.3]]
+    assert found.poses[2].rotation().matrix()[2, 1] == pytest.approx(np.sin(np.radians(2.5)))
+    assert found.remarks == ("F words left out: 1", "M words left out: 1")
+
+
+@pytest.mark.parametrize(
+    ("name", "words", "said"),
+    [
+        ("a.csv", "x,y\n1,2\n", "line 1: found the columns x, y"),
+        ("a.csv", "0,0,1\n0,0\n", "line 2: .* accepted: 3 finite"),
+        ("a.csv", "0,0,1\n0,nan,1\n", "line 2"),
+        ("a.csv", "0,0,1\n", "found 1 poses"),
+        ("a.nc", "G0 X0 Y0 Z0\nG2 X1 Y1 I1\n", "line 2: found G2; accepted: straight"),
+        ("a.nc", "G0 X0 Y0\n", "line 1: Z is not known"),
+        ("a.nc", "X0 Y0\n", "line 1: found coordinates before"),
+        ("a.nc", "G0 X0 X1\n", "X twice"),
+        ("a.nc", "G0 !\n", "found '!'"),
+        ("a.nc", "G0 X1 Q3\n", "the word Q3"),
+        ("a.txt", "", "accepted: .csv, .gcode"),
+    ],
+)
+def test_wrong_files_are_named_with_their_line(tmp_path, name, words, said):
+    with pytest.raises(DataFileError, match=said):
+        read_path(write(tmp_path / name, words))
+
+
+def test_what_is_no_text_is_refused(tmp_path):
+    (tmp_path / "a.csv").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(DataFileError, match="cannot be read as text"):
+        read_path(tmp_path / "a.csv")
+    with pytest.raises(DataFileError, match="no such file"):
+        read_path(tmp_path / "b.csv")
+
+
+def test_the_simulated_robot_keeps_the_limits(tmp_path):
+    robot = load_robot("acrobot_large")
+    given = LimitSettings(tensions=(1.0, 60.0))
+    poses = read_path(write(tmp_path / "p.csv", "0,0,0.2\n0.15,-0.1,0.4\n-0.1,0.1,0.3\n")).poses
+    plan = plan_along_path(path_task(robot, given), make_path(robot, poses, "blend"))
+    tracked = track_plan(robot, plan, robot_limits(robot, given))
+    assert tracked.keeps_limits()
+    assert tracked.missed_steps() == 0
+    assert tracked.errors()[0] < 2e-3  # a step of control late at every switch
+    final = tracked.log["X_WP"][-1, 4:]
+    np.testing.assert_allclose(final, [-0.1, 0.1, 0.3], atol=1e-3)
+    without = track_plan(robot, plan, plan.task.limits)  # no reserve: feedback misses some
+    assert without.missed_steps() > 0
+    assert not without.keeps_limits()
+
+
+def test_the_torque_that_friction_leaves_is_what_a_plan_may_use():
+    robot = load_robot("caroca")
+    limits = robot_limits(robot, LimitSettings())
+    viscous = 2e-3 * robot.winch.rated_cable_speed() / limits.ratio
+    assert limits.torque == pytest.approx(15.34 - 0.2 - viscous)
+    assert np.isinf(robot_limits(load_robot("planar"), LimitSettings()).torque)
+
+
+def test_robots_whose_winches_or_pulleys_are_not_known_to_plans_are_refused():
+    shared = load_robot("planar")
+    shared.cables[0].winch = shared.cables[1].winch = "one"
+    with pytest.raises(PlanningError, match="several cables on a winch"):
+        path_task(shared, LimitSettings())
+    robot = load_robot("acrobot_large")
+    axes = np.tile([[0.0], [0.0], [1.0]], (1, 8))
+    pulleys = robot.cable_set().over_platform_pulleys(0.01, axes)
+    with pytest.raises(PlanningError, match="pulleys at the platform"):
+        path_task(robot, LimitSettings(), pulleys)
+
+
+def run(capsys, *words):
+    with pytest.raises(SystemExit) as end:
+        main(["plan", *words])
+    out, err = printed(capsys)
+    return end.value.code, out, err
+
+
+def test_the_command_plans_and_writes(tmp_path, capsys):
+    folder = tmp_path / "out"
+    code, out, _ = run(
+        capsys, "planar", "--waypoints", "-0.1,0.1,0.3; 0.15,-0.1,0.3,0,0,10; 0.2,0.1,0.3",
+        "--stations", "150", "--out", str(folder), "--json",
+    )  # fmt: skip
+    assert code == 0
+    told = json.loads(out)
+    assert told == json.loads((folder / "summary.json").read_text())
+    assert told["tracked"]["keeps_limits"]
+    table = np.genfromtxt(folder / "motion.csv", delimiter=",", names=True)
+    assert table["time_s"][-1] == pytest.approx(told["duration_s"], abs=1e-3)
+    assert np.max(table["tension_C1_n"]) <= 60.0
+    for figure in ("phase_plane", "tensions", "winches", "path"):
+        assert (folder / f"{figure}.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["planar"], "--path, --waypoints: found neither"),
+        (["planar", "--waypoints", "0,0,0.3"], "found 1 poses"),
+        (["planar", "--waypoints", "0,0,0.3;0,x,0.3"], "--waypoints: found '0,x,0.3'"),
+        (
+            ["planar", "--waypoints", "0,0,0.3;0.1,0,0.35"],
+            "path: 2 of 2 poses: pose: found .* cannot have",
+        ),
+        (["planar", "--waypoints", "0,0,0.3;9,0,0.3"], "outside the frame"),
+        (["planar", "--waypoints", "0,0,0.3;0.1,0,0.3", "--reserve", "0.6"], "reserve: found 0.6"),
+        (["planar", "--waypoints", "0,0,0.3;0.1,0,0.3", "--tolerance", "0"], "tolerance: found 0"),
+        (["planar", "--waypoints", "0,0,0.3;0.1,0,0.3", "--speed", "-1"], "speed: found -1"),
+        (["planar", "--waypoints", "0,0,0.3;0,0,0.3"], "poses 1 and 2 are the same"),
+        (
+            ["acrobot_large", "--waypoints", "0,0,.2;.4,.4,1", "--limits", "5,20"],
+            r"at s = .*pose .*C\d",
+        ),
+    ],
+)
+def test_bad_input_is_named_and_writes_nothing(tmp_path, monkeypatch, capsys, words, said):
+    monkeypatch.chdir(tmp_path)
+    code, _, err = run(capsys, *words)
+    assert code == 2
+    assert re.search(said, err), err
+    assert len(err.strip().splitlines()) == 1
+    assert not list(tmp_path.rglob("*.csv"))
+
+
+def test_errors_are_of_the_family():
+    assert issubclass(DataFileError, CdprError)

@@ -1,0 +1,160 @@
+"""What a run leaves in its folder: summary, log, scenario, figures, replay, film."""
+
+import csv
+import json
+import re
+
+import cv2
+import numpy as np
+import pytest
+
+from cdpr_drake.analyses.reporting.deferred_figures import write_pictures
+from cdpr_drake.analyses.reporting.log_files import column_names
+from cdpr_drake.analyses.simulation.run_files import run_pictures, write_run_data
+from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
+from cdpr_drake.analyses.visualization.replay import write_replay
+from cdpr_drake.systems.diagrams.load import load_scenario
+
+SUMMARY_KEYS = {
+    "scenario", "robot", "controller", "estimator", "camera", "seed", "outcome", "sim_time_s",
+    "wall_time_s", "realtime_factor", "final_position_error_m", "final_rotation_error_rad",
+    "final_pose_estimate_error_m", "final_pose_estimate_error_rad", "image_deviation_px",
+    "camera_deviation_m", "tension_n", "slack_cable_seconds",
+}  # fmt: skip
+FIGURES = ("image_path", "error", "cable_velocities", "cable_lengths", "tensions", "platform_path")
+
+
+def write_run(folder, result, video=False):
+    write_run_data(folder, result)
+    assert write_pictures(folder, run_pictures(result, video)) == {}
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("run")
+    result = run_scenario(load_scenario("acrobot_pbvs", ["camera.kind=projected", "duration=0.4"]))
+    write_run(folder, result, video=True)
+    return folder, result
+
+
+def test_summary_has_the_promised_keys(run):
+    summary = json.loads((run[0] / "summary.json").read_text())
+    assert summary.keys() >= SUMMARY_KEYS
+    assert summary["controller"] == "pbvs"
+    assert summary["estimator"] == "control_integration"
+    assert summary["tension_n"].keys() == {"min", "max"}
+    for key in ("image_deviation_px", "camera_deviation_m"):
+        assert summary[key].keys() == {"max", "mean"}
+
+
+def test_npz_and_csv_hold_the_same_log(run):
+    folder, result = run
+    with np.load(folder / "log.npz") as arrays:
+        assert set(arrays) == set(result.log)
+        table = np.column_stack([arrays[name] for name in result.log])
+    with (folder / "log.csv").open(newline="") as file:
+        rows = list(csv.reader(file))
+    assert rows[0] == column_names(
+        result.log, [f"C{i}" for i in range(1, 9)], result.servo.feature_names
+    )
+    assert len(set(rows[0])) == len(rows[0])
+    np.testing.assert_array_equal(np.array(rows[1:], float), table)
+
+
+def test_log_files_are_the_same_bytes_for_the_same_seed(run, tmp_path):
+    folder, result = run
+    again = run_scenario(result.servo.scenario)
+    write_run_data(tmp_path, again)
+    for name in ("log.npz", "log.csv", "scenario.yaml"):
+        assert (folder / name).read_bytes() == (tmp_path / name).read_bytes()
+
+
+def test_written_scenario_runs_again_to_the_same_log(run):
+    folder, result = run
+    again = run_scenario(load_scenario(str(folder / "scenario.yaml")))
+    for name, values in result.log.items():
+        np.testing.assert_array_equal(again.log[name], values)
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_figure_is_a_picture_with_something_in_it(run, name):
+    picture = cv2.imread(str(run[0] / f"{name}.png"))
+    assert picture.shape[0] > 400
+    assert picture.shape[1] > 800
+    assert np.std(picture) > 5.0
+
+
+def test_replay_needs_no_server(run):
+    page = (run[0] / "replay.html").read_text()
+    assert 'src="http' not in page
+
+
+def test_replay_shows_what_the_film_shows_and_where_the_target_should_be(run):
+    page = (run[0] / "replay.html").read_text()
+    (words,) = re.findall(r'id="cdpr-data">(.*?)</script>', page, re.DOTALL)
+    camera, servo = json.loads(words)["camera"], run[1].servo
+    times = [time for time, _ in camera["images"]]
+    np.testing.assert_allclose(times, [0.0, 0.2, 0.4])
+    assert all(image.startswith("data:image/jpeg;base64,") for _, image in camera["images"])
+    ((begins, desired),) = camera["desired"]
+    assert begins == 0.0
+    exactly = servo.pinhole.project(servo.X_CdO @ servo.target.points)
+    np.testing.assert_allclose(np.reshape(desired, (-1, 2)).T, exactly)
+
+
+def test_replay_holds_the_motion(run, tmp_path):
+    """A page without a recording would be as long for one row as for all."""
+    result = run[1]
+    first = {name: values[:1] for name, values in result.log.items()}
+    write_replay(tmp_path / "still.html", result.servo.robot, first, result.servo.scenario)
+    still = (tmp_path / "still.html").stat().st_size
+    frames = 10  # of 0.4 s at 25 Hz, beyond the first
+    bytes_per_pose = 7 * 8
+    assert (run[0] / "replay.html").stat().st_size - still > frames * bytes_per_pose
+
+
+def test_film_has_a_frame_per_image(run):
+    film = cv2.VideoCapture(str(run[0] / "camera.mp4"))
+    assert film.get(cv2.CAP_PROP_FRAME_COUNT) == 11
+    assert film.get(cv2.CAP_PROP_FRAME_WIDTH) == 640
+    found, frame = film.read()
+    assert found
+    assert np.std(frame) > 5.0
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("acrobot_circles", ["ellipses_px.u0_px", "ellipses_px.n11_1_px2", "error.n20_0"]),
+        ("acrobot_hybrid", ["corners_px.u3_px", "error.xo", "error.rz_rad", "error.z_m"]),
+        ("acrobot_eye_to_hand", ["corners_px.v3_px", "error.rx_rad"]),
+    ],
+)
+def test_other_schemes_leave_the_same_files_with_their_own_columns(name, expected, tmp_path):
+    result = run_scenario(load_scenario(name, ["camera.kind=projected", "duration=0.1"]))
+    write_run(tmp_path, result, video=name == "acrobot_circles")
+    for figure in FIGURES:
+        assert (tmp_path / f"{figure}.png").stat().st_size > 0
+    with (tmp_path / "log.csv").open(newline="") as file:
+        columns = next(csv.reader(file))
+    assert set(expected) <= set(columns)
+    assert len(set(columns)) == len(columns)
+
+
+def test_a_picture_that_fails_is_named_and_the_others_are_there(run, tmp_path):
+    """Data comes first; what fails after it takes nothing with it, and leaves no half file."""
+    pictures = run_pictures(run[1])
+
+    def fail(path):
+        path.write_text("half")
+        raise RuntimeError("no font\nmore words")
+
+    failed = write_pictures(tmp_path, {"error.png": fail, "tensions.png": pictures["tensions.png"]})
+    assert failed == {"error.png": "no font"}
+    assert [path.name for path in tmp_path.iterdir()] == ["tensions.png"]
+
+
+def test_no_picture_is_begun_after_a_request_to_stop(run, tmp_path):
+    failed = write_pictures(tmp_path, run_pictures(run[1]), should_stop=lambda: True)
+    assert "replay.html" in failed
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,150 @@
+"""What is said before a servo starts: a target out of view, a goal that is not possible."""
+
+import re
+
+import pytest
+
+from cdpr_drake.analyses.simulation.scenario_kinds import SCENARIO_KINDS
+from cdpr_drake.analyses.simulation.session import RunSession
+from cdpr_drake.analyses.simulation.start_checks import (
+    check_length,
+    check_start,
+    goal_warnings,
+    step_warnings,
+)
+from cdpr_drake.analyses.simulation.tension_control_run import run_tension_scenario
+from cdpr_drake.analyses.simulation.visual_servo_run import run_built, run_scenario, warm_up
+from cdpr_drake.cli.app import main
+from cdpr_drake.errors import ScenarioError
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.diagrams.visual_servo import build_visual_servo
+from cdpr_drake.systems.monitoring.run_monitor import Outcome
+from cdpr_drake.systems.scenarios.files import scenario_names
+from tests.messages import printed
+
+PROJECTED = "camera.kind=projected"
+
+
+def servo(*overrides, name="acrobot_pbvs"):
+    return build_visual_servo(load_scenario(name, [PROJECTED, *overrides]))
+
+
+@pytest.mark.parametrize("name", ["acrobot_pbvs", "acrobot_circles", "acrobot_eye_to_hand"])
+def test_scenarios_of_the_package_see_their_target_and_can_reach_their_goal(name):
+    built = servo(name=name)
+    check_start(built)
+    assert goal_warnings(built) == []
+
+
+@pytest.mark.parametrize(
+    ("override", "expected"),
+    [
+        (
+            "target.pose.position=[-0.5, 0.5, 0.0]",
+            "its middle would be at (2937, 3134) px, 0.0847 m away",
+        ),
+        ("target.pose.position=[0.2209, -0.197, 0.9]", "m behind the camera"),
+        ("target.pose.angles_deg=[180, 0, 0]", "it is turned away from the camera, or a part"),
+    ],
+)
+def test_a_target_out_of_view_is_refused_with_where_it_would_be(override, expected):
+    with pytest.raises(ScenarioError) as caught:
+        check_start(servo(override))
+    message = str(caught.value)
+    assert message.startswith("acrobot_pbvs: initial_pose: the camera does not see the target")
+    assert expected in message
+    assert "accepted: all of it within 640 x 480 px, face on" in message
+    assert "\n" not in message
+
+
+def test_a_goal_from_which_the_target_is_not_seen_is_a_warning():
+    (warning,) = goal_warnings(servo("desired.position=[0.1, 0, 0.09]"))
+    assert warning == "acrobot_pbvs: desired: the camera does not see all of the target from there"
+
+
+def test_a_goal_outside_the_static_workspace_is_a_warning():
+    built = servo("desired.position=[0.0, 0.0, 1.12]")
+    (warning,) = goal_warnings(built)
+    assert warning.startswith("acrobot_pbvs: desired: outside the static workspace: ")
+
+
+def test_a_step_beyond_the_stable_one_is_warned_of_with_the_number():
+    """Such a run once showed tensions of 1,630 N without a word."""
+    good = servo()
+    assert step_warnings(good) == []
+    assert step_warnings(servo(f"integration.max_step={good.max_step}")) == []
+    (warning,) = step_warnings(servo("integration.max_step=0.05"))
+    largest = float(re.search(r"is about (\S+) s", warning)[1])
+    assert good.max_step < largest < 2.0 * good.max_step
+
+
+def test_a_run_that_would_never_end_is_refused():
+    check_length("long", 100.0, 1e-3)
+    with pytest.raises(ScenarioError, match=r"duration: found 1e\+08 s.*accepted: at most 1e\+09"):
+        check_length("long", 1e8, 1e-3)
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["acrobot_pbvs", "--camera", "projected", "--duration", "1e12"],
+        ["acrobot_pbvs", "--camera", "projected", "--set", "integration.max_step=1e-12"],
+        ["planar_computed_torque", "--duration", "1e12"],
+        ["planar_computed_torque", "--set", "integration.max_step=1e-12"],
+        ["planar_computed_torque", "--set", "controller.rate=1e9"],
+        ["acrobot_pbvs", "--set", "camera.rate=1e9"],
+        ["acrobot_pbvs", "--set", "camera.latency_frames=1000000000"],
+        ["acrobot_pbvs", "--set", "log_rate=1e300"],
+    ],
+)
+def test_steps_rates_and_delays_beyond_sense_are_one_line(arguments, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit) as ended:
+        main(["simulate", *arguments])
+    error = printed(capsys).err
+    assert ended.value.code == 2
+    assert "accepted: " in error
+    assert len(error.strip().splitlines()) == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_camera_of_a_frame_an_hour_is_not_waited_for_in_the_warm_up():
+    built = servo("camera.rate=0.0003", "controller.rate=0.0003")
+    seen = []
+    warm_up(built)
+    result = run_built(built, RunSession(seen.append, lambda: len(seen) >= 2))
+    assert result.outcome == Outcome.INTERRUPTED
+    assert result.sim_time == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize("name", SCENARIO_KINDS)
+def test_every_kind_refuses_runs_that_would_never_end(name):
+    """Runs by tensions once began whatever their step was."""
+    scenario = load_scenario(scenario_names(name)[0], ["integration.max_step=1e-12"])
+    with pytest.raises(ScenarioError, match="accepted: at most"):
+        SCENARIO_KINDS[name].check(scenario)
+
+
+@pytest.mark.parametrize(
+    ("name", "key"),
+    [
+        ("acrobot_pbvs", "camera.rate"),
+        ("acrobot_pbvs", "controller.rate"),
+        ("acrobot_pbvs", "log_rate"),
+        ("planar_computed_torque", "controller.rate"),
+        ("planar_computed_torque", "log_rate"),
+    ],
+)
+def test_rates_that_nothing_follows_are_refused(name, key):
+    """Such runs once stood still."""
+    load_scenario(name, [f"{key}=1e5"])
+    with pytest.raises(ScenarioError, match=f"--set {key}: found 9e15; .* <= 100000"):
+        load_scenario(name, [f"{key}=9e15"])
+
+
+def test_slow_cameras_and_controllers_do_not_make_warming_up_longer_than_the_run():
+    """One image in a hundred years: such a run once began with them."""
+    scenario = load_scenario("acrobot_pbvs", [PROJECTED, "camera.rate=3e-10", "duration=0.05"])
+    assert run_scenario(scenario).sim_time == pytest.approx(0.05)
+    scenario = load_scenario("planar_computed_torque", ["controller.rate=3e-10", "duration=0.05"])
+    assert run_tension_scenario(scenario).sim_time <= 0.05

@@ -1,0 +1,3 @@
+"""Tests of `cdpr_drake.analyses.statics`."""
+
+"""Tests of `cdpr_drake.analyses.statics`."""

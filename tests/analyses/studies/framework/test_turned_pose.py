@@ -1,0 +1,49 @@
+"""Poses beside a pose: sizes and axes are those asked for, and items load as they were meant."""
+
+import numpy as np
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+
+from cdpr_drake.analyses.studies.framework.experiments import (
+    as_transform,
+    between,
+    pose_item,
+    turned,
+)
+from cdpr_drake.geometry.poses import pose_error
+
+ROUNDING = 1e-9
+"""Items carry nine digits; poses here are of the order of 1 m and 1 rad."""
+
+angle = st.floats(-80.0, 80.0)
+place = st.floats(-3.0, 3.0)
+poses = st.tuples(st.tuples(place, place, place), st.tuples(angle, angle, angle))
+
+
+@given(poses, st.floats(0.01, 2.0), st.floats(1.0, 60.0))
+def test_a_turned_pose_is_as_far_away_as_asked(pose, distance, degrees):
+    X = as_transform(pose)
+    shift, axis = np.array([0.6, 0.0, 0.8]), np.array([1.0, 2.0, -2.0])
+    found_distance, found_angle = pose_error(X, turned(X, distance * shift, degrees, axis))
+    np.testing.assert_allclose(found_distance, distance, atol=ROUNDING)
+    np.testing.assert_allclose(np.degrees(found_angle), degrees, atol=1e-6)
+
+
+@given(poses, st.floats(0.01, 2.0), st.floats(1.0, 60.0))
+def test_between_undoes_turned(pose, distance, degrees):
+    X = as_transform(pose)
+    shift, axis = np.array([0.6, 0.0, 0.8]), np.array([1.0, 2.0, -2.0]) / 3.0
+    direction, turn = between(X, turned(X, distance * shift, degrees, axis))
+    np.testing.assert_allclose(direction, shift, atol=1e-7)
+    np.testing.assert_allclose(turn, axis, atol=1e-7)
+
+
+@given(poses)
+def test_an_item_means_the_pose(pose):
+    X = as_transform(pose)
+    key, _, words = pose_item("initial_pose", X).partition("=")
+    value = yaml.safe_load(words)
+    assert key == "initial_pose"
+    again = as_transform((tuple(value["position"]), tuple(value["angles_deg"])))
+    assert again.IsNearlyEqualTo(X, 10.0 * ROUNDING)

@@ -1,0 +1,160 @@
+"""Figures of stability workspaces show what there is: every cell, every curve, every exit point."""
+
+import matplotlib.colors
+import numpy as np
+import pytest
+from matplotlib.collections import QuadMesh
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+from cdpr_drake.analyses.studies.control_stability.figures import table_figure
+from cdpr_drake.analyses.studies.control_stability.tables import StabilityRow
+from cdpr_drake.analyses.studies.published.stability_recipe import recipe_grid
+from cdpr_drake.analyses.studies.published.stability_tables import TABLES
+from cdpr_drake.analyses.workspaces.stability_figures import (
+    COLORS,
+    MOST_PLANES,
+    curves_figure,
+    even_choice,
+    planes_figure,
+    solids_figure,
+)
+from cdpr_drake.analyses.workspaces.stability_workspaces import StabilityWorkspaces
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.stability.verdict import VERDICTS
+from cdpr_drake.workspaces.pose_grid import grid_by_count
+
+
+def workspaces(counts, stable=True, feasible=True, values=()):
+    """A result that was not computed; `values` are those of r_A [m] beside the baseline."""
+    grid = grid_by_count([-0.5, -0.5, 0.0], [0.5, 0.5, 1.0], counts)
+    names = ("baseline", *(f"r_A={value:g}" for value in values))
+    bounds = {name: {"r_A": r} for name, r in zip(names, (0.005, *values), strict=True)}
+    arguments = {
+        "robot": "acrobot_large", "scheme": "pbvs", "verdict": "sampled", "bounds": bounds,
+        "case": {"lever": "error"},
+    }  # fmt: skip
+    shape = (len(names), *grid.shape)
+    return StabilityWorkspaces(
+        arguments=arguments,
+        grid=grid,
+        names=names,
+        stable=np.broadcast_to(stable, shape),
+        margin=np.zeros(shape),
+        feasible=np.broadcast_to(feasible, grid.shape),
+        versions={},
+    )
+
+
+def meshes(figure):
+    """The coloured cells of every panel."""
+    figure.draw_without_rendering()
+    return [c for axes in figure.axes for c in axes.collections if isinstance(c, QuadMesh)]
+
+
+@pytest.mark.parametrize(
+    ("counts", "across", "up", "panels"),
+    [
+        ((4, 3, 2), "x", "y", 2),
+        ((7, 1, 6), "x", "z", 1),
+        ((1, 7, 6), "y", "z", 1),
+        ((1, 1, 6), "x", "z", 1),
+        ((5, 1, 1), "x", "y", 1),
+        ((1, 5, 1), "x", "y", 1),
+        ((1, 1, 1), "x", "y", 1),
+    ],
+)
+def test_planes_show_every_point_as_a_cell(counts, across, up, panels):
+    figure = planes_figure(workspaces(counts))
+    found = meshes(figure)
+    assert len(found) == panels
+    size = dict(zip("xyz", counts, strict=True))
+    for mesh in found:
+        corners = mesh.get_coordinates()  # shape (rows + 1, columns + 1, 2)
+        assert corners.shape == (size[up] + 1, size[across] + 1, 2)
+        sides = [np.diff(corners[..., 0], axis=1), np.diff(corners[..., 1], axis=0)]
+        assert min(np.min(side) for side in sides) > 0.05
+    assert figure.axes[-1].get_xlabel() == f"{across} in W [m]"
+    assert figure.axes[0].get_ylabel() == f"{up} in W [m]"
+
+
+@pytest.mark.parametrize("counts", [(7, 1, 6), (1, 7, 6), (4, 3, 1)])
+def test_cells_are_coloured_by_their_own_points(counts):
+    stable = np.random.default_rng(0).random((1, 1, *counts)) < 0.5
+    (mesh,) = meshes(planes_figure(workspaces(counts, stable)))
+    wanted = [COLORS["SZ" if one else "S"] for one in np.squeeze(stable).T.ravel()]
+    np.testing.assert_allclose(mesh.get_facecolors(), matplotlib.colors.to_rgba_array(wanted))
+
+
+def test_planes_are_evenly_spaced_and_a_selection_is_said():
+    for count in range(1, 60):
+        chosen = even_choice(count, MOST_PLANES)
+        assert len(chosen) <= MOST_PLANES
+        assert len(set(np.diff(chosen))) <= 1
+        assert 0 <= chosen[0] <= chosen[-1] < count
+    figure = planes_figure(workspaces((3, 3, 16)))
+    assert len(meshes(figure)) == 16
+    assert "planes" not in figure.get_suptitle()
+    figure = planes_figure(workspaces((3, 3, 25)))
+    assert f"{len(meshes(figure))} of 25 planes" in figure.get_suptitle()
+
+
+def test_ticks_of_a_square_plane_are_alike():
+    panel = planes_figure(workspaces((9, 7, 4))).axes[0]
+    np.testing.assert_allclose(panel.get_xticks(), [-0.5, 0.0, 0.5], atol=1e-12)
+    np.testing.assert_allclose(panel.get_yticks(), panel.get_xticks(), atol=1e-12)
+
+
+def test_exit_points_are_over_the_solids_and_in_the_legend():
+    figure = solids_figure(workspaces((4, 4, 4)), load_robot("acrobot_large"))
+    for axes in figure.axes:
+        assert not axes.computed_zorder  # else matplotlib sorts by depth, solids last
+        (solid,) = (c for c in axes.collections if isinstance(c, Poly3DCollection))
+        (exits,) = (line for line in axes.lines if line.get_marker() == "^")
+        assert exits.get_zorder() > solid.get_zorder()
+    (legend,) = figure.legends
+    assert "exit points of the cables" in [text.get_text() for text in legend.get_texts()]
+    assert "all eight corners inside" in legend.get_title().get_text()
+
+
+def test_curves_that_lie_on_each_other_can_both_be_seen():
+    figure = curves_figure(workspaces((3, 3, 3), values=(0.01, 0.02)))
+    (axes,) = figure.axes
+    assert axes.get_xlabel() == "r_A [m]"
+    lines = {line.get_label(): line for line in axes.lines}
+    np.testing.assert_array_equal(lines["Z, r_A [m]"].get_ydata(), lines["SZ, r_A [m]"].get_ydata())
+    assert lines["Z, r_A [m]"].get_linewidth() > 2.0 * lines["SZ, r_A [m]"].get_linewidth()
+    assert lines["Z, r_A [m]"].get_markersize() > lines["SZ, r_A [m]"].get_markersize()
+    figure.draw_without_rendering()
+    labels = [text.get_text() for text in axes.get_xticklabels()]
+    assert "0.01" in labels
+    assert len(labels) <= 7
+
+
+@pytest.mark.parametrize("quick", [True, False])
+def test_tables_tell_verdicts_apart_and_say_that_a_grid_is_coarse(quick):
+    table = next(table for table in TABLES if table.name == "A.8")
+    grid = recipe_grid(table.robot, quick).size
+    shares, poses = dict.fromkeys(VERDICTS, 50.0), dict.fromkeys(VERDICTS, 9)
+    rows = [
+        StabilityRow(
+            table="A.8",
+            bound=bound,
+            value=value,
+            published=60.0,
+            shares=shares,
+            poses=poses,
+            grid=grid,
+            ordered=True,
+        )
+        for bound, value in (("r_bp", 0.05), ("r_A", 0.01), ("r_A", 0.03))
+    ]
+    figure = table_figure(table, rows)
+    assert ("not to be compared" in figure.get_suptitle()) == quick
+    assert "3 of 44 printed rows" in figure.get_suptitle()
+    for axes in figure.axes:
+        assert axes.get_xlim()[0] == 0.0
+        lines = [line for line in axes.lines if line.get_label() in VERDICTS]
+        assert len({line.get_marker() for line in lines}) == len(VERDICTS)
+        assert len({line.get_linestyle() for line in lines}) == len(VERDICTS)
+        sizes = [line.get_markersize() for line in lines]
+        assert sizes == sorted(sizes, reverse=True)

@@ -1,0 +1,3 @@
+"""Tests of `cdpr_drake.systems.controllers`."""
+
+"""Tests of `cdpr_drake.systems.controllers`."""

@@ -1,0 +1,330 @@
+"""Clients that die, are silent, or send nonsense: the run ends, with what was simulated."""
+
+import json
+import os
+import subprocess
+import sys
+import time
+
+import msgpack
+import numpy as np
+import pytest
+import zmq
+
+from cdpr_drake.analyses.simulation.tension_control_run import summarize_tension_run
+from cdpr_drake.errors import BridgeError, ClientEndedError
+from cdpr_drake.geometry.poses import pose_row
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_statics import tension_problem
+from cdpr_drake.systems.monitoring.run_monitor import Outcome
+from cdpr_drake.systems.remote.messages import (
+    JSON,
+    LARGEST,
+    MSGPACK,
+    decode,
+    encode,
+    listed,
+    vector,
+)
+from cdpr_drake.systems.remote.remote_client import Client
+from cdpr_drake.systems.remote.remote_driver import Driver, Pace
+from cdpr_drake.systems.remote.server_socket import ServerSocket
+from cdpr_drake.tensions.methods import distribute
+from tests.systems.remote.served import LONG, beside, scenario, server
+
+HOLD = {"tensions": [4.0] * 8}
+STEPS = 7
+
+
+def settings(*overrides):
+    return scenario("integration.engine=compiled", "remote.place=distributor", *overrides)
+
+
+def raw(address):
+    socket = zmq.Context.instance().socket(zmq.REQ)
+    socket.setsockopt(zmq.LINGER, 0)
+    socket.setsockopt(zmq.RCVTIMEO, round(1e3 * LONG))
+    socket.connect(address)
+    return socket
+
+
+def say(socket, message):
+    payload = message if isinstance(message, bytes) else json.dumps(message).encode()
+    socket.send(payload)
+    return socket.recv()
+
+
+def some_steps(socket, last, steps=STEPS):
+    """Starts, steps, and then sends what is no good."""
+    assert json.loads(say(socket, {"do": "start"}))["time"] == 0.0
+    for number in range(1, steps + 1):
+        now = json.loads(say(socket, {"do": "step", "inputs": HOLD}))
+        assert now["time"] == pytest.approx(1e-3 * number)
+    reply = say(socket, last)
+    socket.close()
+    return reply
+
+
+NONSENSE = {
+    "garbage": (b"\xff\x00garbage", "accepted: one object"),
+    "half of a message": (b'{"do": "st', "accepted: one object"),
+    "deep": (b'{"a":' + b"[" * 100_000, "accepted: one object"),
+    "nothing": (b"", "accepted: one object"),
+    "a list": (msgpack.packb([1, 2]), "accepted: one object"),
+    "no question": ({"what": 1}, "do: found None"),
+    "another one": ({"do": "fly"}, "do: found 'fly'"),
+    "start again": ({"do": "start"}, "drives it already"),
+    "wrong size": ({"do": "step", "inputs": {"tensions": [1.0] * 7}}, "found 7 entries"),
+    "NaN in JSON": (b'{"do":"step","inputs":{"tensions":[NaN,1,1,1,1,1,1,1]}}', "one object"),
+    "NaN": (
+        msgpack.packb({"do": "step", "inputs": {"tensions": [float("nan")] * 8}}),
+        "8 finite numbers",
+    ),
+    "infinite": (b'{"do":"step","inputs":{"tensions":[1e999,1,1,1,1,1,1,1]}}', "finite numbers"),
+    "too large": (
+        b'{"do":"step","inputs":{"tensions":[' + b"9" * 400 + b",1,1,1,1,1,1,1]}}",
+        "finite numbers",
+    ),
+    "truth": ({"do": "step", "inputs": {"tensions": [True] * 8}}, "finite numbers"),
+    "words": ({"do": "step", "inputs": {"tensions": ["1"] * 8}}, "finite numbers"),
+    "unknown port": ({"do": "step", "inputs": {**HOLD, "torques": [1.0]}}, "accepted: tensions"),
+    "missing port": ({"do": "step", "inputs": {}}, "accepted: tensions"),
+    "no inputs": ({"do": "step"}, "found None; accepted: tensions"),
+    "pushing": ({"do": "step", "inputs": {"tensions": [-1.0] * 8}}, "a cable does not push"),
+}
+
+
+@pytest.mark.parametrize("kind", NONSENSE)
+def test_nonsense_ends_the_run_and_is_named(kind):
+    last, words = NONSENSE[kind]
+    with server() as one, beside(some_steps, raw(one.socket.address), last) as found:
+        run = one.run(settings())
+    assert run.outcome == Outcome.CLIENT_ENDED
+    assert words in run.message
+    assert len(run.message) < 500
+    assert "\n" not in run.message
+    assert run.sim_time == pytest.approx(1e-3 * STEPS)
+    assert np.all(run.log["tensions"][1:] == 4.0)
+    summary = summarize_tension_run(run)
+    assert (summary["outcome"], summary["message"]) == ("client_ended", run.message)
+    assert summary["remote"]["exchanges"] == STEPS + (kind == "pushing")
+    assert isinstance(found[0], bytes)  # who sends nonsense gets a reply
+
+
+def test_a_message_that_is_too_long_is_not_read():
+    def flood(socket):
+        say(socket, {"do": "start"})
+        socket.send(b"{" + b" " * LARGEST)
+
+    with server() as one:
+        socket = raw(one.socket.address)
+        with beside(flood, socket):
+            run = one.run(settings())
+        socket.close()
+    assert run.outcome == Outcome.CLIENT_ENDED
+    assert str(LARGEST) in run.message
+
+
+DYING = """
+import os, sys, json, zmq
+socket = zmq.Context().socket(zmq.REQ)
+socket.connect(sys.argv[1])
+socket.send(b'{"do": "start"}')
+for _ in range(5):
+    socket.recv()
+    socket.send(json.dumps({"do": "step", "inputs": {"tensions": [4.0] * 8}}).encode())
+socket.recv()
+os._exit(9)
+"""
+
+
+def test_a_client_that_dies_is_missed_at_once():
+    """The time-out is a minute, and would be the message."""
+    with server() as one:
+        dying = subprocess.Popen([sys.executable, "-c", DYING, one.socket.address])
+        run = one.run(settings())
+        assert dying.wait() == 9
+    assert run.outcome == Outcome.CLIENT_ENDED
+    assert run.message.startswith("the client went away")
+    assert run.sim_time == pytest.approx(5e-3)
+
+
+@pytest.mark.parametrize("pace", ["lock_step", "real_time"])
+def test_a_silent_client(pace):
+    def fall_silent(socket):
+        say(socket, {"do": "start"})
+        return say(socket, {"do": "step", "inputs": HOLD})
+
+    # In real time what was held last goes on, and leads away within a second.
+    timeout = {"lock_step": 1.0, "real_time": 0.2}[pace]
+    with server(timeout=timeout) as one:
+        socket = raw(one.socket.address)
+        with beside(fall_silent, socket):
+            run = one.run(settings(f"remote.pace={pace}", "duration=60.0"))
+        socket.close()
+    assert run.outcome == Outcome.CLIENT_ENDED
+    assert run.message == f"the client was silent for {timeout:g} s"
+    if pace == "lock_step":
+        assert run.sim_time == pytest.approx(1e-3)
+    else:
+        assert run.sim_time < 60.0
+        assert run.control.remote.report()["held_steps"] > 0
+
+
+def test_stop_by_the_client():
+    def stop(address):
+        with Client(address, timeout=LONG) as client:
+            client.start()
+            client.step(**HOLD)
+            return client.stop()
+
+    with server() as one, beside(stop, one.socket.address) as found:
+        run = one.run(settings())
+    assert run.message == "the client said stop"
+    assert found[0].end["outcome"] == "client_ended"
+    assert found[0].time == run.sim_time == pytest.approx(1e-3)
+
+
+def test_a_request_to_stop_while_the_client_thinks():
+    asked = []
+
+    def start(socket):
+        say(socket, {"do": "start"})
+        asked.append(True)
+        return json.loads(say(socket, {"do": "step", "inputs": HOLD}))
+
+    with server(should_stop=lambda: bool(asked)) as one:
+        socket = raw(one.socket.address)
+        with beside(start, socket):
+            run = one.run(settings())
+        socket.close()
+    assert run.outcome == Outcome.INTERRUPTED
+
+
+def test_strangers_are_answered_and_change_nothing():
+    """Beside the driver: descriptions and tensions for all, commands from nobody else."""
+    robot, home = load_robot("acrobot_large"), load_robot("acrobot_large").home.transform()
+    expected = distribute(tension_problem(robot, home), "quadratic_program").tensions
+
+    def drive(address):
+        with (
+            Client(address, timeout=LONG) as driver,
+            Client(address, codec="json", timeout=LONG) as other,
+        ):
+            assert set(other.describe()["inputs"]) == {"tensions"}
+            driver.start(["X_WP"])
+            held, feasible = other.distribute(pose_row(home))
+            np.testing.assert_array_equal(held, expected)
+            assert feasible
+            weight = [0.0, 0.0, 0.0, 0.0, 0.0, 3.5 * 9.81]
+            moved = robot.center_of_mass()[2]
+            assert moved > 0.0  # over Po, so that at home the weight has no moment
+            again, _ = other.distribute(pose_row(home), weight)
+            np.testing.assert_allclose(again, expected, atol=1e-9)
+            _, feasible = other.distribute(pose_row(home), limits=(0.0, 1.0))
+            assert not feasible
+            for nonsense, words in (
+                ({"do": "step", "inputs": HOLD}, "does not drive"),
+                ({"do": "start"}, "does not drive"),
+                ({"do": "stop"}, "does not drive"),
+                ({"do": "distribute", "pose": [1, 0, 0, 0, 0, 0, 9]}, "outside the frame"),
+                ({"do": "distribute", "pose": [2, 0, 0, 0, 0, 0, 0]}, "norm 2; accepted: 1"),
+                ({"do": "distribute", "pose": [1.0]}, "a list of 7"),
+                ({"do": "distribute", "pose": [1, 0, 0, 0, 0, 0, 0.1], "x": 1}, "found 'x'"),
+            ):
+                with pytest.raises(BridgeError, match=words):
+                    other.ask(nonsense)
+            with pytest.raises(BridgeError, match="pose"):  # the driver may ask wrongly, too
+                driver.distribute([1.0])
+            now = driver.step(**HOLD)
+            while now.end is None:
+                now = driver.step(**HOLD)
+            return now.end
+
+    with server() as one, beside(drive, one.socket.address) as found:
+        run = one.run(settings())
+    assert run.outcome == Outcome.COMPLETED, found
+    assert found[0]["outcome"] == "completed"
+    assert run.control.remote.report()["services"] == 3
+
+
+def test_nobody_comes():
+    with server() as one:
+        driver = Driver(
+            one.socket, {}, [], [], pace=Pace.LOCK_STEP, timeout=1.0, period=1.0, services={}
+        )
+        with pytest.raises(ClientEndedError, match=r"within 0\.01 s"):
+            driver.wait(0.01)
+
+
+def test_nowhere_to_listen():
+    with server() as one:
+        port = int(one.socket.address.rsplit(":", 1)[1])
+        with pytest.raises(BridgeError, match=f"found 127.0.0.1:{port}"):
+            ServerSocket("127.0.0.1", port, lambda: False)
+    with pytest.raises(BridgeError, match="an interface of this machine"):
+        ServerSocket("no.such.host.invalid", 0, lambda: False)
+
+
+def test_nobody_serves():
+    with (
+        Client("tcp://127.0.0.1:9", timeout=0.05) as client,
+        pytest.raises(BridgeError, match=r"found no reply in 0.05 s.*cdpr serve"),
+    ):
+        client.describe()
+    with pytest.raises(BridgeError, match="address: found 'nonsense'"):
+        Client("nonsense")
+
+
+def test_a_client_needs_neither_drake_nor_numba():
+    words = (
+        "import sys, cdpr_drake.bridge; "
+        "print([m for m in ('pydrake', 'numba', 'zmq', 'msgpack', 'scipy') if m in sys.modules])"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", words], capture_output=True, text=True, check=True, env=os.environ
+    )
+    assert done.stdout.strip() == "[]"
+
+
+def test_vectors_as_they_are_sent():
+    values = [0.1, -1e300, 2.0, 1e-320]
+    for found in (values, np.array(values).tobytes()):
+        assert vector("v", found, 4).tobytes() == np.array(values).tobytes()
+    assert vector("v", [1, 2.5], 2).tolist() == [1.0, 2.5]
+    assert vector("v", [1.7e308, 1.7e308], 2).tolist() == [1.7e308, 1.7e308]
+    for codec in (JSON, MSGPACK):
+        again, how = decode(encode({"v": listed(np.array(values), codec)}, codec))
+        assert how == codec
+        assert vector("v", again["v"], 4).tobytes() == np.array(values).tobytes()
+    assert listed(np.array([np.nan, 1.0]), JSON) == [None, 1.0]
+    bad = (b"", b"1234567", [1.0], [None, 1.0], "ab", [[1.0], [2.0]], [np.inf, 1.0], [10**400, 1],
+           np.array([np.nan, 1.0]).tobytes(), {"a": 1}, None)  # fmt: skip
+    for found in bad:
+        with pytest.raises(BridgeError, match=r"^v: found .*accepted: .*finite numbers"):
+            vector("v", found, 2)
+
+
+def test_in_real_time_a_command_holds_until_the_next():
+    """A client that pauses is not waited for; what it asked for last stays."""
+
+    def pause(address):
+        with Client(address, timeout=LONG) as client:
+            client.start(["tensions"])
+            now = client.step(tensions=[3.0] * 8)
+            time.sleep(0.03)
+            while now.end is None:
+                now = client.step(tensions=[5.0] * 8)
+            return now.end
+
+    with server() as one, beside(pause, one.socket.address) as found:
+        run = one.run(settings("remote.pace=real_time", "duration=0.2", "log_rate=1000"))
+    assert run.outcome == Outcome.COMPLETED, found
+    assert found[0]["outcome"] == "completed"
+    commanded = run.log["tensions"][1:, 0]
+    assert set(commanded) <= {3.0, 5.0}
+    assert np.all(np.diff(commanded) >= 0.0)
+    assert np.count_nonzero(commanded == 3.0) > 1
+    report = run.control.remote.report()
+    assert report["held_steps"] > 0
+    assert report["exchanges"] + report["held_steps"] >= len(commanded) - 1

@@ -1,0 +1,149 @@
+"""The same log with the loop closed from outside as inside, byte for byte."""
+
+import numpy as np
+import pytest
+
+from cdpr_drake.analyses.simulation.tension_control_run import run_tension_scenario
+from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
+from cdpr_drake.control.task_space import tracking_wrench_at
+from cdpr_drake.errors import ScenarioError
+from cdpr_drake.geometry.poses import pose_from_row
+from cdpr_drake.systems.diagrams.tension_control import (
+    TensionControlSettings,
+    build_tension_control,
+)
+from cdpr_drake.systems.diagrams.visual_servo import build_visual_servo
+from cdpr_drake.systems.monitoring.run_monitor import Outcome
+from cdpr_drake.tensions.control_step_kernel import update_tensions_at
+from cdpr_drake.trajectories.pose_trajectory import MOTION_SIZE, write_motion
+from tests.systems.remote.served import assert_same_log, driven, scenario
+
+ENGINES = ("compiled", "plant")
+
+
+def own_control(settings):
+    """Controller, distributor and trajectory as a client has them for itself, by place."""
+    from cdpr_drake.models.robot_loader import load_robot
+
+    control = build_tension_control(
+        load_robot(settings.robot),
+        TensionControlSettings(
+            trajectory=settings.trajectory.trajectory(),
+            gains=settings.controller.gains(),
+            method=settings.distribution.method,
+            limits=settings.limits(),
+        ),
+    )
+    law, distribution = control.blocks.controller.packed(), control.blocks.distributor.packed()
+    tensions, wrench, verdict = distribution.bounds[0].copy(), np.zeros(6), np.zeros(2)
+
+    def controller(now):
+        state = now.outputs["platform_state"].copy()  # kernels are compiled for writable arrays
+        tracking_wrench_at(law.table, now.time, state, wrench)
+        return {"desired_wrench": wrench}
+
+    def distributor(now):
+        state, asked = (now.outputs[name].copy() for name in ("platform_state", "desired_wrench"))
+        update_tensions_at(distribution.table, state, asked, tensions, verdict)
+        return {"tensions": tensions}
+
+    def trajectory(now):
+        motion = np.empty(MOTION_SIZE)
+        write_motion(now.time, control.trajectory.stretches(), motion)
+        return {"desired_motion": motion}
+
+    return {"controller": controller, "distributor": distributor, "trajectory": trajectory}
+
+
+@pytest.fixture(scope="module")
+def inside():
+    runs = {}
+    for engine in ENGINES:
+        runs[engine] = run_tension_scenario(scenario(f"integration.engine={engine}"))
+    return runs
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("place", ["controller", "distributor", "trajectory"])
+def test_tension_control(inside, engine, place):
+    settings = scenario(f"integration.engine={engine}", f"remote.place={place}")
+    codec = "json" if engine == "plant" else "msgpack"
+    run, end = driven(settings, own_control(settings)[place], codec)
+    assert end == {"outcome": "completed", "message": "", "sim_time_s": 0.05}
+    assert run.outcome == Outcome.COMPLETED
+    assert run.loop == ("diagram" if engine == "plant" else "remote")
+    assert_same_log(run, inside[engine])
+    report = run.control.remote.report()
+    assert report["exchanges"] == (50 if place == "distributor" else 51)  # and the log's last row
+    assert report["codec"] == codec
+
+
+def test_rows_of_the_log_between_control_steps():
+    """They need a wrench of their own; the diagram and the loop ask for it at the same times."""
+    rates = ("log_rate=300", "remote.place=controller")
+    runs = []
+    for how in ("integration.engine=compiled", None):
+        settings = scenario("integration.engine=compiled", *rates)
+        law = own_control(settings)["controller"]
+        look = None if how else (lambda simulator, diagram: None)
+        runs.append(driven(settings, law, prepare=look)[0])
+    alone = run_tension_scenario(scenario("integration.engine=compiled", "log_rate=300"))
+    assert [run.loop for run in runs] == ["remote", "diagram"]
+    for run in runs:
+        assert_same_log(run, alone)
+
+
+def test_a_client_without_the_outputs_that_it_does_not_need():
+    settings = scenario("integration.engine=compiled", "remote.place=distributor")
+    seen = []
+
+    def control(now):
+        seen.append(set(now.outputs))
+        return {"tensions": np.full(8, 5.0)}
+
+    driven(settings, control, outputs=["X_WP", "lengths"])
+    assert seen[0] == {"X_WP", "lengths"}
+
+
+def servo_scenario(*overrides):
+    return scenario(
+        "camera.kind=projected", "duration=0.3", *overrides, name="acrobot_pbvs"
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("place", ["servo", "twist"])
+def test_visual_servo(place):
+    settings = servo_scenario(f"remote.place={place}")
+    law = build_visual_servo(servo_scenario()).servo
+    memory = [law.controller.fresh_memory()]
+
+    def control(now):
+        seen = now.outputs
+
+        def read(name):
+            return pose_from_row(seen[name]) if name.startswith("X_") else seen[name]
+
+        if seen["found"][0] == 0.0:
+            return {**{port.name: np.zeros(port.size) for port in ()}, **still(place)}
+        decided, memory[0] = law.decide(read, memory[0], now.time)
+        names = ["platform_velocity"] + ["cable_velocities"] * (place == "servo")
+        return {name: decided[name] for name in names}
+
+    run, _ = driven(settings, control)
+    alone = run_scenario(servo_scenario())
+    assert list(run.log) == list(alone.log)
+    for name in run.log:  # a pose that went through a quaternion has lost its last bits
+        np.testing.assert_allclose(run.log[name], alone.log[name], rtol=0.0, atol=1e-9)
+    assert np.max(np.abs(run.log["cable_velocities"])) > 1e-3
+
+
+def still(place):
+    velocities = {"cable_velocities": np.zeros(8)} if place == "servo" else {}
+    return {"platform_velocity": np.zeros(6), **velocities}
+
+
+def test_a_place_needs_somebody():
+    with pytest.raises(ScenarioError, match="cdpr serve"):
+        run_tension_scenario(scenario("remote.place=controller"))
+    with pytest.raises(ScenarioError, match=r"remote\.place.*servo, twist"):
+        servo_scenario("remote.place=controller")
