@@ -64,7 +64,8 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         files.append(File.generated(config, uri, content=content))
 
     for page, source in ROOT_PAGES.items():
-        add(page, (ROOT / source).read_text(encoding="utf-8"))
+        text = (ROOT / source).read_text(encoding="utf-8")
+        add(page, text.replace("](docs/", "]("))
     add("reference/commands.md", commands_page())
     for room in rooms():
         add(room_page(room), f"# {room}\n\n::: {room}\n")

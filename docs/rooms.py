@@ -1,0 +1,170 @@
+"""Draws the rooms in their layers, and lists them in ARCHITECTURE.md: both from the code.
+
+    python -m docs.rooms          writes docs/images/rooms.svg and the list
+    python -m docs.rooms --check  exit code 1 where one of them is not what the code says
+
+A layer imports only from layers below it, as import-linter's contract in pyproject.toml says.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+import sys
+import tomllib
+from html import escape
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+PICTURE = ROOT / "docs" / "images" / "rooms.svg"
+PAGE = ROOT / "ARCHITECTURE.md"
+BEGIN, END = "<!-- rooms: python -m docs.rooms -->\n", "<!-- end of rooms -->\n"
+
+FOLDERS = {
+    "cdpr_drake.cli": ("cdpr_drake/cli", "#ffffff"),
+    "cdpr_drake.studio": ("cdpr_drake/studio", "#f2f2f2"),
+    "cdpr_drake.analyses": ("analyses", "#d9e8f5"),
+    "cdpr_drake.systems": ("systems", "#f7e3c6"),
+    "cdpr_drake.models": ("models", "#d8ecd8"),
+}
+"""Folders by their packages, each with the colour of its boxes; what is left is the library."""
+
+LIBRARY = ("cdpr_drake", "#ffffff")
+
+WIDTH, LEFT, HEIGHT, GAP, LETTER = 640, 120, 26, 6, 6.9
+
+
+def layers() -> list[list[str]]:
+    """Modules and packages from the top layer down, siblings side by side."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    contract = project["tool"]["importlinter"]["contracts"][0]
+    return [[name.strip() for name in layer.split("|")] for layer in contract["layers"]]
+
+
+def folder_of(module: str) -> tuple[str, str]:
+    """The folder that a package's box belongs to, and its colour."""
+    for package, folder in FOLDERS.items():
+        if module == package or module.startswith(f"{package}."):
+            return folder
+    return LIBRARY
+
+
+def path_of(module: str) -> Path:
+    """Where a module or package lies."""
+    parts = module.split(".")[1:]
+    folder = ROOT if parts[0] in ("models", "systems", "analyses") else ROOT / "cdpr_drake"
+    path = folder.joinpath(*parts)
+    return path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
+
+
+def first_line(module: str) -> str:
+    """The first line of a docstring."""
+    text = ast.get_docstring(ast.parse(path_of(module).read_text(encoding="utf-8"))) or ""
+    return " ".join(text.split("\n\n")[0].split())
+
+
+def rooms() -> list[str]:
+    """Packages that layers name, from the top down; studies, which are many, as one."""
+    found: list[str] = []
+    for layer in layers():
+        for module in sorted(layer):
+            if is_study(module):
+                module = "cdpr_drake.analyses.studies"
+            elif module.startswith("cdpr_drake.studio."):
+                module = "cdpr_drake.studio"
+            if module not in found and path_of(module).name == "__init__.py":
+                found.append(module)
+    return found
+
+
+def is_study(module: str) -> bool:
+    """Whether this is a study, not what studies share."""
+    name = module.removeprefix("cdpr_drake.analyses.studies.")
+    return name != module and name not in ("catalogue", "framework", "published")
+
+
+def label(module: str) -> str:
+    """What stands in a box: the path below its folder."""
+    words = module.removeprefix("cdpr_drake.").split(".")
+    return (
+        "/".join(
+            words if folder_of(module) in ((LIBRARY), FOLDERS["cdpr_drake.cli"]) else words[1:]
+        )
+        or words[0]
+    )
+
+
+def picture() -> str:
+    """The layers as SVG: a row each, boxes coloured by folder."""
+    parts, y, shown = [], GAP, None
+    for layer in layers():
+        boxes = [module for module in layer if not is_study(module)]
+        labels = [(label(module), folder_of(module)) for module in boxes]
+        count = len(layer) - len(boxes)
+        if count:
+            labels.append((f"{count} studies, none of which knows another", folder_of(layer[0])))
+        x, rows = LEFT, 1
+        if labels[0][1] != shown:
+            shown = labels[0][1]
+            y += GAP
+            parts.append(
+                f'<text x="{GAP}" y="{y + 17}" font-weight="bold">{escape(shown[0])}</text>'
+            )
+        for words, (_, colour) in labels:
+            wide = LETTER * len(words) + 16
+            if x + wide > WIDTH and x > LEFT:
+                x, rows = LEFT, rows + 1
+                y += HEIGHT + GAP // 2
+            parts.append(
+                f'<rect x="{x:.0f}" y="{y}" width="{wide:.0f}" height="{HEIGHT}" rx="3" '
+                f'fill="{colour}" stroke="#555555"/>'
+                f'<text x="{x + wide / 2:.0f}" y="{y + 17}" text-anchor="middle">'
+                f"{escape(words)}</text>"
+            )
+            x += wide + GAP
+        y += HEIGHT + GAP
+    head = (
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {y}" '
+        'font-family="sans-serif" font-size="12">\n'
+        f'<rect width="{WIDTH}" height="{y}" fill="#ffffff"/>\n'
+    )
+    return head + "\n".join(parts) + "\n</svg>\n"
+
+
+def listed() -> str:
+    """The rooms as a list in Markdown: where, and what for."""
+    rows = []
+    for module in rooms():
+        where = path_of(module).parent.relative_to(ROOT).as_posix()
+        rows.append(f"- `{where}`: {first_line(module)}\n")
+    return "".join(rows)
+
+
+def page() -> str:
+    """ARCHITECTURE.md with the list of today.
+
+    Raises:
+        SystemExit: The page has no place for it.
+    """
+    text = PAGE.read_text(encoding="utf-8")
+    if BEGIN not in text or END not in text:
+        raise SystemExit(f"{PAGE.name}: found no place for the rooms; accepted: {BEGIN.strip()}")
+    inside = re.compile(re.escape(BEGIN) + ".*?" + re.escape(END), re.DOTALL)
+    return inside.sub(lambda _: f"{BEGIN}{listed()}{END}", text)
+
+
+def main() -> int:
+    """Writes both, or says which is old."""
+    made = {PICTURE: picture(), PAGE: page()}
+    if "--check" not in sys.argv[1:]:
+        for path, text in made.items():
+            path.write_text(text, encoding="utf-8")
+        return 0
+    old = [path.name for path, text in made.items() if path.read_text(encoding="utf-8") != text]
+    for name in old:
+        print(f"{name} is not what the code says; python -m docs.rooms writes it")
+    return int(bool(old))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
