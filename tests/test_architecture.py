@@ -134,6 +134,14 @@ def test_a_face_holds_what_its_stub_says(name):
         assert {a.name for a in node.names} <= read(home.__name__)[2]
 
 
+@pytest.mark.parametrize("name", sorted(STUBS))
+def test_no_public_name_is_a_module_of_its_room(name):
+    """`from room import name` would give the function, or the module, as imports went before."""
+    folder = FILES[name].parent
+    beside = {path.stem for path in folder.glob("*.py")} | {path.name for path in folder.iterdir()}
+    assert not set(import_module(name).__all__) & beside
+
+
 def test_files_have_no_circles():
     """Imports under TYPE_CHECKING and inside functions count; the sorter raises CycleError."""
     graph = {}

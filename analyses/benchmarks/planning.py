@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import linprog
 
-from cdpr_drake.analyses.planning.robot_limits import LimitSettings, make_path, path_task
+from cdpr_drake.analyses.planning.robot_path_task import LimitSettings, make_path, path_task
 from cdpr_drake.analyses.reporting.timing import TimingRow, interleaved, processor_seconds
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.poses import pose_from_angles

@@ -6,4 +6,4 @@ from .identification_task import Identification as Identification
 from .identification_task import identify as identify
 from .identified_robots import dynamic_model as dynamic_model
 from .identified_robots import platform_size as platform_size
-from .next_poses import next_poses as next_poses
+from .pose_proposal import next_poses as next_poses

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from cdpr_drake.analyses.design.goals import GOALS, Judging, servo_stable
-from cdpr_drake.analyses.workspaces.certified_boxes import box_search, certified_boxes
+from cdpr_drake.analyses.workspaces.box_certificates import box_search, certified_boxes
 from cdpr_drake.analyses.workspaces.workspace_question import (
     Asked,
     make_workspace_question,

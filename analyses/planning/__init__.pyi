@@ -2,8 +2,8 @@ from .plan_figures import phase_figure as phase_figure
 from .plan_results import PlanRun as PlanRun
 from .plan_tracking import track_plan as track_plan
 from .rest_to_rest import plan_rest_to_rest as plan_rest_to_rest
-from .robot_limits import LimitSettings as LimitSettings
-from .robot_limits import make_path as make_path
-from .robot_limits import path_task as path_task
-from .robot_limits import robot_limits as robot_limits
+from .robot_path_task import LimitSettings as LimitSettings
+from .robot_path_task import make_path as make_path
+from .robot_path_task import path_task as path_task
+from .robot_path_task import robot_limits as robot_limits
 from .shooting import plan_shot_rest as plan_shot_rest

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.planning.robot_limits import length_scale
+from cdpr_drake.analyses.planning.robot_path_task import length_scale
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import PlanningError, TensionProblemError
 from cdpr_drake.geometry.poses import pose_error

@@ -1,11 +1,11 @@
-from .advance import advance as advance
-from .advance import ended as ended
 from .hardware_figures import motor_figure as motor_figure
 from .hardware_figures import reading_figure as reading_figure
 from .live_messages import send as send
 from .monte_carlo import run_many as run_many
 from .monte_carlo import with_seeds as with_seeds
 from .perception_figures import looking_figures as looking_figures
+from .run_loop import advance as advance
+from .run_loop import ended as ended
 from .run_stability import stability_along as stability_along
 from .run_summary import camera_path as camera_path
 from .run_summary import image_path as image_path

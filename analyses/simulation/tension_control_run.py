@@ -17,7 +17,7 @@ from cdpr_drake.analyses.reporting.deferred_figures import Pictures
 from cdpr_drake.analyses.reporting.log_files import finite, spread, write_json, write_log
 from cdpr_drake.analyses.reporting.log_on_disk import Log
 from cdpr_drake.analyses.reporting.provenance import package_versions, write_run_inputs
-from cdpr_drake.analyses.simulation.advance import (
+from cdpr_drake.analyses.simulation.run_loop import (
     LONGEST_WARM_UP,
     EndedRun,
     advance,

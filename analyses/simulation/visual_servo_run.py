@@ -11,7 +11,7 @@ from pydrake.systems.analysis import Simulator, SimulatorStatus
 from pydrake.systems.framework import Context
 
 from cdpr_drake.analyses.reporting.log_on_disk import Log
-from cdpr_drake.analyses.simulation.advance import (
+from cdpr_drake.analyses.simulation.run_loop import (
     LONGEST_WARM_UP,
     EndedRun,
     advance,

@@ -1,5 +1,5 @@
-from .certified_boxes import box_search as box_search
-from .certified_boxes import certified_boxes as certified_boxes
+from .box_certificates import box_search as box_search
+from .box_certificates import certified_boxes as certified_boxes
 from .conditions import MEASURES as MEASURES
 from .conditions import Kind as Kind
 from .conditions import Measure as Measure
@@ -9,9 +9,9 @@ from .stability_figures import curves_figure as curves_figure
 from .stability_figures import planes_figure as planes_figure
 from .stability_question import CameraTask as CameraTask
 from .stability_question import make_question as make_question
-from .stability_workspaces import KINDS as KINDS
-from .stability_workspaces import load_workspaces as load_workspaces
-from .stability_workspaces import stability_workspaces as stability_workspaces
+from .stability_results import KINDS as KINDS
+from .stability_results import load_workspaces as load_workspaces
+from .stability_results import stability_workspaces as stability_workspaces
 from .static_feasible import static_case as static_case
 from .workspace_hulls import question_hull as question_hull
 from .workspace_question import Asked as Asked

@@ -25,7 +25,7 @@ from cdpr_drake.analyses.visualization.figure_style import (
     plain_numbers,
 )
 from cdpr_drake.analyses.visualization.solids import draw_solid
-from cdpr_drake.analyses.workspaces.stability_workspaces import KINDS, StabilityWorkspaces
+from cdpr_drake.analyses.workspaces.stability_results import KINDS, StabilityWorkspaces
 from cdpr_drake.arrays import Array
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.palette import IDEAL, WORKSPACES, look_of

@@ -11,7 +11,7 @@ from pydrake.geometry import Rgba
 from cdpr_drake.analyses.reporting.deferred_figures import Pictures
 from cdpr_drake.analyses.visualization.replay import RobotPicture
 from cdpr_drake.analyses.visualization.solids import add_solid
-from cdpr_drake.analyses.workspaces.stability_workspaces import StabilityWorkspaces
+from cdpr_drake.analyses.workspaces.stability_results import StabilityWorkspaces
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CdprError, InfeasibleTensionError
 from cdpr_drake.models.robot_schema import Robot

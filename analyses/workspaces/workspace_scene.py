@@ -16,7 +16,7 @@ from cdpr_drake.analyses.reporting.deferred_figures import Pictures
 from cdpr_drake.analyses.reporting.written_files import whole_file
 from cdpr_drake.analyses.visualization.replay import RobotPicture
 from cdpr_drake.analyses.visualization.solids import add_solid
-from cdpr_drake.analyses.workspaces.certified_boxes import (
+from cdpr_drake.analyses.workspaces.box_certificates import (
     BoxSearch,
     agreement_numbers,
     agreements,

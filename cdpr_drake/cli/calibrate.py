@@ -30,7 +30,7 @@ from cdpr_drake.analyses.calibration.calibration_task import (
     calibrate as run_calibration,
 )
 from cdpr_drake.analyses.calibration.log_file import read_log
-from cdpr_drake.analyses.calibration.next_poses import next_poses
+from cdpr_drake.analyses.calibration.pose_proposal import next_poses
 from cdpr_drake.analyses.calibration.tag_file import read_tags
 from cdpr_drake.analyses.calibration.tracker import shifted_log
 from cdpr_drake.analyses.planning.path_files import read_path

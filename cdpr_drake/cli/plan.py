@@ -23,7 +23,7 @@ from cdpr_drake.analyses.planning.free_plan_results import FreeRun
 from cdpr_drake.analyses.planning.path_files import read_path
 from cdpr_drake.analyses.planning.plan_results import PlanRun
 from cdpr_drake.analyses.planning.plan_tracking import TrackedPlan, track_plan
-from cdpr_drake.analyses.planning.robot_limits import (
+from cdpr_drake.analyses.planning.robot_path_task import (
     CORNERS,
     RESERVE,
     TOLERANCE,

@@ -22,13 +22,13 @@ from cdpr_drake.analyses.simulation.stability_files import stability_of_folder
 from cdpr_drake.analyses.workspaces.stability_defaults import load_bounds, workspace_defaults
 from cdpr_drake.analyses.workspaces.stability_figures import stability_pictures
 from cdpr_drake.analyses.workspaces.stability_question import make_question, scenario_task
-from cdpr_drake.analyses.workspaces.stability_scene import scene_page
-from cdpr_drake.analyses.workspaces.stability_workspaces import (
+from cdpr_drake.analyses.workspaces.stability_results import (
     KINDS,
     StabilityRun,
     StabilityWorkspaces,
     stability_workspaces,
 )
+from cdpr_drake.analyses.workspaces.stability_scene import scene_page
 from cdpr_drake.analyses.workspaces.static_feasible import static_case
 from cdpr_drake.cli.completion import robot_words, scenario_words
 from cdpr_drake.cli.grid_options import (

@@ -22,7 +22,7 @@ from cdpr_drake.analyses.reporting.deferred_figures import write_pictures
 from cdpr_drake.analyses.reporting.log_files import write_json
 from cdpr_drake.analyses.reporting.output_folder import continued_folder
 from cdpr_drake.analyses.sweeps.sweep import STARTING
-from cdpr_drake.analyses.workspaces.certified_boxes import BoxSearch, box_search, certified_boxes
+from cdpr_drake.analyses.workspaces.box_certificates import BoxSearch, box_search, certified_boxes
 from cdpr_drake.analyses.workspaces.conditions import KINDS, MEASURES
 from cdpr_drake.analyses.workspaces.stability_defaults import workspace_defaults
 from cdpr_drake.analyses.workspaces.workspace_files import load_obstacles, load_wrench_set

@@ -7,6 +7,12 @@ from hypothesis import strategies as st
 
 from cdpr_drake.cables.dispatch_kernel import cable_energy, cable_response
 from cdpr_drake.cables.response_kernel import DERIVATIVES
+from cdpr_drake.geometry.pulley_kernel import (
+    CABLE_SET_COLUMNS,
+    LINEAR_WEIGHT,
+    PULLEY_RADIUS,
+    SWIVEL_AXIS,
+)
 
 STEP = 1e-5
 SLOPE = 1e-6
@@ -16,7 +22,11 @@ FEW = settings(max_examples=30, deadline=None)
 
 
 def cable(radius, weight, axis=1.0):
-    return np.array([0.3, -0.2, 3.0, 0.0, 0.0, 0.0, 1e4, 0.0, radius, weight, 0.0, 0.0, axis])
+    """A row as `CableSet.packed` has it, without a pulley at the platform."""
+    row = np.zeros(CABLE_SET_COLUMNS)
+    row[:3], row[6] = (0.3, -0.2, 3.0), 1e4
+    row[PULLEY_RADIUS], row[LINEAR_WEIGHT], row[SWIVEL_AXIS + 2] = radius, weight, axis
+    return row
 
 
 def energy_and_pull(sags, row, p, l0):

@@ -16,7 +16,7 @@ import yaml
 from cdpr_drake.analyses.workspaces.stability_defaults import workspace_defaults
 from cdpr_drake.analyses.workspaces.stability_figures import curves, planes_figure
 from cdpr_drake.analyses.workspaces.stability_question import make_question
-from cdpr_drake.analyses.workspaces.stability_workspaces import CHUNK_POSES, load_workspaces
+from cdpr_drake.analyses.workspaces.stability_results import CHUNK_POSES, load_workspaces
 from cdpr_drake.cli.app import main
 from cdpr_drake.cli.grid_options import parse_grid
 from cdpr_drake.models.robot_loader import load_robot, robot_file
@@ -122,7 +122,7 @@ CHUNK, KEPT, POSES = 64, 3, 2 * 9 * 9 * 5
 KILLED = killed_after(
     KEPT,
     f"""
-from cdpr_drake.analyses.workspaces import stability_workspaces as workspaces as module
+from cdpr_drake.analyses.workspaces import stability_results as module
 module.CHUNK_POSES["sampled"] = {CHUNK}
 """,
 )

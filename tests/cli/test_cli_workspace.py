@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.workspaces import certified_boxes as boxes
-from cdpr_drake.analyses.workspaces.certified_boxes import box_search, certified_boxes
+from cdpr_drake.analyses.workspaces import box_certificates as boxes
+from cdpr_drake.analyses.workspaces.box_certificates import box_search, certified_boxes
 from cdpr_drake.analyses.workspaces.workspace_hulls import question_hull
 from cdpr_drake.analyses.workspaces.workspace_question import make_workspace_question
 from cdpr_drake.analyses.workspaces.workspace_results import load_robot_workspace

@@ -10,8 +10,8 @@ from dataclasses import replace
 import pytest
 
 from cdpr_drake.analyses.reporting.log_on_disk import CHECKPOINT, PARTS
-from cdpr_drake.analyses.simulation import advance as loop
 from cdpr_drake.analyses.simulation import log_keeper
+from cdpr_drake.analyses.simulation import run_loop as loop
 from cdpr_drake.analyses.simulation.scenario_kinds import SCENARIO_KINDS
 from cdpr_drake.analyses.simulation.session import RunSession
 from cdpr_drake.cli.app import main

@@ -20,7 +20,7 @@ def code_of(arguments):
 def test_every_step_is_done_and_named(capsys, monkeypatch):
     done = []
     steps = [(name, lambda name=name: done.append(name)) for name in ("one", "two")]
-    for module in ("analyses.compilation", "cli.doctor"):
+    for module in ("analyses.installation", "cli.doctor"):
         monkeypatch.setattr(f"cdpr_drake.{module}.compilation_steps", lambda: steps)
     monkeypatch.setattr("cdpr_drake.analyses.installation.compile_needed", done.append)
     assert code_of(["doctor", "--compile", "--json"]) == 0

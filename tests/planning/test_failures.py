@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.planning.robot_limits import LimitSettings, path_task
+from cdpr_drake.analyses.planning.robot_path_task import LimitSettings, path_task
 from cdpr_drake.geometry.poses import pose_from_angles, pose_row
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.planning.failures import not_held

@@ -7,7 +7,7 @@ import pytest
 from pydrake.autodiffutils import ExtractGradient, InitializeAutoDiff
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.planning.robot_limits import LimitSettings, make_path, path_task
+from cdpr_drake.analyses.planning.robot_path_task import LimitSettings, make_path, path_task
 from cdpr_drake.control.task_space import TaskGains, computed_torque
 from cdpr_drake.errors import PlanningError
 from cdpr_drake.geometry.cable_paths import cable_jacobian

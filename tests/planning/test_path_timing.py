@@ -14,7 +14,7 @@ from pydrake.multibody.tree import PrismaticJoint, SpatialInertia
 from pydrake.trajectories import PiecewisePolynomial
 
 from cdpr_drake.analyses.planning.plan_tracking import track_plan
-from cdpr_drake.analyses.planning.robot_limits import (
+from cdpr_drake.analyses.planning.robot_path_task import (
     LimitSettings,
     make_path,
     path_task,

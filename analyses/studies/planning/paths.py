@@ -9,7 +9,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.planning.plan_tracking import track_plan
-from cdpr_drake.analyses.planning.robot_limits import (
+from cdpr_drake.analyses.planning.robot_path_task import (
     LimitSettings,
     make_path,
     path_task,

@@ -18,7 +18,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from rich.table import Table
 
-from cdpr_drake.analyses.planning.robot_limits import RESERVE
+from cdpr_drake.analyses.planning.robot_path_task import RESERVE
 from cdpr_drake.analyses.reporting.log_files import finite
 from cdpr_drake.analyses.reporting.progress import ALONE, StoppableStudy, StudySession, WorkProgress
 from cdpr_drake.analyses.reporting.provenance import code_version, package_versions

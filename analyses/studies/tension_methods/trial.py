@@ -14,7 +14,7 @@ import numpy as np
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator, SimulatorStatus
 from pydrake.systems.framework import Context, DiscreteValues, EventStatus
 
-from cdpr_drake.analyses.simulation.advance import advance
+from cdpr_drake.analyses.simulation.run_loop import advance
 from cdpr_drake.analyses.simulation.session import RunSession
 from cdpr_drake.arrays import Array
 from cdpr_drake.control.task_space import TaskGains

@@ -11,10 +11,10 @@ import numpy as np
 from pydrake.geometry import Meshcat, Rgba
 
 from cdpr_drake.analyses.visualization.solids import add_solid
-from cdpr_drake.analyses.workspaces.certified_boxes import load_boxes
+from cdpr_drake.analyses.workspaces.box_certificates import load_boxes
 from cdpr_drake.analyses.workspaces.conditions import MEASURES
+from cdpr_drake.analyses.workspaces.stability_results import KINDS, load_workspaces
 from cdpr_drake.analyses.workspaces.stability_scene import stability_solids
-from cdpr_drake.analyses.workspaces.stability_workspaces import KINDS, load_workspaces
 from cdpr_drake.analyses.workspaces.workspace_hulls import load_hull
 from cdpr_drake.analyses.workspaces.workspace_results import load_robot_workspace
 from cdpr_drake.analyses.workspaces.workspace_scene import box_solids, hull_solid, workspace_solids

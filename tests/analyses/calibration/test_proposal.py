@@ -8,7 +8,7 @@ import pytest
 from cdpr_drake.analyses.calibration.calibrated_robots import calibration_model
 from cdpr_drake.analyses.calibration.calibration_task import calibrate
 from cdpr_drake.analyses.calibration.candidate_poses import rest_poses
-from cdpr_drake.analyses.calibration.next_poses import next_poses
+from cdpr_drake.analyses.calibration.pose_proposal import next_poses
 from cdpr_drake.analyses.planning.path_files import read_path
 from cdpr_drake.calibration.measurements import simulated_lengths, simulated_poses
 from cdpr_drake.calibration.pose_design import expected_std

@@ -9,7 +9,7 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.planning.free_motion import FreeSettings, plan_free_motion
 from cdpr_drake.analyses.planning.plan_tracking import track_plan
-from cdpr_drake.analyses.planning.robot_limits import LimitSettings, path_task, robot_limits
+from cdpr_drake.analyses.planning.robot_path_task import LimitSettings, path_task, robot_limits
 from cdpr_drake.analyses.reporting.provenance import write_run_inputs
 from cdpr_drake.analyses.simulation.tension_control_run import run_tension_scenario
 from cdpr_drake.cli.app import main

@@ -8,7 +8,7 @@ import pytest
 
 from cdpr_drake.analyses.planning.path_files import read_path
 from cdpr_drake.analyses.planning.plan_tracking import track_plan
-from cdpr_drake.analyses.planning.robot_limits import (
+from cdpr_drake.analyses.planning.robot_path_task import (
     LimitSettings,
     make_path,
     path_task,

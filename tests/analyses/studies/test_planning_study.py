@@ -7,7 +7,7 @@ from scipy.optimize import linprog
 
 from cdpr_drake.analyses.benchmarks.groups import BENCH_GROUPS
 from cdpr_drake.analyses.benchmarks.planning import station_programs
-from cdpr_drake.analyses.planning.robot_limits import LimitSettings, make_path, path_task
+from cdpr_drake.analyses.planning.robot_path_task import LimitSettings, make_path, path_task
 from cdpr_drake.analyses.reporting.progress import StudySession
 from cdpr_drake.analyses.studies.catalogue import STUDIES
 from cdpr_drake.analyses.studies.planning.study import study_planning

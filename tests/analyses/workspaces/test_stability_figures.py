@@ -18,7 +18,7 @@ from cdpr_drake.analyses.workspaces.stability_figures import (
     planes_figure,
     solids_figure,
 )
-from cdpr_drake.analyses.workspaces.stability_workspaces import StabilityWorkspaces
+from cdpr_drake.analyses.workspaces.stability_results import StabilityWorkspaces
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.stability.verdict import VERDICTS
 from cdpr_drake.workspaces.pose_grid import grid_by_count

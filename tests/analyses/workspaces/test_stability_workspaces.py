@@ -10,12 +10,12 @@ from pydrake.math import RigidTransform
 from cdpr_drake.analyses.reporting.deferred_figures import write_pictures
 from cdpr_drake.analyses.workspaces.stability_figures import curves, stability_pictures
 from cdpr_drake.analyses.workspaces.stability_question import CameraTask, make_question, varied
-from cdpr_drake.analyses.workspaces.stability_scene import workspace_html
-from cdpr_drake.analyses.workspaces.stability_workspaces import (
+from cdpr_drake.analyses.workspaces.stability_results import (
     CHUNK_POSES,
     load_workspaces,
     stability_workspaces,
 )
+from cdpr_drake.analyses.workspaces.stability_scene import workspace_html
 from cdpr_drake.analyses.workspaces.static_feasible import static_case
 from cdpr_drake.errors import CdprError, DataFileError, OutputFolderError, StabilityError
 from cdpr_drake.geometry.poses import pose_row

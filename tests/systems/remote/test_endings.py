@@ -278,7 +278,7 @@ def test_nobody_serves():
 
 def test_a_client_needs_neither_drake_nor_numba():
     words = (
-        "import sys, cdpr_drake.bridge; "
+        "import sys, cdpr_drake.systems.remote.remote_client; "
         "print([m for m in ('pydrake', 'numba', 'zmq', 'msgpack', 'scipy') if m in sys.modules])"
     )
     done = subprocess.run(
