@@ -130,7 +130,8 @@ METHODS: dict[str, TensionMethod] = {
         "vertices weighted by exterior angles", weighted_vertices, (0, 1, 2), exact=True
     ),
     "optimally_safe": TensionMethod(
-        "largest margin to the bounds", optimally_safe, exact=True, program=objectives.largest_margin
+        "largest margin to the bounds", optimally_safe, exact=True,
+        program=objectives.largest_margin,
     ),
     "slack_relaxed": TensionMethod(
         "least unbalanced wrench, always answers", slack_relaxed, exact=True, relaxes=True,
