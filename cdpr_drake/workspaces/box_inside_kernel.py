@@ -1,6 +1,6 @@
 """Proof that a demanded wrench can be given at every pose of a box: a numba kernel.
 
-See the room's docstring for notation and proof.
+Notation and proof stand in `box_verdicts_kernel`, under **Inside**.
 """
 
 from __future__ import annotations
