@@ -22,11 +22,11 @@ FILE_KINDS: dict[str, tuple[frozenset[str], str]] = {
     "a scenario": (frozenset({"robot", "duration"}), "cdpr_drake.systems.load_scenario"),
     "a camera": (
         frozenset({"view_angle_horizontal_deg", "view_angle_vertical_deg"}),
-        "cdpr_drake.models.load_camera",
+        "cdpr_drake.models.camera_catalogue.load_camera",
     ),
     "perturbation bounds": (
         frozenset({"r_bp", "r_A"}),
-        "cdpr_drake.analyses.workspaces.load_bounds",
+        "cdpr_drake.analyses.workspaces.stability_defaults.load_bounds",
     ),
 }
 """What files describe: keys that only those have, all of them, and what loads them."""

@@ -2,8 +2,8 @@
 
 The same numbers as `criterion_at_pose_kernel.evaluate` up to rounding, from one flat array
 with constant indices: a call with many arrays would count references to them longer than it
-computes.
-Products are folded into S = ((L J^+) J_hat L^+ + its transpose) / 2, and nothing is allocated.
+computes. Products are folded into S = ((L J^+) J_hat L^+ + its transpose) / 2, and nothing is
+allocated.
 """
 
 from __future__ import annotations
