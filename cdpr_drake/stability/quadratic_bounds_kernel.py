@@ -1,4 +1,4 @@
-"""Quadratic forms that bound v' Pi v from below, as blocks: a proof that it is never negative.
+"""Quadratic forms that bound v' Pi v from below: a proof that no perturbation makes it negative.
 
 This is the proof behind the certified verdict; it is this project's own. `fill_blocks` writes its
 blocks, `linear_forms_kernel.cable_remainder` its remainders, `bound_ascent_kernel` finds their free
