@@ -1,4 +1,4 @@
-"""Poses as angles, twists, adjoints and rows of numbers, and distances between them.
+"""Poses as angles, twists, rotation vectors, adjoints and rows of numbers; distances of poses.
 
 Angles (phi, theta, psi) mean R = Rx(phi) Ry(theta) Rz(psi). Twists and adjoints are ordered
 (rotation, translation). A row is seven numbers: quaternion (w, x, y, z) with w >= 0 [-], then

@@ -1,6 +1,7 @@
 """Small linear algebra in kernels: elimination, least squares, smallest eigenpair, copies.
 
-Shapes are given with each function; `least_squares` alone allocates.
+`eliminate` and `substitute` solve small linear systems, `least_squares` those of limited rank;
+`least_squares` alone allocates.
 
 Source: Golub and Van Loan, Matrix Computations, 3.4, 8.3 and 8.4.
 """

@@ -1,4 +1,4 @@
-"""A body, or a point, at rest on cables that are all taut: all poses of it.
+"""A body, or a point, at rest on inextensible cables that are all taut: all poses of it.
 
 On one point a body hangs like a pendulum, in closed form. On two cables a body in space is in the
 vertical plane of their exit points, either way round. Everything else is a system of polynomials.

@@ -19,9 +19,9 @@ They are pure functions of readings; `systems.controllers` has their block, `Ten
 * `polygon_correction`: tensions that leave the feasible polygon of the believed pose, or come near
   its edges, are brought back by velocities that change tensions and do not move the platform.
 
-Source: Gazebo thesis 6.2; servoing thesis 1.2.2, (1.27) with its minus sign, and 5.2; Pott, 2018.
-Different from print: (5.3) is clamped at zero, as a cable that is shorter than expected would be
-paid out; its gain has another unit than that of (5.1) and another name here.
+Source: Gazebo thesis 6.2; Zake, servoing thesis, 1.2.2, (1.27) with its minus sign, and 5.2; Pott,
+2018. Different from print: (5.3) is clamped at zero, as a cable that is shorter than expected would
+be paid out; its gain has another unit than that of (5.1) and another name here.
 """
 
 import lazy_loader
