@@ -7,7 +7,7 @@ says otherwise. Drake's monogram notation: `X_WP` is the pose of the platform P 
 vectors are ordered (rotation, translation), as in Drake, also in Jacobians, wrench matrices and
 interaction matrices.
 
-The rooms of this folder take arrays, small dataclasses and RigidTransforms, never a robot file;
+Packages of pure functions take arrays, small dataclasses and RigidTransforms, never a robot file;
 `cdpr_drake.models` turns files into those, `cdpr_drake.systems` holds the Drake blocks,
 `cdpr_drake.analyses` the runs, studies and benchmarks.
 

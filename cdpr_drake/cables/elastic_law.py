@@ -1,8 +1,10 @@
-"""The elastic cable law in its static form: unstrained lengths, elastic energy, stiffness.
+"""The elastic cable law at rest: unstrained lengths, stiffness, and the energy that is stored.
 
-Numba kernel for the potential energy of one cable at rest: stretch, and weight where it sags.
+The functions on arrays take straight cables without weight. `straight_energy` and `sagging_energy`
+are kernels for the potential energy of one cable: its stretch and, where it sags, its weight. The
+derivative of that energy by the anchor point p_WB is the pull of `dispatch_kernel.cable_response`.
 
-Its derivative by the anchor point p_WB is the pull of `dispatch_kernel.cable_response`.
+Source: servoing thesis (2.7), there linearised; Gazebo thesis (2.28).
 """
 
 from __future__ import annotations
@@ -16,6 +18,11 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.cables.catenary_kernel import VERTICAL, free_part, stored_energy
 from cdpr_drake.geometry.motion_kernel import Motion
 from cdpr_drake.geometry.pulley_kernel import pulley_line
+
+_NODES = (0.5 - 0.5 * np.sqrt(0.6), 0.5, 0.5 + 0.5 * np.sqrt(0.6))
+
+_WEIGHTS = (5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0)
+"""Of Gauss' rule with three points on [0, 1]."""
 
 
 def axial_stiffness(youngs_modulus: float, diameter: float) -> float:
@@ -74,37 +81,12 @@ def cable_stiffness_matrix(J: Array, stiffness: Array, l0: Array) -> Array:
     return np.asarray(J.T @ ((stiffness / l0)[:, np.newaxis] * J), float)
 
 
-_NODES = (0.5 - 0.5 * np.sqrt(0.6), 0.5, 0.5 + 0.5 * np.sqrt(0.6))
-_WEIGHTS = (5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0)
-
-
 @njit(cache=True, error_model="numpy")
 def straight_energy(X: Motion, cable: Array, l0: float) -> float:
     """Energy of a spring that only pulls [J]; see `dispatch_kernel.cable_energy`."""
     length, _, _, _, _, _, _ = pulley_line(X, cable)
     stretch = length - l0
     return 0.5 * cable[6] * stretch * stretch / l0 if stretch > 0.0 else 0.0
-
-
-@njit(cache=True, error_model="numpy")
-def _groove_energy(alpha: float, T_A: float, r: float, sigma: float, ES: float, w: float) -> Any:
-    """Energy of what lies in the groove, heights from A [J], and its unstrained length [m].
-
-    Three points for an integrand that is nearly a sine over less than half a turn.
-    """
-    q = 1.0 + T_A / ES
-    sine, span = np.sin(alpha), np.pi - alpha
-    energy = length = 0.0
-    for k in range(3):
-        height = sigma * r * np.sin(alpha + _NODES[k] * span)
-        root = np.sqrt(max(q * q - 2.0 * w / ES * (sigma * r * sine - height), 0.25))
-        T = ES * (root - 1.0)
-        energy += _WEIGHTS[k] * (T * T / (2.0 * ES)) / root
-        length += _WEIGHTS[k] / root
-    # The weight's part in closed form, but for the stretch, which varies by a millionth.
-    per_stretch = length
-    energy = energy * r * span + w * sigma * r * r * (1.0 + np.cos(alpha)) * per_stretch
-    return energy, length * r * span
 
 
 @njit(cache=True, error_model="numpy")
@@ -126,3 +108,24 @@ def sagging_energy(X: Motion, cable: Array, l0: float, solved: Array) -> float:
         z -= height
     _, _, _, _, _, _, _, V, S, phi = free_part(H, V_A, s, ES, w)
     return energy + w * s * height + stored_energy(x, z, s, ES, w, H, V, S, phi)
+
+
+@njit(cache=True, error_model="numpy")
+def _groove_energy(alpha: float, T_A: float, r: float, sigma: float, ES: float, w: float) -> Any:
+    """Energy of what lies in the groove, heights from A [J], and its unstrained length [m].
+
+    Three points for an integrand that is nearly a sine over less than half a turn.
+    """
+    q = 1.0 + T_A / ES
+    sine, span = np.sin(alpha), np.pi - alpha
+    energy = length = 0.0
+    for k in range(3):
+        height = sigma * r * np.sin(alpha + _NODES[k] * span)
+        root = np.sqrt(max(q * q - 2.0 * w / ES * (sigma * r * sine - height), 0.25))
+        T = ES * (root - 1.0)
+        energy += _WEIGHTS[k] * (T * T / (2.0 * ES)) / root
+        length += _WEIGHTS[k] / root
+    # The weight's part in closed form, but for the stretch, which varies by a millionth.
+    per_stretch = length
+    energy = energy * r * span + w * sigma * r * r * (1.0 + np.cos(alpha)) * per_stretch
+    return energy, length * r * span

@@ -110,7 +110,7 @@ def damping_tension(
     """The damping part t_d of a cable's tension [N]; see the module. 0 where t is 0.
 
     Args:
-        X: Motion of the platform, 18 numbers, see `geometry.floating_motion`.
+        X: Motion of the platform, 18 numbers, see `motion_kernel.floating_motion`.
         px: Pull of the cable at rest, with py, pz [N].
         py: See px.
         pz: See px.

@@ -8,7 +8,7 @@ import numpy as np
 from pydrake.autodiffutils import AutoDiffXd
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables import simulation_kernel as cable_force_kernel
+from cdpr_drake.cables import simulation_kernel
 from cdpr_drake.cables.hanging_kernel import equations, hang
 from cdpr_drake.cables.simulation_kernel import OUTPUTS, make_room
 from cdpr_drake.geometry.two_pulleys_kernel import begin_swivels
@@ -49,9 +49,9 @@ def begin_swivels_any(*arguments: Any) -> Any:
 _SOLVED = {"hang": hang_any, "begin_swivels": begin_swivels_any}
 """What is solved by iterations: as numbers, and then differentiated."""
 
-_force = any_scalar(cable_force_kernel.model_force, _SOLVED)
-_force_and_drums = any_scalar(cable_force_kernel.model_force_and_drums, _SOLVED)
-_outputs = any_scalar(cable_force_kernel.model_outputs, _SOLVED)
+_force = any_scalar(simulation_kernel.model_force, _SOLVED)
+_force_and_drums = any_scalar(simulation_kernel.model_force_and_drums, _SOLVED)
+_outputs = any_scalar(simulation_kernel.model_outputs, _SOLVED)
 
 
 def model_force_array(

@@ -93,7 +93,7 @@ def torque_step(
         cables: `CableSet.packed()` of the believed robot, shape (m, 17).
         bounds: Smallest, largest and reference tensions, shape (3, m) [N].
         row_scale: As `TensionMethod.kernel`, shape (n,).
-        work: Work space of `tensions.workspace_shape`.
+        work: Work space of `quadratic_program_kernel.workspace_shape`.
         pose: Believed X_WP as `geometry.pose_row`, shape (7,) [-, m].
         wanted: The servo's last twist (w, v) of P in P, shape (6,) [rad/s, m/s].
         measured: Tensions, shape (m,) [N].

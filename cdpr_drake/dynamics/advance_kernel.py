@@ -174,7 +174,8 @@ def advance_robot(
 def robot_energy(robot: RobotArrays, state: Array) -> float:
     """Kinetic and potential energy of platform and cables [J], heights from the joint's frame.
 
-    Cables count as `cables.cable_energy` says; commanded tensions have none, nor have motors.
+    Cables count as `dispatch_kernel.cable_energy` says; commanded tensions have none, nor have
+    motors.
 
     Args:
         robot: The robot.

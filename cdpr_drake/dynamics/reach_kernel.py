@@ -29,7 +29,7 @@ BACKWARD = -3
 """Result of `reach_explicitly` where the time lies before the state's."""
 
 REACHED_MORE = 5
-"""Numbers of what is reached behind the state: its time [s] and `dynamics.REPORTED`."""
+"""Numbers of what is reached behind the state: its time [s] and `advance_kernel.REPORTED`."""
 
 
 def fresh_memory(states: int, cables: int) -> Array:

@@ -1,4 +1,4 @@
-"""All constants of a robot in motion as arrays for the kernels of this room, and work space."""
+"""All constants of a robot in motion as arrays for the kernels of `dynamics`, and work space."""
 
 from __future__ import annotations
 

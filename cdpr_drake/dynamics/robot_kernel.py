@@ -1,7 +1,8 @@
 """Numba kernel for the derivative of a whole robot's state: platform, cables, winches.
 
 The state is that of the platform (13, 6 or 2 numbers) and, behind it, unstrained lengths of ideal
-winches, or what `winches.winch_rates` integrates. All laws are those of the rooms below.
+winches, or what `motor_kernel.winch_rates` integrates. Laws of forces are those of `cables`, of
+winches those of `winches`.
 """
 
 from __future__ import annotations

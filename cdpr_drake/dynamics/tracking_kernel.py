@@ -1,10 +1,10 @@
 """Numba kernel for a whole loop of dynamic control: computed torque, tensions, motion, log.
 
-It calls what the blocks of the same loop in a diagram call, `control.tracking_wrench`,
-`tensions.update_tensions` and the steps of this room, and it does so at the same instants in the
-same order: at each instant the log is written before the controller acts, instants are whole
-multiples of a period, and the motion is integrated from each instant to the next. So its numbers
-are those of the diagram.
+It calls what the blocks of the same loop in a diagram call, `task_space.tracking_wrench`,
+`control_step_kernel.update_tensions` and the steps of `advance_kernel`, and it does so at the same
+instants in the same order: at each instant the log is written before the controller acts, instants
+are whole multiples of a period, and the motion is integrated from each instant to the next. So its
+numbers are those of the diagram.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class TrackingMemory(NamedTuple):
         state: State of the robot, shape (k,).
         tensions: Tensions that are commanded, shape (m,) [N].
         verdicts: See `MET`, shape (2,).
-        report: See `dynamics.REPORTED`, shape (4,).
+        report: See `advance_kernel.REPORTED`, shape (4,).
         wrench: Work space: F_P_W that is asked for, shape (6,) [N m, N].
         still: Zeros, shape (m,): tensions are constant from step to step, and nothing brakes.
     """
@@ -136,8 +136,8 @@ def track(
 
     Args:
         robot: `robot_addresses` of a robot of which the tensions are commanded.
-        law: `control.TrackingStep.table`.
-        distribution: `tensions.TensionStep.table`.
+        law: `task_space.TrackingStep.table`.
+        distribution: `control_step_kernel.TensionStep.table`.
         rule: As of `reach_explicitly`; an explicit method, since no tension is stiff.
         periods: Time between control steps and between rows of the log, shape (2,) [s].
         memory: Where the loop stands; changed. After a step that failed the time is that to which

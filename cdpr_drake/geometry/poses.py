@@ -1,6 +1,10 @@
-"""Poses written as position and three angles, twists, rotation vectors and adjoints.
+"""Poses as angles, twists, rotation vectors, adjoints and rows of numbers; distances of poses.
 
-Poses as rows of seven numbers: quaternion (w, x, y, z) with w >= 0 [-], then position [m].
+Angles (phi, theta, psi) mean R = Rx(phi) Ry(theta) Rz(psi). Twists and adjoints are ordered
+(rotation, translation). A row is seven numbers: quaternion (w, x, y, z) with w >= 0 [-], then
+position [m].
+
+Source: Gazebo thesis (2.1); servoing thesis (1.37), (2.1).
 """
 
 from __future__ import annotations

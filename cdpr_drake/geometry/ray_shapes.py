@@ -1,6 +1,9 @@
-"""Shapes on which rays end, packed for the kernel.
+"""Shapes on which rays end, the beams of range sensors, and what a sensor makes of distances.
 
-Beams of range sensors and of the pixels of cameras, and what a sensor makes of distances.
+`RayScene` holds `RayShape`s as `ray_casting_kernel` takes them. Beams stand in the sensor's frame
+S; `reported_ranges` serves range sensors and the pixels of depth cameras.
+
+Source: Ericson, Real-Time Collision Detection, 2005; ROS's LaserScan and REP 117.
 """
 
 from __future__ import annotations
@@ -31,8 +34,8 @@ class RayShape:
     """One shape in its own frame G; the functions of this module make them.
 
     Attributes:
-        kind: One of `rays_kernel`.
-        size: As `rays_kernel.cast_rays` explains, shape (3,) [m].
+        kind: A kind of `ray_casting_kernel`, as `BOX`.
+        size: As `ray_casting_kernel.cast_rays` explains, shape (3,) [m].
         reach: Radius round Go that holds all of it [m].
         triangles: Corners of a mesh, shape (n, 3, 3) [m]; None for others.
     """

@@ -1,9 +1,8 @@
-"""Numba kernels between rotation vectors, quaternions and rotation matrices.
+"""Numba kernels for rotations: vectors, quaternions and matrices, and steps in search of a pose.
 
-`cdpr_drake.geometry.floating_motion` has its own matrix of a quaternion, since cable kernels take
-one as a tuple of numbers in registers.
-
-Numba kernels for steps in search of a pose: turning a platform, solving for a step.
+A search turns its platform by `turn_pose` and finds its step by `solve_damped`.
+`motion_kernel.floating_motion` has its own matrix of a quaternion, since cable kernels take one as
+a tuple of numbers in registers.
 """
 
 from __future__ import annotations

@@ -21,8 +21,8 @@ def triangle_blocks(corners: Array) -> tuple[Array, Array]:
 
     Returns:
         Boxes of the blocks, lower and upper corner, shape (b, 6) [m], and the triangles as
-        `rays_kernel` takes them, shape (b BLOCK_SIZE, 9) [m]; those that fill up the last block of
-        a part are zero, and no ray meets them.
+        `ray_casting_kernel` takes them, shape (b BLOCK_SIZE, 9) [m]; those that fill up the last
+        block of a part are zero, and no ray meets them.
     """
     parts: list[Any] = []
     rest: list[Any] = [np.arange(len(corners))]

@@ -1,6 +1,10 @@
-"""What was measured as linear equations in the unknown vector, weighted by its noise.
+"""What was measured, and what is known beforehand, as linear equations in the unknown vector.
 
-What is known of parameters beforehand, as equations in the unknown vector.
+A `Term` is a kind of measurement: rows A theta = b, weighted by its noise. `prior_rows` makes
+equations in the same vector of what is known of parameters beforehand.
+
+Source: servoing thesis (2.6), (5.7) with the sign of the speed; Cook, Weisberg, Residuals and
+influence in regression, 1982.
 """
 
 from __future__ import annotations
@@ -213,12 +217,6 @@ class WinchTerm:
         return largest_residuals(s.time, s.cable, off, off * self.weights, equations)
 
 
-def _friction_columns(samples: WinchSamples) -> Array:
-    """Torques of unit Coulomb friction, unit excess of static friction, unit viscous friction."""
-    sign = np.sign(samples.speed)
-    return np.column_stack([sign, sign * samples.excess, samples.speed])
-
-
 def correlated(C: Array, G: Array) -> Array:
     """Covariance of G_a n_a with cov(n_a, n_b) = C_ab 1: from (s, s) and (s, r, q), (s r, s r)."""
     s, r, q = G.shape
@@ -286,6 +284,12 @@ def largest_residuals(
         if len(found) == MOST_SHOWN:
             break
     return list(found.values())
+
+
+def _friction_columns(samples: WinchSamples) -> Array:
+    """Torques of unit Coulomb friction, unit excess of static friction, unit viscous friction."""
+    sign = np.sign(samples.speed)
+    return np.column_stack([sign, sign * samples.excess, samples.speed])
 
 
 Prior = tuple[dict[int, float], float, float]

@@ -132,7 +132,7 @@ def _remove(folder: Path, process: int) -> None:
 
 
 def _state_of_sources() -> str:
-    """Twelve digits that change with the time or size of any file of the pure rooms."""
+    """Twelve digits that change with the time or size of any file of the packages with kernels."""
     here, hashed = Path(__file__).parent.parent, hashlib.sha256(sys.version.encode())
     for room in sorted(os.scandir(here), key=lambda entry: entry.name):
         if room.is_dir(follow_symlinks=False) and room.name not in _WITHOUT_KERNELS:

@@ -114,4 +114,4 @@ def main() -> None:
         return
     threading.Thread(target=_end_with_parent, args=[locks], daemon=True).start()
     compile_needed(sys.argv[1:])
-    os._exit(0)  # taking down numba and what kernels' rooms import takes longer than a kernel
+    os._exit(0)  # taking down numba and what kernels' modules import takes longer than a kernel

@@ -1,21 +1,8 @@
-"""Calls of kernels by the address of their machine code, from other kernels.
+"""How kernels are called: by address, with a table of arrays, in threads, on other scalars.
 
-What calls a kernel by its address is compiled, and cached on disk, once for all of them. As an
-argument a kernel would make its caller another function in every process; its position in a chain
-of comparisons would make all of them wait for all others.
-
-Many arrays as one argument of a kernel: their addresses.
-
-To hand fifteen arrays from Python to a compiled function costs as much as the forces of eight
-cables. Arrays that stay where they are are handed over once, as a table of where they begin.
-
-Kernels over many rows in threads.
-
-A kernel here is compiled with `nogil=True` and takes the first row and the one past the last
-before its other arguments. Threads of Python do what numba's own `prange` does, without its second
-compilation of everything below the loop, and may be used from several threads at once.
-
-Runs the source of numba kernels on other scalars, such as AutoDiffXd.
+`kernel_address` and `call_at_address` let one kernel call another that is chosen at run time.
+`array_addresses` hands many arrays over as one argument. `over_rows` shares rows among threads.
+`any_scalar` runs the source of a kernel on other scalars, such as AutoDiffXd.
 """
 
 from __future__ import annotations
@@ -32,6 +19,9 @@ from numba.extending import intrinsic
 
 from cdpr_drake.arrays import Array
 
+SHARES = 8
+"""Shares of the rows per thread, so that a thread whose rows are quick takes over others."""
+
 
 @njit(cache=True, inline="always")
 def as_number(k: int) -> int:
@@ -44,7 +34,12 @@ def as_number(k: int) -> int:
 
 @cache
 def kernel_address(kernel: Any, signature: Any) -> int:
-    """Where the machine code of a kernel, compiled by numba for a signature, begins."""
+    """Where the machine code of a kernel, compiled by numba for a signature, begins.
+
+    What calls a kernel by its address is compiled, and cached on disk, once for all of them. As an
+    argument a kernel would make its caller another function in every process; its position in a
+    chain of comparisons would make all of them wait for all others.
+    """
     kernel.compile(signature.args)  # as for a call from Python, which would be compiled once more
     compiled = kernel.get_compile_result(signature)
     return int(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name))
@@ -71,7 +66,9 @@ def call_at_address(signature: Any) -> Callable[..., Any]:
 def array_addresses(arrays: Sequence[Array]) -> np.ndarray:
     """Address and lengths of up to three axes of each array, shape (k, 4), whole numbers.
 
-    Whoever keeps the table must keep the arrays, too.
+    To hand fifteen arrays from Python to a compiled function costs as much as the forces of eight
+    cables. Arrays that stay where they are are handed over once, as this table, and read by
+    `vector_at` and its like. Whoever keeps the table must keep the arrays, too.
 
     Args:
         arrays: Of 64 bit numbers, without gaps.
@@ -86,6 +83,30 @@ def array_addresses(arrays: Sequence[Array]) -> np.ndarray:
         row[0] = array.ctypes.data
         row[1 : 1 + array.ndim] = array.shape
     return table
+
+
+@njit(cache=True, inline="always")
+def integers_at(table: np.ndarray, k: int) -> np.ndarray:
+    """Array k of a table as whole numbers, one axis."""
+    return _whole_numbers(table, as_number(k))
+
+
+@njit(cache=True, inline="always")
+def vector_at(table: np.ndarray, k: int) -> Array:
+    """Array k of a table, one axis."""
+    return _vector(table, as_number(k))
+
+
+@njit(cache=True, inline="always")
+def matrix_at(table: np.ndarray, k: int) -> Array:
+    """Array k of a table, two axes."""
+    return _matrix(table, as_number(k))
+
+
+@njit(cache=True, inline="always")
+def cube_at(table: np.ndarray, k: int) -> Array:
+    """Array k of a table, three axes."""
+    return _cube(table, as_number(k))
 
 
 def _pointer_to(kind: Any) -> Any:
@@ -124,41 +145,17 @@ def _cube(table: np.ndarray, k: int) -> Array:
     return carray(_floats_at(table[k, 0]), (table[k, 1], table[k, 2], table[k, 3]))
 
 
-@njit(cache=True, inline="always")
-def integers_at(table: np.ndarray, k: int) -> np.ndarray:
-    """Array k of a table as whole numbers, one axis."""
-    return _whole_numbers(table, as_number(k))
-
-
-@njit(cache=True, inline="always")
-def vector_at(table: np.ndarray, k: int) -> Array:
-    """Array k of a table, one axis."""
-    return _vector(table, as_number(k))
-
-
-@njit(cache=True, inline="always")
-def matrix_at(table: np.ndarray, k: int) -> Array:
-    """Array k of a table, two axes."""
-    return _matrix(table, as_number(k))
-
-
-@njit(cache=True, inline="always")
-def cube_at(table: np.ndarray, k: int) -> Array:
-    """Array k of a table, three axes."""
-    return _cube(table, as_number(k))
-
-
-SHARES = 8
-"""Shares of the rows per thread, so that a thread whose rows are quick takes over others."""
-
-
 def over_rows(
     kernel: Callable[..., Any], count: int, threads: int | None, *arguments: object
 ) -> None:
     """Calls `kernel(first, past, *arguments)` until all rows of range(count) are done.
 
+    Threads of Python do what numba's own `prange` does, without its second compilation of
+    everything below the loop, and may be used from several threads at once.
+
     Args:
-        kernel: Compiled with `nogil=True`; what it writes for a row no other row may touch.
+        kernel: Compiled with `nogil=True`; takes the first row and the one past the last before
+            its other arguments; what it writes for a row no other row may touch.
         count: Number of rows.
         threads: Number of threads; None: as many as `numba.set_num_threads` allows, by itself all
             cores.

@@ -1,21 +1,9 @@
-"""Small linear systems by Gauss' elimination with row pivots, as kernels without allocation.
+"""Small linear algebra in kernels: elimination, least squares, smallest eigenpair, copies.
 
-Source: Golub and Van Loan, Matrix Computations, 3.4.
+`eliminate` and `substitute` solve small linear systems, `least_squares` those of limited rank;
+`least_squares` alone allocates.
 
-Least squares of limited rank, and what it leaves free, as a numba kernel.
-
-Smallest eigenvalue of a small symmetric matrix and its vector, as kernels without allocation.
-
-Householder reflections make the matrix tridiagonal; Sturm's sign count brackets the eigenvalue, and
-bisection closes the bracket to rounding. The vector comes by inverse iteration with a Cholesky
-factor shifted below it. For matrices of six rows this takes about a tenth of LAPACK's time.
-
-Source: Golub and Van Loan, Matrix Computations, 8.3 and 8.4.
-
-Copies between arrays inside kernels, as loops.
-
-An assignment of one array to a slice of another compiles much more: messages about shapes that do
-not fit, and strings to write them with, in every kernel that is linked above it.
+Source: Golub and Van Loan, Matrix Computations, 3.4, 8.3 and 8.4.
 """
 
 from __future__ import annotations
@@ -25,10 +13,19 @@ from numba import njit
 
 from cdpr_drake.arrays import Array
 
+SHIFT = 1e-7
+"""How far below the eigenvalue the factor for its vector is shifted, relative to the largest
+element or 1: far above rounding, so that the factor exists."""
+
+NEGLIGIBLE = 1e-280
+"""A column whose squares sum to less is zero already; reflecting it would only lose digits."""
+
 
 @njit(cache=True, error_model="numpy")
 def eliminate(A: Array, n: int, pivots: Array) -> None:
     """Overwrites `A[:n, :n]` by its triangular factors, for `substitute`.
+
+    Gauss' elimination with row pivots. Source: Golub and Van Loan, 3.4.
 
     Args:
         A: Matrix, shape (n, n) or larger; a singular one leaves infinite or NaN numbers.
@@ -69,6 +66,8 @@ def substitute(A: Array, n: int, pivots: Array, x: Array) -> None:
 def least_squares(L: Array, rate: Array, rank: int) -> tuple[Array, Array]:
     """v of least norm that brings L @ v nearest to a rate, and the projector on L's null space.
 
+    Allocates what it returns and what LAPACK needs.
+
     Args:
         L: Interaction matrix, shape (n, k).
         rate: Wanted rate of the features, shape (n,).
@@ -96,38 +95,12 @@ def least_squares(L: Array, rate: Array, rank: int) -> tuple[Array, Array]:
     return v, free
 
 
-SHIFT = 1e-7
-"""How far below the eigenvalue the factor for its vector is shifted, relative to the largest
-element or 1: far above rounding, so that the factor exists."""
-
-
-NEGLIGIBLE = 1e-280
-"""A column whose squares sum to less is zero already; reflecting it would only lose digits."""
-
-
-@njit(cache=True, error_model="numpy")
-def factor(S: Array, shift: float, F: Array) -> bool:
-    """F <- lower Cholesky factor of S - shift I; False, and F unfinished, if not positive."""
-    n = S.shape[0]
-    for j in range(n):
-        x = S[j, j] - shift
-        for k in range(j):
-            x -= F[j, k] * F[j, k]
-        if not x > 0.0:
-            return False
-        x = np.sqrt(x)
-        F[j, j] = x
-        for i in range(j + 1, n):
-            y = S[i, j]
-            for k in range(j):
-                y -= F[i, k] * F[j, k]
-            F[i, j] = y / x
-    return True
-
-
 @njit(cache=True, error_model="numpy")
 def smallest_eigenvalue(S: Array, T: Array) -> float:
     """Smallest eigenvalue of S; minus infinity where a number is not finite.
+
+    Householder reflections make the matrix tridiagonal; Sturm's sign count brackets the eigenvalue,
+    and bisection closes the bracket to rounding. Source: Golub and Van Loan, 8.3 and 8.4.
 
     Args:
         S: Symmetric, shape (n, n).
@@ -204,6 +177,9 @@ def smallest_eigenvalue(S: Array, T: Array) -> float:
 def smallest_eigenpair(S: Array, T: Array, F: Array, v: Array) -> float:
     """Smallest eigenvalue of S, as `smallest_eigenvalue`; v <- a unit vector of it.
 
+    The vector comes by inverse iteration with a Cholesky factor shifted below the eigenvalue. For
+    matrices of six rows all this takes about a tenth of LAPACK's time.
+
     Args:
         S: Symmetric, shape (n, n).
         T: Work space, shape (n, n).
@@ -243,16 +219,40 @@ def smallest_eigenpair(S: Array, T: Array, F: Array, v: Array) -> float:
     return value
 
 
+@njit(cache=True, error_model="numpy")
+def factor(S: Array, shift: float, F: Array) -> bool:
+    """F <- lower Cholesky factor of S - shift I; False, and F unfinished, if not positive."""
+    n = S.shape[0]
+    for j in range(n):
+        x = S[j, j] - shift
+        for k in range(j):
+            x -= F[j, k] * F[j, k]
+        if not x > 0.0:
+            return False
+        x = np.sqrt(x)
+        F[j, j] = x
+        for i in range(j + 1, n):
+            y = S[i, j]
+            for k in range(j):
+                y -= F[i, k] * F[j, k]
+            F[i, j] = y / x
+    return True
+
+
 @njit(cache=True)
 def copy_vector(a: Array, out: Array) -> None:
-    """out <- a, both of shape (n,)."""
+    """out <- a, both of shape (n,), as a loop.
+
+    An assignment of one array to a slice of another compiles much more: messages about shapes that
+    do not fit, and strings to write them with, in every kernel that is linked above it.
+    """
     for i in range(a.shape[0]):
         out[i] = a[i]
 
 
 @njit(cache=True)
 def copy_matrix(a: Array, out: Array) -> None:
-    """out <- a, both of shape (n, k)."""
+    """out <- a, both of shape (n, k), as loops, see `copy_vector`."""
     for i in range(a.shape[0]):
         for j in range(a.shape[1]):
             out[i, j] = a[i, j]

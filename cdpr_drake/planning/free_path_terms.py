@@ -61,7 +61,7 @@ class Capsule:
 
     @staticmethod
     def around(box: Array) -> Capsule:
-        """The one around a box, a row of `workspaces.box_row`: along its longest edge."""
+        """The one around a box, a row of `cable_interference.box_row`: along its longest edge."""
         R, middle, half = box[:9].reshape(3, 3), box[9:12], box[12:]
         k = int(np.argmax(half))
         radius = float(np.linalg.norm(np.delete(half, k)))

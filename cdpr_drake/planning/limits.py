@@ -85,7 +85,7 @@ class MotionLimits:
         )
 
     def packed(self) -> Array:
-        """For the kernels of this room, in the order of the fields, shape (8,)."""
+        """For the kernels of `planning`, in the order of the fields, shape (8,)."""
         return np.array([float(getattr(self, one.name)) for one in fields(self)])
 
 

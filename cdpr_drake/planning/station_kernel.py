@@ -40,7 +40,7 @@ def stations_of(
     """Fills the rows of all stations.
 
     Args:
-        points: Points of the path as `trajectories.PosePath.points`, shape (n, 19).
+        points: Points of the path as `pose_path.PosePath.points`, shape (n, 19).
         cables: `CableSet.packed`, shape (m, 17).
         dynamics: `PlatformDynamics.packed`.
         planar: Whether the platform moves by (turn about z, x, y) only.

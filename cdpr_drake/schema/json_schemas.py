@@ -17,7 +17,7 @@ DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
 def json_schema(schema: type, title: str) -> dict[str, Any]:
-    """The JSON schema of a dataclass whose fields were made by this room.
+    """The JSON schema of a dataclass whose fields were made by `fields`.
 
     Args:
         schema: The dataclass.

@@ -19,7 +19,7 @@ def commented_yaml(schema: type, content: Mapping[str, Any]) -> str:
     """Content of a file with a comment on each of its keys, and the keys that it lacks as comments.
 
     Args:
-        schema: Dataclass whose fields were made by this room.
+        schema: Dataclass whose fields were made by `fields`.
         content: Keys of the file, as YAML gives them.
     """
     return "\n".join(_section(schema, content, 0)) + "\n"

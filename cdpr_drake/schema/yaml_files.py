@@ -1,11 +1,8 @@
-"""Tells a file that was given to the wrong loader, from the keys at its top.
+"""What a YAML file is before a schema looks at it: its kind, its size, and whether it is known.
 
-How large a YAML file may be: files of this package are small, and a bomb is told at once.
-
-YAML that was parsed before: the same small files are read again and again.
-
-A run reads its robot five times and a study hundreds of times, and PyYAML takes 5 ms each time in
-each of three passes. What a file says is checked every time all the same, as that may change.
+`other_kind` tells a file that was given to the wrong loader, from the keys at its top.
+`too_many_bytes` and `too_many_nodes` refuse large files: those of this package are small, and a
+bomb is told at once. `known_yaml` keeps what was parsed before.
 """
 
 from __future__ import annotations
@@ -25,14 +22,23 @@ FILE_KINDS: dict[str, tuple[frozenset[str], str]] = {
     "a scenario": (frozenset({"robot", "duration"}), "cdpr_drake.systems.load_scenario"),
     "a camera": (
         frozenset({"view_angle_horizontal_deg", "view_angle_vertical_deg"}),
-        "cdpr_drake.models.load_camera",
+        "cdpr_drake.models.camera_catalogue.load_camera",
     ),
     "perturbation bounds": (
         frozenset({"r_bp", "r_A"}),
-        "cdpr_drake.analyses.workspaces.load_bounds",
+        "cdpr_drake.analyses.workspaces.stability_defaults.load_bounds",
     ),
 }
 """What files describe: keys that only those have, all of them, and what loads them."""
+
+MOST_BYTES = 262_144
+"""Of a file; the largest of this package's own has 20 kB, and more would take seconds to parse."""
+
+MOST_NODES = 100_000
+"""Keys and values of a file, those that an alias repeats counted again."""
+
+SMALL, MOST = 20_000, 32
+"""Letters of files that are kept, and how many of them."""
 
 
 def other_kind(keys: Collection[str], accepted: Collection[str]) -> str:
@@ -46,13 +52,6 @@ def other_kind(keys: Collection[str], accepted: Collection[str]) -> str:
         if marks <= set(keys) and not marks & set(accepted):
             return f"found {what}; use {loader}"
     return ""
-
-
-MOST_BYTES = 262_144
-"""Of a file; the largest of this package's own has 20 kB, and more would take seconds to parse."""
-
-MOST_NODES = 100_000
-"""Keys and values of a file, those that an alias repeats counted again."""
 
 
 def too_many_bytes(path: Path) -> str:
@@ -93,10 +92,6 @@ def _size(node: yaml.Node, sizes: dict[int, int]) -> int:
     return total
 
 
-SMALL, MOST = 20_000, 32
-"""Letters of files that are kept, and how many of them."""
-
-
 class KnownYaml:
     """Nodes of a text, and the instance of a schema that they make.
 
@@ -127,12 +122,12 @@ class KnownYaml:
             _KEPT.pop((self._schema, self._content), None)
 
 
-_KEPT: OrderedDict[tuple[type, str], KnownYaml] = OrderedDict()
-_CHANGING = Lock()
-
-
 def known_yaml(schema: type, content: str, edited: bool) -> KnownYaml:
     """A text that was read before, or one anew.
+
+    The same small files are read again and again: a run reads its robot five times and a study
+    hundreds of times, and PyYAML takes 5 ms each time in each of three passes. What a file says is
+    checked every time all the same, as that may change.
 
     Args:
         schema: Dataclass.
@@ -149,3 +144,8 @@ def known_yaml(schema: type, content: str, edited: bool) -> KnownYaml:
             while len(_KEPT) > MOST:
                 _KEPT.popitem(last=False)
     return found
+
+
+_KEPT: OrderedDict[tuple[type, str], KnownYaml] = OrderedDict()
+
+_CHANGING = Lock()

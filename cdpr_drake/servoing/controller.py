@@ -77,9 +77,9 @@ class Command(NamedTuple):
 class ServoController:
     """A visual servo as a function of a sighting, the platform's pose and a memory.
 
-    Where `sees_packed`, a step is one call of `step_kernel.look_and_step_at`, which compiled loops
-    call as `step_packed` does; features written in Python, plans and compensation keep their part
-    in Python before `step_kernel.servo_step`.
+    Where `sees_packed`, a step is one call of `servo_step_kernel.look_and_step_at`, which compiled
+    loops call as `step_packed` does; features written in Python, plans and compensation keep their
+    part in Python before `servo_step_kernel.servo_step`.
 
     The memory is one vector of `memory_size` numbers, so that it can be a discrete state; it
     begins as `fresh_memory()`.
@@ -128,7 +128,7 @@ class ServoController:
             "twist": 6,  # V_C of the step before
             "before": 6,  # V_0
             "toward": 6,  # -U_0 / lambda_0
-            "switch": FEATURES - SWITCH,  # of a switching servo, see `law_numbers`
+            "switch": FEATURES - SWITCH,  # of a switching servo, see `servo_law.MODE`
             "features": k,  # s of the step before
             "own_rate": k,  # L V_C of the step before
             "plan": 3,  # when the plan began, its t_full, waypoints passed before it

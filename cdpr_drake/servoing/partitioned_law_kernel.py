@@ -1,7 +1,6 @@
 """The twist of partitioned servoing: the optical axis first, the rest by the image points.
 
-The last two features are alpha and ln sigma, see `servoing.partitioned_features_kernel`. From the
-rates that
+The last two features are alpha and ln sigma, see `partitioned_features_kernel`. From the rates that
 are asked of all features,
 
     w_z = rate(alpha) / L(alpha, w_z),  v_z = rate(ln sigma) / L(ln sigma, v_z),

@@ -1,6 +1,11 @@
-"""Poses as visual features, and their interaction matrices (PBVS, both forms).
+"""Poses as visual features, with their interaction matrices: PBVS in both forms, and 2 1/2 D.
 
-The 2 1/2 D feature: the camera's position, the object's centre in the image, and theta u_z.
+PBVS controls theta u of R_CdC beside p_CO or p_CdC; 2 1/2 D servoing controls the camera's position
+p_CdC, the object's centre in the image, and theta u_z. C is the camera, Cd the desired camera, O
+the object. All are ordered (rotation, translation).
+
+Source: servoing thesis 1.4.4 and 1.4.5, there ordered (translation, rotation); Chaumette and
+Hutchinson, Visual servo control I, 2006.
 """
 
 from __future__ import annotations

@@ -1,8 +1,10 @@
 """How a visual servo moves, as data: gain, continuous start, filters, partition, switching.
 
-Pieces of the laws of visual servoing: adaptive gain, least squares, saturation.
+`ServoLaw` and its parts are what one chooses. `adaptive_gain` and `saturation_share` are pieces of
+the law as kernels. Below them stands where the numbers of a law and of a servo's memory are in the
+arrays of `servo_step_kernel`.
 
-Where the numbers of a law and of a servo's memory stand, for the kernels of this room.
+Source: servoing thesis (1.31).
 """
 
 from __future__ import annotations
@@ -15,113 +17,8 @@ from numba import njit
 from cdpr_drake.arrays import Array
 from cdpr_drake.servoing.target_motion import MotionFilter
 
-
-@dataclass(frozen=True)
-class AdaptiveGain:
-    """Gain that falls from `at_zero` to `at_infinity` as the error grows.
-
-    Attributes:
-        at_zero: lambda(0) [1/s].
-        at_infinity: lambda(infinity) [1/s]; equal to `at_zero` for a constant gain.
-        slope: Fall of lambda at 0, per unit of the error's 2-norm [1/s].
-
-    Source: servoing thesis (1.31).
-    """
-
-    at_zero: float
-    at_infinity: float
-    slope: float
-
-    def __call__(self, error: Array) -> float:
-        """lambda [1/s] for an error, any shape (n,), its components as they come (m and rad)."""
-        size = math.sqrt(float(error @ error))
-        return float(adaptive_gain(self.at_zero, self.at_infinity, self.slope, size))
-
-
-@njit(cache=True)
-def adaptive_gain(at_zero: float, at_infinity: float, slope: float, size: float) -> float:
-    """lambda [1/s] for an error of this 2-norm; see `AdaptiveGain`."""
-    span = at_zero - at_infinity
-    if span == 0.0:
-        return at_zero
-    return span * math.exp(-slope / span * size) + at_infinity
-
-
-@njit(cache=True)
-def saturation_share(rates: Array, limit: float) -> float:
-    """Largest share in (0, 1] of rates, shape (m,), that keeps all within +-limit, same unit.
-
-    Scaling by one share keeps the direction of motion.
-    """
-    largest = 0.0
-    for rate in rates:
-        largest = max(largest, abs(rate))
-    return 1.0 if largest <= limit else limit / largest
-
-
 FRAMES = ("platform", "base")
-
-
-@dataclass(frozen=True)
-class YawTask:
-    """A secondary task: turns the platform about the vertical as far as the features let it.
-
-    Attributes:
-        angle: Wanted yaw of the platform's x axis about z of W [rad].
-        gain: [1/s].
-    """
-
-    angle: float
-    gain: float
-
-
-@dataclass(frozen=True, eq=False)
-class EdgeField:
-    """Keeps points away from the edges of the image; see `partition_kernel`.
-
-    Attributes:
-        gain: eta [1/s].
-        distance: rho_0, within which an edge repels, at unit focal length [-].
-        edges: Lowest and highest x, lowest and highest y of the image there, shape (4,) [-].
-    """
-
-    gain: float
-    distance: float
-    edges: Array
-
-
-@dataclass(frozen=True)
-class AxisPartition:
-    """Motions about and along the optical axis by features of their own.
-
-    Attributes:
-        axis_gain: Their gain as a share of lambda.
-        field: What keeps points in the image; None: nothing.
-        goal: Where the four other motions want the points, one of `GOALS`.
-    """
-
-    axis_gain: float = 1.0
-    field: EdgeField | None = None
-    goal: str = "fixed"
-
-
-@dataclass(frozen=True)
-class ModeSwitching:
-    """Two controllers, of which one acts; see `switching_kernel`.
-
-    Attributes:
-        pose_bound: Of half the square of the pose's error [rad^2 + m^2]; None: by the ratio.
-        image_bound: Of half the square of the image's error [-]; None: by the ratio.
-        bound_ratio: Times what they are at the start of a task.
-        dwell: Least time between two switches [s].
-        first: Which acts first, one of `MODES`.
-    """
-
-    pose_bound: float | None = None
-    image_bound: float | None = None
-    bound_ratio: float = 1.5
-    dwell: float = 0.1
-    first: str = "image"
+"""In which a twist can become cable velocities."""
 
 
 @dataclass(frozen=True)
@@ -151,6 +48,111 @@ class ServoLaw:
     def uses_all_features(self) -> bool:
         """Whether a step solves for all features at once, as the analysis of stability takes it."""
         return self.partition is None and self.switching is None
+
+
+@dataclass(frozen=True)
+class AdaptiveGain:
+    """Gain that falls from `at_zero` to `at_infinity` as the error grows.
+
+    Attributes:
+        at_zero: lambda(0) [1/s].
+        at_infinity: lambda(infinity) [1/s]; equal to `at_zero` for a constant gain.
+        slope: Fall of lambda at 0, per unit of the error's 2-norm [1/s].
+
+    Source: servoing thesis (1.31).
+    """
+
+    at_zero: float
+    at_infinity: float
+    slope: float
+
+    def __call__(self, error: Array) -> float:
+        """lambda [1/s] for an error, any shape (n,), its components as they come (m and rad)."""
+        size = math.sqrt(float(error @ error))
+        return float(adaptive_gain(self.at_zero, self.at_infinity, self.slope, size))
+
+
+@dataclass(frozen=True)
+class YawTask:
+    """A secondary task: turns the platform about the vertical as far as the features let it.
+
+    Attributes:
+        angle: Wanted yaw of the platform's x axis about z of W [rad].
+        gain: [1/s].
+    """
+
+    angle: float
+    gain: float
+
+
+@dataclass(frozen=True, eq=False)
+class EdgeField:
+    """Keeps points away from the edges of the image; see `partitioned_law_kernel`.
+
+    Attributes:
+        gain: eta [1/s].
+        distance: rho_0, within which an edge repels, at unit focal length [-].
+        edges: Lowest and highest x, lowest and highest y of the image there, shape (4,) [-].
+    """
+
+    gain: float
+    distance: float
+    edges: Array
+
+
+@dataclass(frozen=True)
+class AxisPartition:
+    """Motions about and along the optical axis by features of their own.
+
+    Attributes:
+        axis_gain: Their gain as a share of lambda.
+        field: What keeps points in the image; None: nothing.
+        goal: Where the four other motions want the points, one of `GOALS`.
+    """
+
+    axis_gain: float = 1.0
+    field: EdgeField | None = None
+    goal: str = "fixed"
+
+
+@dataclass(frozen=True)
+class ModeSwitching:
+    """Two controllers, of which one acts; see `switching_law_kernel`.
+
+    Attributes:
+        pose_bound: Of half the square of the pose's error [rad^2 + m^2]; None: by the ratio.
+        image_bound: Of half the square of the image's error [-]; None: by the ratio.
+        bound_ratio: Times what they are at the start of a task.
+        dwell: Least time between two switches [s].
+        first: Which acts first, one of `MODES`.
+    """
+
+    pose_bound: float | None = None
+    image_bound: float | None = None
+    bound_ratio: float = 1.5
+    dwell: float = 0.1
+    first: str = "image"
+
+
+@njit(cache=True)
+def adaptive_gain(at_zero: float, at_infinity: float, slope: float, size: float) -> float:
+    """lambda [1/s] for an error of this 2-norm; see `AdaptiveGain`."""
+    span = at_zero - at_infinity
+    if span == 0.0:
+        return at_zero
+    return span * math.exp(-slope / span * size) + at_infinity
+
+
+@njit(cache=True)
+def saturation_share(rates: Array, limit: float) -> float:
+    """Largest share in (0, 1] of rates, shape (m,), that keeps all within +-limit, same unit.
+
+    Scaling by one share keeps the direction of motion.
+    """
+    largest = 0.0
+    for rate in rates:
+        largest = max(largest, abs(rate))
+    return 1.0 if largest <= limit else limit / largest
 
 
 (
@@ -189,7 +191,7 @@ POSE_ROWS = 6
 
 BEGUN, TASK, TWIST, BEFORE, TOWARD, SWITCH, FEATURES = 0, 1, 2, 8, 14, 20, 27
 """Where a memory begins to hold: when the task began (negative: it has not), its number, V_C of the
-step before, V_0, -U_0 / lambda_0, the seven numbers of `SWITCH_NUMBERS`, and s of the step before,
+step before, V_0, -U_0 / lambda_0, the seven numbers from `MODE` on, and s of the step before,
 which L V_C of that step follows."""
 
 (

@@ -5,11 +5,11 @@ From features s, their interaction matrix L and what they should be, to cable ve
     U = L^+ (-lambda e + ds*/dt - b) + (1 - L^+ L) V_2,
     V_C = U + (V_0 - lambda U_0 / lambda_0) exp(-sigma t),
 
-or U by the partition of `partition_kernel`, or of the features that `switching_kernel` chooses;
-then the platform's twist, cable velocities by the believed robot's Jacobian, and one share for all
-where a cable would be too fast. All numbers come and go in arrays, so that a loop that is compiled
-as a whole can call it for every step: `ServoController` says what goes into them, and is what
-calls it in a diagram.
+or U by the partition of `partitioned_law_kernel`, or of the features that `switching_law_kernel`
+chooses; then the platform's twist, cable velocities by the believed robot's Jacobian, and one share
+for all where a cable would be too fast. All numbers come and go in arrays, so that a loop that is
+compiled as a whole can call it for every step: `ServoController` says what goes into them, and is
+what calls it in a diagram.
 
 Source: servoing thesis (1.31), (1.35), (1.39), (4.2).
 """
@@ -60,7 +60,7 @@ from cdpr_drake.servoing.servo_law import (
 from cdpr_drake.servoing.switching_law_kernel import has_to_switch, switch_mode, take_bounds
 
 CURRENT, DESIRED, MEAN = range(3)
-"""Interaction matrices, in the order of `task.INTERACTIONS`."""
+"""Interaction matrices, in the order of `servo_task.INTERACTIONS`."""
 
 FADED = 1e-12
 """What is left of a start below this share is nothing."""

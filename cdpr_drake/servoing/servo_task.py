@@ -1,8 +1,8 @@
-"""What a visual servo is asked to do: features, where they should be, and on which path.
+"""What a visual servo is asked to do, how its camera is mounted, and which robot it believes in.
 
-Where camera and object are fixed: on the platform or in the world.
-
-What controllers and estimators believe about the robot that they move.
+`ServoTask`: features, where they should be, and on which path. `CameraMounting`: where camera and
+object are fixed, on the platform or in the world. `BelievedRobot`: what controllers and estimators
+believe about the robot that they move.
 """
 
 from __future__ import annotations

@@ -67,7 +67,7 @@ def for_kernels(seen: Sighting) -> tuple[Array, Array]:
 
 @dataclass(frozen=True)
 class PackedFeatures:
-    """Features for compiled loops, see `packed_kernel`.
+    """Features for compiled loops, see `packed_features_kernel`.
 
     Attributes:
         kernel: What computes.
@@ -294,7 +294,7 @@ class WithoutFeature(VisualFeatures):
 
 
 def packed_sighting(seen: Sighting) -> Array:
-    """A sighting as kernels of features take it, see `packed_kernel`."""
+    """A sighting as kernels of features take it, see `packed_features_kernel`."""
     packed = np.full(MARKS + np.size(seen.marks), np.nan)
     packed[:9].reshape(3, 3)[:] = seen.R_CO.T
     packed[9:12] = seen.p_CO

@@ -1,10 +1,10 @@
 """The certified verdict: a proof that no perturbation within the bounds makes a pose unstable.
 
-`stability` bounds v' Pi v from below on a piece of the perturbations. First the whole
-set is one piece. Where that proves nothing, the set is cut into pieces, depth first, each one that
-is not proven into two, until all are proven or so many have been looked at that it is given up.
-Where the centre of a piece is unstable itself it is given up, too. A piece starts with the density
-matrix that its parent ended with.
+`quadratic_bounds_kernel` bounds v' Pi v from below on a piece of the perturbations, which is the
+proof. First the whole set is one piece. Where that proves nothing, the set is cut into pieces,
+depth first, each one that is not proven into two, until all are proven or so many have been looked
+at that it is given up. Where the centre of a piece is unstable itself it is given up, too. A piece
+starts with the density matrix that its parent ended with.
 
 **Rounding.** Nothing in the expansion needs the left inverse M of J to be exact: with the computed
 one it bounds v' K_l M J^ K_r v for every perturbed J^. The solution of the normal equations by

@@ -3,8 +3,8 @@
 Then the Jacobians of robot and estimate cancel, and what is left holds for any robot: analyses I
 (only the object's pose is wrong) and II (the camera's mounting as well) of the servoing thesis.
 
-Signs: `matrix` orders (rotation, translation) and counts a planar rotation
-positive where the thesis has a minus, which mirrors the offsets (d_1, d_2) and no eigenvalue.
+Signs: `criterion` orders (rotation, translation) and counts a planar rotation positive where the
+thesis has a minus, which mirrors the offsets (d_1, d_2) and no eigenvalue.
 
 Source: servoing thesis 3.2.1 and 3.2.2.
 """

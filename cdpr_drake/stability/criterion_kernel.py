@@ -4,7 +4,7 @@ With J the map from camera twists in C to cable length rates, J = A Ad, the crit
 Pi = K_l J^+ J_hat K_r, where K_l = L and K_r = L_hat^+, or K_l = L_hat^+ L and K_r = I for IBVS.
 A planar robot is embedded: what it cannot move is the identity in J^+ J_hat and in L.
 
-Source: servoing thesis (3.1), (3.8), (3.26); `matrix` is the plain form.
+Source: servoing thesis (3.1), (3.8), (3.26); `criterion` is the plain form.
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
 """The criterion for a perturbed estimate and a known object, fast: what most questions need.
 
-The same numbers as `perturbed_pose_kernel.evaluate` up to rounding, from one flat array with
-constant indices: a call with many arrays would count references to them longer than it computes.
-Products are folded into S = ((L J^+) J_hat L^+ + its transpose) / 2, and nothing is allocated.
+The same numbers as `criterion_at_pose_kernel.evaluate` up to rounding, from one flat array
+with constant indices: a call with many arrays would count references to them longer than it
+computes. Products are folded into S = ((L J^+) J_hat L^+ + its transpose) / 2, and nothing is
+allocated.
 """
 
 from __future__ import annotations
@@ -82,7 +83,7 @@ def pack_quick(case: CaseArrays, w: Work, q: Array) -> None:
 def _turn(d: Array, at: int, q: Array, base: int, out: int) -> None:
     """q[out :] <- R exp(d[at : at + 3]) for R at q[base :], both by rows.
 
-    Not `geometry.rotation_into`: one sine instead of two in what most of the time goes into.
+    Not `rotation_kernel.rotation_into`: one sine instead of two in what most of the time goes into.
     """
     x, y, z = d[at], d[at + 1], d[at + 2]
     square = x * x + y * y + z * z

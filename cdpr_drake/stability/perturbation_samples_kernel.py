@@ -141,7 +141,7 @@ def draw_into(
         inside: Whether magnitudes fill the balls evenly instead of being full.
         m: Number of cables.
         room: Of `draw_room`.
-        d: Output, shape (18 + 6 m,), laid out as in `bounds`.
+        d: Output, shape (18 + 6 m,), laid out as in `perturbation_bounds`.
     """
     base = mixed(key ^ mixed(np.uint64(number) + _STEP))
     total = 6

@@ -1,9 +1,7 @@
 """All poses at which a platform rests on inextensible cables of given lengths.
 
-Poses of rest that turns lead to from one of them: which of these lets the slack cables be slack.
-
-The square of a cable's path is a sinusoid of the angle of turn, so that each cable that is to be
-slack leaves an arc of angles, in closed form.
+`all_rests` asks every set of cables that may be taut. Where turns lead from one pose of rest to
+others, `member_within_reach` finds one of that family that lets the slack cables be slack.
 """
 
 from __future__ import annotations
@@ -41,69 +39,8 @@ from cdpr_drake.statics.taut_equilibria import (
     rests_on_two,
 )
 
-ANY_TURNS = 500
-"""Orientations that are tried where a platform turns anyhow about its centre of mass."""
-
-
-def member_within_reach(
-    one: TautRest, platform: HangingPlatform, lengths: Array, slack: np.ndarray
-) -> RigidTransform | None:
-    """A pose of the family at which no cable is too short, the one given if that is one; or None.
-
-    Args:
-        one: One of the family.
-        platform: The platform.
-        lengths: Shape (m,) [m].
-        slack: Numbers of the cables that are not taut.
-    """
-
-    def within(X_WP: RigidTransform) -> bool:
-        paths = cable_paths(X_WP, platform.cables).lengths
-        return bool(np.all(paths[slack] <= lengths[slack] + JUST_TAUT))
-
-    if within(one.X_WP):
-        return one.X_WP
-    if one.axis is None:
-        return next((X for X in _turned_anyhow(one.X_WP, platform) if within(X)), None)
-    point, axis = one.axis
-    axis = axis / np.linalg.norm(axis)
-    ends = [0.0]
-    for j in slack:
-        r = one.X_WP.multiply(platform.cables.p_PB[:, j]) - point
-        along = axis * (axis @ r)
-        across = r - along
-        v = point + along - platform.cables.p_WA[:, j]
-        c, s = 2.0 * v @ across, 2.0 * v @ np.cross(axis, across)
-        size = float(np.hypot(c, s))
-        room = lengths[j] ** 2 - v @ v - across @ across
-        if abs(room) < size:
-            middle, half = np.arctan2(s, c), np.arccos(room / size)
-            ends += [middle + half, middle - half]
-    ends = sorted(np.mod(ends, 2.0 * np.pi).tolist())
-    gaps = np.diff([*ends, ends[0] + 2.0 * np.pi])
-    for i in np.argsort(-gaps):
-        turn = rotation_from_vector(axis * (ends[i] + 0.5 * gaps[i]))
-        R = RotationMatrix.ProjectToRotationMatrix(turn.matrix() @ one.X_WP.rotation().matrix())
-        X_WP = RigidTransform(R, point + turn.matrix() @ (one.X_WP.translation() - point))
-        if within(X_WP):
-            return X_WP
-    return None
-
-
-def _turned_anyhow(X_WP: RigidTransform, platform: HangingPlatform) -> list[RigidTransform]:
-    """The platform turned about its centre of mass, the same orientations every time."""
-    random, center = np.random.default_rng(0), X_WP.multiply(platform.p_PCo)
-    poses = []
-    for _ in range(ANY_TURNS):
-        q = random.normal(size=4)
-        s, v = q[0] / np.linalg.norm(q), q[1:] / np.linalg.norm(q)
-        angle = 2.0 * np.arctan2(np.linalg.norm(v), s)
-        R = rotation_from_vector(v / np.linalg.norm(v) * angle)
-        poses.append(RigidTransform(R, center - R.matrix() @ platform.p_PCo))
-    return poses
-
-
 MOST_CABLES = 8
+"""Of a platform that is accepted."""
 
 TENSE = 1e-9
 """A tension below this share of the weight is none: the set of cables without it has the pose."""
@@ -113,6 +50,9 @@ SAME_PLACE = 1e-6
 
 BALANCED = 1e-6
 """Unbalanced force relative to the weight up to which a solution is one of the robot, too."""
+
+ANY_TURNS = 500
+"""Orientations that are tried where a platform turns anyhow about its centre of mass."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,6 +116,11 @@ def all_rests(
     if not rests:
         raise EquilibriumError(_why_none(platform, lengths))
     return AllRests(sorted(rests, key=lambda one: one.energy), count, len(sets))
+
+
+def is_stable(one: Rest) -> bool:
+    """Whether a small push is forgiven."""
+    return one.stability == Stability.STABLE
 
 
 def checked_lengths(platform: HangingPlatform, lengths: Array) -> Array:
@@ -343,6 +288,63 @@ def _why_none(platform: HangingPlatform, lengths: Array) -> str:
     )
 
 
-def is_stable(one: Rest) -> bool:
-    """Whether a small push is forgiven."""
-    return one.stability == Stability.STABLE
+def member_within_reach(
+    one: TautRest, platform: HangingPlatform, lengths: Array, slack: np.ndarray
+) -> RigidTransform | None:
+    """A pose of the family at which no cable is too short, the one given if that is one; or None.
+
+    The square of a cable's path is a sinusoid of the angle of turn, so that each cable that is to
+    be slack leaves an arc of angles, in closed form. Where the family turns anyhow, `ANY_TURNS`
+    orientations are tried.
+
+    Args:
+        one: One of the family.
+        platform: The platform.
+        lengths: Shape (m,) [m].
+        slack: Numbers of the cables that are not taut.
+    """
+
+    def within(X_WP: RigidTransform) -> bool:
+        paths = cable_paths(X_WP, platform.cables).lengths
+        return bool(np.all(paths[slack] <= lengths[slack] + JUST_TAUT))
+
+    if within(one.X_WP):
+        return one.X_WP
+    if one.axis is None:
+        return next((X for X in _turned_anyhow(one.X_WP, platform) if within(X)), None)
+    point, axis = one.axis
+    axis = axis / np.linalg.norm(axis)
+    ends = [0.0]
+    for j in slack:
+        r = one.X_WP.multiply(platform.cables.p_PB[:, j]) - point
+        along = axis * (axis @ r)
+        across = r - along
+        v = point + along - platform.cables.p_WA[:, j]
+        c, s = 2.0 * v @ across, 2.0 * v @ np.cross(axis, across)
+        size = float(np.hypot(c, s))
+        room = lengths[j] ** 2 - v @ v - across @ across
+        if abs(room) < size:
+            middle, half = np.arctan2(s, c), np.arccos(room / size)
+            ends += [middle + half, middle - half]
+    ends = sorted(np.mod(ends, 2.0 * np.pi).tolist())
+    gaps = np.diff([*ends, ends[0] + 2.0 * np.pi])
+    for i in np.argsort(-gaps):
+        turn = rotation_from_vector(axis * (ends[i] + 0.5 * gaps[i]))
+        R = RotationMatrix.ProjectToRotationMatrix(turn.matrix() @ one.X_WP.rotation().matrix())
+        X_WP = RigidTransform(R, point + turn.matrix() @ (one.X_WP.translation() - point))
+        if within(X_WP):
+            return X_WP
+    return None
+
+
+def _turned_anyhow(X_WP: RigidTransform, platform: HangingPlatform) -> list[RigidTransform]:
+    """The platform turned about its centre of mass, the same orientations every time."""
+    random, center = np.random.default_rng(0), X_WP.multiply(platform.p_PCo)
+    poses = []
+    for _ in range(ANY_TURNS):
+        q = random.normal(size=4)
+        s, v = q[0] / np.linalg.norm(q), q[1:] / np.linalg.norm(q)
+        angle = 2.0 * np.arctan2(np.linalg.norm(v), s)
+        R = rotation_from_vector(v / np.linalg.norm(v) * angle)
+        poses.append(RigidTransform(R, center - R.matrix() @ platform.p_PCo))
+    return poses

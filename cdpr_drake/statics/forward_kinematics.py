@@ -98,7 +98,7 @@ class ForwardKinematics:
     """
 
     def __init__(self, cables: CableSet, motion: MotionType = FREE) -> None:
-        """For cables over their pulleys; `cables.without_pulleys()` leave out the pulleys.
+        """For cables over their pulleys; `CableSet.without_pulleys` leaves them out.
 
         The platform moves as its type says; of the guess, what it cannot move stays.
 

@@ -1,12 +1,8 @@
-"""A body at rest on cables that are all taut: all poses of it.
+"""A body, or a point, at rest on inextensible cables that are all taut: all poses of it.
 
-On one point it hangs like a pendulum, in closed form. On two cables a body in space is in the
+On one point a body hangs like a pendulum, in closed form. On two cables a body in space is in the
 vertical plane of their exit points, either way round. Everything else is a system of polynomials.
-
-Where a point on inextensible cables rests, in closed form.
-
-The taut cables put it on spheres. Their differences are planes; in what these have in common, the
-spheres are one, of which the lowest and the highest point are at rest.
+Where the point itself rests, `hanging_points` says, in closed form.
 """
 
 from __future__ import annotations
@@ -21,49 +17,6 @@ from cdpr_drake.statics.real_solutions import PathCount, real_solutions
 
 COINCIDE = 1e-9
 """Points nearer than this, relative to lengths, are one; centres nearer to a line lie on it."""
-
-
-def hanging_points(centers: Array, radii: Array, down: Array) -> list[tuple[Array, Array]]:
-    """Points at rest on k taut cables, and shares of the weight.
-
-    Args:
-        centers: Where the cables end in the space of motions, shape (d, k) [m].
-        radii: How far the point is from each, shape (k,) [m].
-        down: Weight in that space, shape (d,) [N].
-
-    Returns:
-        Points, shape (d,) [m], and tensions per distance, shape (k,) [N/m], of any sign: none
-        where cables cannot all be taut, or the centres lie on one line or plane too many.
-    """
-    d, k = centers.shape
-    if k > d or np.any(radii <= 0.0):
-        return []
-    first, size = centers[:, 0], float(np.max(radii))
-    N = (centers[:, 1:] - first[:, None]).T
-    right = 0.5 * (np.sum(N * N, axis=1) + radii[0] ** 2 - radii[1:] ** 2)
-    if k > 1:
-        U, s, V = np.linalg.svd(N)
-        if s[-1] < COINCIDE * size:
-            return []
-        foot = V[: k - 1].T @ ((U.T @ right) / s)
-        left = V[k - 1 :].T
-    else:
-        foot, left = np.zeros(d), np.eye(d)
-    square = radii[0] ** 2 - foot @ foot
-    if square < 0.0:
-        return []
-    along = left @ (left.T @ down)
-    length = float(np.linalg.norm(along))
-    if length < COINCIDE * np.linalg.norm(down):
-        return []  # all of a circle is level: no cables of its axis balance a weight along it
-    points = []
-    for sign in (1.0, -1.0):
-        point = first + foot + sign * np.sqrt(square) * along / length
-        lines = point[:, None] - centers
-        tight, _, rank, _ = np.linalg.lstsq(lines, down, rcond=COINCIDE)
-        if rank == k and np.max(np.abs(lines @ tight - down)) < 1e-7 * np.linalg.norm(down):
-            points.append((point, tight))
-    return points
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,21 +101,6 @@ def rests_from_a_point(
                 axis = (X.multiply(anchor), body.down)
             found.append(TautRest(X, tight, spins or len(turns) == 1, axis, closed=True))
     return found
-
-
-def _turn(vector: Array, onto: Array, moves: Array) -> Array:
-    """The least rotation of a vector into a direction, shape (3, 3); in the plane of moves."""
-    u, v = vector / np.linalg.norm(vector), onto / np.linalg.norm(onto)
-    axis, cosine = np.cross(u, v), float(u @ v)
-    if cosine < -1.0 + 1e-12:  # half a turn
-        if moves.shape[1] == 2:
-            axis = np.cross(moves[:, 0], moves[:, 1])
-        else:
-            axis = np.cross(u, np.eye(3)[int(np.argmin(np.abs(u)))])
-        axis /= np.linalg.norm(axis)
-        return np.asarray(2.0 * np.outer(axis, axis) - np.eye(3), float)
-    S = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
-    return np.asarray(np.eye(3) + S + S @ S / (1.0 + cosine), float)
 
 
 def rests_in_plane(
@@ -262,6 +200,21 @@ def rests_in_space(
     return rests, count
 
 
+def _turn(vector: Array, onto: Array, moves: Array) -> Array:
+    """The least rotation of a vector into a direction, shape (3, 3); in the plane of moves."""
+    u, v = vector / np.linalg.norm(vector), onto / np.linalg.norm(onto)
+    axis, cosine = np.cross(u, v), float(u @ v)
+    if cosine < -1.0 + 1e-12:  # half a turn
+        if moves.shape[1] == 2:
+            axis = np.cross(moves[:, 0], moves[:, 1])
+        else:
+            axis = np.cross(u, np.eye(3)[int(np.argmin(np.abs(u)))])
+        axis /= np.linalg.norm(axis)
+        return np.asarray(2.0 * np.outer(axis, axis) - np.eye(3), float)
+    S = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
+    return np.asarray(np.eye(3) + S + S @ S / (1.0 + cosine), float)
+
+
 _Solved = tuple[Array, Array, Array, bool, tuple[str, Array, Array]]
 """p, R, tensions per length and weight, whether singular, what a proof needs."""
 
@@ -282,3 +235,49 @@ def _solved(name: str, constants: Array) -> tuple[list[_Solved], PathCount]:
         full = np.concatenate([scale * x[:3], x[3:7], x[7:] / scale])
         solved.append((full[:3], R, full[7:], singular, (name, constants, full)))
     return solved, count
+
+
+def hanging_points(centers: Array, radii: Array, down: Array) -> list[tuple[Array, Array]]:
+    """Points at rest on k taut cables, and shares of the weight.
+
+    The taut cables put the point on spheres. Their differences are planes; in what these have in
+    common, the spheres are one, of which the lowest and the highest point are at rest.
+
+    Args:
+        centers: Where the cables end in the space of motions, shape (d, k) [m].
+        radii: How far the point is from each, shape (k,) [m].
+        down: Weight in that space, shape (d,) [N].
+
+    Returns:
+        Points, shape (d,) [m], and tensions per distance, shape (k,) [N/m], of any sign: none
+        where cables cannot all be taut, or the centres lie on one line or plane too many.
+    """
+    d, k = centers.shape
+    if k > d or np.any(radii <= 0.0):
+        return []
+    first, size = centers[:, 0], float(np.max(radii))
+    N = (centers[:, 1:] - first[:, None]).T
+    right = 0.5 * (np.sum(N * N, axis=1) + radii[0] ** 2 - radii[1:] ** 2)
+    if k > 1:
+        U, s, V = np.linalg.svd(N)
+        if s[-1] < COINCIDE * size:
+            return []
+        foot = V[: k - 1].T @ ((U.T @ right) / s)
+        left = V[k - 1 :].T
+    else:
+        foot, left = np.zeros(d), np.eye(d)
+    square = radii[0] ** 2 - foot @ foot
+    if square < 0.0:
+        return []
+    along = left @ (left.T @ down)
+    length = float(np.linalg.norm(along))
+    if length < COINCIDE * np.linalg.norm(down):
+        return []  # all of a circle is level: no cables of its axis balance a weight along it
+    points = []
+    for sign in (1.0, -1.0):
+        point = first + foot + sign * np.sqrt(square) * along / length
+        lines = point[:, None] - centers
+        tight, _, rank, _ = np.linalg.lstsq(lines, down, rcond=COINCIDE)
+        if rank == k and np.max(np.abs(lines @ tight - down)) < 1e-7 * np.linalg.norm(down):
+            points.append((point, tight))
+    return points

@@ -1,7 +1,7 @@
 """Tension methods that are linear programs in the null space, as one numba kernel.
 
-What the walk of `numerics.lowest_point` ends at is projected back on the bounds: that takes away
-its rounding, and proves infeasibility where there is nothing.
+What the walk of `linear_program_kernel.lowest_point` ends at is projected back on the bounds: that
+takes away its rounding, and proves infeasibility where there is nothing.
 """
 
 from __future__ import annotations

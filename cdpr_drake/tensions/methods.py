@@ -9,7 +9,7 @@ import numpy as np
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import TensionProblemError
-from cdpr_drake.tensions import objectives as goals
+from cdpr_drake.tensions import objectives
 from cdpr_drake.tensions.barrier_kernel import log_barrier
 from cdpr_drake.tensions.closed_form_kernel import (
     MISSED,
@@ -107,17 +107,17 @@ METHODS: dict[str, TensionMethod] = {
     ),
     "kernel": TensionMethod("middle of the null line", kernel_line, (1,), exact=True),
     "linear_program": TensionMethod(
-        "least 1-norm", linear_program, exact=True, program=goals.one_norm
+        "least 1-norm", linear_program, exact=True, program=objectives.one_norm
     ),
     "infinity_norm": TensionMethod(
-        "least largest tension", infinity_norm, exact=True, program=goals.infinity_norm
+        "least largest tension", infinity_norm, exact=True, program=objectives.infinity_norm
     ),
     "quadratic_program": TensionMethod(
-        "least 2-norm", None, exact=True, program=goals.two_norm
+        "least 2-norm", None, exact=True, program=objectives.two_norm
     ),
     "reference_program": TensionMethod(
         "nearest to the reference", None, exact=True, needs_reference=True,
-        program=goals.nearest_reference,
+        program=objectives.nearest_reference,
     ),
     "barycenter": TensionMethod("centre of the feasible polygon", barycenter, (2,), exact=True),
     "polygon_1_norm": TensionMethod("corner of least sum", polygon_1_norm, (2,), exact=True),
@@ -130,15 +130,16 @@ METHODS: dict[str, TensionMethod] = {
         "vertices weighted by exterior angles", weighted_vertices, (0, 1, 2), exact=True
     ),
     "optimally_safe": TensionMethod(
-        "largest margin to the bounds", optimally_safe, exact=True, program=goals.largest_margin
+        "largest margin to the bounds", optimally_safe, exact=True,
+        program=objectives.largest_margin,
     ),
     "slack_relaxed": TensionMethod(
         "least unbalanced wrench, always answers", slack_relaxed, exact=True, relaxes=True,
-        program=goals.least_slack,
+        program=objectives.least_slack,
     ),
     "median": TensionMethod(
         "nearest to the middle of the bounds within them", median, exact=True,
-        program=goals.nearest_middle,
+        program=objectives.nearest_middle,
     ),
     "log_barrier": TensionMethod(
         "least 4-norm with barriers at the bounds, continuous rates", log_barrier, relaxes=True,

@@ -1,10 +1,12 @@
-"""Velocities that take up slack: where a tension is too small, or a cable too long.
+"""Laws that correct tensions by cable velocities: wind up slack, follow wanted tensions.
 
-Velocities that bring tensions back into the feasible polygon, and leave the platform alone.
+`tension_correction` and `length_correction` wind up a cable whose tension is too small, or which is
+too long. `polygon_target` and `polygon_correction` bring tensions back into the feasible polygon
+and leave the platform alone. `TensionFollower` follows wanted tensions from both sides.
+`length_thresholds` gives thresholds of slack as functions of cable lengths. Velocities are added to
+the commanded ones [m/s]; negative ones shorten a cable.
 
-Follows wanted tensions from both sides by cable velocities.
-
-Thresholds below which a cable counts as slack, as functions of its length.
+Source: servoing thesis 5.2.1, (5.1), (5.3), (5.4), (5.5), Fig. 5.3; (1.29) for the polygon.
 """
 
 from __future__ import annotations
@@ -14,6 +16,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdpr_drake.arrays import Array
+
+SLACK_SHARE = 0.25
+"""A cable that has less than this of its least tension is taken for slack: it does not answer. Half
+of the bound where the margin is as large as that."""
+
+SHAPES = ("linear", "exponential")
+"""How a threshold falls from the shortest cable to the longest."""
 
 
 def tension_correction(tensions: Array, thresholds: Array, gains: Array) -> Array:
@@ -50,6 +59,39 @@ def adaptive_gains(lengths: Array, expected: Array, gain_per_length: float) -> A
     return gain_per_length * np.maximum(np.subtract(lengths, expected), 0.0)
 
 
+def length_thresholds(
+    lengths: Array,
+    shortest: float,
+    longest: float,
+    *,
+    lowest: Array,
+    highest: Array,
+    shape: str = "linear",
+) -> Array:
+    """Thresholds that are higher for shorter cables, which carry more of the platform.
+
+    Args:
+        lengths: Lengths of the cables, shape (m,) [m].
+        shortest: Length at which a threshold is `highest`, and below [m].
+        longest: Length at which it is `lowest`, and above; larger than `shortest` [m].
+        lowest: Shape (m,) [N].
+        highest: Not below `lowest`, shape (m,) [N]; both positive if exponential.
+        shape: One of `SHAPES`: in between, the threshold or its logarithm is linear in the length.
+
+    Returns:
+        Shape (m,) [N].
+
+    Source: servoing thesis 5.2.1, "Threshold as a function of cable lengths", which leaves the
+    function open.
+    """
+    share = np.clip((longest - np.asarray(lengths)) / (longest - shortest), 0.0, 1.0)
+    if shape == "linear":
+        return lowest + share * np.subtract(highest, lowest)
+    if shape == "exponential":
+        return np.asarray(lowest * np.exp(share * np.log(np.divide(highest, lowest))))
+    raise ValueError(f"shape: found {shape!r}; accepted: {', '.join(SHAPES)}")
+
+
 def length_correction(
     tensions: Array,
     lengths: Array,
@@ -82,11 +124,6 @@ def length_correction(
         if surplus > 0.0:
             found[cable] = -surplus / (slowness * period)
     return found
-
-
-SLACK_SHARE = 0.25
-"""A cable that has less than this of its least tension is taken for slack: it does not answer. Half
-of the bound where the margin is as large as that."""
 
 
 def polygon_target(
@@ -203,40 +240,3 @@ class TensionFollower:
         # An integral that would push further against the limit is left as it was.
         winding = (held != wanted) & (np.sign(missing) == -np.sign(wanted))
         return held, np.where(winding, integrated, grown)
-
-
-SHAPES = ("linear", "exponential")
-"""How a threshold falls from the shortest cable to the longest."""
-
-
-def length_thresholds(
-    lengths: Array,
-    shortest: float,
-    longest: float,
-    *,
-    lowest: Array,
-    highest: Array,
-    shape: str = "linear",
-) -> Array:
-    """Thresholds that are higher for shorter cables, which carry more of the platform.
-
-    Args:
-        lengths: Lengths of the cables, shape (m,) [m].
-        shortest: Length at which a threshold is `highest`, and below [m].
-        longest: Length at which it is `lowest`, and above; larger than `shortest` [m].
-        lowest: Shape (m,) [N].
-        highest: Not below `lowest`, shape (m,) [N]; both positive if exponential.
-        shape: One of `SHAPES`: in between, the threshold or its logarithm is linear in the length.
-
-    Returns:
-        Shape (m,) [N].
-
-    Source: servoing thesis 5.2.1, "Threshold as a function of cable lengths", which leaves the
-    function open.
-    """
-    share = np.clip((longest - np.asarray(lengths)) / (longest - shortest), 0.0, 1.0)
-    if shape == "linear":
-        return lowest + share * np.subtract(highest, lowest)
-    if shape == "exponential":
-        return np.asarray(lowest * np.exp(share * np.log(np.divide(highest, lowest))))
-    raise ValueError(f"shape: found {shape!r}; accepted: {', '.join(SHAPES)}")

@@ -1,6 +1,10 @@
-"""Quintic time laws, and motions of the platform through poses at which it rests.
+"""Poses as functions of time: quintic laws from rest to rest, steady motions, waypoints.
 
-Poses as functions of time: at constant velocity, or through waypoints.
+`PoseTrajectory` takes the platform through poses at which it rests, by quintic time laws; a row of
+`MOTION_SIZE` numbers is its pose, velocity and acceleration. A `MovingPose` is the pose of an
+object: at constant velocity (`SteadyMotion`) or through waypoints (`WaypointMotion`).
+
+Source: Gazebo thesis (6.16)-(6.21); servoing thesis (A.15)-(A.20).
 """
 
 from __future__ import annotations
@@ -24,10 +28,9 @@ MOTION_SIZE = 19
 """Length of a motion row: quaternion wxyz and origin of P in W [-, m], V_WP = (w, v) of P in W
 [rad/s, m/s], A_WP = (alpha, a) of P in W [rad/s^2, m/s^2]."""
 
-
 TIMED_NUMBERS = 4 + PIECE_NUMBERS
 """Of a stretch of a `TimedPath`: start and duration [s], ds/dt at its start [m/s], d2s/dt2
-[m/s^2], and the path from there on as `path_kernel.path_point` takes it."""
+[m/s^2], and the path from there on as `pose_path.path_point` takes it."""
 
 
 def quintic_coefficients(duration: float, start: Array, end: Array) -> Array:
@@ -154,27 +157,6 @@ def motion_row(X_WP: RigidTransform, V_WP: Array, A_WP: Array) -> Array:
     return np.concatenate([pose_row(X_WP), V_WP, A_WP])
 
 
-def _check_duration(duration: float) -> None:
-    if not (np.isfinite(duration) and duration > 0.0):
-        raise TrajectoryError(
-            f"a trajectory's duration must be above 0 s and finite, found {duration} s"
-        )
-
-
-def _stretch(start: float, duration: float, X_WS: RigidTransform, X_WE: RigidTransform) -> Array:
-    """One row of `PoseTrajectory.stretches`, from pose S to pose E."""
-    turn = rotation_vector(X_WS.rotation().inverse() @ X_WE.rotation())
-    return np.concatenate(
-        [
-            [start, duration],
-            pose_row(X_WS),
-            X_WS.rotation().matrix() @ turn,
-            X_WE.translation() - X_WS.translation(),
-            [float(np.linalg.norm(turn))],
-        ]
-    )
-
-
 @njit(cache=True)
 def write_motion(time: float, stretches: Array, out: Array) -> None:
     """Writes the motion row of a trajectory at a time [s] to `out`, shape (`MOTION_SIZE`,).
@@ -237,6 +219,27 @@ def _write_timed_motion(time: float, stretches: Array, out: Array) -> None:
     for k in range(6):
         out[7 + k] = speed * point[7 + k]
         out[13 + k] = growth * point[7 + k] + speed * speed * point[13 + k]
+
+
+def _check_duration(duration: float) -> None:
+    if not (np.isfinite(duration) and duration > 0.0):
+        raise TrajectoryError(
+            f"a trajectory's duration must be above 0 s and finite, found {duration} s"
+        )
+
+
+def _stretch(start: float, duration: float, X_WS: RigidTransform, X_WE: RigidTransform) -> Array:
+    """One row of `PoseTrajectory.stretches`, from pose S to pose E."""
+    turn = rotation_vector(X_WS.rotation().inverse() @ X_WE.rotation())
+    return np.concatenate(
+        [
+            [start, duration],
+            pose_row(X_WS),
+            X_WS.rotation().matrix() @ turn,
+            X_WE.translation() - X_WS.translation(),
+            [float(np.linalg.norm(turn))],
+        ]
+    )
 
 
 class MovingPose(Protocol):

@@ -1,6 +1,6 @@
-"""Dark ellipses in images: what dots and circles are found by.
+"""Dark ellipses in images, by which dots and circles are found, and the brightness of an image.
 
-Brightness of a color image, which is what targets are found in.
+`gray_image` makes of a colour image what all targets are found in. Pixels are (u right, v down).
 """
 
 from __future__ import annotations
@@ -11,20 +11,6 @@ import cv2
 import numpy as np
 
 from cdpr_drake.arrays import Array
-
-
-def gray_image(rgb: np.ndarray) -> np.ndarray:
-    """Brightness of an image, shape (height, width), 8 bits.
-
-    A fourth channel is passed over by the conversion itself: three channels cut out of four are
-    not contiguous, and OpenCV copies them first, which takes ten times as long or more.
-
-    Args:
-        rgb: Image, shape (height, width, 3 or 4), 8 bits a channel.
-    """
-    code = cv2.COLOR_RGBA2GRAY if rgb.shape[2] == 4 else cv2.COLOR_RGB2GRAY
-    return np.asarray(cv2.cvtColor(rgb, code))
-
 
 SMALLEST_AREA = 40.0
 """Smaller blobs are not looked at [px^2]."""
@@ -80,6 +66,19 @@ def find_dark_blobs(rgb: np.ndarray) -> list[Blob]:
         if blob is not None:
             blobs.append(blob)
     return sorted(blobs, key=lambda blob: -blob.area())
+
+
+def gray_image(rgb: np.ndarray) -> np.ndarray:
+    """Brightness of an image, shape (height, width), 8 bits.
+
+    A fourth channel is passed over by the conversion itself: three channels cut out of four are
+    not contiguous, and OpenCV copies them first, which takes ten times as long or more.
+
+    Args:
+        rgb: Image, shape (height, width, 3 or 4), 8 bits a channel.
+    """
+    code = cv2.COLOR_RGBA2GRAY if rgb.shape[2] == 4 else cv2.COLOR_RGB2GRAY
+    return np.asarray(cv2.cvtColor(rgb, code))
 
 
 def _children(hierarchy: np.ndarray, parent: int) -> list[int]:

@@ -1,8 +1,10 @@
-"""The inextensible catenary by its length, and its length by how far it hangs down.
+"""Images of cables, and the surplus lengths that are read from them.
 
-Surplus lengths from an image of the cables, and how fast to wind them in.
+`cable_images` gives points of the cables' curves as a camera E in the world sees them.
+`seen_slack` reads surplus lengths from such an image, and `slack_rates` says how fast to wind them
+in. Below both is the inextensible catenary by its length, and its length by how far it hangs down.
 
-Images of cables: points of their curves as a camera in the world sees them.
+Source: servoing thesis, perspectives; Irvine, Cable Structures, 1981, 1.1 and 2.1.
 """
 
 from __future__ import annotations
@@ -17,6 +19,15 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.vision.pinhole import Pinhole
+
+LEAST_POINTS = 5
+"""Points of a cable that must be seen."""
+
+LEAST_ANGLE = 0.1
+"""Sine of the least angle between a line of sight and the plane in which the cable hangs."""
+
+LEAST_SPAN = 0.02
+"""Horizontal distance of the ends from which a cable hangs down sideways [m]."""
 
 ITERATIONS = 12
 """Of Newton's method for the catenary, and of Gauss and Newton's for its length; both converge from
@@ -33,85 +44,48 @@ DIFFERENCE = 1e-6
 """Step of the derivative by the root of the surplus [m^0.5]."""
 
 
-def catenary_drop(x: Array, span: float, rise: float, surplus: float) -> Array:
-    """How far a hanging cable is below the line between its ends, shape (n,) [m].
+def cable_images(
+    curves: Sequence[Array],
+    X_WE: RigidTransform,
+    pinhole: Pinhole,
+    count: int,
+    noise: float,
+    random: np.random.Generator,
+) -> Array:
+    """Pixels of points of cables, shape (m, 2, count) [px]; NaN where they are not in the image.
+
+    What hides a cable, as the platform may, is not modelled.
 
     Args:
-        x: Horizontal distances from the first end, shape (n,) [m].
-        span: Horizontal distance of the ends, positive [m].
-        rise: How much higher the second end is [m].
-        surplus: Length less the distance of the ends, not negative [m].
-
-    Source: Irvine, Cable Structures, 1981, 1.1: z = a cosh((x - x0) / a) + c, with
-    L^2 = rise^2 + (2 a sinh(span / 2a))^2.
+        curves: Curves of the cables in W, shape (3, n) each [m].
+        X_WE: The camera E in W [m].
+        pinhole: Its intrinsic parameters.
+        count: Points of each cable.
+        noise: Standard deviation of each coordinate [px].
+        random: Where the noise comes from.
     """
-    chord = float(np.hypot(span, rise))
-    if surplus < FLAT * chord:
-        middle = np.sqrt(max(surplus, 0.0)) * _per_root(span, chord)
-        return np.asarray(4.0 * middle * x * (span - x) / span**2)
-    line, length = rise * x / span, chord + surplus
-    # More than 1, and 1 + xi^2 / 6 + xi^4 / 120 + ... of xi = span / 2a.
-    ratio = np.sqrt(length**2 - rise**2) / span
-    xi = np.sqrt(6.0 * (ratio - 1.0)) if ratio < 3.0 else np.log(2.0 * ratio) + 1.0
-    for _ in range(ITERATIONS):
-        xi -= (np.sinh(xi) - ratio * xi) / (np.cosh(xi) - ratio)
-    a = span / (2.0 * xi)
-    x0 = span / 2.0 - a * np.arcsinh(rise / (2.0 * a * np.sinh(xi)))
-    return np.asarray(line - a * (np.cosh((x - x0) / a) - np.cosh(x0 / a)))
+    found = np.full((len(curves), 2, count), np.nan)
+    X_EW = X_WE.inverse()
+    for k, curve in enumerate(curves):
+        found[k] = pinhole.project(X_EW @ even_points(curve, count))
+    found += noise * random.standard_normal(found.shape)
+    size = np.array([[pinhole.width], [pinhole.height]]) - 1.0
+    outside = np.any(~((found >= 0.0) & (found <= size)), axis=1)
+    found[np.broadcast_to(outside[:, np.newaxis], found.shape)] = np.nan
+    return found
 
 
-def surplus_of_drops(x: Array, drops: Array, span: float, rise: float) -> tuple[float, Array]:
-    """Surplus of the catenary that hangs closest to some points, by least squares.
+def even_points(curve: Array, count: int) -> Array:
+    """Points evenly along a curve without its ends, shape (3, count) [m].
 
     Args:
-        x: Horizontal distances of points from the first end, shape (n,) [m].
-        drops: How far they are below the line between the ends, shape (n,) [m].
-        span: Horizontal distance of the ends, positive [m].
-        rise: How much higher the second end is [m].
-
-    Returns:
-        Surplus [m], 0 where they lie above the line, and what it changes by each drop, shape (n,).
+        curve: Points, shape (3, n) [m].
+        count: How many.
     """
-    chord = float(np.hypot(span, rise))
-    bow = 4.0 * x * (span - x) / span**2
-    middle = float(bow @ drops / (bow @ bow))
-    # Of a parabola; the drop grows with the root of the surplus, which so is what is looked for.
-    root = middle / _per_root(span, chord)
-    if root <= SMALLEST_ROOT:
-        return 0.0, np.zeros_like(x)
-    for _ in range(ITERATIONS):
-        slope = _slope(x, span, rise, root)
-        change = slope @ (drops - catenary_drop(x, span, rise, root**2)) / (slope @ slope)
-        root = max(root + float(change), 0.1 * root)
-        if abs(change) < 1e-9:
-            break
-    slope = _slope(x, span, rise, root)
-    return root**2, 2.0 * root * slope / (slope @ slope)
-
-
-def _per_root(span: float, chord: float) -> float:
-    """Drop of a flat parabola's middle by the root of its surplus, for ends so far apart [m^0.5].
-
-    Source: Irvine, Cable Structures, 1981, 2.1: surplus = 8 middle^2 span^2 / (3 chord^3).
-    """
-    return float(chord**1.5 / (np.sqrt(8.0 / 3.0) * span))
-
-
-def _slope(x: Array, span: float, rise: float, root: float) -> Array:
-    """Derivative of the drops by the root of the surplus, shape (n,) [m^0.5]."""
-    step = min(DIFFERENCE, 0.5 * root)
-    after, before = (catenary_drop(x, span, rise, (root + s) ** 2) for s in (step, -step))
-    return np.asarray((after - before) / (2.0 * step))
-
-
-LEAST_POINTS = 5
-"""Points of a cable that must be seen."""
-
-LEAST_ANGLE = 0.1
-"""Sine of the least angle between a line of sight and the plane in which the cable hangs."""
-
-LEAST_SPAN = 0.02
-"""Horizontal distance of the ends from which a cable hangs down sideways [m]."""
+    steps = np.linalg.norm(np.diff(curve, axis=1), axis=0)
+    along = np.concatenate([[0.0], np.cumsum(steps)])
+    wanted = along[-1] * (np.arange(count) + 0.5) / count
+    return np.array([np.interp(wanted, along, row) for row in curve])
 
 
 @dataclass(frozen=True)
@@ -215,45 +189,72 @@ def slack_rates(
     return -np.minimum(np.maximum(rates, -correction), fastest)
 
 
-def even_points(curve: Array, count: int) -> Array:
-    """Points evenly along a curve without its ends, shape (3, count) [m].
+def catenary_drop(x: Array, span: float, rise: float, surplus: float) -> Array:
+    """How far a hanging cable is below the line between its ends, shape (n,) [m].
 
     Args:
-        curve: Points, shape (3, n) [m].
-        count: How many.
+        x: Horizontal distances from the first end, shape (n,) [m].
+        span: Horizontal distance of the ends, positive [m].
+        rise: How much higher the second end is [m].
+        surplus: Length less the distance of the ends, not negative [m].
+
+    Source: Irvine, Cable Structures, 1981, 1.1: z = a cosh((x - x0) / a) + c, with
+    L^2 = rise^2 + (2 a sinh(span / 2a))^2.
     """
-    steps = np.linalg.norm(np.diff(curve, axis=1), axis=0)
-    along = np.concatenate([[0.0], np.cumsum(steps)])
-    wanted = along[-1] * (np.arange(count) + 0.5) / count
-    return np.array([np.interp(wanted, along, row) for row in curve])
+    chord = float(np.hypot(span, rise))
+    if surplus < FLAT * chord:
+        middle = np.sqrt(max(surplus, 0.0)) * _per_root(span, chord)
+        return np.asarray(4.0 * middle * x * (span - x) / span**2)
+    line, length = rise * x / span, chord + surplus
+    # More than 1, and 1 + xi^2 / 6 + xi^4 / 120 + ... of xi = span / 2a.
+    ratio = np.sqrt(length**2 - rise**2) / span
+    xi = np.sqrt(6.0 * (ratio - 1.0)) if ratio < 3.0 else np.log(2.0 * ratio) + 1.0
+    for _ in range(ITERATIONS):
+        xi -= (np.sinh(xi) - ratio * xi) / (np.cosh(xi) - ratio)
+    a = span / (2.0 * xi)
+    x0 = span / 2.0 - a * np.arcsinh(rise / (2.0 * a * np.sinh(xi)))
+    return np.asarray(line - a * (np.cosh((x - x0) / a) - np.cosh(x0 / a)))
 
 
-def cable_images(
-    curves: Sequence[Array],
-    X_WE: RigidTransform,
-    pinhole: Pinhole,
-    count: int,
-    noise: float,
-    random: np.random.Generator,
-) -> Array:
-    """Pixels of points of cables, shape (m, 2, count) [px]; NaN where they are not in the image.
-
-    What hides a cable, as the platform may, is not modelled.
+def surplus_of_drops(x: Array, drops: Array, span: float, rise: float) -> tuple[float, Array]:
+    """Surplus of the catenary that hangs closest to some points, by least squares.
 
     Args:
-        curves: Curves of the cables in W, shape (3, n) each [m].
-        X_WE: The camera E in W [m].
-        pinhole: Its intrinsic parameters.
-        count: Points of each cable.
-        noise: Standard deviation of each coordinate [px].
-        random: Where the noise comes from.
+        x: Horizontal distances of points from the first end, shape (n,) [m].
+        drops: How far they are below the line between the ends, shape (n,) [m].
+        span: Horizontal distance of the ends, positive [m].
+        rise: How much higher the second end is [m].
+
+    Returns:
+        Surplus [m], 0 where they lie above the line, and what it changes by each drop, shape (n,).
     """
-    found = np.full((len(curves), 2, count), np.nan)
-    X_EW = X_WE.inverse()
-    for k, curve in enumerate(curves):
-        found[k] = pinhole.project(X_EW @ even_points(curve, count))
-    found += noise * random.standard_normal(found.shape)
-    size = np.array([[pinhole.width], [pinhole.height]]) - 1.0
-    outside = np.any(~((found >= 0.0) & (found <= size)), axis=1)
-    found[np.broadcast_to(outside[:, np.newaxis], found.shape)] = np.nan
-    return found
+    chord = float(np.hypot(span, rise))
+    bow = 4.0 * x * (span - x) / span**2
+    middle = float(bow @ drops / (bow @ bow))
+    # Of a parabola; the drop grows with the root of the surplus, which so is what is looked for.
+    root = middle / _per_root(span, chord)
+    if root <= SMALLEST_ROOT:
+        return 0.0, np.zeros_like(x)
+    for _ in range(ITERATIONS):
+        slope = _slope(x, span, rise, root)
+        change = slope @ (drops - catenary_drop(x, span, rise, root**2)) / (slope @ slope)
+        root = max(root + float(change), 0.1 * root)
+        if abs(change) < 1e-9:
+            break
+    slope = _slope(x, span, rise, root)
+    return root**2, 2.0 * root * slope / (slope @ slope)
+
+
+def _per_root(span: float, chord: float) -> float:
+    """Drop of a flat parabola's middle by the root of its surplus, for ends so far apart [m^0.5].
+
+    Source: Irvine, Cable Structures, 1981, 2.1: surplus = 8 middle^2 span^2 / (3 chord^3).
+    """
+    return float(chord**1.5 / (np.sqrt(8.0 / 3.0) * span))
+
+
+def _slope(x: Array, span: float, rise: float, root: float) -> Array:
+    """Derivative of the drops by the root of the surplus, shape (n,) [m^0.5]."""
+    step = min(DIFFERENCE, 0.5 * root)
+    after, before = (catenary_drop(x, span, rise, (root + s) ** 2) for s in (step, -step))
+    return np.asarray((after - before) / (2.0 * step))

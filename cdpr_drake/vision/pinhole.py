@@ -1,13 +1,11 @@
-"""The pinhole camera: intrinsic parameters, projection, field of view.
+"""The pinhole camera: intrinsic parameters, projection, field of view, and marks without pixels.
 
-Numba kernels of the pinhole camera: images of points, and whether they are in the picture.
+`Pinhole` is the camera for Python. The kernels take it as `Pinhole.numbers`, fx, fy, cx, cy first,
+and a pose X_CO as its matrix (3, 4), column by column, shape (12,) [-, m]: `images_of`, `is_faced`
+and `is_pictured` project points; `normalize_points`, `normalize_ellipses` and `crossing_diagonals`
+bring marks of targets to unit focal length.
 
-A pose X_CO comes as its matrix (3, 4), column by column, shape (12,) [-, m], a camera as
-`Pinhole.numbers`.
-
-Numba kernels that bring marks of targets to unit focal length.
-
-A camera is given by the numbers of its pinhole: fx, fy, cx, cy [px].
+Source: servoing thesis (1.41).
 """
 
 from __future__ import annotations

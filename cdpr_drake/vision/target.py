@@ -1,6 +1,8 @@
-"""What a camera looks at: one interface for tags, bundles of tags, dots and circles.
+"""What a camera looks at: one interface for tags, bundles of tags, dots, circles and textures.
 
-The pictures that targets carry.
+A `Target` is an object O with a pattern in its plane z = 0; `PointTarget` is one whose marks are
+points. `pose_from_points` finds X_CO. A `Plate` is a square with a picture on it, which a target
+carries; `blank_picture`, `draw_disc` and `picture_png` make such pictures.
 """
 
 from __future__ import annotations
@@ -17,50 +19,11 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.vision.pinhole import Pinhole, images_of, is_faced, is_pictured, normalize_points
 from cdpr_drake.vision.planar_pose_kernel import planar_pose
 
-PICTURE_PIXELS = 640
-
-
-@dataclass(frozen=True)
-class Plate:
-    """A square with a picture on it.
-
-    Attributes:
-        X_OT: Pose of its frame T in the object: x right, y up, z out of the picture.
-        png: The picture, a PNG file.
-        width: Edge [m].
-    """
-
-    X_OT: RigidTransform
-    png: bytes
-    width: float
-
-
-def blank_picture() -> np.ndarray:
-    """A white picture, 8 bits, grey."""
-    return np.full((PICTURE_PIXELS, PICTURE_PIXELS), 255, np.uint8)
-
-
-def draw_disc(picture: np.ndarray, middle: tuple[float, float], radius: float, gray: int) -> None:
-    """Draws a disc with smooth edges; positions are from the picture's upper left corner [px]."""
-    v, u = np.mgrid[: picture.shape[0], : picture.shape[1]] + 0.5
-    share = np.clip(radius + 0.5 - np.hypot(u - middle[0], v - middle[1]), 0.0, 1.0)
-    picture[:] = np.round((1.0 - share) * picture + share * gray)
-
-
-def picture_png(picture: np.ndarray) -> bytes:
-    """The PNG file of a picture."""
-    return bytes(cv2.imencode(".png", picture)[1].tobytes())
-
-
 VISIBLE_BORDER = 1.0
 """What is seen must lie this far inside the image [px]."""
 
-
-class NormalNumbers(Protocol):
-    """Gives independent standard normal numbers, as numpy's Generator does."""
-
-    def standard_normal(self, size: Any) -> Any:
-        """An array of a shape."""
+PICTURE_PIXELS = 640
+"""Edge of a picture that is drawn here."""
 
 
 class Target(ABC):
@@ -208,14 +171,16 @@ class PointTarget(Target):
         return p_CK[:2] / p_CK[2]
 
 
+class NormalNumbers(Protocol):
+    """Gives independent standard normal numbers, as numpy's Generator does."""
+
+    def standard_normal(self, size: Any) -> Any:
+        """An array of a shape."""
+
+
 def faces_camera(X_CO: RigidTransform) -> bool:
     """Whether z of O points to the camera's side of its plane."""
     return bool(is_faced(_columns(X_CO)))
-
-
-def _columns(X: RigidTransform) -> Array:
-    """A pose as `projection_kernel` takes it, shape (12,)."""
-    return np.asarray(X.GetAsMatrix34().ravel("F"))
 
 
 def pose_from_points(p_OK: Array, uv: Array, pinhole: Pinhole) -> RigidTransform | None:
@@ -241,6 +206,11 @@ def pose_from_points(p_OK: Array, uv: Array, pinhole: Pinhole) -> RigidTransform
     return RigidTransform(RotationMatrix.ProjectToRotationMatrix(R), p)
 
 
+def _columns(X: RigidTransform) -> Array:
+    """A pose as the kernels of `pinhole` take it, shape (12,)."""
+    return np.asarray(X.GetAsMatrix34().ravel("F"))
+
+
 def _pose_in_space(points: Array, image: Array, pinhole: Pinhole) -> RigidTransform | None:
     """X_CO of points, shape (n, 3) [m], from their images, shape (n, 2) [px], by OpenCV."""
     K = pinhole.matrix()
@@ -256,3 +226,35 @@ def _pose_in_space(points: Array, image: Array, pinhole: Pinhole) -> RigidTransf
             R = RotationMatrix.ProjectToRotationMatrix(cv2.Rodrigues(r)[0])
             best, best_error = RigidTransform(R, np.ravel(p)), error
     return best
+
+
+@dataclass(frozen=True)
+class Plate:
+    """A square with a picture on it.
+
+    Attributes:
+        X_OT: Pose of its frame T in the object: x right, y up, z out of the picture.
+        png: The picture, a PNG file.
+        width: Edge [m].
+    """
+
+    X_OT: RigidTransform
+    png: bytes
+    width: float
+
+
+def blank_picture() -> np.ndarray:
+    """A white picture, 8 bits, grey."""
+    return np.full((PICTURE_PIXELS, PICTURE_PIXELS), 255, np.uint8)
+
+
+def draw_disc(picture: np.ndarray, middle: tuple[float, float], radius: float, gray: int) -> None:
+    """Draws a disc with smooth edges; positions are from the picture's upper left corner [px]."""
+    v, u = np.mgrid[: picture.shape[0], : picture.shape[1]] + 0.5
+    share = np.clip(radius + 0.5 - np.hypot(u - middle[0], v - middle[1]), 0.0, 1.0)
+    picture[:] = np.round((1.0 - share) * picture + share * gray)
+
+
+def picture_png(picture: np.ndarray) -> bytes:
+    """The PNG file of a picture."""
+    return bytes(cv2.imencode(".png", picture)[1].tobytes())

@@ -1,6 +1,7 @@
-"""Textures that are drawn by numbers from a seed: nobody's pictures, the same on every machine.
+"""Pictures of textures, and of what a camera sees of a target, drawn without a renderer.
 
-Draws what a camera sees of a target, without a renderer: each pixel the mean of samples.
+`texture_picture` draws a texture by numbers from a seed: nobody's picture, the same on every
+machine. `drawn_image` draws a target at a pose: each pixel is the mean of samples.
 """
 
 from __future__ import annotations
@@ -29,6 +30,55 @@ _SOFTNESS = 0.7
 """Standard deviation of the blur that takes away what pixels cannot show [px]."""
 
 _SEED = 7
+
+SAMPLES = 4
+"""Of a drawn image, along a pixel."""
+
+
+@cache
+def texture_picture(name: str) -> np.ndarray:
+    """The picture of a texture, shape (256, 256), 8 bits, grey; not to be written to.
+
+    Args:
+        name: One of `TEXTURES`.
+    """
+    random = np.random.default_rng([_SEED, list(TEXTURES).index(name)])
+    fine = TEXTURES[name](random, _FINE * TEXTURE_PIXELS)
+    cells = fine.reshape(TEXTURE_PIXELS, _FINE, TEXTURE_PIXELS, _FINE).mean(axis=(1, 3))
+    soft = cv2.GaussianBlur(cells, (0, 0), _SOFTNESS, borderType=cv2.BORDER_REPLICATE)
+    picture = np.clip(np.round(soft), 0, 255).astype(np.uint8)
+    picture.flags.writeable = False
+    return picture
+
+
+def drawn_image(
+    target: Target, X_CO: RigidTransform, pinhole: Pinhole, *, ground: int = 150
+) -> np.ndarray:
+    """An image of a target's plates on a plain ground, shape (height, width, 3), 8 bits.
+
+    Args:
+        target: What is drawn; its plates do not hide each other.
+        X_CO: Its pose in the camera [m]; all corners of its plates lie before the camera.
+        pinhole: The camera.
+        ground: Gray of what is round it, 0..255.
+    """
+    size = (SAMPLES * pinhole.width, SAMPLES * pinhole.height)
+    samples = np.full(size[::-1], ground, np.uint8)
+    for plate in target.plates():
+        picture = cv2.imdecode(np.frombuffer(plate.png, np.uint8), cv2.IMREAD_GRAYSCALE)
+        # The last pixel's middle is not its rim: what is beyond is that pixel, too.
+        n, wider = picture.shape[0], 4
+        fine = cv2.resize(picture, (wider * n, wider * n), interpolation=cv2.INTER_LINEAR)
+        edge = wider * n
+        source = np.array([[0, 0], [edge, 0], [edge, edge], [0, edge]], np.float32) - 0.5
+        rim = pinhole.project(X_CO @ plate.X_OT @ tag_corners(plate.width)).T
+        place = ((rim + 0.5) * SAMPLES - 0.5).astype(np.float32)
+        H = cv2.getPerspectiveTransform(source, place)
+        where = cv2.warpPerspective(np.full_like(fine, 255), H, size, flags=cv2.INTER_NEAREST)
+        drawn = cv2.warpPerspective(fine, H, size, borderMode=cv2.BORDER_REPLICATE)
+        cv2.copyTo(drawn, where, samples)
+    gray = cv2.resize(samples, (pinhole.width, pinhole.height), interpolation=cv2.INTER_AREA)
+    return np.asarray(cv2.cvtColor(gray, cv2.COLOR_GRAY2RGB))
 
 
 def _stones(random: np.random.Generator, size: int) -> Array:
@@ -99,53 +149,3 @@ TEXTURES: dict[str, Callable[[np.random.Generator, int], Array]] = {
     "print": _print,
 }
 """Draws a texture from random numbers, `size` pixels along its edge, in grays from 0 to 255."""
-
-
-@cache
-def texture_picture(name: str) -> np.ndarray:
-    """The picture of a texture, shape (256, 256), 8 bits, grey; not to be written to.
-
-    Args:
-        name: One of `TEXTURES`.
-    """
-    random = np.random.default_rng([_SEED, list(TEXTURES).index(name)])
-    fine = TEXTURES[name](random, _FINE * TEXTURE_PIXELS)
-    cells = fine.reshape(TEXTURE_PIXELS, _FINE, TEXTURE_PIXELS, _FINE).mean(axis=(1, 3))
-    soft = cv2.GaussianBlur(cells, (0, 0), _SOFTNESS, borderType=cv2.BORDER_REPLICATE)
-    picture = np.clip(np.round(soft), 0, 255).astype(np.uint8)
-    picture.flags.writeable = False
-    return picture
-
-
-SAMPLES = 4
-"""Along a pixel."""
-
-
-def drawn_image(
-    target: Target, X_CO: RigidTransform, pinhole: Pinhole, *, ground: int = 150
-) -> np.ndarray:
-    """An image of a target's plates on a plain ground, shape (height, width, 3), 8 bits.
-
-    Args:
-        target: What is drawn; its plates do not hide each other.
-        X_CO: Its pose in the camera [m]; all corners of its plates lie before the camera.
-        pinhole: The camera.
-        ground: Gray of what is round it, 0..255.
-    """
-    size = (SAMPLES * pinhole.width, SAMPLES * pinhole.height)
-    samples = np.full(size[::-1], ground, np.uint8)
-    for plate in target.plates():
-        picture = cv2.imdecode(np.frombuffer(plate.png, np.uint8), cv2.IMREAD_GRAYSCALE)
-        # The last pixel's middle is not its rim: what is beyond is that pixel, too.
-        n, wider = picture.shape[0], 4
-        fine = cv2.resize(picture, (wider * n, wider * n), interpolation=cv2.INTER_LINEAR)
-        edge = wider * n
-        source = np.array([[0, 0], [edge, 0], [edge, edge], [0, edge]], np.float32) - 0.5
-        rim = pinhole.project(X_CO @ plate.X_OT @ tag_corners(plate.width)).T
-        place = ((rim + 0.5) * SAMPLES - 0.5).astype(np.float32)
-        H = cv2.getPerspectiveTransform(source, place)
-        where = cv2.warpPerspective(np.full_like(fine, 255), H, size, flags=cv2.INTER_NEAREST)
-        drawn = cv2.warpPerspective(fine, H, size, borderMode=cv2.BORDER_REPLICATE)
-        cv2.copyTo(drawn, where, samples)
-    gray = cv2.resize(samples, (pinhole.width, pinhole.height), interpolation=cv2.INTER_AREA)
-    return np.asarray(cv2.cvtColor(gray, cv2.COLOR_GRAY2RGB))

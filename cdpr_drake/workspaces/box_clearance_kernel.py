@@ -1,6 +1,6 @@
 """Proofs that a cable stays clear of a solid box, or does not, at every pose: numba kernels.
 
-See the room's docstring for notation and proof.
+Notation and proof stand in `box_verdicts_kernel`, under **Interference**.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def judge_box(
         end: The other at the middle, shape (3,) [m].
         sign: 1 or -1: how it moves.
         half: Half widths of the position, shape (3,) [m].
-        box: Row of `interference.box_row`.
+        box: Row of `cable_interference.box_row`.
         free: Length next to the apex that is not compared [m].
         apart: How far the cable's axis must be from the box, more than this [m].
         apex_error: How far the apex may be off [m].

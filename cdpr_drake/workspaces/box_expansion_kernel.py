@@ -1,6 +1,6 @@
 """Cables and demanded wrench about a pose, to first order with a bound on the rest: a numba kernel.
 
-See the room's docstring for notation and proof.
+Notation and proof stand in `box_verdicts_kernel`, under **Expansion**.
 """
 
 from __future__ import annotations
@@ -17,7 +17,8 @@ NUMBERS = 6
 """Of a pose: position, angles."""
 
 ROUNDING = 1e-12
-"""Share of the sum of absolute values that a computed sum may be wrong by; see the room."""
+"""Share of the sum of absolute values that a computed sum may be wrong by; see **Rounding** in
+`box_verdicts_kernel`."""
 
 EXIT, ANCHOR, BEND, GAIN = 0, 1, 2, 3
 """Columns of what is known of a cable's points in a box: bounds r_A, r_B on how far its exit point

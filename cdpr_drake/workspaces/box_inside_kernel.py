@@ -1,6 +1,6 @@
 """Proof that a demanded wrench can be given at every pose of a box: a numba kernel.
 
-See the room's docstring for notation and proof.
+Notation and proof stand in `box_verdicts_kernel`, under **Inside**.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ def central_tensions(
         d: Demanded wrench W t, shape (n,).
         lower: Smallest tensions, shape (m,).
         upper: Largest tensions, shape (m,), above them.
-        work: Of `tensions.workspace_shape`.
+        work: Of `quadratic_program_kernel.workspace_shape`.
         t: Gets the tensions, shape (m,).
         D2: Gets squares of the room, shape (m,).
         L: Gets the Cholesky factor of W D^2 W', shape (n, n).
@@ -136,7 +136,7 @@ def proves_inside(
         upper: Largest tensions, shape (m,).
         endless: Whether the proof may take any positive tensions; the bounds serve to find some.
         blamed: How much of the rest of V is due to each half width, shape (6,).
-        work: Of `tensions.workspace_shape`.
+        work: Of `quadratic_program_kernel.workspace_shape`.
         stretch: Gets how much of the room each of the half widths takes, shape (6,).
     """
     n, m = g.shape

@@ -1,6 +1,6 @@
 """Proof that no pose of a box can give a demanded wrench, or has wrench closure: numba kernels.
 
-See the room's docstring for notation and proof.
+Notation and proof stand in `box_verdicts_kernel`, under **Outside**.
 """
 
 from __future__ import annotations
@@ -141,7 +141,7 @@ def proves_outside(
     """Whether no pose of a box can give d within the bounds; c any vector, shape (n,), is changed.
 
     blame, shape (6,), gets how much each half width is in the way. Other arguments as
-    `inside_kernel.proves_inside`.
+    `box_inside_kernel.proves_inside`.
     """
     n, m = g.shape
     ck, width, some, W = (

@@ -1,6 +1,6 @@
 """Proofs that two cables stay clear, or do not, at every pose of a box: numba kernels.
 
-See the room's docstring for notation and proof.
+Notation and proof stand in `box_verdicts_kernel`, under **Interference**.
 """
 
 from __future__ import annotations

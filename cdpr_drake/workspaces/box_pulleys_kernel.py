@@ -1,6 +1,7 @@
 """What pulleys do to cables within a box of poses: points, first order and bounds: numba kernels.
 
-See the room's docstring for notation and proof.
+Notation and proof stand in `box_verdicts_kernel`, under **Pulleys at the frame** and **Pulleys at
+the platform**.
 """
 
 from __future__ import annotations

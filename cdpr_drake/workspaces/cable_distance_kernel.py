@@ -229,7 +229,7 @@ def many_clearances(
     first: int, past: int, positions: Array, rotations: Array, cables: Array, radius: Array,
     pairs: np.ndarray, bodies: Array, fixtures: Array, obstacles: Array, free: Array, out: Array,
 ) -> None:  # fmt: skip
-    """Writes the clearances of many poses, for `numerics.over_rows`.
+    """Writes the clearances of many poses, for `kernel_calls.over_rows`.
 
     Args:
         first: First pose.

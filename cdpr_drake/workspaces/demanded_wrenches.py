@@ -96,7 +96,7 @@ class Demand:
     Attributes:
         points: Vertices, shape (n, k, rows) [N m, N].
         spread: The set round each, T (box + ellipsoid), shape (n or 1, rows + 2, rows): T, half
-            widths, semi-axes; as `facets_kernel.demand_reach` takes it.
+            widths, semi-axes; as `wrench_facets_kernel.demand_reach` takes it.
     """
 
     points: Array

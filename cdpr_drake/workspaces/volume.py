@@ -1,6 +1,7 @@
-"""Volume of the part of a grid that belongs to a workspace, measured in three ways.
+"""Volume of the part of a grid that belongs to a workspace, and its surface for pictures.
 
-The surface of a set of grid points, for pictures.
+`workspace_volume` measures a set of grid points by one of three rules; `surface_quads` gives the
+faces of the cells all of whose corners are inside.
 """
 
 from __future__ import annotations

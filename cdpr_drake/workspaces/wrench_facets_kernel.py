@@ -178,7 +178,7 @@ def many_margins(
     first: int, past: int, W: Array, lower: Array, upper: Array, points: Array, spread: Array,
     terms: Array, starts: Array, margins: Array, worst: Array, full: Array,
 ) -> None:  # fmt: skip
-    """Writes the capacity margins of many poses, for `numerics.over_rows`.
+    """Writes the capacity margins of many poses, for `kernel_calls.over_rows`.
 
     Args:
         first: First pose.
@@ -245,7 +245,7 @@ def many_margins(
 
 @njit(cache=True, nogil=True)
 def many_closures(first: int, past: int, W: Array, terms: Array, starts: Array, out: Array) -> None:
-    """Writes how far W is from losing wrench closure, for `numerics.over_rows`.
+    """Writes how far W is from losing wrench closure, for `kernel_calls.over_rows`.
 
     That is the least, over all normals, of how far the columns reach to both sides; columns are of
     their own length. Positive: positive tensions can balance every wrench. Arguments as
@@ -290,7 +290,9 @@ def many_reaches(
     first: int, past: int, W: Array, lower: Array, upper: Array, points: Array, along: Array,
     terms: Array, starts: Array, out: Array,
 ) -> None:  # fmt: skip
-    """Writes how far one can go from a point inside along a direction, for `numerics.over_rows`.
+    """Writes how far one can go from a point inside along a direction.
+
+    For `kernel_calls.over_rows`.
 
     Args:
         first: First pose.

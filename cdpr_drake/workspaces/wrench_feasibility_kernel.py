@@ -163,7 +163,7 @@ def many_static(
     first: int, past: int, positions: Array, rotations: Array, cables: Array, load: Array,
     rows: np.ndarray, lower: Array, upper: Array, row_scale: Array, out: np.ndarray,
 ) -> None:  # fmt: skip
-    """Writes whether tensions balance weight and wrench, for `numerics.over_rows`.
+    """Writes whether tensions balance weight and wrench, for `kernel_calls.over_rows`.
 
     Args:
         first: First pose.

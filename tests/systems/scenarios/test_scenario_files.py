@@ -1,5 +1,7 @@
 """Scenario files are found, and told apart by their kind."""
 
+from importlib import import_module
+
 import pytest
 import yaml
 
@@ -8,6 +10,7 @@ from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
 from cdpr_drake.analyses.workspaces.stability_defaults import load_bounds
 from cdpr_drake.errors import DataFileError, ScenarioError
 from cdpr_drake.models.robot_loader import load_robot, robot_file
+from cdpr_drake.schema.yaml_files import FILE_KINDS
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.scenarios.files import (
     KINDS,
@@ -86,6 +89,12 @@ def test_a_file_of_another_kind_is_told_with_its_loader(load, file, words):
         load(file if load is load_bounds else str(file))
     assert caught.value.problems[0].startswith(f"{file}: {words}")
     assert len(caught.value.problems) == 1
+
+
+@pytest.mark.parametrize("what", FILE_KINDS)
+def test_the_loader_that_is_told_for_a_kind_of_file_can_be_imported(what):
+    module, name = FILE_KINDS[what][1].rsplit(".", 1)
+    assert callable(getattr(import_module(module), name))
 
 
 def test_a_scenario_of_another_kind_is_told_with_what_runs_it():
