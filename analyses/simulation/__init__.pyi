@@ -13,4 +13,5 @@ from .run_summary import summarize as summarize
 from .scenario_kinds import SCENARIO_KINDS as SCENARIO_KINDS
 from .session import Connect as Connect
 from .stability_files import stability_figure as stability_figure
+from .tension_control_run import run_tension_scenario as run_tension_scenario
 from .visual_servo_run import run_scenario as run_scenario
