@@ -63,7 +63,7 @@ def run_pick_and_place(
 ) -> PickAndPlaceRun:
     """Simulates a scenario until the box is set down, or the task has failed.
 
-    Arguments as `runs.run_scenario`; nothing outside can be connected.
+    Arguments as `visual_servo_run.run_scenario`; nothing outside can be connected.
 
     Raises:
         CdprError: The scenario cannot be built: robot, cameras or initial pose.
