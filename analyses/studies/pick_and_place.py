@@ -203,7 +203,6 @@ def one_camera_fails(found: Found) -> Statement:
 
 JUDGES = (set_down, hidden_on_the_way, hidden_while_lowered, one_camera_fails)
 
-
 SEEDS, QUICK_SEEDS = 20, 1
 ONE_CAMERA_SEEDS = 5
 """Runs with one camera, which all end the same way."""

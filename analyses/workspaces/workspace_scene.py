@@ -49,7 +49,6 @@ COLORS = (
 )
 """Of what all kinds have in common, then of the kinds in turn."""
 
-
 HULL_COLOR = Rgba(0.48, 0.65, 0.85, 0.45)
 
 MOST_BOXES = 3000

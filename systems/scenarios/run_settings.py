@@ -19,7 +19,6 @@ DIAGRAM = "diagram"
 LOOPS = (AUTOMATIC, DIAGRAM, COMPILED)
 """What steps a servo: a diagram, or `systems.loops.ServoLoop`."""
 
-
 ENDINGS = tuple(
     outcome.name.lower() for outcome in Outcome
     if outcome not in (Outcome.RUNNING, Outcome.INTERRUPTED, Outcome.CLIENT_ENDED)
