@@ -88,7 +88,7 @@ def make_control(scenario: TensionScenario) -> TensionControl:
     if not isinstance(scenario, TensionScenario):
         raise ScenarioError(
             f"{scenario.name}: kind: found {scenario.kind}; accepted: {TENSION_CONTROL}; for this "
-            "one use cdpr_drake.analyses.runs.run_scenario"
+            "one use cdpr_drake.analyses.simulation.run_scenario"
         )
     robot, belief = load_robot(scenario.robot), scenario.perturbations.believed_robot
     believed = robot if belief is None else load_robot(belief)

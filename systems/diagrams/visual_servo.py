@@ -153,7 +153,7 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
     if not isinstance(scenario, Scenario):
         raise ScenarioError(
             f"{scenario.name}: kind: found {scenario.kind}; accepted: {VISUAL_SERVO}; for this one "
-            "use cdpr_drake.analyses.runs.run_tension_scenario"
+            "use cdpr_drake.analyses.simulation.tension_control_run.run_tension_scenario"
         )
     robot = load_robot(scenario.robot)
     builder = DiagramBuilder()
