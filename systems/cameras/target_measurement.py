@@ -1,6 +1,7 @@
 """Measurements of a target by a camera: the ports and delay line that all share, and the detector.
 
-`TargetMeasurement` is the base of all cameras; `TargetDetector` finds the target in images.
+`TargetMeasurement` is the base of the rendered and of the projected camera; `TargetDetector` finds
+the target in images.
 """
 
 from __future__ import annotations
