@@ -122,9 +122,9 @@ def see_through(meshcat: Meshcat, path: str) -> None:
 
     Meshcat's materials write their depth also where they are transparent (`depthWrite`, of
     three.js). Of two faces of a solid that lie behind each other, the farther one is then seen only
-    if its triangle happens to be drawn first: there are dark triangles, patches of two layers, with
-    ragged edges. Without it every layer is seen, whatever the order, and other solids behind are,
-    too.
+    if its triangle happens to be drawn first: there are dark triangles, patches of two layers,
+    which are darker, with ragged edges. Without it every layer is seen, whatever the order, and
+    other solids behind are, too.
     """
     meshcat.SetProperty(f"{path}/<object>", "material.depthWrite", False)
     # Its shadow would be that of something solid.
