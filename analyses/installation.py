@@ -1,6 +1,8 @@
-"""Looks whether this machine has what cdpr_drake needs, and says the remedy where not.
+"""The installation on this machine: whether it has what is needed, and kernels compiled beforehand.
 
-Compiles at once what the first simulation, the first tension query and others would wait for.
+`examine` looks for what cdpr_drake needs, and says the remedy where something is missing or does
+not work. `compilation_steps` and `compile_step` compile at once what the first simulation, the
+first tension query and others would wait for.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
-"""Exit points on rails: where a reconfigurable robot's cables leave the frame in a configuration.
+"""Where cables leave the frame and reach the platform: exit points on rails, pulleys at both ends.
 
-Drake's YAML loader reads the annotations themselves, so they are not postponed here.
-
-Pulleys at both ends of cables.
+`Rail` is for reconfigurable robots: it says where a cable leaves the frame in a configuration.
+`Pulley` and `PlatformPulley` are schemas of swivelling pulleys.
 
 Drake's YAML loader reads the annotations themselves, so they are not postponed here.
 """

@@ -94,7 +94,6 @@ _ASSUMED = "frame.assumed"
 _TAKEN = ("exit_", "anchor_", "guide_", "rod_", "turn_", "hold_", "__")
 _NAMES = ("world", "frame", "platform", "frame_to_world", "home")
 
-
 _IN_W = {
     "axis", "plane_height", "cables[].exit_point", "home.position", "home.angles_deg",
     "pulley.swivel_axis", "cables[].swivel_axis", "frame.lower", "frame.upper",

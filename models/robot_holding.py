@@ -34,7 +34,7 @@ def hold_robot(robot: Robot, X_WP: RigidTransform, cables: CableSet, model: str)
 
     Raises:
         InfeasibleTensionError: No tensions within the robot's bounds hold this pose; sagging
-            cables need a tension of `statics.LEAST_TENSION_WEIGHTS` times their weight each.
+            cables need a tension of `static_tensions.LEAST_TENSION_WEIGHTS` times their weight.
         CableGeometryError: A pulley reaches into the platform, a cable cannot run, or it would
             break.
         TensionProblemError: The pose lies outside the frame, or the cables hold nothing there.

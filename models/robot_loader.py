@@ -1,6 +1,8 @@
-"""Finds and reads robot files.
+"""Finds, reads and checks robot files, and puts robots elsewhere.
 
-A robot somewhere else: in the world, shifted or turned, or its file in another folder.
+`load_robot` reads one by name or path. Further functions give the same robot somewhere else:
+shifted in the world (`moved_robot`), seen from a turned world (`turned_robot`), or with its file in
+another folder (`portable_robot`).
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
-"""What platform and frame look like where they are no boxes: spheres, cylinders, meshes, beams.
+"""Shapes of platform and frame where they are no boxes: spheres, cylinders, meshes, beams.
+
+`PlatformShape`, `FrameBeam` and `Frame` are schemas of a robot file. `check_shapes` holds what a
+file says of shapes against the platform's box and the file's folder.
 
 Drake's YAML loader reads the annotations themselves, so they are not postponed here.
-
-What a robot file says of shapes, held against its box and its folder.
 """
 
 import json

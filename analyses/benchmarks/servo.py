@@ -44,7 +44,6 @@ SCENARIOS = {
     "switching": "acrobot_switching",
 }
 
-
 CORRECTIONS = {
     "constant": "{kind: constant}",
     "adaptive": "{kind: adaptive}",

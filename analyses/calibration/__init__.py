@@ -1,17 +1,13 @@
-"""Calibration of a robot from a log: reads what was measured, asks, reports, writes a robot file.
+"""Calibration of a robot's geometry, and identification of its dynamics, from logs.
 
-A log is text with columns that bear their names and units, see `read_log`. What comes out is a
-robot file that scenarios take as `perturbations.believed_robot`, and all numbers as JSON.
+Both read a log, estimate parameters, report them, and write a robot file, and all numbers as JSON.
+A log is text with columns that bear their names and units, see `read_log`.
 
-Source: see `cdpr_drake.calibration`.
+* Calibration gives a robot file that scenarios take as `perturbations.believed_robot`.
+* Identification also validates what it found. Logs that `cdpr simulate` writes can be its logs, and
+  scenarios take its robot file as what the controller believes.
 
-Identification of a robot's dynamics from a log: reads, asks, validates, reports, writes a robot.
-
-A log is text with columns that bear their names and units, see `analyses.calibration.read_log`;
-those that `cdpr simulate` writes are such. What comes out is a robot file that scenarios take as
-what the controller believes, and all numbers as JSON.
-
-Source: see `cdpr_drake.identification`.
+Source: see `cdpr_drake.calibration` and `cdpr_drake.identification`.
 """
 
 import lazy_loader

@@ -57,7 +57,7 @@ class IdentificationTask:
 
     Attributes:
         robot: The robot as it is believed.
-        unknown: Groups of parameters, see `identification.GROUPS`.
+        unknown: Groups of parameters, see `identification.parameters.GROUPS`.
         common: Groups that are one for all cables or winches.
         priors: Standard deviations by group.
         bandwidth: Of the smoothing [Hz]; None: `USUAL_BANDWIDTH`, less for slow logs.

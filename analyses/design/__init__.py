@@ -1,23 +1,25 @@
-"""Designs of robots: what may change, what is wanted, the search, and whether it came true.
+"""Design of robots: what may change, what is wanted, the search, and whether it came true.
 
-A design is judged as the robot file that it would be: points moved, cables left out, drum and motor
-changed. `GOALS` is the table of what may be wanted; volumes are shares of a grid of poses and
-steer the search only. What was gained is said by `confirm`, which knows nothing of the search: by
-boxes proven inside the workspace, or poses proven stable on another grid.
+A design is a vector of numbers in [0, 1], one a free coordinate; symmetries tie coordinates
+together. It is judged as the robot file that it would be: points moved, cables left out, drum and
+motor changed.
 
-Source: kinds and measures of workspaces as `analyses.workspaces`; control stability as
-`analyses.workspaces`.
+* `MovedPoints` makes displacements of points of the vector.
+* `GOALS` is the table of what may be wanted; volumes are shares of a grid of poses and steer the
+  search only.
+* `EvolutionSearch` seeks the vector of the largest score by CMA-ES, which needs no gradients:
+  shares of poses are steps of the coordinates.
+* `SlopeSearch` seeks the largest least of smooth functions by their slopes, which takes far fewer
+  designs where a goal is such a least.
+* `undominated` says which designs no other one is better than, where several values are wanted.
+* `confirm` says what was gained, and knows nothing of the search: by boxes proven inside the
+  workspace, or poses proven stable on another grid.
 
-Searching a design: coordinates that symmetries tie together, evolution, what dominates what.
+What a search knows can be replayed from the scores, so that it goes on where it was killed.
 
-A design is a vector of numbers in [0, 1], one a free coordinate. `MovedPoints` makes displacements
-of points of it; `EvolutionSearch` seeks the vector of the largest score by CMA-ES, which needs no
-gradients: shares of poses are steps of the coordinates. `SlopeSearch` seeks the largest least of
-smooth functions by their slopes, which takes far fewer designs where a goal is such a least. All
-they know can be replayed from the scores, so that a search goes on where it was killed.
-
-Source: Hansen and Ostermeier, Completely derandomized self-adaptation in evolution strategies,
-2001, by the package cmaes; Deb, Multi-objective optimization using evolutionary algorithms, 2001.
+Source: kinds and measures of workspaces, and control stability, as `analyses.workspaces`; Hansen
+and Ostermeier, Completely derandomized self-adaptation in evolution strategies, 2001, by the
+package cmaes; Deb, Multi-objective optimization using evolutionary algorithms, 2001.
 """
 
 import lazy_loader

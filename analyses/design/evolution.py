@@ -1,6 +1,10 @@
-"""CMA-ES in the box [0, 1]^d by the package cmaes, a generation at a time.
+"""Evolutionary search for a design in the box [0, 1]^d, and which designs no other one dominates.
 
-Which designs no other one is better than.
+`EvolutionSearch` is CMA-ES by the package cmaes, a generation at a time; `undominated` finds the
+Pareto front of designs that have several values.
+
+Source: Hansen and Ostermeier, Completely derandomized self-adaptation in evolution strategies,
+2001; Deb, Multi-objective optimization using evolutionary algorithms, 2001.
 """
 
 from __future__ import annotations

@@ -107,7 +107,7 @@ def servo_stable(robot: Robot, judging: Judging, verdict: str) -> np.ndarray:
     Args:
         robot: The robot.
         judging: Poses and bounds.
-        verdict: One of `stability.VERDICTS`; certified: proven.
+        verdict: One of `stability.verdict.VERDICTS`; certified: proven.
     """
     grid = judging.grid
     case = stability_case(robot, "pbvs", grid)

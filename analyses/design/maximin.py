@@ -1,6 +1,9 @@
-"""The largest least value of many smooth functions in the box [0, 1]^d, by their slopes.
+"""Maximin search for a design: the largest least value of many smooth functions in [0, 1]^d.
 
-Slopes of goals by the coordinates of a design, where a goal is the least of smooth functions.
+`SlopeSearch` seeks it by the slopes of the functions. `SLOPES` has those of goals by the
+coordinates of a design, where a goal is the least of smooth functions.
+
+Source: see `SlopeSearch`.
 """
 
 from __future__ import annotations

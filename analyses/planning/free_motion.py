@@ -54,7 +54,7 @@ class FreeSettings:
         knots: Of the program.
         clearance: Least distance of cables from each other, and of cables and platform from
             obstacles; None: not asked for [m].
-        obstacles: Boxes, rows of `workspaces.box_row`, shape (o, 15).
+        obstacles: Boxes, rows of `cable_interference.box_row`, shape (o, 15).
         in_view: Points of W that a camera on the platform sees all along, shape (3, p); None: no.
         camera: Name of the camera's mounting; None: the only one on the platform.
         nearest: Least depth of these points in the camera [m].

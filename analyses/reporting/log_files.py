@@ -53,10 +53,8 @@ _PER_CABLE = {
     "friction_torques": "nm",
 }
 
-
 ROWS_AT_ONCE = 2000
 """Rows of a log that are words at the same time: hours of them would not fit into memory."""
-
 
 Parts = Mapping[str, Sequence[str]]
 """Names of the numbers of quantities, by the names of these."""

@@ -1,6 +1,8 @@
-"""What computed a result: versions, and whether the code is still the same.
+"""Provenance of results: the versions and sources that computed them, and a run's input files.
 
-What a run was made of, beside its results: somebody else can repeat it from the folder.
+`package_versions` and `code_version` say what computed a result, and whether the code is still the
+same. `write_run_inputs` puts robot, scenario and motion beside a run's results, so that somebody
+else can repeat it from the folder.
 """
 
 from __future__ import annotations

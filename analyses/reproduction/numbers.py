@@ -40,7 +40,7 @@ def judge_number(number: PublishedNumber, ours: Mapping[str, Any]) -> tuple[str,
 
     Args:
         number: What is printed.
-        ours: What was found of its configuration, see `case_studies` results.
+        ours: What was found of its configuration, see `CaseResult.as_dict`.
 
     Returns:
         Our number in words, with its spread over the runs; verdict; by how much it differs, and

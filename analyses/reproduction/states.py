@@ -27,7 +27,7 @@ class StudyState:
         study: Its name.
         status: BEGUN, FINISHED, STOPPED or FAILED.
         quick: Whether it is the quick form.
-        code: Version of the code, see `reporting.code_version`.
+        code: Version of the code, see `reporting.provenance.code_version`.
         seconds: Wall time of all sessions [s].
         note: What happened to earlier results, such as that the code has changed.
         error: What went wrong, in a line.

@@ -34,7 +34,7 @@ class Checkpoint:
 
     Attributes:
         asked: All that the run depends on, for JSON: code, scenario, robot.
-        state: State of its diagram, see `systems.monitoring.state_arrays`.
+        state: State of its diagram, see `monitoring.context_state.state_arrays`.
         rows: Rows of the log on disk by then.
         wall_time: Time that the run had taken [s].
     """

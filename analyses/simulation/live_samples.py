@@ -39,7 +39,7 @@ class Moments:
             self._picture = MarksPicture(self._model)
 
     def begin(self) -> Message:
-        """What is said before the run starts, see `messages`."""
+        """What is said before the run starts, see `live_messages`."""
         scenario, robot = self._scenario, self._robot
         return Message(
             "begin",

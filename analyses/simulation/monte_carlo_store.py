@@ -1,6 +1,7 @@
-"""Keeps each finished run of many in a folder, so that whatever ends the program loses none.
+"""The store of Monte Carlo runs: each finished run is kept in a folder, by its seed.
 
-What is kept of one run of many.
+Whatever ends the program loses no finished run. `RunRecord` is what is kept of one, `KeptRuns` the
+folder.
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
-"""Advances a simulation in pieces, with reports, requests to stop, and an outcome at the end.
+"""Advances a simulation in pieces, with reports and requests to stop, and says how it ended.
 
-What every run keeps, however it was simulated and whoever wrote its log.
+`advance` does so with a Drake simulator, `go_on` with whatever can be advanced. `EndedRun` is what
+every run keeps, however it was simulated and whoever wrote its log.
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""How a run is run: who looks, who may stop it, where its log goes, who takes part.
-
-A process outside in the loop of a run.
-"""
+"""How a run is run: who looks, who may stop it, where its log goes, which process outside joins."""
 
 from __future__ import annotations
 

@@ -1,6 +1,7 @@
-"""Two models of the same robot beside each other: modelling errors, cables against rigid rods.
+"""Statics of a robot at one pose, and its modelling errors: numbers, and pictures of them.
 
-Questions about a robot at one pose: tensions, rest; numbers, and pictures of them.
+* Queries at one pose: tensions, the pose of rest.
+* Modelling errors: two models of the same robot beside each other, cables against rigid rods.
 
 Pictures are imported when they are asked for, since that takes longer than the answers.
 """

@@ -223,7 +223,6 @@ STUDIES: dict[str, StudyEntry] = {
 }
 """Studies by name, in the order in which the command line lists them."""
 
-
 RESULTS = "results.json"
 """A study's numbers."""
 

@@ -1,9 +1,8 @@
-"""Runs the study: a search for each robot, and the proof of its best design.
-
-Study: what moving points is worth: ACROBOT for wrenches to resist, CAROCA for visual servoing.
+"""Study of what moving points is worth: ACROBOT for wrenches to resist, CAROCA for visual servoing.
 
 Exit points move by up to 10 cm, anchor points of CAROCA by up to 5 cm, with the half-turn symmetry
-of both robots kept; what was gained is proven, not taken from the search.
+of both robots kept. `study_design` runs a search for each robot and proves its best design: what
+was gained is proven, not taken from the search.
 """
 
 from __future__ import annotations

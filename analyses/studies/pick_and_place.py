@@ -1,14 +1,12 @@
-"""Runs the study, and what it leaves: numbers, tables, figures.
-
-One run of picking and placing as numbers, as an item of a sweep.
-
-What picking and placing has to show, and whether it does.
-
-Study: a box is taken and set down by what cameras see, with its goal in view and hidden.
+"""Study: a box is taken and set down by what cameras see, with its goal in view and hidden.
 
 `study_pick_and_place` runs `acrobot_pick_and_place` over seeds, which say where box and goal truly
 are and what the robot believes wrongly: with the goal's tag in view, hidden on the way, hidden
 while the box is lowered, and with the camera alone that the box blinds.
+
+`HandlingTrial` gives one run as numbers, an item of a sweep. `JUDGES` say what picking and placing
+has to show, and whether it does. `PickAndPlaceStudy` is what the study leaves: numbers, tables,
+figures.
 
 Source: servoing thesis 5.4, perspectives; the numbers that have to be reached are ours.
 """
@@ -204,7 +202,6 @@ def one_camera_fails(found: Found) -> Statement:
 
 
 JUDGES = (set_down, hidden_on_the_way, hidden_while_lowered, one_camera_fails)
-
 
 SEEDS, QUICK_SEEDS = 20, 1
 ONE_CAMERA_SEEDS = 5

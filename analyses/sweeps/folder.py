@@ -35,7 +35,6 @@ OWN_CHUNK = re.compile(r"(\.part-)?.+-\d{7,}-\d{7,}\.npz")
 NAMED_DIFFERENCES = 3
 """So many differences between arguments are named in an error."""
 
-
 LONGEST_VALUE = 40
 """A value of more characters is not written out in an error."""
 

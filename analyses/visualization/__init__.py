@@ -1,4 +1,4 @@
-"""Figures and pages that runs and studies share: style, cables in space, the replay of a run."""
+"""Figures and pages that runs and studies share: style, cables, solids, the replay of a run."""
 
 import lazy_loader
 

@@ -50,7 +50,6 @@ and beside each other."""
 BAR_EDGE = "#202020"
 """Of bars, and so of their hatches."""
 
-
 COVERED_LINE: dict[str, Any] = {
     "linestyle": "-", "linewidth": 5.0, "alpha": 0.4,
     "marker": "o", "markersize": 9, "markerfacecolor": "none", "markeredgewidth": 1.4,

@@ -1,11 +1,7 @@
-"""Solids in a robot's frame, as workspaces are drawn.
+"""Solids in a robot's frame, as workspaces are drawn: in a figure, and in Meshcat.
 
-Solids that are seen through, without the dark triangles that Meshcat would show in them.
-
-Meshcat's materials write their depth also where they are transparent (`depthWrite`, of three.js).
-Of two faces of a solid that lie behind each other, the farther one is then seen only if its
-triangle happens to be drawn first: patches of two layers, which are darker, with ragged edges.
-Without it every layer is seen, whatever the order, and other solids behind are, too.
+`draw_solid` draws one in a figure, `add_solid` in Meshcat. `see_through` and `transparent_paths`
+are for what is transparent there.
 """
 
 from __future__ import annotations
@@ -122,7 +118,14 @@ def add_solid(
 
 
 def see_through(meshcat: Meshcat, path: str) -> None:
-    """Lets the one mesh at a path, which is transparent, be seen through wherever it is."""
+    """Lets the one mesh at a path, which is transparent, be seen through wherever it is.
+
+    Meshcat's materials write their depth also where they are transparent (`depthWrite`, of
+    three.js). Of two faces of a solid that lie behind each other, the farther one is then seen only
+    if its triangle happens to be drawn first: there are dark triangles, patches of two layers,
+    which are darker, with ragged edges. Without it every layer is seen, whatever the order, and
+    other solids behind are, too.
+    """
     meshcat.SetProperty(f"{path}/<object>", "material.depthWrite", False)
     # Its shadow would be that of something solid.
     meshcat.SetProperty(f"{path}/<object>", "castShadow", False)

@@ -1,18 +1,17 @@
-"""Workspaces of robots: kinds and measures by name, the question, the sweep, figures, the page.
+"""Workspaces of robots over grids of poses: which poses are inside, and measures of those.
 
-`KINDS` and `MEASURES` are the tables; a new kind is a row. Figures are imported when they are asked
-for.
+* Grids of poses: what `cdpr stability` and `cdpr workspace` share. Each says its tasks and makes a
+  result of their arrays; how chunks are kept, found again and computed in processes or on a cluster
+  is here, and so are the grid, the results' file and their numbers.
+* Workspaces of a robot (`cdpr workspace`): `KINDS` and `MEASURES` of `conditions` are the tables of
+  kinds and measures by name; a new kind is a row.
+* Workspaces of control stability (`cdpr stability`): where a visual servo is stable.
 
-Source: Gazebo thesis 2.6; servoing thesis 1.2.2 and 1.3.3.
+Each of the two has its question, its sweep over the grid, its figures and its page. Figures are
+imported when they are asked for.
 
-What questions over a grid of poses share: their grid, their run, their file, their numbers.
-
-`cdpr stability` and `cdpr workspace` are such questions: each says its tasks and makes a result of
-their arrays; how chunks are kept, found again and computed in processes or on a cluster is here.
-
-Workspaces of stability: the question, the sweep over a grid, figures and the page.
-
-Source: servoing thesis 3.3.
+Source: workspaces: Gazebo thesis 2.6, servoing thesis 1.2.2 and 1.3.3; control stability:
+servoing thesis 3.3.
 """
 
 import lazy_loader

@@ -226,7 +226,7 @@ def write_boxes(found: CertifiedBoxes, path: Path) -> Path:
     """Writes the positions of the boxes as cells of VTK, with verdict and half angles.
 
     Raises:
-        WorkspaceError: The file's ending is none of `workspaces.GRID_ENDINGS`, or meshio is not
+        WorkspaceError: The file's ending is none of `mesh_files.GRID_ENDINGS`, or meshio is not
             installed.
     """
     numbers: dict[str, np.ndarray] = {"verdict": found.verdicts.astype(np.int32)}

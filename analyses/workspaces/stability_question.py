@@ -1,6 +1,7 @@
-"""What a control stability workspace is asked for: all that its numbers depend on.
+"""The question of a control stability workspace: all that its numbers depend on.
 
-The task of a scenario as a question of stability has it: camera, object, desired view.
+`make_question` fills it up with the servoing thesis' grid and bounds. `scenario_task` makes its
+task of a scenario's: camera, object, desired view.
 """
 
 from __future__ import annotations
@@ -63,7 +64,7 @@ class CameraTask:
             grid's box, the longest there is, with half a turn about z; for 2.5d without a turn and
             with the object `OBJECT_DISTANCE` ahead.
         X_PC: Camera on the platform; aligned with it, at Po.
-        lever: One of `stability.LEVERS`.
+        lever: One of `stability.stability_case.LEVERS`.
     """
 
     target: ServoTarget | None = None
@@ -169,7 +170,7 @@ def make_question(
     Args:
         robot_name: Robot by name, or path of a robot file.
         scheme: Visual servoing scheme.
-        verdict: One of `stability.VERDICTS`.
+        verdict: One of `stability.verdict.VERDICTS`.
         bounds: Perturbation bounds, named `GIVEN`; None: those of `defaults`, `BASE`.
         vary: Values of single bounds, each with the others as they are; in m and rad, or in
             degrees where the name ends in _deg.

@@ -33,7 +33,6 @@ were kept under other numbers are not found, and computed again."""
 STATIC = "static"
 """Name of the static feasible workspace among the tasks of the sweep."""
 
-
 LEVERS_IN_WORDS = {
     "error": "L_s with [e_t]x, (1.47) as printed",
     "object": "L_s with [s_t]x, exact",

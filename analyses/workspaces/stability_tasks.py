@@ -34,7 +34,7 @@ class GridTask:
     options: VerdictOptions
 
     def judged(self, start: int, stop: int, verdict: str) -> StabilityChunk:
-        """What one of `stability.VERDICTS` says of the poses start to stop."""
+        """What one of `stability.verdict.VERDICTS` says of the poses start to stop."""
         poses = self.grid.pose_rows(start, stop)
         return judge_stability(self.case, self.bounds, poses, verdict, self.options)
 
@@ -44,7 +44,7 @@ class StabilityTask(GridTask):
     """By one verdict, with margins.
 
     Attributes:
-        verdict: One of `stability.VERDICTS`.
+        verdict: One of `stability.verdict.VERDICTS`.
     """
 
     verdict: str

@@ -68,7 +68,7 @@ def load_wrench_set(path: Path) -> SpatialSet:
 
 
 def load_obstacles(path: Path) -> Array:
-    """Reads boxes, shape (o, 15), rows of `workspaces.box_row`; keys as `ObstacleFile`.
+    """Reads boxes, shape (o, 15), rows of `cable_interference.box_row`; keys as `ObstacleFile`.
 
     Raises:
         DataFileError: The file cannot be read, or a value is not accepted.

@@ -116,7 +116,7 @@ def question_hull(
         bound: Where rays end at the latest; None: as `hull_bound` says of the robot.
 
     Raises:
-        WorkspaceError: As `workspaces.workspace_hull`, or the robot does not move in space.
+        WorkspaceError: As `workspaces.hull.workspace_hull`, or the robot does not move in space.
     """
     if robot.motion_type().num_moves < 3:
         raise WorkspaceError(

@@ -164,7 +164,7 @@ def robot_workspace(
     on_progress: Callable[[WorkProgress], None] | None = None,
     should_stop: Callable[[], bool] | None = None,
 ) -> WorkspaceRun:
-    """Computes a workspace; arguments as `sweeps.run_sweep`.
+    """Computes a workspace; arguments as `sweeps.sweep.run_sweep`.
 
     Args:
         question: What to compute.

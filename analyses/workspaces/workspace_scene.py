@@ -1,6 +1,7 @@
-"""Workspaces in the robot's scene, as a page for the browser.
+"""A workspace as grid, hull and boxes: in the robot's scene as a page, its numbers, its files.
 
-All ways in which a workspace was drawn, and their files.
+`workspace_page` writes the page for the browser; `WorkspaceDrawings` has all ways in which a
+workspace was drawn, and writes their files.
 """
 
 from __future__ import annotations
@@ -47,7 +48,6 @@ COLORS = (
     Rgba(0.60, 0.60, 0.60, 0.45),
 )
 """Of what all kinds have in common, then of the kinds in turn."""
-
 
 HULL_COLOR = Rgba(0.48, 0.65, 0.85, 0.45)
 

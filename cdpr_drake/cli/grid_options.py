@@ -1,8 +1,8 @@
-"""Options of questions over a grid of poses, and what their words mean: one set for all of them.
+"""Questions over a grid of poses on the command line: their options, their grids, their sweep.
 
-Grids of poses on the command line.
-
-A sweep over poses on the command line: where it stands, and how Ctrl-C ends it.
+One set of options for all such commands (`GridWords` to `Workers`), and what their words mean:
+`parse_grid` and `parse_turns` make the grid. `watched` runs the sweep over it, shows where it
+stands, and lets Ctrl-C end it.
 """
 
 from __future__ import annotations
@@ -80,7 +80,6 @@ def default_folder(command: str, name: str, arguments: dict[str, Any]) -> Path:
 
 MOST_POSES = 10_000_000
 """Largest grid: its results are some 100 MB for each bounds, and take hours at least."""
-
 
 MOST_TURNS = 10_000
 """Orientations of one grid."""

@@ -18,16 +18,10 @@ from cdpr_drake.analyses.calibration.identification_campaign_files import (
     write_dynamic_campaign,
 )
 from cdpr_drake.analyses.calibration.identification_report import (
-    identification_dict as as_dict,
-)
-from cdpr_drake.analyses.calibration.identification_report import (
+    identification_dict,
     identification_drawings,
-)
-from cdpr_drake.analyses.calibration.identification_report import (
-    identification_tables as tables,
-)
-from cdpr_drake.analyses.calibration.identification_report import (
-    write_identification as write,
+    identification_tables,
+    write_identification,
 )
 from cdpr_drake.analyses.calibration.identification_task import (
     UNKNOWN,
@@ -153,9 +147,11 @@ def identify(
 
     def work(folder: Path, say: Callable[[str], None]) -> Told:
         found = run_identification(task, read, other, say)
-        write(found, folder)
+        write_identification(found, folder)
         drawings = identification_drawings(found)
-        return Told(as_dict(found), tables(found), drawings, _code(found.result))
+        return Told(
+            identification_dict(found), identification_tables(found), drawings, _code(found.result)
+        )
 
     folder = results_below_runs(out, f"identify-{loaded.name}")
     return write_and_tell(f"Identifying {loaded.name}", folder, ending, work)
@@ -178,8 +174,8 @@ def _campaign(name: str, unknown: tuple[str, ...], out: Path | None, ending: End
         run = run_dynamic_campaign(scenario, unknown, say)
         write_dynamic_campaign(run, folder)
         found = run.identification
-        shown = (*tables(found, run.truth), tracking_table(run))
-        numbers = as_dict(found, run.as_dict(), run.truth)
+        shown = (*identification_tables(found, run.truth), tracking_table(run))
+        numbers = identification_dict(found, run.as_dict(), run.truth)
         return Told(numbers, shown, campaign_drawings(run), _code(found.result))
 
     folder = results_below_runs(out, f"identify-{scenario.name}")

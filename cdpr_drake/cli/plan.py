@@ -1,6 +1,7 @@
 """`cdpr plan`: the fastest motion of a robot along a path, or a motion whose path is free.
 
-Options of `cdpr plan`, and what their words mean.
+The options come first, and what users wrote of a free path (`FreeWords`); then the command, and
+what it does for either kind of motion.
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
-"""Ctrl-C, and SIGTERM as batch systems and containers send it, as a polite request.
+"""A command as a process: how it is asked to stop, and what it starts while it is imported.
 
-Commands that another program started end with it, also where that was killed.
-
-Which kernels a command will need, so that other processes compile them while it starts.
+* `StopRequest`: Ctrl-C, and SIGTERM as batch systems and containers send it, as a polite request.
+* `hold_lifeline`: a command that another program started ends with it, also where that was killed.
+* `compile_ahead`: which kernels a command will need, so that other processes compile them while it
+  starts.
 """
 
 from __future__ import annotations
@@ -23,7 +24,6 @@ INTERRUPTED = 130
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 """What asks to stop."""
-
 
 STOPPING = "Stopping; what is finished is written; Ctrl-C again ends this now"
 """Answer to the first Ctrl-C where nothing else is said."""

@@ -18,7 +18,6 @@ INCOMPLETE = 3
 CLIENT_ENDED = 4
 """Exit code of a run that ended early because of the process outside that closes its loop."""
 
-
 STUDY_FAILED = 5
 """Exit code of a reproduction of which a study failed; the report says which."""
 

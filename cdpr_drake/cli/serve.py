@@ -23,8 +23,7 @@ from cdpr_drake.systems.remote.messages import PROTOCOL, check_available
 from cdpr_drake.systems.remote.remote_client import LOCAL_HOST, USUAL_PORT
 from cdpr_drake.systems.remote.remote_driver import Driver, Pace
 from cdpr_drake.systems.remote.remote_place import SERVO_PLACES, TENSION_PLACES, Remote
-from cdpr_drake.systems.remote.server_socket import ServerSocket as Socket
-from cdpr_drake.systems.remote.server_socket import is_loopback
+from cdpr_drake.systems.remote.server_socket import ServerSocket, is_loopback
 from cdpr_drake.systems.remote.service import tension_service
 from cdpr_drake.systems.scenarios.files import scenario_kind
 from cdpr_drake.systems.scenarios.tension_control_scenario import TensionScenario
@@ -115,7 +114,7 @@ class _Client:
         self._scenario, self._wait = scenario, wait
         self._stop: StopRequest | None = None
         self._driver: Driver | None = None
-        self._socket = Socket(host, port, lambda: self._stop is not None and self._stop())
+        self._socket = ServerSocket(host, port, lambda: self._stop is not None and self._stop())
         if not is_loopback(host):
             message_console().print(
                 f"warning: {self._socket.address} is open to other machines: whoever reaches it "

@@ -1,7 +1,4 @@
-"""Starts the studio's server.
-
-How the studio is started.
-"""
+"""The studio's server: its options, and what starts it."""
 
 from __future__ import annotations
 

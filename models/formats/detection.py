@@ -28,7 +28,7 @@ _XML = {is_caspr: read_caspr, is_wirex: read_wirex, is_mjcf: read_mjcf,
 
 
 def is_foreign(path: Path) -> bool:
-    """Whether a path is for a reader of this room rather than a robot file of this package."""
+    """Whether a path is of another tool's format rather than a robot file of this package."""
     if path.is_dir():
         return not (path / "robot.yaml").is_file()
     if path.suffix.lower() in YAML_SUFFIXES:

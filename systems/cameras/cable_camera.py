@@ -34,7 +34,7 @@ class CableCamera(LeafSystem):
                                            the image
     ================== ============== ==== =====================================================
 
-    A cable is drawn as `cables.cable_curves` has it; a slack one without weight hangs as its length
+    A cable is drawn as `curves.cable_curves` has it; a slack one without weight hangs as its length
     does. What hides a cable is not modelled. The image of time t is on the port for who acts at t.
     """
 

@@ -1,8 +1,6 @@
-"""Scenario section `camera`.
+"""Scenario section `camera`: its settings, and checks of them that need more than one field.
 
 Drake's YAML loader reads the annotations themselves, so they are not postponed here.
-
-Checks of a camera's settings that need more than one field.
 """
 
 from dataclasses import dataclass

@@ -1,6 +1,7 @@
-"""What cameras report about a target: the ports and the delay line that they share.
+"""Measurements of a target by a camera: the ports and delay line that all share, and the detector.
 
-Finds a target in the images of a camera.
+`TargetMeasurement` is the base of the rendered and of the projected camera; `TargetDetector` finds
+the target in images.
 """
 
 from __future__ import annotations

@@ -1,8 +1,6 @@
-"""The kinds of targets that a scenario can name; a new one is one entry of `TARGETS`.
+"""Scenario section `target`: what the camera servos on, of which kind it is and how it moves.
 
-Drake's YAML loader reads the annotations themselves, so they are not postponed here.
-
-Scenario section `target`: what the camera servos on.
+`TARGETS` is the table of the kinds that a scenario can name; a new one is one entry of it.
 
 Drake's YAML loader reads the annotations themselves, so they are not postponed here.
 """

@@ -1,8 +1,9 @@
-"""Computed-torque control of the platform in task space.
+"""Computed-torque control of the platform in task space, along a trajectory of poses.
 
-Computed torque along a trajectory of the platform, in one block.
+`PoseTrajectorySource` gives a trajectory on ports, `ComputedTorque` the wrench that makes the
+platform follow it; `PoseTracking` is both in one block.
 
-A trajectory of poses as ports of a diagram.
+Source: see `control.task_space.computed_torque`.
 """
 
 from __future__ import annotations
@@ -61,7 +62,7 @@ class ComputedTorque(LeafSystem):
     samples by itself would read the wrench of the period before: put it after a `ComputedTorque`
     without rate, whose wrench follows its inputs at once, or after a `PoseTracking`.
 
-    Source: see `control.computed_torque`.
+    Source: see `task_space.computed_torque`.
     """
 
     def __init__(

@@ -1,6 +1,7 @@
-"""Moves the platform along a plan by the model alone: what visual servoing is compared with.
+"""Open-loop motion along a plan by the model alone: what visual servoing is compared with.
 
-Scenario section `open_loop`: a planned motion of the platform instead of visual servoing.
+`OpenLoopSettings` is the scenario section `open_loop`: a planned motion of the platform instead of
+visual servoing.
 
 Drake's YAML loader reads the annotations themselves, so they are not postponed here.
 """

@@ -1,6 +1,7 @@
-"""Moves the platform to the pose from which its camera sees the target as desired, by a plan.
+"""Vision-based position control: a plan leads to where the camera sees the target as desired.
 
-Scenario section `pose_plan`: to the pose that the camera asks for, instead of by its features.
+`PosePlanSettings` is the scenario section `pose_plan`: the platform moves to the pose that the
+camera asks for, instead of by its features.
 
 Drake's YAML loader reads the annotations themselves, so they are not postponed here.
 """
@@ -41,7 +42,7 @@ class PlannedPoseServo(FeatureServo):
     ========= ============== ==== ==========================================================
 
     Every image corrects the goal, and the platform heads for it from where it is believed to be;
-    see `control.GoalPlan`. The gain is that plan's rate. While the target is not found the cables
+    see `GoalPlan`. The gain is that plan's rate. While the target is not found the cables
     stop; then, and with a new task, the plan begins anew. Winches by velocity or position follow
     its cable velocities, winches by torque its twist.
 

@@ -46,7 +46,7 @@ class PredictiveTensions:
 
 
 class PredictiveDistributor(TensionDistributor):
-    """Finds tensions by a quadratic program over a horizon, see `planning.Horizon`.
+    """Finds tensions by a quadratic program over a horizon, see `planning.horizon.Horizon`.
 
     Ports are those of `TensionDistributor`, so that the two are exchanged for each other. The
     desired wrench is what it distributes, by the method, where its program is not solved; that

@@ -32,7 +32,7 @@ class TorqueController(LeafSystem):
     ================= ============== ======== ===================================================
 
     Samples its inputs at a rate of its own, much faster than the servo's, and holds its torques.
-    The law is that of `control.TorqueServoLaw`.
+    The law is that of `torque_law.TorqueServoLaw`.
 
     Source: servoing thesis 5.2.3, Figs 5.5 to 5.7.
     """

@@ -173,7 +173,7 @@ class TensionControlSettings:
         distributor: Makes the block that distributes, from the arguments of `TensionDistributor`.
         rule: How the robot is integrated in compiled steps; None: a plant moves it, by the
             simulator's integrator.
-        remote: In which place of `remote.TENSION_PLACES` a process outside stands; None: nowhere.
+        remote: In which of `remote_place.TENSION_PLACES` a process outside stands; None: nowhere.
         world: What is round the robot; None: nothing. Contact needs the plant.
         stop_at_contact: Whether the first touch ends the simulation.
     """

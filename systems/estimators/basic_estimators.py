@@ -1,6 +1,7 @@
-"""The platform's pose as it is measured from outside, and one that is always wrong by the same.
+"""Estimators of the platform's pose from one reading: a tracker's, or the controller's own output.
 
-Estimates the platform's pose by integrating what the controller asks for.
+`MeasuredPose` passes a measurement from outside on; `ShiftedPose` is always wrong by the same;
+`ControlIntegration` integrates what the controller asks for.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""The pose estimators that a scenario can name; a new one is one entry of `ESTIMATORS`.
+"""Scenario section `estimator`: how the controller knows the platform's pose.
 
-Scenario section `estimator`: how the controller knows the platform's pose.
+`ESTIMATORS` is the table of the estimators that a scenario can name; a new one is one entry of it.
 
 Drake's YAML loader reads the annotations themselves, so they are not postponed here.
 """

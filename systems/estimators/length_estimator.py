@@ -1,6 +1,7 @@
-"""Estimates the platform's pose from the lengths of the tautest cables.
+"""Estimators of the platform's pose from the lengths of the tautest cables.
 
-Cable lengths as an estimator knows them: counted by the winches from a pose believed once.
+`EncoderLengths` are these lengths as an estimator knows them: counted by the winches from a pose
+believed once. `LengthEstimator` finds the pose.
 """
 
 from __future__ import annotations

@@ -64,7 +64,7 @@ NEAREST = 1e-3
 """What is nearer to the camera is not seen by anybody [m]."""
 
 MOTION_SIZE = 19
-"""Numbers of an IMU's motion since the start, see `perception.InertialMotion`."""
+"""Numbers of an IMU's motion since the start, see `InertialMotion`."""
 
 
 class SensorFusion(PoseEstimator):

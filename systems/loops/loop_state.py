@@ -1,6 +1,7 @@
-"""The whole state of a loop as arrays, so that a run can stop and go on elsewhere.
+"""The state of a loop as arrays, so that a run can stop and go on elsewhere, and its clocks.
 
-When a periodic event comes, as Drake says it.
+`Part`, `arrays_of` and `restore_arrays` are the state; `Clock` and `first_time` say when a periodic
+event comes, as Drake says it.
 """
 
 from __future__ import annotations

@@ -31,7 +31,7 @@ from cdpr_drake.winches.motor import MODES
 from cdpr_drake.winches.motor_kernel import pack_winch, winch_torques
 
 TENSIONS, DRUM_TENSIONS, LENGTHS, SLACK, SURPLUS = range(5)
-"""Rows of `RobotMotion.cables`, in the order of `cables.model_outputs`."""
+"""Rows of `RobotMotion.cables`, in the order of `simulation_kernel.model_outputs`."""
 
 
 class RobotMotion:
@@ -40,7 +40,7 @@ class RobotMotion:
     Attributes:
         robot: The robot.
         rule: How it is integrated.
-        report: Errors and numbers of steps so far, as `dynamics.REPORTED` says, shape (4,).
+        report: Errors and numbers of steps so far, as `advance_kernel.REPORTED` says, shape (4,).
     """
 
     def __init__(self, robot: Robot, settings: CableRobotSettings, rule: StepRule) -> None:

@@ -86,7 +86,7 @@ class CablePictures:
 
         Args:
             X_WP: The pose.
-            tensions: Shape (m,) [N]; a slack cable is red, see `cables.slack_tensions`, one with
+            tensions: Shape (m,) [N]; a slack cable is red, see `slack_tensions`, one with
                 NaN grey.
             time: While Meshcat records, where this goes in the recording [s].
             unstrained_lengths: From the exit points to the platform, which decide how cables sag

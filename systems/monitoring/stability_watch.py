@@ -1,6 +1,7 @@
-"""The stability criterion at moments of a servo, with the cables that are slack left out.
+"""The stability criterion along a run, with the cables that are slack left out.
 
-Scenario section `stability`: the stability criterion along a run, as signals of its log.
+`ServoCriterion` is the criterion at moments of a servo, `StabilityWatch` the block that gives it as
+signals of the log, and `StabilitySettings` the scenario section `stability` that asks for it.
 
 Drake's YAML loader reads the annotations themselves, so they are not postponed here.
 """

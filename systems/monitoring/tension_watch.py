@@ -1,6 +1,6 @@
-"""Remembers how far tensions went, at every step of a control and not only where a log has rows.
+"""Watches of tensions: how far they went, and which cables were pulled beyond their breaking load.
 
-Watches for cables that are pulled beyond their breaking load.
+They look at every step of a control, not only where a log has rows.
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
-"""The integration step that follows a box on its corners, in a grip.
+"""What is settled before a box is handled: the integration step, and the robot as it is believed.
 
-The robot as it believes itself to be while it handles a box.
+`box_step` is the step that follows a box on its corners, in a grip. `believed_robot` and
+`camera_poses` are the robot and its cameras as it believes them to be while it handles a box.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ def box_step(
         law: The grip, whose platform counts as fixed.
         gravity: Acceleration of free fall [m/s^2].
         slip_speed: That of contact [m/s].
-        integrator: One of `numerics.explicit_integrators()`.
+        integrator: One of `explicit_integration.explicit_integrators()`.
     """
     M = SpatialInertia.SolidBoxWithMass(
         settings.mass, *(float(edge) for edge in settings.size)

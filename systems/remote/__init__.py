@@ -1,10 +1,4 @@
-"""Blocks in whose place a process outside stands, and the scenario section that asks for one.
-
-Each is the block that it replaces, with the same ports, so that logs and figures stay; where that
-would decide, it asks a `Remote`, which knows a driver of `cdpr_drake.systems.remote` while a run is
-driven.
-
-A process outside closes the loop of a run: the messages, the server's socket, a client.
+"""A process outside closes the loop of a run: messages, the server's socket, a client, the blocks.
 
 `cdpr serve SCENARIO` simulates; in the place of one block of the loop it asks a client. The two
 exchange messages over ZeroMQ: the server binds a ROUTER socket, tcp://127.0.0.1:5757 unless asked
@@ -53,6 +47,10 @@ Place, pace and time-out are the scenario's section `remote`:
 A driver that goes away, is silent for longer than the time-out, says stop, or sends what makes no
 sense (a message that cannot be read, unknown or missing ports, wrong sizes, numbers that are not
 finite) ends the run with outcome client_ended; what was simulated is written.
+
+The blocks in whose place the process outside stands are each the block that they replace, with the
+same ports, so that logs and figures stay. Where that would decide, they ask a `Remote`, which knows
+a `Driver` while a run is driven.
 
 Source: the interfaces of the Gazebo thesis, 3.5 and chapter 6: poses, set points and tensions as
 topics, tension distribution as a service.

@@ -1,4 +1,4 @@
-"""Messages of the bridge as bytes, and what is checked of them."""
+"""Messages between a run and a process outside as bytes, and what is checked of them."""
 
 from __future__ import annotations
 

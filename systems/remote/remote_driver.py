@@ -1,4 +1,4 @@
-"""The server's side of the bridge: what a run asks at each instant, and who else asks the run."""
+"""The server's side of an exchange: what a run asks at each instant, and who else asks the run."""
 
 from __future__ import annotations
 

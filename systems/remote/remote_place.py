@@ -1,6 +1,7 @@
-"""The place of a process outside: whom it asks, and what stands there until then.
+"""The place of a process outside in a loop: whom it asks, and which ports are exchanged.
 
-Which ports are exchanged in which place.
+A `Remote` stands in the place and asks its `Commander`; `tension_ports` and `servo_ports` say what
+is exchanged in which place.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The socket at which a server of the bridge listens."""
+"""The socket at which `cdpr serve` listens for clients."""
 
 from __future__ import annotations
 

@@ -62,7 +62,7 @@ class CompiledMotion(LeafSystem):
                                                     far, in position and rotation
     steps                  vector(2)       -        out, steps taken, and taken back, so far
     motion_memory          vector          any      out, what all others are read from, with
-                                                    `parts`; see `dynamics.reach_explicitly`
+                                                    `parts`; see `reach_kernel.reach_explicitly`
     ====================== =============== ======== =============================================
 
     The state is discrete: that of the platform and the winches at the last event, and its time. At
@@ -339,7 +339,7 @@ class CompiledMotion(LeafSystem):
         return memory[self._own]
 
     def report(self, context: Context) -> Array:
-        """Errors and numbers of steps so far, as `dynamics.REPORTED` says, shape (4,)."""
+        """Errors and numbers of steps so far, as `advance_kernel.REPORTED` says, shape (4,)."""
         memory: Array = self._reached(context)
         return memory[self._told]
 
@@ -362,7 +362,7 @@ class CompiledMotion(LeafSystem):
         return resting_state(self._robot, self._drive, X_WP, lengths, tensions, home=self._home)
 
     def energy(self, context: Context) -> float:
-        """Kinetic and potential energy of platform and cables [J], see `dynamics.robot_energy`."""
+        """Kinetic and potential energy of platform and cables [J], see `robot_energy`."""
         return self.energy_of(self.state(context))
 
     def energy_of(self, state: Array) -> float:

@@ -116,7 +116,7 @@ def motion_problem(
         robot: The robot.
         cables: Its cables.
         rule: How it was integrated.
-        bad: What `dynamics.advance_robot` returned.
+        bad: What `advance_kernel.advance_robot` returned.
         state: The last good state, shape (n,).
         time: To when it was to be advanced [s].
     """

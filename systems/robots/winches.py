@@ -1,6 +1,6 @@
-"""An ideal winch that follows a commanded cable velocity at once.
+"""Winches of a robot: an ideal one, which follows a commanded cable velocity at once.
 
-Makes the winches that settings ask for.
+`make_winches` makes the winches that settings ask for, ideal ones or such with motors.
 """
 
 from typing import Any

@@ -1,8 +1,9 @@
-"""What scenarios of every kind share, and the sections `stop` and `integration` of a servo's.
+"""What scenarios of every kind share, sections `stop` and `integration`, and the engine's choice.
+
+`StopSettings` and `IntegrationSettings` are the two sections of a visual servo. `with_engine`
+chooses which engine moves the robot of a scenario that leaves the choice open.
 
 Drake's YAML loader reads the annotations themselves, so they are not postponed here.
-
-Which engine moves the robot of a scenario that leaves the choice open.
 """
 
 from dataclasses import dataclass, replace
@@ -17,7 +18,6 @@ from cdpr_drake.systems.worlds.settings import WorldSettings
 DIAGRAM = "diagram"
 LOOPS = (AUTOMATIC, DIAGRAM, COMPILED)
 """What steps a servo: a diagram, or `systems.loops.ServoLoop`."""
-
 
 ENDINGS = tuple(
     outcome.name.lower() for outcome in Outcome

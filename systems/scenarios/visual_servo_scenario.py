@@ -1,8 +1,7 @@
-"""The schema of a scenario file: one servo run, with units and accepted ranges.
+"""The schema of a scenario file for one run of a visual servo, with units and accepted ranges.
 
-Drake's YAML loader reads the annotations themselves, so they are not postponed here.
-
-All settings of a visual servo on a robot: what it looks at, how it moves, what it believes.
+`VisualServoSettings` are all settings of a visual servo on a robot: what it looks at, how it moves,
+what it believes. `Scenario` adds the robot, and when and how it is run.
 
 Drake's YAML loader reads the annotations themselves, so they are not postponed here.
 """

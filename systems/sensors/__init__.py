@@ -1,14 +1,14 @@
-"""Sensors beside cameras as Drake blocks: tensions, motor encoders, poses from outside.
+"""Sensors as Drake blocks: of the robot itself, and of the world and motion.
 
-`SENSORS` is their table. Readings carry bias, noise, resolution and rate of a type of the
-catalogue, repeatable by a seed.
+* Of the robot: tensions, motor encoders, poses from outside. `SENSORS` is their table. Readings
+  carry bias, noise, resolution and rate of a type of the catalogue, repeatable by a seed.
+* Of the world and of motion: laser scanners and beams, an inertial measurement unit, a depth
+  camera, a head on two joints, odometry of the mobile robot. `add_looking_sensors` adds those of a
+  scenario's section `sensors`. Each has its own rate and its own stream of random numbers,
+  repeatable by a seed.
 
-Sensors that look at the world and at motion, as Drake blocks.
-
-Laser scanners and beams, an inertial measurement unit, a depth camera, a head on two joints,
-odometry of the mobile robot; `add_looking_sensors` adds those of a scenario's section `sensors`.
-Each has its own rate and its own stream of random numbers, repeatable by a seed. Frames: S of a
-sensor (x ahead, y to the left), C of a camera (z ahead, y down), H of a head, B of what carries it.
+Cameras are in `systems.cameras`. Frames: S of a sensor (x ahead, y to the left), C of a camera (z
+ahead, y down), H of a head, B of what carries it.
 
 Source: each block names its own.
 """

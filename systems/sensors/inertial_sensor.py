@@ -1,6 +1,9 @@
-"""An inertial measurement unit on the platform.
+"""An inertial measurement unit on the platform: its readings, and what it feels added up.
 
-An inertial measurement unit that adds up what it feels, for estimators slower than it is.
+`InertialSensor` reads at its rate. `InertialMotion` adds up what it feels between readings, for
+estimators slower than it is.
+
+Source: see the two classes.
 """
 
 from __future__ import annotations

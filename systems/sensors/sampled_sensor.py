@@ -1,6 +1,7 @@
-"""A sensor that reads its input at a fixed rate: the event and the state that all share.
+"""A sensor that reads its input at a fixed rate: event, state and random numbers that all share.
 
-Random numbers of sensors of which a robot can have several: a stream for each name.
+`SampledSensor` is the base. Where a robot can have several sensors of one kind, `named_stream`
+gives each name a stream of random numbers.
 """
 
 from __future__ import annotations
@@ -90,5 +91,5 @@ def named_stream(kind: int, name: str) -> int:
 
 
 def large_noise(seed: int, stream: int, number: int, size: int) -> Array:
-    """As `estimation.sample_noise`, for samples of so many numbers that none are kept."""
+    """As `sensor_noise.sample_noise`, for samples of so many numbers that none are kept."""
     return np.asarray(sensor_random(seed, stream, number).standard_normal(size))

@@ -23,9 +23,10 @@ from pydrake.geometry import (
     Sphere,
 )
 
-from cdpr_drake import geometry as rays
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import SensorError
+from cdpr_drake.geometry import ray_shapes
+from cdpr_drake.geometry.triangle_meshes import fan_triangles, obj_triangles
 
 ROLES = {"perception": Role.kPerception, "proximity": Role.kProximity}
 """What a ray may end on, by name: what cameras see, or what things bump into."""
@@ -44,7 +45,7 @@ class SceneShapes:
         self._version: GeometryVersion | None = None
         self._there: list[GeometryId] = []
         self._ids: list[GeometryId] = []
-        self._scene = rays.RayScene([])
+        self._scene = ray_shapes.RayScene([])
 
     def cast(
         self, query: QueryObject, origin: Array, directions: Array
@@ -83,23 +84,23 @@ class SceneShapes:
             for geometry in there
             if self._unseen is None or inspector.GetFrameId(geometry) != self._unseen
         ]
-        self._scene = rays.RayScene([_packed(inspector, geometry) for geometry in self._ids])
+        self._scene = ray_shapes.RayScene([_packed(inspector, geometry) for geometry in self._ids])
 
 
-def _packed(inspector: SceneGraphInspector, geometry: GeometryId) -> rays.RayShape:
+def _packed(inspector: SceneGraphInspector, geometry: GeometryId) -> ray_shapes.RayShape:
     shape, name = inspector.GetShape(geometry), inspector.GetName(geometry)
     if isinstance(shape, Box):
-        return rays.box(shape.size())
+        return ray_shapes.box(shape.size())
     if isinstance(shape, Sphere):
-        return rays.sphere(shape.radius())
+        return ray_shapes.sphere(shape.radius())
     if isinstance(shape, Cylinder):
-        return rays.cylinder(shape.radius(), shape.length())
+        return ray_shapes.cylinder(shape.radius(), shape.length())
     if isinstance(shape, Capsule):
-        return rays.capsule(shape.radius(), shape.length())
+        return ray_shapes.capsule(shape.radius(), shape.length())
     if isinstance(shape, Ellipsoid):
-        return rays.ellipsoid(np.array([shape.a(), shape.b(), shape.c()]))
+        return ray_shapes.ellipsoid(np.array([shape.a(), shape.b(), shape.c()]))
     if isinstance(shape, HalfSpace):
-        return rays.half_space()
+        return ray_shapes.half_space()
     if isinstance(shape, Convex):
         hull = shape.GetConvexHull()
         points = np.array([hull.vertex(i) for i in range(hull.num_vertices())])
@@ -107,9 +108,9 @@ def _packed(inspector: SceneGraphInspector, geometry: GeometryId) -> rays.RaySha
             [hull.element(k).vertex(i) for i in range(hull.element(k).num_vertices())]
             for k in range(hull.num_elements())
         ]
-        return rays.mesh(rays.fan_triangles(points, faces))
+        return ray_shapes.mesh(fan_triangles(points, faces))
     if isinstance(shape, Mesh):
-        return rays.mesh(_mesh_triangles(shape, name) * shape.scale3())
+        return ray_shapes.mesh(_mesh_triangles(shape, name) * shape.scale3())
     raise SensorError(
         f"geometry {name}: found a {type(shape).__name__}; accepted by range sensors: boxes, "
         "spheres, cylinders, capsules, ellipsoids, half spaces, meshes"
@@ -123,9 +124,9 @@ def _mesh_triangles(shape: Mesh, name: str) -> Array:
     if source.extension() != ".obj":
         return _foreign_triangles(source, where)
     if source.is_path():
-        return rays.obj_triangles(Path(source.path()).read_text(encoding="utf-8"), where)
+        return obj_triangles(Path(source.path()).read_text(encoding="utf-8"), where)
     contents = source.in_memory().mesh_file.contents()
-    return rays.obj_triangles(contents.decode("utf-8"), where)
+    return obj_triangles(contents.decode("utf-8"), where)
 
 
 def _foreign_triangles(source: Any, where: str) -> Array:

@@ -1,6 +1,7 @@
-"""The sensors that a scenario can have beside its camera; a new one is one entry of `SENSORS`.
+"""Sensors that a scenario can have beside its camera: what estimators read, and what is logged.
 
-Scenario section `sensors`: what estimators read besides images, and what is logged.
+`SENSORS` is their table; a new one is one entry of it. `SensorSettings` is the part of the scenario
+section `sensors` that chooses their types.
 
 Drake's YAML loader reads the annotations themselves, so they are not postponed here.
 """

@@ -128,7 +128,7 @@ def contact_step(robot: Robot, law: ContactLaw, friction: float, integrator: str
         robot: The robot.
         law: The law.
         friction: Largest friction coefficient of what it may stand on.
-        integrator: One of `numerics.explicit_integrators()`.
+        integrator: One of `explicit_integration.explicit_integrators()`.
     """
     J = np.array([_corner_velocities(p) for p in _corners(robot) if p[2] < robot.box_center()[2]])
     normal = law.stiffness * law.penetration

@@ -21,7 +21,7 @@ class BodyMotion(MovingPose, Protocol):
     """A pose X_WB of a body in W over time, with what a body that is driven along it needs."""
 
     def motion(self, time: float) -> Array:
-        """X_WB, V_WB and A_WB at a time [s] as one row, shape (`trajectories.MOTION_SIZE`,)."""
+        """X_WB, V_WB and A_WB at a time [s] as one row, shape (`MOTION_SIZE`,)."""
 
 
 class SteadyBody(SteadyMotion):

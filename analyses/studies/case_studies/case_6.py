@@ -1,6 +1,8 @@
-"""Case study VI: image-based visual servoing on ACROBOT, its first pose badly known.
+"""Case study VI: image-based visual servoing on four points, ACROBOT's first pose badly known.
 
-What case study VI and its appendix share: image-based servoing on four points, on ACROBOT.
+`SETUP` and `ASSUMPTIONS` are also those of case study A.6, its appendix.
+
+Source: servoing thesis 3.4.5.
 """
 
 from __future__ import annotations
@@ -44,7 +46,6 @@ ASSUMPTIONS = (
     "Directions of perturbations are not printed; each run draws its own from its seed.",
     "Stop rules and sigma are those of case study I.",
 )
-
 
 NAMES = ("E1", "E2", "E3", "E4")
 

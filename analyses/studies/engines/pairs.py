@@ -1,6 +1,8 @@
-"""Runs of one servo, or of one command, by both engines, and how far they part.
+"""Runs by the plant and by the compiled engine, how far they part, and the tasks of a sweep.
 
-What the study runs, as tasks of a sweep; each item is a pair of runs or a row of them.
+`run_pair` runs a scenario by both engines. `commanded_path` runs a robot by one of them, with a
+cable velocity for each period, and `state_distance` says how far two of these part. Of the tasks
+each item is a pair of runs or a row of them.
 """
 
 from __future__ import annotations

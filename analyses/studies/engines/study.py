@@ -54,7 +54,6 @@ QUICK_SCENARIOS = ("acrobot_pbvs", "planar_computed_torque", "planar_pbvs")
 QUICK_DURATION = 0.5
 """Scenarios of the quick form, and how long they run [s]."""
 
-
 ORDER_TASKS = {
     "order taut": TAUT_ORDERS,
     "order catching": CATCHING_ORDERS,

@@ -3,7 +3,7 @@
 A `CaseStudy` names configurations of scenarios and the judges of what a thesis states of them;
 `run_case_study` runs them with several seeds and writes what they leave. A `SeededStudy` is the
 frame of studies with runs of their own: configurations over seeds, continued, judged, written. The
-studies themselves are in the rooms of `analyses.studies`.
+studies themselves are beside this package, in `analyses.studies`.
 """
 
 import lazy_loader

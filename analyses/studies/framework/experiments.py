@@ -1,6 +1,9 @@
-"""Experiments of case study VII: start, servo, planned path and perturbation sets d1 to d4.
+"""Poses and perturbations of experiments, as items for scenarios.
 
-Poses beside a pose, as items for a scenario: what the thesis gives as a size and an axis.
+First, poses beside a pose: what the thesis gives as a size and an axis. Then the experiments of
+case study VII: start, servo, planned path, and perturbation sets d1 to d4.
+
+Source: servoing thesis 4.3.1.
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
 """The frame of studies that run configurations over seeds: continued, judged, written.
 
-How a study is written: its numbers, then the figures that can be drawn of them.
+`DrawnStudy` is how any study is written: its numbers, then the figures that can be drawn of them.
+`SeededStudy` adds configurations, seeds and judges.
 """
 
 from __future__ import annotations

@@ -36,7 +36,6 @@ from cdpr_drake.palette import SHADED, nth_look
 BOTH = ("plain", "corrected")
 WORDS = {"plain": "no correction", "corrected": "with correction"}
 
-
 FIGURES = ("mobile_robot", "choices", *TENSIONS, *PATHS, LENGTHS)
 """Names of all figures that the study can write."""
 

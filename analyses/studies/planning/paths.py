@@ -34,7 +34,7 @@ class PathSpec:
 
     Attributes:
         robot: Name of the robot.
-        corners: What it does at its poses, see `plans.make_path`.
+        corners: What it does at its poses, see `robot_limits.make_path`.
         seed: Of the poses.
         tensions: Smallest and largest tension [N].
         cable_acceleration: Largest acceleration of a cable; None: any [m/s^2].

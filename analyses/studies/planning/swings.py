@@ -67,7 +67,6 @@ CASES = (
     ),
 )  # fmt: skip
 
-
 OFF = (0.9, 1.1)
 """Shares of the stiffness that was planned with, on which motions are looked at, too."""
 

@@ -76,7 +76,6 @@ LEAST_DRAWN_VOLUME = 0.004
 SMALLEST = 1e-3
 """Lengths below are drawn as this, on a logarithmic axis [m]."""
 
-
 FIGURES = (
     "ranges_planar_II", "ranges_planar_III", "ranges_spatial_I", "ranges_spatial_III",
     "single_errors",

@@ -39,7 +39,6 @@ LOST_DISTANCE = 1.0
 KEPT_ROWS = 4000
 """Rows of a run's history that are kept for figures, about."""
 
-
 BALANCE = 1e-6
 """Tensions balance the wrench if they miss it by at most this, relative to the cables' forces."""
 

@@ -27,7 +27,6 @@ PUBLISHED_FIGURES = {
 DARK = 55.0
 """Numbers on cells of a larger share are white [%]."""
 
-
 FIGURES = (*PUBLISHED_FIGURES, "kinds", "pairs")
 """Names of all figures that the study can write."""
 

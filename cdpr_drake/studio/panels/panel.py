@@ -1,6 +1,6 @@
-"""What a panel is.
+"""What a panel is, how it connects to a workbench, and messages in the page.
 
-Errors as messages in the page: whatever a handler raises, the server stays alive.
+Errors are messages, too: whatever a handler raises, the server stays alive, see `quietly`.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """What a run shows: state, camera, plots, and the cursor of one that is finished.
 
-How the run panel looks, beside `studio.page`.
+`RUN_STYLE` is how the run panel looks, beside `studio.page`.
 """
 
 from __future__ import annotations

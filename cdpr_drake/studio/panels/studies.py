@@ -40,7 +40,6 @@ TYPES = {".png": "image/png", ".svg": "image/svg+xml"}
 SHADES = {"confirmed": "#1b7f4f", "in part": "#a86200", "not confirmed": "#c01010"}
 """Behind the words of verdicts."""
 
-
 STUDY = "study"
 """Name of the result."""
 

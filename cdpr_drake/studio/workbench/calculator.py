@@ -1,10 +1,9 @@
-"""One thread for numbers and scenes, so that the page never waits for them.
+"""One thread for numbers and scenes, so that the page never waits for them, and signals of changes.
 
 Compiled kernels are compiled under one lock, a minute long at the first use, and Drake's Meshcat
-takes calls from the thread only that made it. So all of that happens in one thread beside that of
-the server, which answers pages.
-
-Tells who listens that something has changed.
+takes calls from the thread only that made it. So all of that happens in one thread, the
+`Calculator`'s, beside that of the server, which answers pages. `Signal` tells who listens that
+something has changed.
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""The results folder of a run, to be looked at from row to row.
-
-A results folder as one file.
-"""
+"""The results folder of a run, to be looked at from row to row, and any folder as one file."""
 
 from __future__ import annotations
 

@@ -13,7 +13,6 @@ DASHES: dict[str, tuple[float, ...]] = {"-": (), "--": (6.0, 3.0), "-.": (8.0, 3
                                         ":": (2.0, 3.0)}  # fmt: skip
 """Dashes of the palette's names [px]."""
 
-
 ROTATION = Look(ANGLE.color, DASHED)
 """Dashed, as both errors often are the same curve, each in its unit."""
 

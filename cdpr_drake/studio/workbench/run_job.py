@@ -1,6 +1,7 @@
 """A job that runs a scenario, can be looked at and steered.
 
-Samples of a run that are kept, so that a page that is opened late has them all, thinned.
+`Samples` are those of its run that are kept, thinned, so that a page that is opened late has all of
+the run.
 """
 
 from __future__ import annotations
@@ -67,7 +68,7 @@ class RunJob(CommandJob):
         settings: Items key=value that replace what the file says.
         samples: What it has shown so far.
         header: What it said at its beginning, see `analyses.simulation.live_messages`; empty
-        before.
+            before.
         image: The newest image as JPEG; empty where there is none.
         pace: Whether it stands, and its speed, as it said last.
     """

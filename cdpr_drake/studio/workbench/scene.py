@@ -1,6 +1,6 @@
-"""The robot of a workbench in Meshcat: cables and points in the colours of their numbers.
+"""Scenes in Meshcat: the robot of a workbench, and the robot of a run.
 
-Draws a run into Meshcat.
+`RobotScene` draws cables and points in the colours of their numbers; `RunScene` draws a run.
 """
 
 from __future__ import annotations
@@ -114,7 +114,6 @@ def _solids(robot: Robot) -> str:
 
 Draw = Callable[[RobotScene], Any]
 """What draws into a scene."""
-
 
 PATHS = ("visualizer", "cables", "studio")
 """What is taken out of a scene before a run's robot is put there."""
