@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import ast
 import base64
 import hashlib
 import html
 import json
 import logging
+import os
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -68,7 +70,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         add(page, text.replace("](docs/", "]("))
     add("reference/commands.md", commands_page())
     for room in rooms():
-        add(room_page(room), f"# {room}\n\n::: {room}\n")
+        add(room_page(room), room_text(room))
     for path in notebooks():
         for uri, content in notebook_pages(path):
             add(uri, content)
@@ -99,6 +101,61 @@ def rooms() -> list[str]:
         for stub in (ROOT / top).rglob("*/__init__.pyi"):
             found.append(".".join(("cdpr_drake", *stub.parent.relative_to(ROOT).parts)))
     return sorted({*found} - {*HIDDEN_ROOMS})
+
+
+def room_text(room: str) -> str:
+    """A room's docstring, then its public names; what a room below it explains is a link."""
+    below = {
+        name: other
+        for other in rooms()
+        if room in ("cdpr_drake", "cdpr_drake.systems") and other.startswith(f"{room}.")
+        for name in public_names(other).items()
+    }
+    out = [f"# {room}\n\n::: {room}\n    options:\n      members: false\n"]
+    for name, module in sorted(public_names(room).items()):
+        if (name, module) in below:
+            other = below[name, module]
+            page = os.path.relpath(room_page(other), Path(room_page(room)).parent)
+            anchor = f"{module}.{name}" if _stands_alone(module, name) else name.lower()
+            out.append(f"\n## {name}\n\nSee [{other}]({page}#{anchor}).\n")
+        elif _stands_alone(module, name):
+            out.append(
+                f"\n::: {module}.{name}\n    options:\n      show_root_heading: true\n"
+                "      show_root_full_path: false\n      show_root_toc_entry: true\n"
+            )
+        else:
+            out.append(f"\n## {name}\n\nIn `{module}`.\n")
+    return "".join(out)
+
+
+def public_names(room: str) -> dict[str, str]:
+    """The names that a room's stub lists, and the modules that define them."""
+    stub = ast.parse((_file_of(room) / "__init__.pyi").read_text(encoding="utf-8"))
+    return {
+        alias.name: f"{room}.{node.module}"
+        for node in stub.body
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+    }
+
+
+def _file_of(module: str) -> Path:
+    """Where a package, or a module without its ending, lies."""
+    parts = module.split(".")[1:]
+    top = ROOT if parts[:1] in (["models"], ["systems"], ["analyses"]) else ROOT / "cdpr_drake"
+    return top.joinpath(*parts)
+
+
+def _stands_alone(module: str, name: str) -> bool:
+    """Whether a module binds a name by a statement of its own, which mkdocstrings can read."""
+    path = _file_of(module).with_suffix(".py")
+    for node in ast.parse(path.read_text(encoding="utf-8")).body:
+        targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", node)]
+        if any(
+            name in (getattr(each, "id", None), getattr(each, "name", None)) for each in targets
+        ):
+            return True
+    return False
 
 
 def room_page(room: str) -> str:
