@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -35,6 +35,10 @@ from cdpr_drake.statics.equilibrium import (
     random_starts,
 )
 from cdpr_drake.statics.stiffness import inextensible_modes, natural_modes, platform_stiffness
+from cdpr_drake.summaries import Summarized, numbers
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 STARTS = 40
 """Poses from which equilibria are searched, beside the home pose."""
@@ -44,8 +48,8 @@ LARGEST_STRAIN = 0.03
 about what ropes of steel or stretched polyethylene bear."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class StaticReport:
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class StaticReport(Summarized):
     """A robot at rest.
 
     Attributes:
@@ -115,6 +119,29 @@ class StaticReport:
                 for one in self.others
             ],
         }
+
+    def plot(self) -> Figure:
+        """The robot with its tensions, sags and natural frequencies."""
+        from cdpr_drake.analyses.statics.static_figures import static_figure
+
+        return static_figure(self, f"{self.robot} at rest, {self.model} cables")
+
+    def summary(self) -> tuple[str, list[tuple[str, str]]]:
+        """What it shows of itself."""
+        angles = np.degrees(angles_from_rotation(self.X_WP.rotation()))
+        slack = [name for name, loose in zip(self.names, self.slack, strict=True) if loose]
+        slowest = "-"
+        if self.frequencies is not None:
+            slowest = f"{self.frequencies[0]:.4g} Hz"
+        return f"{self.robot} at rest, {self.model} cables: {self.stability}", [
+            ("pose", f"({numbers(self.X_WP.translation())}) m, ({numbers(angles)}) deg"),
+            ("tensions", f"{np.min(self.tensions):.4g} to {np.max(self.tensions):.4g} N"),
+            ("slack", ", ".join(slack) or "none"),
+            ("unstrained", f"({numbers(self.l0)}) m"),
+            ("least stiffness", f"{self.principal[0]:.4g} N/m"),
+            ("slowest mode", slowest),
+            ("other rests", str(len(self.others))),
+        ]
 
 
 def at_pose(robot: Robot, X_WP: RigidTransform, model: str, pulleys: bool) -> StaticReport:

@@ -18,7 +18,7 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
-from cdpr_drake.analyses.planning.free_motion import LEAST, FreeSettings, plan_free_motion
+from cdpr_drake.analyses.planning.free_motion import LEAST, FreeSettings, solve_free_motion
 from cdpr_drake.analyses.planning.free_plan_results import FreeRun
 from cdpr_drake.analyses.planning.path_files import read_path
 from cdpr_drake.analyses.planning.plan_results import PlanRun
@@ -348,7 +348,7 @@ def _free_planner(asked: _Asked, words: FreeWords) -> Planner:
 
     def plan(say: Callable[[str], None], track: Tracker) -> FreeRun:
         begin = time.perf_counter()
-        found = plan_free_motion(asked.robot, asked.task, settings, say)
+        found = solve_free_motion(asked.robot, asked.task, settings, say)
         took = time.perf_counter() - begin
         return FreeRun(asked=settings, solution=found, **_told(asked, found, took, track))
 

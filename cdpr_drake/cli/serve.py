@@ -83,7 +83,7 @@ def serve(
     """Runs a scenario with a process outside in its loop, over ZeroMQ.
 
     The client may be written in any language; the messages are explained in cdpr_drake.bridge,
-    whose Client is one in Python. notebooks/plain_client.py is one without this package.
+    whose RemoteClient is one in Python. notebooks/plain_client.py is one without this package.
     """
     check_available()
     kind = SCENARIO_KINDS[scenario_kind(scenario)]
