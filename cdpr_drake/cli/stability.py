@@ -15,13 +15,12 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
+from cdpr_drake.analyses.front.workspaces import default_box, stability_question
 from cdpr_drake.analyses.reporting.deferred_figures import write_pictures
 from cdpr_drake.analyses.reporting.log_files import write_json
 from cdpr_drake.analyses.reporting.output_folder import continued_folder
 from cdpr_drake.analyses.simulation.stability_files import stability_of_folder
-from cdpr_drake.analyses.workspaces.stability_defaults import load_bounds, workspace_defaults
 from cdpr_drake.analyses.workspaces.stability_figures import stability_pictures
-from cdpr_drake.analyses.workspaces.stability_question import make_question, scenario_task
 from cdpr_drake.analyses.workspaces.stability_scene import scene_page
 from cdpr_drake.analyses.workspaces.stability_workspaces import (
     KINDS,
@@ -29,7 +28,6 @@ from cdpr_drake.analyses.workspaces.stability_workspaces import (
     StabilityWorkspaces,
     stability_workspaces,
 )
-from cdpr_drake.analyses.workspaces.static_feasible import static_case
 from cdpr_drake.cli.completion import robot_words, scenario_words
 from cdpr_drake.cli.grid_options import (
     GridWords,
@@ -196,21 +194,13 @@ def stability(
     check_mass(mass, zero=True)
     formats = parse_formats(figure_format)
     loaded = load_robot(robot)
-    defaults = workspace_defaults(loaded, robot)
-    low_high, wrenches = parse_limits(limits), parse_wrench(wrench)
-    question = make_question(
-        robot,
-        scheme=scheme,
-        verdict=verdict,
-        bounds=None if bounds is None else load_bounds(bounds),
-        vary=parse_vary(vary or []),
-        grid=parse_grid(
-            grid, parse_turns(orientation or []), defaults.lower, defaults.upper, defaults.step
-        ),
+    question = stability_question(
+        robot, scheme, verdict, bounds=bounds, vary=parse_vary(vary or []),
+        grid=parse_grid(grid, parse_turns(orientation or []), *default_box(robot)),
+        scenario=scenario,
         options=VerdictOptions(draws=draws, seed=seed, searches=searches, pieces=pieces),
-        statics=static_case(loaded, low_high, mass, wrenches),
-        task=None if scenario is None else scenario_task(robot, scenario),
-    )
+        limits=parse_limits(limits), mass=mass, wrench=parse_wrench(wrench),
+    )  # fmt: skip
     name = f"{question.robot}-{scheme}-{verdict}"
     folder = out if out is not None else default_folder("stability", name, question.arguments())
     console = message_console()

@@ -7,7 +7,6 @@ What `cdpr workspace` says of its results.
 
 from __future__ import annotations
 
-import math
 import time
 from pathlib import Path
 from typing import Annotated, Any
@@ -18,20 +17,15 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
+from cdpr_drake.analyses.front.workspaces import default_box, workspace_question
 from cdpr_drake.analyses.reporting.deferred_figures import write_pictures
 from cdpr_drake.analyses.reporting.log_files import write_json
 from cdpr_drake.analyses.reporting.output_folder import continued_folder
 from cdpr_drake.analyses.sweeps.sweep import STARTING
 from cdpr_drake.analyses.workspaces.certified_boxes import BoxSearch, box_search, certified_boxes
 from cdpr_drake.analyses.workspaces.conditions import KINDS, MEASURES
-from cdpr_drake.analyses.workspaces.stability_defaults import workspace_defaults
-from cdpr_drake.analyses.workspaces.workspace_files import load_obstacles, load_wrench_set
+from cdpr_drake.analyses.workspaces.workspace_files import load_wrench_set
 from cdpr_drake.analyses.workspaces.workspace_hulls import hull_bound, question_hull
-from cdpr_drake.analyses.workspaces.workspace_question import (
-    Asked,
-    make_workspace_question,
-    surroundings,
-)
 from cdpr_drake.analyses.workspaces.workspace_results import (
     RobotWorkspace,
     WorkspaceRun,
@@ -81,26 +75,6 @@ FARTHEST = 1e6
 """Largest coordinate of a corner of --box [m]."""
 
 
-def parse_required(
-    file: Path | None, force: float | None, moment: float | None
-) -> SpatialSet | None:
-    """The wrenches of --wrench-set, or of --force and --moment; None without.
-
-    Raises:
-        CdprError: Both are given, or they are not accepted.
-    """
-    if file is not None:
-        if force is not None or moment is not None:
-            raise WorkspaceError("--wrench-set: found --force or --moment too; accepted: one way")
-        return load_wrench_set(file)
-    if force is None and moment is None:
-        return None
-    for name, value in (("--force", force), ("--moment", moment)):
-        if value is not None and not (math.isfinite(value) and value >= 0.0):
-            raise WorkspaceError(f"{name}: found {value:g}; accepted: a finite number >= 0")
-    return SpatialSet(box=np.array([*[moment or 0.0] * 3, *[force or 0.0] * 3]))
-
-
 def parse_accelerations(words: str | None) -> SpatialSet | None:
     """The box of --acceleration; None without; raises as `parse_numbers`."""
     if words is None:
@@ -136,21 +110,6 @@ def parse_box(words: str | None) -> tuple[np.ndarray, np.ndarray] | None:
         )
     lower, upper = np.array(spans).T
     return lower, upper
-
-
-def grid_box(
-    lower: np.ndarray, upper: np.ndarray, step: np.ndarray,
-    region: tuple[np.ndarray, np.ndarray] | None,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
-    """Corners and step of the default grid, with as many points in a region in its place [m].
-
-    An axis along which the platform does not move stays as it is.
-    """
-    if region is None:
-        return lower, upper, step
-    free = lower < upper
-    by = np.where(free, step * (region[1] - region[0]) / np.where(free, upper - lower, 1.0), step)
-    return np.where(free, region[0], lower), np.where(free, region[1], upper), by
 
 
 def parse_velocities(items: list[str]) -> np.ndarray | None:
@@ -391,32 +350,18 @@ def workspace(
         found = "no --hull" if hull is None else "--box"
         raise WorkspaceError(f"--unbounded: found {found}; accepted: with --hull, without --box")
     loaded = load_robot(robot)
-    defaults = workspace_defaults(loaded, robot)
-    asked = Asked(
-        limits=parse_limits(limits),
-        mass=mass,
-        wrench=parse_wrench(wrench),
-        required=parse_required(wrench_set, force, moment),
+    required = None if wrench_set is None else load_wrench_set(wrench_set)
+    question = workspace_question(
+        robot, kind.split(","),
+        parse_grid(grid, parse_turns(orientation or []), *default_box(robot, region)),
+        measures=() if measure is None else measure.split(","), orientations=orientations,
+        limits=parse_limits(limits), mass=mass, wrench=parse_wrench(wrench),
+        required=required, force=force, moment=moment,
         accelerations=parse_accelerations(acceleration),
-        velocities=parse_velocities(velocity or []),
-        clearance=clearance,
-        around=surroundings(
-            loaded, None if obstacles is None else load_obstacles(obstacles), exit_free,
-            anchor_free, pulleys,
-        ),
-        scenario=scenario,
-        pulleys=pulleys,
+        velocities=parse_velocities(velocity or []), clearance=clearance, obstacles=obstacles,
+        exit_free=exit_free, anchor_free=anchor_free, scenario=scenario, pulleys=pulleys,
         method=method,
     )  # fmt: skip
-    corners = grid_box(defaults.lower, defaults.upper, defaults.step, region)
-    question = make_workspace_question(
-        robot,
-        kind.split(","),
-        parse_grid(grid, parse_turns(orientation or []), *corners),
-        () if measure is None else measure.split(","),
-        orientations,
-        asked,
-    )
     console = message_console()
     search = None
     if certify:
