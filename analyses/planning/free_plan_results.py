@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,6 +17,9 @@ from cdpr_drake.planning.path_task import MotionSamples, PathTask
 from cdpr_drake.trajectories.timed_path import TimedPath
 from cdpr_drake.workspaces.cable_interference import PART_NAMES, Surroundings, box_row, clearances
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 LOOKS = 200
 """Instants at which distances and the view are looked at, from start to goal."""
 
@@ -24,7 +27,7 @@ KEPT_WITHIN = 1e-6
 """A distance that is missed by less is kept [m]."""
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class FreeRun(MotionRun):
     """A motion of a robot whose path was free.
 
@@ -105,6 +108,12 @@ class FreeRun(MotionRun):
             near = p[:, 2] < self.asked.nearest - KEPT_WITHIN
             found[f"point {number}"] = np.where(near, np.minimum(inside, -1.0), inside)
         return found
+
+    def plot(self) -> Figure:
+        """How much of each limit is used over time."""
+        from cdpr_drake.analyses.planning.free_plan_figures import limits_figure
+
+        return limits_figure(self)
 
     def keeps_asked(self) -> bool:
         """Whether distances and view are as asked between the knots, too."""
