@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import fields
 from html import escape
+from typing import Any, TypeVar
+
+T = TypeVar("T")
 
 MOST_LINES = 10
 """Lines that a result shows of itself, at most."""
@@ -35,6 +39,16 @@ class Summarized:
             for label, words in rows
         )
         return f"<table><caption>{escape(title)}</caption>{cells}</table>"
+
+
+def as_kind(kind: type[T], result: Any) -> T:
+    """A result as an object of a class of its own class that has more methods, and no more fields.
+
+    Args:
+        kind: A subclass of the result's dataclass.
+        result: The result.
+    """
+    return kind(**{field.name: getattr(result, field.name) for field in fields(result)})
 
 
 def numbers(values: Iterable[float], digits: int = 4) -> str:

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -34,6 +34,9 @@ from cdpr_drake.planning.path_task import PathTask
 from cdpr_drake.planning.path_timing import STATIONS, PathPlan, plan_along_path
 from cdpr_drake.schema.typed_yaml import closest
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 Say = Callable[[str], None]
 """Told what is done now."""
 
@@ -42,6 +45,26 @@ Limits = LimitSettings | Mapping[str, Any] | None
 
 ASKED = tuple(field.name for field in fields(FreeSettings) if field.name not in ("start", "goal"))
 """What `plan_free_motion` can be asked for by name."""
+
+
+class DrawnPlan(PlanRun):
+    """A `PlanRun` that draws itself."""
+
+    def plot(self) -> Figure:
+        """The phase plane: speed along the path with its limits."""
+        from cdpr_drake.analyses.planning.plan_figures import phase_figure
+
+        return phase_figure(self)
+
+
+class DrawnFreePlan(FreeRun):
+    """A `FreeRun` that draws itself."""
+
+    def plot(self) -> Figure:
+        """How much of each limit is used over time."""
+        from cdpr_drake.analyses.planning.free_plan_figures import limits_figure
+
+        return limits_figure(self)
 
 
 @dataclass(frozen=True)
@@ -93,7 +116,7 @@ def plan_path(
     pulleys: bool = True,
     track: bool = False,
     say: Say | None = None,
-) -> PlanRun:
+) -> DrawnPlan:
     """The fastest motion of a robot along a path, within limits of tensions and winches.
 
     Args:
@@ -128,7 +151,7 @@ def plan_path(
     plan = plan_along_path(task, way, stations)
     took = time.perf_counter() - begin
     told = _told(loaded, given, plan, say, track)
-    return PlanRun(
+    return DrawnPlan(
         plan=plan, source=found.source, arguments=arguments, planning_time=took, **told
     )  # fmt: skip
 
@@ -143,7 +166,7 @@ def plan_free_motion(
     track: bool = False,
     say: Say | None = None,
     **asked: Any,
-) -> FreeRun:
+) -> DrawnFreePlan:
     """A motion of a robot from one pose to another whose path is free, within limits.
 
     Args:
@@ -181,7 +204,9 @@ def plan_free_motion(
         },
     }
     told = _told(loaded, given, found, say, track)
-    return FreeRun(asked=settings, solution=found, arguments=arguments, planning_time=took, **told)
+    return DrawnFreePlan(
+        asked=settings, solution=found, arguments=arguments, planning_time=took, **told
+    )
 
 
 def _told(

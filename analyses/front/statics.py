@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -23,9 +24,23 @@ from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import as_pose
 from cdpr_drake.schema.typed_yaml import closest
 from cdpr_drake.statics.forward_kinematics import ForwardKinematics, PoseFit
+from cdpr_drake.summaries import as_kind
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 EQUILIBRIA_MODELS = ("inextensible", "elastic")
 """Cable models of `find_equilibria`."""
+
+
+class RobotAtRest(StaticReport):
+    """A `StaticReport` that draws itself."""
+
+    def plot(self) -> Figure:
+        """The robot with its tensions, sags and natural frequencies."""
+        from cdpr_drake.analyses.statics.static_figures import static_figure
+
+        return static_figure(self, f"{self.robot} at rest, {self.model} cables")
 
 
 def solve_static(
@@ -34,7 +49,7 @@ def solve_static(
     lengths: Array | Sequence[float] | None = None,
     model: str = "elastic",
     pulleys: bool = True,
-) -> StaticReport:
+) -> RobotAtRest:
     """A robot at rest: lengths, tensions, stiffness, vibrations and sag.
 
     Args:
@@ -56,8 +71,10 @@ def solve_static(
     _check_model(model, CABLE_MODELS)
     loaded = as_robot(robot)
     if lengths is None:
-        return at_pose(loaded, as_pose(loaded, pose), model, pulleys)
-    return at_lengths(loaded, _checked_lengths(loaded, lengths), model, pulleys)
+        found = at_pose(loaded, as_pose(loaded, pose), model, pulleys)
+    else:
+        found = at_lengths(loaded, _checked_lengths(loaded, lengths), model, pulleys)
+    return as_kind(RobotAtRest, found)
 
 
 def find_equilibria(

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -36,8 +36,12 @@ from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.schema.typed_yaml import closest
 from cdpr_drake.stability.perturbation_bounds import PerturbationBounds
 from cdpr_drake.stability.verdict import VerdictOptions
+from cdpr_drake.summaries import as_kind
 from cdpr_drake.workspaces.demanded_wrenches import SpatialSet
 from cdpr_drake.workspaces.pose_grid import WorkspaceGrid, grid_by_count, grid_by_step
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 Box = tuple[Array, Array]
 """Lower and upper corner in W, shape (3,) each [m]."""
@@ -51,6 +55,26 @@ ASKED = (
 
 HELD = ("limits", "mass", "wrench")
 """What cables have to hold in `assess_stability`, by name."""
+
+
+class DrawnWorkspace(RobotWorkspace):
+    """A `RobotWorkspace` that draws itself."""
+
+    def plot(self, measure: str | None = None) -> Figure:
+        """Planes of the grid, coloured by what holds, or by a measure."""
+        from cdpr_drake.analyses.workspaces.workspace_figures import planes_figure
+
+        return planes_figure(self, measure)
+
+
+class DrawnStability(StabilityWorkspaces):
+    """`StabilityWorkspaces` that draw themselves."""
+
+    def plot(self, bounds: str | None = None) -> Figure:
+        """Planes of the grid, coloured by what holds under bounds of a name; None: the first."""
+        from cdpr_drake.analyses.workspaces.stability_figures import planes_figure
+
+        return planes_figure(self, bounds)
 
 
 def default_box(
@@ -152,7 +176,7 @@ def compute_workspace(
     folder: Path | str | None = None,
     workers: int | None = 1,
     **asked: Any,
-) -> RobotWorkspace:
+) -> DrawnWorkspace:
     """Where a robot can work: kinds of workspaces, what they have in common, and measures.
 
     Args:
@@ -181,7 +205,7 @@ def compute_workspace(
     )
     found = robot_workspace(question, _folder(folder), workers).workspace
     assert found is not None  # nobody stopped it
-    return found
+    return as_kind(DrawnWorkspace, found)
 
 
 def wrench_box(force: float | None, moment: float | None) -> SpatialSet:
@@ -234,7 +258,7 @@ def assess_stability(
     folder: Path | str | None = None,
     workers: int | None = 1,
     **held: Any,
-) -> StabilityWorkspaces:
+) -> DrawnStability:
     """Where a visual servo is stable in spite of perturbations, and the platform can be held.
 
     Args:
@@ -263,7 +287,7 @@ def assess_stability(
     )  # fmt: skip
     found = stability_workspaces(question, _folder(folder), workers).workspaces
     assert found is not None  # nobody stopped it
-    return found
+    return as_kind(DrawnStability, found)
 
 
 def _name(robot: Robot | str | Path) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -16,9 +16,6 @@ from cdpr_drake.planning.free_path_solution import FreePathSolution
 from cdpr_drake.planning.path_task import MotionSamples, PathTask
 from cdpr_drake.trajectories.timed_path import TimedPath
 from cdpr_drake.workspaces.cable_interference import PART_NAMES, Surroundings, box_row, clearances
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 LOOKS = 200
 """Instants at which distances and the view are looked at, from start to goal."""
@@ -108,12 +105,6 @@ class FreeRun(MotionRun):
             near = p[:, 2] < self.asked.nearest - KEPT_WITHIN
             found[f"point {number}"] = np.where(near, np.minimum(inside, -1.0), inside)
         return found
-
-    def plot(self) -> Figure:
-        """How much of each limit is used over time."""
-        from cdpr_drake.analyses.planning.free_plan_figures import limits_figure
-
-        return limits_figure(self)
 
     def keeps_asked(self) -> bool:
         """Whether distances and view are as asked between the knots, too."""

@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -22,9 +22,6 @@ from cdpr_drake.planning.path_timing import PathPlan
 from cdpr_drake.summaries import Summarized, numbers
 from cdpr_drake.trajectories.sampled_motion import MOTION_COLUMNS, TIME_COLUMN
 from cdpr_drake.trajectories.timed_path import TimedPath
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 SUMMARY, MOTION = "summary.json", "motion.csv"
 
@@ -88,10 +85,6 @@ class MotionRun(Summarized, ABC):
             }
         )
         return told
-
-    @abstractmethod
-    def plot(self) -> Figure:
-        """The figure that says most of it."""
 
     def summary(self) -> tuple[str, list[tuple[str, str]]]:
         """What it shows of itself."""
@@ -157,12 +150,6 @@ class PlanRun(MotionRun):
     def samples(self) -> MotionSamples:
         """The plan, as often as it is controlled."""
         return self.plan.samples(RATE)
-
-    def plot(self) -> Figure:
-        """The phase plane: speed along the path with its limits."""
-        from cdpr_drake.analyses.planning.plan_figures import phase_figure
-
-        return phase_figure(self)
 
     def reached_share(self) -> float:
         """Share of the instants at which a limit is reached, see `REACHED`."""

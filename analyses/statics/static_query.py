@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -36,9 +36,6 @@ from cdpr_drake.statics.equilibrium import (
 )
 from cdpr_drake.statics.stiffness import inextensible_modes, natural_modes, platform_stiffness
 from cdpr_drake.summaries import Summarized, numbers
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 STARTS = 40
 """Poses from which equilibria are searched, beside the home pose."""
@@ -119,12 +116,6 @@ class StaticReport(Summarized):
                 for one in self.others
             ],
         }
-
-    def plot(self) -> Figure:
-        """The robot with its tensions, sags and natural frequencies."""
-        from cdpr_drake.analyses.statics.static_figures import static_figure
-
-        return static_figure(self, f"{self.robot} at rest, {self.model} cables")
 
     def summary(self) -> tuple[str, list[tuple[str, str]]]:
         """What it shows of itself."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -19,9 +19,6 @@ from cdpr_drake.stability.perturbation_bounds import PerturbationBounds
 from cdpr_drake.summaries import Summarized
 from cdpr_drake.workspaces.pose_grid import WorkspaceGrid
 from cdpr_drake.workspaces.volume import VolumeRule, WorkspaceVolume, workspace_volume
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 KINDS = {
     "Z": "control stability workspace",
@@ -112,12 +109,6 @@ class StabilityWorkspaces(Summarized):
 
     def _numbers(self, kind: str, name: str) -> dict[str, Any]:
         return region_numbers(self.inside(kind, name), self.places(kind, name), self.grid.axes)
-
-    def plot(self, bounds: str | None = None) -> Figure:
-        """Planes of the grid, coloured by what holds under bounds of a name; None: the first."""
-        from cdpr_drake.analyses.workspaces.stability_figures import planes_figure
-
-        return planes_figure(self, bounds)
 
     def summary(self) -> tuple[str, list[tuple[str, str]]]:
         """What it shows of itself: volumes of the first bounds."""

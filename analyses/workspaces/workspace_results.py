@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -19,9 +19,6 @@ from cdpr_drake.analyses.workspaces.workspace_question import WorkspaceQuestion
 from cdpr_drake.summaries import Summarized
 from cdpr_drake.workspaces.pose_grid import WorkspaceGrid
 from cdpr_drake.workspaces.volume import VolumeRule, WorkspaceVolume, workspace_volume
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 ALL = "all"
 """Name of what all kinds have in common."""
@@ -128,12 +125,6 @@ class RobotWorkspace(Summarized):
             "median": finite(float(np.median(values))) if some else None,
             "largest": finite(float(np.max(values))) if some else None,
         }
-
-    def plot(self, measure: str | None = None) -> Figure:
-        """Planes of the grid, coloured by what holds, or by a measure."""
-        from cdpr_drake.analyses.workspaces.workspace_figures import planes_figure
-
-        return planes_figure(self, measure)
 
     def summary(self) -> tuple[str, list[tuple[str, str]]]:
         """What it shows of itself: shares and volumes of the first kinds."""

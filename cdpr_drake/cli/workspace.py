@@ -350,6 +350,8 @@ def workspace(
         found = "no --hull" if hull is None else "--box"
         raise WorkspaceError(f"--unbounded: found {found}; accepted: with --hull, without --box")
     loaded = load_robot(robot)
+    if wrench_set is not None and (force is not None or moment is not None):
+        raise WorkspaceError("--wrench-set: found --force or --moment too; accepted: one way")
     required = None if wrench_set is None else load_wrench_set(wrench_set)
     question = workspace_question(
         robot, kind.split(","),

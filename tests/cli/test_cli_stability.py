@@ -122,7 +122,7 @@ CHUNK, KEPT, POSES = 64, 3, 2 * 9 * 9 * 5
 KILLED = killed_after(
     KEPT,
     f"""
-from cdpr_drake.analyses.workspaces import stability_workspaces as workspaces as module
+from cdpr_drake.analyses.workspaces import stability_workspaces as module
 module.CHUNK_POSES["sampled"] = {CHUNK}
 """,
 )

@@ -139,7 +139,7 @@ def test_files_of_wrenches_and_obstacles(tmp_path, capsys):
         (["--kind", "dynamic"], ["dynamic", "--acceleration"]),
         (["--kind", "target-visible"], ["target-visible", "--scenario"]),
         (["--orientations", "most"], ["--orientations", "all"]),
-        (["--force", "inf"], ["--force", "finite"]),
+        (["--force", "inf"], ["force", "finite"]),
         (["--force", "1", "--wrench-set", "no.yaml"], ["--wrench-set", "--force"]),
         (["--wrench-set", "no.yaml"], ["no.yaml", "no such file"]),
         (["--obstacles", "no.yaml"], ["no.yaml", "no such file"]),
