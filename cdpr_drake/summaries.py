@@ -28,7 +28,9 @@ class Summarized:
         title, rows = self.summary()
         width = max((len(label) for label, _ in rows), default=0)
         lines = [title, *(f"  {label:<{width}}  {words}" for label, words in rows)]
-        return "\n".join(_cut(" ".join(line.splitlines())) for line in lines[:MOST_LINES])
+        if len(lines) > MOST_LINES:
+            lines[MOST_LINES - 1 :] = [f"  ... {len(lines) - MOST_LINES + 1} more"]
+        return "\n".join(_cut(" ".join(line.splitlines())) for line in lines)
 
     def _repr_html_(self) -> str:
         """Title and rows as a table, for notebooks."""

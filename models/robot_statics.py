@@ -28,6 +28,10 @@ ROTATION_TOLERANCE = 1e-6
 """How far a rotation that is given by numbers may be off an orthonormal one [-]."""
 
 
+EXACT_ROTATION = 1e-14
+"""A rotation that is off by less is taken as it is, else the nearest one [-]."""
+
+
 def rigid_platform(robot: Robot) -> RigidPlatform:
     """The robot's platform for equilibria, stiffness and vibrations."""
     spatial = platform_inertia(robot)
@@ -206,13 +210,17 @@ def as_pose(robot: Robot, pose: object = None) -> RigidTransform:
             f"pose: found a {type(pose).__name__}{shape}; accepted: {accepted}"
         )
     R = matrix[:3, :3]
-    turned = np.allclose(R @ R.T, np.eye(3), rtol=0.0, atol=ROTATION_TOLERANCE)
-    if not turned or np.linalg.det(R) < 0.0 or not np.array_equal(matrix[3], (0.0, 0.0, 0.0, 1.0)):
+    off = float(np.max(np.abs(R @ R.T - np.eye(3))))
+    if (
+        not off <= ROTATION_TOLERANCE
+        or np.linalg.det(R) < 0.0
+        or not np.array_equal(matrix[3], (0.0, 0.0, 0.0, 1.0))
+    ):
         raise TensionProblemError(
             "pose: found a matrix that is no pose; accepted: a rotation, a position [m], and the "
             "last row 0 0 0 1"
         )
-    if not RotationMatrix.IsValid(R):
+    if off > EXACT_ROTATION:
         R = RotationMatrix.ProjectToRotationMatrix(R).matrix()
     return RigidTransform(RotationMatrix(R), matrix[:3, 3])
 

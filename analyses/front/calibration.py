@@ -144,22 +144,33 @@ def calibrate(
     """
     loaded = as_robot(robot)
     _check_names(options, OPTIONS, CalibrationError)
-    if tags is not None and tag_size is not None:
-        raise CalibrationError("tag_size: found beside tags; accepted: one of them")
-    read = _read(loaded, log, tracker_late)
-    places = {} if tags is None else tags
-    if isinstance(places, str | Path):
-        places = read_tags(Path(places))
-    if tag_size is not None:
-        if not 0.0 < tag_size < 1e3:
-            raise CalibrationError(f"tag_size: found {tag_size:g}; accepted: > 0 [m]")
-        places = dict.fromkeys(read.corners, TagPlace(tag_size))
+    read, places = calibration_inputs(loaded, log, tags, tag_size, tracker_late)
     if options.get("start") is not None:
         options["start"] = as_pose(loaded, options["start"])
     task = CalibrationTask(
-        robot=loaded, unknown=_words(unknown), sigmas=_sigmas(sigmas), tags=dict(places), **options
+        robot=loaded, unknown=_words(unknown), sigmas=_sigmas(sigmas), tags=places, **options
     )
     return as_kind(RobotCalibration, calibrate_log(task, read, say or _silent))
+
+
+def calibration_inputs(
+    robot: Robot,
+    log: CalibrationLog | Path | str,
+    tags: Mapping[int, TagPlace] | Path | str | None,
+    tag_size: float | None,
+    tracker_late: float | None,
+) -> tuple[CalibrationLog, dict[int, TagPlace]]:
+    """The log and what is known of tags; arguments, and what is raised, as of `calibrate`."""
+    if tags is not None and tag_size is not None:
+        raise CalibrationError("tag_size: found beside tags; accepted: one of them")
+    read = _read(robot, log, tracker_late)
+    if tag_size is not None:
+        if not 0.0 < tag_size < 1e3:
+            raise CalibrationError(f"tag_size: found {tag_size:g}; accepted: > 0 [m]")
+        return read, dict.fromkeys(read.corners, TagPlace(tag_size))
+    if isinstance(tags, str | Path):
+        return read, read_tags(Path(tags))
+    return read, dict(tags or {})
 
 
 def identify(

@@ -88,7 +88,8 @@ def optimize_design(
         if generations is not None:
             asked = replace(asked, generations=generations)
         candidates = make_candidates(name, asked, source)
-        search = search_design(name, candidates, asked, StudySession(where, workers=workers))
+        given = robot if isinstance(robot, Robot) else name
+        search = search_design(given, candidates, asked, StudySession(where, workers=workers))
         confirmed = []
         if search.best is not None:
             file = write_design(search, loaded.name, where)

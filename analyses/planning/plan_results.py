@@ -28,6 +28,9 @@ SUMMARY, MOTION = "summary.json", "motion.csv"
 REACHED = 0.99
 """A limit counts as reached from this share of it on."""
 
+POSITION = slice(4, 7)
+"""Of a row of `MOTION_COLUMNS`."""
+
 MOMENT = 1e-9
 """Instants that are nearer are one [s]."""
 
@@ -93,7 +96,7 @@ class MotionRun(Summarized, ABC):
             name: int(np.sum(np.any(holds, axis=1))) for name, holds in samples.active().items()
         }
         most = max(reached, key=lambda name: reached[name])
-        start, end = (self.motion.motion(t)[:3] for t in (0.0, self.motion.end_time))
+        start, end = (self.motion.motion(t)[POSITION] for t in (0.0, self.motion.end_time))
         rows = [
             ("duration", f"{self.motion.end_time:.4f} s, planned in {self.planning_time:.3g} s"),
             ("positions", f"({numbers(start)}) to ({numbers(end)}) m"),

@@ -171,7 +171,7 @@ class TensionSolution(Summarized):
     def summary(self) -> tuple[str, list[tuple[str, str]]]:
         """What it shows of itself; tensions on a bound have a star."""
         words = (
-            f"{t:.2f}{'*' * (bound != 0)}"
+            f"{t:.2f}{'*' if bound else ''}"
             for t, bound in zip(self.tensions, self.active, strict=True)
         )
         return f"Tensions by {self.method}: {self.status}", [
