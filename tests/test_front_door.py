@@ -2,6 +2,7 @@
 
 import ast
 import json
+import re
 import subprocess
 import sys
 from importlib import import_module
@@ -201,6 +202,10 @@ def test_tensions(planar, aside):
     ]
     shows_itself(every)
     assert isinstance(every.plot_wrenches(), Figure)
+    given = {"limits": (2.0, 30.0), "length_scale": 0.1, "mass": 2.0}
+    relaxed = cdpr.solve_tensions(planar, aside, push, "slack_relaxed", **given)
+    problem = tension_problem(planar, aside.transform(), push, **given)
+    assert relaxed.solution.as_dict() == distribute(problem, "slack_relaxed").as_dict()
     wanted = cdpr.solve_tensions(planar, method="reference_program", reference=6.0)
     assert np.max(np.abs(wanted.tensions - 6.0)) < 1.0
     one_line(lambda: cdpr.solve_tensions(planar, method="dijkstra"), "dijkstra", "dykstra")
@@ -480,3 +485,15 @@ def test_scenario_names():
     by_kind = [name for kind in kinds for name in cdpr.scenario_names(kind)]
     assert sorted(by_kind) == list(cdpr.scenario_names())
     one_line(lambda: cdpr.scenario_names("dance"), "dance")
+
+
+def test_twenty_tasks_take_five_lines_each():
+    """That they run is tested with all pages."""
+    page = Path(__file__).parents[1] / "docs" / "howto" / "twenty_tasks.md"
+    first, *tasks = re.findall(r"^```python\n(.*?)^```", page.read_text(), re.DOTALL | re.MULTILINE)
+    assert first == "import cdpr_drake as cdpr\n"
+    assert len(tasks) == 20
+    for task in tasks:
+        assert len(task.splitlines()) <= 5, task
+        assert "import " not in task
+        assert set(re.findall(r"cdpr\.(\w+)", task)) <= set(cdpr.__all__)
