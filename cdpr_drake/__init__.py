@@ -1,4 +1,17 @@
-"""Pure functions for cable-driven parallel robots, and the `cdpr` command.
+"""Cable-driven parallel robots in Drake: `import cdpr_drake as cdpr`.
+
+The names of this package are loaded when they are first asked for. Those of most use:
+
+    robot = cdpr.load_robot("acrobot_large")          # or the path of a robot file of yours
+    cdpr.solve_tensions(robot)                        # tensions that hold it at its home pose
+    cdpr.solve_static(robot, lengths=l0)              # where it hangs with unstrained lengths
+    cdpr.compute_workspace(robot, "wrench-feasible", force=5.0)
+    cdpr.simulate("acrobot_pbvs", ["duration=5"])     # a visual servo
+
+`cdpr.robot_names()` and `cdpr.scenario_names()` list what comes with the package. Each of these
+functions takes a robot by name, by path or as a Robot; a pose as a RigidTransform, a matrix of
+shape (4, 4), a `Pose`, or None for the home pose. Results show themselves, have `as_dict()`, the
+same as `cdpr ... --json` prints, and mostly `plot()`. What users can do wrong raises a `CdprError`.
 
 Conventions hold everywhere and are stated once, here. Units are SI and angles radians unless a name
 says otherwise. Drake's monogram notation: `X_WP` is the pose of the platform P in the world W,
@@ -14,8 +27,10 @@ Packages of pure functions take arrays, small dataclasses and RigidTransforms, n
 Compiled kernels are cached in the user's cache folder, or where NUMBA_CACHE_DIR says.
 """
 
+import lazy_loader
+
 from cdpr_drake.kernel_cache.folder import use_kernel_cache
 
-__all__: list[str] = []
-
 use_kernel_cache()
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,6 +1,6 @@
 from .robot_exchange import draft_robot as draft_robot
+from .robot_exchange import export_robot as export_robot
 from .robot_exchange import import_robot as import_robot
-from .robot_exchange import write_robot as write_robot
 from .robot_exports import EXPORTS as EXPORTS
 from .robot_exports import HELD as HELD
 from .robot_exports import given_fields as given_fields

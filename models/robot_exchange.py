@@ -20,7 +20,13 @@ from cdpr_drake.models.materials import given_material
 from cdpr_drake.models.robot_exports import check_format, names_in_file, xml_words
 from cdpr_drake.models.robot_holding import lengths_at_home
 from cdpr_drake.models.robot_in_plant import platform_inertia
-from cdpr_drake.models.robot_loader import gravity_turn, parse_robot, turned_robot, world_turn
+from cdpr_drake.models.robot_loader import (
+    as_robot,
+    gravity_turn,
+    parse_robot,
+    turned_robot,
+    world_turn,
+)
 from cdpr_drake.models.robot_schema import Robot
 
 
@@ -122,11 +128,11 @@ def draft_robot(robot: Robot) -> RobotDraft:
     )  # fmt: skip
 
 
-def write_robot(robot: Robot, format: str) -> dict[str, str]:
+def export_robot(robot: Robot | str | Path, format: str) -> dict[str, str]:
     """Files of a robot in the format of another tool.
 
     Args:
-        robot: The robot.
+        robot: The robot, or its name or path.
         format: A name of `EXPORTS`.
 
     Returns:
@@ -137,6 +143,7 @@ def write_robot(robot: Robot, format: str) -> dict[str, str]:
         RobotFileError: There is no such format, or it cannot hold this robot. What it cannot hold
             of one that it takes, `not_written` says.
     """
+    robot = as_robot(robot)
     check_format(format)
     turn, words = gravity_turn(robot), world_turn(robot, format)
     if turn is None or not words:

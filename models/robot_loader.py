@@ -7,9 +7,11 @@ another folder (`portable_robot`).
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from copy import deepcopy
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 from pydrake.common.eigen_geometry import AngleAxis
@@ -102,15 +104,19 @@ def robot_text(name: str) -> str:
     return yaml_dump_typed(robot)
 
 
-def load_robot(name: str) -> Robot:
+def load_robot(name: str | Path) -> Robot:
     """Reads a robot by name or by path, also from a file of another tool.
 
     What a foreign file lacks is assumed, and stands in the robot's `assumptions`. Exit points on
     rails are where the file says, or where the name does, as in `name@C1=0.3,C2=-0.1` [m].
 
+    Args:
+        name: A name of `robot_names()`, or the path of a file or folder.
+
     Raises:
         RobotFileError: Unknown robot, or the file does not describe a possible one.
     """
+    name = str(name)
     path, (_, rails) = robot_file(name), split_name(name)
     if is_foreign(path):
         robot = parse_robot(complete_draft(read_foreign(path)).yaml(), path)
@@ -121,6 +127,36 @@ def load_robot(name: str) -> Robot:
     if rails:
         _put_on_rails(robot, rails, path)
     return robot
+
+
+def as_robot(robot: Robot | str | Path) -> Robot:
+    """A robot that is given as itself, or by name or path as `load_robot` takes it.
+
+    Raises:
+        RobotFileError: As `load_robot`, or it is something else.
+    """
+    if isinstance(robot, Robot):
+        return robot
+    if isinstance(robot, str | Path):
+        return load_robot(robot)
+    raise RobotFileError(
+        f"robot: found a {type(robot).__name__}; accepted: a name, a path or a Robot"
+    )
+
+
+@contextmanager
+def robot_reference(robot: Robot | str | Path) -> Iterator[str]:
+    """A name or path by which `load_robot` finds a robot inside the block.
+
+    That of a Robot is a file of its own, which goes with the block.
+    """
+    if not isinstance(robot, Robot):
+        yield str(robot)
+        return
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "robot.yaml"
+        path.write_text(yaml_dump_typed(robot), encoding="utf-8")
+        yield str(path)
 
 
 def _put_on_rails(robot: Robot, rails: dict[str, float], path: Path) -> None:

@@ -29,6 +29,7 @@ from cdpr_drake.schema.fields import (
     sections,
     text,
 )
+from cdpr_drake.summaries import Summarized, numbers
 from cdpr_drake.winches.drum import Drum
 from cdpr_drake.winches.groups import WinchGroups
 from cdpr_drake.winches.motor import WinchLaw
@@ -141,8 +142,8 @@ class CameraMount:
     pose: Pose = section("Pose of the camera frame C in the parent, z forward, y down.", Pose)
 
 
-@dataclass(kw_only=True)
-class Robot:
+@dataclass(kw_only=True, repr=False)
+class Robot(Summarized):
     """A cable-driven parallel robot."""
 
     name: str = file_name("Name, the same as that of its folder.")
@@ -186,6 +187,25 @@ class Robot:
         "What tension sensors read while the cables are slack; null: zero.", "N", (None,), None
     )
     assumptions: str = text("Values that no source gives, and what they were taken from.", "")
+
+    def summary(self) -> tuple[str, list[tuple[str, str]]]:
+        """What it shows of itself."""
+        low, high = self.tension_limits()
+        radii = sorted({float(radius) for radius in self.cable_set().pulley_radius})
+        size, m = numbers(self.platform.size), len(self.cables)
+        pulleys = f"radius {numbers(radii)} m" if max(radii) > 0.0 else "none, fixed exit points"
+        frame = f"({numbers(self.frame.lower)}) to ({numbers(self.frame.upper)}) m"
+        return f"Robot {self.name}: {self.title}".rstrip(": "), [
+            ("motion", f"{self.motion}, {m} cable{'s' * (m != 1)}"),
+            ("platform", f"{self.platform.mass:g} kg, box ({size}) m"),
+            ("home", f"({numbers(self.home.position)}) m, ({numbers(self.home.angles_deg)}) deg"),
+            ("frame", frame),
+            ("tensions", f"{low:g} to {high:g} N"),
+            ("pulleys", pulleys),
+            ("cables", f"diameter {1e3 * self.cable.diameter:g} mm, "
+             f"E {1e-9 * self.cable.youngs_modulus:g} GPa"),
+            ("cameras", ", ".join(mount.name for mount in self.cameras) or "none"),
+        ]  # fmt: skip
 
     def exit_points(self) -> Array:
         """p_WA where rails stand as the file says, shape (3, m) [m]."""

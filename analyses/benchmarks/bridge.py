@@ -46,8 +46,8 @@ for _ in range(int(sys.argv[3])):
 
 CLIENT = """
 import sys
-from cdpr_drake.systems.remote.remote_client import Client
-with Client(sys.argv[1], timeout=float(sys.argv[3])) as client:
+from cdpr_drake.systems.remote.remote_client import RemoteClient
+with RemoteClient(sys.argv[1], timeout=float(sys.argv[3])) as client:
     now = client.start(sys.argv[2].split(","))
     tensions = client.distribute(now.outputs["platform_state"][:7])[0]
     while now.end is None:

@@ -6,7 +6,7 @@ import csv
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich.box import SIMPLE_HEAD
@@ -23,13 +23,17 @@ from cdpr_drake.analyses.workspaces.pose_grid import plain
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import DesignError
 from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.summaries import Summarized
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 TABLE = "designs.csv"
 """All designs that were judged, in the order of the search."""
 
 
-@dataclass(frozen=True, eq=False)
-class DesignResult:
+@dataclass(frozen=True, eq=False, repr=False)
+class DesignResult(Summarized):
     """A finished or stopped search, and what was confirmed of its best design.
 
     Attributes:
@@ -80,6 +84,24 @@ class DesignResult:
                 **_named(search.names, search.values[best]),
             }
         return found
+
+    def plot(self) -> Figure:
+        """How the search went."""
+        from cdpr_drake.analyses.design.figures import design_drawings
+
+        return next(iter(design_drawings(self.robot, self.search).values()))()
+
+    def summary(self) -> tuple[str, list[tuple[str, str]]]:
+        """What it shows of itself: goals of the robot and of the best design."""
+        search, best = self.search, self.search.best
+        rows = [("designs", f"{len(search.values)} judged, {search.candidates.size} coordinates")]
+        for k, name in enumerate(search.names[:4]):
+            sign = -1.0 if GOALS[name].smaller else 1.0
+            after = "-" if best is None else f"{sign * search.values[best, k]:.5g}"
+            rows.append((name, f"{sign * search.original[k]:.5g} to {after} {GOALS[name].unit}"))
+        for one in self.confirmed[:3]:
+            rows.append(("proven", f"{one.goal} {one.original:.5g} to {one.design:.5g} {one.unit}"))
+        return f"Design of {self.robot}" + ", interrupted" * self.interrupted, rows
 
     def _cables(self, number: int) -> list[int]:
         return [k + 1 for k in self.search.candidates.kept[self.search.sets[number]]]

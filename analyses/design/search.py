@@ -23,7 +23,8 @@ from cdpr_drake.analyses.workspaces.pose_grid import plain
 from cdpr_drake.analyses.workspaces.stability_defaults import workspace_defaults
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CdprError, DesignError
-from cdpr_drake.models.robot_loader import load_robot, parse_robot
+from cdpr_drake.models.robot_loader import as_robot, parse_robot
+from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.workspaces.demanded_wrenches import SpatialSet
 from cdpr_drake.workspaces.pose_grid import grid_by_count
 
@@ -96,14 +97,15 @@ class DesignSearch:
         return self.progress.done < self.progress.total
 
 
-def judging_of(robot_name: str, poses: PosesSettings, settings: DesignSettings) -> Judging:
+def judging_of(robot: Robot | str, poses: PosesSettings, settings: DesignSettings) -> Judging:
     """What designs of a robot are judged by.
 
     Raises:
         CdprError: The box is empty or outside the robot's frame.
     """
-    robot = load_robot(robot_name)
-    defaults = workspace_defaults(robot, robot_name)
+    name = robot.name if isinstance(robot, Robot) else robot
+    robot = as_robot(robot)
+    defaults = workspace_defaults(robot, name)
     lower = defaults.lower if poses.lower is None else poses.lower
     upper = defaults.upper if poses.upper is None else poses.upper
     if np.any(lower > upper):
@@ -151,7 +153,7 @@ def judge_original(candidates: Candidates, judging: Judging, names: Sequence[str
 
 
 def search_design(
-    robot_name: str,
+    robot: Robot | str,
     candidates: Candidates,
     settings: DesignSettings,
     session: StudySession = ALONE,
@@ -162,7 +164,7 @@ def search_design(
     kept one by one, and the search is replayed from them.
 
     Args:
-        robot_name: Robot by name, or path of a robot file.
+        robot: The robot, or its name or path.
         candidates: What it may become.
         settings: What is wanted.
         session: How it is run; without a number of workers one, whose kernels use all processors.
@@ -172,7 +174,7 @@ def search_design(
         CdprError: The robot cannot be asked for a goal.
     """
     slopes = _slopes_of(settings)
-    judging = judging_of(robot_name, settings.poses, settings)
+    judging = judging_of(robot, settings.poses, settings)
     names = tuple(goal.name for goal in settings.goals)
     original = judge_original(candidates, judging, names)
     population = settings.population or default_population(candidates.size)

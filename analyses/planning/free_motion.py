@@ -135,7 +135,7 @@ def camera_view(robot: Robot, name: str | None) -> View:
     return View(mount.pose.transform(), (slopes[0], slopes[1]))
 
 
-def plan_free_motion(
+def solve_free_motion(
     robot: Robot,
     task: PathTask,
     asked: FreeSettings,

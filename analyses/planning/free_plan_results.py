@@ -24,7 +24,7 @@ KEPT_WITHIN = 1e-6
 """A distance that is missed by less is kept [m]."""
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class FreeRun(MotionRun):
     """A motion of a robot whose path was free.
 

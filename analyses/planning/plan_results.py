@@ -19,6 +19,7 @@ from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.planning.limits import MotionLimits
 from cdpr_drake.planning.path_task import MotionSamples, PathTask, sample_motion
 from cdpr_drake.planning.path_timing import PathPlan
+from cdpr_drake.summaries import Summarized, numbers
 from cdpr_drake.trajectories.sampled_motion import MOTION_COLUMNS, TIME_COLUMN
 from cdpr_drake.trajectories.timed_path import TimedPath
 
@@ -27,12 +28,15 @@ SUMMARY, MOTION = "summary.json", "motion.csv"
 REACHED = 0.99
 """A limit counts as reached from this share of it on."""
 
+POSITION = slice(4, 7)
+"""Of a row of `MOTION_COLUMNS`."""
+
 MOMENT = 1e-9
 """Instants that are nearer are one [s]."""
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class MotionRun(ABC):
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class MotionRun(Summarized, ABC):
     """A planned motion of a robot, of any kind, as figures and tables ask it.
 
     Attributes:
@@ -85,6 +89,31 @@ class MotionRun(ABC):
         )
         return told
 
+    def summary(self) -> tuple[str, list[tuple[str, str]]]:
+        """What it shows of itself."""
+        samples, limits = self.samples, self.task.limits
+        reached = {
+            name: int(np.sum(np.any(holds, axis=1))) for name, holds in samples.active().items()
+        }
+        most = max(reached, key=lambda name: reached[name])
+        start, end = (self.motion.motion(t)[POSITION] for t in (0.0, self.motion.end_time))
+        rows = [
+            ("duration", f"{self.motion.end_time:.4f} s, planned in {self.planning_time:.3g} s"),
+            ("positions", f"({numbers(start)}) to ({numbers(end)}) m"),
+            ("tensions", f"{np.min(samples.tensions):.4g} to {np.max(samples.tensions):.4g} N, "
+             f"limits {limits.lower:g} to {limits.upper:g} N"),
+            ("cable speed", f"up to {np.max(np.abs(samples.cable_speeds)):.4g} m/s, "
+             f"limit {limits.cable_speed:.4g} m/s"),
+            ("largest share", f"{np.max(samples.uses):.4f} of a limit"),
+            ("most reached", most if reached[most] else "none"),
+        ]  # fmt: skip
+        if self.tracked is not None:
+            told = self.tracked.as_dict()
+            words = "all limits kept" if told["keeps_limits"] else "limits missed"
+            error = 1e3 * told["largest_position_error_m"]
+            rows.append(("tracked", f"{words}, error up to {error:.3g} mm"))
+        return self.about, rows
+
     def write(self, folder: Path) -> dict[str, Any]:
         """Writes summary and motion into an existing folder; returns the summary."""
         told = self.as_dict()
@@ -93,7 +122,7 @@ class MotionRun(ABC):
         return told
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class PlanRun(MotionRun):
     """A time-optimal plan of a robot.
 

@@ -8,12 +8,14 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
+from matplotlib.figure import Figure
 from pydrake.geometry import Meshcat
 
 from cdpr_drake.analyses.reporting.deferred_figures import Pictures
 from cdpr_drake.analyses.reporting.log_on_disk import Log
 from cdpr_drake.analyses.simulation.pick_and_place_figures import (
     live_view,
+    phase_figure,
     pick_and_place_pictures,
     write_pick_and_place_data,
 )
@@ -21,9 +23,14 @@ from cdpr_drake.analyses.simulation.pick_and_place_run import (
     run_pick_and_place,
     unfinished_pick_and_place,
 )
-from cdpr_drake.analyses.simulation.pick_and_place_summary import pick_and_place_facts, placed_error
+from cdpr_drake.analyses.simulation.pick_and_place_summary import (
+    pick_and_place_facts,
+    placed_error,
+    summarize_pick_and_place,
+)
+from cdpr_drake.analyses.simulation.run_figures import error_figure as servo_error_figure
 from cdpr_drake.analyses.simulation.run_files import run_pictures, write_run_data
-from cdpr_drake.analyses.simulation.run_summary import final_errors
+from cdpr_drake.analyses.simulation.run_summary import final_errors, summarize
 from cdpr_drake.analyses.simulation.session import UNWATCHED, RunSession
 from cdpr_drake.analyses.simulation.start_checks import (
     check_length,
@@ -32,9 +39,11 @@ from cdpr_drake.analyses.simulation.start_checks import (
     goal_warnings,
     step_warnings,
 )
+from cdpr_drake.analyses.simulation.tension_control_run import error_figure as tension_error_figure
 from cdpr_drake.analyses.simulation.tension_control_run import (
     make_control,
     run_tension_scenario,
+    summarize_tension_run,
     tension_end_error,
     tension_pictures,
     unfinished_tension_run,
@@ -78,8 +87,10 @@ class ScenarioKind:
             simulator and diagram before they start.
         unfinished: The result of a run whose program ended before, from scenario and log.
         live: Makes what lets Meshcat follow a run, for `run`.
+        numbers: The summary of a result, for JSON.
         data: Writes the data of a result into a folder; returns the summary.
         pictures: What draws it, with a film if asked, its figures in the formats given.
+        figure: The figure of a result that says most of it.
         facts: Label and words for the table at the end, from the summary.
         end_error: True distance [m] and angle [rad] that a result ends with, of which a scenario
             says how large it expects them, see `ExpectedEnd`.
@@ -91,8 +102,10 @@ class ScenarioKind:
     run: Run
     unfinished: Callable[[Any, Log], Any]
     live: Callable[[Any, Meshcat], Prepare]
+    numbers: Callable[[Any], dict[str, Any]]
     data: Callable[[Path, Any], dict[str, Any]]
     pictures: Callable[[Any, bool, Sequence[str]], Pictures]
+    figure: Callable[[Any], Figure]
     facts: Callable[[dict[str, Any]], list[tuple[str, str]]]
     end_error: Callable[[Any], tuple[float, float]]
 
@@ -191,8 +204,10 @@ SCENARIO_KINDS: dict[str, ScenarioKind] = {
         run=run_scenario,
         unfinished=unfinished_run,
         live=live_servo,
+        numbers=summarize,
         data=write_run_data,
         pictures=run_pictures,
+        figure=servo_error_figure,
         facts=_servo_facts,
         end_error=final_errors,
     ),
@@ -203,8 +218,10 @@ SCENARIO_KINDS: dict[str, ScenarioKind] = {
         run=run_tension_scenario,
         unfinished=unfinished_tension_run,
         live=live_tension_control,
+        numbers=summarize_tension_run,
         data=write_tension_data,
         pictures=lambda run, video, formats: tension_pictures(run, formats),
+        figure=tension_error_figure,
         facts=_tension_facts,
         end_error=tension_end_error,
     ),
@@ -215,8 +232,10 @@ SCENARIO_KINDS: dict[str, ScenarioKind] = {
         run=run_pick_and_place,
         unfinished=unfinished_pick_and_place,
         live=live_view,
+        numbers=summarize_pick_and_place,
         data=write_pick_and_place_data,
         pictures=lambda run, video, formats: pick_and_place_pictures(run, formats),
+        figure=phase_figure,
         facts=pick_and_place_facts,
         end_error=placed_error,
     ),

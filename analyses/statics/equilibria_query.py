@@ -15,16 +15,21 @@ from cdpr_drake.geometry.poses import angles_from_rotation
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import hanging_platform
 from cdpr_drake.statics.equilibria_at_position import placed_rests
+from cdpr_drake.statics.equilibrium import Stability
 from cdpr_drake.statics.equilibrium_enumeration import all_rests
 from cdpr_drake.statics.equilibrium_search import sampled_rests
 from cdpr_drake.statics.inextensible_problem import HangingPlatform, Rest
 from cdpr_drake.statics.real_solutions import PathCount
+from cdpr_drake.summaries import Summarized, numbers
 
 Report = Callable[[int, int], object]
 
+SHOWN = 6
+"""So many poses are shown where the report shows itself."""
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class EquilibriaReport:
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class EquilibriaReport(Summarized):
     """Poses of rest of a robot.
 
     Attributes:
@@ -61,6 +66,19 @@ class EquilibriaReport:
                 _rest(one, needed) for one, needed in zip(self.rests, self.needed, strict=True)
             ],
         }
+
+    def summary(self) -> tuple[str, list[tuple[str, str]]]:
+        """What it shows of itself: the first poses, the lowest energy first."""
+        count = len(self.rests)
+        stable = sum(one.stability == Stability.STABLE for one in self.rests)
+        title = f"{self.robot}: {count} pose{'s' * (count != 1)} of rest, {stable} stable"
+        rows = [
+            (str(one.stability), f"({numbers(one.X_WP.translation())}) m, {one.energy:.5g} J")
+            for one in self.rests[:SHOWN]
+        ]
+        if count > SHOWN:
+            rows.append(("...", f"{count - SHOWN} more"))
+        return title, [("cables", self.model), ("evidence", self.words), *rows]
 
 
 def rests_at_lengths(

@@ -35,6 +35,7 @@ from cdpr_drake.statics.equilibrium import (
     random_starts,
 )
 from cdpr_drake.statics.stiffness import inextensible_modes, natural_modes, platform_stiffness
+from cdpr_drake.summaries import Summarized, numbers
 
 STARTS = 40
 """Poses from which equilibria are searched, beside the home pose."""
@@ -44,8 +45,8 @@ LARGEST_STRAIN = 0.03
 about what ropes of steel or stretched polyethylene bear."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class StaticReport:
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class StaticReport(Summarized):
     """A robot at rest.
 
     Attributes:
@@ -115,6 +116,23 @@ class StaticReport:
                 for one in self.others
             ],
         }
+
+    def summary(self) -> tuple[str, list[tuple[str, str]]]:
+        """What it shows of itself."""
+        angles = np.degrees(angles_from_rotation(self.X_WP.rotation()))
+        slack = [name for name, loose in zip(self.names, self.slack, strict=True) if loose]
+        slowest = "-"
+        if self.frequencies is not None:
+            slowest = f"{self.frequencies[0]:.4g} Hz"
+        return f"{self.robot} at rest, {self.model} cables: {self.stability}", [
+            ("pose", f"({numbers(self.X_WP.translation())}) m, ({numbers(angles)}) deg"),
+            ("tensions", f"{np.min(self.tensions):.4g} to {np.max(self.tensions):.4g} N"),
+            ("slack", ", ".join(slack) or "none"),
+            ("unstrained", f"({numbers(self.l0)}) m"),
+            ("least stiffness", f"{self.principal[0]:.4g} N/m"),
+            ("slowest mode", slowest),
+            ("other rests", str(len(self.others))),
+        ]
 
 
 def at_pose(robot: Robot, X_WP: RigidTransform, model: str, pulleys: bool) -> StaticReport:

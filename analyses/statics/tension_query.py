@@ -28,19 +28,6 @@ def solve_all(problem: TensionProblem) -> list[TensionSolution]:
     return [distribute(problem, name) for name in applicable_methods(problem)]
 
 
-def as_dict(solution: TensionSolution) -> dict[str, Any]:
-    """A solution for JSON; tensions that are not there are null."""
-    finite = np.all(np.isfinite(solution.tensions))
-    return {
-        "method": solution.method,
-        "status": str(solution.status),
-        "tensions_n": solution.tensions.tolist() if finite else None,
-        "residual": solution.residual if finite else None,
-        "active_bounds": solution.active.tolist(),
-        "slack_wrench": solution.slack.tolist() if finite else None,
-    }
-
-
 def polygon_tensions(problem: TensionProblem) -> list[list[float]]:
     """Tensions at the corners of the feasible polygon, one list of m [N] per corner."""
     t, N = solution_space(problem)

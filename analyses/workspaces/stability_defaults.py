@@ -132,8 +132,8 @@ def workspace_defaults(robot: Robot, name: str) -> WorkspaceDefaults:
         robot: The robot.
         name: Its name in the catalogue, or the path of its file.
     """
-    path = robot_file(name).parent / FILE
-    if name in robot_names() and path.is_file():
+    path = robot_file(name).parent / FILE if name in robot_names() else None
+    if path is not None and path.is_file():
         settings = load_typed(WorkspaceSettings, path, error=BoundsFileError)
         grid = settings.grid
         return WorkspaceDefaults(

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,7 @@ from cdpr_drake.analyses.workspaces.stability_tasks import StabilityTask
 from cdpr_drake.analyses.workspaces.static_feasible import static_case
 from cdpr_drake.errors import StabilityError
 from cdpr_drake.geometry.straight_cables import PLANAR_ROWS
-from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_loader import as_robot, robot_reference
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.schema.typed_yaml import closest
 from cdpr_drake.stability.desired_view import FixedObject, OppositeCorner, ServoTarget
@@ -154,7 +155,7 @@ def stability_case(
 
 
 def make_question(
-    robot_name: str,
+    robot: Robot | str | Path,
     *,
     scheme: str = "pbvs",
     verdict: str = "searched",
@@ -168,7 +169,7 @@ def make_question(
     """The question for a robot, filled up with the servoing thesis' grid and bounds.
 
     Args:
-        robot_name: Robot by name, or path of a robot file.
+        robot: The robot, or its name or path.
         scheme: Visual servoing scheme.
         verdict: One of `stability.verdict.VERDICTS`.
         bounds: Perturbation bounds, named `GIVEN`; None: those of `defaults`, `BASE`.
@@ -184,8 +185,9 @@ def make_question(
     """
     if verdict not in VERDICTS:
         raise StabilityError(f"verdict {verdict!r} is unknown; {closest(verdict, VERDICTS)}")
-    robot = load_robot(robot_name)
-    defaults = workspace_defaults(robot, robot_name)
+    name = robot.name if isinstance(robot, Robot) else str(robot)
+    robot = as_robot(robot)
+    defaults = workspace_defaults(robot, name)
     if grid is None:
         grid = grid_by_step(defaults.lower, defaults.upper, defaults.step)
     check_grid(robot, grid)
@@ -233,11 +235,11 @@ def varied(base: PerturbationBounds, parameter: str, value: float) -> Perturbati
     return base.varied(**{name: value})
 
 
-def scenario_task(robot: str, scenario: str) -> CameraTask:
+def scenario_task(robot: Robot | str | Path, scenario: str) -> CameraTask:
     """What a scenario's camera sees and shall see.
 
     Args:
-        robot: Name or path of the robot, in the place of the scenario's.
+        robot: The robot, or its name or path, in the place of the scenario's.
         scenario: Name or path of a visual servo's scenario.
 
     Returns:
@@ -250,7 +252,8 @@ def scenario_task(robot: str, scenario: str) -> CameraTask:
             about neither.
         ScenarioError: There is no such scenario, or the robot does not fit into it.
     """
-    loaded = load_scenario(scenario, [f"robot={robot}"])
+    with robot_reference(robot) as name:
+        loaded = load_scenario(scenario, [f"robot={name}"])
     where = f"--scenario {scenario}"
     if loaded.target.carrier != "world":
         raise StabilityError(
@@ -261,6 +264,6 @@ def scenario_task(robot: str, scenario: str) -> CameraTask:
         raise StabilityError(f"{where}: found target.motion; accepted: an object that rests")
     return CameraTask(
         FixedObject(loaded.target.pose.transform(), loaded.desired.transform()),
-        load_robot(robot).camera_mount(loaded.camera.mount).pose.transform(),
+        as_robot(robot).camera_mount(loaded.camera.mount).pose.transform(),
         "object",
     )

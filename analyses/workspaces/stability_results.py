@@ -16,6 +16,7 @@ from cdpr_drake.analyses.workspaces.grid_runs import SweepOptions, run_poses
 from cdpr_drake.analyses.workspaces.stability_question import StabilityQuestion
 from cdpr_drake.analyses.workspaces.static_feasible import StaticTask
 from cdpr_drake.stability.perturbation_bounds import PerturbationBounds
+from cdpr_drake.summaries import Summarized
 from cdpr_drake.workspaces.pose_grid import WorkspaceGrid
 from cdpr_drake.workspaces.volume import VolumeRule, WorkspaceVolume, workspace_volume
 
@@ -30,6 +31,9 @@ CHUNK_POSES = {"sampled": 1024, "searched": 256, "certified": 64}
 """Poses per chunk for each verdict, seconds of work: what Ctrl-C waits for, or loses. Chunks that
 were kept under other numbers are not found, and computed again."""
 
+SHOWN = 5
+"""So many bounds are shown where workspaces show themselves."""
+
 STATIC = "static"
 """Name of the static feasible workspace among the tasks of the sweep."""
 
@@ -40,8 +44,8 @@ LEVERS_IN_WORDS = {
 """What PBVS' interaction matrix has in its rotational columns, by `StabilityCase.lever`."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class StabilityWorkspaces:
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class StabilityWorkspaces(Summarized):
     """Workspaces of one robot and scheme under one or several perturbation bounds.
 
     Attributes:
@@ -104,6 +108,25 @@ class StabilityWorkspaces:
 
     def _numbers(self, kind: str, name: str) -> dict[str, Any]:
         return region_numbers(self.inside(kind, name), self.places(kind, name), self.grid.axes)
+
+    def summary(self) -> tuple[str, list[tuple[str, str]]]:
+        """What it shows of itself: volumes of the first bounds."""
+        about = self.arguments
+        k, *counts = self.grid.shape
+        rows = [
+            ("grid", " x ".join(map(str, counts)) + (f", {k} orientations" if k > 1 else "")),
+            ("evidence", about["verdict"]),
+        ]
+        for name in self.names[:SHOWN]:
+            found = {kind: self.volume(kind, bounds=name) for kind in KINDS}
+            words = (
+                f"{kind} {100.0 * one.share:.4g} %, {one.value:.4g} {one.unit}"
+                for kind, one in found.items()
+            )
+            rows.append((name, "; ".join(words)))
+        if len(self.names) > SHOWN:
+            rows.append(("...", f"{len(self.names) - SHOWN} more bounds"))
+        return f"Stability of {about['robot']} under {about['scheme']}", rows
 
     def save(self, folder: Path) -> Path:
         """Writes `workspace.npz` into a folder that exists, and returns its path."""

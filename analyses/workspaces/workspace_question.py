@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,7 +23,7 @@ from cdpr_drake.analyses.workspaces.static_feasible import static_case
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import WorkspaceError
 from cdpr_drake.models.camera_catalogue import load_camera
-from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_loader import as_robot, robot_reference
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import rigid_platform
 from cdpr_drake.schema.typed_yaml import closest
@@ -200,7 +201,7 @@ HINTS = {
 
 
 def make_workspace_question(
-    robot_name: str,
+    robot: Robot | str | Path,
     kinds: Sequence[str],
     grid: WorkspaceGrid,
     measures: Sequence[str] = (),
@@ -210,7 +211,7 @@ def make_workspace_question(
     """The question for a robot.
 
     Args:
-        robot_name: Robot by name, or path of a robot file.
+        robot: The robot, or its name or path.
         kinds: Names of `KINDS`, at least one.
         grid: Poses of the platform.
         measures: Names of `MEASURES`.
@@ -232,12 +233,12 @@ def make_workspace_question(
         raise WorkspaceError(f"--kind: found none; accepted: {', '.join(KINDS)}")
     if not (np.isfinite(asked.clearance) and asked.clearance >= 0.0):
         raise WorkspaceError(f"--clearance: found {asked.clearance:g}; accepted: >= 0 [m]")
-    robot = load_robot(robot_name)
+    given, robot = robot, as_robot(robot)
     check_grid(robot, grid)
     about = pose_conditions(robot, asked)
     if "stable" in kinds:
-        task = None if asked.scenario is None else scenario_task(robot_name, asked.scenario)
-        stability = make_question(robot_name, grid=grid, task=task)
+        task = None if asked.scenario is None else scenario_task(given, asked.scenario)
+        stability = make_question(given, grid=grid, task=task)
         about = replace(about, stable=stability.task(next(iter(stability.bounds))))
     for name in kinds:
         needs = KINDS[name].needs
@@ -330,7 +331,8 @@ def camera_view(robot: Robot, scenario: str) -> CameraView:
         WorkspaceError: The camera is not on the platform, or the target does not rest.
         ScenarioError: There is no such scenario, or the robot does not fit into it.
     """
-    loaded = load_scenario(scenario, [f"robot={robot.name}"])
+    with robot_reference(robot) as name:
+        loaded = load_scenario(scenario, [f"robot={name}"])
     if loaded.target.carrier != "world" or loaded.target.motion is not None:
         raise WorkspaceError(
             f"--scenario {scenario}: found a target that moves; accepted: one that rests in the "

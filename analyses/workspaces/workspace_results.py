@@ -16,6 +16,7 @@ from cdpr_drake.analyses.workspaces.conditions import KINDS, MEASURES
 from cdpr_drake.analyses.workspaces.grid_results import load_grid, region_numbers, save_grid
 from cdpr_drake.analyses.workspaces.grid_runs import SweepOptions, run_poses
 from cdpr_drake.analyses.workspaces.workspace_question import WorkspaceQuestion
+from cdpr_drake.summaries import Summarized
 from cdpr_drake.workspaces.pose_grid import WorkspaceGrid
 from cdpr_drake.workspaces.volume import VolumeRule, WorkspaceVolume, workspace_volume
 
@@ -31,11 +32,14 @@ CHUNK_POSES = 4096
 SLOW_CHUNK_POSES = 256
 """With kinds that take about a millisecond a pose."""
 
+SHOWN = 4
+"""So many kinds, and measures, are shown where a workspace shows itself."""
+
 SLOW = {"stable", "target-visible"}
 
 
-@dataclass(frozen=True, eq=False)
-class RobotWorkspace:
+@dataclass(frozen=True, eq=False, repr=False)
+class RobotWorkspace(Summarized):
     """Where kinds hold on a grid, and measures there.
 
     Attributes:
@@ -121,6 +125,23 @@ class RobotWorkspace:
             "median": finite(float(np.median(values))) if some else None,
             "largest": finite(float(np.max(values))) if some else None,
         }
+
+    def summary(self) -> tuple[str, list[tuple[str, str]]]:
+        """What it shows of itself: shares and volumes of the first kinds."""
+        told = self.as_dict()
+        k, *counts = self.grid.shape
+        many = f", {k} orientations, {told['orientations']} of them" if k > 1 else ""
+        rows = [("grid", " x ".join(map(str, counts)) + many)]
+        for name, numbers in list(told["workspaces"].items())[-SHOWN:]:
+            volume = self.volume(name)
+            share = f"{100.0 * numbers['pose_share']:.4g} % of the poses"
+            rows.append((name, f"{share}, {volume.value:.4g} {volume.unit}"))
+        for name in list(self.values)[:SHOWN]:
+            one = told["measured"][name]
+            least, most = one["least"], one["largest"]
+            words = "none" if least is None else f"{least:.4g} to {most:.4g} {one['unit']}"
+            rows.append((name, words))
+        return f"Workspaces of {told['robot']}, cables {told['cables']}", rows
 
     def save(self, folder: Path) -> Path:
         """Writes `workspace.npz` into a folder that exists, and returns its path."""

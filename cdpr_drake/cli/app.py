@@ -12,7 +12,6 @@ import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from importlib import import_module
-from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
 from types import FrameType
@@ -25,6 +24,7 @@ from cdpr_drake.cli.completion import PROGRAM, asked_words, stand_in
 from cdpr_drake.cli.process import INTERRUPTED, SIGNALS, compile_ahead, hold_lifeline
 from cdpr_drake.errors import CdprError
 from cdpr_drake.kernel_cache.locks import share_compilation
+from cdpr_drake.version import __version__
 
 TRACEBACK = "CDPR_TRACEBACK"
 """Environment variable that lets errors through which Drake or Python raised."""
@@ -132,7 +132,9 @@ def _first_line(name: str, where: str) -> str | None:
 
 def _show_version(wanted: bool) -> None:
     if wanted:
-        print(f"cdpr_drake {version('cdpr_drake')}, Drake {version('drake')}")
+        from importlib.metadata import version
+
+        print(f"cdpr_drake {__version__}, Drake {version('drake')}")
         raise typer.Exit
 
 

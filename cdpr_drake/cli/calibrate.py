@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import fields, replace
+from dataclasses import fields
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
@@ -22,17 +22,13 @@ from cdpr_drake.analyses.calibration.calibration_report import (
     calibration_tables,
     write_calibration,
 )
-from cdpr_drake.analyses.calibration.calibration_request import CalibrationTask, Sigmas, TagPlace
+from cdpr_drake.analyses.calibration.calibration_request import Sigmas
 from cdpr_drake.analyses.calibration.calibration_task import (
     Calibration,
 )
-from cdpr_drake.analyses.calibration.calibration_task import (
-    calibrate as run_calibration,
-)
-from cdpr_drake.analyses.calibration.log_file import read_log
 from cdpr_drake.analyses.calibration.pose_proposal import next_poses
-from cdpr_drake.analyses.calibration.tag_file import read_tags
-from cdpr_drake.analyses.calibration.tracker import shifted_log
+from cdpr_drake.analyses.front.calibration import calibrate as run_calibration
+from cdpr_drake.analyses.front.calibration import calibration_inputs
 from cdpr_drake.analyses.planning.path_files import read_path
 from cdpr_drake.analyses.reporting.provenance import BELIEVED_FILE, write_run_inputs
 from cdpr_drake.analyses.reporting.statements import new_table
@@ -168,26 +164,17 @@ def calibrate(
     name, file = robot_and_log("calibrate", robot, log)
     loaded = load_robot(name)
     known_sigmas = named_values("--sigma", sigma, [f.name for f in fields(Sigmas)])
-    if tags is not None and tag_size is not None:
-        raise CdprError("--tag-size: found beside --tags; accepted: one of them")
-    read = read_log(file, [cable.name for cable in loaded.cables])
-    places = {} if tags is None else read_tags(tags)
-    if tag_size is not None:
-        if not 0.0 < tag_size < 1e3:
-            raise CdprError(f"--tag-size: found {tag_size:g}; accepted: > 0 [m]")
-        places = dict.fromkeys(read.corners, TagPlace(tag_size))
-    if tracker_late is not None:
-        read = shifted_log(read, tracker_late)
-    task = CalibrationTask(
-        robot=loaded, unknown=comma_words(unknown),
-        priors=named_values("--prior", prior), sigmas=replace(Sigmas(), **known_sigmas),
-        tags=places, mount=mount, image_size=_size(image_size),
-        start=None if start is None else parse_pose(start), rest=rest,
-        outliers=not keep_outliers,
-    )  # fmt: skip
+    read, places = calibration_inputs(loaded, file, tags, tag_size, tracker_late)
+    options: dict[str, Any] = {
+        "priors": named_values("--prior", prior), "mount": mount, "image_size": _size(image_size),
+        "start": None if start is None else parse_pose(start), "rest": rest,
+        "outliers": not keep_outliers,
+    }  # fmt: skip
 
     def work(folder: Path, say: Callable[[str], None]) -> Told:
-        found = run_calibration(task, read, say)
+        found = run_calibration(
+            loaded, read, comma_words(unknown), sigmas=known_sigmas, tags=places, say=say, **options
+        )
         more, proposed = _proposed(found, next_count, folder, say)
         write_calibration(found, folder, more)
         return _told(found, more, proposed)

@@ -9,12 +9,8 @@ import typer
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from cdpr_drake.analyses.statics.equilibria_query import (
-    EquilibriaReport,
-    rests_at_lengths,
-    rests_at_position,
-    rests_elastic,
-)
+from cdpr_drake.analyses.front.statics import EQUILIBRIA_MODELS, find_equilibria
+from cdpr_drake.analyses.statics.equilibria_query import EquilibriaReport
 from cdpr_drake.arrays import Array
 from cdpr_drake.cli.completion import words_among
 from cdpr_drake.cli.options import AsJson, RobotName, parse_numbers
@@ -22,10 +18,6 @@ from cdpr_drake.cli.terminal import message_console, print_json, wide_console, w
 from cdpr_drake.errors import CdprError
 from cdpr_drake.geometry.poses import angles_from_rotation
 from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.schema.typed_yaml import closest
-
-MODELS = ("inextensible", "elastic")
 
 
 def equilibria(
@@ -44,7 +36,7 @@ def equilibria(
         str,
         typer.Option(
             help="inextensible: all poses, from fixed exit points; elastic: searched.",
-            autocompletion=words_among(MODELS),
+            autocompletion=words_among(EQUILIBRIA_MODELS),
         ),
     ] = "inextensible",
     pulleys: Annotated[
@@ -58,56 +50,28 @@ def equilibria(
     if (position is None) == (lengths is None):
         found = "neither" if position is None else "both"
         raise CdprError(f"--lengths, --position: found {found}; accepted: one of them")
-    if taut is not None and position is None:
-        raise CdprError("--taut: found without --position; accepted: with it")
-    if cable_model not in MODELS:
-        raise CdprError(
-            f"--cable-model: {cable_model!r} is unknown; {closest(cable_model, MODELS)}"
-        )
-    if searches < 1:
-        raise CdprError(f"--searches: found {searches}; accepted: at least 1")
-    if seed < 0:
-        raise CdprError(f"--seed: found {seed}; accepted: at least 0")
-    if position is not None and cable_model == "elastic":
-        raise CdprError("--position: found with elastic cables; accepted: inextensible ones")
     loaded = load_robot(robot)
+    place, given = None, None
+    if position is not None:
+        place = parse_numbers("--position", position, (3,), "x,y,z [m]")
+    if lengths is not None:
+        m = len(loaded.cables)
+        given = parse_numbers("--lengths", lengths, (m,), f"{m} lengths [m]")
+    holding = None if taut is None else [word.strip() for word in taut.split(",")]
     with working(message_console(), f"{loaded.name} at rest") as say:
 
         def report(done: int, total: int) -> None:
             what = "searches" if cable_model == "elastic" else "sets of taut cables"
             say(f"{loaded.name} at rest, {done} of {total} {what}")
 
-        if position is not None:
-            place = np.array(parse_numbers("--position", position, (3,), "x,y,z [m]"))
-            answer = rests_at_position(loaded, place, _taut(loaded, taut))
-        else:
-            assert lengths is not None
-            m = len(loaded.cables)
-            given = np.array(parse_numbers("--lengths", lengths, (m,), f"{m} lengths [m]"))
-            if np.min(given) <= 0.0:
-                raise CdprError(f"--lengths: found {np.min(given):g}; accepted: > 0 [m]")
-            if cable_model == "elastic":
-                answer = rests_elastic(
-                    loaded, given, pulleys, searches=searches, seed=seed, report=report
-                )
-            else:
-                answer = rests_at_lengths(loaded, given, report=report)
+        answer = find_equilibria(
+            loaded, given, place, taut=holding, model=cable_model, pulleys=pulleys,
+            searches=searches, seed=seed, report=report,
+        )  # fmt: skip
     if as_json:
         print_json(answer.as_dict())
     else:
         _print(answer)
-
-
-def _taut(robot: Robot, words: str | None) -> list[int]:
-    """Numbers of the cables of --taut; without it all that the robot has."""
-    names = [cable.name for cable in robot.cables]
-    if words is None:
-        return list(range(len(names)))
-    chosen = [word.strip() for word in words.split(",")]
-    for name in chosen:
-        if name not in names:
-            raise CdprError(f"--taut: {name!r} is unknown; {closest(name, names)}")
-    return [names.index(name) for name in chosen]
 
 
 def _print(report: EquilibriaReport) -> None:

@@ -11,7 +11,7 @@ from cdpr_drake.cli.completion import words_among
 from cdpr_drake.cli.options import AsJson, RobotName
 from cdpr_drake.cli.robot_folder import write_files
 from cdpr_drake.cli.terminal import print_json
-from cdpr_drake.models.robot_exchange import write_robot
+from cdpr_drake.models.robot_exchange import export_robot
 from cdpr_drake.models.robot_exports import EXPORTS, not_written, not_written_words
 from cdpr_drake.models.robot_loader import load_robot
 
@@ -41,7 +41,7 @@ def export(
 ) -> None:
     """Exports a robot to the format of another tool."""
     loaded = load_robot(robot)
-    paths = write_files(out, write_robot(loaded, format), overwrite)
+    paths = write_files(out, export_robot(loaded, format), overwrite)
     lost = not_written(loaded, format)
     if as_json:
         files = [str(path) for path in paths]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -18,20 +18,20 @@ from cdpr_drake.analyses.calibration.identification_campaign_files import (
     write_dynamic_campaign,
 )
 from cdpr_drake.analyses.calibration.identification_report import (
-    identification_dict,
+    identification_dict as as_dict,
+)
+from cdpr_drake.analyses.calibration.identification_report import (
     identification_drawings,
-    identification_tables,
-    write_identification,
 )
-from cdpr_drake.analyses.calibration.identification_task import (
-    UNKNOWN,
-    IdentificationTask,
+from cdpr_drake.analyses.calibration.identification_report import (
+    identification_tables as tables,
 )
-from cdpr_drake.analyses.calibration.identification_task import (
-    identify as run_identification,
+from cdpr_drake.analyses.calibration.identification_report import (
+    write_identification as write,
 )
+from cdpr_drake.analyses.calibration.identification_task import UNKNOWN
 from cdpr_drake.analyses.calibration.log_file import read_log
-from cdpr_drake.analyses.calibration.tracker import shifted_log
+from cdpr_drake.analyses.front.calibration import identify as run_identification
 from cdpr_drake.cli.log_options import (
     Ending,
     LogOrCampaign,
@@ -135,23 +135,20 @@ def identify(
     names = [cable.name for cable in loaded.cables]
     read = read_log(file, names)
     other = None if validate is None else read_log(validate, names)
-    if tracker_late is not None:
-        read = shifted_log(read, tracker_late)
-        other = None if other is None else shifted_log(other, tracker_late)
-    task = IdentificationTask(
-        robot=loaded, unknown=UNKNOWN if unknown is None else comma_words(unknown),
-        common=comma_words(common),
-        priors=named_values("--prior", prior), bandwidth=bandwidth, sigma_lengths=sigma_lengths,
-        pulleys=pulleys, outliers=not keep_outliers, check_clock=tracker_late is None,
-    )  # fmt: skip
+    options: dict[str, Any] = {
+        "common": comma_words(common), "priors": named_values("--prior", prior),
+        "bandwidth": bandwidth, "sigma_lengths": sigma_lengths, "pulleys": pulleys,
+        "outliers": not keep_outliers,
+    }  # fmt: skip
 
     def work(folder: Path, say: Callable[[str], None]) -> Told:
-        found = run_identification(task, read, other, say)
-        write_identification(found, folder)
+        found = run_identification(
+            loaded, read, UNKNOWN if unknown is None else comma_words(unknown), validate=other,
+            tracker_late=tracker_late, say=say, **options,
+        )  # fmt: skip
+        write(found, folder)
         drawings = identification_drawings(found)
-        return Told(
-            identification_dict(found), identification_tables(found), drawings, _code(found.result)
-        )
+        return Told(as_dict(found), tables(found), drawings, _code(found.result))
 
     folder = results_below_runs(out, f"identify-{loaded.name}")
     return write_and_tell(f"Identifying {loaded.name}", folder, ending, work)
@@ -174,8 +171,8 @@ def _campaign(name: str, unknown: tuple[str, ...], out: Path | None, ending: End
         run = run_dynamic_campaign(scenario, unknown, say)
         write_dynamic_campaign(run, folder)
         found = run.identification
-        shown = (*identification_tables(found, run.truth), tracking_table(run))
-        numbers = identification_dict(found, run.as_dict(), run.truth)
+        shown = (*tables(found, run.truth), tracking_table(run))
+        numbers = as_dict(found, run.as_dict(), run.truth)
         return Told(numbers, shown, campaign_drawings(run), _code(found.result))
 
     folder = results_below_runs(out, f"identify-{scenario.name}")

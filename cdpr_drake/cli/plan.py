@@ -6,9 +6,8 @@ what it does for either kind of motion.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -19,24 +18,19 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
-from cdpr_drake.analyses.planning.free_motion import LEAST, FreeSettings, plan_free_motion
+from cdpr_drake.analyses.front.planning import PathPoses, path_poses, plan_free_motion, plan_path
+from cdpr_drake.analyses.planning.free_motion import LEAST
 from cdpr_drake.analyses.planning.free_plan_results import FreeRun
-from cdpr_drake.analyses.planning.path_files import read_path
 from cdpr_drake.analyses.planning.plan_results import PlanRun
-from cdpr_drake.analyses.planning.plan_tracking import TrackedPlan, track_plan
 from cdpr_drake.analyses.planning.robot_path_task import (
     CORNERS,
     RESERVE,
     TOLERANCE,
     LimitSettings,
-    make_path,
-    path_task,
-    robot_limits,
 )
 from cdpr_drake.analyses.reporting.deferred_figures import Pictures, write_pictures
 from cdpr_drake.analyses.reporting.folder_lock import free_folder
 from cdpr_drake.analyses.reporting.output_folder import results_folder
-from cdpr_drake.analyses.workspaces.workspace_files import load_obstacles
 from cdpr_drake.cli.completion import words_among
 from cdpr_drake.cli.options import (
     FigureFormats,
@@ -54,11 +48,7 @@ from cdpr_drake.cli.terminal import message_console, print_json, wide_console, w
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.planning.free_path_solution import FreePathSolution
-from cdpr_drake.planning.limits import MotionLimits
-from cdpr_drake.planning.path_task import PathTask
-from cdpr_drake.planning.path_timing import STATIONS, PathPlan, plan_along_path
-from cdpr_drake.trajectories.pose_path import PosePath
+from cdpr_drake.planning.path_timing import STATIONS
 
 PathOption = Annotated[
     Path | None,
@@ -168,8 +158,8 @@ class FreeWords:
             if getattr(self, name) is not None
         ]
 
-    def settings(self) -> FreeSettings:
-        """What is asked.
+    def asked(self) -> dict[str, Any]:
+        """What is asked, as `plan_free_motion` takes it.
 
         Raises:
             CdprError: Something is missing or not accepted; names the option.
@@ -181,24 +171,28 @@ class FreeWords:
             raise CdprError(
                 "--keep-in-view: found none with --camera or --nearest; accepted: points"
             )
-        chosen = {
+        found: dict[str, Any] = {
             name: value
-            for name in ("least", "duration", "clearance", "camera", "nearest", "knots")
+            for name in (
+                "least",
+                "duration",
+                "clearance",
+                "obstacles",
+                "camera",
+                "nearest",
+                "knots",
+            )
             if (value := getattr(self, name)) is not None
         }
-        points = None
         if self.keep_in_view is not None:
-            points = np.array(
+            found["in_view"] = np.array(
                 [
                     parse_numbers("--keep-in-view", word, (3,), "points x,y,z [m], with ; between")
                     for word in self.keep_in_view.split(";")
                 ]
             ).T
-        obstacles = None if self.obstacles is None else load_obstacles(self.obstacles)
-        return FreeSettings(
-            start=one_pose("--from", self.start), goal=one_pose("--to", self.goal),
-            in_view=points, obstacles=obstacles, **chosen,
-        )  # fmt: skip
+        start, goal = one_pose("--from", self.start), one_pose("--to", self.goal)
+        return found | {"start": start, "goal": goal}
 
     def as_dict(self) -> dict[str, object]:
         """For JSON, by the names of the options."""
@@ -263,47 +257,36 @@ def plan(
     words = FreeWords(
         start, goal, least, duration, clearance, obstacles, keep_in_view, camera, nearest, knots
     )
-    arguments = {
-        "limits_n": given.tensions, "cable_speed_m_s": cable_speed,
-        "cable_acceleration_m_s2": cable_acceleration, "speed_m_s": speed, "reserve": reserve,
-        "pulleys": pulleys,
-    }  # fmt: skip
-    cables = loaded.cable_set()
-    asked = _Asked(
-        loaded, given, path_task(loaded, given, cables if pulleys else cables.without_pulleys()),
-        arguments,
-    )  # fmt: skip
+    planner: Planner
     if free:
         if path is not None or waypoints is not None:
             raise CdprError("--free: found --path or --waypoints too; accepted: --from and --to")
-        asked.arguments.update(words.as_dict())
-        planner = _free_planner(asked, words)
+        asked = words.asked()
+
+        def planner(say: Callable[[str], None]) -> PlanRun | FreeRun:
+            found = plan_free_motion(
+                loaded, limits=given, pulleys=pulleys, track=track, say=say, **asked
+            )
+            arguments = {k: v for k, v in found.arguments.items() if k != "in_view"}
+            return replace(found, arguments=arguments | words.as_dict())
+
     else:
         if words.given():
             raise CdprError(f"{words.given()[0]}: accepted with --free; found no --free")
-        asked.arguments.update(
-            {
-                "path": None if path is None else str(path), "waypoints": waypoints,
-                "corners": corners, "tolerance_m": tolerance, "stations": stations,
-            }
-        )  # fmt: skip
-        poses, source, remarks = _poses(loaded, path, waypoints)
-        for remark in remarks:
+        poses = _poses(loaded, path, waypoints)
+        for remark in poses.remarks:
             message_console().print(f"note: {path}: {remark}")
-        way = make_path(loaded, poses, corners, tolerance)
-        planner = _path_planner(asked, way, source, stations)
+
+        def planner(say: Callable[[str], None]) -> PlanRun | FreeRun:
+            found = plan_path(
+                loaded, poses, given, corners=corners, tolerance=tolerance, stations=stations,
+                pulleys=pulleys, track=track, say=say,
+            )  # fmt: skip
+            asked = {"path": None if path is None else str(path), "waypoints": waypoints}
+            return replace(found, arguments=found.arguments | asked)
+
     folder = out if out is not None else free_folder(Path("plans") / loaded.name)
-    return _run(asked, planner, folder, _Ending(overwrite, formats, as_json, track))
-
-
-@dataclass(frozen=True)
-class _Asked:
-    """The robot and its limits, of any plan."""
-
-    robot: Robot
-    limits: LimitSettings
-    task: PathTask
-    arguments: dict[str, Any]
+    return _run(loaded, planner, folder, _Ending(overwrite, formats, as_json))
 
 
 @dataclass(frozen=True)
@@ -313,68 +296,18 @@ class _Ending:
     overwrite: bool
     formats: tuple[str, ...]
     as_json: bool
-    track: bool
 
 
-Tracker = Callable[[PathPlan | FreePathSolution, MotionLimits], TrackedPlan | None]
-Planner = Callable[[Callable[[str], None], Tracker], PlanRun | FreeRun]
+Planner = Callable[[Callable[[str], None]], PlanRun | FreeRun]
 
 
-def _told(
-    asked: _Asked, found: PathPlan | FreePathSolution, took: float, track: Tracker
-) -> dict[str, Any]:
-    """What every `MotionRun` has, of a motion that was found in a time [s]."""
-    own = robot_limits(asked.robot, asked.limits)
-    return {
-        "robot": asked.robot,
-        "limits": own,
-        "arguments": asked.arguments,
-        "planning_time": took,
-        "tracked": track(found, own),
-    }
-
-
-def _path_planner(asked: _Asked, way: PosePath, source: str, stations: int) -> Planner:
-    def plan(say: Callable[[str], None], track: Tracker) -> PlanRun:
-        begin = time.perf_counter()
-        found = plan_along_path(asked.task, way, stations)
-        took = time.perf_counter() - begin
-        return PlanRun(plan=found, source=source, **_told(asked, found, took, track))
-
-    return plan
-
-
-def _free_planner(asked: _Asked, words: FreeWords) -> Planner:
-    settings = words.settings()
-
-    def plan(say: Callable[[str], None], track: Tracker) -> FreeRun:
-        begin = time.perf_counter()
-        found = plan_free_motion(asked.robot, asked.task, settings, say)
-        took = time.perf_counter() - begin
-        return FreeRun(asked=settings, solution=found, **_told(asked, found, took, track))
-
-    return plan
-
-
-def _run(asked: _Asked, planner: Planner, folder: Path, ending: _Ending) -> int:
+def _run(robot: Robot, planner: Planner, folder: Path, ending: _Ending) -> int:
     """Plans, tracks, writes, and says what was found."""
-    console, robot = message_console(), asked.robot
+    console = message_console()
     with results_folder(folder, ending.overwrite) as results:
         say_recovered(console, results)
         with working(console, f"Planning for {robot.name}") as say:
-
-            def track(plan: PathPlan | FreePathSolution, own: MotionLimits) -> TrackedPlan | None:
-                if not ending.track:
-                    return None
-                say(f"Tracking the plan of {robot.name}")
-                end = plan.duration
-
-                def show(now: float) -> None:
-                    say(f"Tracking the plan of {robot.name}: {now:.0f} of {end:.0f} s")
-
-                return track_plan(robot, plan, own, show)
-
-            run = planner(say, track)
+            run = planner(say)
             say("Writing results")
             told = run.write(results.path)
             failed = write_pictures(results.path, _pictures(run, ending.formats), say)
@@ -394,24 +327,20 @@ def _pictures(run: PlanRun | FreeRun, formats: tuple[str, ...]) -> Pictures:
     return free_pictures(run, formats) if isinstance(run, FreeRun) else plan_pictures(run, formats)
 
 
-def _poses(
-    robot: Robot, path: Path | None, waypoints: str | None
-) -> tuple[list[RigidTransform], str, tuple[str, ...]]:
-    """Poses of the path, what it is in words, and what was left out."""
+def _poses(robot: Robot, path: Path | None, waypoints: str | None) -> PathPoses:
+    """Poses of --path or of --waypoints."""
     if (path is None) == (waypoints is None):
         found = "neither" if path is None else "both"
         raise CdprError(f"--path, --waypoints: found {found}; accepted: one of them")
     if path is not None:
-        read = read_path(path, robot.plane_height)
-        return read.poses, path.name, read.remarks
+        return path_poses(robot, path)
     assert waypoints is not None
     words = [word for word in waypoints.split(";") if word.strip()]
     if len(words) < 2:
         raise CdprError(
             f"--waypoints: found {len(words)} poses; accepted: at least 2, with ; between them"
         )
-    poses = [one_pose("--waypoints", word) for word in words]
-    return poses, f"{len(poses)} waypoints", ()
+    return path_poses(robot, [one_pose("--waypoints", word) for word in words])
 
 
 def _print(console: Console, told: dict[str, Any], folder: Path) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -11,25 +11,20 @@ from typing import Annotated, Any
 import typer
 from rich.console import Console
 
-from cdpr_drake.analyses.reporting.log_files import write_json
+from cdpr_drake.analyses.front.studies import chosen_studies, write_reproduction
 from cdpr_drake.analyses.reporting.output_folder import continued_folder
 from cdpr_drake.analyses.reporting.progress import WorkProgress
-from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
 from cdpr_drake.analyses.reporting.statements import new_table
-from cdpr_drake.analyses.reproduction.page import write_report
-from cdpr_drake.analyses.reproduction.rows import FAILED, ReportRow, report_rows
+from cdpr_drake.analyses.reproduction.rows import FAILED, ReportRow
 from cdpr_drake.analyses.reproduction.runner import RunSettings, run_studies
 from cdpr_drake.analyses.reproduction.scorecard import Scorecard
 from cdpr_drake.analyses.reproduction.states import StudyState, check_folder
-from cdpr_drake.analyses.studies.catalogue import STUDIES, StudyEntry
-from cdpr_drake.analyses.studies.published.register import published_registers
+from cdpr_drake.analyses.studies.catalogue import STUDIES
 from cdpr_drake.cli.completion import words_among
 from cdpr_drake.cli.options import FigureFormats, Overwrite, ResultsAsJson, parse_formats
 from cdpr_drake.cli.process import INTERRUPTED, StopRequest
 from cdpr_drake.cli.run_endings import INCOMPLETE, STUDY_FAILED, say_kept, shown_path
 from cdpr_drake.cli.terminal import message_console, print_json, progress_bar, wide_console, working
-from cdpr_drake.errors import CdprError
-from cdpr_drake.schema.typed_yaml import closest
 
 STOPPING = (
     "Stopping: waits for what the study has begun, then writes the report; Ctrl-C again ends the "
@@ -39,9 +34,6 @@ STOPPING = (
 
 WRITING = "The report is being written, from what is there; Ctrl-C again ends this without it"
 """Answer to a Ctrl-C while the report is written, also where one has ended the studies."""
-
-SUMMARY = "summary.json"
-"""All rows and counts of the report."""
 
 
 def reproduce(
@@ -74,7 +66,9 @@ def reproduce(
     """
     # The report shows those in PNG.
     formats = tuple(dict.fromkeys(("png", *parse_formats(figure_format))))
-    studies = chosen_studies(only)
+    studies = chosen_studies(
+        None if only is None else [name.strip() for name in only.split(",") if name.strip()]
+    )
     folder = out if out is not None else Path("reproduction-quick" if quick else "reproduction")
     console = message_console()
     stop = StopRequest(STOPPING)
@@ -87,41 +81,21 @@ def reproduce(
                 replace(_settings(quick, workers, stop, bar, len(studies)), formats=formats),
             )
         with StopRequest(WRITING).listening(), working(console, "Writing the report"):
-            registers = published_registers()
-            rows = report_rows(registers, results.path, studies, states)
-            summary = _summary(rows, states, quick)
-            write_json(results.path / SUMMARY, summary)  # before the page, which is larger
-            page = write_report(results.path, registers, rows, states, quick)
-            results.unfinished = bool(_left(studies, states))
+            found = write_reproduction(results.path, studies, states, quick)
+            left = found.unfinished(list(studies))
+            results.unfinished = bool(left)
     say_kept(console, results.kept)
     if as_json:
-        print_json(summary)
+        print_json(found.as_dict())
     else:
-        _print(rows, states, shown_path(page))
+        _print(found.rows, states, shown_path(found.page))
     again = shlex.join(
         ["cdpr", "reproduce", "--out", str(folder), *(["--quick"] if quick else [])]
         + (["--only", only] if only else [])
         + (["--workers", str(workers)] if workers else [])
         + (["--format", figure_format] if figure_format != "png" else [])
     )
-    return _ending(console, studies, states, again)
-
-
-def chosen_studies(only: str | None) -> dict[str, StudyEntry]:
-    """Studies of --only in the order of the catalogue; all without.
-
-    Raises:
-        CdprError: One is unknown, or none is named.
-    """
-    if only is None:
-        return dict(STUDIES)
-    names = [name.strip() for name in only.split(",") if name.strip()]
-    for name in names:
-        if name not in STUDIES:
-            raise CdprError(f"--only: study {name!r} is unknown; {closest(name, STUDIES)}")
-    if not names:
-        raise CdprError(f"--only: found {only!r}; accepted: names of studies, with commas")
-    return {name: entry for name, entry in STUDIES.items() if name in names}
+    return _ending(console, left, states, again)
 
 
 def _settings(
@@ -143,20 +117,6 @@ def _settings(
     return RunSettings(quick, workers, tell, bar.console.print, stop)
 
 
-def _summary(
-    rows: Sequence[ReportRow], states: dict[str, StudyState], quick: bool
-) -> dict[str, Any]:
-    """Everything for JSON."""
-    return {
-        "quick": quick,
-        "code": code_version(),
-        "versions": package_versions(),
-        "scorecard": Scorecard.of(rows).as_dict(),
-        "studies": [state.as_dict() for state in states.values()],
-        "items": [row.as_dict() for row in rows],
-    }
-
-
 def _print(rows: Sequence[ReportRow], states: dict[str, StudyState], page: Path) -> None:
     """The scorecard, what failed, and where the report is."""
     card = Scorecard.of(rows)
@@ -174,7 +134,7 @@ def _print(rows: Sequence[ReportRow], states: dict[str, StudyState], page: Path)
 
 
 def _ending(
-    console: Console, studies: dict[str, StudyEntry], states: dict[str, StudyState], again: str
+    console: Console, left: Sequence[str], states: dict[str, StudyState], again: str
 ) -> int:
     """Says what is left to do; returns the exit code."""
     failed = [state for state in states.values() if state.status == "failed"]
@@ -187,15 +147,9 @@ def _ending(
             "command tries again",
             soft_wrap=True, markup=False, highlight=False,
         )  # fmt: skip
-    left = _left(studies, states)
     if left:
         console.print(f"Interrupted; left: {', '.join(left)}; to continue:\n{again}")
         return INTERRUPTED
     if failed:
         return STUDY_FAILED
     return INCOMPLETE if pictures else 0
-
-
-def _left(studies: Iterable[str], states: Mapping[str, StudyState]) -> list[str]:
-    """Studies that were not begun, or stopped."""
-    return [name for name in studies if name not in states or states[name].unfinished]

@@ -11,7 +11,7 @@ from rich.table import Table
 from cdpr_drake.cli.options import AsJson
 from cdpr_drake.cli.terminal import print_json, wide_console
 from cdpr_drake.systems.diagrams.load import load_scenario
-from cdpr_drake.systems.scenarios.files import all_scenario_names
+from cdpr_drake.systems.scenarios.files import scenario_names
 from cdpr_drake.systems.scenarios.run_settings import ScenarioHeader
 from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
 
@@ -40,7 +40,7 @@ def _end(facts: dict[str, Any]) -> str:
 
 def scenarios(as_json: AsJson = False) -> None:
     """Lists the scenarios that come with the package."""
-    facts = [scenario_facts(load_scenario(name)) for name in all_scenario_names()]
+    facts = [scenario_facts(load_scenario(name)) for name in scenario_names()]
     if as_json:
         print_json(facts)
         return

@@ -23,7 +23,8 @@ from cdpr_drake.systems.remote.messages import PROTOCOL, check_available
 from cdpr_drake.systems.remote.remote_client import LOCAL_HOST, USUAL_PORT
 from cdpr_drake.systems.remote.remote_driver import Driver, Pace
 from cdpr_drake.systems.remote.remote_place import SERVO_PLACES, TENSION_PLACES, Remote
-from cdpr_drake.systems.remote.server_socket import ServerSocket, is_loopback
+from cdpr_drake.systems.remote.server_socket import ServerSocket as Socket
+from cdpr_drake.systems.remote.server_socket import is_loopback
 from cdpr_drake.systems.remote.service import tension_service
 from cdpr_drake.systems.scenarios.files import scenario_kind
 from cdpr_drake.systems.scenarios.tension_control_scenario import TensionScenario
@@ -81,8 +82,8 @@ def serve(
 ) -> int:
     """Runs a scenario with a process outside in its loop, over ZeroMQ.
 
-    The client may be written in any language; cdpr_drake.systems.remote explains the messages, and
-    has a client in Python. notebooks/plain_client.py is one without this package.
+    The client may be written in any language; the messages are explained in cdpr_drake.bridge,
+    whose RemoteClient is one in Python. notebooks/plain_client.py is one without this package.
     """
     check_available()
     kind = SCENARIO_KINDS[scenario_kind(scenario)]
@@ -114,7 +115,7 @@ class _Client:
         self._scenario, self._wait = scenario, wait
         self._stop: StopRequest | None = None
         self._driver: Driver | None = None
-        self._socket = ServerSocket(host, port, lambda: self._stop is not None and self._stop())
+        self._socket = Socket(host, port, lambda: self._stop is not None and self._stop())
         if not is_loopback(host):
             message_console().print(
                 f"warning: {self._socket.address} is open to other machines: whoever reaches it "

@@ -15,13 +15,12 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
+from cdpr_drake.analyses.front.workspaces import default_box, stability_question
 from cdpr_drake.analyses.reporting.deferred_figures import write_pictures
 from cdpr_drake.analyses.reporting.log_files import write_json
 from cdpr_drake.analyses.reporting.output_folder import continued_folder
 from cdpr_drake.analyses.simulation.stability_files import stability_of_folder
-from cdpr_drake.analyses.workspaces.stability_defaults import load_bounds, workspace_defaults
 from cdpr_drake.analyses.workspaces.stability_figures import stability_pictures
-from cdpr_drake.analyses.workspaces.stability_question import make_question, scenario_task
 from cdpr_drake.analyses.workspaces.stability_results import (
     KINDS,
     StabilityRun,
@@ -29,7 +28,6 @@ from cdpr_drake.analyses.workspaces.stability_results import (
     stability_workspaces,
 )
 from cdpr_drake.analyses.workspaces.stability_scene import scene_page
-from cdpr_drake.analyses.workspaces.static_feasible import static_case
 from cdpr_drake.cli.completion import robot_words, scenario_words
 from cdpr_drake.cli.grid_options import (
     GridWords,
@@ -62,6 +60,50 @@ from cdpr_drake.errors import CdprError, OutputFolderError
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.stability.verdict import VerdictOptions
+
+
+def show_stability_along(
+    run: Path, threshold: float | None, out: Path | None, formats: Sequence[str], as_json: bool
+) -> int:
+    """Judges a run's log; writes and prints what was found.
+
+    Args:
+        run: Folder of the run.
+        threshold: Tension from which a cable counts as taut [N]; None: one that is not slack.
+        out: Where to write; None: into the run's folder.
+        formats: Of the figure.
+        as_json: Whether to print JSON.
+    """
+    if threshold is not None and not (math.isfinite(threshold) and threshold >= 0.0):
+        raise CdprError(f"--threshold: found {threshold:g}; accepted: >= 0 [N]")
+    folder = run if out is None else out
+    with working(message_console(), f"{run}: reading the log") as say:
+        found = stability_of_folder(run, threshold)
+        say("Writing results")
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            failed = found.write(folder, formats)
+        except OSError as problem:
+            raise OutputFolderError(f"{folder}: cannot be written: {problem}") from problem
+    numbers = found.as_dict()
+    code = say_failed(message_console(), failed, folder, None)
+    if as_json:
+        print_json(numbers)
+        return code
+    margin, taut = numbers["least_stability_margin"], numbers["taut_cables"]
+    table = Table(title=f"{run}: stability along the run", show_header=False)
+    for label, words in (
+        ("cables that pull", f"at least {taut['min']}, {taut['end']} at the end"),
+        ("rank of the Jacobian", f"at least {numbers['least_jacobian_rank']}"),
+        ("rank below " + str(numbers["freedom"]), f"{numbers['underactuated_s']:.2f} s"),
+        ("least eigenvalue of sym(Pi)", "unknown" if margin is None else f"{margin:.3f}"),
+        ("not stable", f"{numbers['unstable_s']:.2f} s"),
+        ("results", str(folder)),
+    ):
+        table.add_row(label, words)
+    wide_console().print(table)
+    return code
+
 
 RESULTS = "results.json"
 """Arguments, versions and volumes."""
@@ -152,21 +194,13 @@ def stability(
     check_mass(mass, zero=True)
     formats = parse_formats(figure_format)
     loaded = load_robot(robot)
-    defaults = workspace_defaults(loaded, robot)
-    low_high, wrenches = parse_limits(limits), parse_wrench(wrench)
-    question = make_question(
-        robot,
-        scheme=scheme,
-        verdict=verdict,
-        bounds=None if bounds is None else load_bounds(bounds),
-        vary=parse_vary(vary or []),
-        grid=parse_grid(
-            grid, parse_turns(orientation or []), defaults.lower, defaults.upper, defaults.step
-        ),
+    question = stability_question(
+        robot, scheme, verdict, bounds=bounds, vary=parse_vary(vary or []),
+        grid=parse_grid(grid, parse_turns(orientation or []), *default_box(robot)),
+        scenario=scenario,
         options=VerdictOptions(draws=draws, seed=seed, searches=searches, pieces=pieces),
-        statics=static_case(loaded, low_high, mass, wrenches),
-        task=None if scenario is None else scenario_task(robot, scenario),
-    )
+        limits=parse_limits(limits), mass=mass, wrench=parse_wrench(wrench),
+    )  # fmt: skip
     name = f"{question.robot}-{scheme}-{verdict}"
     folder = out if out is not None else default_folder("stability", name, question.arguments())
     console = message_console()
@@ -270,46 +304,3 @@ def _print_table(found: StabilityWorkspaces, folder: Path) -> None:
     if found.interaction_matrix:
         printer.print(f"interaction matrix: {found.interaction_matrix}", markup=False)
     printer.print(f"results: {folder}", soft_wrap=True, highlight=False)
-
-
-def show_stability_along(
-    run: Path, threshold: float | None, out: Path | None, formats: Sequence[str], as_json: bool
-) -> int:
-    """Judges a run's log; writes and prints what was found.
-
-    Args:
-        run: Folder of the run.
-        threshold: Tension from which a cable counts as taut [N]; None: one that is not slack.
-        out: Where to write; None: into the run's folder.
-        formats: Of the figure.
-        as_json: Whether to print JSON.
-    """
-    if threshold is not None and not (math.isfinite(threshold) and threshold >= 0.0):
-        raise CdprError(f"--threshold: found {threshold:g}; accepted: >= 0 [N]")
-    folder = run if out is None else out
-    with working(message_console(), f"{run}: reading the log") as say:
-        found = stability_of_folder(run, threshold)
-        say("Writing results")
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            failed = found.write(folder, formats)
-        except OSError as problem:
-            raise OutputFolderError(f"{folder}: cannot be written: {problem}") from problem
-    numbers = found.as_dict()
-    code = say_failed(message_console(), failed, folder, None)
-    if as_json:
-        print_json(numbers)
-        return code
-    margin, taut = numbers["least_stability_margin"], numbers["taut_cables"]
-    table = Table(title=f"{run}: stability along the run", show_header=False)
-    for label, words in (
-        ("cables that pull", f"at least {taut['min']}, {taut['end']} at the end"),
-        ("rank of the Jacobian", f"at least {numbers['least_jacobian_rank']}"),
-        ("rank below " + str(numbers["freedom"]), f"{numbers['underactuated_s']:.2f} s"),
-        ("least eigenvalue of sym(Pi)", "unknown" if margin is None else f"{margin:.3f}"),
-        ("not stable", f"{numbers['unstable_s']:.2f} s"),
-        ("results", str(folder)),
-    ):
-        table.add_row(label, words)
-    wide_console().print(table)
-    return code

@@ -10,7 +10,8 @@ import typer
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from cdpr_drake.analyses.statics.static_query import StaticReport, at_lengths, at_pose
+from cdpr_drake.analyses.front.statics import solve_static
+from cdpr_drake.analyses.statics.static_query import StaticReport
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.models import CABLE_MODELS
 from cdpr_drake.cli.completion import words_among
@@ -19,7 +20,6 @@ from cdpr_drake.cli.terminal import message_console, print_json, wide_console, w
 from cdpr_drake.errors import CdprError
 from cdpr_drake.geometry.poses import angles_from_rotation
 from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.schema.typed_yaml import closest
 
 
 def static(
@@ -43,28 +43,18 @@ def static(
     if (pose is None) == (lengths is None):
         found = "neither" if pose is None else "both"
         raise CdprError(f"--pose, --lengths: found {found}; accepted: one of them")
-    if cable_model not in CABLE_MODELS:
-        raise CdprError(
-            f"--cable-model: {cable_model!r} is unknown; {closest(cable_model, CABLE_MODELS)}"
-        )
     loaded = load_robot(robot)
-    busy = working(message_console(), f"{loaded.name} at rest")
+    given, X_WP = None, None
     if pose is not None:
         X_WP = parse_pose(pose)
-        with busy:
-            report = at_pose(loaded, X_WP, cable_model, pulleys)
     else:
         assert lengths is not None
         m = len(loaded.cables)
-        numbers = parse_numbers("--lengths", lengths, (m,), f"{m} lengths [m]")
-        if min(numbers) <= 0.0:
-            raise CdprError(f"--lengths: found {min(numbers):g}; accepted: > 0 [m]")
-        with busy:
-            report = at_lengths(loaded, np.array(numbers), cable_model, pulleys)
+        given = parse_numbers("--lengths", lengths, (m,), f"{m} lengths [m]")
+    with working(message_console(), f"{loaded.name} at rest"):
+        report = solve_static(loaded, X_WP, given, cable_model, pulleys)
     if plot is not None:
-        from cdpr_drake.analyses.statics.static_figures import static_figure
-
-        save_plot(static_figure(report, f"{loaded.name} at rest, {cable_model} cables"), plot)
+        save_plot(report.plot(), plot)
     if as_json:
         print_json(report.as_dict())
     else:

@@ -10,6 +10,7 @@ from typing import Annotated
 
 import typer
 
+from cdpr_drake.analyses.front.studies import chosen_studies
 from cdpr_drake.analyses.reporting.folder_lock import free_folder
 from cdpr_drake.analyses.reporting.output_folder import continued_folder, results_folder
 from cdpr_drake.analyses.reporting.progress import StudySession, WorkProgress
@@ -83,8 +84,7 @@ def study(
     ] = None,
 ) -> int:
     """Runs a study and writes results.json and figures; Ctrl-C keeps what is finished."""
-    if name not in STUDIES:
-        raise CdprError(f"study {name!r} is unknown; {closest(name, STUDIES)}")
+    chosen_studies([name])
     if scheduler is not None:
         if not STUDIES[name].spreads:
             raise CdprError(f"--scheduler: study {name} is computed here; leave it out")

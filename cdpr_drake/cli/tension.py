@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -10,11 +11,12 @@ import typer
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from cdpr_drake.analyses.statics.tension_query import (
-    as_dict,
-    polygon_tensions,
-    solve_all,
-    underactuated_answer,
+from cdpr_drake.analyses.front.tensions import (
+    UNDERACTUATED,
+    TensionsAtPose,
+    UnderactuatedTensions,
+    compare_tensions,
+    solve_tensions,
 )
 from cdpr_drake.cli.completion import words_among
 from cdpr_drake.cli.options import (
@@ -32,10 +34,8 @@ from cdpr_drake.cli.options import (
 from cdpr_drake.cli.terminal import message_console, print_json, wide_console, working
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.models.robot_statics import tension_problem, wrench_balance
-from cdpr_drake.tensions.methods import METHODS, distribute
+from cdpr_drake.tensions.methods import METHODS
 from cdpr_drake.tensions.problem import TensionSolution
-from cdpr_drake.workspaces.available_wrenches import available_wrenches
 
 
 def tension(
@@ -74,61 +74,38 @@ def tension(
     """
     loaded = load_robot(robot)
     X_WP, external, bounds = parse_pose(pose), parse_wrench(wrench), parse_limits(limits)
+    cables = [cable.name for cable in loaded.cables]
+    every = method == "all"
     if loaded.is_underactuated():
         for option, given in (("plot", plot), ("wrench-set-plot", wrench_set_plot)):
             if given is not None:
                 raise CdprError(
-                    f"--{option}: found {loaded.name} with {len(loaded.cables)} cables for "
+                    f"--{option}: found {loaded.name} with {len(cables)} cables for "
                     f"{loaded.motion_type().freedom} degrees of freedom; accepted: at least as many"
                 )
-        if method not in ("quadratic_program", "all"):
-            raise CdprError(
-                f"--method: found {method} for fewer cables than degrees of freedom of "
-                f"{loaded.name}; accepted: quadratic_program"
-            )
-        balance = wrench_balance(
-            loaded, X_WP, external, limits=bounds, mass=mass, length_scale=length_scale
-        )
-        answer = underactuated_answer(loaded, balance)
-        if as_json:
-            print_json(answer)
-        else:
-            _print_underactuated([cable.name for cable in loaded.cables], answer)
-        return
-    wanted = None if reference is None else np.full(len(loaded.cables), reference)
-    problem = tension_problem(
-        loaded,
-        X_WP,
-        external,
-        limits=bounds,
-        mass=mass,
-        reference=wanted,
-        length_scale=length_scale,
-    )
-    every = method == "all"
+        every, method = False, UNDERACTUATED if every else method
+    found: TensionsAtPose | UnderactuatedTensions
     with working(message_console(), f"Distributing tensions of {loaded.name}"):
-        solutions = solve_all(problem) if every else [distribute(problem, method)]
-    if plot is not None:
-        from cdpr_drake.analyses.statics.static_figures import polygon_figure
-
-        save_plot(polygon_figure(problem, f"{loaded.name} at ({pose})"), plot)
-    if wrench_set_plot is not None:
-        from cdpr_drake.analyses.workspaces.workspace_figures import wrench_set_figure
-
-        wrenches = available_wrenches(problem.W, problem.lower, problem.upper, problem.row_scale)
-        title = f"{loaded.name} at ({pose}): what the cables can give"
-        save_plot(wrench_set_figure(wrenches, -problem.wrench, title), wrench_set_plot)
-    if as_json:
-        found: dict[str, Any] = {"robot": loaded.name, "redundancy": problem.redundancy}
         if every:
-            found["solutions"] = [as_dict(solution) for solution in solutions]
+            found = compare_tensions(
+                loaded, X_WP, external, limits=bounds, mass=mass, reference=reference,
+                length_scale=length_scale,
+            )  # fmt: skip
         else:
-            found |= as_dict(solutions[0])
-        if problem.redundancy == 2:
-            found["polygon_vertices_n"] = polygon_tensions(problem)
-        print_json(found)
-        return
-    _print_table([cable.name for cable in loaded.cables], solutions)
+            found = solve_tensions(
+                loaded, X_WP, external, method, limits=bounds, mass=mass, reference=reference,
+                length_scale=length_scale,
+            )  # fmt: skip
+    if plot is not None and isinstance(found, TensionsAtPose):
+        save_plot(found.plot(f"{loaded.name} at ({pose})"), plot)
+    if wrench_set_plot is not None and isinstance(found, TensionsAtPose):
+        save_plot(found.plot_wrenches(f"{loaded.name} at ({pose})"), wrench_set_plot)
+    if as_json:
+        print_json(found.as_dict())
+    elif isinstance(found, TensionsAtPose):
+        _print_table(cables, found.solutions)
+    else:
+        _print_underactuated(cables, found.as_dict())
 
 
 def _print_underactuated(cables: list[str], answer: dict[str, Any]) -> None:
@@ -145,7 +122,7 @@ def _print_underactuated(cables: list[str], answer: dict[str, Any]) -> None:
         console.print(f"  {one['combination']}: {one['unbalanced']:.4g}")
 
 
-def _print_table(cables: list[str], solutions: list[TensionSolution]) -> None:
+def _print_table(cables: list[str], solutions: Sequence[TensionSolution]) -> None:
     table = Table(box=SIMPLE_HEAD, pad_edge=False, collapse_padding=True, title="Tensions [N]")
     table.add_column("method", no_wrap=True)
     table.add_column("status", no_wrap=True)

@@ -6,7 +6,6 @@ its results.
 
 from __future__ import annotations
 
-import math
 import time
 from pathlib import Path
 from typing import Annotated, Any
@@ -17,20 +16,15 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
+from cdpr_drake.analyses.front.workspaces import default_box, workspace_question
 from cdpr_drake.analyses.reporting.deferred_figures import write_pictures
 from cdpr_drake.analyses.reporting.log_files import write_json
 from cdpr_drake.analyses.reporting.output_folder import continued_folder
 from cdpr_drake.analyses.sweeps.sweep import STARTING
 from cdpr_drake.analyses.workspaces.box_certificates import BoxSearch, box_search, certified_boxes
 from cdpr_drake.analyses.workspaces.conditions import KINDS, MEASURES
-from cdpr_drake.analyses.workspaces.stability_defaults import workspace_defaults
-from cdpr_drake.analyses.workspaces.workspace_files import load_obstacles, load_wrench_set
+from cdpr_drake.analyses.workspaces.workspace_files import load_wrench_set
 from cdpr_drake.analyses.workspaces.workspace_hulls import hull_bound, question_hull
-from cdpr_drake.analyses.workspaces.workspace_question import (
-    Asked,
-    make_workspace_question,
-    surroundings,
-)
 from cdpr_drake.analyses.workspaces.workspace_results import (
     RobotWorkspace,
     WorkspaceRun,
@@ -75,6 +69,163 @@ from cdpr_drake.tensions.methods import METHODS
 from cdpr_drake.workspaces.certified_boxes import CertifiedBoxes
 from cdpr_drake.workspaces.demanded_wrenches import SpatialSet
 from cdpr_drake.workspaces.mesh_files import GRID_ENDINGS, MESH_ENDINGS, mesh_ending
+
+FARTHEST = 1e6
+"""Largest coordinate of a corner of --box [m]."""
+
+
+def parse_accelerations(words: str | None) -> SpatialSet | None:
+    """The box of --acceleration; None without; raises as `parse_numbers`."""
+    if words is None:
+        return None
+    meaning = "a or a,alpha, each >= 0 [m/s^2, rad/s^2]"
+    numbers = parse_numbers("--acceleration", words, (1, 2), meaning)
+    if min(numbers) < 0.0:
+        raise WorkspaceError(f"--acceleration: found {words!r}; accepted: {meaning}")
+    linear, angular = (*numbers, 0.0)[:2]
+    return SpatialSet(box=np.array([*[angular] * 3, *[linear] * 3]))
+
+
+def parse_box(words: str | None) -> tuple[np.ndarray, np.ndarray] | None:
+    """Corners of --box, shape (3,) each [m]; None without.
+
+    Raises:
+        WorkspaceError: They are not six numbers up to `FARTHEST`, or a lower one is not below its
+            upper one.
+    """
+    if words is None:
+        return None
+    try:
+        spans = [[float(word) for word in part.split(":")] for part in words.split(",")]
+    except ValueError:
+        spans = []
+    good = len(spans) == 3 and all(
+        len(span) == 2 and -FARTHEST <= span[0] < span[1] <= FARTHEST for span in spans
+    )
+    if not good:
+        raise WorkspaceError(
+            f"--box: found {words!r}; accepted: lower:upper along x, y and z [m], as in "
+            f"-0.4:0.4,-0.4:0.4,0:1; no number beyond {FARTHEST:g}"
+        )
+    lower, upper = np.array(spans).T
+    return lower, upper
+
+
+def parse_velocities(items: list[str]) -> np.ndarray | None:
+    """Velocities of --velocity, shape (k, 6); None without; raises as `parse_numbers`."""
+    if not items:
+        return None
+    turns = [parse_numbers("--velocity", one, (3,), "wx,wy,wz [rad/s]") for one in items]
+    return np.array([[*one, 0.0, 0.0, 0.0] for one in turns])
+
+
+CONTRADICTION = 1
+"""Exit code where a proof and the grid or the hull say different things."""
+
+BOUNDS = {"frame": "the frame", "box": "--box", "nothing": "nothing"}
+ENDS = {"frame": " there", "box": " there", "nothing": " at ten times the frame"}
+"""What is said of what bounds a hull, and of the rays that do not end before."""
+
+AGREEING = {"grid": "poses of the grid", "hull": "ends of the hull's rays"}
+
+
+def print_workspace(found: RobotWorkspace, told: dict[str, Any], folder: Path) -> None:
+    """Prints tables of kinds and measures, and lines on hull and boxes."""
+    unit = found.volume().unit
+    by = "" if told["method"] is None else f", tensions by {told['method']}"
+    title = f"{told['robot']}: workspaces, cables {told['cables']}{by}"
+    table = Table(title=title, box=SIMPLE_HEAD, pad_edge=False)
+    table.add_column("kind", no_wrap=True)
+    for heading in ("poses [%]", "cells inside [%]", f"volume [{unit}]"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    table.add_column("where")
+    for name, numbers in told["workspaces"].items():
+        volume = found.volume(name)
+        table.add_row(
+            name,
+            f"{100.0 * numbers['pose_share']:.2f}",
+            f"{100.0 * volume.share:.2f}",
+            f"{volume.value:.4g}",
+            numbers["title"],
+        )
+    printer = wide_console()
+    printer.print(table)
+    if found.is_tilted():
+        printer.print(f"axes: {told['axes']}")
+    if told["measured"]:
+        table = Table(title="Measures inside", box=SIMPLE_HEAD, pad_edge=False)
+        table.add_column("measure", no_wrap=True)
+        for heading in ("least", "median", "largest"):
+            table.add_column(heading, justify="right", no_wrap=True)
+        for numbers in told["measured"].values():
+            values = [numbers[key] for key in ("least", "median", "largest")]
+            table.add_row(
+                f"{numbers['title']} [{numbers['unit']}]",
+                *("-" if value is None else f"{value:.4g}" for value in values),
+            )
+        printer.print(table)
+    if "hull" in told:
+        hull = told["hull"]
+        printer.print(
+            f"hull: {hull['volume_m3']:.4g} m^3, {hull['area_m2']:.4g} m^2, {hull['rays']} rays, "
+            f"bounded by {BOUNDS[hull['bounded_by']]}, {hull['why']}; "
+            f"{hull['rays_to_the_bound']} of them were cut{ENDS[hull['bounded_by']]}"
+        )
+    if "certified" in told:
+        proven = told["certified"]
+        printer.print(
+            f"certified, cables {proven['cables']}: {proven['inside_share']:.2%} of the box "
+            f"inside, {proven['outside_share']:.2%} outside, {proven['open_share']:.2%} open; "
+            f"{proven['boxes_judged']} boxes"
+        )
+    for name, one in told.get("agreement", {}).items():
+        printer.print(
+            f"boxes against {AGREEING[name]}: {one['contradictions']} contradictions at "
+            f"{one['poses']} of them; {one['in_boxes_proven_inside']} in boxes proven inside, "
+            f"{one['in_boxes_proven_outside']} outside"
+        )
+    printer.print(f"results: {folder}", soft_wrap=True, highlight=False)
+
+
+def say_what_was_asked(console: Console, told: dict[str, Any], assumed: bool) -> None:
+    """Says in the log how cables run, and where boxes of an assumed frame are no result.
+
+    Args:
+        console: Of messages.
+        told: The results for JSON.
+        assumed: Whether an assumed frame is where the default grid and boxes lie.
+    """
+    lines = [f"{told['robot']}: cables {told['cables']}"]
+    if assumed:
+        lines.append(
+            "note: the robot's frame was assumed when it was imported; the default grid and the "
+            "boxes of --certify lie in it; --box chooses another"
+        )
+    if told.get("hull", {}).get("bounded_by") == "nothing" and told["hull"]["rays_to_the_bound"]:
+        lines.append(
+            f"note: {told['hull']['rays_to_the_bound']} rays of the hull do not end: volume and "
+            "area are those of what lies within ten times the frame; --box chooses"
+        )
+    for line in lines:
+        console.print(line, soft_wrap=True, markup=False, highlight=False)
+
+
+def say_contradictions(console: Console, told: dict[str, Any]) -> int:
+    """Says where proven boxes say what is not so; returns the exit code, 0 where there is none."""
+    code = 0
+    for name, one in told.get("agreement", {}).items():
+        if not one["contradictions"]:
+            continue
+        first = ", ".join(f"{x:g}" for x in one["first_contradictions_m_rad"][0])
+        console.print(
+            f"cdpr: error: proven boxes contradict {one['contradictions']} of {one['poses']} "
+            f"{AGREEING[name]}, first at ({first}) [m, rad]: proof or kernel is wrong; do not use "
+            "these results, and report them",
+            soft_wrap=True, markup=False, highlight=False,
+        )  # fmt: skip
+        code = CONTRADICTION
+    return code
+
 
 RESULTS = "results.json"
 """Arguments, versions, volumes and ranges."""
@@ -198,32 +349,20 @@ def workspace(
         found = "no --hull" if hull is None else "--box"
         raise WorkspaceError(f"--unbounded: found {found}; accepted: with --hull, without --box")
     loaded = load_robot(robot)
-    defaults = workspace_defaults(loaded, robot)
-    asked = Asked(
-        limits=parse_limits(limits),
-        mass=mass,
-        wrench=parse_wrench(wrench),
-        required=parse_required(wrench_set, force, moment),
+    if wrench_set is not None and (force is not None or moment is not None):
+        raise WorkspaceError("--wrench-set: found --force or --moment too; accepted: one way")
+    required = None if wrench_set is None else load_wrench_set(wrench_set)
+    question = workspace_question(
+        robot, kind.split(","),
+        parse_grid(grid, parse_turns(orientation or []), *default_box(robot, region)),
+        measures=() if measure is None else measure.split(","), orientations=orientations,
+        limits=parse_limits(limits), mass=mass, wrench=parse_wrench(wrench),
+        required=required, force=force, moment=moment,
         accelerations=parse_accelerations(acceleration),
-        velocities=parse_velocities(velocity or []),
-        clearance=clearance,
-        around=surroundings(
-            loaded, None if obstacles is None else load_obstacles(obstacles), exit_free,
-            anchor_free, pulleys,
-        ),
-        scenario=scenario,
-        pulleys=pulleys,
+        velocities=parse_velocities(velocity or []), clearance=clearance, obstacles=obstacles,
+        exit_free=exit_free, anchor_free=anchor_free, scenario=scenario, pulleys=pulleys,
         method=method,
     )  # fmt: skip
-    corners = grid_box(defaults.lower, defaults.upper, defaults.step, region)
-    question = make_workspace_question(
-        robot,
-        kind.split(","),
-        parse_grid(grid, parse_turns(orientation or []), *corners),
-        () if measure is None else measure.split(","),
-        orientations,
-        asked,
-    )
     console = message_console()
     search = None
     if certify:
@@ -300,195 +439,3 @@ def _certified(search: BoxSearch, boxes: int, folder: Path, console: Console) ->
             bar.update(task, completed=judged, state=state)
 
         return certified_boxes(search, boxes, folder, on_progress=show, should_stop=stop)
-
-
-FARTHEST = 1e6
-"""Largest coordinate of a corner of --box [m]."""
-
-
-def parse_required(
-    file: Path | None, force: float | None, moment: float | None
-) -> SpatialSet | None:
-    """The wrenches of --wrench-set, or of --force and --moment; None without.
-
-    Raises:
-        CdprError: Both are given, or they are not accepted.
-    """
-    if file is not None:
-        if force is not None or moment is not None:
-            raise WorkspaceError("--wrench-set: found --force or --moment too; accepted: one way")
-        return load_wrench_set(file)
-    if force is None and moment is None:
-        return None
-    for name, value in (("--force", force), ("--moment", moment)):
-        if value is not None and not (math.isfinite(value) and value >= 0.0):
-            raise WorkspaceError(f"{name}: found {value:g}; accepted: a finite number >= 0")
-    return SpatialSet(box=np.array([*[moment or 0.0] * 3, *[force or 0.0] * 3]))
-
-
-def parse_accelerations(words: str | None) -> SpatialSet | None:
-    """The box of --acceleration; None without; raises as `parse_numbers`."""
-    if words is None:
-        return None
-    meaning = "a or a,alpha, each >= 0 [m/s^2, rad/s^2]"
-    numbers = parse_numbers("--acceleration", words, (1, 2), meaning)
-    if min(numbers) < 0.0:
-        raise WorkspaceError(f"--acceleration: found {words!r}; accepted: {meaning}")
-    linear, angular = (*numbers, 0.0)[:2]
-    return SpatialSet(box=np.array([*[angular] * 3, *[linear] * 3]))
-
-
-def parse_box(words: str | None) -> tuple[np.ndarray, np.ndarray] | None:
-    """Corners of --box, shape (3,) each [m]; None without.
-
-    Raises:
-        WorkspaceError: They are not six numbers up to `FARTHEST`, or a lower one is not below its
-            upper one.
-    """
-    if words is None:
-        return None
-    try:
-        spans = [[float(word) for word in part.split(":")] for part in words.split(",")]
-    except ValueError:
-        spans = []
-    good = len(spans) == 3 and all(
-        len(span) == 2 and -FARTHEST <= span[0] < span[1] <= FARTHEST for span in spans
-    )
-    if not good:
-        raise WorkspaceError(
-            f"--box: found {words!r}; accepted: lower:upper along x, y and z [m], as in "
-            f"-0.4:0.4,-0.4:0.4,0:1; no number beyond {FARTHEST:g}"
-        )
-    lower, upper = np.array(spans).T
-    return lower, upper
-
-
-def grid_box(
-    lower: np.ndarray, upper: np.ndarray, step: np.ndarray,
-    region: tuple[np.ndarray, np.ndarray] | None,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
-    """Corners and step of the default grid, with as many points in a region in its place [m].
-
-    An axis along which the platform does not move stays as it is.
-    """
-    if region is None:
-        return lower, upper, step
-    free = lower < upper
-    by = np.where(free, step * (region[1] - region[0]) / np.where(free, upper - lower, 1.0), step)
-    return np.where(free, region[0], lower), np.where(free, region[1], upper), by
-
-
-def parse_velocities(items: list[str]) -> np.ndarray | None:
-    """Velocities of --velocity, shape (k, 6); None without; raises as `parse_numbers`."""
-    if not items:
-        return None
-    turns = [parse_numbers("--velocity", one, (3,), "wx,wy,wz [rad/s]") for one in items]
-    return np.array([[*one, 0.0, 0.0, 0.0] for one in turns])
-
-
-CONTRADICTION = 1
-"""Exit code where a proof and the grid or the hull say different things."""
-
-BOUNDS = {"frame": "the frame", "box": "--box", "nothing": "nothing"}
-ENDS = {"frame": " there", "box": " there", "nothing": " at ten times the frame"}
-"""What is said of what bounds a hull, and of the rays that do not end before."""
-
-AGREEING = {"grid": "poses of the grid", "hull": "ends of the hull's rays"}
-
-
-def print_workspace(found: RobotWorkspace, told: dict[str, Any], folder: Path) -> None:
-    """Prints tables of kinds and measures, and lines on hull and boxes."""
-    unit = found.volume().unit
-    by = "" if told["method"] is None else f", tensions by {told['method']}"
-    title = f"{told['robot']}: workspaces, cables {told['cables']}{by}"
-    table = Table(title=title, box=SIMPLE_HEAD, pad_edge=False)
-    table.add_column("kind", no_wrap=True)
-    for heading in ("poses [%]", "cells inside [%]", f"volume [{unit}]"):
-        table.add_column(heading, justify="right", no_wrap=True)
-    table.add_column("where")
-    for name, numbers in told["workspaces"].items():
-        volume = found.volume(name)
-        table.add_row(
-            name,
-            f"{100.0 * numbers['pose_share']:.2f}",
-            f"{100.0 * volume.share:.2f}",
-            f"{volume.value:.4g}",
-            numbers["title"],
-        )
-    printer = wide_console()
-    printer.print(table)
-    if found.is_tilted():
-        printer.print(f"axes: {told['axes']}")
-    if told["measured"]:
-        table = Table(title="Measures inside", box=SIMPLE_HEAD, pad_edge=False)
-        table.add_column("measure", no_wrap=True)
-        for heading in ("least", "median", "largest"):
-            table.add_column(heading, justify="right", no_wrap=True)
-        for numbers in told["measured"].values():
-            values = [numbers[key] for key in ("least", "median", "largest")]
-            table.add_row(
-                f"{numbers['title']} [{numbers['unit']}]",
-                *("-" if value is None else f"{value:.4g}" for value in values),
-            )
-        printer.print(table)
-    if "hull" in told:
-        hull = told["hull"]
-        printer.print(
-            f"hull: {hull['volume_m3']:.4g} m^3, {hull['area_m2']:.4g} m^2, {hull['rays']} rays, "
-            f"bounded by {BOUNDS[hull['bounded_by']]}, {hull['why']}; "
-            f"{hull['rays_to_the_bound']} of them were cut{ENDS[hull['bounded_by']]}"
-        )
-    if "certified" in told:
-        proven = told["certified"]
-        printer.print(
-            f"certified, cables {proven['cables']}: {proven['inside_share']:.2%} of the box "
-            f"inside, {proven['outside_share']:.2%} outside, {proven['open_share']:.2%} open; "
-            f"{proven['boxes_judged']} boxes"
-        )
-    for name, one in told.get("agreement", {}).items():
-        printer.print(
-            f"boxes against {AGREEING[name]}: {one['contradictions']} contradictions at "
-            f"{one['poses']} of them; {one['in_boxes_proven_inside']} in boxes proven inside, "
-            f"{one['in_boxes_proven_outside']} outside"
-        )
-    printer.print(f"results: {folder}", soft_wrap=True, highlight=False)
-
-
-def say_what_was_asked(console: Console, told: dict[str, Any], assumed: bool) -> None:
-    """Says in the log how cables run, and where boxes of an assumed frame are no result.
-
-    Args:
-        console: Of messages.
-        told: The results for JSON.
-        assumed: Whether an assumed frame is where the default grid and boxes lie.
-    """
-    lines = [f"{told['robot']}: cables {told['cables']}"]
-    if assumed:
-        lines.append(
-            "note: the robot's frame was assumed when it was imported; the default grid and the "
-            "boxes of --certify lie in it; --box chooses another"
-        )
-    if told.get("hull", {}).get("bounded_by") == "nothing" and told["hull"]["rays_to_the_bound"]:
-        lines.append(
-            f"note: {told['hull']['rays_to_the_bound']} rays of the hull do not end: volume and "
-            "area are those of what lies within ten times the frame; --box chooses"
-        )
-    for line in lines:
-        console.print(line, soft_wrap=True, markup=False, highlight=False)
-
-
-def say_contradictions(console: Console, told: dict[str, Any]) -> int:
-    """Says where proven boxes say what is not so; returns the exit code, 0 where there is none."""
-    code = 0
-    for name, one in told.get("agreement", {}).items():
-        if not one["contradictions"]:
-            continue
-        first = ", ".join(f"{x:g}" for x in one["first_contradictions_m_rad"][0])
-        console.print(
-            f"cdpr: error: proven boxes contradict {one['contradictions']} of {one['poses']} "
-            f"{AGREEING[name]}, first at ({first}) [m, rad]: proof or kernel is wrong; do not use "
-            "these results, and report them",
-            soft_wrap=True, markup=False, highlight=False,
-        )  # fmt: skip
-        code = CONTRADICTION
-    return code

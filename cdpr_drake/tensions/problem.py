@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import StrEnum
+from typing import Any
 
 import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import TensionProblemError
+from cdpr_drake.summaries import Summarized
 from cdpr_drake.tensions.null_space_kernel import RANK_TOLERANCE
 
 RESIDUAL_TOLERANCE = 1e-9
@@ -133,8 +135,8 @@ class TensionProblem:
         return float(np.linalg.norm(self.W @ tensions + self.wrench)) / max(scale, 1e-300)
 
 
-@dataclass(frozen=True)
-class TensionSolution:
+@dataclass(frozen=True, repr=False)
+class TensionSolution(Summarized):
     """The answer of a method.
 
     Attributes:
@@ -151,8 +153,31 @@ class TensionSolution:
     status: TensionStatus
     tensions: Array
     residual: float
-    active: np.ndarray = field(repr=False)
-    slack: Array = field(repr=False)
+    active: np.ndarray
+    slack: Array
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON; tensions that are not there are null."""
+        finite = np.all(np.isfinite(self.tensions))
+        return {
+            "method": self.method,
+            "status": str(self.status),
+            "tensions_n": self.tensions.tolist() if finite else None,
+            "residual": self.residual if finite else None,
+            "active_bounds": self.active.tolist(),
+            "slack_wrench": self.slack.tolist() if finite else None,
+        }
+
+    def summary(self) -> tuple[str, list[tuple[str, str]]]:
+        """What it shows of itself; tensions on a bound have a star."""
+        words = (
+            f"{t:.2f}{'*' if bound else ''}"
+            for t, bound in zip(self.tensions, self.active, strict=True)
+        )
+        return f"Tensions by {self.method}: {self.status}", [
+            ("tensions [N]", ", ".join(words)),
+            ("residual", f"{self.residual:.2g}"),
+        ]
 
 
 @njit(cache=True)

@@ -39,10 +39,10 @@ class Instant(NamedTuple):
     end: Mapping[str, Any] | None = None
 
 
-class Client:
+class RemoteClient:
     """Drives a run of `cdpr serve`, or asks it for tensions.
 
-    with Client() as client:
+    with RemoteClient() as client:
         client.run(lambda now: {"tensions": my_tensions(now.time, now.outputs["X_WP"])})
 
     Each call sends one message and waits for its reply. Messages: see `cdpr_drake.systems.remote`.
@@ -105,7 +105,9 @@ class Client:
             BridgeError: There is none in time, or the server does not accept the message.
         """
         if self._lost:  # a reply that comes late would be taken for that to the next message
-            raise BridgeError(f"{self._address}: found no reply before; accepted: a new Client")
+            raise BridgeError(
+                f"{self._address}: found no reply before; accepted: a new RemoteClient"
+            )
         try:
             self._socket.send(encode(message, self._codec))
             reply, _ = decode(self._socket.recv())

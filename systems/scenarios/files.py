@@ -26,21 +26,28 @@ KINDS = (VISUAL_SERVO, TENSION_CONTROL, PICK_AND_PLACE)
 """Kinds of runs; a file without the key `kind` describes a visual servo."""
 
 
-def all_scenario_names() -> tuple[str, ...]:
-    """Names of the scenarios that come with the package, of every kind."""
-    return tuple(sorted(path.stem for path in _FOLDER.glob("*.yaml")))
+def scenario_names(kind: str | None = None) -> tuple[str, ...]:
+    """Names of the scenarios that come with the package.
 
+    Args:
+        kind: One of `KINDS`; None: every kind.
 
-def scenario_names(kind: str = VISUAL_SERVO) -> tuple[str, ...]:
-    """Names of the scenarios of one kind that come with the package."""
-    return tuple(name for name in all_scenario_names() if scenario_kind(name) == kind)
+    Raises:
+        ScenarioError: There is no such kind.
+    """
+    names = tuple(sorted(path.stem for path in _FOLDER.glob("*.yaml")))
+    if kind is None:
+        return names
+    if kind not in KINDS:
+        raise ScenarioError(f"kind: found {kind!r}; accepted: {', '.join(KINDS)}")
+    return tuple(name for name in names if scenario_kind(name) == kind)
 
 
 def scenario_file(name: str) -> Path:
     """The file of a scenario.
 
     Args:
-        name: A name of `all_scenario_names()`, a path that ends in .yaml, or a folder that
+        name: A name of `scenario_names()`, a path that ends in .yaml, or a folder that
             `cdpr simulate` wrote; a folder that is called as a scenario is found as ./NAME.
 
     Raises:
@@ -51,10 +58,10 @@ def scenario_file(name: str) -> Path:
         if not path.is_file():
             raise ScenarioError(f"{path}: there is no such scenario file")
         return path
-    if name not in all_scenario_names():
+    if name not in scenario_names():
         if Path(name).is_dir():
             return _in_folder(Path(name))
-        raise ScenarioError(f"scenario {name!r} is unknown; {closest(name, all_scenario_names())}")
+        raise ScenarioError(f"scenario {name!r} is unknown; {closest(name, scenario_names())}")
     return _FOLDER / f"{name}.yaml"
 
 

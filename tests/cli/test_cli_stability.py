@@ -122,7 +122,8 @@ CHUNK, KEPT, POSES = 64, 3, 2 * 9 * 9 * 5
 KILLED = killed_after(
     KEPT,
     f"""
-from cdpr_drake.analyses.workspaces import stability_results as module
+from importlib import import_module
+module = import_module("cdpr_drake.analyses.workspaces.stability_results")
 module.CHUNK_POSES["sampled"] = {CHUNK}
 """,
 )

@@ -9,7 +9,7 @@ import pytest
 from cdpr_drake.cli.app import SUBCOMMANDS, main
 from cdpr_drake.cli.completion import asked_words, robot_words, scenario_words
 from cdpr_drake.models.robot_loader import robot_names
-from cdpr_drake.systems.scenarios.files import all_scenario_names
+from cdpr_drake.systems.scenarios.files import scenario_names
 from tests.messages import printed
 
 WORDS = """
@@ -95,7 +95,7 @@ def test_options_and_their_values(capsys, monkeypatch):
 
 def test_names_are_those_that_the_loaders_know():
     assert robot_words("") == list(robot_names())
-    assert scenario_words("") == list(all_scenario_names())
+    assert scenario_words("") == list(scenario_names())
 
 
 def test_a_quote_that_is_open_breaks_nothing(monkeypatch):

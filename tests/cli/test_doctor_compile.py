@@ -7,7 +7,7 @@ import pytest
 from cdpr_drake import cli
 from cdpr_drake.analyses.installation import LISTED, compilation_steps
 from cdpr_drake.kernel_cache.kernel_list import group_names
-from cdpr_drake.systems.scenarios.files import all_scenario_names
+from cdpr_drake.systems.scenarios.files import scenario_names
 from tests.messages import printed
 
 
@@ -34,7 +34,7 @@ def test_every_step_is_done_and_named(capsys, monkeypatch):
 
 def test_the_steps_are_all_scenarios_and_both_engines_of_the_default():
     names = [name for name, _ in compilation_steps()]
-    assert set(all_scenario_names()) < set(names)
+    assert set(scenario_names()) < set(names)
     assert {"tension methods", "acrobot_pbvs, compiled engine"} < set(names)
     assert names[1] == "acrobot_pbvs"
     dict(compilation_steps())["tension methods"]()

@@ -22,7 +22,7 @@ import cdpr_drake.cli
 
 PLANNING = """
 import signal, sys
-from cdpr_drake.cli.app import main; from cdpr_drake.cli import plan
+from cdpr_drake.analyses.front import planning as plan; from cdpr_drake.cli.app import main
 number = int(sys.argv.pop(1))
 plan.plan_along_path = lambda *_: signal.raise_signal(number)
 main()
@@ -45,7 +45,7 @@ main()
 
 WRAPPED = """
 import builtins, sys
-from cdpr_drake.cli.app import main; from cdpr_drake.cli import plan
+from cdpr_drake.analyses.front import planning as plan; from cdpr_drake.cli.app import main
 kind = getattr(builtins, sys.argv.pop(1))
 
 def wraps(*_):
@@ -60,7 +60,7 @@ main()
 
 MAKING = """
 import signal, sys
-from cdpr_drake.cli.app import main; from cdpr_drake.cli import plan
+from cdpr_drake.analyses.front import planning as plan; from cdpr_drake.cli.app import main
 number = int(sys.argv.pop(1))
 
 class Late:

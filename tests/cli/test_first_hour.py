@@ -14,7 +14,7 @@ from cdpr_drake.analyses.visualization.meshcat_window import open_meshcat, page_
 from cdpr_drake.cli import notebooks as notebook_command
 from cdpr_drake.errors import MeshcatError
 from cdpr_drake.models.robot_loader import robot_file
-from cdpr_drake.systems.scenarios.files import all_scenario_names
+from cdpr_drake.systems.scenarios.files import scenario_names
 from tests.cli.test_cli import QUICK, refuse, run
 
 pytestmark = pytest.mark.usefixtures("_in_a_folder_of_its_own")
@@ -45,7 +45,7 @@ def test_scenarios_lists_all(capsys):
     code, out, _ = run(capsys, "scenarios", "--json")
     assert code == 0
     facts = {fact["name"]: fact for fact in json.loads(out)}
-    assert list(facts) == list(all_scenario_names())
+    assert list(facts) == list(scenario_names())
     assert facts["acrobot_ibvs"]["scheme"] == "ibvs"
     assert facts["caroca_computed_torque"]["kind"] == "tension_control"
     assert facts["caroca_computed_torque"]["camera"] is None

@@ -17,7 +17,7 @@ import pytest
 from cdpr_drake.cli.app import main
 from cdpr_drake.cli.process import INTERRUPTED
 from cdpr_drake.cli.run_endings import CLIENT_ENDED
-from cdpr_drake.systems.remote.remote_client import Client
+from cdpr_drake.systems.remote.remote_client import RemoteClient
 from tests.messages import printed
 
 PLAIN_CLIENT = Path(str(files("cdpr_drake").joinpath("notebooks/plain_client.py")))
@@ -83,7 +83,7 @@ def test_what_was_simulated_is_written(capsys, tmp_path, ending):
     ends = []
 
     def drive():
-        with Client(f"tcp://127.0.0.1:{port}", timeout=LONG) as client:
+        with RemoteClient(f"tcp://127.0.0.1:{port}", timeout=LONG) as client:
             now = client.start([])
             while now.time < 0.1:
                 now = client.step(tensions=np.full(8, 5.0))
@@ -131,7 +131,7 @@ def test_a_signal_while_it_waits(capsys, tmp_path):
     out, port = tmp_path / "out", free_port()
 
     def ask_and_stop():
-        with Client(f"tcp://127.0.0.1:{port}", timeout=LONG) as client:
+        with RemoteClient(f"tcp://127.0.0.1:{port}", timeout=LONG) as client:
             client.describe()  # it waits by then
             os.kill(os.getpid(), signal.SIGTERM)
 

@@ -10,7 +10,7 @@ from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
 from cdpr_drake.errors import RobotFileError
 from cdpr_drake.geometry.poses import pose_error
-from cdpr_drake.models.robot_exchange import write_robot
+from cdpr_drake.models.robot_exchange import export_robot
 from cdpr_drake.models.robot_exports import EXPORTS
 from cdpr_drake.models.robot_loader import load_robot, robot_names
 from cdpr_drake.systems.robots.cable_robot import CableRobot, automatic_step
@@ -29,7 +29,7 @@ ROBOTS = files("cdpr_drake.models").joinpath("robots")
 def exported(robot, format):
     """Files by name, or why there are none."""
     try:
-        return write_robot(robot, format)
+        return export_robot(robot, format)
     except RobotFileError as problem:
         return str(problem)
 

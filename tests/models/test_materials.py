@@ -11,7 +11,7 @@ from cdpr_drake.cables.models import check_breaking
 from cdpr_drake.cli.app import make_app
 from cdpr_drake.errors import CableGeometryError, RobotFileError
 from cdpr_drake.geometry.cable_paths import cable_paths
-from cdpr_drake.models.robot_exchange import write_robot
+from cdpr_drake.models.robot_exchange import export_robot
 from cdpr_drake.models.robot_exports import not_written
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_statics import rigid_platform
@@ -140,7 +140,7 @@ def test_mujoco_gets_width_and_stiffness_of_each_tendon(tmp_path):
     pytest.importorskip("mujoco")
     robot = mixed({"diameter": 0.004, "youngs_modulus": 2.5e9})
     path = tmp_path / "robot.xml"
-    (text,) = write_robot(robot, "mjcf").values()
+    (text,) = export_robot(robot, "mjcf").values()
     path.write_text(text)
     again = load_robot(str(path))
     np.testing.assert_allclose(again.diameters(), robot.diameters(), rtol=1e-15)

@@ -33,7 +33,7 @@ REFUSED = [
 
 def through(robot, format, folder):
     """The robot as it comes back from a format."""
-    for name, text in models.write_robot(robot, format).items():
+    for name, text in models.export_robot(robot, format).items():
         (folder / name).write_text(text, encoding="utf-8")
         path = folder / name
     return models.import_robot(folder if format == "caspr" else path).robot
@@ -64,7 +64,7 @@ def test_out_and_in(format, name, tmp_path):
 @pytest.mark.parametrize(("format", "name", "words"), REFUSED)
 def test_what_a_format_cannot_hold_is_refused_by_name(format, name, words):
     with pytest.raises(RobotFileError, match=words):
-        models.write_robot(small_robot(name), format)
+        models.export_robot(small_robot(name), format)
 
 
 @pytest.mark.parametrize("format", ["caspr", "wcrfx", "gazebo-yaml", "urdf", "sdf", "sdf-drake"])
@@ -73,7 +73,7 @@ def test_the_world_is_turned_for_formats_with_gravity_along_z(format, tmp_path):
     robot = small_robot("tilted_gravity")
     said = models.not_written(robot, format)["gravity_direction"]
     assert said.startswith(f"The world was turned by 19.827 deg: {format} has gravity along -z")
-    texts = models.write_robot(robot, format).values()
+    texts = models.export_robot(robot, format).values()
     assert all(said.removesuffix(".") in text for text in texts)
     rows = said.partition("R_UW by rows ")[2].removesuffix(".")
     R_UW = np.array(ast.literal_eval(f"[{rows}]"))
@@ -105,9 +105,9 @@ def test_a_plane_that_is_oblique_in_the_turned_world_is_refused_in_words():
     robot = small_robot("upright_body", gravity_direction=[0.0, -0.1, -1.0])
     words = r"with axis .*; accepted for caspr.* in the world that was turned by 5\.71"
     with pytest.raises(RobotFileError, match=words):
-        models.write_robot(robot, "caspr")
+        models.export_robot(robot, "caspr")
     in_plane = small_robot("upright_body", gravity_direction=[0.1, 0.0, -1.0])
-    assert "PLANAR_XZ" in "".join(models.write_robot(in_plane, "caspr").values())
+    assert "PLANAR_XZ" in "".join(models.export_robot(in_plane, "caspr").values())
 
 
 def test_turned_upside_down_and_back():
@@ -141,7 +141,7 @@ def test_turned_upside_down_and_back():
 def test_mujoco_has_the_same_accelerations(name, tmp_path):
     mujoco = pytest.importorskip("mujoco")
     robot = small_robot(name)
-    (text,) = models.write_robot(robot, "mjcf").values()
+    (text,) = models.export_robot(robot, "mjcf").values()
     model = mujoco.MjModel.from_xml_string(text)
     data = mujoco.MjData(model)
     model.tendon_stiffness[:] = 0.0  # falling, without its cables

@@ -48,7 +48,7 @@ def test_every_file_that_ships_is_accepted(kind, schemas):
     paths = (
         [models.robot_file(name) for name in models.robot_names()]
         if kind == "robot"
-        else [scenarios.scenario_file(name) for name in scenarios.all_scenario_names()]
+        else [scenarios.scenario_file(name) for name in scenarios.scenario_names()]
     )
     for path in paths:
         jsonschema.validate(as_numbers(content_of(path)), schemas[kind])

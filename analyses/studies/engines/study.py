@@ -38,7 +38,7 @@ from cdpr_drake.analyses.sweeps.sweep import run_study_sweep
 from cdpr_drake.arrays import Array
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
-from cdpr_drake.systems.scenarios.files import TENSION_CONTROL, all_scenario_names, scenario_kind
+from cdpr_drake.systems.scenarios.files import TENSION_CONTROL, scenario_kind, scenario_names
 from cdpr_drake.systems.scenarios.run_settings import has_contact
 
 RUNS, QUICK_RUNS = 200, 2
@@ -163,7 +163,7 @@ def study_engines(quick: bool = False, session: StudySession = ALONE) -> Engines
 
 
 def _tasks(quick: bool) -> dict[str, tuple[Any, int]]:
-    names = QUICK_SCENARIOS if quick else all_scenario_names()
+    names = QUICK_SCENARIOS if quick else scenario_names()
     # One engine only has contact: there is nothing to compare.
     names = tuple(name for name in names if not has_contact(load_scenario(name)))
     short = (f"duration={QUICK_DURATION}",) if quick else ()

@@ -27,7 +27,7 @@ from cdpr_drake.analyses.sweeps.sweep import run_study_sweep
 from cdpr_drake.analyses.visualization.figure_style import new_figure
 from cdpr_drake.arrays import Array
 from cdpr_drake.palette import nth_look
-from cdpr_drake.systems.scenarios.files import all_scenario_names
+from cdpr_drake.systems.scenarios.files import scenario_names
 
 FIGURES = ("endings",)
 """Names of the figures that it can write."""
@@ -182,7 +182,7 @@ def study_scenarios(quick: bool = False, session: StudySession = ALONE) -> Scena
         OutputFolderError: The folder belongs to other arguments, or cannot be written.
         SweepError: A local process died.
     """
-    tasks = {name: (ScenarioRun(name, quick), 1) for name in all_scenario_names()}
+    tasks = {name: (ScenarioRun(name, quick), 1) for name in scenario_names()}
     arguments = {
         "cdpr_drake": code_version(),
         "study": "scenarios",

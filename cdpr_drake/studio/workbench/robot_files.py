@@ -18,7 +18,7 @@ import yaml
 from cdpr_drake.errors import CdprError, RobotFileError
 from cdpr_drake.models.formats.detection import SUFFIXES as ROBOT_SUFFIXES
 from cdpr_drake.models.formats.detection import is_foreign
-from cdpr_drake.models.robot_exchange import import_robot, write_robot
+from cdpr_drake.models.robot_exchange import export_robot, import_robot
 from cdpr_drake.models.robot_exports import EXPORTS, not_written, not_written_words
 from cdpr_drake.models.robot_loader import parse_robot, robot_file, robot_names, robot_text
 from cdpr_drake.models.robot_schema import Robot
@@ -185,7 +185,7 @@ def exported(robot: Robot, text: str, format: str) -> tuple[dict[str, str], list
     """
     if format == YAML:
         return {f"{robot.name}.yaml": text}, []
-    return write_robot(robot, format), not_written_words(not_written(robot, format))
+    return export_robot(robot, format), not_written_words(not_written(robot, format))
 
 
 def export_formats() -> dict[str, str]:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.planning.free_motion import FreeSettings, plan_free_motion
+from cdpr_drake.analyses.planning.free_motion import FreeSettings, solve_free_motion
 from cdpr_drake.analyses.planning.plan_tracking import track_plan
 from cdpr_drake.analyses.planning.robot_path_task import LimitSettings, path_task, robot_limits
 from cdpr_drake.analyses.reporting.provenance import write_run_inputs
@@ -124,7 +124,7 @@ def asked(**more):
 
 def test_limits_of_winches_and_speed_are_kept(task):
     robot, planar, limits = task
-    found = plan_free_motion(robot, planar, asked())
+    found = solve_free_motion(robot, planar, asked())
     samples = found.samples()
     assert np.max(samples.uses) < 1.0 + BETWEEN
     assert np.max(samples.uses[:, 2]) > 0.95  # what the least time rests on
@@ -133,9 +133,9 @@ def test_limits_of_winches_and_speed_are_kept(task):
 
 def test_least_tension_and_least_energy_differ_in_the_time_that_they_take(task):
     robot, planar, _ = task
-    energy = plan_free_motion(robot, planar, asked(least="energy"))
-    given = plan_free_motion(robot, planar, asked(least="energy", duration=2.0 * energy.duration))
-    tension = plan_free_motion(robot, planar, asked(least="tension", duration=1.5))
+    energy = solve_free_motion(robot, planar, asked(least="energy"))
+    given = solve_free_motion(robot, planar, asked(least="energy", duration=2.0 * energy.duration))
+    tension = solve_free_motion(robot, planar, asked(least="tension", duration=1.5))
 
     def heat(one):
         return float(np.mean(one.tensions**2)) * one.duration
@@ -148,7 +148,7 @@ def test_least_tension_and_least_energy_differ_in_the_time_that_they_take(task):
 def test_what_no_motion_can_do_names_place_and_cable(task):
     robot, planar, _ = task
     with pytest.raises(PlanningError, match=r"of the way, at .*; cables at a limit .*: C\d"):
-        plan_free_motion(robot, planar, asked(least="energy", duration=0.06))
+        solve_free_motion(robot, planar, asked(least="energy", duration=0.06))
 
 
 @pytest.mark.parametrize(

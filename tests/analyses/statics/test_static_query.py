@@ -102,7 +102,7 @@ def test_command_prints_a_table_and_draws(capsys, tmp_path):
         ("acrobot_large --pose 0,0,0.4 --lengths 1,1,1,1,1,1,1,1", "found both"),
         ("acrobot_large --pose 0,0", "--pose: found '0,0'"),
         ("acrobot_large --lengths 1,1,1", "accepted: 8 lengths [m]"),
-        ("acrobot_large --lengths 1,1,1,1,1,1,1,-1", "--lengths: found -1; accepted: > 0"),
+        ("acrobot_large --lengths 1,1,1,1,1,1,1,-1", "lengths: found -1; accepted: > 0"),
         ("acrobot_large --pose 0,0,5", "outside the frame"),
         ("acrobot_large --pose 0.5,0.5,1.1", "reaches into the platform"),
         ("acrobot_large --pose 0.5,0,0.5", "no tensions within 0..60 N"),

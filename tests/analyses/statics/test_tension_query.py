@@ -8,7 +8,6 @@ import pytest
 from cdpr_drake.analyses.statics.static_figures import polygon_figure
 from cdpr_drake.analyses.statics.tension_query import (
     applicable_methods,
-    as_dict,
     polygon_tensions,
     solve_all,
 )
@@ -47,7 +46,7 @@ def test_methods_that_apply(problem):
 
 def test_json_of_a_solution_has_no_nan(hopeless):
     for solution in solve_all(hopeless):
-        found = as_dict(solution)
+        found = solution.as_dict()
         assert found["status"] == "infeasible"
         json.dumps(found, allow_nan=False)
         assert (found["tensions_n"] is None) == (not METHODS[solution.method].relaxes)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cdpr_drake.errors import InfeasibleTensionError
-from cdpr_drake.models.robot_exchange import write_robot
+from cdpr_drake.models.robot_exchange import export_robot
 from cdpr_drake.models.robot_exports import not_written
 from cdpr_drake.models.robot_holding import hold_robot
 from cdpr_drake.models.robot_loader import load_robot, robot_names
@@ -29,7 +29,7 @@ def robot_of(name):
 
 def at_home(robot):
     """MuJoCo's model and data, nothing commanded."""
-    (text,) = write_robot(robot, "mjcf").values()
+    (text,) = export_robot(robot, "mjcf").values()
     model = mujoco.MjModel.from_xml_string(text)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)

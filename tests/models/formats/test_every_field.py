@@ -13,7 +13,7 @@ import pytest
 from cdpr_drake import models
 from cdpr_drake.cli.app import main
 from cdpr_drake.errors import RobotFileError
-from cdpr_drake.models.robot_exchange import write_robot
+from cdpr_drake.models.robot_exchange import export_robot
 from cdpr_drake.models.robot_exports import EXPORTS, HELD, not_written
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.schema.fields import text
@@ -40,7 +40,7 @@ def robot(request):
 def through(robot, format, folder):
     """The robot as it comes back; None where the format refuses it by its motion."""
     try:
-        files = write_robot(robot, format)
+        files = export_robot(robot, format)
     except RobotFileError as problem:
         words = str(problem)
         assert f"robot {robot.name}: motion: found {robot.motion}" in words

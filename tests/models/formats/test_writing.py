@@ -37,9 +37,9 @@ ALL = [
 
 def written(robot, format, folder):
     """The first file of a robot in a format."""
-    for name, text in models.write_robot(robot, format).items():
+    for name, text in models.export_robot(robot, format).items():
         (folder / name).write_text(text, encoding="utf-8")
-    return folder / next(iter(models.write_robot(robot, format)))
+    return folder / next(iter(models.export_robot(robot, format)))
 
 
 @pytest.mark.parametrize(("name", "format"), ALL)
@@ -111,7 +111,7 @@ def length_over_caspr_pulley(entry, to, anchor, radius):
 @pytest.mark.parametrize("name", ["caroca", "ipanema_1", "grab_four"])
 def test_caspr_has_cables_as_long_over_its_pulleys(name, tmp_path):
     robot = models.load_robot(name)
-    files = models.write_robot(robot, "caspr")
+    files = models.export_robot(robot, "caspr")
     cables = ET.fromstring(files[f"{name}_cables.xml"].partition("?>")[2])
     X_WP, found = robot.home.transform(), []
     for cable in cables.iter("cable_ideal"):
@@ -182,9 +182,9 @@ def test_drake_moves_the_chains_as_the_robot_with_rods(tmp_path):
 def test_formats_that_cannot_hold_a_robot_say_so():
     robot = models.load_robot("planar")
     with pytest.raises(RobotFileError, match="accepted for sdf: 3R3T"):
-        models.write_robot(robot, "sdf")
+        models.export_robot(robot, "sdf")
     with pytest.raises(RobotFileError, match="accepted: sdf, sdf-drake"):
-        models.write_robot(robot, "docx")
+        models.export_robot(robot, "docx")
 
 
 @pytest.fixture

@@ -30,7 +30,7 @@ import zmq
 from cdpr_drake.errors import BridgeError, ClientEndedError
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.remote.messages import LARGEST, decode
-from cdpr_drake.systems.remote.remote_client import Client
+from cdpr_drake.systems.remote.remote_client import RemoteClient
 from cdpr_drake.systems.remote.remote_driver import Driver, Pace, Port
 from cdpr_drake.systems.remote.server_socket import ServerSocket
 from cdpr_drake.systems.remote.service import tension_service
@@ -318,7 +318,7 @@ class Sender:
         """Describes itself; a question on its way while a run ends and another begins is lost."""
         end = time.monotonic() + LONG
         while True:
-            with Client(self.server.address, timeout=5.0) as other:
+            with RemoteClient(self.server.address, timeout=5.0) as other:
                 try:
                     assert set(other.describe()["inputs"]) == {"tensions", "motion"}
                     return

@@ -12,7 +12,7 @@ from cdpr_drake.analyses.simulation.tension_control_run import run_tension_scena
 from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.diagrams.load import load_scenario
-from cdpr_drake.systems.remote.remote_client import Client
+from cdpr_drake.systems.remote.remote_client import RemoteClient
 from cdpr_drake.systems.remote.remote_driver import Driver, Pace
 from cdpr_drake.systems.remote.server_socket import ServerSocket
 from cdpr_drake.systems.remote.service import tension_service
@@ -91,7 +91,7 @@ def driven(scenario, control, codec="msgpack", outputs=None, **options):
     with server() as one:
 
         def drive():
-            with Client(one.socket.address, codec=codec, timeout=LONG) as client:
+            with RemoteClient(one.socket.address, codec=codec, timeout=LONG) as client:
                 return dict(client.run(control, outputs))
 
         with beside(drive) as found:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cdpr_drake.errors import ClientEndedError
-from cdpr_drake.systems.remote.remote_client import Client
+from cdpr_drake.systems.remote.remote_client import RemoteClient
 from cdpr_drake.systems.remote.remote_driver import Driver, Pace, Port
 from cdpr_drake.systems.remote.server_socket import SLICE, ServerSocket
 from tests.systems.remote.message_fuzz import RAW, Sender
@@ -42,7 +42,7 @@ def raw(one, payload):
 def starts(one, before):
     """Does something as a stranger does, and starts then; the first instant."""
     before()
-    with Client(one.address, timeout=LONG) as client:
+    with RemoteClient(one.address, timeout=LONG) as client:
         return client.start([])
 
 
@@ -73,7 +73,7 @@ def test_who_speaks_an_old_protocol_is_refused_in_words(listening):
             said = b""
             while b"ZeroMQ 4" not in said:
                 said += to.recv(1000)
-        with Client(listening.address, timeout=LONG) as client:
+        with RemoteClient(listening.address, timeout=LONG) as client:
             client.start([])
 
     with beside(ask) as found:
@@ -96,9 +96,9 @@ def test_the_end_of_an_earlier_connection_is_not_that_of_the_driver(listening):
 
     def look():
         for _ in range(20):
-            with Client(listening.address, timeout=LONG) as other:
+            with RemoteClient(listening.address, timeout=LONG) as other:
                 other.describe()
-        with Client(listening.address, timeout=LONG) as client:
+        with RemoteClient(listening.address, timeout=LONG) as client:
             client.start([])
             time.sleep(4 * SLICE)  # so that the server looks after it
             return [client.step(tensions=[1.0, 2.0]).time for _ in range(3)]

@@ -26,7 +26,7 @@ from cdpr_drake.systems.remote.messages import (
     listed,
     vector,
 )
-from cdpr_drake.systems.remote.remote_client import Client
+from cdpr_drake.systems.remote.remote_client import RemoteClient
 from cdpr_drake.systems.remote.remote_driver import Driver, Pace
 from cdpr_drake.systems.remote.server_socket import ServerSocket
 from cdpr_drake.tensions.methods import distribute
@@ -173,7 +173,7 @@ def test_a_silent_client(pace):
 
 def test_stop_by_the_client():
     def stop(address):
-        with Client(address, timeout=LONG) as client:
+        with RemoteClient(address, timeout=LONG) as client:
             client.start()
             client.step(**HOLD)
             return client.stop()
@@ -208,8 +208,8 @@ def test_strangers_are_answered_and_change_nothing():
 
     def drive(address):
         with (
-            Client(address, timeout=LONG) as driver,
-            Client(address, codec="json", timeout=LONG) as other,
+            RemoteClient(address, timeout=LONG) as driver,
+            RemoteClient(address, codec="json", timeout=LONG) as other,
         ):
             assert set(other.describe()["inputs"]) == {"tensions"}
             driver.start(["X_WP"])
@@ -268,12 +268,12 @@ def test_nowhere_to_listen():
 
 def test_nobody_serves():
     with (
-        Client("tcp://127.0.0.1:9", timeout=0.05) as client,
+        RemoteClient("tcp://127.0.0.1:9", timeout=0.05) as client,
         pytest.raises(BridgeError, match=r"found no reply in 0.05 s.*cdpr serve"),
     ):
         client.describe()
     with pytest.raises(BridgeError, match="address: found 'nonsense'"):
-        Client("nonsense")
+        RemoteClient("nonsense")
 
 
 def test_a_client_needs_neither_drake_nor_numba():
@@ -309,7 +309,7 @@ def test_in_real_time_a_command_holds_until_the_next():
     """A client that pauses is not waited for; what it asked for last stays."""
 
     def pause(address):
-        with Client(address, timeout=LONG) as client:
+        with RemoteClient(address, timeout=LONG) as client:
             client.start(["tensions"])
             now = client.step(tensions=[3.0] * 8)
             time.sleep(0.03)

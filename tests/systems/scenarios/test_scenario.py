@@ -11,7 +11,7 @@ from cdpr_drake.geometry.poses import pose_error, pose_from_angles
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.diagrams.visual_servo import build_visual_servo
-from cdpr_drake.systems.scenarios.files import scenario_names
+from cdpr_drake.systems.scenarios.files import VISUAL_SERVO, scenario_names
 
 ROUND_OFF = 1e-12
 """Of poses with entries of order one."""
@@ -21,8 +21,8 @@ PRINTED_DIGIT = 5e-4
 
 
 def test_every_scenario_loads_under_its_own_name():
-    assert {"acrobot_pbvs", "caroca_pbvs", "planar_pbvs"} <= set(scenario_names())
-    for name in scenario_names():
+    assert {"acrobot_pbvs", "caroca_pbvs", "planar_pbvs"} <= set(scenario_names(VISUAL_SERVO))
+    for name in scenario_names(VISUAL_SERVO):
         scenario = load_scenario(name)
         assert scenario.name == name
         assert scenario.title

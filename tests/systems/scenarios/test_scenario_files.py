@@ -14,7 +14,6 @@ from cdpr_drake.schema.yaml_files import FILE_KINDS
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.scenarios.files import (
     KINDS,
-    all_scenario_names,
     scenario_file,
     scenario_kind,
     scenario_names,
@@ -24,7 +23,7 @@ from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
 
 def test_every_scenario_has_one_kind():
     by_kind = [name for kind in KINDS for name in scenario_names(kind)]
-    assert sorted(by_kind) == list(all_scenario_names())
+    assert sorted(by_kind) == list(scenario_names())
 
 
 def test_a_file_without_kind_is_a_visual_servo(tmp_path):

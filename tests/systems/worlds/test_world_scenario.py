@@ -19,7 +19,7 @@ from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.diagrams.visual_servo import build_visual_servo
 from cdpr_drake.systems.loops.loop_choice import why_diagram, with_loop
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
-from cdpr_drake.systems.scenarios.files import all_scenario_names
+from cdpr_drake.systems.scenarios.files import scenario_names
 from cdpr_drake.systems.scenarios.run_settings import engine_of, has_contact
 from cdpr_drake.systems.sensors.scene_shapes import SceneShapes
 
@@ -219,7 +219,7 @@ def test_the_world_of_the_gazebo_thesis_stands_where_it_says():
     upper = world.body("hose").motion.at(0.0) @ np.array([0.0, 0.0, 1.0])
     later = world.body("hose").motion.at(0.7) @ np.array([0.0, 0.0, 1.0])
     np.testing.assert_allclose(upper, later, atol=1e-4)
-    assert "acrobot_set_down" in all_scenario_names()
+    assert "acrobot_set_down" in scenario_names()
 
 
 def test_the_hokuyo_on_the_hose_looks_down_on_the_ground():

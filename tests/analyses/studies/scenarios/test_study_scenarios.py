@@ -23,7 +23,7 @@ from cdpr_drake.analyses.studies.scenarios.task import (
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
-from cdpr_drake.systems.scenarios.files import all_scenario_names, scenario_file
+from cdpr_drake.systems.scenarios.files import scenario_file, scenario_names
 
 LOST = "acrobot_partitioned"
 
@@ -40,7 +40,7 @@ def canned(self, start, stop):
     return {"runs": np.array([row]), "messages": np.array(["it was not seen"], "U300")}
 
 
-@pytest.mark.parametrize("name", all_scenario_names())
+@pytest.mark.parametrize("name", scenario_names())
 def test_every_scenario_ends_as_its_file_says(name):
     """With projected targets; what only a diagram can do is cut after a second."""
     (ending,) = endings({name: ScenarioRun(name, quick=True)(0, 1)})
@@ -63,7 +63,7 @@ def test_one_that_loses_its_target_is_named(tmp_path, monkeypatch):
     assert len(study.tables()) == 2
     assert study.write(tmp_path) == {}
     told = json.loads((tmp_path / "results.json").read_text())["scenarios"]
-    assert list(told) == list(all_scenario_names())
+    assert list(told) == list(scenario_names())
     assert [name for name, one in told.items() if not one["as_expected"]] == [LOST]
     assert told[LOST]["expected"]["outcome"] == "converged"
     assert {path.stem for path in tmp_path.glob("*.png")} == set(STUDIES["scenarios"].figures)

@@ -1,0 +1,126 @@
+"""A better robot, searched and proven."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from cdpr_drake.analyses.design.candidates import make_candidates
+from cdpr_drake.analyses.design.confirmation import BOXES, confirm
+from cdpr_drake.analyses.design.goals import GOALS
+from cdpr_drake.analyses.design.results import DesignResult, write_design
+from cdpr_drake.analyses.design.search import search_design
+from cdpr_drake.analyses.design.settings import (
+    DesignSettings,
+    GoalSettings,
+    load_design_settings,
+)
+from cdpr_drake.analyses.reporting.output_folder import continued_folder
+from cdpr_drake.analyses.reporting.progress import StudySession
+from cdpr_drake.errors import DesignError
+from cdpr_drake.models.robot_loader import load_robot, robot_reference
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.schema.typed_yaml import closest
+
+REACH = 0.1
+"""Without settings, exit points move so far, either way along each axis that they can [m]."""
+
+
+def plain_design(robot: Robot, goals: str | Sequence[str]) -> DesignSettings:
+    """What is searched where only goals are given: exit points, which move by `REACH`.
+
+    Args:
+        robot: The robot.
+        goals: Names of `GOALS`, of weight 1.
+
+    Raises:
+        DesignError: A goal is unknown.
+    """
+    names = (goals,) if isinstance(goals, str) else tuple(goals)
+    for name in names:
+        if name not in GOALS:
+            raise DesignError(f"goals: {name!r} is unknown; {closest(name, GOALS)}")
+    settings = DesignSettings(goals=[GoalSettings(name=name, weight=1.0) for name in names])
+    settings.exit_points.reach = np.full(3, REACH)
+    if robot.is_planar():
+        settings.exit_points.reach = np.array([REACH, REACH, 0.0])
+    return settings
+
+
+def optimize_design(
+    robot: Robot | str | Path,
+    settings: DesignSettings | Path | str | Sequence[str],
+    folder: Path | str | None = None,
+    *,
+    generations: int | None = None,
+    boxes: int = BOXES,
+    workers: int = 1,
+    say: Callable[[str], object] | None = None,
+) -> DesignResult:
+    """Searches where points of a robot should be, how many cables, which drum and motor.
+
+    What the best design is better by is proven, not taken from the search.
+
+    Args:
+        robot: The robot, or its name or path.
+        settings: What may change and what is wanted: `DesignSettings`, or a file of them that ends
+            in .yaml; or a goal, a name of `GOALS`, or several: exit points move by `REACH` then.
+        folder: Where the search, the robot file of the best design, results and figures are kept,
+            and the search is continued from; None: nowhere.
+        generations: Of the search; None: as the settings say.
+        boxes: Boxes that prove a volume, at most, for each robot.
+        workers: Processes; kernels use all processors in one.
+        say: Told what is proven now.
+
+    Raises:
+        DesignError: The settings make no sense; names the field.
+        CdprError: The robot cannot be asked for a goal.
+        OutputFolderError: The folder belongs to other arguments, or cannot be written.
+    """
+    with robot_reference(robot) as name, _kept(folder) as where:
+        loaded = load_robot(name)
+        asked, source = _settings(loaded, settings)
+        if generations is not None:
+            asked = replace(asked, generations=generations)
+        candidates = make_candidates(name, asked, source)
+        given = robot if isinstance(robot, Robot) else name
+        search = search_design(given, candidates, asked, StudySession(where, workers=workers))
+        confirmed = []
+        if search.best is not None:
+            file = write_design(search, loaded.name, where)
+            for goal in search.names:
+                one = confirm(goal, name, str(file), search.judging, boxes=boxes, say=say)
+                confirmed += [] if one is None else [one]
+        found = DesignResult(loaded.name, search, tuple(confirmed))
+        if folder is not None:
+            found.write(where)
+    return found
+
+
+@contextmanager
+def _kept(folder: Path | str | None) -> Iterator[Path]:
+    """The folder, or one that goes with the block."""
+    if folder is None:
+        with TemporaryDirectory() as nowhere:
+            yield Path(nowhere)
+        return
+    with continued_folder(Path(folder)):
+        yield Path(folder)
+
+
+def _settings(
+    robot: Robot, settings: DesignSettings | Path | str | Sequence[str]
+) -> tuple[DesignSettings, str]:
+    """Settings, and where they come from in words."""
+    if isinstance(settings, DesignSettings):
+        return settings, "design"
+    if isinstance(settings, Path) or (
+        isinstance(settings, str) and settings.endswith((".yaml", ".yml"))
+    ):
+        return load_design_settings(Path(settings)), str(settings)
+    return plain_design(robot, settings), "design"

@@ -1,0 +1,266 @@
+"""The fastest motion of a robot along a path, and a motion whose path is free."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from pydrake.math import RigidTransform
+
+from cdpr_drake.analyses.planning.free_motion import FreeSettings, solve_free_motion
+from cdpr_drake.analyses.planning.free_plan_results import FreeRun
+from cdpr_drake.analyses.planning.path_files import read_path
+from cdpr_drake.analyses.planning.plan_results import PlanRun
+from cdpr_drake.analyses.planning.plan_tracking import track_plan
+from cdpr_drake.analyses.planning.robot_path_task import (
+    TOLERANCE,
+    LimitSettings,
+    make_path,
+    path_task,
+    robot_limits,
+)
+from cdpr_drake.analyses.workspaces.workspace_files import load_obstacles
+from cdpr_drake.errors import PlanningError
+from cdpr_drake.geometry.poses import angles_from_rotation
+from cdpr_drake.models.robot_loader import as_robot
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.models.robot_statics import as_pose
+from cdpr_drake.planning.free_path_solution import FreePathSolution
+from cdpr_drake.planning.path_task import PathTask
+from cdpr_drake.planning.path_timing import STATIONS, PathPlan, plan_along_path
+from cdpr_drake.schema.typed_yaml import closest
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Say = Callable[[str], None]
+"""Told what is done now."""
+
+Limits = LimitSettings | Mapping[str, Any] | None
+"""`LimitSettings`, or some of its fields by name."""
+
+ASKED = tuple(field.name for field in fields(FreeSettings) if field.name not in ("start", "goal"))
+"""What `plan_free_motion` can be asked for by name."""
+
+
+class DrawnPlan(PlanRun):
+    """A `PlanRun` that draws itself."""
+
+    def plot(self) -> Figure:
+        """The phase plane: speed along the path with its limits."""
+        from cdpr_drake.analyses.planning.plan_figures import phase_figure
+
+        return phase_figure(self)
+
+
+class DrawnFreePlan(FreeRun):
+    """A `FreeRun` that draws itself."""
+
+    def plot(self) -> Figure:
+        """How much of each limit is used over time."""
+        from cdpr_drake.analyses.planning.free_plan_figures import limits_figure
+
+        return limits_figure(self)
+
+
+@dataclass(frozen=True)
+class PathPoses:
+    """Poses of a path.
+
+    Attributes:
+        poses: X_WP, one after the other [m].
+        source: What the path is, in words.
+        remarks: What was left out of a file, a line each.
+    """
+
+    poses: list[RigidTransform]
+    source: str
+    remarks: tuple[str, ...] = ()
+
+
+def path_poses(robot: Robot, path: PathPoses | Path | str | Sequence[object]) -> PathPoses:
+    """Poses of a path of a robot.
+
+    Args:
+        robot: The robot.
+        path: A file, .csv of x,y,z[,phi,theta,psi] [m, deg] or G-code; or at least two poses, each
+            as `as_pose` takes it [m].
+
+    Raises:
+        DataFileError: The file cannot be read, or a line is not accepted.
+        PlanningError: There are fewer than two poses.
+    """
+    if isinstance(path, PathPoses):
+        return path
+    if isinstance(path, str | Path):
+        read = read_path(Path(path), robot.plane_height)
+        return PathPoses(read.poses, Path(path).name, read.remarks)
+    poses = [as_pose(robot, pose) for pose in path]
+    if len(poses) < 2:
+        raise PlanningError(f"path: found {len(poses)} poses; accepted: at least 2")
+    return PathPoses(poses, f"{len(poses)} waypoints")
+
+
+def plan_path(
+    robot: Robot | str | Path,
+    path: PathPoses | Path | str | Sequence[object],
+    limits: Limits = None,
+    *,
+    corners: str = "smooth",
+    tolerance: float = TOLERANCE,
+    stations: int = STATIONS,
+    pulleys: bool = True,
+    track: bool = False,
+    say: Say | None = None,
+) -> DrawnPlan:
+    """The fastest motion of a robot along a path, within limits of tensions and winches.
+
+    Args:
+        robot: The robot, or its name or path.
+        path: A file or poses, as `path_poses` takes them [m].
+        limits: Beside the robot's: `tensions` (2,) [N], `cable_speed` [m/s],
+            `cable_acceleration` [m/s^2], `speed` [m/s], `reserve` [-], see `LimitSettings`.
+        corners: At the poses: smooth (a spline), blend (rounded corners) or rest.
+        tolerance: How far rounded corners may pass from a pose [m].
+        stations: Points at which limits are asked.
+        pulleys: Whether the cables run over the robot's pulleys.
+        track: Whether the simulated robot also tracks the plan.
+        say: Told what is done now.
+
+    Raises:
+        PlanningError: No motion keeps the limits, or something is not accepted; names the place
+            and the cable.
+        CdprError: The path makes no sense.
+    """
+    loaded, given = as_robot(robot), _limits(limits)
+    task = _task(loaded, given, pulleys)
+    found = path_poses(loaded, path)
+    way = make_path(loaded, found.poses, corners, tolerance)
+    arguments = _limits_told(given, pulleys) | {
+        "path": str(path) if _is_file(path) else None,
+        "waypoints": None if _is_file(path) else [_row(X) for X in found.poses],
+        "corners": corners,
+        "tolerance_m": tolerance,
+        "stations": stations,
+    }
+    begin = time.perf_counter()
+    plan = plan_along_path(task, way, stations)
+    took = time.perf_counter() - begin
+    told = _told(loaded, given, plan, say, track)
+    return DrawnPlan(
+        plan=plan, source=found.source, arguments=arguments, planning_time=took, **told
+    )  # fmt: skip
+
+
+def plan_free_motion(
+    robot: Robot | str | Path,
+    start: object,
+    goal: object,
+    limits: Limits = None,
+    *,
+    pulleys: bool = True,
+    track: bool = False,
+    say: Say | None = None,
+    **asked: Any,
+) -> DrawnFreePlan:
+    """A motion of a robot from one pose to another whose path is free, within limits.
+
+    Args:
+        robot: The robot, or its name or path.
+        start: X_WP at its start, as `as_pose` takes it [m]; None: the home pose.
+        goal: X_WP at its end, likewise.
+        limits: As of `plan_path`.
+        pulleys: Whether the cables run over the robot's pulleys.
+        track: Whether the simulated robot also tracks the motion.
+        say: Told what is done now.
+        asked: Fields of `FreeSettings`: `least` (time, tension or energy), `duration` [s],
+            `knots`, `clearance` [m], `obstacles`, rows of boxes or a file, `in_view` (3, p) [m],
+            `camera`, `nearest` [m].
+
+    Raises:
+        PlanningError: No motion was found, or something is not accepted; names it.
+    """
+    for name in asked:
+        if name not in ASKED:
+            raise PlanningError(f"{name!r} is unknown; {closest(name, ASKED)}")
+    loaded, given = as_robot(robot), _limits(limits)
+    if isinstance(asked.get("obstacles"), str | Path):
+        asked["obstacles"] = load_obstacles(Path(asked["obstacles"]))
+    settings = FreeSettings(start=as_pose(loaded, start), goal=as_pose(loaded, goal), **asked)
+    task = _task(loaded, given, pulleys)
+    begin = time.perf_counter()
+    found = solve_free_motion(loaded, task, settings, say or _silent)
+    took = time.perf_counter() - begin
+    arguments = _limits_told(given, pulleys) | {
+        "from": _row(settings.start),
+        "to": _row(settings.goal),
+        **{
+            name: value.tolist() if isinstance(value, np.ndarray) else value
+            for name, value in asked.items()
+        },
+    }
+    told = _told(loaded, given, found, say, track)
+    return DrawnFreePlan(
+        asked=settings, solution=found, arguments=arguments, planning_time=took, **told
+    )
+
+
+def _told(
+    robot: Robot, given: LimitSettings, found: PathPlan | FreePathSolution, say: Say | None,
+    track: bool,
+) -> dict[str, Any]:  # fmt: skip
+    """What every `MotionRun` has; tracks the motion where that is wanted."""
+    own, tracked = robot_limits(robot, given), None
+    if track:
+        tell, end = say or _silent, found.duration
+        tell(f"Tracking the plan of {robot.name}")
+
+        def show(now: float) -> None:
+            tell(f"Tracking the plan of {robot.name}: {now:.0f} of {end:.0f} s")
+
+        tracked = track_plan(robot, found, own, show)
+    return {"robot": robot, "limits": own, "tracked": tracked}
+
+
+def _limits(limits: Limits) -> LimitSettings:
+    if isinstance(limits, LimitSettings):
+        return limits
+    known = [field.name for field in fields(LimitSettings)]
+    for name in limits or {}:
+        if name not in known:
+            raise PlanningError(f"limits: {name!r} is unknown; {closest(name, known)}")
+    return LimitSettings(**(limits or {}))
+
+
+def _task(robot: Robot, given: LimitSettings, pulleys: bool) -> PathTask:
+    cables = robot.cable_set()
+    return path_task(robot, given, cables if pulleys else cables.without_pulleys())
+
+
+def _limits_told(given: LimitSettings, pulleys: bool) -> dict[str, Any]:
+    return {
+        "limits_n": given.tensions,
+        "cable_speed_m_s": given.cable_speed,
+        "cable_acceleration_m_s2": given.cable_acceleration,
+        "speed_m_s": given.speed,
+        "reserve": given.reserve,
+        "pulleys": pulleys,
+    }
+
+
+def _is_file(path: object) -> bool:
+    return isinstance(path, str | Path)
+
+
+def _row(X_WP: RigidTransform) -> list[float]:
+    """x, y, z [m], phi, theta, psi [deg]."""
+    angles = np.degrees(angles_from_rotation(X_WP.rotation()))
+    return [*X_WP.translation().tolist(), *angles.tolist()]
+
+
+def _silent(words: str) -> None:
+    """Tells nobody."""

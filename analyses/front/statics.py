@@ -1,0 +1,194 @@
+"""A robot at rest: at a pose, with given lengths, all its poses of rest; poses from lengths."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from pydrake.math import RigidTransform
+
+from cdpr_drake.analyses.statics.equilibria_query import (
+    EquilibriaReport,
+    rests_at_lengths,
+    rests_at_position,
+    rests_elastic,
+)
+from cdpr_drake.analyses.statics.static_query import StaticReport, at_lengths, at_pose
+from cdpr_drake.arrays import Array
+from cdpr_drake.cables.models import CABLE_MODELS
+from cdpr_drake.errors import EquilibriumError
+from cdpr_drake.models.robot_loader import as_robot
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.models.robot_statics import as_pose
+from cdpr_drake.schema.typed_yaml import closest
+from cdpr_drake.statics.forward_kinematics import ForwardKinematics, PoseFit
+from cdpr_drake.summaries import as_kind
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+EQUILIBRIA_MODELS = ("inextensible", "elastic")
+"""Cable models of `find_equilibria`."""
+
+
+class RobotAtRest(StaticReport):
+    """A `StaticReport` that draws itself."""
+
+    def plot(self) -> Figure:
+        """The robot with its tensions, sags and natural frequencies."""
+        from cdpr_drake.analyses.statics.static_figures import static_figure
+
+        return static_figure(self, f"{self.robot} at rest, {self.model} cables")
+
+
+def solve_static(
+    robot: Robot | str | Path,
+    pose: object = None,
+    lengths: Array | Sequence[float] | None = None,
+    model: str = "elastic",
+    pulleys: bool = True,
+) -> RobotAtRest:
+    """A robot at rest: lengths, tensions, stiffness, vibrations and sag.
+
+    Args:
+        robot: The robot, or its name or path.
+        pose: X_WP as `as_pose` takes it [m], held by tensions of least 2-norm within the robot's
+            bounds; None without lengths: the home pose.
+        lengths: In the place of a pose: unstrained lengths from A to B, shape (m,) [m]; the robot
+            hangs at the lowest pose of rest.
+        model: A name of `cables.CABLE_MODELS`.
+        pulleys: Whether the cables run over the robot's pulleys.
+
+    Raises:
+        EquilibriumError: Pose and lengths, or a model or lengths that are not accepted; or no pose
+            has these lengths.
+        CdprError: The pose is outside the frame, or cannot be held; says why.
+    """
+    if pose is not None and lengths is not None:
+        raise EquilibriumError("pose, lengths: found both; accepted: one of them")
+    _check_model(model, CABLE_MODELS)
+    loaded = as_robot(robot)
+    if lengths is None:
+        found = at_pose(loaded, as_pose(loaded, pose), model, pulleys)
+    else:
+        found = at_lengths(loaded, _checked_lengths(loaded, lengths), model, pulleys)
+    return as_kind(RobotAtRest, found)
+
+
+def find_equilibria(
+    robot: Robot | str | Path,
+    lengths: Array | Sequence[float] | None = None,
+    position: Array | Sequence[float] | None = None,
+    *,
+    taut: Sequence[str] | None = None,
+    model: str = "inextensible",
+    pulleys: bool = True,
+    searches: int = 1000,
+    seed: int = 0,
+    report: Callable[[int, int], object] | None = None,
+) -> EquilibriaReport:
+    """All poses of rest, stable or not, any cables slack, for lengths or at a position.
+
+    Args:
+        robot: The robot, or its name or path; of 1 to 8 cables.
+        lengths: From A to B, of elastic cables unstrained ones, shape (m,) [m].
+        position: In the place of lengths: where Po is, in W, shape (3,) [m].
+        taut: Names of the cables that hold it at the position, all others slack; None: all.
+        model: inextensible: all poses, from fixed exit points; elastic: searched.
+        pulleys: Whether elastic cables run over the robot's pulleys.
+        searches: Most searches, of elastic cables.
+        seed: Of their random starts.
+        report: Called with work done and in all.
+
+    Raises:
+        EquilibriumError: There is none, or what is asked is not accepted; names it.
+    """
+    if (position is None) == (lengths is None):
+        found = "neither" if position is None else "both"
+        raise EquilibriumError(f"lengths, position: found {found}; accepted: one of them")
+    if taut is not None and position is None:
+        raise EquilibriumError("taut: found without position; accepted: with it")
+    _check_model(model, EQUILIBRIA_MODELS)
+    if searches < 1:
+        raise EquilibriumError(f"searches: found {searches}; accepted: at least 1")
+    if seed < 0:
+        raise EquilibriumError(f"seed: found {seed}; accepted: at least 0")
+    if position is not None and model == "elastic":
+        raise EquilibriumError("position: found with elastic cables; accepted: inextensible ones")
+    loaded = as_robot(robot)
+    if position is not None:
+        place = np.asarray(position, float)
+        if place.shape != (3,) or not np.all(np.isfinite(place)):
+            raise EquilibriumError(f"position: found {position}; accepted: x, y, z [m]")
+        return rests_at_position(loaded, place, _taut(loaded, taut))
+    assert lengths is not None
+    given = _checked_lengths(loaded, lengths)
+    if model == "elastic":
+        return rests_elastic(loaded, given, pulleys, searches=searches, seed=seed, report=report)
+    return rests_at_lengths(loaded, given, report=report)
+
+
+def solve_forward_kinematics(
+    robot: Robot | str | Path,
+    lengths: Array | Sequence[float],
+    guess: object = None,
+    pulleys: bool = True,
+) -> PoseFit:
+    """The pose near a guess at which the cables have given lengths.
+
+    Args:
+        robot: The robot, or its name or path; with at least as many cables as degrees of freedom.
+        lengths: Of the cables, stretched if they are elastic, shape (m,) [m].
+        guess: X_WP as `as_pose` takes it [m]; None: the home pose.
+        pulleys: Whether the cables run over the robot's pulleys.
+
+    Raises:
+        ForwardKinematicsError: No pose near the guess has these lengths, or they do not determine
+            one.
+
+    Source: servoing thesis, section 2.2.3.
+    """
+    loaded = as_robot(robot)
+    cables = loaded.cable_set() if pulleys else loaded.cable_set().without_pulleys()
+    start: RigidTransform = as_pose(loaded, guess)
+    solver = ForwardKinematics(cables, loaded.motion_type())
+    return solver.pose(_checked_lengths(loaded, lengths), start)
+
+
+def _check_model(model: str, models: Collection[str]) -> None:
+    if model not in models:
+        raise EquilibriumError(f"model: {model!r} is unknown; {closest(model, models)}")
+
+
+def _checked_lengths(robot: Robot, lengths: Array | Sequence[float]) -> Array:
+    """Lengths as an array.
+
+    Raises:
+        EquilibriumError: Not one for each cable, or not above 0.
+    """
+    m = len(robot.cables)
+    try:
+        found = np.asarray(lengths, float)
+    except (TypeError, ValueError):
+        found = np.empty(0)
+    if found.shape != (m,):
+        raise EquilibriumError(
+            f"lengths: found shape {found.shape}; accepted: ({m},), one for each cable of "
+            f"{robot.name} [m]"
+        )
+    if not (np.all(np.isfinite(found)) and np.min(found) > 0.0):
+        raise EquilibriumError(f"lengths: found {np.min(found):g}; accepted: > 0 [m]")
+    return found
+
+
+def _taut(robot: Robot, taut: Sequence[str] | None) -> list[int]:
+    """Numbers of cables by their names; None: all that the robot has."""
+    names = [cable.name for cable in robot.cables]
+    if taut is None:
+        return list(range(len(names)))
+    for name in taut:
+        if name not in names:
+            raise EquilibriumError(f"taut: {name!r} is unknown; {closest(name, names)}")
+    return [names.index(name) for name in taut]

@@ -1,0 +1,268 @@
+"""Tensions that hold a robot's platform at a pose."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from pydrake.math import RigidTransform
+
+from cdpr_drake.analyses.statics.tension_query import (
+    polygon_tensions,
+    solve_all,
+    underactuated_answer,
+)
+from cdpr_drake.arrays import Array
+from cdpr_drake.errors import TensionProblemError
+from cdpr_drake.models.robot_loader import as_robot
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.models.robot_statics import WrenchBalance, as_pose, tension_problem, wrench_balance
+from cdpr_drake.summaries import Summarized, numbers
+from cdpr_drake.tensions.methods import METHODS, TensionMethod, distribute
+from cdpr_drake.tensions.problem import TensionProblem, TensionSolution
+from cdpr_drake.workspaces.available_wrenches import available_wrenches
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+TENSION_METHODS: Mapping[str, TensionMethod] = METHODS
+"""The methods of `solve_tensions` and `distribute` by name; `tensions.METHODS`, where a new one is
+a row."""
+
+UNDERACTUATED = "quadratic_program"
+"""The only method for fewer cables than degrees of freedom."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class TensionsAtPose(Summarized):
+    """Tensions of a robot at a pose, by one method or by several.
+
+    Attributes:
+        robot: The robot.
+        X_WP: Pose of the platform [m].
+        problem: What was asked.
+        solutions: The answer of each method that was asked.
+    """
+
+    robot: Robot
+    X_WP: RigidTransform
+    problem: TensionProblem
+    solutions: tuple[TensionSolution, ...]
+
+    def numbers(self) -> dict[str, Any]:
+        """The answers alone for JSON."""
+        return {"solutions": [solution.as_dict() for solution in self.solutions]}
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON; with two cables more than needed also the corners of the feasible polygon."""
+        found = {
+            "robot": self.robot.name, "redundancy": self.problem.redundancy, **self.numbers(),
+        }  # fmt: skip
+        if self.problem.redundancy == 2:
+            found["polygon_vertices_n"] = polygon_tensions(self.problem)
+        return found
+
+    def summary(self) -> tuple[str, list[tuple[str, str]]]:
+        """What it shows of itself: each method with its tensions [N]."""
+        title = f"Tensions of {self.robot.name} at ({numbers(self.X_WP.translation())}) m [N]"
+        return title, [
+            (one.method, f"{one.status}: {numbers(one.tensions)}") for one in self.solutions
+        ]
+
+    def plot(self, title: str | None = None) -> Figure:
+        """The feasible polygon with a point for each method.
+
+        Args:
+            title: Of the figure; None: robot and position.
+
+        Raises:
+            TensionProblemError: There are not two cables more than needed, or no tensions at all.
+        """
+        from cdpr_drake.analyses.statics.static_figures import polygon_figure
+
+        return polygon_figure(self.problem, title or self._where())
+
+    def plot_wrenches(self, title: str | None = None) -> Figure:
+        """Sections of the wrenches that the cables can give at the pose; `title` as of `plot`."""
+        from cdpr_drake.analyses.workspaces.workspace_figures import wrench_set_figure
+
+        asked = self.problem
+        found = available_wrenches(asked.W, asked.lower, asked.upper, asked.row_scale)
+        title = f"{title or self._where()}: what the cables can give"
+        return wrench_set_figure(found, -asked.wrench, title)
+
+    def _where(self) -> str:
+        return f"{self.robot.name} at ({numbers(self.X_WP.translation())})"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RobotTensions(TensionsAtPose):
+    """Tensions of a robot at a pose by one method: a solution, and what it is the solution of."""
+
+    @property
+    def solution(self) -> TensionSolution:
+        """The answer."""
+        return self.solutions[0]
+
+    @property
+    def tensions(self) -> Array:
+        """Shape (m,) [N], see `TensionSolution`."""
+        return self.solution.tensions
+
+    @property
+    def status(self) -> str:
+        """The verdict: feasible, infeasible or missed."""
+        return str(self.solution.status)
+
+    @property
+    def residual(self) -> float:
+        """What is left unbalanced, relative to the forces at work [-]."""
+        return self.solution.residual
+
+    def numbers(self) -> dict[str, Any]:
+        """The answer alone for JSON."""
+        return self.solution.as_dict()
+
+    def summary(self) -> tuple[str, list[tuple[str, str]]]:
+        """What it shows of itself; tensions on a bound have a star."""
+        title, rows = self.solution.summary()
+        low, high = self.problem.lower[0], self.problem.upper[0]
+        return f"{self._where()} m: {title.lower()}", [*rows, ("bounds", f"{low:g} to {high:g} N")]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class UnderactuatedTensions(Summarized):
+    """What fewer cables than degrees of freedom can do at a pose.
+
+    Attributes:
+        robot: The robot.
+        X_WP: Pose of the platform [m].
+        balance: What was asked.
+    """
+
+    robot: Robot
+    X_WP: RigidTransform
+    balance: WrenchBalance
+
+    @cached_property
+    def _answer(self) -> dict[str, Any]:
+        return underactuated_answer(self.robot, self.balance)
+
+    @property
+    def status(self) -> str:
+        """The verdict: feasible, where nothing is left unbalanced, or infeasible."""
+        return str(self._answer["status"])
+
+    @property
+    def tensions(self) -> Array:
+        """Shape (m,) [N]; NaN where none hold the platform."""
+        found = self._answer["tensions_n"]
+        return np.full(len(self.robot.cables), np.nan) if found is None else np.array(found)
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON, see `underactuated_answer`."""
+        return self._answer
+
+    def summary(self) -> tuple[str, list[tuple[str, str]]]:
+        """What it shows of itself: combinations of the wrench that no tensions change."""
+        answer = self._answer
+        title = (
+            f"{answer['robot']}: {len(self.robot.cables)} cables for "
+            f"{answer['degrees_of_freedom']} degrees of freedom: {answer['status']}"
+        )
+        rows = [("not controlled", one["combination"]) for one in answer["uncontrolled"]]
+        return title, [("tensions [N]", numbers(self.tensions)), *rows]
+
+
+def solve_tensions(
+    robot: Robot | str | Path,
+    pose: object = None,
+    wrench: Array | None = None,
+    method: str = "quadratic_program",
+    *,
+    limits: tuple[float, float] | None = None,
+    mass: float | None = None,
+    reference: Array | float | None = None,
+    length_scale: float | None = None,
+) -> RobotTensions | UnderactuatedTensions:
+    """Tensions that hold the platform at rest at a pose, or a proof that there are none.
+
+    W t + w = 0 with lower <= t <= upper, w the weight and the wrench that is given. Cables run from
+    fixed exit points.
+
+    Args:
+        robot: The robot, or its name or path.
+        pose: X_WP as `as_pose` takes it [m]; None: the home pose.
+        wrench: On the platform about Po in W, beside its weight, shape (6,) [N m, N].
+        method: A name of `TENSION_METHODS`.
+        limits: Smallest and largest tension [N]; None: the robot's.
+        mass: Of the platform [kg]; None: the robot's.
+        reference: Wanted tensions, one for all cables or shape (m,) [N], for reference_program.
+        length_scale: By which methods that relax divide moments [m]; None: the anchor points'
+            root mean square distance from Po.
+
+    Returns:
+        The tensions and the verdict on them; with fewer cables than degrees of freedom also what
+        no tensions change.
+
+    Raises:
+        TensionProblemError: The pose is outside the frame, or a number or the method is not
+            accepted.
+
+    Source: servoing thesis 1.2.2, (1.27); Gazebo thesis 6.2.
+    """
+    loaded, X_WP = _at(robot, pose)
+    if loaded.is_underactuated():
+        if method != UNDERACTUATED:
+            raise TensionProblemError(
+                f"method: found {method} for fewer cables than degrees of freedom of "
+                f"{loaded.name}; accepted: {UNDERACTUATED}"
+            )
+        balance = wrench_balance(
+            loaded, X_WP, wrench, limits=limits, mass=mass, length_scale=length_scale
+        )
+        return UnderactuatedTensions(loaded, X_WP, balance)
+    problem = tension_problem(
+        loaded, X_WP, wrench, limits=limits, mass=mass, reference=_wanted(loaded, reference),
+        length_scale=length_scale,
+    )  # fmt: skip
+    return RobotTensions(loaded, X_WP, problem, (distribute(problem, method),))
+
+
+def compare_tensions(
+    robot: Robot | str | Path,
+    pose: object = None,
+    wrench: Array | None = None,
+    *,
+    limits: tuple[float, float] | None = None,
+    mass: float | None = None,
+    reference: Array | float | None = None,
+    length_scale: float | None = None,
+) -> TensionsAtPose:
+    """The tensions of every method that the robot can be asked for; arguments as `solve_tensions`.
+
+    Raises:
+        TensionProblemError: As `solve_tensions`, or there are fewer cables than degrees of freedom.
+    """
+    loaded, X_WP = _at(robot, pose)
+    problem = tension_problem(
+        loaded, X_WP, wrench, limits=limits, mass=mass, reference=_wanted(loaded, reference),
+        length_scale=length_scale,
+    )  # fmt: skip
+    return TensionsAtPose(loaded, X_WP, problem, tuple(solve_all(problem)))
+
+
+def _at(robot: Robot | str | Path, pose: object) -> tuple[Robot, RigidTransform]:
+    loaded = as_robot(robot)
+    return loaded, as_pose(loaded, pose)
+
+
+def _wanted(robot: Robot, reference: Array | float | None) -> Array | None:
+    """Wanted tensions, one for each cable."""
+    if reference is None or np.ndim(reference) > 0:
+        return None if reference is None else np.asarray(reference)
+    return np.full(len(robot.cables), reference)

@@ -1,0 +1,62 @@
+"""How results show themselves: a few lines in a terminal, a small table in a notebook."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import fields
+from html import escape
+from typing import Any, TypeVar
+
+T = TypeVar("T")
+
+MOST_LINES = 10
+"""Lines that a result shows of itself, at most."""
+
+LONGEST_WORDS = 160
+"""Characters of one of these, at most."""
+
+
+class Summarized:
+    """A result that shows itself by a title and rows; what it shows is its method `summary`."""
+
+    def summary(self) -> tuple[str, list[tuple[str, str]]]:
+        """A title, and rows of a label and words; at most `MOST_LINES` in all."""
+        raise NotImplementedError
+
+    def __repr__(self) -> str:
+        """Title and rows, one a line."""
+        title, rows = self.summary()
+        width = max((len(label) for label, _ in rows), default=0)
+        lines = [title, *(f"  {label:<{width}}  {words}" for label, words in rows)]
+        if len(lines) > MOST_LINES:
+            lines[MOST_LINES - 1 :] = [f"  ... {len(lines) - MOST_LINES + 1} more"]
+        return "\n".join(_cut(" ".join(line.splitlines())) for line in lines)
+
+    def _repr_html_(self) -> str:
+        """Title and rows as a table, for notebooks."""
+        title, rows = self.summary()
+        cells = "".join(
+            f"<tr><th style='text-align:left'>{escape(label)}</th>"
+            f"<td style='text-align:left'>{escape(words)}</td></tr>"
+            for label, words in rows
+        )
+        return f"<table><caption>{escape(title)}</caption>{cells}</table>"
+
+
+def as_kind(kind: type[T], result: Any) -> T:
+    """A result as an object of a class of its own class that has more methods, and no more fields.
+
+    Args:
+        kind: A subclass of the result's dataclass.
+        result: The result.
+    """
+    return kind(**{field.name: getattr(result, field.name) for field in fields(result)})
+
+
+def numbers(values: Iterable[float], digits: int = 4) -> str:
+    """Numbers in a row, with so many significant digits; what is no more than rounding is 0."""
+    return ", ".join(f"{round(float(value), 9) + 0.0:.{digits}g}" for value in values)
+
+
+def _cut(line: str) -> str:
+    return line if len(line) <= LONGEST_WORDS else f"{line[: LONGEST_WORDS - 4]} ..."
