@@ -100,7 +100,7 @@ def rooms() -> list[str]:
     for top in ("models", "systems", "analyses"):
         for stub in (ROOT / top).rglob("*/__init__.pyi"):
             found.append(".".join(("cdpr_drake", *stub.parent.relative_to(ROOT).parts)))
-    return sorted({*found} - {*HIDDEN_ROOMS})
+    return ["cdpr_drake", *sorted({*found} - {*HIDDEN_ROOMS})]
 
 
 def room_text(room: str) -> str:

@@ -82,8 +82,8 @@ def serve(
 ) -> int:
     """Runs a scenario with a process outside in its loop, over ZeroMQ.
 
-    The client may be written in any language; the messages are explained in cdpr_drake.bridge,
-    whose RemoteClient is one in Python. notebooks/plain_client.py is one without this package.
+    The client may be written in any language; cdpr_drake.systems.remote explains the messages, and
+    has RemoteClient, one in Python. notebooks/plain_client.py is one without this package.
     """
     check_available()
     kind = SCENARIO_KINDS[scenario_kind(scenario)]
