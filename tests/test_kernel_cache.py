@@ -51,6 +51,19 @@ def test_old_states_of_the_sources_are_forgotten(tmp_path):
     assert sorted(os.listdir(kernels)) == sorted(["state3", "state4", used.name])
 
 
+def test_a_state_that_is_in_use_is_not_forgotten(tmp_path):
+    """Another checkout's processes would compile anew what was removed under them."""
+    kernels = tmp_path / "cdpr_drake" / "kernels"
+    states = [f"state{number}" for number in range(5)]
+    for state in states:
+        (kernels / state).mkdir(parents=True)
+    used = Path(run(ASK, XDG_CACHE_HOME=str(tmp_path)))
+    assert sorted(os.listdir(kernels)) == sorted([*states, used.name])
+    os.utime(used, (0, 0))
+    run(ASK, XDG_CACHE_HOME=str(tmp_path))
+    assert used.stat().st_mtime > 0.0  # each process says that it uses it
+
+
 def ask(tmp_path, temporary=None):
     """The folder that is used, where there is no home: below one for temporary files."""
     kept = {k: v for k, v in os.environ.items() if k not in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME")}

@@ -14,6 +14,7 @@ import shutil
 import stat
 import sys
 import tempfile
+import time
 from contextlib import suppress
 from pathlib import Path
 
@@ -21,6 +22,9 @@ import platformdirs
 
 KEPT = 3
 """Folders of so many states of the sources are kept, the youngest ones."""
+
+IN_USE = 3600.0
+"""A folder that a process began to use within so long [s] is kept as well."""
 
 NUMBA_VARIABLE = "NUMBA_CACHE_DIR"
 
@@ -59,6 +63,7 @@ def _kept_folder() -> Path:
                 continue
             _forget_old(kernels / state)
             _private(kernels / state, anew=True)
+            os.utime(kernels / state)
         except UntrustedFolderError as problem:
             problems.append(str(problem))
         except OSError:  # it cannot be written, as in a container without a home
@@ -151,10 +156,12 @@ def _forget_old(folder: Path) -> None:
         return
     try:
         states = sorted(
-            (each for each in os.scandir(folder.parent) if each.is_dir(follow_symlinks=False)),
-            key=lambda entry: entry.stat().st_mtime,
+            (each.stat().st_mtime, each.path)
+            for each in os.scandir(folder.parent)
+            if each.is_dir(follow_symlinks=False)
         )
     except OSError:
         return
-    for old in states[: max(len(states) - KEPT + 1, 0)]:
-        shutil.rmtree(old.path, ignore_errors=True)
+    for used, old in states[: max(len(states) - KEPT + 1, 0)]:
+        if time.time() - used > IN_USE:  # else another checkout may be at work
+            shutil.rmtree(old, ignore_errors=True)
