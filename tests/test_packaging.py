@@ -71,7 +71,8 @@ def test_data_files_are_packaged():
     assert notebooks == set((ROOT / "notebooks").glob("*.ipynb"))
 
 
-def test_readme_examples_run():
+def test_readme_examples_run(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     readme = (ROOT / "README.md").read_text()
     examples = re.findall(r"```python\n(.*?)```", readme, re.DOTALL)
     assert len(examples) >= 2
