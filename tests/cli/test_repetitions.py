@@ -114,7 +114,8 @@ def test_a_killed_repetition_continues(capsys, tmp_path):
             time.sleep(0.05)
             assert process.poll() is None
         process.kill()
-    kept = {path.name: path.stat().st_mtime_ns for path in tmp_path.glob("out/chunks/*.npz")}
+        process.wait()
+    kept = {path.name: path.stat().st_mtime_ns for path in tmp_path.glob("out/chunks/seed-*.npz")}
     assert 2 <= len(kept) < 60
     options[options.index("0:60")] = f"0:{len(kept) + 1}"
     code, out, err = run(capsys, *options)

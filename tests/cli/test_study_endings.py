@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cdpr_drake.analyses.front import studies as reproduce
 from cdpr_drake.analyses.reporting.log_files import write_json
 from cdpr_drake.analyses.reporting.progress import StoppableStudy, WorkProgress
 from cdpr_drake.analyses.studies.catalogue import STUDIES, StudyEntry
 from cdpr_drake.analyses.sweeps.sweep import run_study_sweep
 from cdpr_drake.analyses.visualization.figure_files import write_figures
 from cdpr_drake.analyses.visualization.figure_style import new_figure
-from cdpr_drake.cli import reproduce
 from cdpr_drake.cli.app import main
 from cdpr_drake.cli.process import StopRequest
 from cdpr_drake.errors import CdprError

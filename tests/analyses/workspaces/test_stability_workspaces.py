@@ -35,14 +35,14 @@ TURNS = [[0.0, 0.0, 0.0], [0.0, 0.0, 0.5]]
 def question(**changes):
     grid = grid_by_count([-0.45, -0.45, 0.0], [0.45, 0.45, 1.0], [7, 7, 5], TURNS)
     asked = {
-        "robot_name": "acrobot_large",
+        "robot": "acrobot_large",
         "verdict": "sampled",
         "vary": {"r_A": [0.005, 0.02, 0.1], "d_theta_bp_deg": [20.0]},
         "grid": grid,
         "options": OPTIONS,
     }
     asked |= changes
-    statics = static_case(load_robot(asked["robot_name"]), (1.0, 60.0))
+    statics = static_case(load_robot(asked["robot"]), (1.0, 60.0))
     return make_question(**asked, statics=statics)
 
 
@@ -154,7 +154,7 @@ def test_figures_and_scene_are_written(found, tmp_path):
 def test_planar_robots_have_areas():
     grid = grid_by_count([-0.48, -0.48, 0.3], [0.48, 0.48, 0.3], [9, 9, 1])
     for scheme in ("pbvs", "pbvs-line"):
-        asked = question(robot_name="planar", scheme=scheme, grid=grid, vary={})
+        asked = question(robot="planar", scheme=scheme, grid=grid, vary={})
         workspaces = stability_workspaces(asked).workspaces
         assert workspaces.volume("SZ").unit == "m^2"
         assert 0.3 < workspaces.volume("Z").share <= 1.0
@@ -184,9 +184,9 @@ def test_the_target_may_be_a_real_one():
         ({"vary": {"r_A": [-1.0]}}, ["r_A", "-1", ">= 0"]),
         ({"vary": {"d_theta_bp": [5.0]}}, ["d_theta_bp", "5", "d_theta_bp_deg for degrees"]),
         ({"vary": {"d_theta_bp_deg": [-5.0]}}, ["d_theta_bp_deg", "-5", "180"]),
-        ({"robot_name": "planar"}, ["z from 0 to 1", "0.3"]),
+        ({"robot": "planar"}, ["z from 0 to 1", "0.3"]),
         (
-            {"robot_name": "planar", "scheme": "ibvs", "grid": None},
+            {"robot": "planar", "scheme": "ibvs", "grid": None},
             ["scheme", "ibvs", "planar", "pbvs, pbvs-line"],
         ),
     ],
@@ -221,7 +221,7 @@ def test_too_few_cables_are_refused(tmp_path):
     path = tmp_path / "five.yaml"
     path.write_text(yaml.safe_dump(file))
     with pytest.raises(CdprError, match=r"found 5 .*at least 6"):
-        question(robot_name=str(path))
+        question(robot=str(path))
 
 
 def test_bounds_vary_in_metres_radians_and_degrees():
