@@ -91,7 +91,7 @@ def test_a_result_is_marked_when_the_robot_or_the_pose_has_changed(folder, panel
             open_panel(user, panel)
             await RESULTS[panel][name](user, bench, folder)
             if name in OF_NO_ROBOT:
-                await until(lambda: "robots of its own" in said(user, name))
+                await until(lambda: "robots of their own" in said(user, name))
                 return
             await until(lambda: said(user, name) == "")
             bench.ask = bench.results.changed.emit  # as while numbers are being computed

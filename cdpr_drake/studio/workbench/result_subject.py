@@ -22,7 +22,7 @@ class Subject:
     """What a result is about.
 
     Attributes:
-        robot: Name of the robot; empty: robots of its own, whatever is open.
+        robot: Name of the robot; empty: robots of their own, whatever is open.
         digest: Of all data of the robot; empty: not known.
         pose: X_WP as (qw, qx, qy, qz, x, y, z) [-, m]; None: it belongs to no pose.
     """
