@@ -8,48 +8,21 @@ from numba import njit
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import TensionProblemError
 from cdpr_drake.numerics.kernel_calls import over_rows
-from cdpr_drake.tensions.closed_form_kernel import MISSED
-from cdpr_drake.tensions.dispatch_kernel import judged, solve_one
+from cdpr_drake.tensions.dispatch_kernel import solve_or_prove
 from cdpr_drake.tensions.methods import method_for
-from cdpr_drake.tensions.quadratic_program_kernel import (
-    FEASIBLE,
-    SINGULAR,
-    nearest_tensions_in,
-    workspace_shape,
-)
+from cdpr_drake.tensions.quadratic_program_kernel import SINGULAR, workspace_shape
 
 
 @njit(cache=True, nogil=True)
 def _many(
-    first: int,
-    past: int,
-    kernel: int,
-    exact: bool,
-    relaxes: bool,
-    W: Array,
-    w: Array,
-    lower: Array,
-    upper: Array,
-    reference: Array,
-    row_scale: Array,
-    t: Array,
-    codes: np.ndarray,
-) -> None:
-    _, n, m = W.shape
-    work = np.empty(workspace_shape(n, m))
-    other = np.empty(m)
+    first: int, past: int, method: tuple[int, bool, bool], W: Array, w: Array, lower: Array,
+    upper: Array, reference: Array, row_scale: Array, t: Array, codes: np.ndarray,
+) -> None:  # fmt: skip
+    work = np.empty(workspace_shape(W.shape[1], W.shape[2]))
     for k in range(first, past):
-        if kernel == 0:
-            code = nearest_tensions_in(work, W[k], w[k], lower, upper, reference, t[k])
-        else:
-            code = solve_one(
-                kernel, exact, work, W[k], w[k], lower, upper, reference, row_scale, t[k]
-            )
-        code = judged(code, relaxes, W[k], w[k], lower, upper, t[k])
-        if code == MISSED:  # or is there nothing to find?
-            proof = nearest_tensions_in(work, W[k], w[k], lower, upper, reference, other)
-            code = MISSED if proof == FEASIBLE else proof
-        codes[k] = code
+        codes[k], _ = solve_or_prove(
+            method, work, W[k], w[k], lower, upper, reference, row_scale, t[k]
+        )
 
 
 def distribute_batch(
@@ -123,7 +96,7 @@ def distribute_batch(
     if threads is not None and threads < 1:
         raise TensionProblemError(f"threads: found {threads}; accepted: at least 1")
     t, codes = np.empty((count, m)), np.empty(count, np.int8)
-    kernel, exact, relaxes = chosen.compiled(m - n)
-    over_rows(_many, count, threads, kernel, exact, relaxes, W, wrenches, *given.values(), t, codes)
-    t[codes == SINGULAR if relaxes else codes < 0] = np.nan
+    solver = chosen.compiled(m - n)
+    over_rows(_many, count, threads, solver, W, wrenches, *given.values(), t, codes)
+    t[codes == SINGULAR if chosen.relaxes else codes < 0] = np.nan
     return t, codes

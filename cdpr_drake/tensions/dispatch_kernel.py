@@ -1,7 +1,13 @@
-"""Any kernel of tension distribution behind one compiled call, by its address."""
+"""Any kernel of tension distribution behind one compiled call, by its address.
+
+`solve` is the one way from a problem to checked tensions: a kernel, the exact program, bounds, the
+check. It is compiled, and inlined in its callers, since steps of control and batches are compiled
+as a whole; what is called from Python, `methods.Distributor`, calls it by `solution_of`.
+"""
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -12,7 +18,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.numerics.kernel_calls import call_at_address
 from cdpr_drake.numerics.kernel_calls import kernel_address as address
 from cdpr_drake.tensions.closed_form_kernel import MISSED
-from cdpr_drake.tensions.problem import RESIDUAL_TOLERANCE, balance, judge_into
+from cdpr_drake.tensions.problem import RESIDUAL_TOLERANCE, balance, describe
 from cdpr_drake.tensions.quadratic_program_kernel import (
     FEASIBLE,
     INFEASIBLE,
@@ -21,12 +27,13 @@ from cdpr_drake.tensions.quadratic_program_kernel import (
 )
 
 NOT_FINITE = -3
-"""Code of `solve_and_judge`: a wrench matrix or a wrench with NaN or infinity."""
+"""Code of `solution_of`: a wrench matrix or a wrench with NaN or infinity."""
 
 _MATRIX, _VECTOR = types.float64[:, ::1], types.float64[::1]
 _SIGNATURE = types.int64(_MATRIX, _MATRIX, *[_VECTOR] * 6)
 
 
+@cache
 def kernel_address(kernel: Any) -> int:
     """Where the machine code of a kernel with the arguments of `TensionMethod.kernel` begins."""
     return address(kernel, _SIGNATURE)
@@ -40,83 +47,46 @@ def _call(typing: Any, kernel: Any, work: Any, W: Any, w: Any, lower: Any, upper
 
 
 @njit(cache=True, inline="always")
-def finish(
-    code: int, exact: bool, work: Array, W: Array, w: Array, lower: Array, upper: Array,
-    reference: Array, t: Array,
-) -> int:  # fmt: skip
-    """What becomes of a kernel's code and tensions: the exact program has the last word.
-
-    Where rounding loses the line or the polygon of a barely feasible problem, the least tensions
-    take its place; they are exact, and prove infeasibility where there is none.
-
-    From what the kernel returned and whether its method is exact to what `solve_one` returns; all
-    other arguments as `TensionMethod.kernel`.
-    """
-    if exact and code == MISSED:
-        code = nearest_tensions_in(work, W, w, lower, upper, reference, t)
-    elif code == FEASIBLE:  # by rounding at most out of bounds
-        for i in range(t.shape[0]):
-            t[i] = min(max(t[i], lower[i]), upper[i])
-    return code
-
-
-@njit(cache=True)
-def solve_one(
-    kernel: int, exact: bool, work: Array, W: Array, w: Array, lower: Array, upper: Array,
-    reference: Array, row_scale: Array, t: Array,
-) -> int:  # fmt: skip
-    """One problem by the kernel at an address, which must fit the redundancy of W; 0: by none.
-
-    The first two arguments as `TensionMethod.compiled` gives them, all others as
-    `TensionMethod.kernel` takes them.
-
-    Returns:
-        1 feasible, 0 missed by this method, -1 infeasible, -2 singular W. Tensions that are not
-        feasible are what the method came to (0), those of least slack (-1, methods that relax), or
-        without meaning.
-    """
-    code = MISSED
-    if kernel != 0:
-        code = _call(kernel, work, W, w, lower, upper, reference, row_scale, t)
-    return finish(code, exact, work, W, w, lower, upper, reference, t)
-
-
-@njit(cache=True)
-def judged(
+def check(
     code: int, relaxes: bool, W: Array, w: Array, lower: Array, upper: Array, t: Array
-) -> int:
-    """The verdict on a code's tensions, by looking at them as `problem.judge_tensions` does.
+) -> tuple[int, float]:
+    """The code that tensions deserve, by looking at them and not at what a method believes.
 
     Args:
-        code: What `solve_one` returned.
+        code: What a method came to, as `TensionMethod.kernel` returns it.
         relaxes: Whether tensions count where the method found the problem infeasible.
-        W: Wrench matrix, shape (n, m); with the following four as `TensionMethod.kernel`.
+        W: Wrench matrix, shape (n, m); with the following three as `TensionMethod.kernel`.
         w: Wrench, shape (n,) [N m, N].
         lower: Smallest tensions, shape (m,) [N].
         upper: Largest tensions, shape (m,) [N].
         t: Tensions, shape (m,) [N]; by rounding out of bounds they are put on them.
 
     Returns:
-        1 where they are within the bounds and balance the wrench; else the code, and 0 for 1.
+        1 where they are within the bounds and balance the wrench; else the code, and 0 for 1. And
+        their `TensionProblem.residual`, NaN where they do not count.
     """
     if code == SINGULAR or (code == INFEASIBLE and not relaxes):
-        return code
+        return code, np.nan
     inside, residual = balance(W, w, lower, upper, t)
     if inside and residual <= RESIDUAL_TOLERANCE:
-        return FEASIBLE
-    return code if code == INFEASIBLE else MISSED
+        return FEASIBLE, residual
+    return (code if code == INFEASIBLE else MISSED), residual
 
 
-@njit(cache=True)
-def solve_and_judge(
+@njit(cache=True, inline="always")
+def solve(
     method: tuple[int, bool, bool], work: Array, W: Array, w: Array, lower: Array, upper: Array,
-    reference: Array, row_scale: Array, t: Array, active: np.ndarray, slack: Array,
+    reference: Array, row_scale: Array, t: Array,
 ) -> tuple[int, float]:  # fmt: skip
-    """One problem from numbers to verdict: what `methods.distribute` does, in one call.
+    """Tensions by a method, checked: the way of single problems, batches and steps of control.
+
+    Where the kernel of an exact method misses, as rounding loses the line or the polygon of a
+    barely feasible problem, the nearest tensions to the reference take its place; they are exact,
+    and prove infeasibility where there is none.
 
     Args:
-        method: What `TensionMethod.compiled` gives.
-        work: As `TensionMethod.kernel`, and so are the next six, and t.
+        method: What `TensionMethod.compiled` gives, for the redundancy of W.
+        work: As `TensionMethod.kernel`, and so are all others.
         W: See work.
         w: See work.
         lower: See work.
@@ -124,12 +94,48 @@ def solve_and_judge(
         reference: See work.
         row_scale: See work.
         t: See work.
-        active: As `judge_into`.
-        slack: As `judge_into`.
 
     Returns:
-        1 feasible, 0 missed although there are some, -1 infeasible, -2 singular W, `NOT_FINITE`;
-        and the residual of t. Where infeasible, t counts only for a method that relaxes.
+        1 feasible, 0 missed by this method, -1 infeasible, -2 singular W; and the residual, as
+        `check`. Tensions that are not feasible are what the method came to (0), those of least
+        slack (-1, methods that relax), or without meaning.
+    """
+    kernel, exact, relaxes = method
+    code = MISSED
+    if kernel != 0:
+        code = _call(kernel, work, W, w, lower, upper, reference, row_scale, t)
+    if exact and code == MISSED:
+        code = nearest_tensions_in(work, W, w, lower, upper, reference, t)
+    elif code == FEASIBLE:  # by rounding at most out of bounds
+        for i in range(t.shape[0]):
+            t[i] = min(max(t[i], lower[i]), upper[i])
+    return check(code, relaxes, W, w, lower, upper, t)
+
+
+@njit(cache=True, inline="always")
+def solve_or_prove(
+    method: tuple[int, bool, bool], work: Array, W: Array, w: Array, lower: Array, upper: Array,
+    reference: Array, row_scale: Array, t: Array,
+) -> tuple[int, float]:  # fmt: skip
+    """As `solve`; where the method missed, 0 says that there are tensions, -1 that there are none.
+
+    A step of control does without: it holds the last tensions in either case.
+    """
+    code, residual = solve(method, work, W, w, lower, upper, reference, row_scale, t)
+    if code == MISSED:
+        zero, other = np.zeros(t.shape[0]), np.empty(t.shape[0])
+        code = min(MISSED, nearest_tensions_in(work, W, w, lower, upper, zero, other))
+    return code, residual
+
+
+@njit(cache=True)
+def solution_of(
+    method: tuple[int, bool, bool], work: Array, W: Array, w: Array, lower: Array, upper: Array,
+    reference: Array, row_scale: Array, t: Array, active: np.ndarray, slack: Array,
+) -> tuple[int, float]:  # fmt: skip
+    """As `solve_or_prove`, with all that a `TensionSolution` says, or `NOT_FINITE`.
+
+    `active` and `slack` are written as `TensionSolution` has them.
     """
     n, m = W.shape
     total = 0.0
@@ -139,19 +145,6 @@ def solve_and_judge(
             total += abs(W[i, j])
     if not np.isfinite(total):
         return NOT_FINITE, np.nan
-    kernel, exact, relaxes = method
-    code = solve_one(kernel, exact, work, W, w, lower, upper, reference, row_scale, t)
-    if code < INFEASIBLE or (code == INFEASIBLE and not relaxes):
-        return code, np.nan
-    exists = code != INFEASIBLE
-    inside, residual = judge_into(W, w, lower, upper, t, active, slack)
-    if inside and residual <= RESIDUAL_TOLERANCE:
-        return FEASIBLE, residual
-    if not exists:
-        return INFEASIBLE, residual
-    zero, other = np.zeros(m), np.empty(m)
-    return (
-        MISSED
-        if nearest_tensions_in(work, W, w, lower, upper, zero, other) == FEASIBLE
-        else INFEASIBLE
-    ), residual
+    code, residual = solve_or_prove(method, work, W, w, lower, upper, reference, row_scale, t)
+    describe(W, w, lower, upper, t, active, slack)
+    return code, residual

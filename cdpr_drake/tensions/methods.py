@@ -20,7 +20,7 @@ from cdpr_drake.tensions.closed_form_kernel import (
     pseudo_inverse,
     puncture,
 )
-from cdpr_drake.tensions.dispatch_kernel import NOT_FINITE, kernel_address, solve_and_judge
+from cdpr_drake.tensions.dispatch_kernel import NOT_FINITE, kernel_address, solution_of
 from cdpr_drake.tensions.linear_goals_kernel import infinity_norm, linear_program, optimally_safe
 from cdpr_drake.tensions.null_space_kernel import null_space
 from cdpr_drake.tensions.objectives import Addition
@@ -34,7 +34,6 @@ from cdpr_drake.tensions.problem import (
     TensionProblem,
     TensionSolution,
     TensionStatus,
-    judge_in_place,
     refuse,
 )
 from cdpr_drake.tensions.quadratic_program_kernel import (
@@ -87,15 +86,11 @@ class TensionMethod:
         """Whether it can distribute over n + redundancy cables."""
         return self.redundancies is None or redundancy in self.redundancies
 
-    def solver(self, redundancy: int) -> tuple[Any | None, bool]:
-        """The kernel for a redundancy, and whether the exact program answers where it misses."""
-        if redundancy == 0 and self.kernel is not None and not self.relaxes:
-            return pseudo_inverse, True
-        return self.kernel, self.exact
-
     def compiled(self, redundancy: int) -> tuple[int, bool, bool]:
         """Address of the compiled solver, whether the exact program answers, `relaxes`."""
-        kernel, exact = self.solver(redundancy)
+        kernel, exact = self.kernel, self.exact
+        if redundancy == 0 and kernel is not None and not self.relaxes:
+            kernel, exact = pseudo_inverse, True
         return 0 if kernel is None else kernel_address(kernel), exact, self.relaxes
 
 
@@ -169,12 +164,6 @@ def method_for(name: str, redundancy: int, has_reference: bool) -> TensionMethod
     return method
 
 
-_SINGULAR_TO_ROUNDING = (
-    "W, wrench: found a wrench matrix that is singular to rounding, or numbers that overflow; "
-    "accepted: full rank"
-)
-
-
 def distribute(problem: TensionProblem, method: str = "quadratic_program") -> TensionSolution:
     """Distributes a wrench over the cables by a method, and judges the result.
 
@@ -188,37 +177,15 @@ def distribute(problem: TensionProblem, method: str = "quadratic_program") -> Te
         TensionProblemError: There is no such method, or it needs another redundancy or a
             reference; or W is singular to rounding.
     """
-    n, m = problem.W.shape
-    chosen = method_for(method, m - n, problem.reference is not None)
-    wanted = problem.reference if chosen.needs_reference else None
-    if wanted is None:
-        wanted = problem.nothing_wanted
-    t, work = np.empty(m), np.empty(_workspace_shape(n, m))
-    given = work, problem.W, problem.wrench, problem.lower, problem.upper, wanted
-    kernel, exact = chosen.solver(m - n)
-    # Step by step as in `finish`: one call of all would wait until the exact program is compiled.
-    code = MISSED if kernel is None else kernel(*given, problem.scale_of_rows, t)
-    if exact and code == MISSED:
-        code = nearest_tensions_in(*given, t)
-    elif code == FEASIBLE:  # by rounding at most out of bounds
-        np.minimum(np.maximum(t, problem.lower, out=t), problem.upper, out=t)
-    if code == SINGULAR:
-        raise TensionProblemError(_SINGULAR_TO_ROUNDING)
-    relaxed = code == INFEASIBLE and chosen.relaxes
-    if code == INFEASIBLE and not relaxed:
-        return refuse(problem, method)
-    solution = judge_in_place(problem, method, t, exists=not relaxed)
-    if solution.status != TensionStatus.MISSED:
-        return solution
-    return solution if exact_tensions(problem) is not None else refuse(problem, method)
+    return Distributor(problem, method)._solution(problem.W, problem.wrench)
 
 
 class Distributor:
     """A method made ready for many wrench matrices and wrenches of one robot, as in a loop.
 
     What stays the same is checked once: bounds, reference, sizes, whether the method applies. A
-    call checks the rest as `TensionProblem` and `distribute` do, in compiled code, and answers as
-    `distribute` does, in a tenth of the time that both take.
+    call checks the rest as `TensionProblem` does, in compiled code, and answers as `distribute`
+    does, in a tenth of the time that both take.
     """
 
     def __init__(self, problem: TensionProblem, method: str = "quadratic_program") -> None:
@@ -230,20 +197,11 @@ class Distributor:
         n, m = problem.W.shape
         chosen = method_for(method, m - n, problem.reference is not None)
         wanted = problem.reference if chosen.needs_reference else None
-        self._problem, self._method, self._relaxes = problem, method, chosen.relaxes
-        self._starts = chosen.starts
+        self._problem, self._method, self._chosen = problem, method, chosen
+        self._wanted = problem.nothing_wanted if wanted is None else wanted
         self._compiled = chosen.compiled(m - n)
         self._shape, self._size, self._count = (n, m), (n,), m
         self._work_shape = _workspace_shape(n, m)
-        self._given = tuple(
-            np.require(array, requirements="W")
-            for array in (
-                problem.lower,
-                problem.upper,
-                problem.nothing_wanted if wanted is None else wanted,
-                problem.scale_of_rows,
-            )
-        )
 
     def __call__(self, W: Array, wrench: Array, start: Array | None = None) -> TensionSolution:
         """Distributes a wrench, shape (n,) [N m, N], by a wrench matrix, shape (n, m).
@@ -266,18 +224,21 @@ class Distributor:
             )
         if not (W.flags.writeable and wrench.flags.writeable):
             W, wrench = W.copy(), wrench.copy()  # kernels at an address take nothing read-only
-        lower, upper, wanted, row_scale = self._given
-        if start is not None and self._starts:
-            wanted = np.array(start, float)
-            if wanted.shape != (self._count,):
-                raise TensionProblemError(
-                    f"start: found shape {wanted.shape}; accepted: ({self._count},)"
-                )
-        t, slack = np.empty(self._count), np.empty(self._size)
+        if start is None or not self._chosen.starts:
+            return self._solution(W, wrench)
+        start = np.array(start, float)
+        if start.shape != (self._count,):
+            raise TensionProblemError(
+                f"start: found shape {start.shape}; accepted: ({self._count},)"
+            )
+        return self._solution(W, wrench, start)
+
+    def _solution(self, W: Array, wrench: Array, start: Array | None = None) -> TensionSolution:
+        problem, t, slack = self._problem, np.empty(self._count), np.empty(self._size)
         active = np.empty(self._count, np.int64)
-        code, residual = solve_and_judge(
-            self._compiled, np.empty(self._work_shape), W, wrench, lower, upper, wanted,
-            row_scale, t, active, slack,
+        code, residual = solution_of(
+            self._compiled, np.empty(self._work_shape), W, wrench, problem.lower, problem.upper,
+            self._wanted if start is None else start, problem.scale_of_rows, t, active, slack,
         )  # fmt: skip
         if code == FEASIBLE:
             return TensionSolution(self._method, TensionStatus.FEASIBLE, t, residual, active, slack)
@@ -286,9 +247,12 @@ class Distributor:
                 "W, wrench: found NaN, infinity or overflow; accepted: finite"
             )
         if code == SINGULAR:
-            raise TensionProblemError(_SINGULAR_TO_ROUNDING)
-        if code == INFEASIBLE and not self._relaxes:
-            return refuse(self._problem, self._method)
+            raise TensionProblemError(
+                "W, wrench: found a wrench matrix that is singular to rounding, or numbers that "
+                "overflow; accepted: full rank"
+            )
+        if code == INFEASIBLE and not self._chosen.relaxes:
+            return refuse(problem, self._method)
         status = TensionStatus.MISSED if code == MISSED else TensionStatus.INFEASIBLE
         return TensionSolution(self._method, status, t, residual, active, slack)
 

@@ -83,6 +83,8 @@ class TensionProblem:
                 raise TensionProblemError(
                     f"{name}: found no array of numbers; accepted: one"
                 ) from problem
+            if not converted.flags.writeable:  # kernels at an address take nothing read-only
+                converted = converted.copy()
             object.__setattr__(self, name, converted)
         if self.W.ndim != 2:
             raise TensionProblemError(f"W: found shape {self.W.shape}; accepted: (n, m)")
@@ -213,11 +215,10 @@ def balance(W: Array, w: Array, lower: Array, upper: Array, t: Array) -> tuple[b
 
 
 @njit(cache=True)
-def judge_into(
+def describe(
     W: Array, w: Array, lower: Array, upper: Array, t: Array, active: np.ndarray, slack: Array
-) -> tuple[bool, float]:
-    """As `balance`; also writes what `TensionSolution` says of `active` and `slack`."""
-    inside, residual = balance(W, w, lower, upper, t)
+) -> None:
+    """Writes what `TensionSolution` says of tensions, shape (m,) [N]: `active` and `slack`."""
     n, m = W.shape
     largest = 1.0
     for i in range(m):
@@ -233,37 +234,6 @@ def judge_into(
         slack[j] = w[j]
         for i in range(m):
             slack[j] += W[j, i] * t[i]
-    return inside, residual
-
-
-def judge_tensions(
-    problem: TensionProblem, method: str, tensions: Array, exists: bool
-) -> TensionSolution:
-    """The solution that tensions make, by looking at them and not at what a method believes.
-
-    Args:
-        problem: The problem.
-        method: Name of the method.
-        tensions: Its result, shape (m,) [N].
-        exists: Whether feasible tensions are known to exist; only asked when these are not.
-    """
-    return judge_in_place(problem, method, np.array(tensions, float), exists)
-
-
-def judge_in_place(
-    problem: TensionProblem, method: str, tensions: Array, exists: bool
-) -> TensionSolution:
-    """As `judge_tensions`, with tensions that the solution may keep and clip."""
-    W = problem.W
-    active, slack = np.empty(W.shape[1], np.int64), np.empty(W.shape[0])
-    inside, residual = judge_into(
-        W, problem.wrench, problem.lower, problem.upper, tensions, active, slack
-    )
-    if inside and residual <= RESIDUAL_TOLERANCE:
-        status = TensionStatus.FEASIBLE
-    else:
-        status = TensionStatus.MISSED if exists else TensionStatus.INFEASIBLE
-    return TensionSolution(method, status, tensions, residual, active, slack)
 
 
 def refuse(problem: TensionProblem, method: str) -> TensionSolution:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cdpr_drake.tensions.dispatch_kernel import solve_one
+from cdpr_drake.tensions.dispatch_kernel import solve
 from cdpr_drake.tensions.methods import METHODS, distribute
 from cdpr_drake.tensions.problem import TensionProblem, TensionStatus
 from cdpr_drake.tensions.quadratic_program_kernel import workspace_shape
@@ -18,7 +18,6 @@ def test_compiled_choice_is_the_method(name, r):
     method = METHODS[name]
     if not method.takes(r):
         return
-    kernel, exact, relaxes = method.compiled(r)
     rng = np.random.default_rng(r)
     seen = set()
     for k in range(40):
@@ -30,9 +29,8 @@ def test_compiled_choice_is_the_method(name, r):
         solution = distribute(problem, name)
         seen.add(solution.status)
         t = np.empty(3 + r)
-        code = solve_one(
-            kernel,
-            exact,
+        code, _ = solve(
+            method.compiled(r),
             np.empty(workspace_shape(3, 3 + r)),
             W,
             problem.wrench,
@@ -43,7 +41,7 @@ def test_compiled_choice_is_the_method(name, r):
             t,
         )
         assert (code == 1) == (solution.status == TensionStatus.FEASIBLE)
-        if code == 1 or relaxes:
+        if code == 1 or method.relaxes:
             np.testing.assert_allclose(t, solution.tensions, rtol=0.0, atol=COMPILED)
         if method.exact:
             assert code == (1 if solution.status == TensionStatus.FEASIBLE else -1)

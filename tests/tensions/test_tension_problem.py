@@ -7,18 +7,27 @@ from hypothesis import strategies as st
 from scipy.optimize import linprog
 
 from cdpr_drake.errors import CdprError, TensionProblemError
+from cdpr_drake.tensions.closed_form_kernel import MISSED
+from cdpr_drake.tensions.dispatch_kernel import check
 from cdpr_drake.tensions.methods import METHODS, Distributor, distribute
 from cdpr_drake.tensions.problem import (
     RESIDUAL_TOLERANCE,
     VERDICT_ROUNDING,
     TensionProblem,
+    TensionSolution,
     TensionStatus,
-    judge_tensions,
+    describe,
     refuse,
 )
+from cdpr_drake.tensions.quadratic_program_kernel import FEASIBLE, INFEASIBLE
 
 MARGIN = 1e-9  # relative to the largest bound; nearer to the limit a verdict may go either way
 ORACLE_MARGIN = 1e-6  # as above, where HiGHS, exact to 1e-7, must be trusted
+STATUS = {
+    FEASIBLE: TensionStatus.FEASIBLE,
+    MISSED: TensionStatus.MISSED,
+    INFEASIBLE: TensionStatus.INFEASIBLE,
+}
 SUMMING = 1e-10  # [N]; sums of a few products of some 100 N in another order
 
 W = np.array([[1.0, 0.0, -1.0, 0.5], [0.0, 1.0, -1.0, -0.5]])
@@ -113,8 +122,18 @@ def balanced():
     return changed(wrench=-W @ t), t
 
 
-def judged_by_numpy(problem, tensions):
-    """What `judge_tensions` finds, written for reading."""
+def checked(problem, tensions, exists):
+    """Tensions of which a method says that some exist, or that none do and these relax; checked."""
+    t = np.array(tensions, float)
+    active, slack = np.empty(len(t), int), np.empty(len(problem.wrench))
+    given = problem.W, problem.wrench, problem.lower, problem.upper, t
+    code, residual = check(FEASIBLE if exists else INFEASIBLE, True, *given)
+    describe(*given, active, slack)
+    return TensionSolution("some", STATUS[code], t, residual, active, slack)
+
+
+def checked_by_numpy(problem, tensions):
+    """What `checked` finds, written for reading."""
     rounding = VERDICT_ROUNDING * max(np.max(problem.upper), 1.0)
     low, high = problem.lower - rounding, problem.upper + rounding
     inside = np.all(tensions >= low) and np.all(tensions <= high)
@@ -136,9 +155,9 @@ def test_the_verdict_is_what_numpy_finds(seed):
     t[-1] = [lower[-1], np.nan, 1.9, t[-1]][seed // 4 % 4]
     problem = TensionProblem(W, -W @ np.nan_to_num(t), lower, upper)
     given = t.copy()
-    solution = judge_tensions(problem, "some", t, exists=True)
+    solution = checked(problem, t, exists=True)
     np.testing.assert_array_equal(t, given)
-    inside, expected, active, slack = judged_by_numpy(problem, t)
+    inside, expected, active, slack = checked_by_numpy(problem, t)
     residual = problem.residual(expected)
     feasible = inside and residual <= RESIDUAL_TOLERANCE
     assert solution.status == (TensionStatus.FEASIBLE if feasible else TensionStatus.MISSED)
@@ -151,7 +170,7 @@ def test_the_verdict_is_what_numpy_finds(seed):
 def test_good_tensions_are_feasible_whatever_is_believed():
     problem, t = balanced()
     for exists in (True, False):
-        solution = judge_tensions(problem, "some", t, exists)
+        solution = checked(problem, t, exists)
         assert solution.status == TensionStatus.FEASIBLE
         np.testing.assert_array_equal(solution.tensions, t)
         np.testing.assert_array_equal(solution.active, 0)
@@ -162,11 +181,11 @@ def test_good_tensions_are_feasible_whatever_is_believed():
 def test_tensions_off_balance_are_not_feasible(error):
     problem, t = balanced()
     t[0] += error
-    wrong = judge_tensions(problem, "some", t, exists=True)
+    wrong = checked(problem, t, exists=True)
     assert wrong.status == TensionStatus.MISSED
     assert wrong.residual > RESIDUAL_TOLERANCE
     np.testing.assert_allclose(wrong.slack, error * W[:, 0], rtol=1e-6)
-    none = judge_tensions(problem, "some", t, exists=False)
+    none = checked(problem, t, exists=False)
     assert none.status == TensionStatus.INFEASIBLE
 
 
@@ -174,9 +193,9 @@ def test_tensions_off_balance_are_not_feasible(error):
 def test_tensions_out_of_bounds_are_not_feasible(beyond):
     problem, t = balanced()
     tight = changed(wrench=problem.wrench, upper=np.array([9.0, 9.0, 9.0, t[3] - beyond]))
-    assert judge_tensions(tight, "some", t, exists=True).status == TensionStatus.MISSED
+    assert checked(tight, t, exists=True).status == TensionStatus.MISSED
     tight = changed(wrench=problem.wrench, lower=np.array([t[0] + beyond, 0.0, 0.0, 0.0]))
-    assert judge_tensions(tight, "some", t, exists=False).status == TensionStatus.INFEASIBLE
+    assert checked(tight, t, exists=False).status == TensionStatus.INFEASIBLE
 
 
 def test_tensions_on_their_bounds_are_named_and_put_there():
@@ -184,7 +203,7 @@ def test_tensions_on_their_bounds_are_named_and_put_there():
     lower, upper = np.array([2.0, 0.0, 0.0, 0.0]), np.array([9.0, 9.0, 9.0, 5.0])
     tight = TensionProblem(W, problem.wrench, lower, upper)
     rounding = np.array([-1e-15, 0.0, 0.0, 1e-15])
-    solution = judge_tensions(tight, "some", t + rounding, exists=True)
+    solution = checked(tight, t + rounding, exists=True)
     assert solution.status == TensionStatus.FEASIBLE
     np.testing.assert_array_equal(solution.active, [-1, 0, 0, 1])
     np.testing.assert_array_equal(solution.tensions, t)
@@ -194,12 +213,10 @@ def test_no_tension_at_all_is_feasible_without_a_wrench():
     """Rounding of the size of nothing is not off balance, measured against what cables can do."""
     problem = changed(wrench=np.zeros(2))
     t = np.array([1e-16, 0.0, 3e-16, 0.0])
-    assert judge_tensions(problem, "some", t, exists=True).status == TensionStatus.FEASIBLE
-    assert (
-        judge_tensions(problem, "some", np.zeros(4), exists=True).status == TensionStatus.FEASIBLE
-    )
+    assert checked(problem, t, exists=True).status == TensionStatus.FEASIBLE
+    assert checked(problem, np.zeros(4), exists=True).status == TensionStatus.FEASIBLE
     # A millinewton a cable is no rounding.
-    assert judge_tensions(problem, "some", t + 1e-3, exists=True).status == TensionStatus.MISSED
+    assert checked(problem, t + 1e-3, exists=True).status == TensionStatus.MISSED
 
 
 @pytest.mark.parametrize("method", METHODS)
