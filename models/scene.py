@@ -100,17 +100,6 @@ def plate_mesh(png: bytes, width: float) -> Mesh:
     )
 
 
-def tag_mesh(tag_id: int, size: float) -> Mesh:
-    """A flat square with an AprilTag 36h11, x right, y up, z out of the tag, held in memory.
-
-    Args:
-        tag_id: Identity of the tag, 0..586.
-        size: Edge of the black square [m]; the white rim adds a quarter to it.
-    """
-    plate = tag_plate(tag_id, size, RigidTransform())
-    return plate_mesh(plate.png, plate.width)
-
-
 def plate_geometry(plate: Plate, X_FO: RigidTransform, name: str) -> GeometryInstance:
     """A plate of an object at X_FO in a frame F, for pictures and for the browser."""
     # Not by a colour, which Drake would say that it ignores: the mesh brings its own.

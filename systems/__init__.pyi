@@ -4,9 +4,7 @@ from .cameras.target_measurement import TargetDetector as TargetDetector
 from .cameras.target_measurement import TargetMeasurement as TargetMeasurement
 from .cameras.targets import TARGETS as TARGETS
 from .cameras.targets import TargetSettings as TargetSettings
-from .controllers.computed_torque import ComputedTorque as ComputedTorque
 from .controllers.computed_torque import PoseTracking as PoseTracking
-from .controllers.computed_torque import PoseTrajectorySource as PoseTrajectorySource
 from .controllers.feature_servo import FeatureServo as FeatureServo
 from .controllers.open_loop_servo import OpenLoopServo as OpenLoopServo
 from .controllers.perturbation_settings import Perturbations as Perturbations

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.simulation.visual_servo_run import RunResult
 from cdpr_drake.arrays import Array
@@ -53,17 +52,6 @@ class StabilityAlong:
     def unstable_time(self) -> float:
         """Time without a positive margin, as far as it is known [s]."""
         return float(np.sum(np.diff(self.time) * (self.margin[:-1] <= 0.0)))
-
-
-def stability_at(
-    servo: VisualServo | LoopServo,
-    X_WP: RigidTransform,
-    X_estimated: RigidTransform,
-    taut: np.ndarray,
-    time: float = 0.0,
-) -> tuple[int, float]:
-    """Rank of the Jacobian and margin of Pi at a moment of a servo; see `ServoCriterion.at`."""
-    return run_criterion(servo).at(X_WP, X_estimated, taut, time)
 
 
 def run_criterion(servo: VisualServo | LoopServo) -> ServoCriterion:

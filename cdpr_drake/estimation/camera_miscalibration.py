@@ -218,17 +218,3 @@ def surprise_of(belief: FusedBelief, camera: Calibration) -> tuple[float, int]:
         return 0.0, 0
     parts = (directions[:, judged_ones].T @ scaled) ** 2 / shares[judged_ones]
     return float(np.sum(parts)), int(np.count_nonzero(judged_ones))
-
-
-def learnt_shares(belief: FusedBelief, columns: slice, prior: Array) -> Array:
-    """Shares of the variance of an error that readings have taken away, ascending, shape (6,).
-
-    0: nothing was learnt in that direction, which is not observable; 1: all is known of it.
-
-    Args:
-        belief: What is believed.
-        columns: Where the error stands in P.
-        prior: Its standard deviations at the start, shape (6,) [rad, m].
-    """
-    P = belief.covariance[columns, columns] / np.outer(prior, prior)
-    return np.asarray(np.linalg.eigvalsh(np.eye(len(prior)) - P))

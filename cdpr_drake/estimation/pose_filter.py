@@ -236,18 +236,6 @@ def _correct(belief: PoseBelief, H: Array, innovation: Array, R: Array) -> PoseB
     )
 
 
-def normalized_error(belief: PoseBelief, X_WP: RigidTransform) -> float:
-    """x' P_x^-1 x of the error x of the believed pose against the true one (NEES) [-].
-
-    Of a consistent filter it has the mean 6, over many runs.
-
-    Source: Bar-Shalom, Li and Kirubarajan, Estimation with Applications to Tracking and Navigation,
-    2001, 5.4.2.
-    """
-    x = logarithm(X_WP @ belief.X_WP.inverse())
-    return float(x @ np.linalg.solve(belief.covariance[POSE, POSE], x))
-
-
 def image_covariance(X_CO: RigidTransform, p_OK: Array, pixel_noise: float, focal: float) -> Array:
     """Covariance of an object's pose from image points, a twist of O in O, shape (6, 6) [rad, m].
 

@@ -54,24 +54,6 @@ def pose_interaction(X_CO: RigidTransform, X_CdO: RigidTransform) -> Array:
     return np.asarray(object_pose_feature(*pose_arrays(X_CO), pose_arrays(X_CdO)[0])[1])
 
 
-def camera_pose_error(X_CO: RigidTransform, X_CdO: RigidTransform) -> Array:
-    """e = s of the feature s = (theta u of R_CdC, p_CdC), shape (6,) [rad, m].
-
-    The camera's origin then moves on a straight line. Arguments as for `pose_feature_error`.
-
-    Source: servoing thesis 1.4.4, there ordered (translation, rotation).
-    """
-    return np.asarray(camera_pose_feature(*pose_arrays(X_CO), *pose_arrays(X_CdO))[0])
-
-
-def camera_pose_interaction(X_CO: RigidTransform, X_CdO: RigidTransform) -> Array:
-    """L with de/dt = L @ V_C for `camera_pose_error` and an object at rest, shape (6, 6).
-
-    Source: servoing thesis (1.48), there ordered (translation, rotation).
-    """
-    return np.asarray(camera_pose_feature(*pose_arrays(X_CO), *pose_arrays(X_CdO))[1])
-
-
 def seen_pose_error(
     X_CO: RigidTransform, X_CdO: RigidTransform, free_rotation: bool = False
 ) -> tuple[float, float]:

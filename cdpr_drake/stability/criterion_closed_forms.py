@@ -18,34 +18,12 @@ from itertools import product
 import numpy as np
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.geometry.poses import cross_matrix
 from cdpr_drake.servoing.pose_features import theta_u_interaction
 
 TURN_STEP = math.radians(0.1)
 """Distance of the turns at which a range of turns is looked at [rad]."""
 
 _CORNERS = np.array(list(product((-1.0, 1.0), repeat=6)))
-
-
-def planar_offsets(
-    e: Array, e_hat: Array, shift: Array, theta_pc: float, psi: float
-) -> tuple[float, float]:
-    """(d_1, d_2), what couples rotation and translation in planar analysis II [m].
-
-    Args:
-        e: Error (e_x, e_y), shape (2,) [m].
-        e_hat: Its estimate, shape (2,) [m].
-        shift: Camera's true position on the platform minus its estimate, in P, shape (2,) [m].
-        theta_pc: True angle of the camera on the platform [rad].
-        psi: Its estimate minus theta_pc [rad].
-
-    Source: servoing thesis (3.15), (3.16).
-    """
-    c, s = math.cos(psi), math.sin(psi)
-    C, S = math.cos(theta_pc), math.sin(theta_pc)
-    d1 = e_hat[1] * c - e[1] + e_hat[0] * s - shift[1] * C + shift[0] * S
-    d2 = -e_hat[0] * c + e[0] + e_hat[1] * s + shift[1] * S + shift[0] * C
-    return float(d1), float(d2)
 
 
 def planar_margin(psi: float, offset: float) -> float:
@@ -112,23 +90,6 @@ class PlanarVisionLimits:
         margin = np.minimum(c, (1.0 + c - np.hypot(1.0 - c, offset)) / 2.0)
         slope = 1.0 + (self.error + self.d_error) / math.sqrt(2.0)
         return float(np.min(margin)) - slope * largest_psi / (count - 1)
-
-
-def spatial_vision_matrix(theta_u: Array, theta_u_hat: Array, d_error: Array) -> Array:
-    """Pi of spatial analysis I, rows and columns (rotation, translation), shape (6, 6).
-
-    Args:
-        theta_u: Rotation vector of R_CdC, shape (3,) [rad].
-        theta_u_hat: Its estimate, shape (3,) [rad].
-        d_error: e_t minus its estimate, shape (3,) [m].
-
-    Source: servoing thesis (3.19), where the translation comes first.
-    """
-    inverse = np.linalg.inv(theta_u_interaction(np.asarray(theta_u_hat, float)))
-    Pi = np.eye(6)
-    Pi[:3, :3] = theta_u_interaction(np.asarray(theta_u, float)) @ inverse
-    Pi[3:, :3] = cross_matrix(d_error) @ inverse
-    return Pi
 
 
 def largest_object_error(theta_u: Array, theta_u_hat: Array) -> Array:

@@ -16,8 +16,7 @@ from cdpr_drake.geometry.cable_paths import cable_paths, motion_of
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.geometry.motion_type import FREE, MotionType
 from cdpr_drake.geometry.poses import pose_error, pose_from_row, pose_row, rotation_from_vector
-from cdpr_drake.numerics.kernel_calls import over_rows
-from cdpr_drake.statics.equilibrium_kernel import RESTS, SOFTENING, energy_at, settle, settle_many
+from cdpr_drake.statics.equilibrium_kernel import RESTS, SOFTENING, energy_at, settle
 from cdpr_drake.statics.inextensible_equilibrium import rigid_cables_rest
 from cdpr_drake.statics.rigid_platform import RigidPlatform
 
@@ -121,48 +120,6 @@ def equilibrium_near(
         unbalanced=unbalanced, stiffnesses=stiffnesses, stability=judge_equilibrium(stiffnesses),
         steps=steps,
     )  # fmt: skip
-
-
-def equilibrium_poses(
-    cables: CableSet,
-    model: str,
-    platform: RigidPlatform,
-    l0: Array,
-    guesses: Array,
-    soften: bool = False,
-) -> Array:
-    """Poses of rest for many sets of lengths, on all cores; NaN where the search ends before.
-
-    Args:
-        cables: As in `equilibrium_near`.
-        model: One of the elastic models.
-        platform: The platform.
-        l0: Unstrained lengths, shape (k, m) [m].
-        guesses: (Quaternion wxyz, position), shape (k, 7), see `geometry.pose_row`.
-        soften: As in `equilibrium_near`.
-
-    Returns:
-        (Quaternion wxyz, position), shape (k, 7) [-, m].
-
-    Raises:
-        EquilibriumError: Sizes that do not fit, or inextensible cables.
-        CableModelError: An unknown model.
-    """
-    check_model(model, cables)
-    if not CABLE_MODELS[model].extensible:
-        raise EquilibriumError(f"cable model: found {model}; accepted: an elastic one for a batch")
-    guesses = np.ascontiguousarray(guesses, float)
-    if guesses.ndim != 2 or guesses.shape[1] != 7:
-        raise EquilibriumError(f"guesses: found shape {guesses.shape}; accepted: (k, 7)")
-    l0 = _checked_lengths(l0, (len(guesses), cables.count))
-    states, codes = np.zeros((len(guesses), 13)), np.empty(len(guesses), int)
-    states[:, :7] = guesses
-    over_rows(
-        settle_many, len(states), None, states, CABLE_MODELS[model].law, cables.packed(), l0,
-        soften, platform.packed_weight(), platform.motion.packed(), anchor_arm(cables), codes,
-    )  # fmt: skip
-    states[codes != RESTS] = np.nan
-    return states[:, :7]
 
 
 def principal_stiffnesses(K: Array, platform: RigidPlatform, arm: float) -> Array:

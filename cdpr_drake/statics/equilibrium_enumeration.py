@@ -17,7 +17,6 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.errors import EquilibriumError
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.poses import pose_error, rotation_from_vector
-from cdpr_drake.statics.equilibrium import Stability
 from cdpr_drake.statics.equilibrium_certificate import ProvenBox, prove_rest
 from cdpr_drake.statics.inextensible_problem import (
     JUST_TAUT,
@@ -116,11 +115,6 @@ def all_rests(
     if not rests:
         raise EquilibriumError(_why_none(platform, lengths))
     return AllRests(sorted(rests, key=lambda one: one.energy), count, len(sets))
-
-
-def is_stable(one: Rest) -> bool:
-    """Whether a small push is forgiven."""
-    return one.stability == Stability.STABLE
 
 
 def checked_lengths(platform: HangingPlatform, lengths: Array) -> Array:

@@ -219,30 +219,3 @@ def settle(
             if shift > 1e12:
                 return STUCK, step, rest
     return RESTS if rest <= ACCEPTED_UNBALANCE * (weight + pull) else STUCK, MAX_STEPS, rest
-
-
-@njit(cache=True, nogil=True)
-def settle_many(
-    first: int,
-    past: int,
-    states: Array,
-    law: int,
-    cables: Array,
-    l0: Array,
-    soften: bool,
-    platform: Array,
-    free: Array,
-    arm: float,
-    codes: np.ndarray,
-) -> None:
-    """`settle` for many: moves states, shape (k, 13), with lengths (k, m); writes codes, (k,).
-
-    Only rows from `first` on, up to the one before `past`.
-    """
-    for k in range(first, past):
-        solved = np.zeros((cables.shape[0], 2))
-        for softness in SOFTENING:
-            if soften or softness == 1.0:
-                codes[k], _, _ = settle(
-                    states[k], law, cables, l0[k], softness, platform, free, arm, solved
-                )

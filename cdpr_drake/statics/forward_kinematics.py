@@ -9,7 +9,6 @@ import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables.elastic_law import stretched_lengths
 from cdpr_drake.errors import ForwardKinematicsError
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.geometry.motion_type import FREE, MotionType
@@ -201,32 +200,6 @@ class ForwardKinematics:
         )  # fmt: skip
         poses[codes != FITS] = np.nan
         return PoseFits(poses, codes, steps)
-
-    def pose_of_tautest(
-        self,
-        lengths: Array,
-        tensions: Array,
-        guess: RigidTransform,
-        elastic: bool = False,
-        tolerance: float = TOLERANCE,
-    ) -> PoseFit:
-        """The pose from the tautest cables only, as many as degrees of freedom.
-
-        Args:
-            lengths: Lengths that the winches paid out, shape (m,) [m].
-            tensions: Measured tensions, shape (m,) [N].
-            guess: Pose to start from, usually the last one found.
-            elastic: Whether the tensions stretch the lengths, or the cables are inextensible.
-            tolerance: Largest accepted residual [m].
-
-        Raises:
-            ForwardKinematicsError: As `pose`.
-
-        Source: servoing thesis, algorithm 2; (2.7), (2.8).
-        """
-        if elastic:
-            lengths = stretched_lengths(lengths, tensions, self.cables.stiffness)
-        return self.pose(lengths, guess, tautest_cables(tensions, self.num_unknowns), tolerance)
 
     def _check_count(self, count: int) -> None:
         if count < self.num_unknowns:

@@ -33,50 +33,6 @@ TIMED_NUMBERS = 4 + PIECE_NUMBERS
 [m/s^2], and the path from there on as `pose_path.path_point` takes it."""
 
 
-def quintic_coefficients(duration: float, start: Array, end: Array) -> Array:
-    """Coefficients c_k of x(t) = sum c_k t^k, k = 0..5, that meets both ends of [0, T].
-
-    With D = x_f - x_i:
-
-        c_3 = (20 D - (8 v_f + 12 v_i) T - (3 a_i - a_f) T^2) / (2 T^3)
-        c_4 = (-30 D + (14 v_f + 16 v_i) T + (3 a_i - 2 a_f) T^2) / (2 T^4)
-        c_5 = (12 D - 6 (v_f + v_i) T - (a_i - a_f) T^2) / (2 T^5)
-
-    Args:
-        duration: T [s].
-        start: (x_i, v_i, a_i) at t = 0, shape (3,) or, for n coordinates, (3, n) [any, /s, /s^2].
-        end: (x_f, v_f, a_f) at t = T, same shape.
-
-    Returns:
-        Coefficients, shape (6,) or (6, n).
-
-    Source: Gazebo thesis (6.16)-(6.21), with signs and brackets of (6.19)-(6.21) corrected.
-    """
-    _check_duration(duration)
-    x_i, v_i, a_i = np.asarray(start, float)
-    x_f, v_f, a_f = np.asarray(end, float)
-    T = duration
-    D = x_f - x_i
-    return np.array(
-        [
-            x_i,
-            v_i,
-            a_i / 2.0,
-            (20.0 * D - (8.0 * v_f + 12.0 * v_i) * T - (3.0 * a_i - a_f) * T**2) / (2.0 * T**3),
-            (-30.0 * D + (14.0 * v_f + 16.0 * v_i) * T + (3.0 * a_i - 2.0 * a_f) * T**2)
-            / (2.0 * T**4),
-            (12.0 * D - 6.0 * (v_f + v_i) * T - (a_i - a_f) * T**2) / (2.0 * T**5),
-        ]
-    )
-
-
-def quintic(coefficients: Array, time: float) -> Array:
-    """(x, v, a) at a time [s] of a polynomial from `quintic_coefficients`, shape (3,) or (3, n)."""
-    p = np.polynomial.polynomial
-    derivatives = (coefficients, p.polyder(coefficients), p.polyder(coefficients, 2))
-    return np.array([p.polyval(time, c) for c in derivatives])
-
-
 @dataclass(frozen=True, eq=False)
 class PoseTrajectory:
     """A motion of the platform P in the world W through poses, at rest in each of them.

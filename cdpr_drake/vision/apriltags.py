@@ -33,9 +33,6 @@ REFINEMENT_OFFSET = 0.44
 """OpenCV's AprilTag refinement reports corners this far to the right and down [px], measured on
 drawn tags of 60 to 260 px: it counts from the corner of a pixel, not from its middle."""
 
-_NO_CAMERA = np.array([1.0, 1.0, 0.0, 0.0])
-"""Numbers of a pinhole that leave pixels as they are."""
-
 
 class TagTarget(PointTarget):
     """One AprilTag 36h11; its marks are the corners, in the order of `tag_corners`."""
@@ -167,13 +164,6 @@ def tag_corners(size: float) -> Array:
     """
     h = size / 2.0
     return np.array([[-h, h, h, -h], [h, h, -h, -h], [0.0, 0.0, 0.0, 0.0]])
-
-
-def tag_center(corners: Array) -> Array:
-    """Image of the tag's middle, (2,) [px]: where the diagonals of the corners, (2, 4), meet."""
-    middle = np.empty(2)
-    crossing_diagonals(np.ravel(corners.T), _NO_CAMERA, middle)
-    return middle
 
 
 def tag_png(tag_id: int) -> bytes:

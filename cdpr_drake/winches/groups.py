@@ -59,7 +59,3 @@ class WinchGroups:
         """Means over the cables of each winch, shape (k, m): what one velocity serves best."""
         E = self.to_cables()
         return np.asarray(E.T / np.sum(E, axis=0)[:, np.newaxis])
-
-    def selection(self) -> Array:
-        """The first cable of each winch, shape (k, m)."""
-        return np.eye(len(self.of_cable))[list(self.first_cables())]

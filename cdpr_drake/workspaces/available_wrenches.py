@@ -79,11 +79,6 @@ class AvailableWrenches:
         b = self.offsets - self.normals[:, held] @ x[held]
         return _polytope_vertices(A, b) * self.row_scale[free]
 
-    def shadow(self, rows: tuple[int, ...]) -> Array:
-        """Vertices of the projection on two or three rows, shape (v, len(rows)) [N m, N]."""
-        points = self.vertices[:, list(rows)]
-        return _hull_points(points)
-
 
 def available_wrenches(
     W: Array, lower: Array, upper: Array, row_scale: Array | None = None

@@ -27,8 +27,8 @@ class TensionDistributor(LeafSystem):
     failures       vector(1) -     out, how many requests were not met so far
     ============== ========= ===== ===========================================================
 
-    Samples its inputs at a rate of its own; put it after a `PoseTracking`, or a `ComputedTorque`
-    without rate, or it reads the wrench of the period before. A request that cannot be met, or
+    Samples its inputs at a rate of its own; the wrench must follow the state at once, as that of a
+    `PoseTracking` does, or it reads that of the period before. A request that cannot be met, or
     that the method misses, leaves the tensions of the last one that was met; before the first they
     are the lower limits. Methods that relax, `slack_relaxed` and `log_barrier`, answer a request
     that cannot be met with tensions within the limits of which the wrench is nearest, or near it;

@@ -99,16 +99,3 @@ def depth_pinhole(model: DepthSensorModel) -> Pinhole:
         model.width, model.height, model.focal_length, model.focal_length,
         0.5 * (model.width - 1), 0.5 * (model.height - 1),
     )  # fmt: skip
-
-
-def pixel_directions(pinhole: Pinhole) -> Array:
-    """Unit vectors in C through the middles of all pixels, row by row, shape (h w, 3)."""
-    u, v = np.meshgrid(np.arange(pinhole.width), np.arange(pinhole.height))
-    rays = np.column_stack(
-        [
-            (u.ravel() - pinhole.cx) / pinhole.fx,
-            (v.ravel() - pinhole.cy) / pinhole.fy,
-            np.ones(u.size),
-        ]
-    )
-    return np.asarray(rays / np.linalg.norm(rays, axis=1)[:, None])

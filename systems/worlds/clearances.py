@@ -83,10 +83,6 @@ class WorldClearances:
             geometries.append(self._scene.RegisterGeometry(source, frame, instance))
         return frame, geometries
 
-    def compared_with_cables(self) -> list[str]:
-        """Names of the bodies that cables are compared with: those without meshes."""
-        return [body.name for body in self.world.bodies if _is_compared(body)]
-
     def platform(self, X_WP: RigidTransform, time: float) -> Array:
         """Distances of the platform from the bodies at a pose and a time [s], shape (b,) [m]."""
         found = []

@@ -7,8 +7,8 @@ import pytest
 from pydrake.math import RigidTransform
 
 from cdpr_drake.estimation.pose_filter import (
+    POSE,
     image_covariance,
-    normalized_error,
     predict,
     start_belief,
     update_image,
@@ -217,7 +217,8 @@ def run(seed, covariance=START_COVARIANCE, points=0.0, camera=0.0):
             lengths(belief.X_WP0, near),
             np.full(8, LENGTH**2),
         )
-        nees.append(normalized_error(belief, X))
+        x = logarithm(X @ belief.X_WP.inverse())
+        nees.append(x @ np.linalg.solve(belief.covariance[POSE, POSE], x))
         V = logarithm(way.pose(k * PERIOD).inverse() @ way.pose((k + 1) * PERIOD)) / PERIOD
         X = (
             X

@@ -11,8 +11,8 @@ from pydrake.systems.framework import DiagramBuilder
 from cdpr_drake.geometry.poses import pose_from_angles
 from cdpr_drake.models.rendered_camera import add_renderer, make_rgbd_sensor
 from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.models.scene import GROUND_DEPTH, add_frame, add_ground, add_tag, tag_mesh
-from cdpr_drake.vision.apriltags import TagFinder, tag_corners
+from cdpr_drake.models.scene import GROUND_DEPTH, add_frame, add_ground, add_tag, plate_mesh
+from cdpr_drake.vision.apriltags import TagFinder, tag_corners, tag_plate
 from cdpr_drake.vision.pinhole import Pinhole
 
 CORNER_OFFSET = 0.6
@@ -110,7 +110,9 @@ def test_a_tag_on_the_floor_is_not_hidden_by_the_ground():
 
 def test_the_picture_s_black_square_has_the_asked_size():
     """The plate's edge is a quarter longer than the tag, by the white rim."""
-    for shape, size in ((tag_mesh(0, 0.2), 0.2), (tag_mesh(17, 0.06), 0.06)):
+    for tag_id, size in ((0, 0.2), (17, 0.06)):
+        plate = tag_plate(tag_id, size, RigidTransform())
+        shape = plate_mesh(plate.png, plate.width)
         obj = shape.source().in_memory().mesh_file.contents().decode()
         vertices = np.array([line.split()[1:] for line in obj.splitlines() if line[:2] == "v "])
         edges = np.ptp(vertices.astype(float), axis=0)

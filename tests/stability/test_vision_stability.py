@@ -18,9 +18,7 @@ from cdpr_drake.stability.criterion_closed_forms import (
     PlanarVisionLimits,
     largest_object_error,
     planar_margin,
-    planar_offsets,
     seen_turned,
-    spatial_vision_matrix,
     worst_object_error,
 )
 from cdpr_drake.stability.stability_case import StabilityCase
@@ -46,6 +44,31 @@ def model(name: str, X_PC: RigidTransform, L: np.ndarray) -> ModelAtPose:
 
 def camera(x: float, y: float, angle: float) -> RigidTransform:
     return RigidTransform(RotationMatrix.MakeZRotation(angle), [x, y, 0.0])
+
+
+def planar_offsets(
+    e: np.ndarray, e_hat: np.ndarray, shift: np.ndarray, theta_pc: float, psi: float
+) -> tuple[float, float]:
+    """(d_1, d_2), what couples rotation and translation in planar analysis II [m].
+
+    Source: servoing thesis (3.15), (3.16).
+    """
+    c, s = math.cos(psi), math.sin(psi)
+    C, S = math.cos(theta_pc), math.sin(theta_pc)
+    d1 = e_hat[1] * c - e[1] + e_hat[0] * s - shift[1] * C + shift[0] * S
+    d2 = -e_hat[0] * c + e[0] + e_hat[1] * s + shift[1] * S + shift[0] * C
+    return float(d1), float(d2)
+
+
+def spatial_vision_matrix(
+    theta_u: np.ndarray, theta_u_hat: np.ndarray, d_error: np.ndarray
+) -> np.ndarray:
+    """Pi of spatial analysis I: servoing thesis (3.19), where the translation comes first."""
+    inverse = np.linalg.inv(theta_u_interaction(theta_u_hat))
+    Pi = np.eye(6)
+    Pi[:3, :3] = theta_u_interaction(theta_u) @ inverse
+    Pi[3:, :3] = cross_matrix(d_error) @ inverse
+    return Pi
 
 
 @pytest.mark.parametrize("seed", range(20))

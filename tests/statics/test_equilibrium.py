@@ -11,7 +11,7 @@ from cdpr_drake.cables.elastic_law import unstrained_lengths
 from cdpr_drake.cables.models import CABLE_MODELS, cable_state
 from cdpr_drake.errors import CableModelError, EquilibriumError
 from cdpr_drake.geometry.cable_set import CableSet
-from cdpr_drake.geometry.poses import pose_error, pose_from_angles, pose_from_row, pose_row
+from cdpr_drake.geometry.poses import pose_error, pose_from_angles
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_statics import rigid_platform
 from cdpr_drake.statics import equilibrium
@@ -20,7 +20,6 @@ from cdpr_drake.statics.equilibrium import (
     Stability,
     equilibria,
     equilibrium_near,
-    equilibrium_poses,
     random_starts,
 )
 from cdpr_drake.statics.forward_kinematics import ForwardKinematics
@@ -224,24 +223,6 @@ def test_one_of_a_neutral_family_is_kept(monkeypatch, energies, kinds, distinct)
     monkeypatch.setattr(equilibrium, "equilibrium_near", lambda *args, **how: next(searched))
     kept = equilibria(None, "elastic", PLATFORM, None, [one.X_WP for one in found])
     assert len(kept) == distinct
-
-
-def test_many_at_once_are_the_same():
-    _, cables, platform, l0, X = of_robot("acrobot_large", pulleys=True)
-    random = np.random.default_rng(0)
-    lengths = l0 + 1e-3 * random.normal(size=(20, 8))
-    guesses = np.tile(pose_row(X), (20, 1))
-    for model in ("elastic", "catenary"):
-        poses = equilibrium_poses(cables, model, platform, lengths, guesses)
-        for k in (0, 19):
-            one = equilibrium_near(cables, model, platform, lengths[k], X)
-            assert pose_error(one.X_WP, pose_from_row(poses[k])) < (1e-12, 1e-12)
-    with pytest.raises(EquilibriumError, match="an elastic one"):
-        equilibrium_poses(cables, "inextensible", platform, lengths, guesses)
-    with pytest.raises(EquilibriumError, match=r"accepted: \(k, 7\)"):
-        equilibrium_poses(cables, "elastic", platform, lengths, guesses[:, :6])
-    with pytest.raises(EquilibriumError, match="20 x 8"):
-        equilibrium_poses(cables, "elastic", platform, -lengths, guesses)
 
 
 def test_errors_say_what_is_wrong():

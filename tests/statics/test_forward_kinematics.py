@@ -8,7 +8,7 @@ from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RigidTransform
 from scipy.optimize import least_squares
 
-from cdpr_drake.cables.elastic_law import unstrained_lengths
+from cdpr_drake.cables.elastic_law import stretched_lengths, unstrained_lengths
 from cdpr_drake.errors import ForwardKinematicsError
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.motion_type import FREE, LEVEL
@@ -187,10 +187,11 @@ def test_six_tautest_elastic_cables():
     fk = ForwardKinematics(cables)
     l0 = unstrained_lengths(fk.lengths(X), tensions, cables.stiffness)
     guess = disturbed(X, np.random.default_rng(0), 0.005, 0.01)
-    elastic = fk.pose_of_tautest(l0, tensions, guess, elastic=True)
+    tautest = tautest_cables(tensions, 6)
+    elastic = fk.pose(stretched_lengths(l0, tensions, cables.stiffness), guess, tautest)
     assert pose_error(elastic.X_WP, X) < (EXACT, EXACT)
     assert len(elastic.residuals) == 6
-    stiff = fk.pose_of_tautest(l0, tensions, guess)
+    stiff = fk.pose(l0, guess, tautest)
     distance, _ = pose_error(stiff.X_WP, X)
     assert 1e-4 < distance < 1e-2  # a stretch of a millimetre
 
@@ -201,7 +202,8 @@ def test_slack_cables_are_left_alone():
     X = robot.home.transform()
     lengths, tensions = fk.lengths(X), np.arange(8.0)
     lengths[:2] += 0.1
-    fit = fk.pose_of_tautest(lengths, tensions, disturbed(X, np.random.default_rng(1), 0.003, 0.01))
+    guess = disturbed(X, np.random.default_rng(1), 0.003, 0.01)
+    fit = fk.pose(lengths, guess, tautest_cables(tensions, 6))
     assert pose_error(fit.X_WP, X) < (EXACT, EXACT)
 
 

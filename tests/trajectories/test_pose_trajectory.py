@@ -5,8 +5,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from pydrake.math import RigidTransform
-from pydrake.polynomial import Polynomial
-from pydrake.trajectories import PiecewisePolynomial
 from scipy.interpolate import BPoly
 
 from cdpr_drake.errors import TrajectoryError
@@ -15,8 +13,6 @@ from cdpr_drake.trajectories.pose_trajectory import (
     MOTION_SIZE,
     PoseTrajectory,
     motion_row,
-    quintic,
-    quintic_coefficients,
 )
 
 ROUNDING = 1e-13
@@ -49,48 +45,13 @@ def poses(draw):
     return RigidTransform(rotation_from_vector(turn * (3.0 / 5.2)), draw(vector))
 
 
-@given(duration, boundary, boundary)
-def test_quintic_meets_its_boundary_values(T, start, end):
-    c = quintic_coefficients(T, start, end)
-    np.testing.assert_allclose(quintic(c, 0.0), start, rtol=0.0, atol=ROUNDING)
-    scale = np.max(np.abs(c * T ** np.arange(6))) * np.array([1.0, 1.0 / T, 1.0 / T**2])
-    assert np.all(np.abs(quintic(c, T) - end) <= BOUNDARY * (1.0 + scale))
-
-
-@given(duration, boundary, boundary, st.floats(0.0, 1.0))
-def test_quintic_is_the_one_of_scipy_and_drake(T, start, end, share):
-    """BPoly finds the polynomial from the boundary values; Drake differentiates ours."""
-    c = quintic_coefficients(T, start, end)
-    found = quintic(c, share * T)
-    bernstein = BPoly.from_derivatives([0.0, T], [start, end])
-    drake = PiecewisePolynomial([np.array([[Polynomial(c)]])], [0.0, T])
-    scale = np.max(np.abs(c * T ** np.arange(6)))
-    for k in range(3):
-        tolerance = BOUNDARY * (1.0 + scale / T**k)
-        assert abs(bernstein(share * T, nu=k) - found[k]) <= tolerance
-        assert abs(drake.EvalDerivative(share * T, k)[0, 0] - found[k]) <= tolerance
-
-
-def test_quintic_takes_several_coordinates_at_once():
-    start, end = np.arange(6.0).reshape(3, 2), np.arange(6.0)[::-1].reshape(3, 2)
-    c = quintic_coefficients(1.5, start, end)
-    assert c.shape == (6, 2)
-    np.testing.assert_allclose(quintic(c, 1.5), end, atol=BOUNDARY)
-    for k in range(2):
-        one = quintic_coefficients(1.5, start[:, k], end[:, k])
-        np.testing.assert_array_equal(c[:, k], one)
-
-
 def test_rest_to_rest_law_is_the_quintic_with_nothing_at_its_ends():
     """The trajectory's s(t) = 10 x^3 - 15 x^4 + 6 x^5, x = t / T."""
     T = 4.0
-    c = quintic_coefficients(T, np.zeros(3), np.array([1.0, 0.0, 0.0]))
-    np.testing.assert_allclose(
-        c * T ** np.arange(6), [0.0, 0.0, 0.0, 10.0, -15.0, 6.0], atol=ROUNDING
-    )
+    law = BPoly.from_derivatives([0.0, T], [np.zeros(3), [1.0, 0.0, 0.0]])
     line = PoseTrajectory((RigidTransform(), RigidTransform([1.0, 0.0, 0.0])), (T,))
     for time in np.linspace(0.0, T, 17):
-        s, s_dot, s_ddot = quintic(c, time)
+        s, s_dot, s_ddot = (law(time, nu=k) for k in range(3))
         assert line.pose(time).translation()[0] == pytest.approx(s, abs=ROUNDING)
         assert line.velocity(time)[3] == pytest.approx(s_dot, abs=ROUNDING)
         assert line.acceleration(time)[3] == pytest.approx(s_ddot, abs=ROUNDING)
@@ -130,7 +91,7 @@ def test_way_is_straight_and_the_axis_is_fixed(X_WS, X_WE, share):
     """Every pose lies on the way: Po on the line, P turned by a share of the whole turn."""
     trajectory = PoseTrajectory((X_WS, X_WE), (2.0,))
     X = trajectory.pose(2.0 * share)
-    s = quintic(quintic_coefficients(2.0, np.zeros(3), np.array([1.0, 0.0, 0.0])), 2.0 * share)[0]
+    s = share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
     line = X_WS.translation() + s * (X_WE.translation() - X_WS.translation())
     np.testing.assert_allclose(X.translation(), line, atol=ROUNDING)
     turn_P = s * rotation_vector(X_WS.rotation().inverse() @ X_WE.rotation())
@@ -177,8 +138,3 @@ def test_motion_row_has_pose_velocity_and_acceleration():
 def test_refuses_times_that_make_no_trajectory(stops, durations, start, message):
     with pytest.raises(TrajectoryError, match=message):
         PoseTrajectory(stops, durations, start)
-
-
-def test_quintic_refuses_no_duration():
-    with pytest.raises(TrajectoryError, match=r"found 0\.0 s"):
-        quintic_coefficients(0.0, np.zeros(3), np.ones(3))

@@ -16,7 +16,6 @@ from cdpr_drake.vision.apriltags import (
     TAG_COUNT,
     TagFinder,
     TagTarget,
-    tag_center,
     tag_corners,
     tag_png,
 )
@@ -216,13 +215,6 @@ def test_a_tag_twice_as_large_is_twice_as_far(X_CO):
     far = pose_of(corners, 2.0 * SIZE)
     doubled = RigidTransform(near.rotation(), 2.0 * near.translation())
     assert max(pose_error(doubled, far)) < POSE_TOLERANCE
-
-
-@given(poses)
-def test_the_center_is_the_projection_of_the_middle(X_CO):
-    middle = CAMERA.project(X_CO.translation()[:, np.newaxis])[:, 0]
-    found = tag_center(corners_of(X_CO))
-    np.testing.assert_allclose(found, middle, rtol=0.0, atol=CENTER_TOLERANCE)
 
 
 def test_a_fourth_channel_changes_nothing():

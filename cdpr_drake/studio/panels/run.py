@@ -132,7 +132,6 @@ class RunPanel:
         with ui.expansion("Fields of the scenario", value=True).classes("w-full"):
             self._body = ui.element("div")
         self._choose_scenario(self._scenario.value)
-        on_page(bench.scenario_chosen, self._scenario_chosen)
         on_page(bench.robot.changed, self._take_robot)
         ui.timer(TICK, self._tick)
         ui.timer(SLOW_TICK, self._slow_tick)
@@ -196,12 +195,6 @@ class RunPanel:
             return name
         file = self._bench.folder.shown(Path(name).resolve()) if name else ""
         return file if file in options else ""
-
-    def _scenario_chosen(self) -> None:
-        options = self._scenarios()
-        chosen = self._chosen(options)
-        if chosen:
-            self._scenario.set_options(options, value=chosen)
 
     def _choose_scenario(self, name: str | None) -> None:
         """Shows the form of another scenario."""

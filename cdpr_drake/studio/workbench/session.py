@@ -52,7 +52,6 @@ class Workbench:
         problem: Why there is no answer, which is a mistake of this program; None: there is one.
         answered: Called when there is another answer or problem.
         scenario: Name or path of the scenario that is worked with; empty: none was chosen.
-        scenario_chosen: Called when there is another one.
         panel: Name of the panel that was shown last.
         dark: Whether the page is dark; None: as the browser likes it.
         jobs: Work in processes of its own, the same for all sessions of a server.
@@ -90,7 +89,7 @@ class Workbench:
         self.answer: PoseAnswer | None = None
         self.problem: BaseException | None = None
         self.answered = Signal()
-        self.scenario, self.scenario_chosen = scenario, Signal()
+        self.scenario = scenario
         self.panel = ""
         self.dark: bool | None = None
         self.jobs = JobManager() if jobs is None else jobs
@@ -176,11 +175,6 @@ class Workbench:
         self.folder.write(name, text, overwrite or name == self.file)
         self._saved[path] = text
         self.robot.belongs_to(path)
-
-    def choose_scenario(self, scenario: str) -> None:
-        """Works with another scenario from now on."""
-        self.scenario = scenario
-        self.scenario_chosen.emit()
 
     def go_home(self) -> None:
         """Puts the platform to the robot's home pose, without asking about it."""

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.simulation.run_stability import stability_along, stability_at
+from cdpr_drake.analyses.simulation.run_stability import run_criterion, stability_along
 from cdpr_drake.analyses.simulation.run_summary import summarize
 from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
 from cdpr_drake.errors import ScenarioError
@@ -92,19 +92,19 @@ def test_stability_along_a_run_is_that_at_its_poses(without):
     log, row = without.log, 40
     X, X_hat = (pose_from_row(log[name][row]) for name in ("X_WP", "X_WP_estimated"))
     taut = log["slack"][row] == 0.0
-    again = stability_at(without.servo, X, X_hat, taut, float(log["time"][row]))
+    again = run_criterion(without.servo).at(X, X_hat, taut, float(log["time"][row]))
     assert again == (along.rank[row], along.margin[row])
 
 
 def test_a_perfect_belief_has_the_margin_one():
     servo = build_visual_servo(load("perturbations.slack=null", "cables.pulleys=false"))
-    X_WP = servo.scenario.initial_pose.transform()
+    X_WP, criterion = servo.scenario.initial_pose.transform(), run_criterion(servo)
     for taut in (np.ones(8, bool), np.arange(8) != 3, np.arange(8) > 1):
-        rank, margin = stability_at(servo, X_WP, X_WP, taut)
+        rank, margin = criterion.at(X_WP, X_WP, taut, 0.0)
         assert rank == 6
         assert margin == pytest.approx(1.0, abs=1e-9)
-    assert stability_at(servo, X_WP, X_WP, np.arange(8) > 2) == (5, 0.0)
-    assert stability_at(servo, X_WP, X_WP, np.zeros(8, bool)) == (0, 0.0)
+    assert criterion.at(X_WP, X_WP, np.arange(8) > 2, 0.0) == (5, 0.0)
+    assert criterion.at(X_WP, X_WP, np.zeros(8, bool), 0.0) == (0, 0.0)
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,6 @@ from cdpr_drake.systems.sensors.depth_sensor import (
     DepthSensor,
     binned,
     depth_pinhole,
-    pixel_directions,
 )
 from cdpr_drake.systems.sensors.scene_shapes import SceneShapes
 from tests.systems.sensors.scenes import scene_of
@@ -60,7 +59,10 @@ def pictures():
     root = simulator.get_context()
     own = sensor.GetMyContextFromRoot(root)
     query = scene_graph.get_query_output_port().Eval(scene_graph.GetMyContextFromRoot(root))
-    rays = pixel_directions(pinhole)
+    u, v = np.meshgrid(np.arange(pinhole.width), np.arange(pinhole.height))
+    x, y = (u.ravel() - pinhole.cx) / pinhole.fx, (v.ravel() - pinhole.cy) / pinhole.fy
+    rays = np.column_stack([x, y, np.ones(u.size)])
+    rays /= np.linalg.norm(rays, axis=1)[:, None]
     distances, hits = SceneShapes().cast(
         query, X_WC.translation(), rays @ X_WC.rotation().matrix().T
     )
