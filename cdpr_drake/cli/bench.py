@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+import importlib.util
+from collections.abc import Callable
 from typing import Annotated
 
 import typer
 from rich.table import Table
 
-from cdpr_drake.analyses.benchmarks.groups import BENCH_GROUPS
 from cdpr_drake.analyses.reporting.timing import TimingRow
 from cdpr_drake.cli.completion import words_among
 from cdpr_drake.cli.options import AsJson
 from cdpr_drake.cli.terminal import message_console, print_json, wide_console
 from cdpr_drake.errors import CdprError
 from cdpr_drake.schema.typed_yaml import closest
+
+if importlib.util.find_spec("cdpr_drake.analyses.benchmarks") is None:  # as in a wheel
+    BENCH_GROUPS: dict[str, Callable[[bool], list[TimingRow]]] = {}
+else:
+    from cdpr_drake.analyses.benchmarks.groups import BENCH_GROUPS
 
 
 def bench(
@@ -26,7 +32,9 @@ def bench(
     quick: Annotated[bool, typer.Option(help="Time less, and nothing rendered.")] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Times what matters, each against a baseline in the same run."""
+    """Times what matters, each against a baseline in the same run; needs a source checkout."""
+    if not BENCH_GROUPS:
+        raise CdprError("bench: found no benchmarks; accepted: an install from a source checkout")
     if group is not None and group not in BENCH_GROUPS:
         raise CdprError(f"benchmark {group!r} is unknown; {closest(group, BENCH_GROUPS)}")
     names = [group] if group is not None else list(BENCH_GROUPS)

@@ -297,12 +297,14 @@ def test_doctor(capsys):
     assert all(finding["passed"] for finding in json.loads(out))
 
 
-def test_bench(capsys):
+def test_bench(capsys, monkeypatch):
     code, out, _ = run(capsys, "bench", "tension", "--quick", "--json")
     assert code == 0
     names = [row["name"] for row in json.loads(out)["tension"]]
     assert "exact QP, one call" in names
     assert "unknown" in refuse(capsys, "bench", "foo")
+    monkeypatch.setattr("cdpr_drake.cli.bench.BENCH_GROUPS", {})  # as in a wheel
+    assert "source checkout" in refuse(capsys, "bench", "tension")
 
 
 def test_help_and_version(capsys):
