@@ -93,30 +93,15 @@ def design(
     Run again with the same arguments, it continues where it was stopped or killed.
     """
     formats = parse_formats(figure_format)
-    source = "design" if parameters is None else str(parameters)
-    settings = _plain() if parameters is None else load_design_settings(parameters)
     if quick and generations is None:
         generations = QUICK_GENERATIONS
-    for name, value in (
-        ("force", _positive("--force", force)), ("moment", _positive("--moment", moment)),
-        ("generations", generations), ("seed", seed),
-    ):  # fmt: skip
-        if value is not None:
-            setattr(settings, name, value)
-    if by is not None:
-        if by not in SEARCHES:
-            raise CdprError(f"--search: found {by!r}; accepted: {', '.join(SEARCHES)}")
-        settings.search = by
-    if goal:
-        settings.goals = [_goal(words) for words in goal]
-    if not settings.goals:
-        raise CdprError(f"--goal: found none; accepted: {', '.join(GOALS)}")
+    settings = _plain() if parameters is None else load_design_settings(parameters)
+    _apply(settings, goal, by, force=force, moment=moment, generations=generations, seed=seed)
     names = [one.name for one in settings.goals]
-    if len(set(names)) < len(names):
-        raise CdprError(f"--goal: found {', '.join(names)}; accepted: each once")
     loaded = load_robot(robot)
     if parameters is None and loaded.is_planar():
         settings.exit_points.reach = np.array([REACH, REACH, 0.0])
+    source = "design" if parameters is None else str(parameters)
     candidates = make_candidates(robot, settings, source)
     arguments = {"robot": candidates.text, "settings": repr(replace(settings, generations=1))}
     folder = out if out is not None else default_folder("design", loaded.name, arguments)
@@ -154,6 +139,15 @@ def design(
         result = DesignResult(loaded.name, search, tuple(confirmed))
         with working(console, "Writing results"):
             failed = result.write(folder, formats)
+    _print_result(result, folder, file, as_json)
+    code = say_failed(console, failed, shown_path(folder.resolve()), None)
+    if result.interrupted:
+        console.print("Interrupted; run again with the same arguments to continue")
+        return INTERRUPTED
+    return code
+
+
+def _print_result(result: DesignResult, folder: Path, file: Path | None, as_json: bool) -> None:
     if as_json:
         print_json(result.as_dict())
     else:
@@ -163,11 +157,6 @@ def design(
         if file is not None:
             printer.print(f"robot file: {shown_path(file.resolve())}")
         printer.print(f"results: {shown_path(folder.resolve())}")
-    code = say_failed(console, failed, shown_path(folder.resolve()), None)
-    if result.interrupted:
-        console.print("Interrupted; run again with the same arguments to continue")
-        return INTERRUPTED
-    return code
 
 
 def _plain() -> DesignSettings:
@@ -177,10 +166,31 @@ def _plain() -> DesignSettings:
     return settings
 
 
-def _positive(option: str, value: float | None) -> float | None:
+def _apply(
+    settings: DesignSettings, goals: list[str] | None, by: str | None, **numbers: float | None
+) -> None:
+    """Puts options in the place of a file's settings; None leaves what it says."""
+    for name in ("force", "moment"):
+        _check_positive(f"--{name}", numbers[name])
+    for name, value in numbers.items():
+        if value is not None:
+            setattr(settings, name, value)
+    if by is not None:
+        if by not in SEARCHES:
+            raise CdprError(f"--search: found {by!r}; accepted: {', '.join(SEARCHES)}")
+        settings.search = by
+    if goals:
+        settings.goals = [_goal(words) for words in goals]
+    if not settings.goals:
+        raise CdprError(f"--goal: found none; accepted: {', '.join(GOALS)}")
+    names = [one.name for one in settings.goals]
+    if len(set(names)) < len(names):
+        raise CdprError(f"--goal: found {', '.join(names)}; accepted: each once")
+
+
+def _check_positive(option: str, value: float | None) -> None:
     if value is not None and not (math.isfinite(value) and value >= 0.0):
         raise CdprError(f"{option}: found {value:g}; accepted: >= 0")
-    return value
 
 
 def _goal(words: str) -> GoalSettings:
