@@ -9,44 +9,9 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.servoing import servo_law
 from cdpr_drake.servoing.packed_features_kernel import feature_kernel
-from cdpr_drake.servoing.servo_law import (
-    AHEAD,
-    AXIS_GAIN,
-    BEGUN,
-    BOUND_RATIO,
-    CABLE_SPEED,
-    DWELL,
-    EDGE_DISTANCE,
-    EDGE_GAIN,
-    FEATURES,
-    FIRST_MODE,
-    GAIN_AT_INFINITY,
-    GAIN_AT_ZERO,
-    GAIN_SLOPE,
-    GOAL,
-    GOALS,
-    IMAGE_BOUND,
-    IN_BASE_FRAME,
-    KIND,
-    LAW_SIZE,
-    MODE,
-    MODES,
-    OF_POSE,
-    PARTITIONED,
-    POSE_BOUND,
-    SIGMA,
-    SIGN,
-    SWITCH,
-    SWITCHES,
-    SWITCHING,
-    WHOLE,
-    X_LOWEST,
-    Y_HIGHEST,
-    YAW_ANGLE,
-    YAW_GAIN,
-    ServoLaw,
-)
+from cdpr_drake.servoing.servo_law import ServoLaw
 from cdpr_drake.servoing.servo_step_kernel import (
     look_and_step_at,
     servo_step,
@@ -128,7 +93,8 @@ class ServoController:
             "twist": 6,  # V_C of the step before
             "before": 6,  # V_0
             "toward": 6,  # -U_0 / lambda_0
-            "switch": FEATURES - SWITCH,  # of a switching servo, see `servo_law.MODE`
+            # Of a switching servo, see `servo_law.MODE`.
+            "switch": servo_law.FEATURES - servo_law.SWITCH,
             "features": k,  # s of the step before
             "own_rate": k,  # L V_C of the step before
             "plan": 3,  # when the plan began, its t_full, waypoints passed before it
@@ -144,7 +110,7 @@ class ServoController:
             for (name, size), end in zip(sizes.items(), ends, strict=True)
         }
         self.memory_size = int(ends[-1])
-        assert self._at["features"].start == FEATURES
+        assert self._at["features"].start == servo_law.FEATURES
         self._motions = np.array(robot.motions)
         self._law = self._packed_law()
         self._begins = np.array([task.begins for task in self.tasks])
@@ -175,32 +141,37 @@ class ServoController:
 
     def _packed_law(self) -> Array:
         """The law as `servo_step` takes it."""
-        law, packed = self.law, np.full(LAW_SIZE, np.nan)
-        packed[GAIN_AT_ZERO] = law.gain.at_zero
-        packed[GAIN_AT_INFINITY] = law.gain.at_infinity
-        packed[GAIN_SLOPE] = law.gain.slope
+        law, packed = self.law, np.full(servo_law.LAW_SIZE, np.nan)
+        packed[servo_law.GAIN_AT_ZERO] = law.gain.at_zero
+        packed[servo_law.GAIN_AT_INFINITY] = law.gain.at_infinity
+        packed[servo_law.GAIN_SLOPE] = law.gain.slope
         if law.sigma is not None:
-            packed[SIGMA] = law.sigma
+            packed[servo_law.SIGMA] = law.sigma
         if law.yaw is not None:
-            packed[YAW_GAIN], packed[YAW_ANGLE] = law.yaw.gain, law.yaw.angle
-        packed[IN_BASE_FRAME] = float(law.frame == "base")
-        packed[CABLE_SPEED] = self.robot.cable_speed
-        packed[SIGN] = -1.0 if self.mounting.is_eye_to_hand() else 1.0
-        packed[KIND] = WHOLE
+            packed[servo_law.YAW_GAIN], packed[servo_law.YAW_ANGLE] = law.yaw.gain, law.yaw.angle
+        packed[servo_law.IN_BASE_FRAME] = float(law.frame == "base")
+        packed[servo_law.CABLE_SPEED] = self.robot.cable_speed
+        packed[servo_law.SIGN] = -1.0 if self.mounting.is_eye_to_hand() else 1.0
+        packed[servo_law.KIND] = servo_law.WHOLE
         partition, switching = law.partition, law.switching
         if partition is not None:
-            packed[KIND], packed[AXIS_GAIN] = PARTITIONED, partition.axis_gain
-            packed[GOAL] = GOALS.index(partition.goal)
+            packed[servo_law.KIND] = servo_law.PARTITIONED
+            packed[servo_law.AXIS_GAIN] = partition.axis_gain
+            packed[servo_law.GOAL] = servo_law.GOALS.index(partition.goal)
             if partition.field is not None:
-                packed[EDGE_GAIN] = partition.field.gain
-                packed[EDGE_DISTANCE] = partition.field.distance
-                packed[X_LOWEST : Y_HIGHEST + 1] = partition.field.edges
+                packed[servo_law.EDGE_GAIN] = partition.field.gain
+                packed[servo_law.EDGE_DISTANCE] = partition.field.distance
+                packed[servo_law.X_LOWEST : servo_law.Y_HIGHEST + 1] = partition.field.edges
         elif switching is not None:
-            packed[KIND], packed[FIRST_MODE] = SWITCHING, MODES.index(switching.first)
+            packed[servo_law.KIND] = servo_law.SWITCHING
+            packed[servo_law.FIRST_MODE] = servo_law.MODES.index(switching.first)
             bounds = (switching.pose_bound, switching.image_bound)
-            packed[POSE_BOUND : IMAGE_BOUND + 1] = [np.nan if b is None else b for b in bounds]
-            packed[BOUND_RATIO], packed[DWELL] = switching.bound_ratio, switching.dwell
-            packed[AHEAD] = self._period
+            packed[servo_law.POSE_BOUND : servo_law.IMAGE_BOUND + 1] = [
+                np.nan if b is None else b for b in bounds
+            ]
+            packed[servo_law.BOUND_RATIO] = switching.bound_ratio
+            packed[servo_law.DWELL] = switching.dwell
+            packed[servo_law.AHEAD] = self._period
         return packed
 
     def fresh_memory(self) -> Array:
@@ -214,7 +185,7 @@ class ServoController:
         """Memory after a step without the object: the platform rests, the task begins anew."""
         fresh = self.fresh_memory()
         fresh[self._at["task"]] = memory[self._at["task"]]
-        fresh[SWITCHES] = memory[SWITCHES]
+        fresh[servo_law.SWITCHES] = memory[servo_law.SWITCHES]
         return fresh
 
     def step(
@@ -237,7 +208,7 @@ class ServoController:
         memory = np.array(memory)
         task = self.tasks[task_at(self._begins, memory, time)]
         s, L = task.features.evaluate(seen)
-        first = bool(memory[BEGUN] < 0.0)
+        first = bool(memory[servo_law.BEGUN] < 0.0)
         reference = np.empty((3, self.size))
         reference[2] = self._drift(memory, s, first)
         reference[0], reference[1] = self._reference(memory, task, s, time, first)
@@ -324,4 +295,6 @@ class ServoController:
     def mode(self, memory: Array) -> Array:
         """What a switching servo does: number in `MODES` of the features that act, switches since
         the run began, L_P and L_I of the last step and their bounds; shape (6,)."""
-        return memory[[MODE, SWITCHES, *range(OF_POSE, FEATURES)]]
+        return memory[
+            [servo_law.MODE, servo_law.SWITCHES, *range(servo_law.OF_POSE, servo_law.FEATURES)]
+        ]
