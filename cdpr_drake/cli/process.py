@@ -17,7 +17,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from types import FrameType
 
-from cdpr_drake.kernel_cache.beside import compile_beside
+from cdpr_drake.kernel_cache.background import compile_in_background
 
 INTERRUPTED = 130
 """Exit code of what Ctrl-C or SIGTERM ended, as shells have it for the former."""
@@ -134,4 +134,4 @@ def compile_ahead(words: Sequence[str]) -> int:
     if command not in SIMULATIONS or any(word in QUIET for word in words):
         return 0
     compiled = "--seeds" in words or any(word.startswith("integration.") for word in words)
-    return compile_beside([DEFAULT, COMPILED] if compiled else [DEFAULT])
+    return compile_in_background([DEFAULT, COMPILED] if compiled else [DEFAULT])

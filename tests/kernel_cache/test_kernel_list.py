@@ -53,7 +53,9 @@ def test_what_a_group_needs_calls_what_it_needs():
 )
 def test_a_command_asks_for_what_it_needs(line, groups, monkeypatch):
     asked = [None]
-    monkeypatch.setattr(first_use, "compile_beside", lambda *given: asked.append(list(given[0])))
+    monkeypatch.setattr(
+        first_use, "compile_in_background", lambda *given: asked.append(list(given[0]))
+    )
     first_use.compile_ahead(line.split())
     assert asked[-1] == groups
     assert set(groups or []) <= set(group_names())

@@ -24,7 +24,7 @@ LONGEST_END = 5.0
 """A process that compiles is killed if it has not ended by itself after so long [s]."""
 
 
-def compile_beside(groups: Collection[str], most: int = MOST) -> int:
+def compile_in_background(groups: Collection[str], most: int = MOST) -> int:
     """Starts processes that compile the kernels of some groups into the cache folder.
 
     Nothing is started where all are there, where this process may use one processor only, or where
