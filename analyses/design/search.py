@@ -14,11 +14,11 @@ from cdpr_drake.analyses.design.evolution import EvolutionSearch, default_popula
 from cdpr_drake.analyses.design.goals import Judging, judged
 from cdpr_drake.analyses.design.maximin import SLOPES, Slopes, SlopeSearch
 from cdpr_drake.analyses.design.settings import BY_SLOPES, DesignSettings, PosesSettings
-from cdpr_drake.analyses.reporting.progress import ALONE, StudySession, WorkProgress
+from cdpr_drake.analyses.reporting.progress import DEFAULT_STUDY_SESSION, StudySession, WorkProgress
 from cdpr_drake.analyses.reporting.provenance import code_version
 from cdpr_drake.analyses.sweeps.folder import SweepFolder
 from cdpr_drake.analyses.sweeps.sweep import STARTING, run_sweep
-from cdpr_drake.analyses.sweeps.worker_pool import StandingPool
+from cdpr_drake.analyses.sweeps.worker_pool import PersistentPool
 from cdpr_drake.analyses.workspaces.pose_grid import plain
 from cdpr_drake.analyses.workspaces.stability_defaults import workspace_defaults
 from cdpr_drake.arrays import Array
@@ -156,7 +156,7 @@ def search_design(
     robot: Robot | str,
     candidates: Candidates,
     settings: DesignSettings,
-    session: StudySession = ALONE,
+    session: StudySession = DEFAULT_STUDY_SESSION,
 ) -> DesignSearch:
     """Searches the best design of each set of cables by CMA-ES.
 
@@ -185,7 +185,7 @@ def search_design(
     if session.folder is not None:
         folder = SweepFolder(session.folder, search_arguments(candidates, settings, judging))
     # Each generation is a sweep of its own, for which no process shall be started anew.
-    with StandingPool(session.workers or 1) as pool:
+    with PersistentPool(session.workers or 1) as pool:
         record = _Record(session, lambda values: scores_of(values, original, settings), total, pool)
         for number in range(len(candidates.kept)):
             task = DesignTask(candidates, number, np.zeros((0, 0)), names, judging)
@@ -276,7 +276,7 @@ class _Record:
         session: StudySession,
         score: Callable[[Array], Array],
         total: int,
-        pool: StandingPool,
+        pool: PersistentPool,
     ) -> None:
         self.sets: list[int] = []
         self.designs: list[Array] = []

@@ -26,7 +26,7 @@ from cdpr_drake.errors import ScenarioError
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.summaries import Summarized
 from cdpr_drake.systems.diagrams.load import load_scenario
-from cdpr_drake.systems.loops.loop_choice import with_loop
+from cdpr_drake.systems.loops.loop_choice import set_loop
 from cdpr_drake.systems.scenarios.run_settings import ScenarioHeader
 
 if TYPE_CHECKING:
@@ -165,7 +165,7 @@ def simulate(
         raise ScenarioError(f"seeds: found with a {loaded.kind}; accepted: visual servos")
     if seeds is not None and (not seeds or len(set(seeds)) < len(seeds)):
         raise ScenarioError(f"seeds: found {list(seeds)}; accepted: different numbers, at least 1")
-    loaded, _ = with_loop(loaded, seeds is not None)
+    loaded, _ = set_loop(loaded, seeds is not None)
     check_connected(loaded, None)
     kind.check(loaded)
     where = None if folder is None else Path(folder)

@@ -19,7 +19,7 @@ from cdpr_drake.analyses.simulation.run_loop import (
     fixed_step_simulator,
     left_unfinished,
 )
-from cdpr_drake.analyses.simulation.session import UNWATCHED, RunSession
+from cdpr_drake.analyses.simulation.session import DEFAULT_SESSION, RunSession
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CableGeometryError
 from cdpr_drake.geometry.poses import pose_error
@@ -59,7 +59,7 @@ def make_simulator(built: PickAndPlace, context: Context) -> Simulator:
 
 
 def run_pick_and_place(
-    scenario: PickAndPlaceScenario, session: RunSession = UNWATCHED, **how: Any
+    scenario: PickAndPlaceScenario, session: RunSession = DEFAULT_SESSION, **how: Any
 ) -> PickAndPlaceRun:
     """Simulates a scenario until the box is set down, or the task has failed.
 

@@ -23,7 +23,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from rich.table import Table
 
-from cdpr_drake.analyses.reporting.progress import ALONE, StudySession
+from cdpr_drake.analyses.reporting.progress import DEFAULT_STUDY_SESSION, StudySession
 from cdpr_drake.analyses.reporting.provenance import package_versions
 from cdpr_drake.analyses.reporting.statements import Statement, new_table, verdict
 from cdpr_drake.analyses.simulation.pick_and_place_run import PickAndPlaceRun, run_pick_and_place
@@ -293,7 +293,9 @@ def set_down_figure(study: PickAndPlaceStudy) -> Figure:
     return figure
 
 
-def study_pick_and_place(quick: bool = False, session: StudySession = ALONE) -> PickAndPlaceStudy:
+def study_pick_and_place(
+    quick: bool = False, session: StudySession = DEFAULT_STUDY_SESSION
+) -> PickAndPlaceStudy:
     """Runs the study; each run is an item of a sweep.
 
     Args:

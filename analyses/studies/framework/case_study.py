@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from rich.table import Table
 
 from cdpr_drake.analyses.reporting.log_files import finite
-from cdpr_drake.analyses.reporting.progress import ALONE, StudySession, WorkProgress
+from cdpr_drake.analyses.reporting.progress import DEFAULT_STUDY_SESSION, StudySession, WorkProgress
 from cdpr_drake.analyses.reporting.provenance import package_versions
 from cdpr_drake.analyses.reporting.statements import Statement, judged_statements
 from cdpr_drake.analyses.studies.framework.case_definition import CaseStudy
@@ -95,7 +95,7 @@ class CaseResult(DrawnStudy):
 def run_case_study(
     case: CaseStudy,
     quick: bool = False,
-    session: StudySession = ALONE,
+    session: StudySession = DEFAULT_STUDY_SESSION,
 ) -> CaseResult:
     """Runs a case study in parallel processes.
 

@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from rich.table import Table
 
-from cdpr_drake.analyses.reporting.progress import ALONE, StudySession
+from cdpr_drake.analyses.reporting.progress import DEFAULT_STUDY_SESSION, StudySession
 from cdpr_drake.analyses.reporting.statements import Statement, judged_statements, new_table
 from cdpr_drake.analyses.studies.framework.seeded_study import SeededStudy
 from cdpr_drake.analyses.studies.fusion.configurations import (
@@ -137,7 +137,7 @@ class FusionStudy(SeededStudy):
         return {"fusion": partial(fusion_figure, self.found, shown)} if shown else {}
 
 
-def study_fusion(quick: bool = False, session: StudySession = ALONE) -> FusionStudy:
+def study_fusion(quick: bool = False, session: StudySession = DEFAULT_STUDY_SESSION) -> FusionStudy:
     """Runs all configurations over their seeds; each run is an item of a sweep.
 
     Args:

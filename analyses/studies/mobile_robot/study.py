@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from rich.table import Table
 
-from cdpr_drake.analyses.reporting.progress import ALONE, StudySession
+from cdpr_drake.analyses.reporting.progress import DEFAULT_STUDY_SESSION, StudySession
 from cdpr_drake.analyses.reporting.statements import new_table
 from cdpr_drake.analyses.studies.framework.seeded_study import SeededStudy
 from cdpr_drake.analyses.studies.mobile_robot.configurations import (
@@ -108,7 +108,9 @@ class MobileRobotStudy(SeededStudy):
         return mobile_robot_drawings(self.found, self.shown())
 
 
-def study_mobile_robot(quick: bool = False, session: StudySession = ALONE) -> MobileRobotStudy:
+def study_mobile_robot(
+    quick: bool = False, session: StudySession = DEFAULT_STUDY_SESSION
+) -> MobileRobotStudy:
     """Runs all configurations over their seeds; each run is an item of a sweep.
 
     Args:

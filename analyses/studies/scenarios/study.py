@@ -12,7 +12,12 @@ from rich.table import Table
 
 from cdpr_drake.analyses.reporting.deferred_figures import NothingToDraw
 from cdpr_drake.analyses.reporting.log_files import finite
-from cdpr_drake.analyses.reporting.progress import ALONE, StoppableStudy, StudySession, WorkProgress
+from cdpr_drake.analyses.reporting.progress import (
+    DEFAULT_STUDY_SESSION,
+    StoppableStudy,
+    StudySession,
+    WorkProgress,
+)
 from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
 from cdpr_drake.analyses.reporting.statements import (
     Statement,
@@ -171,7 +176,9 @@ def _row_label(one: Ending) -> str:
     return f"{one.name}: {one.outcome.replace('_', ' ')}{any_error}"
 
 
-def study_scenarios(quick: bool = False, session: StudySession = ALONE) -> ScenariosStudy:
+def study_scenarios(
+    quick: bool = False, session: StudySession = DEFAULT_STUDY_SESSION
+) -> ScenariosStudy:
     """Runs every scenario that comes with the package; each is an item of a sweep.
 
     Args:

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from rich.table import Table
 
-from cdpr_drake.analyses.reporting.progress import ALONE, StudySession
+from cdpr_drake.analyses.reporting.progress import DEFAULT_STUDY_SESSION, StudySession
 from cdpr_drake.analyses.reporting.provenance import package_versions
 from cdpr_drake.analyses.reporting.statements import new_table
 from cdpr_drake.analyses.studies.framework.seeded_study import SeededStudy, constants_of
@@ -160,7 +160,9 @@ def _median(values: Array) -> float:
         return float(np.nanmedian(values))
 
 
-def study_schemes(quick: bool = False, session: StudySession = ALONE) -> SchemesStudy:
+def study_schemes(
+    quick: bool = False, session: StudySession = DEFAULT_STUDY_SESSION
+) -> SchemesStudy:
     """Runs the study; each run is an item of a sweep.
 
     Args:

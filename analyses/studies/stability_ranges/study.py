@@ -9,7 +9,12 @@ from typing import Any
 from matplotlib.figure import Figure
 from rich.table import Table
 
-from cdpr_drake.analyses.reporting.progress import ALONE, StoppableStudy, StudySession, WorkProgress
+from cdpr_drake.analyses.reporting.progress import (
+    DEFAULT_STUDY_SESSION,
+    StoppableStudy,
+    StudySession,
+    WorkProgress,
+)
 from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
 from cdpr_drake.analyses.reporting.statements import Statement, judged_statements
 from cdpr_drake.analyses.studies.framework.seeded_study import DrawnStudy
@@ -91,7 +96,7 @@ def range_items(quick: bool) -> list[RangeItem]:
 
 def study_stability_ranges(
     quick: bool = False,
-    session: StudySession = ALONE,
+    session: StudySession = DEFAULT_STUDY_SESSION,
 ) -> StabilityRangesStudy:
     """Runs the study; each question is a task of a sweep.
 

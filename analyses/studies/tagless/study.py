@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from rich.table import Table
 
-from cdpr_drake.analyses.reporting.progress import ALONE, StudySession
+from cdpr_drake.analyses.reporting.progress import DEFAULT_STUDY_SESSION, StudySession
 from cdpr_drake.analyses.reporting.provenance import package_versions
 from cdpr_drake.analyses.reporting.statements import new_table
 from cdpr_drake.analyses.studies.framework.seeded_study import SeededStudy, constants_of
@@ -124,7 +124,9 @@ class TaglessStudy(SeededStudy):
         )  # fmt: skip
 
 
-def study_tagless(quick: bool = False, session: StudySession = ALONE) -> TaglessStudy:
+def study_tagless(
+    quick: bool = False, session: StudySession = DEFAULT_STUDY_SESSION
+) -> TaglessStudy:
     """Runs the study; each run is an item of a sweep.
 
     Args:

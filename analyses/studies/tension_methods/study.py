@@ -9,7 +9,12 @@ from typing import Any
 from matplotlib.figure import Figure
 from rich.table import Table
 
-from cdpr_drake.analyses.reporting.progress import ALONE, StoppableStudy, StudySession, WorkProgress
+from cdpr_drake.analyses.reporting.progress import (
+    DEFAULT_STUDY_SESSION,
+    StoppableStudy,
+    StudySession,
+    WorkProgress,
+)
 from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
 from cdpr_drake.analyses.reporting.statements import Statement
 from cdpr_drake.analyses.statics.tension_query import applicable_methods
@@ -86,7 +91,9 @@ class TensionStudy(DrawnStudy, StoppableStudy):
         return study_drawings(self.runs, self.coverage)
 
 
-def study_tension_methods(quick: bool = False, session: StudySession = ALONE) -> TensionStudy:
+def study_tension_methods(
+    quick: bool = False, session: StudySession = DEFAULT_STUDY_SESSION
+) -> TensionStudy:
     """Runs the study; each run, and each method on a grid of poses, is an item of a sweep.
 
     Args:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 from nicegui import ui
 
-from cdpr_drake.studio.panels.panel import quietly
+from cdpr_drake.studio.panels.panel import show_errors
 from cdpr_drake.studio.workbench.command_board import CommandBoard, Computed
 from cdpr_drake.studio.workbench.job import JobState
 
@@ -89,7 +89,7 @@ class JobBar:
 
     def _ask_to_go_on(self) -> None:
         computed = self.computed
-        with quietly():
+        with show_errors():
             if computed is not None:
                 self._board.go_on(computed)
                 self.refresh()

@@ -1,6 +1,6 @@
 """What a panel is, how it connects to a workbench, and messages in the page.
 
-Errors are messages, too: whatever a handler raises, the server stays alive, see `quietly`.
+Errors are messages, too: whatever a handler raises, the server stays alive, see `show_errors`.
 """
 
 from __future__ import annotations
@@ -114,7 +114,7 @@ def shown(words: str, kind: str = "negative", *, stays: bool = False) -> None:
 
 
 @contextmanager
-def quietly() -> Iterator[None]:
+def show_errors() -> Iterator[None]:
     """Shows what the block raises as a message in the page, and goes on.
 
     Mistakes of this program are shown, too, and logged with their traceback.

@@ -12,7 +12,7 @@ from nicegui import events, ui
 
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models.robot_loader import robot_names
-from cdpr_drake.studio.panels.panel import message, quietly, shown
+from cdpr_drake.studio.panels.panel import message, show_errors, shown
 from cdpr_drake.studio.workbench.robot_files import (
     LARGEST_UPLOAD,
     MOST_UPLOADS,
@@ -81,7 +81,7 @@ def open_dialog(bench: Workbench) -> None:
             def action() -> None:
                 tell_opened(bench.upload(content))
 
-            with quietly():
+            with show_errors():
                 if _attempt(said, action):
                     dialog.close()
                 else:

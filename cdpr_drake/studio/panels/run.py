@@ -16,7 +16,7 @@ from cdpr_drake.errors import CdprError
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.studio.panels.live_bar import SteeringBar
-from cdpr_drake.studio.panels.panel import on_page, quietly, robot_argument
+from cdpr_drake.studio.panels.panel import on_page, robot_argument, show_errors
 from cdpr_drake.studio.panels.run_watch import RUN_STYLE, RunWatch
 from cdpr_drake.studio.panels.scenario_form import ScenarioForm
 from cdpr_drake.studio.workbench.finished_run import zipped
@@ -209,7 +209,7 @@ class RunPanel:
             return
         self._body.clear()
         self._form = None
-        with self._body, quietly():
+        with self._body, show_errors():
             known = name in scenario_names()
             draft = self._board.choose(name if known else str(self._bench.folder.path(name)))
             self._form = ScenarioForm(draft)
@@ -238,14 +238,14 @@ class RunPanel:
         self._own.set_visibility(bool(own))
 
     def _open_own_robot(self) -> None:
-        with quietly():
+        with show_errors():
             if self._board.draft is not None:
                 self._bench.open(self._board.draft.own_robot)
 
     async def _start(self) -> None:
         if self._form is None or not await self._form.check():
             return
-        with quietly():
+        with show_errors():
             self._take_robot()
             if self._board.draft is not None and ROBOT in self._board.draft.changes:
                 robot_argument(self._bench)  # says why there is none
@@ -268,24 +268,24 @@ class RunPanel:
     def _recover_run(self) -> None:
         job = self._watch.job
         if job is not None:
-            with quietly():
+            with show_errors():
                 self._board.recover(job)
 
     async def _send_all(self) -> None:
         shown = self._watch.shown
         if shown is None:
             return
-        with quietly():
+        with show_errors():
             data = await run.io_bound(_packed, shown.folder)
             if data is not None:
                 ui.download(data, f"{shown.folder.name}.zip", "application/zip")
 
     def _tick(self) -> None:
-        with quietly():
+        with show_errors():
             self._watch.tick()
 
     async def _slow_tick(self) -> None:
-        with quietly():
+        with show_errors():
             self._refresh_runs()
             await self._watch.load_finished()
             self._watch.follow_cursor()

@@ -12,7 +12,7 @@ from typing import Any
 from nicegui import run, ui
 
 from cdpr_drake.studio.panels.moving_plots import MovingPlots, Row
-from cdpr_drake.studio.panels.panel import quietly
+from cdpr_drake.studio.panels.panel import show_errors
 from cdpr_drake.studio.workbench.finished_run import FinishedRun, is_run
 from cdpr_drake.studio.workbench.job import JobState, Listener
 from cdpr_drake.studio.workbench.plot_rows import charts_of, plot_row
@@ -142,7 +142,7 @@ class RunWatch:
         if (shown.job is not None and not shown.job.state.is_over) or not is_run(shown.folder):
             return
         self._loading = True
-        with quietly():
+        with show_errors():
             done = await run.io_bound(self._board.finished, shown.folder)
             if shown is self._shown and done is not None:
                 self._take_finished(done)
@@ -216,7 +216,7 @@ class RunWatch:
 
     async def compare(self, other: Shown | None) -> None:
         """Shows another run behind this one; None: that ends."""
-        with quietly():
+        with show_errors():
             self._others = ([], "")
             if other is not None:
                 done = await run.io_bound(self._board.finished, other.folder)

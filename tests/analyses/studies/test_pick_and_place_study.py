@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.reporting.progress import ALONE
+from cdpr_drake.analyses.reporting.progress import DEFAULT_STUDY_SESSION
 from cdpr_drake.analyses.reporting.statements import CONFIRMED, NOT_CONFIRMED, judged_statements
 from cdpr_drake.analyses.studies.catalogue import STUDIES
 from cdpr_drake.analyses.studies.pick_and_place import (
@@ -77,7 +77,7 @@ def test_it_runs_its_seeds_and_writes_numbers_and_a_figure(monkeypatch, tmp_path
         return BLIND if trial.condition == "one camera" else row(1e-3 * (1 + seed))
 
     monkeypatch.setattr(HandlingTrial, "row", made_up)
-    study = study_pick_and_place(True, ALONE)
+    study = study_pick_and_place(True, DEFAULT_STUDY_SESSION)
     assert not study.interrupted
     study.write(tmp_path)
     told = json.loads((tmp_path / "results.json").read_text(encoding="utf-8"))
