@@ -34,9 +34,9 @@ from cdpr_drake.analyses.studies.catalogue import STUDIES, StudyEntry
 from cdpr_drake.analyses.workspaces.stability_question import make_question
 from cdpr_drake.analyses.workspaces.stability_results import stability_workspaces
 from cdpr_drake.analyses.workspaces.workspace_question import (
-    Asked,
+    WorkspaceRequest,
+    interference_bodies,
     make_workspace_question,
-    surroundings,
 )
 from cdpr_drake.analyses.workspaces.workspace_results import robot_workspace
 from cdpr_drake.geometry.cable_paths import cable_paths
@@ -265,8 +265,8 @@ def test_workspaces(planar):
     )
     question = make_workspace_question(
         "planar", ["wrench-feasible"], found.grid, ["capacity-margin"], "all",
-        Asked(
-            required=forces(2.0), pulleys=True, around=surroundings(planar, pulleys=True)
+        WorkspaceRequest(
+            required=forces(2.0), pulleys=True, around=interference_bodies(planar, pulleys=True)
         ),
     )  # fmt: skip
     expected = robot_workspace(question).workspace

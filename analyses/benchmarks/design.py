@@ -9,7 +9,7 @@ from cdpr_drake.analyses.design.candidates import make_candidates
 from cdpr_drake.analyses.design.settings import DesignSettings, GoalSettings
 from cdpr_drake.analyses.reporting.timing import TimingRow, interleaved, seconds_per_call
 from cdpr_drake.analyses.workspaces.conditions import ConditionsTask
-from cdpr_drake.analyses.workspaces.workspace_question import Asked, pose_conditions
+from cdpr_drake.analyses.workspaces.workspace_question import WorkspaceRequest, pose_conditions
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.statics.equilibrium_enumeration import all_rests
@@ -66,7 +66,7 @@ def judged_row(points: int, repeats: int) -> TimingRow:
     robot = load_robot(ROBOT)
     lower, upper = np.array([-0.4, -0.4, 0.05]), np.array([0.4, 0.4, 0.9])
     grid = grid_by_count(lower, upper, (points,) * 3)
-    asked = Asked(required=SpatialSet(box=np.array([0.0, 0.0, 0.0, 5.0, 5.0, 5.0])))
+    asked = WorkspaceRequest(required=SpatialSet(box=np.array([0.0, 0.0, 0.0, 5.0, 5.0, 5.0])))
     middle = np.full(candidates.size, 0.5)
     about = pose_conditions(robot, asked)
 

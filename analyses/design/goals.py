@@ -10,7 +10,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.analyses.workspaces.conditions import KINDS, MEASURES, ConditionsTask
 from cdpr_drake.analyses.workspaces.stability_question import stability_case
-from cdpr_drake.analyses.workspaces.workspace_question import Asked, pose_conditions
+from cdpr_drake.analyses.workspaces.workspace_question import WorkspaceRequest, pose_conditions
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.models import ELASTIC
 from cdpr_drake.errors import CdprError
@@ -73,7 +73,7 @@ class Goal:
 
 def _arrays(robot: Robot, judging: Judging, name: str) -> Array:
     """A kind (as 0 and 1) or measure at all poses of the grid."""
-    about = pose_conditions(robot, Asked(required=judging.required))
+    about = pose_conditions(robot, WorkspaceRequest(required=judging.required))
     kinds, measures = ((name,), ()) if name in KINDS else ((), (name,))
     task = ConditionsTask(about, judging.grid, kinds, measures)
     return np.asarray(task(0, judging.grid.size)[name], float)

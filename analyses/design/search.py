@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from cdpr_drake.analyses.design.candidates import Candidates
-from cdpr_drake.analyses.design.evolution import EvolutionSearch, default_population, undominated
+from cdpr_drake.analyses.design.evolution import EvolutionSearch, default_population, pareto_front
 from cdpr_drake.analyses.design.goals import Judging, judged
 from cdpr_drake.analyses.design.maximin import SLOPES, Slopes, SlopeSearch
 from cdpr_drake.analyses.design.settings import BY_SLOPES, DesignSettings, PosesSettings
@@ -89,7 +89,7 @@ class DesignSearch:
     @property
     def front(self) -> np.ndarray:
         """Numbers of the designs that no other one is better than in everything."""
-        return np.flatnonzero(undominated(self.values))
+        return np.flatnonzero(pareto_front(self.values))
 
     @property
     def interrupted(self) -> bool:

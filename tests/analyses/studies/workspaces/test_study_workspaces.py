@@ -208,7 +208,7 @@ def test_a_wrong_distance_is_noticed(monkeypatch):
 
 def test_least_squares_find_the_distances_of_drake_where_its_iterations_end():
     robot = load_robot("caroca")
-    around = distances.surroundings(robot)
+    around = distances.interference_bodies(robot)
     around = replace(around, radius=np.maximum(around.radius, 1e-4))
     position = np.array([0.3, -0.4, 1.2])
     theirs = distances.drake_clearances(around, position, np.eye(3))
