@@ -198,7 +198,7 @@ def compiled_simulator(method: str, step: float) -> Simulator:
     block = CompiledCableRobot(robot, rule=StepRule(method=method, max_step=step))
     simulator = Simulator(block)
     context = simulator.get_mutable_context()
-    block.hang(context, robot.home.transform())
+    block.set_at_equilibrium(context, robot.home.transform())
     block.GetInputPort("cable_velocities").FixValue(context, np.zeros(len(robot.cables)))
     simulator.Initialize()
     return simulator

@@ -101,7 +101,7 @@ class ConstantThreshold:
 
 
 @dataclass(frozen=True, eq=False)
-class AdaptiveGain:
+class AdaptiveCorrection:
     """(5.4): a gain that grows with the surplus over the believed cables, `gain` [1/(N s)]."""
 
     threshold: Array

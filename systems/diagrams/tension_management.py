@@ -17,7 +17,7 @@ from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.servoing.servo_task import BelievedRobot
 from cdpr_drake.systems.cameras.cable_camera import CableCamera
 from cdpr_drake.systems.controllers.correction_laws import (
-    AdaptiveGain,
+    AdaptiveCorrection,
     ConstantThreshold,
     CorrectionLaw,
     ExpectedLength,
@@ -156,7 +156,7 @@ def correction_law(
     if settings.kind == CONSTANT:
         return ConstantThreshold(threshold, gain)
     if settings.kind == ADAPTIVE:
-        return AdaptiveGain(threshold, settings.gain_per_length, cables)
+        return AdaptiveCorrection(threshold, settings.gain_per_length, cables)
     if settings.kind == BY_LENGTH:
         assert settings.highest is not None
         assert settings.shortest is not None

@@ -17,7 +17,7 @@ from cdpr_drake.models.robot_in_plant import pose_on_joint
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import rigid_platform
 from cdpr_drake.systems.loops.loop_state import Part, held
-from cdpr_drake.systems.robots.assembly import held_start
+from cdpr_drake.systems.robots.assembly import equilibrium_start
 from cdpr_drake.systems.robots.cable_forces import simulated_cables
 from cdpr_drake.systems.robots.compiled_cable_robot import winch_drive
 from cdpr_drake.systems.robots.compiled_step import (
@@ -94,11 +94,11 @@ class RobotMotion:
     def resting(
         self, X_WP: RigidTransform, slack: Array | None = None, at_rest: bool = False
     ) -> Array:
-        """State of platform and winches at rest at a pose [m], shape (n,), as `CableRobot.hang`.
+        """State of platform and winches at rest at a pose [m], shape (n,), as `CableRobot.set_at_equilibrium`.
 
         Raises as that does.
         """
-        X_WP, holding = held_start(
+        X_WP, holding = equilibrium_start(
             self.robot, self._set, self._model, X_WP, slack=slack, at_rest=at_rest
         )
         return resting_state(

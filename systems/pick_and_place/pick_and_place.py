@@ -98,7 +98,7 @@ class PickAndPlace:
         """
         context = self.diagram.CreateDefaultContext()
         own = self.block.GetMyMutableContextFromRoot(context)
-        self.block.hang(own, self.scenario.initial_pose.transform())
+        self.block.set_at_equilibrium(own, self.scenario.initial_pose.transform())
         plant_context = self.block.plant.GetMyMutableContextFromRoot(context)
         self.block.plant.SetFreeBodyPose(plant_context, self.box, self.X_WB)
         return context

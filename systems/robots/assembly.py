@@ -119,19 +119,21 @@ class CableRobotPorts:
         """The output of that name."""
         return self.outputs[port_name]
 
-    def hang(
+    def set_at_equilibrium(
         self,
         context: Context,
         X_WP: RigidTransform,
         slack: Array | None = None,
         at_rest: bool = False,
     ) -> Array:
-        """As `CableRobot.hang`, from the root context of the diagram that was built."""
+        """As `CableRobot.set_at_equilibrium`, from the root context of the diagram that was built."""
         plant_context = self.plant.GetMyMutableContextFromRoot(context)
         winch_context = self.winches.GetMyMutableContextFromRoot(context)
         cables, model = self.forces.cable_set(), self.forces.model()
-        X_WP, holding = held_start(self.robot, cables, model, X_WP, slack=slack, at_rest=at_rest)
-        return hang_robot(self, plant_context, winch_context, X_WP, holding)
+        X_WP, holding = equilibrium_start(
+            self.robot, cables, model, X_WP, slack=slack, at_rest=at_rest
+        )
+        return set_robot_at_equilibrium(self, plant_context, winch_context, X_WP, holding)
 
 
 def fill_scene(
@@ -234,7 +236,7 @@ def add_cable_robot(
     return CableRobotPorts(robot, in_plant, plant, scene_graph, forces, winch, inputs, outputs)
 
 
-def hang_robot(
+def set_robot_at_equilibrium(
     block: RobotBlock,
     plant_context: Context,
     winch_context: Context,
@@ -247,7 +249,7 @@ def hang_robot(
     return holding.tensions
 
 
-def held_start(
+def equilibrium_start(
     robot: Robot,
     cables: CableSet,
     model: str,
@@ -256,7 +258,7 @@ def held_start(
     slack: Array | None,
     at_rest: bool,
 ) -> tuple[RigidTransform, Holding]:
-    """Where a platform starts, and with which lengths and tensions; see `CableRobot.hang`.
+    """Where a platform starts, and with which lengths and tensions; see `CableRobot.set_at_equilibrium`.
 
     Args:
         robot: The robot.

@@ -150,7 +150,7 @@ def test_both_engines_move_it_alike():
         block = kind(ROBOT, HOW)
         simulator = Simulator(block)
         context = simulator.get_mutable_context()
-        block.hang(context, POSE)
+        block.set_at_equilibrium(context, POSE)
         block.GetInputPort("cable_velocities").FixValue(context, command)
         if kind is CableRobot:
             ResetIntegratorFromFlags(simulator, "runge_kutta3", 1e-4).set_fixed_step_mode(True)
@@ -167,7 +167,7 @@ def test_energy_stays_without_damping():
     block = CompiledCableRobot(ROBOT, free)
     simulator = Simulator(block)
     context = simulator.get_mutable_context()
-    block.hang(context, POSE)
+    block.set_at_equilibrium(context, POSE)
     block.GetInputPort("cable_velocities").FixValue(context, np.zeros(8))
     own = block.GetMutableSubsystemContext(block.motion, context)
     state = block.motion.state(own).copy()
@@ -184,7 +184,7 @@ def test_energy_stays_without_damping():
 def test_the_plant_is_differentiable():
     block = CableRobot(ROBOT, HOW)
     context = block.CreateDefaultContext()
-    block.hang(context, POSE)
+    block.set_at_equilibrium(context, POSE)
     port = block.GetInputPort("cable_velocities")
     port.FixValue(context, np.zeros(8))
     linear = Linearize(

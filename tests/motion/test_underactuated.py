@@ -126,7 +126,7 @@ def test_it_hangs_swings_and_keeps_its_energy(name, kind):
     simulator = Simulator(diagram)
     context, m = simulator.get_mutable_context(), len(robot.cables)
     diagram.GetInputPort("cable_velocities").FixValue(context, np.zeros(m))
-    diagram.hang(context, robot.home.transform())
+    diagram.set_at_equilibrium(context, robot.home.transform())
     X_WP = diagram.GetOutputPort("X_WP").Eval(context)
     cables = robot.cable_set().without_pulleys()
     l0 = cable_paths(robot.home.transform(), cables).lengths

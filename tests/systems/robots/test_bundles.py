@@ -70,7 +70,7 @@ def moved(kind, how, command, duration, step):
     block = kind(ROBOT, how)
     simulator = Simulator(block)
     context = simulator.get_mutable_context()
-    block.hang(context, HOME)
+    block.set_at_equilibrium(context, HOME)
     l0 = block.GetOutputPort("unstrained_lengths").Eval(context).copy()
     for index in range(block.num_input_ports()):
         port = block.get_input_port(index)
@@ -153,7 +153,7 @@ def test_a_motor_holds_all_cables_on_its_winch():
     block = CompiledCableRobot(ROBOT, settings("velocity"))
     simulator = Simulator(block)
     context = simulator.get_mutable_context()
-    tensions = block.hang(context, HOME)
+    tensions = block.set_at_equilibrium(context, HOME)
     block.GetInputPort("cable_velocities").FixValue(context, np.zeros(3))
     radius = ROBOT.drum().radii(6)[0]
     torques = value(block, context, "applied_torques")
