@@ -37,7 +37,7 @@ from cdpr_drake.palette import BOUND, look_of
 from cdpr_drake.systems.cameras.camera_settings import PROJECTED, RENDERED
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
-from cdpr_drake.systems.pick_and_place.handling_task import FAILURE_WORDS, Failure, Phase
+from cdpr_drake.systems.pick_and_place.pick_and_place_task import FAILURE_WORDS, Failure, Phase
 
 SCENARIO = "acrobot_pick_and_place"
 

@@ -16,8 +16,8 @@ from cdpr_drake.servoing.servo_task import CameraMounting
 from cdpr_drake.systems.cameras.camera_settings import PROJECTED
 from cdpr_drake.systems.cameras.scene_picture import SceneCamera
 from cdpr_drake.systems.cameras.target_measurement import TargetMeasurement
-from cdpr_drake.systems.pick_and_place.handling_machine import HandlingMachine
 from cdpr_drake.systems.pick_and_place.handling_step import camera_poses
+from cdpr_drake.systems.pick_and_place.pick_and_place_state_machine import PickAndPlaceStateMachine
 from cdpr_drake.systems.pick_and_place.tag_cameras import AttentiveDetector, AttentiveProjection
 from cdpr_drake.systems.pick_and_place.workpiece import tag_pose
 from cdpr_drake.systems.robots.cable_robot import CableRobot
@@ -60,7 +60,7 @@ def add_cameras(
     scenario: PickAndPlaceScenario,
     block: CableRobot,
     *,
-    machine: HandlingMachine,
+    machine: PickAndPlaceStateMachine,
     X_WG: RigidTransform,
 ) -> list[TargetMeasurement]:
     """Adds the cameras of box and goal, and connects them with the machine.

@@ -27,16 +27,19 @@ from cdpr_drake.systems.estimators.estimator_kinds import ESTIMATORS, EstimatorT
 from cdpr_drake.systems.monitoring.log_row import RunLog, add_log
 from cdpr_drake.systems.pick_and_place.cameras import add_cameras, pinholes
 from cdpr_drake.systems.pick_and_place.gripper import GripLaw, Gripper
-from cdpr_drake.systems.pick_and_place.handling_machine import HandlingMachine, X_CdV
 from cdpr_drake.systems.pick_and_place.handling_step import believed_robot, box_step, camera_poses
-from cdpr_drake.systems.pick_and_place.handling_task import (
-    GAP,
-    HandlingGeometry,
-    HandlingRules,
-    HandlingTask,
-    Phase,
+from cdpr_drake.systems.pick_and_place.pick_and_place_state_machine import (
+    PickAndPlaceStateMachine,
+    X_CdV,
 )
-from cdpr_drake.systems.pick_and_place.tag_cover import TagCover
+from cdpr_drake.systems.pick_and_place.pick_and_place_task import (
+    GAP,
+    Phase,
+    PickAndPlaceGeometry,
+    PickAndPlaceRules,
+    PickAndPlaceTask,
+)
+from cdpr_drake.systems.pick_and_place.tag_occlusion import TagOcclusion
 from cdpr_drake.systems.pick_and_place.workpiece import (
     INSTANCE,
     add_goal,
@@ -78,7 +81,7 @@ class PickAndPlace:
     diagram: Diagram
     block: CableRobot
     box: RigidBody
-    machine: HandlingMachine
+    machine: PickAndPlaceStateMachine
     gripper: Gripper
     X_WB: RigidTransform
     X_WG: RigidTransform
@@ -132,13 +135,13 @@ def grip_law(scenario: PickAndPlaceScenario) -> GripLaw:
     )
 
 
-def handling_task(scenario: PickAndPlaceScenario, robot: Robot) -> HandlingTask:
+def make_task(scenario: PickAndPlaceScenario, robot: Robot) -> PickAndPlaceTask:
     """The task with what the robot believes."""
     box, goal, rules = scenario.workpiece, scenario.goal, scenario.handling
     half = 0.5 * float(box.size[2])
     of_object, of_goal = camera_poses(scenario, robot, believed=True)
-    return HandlingTask(
-        HandlingGeometry(
+    return PickAndPlaceTask(
+        PickAndPlaceGeometry(
             X_BO=tag_pose(box.tag, half),
             X_BP=RigidTransform(np.array([0.0, 0.0, half + GAP]) - scenario.gripper.tip),
             X_GT=tag_pose(goal.tag, -half),
@@ -148,7 +151,7 @@ def handling_task(scenario: PickAndPlaceScenario, robot: Robot) -> HandlingTask:
             X_WG=goal.pose.transform(),
             weight=box.mass * (robot.gravity or FREE_FALL),
         ),
-        HandlingRules(
+        PickAndPlaceRules(
             hover=rules.hover,
             distance=rules.distance,
             angle=float(np.radians(rules.angle_deg)),
@@ -180,9 +183,9 @@ def build_pick_and_place(scenario: PickAndPlaceScenario) -> PickAndPlace:
     assert scene.box is not None
     assert scene.gripper is not None
     believed = believed_robot(scenario, robot)
-    task = handling_task(scenario, robot)
+    task = make_task(scenario, robot)
     machine = builder.AddNamedSystem(
-        "machine", HandlingMachine(task, believed.X_WP0, believed.X_PC)
+        "machine", PickAndPlaceStateMachine(task, believed.X_WP0, believed.X_PC)
     )
     cameras = add_cameras(builder, scenario, block, machine=machine, X_WG=X_WG)
     servo = _add_servo(builder, scenario, robot, believed, machine)
@@ -255,7 +258,7 @@ class _Scene:
             number = int(Phase[scenario.cover.phase.upper()])
             cover = builder.AddNamedSystem(
                 "cover",
-                TagCover(
+                TagOcclusion(
                     scene_graph, tag.size, number, scenario.cover.delay, scenario.cover.duration
                 ),
             )
@@ -302,7 +305,7 @@ def _add_servo(
     scenario: PickAndPlaceScenario,
     robot: Robot,
     believed: BelievedRobot,
-    machine: HandlingMachine,
+    machine: PickAndPlaceStateMachine,
 ) -> FeatureServo:
     """The visual servo, which looks at what the machine shows it."""
     own, target = scenario.handling, scenario.workpiece.tag.target()

@@ -17,7 +17,7 @@ from cdpr_drake.analyses.studies.pick_and_place import (
     within,
 )
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
-from cdpr_drake.systems.pick_and_place.handling_task import Failure, Phase
+from cdpr_drake.systems.pick_and_place.pick_and_place_task import Failure, Phase
 
 
 def row(distance=1e-3, angle_deg=0.5, failed_in=None, failure=Failure.NONE):

@@ -15,12 +15,12 @@ from pydrake.systems.framework import (
     LeafSystem,
 )
 
-from cdpr_drake.systems.pick_and_place.handling_task import (
+from cdpr_drake.systems.pick_and_place.pick_and_place_task import (
     CLOSED,
     LOOKS_AT_GOAL,
     LOOKS_AT_OBJECT,
-    HandlingState,
-    HandlingTask,
+    PickAndPlaceState,
+    PickAndPlaceTask,
     Reading,
 )
 
@@ -29,7 +29,7 @@ X_CdV = RigidTransform(RotationMatrix.MakeXRotation(np.pi), [0.0, 0.0, 0.1])
 does, since only what is apart of it counts."""
 
 
-class HandlingMachine(LeafSystem):
+class PickAndPlaceStateMachine(LeafSystem):
     """Tells the servo where to go, the cameras whether to look, and the gripper whether to close.
 
     ============ ============== ==== ==========================================================
@@ -56,7 +56,7 @@ class HandlingMachine(LeafSystem):
     was estimated then; where to go is said with the pose that is estimated now.
     """
 
-    def __init__(self, task: HandlingTask, X_WP0: RigidTransform, X_PC: RigidTransform) -> None:
+    def __init__(self, task: PickAndPlaceTask, X_WP0: RigidTransform, X_PC: RigidTransform) -> None:
         """For a task, the pose that is believed at time 0, and the camera of the servo [m]."""
         super().__init__()
         self.task, self._X_PC = task, X_PC
@@ -79,9 +79,9 @@ class HandlingMachine(LeafSystem):
         self.DeclareVectorOutputPort("looks", 2, self._calc_looks, state)
         self.DeclareVectorOutputPort("phase", 2, self._calc_phase, state)
 
-    def state(self, context: Context) -> HandlingState:
+    def state(self, context: Context) -> PickAndPlaceState:
         """Where the task stands, from this block's own context."""
-        return HandlingState.unpacked(context.get_discrete_state(self._memory).value())
+        return PickAndPlaceState.unpacked(context.get_discrete_state(self._memory).value())
 
     def _read(self, context: Context, name: str) -> Any:
         return self.GetInputPort(name).Eval(context)

@@ -17,7 +17,7 @@ from pydrake.geometry import (
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
 
-NAME = "tag_cover"
+NAME = "tag_occlusion"
 COVER_COLOR = np.array([0.25, 0.55, 0.35, 1.0])
 
 ABOVE = 4e-3
@@ -36,7 +36,7 @@ def cover_plate(size: float) -> tuple[Box, RigidTransform]:
     return Box(edge, edge, 1e-3), RigidTransform([0.0, 0.0, ABOVE])
 
 
-class TagCover(LeafSystem):
+class TagOcclusion(LeafSystem):
     """Lies above a tag from a while after a phase began, for a time.
 
     ============= =============== ==== ==================================================
