@@ -19,7 +19,7 @@ from cdpr_drake.models.robot_holding import check_bundles, hold_robot, rest_as_l
 from cdpr_drake.models.robot_in_plant import RobotInPlant, add_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.scene import add_frame, add_ground
-from cdpr_drake.statics.static_tensions import Holding
+from cdpr_drake.statics.static_tensions import StaticTensions
 from cdpr_drake.systems.robots.cable_forces import PORTS, CableForces
 from cdpr_drake.systems.robots.platform_pose import PlatformPose
 from cdpr_drake.systems.robots.settings import CableRobotSettings
@@ -241,7 +241,7 @@ def set_robot_at_equilibrium(
     plant_context: Context,
     winch_context: Context,
     X_WP: RigidTransform,
-    holding: Holding,
+    holding: StaticTensions,
 ) -> Array:
     """Puts a platform at a pose, at rest, with lengths and drum tensions; returns its tensions."""
     block.in_plant.set_pose(plant_context, X_WP)
@@ -257,7 +257,7 @@ def equilibrium_start(
     *,
     slack: Array | None,
     at_rest: bool,
-) -> tuple[RigidTransform, Holding]:
+) -> tuple[RigidTransform, StaticTensions]:
     """Where a platform starts, and with which lengths and tensions; see `CableRobot.set_at_equilibrium`.
 
     Args:
