@@ -11,7 +11,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from cdpr_drake.analyses.reporting.provenance import write_run_inputs
 from cdpr_drake.analyses.workspaces.workspace_question import interference_bodies
 from cdpr_drake.errors import RobotFileError
-from cdpr_drake.models.robot_exports import not_written
+from cdpr_drake.models.robot_exports import export_omissions
 from cdpr_drake.models.robot_in_plant import add_robot, platform_inertia
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.scene import add_frame
@@ -172,10 +172,10 @@ def test_a_mesh_that_encloses_nothing_has_no_inertia(tmp_path):
 
 def test_an_export_says_that_it_writes_the_box():
     robot = robot_of(content_with({"kind": "sphere", "radius": 0.1}))
-    lost = not_written(robot, "urdf")
+    lost = export_omissions(robot, "urdf")
     for key in ("kind", "radius"):
         assert lost[f"platform.shape.{key}"] == "the platform was written as its box"
-    assert "no place" in not_written(robot, "wcrfx")["platform.shape.kind"]
+    assert "no place" in export_omissions(robot, "wcrfx")["platform.shape.kind"]
 
 
 def test_the_folder_of_a_run_has_all_of_the_robot(tmp_path):
