@@ -22,9 +22,9 @@ from cdpr_drake.systems.controllers.correction_laws import (
     CorrectionLaw,
     ExpectedLength,
     FollowedDistribution,
+    ImageSlackRate,
     InsidePolygon,
     LengthThreshold,
-    SeenSlackRate,
 )
 from cdpr_drake.systems.controllers.tension_corrector import TensionCorrector
 from cdpr_drake.systems.controllers.tension_management_settings import (
@@ -181,7 +181,7 @@ def correction_law(
         )  # fmt: skip
     if settings.kind == IMAGE:
         mount = robot.camera_mount(settings.sight_mount)
-        return SeenSlackRate(
+        return ImageSlackRate(
             threshold, gain, cables,
             (mount.pose.transform(), _sight(robot, settings), settings.sight_noise),
             settings.allowance, settings.closing_time, settings.fastest or fastest,
