@@ -19,7 +19,7 @@ NOT_JUDGED = "not judged"
 NOT_IN_QUICK = "not judged in the quick form"
 """The runs that it needs are those of the full form."""
 
-Found = TypeVar("Found")
+StudyData = TypeVar("Found")
 Said = TypeVar("Said")
 
 
@@ -34,7 +34,7 @@ class Statement:
         verdict: CONFIRMED, IN_PART, NOT_CONFIRMED, NOT_TESTABLE, NOT_JUDGED or NOT_IN_QUICK.
         why: What is known of the difference; may be empty.
         name: That of its judge, by which tables of what was published find it; see
-            `judge_name`.
+            `name_of_check`.
     """
 
     words: str
@@ -60,24 +60,24 @@ def not_judged(judge: str, problem: Exception) -> Statement:
     return Statement(f"({judge})", "", f"judging failed: {words}", NOT_JUDGED)
 
 
-def judge_name(judge: Callable[..., object]) -> str:
+def name_of_check(judge: Callable[..., object]) -> str:
     """Name of a judge: that of its function, without the underscore of what a module keeps."""
     return str(getattr(judge, "__name__", type(judge).__name__)).lstrip("_")
 
 
-def judge_topic(judge: Callable[..., object]) -> str:
+def topic_of_check(judge: Callable[..., object]) -> str:
     """What a judge looks at, in words: the first line of its docstring; its name without one."""
     lines = (judge.__doc__ or "").strip().splitlines()
-    return lines[0] if lines else judge_name(judge).replace("_", " ")
+    return lines[0] if lines else name_of_check(judge).replace("_", " ")
 
 
-def judge_names(judges: Iterable[Callable[..., object]]) -> tuple[str, ...]:
-    """Names of judges, see `judge_name`."""
-    return tuple(map(judge_name, judges))
+def names_of_checks(judges: Iterable[Callable[..., object]]) -> tuple[str, ...]:
+    """Names of judges, see `name_of_check`."""
+    return tuple(map(name_of_check, judges))
 
 
-def judged_statements(
-    judges: Iterable[Callable[[Found], Statement]], found: Found, quick: bool = False
+def evaluate_checks(
+    judges: Iterable[Callable[[StudyData], Statement]], found: StudyData, quick: bool = False
 ) -> list[Statement]:
     """What judges say of what a study found, each statement with the name of its judge.
 
@@ -89,17 +89,17 @@ def judged_statements(
     """
     statements = []
     for judge in judges:
-        name = judge_name(judge)
+        name = name_of_check(judge)
         said = judged([judge], found, not_judged)
         if not said and quick:
-            said = [Statement(judge_topic(judge), "", "", NOT_IN_QUICK)]
+            said = [Statement(topic_of_check(judge), "", "", NOT_IN_QUICK)]
         statements += [replace(one, name=name) for one in said]
     return statements
 
 
 def judged(
-    judges: Iterable[Callable[[Found], Said]],
-    found: Found,
+    judges: Iterable[Callable[[StudyData], Said]],
+    found: StudyData,
     failed: Callable[[str, Exception], Said] | None = None,
 ) -> list[Said]:
     """What judges say of what was found.

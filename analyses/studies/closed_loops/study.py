@@ -22,7 +22,7 @@ from cdpr_drake.analyses.reporting.provenance import code_version, package_versi
 from cdpr_drake.analyses.reporting.statements import (
     NOT_TESTABLE,
     Statement,
-    judged_statements,
+    evaluate_checks,
     statement_table,
     verdict,
 )
@@ -153,7 +153,7 @@ class ClosedLoopStudy(DrawnStudy, StoppableStudy):
     @property
     def statements(self) -> list[Statement]:
         """What the criterion promises, judged."""
-        return judged_statements(JUDGES, self)
+        return evaluate_checks(CHECKS, self)
 
     def as_dict(self) -> dict[str, Any]:
         """Everything for JSON: parameters, versions, starts, summaries, statements."""
@@ -296,7 +296,7 @@ def managed(found: ClosedLoopStudy) -> Statement:
     )
 
 
-JUDGES = (reached, managed)
+CHECKS = (reached, managed)
 """Of the criterion, and of what it leaves out."""
 
 

@@ -20,7 +20,7 @@ from cdpr_drake.analyses.studies.mobile_robot.configurations import (
     configurations,
 )
 from cdpr_drake.analyses.studies.mobile_robot.figures import mobile_robot_drawings
-from cdpr_drake.analyses.studies.mobile_robot.judges import JUDGES
+from cdpr_drake.analyses.studies.mobile_robot.judges import CHECKS
 from cdpr_drake.analyses.studies.mobile_robot.laps import COLUMNS, SCENARIO, failed
 from cdpr_drake.analyses.studies.mobile_robot.statements import column, laps_words
 from cdpr_drake.analyses.sweeps.workers import SweepTask
@@ -50,7 +50,7 @@ class MobileRobotStudy(SeededStudy):
 
     name = "mobile-robot"
     source = "servoing thesis 2.3.7, 5.3.1"
-    judges = JUDGES
+    judges = CHECKS
     stated = "What the thesis states"
 
     def shown(self) -> list[Configuration]:
@@ -60,7 +60,7 @@ class MobileRobotStudy(SeededStudy):
     def details(self) -> dict[str, Any]:
         """Parameters, versions, the worst of all laps."""
         return {
-            **self.told_setup(SCENARIO, ASSUMPTIONS),
+            **self.setup_dict(SCENARIO, ASSUMPTIONS),
             "columns": list(COLUMNS),
             "configurations": [
                 {

@@ -18,8 +18,8 @@ from cdpr_drake.analyses.reporting.statements import new_table
 from cdpr_drake.analyses.studies.framework.seeded_study import SeededStudy, constants_of
 from cdpr_drake.analyses.studies.schemes import trials
 from cdpr_drake.analyses.studies.schemes.statements import (
+    CHECKS,
     FREE,
-    JUDGES,
     ROBOT,
     TURN,
     column,
@@ -54,7 +54,7 @@ class SchemesStudy(SeededStudy):
     """What the study found, by `task_name`; `seeds` are drawn starts."""
 
     name = "schemes"
-    judges = JUDGES
+    judges = CHECKS
     stated = "What is said of them"
 
     def details(self) -> dict[str, Any]:
@@ -64,7 +64,7 @@ class SchemesStudy(SeededStudy):
             "free_starts": [pose_row(X_CO).tolist() for X_CO in free_starts(self.seeds)],
             "robot_starts": robot_starts(self.seeds),
             "versions": package_versions(),
-            **self.told_runs(COLUMNS),
+            **self.runs_dict(COLUMNS),
         }
 
     def number_tables(self) -> list[Table]:

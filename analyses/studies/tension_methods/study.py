@@ -34,7 +34,7 @@ from cdpr_drake.analyses.studies.tension_methods.experiments import (
     make_plan,
 )
 from cdpr_drake.analyses.studies.tension_methods.figures import study_drawings
-from cdpr_drake.analyses.studies.tension_methods.statements import judge_statements
+from cdpr_drake.analyses.studies.tension_methods.statements import evaluate_statements
 from cdpr_drake.analyses.studies.tension_methods.tables import study_tables
 from cdpr_drake.analyses.studies.tension_methods.trial import STEP, TrialResult, TrialTask
 from cdpr_drake.analyses.sweeps.sweep import run_study_sweep
@@ -65,7 +65,7 @@ class TensionStudy(DrawnStudy, StoppableStudy):
     @property
     def statements(self) -> list[Statement]:
         """The thesis' statements that these runs judge."""
-        return judge_statements(self.runs, self.plan.quick and not self.interrupted)
+        return evaluate_statements(self.runs, self.plan.quick and not self.interrupted)
 
     def as_dict(self) -> dict[str, Any]:
         """Everything for JSON: parameters, versions, runs, coverage, statements."""

@@ -22,7 +22,7 @@ from cdpr_drake.analyses.studies.workspaces.items import (
     ZERO,
     kind_items,
 )
-from cdpr_drake.analyses.studies.workspaces.statements import JUDGES, workspace_statements
+from cdpr_drake.analyses.studies.workspaces.statements import CHECKS, workspace_statements
 from cdpr_drake.analyses.studies.workspaces.study import study_workspaces
 from cdpr_drake.analyses.studies.workspaces.tables import ALL, shares_of
 from cdpr_drake.analyses.workspaces.conditions import KINDS
@@ -112,7 +112,7 @@ def test_figures_take_the_upper_limit_of_the_robot_file(study):
 
 def test_cross_checks_hold(study):
     statements = workspace_statements(study.found, study.distances)
-    assert len(statements) == len(JUDGES)
+    assert len(statements) == len(CHECKS)
     for statement in statements[4:]:
         assert statement.verdict == CONFIRMED, statement.words
 
