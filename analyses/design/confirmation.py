@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from cdpr_drake.analyses.design.goals import GOALS, Judging, servo_stable
+from cdpr_drake.analyses.design.goals import GOALS, GoalContext, servo_stable
 from cdpr_drake.analyses.workspaces.box_certificates import box_search, certified_boxes
 from cdpr_drake.analyses.workspaces.workspace_question import (
     WorkspaceRequest,
@@ -77,7 +77,7 @@ def confirm(
     goal: str,
     original: str,
     design: str,
-    judging: Judging,
+    judging: GoalContext,
     *,
     boxes: int = BOXES,
     say: Callable[[str], object] | None = None,
@@ -127,7 +127,7 @@ def confirm(
     return Confirmation(goal, words, unit, volumes[0], volumes[1], opens[0], opens[1], finished)
 
 
-def _confirm_stability(original: str, design: str, judging: Judging) -> Confirmation:
+def _confirm_stability(original: str, design: str, judging: GoalContext) -> Confirmation:
     grid = between(judging.grid)
     shares = []
     for name in (original, design):

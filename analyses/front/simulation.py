@@ -18,7 +18,7 @@ from cdpr_drake.analyses.simulation.monte_carlo_report import (
     repetition_summary,
     write_repetitions,
 )
-from cdpr_drake.analyses.simulation.monte_carlo_store import KeptRuns
+from cdpr_drake.analyses.simulation.monte_carlo_store import StoredRuns
 from cdpr_drake.analyses.simulation.scenario_kinds import SCENARIO_KINDS, ScenarioKind
 from cdpr_drake.analyses.simulation.session import RunSession, check_connected
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
@@ -177,7 +177,7 @@ def simulate(
         with continued_folder(where, overwrite) as results:
             runs = run_many(
                 scenarios, workers, on_progress, should_stop, keep_traces=True,
-                kept=KeptRuns(results.path, loaded),
+                kept=StoredRuns(results.path, loaded),
             )  # fmt: skip
             told = write_repetitions(results.path, loaded, runs, load_robot(loaded.robot))
             where = results.publish()

@@ -77,7 +77,7 @@ class Ending(NamedTuple):
     formats: tuple[str, ...]
 
 
-class Told(NamedTuple):
+class CommandResults(NamedTuple):
     """What is told of results that are written: for JSON, for the terminal, as figures, and by an
     exit code where they are not what was asked for."""
 
@@ -87,7 +87,7 @@ class Told(NamedTuple):
     code: int = 0
 
 
-Work = Callable[[Path, Callable[[str], None]], Told]
+Work = Callable[[Path, Callable[[str], None]], CommandResults]
 """Writes results into the folder that it gets; may tell how far it is."""
 
 

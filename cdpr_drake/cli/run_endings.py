@@ -7,7 +7,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from cdpr_drake.analyses.reporting.left_folders import Kept, holds_log
+from cdpr_drake.analyses.reporting.left_folders import KeptFiles, holds_log
 from cdpr_drake.analyses.reporting.output_folder import ResultsFolder
 from cdpr_drake.analyses.reporting.progress import WorkProgress
 from cdpr_drake.cli.process import INTERRUPTED, StopRequest
@@ -51,7 +51,7 @@ NAMED = 3
 """So many files that are kept are named."""
 
 
-def report_kept_files(console: Console, kept: Iterable[Kept]) -> None:
+def report_kept_files(console: Console, kept: Iterable[KeptFiles]) -> None:
     """Says which files of a folder whose results were replaced are not of this program, and where
     they are."""
     for names, folder in kept:

@@ -38,7 +38,7 @@ from cdpr_drake.analyses.simulation.monte_carlo_report import (
     repetition_table,
     write_repetitions,
 )
-from cdpr_drake.analyses.simulation.monte_carlo_store import KeptRuns, repetition_folder
+from cdpr_drake.analyses.simulation.monte_carlo_store import StoredRuns, repetition_folder
 from cdpr_drake.analyses.simulation.scenario_kinds import SCENARIO_KINDS, ScenarioKind
 from cdpr_drake.analyses.simulation.session import Progress, RunSession, check_connected
 from cdpr_drake.analyses.sweeps.workers import check_scheduler
@@ -155,7 +155,7 @@ def simulate(
             )
         exports = () if log_format is None else checked_log_formats(log_format)
         formats = parse_formats(figure_format)
-        wanted = Wanted(left, False, exports, formats, video, None, as_json)
+        wanted = RunOutputs(left, False, exports, formats, video, None, as_json)
         return _finish(left, wanted) if resume is None else _continue(left, wanted)
     kind = SCENARIO_KINDS[scenario_kind(scenario)]
     overrides, formats = list(settings or []), parse_formats(figure_format)
@@ -210,7 +210,7 @@ def simulate(
         )  # fmt: skip
     folder = out if out is not None else free_folder(Path("runs") / loaded.name)
     listens = (host or LOCAL, port) if meshcat else None
-    wanted = Wanted(folder, overwrite, exports, formats, video, listens, as_json, steered_by)
+    wanted = RunOutputs(folder, overwrite, exports, formats, video, listens, as_json, steered_by)
     return simulate_once(kind, loaded, wanted, note)
 
 
@@ -225,7 +225,7 @@ class Outside(Protocol):
 
 
 @dataclass(frozen=True)
-class Wanted:
+class RunOutputs:
     """What of one run goes where; `listens` are host and port of Meshcat, if it is wanted, and
     `steered_by` is the open socket of a program that steers it."""
 
@@ -249,7 +249,7 @@ def _refuse(*rules: tuple[bool, str]) -> None:
 def simulate_once(
     kind: ScenarioKind,
     scenario: Any,
-    wanted: Wanted,
+    wanted: RunOutputs,
     note: str,
     outside: Callable[[StopRequest], Outside] | None = None,
 ) -> int:
@@ -277,7 +277,7 @@ def simulate_once(
     return code
 
 
-def _continue(folder: Path, wanted: Wanted) -> int:
+def _continue(folder: Path, wanted: RunOutputs) -> int:
     """Goes on with a run from the last checkpoint that it left in a folder."""
     stop = StopRequest(STOPPING)
     with stop.listening(), resumed_folder(folder) as results:
@@ -289,7 +289,7 @@ def _continue(folder: Path, wanted: Wanted) -> int:
 def _run(
     kind: ScenarioKind,
     scenario: Any,
-    wanted: Wanted,
+    wanted: RunOutputs,
     results: ResultsFolder,
     stop: StopRequest,
     *,
@@ -351,7 +351,7 @@ def _run(
     return code
 
 
-def _finish(folder: Path, wanted: Wanted) -> int:
+def _finish(folder: Path, wanted: RunOutputs) -> int:
     """Makes log, summary and figures of what a run left in a folder that did not end by itself."""
     console = message_console()
     stop = StopRequest(PICTURES)
@@ -466,7 +466,7 @@ def simulate_seeds(
     robot = load_robot(scenario.robot)
     stop = StopRequest(STOPPING_REPETITIONS)
     with stop.listening(), continued_folder(folder, overwrite) as results:
-        kept = KeptRuns(results.path, scenario)
+        kept = StoredRuns(results.path, scenario)
         if note:
             console.print(note)
         with progress_bar(console) as bar:

@@ -98,7 +98,7 @@ def message(problem: BaseException) -> str:
     )
 
 
-def shown(words: str, kind: str = "negative", *, stays: bool = False) -> None:
+def notify(words: str, kind: str = "negative", *, stays: bool = False) -> None:
     """Shows words over the page; `kind` is positive, negative, warning or info.
 
     What is wrong, and what `stays`, is there until it is closed, all else for four seconds.
@@ -124,4 +124,4 @@ def show_errors() -> Iterator[None]:
     except Exception as problem:
         if not isinstance(problem, (CdprError, OSError)):
             _LOG.exception("in a handler of the studio's page")
-        shown(message(problem))
+        notify(message(problem))

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from nicegui import events, ui
 
-from cdpr_drake.studio.panels.panel import show_errors, shown
+from cdpr_drake.studio.panels.panel import notify, show_errors
 from cdpr_drake.studio.workbench.session import Workbench
 
 MOVED = "studio_point"
@@ -116,7 +116,7 @@ def add_point_dragging(bench: Workbench) -> None:
             kind, number, at, done = point
             words = bench.drag_point(kind, number, at, done)
             if words:
-                shown(words)
+                notify(words)
 
     ui.on(MOVED, moved)
     ui.context.client.on_connect(lambda: ui.run_javascript(SCRIPT))

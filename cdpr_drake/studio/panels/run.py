@@ -22,7 +22,7 @@ from cdpr_drake.studio.panels.scenario_form import ScenarioForm
 from cdpr_drake.studio.workbench.finished_run import zipped
 from cdpr_drake.studio.workbench.job import JobState
 from cdpr_drake.studio.workbench.result_subject import subject_of
-from cdpr_drake.studio.workbench.run_board import RunBoard, Shown
+from cdpr_drake.studio.workbench.run_board import RunBoard, RunEntry
 from cdpr_drake.studio.workbench.run_job import RunJob
 from cdpr_drake.studio.workbench.scenario_draft import ROBOT
 from cdpr_drake.studio.workbench.scene import RobotScene, RunScene
@@ -58,9 +58,9 @@ class SceneOfRuns:
         self._scene: RunScene | None = None
         self._of: Path | None = None
         self._busy, self._drawn, self.was_missed = False, 0.0, False
-        self._next: tuple[Shown, Mapping[str, Any], float] | None = None
+        self._next: tuple[RunEntry, Mapping[str, Any], float] | None = None
 
-    def draw(self, shown: Shown, sample: Mapping[str, Any], wait: float) -> None:
+    def draw(self, shown: RunEntry, sample: Mapping[str, Any], wait: float) -> None:
         """Draws a sample of a run, unless one was drawn less than `wait` before [s]."""
         bench = self._bench()
         if bench is None or bench.panel not in ("", "run"):
@@ -75,7 +75,9 @@ class SceneOfRuns:
         dark = bool(bench.dark)
         bench.draw(lambda scene: self._work(scene, shown, sample, dark), self._done)
 
-    def _work(self, scene: RobotScene, shown: Shown, sample: Mapping[str, Any], dark: bool) -> None:
+    def _work(
+        self, scene: RobotScene, shown: RunEntry, sample: Mapping[str, Any], dark: bool
+    ) -> None:
         if self._scene is None or self._of != shown.folder:
             scenario = shown.scenario()
             if scenario is None:
@@ -340,7 +342,7 @@ class RunPanel:
             self._recover.visible = failed
 
 
-def _robot_of(shown: Shown) -> Robot | None:
+def _robot_of(shown: RunEntry) -> Robot | None:
     """The robot of a run; None: it cannot be read any more."""
     with suppress(CdprError, OSError):
         scenario = shown.scenario()

@@ -15,7 +15,7 @@ from cdpr_drake.stability.stability_case import SCHEMES
 from cdpr_drake.stability.verdict import VERDICTS
 from cdpr_drake.studio.panels.command_fields import Choices, CommandFields, Filled
 from cdpr_drake.studio.panels.job_bar import JobBar
-from cdpr_drake.studio.panels.panel import message, on_page, robot_argument, show_errors, shown
+from cdpr_drake.studio.panels.panel import message, notify, on_page, robot_argument, show_errors
 from cdpr_drake.studio.workbench.calculator import Signal
 from cdpr_drake.studio.workbench.command_board import CommandBoard
 from cdpr_drake.studio.workbench.command_form import FieldProblem
@@ -228,7 +228,7 @@ class _WorkspacePanel:
                 regions = await run.io_bound(read_regions, folder)
             except Exception as problem:
                 self._view.board.shown = ""
-                shown(message(problem))
+                notify(message(problem))
                 return
             if wanted is not None and regions is not None:  # else the server is ending
                 known = wanted.about
