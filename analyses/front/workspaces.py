@@ -49,7 +49,8 @@ Box = tuple[Array, Array]
 AROUND = ("obstacles", "exit_free", "anchor_free")
 WRENCHES = ("force", "moment")
 ASKED = (
-    *(field.name for field in fields(WorkspaceRequest) if field.name != "around"), *AROUND, *WRENCHES,
+    *(field.name for field in fields(WorkspaceRequest) if field.name != "around"),
+    *AROUND, *WRENCHES,
 )  # fmt: skip
 """What `compute_workspace` can be asked for by name."""
 

@@ -19,7 +19,7 @@ NOT_JUDGED = "not judged"
 NOT_IN_QUICK = "not judged in the quick form"
 """The runs that it needs are those of the full form."""
 
-StudyData = TypeVar("Found")
+StudyData = TypeVar("StudyData")
 Said = TypeVar("Said")
 
 
@@ -54,7 +54,7 @@ def verdict(every: bool, some: bool = False) -> str:
     return CONFIRMED if every else IN_PART if some else NOT_CONFIRMED
 
 
-def not_judged(judge: str, problem: Exception) -> Statement:
+def failed_check(judge: str, problem: Exception) -> Statement:
     """The statement of a judge that failed: its name, and what went wrong."""
     words = (str(problem) or type(problem).__name__).splitlines()[0][:200]
     return Statement(f"({judge})", "", f"judging failed: {words}", NOT_JUDGED)
@@ -90,14 +90,14 @@ def evaluate_checks(
     statements = []
     for judge in judges:
         name = name_of_check(judge)
-        said = judged([judge], found, not_judged)
+        said = run_checks([judge], found, failed_check)
         if not said and quick:
             said = [Statement(topic_of_check(judge), "", "", NOT_IN_QUICK)]
         statements += [replace(one, name=name) for one in said]
     return statements
 
 
-def judged(
+def run_checks(
     judges: Iterable[Callable[[StudyData], Said]],
     found: StudyData,
     failed: Callable[[str, Exception], Said] | None = None,

@@ -1,7 +1,7 @@
 """The store of Monte Carlo runs: each finished run is kept in a folder, by its seed.
 
-Whatever ends the program loses no finished run. `RunRecord` is what is kept of one, `StoredRuns` the
-folder.
+Whatever ends the program loses no finished run. `RunRecord` is what is kept of one, `StoredRuns`
+the folder.
 """
 
 from __future__ import annotations

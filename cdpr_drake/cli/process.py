@@ -1,7 +1,7 @@
 """A command as a process: how it is asked to stop, and what it starts while it is imported.
 
 * `StopRequest`: Ctrl-C, and SIGTERM as batch systems and containers send it, as a polite request.
-* `exit_with_parent`: a command that another program started ends with it, also where that was killed.
+* `exit_with_parent`: a command that another program started ends with it, also where it was killed.
 * `compile_ahead`: which kernels a command will need, so that other processes compile them while it
   starts.
 """

@@ -13,7 +13,7 @@ from cdpr_drake.cli.completion import scenario_words, words_among
 from cdpr_drake.cli.options import FigureFormats, Overwrite, parse_formats
 from cdpr_drake.cli.process import StopRequest
 from cdpr_drake.cli.run_endings import CLIENT_ENDED
-from cdpr_drake.cli.simulate import Wanted, simulate_once
+from cdpr_drake.cli.simulate import RunOutputs, simulate_once
 from cdpr_drake.cli.terminal import message_console
 from cdpr_drake.errors import ClientEndedError
 from cdpr_drake.models.robot_loader import load_robot
@@ -99,7 +99,7 @@ def serve(
         overrides.append(f"remote.place={usual[0]}")
     loaded, note = set_loop(load_scenario(scenario, overrides))
     folder = out if out is not None else free_folder(Path("runs") / loaded.name)
-    wanted = Wanted(folder, overwrite, (), formats, False, None, as_json)
+    wanted = RunOutputs(folder, overwrite, (), formats, False, None, as_json)
     try:
         with _Client(loaded, host, port, wait) as client:
             return simulate_once(kind, loaded, wanted, note, client.on_request_of)

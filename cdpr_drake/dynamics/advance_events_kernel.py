@@ -33,7 +33,7 @@ REACHED_MORE = 5
 
 
 def fresh_memory(states: int, cables: int) -> Array:
-    """Memory of `integrate_explicit` that has reached nothing, for states of platform and winches."""
+    """Memory of `integrate_explicit` that has reached nothing, for platform and winches."""
     memory = np.zeros(2 * (states + REACHED_MORE) + 1 + cables)
     memory[2 * (states + REACHED_MORE)] = np.nan
     return memory
@@ -111,8 +111,8 @@ def integrate_explicit(
             rest is work space.
 
     Returns:
-        `INTEGRATION_OK`, `BACKWARD`, or as `advance_robot`; then the state that is written is the last good
-        one, and its time not changed.
+        `INTEGRATION_OK`, `BACKWARD`, or as `advance_robot`; then the state that is written is the
+        last good one, and its time not changed.
     """
     size = present.shape[0]
     done = _begins(present, memory, command, others[0], time)

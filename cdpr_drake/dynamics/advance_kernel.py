@@ -155,7 +155,8 @@ def advance_robot(
         report: See `REPORTED`, shape (4,); what happens is added to it.
 
     Returns:
-        `INTEGRATION_OK`, `INTEGRATION_DIVERGED` where numbers are not finite, or the index of a cable that cannot run.
+        `INTEGRATION_OK`, `INTEGRATION_DIVERGED` where numbers are not finite, or the index of a
+        cable that cannot run.
     """
     if method == SEMI_IMPLICIT:
         return int(

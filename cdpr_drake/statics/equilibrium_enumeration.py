@@ -1,7 +1,7 @@
 """All poses at which a platform rests on inextensible cables of given lengths.
 
-`enumerate_equilibria` asks every set of cables that may be taut. Where turns lead from one pose of rest to
-others, `member_within_reach` finds one of that family that lets the slack cables be slack.
+`enumerate_equilibria` asks every set of cables that may be taut. Where turns lead from one pose of
+rest to others, `member_within_reach` finds one of that family that lets the slack cables be slack.
 """
 
 from __future__ import annotations

@@ -99,8 +99,8 @@ class SensorFusion(PoseEstimator):
     fusion_nis             vector(5)      -        out, normalized innovation squared then,
                                                    over its degrees of freedom; NaN: nothing new
     fusion_covariance      vector(36)     rad, m   out, of the pose's error, a twist of P in P
-    fusion_calibration     vector(30)     -, rad,  out, `CalibrationVerdict.row` of the camera on board, then
-                                          m        of that in the world
+    fusion_calibration     vector(30)     -, rad,  out, `CalibrationVerdict.row` of the camera on
+                                          m        board, then of that in the world
     ====================== ============== ======== ===========================================
 
     An image counts once, at the pose of the time at which it was taken. What is less likely than

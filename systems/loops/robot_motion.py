@@ -94,9 +94,9 @@ class RobotMotion:
     def resting(
         self, X_WP: RigidTransform, slack: Array | None = None, at_rest: bool = False
     ) -> Array:
-        """State of platform and winches at rest at a pose [m], shape (n,), as `CableRobot.set_at_equilibrium`.
+        """State of platform and winches at rest at a pose [m], shape (n,).
 
-        Raises as that does.
+        As `CableRobot.set_at_equilibrium`, and raises as that does.
         """
         X_WP, holding = equilibrium_start(
             self.robot, self._set, self._model, X_WP, slack=slack, at_rest=at_rest

@@ -135,7 +135,7 @@ def grip_law(scenario: PickAndPlaceScenario) -> GripLaw:
     )
 
 
-def make_task(scenario: PickAndPlaceScenario, robot: Robot) -> PickAndPlaceTask:
+def make_pick_and_place_task(scenario: PickAndPlaceScenario, robot: Robot) -> PickAndPlaceTask:
     """The task with what the robot believes."""
     box, goal, rules = scenario.workpiece, scenario.goal, scenario.handling
     half = 0.5 * float(box.size[2])
@@ -183,7 +183,7 @@ def build_pick_and_place(scenario: PickAndPlaceScenario) -> PickAndPlace:
     assert scene.box is not None
     assert scene.gripper is not None
     believed = believed_robot(scenario, robot)
-    task = make_task(scenario, robot)
+    task = make_pick_and_place_task(scenario, robot)
     machine = builder.AddNamedSystem(
         "machine", PickAndPlaceStateMachine(task, believed.X_WP0, believed.X_PC)
     )

@@ -126,7 +126,7 @@ class CableRobotPorts:
         slack: Array | None = None,
         at_rest: bool = False,
     ) -> Array:
-        """As `CableRobot.set_at_equilibrium`, from the root context of the diagram that was built."""
+        """As `CableRobot.set_at_equilibrium`, from the root context of the built diagram."""
         plant_context = self.plant.GetMyMutableContextFromRoot(context)
         winch_context = self.winches.GetMyMutableContextFromRoot(context)
         cables, model = self.forces.cable_set(), self.forces.model()
@@ -258,7 +258,9 @@ def equilibrium_start(
     slack: Array | None,
     at_rest: bool,
 ) -> tuple[RigidTransform, StaticTensions]:
-    """Where a platform starts, and with which lengths and tensions; see `CableRobot.set_at_equilibrium`.
+    """Where a platform starts, and with which lengths and tensions.
+
+    See `CableRobot.set_at_equilibrium`.
 
     Args:
         robot: The robot.

@@ -67,7 +67,8 @@ class CableRobot(Diagram):
 
     Subsystems: plant, scene_graph, cables, winches, platform_pose. With motors on the winches, the
     block has the inputs and further outputs of `MotorWinch`, tensions connected. A default context
-    has the platform at the robot's home pose with cables that are just not taut; see `set_at_equilibrium`.
+    has the platform at the robot's home pose with cables that are just not taut; see
+    `set_at_equilibrium`.
     """
 
     def __init__(

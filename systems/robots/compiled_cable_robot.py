@@ -122,9 +122,9 @@ class CompiledCableRobot(Diagram):
         slack: Array | None = None,
         at_rest: bool = False,
     ) -> Array:
-        """Puts the platform at rest at a pose and sets lengths that hold it, as `CableRobot.set_at_equilibrium`.
+        """Puts the platform at rest at a pose and sets lengths that hold it.
 
-        The state is that of the context's time.
+        As `CableRobot.set_at_equilibrium`; the state is that of the context's time.
         """
         cables, model = self.forces.cable_set(), self.forces.model()
         X_WP, holding = equilibrium_start(

@@ -62,7 +62,7 @@ class CompiledMotion(LeafSystem):
                                                     far, in position and rotation
     steps                  vector(2)       -        out, steps taken, and taken back, so far
     motion_memory          vector          any      out, what all others are read from, with
-                                                    `parts`; see `advance_events_kernel.integrate_explicit`
+                                                    `parts`; see `integrate_explicit`
     ====================== =============== ======== =============================================
 
     The state is discrete: that of the platform and the winches at the last event, and its time. At

@@ -126,17 +126,17 @@ def resolve_robot_path(scenario_path: Path, robot: str) -> str:
     there, else as it is found from the working folder."""
     name, mark, rails = robot.rpartition(RAILS_MARK)
     if mark and "=" in rails and "/" not in rails:
-        return _beside(scenario_path, name) + mark + rails
-    return _beside(scenario_path, robot)
+        return _resolve(scenario_path, name) + mark + rails
+    return _resolve(scenario_path, robot)
 
 
 def resolve_file_path(scenario_path: Path, file: str) -> str:
-    """The absolute path of a file that a scenario names, found as `resolve_robot_path` finds one."""
+    """The absolute path of a file that a scenario names, found as by `resolve_robot_path`."""
     beside = scenario_path.parent / file
     return str((beside if beside.exists() else Path(file)).absolute())
 
 
-def _beside(scenario_path: Path, robot: str) -> str:
+def _resolve(scenario_path: Path, robot: str) -> str:
     beside = scenario_path.parent / robot
     folder = "/" in robot and (beside.is_dir() or Path(robot).is_dir())
     if not robot.lower().endswith(ROBOT_SUFFIXES) and not folder:

@@ -75,7 +75,9 @@ def test_slack_is_seen_as_it_is(surplus):
     taut = exact.surplus[2:][np.isfinite(exact.surplus[2:])]
     np.testing.assert_allclose(taut, 0.0, atol=CURVE)
     noisy = np.array([
-        slack_from_image(image(surplus, 0.5, seed), CABLES, X_WP, X_WE, PINHOLE, 0.5).surplus[:2][there]
+        slack_from_image(
+            image(surplus, 0.5, seed), CABLES, X_WP, X_WE, PINHOLE, 0.5
+        ).surplus[:2][there]
         for seed in range(40)
     ])  # fmt: skip
     # Predicted deviation, within a half of that of 40 pictures.

@@ -214,7 +214,7 @@ class SchemaGroups:
     def _change(self, edit: Callable[[str], str]) -> None:
         words = self._form.change(edit)
         if words:
-            shown(words)
+            notify(words)
 
     @staticmethod
     def _button(words: str, icon: str, action: Callable[[], None]) -> None:
