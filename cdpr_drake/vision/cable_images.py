@@ -2,7 +2,8 @@
 
 `cable_images` gives points of the cables' curves as a camera E in the world sees them.
 `slack_from_image` reads surplus lengths from such an image, and `slack_rates` says how fast to wind
-them in. Below both is the inextensible catenary by its length, and its length by how far it hangs down.
+them in. Below both is the inextensible catenary by its length, and its length by how far it hangs
+down.
 
 Source: servoing thesis, perspectives; Irvine, Cable Structures, 1981, 1.1 and 2.1.
 """

@@ -1,8 +1,8 @@
 """A robot that looks for a box, takes it, and sets it down where a tag says.
 
 `PickAndPlaceTask` is the phases as a function; `PickAndPlaceStateMachine` puts them into a diagram,
-between cameras that look when they are asked to, dead reckoning, a visual servo and a `Gripper`. The box is
-a free body of the plant, which contact holds on the table and the gripper's compliance on the
+between cameras that look when they are asked to, dead reckoning, a visual servo and a `Gripper`.
+The box is a free body of the plant, which contact holds on the table and the gripper's compliance on the
 platform. Frames: W the world, P the platform, B the box, G the goal (B once it is set down), O and
 T the tags of box and goal, C a camera.
 
