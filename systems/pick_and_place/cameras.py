@@ -77,7 +77,7 @@ def add_cameras(
     else:
         added = _render(builder, scenario, block, views)
     for view, camera in zip(views, added, strict=True):
-        builder.Connect(machine.GetOutputPort("looks"), camera.GetInputPort("looks"))
+        builder.Connect(machine.GetOutputPort("enabled"), camera.GetInputPort("enabled"))
         seen = "X_CT" if view.number else "X_CO"
         builder.Connect(camera.GetOutputPort("X_CO"), machine.GetInputPort(seen))
         builder.Connect(camera.GetOutputPort("found"), machine.GetInputPort(f"{view.name}_found"))
@@ -138,8 +138,8 @@ def _project(
     builder.Connect(block.GetOutputPort("X_WB"), camera.GetInputPort("X_WB"))
     cover = scenario.cover
     if cover is not None and (COVERED_IN[cover.phase] == OBJECT_TAG) != goal:
-        builder.Connect(block.GetOutputPort("hidden"), camera.GetInputPort("hidden"))
+        builder.Connect(block.GetOutputPort("tag_occluded"), camera.GetInputPort("tag_occluded"))
     else:
         never = builder.AddNamedSystem(f"{view.name}_shown", ConstantVectorSource(np.zeros(1)))
-        builder.Connect(never.get_output_port(), camera.GetInputPort("hidden"))
+        builder.Connect(never.get_output_port(), camera.GetInputPort("tag_occluded"))
     return camera

@@ -194,7 +194,7 @@ def build_pick_and_place(scenario: PickAndPlaceScenario) -> PickAndPlace:
         builder.Connect(estimator.GetOutputPort("X_WP"), system.GetInputPort("X_WP"))
     for name in ("holding", "load"):
         builder.Connect(block.GetOutputPort(name), machine.GetInputPort(name))
-    builder.Connect(machine.GetOutputPort("closed"), block.GetInputPort("closed"))
+    builder.Connect(machine.GetOutputPort("gripper_closed"), block.GetInputPort("gripper_closed"))
     builder.Connect(servo.GetOutputPort("cable_velocities"), block.GetInputPort("cable_velocities"))
     if scenario.cover is not None:
         builder.Connect(machine.GetOutputPort("phase"), block.GetInputPort("phase"))
@@ -212,12 +212,12 @@ def build_pick_and_place(scenario: PickAndPlaceScenario) -> PickAndPlace:
         **{name: block.GetOutputPort(name) for name in LOGGED_OF_CABLES},
     }
     if scenario.cover is not None:
-        ports["hidden"] = block.GetOutputPort("hidden")
+        ports["hidden"] = block.GetOutputPort("tag_occluded")
     log = add_log(builder, ports, scenario.log_rate)
     for name in ("X_WP", "X_WB", "tensions", "lengths", "unstrained_lengths"):
         builder.ExportOutput(block.GetOutputPort(name), name)
     if scenario.cover is not None:
-        builder.ExportOutput(block.GetOutputPort("hidden"), "hidden")
+        builder.ExportOutput(block.GetOutputPort("tag_occluded"), "tag_occluded")
     builder.ExportOutput(machine.GetOutputPort("X_WP_aim"), "X_WP_desired")
     diagram = builder.Build()
     diagram.set_name(scenario.name)
@@ -267,7 +267,7 @@ class _Scene:
                 scene_graph.get_source_pose_port(cover.source_id),
             )
             builder.ExportInput(cover.GetInputPort("phase"), "phase")
-            builder.ExportOutput(cover.GetOutputPort("hidden"), "hidden")
+            builder.ExportOutput(cover.GetOutputPort("tag_occluded"), "tag_occluded")
             X_WO = scenario.places()[0] @ tag_pose(scenario.workpiece.tag, half)
             X_WT = X_WO if self._covers_box() else self._X_WG @ X_GT
             source = builder.AddNamedSystem("covered_tag", ConstantValueSource(Value(X_WT)))
@@ -290,7 +290,7 @@ class _Scene:
         ):
             builder.Connect(plant.get_state_output_port(instance), gripper.GetInputPort(name))
         apply_force(builder, plant, gripper.GetOutputPort("forces"), name="grip")
-        builder.ExportInput(gripper.GetInputPort("closed"), "closed")
+        builder.ExportInput(gripper.GetInputPort("gripper_closed"), "gripper_closed")
         for name in ("X_WB", "holding", "load", "grip"):
             builder.ExportOutput(gripper.GetOutputPort(name), name)
         self.gripper = gripper
@@ -315,7 +315,7 @@ def _add_servo(
     pinhole = pinholes(scenario, robot)[0]
     servo = builder.AddNamedSystem("servo", FeatureServo(controller, target, pinhole, own.rate))
     builder.Connect(machine.GetOutputPort("X_CV"), servo.GetInputPort("X_CO"))
-    builder.Connect(machine.GetOutputPort("moves"), servo.GetInputPort("found"))
+    builder.Connect(machine.GetOutputPort("platform_moving"), servo.GetInputPort("found"))
     unused = builder.AddNamedSystem("no_marks", ConstantVectorSource(np.zeros(target.size)))
     builder.Connect(unused.get_output_port(), servo.GetInputPort(target.mark))
     return servo

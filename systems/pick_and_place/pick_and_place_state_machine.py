@@ -32,25 +32,25 @@ does, since only what is apart of it counts."""
 class PickAndPlaceStateMachine(LeafSystem):
     """Tells the servo where to go, the cameras whether to look, and the gripper whether to close.
 
-    ============ ============== ==== ==========================================================
-    port         type           unit meaning
-    ============ ============== ==== ==========================================================
-    X_WP         RigidTransform m    in, estimated pose of the platform
-    X_CO         RigidTransform m    in, box's tag in its camera
-    object_found vector(1)      -    in, 1 while that is seen
-    X_CT         RigidTransform m    in, goal's tag in its camera
-    goal_found   vector(1)      -    in, 1 while that is seen
-    holding      vector(1)      -    in, 1 while the gripper holds something
-    load         vector(1)      N    in, force that the grip carries along its axis
-    X_CV         RigidTransform m    out, what the servo looks at: seen as `X_CdV` once the platform
-                                     is where it shall be
-    moves        vector(1)      -    out, 1 while the platform shall move; 0 for one step where a
-                                     phase begins, so that the servo begins anew
-    closed       vector(1)      -    out, 1 while the gripper shall be closed
-    looks        vector(2)      -    out, 1 for each camera, box and goal, that shall look
-    phase        vector(2)      -, s out, number of the phase, and when it began
-    X_WP_aim     RigidTransform m    out, where the platform shall go, as poses are estimated
-    ============ ============== ==== ==========================================================
+    =============== ============== ==== ==========================================================
+    port            type           unit meaning
+    =============== ============== ==== ==========================================================
+    X_WP            RigidTransform m    in, estimated pose of the platform
+    X_CO            RigidTransform m    in, box's tag in its camera
+    object_found    vector(1)      -    in, 1 while that is seen
+    X_CT            RigidTransform m    in, goal's tag in its camera
+    goal_found      vector(1)      -    in, 1 while that is seen
+    holding         vector(1)      -    in, 1 while the gripper holds something
+    load            vector(1)      N    in, force that the grip carries along its axis
+    X_CV            RigidTransform m    out, what the servo looks at: seen as `X_CdV` once the
+                                        platform is where it shall be
+    platform_moving vector(1)      -    out, 1 while the platform shall move; 0 for one step where a
+                                        phase begins, so that the servo begins anew
+    gripper_closed  vector(1)      -    out, 1 while the gripper shall be closed
+    enabled         vector(2)      -    out, 1 for each camera, box and goal, that shall look
+    phase           vector(2)      -, s out, number of the phase, and when it began
+    X_WP_aim        RigidTransform m    out, where the platform shall go, as poses are estimated
+    =============== ============== ==== ==========================================================
 
     What is seen came from the images of the step before, and is taken together with the pose that
     was estimated then; where to go is said with the pose that is estimated now.
@@ -74,9 +74,9 @@ class PickAndPlaceStateMachine(LeafSystem):
 
         declare("X_CV", self._calc_view, state | pose)
         declare("X_WP_aim", self._calc_aim, state | pose)
-        self.DeclareVectorOutputPort("moves", 1, self._calc_moves, state)
-        self.DeclareVectorOutputPort("closed", 1, self._calc_closed, state)
-        self.DeclareVectorOutputPort("looks", 2, self._calc_looks, state)
+        self.DeclareVectorOutputPort("platform_moving", 1, self._calc_moves, state)
+        self.DeclareVectorOutputPort("gripper_closed", 1, self._calc_closed, state)
+        self.DeclareVectorOutputPort("enabled", 2, self._calc_looks, state)
         self.DeclareVectorOutputPort("phase", 2, self._calc_phase, state)
 
     def state(self, context: Context) -> PickAndPlaceState:

@@ -44,7 +44,7 @@ class TagOcclusion(LeafSystem):
     ============= =============== ==== ==================================================
     phase         vector(2)       -, s in, number of the phase, and when it began
     X_WT          RigidTransform  m    in, true pose of the tag
-    hidden        vector(1)       -    out, 1 while the tag is hidden
+    tag_occluded  vector(1)       -    out, 1 while the tag is hidden
     geometry_pose FramePoseVector m    out, of the plate, for the scene graph
     ============= =============== ==== ==================================================
 
@@ -71,7 +71,7 @@ class TagOcclusion(LeafSystem):
         plate.set_perception_properties(seen)
         scene_graph.RegisterGeometry(self.source_id, self._frame, plate)
         self.DeclarePeriodicDiscreteUpdateEvent(0.01, 0.0, self._update)
-        self.DeclareVectorOutputPort("hidden", 1, self._calc_hidden)
+        self.DeclareVectorOutputPort("tag_occluded", 1, self._calc_hidden)
         self.DeclareAbstractOutputPort(
             "geometry_pose", lambda: Value(FramePoseVector()), self._calc_pose
         )
