@@ -56,7 +56,7 @@ CAMERA_KIND = "target-visible"
 STRONG = 1e9
 """Upper tension limit that stands for none [N]."""
 
-FIGURE, EVERY, DEFAULT_STUDY_SESSION, ZERO, HEAVY, ENDLESS = (
+FIGURE, EVERY, ALONE, ZERO, HEAVY, ENDLESS = (
     "figure", "every kind", "alone", "zero sets", "other mass", "no upper limit",
 )  # fmt: skip
 """What items are for."""
@@ -68,7 +68,7 @@ class WorkspaceItem:
 
     Attributes:
         name: Unique in the study.
-        group: `FIGURE`, `EVERY`, `DEFAULT_STUDY_SESSION`, `ZERO`, `HEAVY` or `ENDLESS`.
+        group: `FIGURE`, `EVERY`, `ALONE`, `ZERO`, `HEAVY` or `ENDLESS`.
         question: The question.
         upper_share: Upper tension limit over that of the robot's file.
     """
@@ -185,7 +185,7 @@ def _robot_items(name: str, counts: Sequence[int]) -> tuple[list[WorkspaceItem],
         every = make_workspace_question(name, wanted, grid, asked=asked)
     kinds = every.kinds
     alone = [
-        WorkspaceItem(f"{name}, {kind} alone", DEFAULT_STUDY_SESSION, replace(every, kinds=(kind,)))
+        WorkspaceItem(f"{name}, {kind} alone", ALONE, replace(every, kinds=(kind,)))
         for kind in kinds
     ]
     zero = WorkspaceRequest(required=SpatialSet(), accelerations=SpatialSet())

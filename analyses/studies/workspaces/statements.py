@@ -11,7 +11,7 @@ import numpy as np
 from cdpr_drake.analyses.reporting.statements import Statement, evaluate_checks, verdict
 from cdpr_drake.analyses.studies.workspaces.distances import SAME
 from cdpr_drake.analyses.studies.workspaces.items import (
-    DEFAULT_STUDY_SESSION,
+    ALONE,
     ENDLESS,
     EVERY,
     FIGURE,
@@ -278,7 +278,7 @@ def _within(found: FoundSet) -> Statement:
 def _intersections(found: FoundSet) -> Statement:
     by_robot: dict[str, dict[str, np.ndarray]] = {}
     together = {}
-    for every, alone in found.pairs(DEFAULT_STUDY_SESSION):
+    for every, alone in found.pairs(ALONE):
         by_robot.setdefault(every.item.robot, {}).update(alone.holds)
         together[every.item.robot] = every
     outside = common = changed = 0

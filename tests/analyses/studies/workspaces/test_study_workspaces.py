@@ -14,7 +14,7 @@ from cdpr_drake.analyses.studies.workspaces import items as items_module
 from cdpr_drake.analyses.studies.workspaces import study as study_module
 from cdpr_drake.analyses.studies.workspaces.figures import static_figure
 from cdpr_drake.analyses.studies.workspaces.items import (
-    DEFAULT_STUDY_SESSION,
+    ALONE,
     ENDLESS,
     EVERY,
     FIGURE,
@@ -124,7 +124,7 @@ WRONG = {
     "Dynamic without acceleration": (ZERO, "dynamic", 0),
     "Wrench-feasible with no wrench": (ZERO, "wrench-feasible", 1),
     "Wrench-feasible and dynamic lie": (EVERY, "dynamic", 1),
-    "What two kinds": (DEFAULT_STUDY_SESSION, "stable", 0),
+    "What two kinds": (ALONE, "stable", 0),
 }
 """Statements, and which answers, all turned to 1 or 0, make them fail."""
 
