@@ -217,7 +217,7 @@ def build_pick_and_place(scenario: PickAndPlaceScenario) -> PickAndPlace:
     for name in ("X_WP", "X_WB", "tensions", "lengths", "unstrained_lengths"):
         builder.ExportOutput(block.GetOutputPort(name), name)
     if scenario.cover is not None:
-        builder.ExportOutput(block.GetOutputPort("tag_occluded"), "tag_occluded")
+        builder.ExportOutput(block.GetOutputPort("tag_occluded"), "hidden")
     builder.ExportOutput(machine.GetOutputPort("X_WP_aim"), "X_WP_desired")
     diagram = builder.Build()
     diagram.set_name(scenario.name)
