@@ -1,7 +1,7 @@
 """A command as a process: how it is asked to stop, and what it starts while it is imported.
 
 * `StopRequest`: Ctrl-C, and SIGTERM as batch systems and containers send it, as a polite request.
-* `hold_lifeline`: a command that another program started ends with it, also where that was killed.
+* `exit_with_parent`: a command that another program started ends with it, also where it was killed.
 * `compile_ahead`: which kernels a command will need, so that other processes compile them while it
   starts.
 """
@@ -79,7 +79,7 @@ LONGEST_END = 20.0
 """Time to put away what there is before it is ended in earnest, as the studio gives it [s]."""
 
 
-def hold_lifeline() -> None:
+def exit_with_parent() -> None:
     """Ends this process when who started it is gone, if the environment has a `LIFELINE`.
 
     First by SIGTERM, which commands take as a wish, then by SIGKILL, with all that it started.

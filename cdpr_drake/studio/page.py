@@ -13,7 +13,7 @@ from nicegui import ui
 
 from cdpr_drake.palette import COLORS, SLACK
 from cdpr_drake.studio.guard import SESSION
-from cdpr_drake.studio.panels.panel import message, place_remarks, quietly
+from cdpr_drake.studio.panels.panel import message, place_remarks, show_errors
 from cdpr_drake.studio.panels.table import PANELS
 from cdpr_drake.studio.scene_relay import SCENE
 from cdpr_drake.studio.sessions import Sessions
@@ -76,7 +76,7 @@ def _build(bench: Workbench) -> None:
                 lambda event: setattr(bench, "panel", event.value)
             )
             for panel in PANELS.values():
-                with ui.tab_panel(panel.name), quietly():
+                with ui.tab_panel(panel.name), show_errors():
                     place_remarks(bench, panel)
                     panel.build(bench)
 
