@@ -137,7 +137,7 @@ def _as_told(belief: FusedBelief, camera: Calibration) -> tuple[FusedBelief, flo
     return correct(belief, H, innovation, R), float(log)
 
 
-def mixed(found: Sequence[Answer]) -> FusedBelief:
+def mixture(found: Sequence[Answer]) -> FusedBelief:
     """The belief with mean and covariance of all answers together."""
     first = found[0].belief
     if len(found) == 1:
@@ -153,7 +153,7 @@ def mixed(found: Sequence[Answer]) -> FusedBelief:
 
 
 @dataclass(frozen=True)
-class Judged:
+class CalibrationVerdict:
     """What readings say of a camera's calibration.
 
     Attributes:
@@ -176,16 +176,18 @@ class Judged:
         return np.concatenate([numbers, self.error, self.deviation])
 
 
-def judged(found: Sequence[Answer], cameras: Sequence[Calibration]) -> list[Judged]:
+def calibration_verdicts(
+    found: Sequence[Answer], cameras: Sequence[Calibration]
+) -> list[CalibrationVerdict]:
     """What readings say of each camera, from all answers, see `answers`."""
-    whole, results = mixed(found), []
+    whole, results = mixture(found), []
     for k, camera in enumerate(cameras):
         right = [answer for answer in found if not answer.wrong[k]]
         surprise, freedom = np.nan, 0
         if right:
             surprise, freedom = surprise_of(right[0].belief, camera)
         results.append(
-            Judged(
+            CalibrationVerdict(
                 np.nan
                 if camera.wrong is None
                 else sum(answer.probability for answer in found if answer.wrong[k]),

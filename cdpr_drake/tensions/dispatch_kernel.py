@@ -17,7 +17,7 @@ from numba.extending import intrinsic
 from cdpr_drake.arrays import Array
 from cdpr_drake.numerics.kernel_calls import call_at_address
 from cdpr_drake.numerics.kernel_calls import kernel_address as address
-from cdpr_drake.tensions.closed_form_kernel import MISSED
+from cdpr_drake.tensions.closed_form_kernel import NOT_FOUND
 from cdpr_drake.tensions.problem import RESIDUAL_TOLERANCE, balance, describe
 from cdpr_drake.tensions.quadratic_program_kernel import (
     FEASIBLE,
@@ -70,7 +70,7 @@ def check(
     inside, residual = balance(W, w, lower, upper, t)
     if inside and residual <= RESIDUAL_TOLERANCE:
         return FEASIBLE, residual
-    return (code if code == INFEASIBLE else MISSED), residual
+    return (code if code == INFEASIBLE else NOT_FOUND), residual
 
 
 @njit(cache=True, inline="always")
@@ -101,10 +101,10 @@ def solve(
         slack (-1, methods that relax), or without meaning.
     """
     kernel, exact, relaxes = method
-    code = MISSED
+    code = NOT_FOUND
     if kernel != 0:
         code = _call(kernel, work, W, w, lower, upper, reference, row_scale, t)
-    if exact and code == MISSED:
+    if exact and code == NOT_FOUND:
         code = nearest_tensions_in(work, W, w, lower, upper, reference, t)
     elif code == FEASIBLE:  # by rounding at most out of bounds
         for i in range(t.shape[0]):
@@ -122,9 +122,9 @@ def solve_or_prove(
     A step of control does without: it holds the last tensions in either case.
     """
     code, residual = solve(method, work, W, w, lower, upper, reference, row_scale, t)
-    if code == MISSED:
+    if code == NOT_FOUND:
         zero, other = np.zeros(t.shape[0]), np.empty(t.shape[0])
-        code = min(MISSED, nearest_tensions_in(work, W, w, lower, upper, zero, other))
+        code = min(NOT_FOUND, nearest_tensions_in(work, W, w, lower, upper, zero, other))
     return code, residual
 
 

@@ -12,7 +12,7 @@ from cdpr_drake.errors import TensionProblemError
 from cdpr_drake.tensions import objectives
 from cdpr_drake.tensions.barrier_kernel import log_barrier
 from cdpr_drake.tensions.closed_form_kernel import (
-    MISSED,
+    NOT_FOUND,
     closed_form,
     dykstra,
     improved_closed_form,
@@ -253,7 +253,7 @@ class Distributor:
             )
         if code == INFEASIBLE and not self._chosen.relaxes:
             return refuse(problem, self._method)
-        status = TensionStatus.MISSED if code == MISSED else TensionStatus.INFEASIBLE
+        status = TensionStatus.NOT_FOUND if code == NOT_FOUND else TensionStatus.INFEASIBLE
         return TensionSolution(self._method, status, t, residual, active, slack)
 
 

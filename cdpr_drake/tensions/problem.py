@@ -33,12 +33,12 @@ class TensionStatus(StrEnum):
     """The verdict on tensions.
 
     FEASIBLE: they balance the wrench within the bounds. INFEASIBLE: no tensions do; a proof.
-    MISSED: the method found none although there are some.
+    NOT_FOUND: the method found none although there are some.
     """
 
     FEASIBLE = "feasible"
     INFEASIBLE = "infeasible"
-    MISSED = "missed"
+    NOT_FOUND = "missed"
 
 
 @dataclass(frozen=True)
@@ -144,7 +144,7 @@ class TensionSolution(Summarized):
     Attributes:
         method: Name of the method.
         status: The verdict.
-        tensions: Shape (m,) [N]. FEASIBLE: the answer. MISSED: what the method came to, outside
+        tensions: Shape (m,) [N]. FEASIBLE: the answer. NOT_FOUND: what the method came to, outside
             the bounds or off balance. INFEASIBLE: NaN, except for a method that relaxes.
         residual: |W t + w| relative to the forces at work; NaN where there are no tensions.
         active: -1 where a tension is on its lower bound, 1 on its upper, else 0, shape (m,).

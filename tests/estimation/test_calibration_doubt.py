@@ -9,8 +9,8 @@ import pytest
 from cdpr_drake.estimation.camera_miscalibration import (
     Calibration,
     answers,
-    judged,
-    mixed,
+    calibration_verdicts,
+    mixture,
     surprise_of,
 )
 from cdpr_drake.estimation.sensor_filter import (
@@ -147,7 +147,7 @@ def test_a_mixture_has_the_moments_of_its_parts():
     other = replace(moved_by(made, d), covariance=2.0 * made.covariance)
     np.testing.assert_allclose(apart(other, made), d, atol=1e-14)
     first, second = answers(made, ())[0], answers(other, ())[0]
-    whole = mixed([replace(first, probability=0.75), replace(second, probability=0.25)])
+    whole = mixture([replace(first, probability=0.75), replace(second, probability=0.25)])
     np.testing.assert_allclose(apart(whole, made), 0.25 * d, atol=1e-14)
     expected = 1.25 * made.covariance + 0.75 * 0.25 * np.outer(d, d)
     np.testing.assert_allclose(whole.covariance, expected, atol=1e-18)
@@ -170,10 +170,10 @@ def runs():
         seen, errors = readings(seed, wrong)
         base, _ = filtered(start(WRONG, WRONG), seen)
         found = answers(base, cameras())
-        whole = mixed(found)
+        whole = mixture(found)
         sure, _ = filtered(start(TOLD, TOLD), seen)
         true = wrong_by(start(TOLD, TOLD), errors)
-        results = [one.probability for one in judged(found, cameras())]
+        results = [one.probability for one in calibration_verdicts(found, cameras())]
         for made, columns in ((whole, POSE), (whole, slice(15, 27)), (sure, POSE)):
             x = apart(true, made)[columns]
             results.append(x @ np.linalg.solve(made.covariance[columns, columns], x))
@@ -233,7 +233,7 @@ def test_a_found_error_is_in_the_camera_frame_as_told():
     seen, errors = readings(5, (False, True))
     base, _ = filtered(start(TOLD, WRONG), seen)
     sure = (replace(cameras()[0], wrong=None), cameras()[1])
-    one = judged(answers(base, sure), sure)[1]
+    one = calibration_verdicts(answers(base, sure), sure)[1]
     left = one.error - errors[EXTERNAL]
     assert np.all(np.abs(left) < 4.0 * one.deviation)
     true = wrong_by(start(TOLD, WRONG), errors)

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.optimize import linprog
 
 from cdpr_drake.errors import CdprError, TensionProblemError
-from cdpr_drake.tensions.closed_form_kernel import MISSED
+from cdpr_drake.tensions.closed_form_kernel import NOT_FOUND
 from cdpr_drake.tensions.dispatch_kernel import check
 from cdpr_drake.tensions.methods import METHODS, Distributor, distribute
 from cdpr_drake.tensions.problem import (
@@ -25,7 +25,7 @@ MARGIN = 1e-9  # relative to the largest bound; nearer to the limit a verdict ma
 ORACLE_MARGIN = 1e-6  # as above, where HiGHS, exact to 1e-7, must be trusted
 STATUS = {
     FEASIBLE: TensionStatus.FEASIBLE,
-    MISSED: TensionStatus.MISSED,
+    NOT_FOUND: TensionStatus.NOT_FOUND,
     INFEASIBLE: TensionStatus.INFEASIBLE,
 }
 SUMMING = 1e-10  # [N]; sums of a few products of some 100 N in another order
@@ -160,7 +160,7 @@ def test_the_verdict_is_what_numpy_finds(seed):
     inside, expected, active, slack = checked_by_numpy(problem, t)
     residual = problem.residual(expected)
     feasible = inside and residual <= RESIDUAL_TOLERANCE
-    assert solution.status == (TensionStatus.FEASIBLE if feasible else TensionStatus.MISSED)
+    assert solution.status == (TensionStatus.FEASIBLE if feasible else TensionStatus.NOT_FOUND)
     np.testing.assert_array_equal(solution.tensions, expected)
     np.testing.assert_array_equal(solution.active, active)
     np.testing.assert_allclose(solution.slack, slack, rtol=0.0, atol=SUMMING)
@@ -182,7 +182,7 @@ def test_tensions_off_balance_are_not_feasible(error):
     problem, t = balanced()
     t[0] += error
     wrong = checked(problem, t, exists=True)
-    assert wrong.status == TensionStatus.MISSED
+    assert wrong.status == TensionStatus.NOT_FOUND
     assert wrong.residual > RESIDUAL_TOLERANCE
     np.testing.assert_allclose(wrong.slack, error * W[:, 0], rtol=1e-6)
     none = checked(problem, t, exists=False)
@@ -193,7 +193,7 @@ def test_tensions_off_balance_are_not_feasible(error):
 def test_tensions_out_of_bounds_are_not_feasible(beyond):
     problem, t = balanced()
     tight = changed(wrench=problem.wrench, upper=np.array([9.0, 9.0, 9.0, t[3] - beyond]))
-    assert checked(tight, t, exists=True).status == TensionStatus.MISSED
+    assert checked(tight, t, exists=True).status == TensionStatus.NOT_FOUND
     tight = changed(wrench=problem.wrench, lower=np.array([t[0] + beyond, 0.0, 0.0, 0.0]))
     assert checked(tight, t, exists=False).status == TensionStatus.INFEASIBLE
 
@@ -216,7 +216,7 @@ def test_no_tension_at_all_is_feasible_without_a_wrench():
     assert checked(problem, t, exists=True).status == TensionStatus.FEASIBLE
     assert checked(problem, np.zeros(4), exists=True).status == TensionStatus.FEASIBLE
     # A millinewton a cable is no rounding.
-    assert checked(problem, t + 1e-3, exists=True).status == TensionStatus.MISSED
+    assert checked(problem, t + 1e-3, exists=True).status == TensionStatus.NOT_FOUND
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -375,7 +375,7 @@ def test_no_method_is_wrong_about_feasibility(problem):
             forces = np.linalg.norm(np.abs(problem.W) @ problem.upper)
             assert off <= 2.0 * RESIDUAL_TOLERANCE * (np.linalg.norm(problem.wrench) + forces)
             assert margin > -ORACLE_MARGIN, name
-        elif solution.status == TensionStatus.MISSED:
+        elif solution.status == TensionStatus.NOT_FOUND:
             assert not method.exact or abs(margin) <= MARGIN, name
             assert margin > -ORACLE_MARGIN, name
             assert np.all(np.isfinite(solution.tensions)), name
