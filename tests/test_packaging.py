@@ -4,12 +4,18 @@ import re
 import tomllib
 from pathlib import Path
 
+import yaml
 from setuptools import find_packages
+
+from cdpr_drake.version import __version__
 
 ROOT = Path(__file__).parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
 TOP = ("cdpr_drake", "models", "systems", "analyses")
 ENDINGS = ("yaml", "tsv", "css", "js")
+
+MOST_CHANGES = 200
+"""Lines of a changelog that people read; the rest is in the history."""
 
 
 def python_folders():
@@ -87,3 +93,25 @@ def test_readme_has_exactly_two_commands_for_a_fresh_machine():
     assert len(commands) == 2
     assert commands[0].endswith("cdpr simulate")
     assert commands[1].endswith("pytest -n auto")
+
+
+def test_the_citation_and_the_changelog_are_of_this_version():
+    """Every key that CFF 1.2.0 demands, and the newest heading with a version."""
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    assert {"cff-version", "message", "title", "authors"} <= set(citation)
+    assert citation["version"] == __version__
+    assert citation["license"] == PROJECT["project"]["license"]
+    assert citation["keywords"] == PROJECT["project"]["keywords"]
+    changes = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    newest, second = re.findall(r"^## (.*)$", changes, re.MULTILINE)[:2]
+    assert newest == "[Unreleased]"
+    assert second == f"[{__version__}] - {citation['date-released']}"
+
+
+def test_the_changelog_has_the_groups_of_its_form_and_is_short():
+    changes = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    groups = ("Added", "Changed", "Deprecated", "Removed", "Fixed", "Security")
+    for part in re.split(r"^## ", changes, flags=re.MULTILINE)[1:]:
+        found = re.findall(r"^### (.*)$", part, re.MULTILINE)
+        assert found == [group for group in groups if group in found], part.splitlines()[0]
+    assert len(changes.splitlines()) <= MOST_CHANGES
