@@ -22,7 +22,7 @@ print("imported:", [name for name in heavy if name in sys.modules], len(sys.modu
 """
 
 MOST_MODULES = 400
-"""Modules of Python and typer; with rich there are twice as many, with Drake and numba there are above two thousand."""
+"""Modules of Python and typer; with rich there are twice as many, with Drake above two thousand."""
 
 
 def imported(*arguments):
