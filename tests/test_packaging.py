@@ -1,6 +1,7 @@
 """The wheel's packages, the import rules and the README agree with what is on disk."""
 
 import re
+import subprocess
 import tomllib
 from pathlib import Path
 
@@ -8,6 +9,7 @@ import yaml
 from setuptools import find_packages
 
 from cdpr_drake.version import __version__
+from tests.lowest import LISTED, REQUIREMENT, lowest
 
 ROOT = Path(__file__).parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
@@ -116,3 +118,24 @@ def test_the_changelog_has_the_groups_of_its_form_and_is_short():
         found = re.findall(r"^### (.*)$", part, re.MULTILINE)
         assert found == [group for group in groups if group in found], part.splitlines()[0]
     assert len(changes.splitlines()) <= MOST_CHANGES
+
+
+def test_the_lowest_versions_are_those_of_the_project():
+    assert LISTED.read_text(encoding="utf-8") == lowest()
+
+
+def test_every_dependency_has_one_lower_bound():
+    extras = PROJECT["project"]["optional-dependencies"]
+    bounds = {}
+    for requirement in [*PROJECT["project"]["dependencies"], *sum(extras.values(), [])]:
+        found = REQUIREMENT.fullmatch(requirement)
+        assert found["lower"], requirement
+        assert bounds.setdefault(found["name"], found["lower"]) == found["lower"], requirement
+
+
+def test_the_hook_refuses_long_subjects(tmp_path):
+    message = tmp_path / "message"
+    for length, code in ((72, 0), (73, 1)):
+        message.write_text("s" * length + "\n\n" + "body " * 100)
+        done = subprocess.run([ROOT / ".ci" / "commit-msg", message], capture_output=True)
+        assert done.returncode == code
