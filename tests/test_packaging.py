@@ -3,6 +3,7 @@
 import re
 import subprocess
 import tomllib
+from itertools import chain
 from pathlib import Path
 
 import yaml
@@ -127,7 +128,7 @@ def test_the_lowest_versions_are_those_of_the_project():
 def test_every_dependency_has_one_lower_bound():
     extras = PROJECT["project"]["optional-dependencies"]
     bounds = {}
-    for requirement in [*PROJECT["project"]["dependencies"], *sum(extras.values(), [])]:
+    for requirement in chain(PROJECT["project"]["dependencies"], *extras.values()):
         found = REQUIREMENT.fullmatch(requirement)
         assert found["lower"], requirement
         assert bounds.setdefault(found["name"], found["lower"]) == found["lower"], requirement
