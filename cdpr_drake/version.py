@@ -1,6 +1,4 @@
-"""The version of this package."""
+"""The version of this package, from which its metadata take theirs."""
 
-from importlib.metadata import version
-
-__version__ = version("cdpr_drake")
-"""As pip knows it."""
+__version__ = "0.2.0"
+"""See CHANGELOG.md; semantic versioning."""

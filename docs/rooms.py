@@ -31,14 +31,19 @@ FOLDERS = {
 
 LIBRARY = ("cdpr_drake", "#ffffff")
 
+STUDIES = "cdpr_drake.analyses.studies"
+
 WIDTH, LEFT, HEIGHT, GAP, LETTER = 640, 120, 26, 6, 6.9
 
 
 def layers() -> list[list[str]]:
-    """Modules and packages from the top layer down, siblings side by side."""
+    """Modules and packages from the top layer down, siblings side by side; below the catalogue the
+    studies, which no contract lists, as one."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     contract = project["tool"]["importlinter"]["contracts"][0]
-    return [[name.strip() for name in layer.split("|")] for layer in contract["layers"]]
+    rows = [[name.strip() for name in layer.split("|")] for layer in contract["layers"]]
+    below = next(k for k, row in enumerate(rows) if f"{STUDIES}.catalogue" in row) + 1
+    return [*rows[:below], [STUDIES], *rows[below:]]
 
 
 def folder_of(module: str) -> tuple[str, str]:
@@ -64,27 +69,21 @@ def first_line(module: str) -> str:
 
 
 def rooms() -> list[str]:
-    """Packages that layers name, from the top down; studies, which are many, as one."""
+    """Packages that layers name, from the top down."""
     found: list[str] = []
     for layer in layers():
         for module in sorted(layer):
-            if is_study(module):
-                module = "cdpr_drake.analyses.studies"
-            elif module.startswith("cdpr_drake.studio."):
+            if module.startswith("cdpr_drake.studio."):
                 module = "cdpr_drake.studio"
             if module not in found and path_of(module).name == "__init__.py":
                 found.append(module)
     return found
 
 
-def is_study(module: str) -> bool:
-    """Whether this is a study, not what studies share."""
-    name = module.removeprefix("cdpr_drake.analyses.studies.")
-    return name != module and name not in ("catalogue", "framework", "published")
-
-
 def label(module: str) -> str:
     """What stands in a box: the path below its folder."""
+    if module == STUDIES:
+        return "studies, none of which knows another"
     words = module.removeprefix("cdpr_drake.").split(".")
     return (
         "/".join(
@@ -98,11 +97,7 @@ def picture() -> str:
     """The layers as SVG: a row each, boxes coloured by folder."""
     parts, y, shown = [], GAP, None
     for layer in layers():
-        boxes = [module for module in layer if not is_study(module)]
-        labels = [(label(module), folder_of(module)) for module in boxes]
-        count = len(layer) - len(boxes)
-        if count:
-            labels.append((f"{count} studies, none of which knows another", folder_of(layer[0])))
+        labels = [(label(module), folder_of(module)) for module in layer]
         x, rows = LEFT, 1
         if labels[0][1] != shown:
             shown = labels[0][1]

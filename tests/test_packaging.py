@@ -1,15 +1,24 @@
 """The wheel's packages, the import rules and the README agree with what is on disk."""
 
 import re
+import subprocess
 import tomllib
+from itertools import chain
 from pathlib import Path
 
+import yaml
 from setuptools import find_packages
+
+from cdpr_drake.version import __version__
+from tests.lowest import LISTED, REQUIREMENT, lowest
 
 ROOT = Path(__file__).parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
 TOP = ("cdpr_drake", "models", "systems", "analyses")
 ENDINGS = ("yaml", "tsv", "css", "js")
+
+MOST_CHANGES = 200
+"""Lines of a changelog that people read; the rest is in the history."""
 
 
 def python_folders():
@@ -56,7 +65,8 @@ def test_every_file_is_in_a_layer():
             if parts[-1].startswith("__"):  # faces, and what starts the command
                 continue
             above = {".".join(parts[:count]) for count in range(2, len(parts) + 1)}
-            assert above & listed, path
+            is_study = parts[:3] == ("cdpr_drake", "analyses", "studies") and len(parts) > 3
+            assert above & listed or is_study, path  # studies: see test_architecture
 
 
 def test_data_files_are_packaged():
@@ -89,3 +99,46 @@ def test_readme_has_exactly_two_commands_for_a_fresh_machine():
     assert len(commands) == 2
     assert commands[0].endswith("cdpr simulate")
     assert commands[1].endswith("pytest -n auto")
+
+
+def test_the_citation_and_the_changelog_are_of_this_version():
+    """Every key that CFF 1.2.0 demands, and the newest heading with a version."""
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    assert {"cff-version", "message", "title", "authors"} <= set(citation)
+    assert citation["version"] == __version__
+    assert citation["license"] == PROJECT["project"]["license"]
+    assert citation["keywords"] == PROJECT["project"]["keywords"]
+    changes = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    newest, second = re.findall(r"^## (.*)$", changes, re.MULTILINE)[:2]
+    assert newest == "[Unreleased]"
+    assert second == f"[{__version__}] - {citation['date-released']}"
+
+
+def test_the_changelog_has_the_groups_of_its_form_and_is_short():
+    changes = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    groups = ("Added", "Changed", "Deprecated", "Removed", "Fixed", "Security")
+    for part in re.split(r"^## ", changes, flags=re.MULTILINE)[1:]:
+        found = re.findall(r"^### (.*)$", part, re.MULTILINE)
+        assert found == [group for group in groups if group in found], part.splitlines()[0]
+    assert len(changes.splitlines()) <= MOST_CHANGES
+
+
+def test_the_lowest_versions_are_those_of_the_project():
+    assert LISTED.read_text(encoding="utf-8") == lowest()
+
+
+def test_every_dependency_has_one_lower_bound():
+    extras = PROJECT["project"]["optional-dependencies"]
+    bounds = {}
+    for requirement in chain(PROJECT["project"]["dependencies"], *extras.values()):
+        found = REQUIREMENT.fullmatch(requirement)
+        assert found["lower"], requirement
+        assert bounds.setdefault(found["name"], found["lower"]) == found["lower"], requirement
+
+
+def test_the_hook_refuses_long_subjects(tmp_path):
+    message = tmp_path / "message"
+    for length, code in ((72, 0), (73, 1)):
+        message.write_text("s" * length + "\n\n" + "body " * 100)
+        done = subprocess.run([ROOT / ".ci" / "commit-msg", message], capture_output=True)
+        assert done.returncode == code

@@ -23,6 +23,7 @@ from cdpr_drake.analyses.reporting.log_files import write_scenario, write_whole
 from cdpr_drake.analyses.reporting.written_files import whole_file
 from cdpr_drake.models.robot_loader import load_robot, portable_robot
 from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.version import __version__
 
 PACKAGES = ("cdpr_drake", "cdpr_drake.models", "cdpr_drake.systems", "cdpr_drake.analyses")
 """Whose sources numbers depend on."""
@@ -39,7 +40,8 @@ def package_versions() -> dict[str, str]:
 @cache
 def _versions() -> dict[str, str]:
     """Those of packages, read once in a process: their metadata are files."""
-    return {name: version(name) for name in ("cdpr_drake", "drake", "numpy", "numba")}
+    others = {name: version(name) for name in ("drake", "numpy", "numba")}
+    return {"cdpr_drake": __version__, **others}
 
 
 @cache
@@ -49,7 +51,7 @@ def code_version() -> str:
     Sweeps keep it beside their chunks, so that chunks of other code are not taken for their own.
     """
     folders = [Path(import_module(name).__path__[0]) for name in PACKAGES]
-    return f"{version('cdpr_drake')} {hash_of_sources(folders, folders[0] / 'cli')}"
+    return f"{__version__} {hash_of_sources(folders, folders[0] / 'cli')}"
 
 
 def hash_of_sources(folders: list[Path], without: Path | None = None) -> str:

@@ -13,9 +13,10 @@ import shutil
 import stat
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
-from importlib.metadata import version
 from pathlib import Path, PurePosixPath
 from typing import Any
+
+from cdpr_drake.version import __version__
 
 MARKER = ".cdpr_drake.json"
 """File by which this program knows folders that it wrote; no other is ever replaced."""
@@ -298,9 +299,7 @@ def _read_marker(folder: Path) -> dict[str, Any] | None:
 def _write_marker(folder: Path, names: Iterable[str]) -> None:
     own = (MARKER, JOURNAL, part_of(folder / MARKER).name)
     listed = sorted(name for name in names if name not in own)
-    words = json.dumps(
-        {"program": "cdpr_drake", "version": version("cdpr_drake"), FILES: listed}, indent=1
-    )
+    words = json.dumps({"program": "cdpr_drake", "version": __version__, FILES: listed}, indent=1)
     part = part_of(folder / MARKER)
     part.write_text(words + "\n", encoding="utf-8")
     part.replace(folder / MARKER)

@@ -1,13 +1,11 @@
-"""A cable model by a law that is there is a row of the table; then everything takes it by name."""
+"""The toy model is the catenary without damping, wherever models are chosen by name."""
 
 from dataclasses import fields, replace
 
 import numpy as np
-import pytest
 from pydrake.systems.analysis import Simulator
 
-from cdpr_drake.cables.dispatch_kernel import HANGING
-from cdpr_drake.cables.models import CABLE_MODELS, CableModel, cable_state
+from cdpr_drake.cables.models import cable_state
 from cdpr_drake.models.robot_holding import hold_robot
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.robots.cable_robot import CableRobot
@@ -18,22 +16,16 @@ HOME = ROBOT.home.transform()
 CABLES = ROBOT.cable_set()
 
 
-@pytest.fixture(autouse=True)
-def toy(monkeypatch):
-    row = CableModel("a catenary that nothing damps", HANGING, sags=True, damped=False)
-    monkeypatch.setitem(CABLE_MODELS, "toy", row)
-
-
 def undamped(cables):
     return replace(cables, retardation=np.zeros(cables.count))
 
 
 def test_at_a_pose():
-    held = hold_robot(ROBOT, HOME, CABLES, "toy")
+    held = hold_robot(ROBOT, HOME, CABLES, "undamped_catenary")
     same = hold_robot(ROBOT, HOME, CABLES, "catenary")
     np.testing.assert_array_equal(held.unstrained_lengths, same.unstrained_lengths)
     l0, V = held.unstrained_lengths, np.array([0.1, 0.0, 0.2, 0.1, -0.1, 0.2])
-    found = cable_state(CABLES, "toy", HOME, l0, V)
+    found = cable_state(CABLES, "undamped_catenary", HOME, l0, V)
     expected = cable_state(undamped(CABLES), "catenary", HOME, l0, V)
     damped = cable_state(CABLES, "catenary", HOME, l0, V)
     for field in fields(found):
@@ -42,7 +34,9 @@ def test_at_a_pose():
 
 
 def test_in_a_simulation():
-    robot = CableRobot(ROBOT, CableRobotSettings(cables=CableSettings(model="toy", pulleys=True)))
+    robot = CableRobot(
+        ROBOT, CableRobotSettings(cables=CableSettings(model="undamped_catenary", pulleys=True))
+    )
     assert np.all(robot.forces.cable_set().retardation == 0.0)
     simulator = Simulator(robot)
     context = simulator.get_mutable_context()

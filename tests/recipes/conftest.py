@@ -1,0 +1,3 @@
+"""Templates are tests of a copy, in which their modules are."""
+
+collect_ignore = ["templates"]

@@ -1,0 +1,56 @@
+"""A section of a scenario, as CONTRIBUTING.md says; other toys are in tests/recipes."""
+
+from dataclasses import dataclass
+
+import pytest
+from pydrake.systems.framework import LeafSystem
+
+from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
+from cdpr_drake.errors import ScenarioError
+from cdpr_drake.schema.fields import number, section
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
+
+QUICK = ["camera.kind=projected", "duration=0.2"]
+
+
+@dataclass(kw_only=True)
+class Counter:
+    """Counts, at its own rate: a toy of a section that brings a block."""
+
+    rate: float = number("Counts per second.", "Hz", 10.0, above=0.0)
+
+    def add_to(self, builder, blocks):
+        """Adds the block beside the servo."""
+
+        class Count(LeafSystem):
+            def __init__(self, rate):
+                super().__init__()
+                state = self.DeclareDiscreteState(1)
+                self.DeclarePeriodicDiscreteUpdateEvent(
+                    1.0 / rate,
+                    0.0,
+                    lambda context, after: after.set_value(
+                        state, context.get_discrete_state(state).value() + 1.0
+                    ),
+                )
+                self.DeclareStateOutputPort("count", state)
+
+        builder.AddNamedSystem("counter", Count(self.rate))
+
+
+@dataclass(kw_only=True)
+class CountedScenario(Scenario):
+    """A scenario with one section more."""
+
+    counter: Counter = section("A counter.", Counter, required=False)
+
+
+def test_a_scenario_section():
+    overrides = [*QUICK, "counter.rate=100"]
+    result = run_scenario(load_scenario("acrobot_pbvs", overrides, schema=CountedScenario))
+    counter = result.servo.diagram.GetSubsystemByName("counter")
+    assert result.servo.scenario.counter.rate == 100.0
+    assert counter.GetOutputPort("count").size() == 1
+    with pytest.raises(ScenarioError, match="counter"):
+        load_scenario("acrobot_pbvs", overrides)
