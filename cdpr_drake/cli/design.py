@@ -21,13 +21,13 @@ from cdpr_drake.analyses.design.settings import (
     GoalSettings,
     load_design_settings,
 )
-from cdpr_drake.analyses.reporting.output_folder import continued_folder
+from cdpr_drake.analyses.reporting.output_folder import continued_folder, shown_path
 from cdpr_drake.analyses.reporting.progress import StudySession, WorkProgress
 from cdpr_drake.cli.completion import words_among
 from cdpr_drake.cli.grid_options import ForceToResist, MomentToResist, default_folder
 from cdpr_drake.cli.options import FigureFormats, ResultsAsJson, RobotName, Scheduler, parse_formats
 from cdpr_drake.cli.process import INTERRUPTED, StopRequest
-from cdpr_drake.cli.run_endings import SayContinued, say_failed, shown_path
+from cdpr_drake.cli.run_endings import SayContinued, say_failed
 from cdpr_drake.cli.terminal import message_console, print_json, progress_bar, wide_console, working
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models.robot_loader import load_robot

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -53,6 +55,23 @@ Scheduler = Annotated[
     typer.Option(help="Dask scheduler whose workers compute, tcp://host:port; without it, here."),
 ]
 POSE = typer.Option(help="Platform, x,y,z [m] or x,y,z,phi,theta,psi [m, deg].")
+
+
+@contextmanager
+def named_options(**options: str) -> Iterator[None]:
+    """Names options where what is refused in the block begins with Python's arguments.
+
+    Args:
+        options: Of each argument by name, the option.
+    """
+    try:
+        yield
+    except CdprError as problem:
+        names, mark, words = str(problem).partition(": ")
+        asked = names.split(", ")
+        if mark and all(name in options for name in asked):
+            problem.args = (f"{', '.join(options[name] for name in asked)}: {words}",)
+        raise
 
 
 def parse_numbers(option: str, words: str, sizes: tuple[int, ...], meaning: str) -> list[float]:

@@ -12,7 +12,7 @@ import typer
 from rich.console import Console
 
 from cdpr_drake.analyses.front.studies import chosen_studies, write_reproduction
-from cdpr_drake.analyses.reporting.output_folder import continued_folder
+from cdpr_drake.analyses.reporting.output_folder import continued_folder, shown_path
 from cdpr_drake.analyses.reporting.progress import WorkProgress
 from cdpr_drake.analyses.reporting.statements import new_table
 from cdpr_drake.analyses.reproduction.rows import FAILED, ReportRow
@@ -23,7 +23,7 @@ from cdpr_drake.analyses.studies.catalogue import STUDIES
 from cdpr_drake.cli.completion import words_among
 from cdpr_drake.cli.options import FigureFormats, Overwrite, ResultsAsJson, parse_formats
 from cdpr_drake.cli.process import INTERRUPTED, StopRequest
-from cdpr_drake.cli.run_endings import INCOMPLETE, STUDY_FAILED, say_kept, shown_path
+from cdpr_drake.cli.run_endings import INCOMPLETE, STUDY_FAILED, say_kept
 from cdpr_drake.cli.terminal import message_console, print_json, progress_bar, wide_console, working
 
 STOPPING = (

@@ -18,7 +18,7 @@ from rich.table import Table
 from cdpr_drake.analyses.front.workspaces import default_box, stability_question
 from cdpr_drake.analyses.reporting.deferred_figures import write_pictures
 from cdpr_drake.analyses.reporting.log_files import write_json
-from cdpr_drake.analyses.reporting.output_folder import continued_folder
+from cdpr_drake.analyses.reporting.output_folder import continued_folder, shown_path
 from cdpr_drake.analyses.simulation.stability_files import stability_of_folder
 from cdpr_drake.analyses.workspaces.stability_figures import stability_pictures
 from cdpr_drake.analyses.workspaces.stability_results import (
@@ -54,7 +54,7 @@ from cdpr_drake.cli.options import (
     parse_numbers,
     parse_wrench,
 )
-from cdpr_drake.cli.run_endings import say_failed, shown_path
+from cdpr_drake.cli.run_endings import say_failed
 from cdpr_drake.cli.terminal import message_console, print_json, wide_console, working
 from cdpr_drake.errors import CdprError, OutputFolderError
 from cdpr_drake.models.robot_loader import load_robot

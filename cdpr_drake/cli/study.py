@@ -12,7 +12,7 @@ import typer
 
 from cdpr_drake.analyses.front.studies import chosen_studies
 from cdpr_drake.analyses.reporting.folder_lock import free_folder
-from cdpr_drake.analyses.reporting.output_folder import continued_folder, results_folder
+from cdpr_drake.analyses.reporting.output_folder import continued_folder, results_folder, shown_path
 from cdpr_drake.analyses.reporting.progress import StudySession, WorkProgress
 from cdpr_drake.analyses.studies.catalogue import STUDIES, StudyEntry, studies_that, write_study
 from cdpr_drake.analyses.sweeps.workers import check_scheduler
@@ -20,7 +20,7 @@ from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
 from cdpr_drake.cli.completion import words_among
 from cdpr_drake.cli.options import FigureFormats, Overwrite, ResultsAsJson, Scheduler, parse_formats
 from cdpr_drake.cli.process import INTERRUPTED, StopRequest
-from cdpr_drake.cli.run_endings import SayContinued, say_failed, say_kept, say_recovered, shown_path
+from cdpr_drake.cli.run_endings import SayContinued, say_failed, say_kept, say_recovered
 from cdpr_drake.cli.terminal import message_console, print_json, progress_bar, wide_console, working
 from cdpr_drake.errors import CdprError
 from cdpr_drake.schema.typed_yaml import closest

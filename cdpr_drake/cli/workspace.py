@@ -19,7 +19,7 @@ from rich.table import Table
 from cdpr_drake.analyses.front.workspaces import default_box, workspace_question
 from cdpr_drake.analyses.reporting.deferred_figures import write_pictures
 from cdpr_drake.analyses.reporting.log_files import write_json
-from cdpr_drake.analyses.reporting.output_folder import continued_folder
+from cdpr_drake.analyses.reporting.output_folder import continued_folder, shown_path
 from cdpr_drake.analyses.sweeps.sweep import STARTING
 from cdpr_drake.analyses.workspaces.box_certificates import BoxSearch, box_search, certified_boxes
 from cdpr_drake.analyses.workspaces.conditions import KINDS, MEASURES
@@ -61,7 +61,7 @@ from cdpr_drake.cli.options import (
     parse_wrench,
 )
 from cdpr_drake.cli.process import INTERRUPTED, StopRequest
-from cdpr_drake.cli.run_endings import say_failed, shown_path
+from cdpr_drake.cli.run_endings import say_failed
 from cdpr_drake.cli.terminal import message_console, print_json, progress_bar, wide_console, working
 from cdpr_drake.errors import WorkspaceError
 from cdpr_drake.models.robot_loader import load_robot
