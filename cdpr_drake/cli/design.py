@@ -5,39 +5,36 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 import typer
 
 from cdpr_drake.analyses.design.candidates import make_candidates
-from cdpr_drake.analyses.design.confirmation import confirm
+from cdpr_drake.analyses.design.confirmation import BOXES
 from cdpr_drake.analyses.design.goals import GOALS
-from cdpr_drake.analyses.design.results import DesignResult, write_design
-from cdpr_drake.analyses.design.search import search_design
 from cdpr_drake.analyses.design.settings import (
     SEARCHES,
     DesignSettings,
     GoalSettings,
     load_design_settings,
 )
-from cdpr_drake.analyses.reporting.output_folder import continued_folder, shown_path
-from cdpr_drake.analyses.reporting.progress import StudySession, WorkProgress
+from cdpr_drake.analyses.front.design import REACH, optimize_design
+from cdpr_drake.analyses.reporting.output_folder import shown_path
+from cdpr_drake.analyses.reporting.progress import WorkProgress
+from cdpr_drake.cli.command_session import CommandSession
 from cdpr_drake.cli.completion import words_among
 from cdpr_drake.cli.grid_options import ForceToResist, MomentToResist, default_folder
 from cdpr_drake.cli.options import FigureFormats, ResultsAsJson, RobotName, Scheduler, parse_formats
-from cdpr_drake.cli.process import INTERRUPTED, StopRequest
-from cdpr_drake.cli.run_endings import SayContinued, say_failed
-from cdpr_drake.cli.terminal import message_console, print_json, progress_bar, wide_console, working
+from cdpr_drake.cli.process import INTERRUPTED
+from cdpr_drake.cli.run_endings import say_failed
+from cdpr_drake.cli.terminal import print_json, wide_console
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.schema.typed_yaml import closest
 
 STOPPING = "Stopping after the designs under way, which are kept; Ctrl-C again drops them"
 """Answer to the first Ctrl-C."""
-
-REACH = 0.1
-"""Without a file, exit points move so far, either way along each axis that they can [m]."""
 
 QUICK_GENERATIONS, QUICK_BOXES = 3, 2000
 
@@ -74,7 +71,7 @@ def design(
     seed: Annotated[int | None, typer.Option(help="Of the search.", min=0)] = None,
     boxes: Annotated[
         int, typer.Option(help="Boxes that prove a volume, at most, for each robot.", min=1)
-    ] = 200_000,
+    ] = BOXES,
     quick: Annotated[bool, typer.Option(help="A short form, to see that it works.")] = False,
     out: Annotated[
         Path | None,
@@ -120,54 +117,45 @@ def design(
     candidates = make_candidates(robot, settings, source)
     arguments = {"robot": candidates.text, "settings": repr(replace(settings, generations=1))}
     folder = out if out is not None else default_folder("design", loaded.name, arguments)
-    console, stop = message_console(), StopRequest(STOPPING)
-    with continued_folder(folder):
-        with stop.listening(), progress_bar(console) as bar:
-            task = bar.add_task(f"design {loaded.name}", total=None, state="starting")
-            say_continued = SayContinued(bar.console, folder)
-
-            def show(progress: WorkProgress) -> None:
-                known = progress.done > progress.found or progress.found == progress.total
-                if known:
-                    say_continued(progress)
-                bar.update(
-                    task,
-                    completed=progress.done,
-                    total=progress.total,
-                    state=f"{progress.done:.0f}/{progress.total:.0f} designs, {progress.what}",
-                )
-
-            session = StudySession(folder, show, stop, workers, None, scheduler)
-            search = search_design(robot, candidates, settings, session)
-        confirmed = []
-        file = None
-        if search.best is not None and not search.interrupted:
-            file = write_design(search, loaded.name, folder)
-            most = QUICK_BOXES if quick else boxes
-            with stop.listening(), working(console, "proving") as say:
-                for name in names:
-                    one = confirm(
-                        name, robot, str(file), search.judging, boxes=most, say=say,
-                        should_stop=stop,
-                    )  # fmt: skip
-                    confirmed += [] if one is None else [one]
-        result = DesignResult(loaded.name, search, tuple(confirmed))
-        with working(console, "Writing results"):
-            failed = result.write(folder, formats)
+    with DesignSession(STOPPING, folder, f"design {loaded.name}") as session:
+        found = optimize_design(
+            robot, settings, folder, boxes=QUICK_BOXES if quick else boxes,
+            workers=scheduler or workers, formats=formats, source=source, session=session,
+        )  # fmt: skip
+    where = shown_path(folder.resolve())
     if as_json:
-        print_json(result.as_dict())
+        print_json(found.as_dict())
     else:
         printer = wide_console(150)
-        for table in result.tables():
+        for table in found.tables():
             printer.print(table)
-        if file is not None:
-            printer.print(f"robot file: {shown_path(file.resolve())}")
-        printer.print(f"results: {shown_path(folder.resolve())}")
-    code = say_failed(console, failed, shown_path(folder.resolve()), None)
-    if result.interrupted:
-        console.print("Interrupted; run again with the same arguments to continue")
+        if found.file is not None:
+            printer.print(f"robot file: {shown_path(found.file.resolve())}")
+        printer.print(f"results: {where}")
+    code = say_failed(session.console, found.failed, where, None)
+    if found.interrupted:
+        session.say("Interrupted; run again with the same arguments to continue")
         return INTERRUPTED
     return code
+
+
+class DesignSession(CommandSession):
+    """What a terminal shows of a search."""
+
+    def progress(self, progress: WorkProgress) -> None:
+        """Moves the bar; says that a search is continued once it is known how far it was."""
+        if progress.done > progress.found or progress.found == progress.total:
+            super().progress(progress)
+        else:
+            self.show(**self.fields(progress))
+
+    def fields(self, progress: WorkProgress) -> dict[str, Any]:
+        """Of the bar."""
+        return {
+            "completed": progress.done,
+            "total": progress.total,
+            "state": f"{progress.done:.0f}/{progress.total:.0f} designs, {progress.what}",
+        }
 
 
 def _plain() -> DesignSettings:

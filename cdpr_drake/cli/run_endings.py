@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from rich.console import Console
@@ -58,7 +58,7 @@ def say_kept(console: Console, kept: Iterable[Kept]) -> None:
 
 
 def say_failed(
-    console: Console, failed: dict[str, str], folder: Path, stop: StopRequest | None
+    console: Console, failed: Mapping[str, str], folder: Path, stop: StopRequest | None
 ) -> int:
     """Names what could not be written, one line each; returns the exit code."""
     for name, why in failed.items():
