@@ -30,8 +30,8 @@ from types import SimpleNamespace
 from typing import Any
 
 from cdpr_drake.analyses.benchmarks.groups import BENCH_GROUPS
-from cdpr_drake.analyses.studies import catalogue as studies
 from cdpr_drake.analyses.front import simulation
+from cdpr_drake.analyses.studies import catalogue as studies
 from cdpr_drake.cli import app, doctor, stability, view
 from cdpr_drake.models import camera_catalogue, sensor_catalogue
 from tests.fuzz_cases import COMMANDS as GOOD

@@ -212,7 +212,7 @@ def _left(folder: Path, goes_on: bool, as_json: bool, wanted: dict[str, Any]) ->
 
 def _log_formats(words: str | None) -> tuple[str, ...]:
     names = [] if words is None else [word.strip() for word in words.split(",")]
-    with named_options(log_formats="--log-format"):
+    with named_options({"log_formats": "--log-format"}):
         return checked_log_formats(names)
 
 

@@ -49,6 +49,7 @@ from cdpr_drake.cli.options import (
     ResultsAsJson,
     Scheduler,
     Wrench,
+    named_options,
     parse_formats,
     parse_limits,
     parse_numbers,
@@ -194,13 +195,14 @@ def stability(
     check_mass(mass, zero=True)
     formats = parse_formats(figure_format)
     loaded = load_robot(robot)
-    question = stability_question(
-        robot, scheme, verdict, bounds=bounds, vary=parse_vary(vary or []),
-        grid=parse_grid(grid, parse_turns(orientation or []), *default_box(robot)),
-        scenario=scenario,
-        options=VerdictOptions(draws=draws, seed=seed, searches=searches, pieces=pieces),
-        limits=parse_limits(limits), mass=mass, wrench=parse_wrench(wrench),
-    )  # fmt: skip
+    with named_options({f"scenario {scenario}": f"--scenario {scenario}"}):
+        question = stability_question(
+            robot, scheme, verdict, bounds=bounds, vary=parse_vary(vary or []),
+            grid=parse_grid(grid, parse_turns(orientation or []), *default_box(robot)),
+            scenario=scenario,
+            options=VerdictOptions(draws=draws, seed=seed, searches=searches, pieces=pieces),
+            limits=parse_limits(limits), mass=mass, wrench=parse_wrench(wrench),
+        )  # fmt: skip
     name = f"{question.robot}-{scheme}-{verdict}"
     folder = out if out is not None else default_folder("stability", name, question.arguments())
     console = message_console()

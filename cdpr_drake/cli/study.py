@@ -42,6 +42,9 @@ STOPPING = (
 MOST_SEEDS = 10_000
 """Runs of each configuration at the most: every one of them is listed before the first begins."""
 
+OPTIONS = {"seeds": "--seeds", "recipe": "--recipe", "workers": "--scheduler"}
+"""Options by the arguments of `run_study`."""
+
 PIPE_WIDTH = 160
 """Width of tables where there is no terminal [characters]."""
 
@@ -91,7 +94,7 @@ def study(
     called = name if recipe is None else f"{name}-{recipe}"
     folder = out if out is not None else free_folder(Path("studies") / called)
     with (
-        named_options(seeds="--seeds", recipe="--recipe", workers="--scheduler"),
+        named_options(OPTIONS),
         CommandSession(STOPPING, folder, name) as session,
     ):
         found = run_study(

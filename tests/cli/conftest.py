@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from matplotlib.figure import Figure
 
-from cdpr_drake.analyses.reporting.deferred_figures import write_pictures
 from cdpr_drake.analyses.front import simulation
+from cdpr_drake.analyses.reporting.deferred_figures import write_pictures
 from cdpr_drake.cli import plan
 
 
