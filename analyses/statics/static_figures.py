@@ -124,7 +124,7 @@ def polygon_figure(problem: TensionProblem, title: str) -> Figure:
     axes.set(xlim=(low[0] - room, high[0] + room), ylim=(low[1] - room, high[1] + room))
     _draw_bounds(axes, problem, t, N)
     axes.set(xlabel=r"$\eta_1$ [N]", ylabel=r"$\eta_2$ [N]", aspect="equal")
-    axes.legend(loc="center left", bbox_to_anchor=(1.34, 0.5))
+    axes.legend(loc="center left", bbox_to_anchor=(1.26, 0.5))
     return figure
 
 
@@ -169,7 +169,7 @@ def _draw_bounds(axes: Any, problem: TensionProblem, t: Array, N: Array) -> None
             for _, number, bound in group:
                 named.setdefault(bound, []).append(number)
             words = "\n".join(
-                f"cable{'s' * (len(numbers) > 1)} {', '.join(map(str, numbers))} at {bound:g} N"
+                f"cable{'s' * (len(numbers) > 1)} {', '.join(map(str, sorted(numbers)))} at {bound:g} N"
                 for bound, numbers in named.items()
             )
             place = (1.01, (middle - low) / (high - low))
@@ -209,7 +209,7 @@ def _near(
 def tension_figure(
     names: Sequence[str],
     tensions: Mapping[str, Array],
-    bounds: tuple[Array, Array] | None,
+    bounds: tuple[Array, Array],
     title: str,
 ) -> Figure:
     """Tensions of each cable as bars, by one method or several, with their bounds.
@@ -217,7 +217,7 @@ def tension_figure(
     Args:
         names: Of the cables.
         tensions: By the method, shape (m,) each [N]; NaN draws nothing.
-        bounds: Smallest and largest, shape (m,) each [N]; None: not drawn.
+        bounds: Smallest and largest, shape (m,) each [N].
         title: Title.
     """
     figure, axes = new_figure(1, 1, (10.0, 5.0), title)
@@ -227,13 +227,18 @@ def tension_figure(
         shift = (k - (len(tensions) - 1) / 2.0) * width
         axes.bar(places + shift, values, width, label=method, **bar_style(look))
     largest = max(float(np.max(t, where=np.isfinite(t), initial=0.0)) for t in tensions.values())
-    if bounds is not None:
-        ends = np.array([-0.5, 0.5])
-        for k in range(len(names)):
-            for bound in (bounds[0][k], bounds[1][k]):
-                if bound <= 2.0 * max(largest, 1e-9) or bound == bounds[0][k]:
-                    words = "bounds" if k == 0 and bound == bounds[0][0] else None
-                    axes.plot(k + ends, [bound, bound], label=words, **line_style(BOUND))
+    if largest == 0.0:
+        words = "no tensions hold the platform"
+        axes.text(0.5, 0.5, words, transform=axes.transAxes, ha="center", va="center")
+        largest = float("inf")
+    for words, values in zip(("lower", "upper"), bounds, strict=True):
+        if np.min(values) <= 2.0 * largest:
+            same = f" {values[0]:g} N" if np.ptp(values) == 0.0 else ""
+            edges = np.arange(len(names) + 1) - 0.5
+            axes.stairs(
+                values, edges, baseline=None, label=f"{words} bound{same}", **line_style(BOUND)
+            )
+    axes.set_ylim(bottom=0.0)
     axes.set_xticks(places, names)
     axes.set(ylabel="tension [N]")
     axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
