@@ -169,8 +169,8 @@ def _draw_bounds(axes: Any, problem: TensionProblem, t: Array, N: Array) -> None
             for _, number, bound in group:
                 named.setdefault(bound, []).append(number)
             words = "\n".join(
-                f"cable{'s' * (len(numbers) > 1)} {', '.join(map(str, sorted(numbers)))} at {bound:g} N"
-                for bound, numbers in named.items()
+                f"cable{'s' * (len(some) > 1)} {', '.join(map(str, sorted(some)))} at {bound:g} N"
+                for bound, some in named.items()
             )
             place = (1.01, (middle - low) / (high - low))
             axes.text(
