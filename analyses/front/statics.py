@@ -199,17 +199,17 @@ def find_equilibria(
         place = np.asarray(position, float)
         if place.shape != (3,) or not np.all(np.isfinite(place)):
             raise EquilibriumError(f"position: found {position}; accepted: x, y, z [m]")
-        found = rests_at_position(loaded, place, _taut(loaded, taut))
+        rests = rests_at_position(loaded, place, _taut(loaded, taut))
     else:
         assert lengths is not None
         given = _checked_lengths(loaded, lengths)
         if model == "elastic":
-            found = rests_elastic(
+            rests = rests_elastic(
                 loaded, given, pulleys, searches=searches, seed=seed, report=report
             )
         else:
-            found = rests_at_lengths(loaded, given, report=report)
-    return as_kind(RobotEquilibria, found, loaded=loaded)
+            rests = rests_at_lengths(loaded, given, report=report)
+    return as_kind(RobotEquilibria, rests, loaded=loaded)
 
 
 def solve_forward_kinematics(

@@ -113,13 +113,13 @@ class StudyOfMany(NamedTuple):
     Attributes:
         name: The study that runs.
         number: How many came before it.
-        count: How many there are.
+        of: How many there are.
         progress: Where it stands; None: it begins.
     """
 
     name: str
     number: int
-    count: int
+    of: int
     progress: WorkProgress | None
 
 

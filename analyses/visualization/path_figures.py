@@ -100,7 +100,7 @@ def poses_figure(
     title: str,
     robot: Robot,
     poses: Mapping[str, RigidTransform],
-    slack: Sequence[Array] | None = None,
+    slack: Sequence[np.ndarray] | None = None,
 ) -> Figure:
     """A robot with its platform at one pose or several, in 3D.
 
@@ -164,7 +164,7 @@ def _draw_path(axes: Any, path: Path3D, phase: float) -> None:
 
 
 def _draw_cables(
-    axes: Any, cables: CableSet, X_WP: RigidTransform, slack: Array, look: Look | None = None
+    axes: Any, cables: CableSet, X_WP: RigidTransform, slack: np.ndarray, look: Look | None = None
 ) -> None:
     """Cables at a pose, drawn straight behind their pulleys, dotted where slack; with one look
     for all, or each its own."""

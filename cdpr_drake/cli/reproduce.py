@@ -93,7 +93,7 @@ class ReproductionSession(CommandSession):
 
     def progress(self, progress: StudyOfMany) -> None:
         """Moves the bar."""
-        words, now = f"{progress.number + 1}/{progress.count} {progress.name}", progress.progress
+        words, now = f"{progress.number + 1}/{progress.of} {progress.name}", progress.progress
         if now is None:
             self.show(completed=0, total=None, state=words)
         else:
