@@ -148,7 +148,7 @@ def test_every_study_has_a_golden_file():
 
 
 def test_a_refused_scenario_is_a_failure(tmp_path):
-    with pytest.raises(RuntimeError, match="exit code 2: cdpr: .*no_such"):
+    with pytest.raises(RuntimeError, match=r"exit code 2: cdpr: .*no_such"):
         making._written(tmp_path, "simulate", "no_such")
 
 

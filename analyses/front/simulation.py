@@ -27,7 +27,7 @@ from cdpr_drake.analyses.simulation.monte_carlo_report import (
     repetition_summary,
     write_repetitions,
 )
-from cdpr_drake.analyses.simulation.monte_carlo_store import KeptRuns
+from cdpr_drake.analyses.simulation.monte_carlo_store import StoredRuns
 from cdpr_drake.analyses.simulation.scenario_kinds import SCENARIO_KINDS, ScenarioKind
 from cdpr_drake.analyses.simulation.session import RunSession, check_connected
 from cdpr_drake.analyses.sweeps.workers import check_scheduler
@@ -36,7 +36,7 @@ from cdpr_drake.errors import ScenarioError
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.summaries import Summarized
 from cdpr_drake.systems.diagrams.load import load_scenario
-from cdpr_drake.systems.loops.loop_choice import with_loop
+from cdpr_drake.systems.loops.loop_choice import set_loop
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
 from cdpr_drake.systems.scenarios.run_settings import ScenarioHeader
 from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
@@ -188,7 +188,7 @@ def simulate(
     kind = SCENARIO_KINDS[loaded.kind]
     wanted = _Wanted(tuple(formats), checked_log_formats(log_formats), video)
     _check_wanted(loaded, kind, seeds, wanted)
-    loaded, note = with_loop(loaded, repeated, told.watched)
+    loaded, note = set_loop(loaded, repeated, told.watched)
     outside = told.outside
     check_connected(loaded, None if outside is None else outside.connect)
     where = None if folder is None else Path(folder)
@@ -360,7 +360,7 @@ def _repeat(
 ) -> RepeatedRuns:
     """Runs of a scenario over seeds, into a folder or nowhere."""
     scenario = asked.scenario
-    kept = None if results is None else KeptRuns(results.path, scenario)
+    kept = None if results is None else StoredRuns(results.path, scenario)
     if asked.note:
         session.say(asked.note)
     count, scheduler = asked_workers(asked.workers)

@@ -34,11 +34,11 @@ from cdpr_drake.analyses.reporting.provenance import BELIEVED_FILE, write_run_in
 from cdpr_drake.analyses.reporting.statements import new_table
 from cdpr_drake.calibration.parameters import GROUPS
 from cdpr_drake.cli.log_options import (
+    CommandResults,
     Ending,
     LogOrCampaign,
     ResultsBelowRuns,
     RobotOrCampaign,
-    Told,
     TrackerLate,
     check_campaign,
     comma_words,
@@ -171,7 +171,7 @@ def calibrate(
         "outliers": not keep_outliers,
     }  # fmt: skip
 
-    def work(folder: Path, say: Callable[[str], None]) -> Told:
+    def work(folder: Path, say: Callable[[str], None]) -> CommandResults:
         found = run_calibration(
             loaded, read, comma_words(unknown), sigmas=known_sigmas, tags=places, say=say, **options
         )
@@ -183,11 +183,11 @@ def calibrate(
     return write_and_tell(f"Calibrating {loaded.name}", folder, ending, work)
 
 
-def _told(found: Calibration, more: Mapping[str, Any], tables: Sequence[Table]) -> Told:
+def _told(found: Calibration, more: Mapping[str, Any], tables: Sequence[Table]) -> CommandResults:
     """What is told of a calibration, with more numbers and tables."""
     shown = (*calibration_tables(found), *tables)
     code = MISFIT if found.misfit else 0
-    return Told(calibration_dict(found, more), shown, calibration_drawings(found), code)
+    return CommandResults(calibration_dict(found, more), shown, calibration_drawings(found), code)
 
 
 class CampaignOptions(NamedTuple):
@@ -215,7 +215,7 @@ def _campaign(name: str, asked: CampaignOptions, out: Path | None, ending: Endin
     if not isinstance(scenario, Scenario):
         raise CdprError(f"--campaign: found {name}, a {scenario.kind}; accepted: a visual servo")
 
-    def work(folder: Path, say: Callable[[str], None]) -> Told:
+    def work(folder: Path, say: Callable[[str], None]) -> CommandResults:
         run = run_campaign(scenario, asked.poses, say, asked.goals)
         found = run.calibration
         write_calibration(found, folder)

@@ -14,7 +14,7 @@ from cdpr_drake.analyses.front.session import Session
 from cdpr_drake.analyses.reporting.output_folder import ResultsFolder, shown_path
 from cdpr_drake.analyses.reporting.progress import WorkProgress
 from cdpr_drake.cli.process import StopRequest
-from cdpr_drake.cli.run_endings import SayContinued, say_kept, say_recovered
+from cdpr_drake.cli.run_endings import SayContinued, report_kept_files, report_recovered
 from cdpr_drake.cli.terminal import message_console, progress_bar, working
 
 
@@ -68,11 +68,11 @@ class CommandSession(Session):
     def opened(self, results: ResultsFolder) -> None:
         """Says where results of killed runs went."""
         self._results = results
-        say_recovered(self.console, results)
+        report_recovered(self.console, results)
 
     def say_kept(self) -> None:
         """Says which files of others were kept when results were replaced."""
-        say_kept(self.console, [] if self._results is None else self._results.kept)
+        report_kept_files(self.console, [] if self._results is None else self._results.kept)
 
     @contextmanager
     def computing(self) -> Iterator[None]:

@@ -27,7 +27,7 @@ from cdpr_drake.cli.completion import words_among
 from cdpr_drake.cli.grid_options import ForceToResist, MomentToResist, default_folder
 from cdpr_drake.cli.options import FigureFormats, ResultsAsJson, RobotName, Scheduler, parse_formats
 from cdpr_drake.cli.process import INTERRUPTED
-from cdpr_drake.cli.run_endings import say_failed
+from cdpr_drake.cli.run_endings import report_failures
 from cdpr_drake.cli.terminal import print_json, wide_console
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models.robot_loader import load_robot
@@ -132,7 +132,7 @@ def design(
         if found.file is not None:
             printer.print(f"robot file: {shown_path(found.file.resolve())}")
         printer.print(f"results: {where}")
-    code = say_failed(session.console, found.failed, where, None)
+    code = report_failures(session.console, found.failed, where, None)
     if found.interrupted:
         session.say("Interrupted; run again with the same arguments to continue")
         return INTERRUPTED

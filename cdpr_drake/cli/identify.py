@@ -33,11 +33,11 @@ from cdpr_drake.analyses.calibration.identification_task import UNKNOWN
 from cdpr_drake.analyses.calibration.log_file import read_log
 from cdpr_drake.analyses.front.calibration import identify as run_identification
 from cdpr_drake.cli.log_options import (
+    CommandResults,
     Ending,
     LogOrCampaign,
     ResultsBelowRuns,
     RobotOrCampaign,
-    Told,
     TrackerLate,
     check_campaign,
     comma_words,
@@ -141,14 +141,14 @@ def identify(
         "outliers": not keep_outliers,
     }  # fmt: skip
 
-    def work(folder: Path, say: Callable[[str], None]) -> Told:
+    def work(folder: Path, say: Callable[[str], None]) -> CommandResults:
         found = run_identification(
             loaded, read, UNKNOWN if unknown is None else comma_words(unknown), validate=other,
             tracker_late=tracker_late, say=say, **options,
         )  # fmt: skip
         write(found, folder)
         drawings = identification_drawings(found)
-        return Told(as_dict(found), tables(found), drawings, _code(found.result))
+        return CommandResults(as_dict(found), tables(found), drawings, _code(found.result))
 
     folder = results_below_runs(out, f"identify-{loaded.name}")
     return write_and_tell(f"Identifying {loaded.name}", folder, ending, work)
@@ -167,13 +167,13 @@ def _campaign(name: str, unknown: tuple[str, ...], out: Path | None, ending: End
             f"--campaign: found {name}, a {scenario.kind}; accepted: a scenario of tension_control"
         )
 
-    def work(folder: Path, say: Callable[[str], None]) -> Told:
+    def work(folder: Path, say: Callable[[str], None]) -> CommandResults:
         run = run_dynamic_campaign(scenario, unknown, say)
         write_dynamic_campaign(run, folder)
         found = run.identification
         shown = (*tables(found, run.truth), tracking_table(run))
         numbers = as_dict(found, run.as_dict(), run.truth)
-        return Told(numbers, shown, campaign_drawings(run), _code(found.result))
+        return CommandResults(numbers, shown, campaign_drawings(run), _code(found.result))
 
     folder = results_below_runs(out, f"identify-{scenario.name}")
     return write_and_tell(f"Campaign of {scenario.name}", folder, ending, work)

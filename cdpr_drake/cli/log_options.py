@@ -14,7 +14,7 @@ from cdpr_drake.analyses.reporting.folder_lock import free_folder
 from cdpr_drake.analyses.reporting.output_folder import results_folder, shown_path
 from cdpr_drake.analyses.visualization.figure_files import write_figures
 from cdpr_drake.cli.completion import robot_words
-from cdpr_drake.cli.run_endings import say_failed, say_kept
+from cdpr_drake.cli.run_endings import report_failures, report_kept_files
 from cdpr_drake.cli.terminal import message_console, print_json, wide_console, working
 from cdpr_drake.errors import CdprError
 
@@ -77,7 +77,7 @@ class Ending(NamedTuple):
     formats: tuple[str, ...]
 
 
-class Told(NamedTuple):
+class CommandResults(NamedTuple):
     """What is told of results that are written: for JSON, for the terminal, as figures, and by an
     exit code where they are not what was asked for."""
 
@@ -87,7 +87,7 @@ class Told(NamedTuple):
     code: int = 0
 
 
-Work = Callable[[Path, Callable[[str], None]], Told]
+Work = Callable[[Path, Callable[[str], None]], CommandResults]
 """Writes results into the folder that it gets; may tell how far it is."""
 
 
@@ -115,7 +115,7 @@ def write_and_tell(title: str, folder: Path, ending: Ending, work: Work) -> int:
         published = results.publish()
         say("figures")
         failed = write_figures(published, told.drawings, ending.formats)
-    say_kept(console, results.kept)
+    report_kept_files(console, results.kept)
     folder = shown_path(published)
     if ending.as_json:
         print_json(told.numbers)
@@ -124,5 +124,5 @@ def write_and_tell(title: str, folder: Path, ending: Ending, work: Work) -> int:
         for table in told.tables:
             printer.print(table)
         printer.print(f"results: {folder}")
-    missing = say_failed(console, failed, folder, None)
+    missing = report_failures(console, failed, folder, None)
     return told.code or missing

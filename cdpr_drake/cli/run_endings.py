@@ -7,7 +7,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from cdpr_drake.analyses.reporting.left_folders import Kept, holds_log
+from cdpr_drake.analyses.reporting.left_folders import KeptFiles, holds_log
 from cdpr_drake.analyses.reporting.output_folder import ResultsFolder, shown_path
 from cdpr_drake.analyses.reporting.progress import WorkProgress
 from cdpr_drake.cli.process import INTERRUPTED, StopRequest
@@ -25,7 +25,7 @@ MISFIT = 6
 """Exit code of a calibration or an identification that does not fit what was measured."""
 
 
-def say_recovered(console: Console, results: ResultsFolder) -> None:
+def report_recovered(console: Console, results: ResultsFolder) -> None:
     """Says where results of killed runs went that nobody had seen yet."""
     for folder in results.recovered:
         where = shown_path(folder)
@@ -45,7 +45,7 @@ NAMED = 3
 """So many files that are kept are named."""
 
 
-def say_kept(console: Console, kept: Iterable[Kept]) -> None:
+def report_kept_files(console: Console, kept: Iterable[KeptFiles]) -> None:
     """Says which files of a folder whose results were replaced are not of this program, and where
     they are."""
     for names, folder in kept:
@@ -57,7 +57,7 @@ def say_kept(console: Console, kept: Iterable[Kept]) -> None:
         )  # fmt: skip
 
 
-def say_failed(
+def report_failures(
     console: Console, failed: Mapping[str, str], folder: Path, stop: StopRequest | None
 ) -> int:
     """Names what could not be written, one line each; returns the exit code."""

@@ -21,7 +21,7 @@ from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.remote.messages import PROTOCOL, check_available
 from cdpr_drake.systems.remote.remote_client import LOCAL_HOST, USUAL_PORT
-from cdpr_drake.systems.remote.remote_driver import Driver, Pace
+from cdpr_drake.systems.remote.remote_driver import Driver, SyncMode
 from cdpr_drake.systems.remote.remote_place import SERVO_PLACES, TENSION_PLACES, Remote
 from cdpr_drake.systems.remote.server_socket import ServerSocket as Socket
 from cdpr_drake.systems.remote.server_socket import is_loopback
@@ -49,7 +49,7 @@ def serve(
         str | None,
         typer.Option(
             help="lock_step or real_time.",
-            autocompletion=words_among([each.value for each in Pace]),
+            autocompletion=words_among([each.value for each in SyncMode]),
         ),
     ] = None,
     timeout: Annotated[
@@ -150,7 +150,7 @@ class _Client:
             },
             remote.inputs,
             remote.outputs,
-            pace=Pace(scenario.remote.pace),
+            pace=SyncMode(scenario.remote.pace),
             timeout=scenario.remote.timeout,
             period=1.0 / scenario.controller.rate,
             services={"distribute": self._distribution(robot)},

@@ -36,11 +36,11 @@ from cdpr_drake.cli.options import (
     parse_formats,
 )
 from cdpr_drake.cli.process import INTERRUPTED
-from cdpr_drake.cli.run_endings import CLIENT_ENDED, INCOMPLETE, say_failed
+from cdpr_drake.cli.run_endings import CLIENT_ENDED, INCOMPLETE, report_failures
 from cdpr_drake.cli.terminal import print_json, wide_console
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.systems.diagrams.load import load_scenario
-from cdpr_drake.systems.loops.loop_choice import with_loop
+from cdpr_drake.systems.loops.loop_choice import set_loop
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
 from cdpr_drake.systems.scenarios.files import scenario_kind
 from cdpr_drake.systems.scenarios.visual_servo_scenario import DEFAULT_SCENARIO
@@ -180,7 +180,7 @@ def simulate(
             overrides.append(f"{key}={value}")
     loaded = load_scenario(scenario, overrides)
     if repeated is not None:
-        folder = out if out is not None else repetition_folder(with_loop(loaded, True)[0])
+        folder = out if out is not None else repetition_folder(set_loop(loaded, True)[0])
         many = RepetitionSession(STOPPING_REPETITIONS, folder, loaded.name, len(repeated))
         with many:
             runs = run_scenario(
@@ -207,7 +207,7 @@ def _left(folder: Path, goes_on: bool, as_json: bool, wanted: dict[str, Any]) ->
             return tell_run(continue_run(folder, session=session, **wanted), session, as_json)
         found = finish_run(folder, session=session, **wanted)
         _print_summary(found, shown(found.folder), as_json)
-        return say_failed(session.console, found.failed, shown(found.folder), session.request)
+        return report_failures(session.console, found.failed, shown(found.folder), session.request)
 
 
 def _log_formats(words: str | None) -> tuple[str, ...]:
@@ -282,7 +282,7 @@ def tell_run(found: Run, session: SimulationSession, as_json: bool) -> int:
             soft_wrap=True, markup=False, highlight=False,
         )  # fmt: skip
         return INTERRUPTED
-    code = say_failed(console, found.failed, folder, session.request)
+    code = report_failures(console, found.failed, folder, session.request)
     if result.outcome == Outcome.CLIENT_ENDED and code != INTERRUPTED:
         console.print(
             f"cdpr: the run ended at {result.sim_time:g} s of simulated time: {result.message}; "
@@ -368,5 +368,5 @@ def _tell_repetitions(found: RepeatedRuns, session: RepetitionSession, as_json: 
     if runs.lost:
         dead = ", ".join(map(str, runs.lost))
         console.print(f"cdpr: seed {dead}: the process died, perhaps out of memory")
-    code = say_failed(console, found.failed, folder, session.request)
+    code = report_failures(console, found.failed, folder, session.request)
     return max(code, INCOMPLETE if runs.lost else 0)

@@ -24,7 +24,7 @@ from cdpr_drake.cli.options import (
     parse_formats,
 )
 from cdpr_drake.cli.process import INTERRUPTED
-from cdpr_drake.cli.run_endings import say_failed
+from cdpr_drake.cli.run_endings import report_failures
 from cdpr_drake.cli.terminal import print_json, wide_console
 
 RECIPES = sorted({recipe for entry in STUDIES.values() for recipe in entry.recipes})
@@ -121,9 +121,9 @@ def study(
             for option, value in given.items():
                 words += f" {option} {value}" if value is not None else ""
         console.print(words)
-        say_failed(console, found.failed, folder, None)
+        report_failures(console, found.failed, folder, None)
         return INTERRUPTED
-    return say_failed(console, found.failed, folder, None)
+    return report_failures(console, found.failed, folder, None)
 
 
 def _command(name: str, folder: Path, quick: bool, as_json: bool, formats: Sequence[str]) -> str:
