@@ -1,8 +1,12 @@
 from .analyses.front.calibration import calibrate as calibrate
 from .analyses.front.calibration import identify as identify
 from .analyses.front.design import optimize_design as optimize_design
+from .analyses.front.exchange import import_robot as import_robot
 from .analyses.front.planning import plan_free_motion as plan_free_motion
 from .analyses.front.planning import plan_path as plan_path
+from .analyses.front.session import Session as Session
+from .analyses.front.simulation import continue_run as continue_run
+from .analyses.front.simulation import finish_run as finish_run
 from .analyses.front.simulation import simulate as simulate
 from .analyses.front.statics import find_equilibria as find_equilibria
 from .analyses.front.statics import solve_forward_kinematics as solve_forward_kinematics
@@ -18,7 +22,6 @@ from .analyses.front.workspaces import compute_workspace as compute_workspace
 from .errors import CdprError as CdprError
 from .geometry.cable_set import CableSet as CableSet
 from .models.robot_exchange import export_robot as export_robot
-from .models.robot_exchange import import_robot as import_robot
 from .models.robot_in_plant import add_robot as add_robot
 from .models.robot_loader import load_robot as load_robot
 from .models.robot_loader import robot_names as robot_names

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from dataclasses import fields
 from html import escape
@@ -16,12 +17,12 @@ LONGEST_WORDS = 160
 """Characters of one of these, at most."""
 
 
-class Summarized:
+class Summarized(ABC):
     """A result that shows itself by a title and rows; what it shows is its method `summary`."""
 
+    @abstractmethod
     def summary(self) -> tuple[str, list[tuple[str, str]]]:
         """A title, and rows of a label and words; at most `MOST_LINES` in all."""
-        raise NotImplementedError
 
     def __repr__(self) -> str:
         """Title and rows, one a line."""
@@ -43,14 +44,15 @@ class Summarized:
         return f"<table><caption>{escape(title)}</caption>{cells}</table>"
 
 
-def as_kind(kind: type[T], result: Any) -> T:
-    """A result as an object of a class of its own class that has more methods, and no more fields.
+def as_kind(kind: type[T], result: Any, **more: Any) -> T:
+    """A result as an object of a class of its own class that has more methods.
 
     Args:
         kind: A subclass of the result's dataclass.
         result: The result.
+        more: Fields that the subclass has besides.
     """
-    return kind(**{field.name: getattr(result, field.name) for field in fields(result)})
+    return kind(**{field.name: getattr(result, field.name) for field in fields(result)}, **more)
 
 
 def numbers(values: Iterable[float], digits: int = 4) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -28,10 +29,11 @@ from cdpr_drake.models.robot_loader import (
     world_turn,
 )
 from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.summaries import Summarized
 
 
-@dataclass(frozen=True)
-class ImportedRobot:
+@dataclass(frozen=True, repr=False)
+class ImportedRobot(Summarized):
     """A robot from a file of another tool.
 
     Attributes:
@@ -63,6 +65,30 @@ class ImportedRobot:
                 "", *remarks, "",
             ]
         )  # fmt: skip
+
+    def as_dict(self) -> dict[str, Any]:
+        """What came from where, for JSON."""
+        return {
+            "robot": self.robot.name,
+            "format": self.tool,
+            "source": str(self.source),
+            "motion": self.robot.motion,
+            "cables": len(self.robot.cables),
+            "given": list(self.completed.given),
+            "assumed": self.completed.assumed,
+            "remarks": list(self.completed.remarks),
+        }
+
+    def summary(self) -> tuple[str, list[tuple[str, str]]]:
+        """What it shows of itself."""
+        robot, made = self.robot, self.completed
+        return f"Robot {robot.name} from {self.tool}", [
+            ("source", str(self.source)),
+            ("motion, cables", f"{robot.motion}, {len(robot.cables)}"),
+            ("given", f"{len(made.given)} keys"),
+            ("assumed", ", ".join(made.assumed) or "nothing"),
+            *(("remark", words) for words in made.remarks[:4]),
+        ]
 
 
 def import_robot(

@@ -30,9 +30,9 @@ from types import SimpleNamespace
 from typing import Any
 
 from cdpr_drake.analyses.benchmarks.groups import BENCH_GROUPS
+from cdpr_drake.analyses.front import simulation
 from cdpr_drake.analyses.studies import catalogue as studies
-from cdpr_drake.cli import app, doctor, simulate, stability, view
-from cdpr_drake.cli import simulate as seeds
+from cdpr_drake.cli import app, doctor, stability, view
 from cdpr_drake.models import camera_catalogue, sensor_catalogue
 from tests.fuzz_cases import COMMANDS as GOOD
 from tests.fuzz_cases import Case, draw_case, lay_out
@@ -86,8 +86,7 @@ def lighten() -> None:
 
 
 PICTURES = (
-    (simulate, "write_pictures"),
-    (seeds, "write_pictures"),
+    (simulation, "write_pictures"),
     (stability, "stability_pictures"),
 )
 """What draws figures, by the module that calls it."""

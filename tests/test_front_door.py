@@ -1,12 +1,14 @@
 """`import cdpr_drake as cdpr`: its names, and its calls against those that they stand for."""
 
 import ast
+import inspect
 import json
 import re
 import subprocess
 import sys
 from importlib import import_module
 from pathlib import Path
+from typing import Any, get_args, get_type_hints
 
 import numpy as np
 import pytest
@@ -22,6 +24,8 @@ from cdpr_drake.analyses.calibration.identification_report import identification
 from cdpr_drake.analyses.calibration.identification_task import IdentificationTask
 from cdpr_drake.analyses.calibration.identification_task import identify as identify_log
 from cdpr_drake.analyses.calibration.log_file import read_log
+from cdpr_drake.analyses.front.session import Session
+from cdpr_drake.analyses.front.simulation import RepeatedRuns, Run
 from cdpr_drake.analyses.planning.robot_path_task import LimitSettings, make_path, path_task
 from cdpr_drake.analyses.simulation.tension_control_run import (
     run_tension_scenario,
@@ -45,7 +49,7 @@ from cdpr_drake.models.robot_statics import tension_problem, wrench_balance
 from cdpr_drake.planning.path_timing import plan_along_path
 from cdpr_drake.stability.verdict import VerdictOptions
 from cdpr_drake.statics.forward_kinematics import ForwardKinematics
-from cdpr_drake.summaries import MOST_LINES
+from cdpr_drake.summaries import MOST_LINES, Summarized
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.tensions.methods import METHODS, distribute
 from cdpr_drake.workspaces.demanded_wrenches import SpatialSet
@@ -70,6 +74,9 @@ PROMISED = {
     "import_robot",
     "export_robot",
     "simulate",
+    "continue_run",
+    "finish_run",
+    "Session",
     "solve_tensions",
     "distribute",
     "TensionProblem",
@@ -118,12 +125,48 @@ def aside(planar):
 
 
 def shows_itself(result):
-    """In a few lines, as text and as HTML."""
+    """In a few lines, as text and as HTML; what a verb returned also for JSON, and as a figure."""
+    if type(result) in RESULTS:
+        assert as_json(result)
+        assert isinstance(result.plot(), Figure)
     lines = repr(result).splitlines()
     assert 2 <= len(lines) <= MOST_LINES
     assert " object at 0x" not in repr(result)
     assert result._repr_html_().count("<tr>") >= len(lines) - 1
     return repr(result)
+
+
+def verbs():
+    """Functions of the front door that answer, by name."""
+    homes = {name: home for name, home in HOMES.items() if home.startswith("analyses.front.")}
+    return {n: getattr(cdpr, n) for n in homes if inspect.isfunction(getattr(cdpr, n))}
+
+
+def result_classes():
+    """What the verbs return; `simulate` says so in words, since mypy could not tell which."""
+    found = {Run, RepeatedRuns}
+    for verb in verbs().values():
+        told = get_type_hints(verb)["return"]
+        found |= {one for one in (get_args(told) or (told,)) if inspect.isclass(one)}
+    return found - {tuple, str, Any}
+
+
+RESULTS = result_classes()
+
+
+def test_all_results_tell_draw_and_show_themselves():
+    """That they do it well is tested with each."""
+    assert len(RESULTS) >= 16
+    for kind in RESULTS:
+        assert issubclass(kind, Summarized), kind
+        assert not inspect.isabstract(kind), kind
+        for method in ("as_dict", "plot"):
+            assert inspect.isfunction(getattr(kind, method, None)), f"{kind}: {method}"
+
+
+def test_what_does_not_say_what_it_shows_cannot_be_made():
+    with pytest.raises(TypeError, match="summary"):
+        type("Silent", (Summarized,), {})()
 
 
 def as_json(result):
@@ -242,6 +285,8 @@ def test_all_poses_of_rest():
     found = cdpr.find_equilibria(robot, lengths)
     assert found.as_dict() == equilibria_at_lengths(robot, lengths).as_dict()
     shows_itself(found)
+    three = load_robot("grab_three")
+    shows_itself(cdpr.find_equilibria(three, position=three.home.position))
     one_line(lambda: cdpr.find_equilibria(robot), "neither")
     one_line(lambda: cdpr.find_equilibria(robot, position=[0, 0, 0.3], taut=["C9"]), "C9")
     one_line(lambda: cdpr.find_equilibria(robot, lengths, taut=["C1"]), "taut")
@@ -255,6 +300,8 @@ def test_a_pose_from_lengths(planar, aside):
     expected = solver.pose(lengths, planar.home.transform())
     np.testing.assert_array_equal(found.X_WP.GetAsMatrix4(), expected.X_WP.GetAsMatrix4())
     np.testing.assert_allclose(found.X_WP.translation(), aside.position, atol=1e-6)
+    assert as_json(found)["lengths_m"] == lengths.tolist()
+    assert "residuals" in shows_itself(found)
     one_line(lambda: cdpr.solve_forward_kinematics(planar, 9.0 * lengths), "")
     one_line(lambda: cdpr.solve_forward_kinematics(planar, -lengths), "lengths")
 
@@ -280,7 +327,10 @@ def test_workspaces(planar):
             "planar", ["wrench-feasible"], (3, 3, 1), measures=["capacity-margin"], force=2.0
         )
     )
-    one_line(lambda: cdpr.compute_workspace(planar, "wide"), "wide")
+    one_line(lambda: cdpr.compute_workspace(planar, "wide"), "kinds 'wide'")
+    one_line(lambda: cdpr.compute_workspace(planar, measures="wide"), "measures 'wide'")
+    one_line(lambda: cdpr.compute_workspace(planar, clearance=-1.0), "clearance: found")
+    one_line(lambda: cdpr.compute_workspace(planar, "wrench-feasible"), "needs required, force")
     one_line(lambda: cdpr.compute_workspace(planar, grid=(3, 3)), "grid")
     one_line(lambda: cdpr.compute_workspace(planar, forse=1.0), "forse", "force")
 
@@ -338,7 +388,11 @@ def test_a_plan(planar, aside):
 
 def test_a_run(tmp_path):
     asked = ["duration=0.2", "integration.engine=compiled"]
-    found = cdpr.simulate("planar_computed_torque", asked)
+    seen = []
+    session = Session(on_progress=lambda now: seen.append(now.sim_time))
+    found = cdpr.simulate("planar_computed_torque", asked, session=session)
+    assert seen
+    assert max(seen) <= 0.2
     scenario = load_scenario("planar_computed_torque", asked)
     expected = summarize_tension_run(run_tension_scenario(scenario))
     same = ("outcome", "sim_time_s", "position_error_m", "tension_n")
@@ -346,6 +400,11 @@ def test_a_run(tmp_path):
     assert found.log["tensions"].shape[1] == 4
     assert "outcome" not in shows_itself(found)
     assert isinstance(found.plot(), Figure)
+    stopped = cdpr.simulate(scenario, session=Session(should_stop=lambda: True))
+    assert stopped.as_dict()["outcome"] == "interrupted"
+    one_line(lambda: cdpr.simulate(scenario, video=True), "video")
+    one_line(lambda: cdpr.simulate(scenario, log_formats=["xls"]), "log_formats", "xls")
+    one_line(lambda: cdpr.finish_run(tmp_path / "none"), "none")
     kept = cdpr.simulate(scenario, folder=tmp_path / "run", formats=("svg",))
     assert kept.failed == {}
     written = json.loads((tmp_path / "run" / "summary.json").read_text())
@@ -441,6 +500,9 @@ class ToyResult:
     def as_dict(self):
         return {"quick": True}
 
+    def drawings(self):
+        return {"errors": Figure}
+
     def tables(self):
         return []
 
@@ -457,8 +519,14 @@ def test_studies(monkeypatch, tmp_path):
 
     monkeypatch.setitem(STUDIES, "case-8", StudyEntry(study))
     assert cdpr.studies() == tuple(STUDIES)
-    assert isinstance(cdpr.run_study("case-8", quick=True, workers=1), ToyResult)
-    cdpr.run_study("case-8", tmp_path / "s", quick=True)
+    seen = []
+    session = Session(say=seen.append)
+    found = cdpr.run_study("case-8", quick=True, workers=1, session=session)
+    assert isinstance(found.result, ToyResult)
+    assert "Study case-8" in shows_itself(found)
+    one_line(lambda: found.plot("ways"), "ways", "errors")
+    cdpr.run_study("case-8", tmp_path / "s", quick=True, session=session)
+    assert seen == ["Writing results"]
     assert json.loads((tmp_path / "s" / "results.json").read_text()) == {"quick": True}
     found = cdpr.reproduce(tmp_path / "r", quick=True, only=["case-8"])
     assert found.page.is_file()
@@ -474,7 +542,10 @@ def test_studies(monkeypatch, tmp_path):
 def test_robots_go_out_and_come_back(tmp_path):
     ((name, text),) = cdpr.export_robot("acrobot_large", "mjcf").items()
     (tmp_path / name).write_text(text)
-    back = cdpr.import_robot(tmp_path / name).robot
+    imported = cdpr.import_robot(tmp_path / name)
+    assert "acrobot_large" in shows_itself(imported)
+    assert as_json(imported)["cables"] == 8
+    back = imported.robot
     there = load_robot("acrobot_large")
     np.testing.assert_allclose(back.exit_points(), there.exit_points(), atol=1e-9)
     one_line(lambda: cdpr.export_robot("acrobot_large", "docx"), "docx")

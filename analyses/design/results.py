@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -40,11 +40,17 @@ class DesignResult(Summarized):
         robot: Name of the robot as it was.
         search: The search.
         confirmed: Volumes proven of the robot and of the design.
+        folder: Where it was written; None: nowhere.
+        file: The robot file of the best design there; None: there is none.
+        failed: Of each figure that could not be written, the file and why.
     """
 
     robot: str
     search: DesignSearch
     confirmed: tuple[Confirmation, ...]
+    folder: Path | None = None
+    file: Path | None = None
+    failed: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def interrupted(self) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -20,8 +20,10 @@ from cdpr_drake.analyses.design.settings import (
     GoalSettings,
     load_design_settings,
 )
+from cdpr_drake.analyses.front.session import Session, asked_workers
 from cdpr_drake.analyses.reporting.output_folder import continued_folder
 from cdpr_drake.analyses.reporting.progress import StudySession
+from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
 from cdpr_drake.errors import DesignError
 from cdpr_drake.models.robot_loader import load_robot, robot_reference
 from cdpr_drake.models.robot_schema import Robot
@@ -59,8 +61,10 @@ def optimize_design(
     *,
     generations: int | None = None,
     boxes: int = BOXES,
-    workers: int = 1,
-    say: Callable[[str], object] | None = None,
+    workers: int | str = 1,
+    formats: Sequence[str] = DEFAULT_FORMATS,
+    source: str = "design",
+    session: Session | None = None,
 ) -> DesignResult:
     """Searches where points of a robot should be, how many cables, which drum and motor.
 
@@ -74,53 +78,68 @@ def optimize_design(
             and the search is continued from; None: nowhere.
         generations: Of the search; None: as the settings say.
         boxes: Boxes that prove a volume, at most, for each robot.
-        workers: Processes; kernels use all processors in one.
-        say: Told what is proven now.
+        workers: Processes, where kernels use all processors in one, or the address of a Dask
+            scheduler.
+        formats: Endings of the files of figures.
+        source: Where `DesignSettings` come from, for messages.
+        session: Who follows the search and may stop it; None: nobody.
 
     Raises:
         DesignError: The settings make no sense; names the field.
         CdprError: The robot cannot be asked for a goal.
         OutputFolderError: The folder belongs to other arguments, or cannot be written.
     """
-    with robot_reference(robot) as name, _kept(folder) as where:
+    told, (count, scheduler) = session or Session(), asked_workers(workers)
+    with robot_reference(robot) as name, _kept(folder, told) as where:
         loaded = load_robot(name)
-        asked, source = _settings(loaded, settings)
+        asked, words = _settings(loaded, settings, source)
         if generations is not None:
             asked = replace(asked, generations=generations)
-        candidates = make_candidates(name, asked, source)
+        candidates = make_candidates(name, asked, words)
         given = robot if isinstance(robot, Robot) else name
-        search = search_design(given, candidates, asked, StudySession(where, workers=workers))
-        confirmed = []
-        if search.best is not None:
+        with told.computing():
+            search = search_design(
+                given, candidates, asked,
+                StudySession(where, told.progress, told.stop, count, None, scheduler),
+            )  # fmt: skip
+        confirmed, file = [], None
+        if search.best is not None and not search.interrupted:
             file = write_design(search, loaded.name, where)
-            for goal in search.names:
-                one = confirm(goal, name, str(file), search.judging, boxes=boxes, say=say)
-                confirmed += [] if one is None else [one]
+            with told.doing("proving") as say:
+                for goal in search.names:
+                    one = confirm(
+                        goal, name, str(file), search.judging, boxes=boxes, say=say,
+                        should_stop=told.stop,
+                    )  # fmt: skip
+                    confirmed += [] if one is None else [one]
         found = DesignResult(loaded.name, search, tuple(confirmed))
-        if folder is not None:
-            found.write(where)
-    return found
+        if folder is None:
+            return found
+        with told.doing("Writing results"):
+            failed = found.write(where, formats)
+    return replace(found, folder=where, file=file, failed=failed)
 
 
 @contextmanager
-def _kept(folder: Path | str | None) -> Iterator[Path]:
+def _kept(folder: Path | str | None, session: Session) -> Iterator[Path]:
     """The folder, or one that goes with the block."""
     if folder is None:
         with TemporaryDirectory() as nowhere:
             yield Path(nowhere)
         return
-    with continued_folder(Path(folder)):
+    with continued_folder(Path(folder)) as results:
+        session.opened(results)
         yield Path(folder)
 
 
 def _settings(
-    robot: Robot, settings: DesignSettings | Path | str | Sequence[str]
+    robot: Robot, settings: DesignSettings | Path | str | Sequence[str], source: str
 ) -> tuple[DesignSettings, str]:
     """Settings, and where they come from in words."""
     if isinstance(settings, DesignSettings):
-        return settings, "design"
+        return settings, source
     if isinstance(settings, Path) or (
         isinstance(settings, str) and settings.endswith((".yaml", ".yml"))
     ):
         return load_design_settings(Path(settings)), str(settings)
-    return plain_design(robot, settings), "design"
+    return plain_design(robot, settings), source

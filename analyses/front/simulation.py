@@ -1,15 +1,24 @@
-"""Runs of a scenario: one, or one for each of several seeds."""
+"""Runs of a scenario: one, or one for each of several seeds; and runs that were killed."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from cdpr_drake.analyses.front.session import Say, Session, asked_workers
 from cdpr_drake.analyses.reporting.deferred_figures import write_pictures
-from cdpr_drake.analyses.reporting.log_on_disk import PARTS
-from cdpr_drake.analyses.reporting.output_folder import continued_folder, results_folder
+from cdpr_drake.analyses.reporting.exported_logs import checked_log_formats, log_exports
+from cdpr_drake.analyses.reporting.log_on_disk import CHECKPOINT, PARTS, LogOnDisk
+from cdpr_drake.analyses.reporting.output_folder import (
+    ResultsFolder,
+    continued_folder,
+    results_folder,
+    resumed_folder,
+    shown_path,
+    unfinished_folder,
+)
 from cdpr_drake.analyses.reporting.provenance import write_run_inputs
 from cdpr_drake.analyses.simulation.monte_carlo import ManyRuns, run_many, with_seeds
 from cdpr_drake.analyses.simulation.monte_carlo_report import (
@@ -21,16 +30,22 @@ from cdpr_drake.analyses.simulation.monte_carlo_report import (
 from cdpr_drake.analyses.simulation.monte_carlo_store import StoredRuns
 from cdpr_drake.analyses.simulation.scenario_kinds import SCENARIO_KINDS, ScenarioKind
 from cdpr_drake.analyses.simulation.session import RunSession, check_connected
+from cdpr_drake.analyses.sweeps.workers import check_scheduler
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.summaries import Summarized
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.loops.loop_choice import set_loop
+from cdpr_drake.systems.monitoring.run_monitor import Outcome
 from cdpr_drake.systems.scenarios.run_settings import ScenarioHeader
+from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+SCENARIO_FILE = "scenario.yaml"
+"""Of every folder of a run, see `write_run_inputs`."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -43,13 +58,15 @@ class Run(Summarized):
         numbers: Its summary, as `cdpr simulate --json` prints it.
         folder: Where it was written; None: nowhere.
         failed: Of each figure that could not be written, the file and why.
+        goes_on: Whether it was stopped, and `continue_run` of the folder goes on.
     """
 
     scenario: Any
     result: Any
     numbers: dict[str, Any]
-    folder: Path | None
-    failed: dict[str, str]
+    folder: Path | None = None
+    failed: dict[str, str] = field(default_factory=dict)
+    goes_on: bool = False
 
     @property
     def log(self) -> Any:
@@ -64,13 +81,17 @@ class Run(Summarized):
         """Errors over time; of a pick-and-place its phases."""
         return self._kind.figure(self.result)
 
+    def facts(self) -> list[tuple[str, str]]:
+        """What its kind tells of the summary: labels and words."""
+        return self._kind.facts(self.numbers)
+
     def summary(self) -> tuple[str, list[tuple[str, str]]]:
         """What it shows of itself."""
         told = self.numbers
         rows = [("simulated", f"{told['sim_time_s']:.2f} s of {told['robot']}")]
         if "engine" in told:
             rows.append(("engine, loop", f"{told['engine']}, {told['loop']}"))
-        rows += self._kind.facts(told)[:6]
+        rows += self.facts()[:6]
         rows.append(("folder", "none" if self.folder is None else str(self.folder)))
         return f"Run of {told['scenario']}: {told['outcome']}", rows
 
@@ -94,8 +115,8 @@ class RepeatedRuns(Summarized):
     scenario: Any
     runs: ManyRuns
     numbers: dict[str, Any]
-    folder: Path | None
-    failed: dict[str, str]
+    folder: Path | None = None
+    failed: dict[str, str] = field(default_factory=dict)
 
     def as_dict(self) -> dict[str, Any]:
         """The summary for JSON; keys end in units."""
@@ -131,11 +152,12 @@ def simulate(
     folder: Path | str | None = None,
     seeds: Sequence[int] | None = None,
     *,
-    workers: int | None = None,
+    workers: int | str | None = None,
     overwrite: bool = False,
     formats: Sequence[str] = DEFAULT_FORMATS,
-    on_progress: Callable[[Any], None] | None = None,
-    should_stop: Callable[[], bool] | None = None,
+    log_formats: Sequence[str] = (),
+    video: bool = False,
+    session: Session | None = None,
 ) -> Any:
     """Simulates a scenario of any kind until its outcome is known or its duration is over.
 
@@ -145,11 +167,13 @@ def simulate(
         folder: Where log, summary and figures are written; None: nowhere. With seeds, what is
             finished is found there again.
         seeds: Repeats a visual servo with these; None: one run with the scenario's seed.
-        workers: Processes for seeds; None: one for each processor.
+        workers: Processes for seeds, or the address of a Dask scheduler; None: one for each
+            processor.
         overwrite: Whether results in the folder may be replaced.
         formats: Endings of the files of figures.
-        on_progress: Told where the run stands, a `Progress`, or with seeds a `WorkProgress`.
-        should_stop: Asked often; True ends the run early, with what it has.
+        log_formats: The log also as "mat" or "parquet"; of one run.
+        video: Whether camera.mp4 is rendered too; of one run of a visual servo.
+        session: Who follows the runs and may stop them; None: nobody.
 
     Returns:
         A `Run`, or with seeds `RepeatedRuns`.
@@ -159,42 +183,200 @@ def simulate(
         CdprError: It cannot be built: robot, camera or initial pose.
         OutputFolderError: The folder holds other things, or cannot be written.
     """
+    told, repeated = session or Session(), seeds is not None
     loaded = _loaded(scenario, overrides)
     kind = SCENARIO_KINDS[loaded.kind]
-    if seeds is not None and not kind.is_servo:
-        raise ScenarioError(f"seeds: found with a {loaded.kind}; accepted: visual servos")
-    if seeds is not None and (not seeds or len(set(seeds)) < len(seeds)):
-        raise ScenarioError(f"seeds: found {list(seeds)}; accepted: different numbers, at least 1")
-    loaded, _ = set_loop(loaded, seeds is not None)
-    check_connected(loaded, None)
-    kind.check(loaded)
+    wanted = _Wanted(tuple(formats), checked_log_formats(log_formats), video)
+    _check_wanted(loaded, kind, seeds, wanted)
+    loaded, note = set_loop(loaded, repeated, told.watched)
+    outside = told.outside
+    check_connected(loaded, None if outside is None else outside.connect)
     where = None if folder is None else Path(folder)
     if seeds is not None:
-        scenarios = with_seeds(loaded, list(seeds))
+        _check(kind, loaded, "", told)
+        scheduler = asked_workers(workers)[1]
+        if scheduler is not None:
+            check_scheduler(scheduler)
+        asked = _Asked(loaded, tuple(seeds), workers, note)
         if where is None:
-            runs = run_many(scenarios, workers, on_progress, should_stop, keep_traces=True)
-            return RepeatedRuns(loaded, runs, repetition_summary(loaded, runs), None, {})
+            return _repeat(asked, None, wanted, told)
         with continued_folder(where, overwrite) as results:
-            runs = run_many(
-                scenarios, workers, on_progress, should_stop, keep_traces=True,
-                kept=StoredRuns(results.path, loaded),
-            )  # fmt: skip
-            told = write_repetitions(results.path, loaded, runs, load_robot(loaded.robot))
-            where = results.publish()
-        failed = write_pictures(where, repetition_pictures(loaded, runs, formats))
-        return RepeatedRuns(loaded, runs, told, where, failed)
-    session = RunSession(on_progress, should_stop)
+            told.opened(results)
+            return _repeat(asked, results, wanted, told)
     if where is None:
-        result = kind.run(loaded, session)
-        return Run(loaded, result, kind.numbers(result), None, {})
+        _check(kind, loaded, note, told)
+        result = _run(kind, loaded, None, told)
+        return Run(loaded, result, kind.numbers(result))
     with results_folder(where, overwrite) as results:
+        told.opened(results)
+        _check(kind, loaded, note, told)
         write_run_inputs(results.path, loaded, load_robot(loaded.robot))
-        result = kind.run(loaded, replace(session, log_folder=results.path / PARTS))
-        told = kind.data(results.path, result)
-        result.log.remove()  # now that the log is written; it stays readable here
-        where = results.publish()
-    failed = write_pictures(where, kind.pictures(result, False, formats))
-    return Run(loaded, result, told, where, failed)
+        return _run_into(results, kind, loaded, wanted, told)
+
+
+def continue_run(
+    folder: Path | str,
+    *,
+    formats: Sequence[str] = DEFAULT_FORMATS,
+    log_formats: Sequence[str] = (),
+    video: bool = False,
+    session: Session | None = None,
+) -> Run:
+    """Goes on with a run that was killed or stopped, from its last checkpoint, in its folder.
+
+    Args:
+        folder: Where it left its log, or was to write its results; other arguments as `simulate`.
+        formats: See folder.
+        log_formats: See folder.
+        video: See folder.
+        session: See folder.
+
+    Raises:
+        OutputFolderError: There is no such log, or the run is still going on.
+        CheckpointError: There is no checkpoint of this run.
+    """
+    wanted = _Wanted(tuple(formats), checked_log_formats(log_formats), video)
+    with resumed_folder(Path(folder)) as results:
+        scenario = load_scenario(str(results.path / SCENARIO_FILE))
+        kind = SCENARIO_KINDS[scenario.kind]
+        return _run_into(results, kind, scenario, wanted, session or Session(), resume=True)
+
+
+def finish_run(
+    folder: Path | str,
+    *,
+    formats: Sequence[str] = DEFAULT_FORMATS,
+    log_formats: Sequence[str] = (),
+    video: bool = False,
+    session: Session | None = None,
+) -> Run:
+    """Makes log, summary and figures of what a killed run left; arguments as `continue_run`.
+
+    Raises:
+        OutputFolderError: There is no such log, or the run is still going on.
+    """
+    told = session or Session()
+    wanted = _Wanted(tuple(formats), checked_log_formats(log_formats), video)
+    with unfinished_folder(Path(folder)) as found:
+        scenario = load_scenario(str(found / SCENARIO_FILE))
+        kind, log = SCENARIO_KINDS[scenario.kind], LogOnDisk.open(found / PARTS)
+        with told.doing("Writing results") as say:
+            result = kind.unfinished(scenario, log)
+            numbers = kind.data(found, result)
+            log.remove()
+            failed = _write_pictures(found, kind, result, wanted, say, told)
+    return Run(scenario, result, numbers, found, failed)
+
+
+@dataclass(frozen=True)
+class _Wanted:
+    """What is written of runs, beside what always is."""
+
+    formats: tuple[str, ...]
+    log_formats: tuple[str, ...]
+    video: bool
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """What is repeated, who computes it, and what is told of it."""
+
+    scenario: Scenario
+    seeds: tuple[int, ...]
+    workers: int | str | None
+    note: str
+
+
+def _check_wanted(
+    scenario: Any, kind: ScenarioKind, seeds: Sequence[int] | None, wanted: _Wanted
+) -> None:
+    if seeds is not None and not kind.is_servo:
+        raise ScenarioError(f"seeds: found with a {scenario.kind}; accepted: visual servos")
+    if seeds is not None and (not seeds or len(set(seeds)) < len(seeds)):
+        raise ScenarioError(f"seeds: found {list(seeds)}; accepted: different numbers, at least 1")
+    if seeds is not None and (wanted.video or wanted.log_formats):
+        raise ScenarioError("seeds: found with video or log_formats; accepted: without")
+    if wanted.video and not kind.is_servo:
+        raise ScenarioError(f"video: found with a {scenario.kind}; accepted: visual servos")
+
+
+def _check(kind: ScenarioKind, scenario: Any, note: str, session: Session) -> None:
+    """Checks a scenario before it is simulated, and says a note and what speaks against it."""
+    with session.doing(f"{scenario.name}: building the diagram"):
+        warnings = kind.check(scenario)
+    for line in ([note] if note else []) + [f"warning: {warning}" for warning in warnings]:
+        session.say(line)
+
+
+def _run(
+    kind: ScenarioKind, scenario: Any, log_folder: Path | None, session: Session,
+    resume: bool = False,
+) -> Any:  # fmt: skip
+    """The result of one run."""
+    prepare, outside = session.prepare(kind, scenario), session.outside
+    connect = None if outside is None else outside.connect
+    with session.computing():
+        result = kind.run(
+            scenario,
+            RunSession(session.progress, session.stop, log_folder, prepare, resume, connect),
+        )
+        if outside is not None:
+            outside.tell_end(result)
+    return result
+
+
+def _run_into(
+    results: ResultsFolder, kind: ScenarioKind, scenario: Any, wanted: _Wanted, session: Session,
+    resume: bool = False,
+) -> Run:  # fmt: skip
+    """One run into a folder, from the start or from a checkpoint; data first, then pictures."""
+    result = _run(kind, scenario, results.path / PARTS, session, resume)
+    goes_on = (
+        result.outcome == Outcome.INTERRUPTED and (results.path / PARTS / CHECKPOINT).is_file()
+    )
+    with session.doing("Writing results") as say:
+        numbers = kind.data(results.path, result)
+        if not goes_on:
+            result.log.remove()  # now that the log is written; it stays readable here
+        folder = results.publish()
+        failed = _write_pictures(shown_path(folder), kind, result, wanted, say, session)
+    return Run(scenario, result, numbers, folder, failed, goes_on)
+
+
+def _write_pictures(
+    folder: Path, kind: ScenarioKind, result: Any, wanted: _Wanted, say: Say, session: Session
+) -> dict[str, str]:
+    return write_pictures(
+        folder,
+        log_exports(folder, wanted.log_formats)
+        | kind.pictures(result, wanted.video, wanted.formats),
+        lambda name: say(f"Writing {name}"),
+        session.stop,
+    )
+
+
+def _repeat(
+    asked: _Asked, results: ResultsFolder | None, wanted: _Wanted, session: Session
+) -> RepeatedRuns:
+    """Runs of a scenario over seeds, into a folder or nowhere."""
+    scenario = asked.scenario
+    kept = None if results is None else StoredRuns(results.path, scenario)
+    if asked.note:
+        session.say(asked.note)
+    count, scheduler = asked_workers(asked.workers)
+    with session.computing():
+        runs = run_many(
+            with_seeds(scenario, list(asked.seeds)), count, session.progress, session.stop,
+            keep_traces=True, kept=kept, scheduler=scheduler,
+        )  # fmt: skip
+    if results is None:
+        return RepeatedRuns(scenario, runs, repetition_summary(scenario, runs))
+    with session.doing("Writing results"):
+        told = write_repetitions(results.path, scenario, runs, load_robot(scenario.robot))
+        folder = results.publish()
+        pictures = repetition_pictures(scenario, runs, wanted.formats)
+        failed = write_pictures(shown_path(folder), pictures)
+    return RepeatedRuns(scenario, runs, told, folder, failed)
 
 
 def _loaded(scenario: ScenarioHeader | str | Path, overrides: Sequence[str]) -> Any:

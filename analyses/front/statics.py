@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.statics.equilibria_query import (
+    SHOWN,
     EquilibriaReport,
     elastic_equilibria,
     equilibria_at_lengths,
@@ -19,12 +21,13 @@ from cdpr_drake.analyses.statics.static_query import StaticReport, static_at_len
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.models import CABLE_MODELS
 from cdpr_drake.errors import EquilibriumError
+from cdpr_drake.geometry.poses import angles_from_rotation
 from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import as_pose
 from cdpr_drake.schema.typed_yaml import closest
 from cdpr_drake.statics.forward_kinematics import ForwardKinematics, PoseFit
-from cdpr_drake.summaries import as_kind
+from cdpr_drake.summaries import Summarized, as_kind, numbers
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -41,6 +44,80 @@ class RobotAtRest(StaticReport):
         from cdpr_drake.analyses.statics.static_figures import static_figure
 
         return static_figure(self, f"{self.robot} at rest, {self.model} cables")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class RobotEquilibria(EquilibriaReport):
+    """An `EquilibriaReport` that draws itself.
+
+    Attributes:
+        loaded: The robot.
+    """
+
+    loaded: Robot
+
+    def plot(self) -> Figure:
+        """The robot at its poses of rest, the `SHOWN` lowest; slack cables are dotted."""
+        from cdpr_drake.analyses.visualization.path_figures import poses_figure
+
+        some = self.rests[:SHOWN]
+        poses = {f"{k + 1}: {one.stability}": one.X_WP for k, one in enumerate(some)}
+        title = f"{self.robot}: {len(self.rests)} poses of rest, {self.model} cables"
+        slack = [np.asarray(one.tensions) <= 0.0 for one in some]
+        return poses_figure(title, self.loaded, poses, slack)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PoseFromLengths(Summarized):
+    """The pose of a robot's platform that has given cable lengths.
+
+    Attributes:
+        robot: The robot.
+        lengths: What was given, shape (m,) [m].
+        fit: The pose with its residuals, Jacobian, `covariance` and `condition`.
+    """
+
+    robot: Robot
+    lengths: Array
+    fit: PoseFit
+
+    @property
+    def X_WP(self) -> RigidTransform:
+        """The pose [m]."""
+        return self.fit.X_WP
+
+    @property
+    def residuals(self) -> Array:
+        """Lengths at the pose less those given, shape (m,) [m]."""
+        return self.fit.residuals
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON; keys end in units."""
+        return {
+            "robot": self.robot.name,
+            "lengths_m": self.lengths.tolist(),
+            "position_m": self.X_WP.translation().tolist(),
+            "angles_deg": np.degrees(angles_from_rotation(self.X_WP.rotation())).tolist(),
+            "residuals_m": self.residuals.tolist(),
+            "steps": self.fit.steps,
+        }
+
+    def plot(self) -> Figure:
+        """The robot at the pose."""
+        from cdpr_drake.analyses.visualization.path_figures import poses_figure
+
+        title = f"{self.robot.name}: pose from cable lengths"
+        return poses_figure(title, self.robot, {"platform": self.X_WP})
+
+    def summary(self) -> tuple[str, list[tuple[str, str]]]:
+        """What it shows of itself."""
+        angles = np.degrees(angles_from_rotation(self.X_WP.rotation()))
+        worst = float(np.max(np.abs(self.residuals)))
+        return f"Pose of {self.robot.name} from its cable lengths", [
+            ("position [m]", numbers(self.X_WP.translation(), 5)),
+            ("angles [deg]", numbers(angles)),
+            ("residuals", f"at most {1e3 * worst:.2g} mm, in {self.fit.steps} steps"),
+        ]
 
 
 def solve_static(
@@ -88,7 +165,7 @@ def find_equilibria(
     searches: int = 1000,
     seed: int = 0,
     report: Callable[[int, int], object] | None = None,
-) -> EquilibriaReport:
+) -> RobotEquilibria:
     """All poses of rest, stable or not, any cables slack, for lengths or at a position.
 
     Args:
@@ -122,14 +199,17 @@ def find_equilibria(
         place = np.asarray(position, float)
         if place.shape != (3,) or not np.all(np.isfinite(place)):
             raise EquilibriumError(f"position: found {position}; accepted: x, y, z [m]")
-        return equilibria_with_position(loaded, place, _taut(loaded, taut))
-    assert lengths is not None
-    given = _checked_lengths(loaded, lengths)
-    if model == "elastic":
-        return elastic_equilibria(
-            loaded, given, pulleys, searches=searches, seed=seed, report=report
-        )
-    return equilibria_at_lengths(loaded, given, report=report)
+        rests = equilibria_with_position(loaded, place, _taut(loaded, taut))
+    else:
+        assert lengths is not None
+        given = _checked_lengths(loaded, lengths)
+        if model == "elastic":
+            rests = elastic_equilibria(
+                loaded, given, pulleys, searches=searches, seed=seed, report=report
+            )
+        else:
+            rests = equilibria_at_lengths(loaded, given, report=report)
+    return as_kind(RobotEquilibria, rests, loaded=loaded)
 
 
 def solve_forward_kinematics(
@@ -137,7 +217,7 @@ def solve_forward_kinematics(
     lengths: Array | Sequence[float],
     guess: object = None,
     pulleys: bool = True,
-) -> PoseFit:
+) -> PoseFromLengths:
     """The pose near a guess at which the cables have given lengths.
 
     Args:
@@ -156,7 +236,8 @@ def solve_forward_kinematics(
     cables = loaded.cable_set() if pulleys else loaded.cable_set().without_pulleys()
     start: RigidTransform = as_pose(loaded, guess)
     solver = ForwardKinematics(cables, loaded.motion_type())
-    return solver.pose(_checked_lengths(loaded, lengths), start)
+    given = _checked_lengths(loaded, lengths)
+    return PoseFromLengths(loaded, given, solver.pose(given, start))
 
 
 def _check_model(model: str, models: Collection[str]) -> None:

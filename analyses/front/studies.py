@@ -2,29 +2,125 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
+from rich.table import Table
+
+from cdpr_drake.analyses.front.session import Session, asked_workers
 from cdpr_drake.analyses.reporting.log_files import write_json
 from cdpr_drake.analyses.reporting.output_folder import continued_folder, results_folder
-from cdpr_drake.analyses.reporting.progress import StudySession
+from cdpr_drake.analyses.reporting.progress import StudySession, WorkProgress
 from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
 from cdpr_drake.analyses.reproduction.page import write_report
 from cdpr_drake.analyses.reproduction.rows import ReportRow, report_rows
 from cdpr_drake.analyses.reproduction.runner import RunSettings, run_studies
 from cdpr_drake.analyses.reproduction.scorecard import Scorecard
 from cdpr_drake.analyses.reproduction.states import StudyState, check_folder
-from cdpr_drake.analyses.studies.catalogue import STUDIES, StudyEntry, StudyResult, write_study
+from cdpr_drake.analyses.studies.catalogue import (
+    STUDIES,
+    StudyEntry,
+    StudyResult,
+    studies_that,
+    write_study,
+)
 from cdpr_drake.analyses.studies.published.register import published_registers
+from cdpr_drake.analyses.sweeps.workers import check_scheduler
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
 from cdpr_drake.errors import CdprError
 from cdpr_drake.schema.typed_yaml import closest
 from cdpr_drake.summaries import Summarized
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 SUMMARY = "summary.json"
 """All rows and counts of the report."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class StudyRun(Summarized):
+    """What a study found.
+
+    Attributes:
+        name: Of the study.
+        result: Its own result, with more than is here.
+        folder: Where it was written; None: nowhere.
+        failed: Of each figure that could not be written, the file and why.
+    """
+
+    name: str
+    result: StudyResult
+    folder: Path | None = None
+    failed: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether it was stopped before the end."""
+        return self.result.interrupted
+
+    def as_dict(self) -> dict[str, Any]:
+        """Everything for JSON, as `cdpr study --json` prints it."""
+        return self.result.as_dict()
+
+    def tables(self) -> list[Table]:
+        """Tables for the terminal."""
+        return self.result.tables()
+
+    def drawings(self) -> Mapping[str, Callable[[], Figure]]:
+        """What draws its figures, by name; of a study that is all tables none."""
+        drawings = getattr(self.result, "drawings", None)
+        return {} if drawings is None else drawings()
+
+    def plot(self, name: str | None = None) -> Figure:
+        """A figure of the study.
+
+        Args:
+            name: Of `drawings`; None: the first.
+
+        Raises:
+            CdprError: There is no such figure, or none at all.
+        """
+        drawings = self.drawings()
+        if not drawings:
+            raise CdprError(
+                f"study {self.name}: has no figures, or nothing to draw; see its tables"
+            )
+        if name is not None and name not in drawings:
+            raise CdprError(f"name: {name!r} is unknown; {closest(name, drawings)}")
+        return drawings[next(iter(drawings)) if name is None else name]()
+
+    def summary(self) -> tuple[str, list[tuple[str, str]]]:
+        """What it shows of itself: how many of its statements hold, its tables and figures."""
+        judged = self.as_dict().get("statements") or []
+        held = Counter(one["verdict"] for one in judged if "verdict" in one)
+        words = ", ".join(f"{count} {verdict}" for verdict, count in held.items())
+        titles = [str(table.title) for table in self.tables() if table.title]
+        return f"Study {self.name}" + ", interrupted" * self.interrupted, [
+            ("statements", words or "none judged"),
+            *(("table", title) for title in titles[:4]),
+            ("figures", ", ".join(self.drawings()) or "none"),
+            ("folder", "none" if self.folder is None else str(self.folder)),
+        ]
+
+
+class StudyOfMany(NamedTuple):
+    """How far a reproduction is.
+
+    Attributes:
+        name: The study that runs.
+        number: How many came before it.
+        of: How many there are.
+        progress: Where it stands; None: it begins.
+    """
+
+    name: str
+    number: int
+    of: int
+    progress: WorkProgress | None
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -36,12 +132,14 @@ class Reproduction(Summarized):
         rows: The report, a row for each statement, number or figure.
         states: How far each study is, by name.
         page: The report as a page.
+        left: Studies that were not begun, or stopped.
     """
 
     quick: bool
     rows: Sequence[ReportRow]
     states: Mapping[str, StudyState]
     page: Path
+    left: tuple[str, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
         """All rows and counts for JSON."""
@@ -54,9 +152,11 @@ class Reproduction(Summarized):
             "items": [row.as_dict() for row in self.rows],
         }
 
-    def unfinished(self, studies: Sequence[str]) -> list[str]:
-        """Of these studies those that were not begun, or stopped."""
-        return [name for name in studies if name not in self.states or self.states[name].unfinished]
+    def plot(self) -> Figure:
+        """How many items of each chapter came out how."""
+        from cdpr_drake.analyses.reproduction.scorecard import scorecard_figure
+
+        return scorecard_figure(Scorecard.of(self.rows))
 
     def summary(self) -> tuple[str, list[tuple[str, str]]]:
         """What it shows of itself."""
@@ -82,10 +182,12 @@ def run_study(
     quick: bool = False,
     *,
     seeds: int | None = None,
-    workers: int | None = None,
+    recipe: str | None = None,
+    workers: int | str | None = None,
     overwrite: bool = False,
     formats: Sequence[str] = DEFAULT_FORMATS,
-) -> StudyResult:
+    session: Session | None = None,
+) -> StudyRun:
     """Runs a study.
 
     Args:
@@ -94,29 +196,62 @@ def run_study(
             there where they were stopped.
         quick: A short form, to see that it works.
         seeds: Runs of each configuration, of studies that repeat; None: as the study does.
-        workers: Processes; None: one for each processor.
+        recipe: Another recipe alone, of studies that have some; None: the study.
+        workers: Processes, or the address of a Dask scheduler; None: one for each processor.
         overwrite: Whether results in the folder may be replaced.
         formats: Endings of the files of figures.
-
-    Returns:
-        The study's result, with `as_dict`, `tables`, `write` and `interrupted`.
+        session: Who follows the study and may stop it; None: nobody.
 
     Raises:
-        CdprError: There is no such study, or it does not repeat.
+        CdprError: There is no such study, it does not repeat, has not this recipe, or its work is
+            done here alone.
         OutputFolderError: The folder holds other things, or cannot be written.
     """
-    entry = chosen_studies([name])[name]
+    entry, told = chosen_studies([name])[name], session or Session()
+    count, scheduler = asked_workers(workers)
+    if scheduler is not None:
+        if not entry.spreads:
+            raise CdprError(f"workers: study {name} is computed here; leave it out")
+        check_scheduler(scheduler)
     if seeds is not None and not entry.repeats:
-        raise CdprError(f"seeds: found with {name}, which does not repeat; accepted: None")
+        able = studies_that(lambda other: other.repeats)
+        raise CdprError(f"seeds: accepted with {able}, not with {name}")
+    entry = _by_recipe(name, recipe)
+
+    def run(where: Path | None) -> StudyResult:
+        with told.computing():
+            return entry.run(
+                quick, StudySession(where, told.progress, told.stop, count, seeds, scheduler)
+            )
+
     if folder is None:
-        return entry.run(quick, StudySession(workers=workers, seeds=seeds))
+        return StudyRun(name, run(None))
     prepared = continued_folder if entry.continues else results_folder
     with prepared(Path(folder), overwrite) as results:
-        result = entry.run(quick, StudySession(results.path, workers=workers, seeds=seeds))
-        write_study(result, results.path, formats)
-        results.unfinished = result.interrupted
-        results.publish()
-    return result
+        told.opened(results)
+        result = run(results.path)
+        with told.doing("Writing results"):
+            failed = write_study(result, results.path, formats)
+            results.unfinished = result.interrupted
+            where = results.publish()
+    return StudyRun(name, result, where, failed)
+
+
+def _by_recipe(name: str, recipe: str | None) -> StudyEntry:
+    """The study, or that of another recipe of it.
+
+    Raises:
+        CdprError: It has no recipes, or not this one.
+    """
+    entry = STUDIES[name]
+    if recipe is None:
+        return entry
+    if not entry.recipes:
+        able = studies_that(lambda other: bool(other.recipes))
+        raise CdprError(f"recipe: accepted with {able}, not with {name}")
+    if recipe not in entry.recipes:
+        raise CdprError(f"recipe: {recipe!r} is unknown; {closest(recipe, entry.recipes)}")
+    return replace(entry, run=entry.recipes[recipe])
 
 
 def chosen_studies(names: Sequence[str] | None) -> dict[str, StudyEntry]:
@@ -143,6 +278,7 @@ def reproduce(
     workers: int | None = None,
     overwrite: bool = False,
     formats: Sequence[str] = DEFAULT_FORMATS,
+    session: Session | None = None,
 ) -> Reproduction:
     """Runs every study, and writes one report on all that was published beside what is found.
 
@@ -155,34 +291,30 @@ def reproduce(
         workers: Processes; None: one for each processor.
         overwrite: Whether other results in the folder may be replaced.
         formats: Endings of the files of figures; png, which the report shows, is always there.
+        session: Who follows it, told of a `StudyOfMany`, and may stop it; None: nobody.
 
     Raises:
         CdprError: A study is unknown.
         OutputFolderError: The folder holds other things, or cannot be written.
     """
-    chosen = chosen_studies(only)
-    settings = RunSettings(quick, workers, formats=tuple(dict.fromkeys(("png", *formats))))
+    chosen, told = chosen_studies(only), session or Session()
+
+    def tell(name: str, number: int, progress: WorkProgress | None) -> None:
+        told.progress(StudyOfMany(name, number, len(chosen), progress))
+
+    wanted = tuple(dict.fromkeys(("png", *formats)))
+    settings = RunSettings(quick, workers, tell, told.say, told.stop, wanted)
     with continued_folder(Path(folder), overwrite) as results:
         check_folder(results.path, quick)
-        states = run_studies(chosen, results.path, settings)
-        found = write_reproduction(results.path, chosen, states, quick)
-        results.unfinished = bool(found.unfinished(list(chosen)))
-    return found
-
-
-def write_reproduction(
-    folder: Path, studies: Mapping[str, StudyEntry], states: dict[str, StudyState], quick: bool
-) -> Reproduction:
-    """Writes the report on studies that were run.
-
-    Args:
-        folder: Of the reproduction.
-        studies: Those that were asked for.
-        states: How far each is.
-        quick: Whether they were run in their short forms.
-    """
-    registers = published_registers()
-    rows = report_rows(registers, folder, studies, states)
-    told = Reproduction(quick, rows, states, folder)
-    write_json(folder / SUMMARY, told.as_dict())  # before the page, which is larger
-    return Reproduction(quick, rows, states, write_report(folder, registers, rows, states, quick))
+        told.opened(results)
+        with told.computing():
+            states = run_studies(chosen, results.path, settings)
+        with told.doing("Writing the report"):
+            registers = published_registers()
+            rows = report_rows(registers, results.path, chosen, states)
+            found = Reproduction(quick, rows, states, results.path)
+            write_json(results.path / SUMMARY, found.as_dict())  # before the page, which is larger
+            page = write_report(results.path, registers, rows, states, quick)
+            left = tuple(n for n in chosen if n not in states or states[n].unfinished)
+            results.unfinished = bool(left)
+    return replace(found, page=page, left=left)

@@ -22,7 +22,7 @@ from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import WrenchBalance, as_pose, tension_problem, wrench_balance
 from cdpr_drake.summaries import Summarized, numbers
-from cdpr_drake.tensions.methods import METHODS, TensionMethod, distribute
+from cdpr_drake.tensions.methods import METHODS, TensionMethod, distribute, feasible_polygon
 from cdpr_drake.tensions.problem import TensionProblem, TensionSolution
 from cdpr_drake.workspaces.available_wrenches import available_wrenches
 
@@ -74,10 +74,23 @@ class TensionsAtPose(Summarized):
         ]
 
     def plot(self, title: str | None = None) -> Figure:
-        """The feasible polygon with a point for each method.
+        """With two cables more than needed and a feasible polygon that with a point for each
+        method, else tensions with their bounds.
 
         Args:
             title: Of the figure; None: robot and position.
+        """
+        asked, title = self.problem, title or self._where()
+        if asked.redundancy == 2 and feasible_polygon(asked).shape[1]:
+            return self.plot_polygon(title)
+        from cdpr_drake.analyses.statics.static_figures import tension_figure
+
+        names = [cable.name for cable in self.robot.cables]
+        found = {one.method: one.tensions for one in self.solutions}
+        return tension_figure(names, found, (asked.lower, asked.upper), title)
+
+    def plot_polygon(self, title: str | None = None) -> Figure:
+        """The feasible polygon with a point for each method; `title` as of `plot`.
 
         Raises:
             TensionProblemError: There are not two cables more than needed, or no tensions at all.
@@ -166,6 +179,16 @@ class UnderactuatedTensions(Summarized):
     def as_dict(self) -> dict[str, Any]:
         """For JSON, see `underactuated_answer`."""
         return self._answer
+
+    def plot(self) -> Figure:
+        """Tensions that hold the platform, where there are some, with the robot's bounds."""
+        from cdpr_drake.analyses.statics.static_figures import tension_figure
+
+        names = [cable.name for cable in self.robot.cables]
+        lower, upper = self.robot.tension_limits()
+        bounds = np.full(len(names), lower), np.full(len(names), upper)
+        title = f"{self.robot.name} at ({numbers(self.X_WP.translation())}): {self.status}"
+        return tension_figure(names, {UNDERACTUATED: self.tensions}, bounds, title)
 
     def summary(self) -> tuple[str, list[tuple[str, str]]]:
         """What it shows of itself: combinations of the wrench that no tensions change."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -36,7 +36,7 @@ MOMENT = 1e-9
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class MotionRun(Summarized, ABC):
+class MotionRun(Summarized):
     """A planned motion of a robot, of any kind, as figures and tables ask it.
 
     Attributes:

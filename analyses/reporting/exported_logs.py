@@ -26,24 +26,23 @@ LARGEST_MAT = 2**31 - 1
 """A variable of a .mat file of version 5 has at most so many bytes."""
 
 
-def checked_log_formats(words: str) -> tuple[str, ...]:
-    """Formats of --log-format that are to be written besides `ALWAYS`.
+def checked_log_formats(names: Sequence[str]) -> tuple[str, ...]:
+    """Formats of logs that are to be written besides `ALWAYS`.
 
     Args:
-        words: Names separated by commas.
+        names: Of `ALWAYS` and `LOG_WRITERS`.
 
     Raises:
         OutputFormatError: One is unknown, or needs what is not installed.
     """
     known = (*ALWAYS, *LOG_WRITERS)
-    names = [word.strip() for word in words.split(",")]
     unknown = [name for name in names if name not in known]
     if unknown:
         raise OutputFormatError(
-            f"--log-format: found {unknown[0]!r}; accepted: some of {','.join(known)}"
+            f"log_formats: found {unknown[0]!r}; accepted: some of {','.join(known)}"
         )
     for name in names:
-        _check_installed(name, "--log-format")
+        _check_installed(name, "log_formats")
     return tuple(name for name in LOG_WRITERS if name in names)
 
 

@@ -7,6 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+from matplotlib.figure import Figure
+
 from cdpr_drake.analyses.reporting.statements import (
     CONFIRMED,
     IN_PART,
@@ -24,6 +27,8 @@ from cdpr_drake.analyses.reproduction.rows import (
     SHOWN,
     ReportRow,
 )
+from cdpr_drake.analyses.visualization.figure_style import bar_style, new_figure
+from cdpr_drake.palette import look_of
 
 VERDICTS = (
     CONFIRMED, IN_PART, NOT_CONFIRMED, NOT_TESTABLE, SHOWN, NOT_JUDGED, CITED, NOT_IN_QUICK,
@@ -70,3 +75,21 @@ class Scorecard:
                 for (source, chapter), counts in self.chapters.items()
             ],
         }
+
+
+def scorecard_figure(card: Scorecard) -> Figure:
+    """Counts of verdicts as bars, a row for each chapter."""
+    names = [f"{source.replace('_', ' ')}, {chapter}" for source, chapter in card.chapters]
+    height = 1.8 + 0.4 * len(names)
+    figure, axes = new_figure(1, 1, (11.0, height), "What was published, repeated")
+    rows, begin = np.arange(len(names)), np.zeros(len(names))
+    for verdict in card.shown():
+        counts = np.array([float(some[verdict]) for some in card.chapters.values()])
+        look = look_of(verdict, list(VERDICTS))
+        axes.barh(rows, counts, left=begin, label=verdict, **bar_style(look))
+        begin += counts
+    axes.set_yticks(rows, names)
+    axes.invert_yaxis()
+    axes.set(xlabel="items")
+    axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
+    return figure

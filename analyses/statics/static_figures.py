@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -26,6 +27,9 @@ from cdpr_drake.tensions.problem import TensionProblem, TensionSolution, Tension
 
 CURVE_POINTS = 40
 """Points of a drawn cable."""
+
+Leaving = tuple[float, int, float]
+"""Where a line leaves along an edge, number of its cable from 1, and its bound [N]."""
 
 
 def static_figure(report: StaticReport, title: str) -> Figure:
@@ -120,7 +124,7 @@ def polygon_figure(problem: TensionProblem, title: str) -> Figure:
     axes.set(xlim=(low[0] - room, high[0] + room), ylim=(low[1] - room, high[1] + room))
     _draw_bounds(axes, problem, t, N)
     axes.set(xlabel=r"$\eta_1$ [N]", ylabel=r"$\eta_2$ [N]", aspect="equal")
-    axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
+    axes.legend(loc="center left", bbox_to_anchor=(1.26, 0.5))
     return figure
 
 
@@ -143,20 +147,99 @@ def _places(
 
 
 def _draw_bounds(axes: Any, problem: TensionProblem, t: Array, N: Array) -> None:
-    """The lines on which one tension is at a bound, with the cable's number where they leave."""
-    x_low, x_high = axes.get_xlim()
-    y_low, y_high = axes.get_ylim()
-    for i in range(len(t)):
-        for bound, style in ((problem.lower[i], "-"), (problem.upper[i], "--")):
-            a, b, c = N[i, 0], N[i, 1], bound - t[i]
-            ends = []
-            for x in (x_low, x_high):
-                if abs(b) > 1e-12 and y_low <= (c - a * x) / b <= y_high:
-                    ends.append((x, (c - a * x) / b))
-            for y in (y_low, y_high):
-                if abs(a) > 1e-12 and x_low <= (c - b * y) / a <= x_high:
-                    ends.append(((c - b * y) / a, y))
-            if len(ends) >= 2:
-                axes.plot(*np.array(ends[:2]).T, style, color="0.6", linewidth=0.8)
-                word = f"cable {i + 1} at {bound:g} N"
-                axes.annotate(word, ends[0], color="0.4", fontsize=9, clip_on=True)
+    """The lines on which one tension is at a bound; where they leave, whose and which bound.
+
+    Words stand outside at the right and at the top, those of lines that leave together as one.
+    """
+    ends: dict[int, list[Leaving]] = {0: [], 1: []}
+    for bounds, style in ((problem.lower, "-"), (problem.upper, "--")):
+        for i, bound in enumerate(bounds):
+            line = _line_within(axes, N[i], bound - t[i])
+            if line is None:
+                continue
+            axes.plot(*line.T, style, color="0.6", linewidth=0.8)
+            right = abs(N[i, 1]) > abs(N[i, 0])  # it runs more along x than along y
+            last = line[np.argmax(line[:, 0 if right else 1])]
+            ends[0 if right else 1].append((float(last[1 if right else 0]), i + 1, float(bound)))
+    for across, found in ends.items():
+        low, high = axes.get_ylim() if across == 0 else axes.get_xlim()
+        for group in _near(sorted(found), (0.06, 0.24)[across] * (high - low)):
+            middle = (group[0][0] + group[-1][0]) / 2.0
+            named: dict[float, list[int]] = {}
+            for _, number, bound in group:
+                named.setdefault(bound, []).append(number)
+            words = "\n".join(
+                f"cable{'s' * (len(some) > 1)} {', '.join(map(str, sorted(some)))} at {bound:g} N"
+                for bound, some in named.items()
+            )
+            place = (1.01, (middle - low) / (high - low))
+            axes.text(
+                *(place if across == 0 else place[::-1]), words, color="0.3", fontsize=9,
+                transform=axes.transAxes, ha="left" if across == 0 else "center",
+                va="center" if across == 0 else "bottom",
+            )  # fmt: skip
+
+
+def _line_within(axes: Any, normal: Array, offset: float) -> Array | None:
+    """Where a line enters and leaves the axes, shape (2, 2); None where it does not."""
+    (x_low, x_high), (y_low, y_high) = axes.get_xlim(), axes.get_ylim()
+    (a, b), ends = normal, []
+    for x in (x_low, x_high):
+        if abs(b) > 1e-12 and y_low <= (offset - a * x) / b <= y_high:
+            ends.append((x, (offset - a * x) / b))
+    for y in (y_low, y_high):
+        if abs(a) > 1e-12 and x_low <= (offset - b * y) / a <= x_high:
+            ends.append(((offset - b * y) / a, y))
+    return np.array(ends[:2]) if len(ends) >= 2 else None
+
+
+def _near(
+    places: list[tuple[float, int, float]], gap: float
+) -> list[list[tuple[float, int, float]]]:
+    """Places in a row, together where the first is no farther away than a gap."""
+    groups: list[list[tuple[float, int, float]]] = []
+    for place in places:
+        if groups and place[0] - groups[-1][0][0] <= gap:
+            groups[-1].append(place)
+        else:
+            groups.append([place])
+    return groups
+
+
+def tension_figure(
+    names: Sequence[str],
+    tensions: Mapping[str, Array],
+    bounds: tuple[Array, Array],
+    title: str,
+) -> Figure:
+    """Tensions of each cable as bars, by one method or several, with their bounds.
+
+    Args:
+        names: Of the cables.
+        tensions: By the method, shape (m,) each [N]; NaN draws nothing.
+        bounds: Smallest and largest, shape (m,) each [N].
+        title: Title.
+    """
+    figure, axes = new_figure(1, 1, (10.0, 5.0), title)
+    places, width = np.arange(len(names)), 0.8 / max(len(tensions), 1)
+    for k, (method, values) in enumerate(tensions.items()):
+        look = look_of(method, list(METHODS)) if len(tensions) > 1 else PLATFORM
+        shift = (k - (len(tensions) - 1) / 2.0) * width
+        axes.bar(places + shift, values, width, label=method, **bar_style(look))
+    largest = max(float(np.max(t, where=np.isfinite(t), initial=0.0)) for t in tensions.values())
+    if largest == 0.0:
+        words = "no tensions hold the platform"
+        axes.text(0.5, 0.5, words, transform=axes.transAxes, ha="center", va="center")
+        largest = float("inf")
+    for words, values in zip(("lower", "upper"), bounds, strict=True):
+        if np.min(values) <= 2.0 * largest:
+            same = f" {values[0]:g} N" if np.ptp(values) == 0.0 else ""
+            edges = np.arange(len(names) + 1) - 0.5
+            axes.stairs(
+                values, edges, baseline=None, label=f"{words} bound{same}", **line_style(BOUND)
+            )
+    axes.set_ylim(bottom=0.0)
+    axes.set_xticks(places, names)
+    axes.set(ylabel="tension [N]")
+    axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
+    return figure

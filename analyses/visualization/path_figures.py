@@ -96,6 +96,42 @@ def path_figure(
     return figure
 
 
+def poses_figure(
+    title: str,
+    robot: Robot,
+    poses: Mapping[str, RigidTransform],
+    slack: Sequence[np.ndarray] | None = None,
+) -> Figure:
+    """A robot with its platform at one pose or several, in 3D.
+
+    Args:
+        title: Title.
+        robot: The robot.
+        poses: X_WP by what they are [m]; each has a look of its own, cables of one pose theirs.
+        slack: Which cables are slack at each, shape (m,); None: none.
+    """
+    figure = bare_figure((9.0, 7.0), title)
+    with styled():
+        axes = figure.add_subplot(projection="3d")
+        cables = robot.cable_set()
+        loose = slack or [np.zeros(cables.count)] * len(poses)
+        for number, (words, X_WP) in enumerate(poses.items()):
+            look = nth_look(number) if len(poses) > 1 else OUTLINE
+            _draw_cables(axes, cables, X_WP, loose[number], look if len(poses) > 1 else None)
+            _draw_platform(axes, robot, X_WP, look.dash, words, look.color)
+        size = TRIAD * float(np.max(robot.frame.upper - robot.frame.lower))
+        _draw_triad(axes, RigidTransform(), size, "W")
+        ends = [X.multiply(cables.p_PB) for X in poses.values()]
+        everything = np.hstack([cables.p_WA, *ends])
+        lower = np.minimum(robot.frame.lower, everything.min(axis=1))
+        upper = np.maximum(robot.frame.upper, everything.max(axis=1))
+        thin = upper - lower < 0.05 * np.max(upper - lower)
+        room = 0.5 * np.where(thin, 0.05 * np.max(upper - lower), 0.0)
+        set_box(axes, lower - room, upper + room)
+        figure.legend(loc="outside lower center", ncols=3)
+    return figure
+
+
 def set_box(axes: Any, lower: Array, upper: Array) -> None:
     """Shows a box of the world frame W in its true proportions; corners of shape (3,) [m]."""
     axes.set(
@@ -127,26 +163,34 @@ def _draw_path(axes: Any, path: Path3D, phase: float) -> None:
     axes.plot(*path.points.T, label=path.label, **style)
 
 
-def _draw_cables(axes: Any, cables: CableSet, X_WP: RigidTransform, slack: Array) -> None:
-    """Cables at a pose, drawn straight behind their pulleys, dotted where slack."""
+def _draw_cables(
+    axes: Any, cables: CableSet, X_WP: RigidTransform, slack: np.ndarray, look: Look | None = None
+) -> None:
+    """Cables at a pose, drawn straight behind their pulleys, dotted where slack; with one look
+    for all, or each its own."""
     straight = cable_curves(cables, KELVIN_VOIGT, X_WP, np.zeros(cables.count))
     for number, (curve, loose) in enumerate(zip(straight, slack, strict=True)):
         axes.plot(
             *curve,
-            color=nth_look(number).color,
+            color=(look or nth_look(number)).color,
             linestyle=DOTTED if loose else SOLID,
             linewidth=0.9,
         )
 
 
 def _draw_platform(
-    axes: Any, robot: Robot, X_WP: RigidTransform, dash: Dash, label: str | None
+    axes: Any,
+    robot: Robot,
+    X_WP: RigidTransform,
+    dash: Dash,
+    label: str | None,
+    color: str = OUTLINE.color,
 ) -> None:
     """The edges of the platform's box."""
     for number, edge in enumerate(platform_edges(robot)):
         ends = X_WP.multiply(edge)
         axes.plot(
-            *ends, color=OUTLINE.color, linestyle=dash, linewidth=1.1,
+            *ends, color=color, linestyle=dash, linewidth=1.1,
             label=label if number == 0 else None,
         )  # fmt: skip
 

@@ -254,7 +254,7 @@ def scenario_task(robot: Robot | str | Path, scenario: str) -> CameraTask:
     """
     with robot_reference(robot) as name:
         loaded = load_scenario(scenario, [f"robot={name}"])
-    where = f"--scenario {scenario}"
+    where = f"scenario {scenario}"
     if loaded.target.carrier != "world":
         raise StabilityError(
             f"{where}: found target.carrier {loaded.target.carrier}; accepted: world, with the "

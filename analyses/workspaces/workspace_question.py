@@ -193,11 +193,11 @@ class WorkspaceRequest:
 DEFAULT_REQUEST = WorkspaceRequest()
 
 HINTS = {
-    "required": "--wrench-set, --force or --moment",
-    "motion": "--acceleration",
-    "view": "--scenario",
+    "required": "required, force or moment",
+    "motion": "accelerations",
+    "view": "the argument scenario",
 }
-"""Which option gives what a kind needs."""
+"""Which argument gives what a kind needs."""
 
 
 def make_workspace_question(
@@ -223,16 +223,16 @@ def make_workspace_question(
     """
     for name in kinds:
         if name not in KINDS:
-            raise WorkspaceError(f"--kind {name!r} is unknown; {closest(name, KINDS)}")
+            raise WorkspaceError(f"kinds {name!r} is unknown; {closest(name, KINDS)}")
     for name in measures:
         if name not in MEASURES:
-            raise WorkspaceError(f"--measure {name!r} is unknown; {closest(name, MEASURES)}")
+            raise WorkspaceError(f"measures {name!r} is unknown; {closest(name, MEASURES)}")
     if rule not in RULES:
-        raise WorkspaceError(f"--orientations {rule!r} is unknown; {closest(rule, RULES)}")
+        raise WorkspaceError(f"orientations {rule!r} is unknown; {closest(rule, RULES)}")
     if not kinds:
-        raise WorkspaceError(f"--kind: found none; accepted: {', '.join(KINDS)}")
+        raise WorkspaceError(f"kinds: found none; accepted: {', '.join(KINDS)}")
     if not (np.isfinite(asked.clearance) and asked.clearance >= 0.0):
-        raise WorkspaceError(f"--clearance: found {asked.clearance:g}; accepted: >= 0 [m]")
+        raise WorkspaceError(f"clearance: found {asked.clearance:g}; accepted: >= 0 [m]")
     given, robot = robot, as_robot(robot)
     check_grid(robot, grid)
     about = pose_conditions(robot, asked)
@@ -243,21 +243,21 @@ def make_workspace_question(
     for name in kinds:
         needs = KINDS[name].needs
         if needs and getattr(about, needs) is None:
-            raise WorkspaceError(f"--kind {name}: needs {HINTS[needs]}")
+            raise WorkspaceError(f"kinds {name}: needs {HINTS[needs]}")
     if asked.method is not None and "static" not in kinds:
         raise WorkspaceError(
-            f"--method {asked.method}: found --kind {','.join(kinds)}; accepted: static among them"
+            f"method {asked.method}: found kinds {','.join(kinds)}; accepted: static among them"
         )
     n, m = len(about.case.rows), about.case.cables.count
     if "wrench-closure" in kinds and m <= n:
         raise WorkspaceError(
-            f"--kind wrench-closure: found {m} cables of {robot.name} for {n} degrees of freedom; "
+            f"kinds wrench-closure: found {m} cables of {robot.name} for {n} degrees of freedom; "
             f"accepted: robots with more than {n}"
         )
     moved = [row - 3 for row in about.case.rows if row >= 3]
     if "payload" in measures and not np.any(np.array(about.case.down)[moved]):
         raise WorkspaceError(
-            f"--measure payload: found the planar {robot.name}, whose plane carries the weight; "
+            f"measures payload: found the planar {robot.name}, whose plane carries the weight; "
             "accepted: robots that hold it by their cables"
         )
     return WorkspaceQuestion(
@@ -335,7 +335,7 @@ def camera_view(robot: Robot, scenario: str) -> CameraView:
         loaded = load_scenario(scenario, [f"robot={name}"])
     if loaded.target.carrier != "world" or loaded.target.motion is not None:
         raise WorkspaceError(
-            f"--scenario {scenario}: found a target that moves; accepted: one that rests in the "
+            f"scenario {scenario}: found a target that moves; accepted: one that rests in the "
             "world, seen by a camera on the platform"
         )
     mount = robot.camera_mount(loaded.camera.mount)

@@ -5,39 +5,36 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 import typer
 
 from cdpr_drake.analyses.design.candidates import make_candidates
-from cdpr_drake.analyses.design.confirmation import confirm
+from cdpr_drake.analyses.design.confirmation import BOXES
 from cdpr_drake.analyses.design.goals import GOALS
-from cdpr_drake.analyses.design.results import DesignResult, write_design
-from cdpr_drake.analyses.design.search import search_design
 from cdpr_drake.analyses.design.settings import (
     SEARCHES,
     DesignSettings,
     GoalSettings,
     load_design_settings,
 )
-from cdpr_drake.analyses.reporting.output_folder import continued_folder
-from cdpr_drake.analyses.reporting.progress import StudySession, WorkProgress
+from cdpr_drake.analyses.front.design import REACH, optimize_design
+from cdpr_drake.analyses.reporting.output_folder import shown_path
+from cdpr_drake.analyses.reporting.progress import WorkProgress
+from cdpr_drake.cli.command_session import CommandSession
 from cdpr_drake.cli.completion import words_among
 from cdpr_drake.cli.grid_options import ForceToResist, MomentToResist, default_folder
 from cdpr_drake.cli.options import FigureFormats, ResultsAsJson, RobotName, Scheduler, parse_formats
-from cdpr_drake.cli.process import INTERRUPTED, StopRequest
-from cdpr_drake.cli.run_endings import SayContinued, report_failures, shown_path
-from cdpr_drake.cli.terminal import message_console, print_json, progress_bar, wide_console, working
+from cdpr_drake.cli.process import INTERRUPTED
+from cdpr_drake.cli.run_endings import report_failures
+from cdpr_drake.cli.terminal import print_json, wide_console
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.schema.typed_yaml import closest
 
 STOPPING = "Stopping after the designs under way, which are kept; Ctrl-C again drops them"
 """Answer to the first Ctrl-C."""
-
-REACH = 0.1
-"""Without a file, exit points move so far, either way along each axis that they can [m]."""
 
 QUICK_GENERATIONS, QUICK_BOXES = 3, 2000
 
@@ -74,7 +71,7 @@ def design(
     seed: Annotated[int | None, typer.Option(help="Of the search.", min=0)] = None,
     boxes: Annotated[
         int, typer.Option(help="Boxes that prove a volume, at most, for each robot.", min=1)
-    ] = 200_000,
+    ] = BOXES,
     quick: Annotated[bool, typer.Option(help="A short form, to see that it works.")] = False,
     out: Annotated[
         Path | None,
@@ -93,70 +90,72 @@ def design(
     Run again with the same arguments, it continues where it was stopped or killed.
     """
     formats = parse_formats(figure_format)
+    source = "design" if parameters is None else str(parameters)
+    settings = _plain() if parameters is None else load_design_settings(parameters)
     if quick and generations is None:
         generations = QUICK_GENERATIONS
-    settings = _plain() if parameters is None else load_design_settings(parameters)
-    _apply(settings, goal, by, force=force, moment=moment, generations=generations, seed=seed)
+    for name, value in (
+        ("force", _positive("--force", force)), ("moment", _positive("--moment", moment)),
+        ("generations", generations), ("seed", seed),
+    ):  # fmt: skip
+        if value is not None:
+            setattr(settings, name, value)
+    if by is not None:
+        if by not in SEARCHES:
+            raise CdprError(f"--search: found {by!r}; accepted: {', '.join(SEARCHES)}")
+        settings.search = by
+    if goal:
+        settings.goals = [_goal(words) for words in goal]
+    if not settings.goals:
+        raise CdprError(f"--goal: found none; accepted: {', '.join(GOALS)}")
     names = [one.name for one in settings.goals]
+    if len(set(names)) < len(names):
+        raise CdprError(f"--goal: found {', '.join(names)}; accepted: each once")
     loaded = load_robot(robot)
     if parameters is None and loaded.is_planar():
         settings.exit_points.reach = np.array([REACH, REACH, 0.0])
-    source = "design" if parameters is None else str(parameters)
     candidates = make_candidates(robot, settings, source)
     arguments = {"robot": candidates.text, "settings": repr(replace(settings, generations=1))}
     folder = out if out is not None else default_folder("design", loaded.name, arguments)
-    console, stop = message_console(), StopRequest(STOPPING)
-    with continued_folder(folder):
-        with stop.listening(), progress_bar(console) as bar:
-            task = bar.add_task(f"design {loaded.name}", total=None, state="starting")
-            say_continued = SayContinued(bar.console, folder)
-
-            def show(progress: WorkProgress) -> None:
-                known = progress.done > progress.found or progress.found == progress.total
-                if known:
-                    say_continued(progress)
-                bar.update(
-                    task,
-                    completed=progress.done,
-                    total=progress.total,
-                    state=f"{progress.done:.0f}/{progress.total:.0f} designs, {progress.what}",
-                )
-
-            session = StudySession(folder, show, stop, workers, None, scheduler)
-            search = search_design(robot, candidates, settings, session)
-        confirmed = []
-        file = None
-        if search.best is not None and not search.interrupted:
-            file = write_design(search, loaded.name, folder)
-            most = QUICK_BOXES if quick else boxes
-            with stop.listening(), working(console, "proving") as say:
-                for name in names:
-                    one = confirm(
-                        name, robot, str(file), search.judging, boxes=most, say=say,
-                        should_stop=stop,
-                    )  # fmt: skip
-                    confirmed += [] if one is None else [one]
-        result = DesignResult(loaded.name, search, tuple(confirmed))
-        with working(console, "Writing results"):
-            failed = result.write(folder, formats)
-    _print_result(result, folder, file, as_json)
-    code = report_failures(console, failed, shown_path(folder.resolve()), None)
-    if result.interrupted:
-        console.print("Interrupted; run again with the same arguments to continue")
+    with DesignSession(STOPPING, folder, f"design {loaded.name}") as session:
+        found = optimize_design(
+            robot, settings, folder, boxes=QUICK_BOXES if quick else boxes,
+            workers=scheduler or workers, formats=formats, source=source, session=session,
+        )  # fmt: skip
+    where = shown_path(folder.resolve())
+    if as_json:
+        print_json(found.as_dict())
+    else:
+        printer = wide_console(150)
+        for table in found.tables():
+            printer.print(table)
+        if found.file is not None:
+            printer.print(f"robot file: {shown_path(found.file.resolve())}")
+        printer.print(f"results: {where}")
+    code = report_failures(session.console, found.failed, where, None)
+    if found.interrupted:
+        session.say("Interrupted; run again with the same arguments to continue")
         return INTERRUPTED
     return code
 
 
-def _print_result(result: DesignResult, folder: Path, file: Path | None, as_json: bool) -> None:
-    if as_json:
-        print_json(result.as_dict())
-    else:
-        printer = wide_console(150)
-        for table in result.tables():
-            printer.print(table)
-        if file is not None:
-            printer.print(f"robot file: {shown_path(file.resolve())}")
-        printer.print(f"results: {shown_path(folder.resolve())}")
+class DesignSession(CommandSession):
+    """What a terminal shows of a search."""
+
+    def progress(self, progress: WorkProgress) -> None:
+        """Moves the bar; says that a search is continued once it is known how far it was."""
+        if progress.done > progress.found or progress.found == progress.total:
+            super().progress(progress)
+        else:
+            self.show(**self.fields(progress))
+
+    def fields(self, progress: WorkProgress) -> dict[str, Any]:
+        """Of the bar."""
+        return {
+            "completed": progress.done,
+            "total": progress.total,
+            "state": f"{progress.done:.0f}/{progress.total:.0f} designs, {progress.what}",
+        }
 
 
 def _plain() -> DesignSettings:
@@ -166,31 +165,10 @@ def _plain() -> DesignSettings:
     return settings
 
 
-def _apply(
-    settings: DesignSettings, goals: list[str] | None, by: str | None, **numbers: float | None
-) -> None:
-    """Puts options in the place of a file's settings; None leaves what it says."""
-    for name in ("force", "moment"):
-        _check_positive(f"--{name}", numbers[name])
-    for name, value in numbers.items():
-        if value is not None:
-            setattr(settings, name, value)
-    if by is not None:
-        if by not in SEARCHES:
-            raise CdprError(f"--search: found {by!r}; accepted: {', '.join(SEARCHES)}")
-        settings.search = by
-    if goals:
-        settings.goals = [_goal(words) for words in goals]
-    if not settings.goals:
-        raise CdprError(f"--goal: found none; accepted: {', '.join(GOALS)}")
-    names = [one.name for one in settings.goals]
-    if len(set(names)) < len(names):
-        raise CdprError(f"--goal: found {', '.join(names)}; accepted: each once")
-
-
-def _check_positive(option: str, value: float | None) -> None:
+def _positive(option: str, value: float | None) -> float | None:
     if value is not None and not (math.isfinite(value) and value >= 0.0):
         raise CdprError(f"{option}: found {value:g}; accepted: >= 0")
+    return value
 
 
 def _goal(words: str) -> GoalSettings:

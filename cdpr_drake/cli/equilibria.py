@@ -13,11 +13,17 @@ from cdpr_drake.analyses.front.statics import EQUILIBRIA_MODELS, find_equilibria
 from cdpr_drake.analyses.statics.equilibria_query import EquilibriaReport
 from cdpr_drake.arrays import Array
 from cdpr_drake.cli.completion import words_among
-from cdpr_drake.cli.options import AsJson, RobotName, parse_numbers
+from cdpr_drake.cli.options import AsJson, RobotName, named_options, parse_numbers
 from cdpr_drake.cli.terminal import message_console, print_json, wide_console, working
 from cdpr_drake.errors import CdprError
 from cdpr_drake.geometry.poses import angles_from_rotation
 from cdpr_drake.models.robot_loader import load_robot
+
+OPTIONS = {
+    "lengths": "--lengths", "position": "--position", "taut": "--taut", "model": "--cable-model",
+    "searches": "--searches", "seed": "--seed",
+}  # fmt: skip
+"""Options by the arguments of `find_equilibria`."""
 
 
 def equilibria(
@@ -64,10 +70,11 @@ def equilibria(
             what = "searches" if cable_model == "elastic" else "sets of taut cables"
             say(f"{loaded.name} at rest, {done} of {total} {what}")
 
-        answer = find_equilibria(
-            loaded, given, place, taut=holding, model=cable_model, pulleys=pulleys,
-            searches=searches, seed=seed, report=report,
-        )  # fmt: skip
+        with named_options(OPTIONS):
+            answer = find_equilibria(
+                loaded, given, place, taut=holding, model=cable_model, pulleys=pulleys,
+                searches=searches, seed=seed, report=report,
+            )  # fmt: skip
     if as_json:
         print_json(answer.as_dict())
     else:

@@ -7,10 +7,10 @@ from typing import Annotated
 
 import typer
 
+from cdpr_drake.analyses.front.exchange import import_robot
 from cdpr_drake.cli.options import AsJson
 from cdpr_drake.cli.robot_folder import write_files
 from cdpr_drake.cli.terminal import print_json
-from cdpr_drake.models.robot_exchange import import_robot
 
 
 def import_(
@@ -45,19 +45,9 @@ def import_(
     paths = write_files(folder, files, overwrite)
     completed = imported.completed
     if as_json:
-        print_json(
-            {
-                "robot": imported.robot.name,
-                "format": imported.tool,
-                "source": str(file),
-                "files": [str(path) for path in paths],
-                "motion": imported.robot.motion,
-                "cables": len(imported.robot.cables),
-                "given": list(completed.given),
-                "assumed": completed.assumed,
-                "remarks": list(completed.remarks),
-            }
-        )
+        told = imported.as_dict()
+        head = {key: told.pop(key) for key in ("robot", "format", "source")}
+        print_json({**head, "files": [str(path) for path in paths], **told})
         return
     robot = imported.robot
     print(f"{robot.name}: {robot.motion}, {len(robot.cables)} cables, from {imported.tool}")

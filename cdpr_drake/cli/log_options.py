@@ -11,10 +11,10 @@ from matplotlib.figure import Figure
 from rich.table import Table
 
 from cdpr_drake.analyses.reporting.folder_lock import free_folder
-from cdpr_drake.analyses.reporting.output_folder import results_folder
+from cdpr_drake.analyses.reporting.output_folder import results_folder, shown_path
 from cdpr_drake.analyses.visualization.figure_files import write_figures
 from cdpr_drake.cli.completion import robot_words
-from cdpr_drake.cli.run_endings import report_failures, report_kept_files, shown_path
+from cdpr_drake.cli.run_endings import report_failures, report_kept_files
 from cdpr_drake.cli.terminal import message_console, print_json, wide_console, working
 from cdpr_drake.errors import CdprError
 

@@ -30,7 +30,7 @@ from cdpr_drake.analyses.planning.robot_path_task import (
 )
 from cdpr_drake.analyses.reporting.deferred_figures import Pictures, write_pictures
 from cdpr_drake.analyses.reporting.folder_lock import free_folder
-from cdpr_drake.analyses.reporting.output_folder import results_folder
+from cdpr_drake.analyses.reporting.output_folder import results_folder, shown_path
 from cdpr_drake.cli.completion import words_among
 from cdpr_drake.cli.options import (
     FigureFormats,
@@ -43,12 +43,7 @@ from cdpr_drake.cli.options import (
     parse_numbers,
     parse_pose,
 )
-from cdpr_drake.cli.run_endings import (
-    report_failures,
-    report_kept_files,
-    report_recovered,
-    shown_path,
-)
+from cdpr_drake.cli.run_endings import report_failures, report_kept_files, report_recovered
 from cdpr_drake.cli.terminal import message_console, print_json, wide_console, working
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models.robot_loader import load_robot

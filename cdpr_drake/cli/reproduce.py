@@ -3,28 +3,28 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 from rich.console import Console
 
-from cdpr_drake.analyses.front.studies import chosen_studies, write_reproduction
-from cdpr_drake.analyses.reporting.output_folder import continued_folder
-from cdpr_drake.analyses.reporting.progress import WorkProgress
+from cdpr_drake.analyses.front.studies import StudyOfMany, chosen_studies
+from cdpr_drake.analyses.front.studies import reproduce as reproduce_all
+from cdpr_drake.analyses.reporting.output_folder import shown_path
 from cdpr_drake.analyses.reporting.statements import new_table
 from cdpr_drake.analyses.reproduction.rows import FAILED, ReportRow
-from cdpr_drake.analyses.reproduction.runner import RunSettings, run_studies
 from cdpr_drake.analyses.reproduction.scorecard import Scorecard
-from cdpr_drake.analyses.reproduction.states import StudyState, check_folder
+from cdpr_drake.analyses.reproduction.states import StudyState
 from cdpr_drake.analyses.studies.catalogue import STUDIES
+from cdpr_drake.cli.command_session import CommandSession
 from cdpr_drake.cli.completion import words_among
 from cdpr_drake.cli.options import FigureFormats, Overwrite, ResultsAsJson, parse_formats
 from cdpr_drake.cli.process import INTERRUPTED, StopRequest
-from cdpr_drake.cli.run_endings import INCOMPLETE, STUDY_FAILED, report_kept_files, shown_path
-from cdpr_drake.cli.terminal import message_console, print_json, progress_bar, wide_console, working
+from cdpr_drake.cli.run_endings import INCOMPLETE, STUDY_FAILED
+from cdpr_drake.cli.terminal import print_json, wide_console, working
 
 STOPPING = (
     "Stopping: waits for what the study has begun, then writes the report; Ctrl-C again ends the "
@@ -64,27 +64,17 @@ def reproduce(
     killed continues when the same command is given again. One that fails does not end the others.
     Figures are in PNG, which the report shows, and in the formats that are asked for beside.
     """
-    # The report shows those in PNG.
-    formats = tuple(dict.fromkeys(("png", *parse_formats(figure_format))))
-    studies = chosen_studies(
-        None if only is None else [name.strip() for name in only.split(",") if name.strip()]
-    )
+    formats = parse_formats(figure_format)
+    asked = None if only is None else [name.strip() for name in only.split(",") if name.strip()]
+    chosen_studies(asked)
     folder = out if out is not None else Path("reproduction-quick" if quick else "reproduction")
-    console = message_console()
-    stop = StopRequest(STOPPING)
-    with stop.listening(), continued_folder(folder, overwrite) as results:
-        check_folder(results.path, quick)
-        with progress_bar(console) as bar:
-            states = run_studies(
-                studies,
-                results.path,
-                replace(_settings(quick, workers, stop, bar, len(studies)), formats=formats),
-            )
-        with StopRequest(WRITING).listening(), working(console, "Writing the report"):
-            found = write_reproduction(results.path, studies, states, quick)
-            left = found.unfinished(list(studies))
-            results.unfinished = bool(left)
-    report_kept_files(console, results.kept)
+    with ReproductionSession(STOPPING, folder, "reproduce") as session:
+        found = reproduce_all(
+            folder, quick, asked, workers=workers, overwrite=overwrite, formats=formats,
+            session=session,
+        )  # fmt: skip
+    session.say_kept()
+    states = found.states
     if as_json:
         print_json(found.as_dict())
     else:
@@ -95,29 +85,28 @@ def reproduce(
         + (["--workers", str(workers)] if workers else [])
         + (["--format", figure_format] if figure_format != "png" else [])
     )
-    return _ending(console, left, states, again)
+    return _ending(session.console, found.left, states, again)
 
 
-def _settings(
-    quick: bool, workers: int | None, stop: StopRequest, bar: Any, count: int
-) -> RunSettings:
-    """Studies say how far they are by the bar."""
-    task = bar.add_task("reproduce", total=None, state="starting")
+class ReproductionSession(CommandSession):
+    """What a terminal shows of a reproduction: the study that runs, and how far it is."""
 
-    def tell(name: str, number: int, progress: WorkProgress | None) -> None:
-        words = f"{number + 1}/{count} {name}"
-        if progress is None:
-            bar.update(task, completed=0, total=None, state=words)
+    def progress(self, progress: StudyOfMany) -> None:
+        """Moves the bar."""
+        words, now = f"{progress.number + 1}/{progress.of} {progress.name}", progress.progress
+        if now is None:
+            self.show(completed=0, total=None, state=words)
         else:
-            bar.update(
-                task, completed=progress.done, total=progress.total,
-                state=f"{words}: {progress.what}",
-            )  # fmt: skip
+            self.show(completed=now.done, total=now.total, state=f"{words}: {now.what}")
 
-    return RunSettings(quick, workers, tell, bar.console.print, stop)
+    @contextmanager
+    def doing(self, words: str) -> Iterator[Callable[[str], None]]:
+        """Shows words; Ctrl-C has another answer here, also where one has ended the studies."""
+        with StopRequest(WRITING).listening(), working(self.console, words) as say:
+            yield say
 
 
-def _print(rows: Sequence[ReportRow], states: dict[str, StudyState], page: Path) -> None:
+def _print(rows: Sequence[ReportRow], states: Mapping[str, StudyState], page: Path) -> None:
     """The scorecard, what failed, and where the report is."""
     card = Scorecard.of(rows)
     verdicts = card.shown()
@@ -134,7 +123,7 @@ def _print(rows: Sequence[ReportRow], states: dict[str, StudyState], page: Path)
 
 
 def _ending(
-    console: Console, left: Sequence[str], states: dict[str, StudyState], again: str
+    console: Console, left: Sequence[str], states: Mapping[str, StudyState], again: str
 ) -> int:
     """Says what is left to do; returns the exit code."""
     failed = [state for state in states.values() if state.status == "failed"]

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from rich.console import Console
 
 from cdpr_drake.analyses.reporting.left_folders import KeptFiles, holds_log
-from cdpr_drake.analyses.reporting.output_folder import ResultsFolder
+from cdpr_drake.analyses.reporting.output_folder import ResultsFolder, shown_path
 from cdpr_drake.analyses.reporting.progress import WorkProgress
 from cdpr_drake.cli.process import INTERRUPTED, StopRequest
 
@@ -23,12 +23,6 @@ STUDY_FAILED = 5
 
 MISFIT = 6
 """Exit code of a calibration or an identification that does not fit what was measured."""
-
-
-def shown_path(folder: Path) -> Path:
-    """A path as it is shown: from the working folder, where it lies below it."""
-    here = Path.cwd().resolve()
-    return folder.relative_to(here) if folder.is_relative_to(here) else folder
 
 
 def report_recovered(console: Console, results: ResultsFolder) -> None:
@@ -64,7 +58,7 @@ def report_kept_files(console: Console, kept: Iterable[KeptFiles]) -> None:
 
 
 def report_failures(
-    console: Console, failed: dict[str, str], folder: Path, stop: StopRequest | None
+    console: Console, failed: Mapping[str, str], folder: Path, stop: StopRequest | None
 ) -> int:
     """Names what could not be written, one line each; returns the exit code."""
     for name, why in failed.items():

@@ -7,18 +7,18 @@ from typing import Annotated, Any
 
 import typer
 
+from cdpr_drake.analyses.front.simulation import simulate
 from cdpr_drake.analyses.reporting.folder_lock import free_folder
 from cdpr_drake.analyses.simulation.scenario_kinds import SCENARIO_KINDS
 from cdpr_drake.cli.completion import scenario_words, words_among
 from cdpr_drake.cli.options import FigureFormats, Overwrite, parse_formats
 from cdpr_drake.cli.process import StopRequest
 from cdpr_drake.cli.run_endings import CLIENT_ENDED
-from cdpr_drake.cli.simulate import RunOutputs, simulate_once
+from cdpr_drake.cli.simulate import STOPPING, SimulationSession, tell_run
 from cdpr_drake.cli.terminal import message_console
 from cdpr_drake.errors import ClientEndedError
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.diagrams.load import load_scenario
-from cdpr_drake.systems.loops.loop_choice import set_loop
 from cdpr_drake.systems.remote.messages import PROTOCOL, check_available
 from cdpr_drake.systems.remote.remote_client import LOCAL_HOST, USUAL_PORT
 from cdpr_drake.systems.remote.remote_driver import Driver, SyncMode
@@ -97,12 +97,18 @@ def serve(
     if place is None and load_scenario(scenario, list(settings or [])).remote is None:
         usual = SERVO_PLACES if kind.has_camera else TENSION_PLACES
         overrides.append(f"remote.place={usual[0]}")
-    loaded, note = set_loop(load_scenario(scenario, overrides))
+    loaded = load_scenario(scenario, overrides)
     folder = out if out is not None else free_folder(Path("runs") / loaded.name)
-    wanted = RunOutputs(folder, overwrite, (), formats, False, None, as_json)
+    session = SimulationSession(STOPPING, folder)
     try:
-        with _Client(loaded, host, port, wait) as client:
-            return simulate_once(kind, loaded, wanted, note, client.on_request_of)
+        with _Client(loaded, host, port, wait, session.request) as client, session:
+            session.outside = client
+            found = simulate(
+                loaded, folder=folder, overwrite=overwrite, formats=formats, session=session
+            )
+            code = tell_run(found, session, as_json)
+        session.say_kept()
+        return code
     except ClientEndedError as problem:  # before the first step
         message_console().print(f"cdpr: {problem}; nothing was simulated")
         return CLIENT_ENDED
@@ -111,11 +117,10 @@ def serve(
 class _Client:
     """Waits for a client, and tells it how the run ended."""
 
-    def __init__(self, scenario: Any, host: str, port: int, wait: float) -> None:
+    def __init__(self, scenario: Any, host: str, port: int, wait: float, stop: StopRequest) -> None:
         self._scenario, self._wait = scenario, wait
-        self._stop: StopRequest | None = None
         self._driver: Driver | None = None
-        self._socket = Socket(host, port, lambda: self._stop is not None and self._stop())
+        self._socket = Socket(host, port, stop)
         if not is_loopback(host):
             message_console().print(
                 f"warning: {self._socket.address} is open to other machines: whoever reaches it "
@@ -127,11 +132,6 @@ class _Client:
 
     def __exit__(self, *_: object) -> None:
         self._socket.close()
-
-    def on_request_of(self, stop: StopRequest) -> _Client:
-        """Itself, listening to Ctrl-C while it waits."""
-        self._stop = stop
-        return self
 
     def connect(self, remote: Remote) -> None:
         """Waits for a client that starts the run."""

@@ -18,7 +18,7 @@ from rich.table import Table
 from cdpr_drake.analyses.front.workspaces import default_box, stability_question
 from cdpr_drake.analyses.reporting.deferred_figures import write_pictures
 from cdpr_drake.analyses.reporting.log_files import write_json
-from cdpr_drake.analyses.reporting.output_folder import continued_folder
+from cdpr_drake.analyses.reporting.output_folder import continued_folder, shown_path
 from cdpr_drake.analyses.simulation.stability_files import stability_of_folder
 from cdpr_drake.analyses.workspaces.stability_figures import stability_pictures
 from cdpr_drake.analyses.workspaces.stability_results import (
@@ -49,12 +49,13 @@ from cdpr_drake.cli.options import (
     ResultsAsJson,
     Scheduler,
     Wrench,
+    named_options,
     parse_formats,
     parse_limits,
     parse_numbers,
     parse_wrench,
 )
-from cdpr_drake.cli.run_endings import report_failures, shown_path
+from cdpr_drake.cli.run_endings import report_failures
 from cdpr_drake.cli.terminal import message_console, print_json, wide_console, working
 from cdpr_drake.errors import CdprError, OutputFolderError
 from cdpr_drake.models.robot_loader import load_robot
@@ -194,13 +195,14 @@ def stability(
     check_mass(mass, zero=True)
     formats = parse_formats(figure_format)
     loaded = load_robot(robot)
-    question = stability_question(
-        robot, scheme, verdict, bounds=bounds, vary=parse_vary(vary or []),
-        grid=parse_grid(grid, parse_turns(orientation or []), *default_box(robot)),
-        scenario=scenario,
-        options=VerdictOptions(draws=draws, seed=seed, searches=searches, pieces=pieces),
-        limits=parse_limits(limits), mass=mass, wrench=parse_wrench(wrench),
-    )  # fmt: skip
+    with named_options({f"scenario {scenario}": f"--scenario {scenario}"}):
+        question = stability_question(
+            robot, scheme, verdict, bounds=bounds, vary=parse_vary(vary or []),
+            grid=parse_grid(grid, parse_turns(orientation or []), *default_box(robot)),
+            scenario=scenario,
+            options=VerdictOptions(draws=draws, seed=seed, searches=searches, pieces=pieces),
+            limits=parse_limits(limits), mass=mass, wrench=parse_wrench(wrench),
+        )  # fmt: skip
     name = f"{question.robot}-{scheme}-{verdict}"
     folder = out if out is not None else default_folder("stability", name, question.arguments())
     console = message_console()

@@ -4,32 +4,28 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from cdpr_drake.analyses.front.studies import chosen_studies
+from cdpr_drake.analyses.front.studies import chosen_studies, run_study
 from cdpr_drake.analyses.reporting.folder_lock import free_folder
-from cdpr_drake.analyses.reporting.output_folder import continued_folder, results_folder
-from cdpr_drake.analyses.reporting.progress import StudySession, WorkProgress
-from cdpr_drake.analyses.studies.catalogue import STUDIES, StudyEntry, studies_that, write_study
-from cdpr_drake.analyses.sweeps.workers import check_scheduler
+from cdpr_drake.analyses.studies.catalogue import STUDIES, studies_that
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
+from cdpr_drake.cli.command_session import CommandSession, shown
 from cdpr_drake.cli.completion import words_among
-from cdpr_drake.cli.options import FigureFormats, Overwrite, ResultsAsJson, Scheduler, parse_formats
-from cdpr_drake.cli.process import INTERRUPTED, StopRequest
-from cdpr_drake.cli.run_endings import (
-    SayContinued,
-    report_failures,
-    report_kept_files,
-    report_recovered,
-    shown_path,
+from cdpr_drake.cli.options import (
+    FigureFormats,
+    Overwrite,
+    ResultsAsJson,
+    Scheduler,
+    named_options,
+    parse_formats,
 )
-from cdpr_drake.cli.terminal import message_console, print_json, progress_bar, wide_console, working
-from cdpr_drake.errors import CdprError
-from cdpr_drake.schema.typed_yaml import closest
+from cdpr_drake.cli.process import INTERRUPTED
+from cdpr_drake.cli.run_endings import report_failures
+from cdpr_drake.cli.terminal import print_json, wide_console
 
 RECIPES = sorted({recipe for entry in STUDIES.values() for recipe in entry.recipes})
 """Names of recipes of all studies."""
@@ -45,6 +41,9 @@ STOPPING = (
 
 MOST_SEEDS = 10_000
 """Runs of each configuration at the most: every one of them is listed before the first begins."""
+
+OPTIONS = {"seeds": "--seeds", "recipe": "--recipe", "workers": "--scheduler"}
+"""Options by the arguments of `run_study`."""
 
 PIPE_WIDTH = 160
 """Width of tables where there is no terminal [characters]."""
@@ -91,51 +90,29 @@ def study(
 ) -> int:
     """Runs a study and writes results.json and figures; Ctrl-C keeps what is finished."""
     chosen_studies([name])
-    if scheduler is not None:
-        if not STUDIES[name].spreads:
-            raise CdprError(f"--scheduler: study {name} is computed here; leave it out")
-        check_scheduler(scheduler)
-    if seeds is not None and not STUDIES[name].repeats:
-        raise CdprError(f"--seeds: accepted with {REPEATING}, not with {name}")
     formats = parse_formats(figure_format)
-    entry = _by_recipe(name, recipe)
     called = name if recipe is None else f"{name}-{recipe}"
     folder = out if out is not None else free_folder(Path("studies") / called)
-    console = message_console()
-    stop = StopRequest(STOPPING)
-    prepared = continued_folder if entry.continues else results_folder
-    with stop.listening(), prepared(folder, overwrite) as results:
-        report_recovered(console, results)
-        with progress_bar(console) as bar:
-            task = bar.add_task(name, total=None, state="starting")
-            say_continued = SayContinued(bar.console, folder)
-
-            def show(progress: WorkProgress) -> None:
-                say_continued(progress)
-                bar.update(
-                    task,
-                    completed=progress.done,
-                    total=progress.total,
-                    state=f"{progress.speed:.1f} {progress.rate}, {progress.what}",
-                )
-
-            session = StudySession(results.path, show, stop, workers, seeds, scheduler)
-            result = entry.run(quick, session)
-        with working(console, "Writing results"):
-            failed = write_study(result, results.path, formats)
-            results.unfinished = result.interrupted
-            folder = shown_path(results.publish())
-    report_kept_files(console, results.kept)
+    with (
+        named_options(OPTIONS),
+        CommandSession(STOPPING, folder, name) as session,
+    ):
+        found = run_study(
+            name, folder, quick, seeds=seeds, recipe=recipe, workers=scheduler or workers,
+            overwrite=overwrite, formats=formats, session=session,
+        )  # fmt: skip
+    console, folder = session.console, shown(found.folder)
+    session.say_kept()
     if as_json:
-        print_json(result.as_dict())
+        print_json(found.as_dict())
     else:
         printer = wide_console(PIPE_WIDTH)
-        for table in result.tables():
+        for table in found.tables():
             printer.print(table)
         printer.print(f"results: {folder}")
-    if result.interrupted:
+    if found.interrupted:
         words = f"Interrupted; what was finished is in {folder}"
-        if entry.continues:
+        if STUDIES[name].continues:
             words += f"; to continue:\n{_command(name, folder, quick, as_json, formats)}"
             given = {
                 "--seeds": seeds, "--workers": workers, "--scheduler": scheduler,
@@ -144,26 +121,9 @@ def study(
             for option, value in given.items():
                 words += f" {option} {value}" if value is not None else ""
         console.print(words)
-        report_failures(console, failed, folder, None)
+        report_failures(console, found.failed, folder, None)
         return INTERRUPTED
-    return report_failures(console, failed, folder, None)
-
-
-def _by_recipe(name: str, recipe: str | None) -> StudyEntry:
-    """The study, or that of another recipe of it.
-
-    Raises:
-        CdprError: It has no recipes, or not this one.
-    """
-    entry = STUDIES[name]
-    if recipe is None:
-        return entry
-    if not entry.recipes:
-        able = studies_that(lambda other: bool(other.recipes))
-        raise CdprError(f"--recipe: accepted with {able}, not with {name}")
-    if recipe not in entry.recipes:
-        raise CdprError(f"--recipe: {recipe!r} is unknown; {closest(recipe, entry.recipes)}")
-    return replace(entry, run=entry.recipes[recipe])
+    return report_failures(console, found.failed, folder, None)
 
 
 def _command(name: str, folder: Path, quick: bool, as_json: bool, formats: Sequence[str]) -> str:

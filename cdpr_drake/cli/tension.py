@@ -97,7 +97,7 @@ def tension(
                 length_scale=length_scale,
             )  # fmt: skip
     if plot is not None and isinstance(found, TensionsAtPose):
-        save_plot(found.plot(f"{loaded.name} at ({pose})"), plot)
+        save_plot(found.plot_polygon(f"{loaded.name} at ({pose})"), plot)
     if wrench_set_plot is not None and isinstance(found, TensionsAtPose):
         save_plot(found.plot_wrenches(f"{loaded.name} at ({pose})"), wrench_set_plot)
     if as_json:

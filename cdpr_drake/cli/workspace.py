@@ -19,7 +19,7 @@ from rich.table import Table
 from cdpr_drake.analyses.front.workspaces import default_box, workspace_question
 from cdpr_drake.analyses.reporting.deferred_figures import write_pictures
 from cdpr_drake.analyses.reporting.log_files import write_json
-from cdpr_drake.analyses.reporting.output_folder import continued_folder
+from cdpr_drake.analyses.reporting.output_folder import continued_folder, shown_path
 from cdpr_drake.analyses.sweeps.sweep import STARTING
 from cdpr_drake.analyses.workspaces.box_certificates import BoxSearch, box_search, certified_boxes
 from cdpr_drake.analyses.workspaces.conditions import KINDS, MEASURES
@@ -55,13 +55,14 @@ from cdpr_drake.cli.options import (
     RobotName,
     Scheduler,
     Wrench,
+    named_options,
     parse_formats,
     parse_limits,
     parse_numbers,
     parse_wrench,
 )
 from cdpr_drake.cli.process import INTERRUPTED, StopRequest
-from cdpr_drake.cli.run_endings import report_failures, shown_path
+from cdpr_drake.cli.run_endings import report_failures
 from cdpr_drake.cli.terminal import message_console, print_json, progress_bar, wide_console, working
 from cdpr_drake.errors import WorkspaceError
 from cdpr_drake.models.robot_loader import load_robot
@@ -231,6 +232,15 @@ RESULTS = "results.json"
 """Arguments, versions, volumes and ranges."""
 
 
+OPTIONS = {
+    "kinds": "--kind", "measures": "--measure", "orientations": "--orientations",
+    "clearance": "--clearance", "method": "--method", "accelerations": "--acceleration",
+    "the argument scenario": "--scenario", "force": "--force", "moment": "--moment",
+    "required, force or moment": "--wrench-set, --force or --moment",
+}  # fmt: skip
+"""Options by the arguments of `compute_workspace`."""
+
+
 def workspace(
     robot: RobotName,
     kind: Annotated[
@@ -352,17 +362,18 @@ def workspace(
     if wrench_set is not None and (force is not None or moment is not None):
         raise WorkspaceError("--wrench-set: found --force or --moment too; accepted: one way")
     required = None if wrench_set is None else load_wrench_set(wrench_set)
-    question = workspace_question(
-        robot, kind.split(","),
-        parse_grid(grid, parse_turns(orientation or []), *default_box(robot, region)),
-        measures=() if measure is None else measure.split(","), orientations=orientations,
-        limits=parse_limits(limits), mass=mass, wrench=parse_wrench(wrench),
-        required=required, force=force, moment=moment,
-        accelerations=parse_accelerations(acceleration),
-        velocities=parse_velocities(velocity or []), clearance=clearance, obstacles=obstacles,
-        exit_free=exit_free, anchor_free=anchor_free, scenario=scenario, pulleys=pulleys,
-        method=method,
-    )  # fmt: skip
+    with named_options(OPTIONS | {f"scenario {scenario}": f"--scenario {scenario}"}):
+        question = workspace_question(
+            robot, kind.split(","),
+            parse_grid(grid, parse_turns(orientation or []), *default_box(robot, region)),
+            measures=() if measure is None else measure.split(","), orientations=orientations,
+            limits=parse_limits(limits), mass=mass, wrench=parse_wrench(wrench),
+            required=required, force=force, moment=moment,
+            accelerations=parse_accelerations(acceleration),
+            velocities=parse_velocities(velocity or []), clearance=clearance, obstacles=obstacles,
+            exit_free=exit_free, anchor_free=anchor_free, scenario=scenario, pulleys=pulleys,
+            method=method,
+        )  # fmt: skip
     console = message_console()
     search = None
     if certify:

@@ -8,8 +8,9 @@ from pathlib import Path
 import pytest
 from matplotlib.figure import Figure
 
+from cdpr_drake.analyses.front import simulation
 from cdpr_drake.analyses.reporting.deferred_figures import write_pictures
-from cdpr_drake.cli import plan, simulate
+from cdpr_drake.cli import plan
 
 
 @contextmanager
@@ -21,7 +22,7 @@ def only(*endings):
         return write_pictures(folder, kept, *more)
 
     with pytest.MonkeyPatch.context() as patch:
-        for module in (simulate, plan):
+        for module in (simulation, plan):
             patch.setattr(module, "write_pictures", write)
         yield
 

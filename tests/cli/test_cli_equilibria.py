@@ -66,15 +66,15 @@ def test_elastic_cables_say_what_may_be_missing(capsys, hung):
     [
         (["--lengths", "0.5,0.5"], "no pose has them: cables 1 and 2 together are"),
         (["--lengths", "3.8"], "--lengths: found '3.8'"),
-        (["--lengths", "3.8,-1"], "lengths: found -1"),
+        (["--lengths", "3.8,-1"], "--lengths: found -1"),
         (["--lengths", "3.8,nan"], "--lengths"),
         ([], "found neither"),
         (["--lengths", "3,3", "--position", "0,0,1"], "found both"),
-        (["--lengths", "3,3", "--taut", "C1"], "taut: found without position"),
-        (["--position", "0,0,1", "--taut", "C1,C9"], "'C9' is unknown"),
+        (["--lengths", "3,3", "--taut", "C1"], "--taut: found without --position"),
+        (["--position", "0,0,1", "--taut", "C1,C9"], "--taut: 'C9' is unknown"),
         (["--position", "0,0,1"], "accepted: 3 different ones"),
-        (["--lengths", "3,3", "--cable-model", "rubber"], "rubber"),
-        (["--lengths", "3,3", "--searches", "0"], "searches: found 0"),
+        (["--lengths", "3,3", "--cable-model", "rubber"], "--cable-model: 'rubber'"),
+        (["--lengths", "3,3", "--searches", "0"], "--searches: found 0"),
     ],
 )
 def test_what_is_refused(capsys, hung, words, said):

@@ -25,7 +25,7 @@ KILLED_AT = 1.2
 """Simulated time at which a program ends [s]."""
 
 
-NO_PICTURES = ("cdpr_drake.cli.simulate.write_pictures", lambda *_: {})
+NO_PICTURES = ("cdpr_drake.analyses.front.simulation.write_pictures", lambda *_: {})
 """They take most of the time, and are made of the log that is compared here."""
 
 

@@ -9,16 +9,17 @@ from typing import Any
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.statics.static_query import StaticReport, static_at_pose
-from cdpr_drake.analyses.statics.tension_query import applicable_methods, underactuated_answer
+from cdpr_drake.analyses.front.statics import solve_static
+from cdpr_drake.analyses.front.tensions import solve_tensions
+from cdpr_drake.analyses.statics.static_query import StaticReport
+from cdpr_drake.analyses.statics.tension_query import applicable_methods
 from cdpr_drake.analyses.workspaces.conditions import MEASURES, PoseConditions, Poses
 from cdpr_drake.analyses.workspaces.workspace_question import pose_conditions
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables.models import ELASTIC
 from cdpr_drake.errors import CdprError
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.models.robot_statics import tension_problem, wrench_balance
+from cdpr_drake.models.robot_statics import tension_problem
 from cdpr_drake.studio.workbench.pose_axes import pose_axes
 from cdpr_drake.tensions.methods import METHODS, distribute
 from cdpr_drake.workspaces.cable_interference import PART_NAMES, clearances
@@ -97,7 +98,7 @@ class RobotQuestions:
             found["why_no_tensions"] = str(problem)
         rest, why_no_rest = None, ""
         try:
-            rest = static_at_pose(robot, X_WP, ELASTIC, pulleys=True)
+            rest = solve_static(robot, X_WP)
         except CdprError as problem:
             why_no_rest = str(problem)
         try:
@@ -116,7 +117,7 @@ class RobotQuestions:
     ) -> dict[str, Any]:
         robot = self.robot
         if robot.is_underactuated():
-            answer = underactuated_answer(robot, wrench_balance(robot, X_WP))
+            answer = solve_tensions(robot, X_WP).as_dict()
             off = [
                 f"nothing balances {one['combination']}, {one['unbalanced']:.4g}"
                 for one in answer["uncontrolled"]
