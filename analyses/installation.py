@@ -17,7 +17,7 @@ from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 
 from cdpr_drake.errors import CdprError
-from cdpr_drake.kernel_cache.helper import compile_needed
+from cdpr_drake.kernel_cache.background import compile_needed
 from cdpr_drake.kernel_cache.kernel_list import group_names
 from cdpr_drake.models.rendered_camera import check_rendering
 

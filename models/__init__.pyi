@@ -11,8 +11,8 @@ from .robot_exchange import export_robot as export_robot
 from .robot_exchange import import_robot as import_robot
 from .robot_exports import EXPORTS as EXPORTS
 from .robot_exports import HELD as HELD
+from .robot_exports import export_omissions as export_omissions
 from .robot_exports import given_fields as given_fields
-from .robot_exports import not_written as not_written
 from .robot_holding import hold_robot as hold_robot
 from .robot_holding import rest_as_long as rest_as_long
 from .robot_in_plant import RobotInPlant as RobotInPlant

@@ -141,7 +141,7 @@ def export_robot(robot: Robot | str | Path, format: str) -> dict[str, str]:
 
     Raises:
         RobotFileError: There is no such format, or it cannot hold this robot. What it cannot hold
-            of one that it takes, `not_written` says.
+            of one that it takes, `export_omissions` says.
     """
     robot = as_robot(robot)
     check_format(format)

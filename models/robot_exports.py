@@ -150,7 +150,7 @@ def _default(field: Field[Any]) -> Any:
     return field.default_factory() if field.default_factory is not MISSING else field.default
 
 
-def not_written(robot: Robot, format: str) -> dict[str, str]:
+def export_omissions(robot: Robot, format: str) -> dict[str, str]:
     """What a robot file gives and a format does not hold.
 
     Args:
@@ -168,7 +168,7 @@ def not_written(robot: Robot, format: str) -> dict[str, str]:
     turn, words = gravity_turn(robot), world_turn(robot, format)
     if turn is not None and words:
         seen = turned_robot(robot, turn)
-        lost = not_written(seen, format)
+        lost = export_omissions(seen, format)
         held = {*given_fields(robot), *given_fields(seen)} & HELD[format] & _IN_W
         lost |= dict.fromkeys(held - set(lost), "turned with the world") | {
             "gravity_direction": words
@@ -194,7 +194,7 @@ def check_format(format: str) -> None:
         raise RobotFileError(f"format: found {format}; accepted: {', '.join(EXPORTS)}")
 
 
-def not_written_words(lost: dict[str, str]) -> list[str]:
+def omission_words(lost: dict[str, str]) -> list[str]:
     """What was not written, a line for all fields of which the same became."""
     keys: dict[str, list[str]] = {}
     for key, words in lost.items():

@@ -17,13 +17,17 @@ from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import check_pose, rigid_platform, wrench_balance
 from cdpr_drake.statics.controlled_wrenches import combination_words
 from cdpr_drake.statics.equilibrium import equilibrium_near
-from cdpr_drake.statics.static_tensions import LEAST_TENSION_WEIGHTS, Holding, hold
+from cdpr_drake.statics.static_tensions import (
+    LEAST_TENSION_WEIGHTS,
+    StaticTensions,
+    find_static_tensions,
+)
 
 TRIMMED = 0.01
 """By how much of its length a cable is trimmed against the others on its winch at the start."""
 
 
-def hold_robot(robot: Robot, X_WP: RigidTransform, cables: CableSet, model: str) -> Holding:
+def hold_robot(robot: Robot, X_WP: RigidTransform, cables: CableSet, model: str) -> StaticTensions:
     """Tensions and lengths that hold the platform against its weight.
 
     Args:
@@ -44,7 +48,7 @@ def hold_robot(robot: Robot, X_WP: RigidTransform, cables: CableSet, model: str)
     gravity = robot.gravity_vector()
     wrench = gravity_wrench(X_WP, robot.platform.mass, robot.center_of_mass(), gravity)
     bounds = robot.tension_limits()
-    holding = hold(cables, model, X_WP, wrench, bounds, robot.motion_type())
+    holding = find_static_tensions(cables, model, X_WP, wrench, bounds, robot.motion_type())
     if holding is None:
         own_weight = (
             f", with at least {LEAST_TENSION_WEIGHTS:g} times its own in each"
@@ -99,7 +103,7 @@ def rest_as_long(
     cables: CableSet,
     model: str,
     slack: Array | None = None,
-) -> tuple[RigidTransform, Holding]:
+) -> tuple[RigidTransform, StaticTensions]:
     """Where the platform comes to rest with cables as long as their paths at a pose.
 
     That is how robots start that have fewer cables than degrees of freedom: their weight, and not
@@ -124,17 +128,17 @@ def rest_as_long(
     check_pose(robot, rest.X_WP)
     check_breaking(cables, rest.tensions, l0)
     state = cable_state(cables, model, rest.X_WP, l0)
-    return rest.X_WP, Holding(rest.tensions, state.drum_tensions, l0)
+    return rest.X_WP, StaticTensions(rest.tensions, state.drum_tensions, l0)
 
 
 def rest_with_slack(
     robot: Robot,
     X_WP: RigidTransform,
-    holding: Holding,
+    holding: StaticTensions,
     slack: Array,
     cables: CableSet,
     model: str,
-) -> tuple[RigidTransform, Holding]:
+) -> tuple[RigidTransform, StaticTensions]:
     """Where the platform comes to rest when cables are paid out, and what holds it there.
 
     Args:

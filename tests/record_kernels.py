@@ -16,7 +16,6 @@ from pathlib import Path
 
 from cdpr_drake.cli.process import DEFAULT, GROUPS
 from cdpr_drake.kernel_cache import kernel_list
-from cdpr_drake.kernel_cache.signatures import signature_words
 
 UNOPTIMISED = {
     "CDPR_COMPILE_HELPERS": "0", "NUMBA_OPT": "0", "NUMBA_LOOP_VECTORIZE": "0",
@@ -58,6 +57,46 @@ def name_of(dispatcher):
     if not module.startswith("cdpr_drake.") or dispatcher._cache.cache_path is None:
         return None
     return f"{module.removeprefix('cdpr_drake.')}:{name}"
+
+
+SHORT = {
+    "float64": "f8", "int64": "i8", "uint64": "u8", "int8": "i1", "bool": "b1", "complex128": "c16",
+}  # fmt: skip
+
+
+def signature_words(types):
+    """Writes types of arguments for the list; None where it cannot hold one."""
+    written = [type_words(each) for each in types]
+    return None if None in written else "".join(f"{words}, " for words in written).rstrip()
+
+
+def type_words(given):
+    """One type as an expression of numba's names, or None."""
+    kind = type(given).__name__
+    if str(given) in SHORT:
+        return SHORT[str(given)]
+    if kind == "Array" and given.aligned:
+        dtype, more = type_words(given.dtype), [":"] * (given.ndim - 1)
+        if dtype is None or not given.mutable:
+            words = f"Array({dtype}, {given.ndim}, {given.layout!r}, readonly=True)"
+            return None if dtype is None else words
+        axes = {"C": [*more, "::1"], "F": ["::1", *more], "A": [":", *more]}[given.layout]
+        return f"{dtype}[{','.join(axes)}]"
+    if kind in ("UniTuple", "Tuple", "NamedTuple", "NamedUniTuple"):
+        inner = signature_words(tuple(given.types))
+        if inner is None:
+            return None
+        if kind == "UniTuple":
+            return f"UniTuple({type_words(given.dtype)}, {given.count})"
+        if kind == "Tuple":
+            return f"Tuple(({inner}))"
+        where = given.instance_class
+        return f"Named({where.__module__!r}, {where.__qualname__!r}, {inner})"
+    if kind.endswith("Literal") and isinstance(given.literal_value, int):
+        return f"literal({given.literal_value!r})"
+    if kind == "Omitted" and isinstance(given.value, float):
+        return f"Omitted({given.value!r})"
+    return None
 
 
 def kept_kernels(asked):
@@ -127,9 +166,7 @@ def table(steps):
     for key in listed:
         groups = [str(k) for k, name in enumerate(steps) if key in needed[name]]
         called = [str(k) for k in sorted(below(key, set()))]
-        lines.append(
-            "\t".join([str(number[key]), key[0], " ".join(called), " ".join(groups), key[1]])
-        )
+        lines.append("\t".join([key[0], " ".join(called), " ".join(groups), key[1]]))
     return lines
 
 

@@ -14,7 +14,8 @@ killed there again, until they have come to the end. After each signal:
 - every file under a final name is whole, and known to be the program's own;
 - what is there, and in the end all, has the bytes of the run that nobody ended.
 
-A signal that Python gets while it starts, before the first line of this package, is its own.
+A signal that Python gets while it starts, before the first line of the command, is its own: there
+the library may not touch handlers, since it is also imported by programs of others.
 """
 
 from __future__ import annotations
@@ -55,6 +56,9 @@ LEFT = 120.0
 
 TRIES = 12
 """So often a signal is sent anew that came too late."""
+
+BEFORE_COMMAND = {"__init__.py", "kernel_cache/__init__.py", "kernel_cache/folder.py"}
+"""Files of the package that are loaded before the command's own."""
 
 ANSWERED = re.compile(r"^(Stopping|The report is being written)", re.MULTILINE)
 """What a command answers to the first signal."""
@@ -425,7 +429,8 @@ class Campaign:
         elif code not in (0, *ENDED, -SIGNALS[name]) and not self.command.studio:
             yield f"exit code {code}: {said[-300:]!r}"
         if "Traceback" in said or "Exception ignored" in said:
-            if "/cdpr_drake/" in said.partition("Traceback")[2] or "Traceback" not in said:
+            reached = set(re.findall(r"/cdpr_drake/(\S+)\", line", said.partition("Traceback")[2]))
+            if reached - BEFORE_COMMAND or "Traceback" not in said:
                 yield f"traceback: {said[-700:]!r}"
             else:
                 self._tally[name].early += 1

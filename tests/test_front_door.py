@@ -27,16 +27,16 @@ from cdpr_drake.analyses.simulation.tension_control_run import (
     run_tension_scenario,
     summarize_tension_run,
 )
-from cdpr_drake.analyses.statics.equilibria_query import rests_at_lengths
-from cdpr_drake.analyses.statics.static_query import at_lengths, at_pose
+from cdpr_drake.analyses.statics.equilibria_query import equilibria_at_lengths
+from cdpr_drake.analyses.statics.static_query import static_at_lengths, static_at_pose
 from cdpr_drake.analyses.statics.tension_query import underactuated_answer
 from cdpr_drake.analyses.studies.catalogue import STUDIES, StudyEntry
 from cdpr_drake.analyses.workspaces.stability_question import make_question
 from cdpr_drake.analyses.workspaces.stability_results import stability_workspaces
 from cdpr_drake.analyses.workspaces.workspace_question import (
-    Asked,
+    WorkspaceRequest,
+    interference_bodies,
     make_workspace_question,
-    surroundings,
 )
 from cdpr_drake.analyses.workspaces.workspace_results import robot_workspace
 from cdpr_drake.geometry.cable_paths import cable_paths
@@ -224,12 +224,12 @@ def test_tensions_of_fewer_cables():
 def test_rest_at_a_pose_and_with_lengths(planar, aside):
     held = cdpr.solve_static(planar, aside)
     assert as_json(held) == json.loads(
-        json.dumps(at_pose(planar, aside.transform(), "elastic", True).as_dict())
+        json.dumps(static_at_pose(planar, aside.transform(), "elastic", True).as_dict())
     )
     assert "stable" in shows_itself(held)
     assert isinstance(held.plot(), Figure)
     hanging = cdpr.solve_static(planar, lengths=list(held.l0))
-    assert hanging.as_dict() == at_lengths(planar, held.l0, "elastic", True).as_dict()
+    assert hanging.as_dict() == static_at_lengths(planar, held.l0, "elastic", True).as_dict()
     one_line(lambda: cdpr.solve_static(planar, aside, held.l0), "both")
     one_line(lambda: cdpr.solve_static(planar, lengths=[1.0, 1.0]), "shape (2,)")
     one_line(lambda: cdpr.solve_static(planar, model="rubber"), "rubber")
@@ -240,7 +240,7 @@ def test_all_poses_of_rest():
     cables = robot.cable_set().without_pulleys()
     lengths = cable_paths(robot.home.transform(), cables).lengths
     found = cdpr.find_equilibria(robot, lengths)
-    assert found.as_dict() == rests_at_lengths(robot, lengths).as_dict()
+    assert found.as_dict() == equilibria_at_lengths(robot, lengths).as_dict()
     shows_itself(found)
     one_line(lambda: cdpr.find_equilibria(robot), "neither")
     one_line(lambda: cdpr.find_equilibria(robot, position=[0, 0, 0.3], taut=["C9"]), "C9")
@@ -265,8 +265,8 @@ def test_workspaces(planar):
     )
     question = make_workspace_question(
         "planar", ["wrench-feasible"], found.grid, ["capacity-margin"], "all",
-        Asked(
-            required=forces(2.0), pulleys=True, around=surroundings(planar, pulleys=True)
+        WorkspaceRequest(
+            required=forces(2.0), pulleys=True, around=interference_bodies(planar, pulleys=True)
         ),
     )  # fmt: skip
     expected = robot_workspace(question).workspace

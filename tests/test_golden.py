@@ -6,6 +6,7 @@ import sys
 import numpy as np
 import pytest
 
+from cdpr_drake.analyses.studies.catalogue import STUDIES
 from tests.golden import __main__ as golden
 from tests.golden import making
 from tests.golden.comparison import MADE_BY
@@ -139,6 +140,16 @@ def test_arrays_are_told_apart_by_one_bit_and_measured(tmp_path):
     assert found["summary.json"]["message"] == "in <path>, or"
     assert "wall_time_s" not in found["summary.json"]
     assert found["files"] == ["log.npz", "summary.json"]
+
+
+def test_every_study_has_a_golden_file():
+    """Also those with a point in their name."""
+    assert making.study_names() == list(STUDIES)
+
+
+def test_a_refused_scenario_is_a_failure(tmp_path):
+    with pytest.raises(RuntimeError, match=r"exit code 2: cdpr: .*no_such"):
+        making._written(tmp_path, "simulate", "no_such")
 
 
 def test_problems_are_the_same_by_number_and_of_every_kind():

@@ -21,7 +21,7 @@ from cdpr_drake.analyses.simulation.tension_control_run import make_control
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.loops.remote_tension_loop import RemoteTensionLoop
 from cdpr_drake.systems.remote.messages import encode
-from cdpr_drake.systems.remote.remote_driver import Driver, Pace
+from cdpr_drake.systems.remote.remote_driver import Driver, SyncMode
 from cdpr_drake.systems.remote.server_socket import ServerSocket
 from cdpr_drake.systems.remote.service import tension_service
 from cdpr_drake.systems.robots.settings import COMPILED
@@ -100,7 +100,7 @@ def bridge_rate(count: int) -> float:
     )
 
     driver = Driver(
-        socket, {}, remote.inputs, remote.outputs, pace=Pace.LOCK_STEP, timeout=LONGEST,
+        socket, {}, remote.inputs, remote.outputs, pace=SyncMode.LOCK_STEP, timeout=LONGEST,
         period=period, services={"distribute": service},
     )  # fmt: skip
     try:

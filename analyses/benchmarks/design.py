@@ -9,11 +9,11 @@ from cdpr_drake.analyses.design.candidates import make_candidates
 from cdpr_drake.analyses.design.settings import DesignSettings, GoalSettings
 from cdpr_drake.analyses.reporting.timing import TimingRow, interleaved, seconds_per_call
 from cdpr_drake.analyses.workspaces.conditions import ConditionsTask
-from cdpr_drake.analyses.workspaces.workspace_question import Asked, pose_conditions
+from cdpr_drake.analyses.workspaces.workspace_question import WorkspaceRequest, pose_conditions
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.statics.equilibrium_enumeration import all_rests
-from cdpr_drake.statics.equilibrium_search import sampled_rests
+from cdpr_drake.statics.equilibrium_enumeration import enumerate_equilibria
+from cdpr_drake.statics.equilibrium_search import sample_equilibria
 from cdpr_drake.statics.inextensible_problem import HangingPlatform
 from cdpr_drake.workspaces.demanded_wrenches import SpatialSet
 from cdpr_drake.workspaces.pose_grid import grid_by_count
@@ -42,11 +42,11 @@ def rests_row(searches: int, repeats: int) -> TimingRow:
     )
 
     def search() -> object:
-        return sampled_rests(platform, LENGTHS, elastic=False, most=searches)
+        return sample_equilibria(platform, LENGTHS, elastic=False, most=searches)
 
     paths, starts = interleaved(
         [
-            lambda: 1e6 * seconds_per_call(lambda: all_rests(platform, LENGTHS), 1),
+            lambda: 1e6 * seconds_per_call(lambda: enumerate_equilibria(platform, LENGTHS), 1),
             lambda: 1e6 * seconds_per_call(search, 1),
         ],
         repeats,
@@ -66,7 +66,7 @@ def judged_row(points: int, repeats: int) -> TimingRow:
     robot = load_robot(ROBOT)
     lower, upper = np.array([-0.4, -0.4, 0.05]), np.array([0.4, 0.4, 0.9])
     grid = grid_by_count(lower, upper, (points,) * 3)
-    asked = Asked(required=SpatialSet(box=np.array([0.0, 0.0, 0.0, 5.0, 5.0, 5.0])))
+    asked = WorkspaceRequest(required=SpatialSet(box=np.array([0.0, 0.0, 0.0, 5.0, 5.0, 5.0])))
     middle = np.full(candidates.size, 0.5)
     about = pose_conditions(robot, asked)
 

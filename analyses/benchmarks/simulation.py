@@ -29,7 +29,7 @@ from cdpr_drake.models.robot_in_plant import RobotInPlant, add_robot
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.cameras.camera_settings import REGION
 from cdpr_drake.systems.diagrams.load import load_scenario
-from cdpr_drake.systems.loops.loop_choice import looped
+from cdpr_drake.systems.loops.loop_choice import choose_compiled_loop
 from cdpr_drake.systems.robots.cable_forces import CableForces
 from cdpr_drake.systems.robots.cable_robot import SEMI_IMPLICIT, automatic_step, holding_tensions
 from cdpr_drake.systems.robots.compiled_cable_robot import CompiledCableRobot
@@ -198,7 +198,7 @@ def compiled_simulator(method: str, step: float) -> Simulator:
     block = CompiledCableRobot(robot, rule=StepRule(method=method, max_step=step))
     simulator = Simulator(block)
     context = simulator.get_mutable_context()
-    block.hang(context, robot.home.transform())
+    block.set_at_equilibrium(context, robot.home.transform())
     block.GetInputPort("cable_velocities").FixValue(context, np.zeros(len(robot.cables)))
     simulator.Initialize()
     return simulator
@@ -330,7 +330,7 @@ def laps_row(duration: float, repeats: int) -> TimingRow:
     plant = [PROJECTED, "integration.engine=plant", f"duration={duration}", f"stop.hold={duration}"]
     scenarios = [
         load_scenario(SCENARIO, plant),
-        looped(load_scenario(LAPS, [f"duration={duration}", "log_rate=5"])),
+        choose_compiled_loop(load_scenario(LAPS, [f"duration={duration}", "log_rate=5"])),
     ]
     for scenario in scenarios:  # loads kernels
         run_scenario(replace(scenario, duration=WARM))

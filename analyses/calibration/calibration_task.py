@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from cdpr_drake.analyses.calibration.calibration_request import CalibrationTask, prepare
-from cdpr_drake.analyses.calibration.fit_programs import begun_from
+from cdpr_drake.analyses.calibration.fit_programs import start_points
 from cdpr_drake.analyses.calibration.fit_starts import Tie, best_of_starts
 from cdpr_drake.analyses.calibration.fit_verdict import (
     MISFIT,
@@ -64,7 +64,7 @@ def calibrate(
     say("Looking for where the poses were")
     prepared = prepare(task, log)
     if log.poses is not None and prepared.tracked is None:
-        prepared = with_tracker(prepared, begun_from(prepared, [prepared.first])[0].poses)
+        prepared = with_tracker(prepared, start_points(prepared, [prepared.first])[0].poses)
     check_clock(prepared)
     found = best_of_starts(prepared, say)
     result = found.result

@@ -21,7 +21,7 @@ from cdpr_drake.tensions.methods import distribute
 
 
 @dataclass(frozen=True, eq=False)
-class Begun:
+class StartPoint:
     """Where a search begins.
 
     Attributes:
@@ -33,7 +33,7 @@ class Begun:
     poses: list[RigidTransform]
 
 
-def begun_from(prepared: Prepared, firsts: Sequence[RigidTransform]) -> list[Begun]:
+def start_points(prepared: Prepared, firsts: Sequence[RigidTransform]) -> list[StartPoint]:
     """Guesses of what readings count from, and of the poses that follow, for each first pose.
 
     Where all poses are tracked, those; else one after the other from the first.
@@ -48,7 +48,7 @@ def begun_from(prepared: Prepared, firsts: Sequence[RigidTransform]) -> list[Beg
     models = [model for model, _ in counting]
     if tracked is not None and all(X is not None for X in tracked):
         known = [X for X in tracked if X is not None]
-        return [Begun(model, known) for model in models]
+        return [StartPoint(model, known) for model in models]
     count, planar, m = log.count, robot.is_planar(), prepared.model.cables.count
     # Balance is hard to follow from afar; it is asked where lengths and the like are too few.
     told = m * ((prepared.lengths is not None) + (log.swivels is not None))
@@ -63,7 +63,9 @@ def begun_from(prepared: Prepared, firsts: Sequence[RigidTransform]) -> list[Beg
         models, trial.terms, seeds, count=count, tensions=tensions, planar=planar,
         sure=not counting[0][1],
     )  # fmt: skip
-    return [Begun(model, stations.poses()) for model, stations in zip(models, found, strict=True)]
+    return [
+        StartPoint(model, stations.poses()) for model, stations in zip(models, found, strict=True)
+    ]
 
 
 def _counting(prepared: Prepared, seed: RigidTransform) -> tuple[CalibrationModel, bool]:
@@ -139,7 +141,7 @@ def _held(prepared: Prepared, X_WP: RigidTransform) -> Array | None:
     return np.asarray(found, float) if np.isfinite(found).all() else None
 
 
-def program_from(prepared: Prepared, begun: Begun) -> CalibrationProgram:
+def program_from(prepared: Prepared, begun: StartPoint) -> CalibrationProgram:
     """The program, with poses and tags guessed from where a search begins."""
     task, log, poses = prepared.task, prepared.log, prepared.tracked
     sigmas, planar = task.sigmas, task.robot.is_planar()

@@ -17,7 +17,7 @@ import numpy.typing as npt
 from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.calibration.calibration_request import Prepared
-from cdpr_drake.analyses.calibration.fit_programs import begun_from, program_from
+from cdpr_drake.analyses.calibration.fit_programs import program_from, start_points
 from cdpr_drake.arrays import Array
 from cdpr_drake.calibration.pose_search import (
     HUBER,
@@ -79,7 +79,7 @@ class Tie(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class MultiStartFit:
     """The best of all starts.
 
     Attributes:
@@ -101,14 +101,14 @@ class _Minimum(NamedTuple):
     cost: float
 
 
-def best_of_starts(prepared: Prepared, say: Callable[[str], None]) -> Found:
+def best_of_starts(prepared: Prepared, say: Callable[[str], None]) -> MultiStartFit:
     """The best minimum of all starts.
 
     Raises:
         CalibrationError: No start leads anywhere; says why the last one does not.
     """
     firsts = [prepared.first, *_other_starts(prepared)]
-    programs = [program_from(prepared, one) for one in begun_from(prepared, firsts)]
+    programs = [program_from(prepared, one) for one in start_points(prepared, firsts)]
     known: list[_Minimum] = []
     pool: list[Stations] = []
     problem: CalibrationError | None = None
@@ -139,7 +139,7 @@ def best_of_starts(prepared: Prepared, say: Callable[[str], None]) -> Found:
             for k, Y in enumerate(one.result.stations.poses()):
                 _add_tie(ties, best.result, (k, Y), one.cost - best.cost)
     ties.sort(key=lambda tie: (tie.pose, tie.more))
-    return Found(best.result, tuple(ties), len(programs), len(known))
+    return MultiStartFit(best.result, tuple(ties), len(programs), len(known))
 
 
 def _solved(

@@ -21,7 +21,7 @@ from cdpr_drake.identification.result import MISFIT, MISFIT_FACTOR, Identificati
 from cdpr_drake.identification.samples import (
     LEAST_POSE,
     LEAST_TENSION,
-    MotionSamples,
+    LoggedMotion,
     pose_shift,
     sample_motion,
     sample_winches,
@@ -93,7 +93,7 @@ class Validation:
     """
 
     log: CalibrationLog
-    samples: MotionSamples
+    samples: LoggedMotion
     predicted: Array
     misfit: dict[str, dict[str, float]]
 
@@ -214,7 +214,7 @@ def _pose_rows(log: CalibrationLog) -> Array:
     return np.array([nothing if X is None else pose_row(X) for X in log.poses])
 
 
-def _samples(task: IdentificationTask, log: CalibrationLog, bandwidth: float) -> MotionSamples:
+def _samples(task: IdentificationTask, log: CalibrationLog, bandwidth: float) -> LoggedMotion:
     """A log's motion, smoothed."""
     time, rows = _time(log), _pose_rows(log)
     if log.tensions is None:
@@ -249,7 +249,7 @@ def _measure(
     program: IdentificationProgram,
     task: IdentificationTask,
     log: CalibrationLog,
-    samples: MotionSamples,
+    samples: LoggedMotion,
     bandwidth: float,
 ) -> None:
     """Adds what the unknowns need of a log."""
@@ -285,7 +285,7 @@ def _compared(
     program: IdentificationProgram,
     task: IdentificationTask,
     log: CalibrationLog,
-    samples: MotionSamples,
+    samples: LoggedMotion,
     found: IdentificationResult,
     bandwidth: float,
 ) -> Validation:
@@ -321,7 +321,7 @@ def _check_strain(found: IdentificationResult) -> None:
         )
 
 
-def _check_clock(task: IdentificationTask, log: CalibrationLog, samples: MotionSamples) -> None:
+def _check_clock(task: IdentificationTask, log: CalibrationLog, samples: LoggedMotion) -> None:
     """Refuses poses that are out of sync with lengths or tensions.
 
     Raises:

@@ -37,7 +37,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CalibrationError
 from cdpr_drake.geometry.poses import rotation_from_angles, rotation_from_vector
 
-Found = dict[str, dict[int | tuple[int, int, int], Array]]
+ParsedColumns = dict[str, dict[int | tuple[int, int, int], Array]]
 """Columns in SI units, by what they hold and by cable, part or corner."""
 
 MOST_BYTES = 200_000_000
@@ -108,7 +108,7 @@ def read_log(path: Path, cables: Sequence[str]) -> CalibrationLog:
         )
     table = parse_numbers(path, headers, rows, lines, columns)
     _keep_preferred(path, headers, columns)
-    found: Found = {}
+    found: ParsedColumns = {}
     for j, column in enumerate(columns):
         if column is not None:
             found.setdefault(column.what, {})[column.key] = table[:, j] * column.factor
@@ -231,7 +231,7 @@ def _headless(
 
 
 def _assembled(
-    path: Path, found: Found, count: int, m: int, remarks: tuple[str, ...]
+    path: Path, found: ParsedColumns, count: int, m: int, remarks: tuple[str, ...]
 ) -> CalibrationLog:
     tables: dict[str, Array | None] = {}
     for what in (LENGTHS, ANGLES, SWIVELS, TENSIONS, TORQUES):
@@ -270,7 +270,7 @@ def _assembled(
     )  # fmt: skip
 
 
-def parse_poses(path: Path, found: Found, count: int) -> list[RigidTransform | None] | None:
+def parse_poses(path: Path, found: ParsedColumns, count: int) -> list[RigidTransform | None] | None:
     """Poses from columns, None in rows without; None where there are no such columns."""
     if POSITION not in found:
         return None
@@ -292,7 +292,7 @@ def parse_poses(path: Path, found: Found, count: int) -> list[RigidTransform | N
     return poses
 
 
-def parse_tilts(path: Path, found: Found, count: int) -> Array | None:
+def parse_tilts(path: Path, found: ParsedColumns, count: int) -> Array | None:
     """Roll, pitch and yaw from columns without a position, shape (k, 3) [rad]; None: no such.
 
     A whole rotation of another kind gives all three; roll or pitch may stand alone.
@@ -337,7 +337,7 @@ def _rotation(path: Path, kind: str, values: Array, row: int) -> RotationMatrix:
     return RotationMatrix.ProjectToRotationMatrix(R)
 
 
-def _whole(path: Path, found: Found, what: str, size: int, count: int) -> Array:
+def _whole(path: Path, found: ParsedColumns, what: str, size: int, count: int) -> Array:
     mine = found[what]
     if len(mine) != size:
         raise CalibrationError(f"{path}: {what}: found {len(mine)} columns; accepted: all {size}")

@@ -9,7 +9,12 @@ import numpy as np
 
 from cdpr_drake.analyses.calibration.calibration_request import TagPlace
 from cdpr_drake.analyses.calibration.columns import UNITS, Column, read_header, split_unit
-from cdpr_drake.analyses.calibration.log_file import Found, parse_numbers, parse_poses, split_cells
+from cdpr_drake.analyses.calibration.log_file import (
+    ParsedColumns,
+    parse_numbers,
+    parse_poses,
+    split_cells,
+)
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CalibrationError
 
@@ -50,7 +55,7 @@ def read_tags(path: Path) -> dict[int, TagPlace]:
                 "accepted: sigma_m and sigma_deg, or other units of length and angle"
             )
     table = parse_numbers(path, names, rows[1:], lines[1:], columns)
-    found: Found = {}
+    found: ParsedColumns = {}
     for j, column in enumerate(columns):
         if column is not None:
             found.setdefault(column.what, {})[column.key] = table[:, j] * column.factor
@@ -72,7 +77,7 @@ def read_tags(path: Path) -> dict[int, TagPlace]:
     return tags
 
 
-def _sigmas(path: Path, found: Found, lines: list[int], placed: list[bool]) -> Array:
+def _sigmas(path: Path, found: ParsedColumns, lines: list[int], placed: list[bool]) -> Array:
     """Deviations of places and turns, shape (k, 2) [m, rad]; zero where none is given."""
     sigmas = np.full((len(placed), 2), np.nan)
     for j, key in enumerate(SIGMAS.values()):

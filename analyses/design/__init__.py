@@ -11,7 +11,7 @@ motor changed.
   shares of poses are steps of the coordinates.
 * `SlopeSearch` seeks the largest least of smooth functions by their slopes, which takes far fewer
   designs where a goal is such a least.
-* `undominated` says which designs no other one is better than, where several values are wanted.
+* `pareto_front` says which designs no other one is better than, where several values are wanted.
 * `confirm` says what was gained, and knows nothing of the search: by boxes proven inside the
   workspace, or poses proven stable on another grid.
 

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from cdpr_drake.analyses.design.goals import GOALS, Judging, servo_stable
+from cdpr_drake.analyses.design.goals import GOALS, GoalContext, servo_stable
 from cdpr_drake.analyses.workspaces.box_certificates import box_search, certified_boxes
 from cdpr_drake.analyses.workspaces.workspace_question import (
-    Asked,
+    WorkspaceRequest,
+    interference_bodies,
     make_workspace_question,
-    surroundings,
 )
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.workspaces.pose_grid import WorkspaceGrid, grid_by_count
@@ -77,7 +77,7 @@ def confirm(
     goal: str,
     original: str,
     design: str,
-    judging: Judging,
+    judging: GoalContext,
     *,
     boxes: int = BOXES,
     say: Callable[[str], object] | None = None,
@@ -111,9 +111,9 @@ def confirm(
         robot = load_robot(name)
         if say is not None:
             say(f"proving {kind} of {robot.name}")
-        asked = Asked(
+        asked = WorkspaceRequest(
             required=judging.required if kind == "wrench-feasible" else None,
-            around=surroundings(robot),
+            around=interference_bodies(robot),
         )
         question = make_workspace_question(name, [kind], judging.grid, asked=asked)
         found = certified_boxes(box_search(question, robot), boxes, should_stop=should_stop)
@@ -127,7 +127,7 @@ def confirm(
     return Confirmation(goal, words, unit, volumes[0], volumes[1], opens[0], opens[1], finished)
 
 
-def _confirm_stability(original: str, design: str, judging: Judging) -> Confirmation:
+def _confirm_stability(original: str, design: str, judging: GoalContext) -> Confirmation:
     grid = between(judging.grid)
     shares = []
     for name in (original, design):

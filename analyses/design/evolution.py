@@ -1,6 +1,6 @@
 """Evolutionary search for a design in the box [0, 1]^d, and which designs no other one dominates.
 
-`EvolutionSearch` is CMA-ES by the package cmaes, a generation at a time; `undominated` finds the
+`EvolutionSearch` is CMA-ES by the package cmaes, a generation at a time; `pareto_front` finds the
 Pareto front of designs that have several values.
 
 Source: Hansen and Ostermeier, Completely derandomized self-adaptation in evolution strategies,
@@ -67,7 +67,7 @@ class EvolutionSearch:
         self._search.tell(list(zip(self._asked, losses.tolist(), strict=True)))
 
 
-def undominated(values: Array) -> np.ndarray:
+def pareto_front(values: Array) -> np.ndarray:
     """Which rows no other row equals or exceeds in everything and exceeds in something.
 
     Args:

@@ -10,7 +10,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.analyses.workspaces.conditions import KINDS, MEASURES, ConditionsTask
 from cdpr_drake.analyses.workspaces.stability_question import stability_case
-from cdpr_drake.analyses.workspaces.workspace_question import Asked, pose_conditions
+from cdpr_drake.analyses.workspaces.workspace_question import WorkspaceRequest, pose_conditions
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.models import ELASTIC
 from cdpr_drake.errors import CdprError
@@ -35,7 +35,7 @@ SERVO_VERDICT = "certified"
 
 
 @dataclass(frozen=True, eq=False)
-class Judging:
+class GoalContext:
     """What designs are judged by.
 
     Attributes:
@@ -49,7 +49,7 @@ class Judging:
     bounds: PerturbationBounds
 
 
-Value = Callable[[Robot, Judging], float]
+Value = Callable[[Robot, GoalContext], float]
 
 
 @dataclass(frozen=True)
@@ -71,9 +71,9 @@ class Goal:
     proven_as: str = ""
 
 
-def _arrays(robot: Robot, judging: Judging, name: str) -> Array:
+def _arrays(robot: Robot, judging: GoalContext, name: str) -> Array:
     """A kind (as 0 and 1) or measure at all poses of the grid."""
-    about = pose_conditions(robot, Asked(required=judging.required))
+    about = pose_conditions(robot, WorkspaceRequest(required=judging.required))
     kinds, measures = ((name,), ()) if name in KINDS else ((), (name,))
     task = ConditionsTask(about, judging.grid, kinds, measures)
     return np.asarray(task(0, judging.grid.size)[name], float)
@@ -86,7 +86,7 @@ def _share(name: str) -> Value:
 def _least(name: str) -> Value:
     """Least over the poses; a pose at which the measure makes no sense has none: 0 or less."""
 
-    def value(robot: Robot, judging: Judging) -> float:
+    def value(robot: Robot, judging: GoalContext) -> float:
         found = _arrays(robot, judging, name)
         return float(np.min(np.where(np.isfinite(found), found, 0.0)))
 
@@ -94,14 +94,14 @@ def _least(name: str) -> Value:
 
 
 def _mean(name: str) -> Value:
-    def value(robot: Robot, judging: Judging) -> float:
+    def value(robot: Robot, judging: GoalContext) -> float:
         found = _arrays(robot, judging, name)
         return float(np.mean(np.where(np.isfinite(found), found, 0.0)))
 
     return value
 
 
-def servo_stable(robot: Robot, judging: Judging, verdict: str) -> np.ndarray:
+def servo_stable(robot: Robot, judging: GoalContext, verdict: str) -> np.ndarray:
     """At which poses the platform can be held and position-based servoing is stable, shape (n,).
 
     Args:
@@ -121,11 +121,11 @@ def servo_stable(robot: Robot, judging: Judging, verdict: str) -> np.ndarray:
     return np.asarray(stable & held, bool)
 
 
-def _control_stability(robot: Robot, judging: Judging) -> float:
+def _control_stability(robot: Robot, judging: GoalContext) -> float:
     return float(np.mean(servo_stable(robot, judging, SERVO_VERDICT)))
 
 
-def _accuracy(robot: Robot, judging: Judging) -> float:
+def _accuracy(robot: Robot, judging: GoalContext) -> float:
     """Root mean square, over poses that can be held, of how far Po is off; infinite without one."""
     grid, platform = judging.grid, rigid_platform(robot)
     cables = robot.cable_set().without_pulleys()
@@ -143,7 +143,7 @@ def _accuracy(robot: Robot, judging: Judging) -> float:
     return float(np.sqrt(np.mean(squares))) if squares else np.inf
 
 
-def _power(robot: Robot, judging: Judging) -> float:
+def _power(robot: Robot, judging: GoalContext) -> float:
     winch = robot.winch
     torque = np.nan if winch.motor_torque is None else winch.motor_torque
     return float(len(robot.cables) * torque * winch.rated_motor_speed())
@@ -179,7 +179,7 @@ GOALS: dict[str, Goal] = {
 """Goals by name."""
 
 
-def judged(robot: Robot, judging: Judging, names: tuple[str, ...]) -> Array:
+def evaluate_goals(robot: Robot, judging: GoalContext, names: tuple[str, ...]) -> Array:
     """Values of goals, larger is better: those of which less is better with the sign changed."""
     values = [GOALS[name].value(robot, judging) for name in names]
     signs = [-1.0 if GOALS[name].smaller else 1.0 for name in names]

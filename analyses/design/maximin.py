@@ -14,8 +14,8 @@ import numpy as np
 from scipy.optimize import linprog
 
 from cdpr_drake.analyses.design.candidates import Candidates
-from cdpr_drake.analyses.design.goals import Judging
-from cdpr_drake.analyses.workspaces.workspace_question import Asked, pose_conditions
+from cdpr_drake.analyses.design.goals import GoalContext
+from cdpr_drake.analyses.workspaces.workspace_question import WorkspaceRequest, pose_conditions
 from cdpr_drake.arrays import Array
 from cdpr_drake.workspaces.demanded_wrenches import SpatialSet, resisting
 from cdpr_drake.workspaces.wrench_capacity import margin_slopes
@@ -104,15 +104,15 @@ class SlopeSearch:
         self._asked = np.clip(self.best + found.x[:-1], 0.0, 1.0)
 
 
-Slopes = Callable[[Candidates, int, Array, Judging], tuple[Array, Array]]
+Slopes = Callable[[Candidates, int, Array, GoalContext], tuple[Array, Array]]
 """Values at all poses of the grid, shape (n,), and their slopes by the coordinates, (n, size)."""
 
 
 def _capacity_margin(
-    candidates: Candidates, number: int, coordinates: Array, judging: Judging
+    candidates: Candidates, number: int, coordinates: Array, judging: GoalContext
 ) -> tuple[Array, Array]:
     robot, grid = candidates.robot(number, coordinates), judging.grid
-    about = pose_conditions(robot, Asked(required=judging.required))
+    about = pose_conditions(robot, WorkspaceRequest(required=judging.required))
     positions, rotations = grid.positions(0, grid.size), grid.rotations(0, grid.size)
     demand = resisting(about.case, about.required or SpatialSet(), rotations)
     slopes = margin_slopes(about.case, positions, rotations, demand)

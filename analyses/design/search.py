@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 
 from cdpr_drake.analyses.design.candidates import Candidates
-from cdpr_drake.analyses.design.evolution import EvolutionSearch, default_population, undominated
-from cdpr_drake.analyses.design.goals import Judging, judged
+from cdpr_drake.analyses.design.evolution import EvolutionSearch, default_population, pareto_front
+from cdpr_drake.analyses.design.goals import GoalContext, evaluate_goals
 from cdpr_drake.analyses.design.maximin import SLOPES, Slopes, SlopeSearch
 from cdpr_drake.analyses.design.settings import BY_SLOPES, DesignSettings, PosesSettings
-from cdpr_drake.analyses.reporting.progress import ALONE, StudySession, WorkProgress
+from cdpr_drake.analyses.reporting.progress import DEFAULT_STUDY_SESSION, StudySession, WorkProgress
 from cdpr_drake.analyses.reporting.provenance import code_version
 from cdpr_drake.analyses.sweeps.folder import SweepFolder
 from cdpr_drake.analyses.sweeps.sweep import STARTING, run_sweep
-from cdpr_drake.analyses.sweeps.worker_pool import StandingPool
+from cdpr_drake.analyses.sweeps.worker_pool import PersistentPool
 from cdpr_drake.analyses.workspaces.pose_grid import plain
 from cdpr_drake.analyses.workspaces.stability_defaults import workspace_defaults
 from cdpr_drake.arrays import Array
@@ -37,14 +37,16 @@ class DesignTask:
     number: int
     coordinates: Array
     names: tuple[str, ...]
-    judging: Judging
+    judging: GoalContext
 
     def __call__(self, start: int, stop: int) -> dict[str, np.ndarray]:
         """Array `values` of the designs start to stop, shape (n, goals), larger is better."""
         values = np.full((stop - start, len(self.names)), np.nan)
         for row, x in zip(values, self.coordinates[start:stop], strict=True):
             try:
-                row[:] = judged(self.candidates.robot(self.number, x), self.judging, self.names)
+                row[:] = evaluate_goals(
+                    self.candidates.robot(self.number, x), self.judging, self.names
+                )
             except CdprError:
                 continue  # no robot at all, or one that cannot be asked
         return {"values": values}
@@ -68,7 +70,7 @@ class DesignSearch:
 
     candidates: Candidates
     settings: DesignSettings
-    judging: Judging
+    judging: GoalContext
     original: Array
     sets: np.ndarray
     coordinates: Array
@@ -89,7 +91,7 @@ class DesignSearch:
     @property
     def front(self) -> np.ndarray:
         """Numbers of the designs that no other one is better than in everything."""
-        return np.flatnonzero(undominated(self.values))
+        return np.flatnonzero(pareto_front(self.values))
 
     @property
     def interrupted(self) -> bool:
@@ -97,7 +99,7 @@ class DesignSearch:
         return self.progress.done < self.progress.total
 
 
-def judging_of(robot: Robot | str, poses: PosesSettings, settings: DesignSettings) -> Judging:
+def goal_context(robot: Robot | str, poses: PosesSettings, settings: DesignSettings) -> GoalContext:
     """What designs of a robot are judged by.
 
     Raises:
@@ -126,7 +128,7 @@ def judging_of(robot: Robot | str, poses: PosesSettings, settings: DesignSetting
     grid = grid_by_count(lower, upper, counts, [tuple(a) for a in angles])
     half = np.array([settings.moment] * 3 + [settings.force] * 3)
     required = SpatialSet(box=half) if np.any(half > 0.0) else None
-    return Judging(grid, required, defaults.bounds)
+    return GoalContext(grid, required, defaults.bounds)
 
 
 def scores_of(values: Array, original: Array, settings: DesignSettings) -> Array:
@@ -139,7 +141,7 @@ def scores_of(values: Array, original: Array, settings: DesignSettings) -> Array
     return np.asarray(values, float) / size @ weights
 
 
-def judge_original(candidates: Candidates, judging: Judging, names: Sequence[str]) -> Array:
+def evaluate_original(candidates: Candidates, judging: GoalContext, names: Sequence[str]) -> Array:
     """Goals of the robot as it is, with all its cables, larger is better.
 
     Raises:
@@ -149,14 +151,14 @@ def judge_original(candidates: Candidates, judging: Judging, names: Sequence[str
         raise DesignError(
             "goal wrench-feasible: found no wrench to resist; accepted: a force or a moment above 0"
         )
-    return judged(parse_robot(candidates.text, Path("robot")), judging, tuple(names))
+    return evaluate_goals(parse_robot(candidates.text, Path("robot")), judging, tuple(names))
 
 
 def search_design(
     robot: Robot | str,
     candidates: Candidates,
     settings: DesignSettings,
-    session: StudySession = ALONE,
+    session: StudySession = DEFAULT_STUDY_SESSION,
 ) -> DesignSearch:
     """Searches the best design of each set of cables by CMA-ES.
 
@@ -174,9 +176,9 @@ def search_design(
         CdprError: The robot cannot be asked for a goal.
     """
     slopes = _slopes_of(settings)
-    judging = judging_of(robot, settings.poses, settings)
+    judging = goal_context(robot, settings.poses, settings)
     names = tuple(goal.name for goal in settings.goals)
-    original = judge_original(candidates, judging, names)
+    original = evaluate_original(candidates, judging, names)
     population = settings.population or default_population(candidates.size)
     rounds = settings.generations if candidates.size else 1
     each = population if candidates.size and slopes is None else 1
@@ -185,7 +187,7 @@ def search_design(
     if session.folder is not None:
         folder = SweepFolder(session.folder, search_arguments(candidates, settings, judging))
     # Each generation is a sweep of its own, for which no process shall be started anew.
-    with StandingPool(session.workers or 1) as pool:
+    with PersistentPool(session.workers or 1) as pool:
         record = _Record(session, lambda values: scores_of(values, original, settings), total, pool)
         for number in range(len(candidates.kept)):
             task = DesignTask(candidates, number, np.zeros((0, 0)), names, judging)
@@ -276,7 +278,7 @@ class _Record:
         session: StudySession,
         score: Callable[[Array], Array],
         total: int,
-        pool: StandingPool,
+        pool: PersistentPool,
     ) -> None:
         self.sets: list[int] = []
         self.designs: list[Array] = []
@@ -322,7 +324,7 @@ class _Record:
 
 
 def search_arguments(
-    candidates: Candidates, settings: DesignSettings, judging: Judging
+    candidates: Candidates, settings: DesignSettings, judging: GoalContext
 ) -> dict[str, Any]:
     """All that the numbers depend on, for JSON."""
     found: dict[str, Any] = plain(

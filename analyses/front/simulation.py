@@ -18,7 +18,7 @@ from cdpr_drake.analyses.simulation.monte_carlo_report import (
     repetition_summary,
     write_repetitions,
 )
-from cdpr_drake.analyses.simulation.monte_carlo_store import KeptRuns
+from cdpr_drake.analyses.simulation.monte_carlo_store import StoredRuns
 from cdpr_drake.analyses.simulation.scenario_kinds import SCENARIO_KINDS, ScenarioKind
 from cdpr_drake.analyses.simulation.session import RunSession, check_connected
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
@@ -26,7 +26,7 @@ from cdpr_drake.errors import ScenarioError
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.summaries import Summarized
 from cdpr_drake.systems.diagrams.load import load_scenario
-from cdpr_drake.systems.loops.loop_choice import with_loop
+from cdpr_drake.systems.loops.loop_choice import set_loop
 from cdpr_drake.systems.scenarios.run_settings import ScenarioHeader
 
 if TYPE_CHECKING:
@@ -165,7 +165,7 @@ def simulate(
         raise ScenarioError(f"seeds: found with a {loaded.kind}; accepted: visual servos")
     if seeds is not None and (not seeds or len(set(seeds)) < len(seeds)):
         raise ScenarioError(f"seeds: found {list(seeds)}; accepted: different numbers, at least 1")
-    loaded, _ = with_loop(loaded, seeds is not None)
+    loaded, _ = set_loop(loaded, seeds is not None)
     check_connected(loaded, None)
     kind.check(loaded)
     where = None if folder is None else Path(folder)
@@ -177,7 +177,7 @@ def simulate(
         with continued_folder(where, overwrite) as results:
             runs = run_many(
                 scenarios, workers, on_progress, should_stop, keep_traces=True,
-                kept=KeptRuns(results.path, loaded),
+                kept=StoredRuns(results.path, loaded),
             )  # fmt: skip
             told = write_repetitions(results.path, loaded, runs, load_robot(loaded.robot))
             where = results.publish()

@@ -11,11 +11,11 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.statics.equilibria_query import (
     EquilibriaReport,
-    rests_at_lengths,
-    rests_at_position,
-    rests_elastic,
+    elastic_equilibria,
+    equilibria_at_lengths,
+    equilibria_with_position,
 )
-from cdpr_drake.analyses.statics.static_query import StaticReport, at_lengths, at_pose
+from cdpr_drake.analyses.statics.static_query import StaticReport, static_at_lengths, static_at_pose
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.models import CABLE_MODELS
 from cdpr_drake.errors import EquilibriumError
@@ -71,9 +71,9 @@ def solve_static(
     _check_model(model, CABLE_MODELS)
     loaded = as_robot(robot)
     if lengths is None:
-        found = at_pose(loaded, as_pose(loaded, pose), model, pulleys)
+        found = static_at_pose(loaded, as_pose(loaded, pose), model, pulleys)
     else:
-        found = at_lengths(loaded, _checked_lengths(loaded, lengths), model, pulleys)
+        found = static_at_lengths(loaded, _checked_lengths(loaded, lengths), model, pulleys)
     return as_kind(RobotAtRest, found)
 
 
@@ -122,12 +122,14 @@ def find_equilibria(
         place = np.asarray(position, float)
         if place.shape != (3,) or not np.all(np.isfinite(place)):
             raise EquilibriumError(f"position: found {position}; accepted: x, y, z [m]")
-        return rests_at_position(loaded, place, _taut(loaded, taut))
+        return equilibria_with_position(loaded, place, _taut(loaded, taut))
     assert lengths is not None
     given = _checked_lengths(loaded, lengths)
     if model == "elastic":
-        return rests_elastic(loaded, given, pulleys, searches=searches, seed=seed, report=report)
-    return rests_at_lengths(loaded, given, report=report)
+        return elastic_equilibria(
+            loaded, given, pulleys, searches=searches, seed=seed, report=report
+        )
+    return equilibria_at_lengths(loaded, given, report=report)
 
 
 def solve_forward_kinematics(

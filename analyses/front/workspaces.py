@@ -23,10 +23,10 @@ from cdpr_drake.analyses.workspaces.stability_results import (
 from cdpr_drake.analyses.workspaces.static_feasible import static_case
 from cdpr_drake.analyses.workspaces.workspace_files import load_obstacles
 from cdpr_drake.analyses.workspaces.workspace_question import (
-    Asked,
     WorkspaceQuestion,
+    WorkspaceRequest,
+    interference_bodies,
     make_workspace_question,
-    surroundings,
 )
 from cdpr_drake.analyses.workspaces.workspace_results import RobotWorkspace, robot_workspace
 from cdpr_drake.arrays import Array
@@ -49,7 +49,8 @@ Box = tuple[Array, Array]
 AROUND = ("obstacles", "exit_free", "anchor_free")
 WRENCHES = ("force", "moment")
 ASKED = (
-    *(field.name for field in fields(Asked) if field.name != "around"), *AROUND, *WRENCHES,
+    *(field.name for field in fields(WorkspaceRequest) if field.name != "around"),
+    *AROUND, *WRENCHES,
 )  # fmt: skip
 """What `compute_workspace` can be asked for by name."""
 
@@ -156,12 +157,12 @@ def workspace_question(
     obstacles = asked.get("obstacles")
     if isinstance(obstacles, str | Path):
         obstacles = load_obstacles(Path(obstacles))
-    around = surroundings(
+    around = interference_bodies(
         loaded, obstacles, asked.get("exit_free"), asked.get("anchor_free"), own["pulleys"]
     )
     return make_workspace_question(
         robot, _words(kinds), pose_grid(robot, grid, box), _words(measures), orientations,
-        Asked(around=around, **own),
+        WorkspaceRequest(around=around, **own),
     )  # fmt: skip
 
 
@@ -194,7 +195,7 @@ def compute_workspace(
             [N m, N], `force` [N] and `moment` [N m] to resist along and about each axis, or
             `required`, a SpatialSet; `accelerations`, `velocities`, `clearance` [m], `obstacles`,
             rows of boxes or a file; `exit_free`, `anchor_free` [m], `scenario`, `pulleys`,
-            `method`, see `Asked` and `surroundings`.
+            `method`, see `WorkspaceRequest` and `interference_bodies`.
 
     Raises:
         CdprError: Something is unknown, missing, out of range, or not possible for the robot.

@@ -28,7 +28,7 @@ from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import rigid_platform
 from cdpr_drake.planning.input_shaping import NO_SHAPER, Shaper, make_shaper, shaped_share
 from cdpr_drake.statics.equilibrium import Equilibrium, equilibrium_near
-from cdpr_drake.statics.static_tensions import hold
+from cdpr_drake.statics.static_tensions import find_static_tensions
 from cdpr_drake.statics.stiffness import natural_modes, platform_stiffness
 from cdpr_drake.systems.robots.compiled_cable_robot import CompiledCableRobot
 from cdpr_drake.systems.robots.compiled_step import StepRule
@@ -280,7 +280,7 @@ def _lengths(
     knots, found = np.linspace(0.0, 1.0, KNOTS), []
     for s in knots:
         X_WP = path.pose(s * path.length)
-        held = hold(
+        held = find_static_tensions(
             cables, settings.model, X_WP, platform.weight_wrench(X_WP), bounds, platform.motion
         )
         if held is None:

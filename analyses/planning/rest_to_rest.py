@@ -23,7 +23,7 @@ from cdpr_drake.errors import InfeasibleTensionError
 from cdpr_drake.geometry.motion_type import LEVEL
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.statics.static_tensions import hold
+from cdpr_drake.statics.static_tensions import find_static_tensions
 from cdpr_drake.systems.robots.cable_robot import CableRobot
 from cdpr_drake.systems.robots.settings import CableRobotSettings, CableSettings
 
@@ -151,7 +151,9 @@ def _lengths(
     X_WP = RigidTransform(
         RotationMatrix.MakeZRotation(place[2]), [place[0], place[1], robot.plane_height]
     )
-    found = hold(settings.cable_set(robot), settings.model, X_WP, np.zeros(6), bounds, LEVEL)
+    found = find_static_tensions(
+        settings.cable_set(robot), settings.model, X_WP, np.zeros(6), bounds, LEVEL
+    )
     if found is None:
         raise InfeasibleTensionError(
             f"{robot.name} cannot hold the platform at ({place[0]:g}, {place[1]:g}) m: no tensions "

@@ -32,10 +32,14 @@ from cdpr_drake.analyses.planning.input_shaping import (
     rests_on,
 )
 from cdpr_drake.arrays import Array
+from cdpr_drake.dynamics.advance_events_kernel import (
+    fresh_memory,
+    integrate_explicit_along,
+    robot_addresses,
+)
 from cdpr_drake.dynamics.advance_kernel import REPORTED
-from cdpr_drake.dynamics.reach_kernel import fresh_memory, reach_explicitly_along, robot_addresses
 from cdpr_drake.dynamics.robot_arrays import Drive
-from cdpr_drake.dynamics.robot_kernel import GOOD
+from cdpr_drake.dynamics.robot_kernel import INTEGRATION_OK
 from cdpr_drake.errors import PlanningError
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.poses import rotation_from_vector, rotation_vector
@@ -262,10 +266,10 @@ class _Shooter:
         present[n + self.m] = times[0]
         commands = np.diff(l0, axis=0) / np.diff(times)[:, np.newaxis]
         reached = np.empty((len(commands), len(present)))
-        bad = reach_explicitly_along(
+        bad = integrate_explicit_along(
             self._where, self._rule.numbers, present, commands, others, times, memory, reached
         )
-        if bad != GOOD:
+        if bad != INTEGRATION_OK:
             failed = int(np.searchsorted(times, present[n + self.m])) + 1
             raise motion_problem(
                 self.plain.robot, self._cables, self._rule.rule, bad, present,

@@ -28,7 +28,7 @@ FINISHED = ("summary.json", RESULTS)
 """What a folder holds whose data is complete."""
 
 
-class Kept(NamedTuple):
+class KeptFiles(NamedTuple):
     """What of a folder whose results were replaced was not this program's: names, and where."""
 
     names: list[str]
@@ -40,20 +40,20 @@ def holds_log(folder: Path) -> bool:
     return (folder / PARTS / LAYOUT).is_file()
 
 
-def beside(final: Path, what: str = "before") -> Path:
+def sibling_folder(final: Path, what: str = "before") -> Path:
     """Where older results are kept that cannot have their name any longer."""
     return free_folder(final.with_name(f"{final.name}-{what}"))
 
 
-def remove_older(before: Path, final: Path) -> list[Kept]:
+def remove_older(before: Path, final: Path) -> list[KeptFiles]:
     """Removes older results that have been put aside, but for what is not this program's."""
     names = others_in(before)
     if names and not before.name.startswith(f"{final.name}-kept"):
-        kept = beside(final, "kept")
+        kept = sibling_folder(final, "kept")
         before.rename(kept)
         before = kept
     remove_written(before)
-    return [Kept(names, before)] if names else []
+    return [KeptFiles(names, before)] if names else []
 
 
 def hidden_folders(final: Path) -> list[Path]:
@@ -72,7 +72,7 @@ def _just_made(folder: Path) -> bool:
     return all(path.name == part_of(Path(MARKER)).name for path in folder.iterdir())
 
 
-def clear_hidden(final: Path, recover: bool = True) -> tuple[list[Path], list[Kept]]:
+def clear_hidden(final: Path, recover: bool = True) -> tuple[list[Path], list[KeptFiles]]:
     """Removes hidden folders of killed runs; returns where those with data went, and what is kept.
 
     With `recover`, those with data are shown; otherwise they are removed as well.

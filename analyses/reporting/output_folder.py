@@ -14,12 +14,12 @@ from cdpr_drake.analyses.reporting.folder_lock import free_folder, locked
 from cdpr_drake.analyses.reporting.left_folders import (
     BEFORE,
     RESULTS,
-    Kept,
-    beside,
+    KeptFiles,
     clear_hidden,
     hidden_folders,
     holds_log,
     remove_older,
+    sibling_folder,
 )
 from cdpr_drake.analyses.reporting.written_files import (
     MARKER,
@@ -54,7 +54,7 @@ class ResultsFolder:
     ) -> None:
         """With the hidden folder and the final one, and the list of the former's files."""
         self.path, self.recovered, self.unfinished = work, recovered, False
-        self.kept: list[Kept] = []
+        self.kept: list[KeptFiles] = []
         self._final, self._files = final, files
 
     @property
@@ -89,7 +89,7 @@ class ResultsFolder:
             self.path.rename(self._final)
             self._files.shown_as(self._final)
             if before is not None and self.unfinished:
-                _rename_own(before, beside(self._final))
+                _rename_own(before, sibling_folder(self._final))
             elif before is not None:
                 self.replace(before)
         except OSError as problem:
@@ -104,7 +104,7 @@ class ResultsFolder:
         """Renames older results, to a name that can be seen if others' files are among them."""
         hidden = self._final.with_name(f".{self._final.name}{BEFORE}{os.getpid()}")
         if others_in(self._final):
-            return self._final.rename(beside(self._final, "kept"))
+            return self._final.rename(sibling_folder(self._final, "kept"))
         return _rename_own(self._final, hidden)
 
     def replace(self, before: Path) -> None:
@@ -274,7 +274,7 @@ def continued_folder(folder: Path, overwrite: bool = False) -> Iterator[ResultsF
         with locked(final):
             before = None
             if overwrite and final.is_dir():
-                before = _rename_own(final, beside(final))
+                before = _rename_own(final, sibling_folder(final))
             with writing(final) as files:
                 results = ResultsFolder(final, final, [], files)
                 try:

@@ -85,5 +85,5 @@ class StudySession:
             self.on_progress(progress)
 
 
-ALONE = StudySession()
+DEFAULT_STUDY_SESSION = StudySession()
 """Nobody looks, and nothing is kept."""

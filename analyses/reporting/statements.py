@@ -15,11 +15,11 @@ NOT_CONFIRMED = "not confirmed"
 NOT_TESTABLE = "not testable"
 """The study could not have found otherwise, or looks at nothing that the statement is about."""
 NOT_JUDGED = "not judged"
-"""Judging what was found ended in an error."""
+"""Checking what was found ended in an error."""
 NOT_IN_QUICK = "not judged in the quick form"
 """The runs that it needs are those of the full form."""
 
-Found = TypeVar("Found")
+StudyData = TypeVar("StudyData")
 Said = TypeVar("Said")
 
 
@@ -33,8 +33,8 @@ class Statement:
         found: The study's.
         verdict: CONFIRMED, IN_PART, NOT_CONFIRMED, NOT_TESTABLE, NOT_JUDGED or NOT_IN_QUICK.
         why: What is known of the difference; may be empty.
-        name: That of its judge, by which tables of what was published find it; see
-            `judge_name`.
+        name: That of its check, by which tables of what was published find it; see
+            `name_of_check`.
     """
 
     words: str
@@ -54,72 +54,72 @@ def verdict(every: bool, some: bool = False) -> str:
     return CONFIRMED if every else IN_PART if some else NOT_CONFIRMED
 
 
-def not_judged(judge: str, problem: Exception) -> Statement:
-    """The statement of a judge that failed: its name, and what went wrong."""
+def failed_check(check: str, problem: Exception) -> Statement:
+    """The statement of a check that failed: its name, and what went wrong."""
     words = (str(problem) or type(problem).__name__).splitlines()[0][:200]
-    return Statement(f"({judge})", "", f"judging failed: {words}", NOT_JUDGED)
+    return Statement(f"({check})", "", f"judging failed: {words}", NOT_JUDGED)
 
 
-def judge_name(judge: Callable[..., object]) -> str:
-    """Name of a judge: that of its function, without the underscore of what a module keeps."""
-    return str(getattr(judge, "__name__", type(judge).__name__)).lstrip("_")
+def name_of_check(check: Callable[..., object]) -> str:
+    """Name of a check: that of its function, without the underscore of what a module keeps."""
+    return str(getattr(check, "__name__", type(check).__name__)).lstrip("_")
 
 
-def judge_topic(judge: Callable[..., object]) -> str:
-    """What a judge looks at, in words: the first line of its docstring; its name without one."""
-    lines = (judge.__doc__ or "").strip().splitlines()
-    return lines[0] if lines else judge_name(judge).replace("_", " ")
+def topic_of_check(check: Callable[..., object]) -> str:
+    """What a check looks at, in words: the first line of its docstring; its name without one."""
+    lines = (check.__doc__ or "").strip().splitlines()
+    return lines[0] if lines else name_of_check(check).replace("_", " ")
 
 
-def judge_names(judges: Iterable[Callable[..., object]]) -> tuple[str, ...]:
-    """Names of judges, see `judge_name`."""
-    return tuple(map(judge_name, judges))
+def names_of_checks(checks: Iterable[Callable[..., object]]) -> tuple[str, ...]:
+    """Names of checks, see `name_of_check`."""
+    return tuple(map(name_of_check, checks))
 
 
-def judged_statements(
-    judges: Iterable[Callable[[Found], Statement]], found: Found, quick: bool = False
+def evaluate_checks(
+    checks: Iterable[Callable[[StudyData], Statement]], found: StudyData, quick: bool = False
 ) -> list[Statement]:
-    """What judges say of what a study found, each statement with the name of its judge.
+    """What checks say of what a study found, each statement with the name of its check.
 
     Args:
-        judges: Each looks at it; one that misses something in it raises KeyError.
+        checks: Each looks at it; one that misses something in it raises KeyError.
         found: What the study has so far.
-        quick: Whether that was the quick form, where what a judge misses is not coming: it is
+        quick: Whether that was the quick form, where what a check misses is not coming: it is
             named then, as NOT_IN_QUICK, and otherwise left out.
     """
     statements = []
-    for judge in judges:
-        name = judge_name(judge)
-        said = judged([judge], found, not_judged)
+    for check in checks:
+        name = name_of_check(check)
+        said = run_checks([check], found, failed_check)
         if not said and quick:
-            said = [Statement(judge_topic(judge), "", "", NOT_IN_QUICK)]
+            said = [Statement(topic_of_check(check), "", "", NOT_IN_QUICK)]
         statements += [replace(one, name=name) for one in said]
     return statements
 
 
-def judged(
-    judges: Iterable[Callable[[Found], Said]],
-    found: Found,
+def run_checks(
+    checks: Iterable[Callable[[StudyData], Said]],
+    found: StudyData,
     failed: Callable[[str, Exception], Said] | None = None,
 ) -> list[Said]:
-    """What judges say of what was found.
+    """What checks say of what was found.
 
     Args:
-        judges: Each looks at it; one that misses something in it (KeyError) says nothing.
+        checks: Each looks at it; one that misses something in it (KeyError) says nothing.
         found: What a study has so far.
-        failed: What to say for a judge, by its name, that ends in another error, so that one
-            judge does not cost what a study has computed. None: the error is raised.
+        failed: What to say for a check, by its name, that ends in another error, so that one
+            check does not cost what a study has computed. None: the error is raised.
     """
     statements = []
-    for judge in judges:
+    for check in checks:
         try:
-            statements.append(judge(found))
+            statements.append(check(found))
         except KeyError:
             continue
         except Exception as problem:
             if failed is None:
                 raise
-            statements.append(failed(getattr(judge, "__name__", "judge"), problem))
+            statements.append(failed(getattr(check, "__name__", "judge"), problem))
     return statements
 
 

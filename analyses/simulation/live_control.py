@@ -13,9 +13,9 @@ from pydrake.systems.framework import Context, Diagram, EventStatus
 
 from cdpr_drake.analyses.simulation.live_messages import Message, receive, send
 from cdpr_drake.analyses.simulation.live_samples import Moments
-from cdpr_drake.analyses.simulation.realtime_rate import FASTEST_SPEED, SLOWEST_SPEED, Pace
+from cdpr_drake.analyses.simulation.realtime_rate import FASTEST_SPEED, SLOWEST_SPEED, RealtimeRate
 from cdpr_drake.errors import ScenarioError
-from cdpr_drake.systems.loops.loop_choice import is_looped
+from cdpr_drake.systems.loops.loop_choice import uses_compiled_loop
 
 SAMPLE_RATE = 30.0
 """Samples per second at most [Hz]."""
@@ -36,7 +36,7 @@ def check_steered(scenario: Any) -> None:
     Raises:
         ScenarioError: The scenario asks for the compiled loop.
     """
-    if is_looped(scenario):
+    if uses_compiled_loop(scenario):
         raise ScenarioError(
             f"{scenario.name}: integration.loop: found compiled, but a loop cannot be looked into; "
             "accepted: diagram or automatic"
@@ -72,7 +72,7 @@ class Steering:
         check_steered(scenario)
         self._connection = connection
         self._should_stop, self._ask_stop = should_stop, ask_stop
-        self._pace = Pace()
+        self._pace = RealtimeRate()
         self._moments = Moments(scenario)
         self._period = 1.0 / scenario.log_rate
         self._sample_due = self._image_due = self._listen_due = 0.0

@@ -13,7 +13,7 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.reporting.exported_logs import write_columns
 from cdpr_drake.analyses.reporting.progress import WorkProgress
-from cdpr_drake.analyses.simulation.monte_carlo_store import KeptRuns, RunRecord
+from cdpr_drake.analyses.simulation.monte_carlo_store import RunRecord, StoredRuns
 from cdpr_drake.analyses.simulation.run_summary import summarize
 from cdpr_drake.analyses.simulation.run_traces import run_traces
 from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
@@ -100,7 +100,7 @@ def run_many(
     should_stop: Callable[[], bool] | None = None,
     *,
     keep_traces: bool = False,
-    kept: KeptRuns | None = None,
+    kept: StoredRuns | None = None,
     scheduler: str | None = None,
 ) -> ManyRuns:
     """Simulates scenarios, each until its outcome is known or its duration is over.

@@ -1,7 +1,7 @@
 """The store of Monte Carlo runs: each finished run is kept in a folder, by its seed.
 
-Whatever ends the program loses no finished run. `RunRecord` is what is kept of one, `KeptRuns` the
-folder.
+Whatever ends the program loses no finished run. `RunRecord` is what is kept of one, `StoredRuns`
+the folder.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ def repetition_folder(scenario: Scenario) -> Path:
     return Path("runs") / f"{scenario.name}-{hashlib.sha256(words.encode()).hexdigest()[:8]}"
 
 
-class KeptRuns:
+class StoredRuns:
     """Finished runs of one scenario in a folder, by their seeds; other seeds can follow later."""
 
     def __init__(self, folder: Path, scenario: Scenario) -> None:

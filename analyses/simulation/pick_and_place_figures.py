@@ -42,8 +42,8 @@ from cdpr_drake.palette import (
 )
 from cdpr_drake.systems.pick_and_place.cameras import pinholes
 from cdpr_drake.systems.pick_and_place.handling_step import camera_poses
-from cdpr_drake.systems.pick_and_place.handling_task import Phase
-from cdpr_drake.systems.pick_and_place.tag_cover import COVER_COLOR, cover_plate
+from cdpr_drake.systems.pick_and_place.pick_and_place_task import Phase
+from cdpr_drake.systems.pick_and_place.tag_occlusion import COVER_COLOR, cover_plate
 from cdpr_drake.systems.pick_and_place.workpiece import GRIPPER_COLOR, placed_tags, stem
 from cdpr_drake.systems.scenarios.pick_and_place_scenario import PickAndPlaceScenario
 from cdpr_drake.systems.scenarios.pick_and_place_settings import COVERED_IN, OBJECT_TAG

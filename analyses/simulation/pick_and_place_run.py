@@ -19,18 +19,18 @@ from cdpr_drake.analyses.simulation.run_loop import (
     fixed_step_simulator,
     left_unfinished,
 )
-from cdpr_drake.analyses.simulation.session import UNWATCHED, RunSession
+from cdpr_drake.analyses.simulation.session import DEFAULT_SESSION, RunSession
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CableGeometryError
 from cdpr_drake.geometry.poses import pose_error
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
-from cdpr_drake.systems.pick_and_place.handling_task import (
+from cdpr_drake.systems.pick_and_place.pick_and_place import PickAndPlace, build_pick_and_place
+from cdpr_drake.systems.pick_and_place.pick_and_place_task import (
     FAILURE_WORDS,
     Failure,
-    HandlingState,
     Phase,
+    PickAndPlaceState,
 )
-from cdpr_drake.systems.pick_and_place.pick_and_place import PickAndPlace, build_pick_and_place
 from cdpr_drake.systems.scenarios.pick_and_place_scenario import PickAndPlaceScenario
 
 
@@ -44,7 +44,7 @@ class PickAndPlaceRun(EndedRun):
     """
 
     built: PickAndPlace
-    state: HandlingState | None
+    state: PickAndPlaceState | None
 
     @property
     def scenario(self) -> PickAndPlaceScenario:
@@ -59,7 +59,7 @@ def make_simulator(built: PickAndPlace, context: Context) -> Simulator:
 
 
 def run_pick_and_place(
-    scenario: PickAndPlaceScenario, session: RunSession = UNWATCHED, **how: Any
+    scenario: PickAndPlaceScenario, session: RunSession = DEFAULT_SESSION, **how: Any
 ) -> PickAndPlaceRun:
     """Simulates a scenario until the box is set down, or the task has failed.
 
@@ -104,7 +104,9 @@ def _outcome(built: PickAndPlace, context: Context) -> Outcome:
     return Outcome.TIMEOUT if over else Outcome.RUNNING
 
 
-def _message(built: PickAndPlace, context: Context, state: HandlingState, outcome: Outcome) -> str:
+def _message(
+    built: PickAndPlace, context: Context, state: PickAndPlaceState, outcome: Outcome
+) -> str:
     """Why a task was not done, with the phase in which it ended; empty if it was."""
     if outcome == Outcome.COMPLETED:
         return ""

@@ -13,7 +13,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.poses import pose_error, pose_from_row
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
 from cdpr_drake.systems.pick_and_place.gripper import HOLDING
-from cdpr_drake.systems.pick_and_place.handling_task import Phase
+from cdpr_drake.systems.pick_and_place.pick_and_place_task import Phase
 
 NEEDED = {
     Phase.APPROACH: "found_object",

@@ -15,7 +15,7 @@ BEHIND = 0.1
 NEVER = math.inf
 
 
-class Pace:
+class RealtimeRate:
     """Says how long a run has to wait before it goes on.
 
     Attributes:

@@ -22,7 +22,7 @@ from pydrake.systems.framework import Context, Diagram
 
 from cdpr_drake.analyses.reporting.log_on_disk import Log
 from cdpr_drake.analyses.simulation.log_keeper import LogKeeper
-from cdpr_drake.analyses.simulation.session import UNWATCHED, Progress, RunSession
+from cdpr_drake.analyses.simulation.session import DEFAULT_SESSION, Progress, RunSession
 from cdpr_drake.errors import CableGeometryError, ClientEndedError, DivergedError
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
 
@@ -74,7 +74,7 @@ def advance(
     duration: float,
     outcome_after: Callable[[SimulatorStatus], Outcome],
     errors: Callable[[], tuple[float, float]],
-    session: RunSession = UNWATCHED,
+    session: RunSession = DEFAULT_SESSION,
     keeper: LogKeeper | None = None,
 ) -> LoopEnd:
     """Advances until an outcome is known.
@@ -114,7 +114,7 @@ def go_on(
     now: Callable[[], float],
     step: Callable[[float], Outcome],
     errors: Callable[[], tuple[float, float]],
-    session: RunSession = UNWATCHED,
+    session: RunSession = DEFAULT_SESSION,
     keeper: LogKeeper | None = None,
     *,
     is_lost: Callable[[], bool] = lambda: False,

@@ -31,7 +31,7 @@ from cdpr_drake.analyses.simulation.pick_and_place_summary import (
 from cdpr_drake.analyses.simulation.run_figures import error_figure as servo_error_figure
 from cdpr_drake.analyses.simulation.run_files import run_pictures, write_run_data
 from cdpr_drake.analyses.simulation.run_summary import final_errors, summarize
-from cdpr_drake.analyses.simulation.session import UNWATCHED, RunSession
+from cdpr_drake.analyses.simulation.session import DEFAULT_SESSION, RunSession
 from cdpr_drake.analyses.simulation.start_checks import (
     check_length,
     check_start,
@@ -58,7 +58,7 @@ from cdpr_drake.systems.diagrams.calibration_findings import calibration_facts
 from cdpr_drake.systems.diagrams.servo_models import LoopServo
 from cdpr_drake.systems.diagrams.torque_control import loop_warnings
 from cdpr_drake.systems.diagrams.visual_servo import VisualServo, build_visual_servo
-from cdpr_drake.systems.loops.loop_choice import check_loop, is_looped
+from cdpr_drake.systems.loops.loop_choice import check_loop, uses_compiled_loop
 from cdpr_drake.systems.loops.servo_loop import ServoLoop
 from cdpr_drake.systems.pick_and_place.pick_and_place import build_pick_and_place
 from cdpr_drake.systems.scenarios.files import PICK_AND_PLACE, TENSION_CONTROL, VISUAL_SERVO
@@ -70,7 +70,7 @@ from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
 class Run(Protocol):
     """Simulates a scenario, see `run_scenario`."""
 
-    def __call__(self, scenario: Any, session: RunSession = UNWATCHED) -> Any:
+    def __call__(self, scenario: Any, session: RunSession = DEFAULT_SESSION) -> Any:
         """Returns the result."""
 
 
@@ -114,7 +114,7 @@ def _check_servo(scenario: Scenario) -> list[str]:
     if scenario.camera.kind == RENDERED or scenario.sensors.depth is not None:
         probe_rendering()
     servo: VisualServo | LoopServo
-    if is_looped(scenario):
+    if uses_compiled_loop(scenario):
         servo = ServoLoop(check_loop(scenario)).servo()
     else:
         servo = build_visual_servo(scenario)

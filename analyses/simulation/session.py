@@ -134,5 +134,5 @@ class RunSession:
             self.connect(remote)
 
 
-UNWATCHED = RunSession()
+DEFAULT_SESSION = RunSession()
 """Nobody looks, and nothing is kept."""

@@ -26,7 +26,12 @@ from cdpr_drake.analyses.simulation.run_loop import (
     go_on,
     left_unfinished,
 )
-from cdpr_drake.analyses.simulation.session import UNWATCHED, RunSession, check_connected, resting
+from cdpr_drake.analyses.simulation.session import (
+    DEFAULT_SESSION,
+    RunSession,
+    check_connected,
+    resting,
+)
 from cdpr_drake.analyses.simulation.worlds import (
     world_columns,
     world_figure,
@@ -119,7 +124,7 @@ def make_control(scenario: TensionScenario) -> TensionControl:
 
 
 def run_tension_scenario(
-    scenario: TensionScenario, session: RunSession = UNWATCHED, **how: Any
+    scenario: TensionScenario, session: RunSession = DEFAULT_SESSION, **how: Any
 ) -> TensionRun:
     """Simulates a scenario to the end of its duration; arguments as `run_scenario`.
 

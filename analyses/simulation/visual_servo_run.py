@@ -20,14 +20,19 @@ from cdpr_drake.analyses.simulation.run_loop import (
     go_on,
     left_unfinished,
 )
-from cdpr_drake.analyses.simulation.session import UNWATCHED, RunSession, check_connected, resting
+from cdpr_drake.analyses.simulation.session import (
+    DEFAULT_SESSION,
+    RunSession,
+    check_connected,
+    resting,
+)
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CableGeometryError, DivergedError, ScenarioError
 from cdpr_drake.numerics.explicit_integration import explicit_integrators
 from cdpr_drake.systems.diagrams.servo_models import LoopServo
 from cdpr_drake.systems.diagrams.torque_control import tension_limits
 from cdpr_drake.systems.diagrams.visual_servo import VisualServo, build_visual_servo
-from cdpr_drake.systems.loops.loop_choice import check_loop, is_looped
+from cdpr_drake.systems.loops.loop_choice import check_loop, uses_compiled_loop
 from cdpr_drake.systems.loops.servo_loop import ServoLoop
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
 from cdpr_drake.systems.monitoring.tension_watch import TensionExtremes
@@ -124,7 +129,9 @@ def warm_up(servo: VisualServo) -> None:
         simulator.AdvanceTo(min(1.0 / scenario.camera.rate, scenario.duration, LONGEST_WARM_UP))
 
 
-def run_scenario(scenario: Scenario, session: RunSession = UNWATCHED, **how: Any) -> RunResult:
+def run_scenario(
+    scenario: Scenario, session: RunSession = DEFAULT_SESSION, **how: Any
+) -> RunResult:
     """Simulates a scenario until its outcome is known or its duration is over.
 
     Args:
@@ -140,7 +147,7 @@ def run_scenario(scenario: Scenario, session: RunSession = UNWATCHED, **how: Any
     """
     session = session.having(how)
     check_connected(scenario, session.connect)
-    if is_looped(scenario):
+    if uses_compiled_loop(scenario):
         if session.prepare is not None:
             raise ScenarioError(
                 f"{scenario.name}: integration.loop: found compiled, but Meshcat looks into a "
@@ -150,7 +157,7 @@ def run_scenario(scenario: Scenario, session: RunSession = UNWATCHED, **how: Any
     return run_built(build_visual_servo(scenario), session)
 
 
-def run_built(servo: VisualServo, session: RunSession = UNWATCHED, **how: Any) -> RunResult:
+def run_built(servo: VisualServo, session: RunSession = DEFAULT_SESSION, **how: Any) -> RunResult:
     """As `run_scenario`, for a diagram that is built already."""
     session = session.having(how)
     warm_up(servo)
@@ -227,7 +234,7 @@ def unfinished_run(scenario: Scenario, log: Log) -> RunResult:
 
 
 def _servo_of(scenario: Scenario) -> VisualServo | LoopServo:
-    if is_looped(scenario):
+    if uses_compiled_loop(scenario):
         return ServoLoop(check_loop(scenario)).servo()
     return build_visual_servo(scenario)
 

@@ -14,11 +14,11 @@ from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.poses import angles_from_rotation
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import hanging_platform
-from cdpr_drake.statics.equilibria_at_position import placed_rests
+from cdpr_drake.statics.equilibria_at_position import enumerate_at_position
 from cdpr_drake.statics.equilibrium import Stability
-from cdpr_drake.statics.equilibrium_enumeration import all_rests
-from cdpr_drake.statics.equilibrium_search import sampled_rests
-from cdpr_drake.statics.inextensible_problem import HangingPlatform, Rest
+from cdpr_drake.statics.equilibrium_enumeration import enumerate_equilibria
+from cdpr_drake.statics.equilibrium_search import sample_equilibria
+from cdpr_drake.statics.inextensible_problem import EquilibriumPose, HangingPlatform
 from cdpr_drake.statics.real_solutions import PathCount
 from cdpr_drake.summaries import Summarized, numbers
 
@@ -49,7 +49,7 @@ class EquilibriaReport(Summarized):
     model: str
     pulleys: bool
     lengths: Array | None
-    rests: list[Rest]
+    rests: list[EquilibriumPose]
     needed: list[Array]
     evidence: dict[str, Any]
     words: str
@@ -81,7 +81,7 @@ class EquilibriaReport(Summarized):
         return title, [("cables", self.model), ("evidence", self.words), *rows]
 
 
-def rests_at_lengths(
+def equilibria_at_lengths(
     robot: Robot, lengths: Array, *, report: Report | None = None
 ) -> EquilibriaReport:
     """All poses of rest on inextensible cables from fixed exit points.
@@ -95,14 +95,14 @@ def rests_at_lengths(
         EquilibriumError: No pose has these lengths, or the platform has no weight.
     """
     platform = hanging_platform(robot, pulleys=False)
-    found = all_rests(platform, lengths, report)
+    found = enumerate_equilibria(platform, lengths, report)
     evidence, words = _counted(found.paths)
     evidence["taut_sets"] = found.sets
     given = np.asarray(lengths, float)
     return _report(robot, platform, found.rests, given, evidence, words)
 
 
-def rests_elastic(
+def elastic_equilibria(
     robot: Robot,
     l0: Array,
     pulleys: bool,
@@ -126,7 +126,7 @@ def rests_elastic(
     """
     platform = hanging_platform(robot, pulleys=pulleys)
     home = [platform.home]
-    found = sampled_rests(platform, l0, most=searches, seed=seed, starts=home, report=report)
+    found = sample_equilibria(platform, l0, most=searches, seed=seed, starts=home, report=report)
     evidence = {
         "method": "multi-start",
         "complete": False,
@@ -146,7 +146,7 @@ def rests_elastic(
     return replace(_report(robot, platform, found.rests, given, evidence, words), model="elastic")
 
 
-def rests_at_position(robot: Robot, p_WP: Array, taut: list[int]) -> EquilibriaReport:
+def equilibria_with_position(robot: Robot, p_WP: Array, taut: list[int]) -> EquilibriaReport:
     """All poses of rest with Po at a position, on some cables, from fixed exit points.
 
     Args:
@@ -158,7 +158,7 @@ def rests_at_position(robot: Robot, p_WP: Array, taut: list[int]) -> EquilibriaR
         EquilibriumError: There is none, or the request makes no sense.
     """
     platform = hanging_platform(robot, pulleys=False)
-    found = placed_rests(platform, p_WP, taut)
+    found = enumerate_at_position(platform, p_WP, taut)
     evidence, words = _counted(found.paths)
     evidence["taut"] = [robot.cables[i].name for i in taut]
     return _report(robot, platform, found.rests, None, evidence, words)
@@ -188,7 +188,7 @@ def _counted(paths: PathCount) -> tuple[dict[str, Any], str]:
 def _report(
     robot: Robot,
     platform: HangingPlatform,
-    rests: list[Rest],
+    rests: list[EquilibriumPose],
     lengths: Array | None,
     evidence: dict[str, Any],
     words: str,
@@ -201,7 +201,7 @@ def _report(
     )  # fmt: skip
 
 
-def _rest(one: Rest, needed: Array) -> dict[str, Any]:
+def _rest(one: EquilibriumPose, needed: Array) -> dict[str, Any]:
     return {
         "pose": _pose(one.X_WP),
         "stability": str(one.stability),

@@ -28,9 +28,9 @@ from cdpr_drake.statics.equilibrium import (
     Equilibrium,
     Stability,
     anchor_arm,
+    classify_equilibrium,
     equilibria,
     equilibrium_near,
-    judge_equilibrium,
     principal_stiffnesses,
     random_starts,
 )
@@ -135,7 +135,7 @@ class StaticReport(Summarized):
         ]
 
 
-def at_pose(robot: Robot, X_WP: RigidTransform, model: str, pulleys: bool) -> StaticReport:
+def static_at_pose(robot: Robot, X_WP: RigidTransform, model: str, pulleys: bool) -> StaticReport:
     """The robot held at a pose by tensions of least 2-norm within its bounds.
 
     Raises:
@@ -148,7 +148,9 @@ def at_pose(robot: Robot, X_WP: RigidTransform, model: str, pulleys: bool) -> St
     return _report(robot, cables, model, X_WP, l0, held.tensions, state=state, others=[])
 
 
-def at_lengths(robot: Robot, l0: Array, model: str, pulleys: bool, seed: int = 0) -> StaticReport:
+def static_at_lengths(
+    robot: Robot, l0: Array, model: str, pulleys: bool, seed: int = 0
+) -> StaticReport:
     """The robot where it hangs with these unstrained lengths: the lowest pose of rest.
 
     Searched from the home pose and from `STARTS` seeded random poses in the frame.
@@ -301,7 +303,7 @@ def _report(
         stiffness=K,
         principal=principal,
         arm=arm,
-        stability=judge_equilibrium(principal) if rest is None else rest.stability,
+        stability=classify_equilibrium(principal) if rest is None else rest.stability,
         frequencies=frequencies,
         modes=shapes,
         others=others,

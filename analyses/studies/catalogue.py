@@ -11,7 +11,7 @@ from typing import Any, Protocol
 from rich.table import Table
 
 from cdpr_drake.analyses.reporting.progress import StudySession
-from cdpr_drake.analyses.reporting.statements import judge_names
+from cdpr_drake.analyses.reporting.statements import names_of_checks
 from cdpr_drake.analyses.studies import (
     closed_loops,
     control_stability,
@@ -99,26 +99,26 @@ STUDIES: dict[str, StudyEntry] = {
     "tension-methods": StudyEntry(
         tension_methods.study_tension_methods,
         continues=True,
-        judges=judge_names(tension_methods.JUDGES),
+        judges=names_of_checks(tension_methods.CHECKS),
         figures=tension_methods.FIGURES,
     ),
     "worked-examples": StudyEntry(
         worked_examples.study_worked_examples,
         spreads=False,
-        judges=judge_names(worked_examples.JUDGES),
+        judges=names_of_checks(worked_examples.CHECKS),
         figures=("trajectory", "feasible_polygons"),
     ),
     "stability-closed-loop": StudyEntry(
         closed_loops.study_closed_loop,
         continues=True,
-        judges=judge_names(closed_loops.JUDGES),
+        judges=names_of_checks(closed_loops.CHECKS),
         figures=("errors", "ways"),
     ),
     **{
         f"stability-closed-loop-{scheme}": StudyEntry(
             partial(closed_loops.study_closed_loop, scheme=scheme),
             continues=True,
-            judges=judge_names(closed_loops.JUDGES),
+            judges=names_of_checks(closed_loops.CHECKS),
             figures=("errors", "ways"),
         )
         for scheme in SCHEMES
@@ -127,44 +127,44 @@ STUDIES: dict[str, StudyEntry] = {
     "control-stability": StudyEntry(
         control_stability.study_control_stability,
         continues=True,
-        judges=judge_names(control_stability.JUDGES),
+        judges=names_of_checks(control_stability.CHECKS),
         figures=control_stability.FIGURES,
         recipes={name: partial(control_stability.study_recipe, recipe=name) for name in RECIPES},
     ),
     "stability-recipes": StudyEntry(
         control_stability.study_recipes,
         continues=True,
-        judges=judge_names(control_stability.RECIPE_JUDGES),
+        judges=names_of_checks(control_stability.RECIPE_CHECKS),
     ),
     "stability-ranges": StudyEntry(
         stability_ranges.study_stability_ranges,
         continues=True,
-        judges=judge_names(stability_ranges.JUDGES),
+        judges=names_of_checks(stability_ranges.CHECKS),
         figures=stability_ranges.FIGURES,
     ),
     "stability-shapes": StudyEntry(
         stability_shapes.study_stability_shapes,
         continues=True,
-        judges=judge_names(stability_shapes.JUDGES),
+        judges=names_of_checks(stability_shapes.CHECKS),
         figures=stability_shapes.FIGURES,
     ),
     "workspaces": StudyEntry(
         workspaces.study_workspaces,
         continues=True,
-        judges=judge_names(workspaces.JUDGES),
+        judges=names_of_checks(workspaces.CHECKS),
         figures=workspaces.FIGURES,
     ),
     "design": StudyEntry(study_design, continues=True),
     "engines": StudyEntry(
         engines.study_engines,
         continues=True,
-        judges=judge_names(engines.JUDGES),
+        judges=names_of_checks(engines.CHECKS),
         figures=("engines",),
     ),
     "scenarios": StudyEntry(
         scenarios.study_scenarios,
         continues=True,
-        judges=judge_names(scenarios.JUDGES),
+        judges=names_of_checks(scenarios.CHECKS),
         figures=scenarios.FIGURES,
     ),
     "planning": StudyEntry(study_planning, continues=True, figures=("phase_planes",)),
@@ -172,35 +172,35 @@ STUDIES: dict[str, StudyEntry] = {
         mobile_robot.study_mobile_robot,
         continues=True,
         repeats=True,
-        judges=judge_names(mobile_robot.JUDGES),
+        judges=names_of_checks(mobile_robot.CHECKS),
         figures=mobile_robot.FIGURES,
     ),
     "pick-and-place": StudyEntry(
         pick_and_place.study_pick_and_place,
         continues=True,
         repeats=True,
-        judges=judge_names(pick_and_place.JUDGES),
+        judges=names_of_checks(pick_and_place.CHECKS),
         figures=("set_down",),
     ),
     "fusion": StudyEntry(
         fusion.study_fusion,
         continues=True,
         repeats=True,
-        judges=judge_names(fusion.JUDGES),
+        judges=names_of_checks(fusion.CHECKS),
         figures=("fusion",),
     ),
     "schemes": StudyEntry(
         schemes.study_schemes,
         continues=True,
         repeats=True,
-        judges=judge_names(schemes.JUDGES),
+        judges=names_of_checks(schemes.CHECKS),
         figures=("schemes",),
     ),
     "tagless": StudyEntry(
         tagless.study_tagless,
         continues=True,
         repeats=True,
-        judges=judge_names(tagless.JUDGES),
+        judges=names_of_checks(tagless.CHECKS),
         figures=("tagless",),
     ),
     "calibration": StudyEntry(
@@ -214,7 +214,7 @@ STUDIES: dict[str, StudyEntry] = {
             partial(run_case_study, case),
             continues=True,
             repeats=True,
-            judges=judge_names(case.judges),
+            judges=names_of_checks(case.judges),
             numbers=case.published(),
             figures=case.figures(),
         )

@@ -22,7 +22,7 @@ from cdpr_drake.analyses.design.results import DesignResult, write_design
 from cdpr_drake.analyses.design.search import DesignSearch, search_design
 from cdpr_drake.analyses.design.settings import DesignSettings, GoalSettings, MirrorSettings
 from cdpr_drake.analyses.reporting.log_files import write_json
-from cdpr_drake.analyses.reporting.progress import ALONE, StudySession, WorkProgress
+from cdpr_drake.analyses.reporting.progress import DEFAULT_STUDY_SESSION, StudySession, WorkProgress
 from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
 from cdpr_drake.analyses.reporting.statements import Statement, statement_table, verdict
 from cdpr_drake.analyses.sweeps.folder import SweepFolder
@@ -149,7 +149,7 @@ class DesignStudy:
         return failed
 
 
-def study_design(quick: bool = False, session: StudySession = ALONE) -> DesignStudy:
+def study_design(quick: bool = False, session: StudySession = DEFAULT_STUDY_SESSION) -> DesignStudy:
     """Runs the study.
 
     Args:

@@ -4,7 +4,7 @@
 are and what the robot believes wrongly: with the goal's tag in view, hidden on the way, hidden
 while the box is lowered, and with the camera alone that the box blinds.
 
-`HandlingTrial` gives one run as numbers, an item of a sweep. `JUDGES` say what picking and placing
+`HandlingTrial` gives one run as numbers, an item of a sweep. `CHECKS` say what picking and placing
 has to show, and whether it does. `PickAndPlaceStudy` is what the study leaves: numbers, tables,
 figures.
 
@@ -23,12 +23,12 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from rich.table import Table
 
-from cdpr_drake.analyses.reporting.progress import ALONE, StudySession
+from cdpr_drake.analyses.reporting.progress import DEFAULT_STUDY_SESSION, StudySession
 from cdpr_drake.analyses.reporting.provenance import package_versions
 from cdpr_drake.analyses.reporting.statements import Statement, new_table, verdict
 from cdpr_drake.analyses.simulation.pick_and_place_run import PickAndPlaceRun, run_pick_and_place
 from cdpr_drake.analyses.simulation.pick_and_place_summary import unseen
-from cdpr_drake.analyses.studies.framework.seeded_study import Found, SeededStudy
+from cdpr_drake.analyses.studies.framework.seeded_study import SeededStudy, StudyData
 from cdpr_drake.analyses.sweeps.workers import SweepTask
 from cdpr_drake.analyses.visualization.figure_style import line_style, new_figure
 from cdpr_drake.arrays import Array
@@ -37,7 +37,7 @@ from cdpr_drake.palette import BOUND, look_of
 from cdpr_drake.systems.cameras.camera_settings import PROJECTED, RENDERED
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
-from cdpr_drake.systems.pick_and_place.handling_task import FAILURE_WORDS, Failure, Phase
+from cdpr_drake.systems.pick_and_place.pick_and_place_task import FAILURE_WORDS, Failure, Phase
 
 SCENARIO = "acrobot_pick_and_place"
 
@@ -166,27 +166,27 @@ def _set_down(runs: Array, words: str, printed: str) -> Statement:
     )  # fmt: skip
 
 
-def set_down(found: Found) -> Statement:
+def set_down(found: StudyData) -> Statement:
     """The box is set down within 2 mm and 1 deg."""
     words = "a box is taken, carried and set down by what two cameras see, within 2 mm and 1 deg"
     return _set_down(found[CLEAR]["runs"], words, "{0} of {0} seeds")
 
 
-def hidden_on_the_way(found: Found) -> Statement:
+def hidden_on_the_way(found: StudyData) -> Statement:
     """The same with the goal's tag hidden for 3 s on the way."""
     runs = found[ON_THE_WAY]["runs"]
     words = f"the same with the goal's tag hidden for {HIDDEN:g} s while the box is carried"
     return _set_down(runs, words, "{0} of {0} seeds")
 
 
-def hidden_while_lowered(found: Found) -> Statement:
+def hidden_while_lowered(found: StudyData) -> Statement:
     """The same with the goal's tag hidden for 3 s while the box is lowered."""
     runs = found[LOWERED]["runs"]
     words = f"the same with the goal's tag hidden for {HIDDEN:g} s while the box is lowered"
     return _set_down(runs, words, "{0} of {0} seeds")
 
 
-def one_camera_fails(found: Found) -> Statement:
+def one_camera_fails(found: StudyData) -> Statement:
     """With one camera, which the box blinds, no run comes to an end, and says so."""
     runs = found[ONE_CAMERA]["runs"]
     told = column(runs, "failure") == Failure.TAG_NOT_SEEN
@@ -201,7 +201,7 @@ def one_camera_fails(found: Found) -> Statement:
     )
 
 
-JUDGES = (set_down, hidden_on_the_way, hidden_while_lowered, one_camera_fails)
+CHECKS = (set_down, hidden_on_the_way, hidden_while_lowered, one_camera_fails)
 
 SEEDS, QUICK_SEEDS = 20, 1
 ONE_CAMERA_SEEDS = 5
@@ -213,7 +213,7 @@ class PickAndPlaceStudy(SeededStudy):
     """What the study found; `seeds` are runs of each condition with two cameras."""
 
     name = "pick-and-place"
-    judges = JUDGES
+    judges = CHECKS
     stated = "Pick and place"
 
     @property
@@ -233,7 +233,7 @@ class PickAndPlaceStudy(SeededStudy):
             "seeds": self.seeds,
             "conditions": {name: list(CONDITIONS[name]) for name in self.found},
             "within": {"distance_m": DISTANCE, "angle_rad": ANGLE},
-            **self.told_runs(COLUMNS),
+            **self.runs_dict(COLUMNS),
         }
 
     def number_tables(self) -> list[Table]:
@@ -293,7 +293,9 @@ def set_down_figure(study: PickAndPlaceStudy) -> Figure:
     return figure
 
 
-def study_pick_and_place(quick: bool = False, session: StudySession = ALONE) -> PickAndPlaceStudy:
+def study_pick_and_place(
+    quick: bool = False, session: StudySession = DEFAULT_STUDY_SESSION
+) -> PickAndPlaceStudy:
     """Runs the study; each run is an item of a sweep.
 
     Args:

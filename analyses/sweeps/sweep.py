@@ -12,7 +12,7 @@ import numpy as np
 
 from cdpr_drake.analyses.reporting.progress import StudySession, WorkProgress
 from cdpr_drake.analyses.sweeps.folder import SweepFolder
-from cdpr_drake.analyses.sweeps.worker_pool import StandingPool
+from cdpr_drake.analyses.sweeps.worker_pool import PersistentPool
 from cdpr_drake.analyses.sweeps.workers import SweepChunk, SweepTask, check_scheduler, computed
 
 Arrays = dict[str, np.ndarray]
@@ -51,7 +51,7 @@ def run_sweep(
     on_progress: Callable[[WorkProgress], None] | None = None,
     should_stop: Callable[[], bool] | None = None,
     alone: Collection[str] = (),
-    standing: StandingPool | None = None,
+    standing: PersistentPool | None = None,
 ) -> SweepResult:
     """Computes all items of some tasks, `chunk_size` at a time.
 

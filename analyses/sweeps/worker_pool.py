@@ -33,7 +33,7 @@ def run_jobs(
     should_stop: Callable[[], bool] | None = None,
     *,
     on_lost: Callable[[int], None] | None = None,
-    standing: StandingPool | None = None,
+    standing: PersistentPool | None = None,
 ) -> Iterator[tuple[int, Result]]:
     """Does jobs in processes and yields each as it is finished.
 
@@ -70,7 +70,7 @@ def run_jobs(
                 return
             yield index, work(job)
         return
-    pool = standing or StandingPool(count)
+    pool = standing or PersistentPool(count)
     waiting, suspects = deque(range(len(jobs))), deque[int]()
     running: dict[Future[Result], int] = {}
     alone = False  # whether what runs is a suspect, with nobody beside it
@@ -126,7 +126,7 @@ def _work_in_turns(work: Callable[[Job], Result], job: Job) -> Result:
     return work(job)
 
 
-class StandingPool:
+class PersistentPool:
     """Processes that stay for several calls of `run_jobs`, such as the generations of a search.
 
     To start one and import Drake takes seconds. They are started when they are needed first, anew

@@ -13,7 +13,7 @@ import numba
 import numpy as np
 
 from cdpr_drake.analyses.reporting.provenance import code_version
-from cdpr_drake.analyses.sweeps.worker_pool import StandingPool, run_jobs
+from cdpr_drake.analyses.sweeps.worker_pool import PersistentPool, run_jobs
 from cdpr_drake.errors import SweepError
 from cdpr_drake.kernel_cache.locks import share_compilation
 
@@ -80,7 +80,7 @@ def computed(
     workers: int | None,
     scheduler: str | None,
     should_stop: Callable[[], bool],
-    standing: StandingPool | None = None,
+    standing: PersistentPool | None = None,
 ) -> Iterator[tuple[int, dict[str, np.ndarray]]]:
     """Numbers of chunks with their arrays, in the order in which they get finished.
 
@@ -104,7 +104,7 @@ def run_jobs_somewhere(
     workers: int | None,
     scheduler: str | None,
     should_stop: Callable[[], bool] | None = None,
-    standing: StandingPool | None = None,
+    standing: PersistentPool | None = None,
 ) -> Iterator[tuple[int, Result]]:
     """Does jobs in processes of this machine, see `run_jobs`, or of a cluster, see `run_jobs_on`.
 

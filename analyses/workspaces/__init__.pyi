@@ -14,6 +14,6 @@ from .stability_results import load_workspaces as load_workspaces
 from .stability_results import stability_workspaces as stability_workspaces
 from .static_feasible import static_case as static_case
 from .workspace_hulls import question_hull as question_hull
-from .workspace_question import Asked as Asked
+from .workspace_question import WorkspaceRequest as WorkspaceRequest
 from .workspace_question import make_workspace_question as make_workspace_question
 from .workspace_results import robot_workspace as robot_workspace

@@ -65,7 +65,7 @@ class CameraTask:
             grid's box, the longest there is, with half a turn about z; for 2.5d without a turn and
             with the object `OBJECT_DISTANCE` ahead.
         X_PC: Camera on the platform; aligned with it, at Po.
-        lever: One of `stability.stability_case.LEVERS`.
+        lever: One of `stability.stability_case.OBJECT_POSE_MODELS`.
     """
 
     target: ServoTarget | None = None

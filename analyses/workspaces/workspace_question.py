@@ -108,7 +108,7 @@ class WorkspaceQuestion:
         return found
 
 
-def surroundings(
+def interference_bodies(
     robot: Robot,
     obstacles: Array | None = None,
     exit_free: float | None = None,
@@ -159,7 +159,7 @@ def _fixtures(robot: Robot) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class Asked:
+class WorkspaceRequest:
     """Options of a question; None where nothing was said.
 
     Attributes:
@@ -190,7 +190,7 @@ class Asked:
     method: str | None = None
 
 
-NOTHING_ASKED = Asked()
+DEFAULT_REQUEST = WorkspaceRequest()
 
 HINTS = {
     "required": "--wrench-set, --force or --moment",
@@ -206,7 +206,7 @@ def make_workspace_question(
     grid: WorkspaceGrid,
     measures: Sequence[str] = (),
     rule: str = "all",
-    asked: Asked = NOTHING_ASKED,
+    asked: WorkspaceRequest = DEFAULT_REQUEST,
 ) -> WorkspaceQuestion:
     """The question for a robot.
 
@@ -281,7 +281,7 @@ def _cable_words(robot: Robot, pulleys: bool, stable: bool) -> str:
     return "over pulleys" + (", but for the kind stable: from fixed exit points" * stable)
 
 
-def pose_conditions(robot: Robot, asked: Asked = NOTHING_ASKED) -> PoseConditions:
+def pose_conditions(robot: Robot, asked: WorkspaceRequest = DEFAULT_REQUEST) -> PoseConditions:
     """What kinds and measures know of a robot, but for stability.
 
     Args:
@@ -309,7 +309,7 @@ def pose_conditions(robot: Robot, asked: Asked = NOTHING_ASKED) -> PoseCondition
         )
     return PoseConditions(
         case,
-        asked.around or surroundings(robot, pulleys=asked.pulleys),
+        asked.around or interference_bodies(robot, pulleys=asked.pulleys),
         robot.gravity,
         (mass, platform.p_PCo, inertia),
         asked.clearance,

@@ -7,7 +7,7 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.catenary_kernel import VERTICAL, free_part
-from cdpr_drake.cables.hanging_kernel import SENSITIVITIES, hang, sagging_cable
+from cdpr_drake.cables.hanging_kernel import SENSITIVITIES, sagging_cable, solve_catenary
 from cdpr_drake.cables.models import CABLE_MODELS
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.cable_set import CableSet
@@ -85,7 +85,7 @@ def _hanging(
     ES, sigma = float(cables.stiffness[i]), float(np.sign(cables.swivel_axis[2, i]))
     w = float(cables.linear_weight[i]) or WEIGHTLESS_SHARE * ES / l0
     shape = max(rho, VERTICAL * l0), float(rise[2]), float(radius), sigma, float(l0), ES, w
-    H, V_A, good = hang(*shape, 0.0, 0.0)
+    H, V_A, good = solve_catenary(*shape, 0.0, 0.0)
     if not good:
         return None
     V_B = sagging_cable(*shape, H, V_A, np.empty((SENSITIVITIES, 3)))[1]

@@ -126,7 +126,7 @@ def _along_chord(x: float, z: float, s: float, ES: float, w: float) -> Any:
 
 
 @njit(cache=True, error_model="numpy")
-def hang(
+def solve_catenary(
     rho: float, z: float, r: float, sigma: float, l0: float, ES: float, w: float,
     H: float, V_A: float,
 ) -> Any:  # fmt: skip
@@ -204,7 +204,7 @@ def sagging_cable(
         l0: Unstrained length from A to B [m].
         ES: Axial stiffness [N].
         w: Weight per unstrained length, > 0 [N/m].
-        H: Solved horizontal force, from `hang` [N].
+        H: Solved horizontal force, from `solve_catenary` [N].
         V_A: Solved vertical force at the near end [N].
         out: Derivatives by (rho, z, l0) of the first six results, shape (6, 3), are written here.
 

@@ -19,7 +19,7 @@ from numba import njit
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.catenary_kernel import VERTICAL
-from cdpr_drake.cables.hanging_kernel import hang, sagging_cable
+from cdpr_drake.cables.hanging_kernel import sagging_cable, solve_catenary
 from cdpr_drake.geometry.motion_kernel import Motion
 from cdpr_drake.geometry.pulley_kernel import pulley_line, unit_vector_derivative
 
@@ -70,7 +70,7 @@ def sagging_response(
     ex, ey = (dx / rho, dy / rho) if rho > 0.0 else (1.0, 0.0)
     rho = max(rho, VERTICAL * l0)
     r, ES, w, sigma = cable[8], cable[6], cable[9], cable[12]
-    H, V_A, good = hang(rho, z, r, sigma, l0, ES, w, guess[0], guess[1])
+    H, V_A, good = solve_catenary(rho, z, r, sigma, l0, ES, w, guess[0], guess[1])
     if not good:
         guess[0] = 0.0
         return (

@@ -9,7 +9,7 @@ from pydrake.autodiffutils import AutoDiffXd
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables import simulation_kernel
-from cdpr_drake.cables.hanging_kernel import equations, hang
+from cdpr_drake.cables.hanging_kernel import equations, solve_catenary
 from cdpr_drake.cables.simulation_kernel import OUTPUTS, make_room
 from cdpr_drake.geometry.two_pulleys_kernel import begin_swivels
 from cdpr_drake.numerics.kernel_calls import any_scalar
@@ -21,14 +21,14 @@ def _value(x: Any) -> float:
     return float(x.value()) if isinstance(x, AutoDiffXd) else float(x)
 
 
-def hang_any(*arguments: Any) -> Any:
-    """`hanging_kernel.hang` for any scalar: solved by numbers, then one Newton step.
+def solve_catenary_any(*arguments: Any) -> Any:
+    """`hanging_kernel.solve_catenary` for any scalar: solved by numbers, then one Newton step.
 
     The step, in the arguments' scalars and with the solved Jacobian, changes the solution by
     nothing and gives it the derivatives of the implicit function.
     """
     numbers = [_value(a) for a in arguments]
-    H, V_A, good = hang(*numbers)
+    H, V_A, good = solve_catenary(*numbers)
     if not good:
         return H, V_A, False
     _, _, xx, xz, zx, zz, _ = equations(H, V_A, *numbers[:7])
@@ -46,7 +46,7 @@ def begin_swivels_any(*arguments: Any) -> Any:
     return begin_swivels(*numbers)
 
 
-_SOLVED = {"hang": hang_any, "begin_swivels": begin_swivels_any}
+_SOLVED = {"solve_catenary": solve_catenary_any, "begin_swivels": begin_swivels_any}
 """What is solved by iterations: as numbers, and then differentiated."""
 
 _force = any_scalar(simulation_kernel.model_force, _SOLVED)

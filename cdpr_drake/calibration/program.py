@@ -21,7 +21,14 @@ from cdpr_drake.calibration.pose_search import HUBER
 from cdpr_drake.calibration.program_costs import PriorCost, StationCost
 from cdpr_drake.calibration.result import CalibrationResult, make_result, outlying_rows, robust_cost
 from cdpr_drake.calibration.stations import POSE, Point, Stations
-from cdpr_drake.calibration.terms import Lengths, Rest, Swivels, Tensions, Term, TrackedPoses
+from cdpr_drake.calibration.terms import (
+    EquilibriumTerm,
+    Lengths,
+    Swivels,
+    Tensions,
+    Term,
+    TrackedPoses,
+)
 from cdpr_drake.errors import CalibrationError
 from cdpr_drake.vision.pinhole import Pinhole
 
@@ -172,7 +179,7 @@ class CalibrationProgram:
         sigma_moment: float,
         sigma_force: float,
         tensions: Array,
-    ) -> Rest:
+    ) -> EquilibriumTerm:
         """The platform rests at all poses; tensions become unknowns.
 
         Args:
@@ -188,7 +195,7 @@ class CalibrationProgram:
         _positive("equilibrium", sigma_moment, sigma_force)
         guess = self._table("tensions", tensions)
         self.stations = replace(self.stations, tensions=guess)
-        term = Rest(
+        term = EquilibriumTerm(
             self.stations.count,
             np.asarray(weight, float),
             np.asarray(p_PPcm, float),

@@ -298,7 +298,7 @@ class Tensions(Term):
 
 
 @dataclass(eq=False)
-class Rest(Term):
+class EquilibriumTerm(Term):
     """The platform rests: tensions and weight balance up to what is not modelled.
 
     Attributes:

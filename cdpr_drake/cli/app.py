@@ -21,7 +21,7 @@ import typer
 from typer.core import TyperGroup
 
 from cdpr_drake.cli.completion import PROGRAM, asked_words, stand_in
-from cdpr_drake.cli.process import INTERRUPTED, SIGNALS, compile_ahead, hold_lifeline
+from cdpr_drake.cli.process import INTERRUPTED, SIGNALS, compile_ahead, exit_with_parent
 from cdpr_drake.errors import CdprError
 from cdpr_drake.kernel_cache.locks import share_compilation
 from cdpr_drake.version import __version__
@@ -225,7 +225,7 @@ def _was_interrupted(problem: BaseException) -> bool:
 
 def _main(given: Sequence[str], imported: Callable[[], None] = lambda: None) -> None:
     """Runs the command, and ends by SystemExit; `imported` is called before the subcommand is."""
-    hold_lifeline()
+    exit_with_parent()
     # A filter, as Drake sets the level itself when a subcommand imports it.
     logging.getLogger("drake").addFilter(_is_error)
     if not faulthandler.is_enabled():

@@ -9,7 +9,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from cdpr_drake.kernel_cache.beside import helpers_started
+from cdpr_drake.kernel_cache.background import helpers_started
 from cdpr_drake.kernel_cache.locks import compilation_waits
 
 LINGER = 1.0

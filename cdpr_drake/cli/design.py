@@ -27,7 +27,7 @@ from cdpr_drake.cli.completion import words_among
 from cdpr_drake.cli.grid_options import ForceToResist, MomentToResist, default_folder
 from cdpr_drake.cli.options import FigureFormats, ResultsAsJson, RobotName, Scheduler, parse_formats
 from cdpr_drake.cli.process import INTERRUPTED, StopRequest
-from cdpr_drake.cli.run_endings import SayContinued, say_failed, shown_path
+from cdpr_drake.cli.run_endings import SayContinued, report_failures, shown_path
 from cdpr_drake.cli.terminal import message_console, print_json, progress_bar, wide_console, working
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models.robot_loader import load_robot
@@ -163,7 +163,7 @@ def design(
         if file is not None:
             printer.print(f"robot file: {shown_path(file.resolve())}")
         printer.print(f"results: {shown_path(folder.resolve())}")
-    code = say_failed(console, failed, shown_path(folder.resolve()), None)
+    code = report_failures(console, failed, shown_path(folder.resolve()), None)
     if result.interrupted:
         console.print("Interrupted; run again with the same arguments to continue")
         return INTERRUPTED

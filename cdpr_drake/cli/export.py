@@ -12,7 +12,7 @@ from cdpr_drake.cli.options import AsJson, RobotName
 from cdpr_drake.cli.robot_folder import write_files
 from cdpr_drake.cli.terminal import print_json
 from cdpr_drake.models.robot_exchange import export_robot
-from cdpr_drake.models.robot_exports import EXPORTS, not_written, not_written_words
+from cdpr_drake.models.robot_exports import EXPORTS, export_omissions, omission_words
 from cdpr_drake.models.robot_loader import load_robot
 
 
@@ -42,12 +42,12 @@ def export(
     """Exports a robot to the format of another tool."""
     loaded = load_robot(robot)
     paths = write_files(out, export_robot(loaded, format), overwrite)
-    lost = not_written(loaded, format)
+    lost = export_omissions(loaded, format)
     if as_json:
         files = [str(path) for path in paths]
         print_json({"robot": loaded.name, "format": format, "files": files, "not_written": lost})
         return
-    for words in not_written_words(lost):
+    for words in omission_words(lost):
         typer.echo(words, err=True)
     for path in paths:
         print(path)

@@ -13,7 +13,7 @@ from cdpr_drake.analyses.reporting.folder_lock import free_folder
 from cdpr_drake.analyses.reporting.output_folder import results_folder
 from cdpr_drake.analyses.visualization.figure_files import write_figures
 from cdpr_drake.cli.completion import robot_words
-from cdpr_drake.cli.run_endings import MISFIT, say_failed, say_kept, shown_path
+from cdpr_drake.cli.run_endings import MISFIT, report_failures, report_kept_files, shown_path
 from cdpr_drake.cli.terminal import message_console, print_json, wide_console, working
 from cdpr_drake.errors import CdprError
 
@@ -104,7 +104,7 @@ def write_and_tell(title: str, folder: Path, ending: Ending, work: Work) -> int:
         published = results.publish()
         say("figures")
         failed = write_figures(published, fit.drawings, ending.formats)
-    say_kept(console, results.kept)
+    report_kept_files(console, results.kept)
     folder = shown_path(published)
     if ending.as_json:
         print_json(fit.numbers)
@@ -113,5 +113,5 @@ def write_and_tell(title: str, folder: Path, ending: Ending, work: Work) -> int:
         for table in fit.tables:
             printer.print(table)
         printer.print(f"results: {folder}")
-    missing = say_failed(console, failed, folder, None)
+    missing = report_failures(console, failed, folder, None)
     return missing if fit.fits else MISFIT

@@ -16,7 +16,7 @@ from cdpr_drake.models.robot_loader import load_robot, robot_text
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.schema.templates import commented_yaml
 from cdpr_drake.systems.diagrams.load import SCENARIO_SCHEMAS, load_scenario
-from cdpr_drake.systems.scenarios.files import robot_beside, scenario_file, scenario_kind
+from cdpr_drake.systems.scenarios.files import resolve_robot_path, scenario_file, scenario_kind
 from cdpr_drake.systems.scenarios.visual_servo_scenario import DEFAULT_SCENARIO
 from cdpr_drake.systems.worlds.settings import found_file
 
@@ -73,7 +73,7 @@ def _scenario(source: str) -> tuple[type, dict[str, Any]]:
     load_scenario(source)
     path = scenario_file(source)
     content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    content["robot"] = robot_beside(path, str(content["robot"]))
+    content["robot"] = resolve_robot_path(path, str(content["robot"]))
     for obstacle in (content.get("world") or {}).get("obstacles") or ():
         if obstacle.get("file") is not None:
             obstacle["file"] = found_file(str(obstacle["file"]), path.parent)

@@ -43,7 +43,12 @@ from cdpr_drake.cli.options import (
     parse_numbers,
     parse_pose,
 )
-from cdpr_drake.cli.run_endings import say_failed, say_kept, say_recovered, shown_path
+from cdpr_drake.cli.run_endings import (
+    report_failures,
+    report_kept_files,
+    report_recovered,
+    shown_path,
+)
 from cdpr_drake.cli.terminal import message_console, print_json, wide_console, working
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models.robot_loader import load_robot
@@ -305,19 +310,19 @@ def _run(robot: Robot, planner: Planner, folder: Path, ending: _Ending) -> int:
     """Plans, tracks, writes, and says what was found."""
     console = message_console()
     with results_folder(folder, ending.overwrite) as results:
-        say_recovered(console, results)
+        report_recovered(console, results)
         with working(console, f"Planning for {robot.name}") as say:
             run = planner(say)
             say("Writing results")
             told = run.write(results.path)
             failed = write_pictures(results.path, _pictures(run, ending.formats), say)
             folder = shown_path(results.publish())
-    say_kept(console, results.kept)
+    report_kept_files(console, results.kept)
     if ending.as_json:
         print_json(told)
     else:
         _print(wide_console(), told, folder)
-    return say_failed(console, failed, folder, None)
+    return report_failures(console, failed, folder, None)
 
 
 def _pictures(run: PlanRun | FreeRun, formats: tuple[str, ...]) -> Pictures:

@@ -1,7 +1,7 @@
 """A command as a process: how it is asked to stop, and what it starts while it is imported.
 
 * `StopRequest`: Ctrl-C, and SIGTERM as batch systems and containers send it, as a polite request.
-* `hold_lifeline`: a command that another program started ends with it, also where that was killed.
+* `exit_with_parent`: a command that another program started ends with it, also where it was killed.
 * `compile_ahead`: which kernels a command will need, so that other processes compile them while it
   starts.
 """
@@ -17,7 +17,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from types import FrameType
 
-from cdpr_drake.kernel_cache.beside import compile_beside
+from cdpr_drake.kernel_cache.background import compile_in_background
 
 INTERRUPTED = 130
 """Exit code of what Ctrl-C or SIGTERM ended, as shells have it for the former."""
@@ -79,7 +79,7 @@ LONGEST_END = 20.0
 """Time to put away what there is before it is ended in earnest, as the studio gives it [s]."""
 
 
-def hold_lifeline() -> None:
+def exit_with_parent() -> None:
     """Ends this process when who started it is gone, if the environment has a `LIFELINE`.
 
     First by SIGTERM, which commands take as a wish, then by SIGKILL, with all that it started.
@@ -134,4 +134,4 @@ def compile_ahead(words: Sequence[str]) -> int:
     if command not in SIMULATIONS or any(word in QUIET for word in words):
         return 0
     compiled = "--seeds" in words or any(word.startswith("integration.") for word in words)
-    return compile_beside([DEFAULT, COMPILED] if compiled else [DEFAULT])
+    return compile_in_background([DEFAULT, COMPILED] if compiled else [DEFAULT])

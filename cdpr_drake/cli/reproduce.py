@@ -23,7 +23,7 @@ from cdpr_drake.analyses.studies.catalogue import STUDIES
 from cdpr_drake.cli.completion import words_among
 from cdpr_drake.cli.options import FigureFormats, Overwrite, ResultsAsJson, parse_formats
 from cdpr_drake.cli.process import INTERRUPTED, StopRequest
-from cdpr_drake.cli.run_endings import INCOMPLETE, STUDY_FAILED, say_kept, shown_path
+from cdpr_drake.cli.run_endings import INCOMPLETE, STUDY_FAILED, report_kept_files, shown_path
 from cdpr_drake.cli.terminal import message_console, print_json, progress_bar, wide_console, working
 
 STOPPING = (
@@ -84,7 +84,7 @@ def reproduce(
             found = write_reproduction(results.path, studies, states, quick)
             left = found.unfinished(list(studies))
             results.unfinished = bool(left)
-    say_kept(console, results.kept)
+    report_kept_files(console, results.kept)
     if as_json:
         print_json(found.as_dict())
     else:

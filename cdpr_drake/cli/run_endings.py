@@ -7,7 +7,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from cdpr_drake.analyses.reporting.left_folders import Kept, holds_log
+from cdpr_drake.analyses.reporting.left_folders import KeptFiles, holds_log
 from cdpr_drake.analyses.reporting.output_folder import ResultsFolder
 from cdpr_drake.analyses.reporting.progress import WorkProgress
 from cdpr_drake.cli.process import INTERRUPTED, StopRequest
@@ -31,7 +31,7 @@ def shown_path(folder: Path) -> Path:
     return folder.relative_to(here) if folder.is_relative_to(here) else folder
 
 
-def say_recovered(console: Console, results: ResultsFolder) -> None:
+def report_recovered(console: Console, results: ResultsFolder) -> None:
     """Says where results of killed runs went that nobody had seen yet."""
     for folder in results.recovered:
         where = shown_path(folder)
@@ -51,7 +51,7 @@ NAMED = 3
 """So many files that are kept are named."""
 
 
-def say_kept(console: Console, kept: Iterable[Kept]) -> None:
+def report_kept_files(console: Console, kept: Iterable[KeptFiles]) -> None:
     """Says which files of a folder whose results were replaced are not of this program, and where
     they are."""
     for names, folder in kept:
@@ -63,7 +63,7 @@ def say_kept(console: Console, kept: Iterable[Kept]) -> None:
         )  # fmt: skip
 
 
-def say_failed(
+def report_failures(
     console: Console, failed: dict[str, str], folder: Path, stop: StopRequest | None
 ) -> int:
     """Names what could not be written, one line each; returns the exit code."""

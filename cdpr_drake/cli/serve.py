@@ -13,15 +13,15 @@ from cdpr_drake.cli.completion import scenario_words, words_among
 from cdpr_drake.cli.options import FigureFormats, Overwrite, parse_formats
 from cdpr_drake.cli.process import StopRequest
 from cdpr_drake.cli.run_endings import CLIENT_ENDED
-from cdpr_drake.cli.simulate import Wanted, simulate_once
+from cdpr_drake.cli.simulate import RunOutputs, simulate_once
 from cdpr_drake.cli.terminal import message_console
 from cdpr_drake.errors import ClientEndedError
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.diagrams.load import load_scenario
-from cdpr_drake.systems.loops.loop_choice import with_loop
+from cdpr_drake.systems.loops.loop_choice import set_loop
 from cdpr_drake.systems.remote.messages import PROTOCOL, check_available
 from cdpr_drake.systems.remote.remote_client import LOCAL_HOST, USUAL_PORT
-from cdpr_drake.systems.remote.remote_driver import Driver, Pace
+from cdpr_drake.systems.remote.remote_driver import Driver, SyncMode
 from cdpr_drake.systems.remote.remote_place import SERVO_PLACES, TENSION_PLACES, Remote
 from cdpr_drake.systems.remote.server_socket import ServerSocket as Socket
 from cdpr_drake.systems.remote.server_socket import is_loopback
@@ -49,7 +49,7 @@ def serve(
         str | None,
         typer.Option(
             help="lock_step or real_time.",
-            autocompletion=words_among([each.value for each in Pace]),
+            autocompletion=words_among([each.value for each in SyncMode]),
         ),
     ] = None,
     timeout: Annotated[
@@ -97,9 +97,9 @@ def serve(
     if place is None and load_scenario(scenario, list(settings or [])).remote is None:
         usual = SERVO_PLACES if kind.has_camera else TENSION_PLACES
         overrides.append(f"remote.place={usual[0]}")
-    loaded, note = with_loop(load_scenario(scenario, overrides))
+    loaded, note = set_loop(load_scenario(scenario, overrides))
     folder = out if out is not None else free_folder(Path("runs") / loaded.name)
-    wanted = Wanted(folder, overwrite, (), formats, False, None, as_json)
+    wanted = RunOutputs(folder, overwrite, (), formats, False, None, as_json)
     try:
         with _Client(loaded, host, port, wait) as client:
             return simulate_once(kind, loaded, wanted, note, client.on_request_of)
@@ -150,7 +150,7 @@ class _Client:
             },
             remote.inputs,
             remote.outputs,
-            pace=Pace(scenario.remote.pace),
+            pace=SyncMode(scenario.remote.pace),
             timeout=scenario.remote.timeout,
             period=1.0 / scenario.controller.rate,
             services={"distribute": self._distribution(robot)},

@@ -38,7 +38,7 @@ from cdpr_drake.analyses.simulation.monte_carlo_report import (
     repetition_table,
     write_repetitions,
 )
-from cdpr_drake.analyses.simulation.monte_carlo_store import KeptRuns, repetition_folder
+from cdpr_drake.analyses.simulation.monte_carlo_store import StoredRuns, repetition_folder
 from cdpr_drake.analyses.simulation.scenario_kinds import SCENARIO_KINDS, ScenarioKind
 from cdpr_drake.analyses.simulation.session import Progress, RunSession, check_connected
 from cdpr_drake.analyses.sweeps.workers import check_scheduler
@@ -51,16 +51,16 @@ from cdpr_drake.cli.run_endings import (
     CLIENT_ENDED,
     INCOMPLETE,
     SayContinued,
-    say_failed,
-    say_kept,
-    say_recovered,
+    report_failures,
+    report_kept_files,
+    report_recovered,
     shown_path,
 )
 from cdpr_drake.cli.terminal import message_console, print_json, progress_bar, wide_console, working
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.diagrams.load import load_scenario
-from cdpr_drake.systems.loops.loop_choice import with_loop
+from cdpr_drake.systems.loops.loop_choice import set_loop
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
 from cdpr_drake.systems.remote.remote_place import Remote
 from cdpr_drake.systems.scenarios.files import scenario_kind
@@ -155,7 +155,7 @@ def simulate(
             )
         exports = () if log_format is None else checked_log_formats(log_format)
         formats = parse_formats(figure_format)
-        wanted = Wanted(left, False, exports, formats, video, None, as_json)
+        wanted = RunOutputs(left, False, exports, formats, video, None, as_json)
         return _finish(left, wanted) if resume is None else _continue(left, wanted)
     kind = SCENARIO_KINDS[scenario_kind(scenario)]
     overrides, formats = list(settings or []), parse_formats(figure_format)
@@ -198,7 +198,7 @@ def simulate(
     ):  # fmt: skip
         if value is not None:
             overrides.append(f"{key}={value}")
-    loaded, note = with_loop(
+    loaded, note = set_loop(
         load_scenario(scenario, overrides), repeated is not None, watched=meshcat
     )
     check_connected(loaded, None)
@@ -210,7 +210,7 @@ def simulate(
         )  # fmt: skip
     folder = out if out is not None else free_folder(Path("runs") / loaded.name)
     listens = (host or LOCAL, port) if meshcat else None
-    wanted = Wanted(folder, overwrite, exports, formats, video, listens, as_json, steered_by)
+    wanted = RunOutputs(folder, overwrite, exports, formats, video, listens, as_json, steered_by)
     return simulate_once(kind, loaded, wanted, note)
 
 
@@ -225,7 +225,7 @@ class Outside(Protocol):
 
 
 @dataclass(frozen=True)
-class Wanted:
+class RunOutputs:
     """What of one run goes where; `listens` are host and port of Meshcat, if it is wanted, and
     `steered_by` is the open socket of a program that steers it."""
 
@@ -249,7 +249,7 @@ def _refuse(*rules: tuple[bool, str]) -> None:
 def simulate_once(
     kind: ScenarioKind,
     scenario: Any,
-    wanted: Wanted,
+    wanted: RunOutputs,
     note: str,
     outside: Callable[[StopRequest], Outside] | None = None,
 ) -> int:
@@ -265,7 +265,7 @@ def simulate_once(
     console = message_console()
     stop = StopRequest(STOPPING)
     with stop.listening(), results_folder(wanted.folder, wanted.overwrite) as results:
-        say_recovered(console, results)
+        report_recovered(console, results)
         _say_warnings(kind, scenario, note)
         write_run_inputs(results.path, scenario, load_robot(scenario.robot))
         live = None if wanted.listens is None else _live(kind, scenario, *wanted.listens)
@@ -273,11 +273,11 @@ def simulate_once(
             live = _steered(scenario, wanted.steered_by, stop)
         other = None if outside is None else outside(stop)
         code = _run(kind, scenario, wanted, results, stop, live=live, outside=other)
-    say_kept(console, results.kept)
+    report_kept_files(console, results.kept)
     return code
 
 
-def _continue(folder: Path, wanted: Wanted) -> int:
+def _continue(folder: Path, wanted: RunOutputs) -> int:
     """Goes on with a run from the last checkpoint that it left in a folder."""
     stop = StopRequest(STOPPING)
     with stop.listening(), resumed_folder(folder) as results:
@@ -289,7 +289,7 @@ def _continue(folder: Path, wanted: Wanted) -> int:
 def _run(
     kind: ScenarioKind,
     scenario: Any,
-    wanted: Wanted,
+    wanted: RunOutputs,
     results: ResultsFolder,
     stop: StopRequest,
     *,
@@ -340,7 +340,7 @@ def _run(
             soft_wrap=True, markup=False, highlight=False,
         )  # fmt: skip
         return INTERRUPTED
-    code = say_failed(console, failed, folder, stop)
+    code = report_failures(console, failed, folder, stop)
     if result.outcome == Outcome.CLIENT_ENDED and code != INTERRUPTED:
         console.print(
             f"cdpr: the run ended at {result.sim_time:g} s of simulated time: {result.message}; "
@@ -351,7 +351,7 @@ def _run(
     return code
 
 
-def _finish(folder: Path, wanted: Wanted) -> int:
+def _finish(folder: Path, wanted: RunOutputs) -> int:
     """Makes log, summary and figures of what a run left in a folder that did not end by itself."""
     console = message_console()
     stop = StopRequest(PICTURES)
@@ -371,7 +371,7 @@ def _finish(folder: Path, wanted: Wanted) -> int:
                 stop,
             )
     _print_summary(summary, kind, shown_path(found), wanted.as_json)
-    return say_failed(console, failed, shown_path(found), stop)
+    return report_failures(console, failed, shown_path(found), stop)
 
 
 def _say_warnings(kind: ScenarioKind, scenario: Any, note: str) -> None:
@@ -466,7 +466,7 @@ def simulate_seeds(
     robot = load_robot(scenario.robot)
     stop = StopRequest(STOPPING_REPETITIONS)
     with stop.listening(), continued_folder(folder, overwrite) as results:
-        kept = KeptRuns(results.path, scenario)
+        kept = StoredRuns(results.path, scenario)
         if note:
             console.print(note)
         with progress_bar(console) as bar:
@@ -491,7 +491,7 @@ def simulate_seeds(
             summary = write_repetitions(results.path, scenario, runs, robot)
             folder = shown_path(results.publish())
             failed = write_pictures(folder, repetition_pictures(scenario, runs, formats))
-    say_kept(console, results.kept)
+    report_kept_files(console, results.kept)
     if as_json:
         print_json(summary)
     else:
@@ -507,4 +507,4 @@ def simulate_seeds(
     if runs.lost:
         dead = ", ".join(map(str, runs.lost))
         console.print(f"cdpr: seed {dead}: the process died, perhaps out of memory")
-    return max(say_failed(console, failed, folder, stop), INCOMPLETE if runs.lost else 0)
+    return max(report_failures(console, failed, folder, stop), INCOMPLETE if runs.lost else 0)

@@ -54,7 +54,7 @@ from cdpr_drake.cli.options import (
     parse_numbers,
     parse_wrench,
 )
-from cdpr_drake.cli.run_endings import say_failed, shown_path
+from cdpr_drake.cli.run_endings import report_failures, shown_path
 from cdpr_drake.cli.terminal import message_console, print_json, wide_console, working
 from cdpr_drake.errors import CdprError, OutputFolderError
 from cdpr_drake.models.robot_loader import load_robot
@@ -86,7 +86,7 @@ def show_stability_along(
         except OSError as problem:
             raise OutputFolderError(f"{folder}: cannot be written: {problem}") from problem
     numbers = found.as_dict()
-    code = say_failed(message_console(), failed, folder, None)
+    code = report_failures(message_console(), failed, folder, None)
     if as_json:
         print_json(numbers)
         return code
@@ -224,7 +224,7 @@ def stability(
         print_json(found.as_dict())
     else:
         _print_table(found, folder)
-    return say_failed(console, failed, shown_path(folder.resolve()), None)
+    return report_failures(console, failed, shown_path(folder.resolve()), None)
 
 
 BESIDE_ALONG = ("along", "threshold", "out", "as_json", "figure_format")

@@ -20,7 +20,13 @@ from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
 from cdpr_drake.cli.completion import words_among
 from cdpr_drake.cli.options import FigureFormats, Overwrite, ResultsAsJson, Scheduler, parse_formats
 from cdpr_drake.cli.process import INTERRUPTED, StopRequest
-from cdpr_drake.cli.run_endings import SayContinued, say_failed, say_kept, say_recovered, shown_path
+from cdpr_drake.cli.run_endings import (
+    SayContinued,
+    report_failures,
+    report_kept_files,
+    report_recovered,
+    shown_path,
+)
 from cdpr_drake.cli.terminal import message_console, print_json, progress_bar, wide_console, working
 from cdpr_drake.errors import CdprError
 from cdpr_drake.schema.typed_yaml import closest
@@ -99,7 +105,7 @@ def study(
     stop = StopRequest(STOPPING)
     prepared = continued_folder if entry.continues else results_folder
     with stop.listening(), prepared(folder, overwrite) as results:
-        say_recovered(console, results)
+        report_recovered(console, results)
         with progress_bar(console) as bar:
             task = bar.add_task(name, total=None, state="starting")
             say_continued = SayContinued(bar.console, folder)
@@ -119,7 +125,7 @@ def study(
             failed = write_study(result, results.path, formats)
             results.unfinished = result.interrupted
             folder = shown_path(results.publish())
-    say_kept(console, results.kept)
+    report_kept_files(console, results.kept)
     if as_json:
         print_json(result.as_dict())
     else:
@@ -138,9 +144,9 @@ def study(
             for option, value in given.items():
                 words += f" {option} {value}" if value is not None else ""
         console.print(words)
-        say_failed(console, failed, folder, None)
+        report_failures(console, failed, folder, None)
         return INTERRUPTED
-    return say_failed(console, failed, folder, None)
+    return report_failures(console, failed, folder, None)
 
 
 def _by_recipe(name: str, recipe: str | None) -> StudyEntry:

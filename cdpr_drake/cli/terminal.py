@@ -145,7 +145,8 @@ def state_words(task: Task) -> str:
         note = "compiling, first use"
     if not note:
         return state
-    return f"{state}, {note}" if not task.completed else note
+    # The note says that it compiles, and so may the state, behind a semicolon.
+    return note if task.completed else f"{state.partition(';')[0]}, {note}"
 
 
 class _StateColumn(ProgressColumn):

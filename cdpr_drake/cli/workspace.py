@@ -61,7 +61,7 @@ from cdpr_drake.cli.options import (
     parse_wrench,
 )
 from cdpr_drake.cli.process import INTERRUPTED, StopRequest
-from cdpr_drake.cli.run_endings import say_failed, shown_path
+from cdpr_drake.cli.run_endings import report_failures, shown_path
 from cdpr_drake.cli.terminal import message_console, print_json, progress_bar, wide_console, working
 from cdpr_drake.errors import WorkspaceError
 from cdpr_drake.models.robot_loader import load_robot
@@ -405,7 +405,7 @@ def workspace(
         print_json(told)
     else:
         print_workspace(run.workspace, told, folder)
-    code = say_failed(console, failed, shown_path(folder.resolve()), None)
+    code = report_failures(console, failed, shown_path(folder.resolve()), None)
     if proven is not None and not proven.finished:
         console.print("Interrupted; run again with the same arguments to go on with the boxes")
         code = INTERRUPTED

@@ -19,7 +19,7 @@ from cdpr_drake.dynamics.robot_arrays import (
     TENSIONS,
     RobotArrays,
 )
-from cdpr_drake.dynamics.robot_kernel import GOOD, LOST, is_plain
+from cdpr_drake.dynamics.robot_kernel import INTEGRATION_DIVERGED, INTEGRATION_OK, is_plain
 from cdpr_drake.dynamics.semi_implicit_kernel import semi_implicit_step
 from cdpr_drake.geometry.motion_kernel import joint_motion
 
@@ -50,9 +50,9 @@ def _first_step(duration: float, max_step: float) -> float:
 @njit(cache=True)
 def _judge(robot: RobotArrays, bad: int, bound: float, report: Array) -> tuple[int, bool, float]:
     """Result of a step, whether its error is within the bound, and the error; see `REPORTED`."""
-    if bad == GOOD and _is_lost(robot.work[1]):
-        bad = LOST
-    if bad != GOOD:
+    if bad == INTEGRATION_OK and _is_lost(robot.work[1]):
+        bad = INTEGRATION_DIVERGED
+    if bad != INTEGRATION_OK:
         return bad, False, np.inf
     distance, angle = pose_distance(robot.work[1], robot.work[2], robot.kinds[PLATFORM])
     error = max(distance, angle)
@@ -90,7 +90,7 @@ def advance_explicitly(
             h *= 0.5
             report[3] += 1.0
             continue
-        if bad != GOOD:
+        if bad != INTEGRATION_OK:
             state[:] = robot.work[0]
             return bad
         if not good:  # the least step; its error is what it is, and is told
@@ -100,7 +100,7 @@ def advance_explicitly(
         if error < bound / 16.0:
             h = min(2.0 * h, whole)
     state[:] = robot.work[0]
-    return GOOD
+    return INTEGRATION_OK
 
 
 @njit(cache=True)
@@ -120,7 +120,7 @@ def advance_semi_implicitly(
             h *= 0.5
             report[3] += 1.0
             continue
-        if bad != GOOD:
+        if bad != INTEGRATION_OK:
             state[:] = robot.work[0]
             return bad
         if not good:
@@ -130,7 +130,7 @@ def advance_semi_implicitly(
         if error < bound / 16.0:
             h = min(2.0 * h, whole)
     state[:] = robot.work[0]
-    return GOOD
+    return INTEGRATION_OK
 
 
 def advance_robot(
@@ -155,7 +155,8 @@ def advance_robot(
         report: See `REPORTED`, shape (4,); what happens is added to it.
 
     Returns:
-        `GOOD`, `LOST` where numbers are not finite, or the index of a cable that cannot run.
+        `INTEGRATION_OK`, `INTEGRATION_DIVERGED` where numbers are not finite, or the index of a
+        cable that cannot run.
     """
     if method == SEMI_IMPLICIT:
         return int(

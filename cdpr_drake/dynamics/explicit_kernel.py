@@ -13,7 +13,7 @@ from numba import njit
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.dynamics.robot_arrays import RobotArrays
-from cdpr_drake.dynamics.robot_kernel import GOOD, robot_rates
+from cdpr_drake.dynamics.robot_kernel import INTEGRATION_OK, robot_rates
 
 RUNGE_KUTTA_2, RUNGE_KUTTA_3, SEMI_IMPLICIT = range(3)
 METHODS = {
@@ -82,7 +82,7 @@ def explicit_step(
     n = y.shape[0]
     command_at(command, rate, time, now)
     bad = robot_rates(robot, y, now, brakes, plain, k1)
-    if bad != GOOD:
+    if bad != INTEGRATION_OK:
         return bad
     if method == RUNGE_KUTTA_2:
         for i in range(n):
@@ -96,7 +96,7 @@ def explicit_step(
         stage[i] = y[i] + 0.5 * h * k1[i]
     command_at(command, rate, time + 0.5 * h, now)
     bad = robot_rates(robot, stage, now, brakes, plain, k2)
-    if bad != GOOD:
+    if bad != INTEGRATION_OK:
         return bad
     for i in range(n):
         stage[i] = y[i] + h * (2.0 * k2[i] - k1[i])

@@ -33,7 +33,7 @@ from cdpr_drake.geometry.two_pulleys_kernel import ANCHOR_RADIUS
 from cdpr_drake.numerics.kernel_calls import as_number
 from cdpr_drake.winches.motor_kernel import winch_rates
 
-GOOD, LOST = -1, -2
+INTEGRATION_OK, INTEGRATION_DIVERGED = -1, -2
 """Results of kernels where all went well, and where numbers are not finite; else a cable."""
 
 _HEIGHT = 1
@@ -72,14 +72,14 @@ def _plain_rates(
         ideal_rates(limit, command, out[13:])
         floating_force(state, state[13:], out[13:], cables, as_number(0), force)
         floating_rates(state, force, body, out)
-    return GOOD
+    return INTEGRATION_OK
 
 
 @njit(cache=True)
 def _any_rates(robot: RobotArrays, state: Array, command: Array, brakes: Array, out: Array) -> int:
     n, nv, drive = robot.kinds[PLATFORM], robot.kinds[SPEEDS], robot.kinds[DRIVE]
     m = robot.cables.shape[0]
-    platform, force, bad = state[:n], robot.force, GOOD
+    platform, force, bad = state[:n], robot.force, INTEGRATION_OK
     if drive == TENSIONS:
         tension_force(
             platform, command, robot.cables, robot.room[_HEIGHT], robot.kinds[PUSH] > 0,
@@ -125,7 +125,7 @@ def robot_rates(
         out: Where it is written, shape (n,).
 
     Returns:
-        `GOOD`, or the index of the first cable that cannot run.
+        `INTEGRATION_OK`, or the index of the first cable that cannot run.
     """
     # A robot is many arrays, and to hand them on costs half as much as the forces of its cables.
     if plain and robot.kinds[DRIVE] == IDEAL:

@@ -41,7 +41,7 @@ from cdpr_drake.dynamics.robot_arrays import (
     TENSIONS,
     RobotArrays,
 )
-from cdpr_drake.dynamics.robot_kernel import GOOD, robot_rates
+from cdpr_drake.dynamics.robot_kernel import INTEGRATION_OK, robot_rates
 from cdpr_drake.geometry.motion_kernel import Motion, joint_motion
 from cdpr_drake.geometry.rotation_kernel import turn_pose
 from cdpr_drake.numerics.linear_algebra_kernel import eliminate, substitute
@@ -274,7 +274,7 @@ def semi_implicit_step(
     right, now = robot.work[7], robot.command
     command_at(command, rate, time, now)
     bad = robot_rates(robot, y, now, brakes, plain, f)
-    if bad != GOOD:
+    if bad != INTEGRATION_OK:
         return bad
     linearise(robot, f, now, brakes, h)
     M, K, D, S = robot.matrices[0], robot.matrices[1], robot.matrices[2], robot.matrices[3]
@@ -291,7 +291,7 @@ def semi_implicit_step(
     _moved(robot, k1, h, low)
     command_at(command, rate, time + h, now)
     bad = robot_rates(robot, low, now, brakes, plain, f)
-    if bad != GOOD:
+    if bad != INTEGRATION_OK:
         return bad
     for i in range(nv):
         right[i], right[nv + i] = low[n - nv + i], f[n - nv + i] - 2.0 * k1[nv + i]

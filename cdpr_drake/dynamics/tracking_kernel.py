@@ -16,9 +16,9 @@ from numba import njit
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.control.task_space import tracking_wrench_at
+from cdpr_drake.dynamics.advance_events_kernel import BOUND, MAX_STEP, METHOD, robot_at
 from cdpr_drake.dynamics.advance_kernel import advance_explicitly
-from cdpr_drake.dynamics.reach_kernel import BOUND, MAX_STEP, METHOD, robot_at
-from cdpr_drake.dynamics.robot_kernel import GOOD
+from cdpr_drake.dynamics.robot_kernel import INTEGRATION_OK
 from cdpr_drake.numerics.kernel_calls import vector_at
 from cdpr_drake.tensions.control_step_kernel import update_tensions_at
 from cdpr_drake.tensions.quadratic_program_kernel import FEASIBLE
@@ -26,7 +26,7 @@ from cdpr_drake.tensions.quadratic_program_kernel import FEASIBLE
 TIME, STEPS, ROWS = range(3)
 """Entries of `TrackingMemory.clock`: time [s], control steps and rows of the log so far."""
 
-MET, MISSED = range(2)
+LAST_REQUEST_MET, REQUESTS_NOT_MET = range(2)
 """Entries of `TrackingMemory.verdicts`: 1 while the last request was met, requests not met."""
 
 
@@ -41,7 +41,7 @@ class TrackingMemory(NamedTuple):
         clock: See `TIME`, shape (3,).
         state: State of the robot, shape (k,).
         tensions: Tensions that are commanded, shape (m,) [N].
-        verdicts: See `MET`, shape (2,).
+        verdicts: See `LAST_REQUEST_MET`, shape (2,).
         report: See `advance_kernel.REPORTED`, shape (4,).
         wrench: Work space: F_P_W that is asked for, shape (6,) [N m, N].
         still: Zeros, shape (m,): tensions are constant from step to step, and nothing brakes.
@@ -79,7 +79,10 @@ def _write_row(memory: TrackingMemory, row: Array) -> None:
         row[1 + n + i] = memory.wrench[i]
     for i in range(m):
         row[7 + n + i] = memory.tensions[i]
-    row[7 + n + m], row[8 + n + m] = memory.verdicts[MET], memory.verdicts[MISSED]
+    row[7 + n + m], row[8 + n + m] = (
+        memory.verdicts[LAST_REQUEST_MET],
+        memory.verdicts[REQUESTS_NOT_MET],
+    )
 
 
 @njit(cache=True)
@@ -109,11 +112,11 @@ def track_on(
         robot_at(robot), int(rule[METHOD]), state, vector_at(memory, 2), still, still,
         goal - time, rule[MAX_STEP], rule[BOUND], vector_at(memory, 4),
     )  # fmt: skip
-    if bad != GOOD:
+    if bad != INTEGRATION_OK:
         return bad, 0
     if law.shape[0] > 0:
         tracking_wrench_at(law, goal, state, vector_at(memory, 5))
-    return GOOD, due(clock, periods, until)
+    return INTEGRATION_OK, due(clock, periods, until)
 
 
 @njit(cache=True)
@@ -138,7 +141,7 @@ def track(
         robot: `robot_addresses` of a robot of which the tensions are commanded.
         law: `task_space.TrackingStep.table`.
         distribution: `control_step_kernel.TensionStep.table`.
-        rule: As of `reach_explicitly`; an explicit method, since no tension is stiff.
+        rule: As of `integrate_explicit`; an explicit method, since no tension is stiff.
         periods: Time between control steps and between rows of the log, shape (2,) [s].
         memory: Where the loop stands; changed. After a step that failed the time is that to which
             it led, and the state that before it.
@@ -148,7 +151,7 @@ def track(
             shape (r, 9 + k + m).
 
     Returns:
-        `GOOD` or what `advance_robot` says, and the number of rows.
+        `INTEGRATION_OK` or what `advance_robot` says, and the number of rows.
     """
     clock, state, tensions = memory.clock, memory.state, memory.tensions
     wrench, verdicts, still = memory.wrench, memory.verdicts, memory.still
@@ -163,11 +166,11 @@ def track(
             written += 1
             clock[ROWS] += 1.0
         if time >= until:
-            return GOOD, written
+            return INTEGRATION_OK, written
         if acts:
             code = update_tensions_at(distribution, state, wrench, tensions, verdicts)
             if code != FEASIBLE:
-                verdicts[MISSED] += 1.0
+                verdicts[REQUESTS_NOT_MET] += 1.0
             clock[STEPS] += 1.0
         goal = min(clock[STEPS] * periods[0], clock[ROWS] * periods[1], until)
         clock[TIME] = goal
@@ -175,5 +178,5 @@ def track(
             moved, int(rule[METHOD]), state, tensions, still, still, goal - time, rule[MAX_STEP],
             rule[BOUND], memory.report,
         )  # fmt: skip
-        if bad != GOOD:
+        if bad != INTEGRATION_OK:
             return bad, written

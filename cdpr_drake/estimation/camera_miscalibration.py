@@ -137,7 +137,7 @@ def _as_told(belief: FusedBelief, camera: Calibration) -> tuple[FusedBelief, flo
     return correct(belief, H, innovation, R), float(log)
 
 
-def mixed(found: Sequence[Answer]) -> FusedBelief:
+def mixture(found: Sequence[Answer]) -> FusedBelief:
     """The belief with mean and covariance of all answers together."""
     first = found[0].belief
     if len(found) == 1:
@@ -153,7 +153,7 @@ def mixed(found: Sequence[Answer]) -> FusedBelief:
 
 
 @dataclass(frozen=True)
-class Judged:
+class CalibrationVerdict:
     """What readings say of a camera's calibration.
 
     Attributes:
@@ -176,16 +176,18 @@ class Judged:
         return np.concatenate([numbers, self.error, self.deviation])
 
 
-def judged(found: Sequence[Answer], cameras: Sequence[Calibration]) -> list[Judged]:
+def calibration_verdicts(
+    found: Sequence[Answer], cameras: Sequence[Calibration]
+) -> list[CalibrationVerdict]:
     """What readings say of each camera, from all answers, see `answers`."""
-    whole, results = mixed(found), []
+    whole, results = mixture(found), []
     for k, camera in enumerate(cameras):
         right = [answer for answer in found if not answer.wrong[k]]
         surprise, freedom = np.nan, 0
         if right:
             surprise, freedom = surprise_of(right[0].belief, camera)
         results.append(
-            Judged(
+            CalibrationVerdict(
                 np.nan
                 if camera.wrong is None
                 else sum(answer.probability for answer in found if answer.wrong[k]),
@@ -220,7 +222,7 @@ def surprise_of(belief: FusedBelief, camera: Calibration) -> tuple[float, int]:
     return float(np.sum(parts)), int(np.count_nonzero(judged_ones))
 
 
-def learnt_shares(belief: FusedBelief, columns: slice, prior: Array) -> Array:
+def explained_variance(belief: FusedBelief, columns: slice, prior: Array) -> Array:
     """Shares of the variance of an error that readings have taken away, ascending, shape (6,).
 
     0: nothing was learnt in that direction, which is not observable; 1: all is known of it.

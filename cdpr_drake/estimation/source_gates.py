@@ -44,7 +44,7 @@ class Gates:
 
 
 @dataclass(frozen=True)
-class Taken:
+class GateDecision:
     """What became of a reading.
 
     Attributes:
@@ -69,7 +69,7 @@ def take_image(
     calibration: slice,
     gates: Gates,
     refused: tuple[float, float],
-) -> Taken:
+) -> GateDecision:
     """Takes in the pose that a camera measured.
 
     Args:
@@ -87,7 +87,7 @@ def take_image(
     nis = normalized_innovation(belief, sight.H, innovation, R)
     if gates.is_wrong(nis, 6):
         since = now if since < 0.0 else since
-        left_out = Taken(belief, REJECTED, nis / 6.0, since)
+        left_out = GateDecision(belief, REJECTED, nis / 6.0, since)
         if now - since < gates.patience:
             return left_out
         belief, anew = forget(belief, calibration, gates.lost**2), True
@@ -95,7 +95,7 @@ def take_image(
         innovation, R = read(belief, sight)
         if gates.is_wrong(normalized_innovation(belief, sight.H, innovation, R), 6):
             return left_out
-    return Taken(correct(belief, sight.H, innovation, R), USED, nis / 6.0, anew=anew)
+    return GateDecision(correct(belief, sight.H, innovation, R), USED, nis / 6.0, anew=anew)
 
 
 def take_depths(
@@ -105,7 +105,7 @@ def take_depths(
     depths: Array,
     deviations: Array,
     gates: Gates,
-) -> Taken:
+) -> GateDecision:
     """Takes in depths of an object's points, one after the other.
 
     Args:
@@ -125,8 +125,8 @@ def take_depths(
         if used[-1]:
             belief = correct(belief, H, innovation, R)
     if not used:
-        return Taken(belief, NOTHING, np.nan)
-    return Taken(belief, _share(np.array(used), len(points.T)), float(np.mean(nis)))
+        return GateDecision(belief, NOTHING, np.nan)
+    return GateDecision(belief, _share(np.array(used), len(points.T)), float(np.mean(nis)))
 
 
 def take_lengths(
@@ -136,7 +136,7 @@ def take_lengths(
     gates: Gates,
     refused: Array,
     elapsed: float,
-) -> tuple[Taken, Array]:
+) -> tuple[GateDecision, Array]:
     """Takes in counted lengths, each by itself left out or not.
 
     Args:
@@ -160,11 +160,11 @@ def take_lengths(
         belief = forget(belief, slice(COUNTED + k, COUNTED + k + 1), gates.lost[-1:] ** 2)
         refused[k] = 0.0
     if not np.any(taut):
-        return Taken(belief, NOTHING, np.nan), refused
+        return GateDecision(belief, NOTHING, np.nan), refused
     used = np.flatnonzero(taut & ~wrong)
     if len(used):
         belief = correct(belief, H[used], innovation[used], deviation**2 * np.eye(len(used)))
-    return Taken(belief, _share(taut & ~wrong, m), float(np.mean(nis[taut]))), refused
+    return GateDecision(belief, _share(taut & ~wrong, m), float(np.mean(nis[taut]))), refused
 
 
 def _share(used: Array, count: int) -> float:

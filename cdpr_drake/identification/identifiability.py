@@ -20,7 +20,7 @@ LITTLE_ACCELERATION = 0.05
 """Turns [rad] and accelerations, over gravity, that count as none."""
 
 
-def untold_words(
+def unidentifiable_words(
     layout: Layout, theta: Array, Z: Array, H: Array, terms: Sequence[Term]
 ) -> tuple[str, ...]:
     """What information leaves open, in words with the reason where it is known.

@@ -11,7 +11,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.identification.correlated_noise import CorrelatedNoise, correlated, once_a_vector
 from cdpr_drake.identification.regressor import SIZE, inertia_regressor, regressor_slopes
 from cdpr_drake.identification.result import Residual
-from cdpr_drake.identification.samples import MotionSamples
+from cdpr_drake.identification.samples import LoggedMotion
 from cdpr_drake.identification.terms import Rows, largest_residuals
 
 SURELY = 2.0
@@ -66,7 +66,7 @@ class MotionTerm:
     efficient algorithm for nonlinear orthogonal distance regression, 1987.
     """
 
-    samples: MotionSamples
+    samples: LoggedMotion
     gravity: Array
     Y: Array
     slopes: Array
@@ -75,7 +75,7 @@ class MotionTerm:
     name: str = "platform wrench"
 
     @staticmethod
-    def make(samples: MotionSamples, gravity: Array) -> MotionTerm:
+    def make(samples: LoggedMotion, gravity: Array) -> MotionTerm:
         """With the regressor, its derivatives, and the noise that smoothing leaves."""
         s, (X, t) = samples, samples.smoothed
         g = np.asarray(gravity, float)

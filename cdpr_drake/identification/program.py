@@ -12,7 +12,7 @@ from scipy.linalg import null_space
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import IdentificationError
-from cdpr_drake.identification.identifiability import untold_words
+from cdpr_drake.identification.identifiability import unidentifiable_words
 from cdpr_drake.identification.motion_term import MotionTerm
 from cdpr_drake.identification.parameters import GROUPS, DynamicModel, Layout, offsets_needed
 from cdpr_drake.identification.physical_bounds import make_program, violated
@@ -25,7 +25,7 @@ from cdpr_drake.identification.result import (
     TermFit,
 )
 from cdpr_drake.identification.robust_cost import huber_cost, huber_limit, huber_weights
-from cdpr_drake.identification.samples import MotionSamples, WinchSamples
+from cdpr_drake.identification.samples import LoggedMotion, WinchSamples
 from cdpr_drake.identification.terms import CableTerm, Prior, Rows, Term, WinchTerm, prior_rows
 
 MOST_STEPS = 30
@@ -98,7 +98,7 @@ class IdentificationProgram:
         self.terms: list[Term] = []
         self._priors: list[Prior] = []
 
-    def AddMotion(self, samples: MotionSamples) -> MotionTerm:
+    def AddMotion(self, samples: LoggedMotion) -> MotionTerm:
         """The wrench that the cables put on the platform, and the motion that it made."""
         term = MotionTerm.make(samples, self.gravity)
         self.terms.append(term)
@@ -106,7 +106,7 @@ class IdentificationProgram:
 
     def AddCableLengths(
         self,
-        samples: MotionSamples,
+        samples: LoggedMotion,
         counted: Array,
         sigma: float = 5e-5,
         slack_below: float = 0.5,
@@ -152,14 +152,14 @@ class IdentificationProgram:
         """Names of the unknown parameters."""
         return tuple(one[0] for one in self.layout.parameters())
 
-    def FindUntold(self) -> tuple[str, ...]:
+    def FindUnidentifiable(self) -> tuple[str, ...]:
         """What these measurements and priors cannot tell, in words, at the believed model."""
         theta = self.layout.model.vector()
         Z = self._directions(self._scaled(theta)[0])
         told: list[Term] = [t.told() if isinstance(t, MotionTerm) else t for t in self.terms]
         information = self._information(self._rows(theta, told), [])
         H = np.asarray(Z.T @ information @ Z)
-        return untold_words(self.layout, theta, Z, H, self.terms)
+        return unidentifiable_words(self.layout, theta, Z, H, self.terms)
 
     def FindCovariance(self) -> Array:
         """Covariance of the parameters by these measurements at the believed model, shape (f, f).
@@ -185,7 +185,7 @@ class IdentificationProgram:
         began = time.perf_counter()
         if not self.terms:
             raise IdentificationError("measurements: found none; accepted: at least one")
-        untold = self.FindUntold()
+        untold = self.FindUnidentifiable()
         if untold:
             more = f" (and {len(untold) - 2} more such)" if len(untold) > 2 else ""
             raise IdentificationError(

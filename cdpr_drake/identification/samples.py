@@ -34,7 +34,7 @@ STEP = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
-class MotionSamples:
+class LoggedMotion:
     """A motion and what pulled, at times apart by half a period of the bandwidth.
 
     Attributes:
@@ -97,7 +97,7 @@ class MotionSamples:
 
 def sample_motion(
     time: Array, poses: Array, tensions: Array, cables: CableSet, bandwidth: float
-) -> MotionSamples:
+) -> LoggedMotion:
     """Smooths poses and tensions of a log, differentiates, and says how noisy they were.
 
     Args:
@@ -137,7 +137,7 @@ def sample_motion(
     least = LEAST_TENSION * float(np.max(np.abs(tension)))
     sigma_turn = 2.0 * float(np.sqrt(np.sum(X.sigma[:4] ** 2) / 3.0))
     sigma_place = float(np.sqrt(np.mean(X.sigma[4:] ** 2)))
-    return MotionSamples(
+    return LoggedMotion(
         at, R, states[:, 4:7], V, A, tension, np.array([t.at(at, 1), t.at(at, 2)]), W,
         slopes, lengths[:, 0], np.maximum(t.sigma, least), max(sigma_turn, LEAST_POSE),
         max(sigma_place, LEAST_POSE), (X, t), int(X.dropped.sum() + t.dropped.sum()),
@@ -180,7 +180,7 @@ def wrench_matrix_slopes(states: Array, cables: CableSet) -> Array:
     return slopes
 
 
-def pose_shift(samples: MotionSamples, cables: CableSet, gravity: Array) -> tuple[float, float]:
+def pose_shift(samples: LoggedMotion, cables: CableSet, gravity: Array) -> tuple[float, float]:
     """By how much poses are late against tensions, and how much better the motion fits then.
 
     Inertial parameters are fitted for each shift that is tried, so that a wrong belief does not

@@ -36,7 +36,7 @@ from cdpr_drake.identification.parameters import (
 )
 from cdpr_drake.identification.regressor import MASS, SIZE
 from cdpr_drake.identification.result import Residual
-from cdpr_drake.identification.samples import MotionSamples, WinchSamples
+from cdpr_drake.identification.samples import LoggedMotion, WinchSamples
 
 MOST_SHOWN = 5
 """Residuals of a kind of measurement that are named."""
@@ -78,7 +78,7 @@ class CableTerm:
     Source: servoing thesis (2.6).
     """
 
-    samples: MotionSamples
+    samples: LoggedMotion
     counted: Array
     sigma_lengths: float
     slack_below: float
@@ -88,7 +88,7 @@ class CableTerm:
 
     @staticmethod
     def make(
-        samples: MotionSamples, counted: Array, sigma_lengths: float, slack_below: float,
+        samples: LoggedMotion, counted: Array, sigma_lengths: float, slack_below: float,
         cables: tuple[str, ...],
     ) -> CableTerm:  # fmt: skip
         """With unstrained lengths that winches count at the samples, shape (s, m) [m]."""

@@ -1,4 +1,4 @@
-"""Where compiled kernels are kept, who compiles them, and processes that do so beside a command.
+"""Compiled kernels: the folder that keeps them, locks, the list, compilation in the background.
 
 numba compiles one kernel after the other in a process, whatever processors there are. So commands
 that need many start processes that begin with what comes last, while the command goes on. All

@@ -1,2 +1,2 @@
-from .beside import compile_beside as compile_beside
-from .helper import compile_needed as compile_needed
+from .background import compile_in_background as compile_in_background
+from .background import compile_needed as compile_needed

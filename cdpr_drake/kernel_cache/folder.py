@@ -8,6 +8,7 @@ which another one calls has changed, so each state of the sources has a folder o
 from __future__ import annotations
 
 import atexit
+import functools
 import hashlib
 import os
 import shutil
@@ -52,24 +53,21 @@ def _kept_folder() -> Path:
         folders = [Path(platformdirs.user_cache_dir("cdpr_drake")), temporary]
     except (OSError, RuntimeError, KeyError):  # no home
         folders = [temporary]
-    problems, state = [], _state_of_sources()
+    problems = []
     for folder in folders:
-        kernels = folder / "kernels"
+        state = folder / "kernels" / state_of_sources()
         try:
             _check_above(folder)
-            for each in (folder, kernels):
-                _private(each)
-            if not os.access(kernels, os.W_OK):
-                continue
-            _forget_old(kernels / state)
-            _private(kernels / state, anew=True)
-            os.utime(kernels / state)
+            _private(folder)
+            _private(state.parent)
+            _forget_old(state)
+            _private(state, anew=True)
+            os.utime(state)  # fails on a read-only disk
+            return state
         except UntrustedFolderError as problem:
             problems.append(str(problem))
-        except OSError:  # it cannot be written, as in a container without a home
+        except OSError:  # as in a container without a home
             continue
-        else:
-            return kernels / state
     fresh = Path(tempfile.mkdtemp(prefix="cdpr_drake-kernels-"))
     atexit.register(_remove, fresh, os.getpid())
     why = "; ".join(problems) or "no cache folder can be written"
@@ -136,14 +134,15 @@ def _remove(folder: Path, process: int) -> None:
         shutil.rmtree(folder, ignore_errors=True)
 
 
-def _state_of_sources() -> str:
+@functools.cache
+def state_of_sources() -> str:
     """Twelve digits that change with the time or size of any file of the packages with kernels."""
     here, hashed = Path(__file__).parent.parent, hashlib.sha256(sys.version.encode())
     for room in sorted(os.scandir(here), key=lambda entry: entry.name):
         if room.is_dir(follow_symlinks=False) and room.name not in _WITHOUT_KERNELS:
             for path in sorted(Path(room.path).rglob("*.py")):
-                stat = path.stat()
-                hashed.update(f"{path} {stat.st_size} {stat.st_mtime_ns}\n".encode())
+                there = path.stat()
+                hashed.update(f"{path} {there.st_size} {there.st_mtime_ns}\n".encode())
     return hashed.hexdigest()[:12]
 
 
@@ -154,14 +153,12 @@ def _forget_old(folder: Path) -> None:
     """Removes what was compiled from sources that are no longer in use."""
     if folder.exists():
         return
-    try:
+    with suppress(OSError):
         states = sorted(
             (each.stat().st_mtime, each.path)
             for each in os.scandir(folder.parent)
             if each.is_dir(follow_symlinks=False)
         )
-    except OSError:
-        return
-    for used, old in states[: max(len(states) - KEPT + 1, 0)]:
-        if time.time() - used > IN_USE:  # else another checkout may be at work
-            shutil.rmtree(old, ignore_errors=True)
+        for used, old in states[: 1 - KEPT]:
+            if time.time() - used > IN_USE:  # else another checkout may be at work
+                shutil.rmtree(old, ignore_errors=True)

@@ -6,7 +6,6 @@ import functools
 import hashlib
 import os
 import platform
-import sys
 from collections.abc import Collection
 from contextlib import suppress
 from dataclasses import dataclass
@@ -14,11 +13,11 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-LIST = Path(__file__).parent / "kernels.tsv"
-"""A line for each group, a name; then one for each kernel: its number, name, the numbers of those
-that it calls, the numbers of the groups that need it, and the types of its arguments."""
+from cdpr_drake.kernel_cache.folder import state_of_sources
 
-PACKAGE = Path(__file__).parent.parent
+LIST = Path(__file__).parent / "kernels.tsv"
+"""A line for each group, a name; then one for each kernel, called before calling: its name, the
+numbers of those that it calls and of the groups that need it, and the types of its arguments."""
 
 
 @dataclass(frozen=True)
@@ -30,7 +29,7 @@ class ListedKernel:
         name: Module and function, as `geometry.pulley_kernel:tangent`.
         calls: Numbers of the listed kernels that it is compiled with.
         groups: Numbers of the groups that need it.
-        signature: Types of its arguments as words.
+        signature: Types of its arguments as an expression of numba's names, as `f8[:,::1], i8,`.
     """
 
     number: int
@@ -48,20 +47,32 @@ class ListedKernel:
         module, _, function = self.name.partition(":")
         return getattr(import_module(f"cdpr_drake.{module}"), function)
 
+    def types(self) -> tuple[Any, ...]:
+        """Types of its arguments, as numba has them.
+
+        Raises:
+            ImportError, AttributeError, NameError: A class that is named is no longer there.
+        """
+        names = {**vars(import_module("numba.core.types")), "Named": _named}
+        found: tuple[Any, ...] = eval(f"({self.signature})", names)  # from this package's own file
+        return found
+
+
+def _named(module: str, name: str, *types: Any) -> Any:
+    """The type of a NamedTuple of this package."""
+    base = import_module("numba.core.types").BaseTuple
+    return base.from_types(types, getattr(import_module(module), name))
+
 
 @functools.cache
 def _read() -> tuple[tuple[str, ...], tuple[ListedKernel, ...]]:
     """Groups and kernels."""
-    groups, kernels = [], []
-    for line in LIST.read_text(encoding="utf-8").splitlines():
-        fields = line.split("\t")
-        if len(fields) == 1:
-            groups.append(line)
-            continue
-        number, name, calls, needed_by, signature = fields
-        called, asking = (frozenset(map(int, words.split())) for words in (calls, needed_by))
-        kernels.append(ListedKernel(int(number), name, called, asking, signature))
-    return tuple(groups), tuple(kernels)
+    lines = [line.split("\t") for line in LIST.read_text(encoding="utf-8").splitlines()]
+    kernels = []
+    for number, (name, calls, groups, words) in enumerate(line for line in lines if len(line) > 1):
+        called, asking = (frozenset(map(int, numbers.split())) for numbers in (calls, groups))
+        kernels.append(ListedKernel(number, name, called, asking, words))
+    return tuple(line[0] for line in lines if len(line) == 1), tuple(kernels)
 
 
 def group_names() -> tuple[str, ...]:
@@ -90,17 +101,7 @@ def note_complete(groups: Collection[str]) -> None:
 
 def _marker(group: str) -> Path:
     """An empty file whose name stands for all that decides whether a kernel fits."""
-    hashed = hashlib.sha256(f"{group} {sys.version} {platform.node()}".encode())
-    for path in _files(group):
-        with suppress(OSError):
-            stat = path.stat()
-            hashed.update(f"{path} {stat.st_size} {stat.st_mtime_ns}\n".encode())
+    hashed = hashlib.sha256(f"{group} {platform.node()} {state_of_sources()}".encode())
+    hashed.update(LIST.read_bytes())
     folder = Path(os.environ.get("NUMBA_CACHE_DIR", ""))
     return folder / f"complete-{hashed.hexdigest()[:16]}"
-
-
-@functools.cache
-def _files(group: str) -> list[Path]:
-    """The list, and the sources of what a group needs."""
-    modules = {kernel.name.partition(":")[0] for kernel in needed_kernels([group])}
-    return [LIST, *(PACKAGE / f"{name.replace('.', '/')}.py" for name in sorted(modules))]

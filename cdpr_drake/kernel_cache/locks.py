@@ -34,6 +34,10 @@ class CompilationLocks:
     The system takes them away from a process that ends, however it ends. Within a process they are
     free for all: numba lets one thread compile at a time, and kernels that it compiles within
     another one are called by that one, so that nobody waits for one that waits for it.
+
+    Attributes:
+        waits: Whether this process waits for another one that compiles.
+        saving: Held while a compiled kernel is written.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -47,14 +51,10 @@ class CompilationLocks:
         self._fcntl = import_module("fcntl")  # not everywhere
         folder.mkdir(parents=True, exist_ok=True)
         self._file = _opened(folder / LOCK_FILE)
-        with suppress(BlockingIOError, PermissionError):  # somebody else tries just now
-            self._fcntl.lockf(self._file, self._fcntl.LOCK_EX | self._fcntl.LOCK_NB, 1, 0)
-            self._fcntl.lockf(self._file, self._fcntl.LOCK_UN, 1, 0)
         self._held: set[int] = set()
-        self.waits = False
-        """Whether this process waits for another one that compiles."""
-        self.saving = threading.Lock()
-        """Held while a compiled kernel is written."""
+        self.waits, self.saving = False, threading.Lock()
+        if self._take(0):
+            self._release(0)
 
     @contextmanager
     def held(self, name: str, wait: bool = True) -> Iterator[bool]:
@@ -71,32 +71,31 @@ class CompilationLocks:
         if byte in self._held:
             yield True
             return
-        mine = self._taken(byte, LONGEST_WAIT if wait else 0.0)
+        given_up = time.monotonic() + (LONGEST_WAIT if wait else 0.0)
+        try:
+            while not (mine := self._take(byte)) and time.monotonic() < given_up:
+                self.waits = True
+                time.sleep(POLL)
+        finally:
+            self.waits = False
         try:
             yield mine
         finally:
             if mine:
-                self._held.discard(byte)
-                self._fcntl.lockf(self._file, self._fcntl.LOCK_UN, 1, byte)
+                self._release(byte)
 
-    def _taken(self, byte: int, longest: float) -> bool:
-        given_up = time.monotonic() + longest
+    def _take(self, byte: int) -> bool:
+        """Locks a byte; False where another process has it."""
         try:
-            while True:
-                try:
-                    self._fcntl.lockf(
-                        self._file, self._fcntl.LOCK_EX | self._fcntl.LOCK_NB, 1, byte
-                    )
-                except (BlockingIOError, PermissionError):
-                    if time.monotonic() >= given_up:
-                        return False
-                    self.waits = True
-                    time.sleep(POLL)
-                    continue
-                self._held.add(byte)
-                return True
-        finally:
-            self.waits = False
+            self._fcntl.lockf(self._file, self._fcntl.LOCK_EX | self._fcntl.LOCK_NB, 1, byte)
+        except (BlockingIOError, PermissionError):
+            return False
+        self._held.add(byte)
+        return True
+
+    def _release(self, byte: int) -> None:
+        self._held.discard(byte)
+        self._fcntl.lockf(self._file, self._fcntl.LOCK_UN, 1, byte)
 
 
 def _opened(path: Path) -> int:
@@ -124,10 +123,8 @@ def shared_locks() -> CompilationLocks | None:
     global _locks
     folder = os.environ.get("NUMBA_CACHE_DIR")
     if _locks is None and folder:
-        try:
+        with suppress(OSError, ImportError):
             _locks = CompilationLocks(Path(folder))
-        except (OSError, ImportError):
-            return None
     return _locks
 
 

@@ -20,7 +20,7 @@ import yaml
 
 from cdpr_drake.errors import DataFileError, Problems
 from cdpr_drake.schema.fields import FieldRule
-from cdpr_drake.schema.yaml_files import known_yaml, other_kind, too_many_bytes, too_many_nodes
+from cdpr_drake.schema.yaml_files import cached_yaml, other_kind, too_many_bytes, too_many_nodes
 
 
 def printable(words: str) -> str:
@@ -117,7 +117,7 @@ def parse_typed(
     Raises:
         error: As `load_typed`.
     """
-    known = known_yaml(schema, content, edited=bool(overrides))
+    known = cached_yaml(schema, content, edited=bool(overrides))
     try:
         root = known.nodes()
     except yaml.YAMLError as problem:

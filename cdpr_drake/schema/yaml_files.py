@@ -2,7 +2,7 @@
 
 `other_kind` tells a file that was given to the wrong loader, from the keys at its top.
 `too_many_bytes` and `too_many_nodes` refuse large files: those of this package are small, and a
-bomb is told at once. `known_yaml` keeps what was parsed before.
+bomb is told at once. `cached_yaml` keeps what was parsed before.
 """
 
 from __future__ import annotations
@@ -92,7 +92,7 @@ def _size(node: yaml.Node, sizes: dict[int, int]) -> int:
     return total
 
 
-class KnownYaml:
+class CachedYaml:
     """Nodes of a text, and the instance of a schema that they make.
 
     Who checks the nodes writes numbers and words plainly into them, which changes nothing when it
@@ -122,7 +122,7 @@ class KnownYaml:
             _KEPT.pop((self._schema, self._content), None)
 
 
-def known_yaml(schema: type, content: str, edited: bool) -> KnownYaml:
+def cached_yaml(schema: type, content: str, edited: bool) -> CachedYaml:
     """A text that was read before, or one anew.
 
     The same small files are read again and again: a run reads its robot five times and a study
@@ -136,7 +136,7 @@ def known_yaml(schema: type, content: str, edited: bool) -> KnownYaml:
     """
     found = None if edited else _KEPT.get((schema, content))
     if found is None:
-        found = KnownYaml(schema, content)
+        found = CachedYaml(schema, content)
     if not edited and len(content) <= SMALL:
         with _CHANGING:
             _KEPT[schema, content] = found
@@ -146,6 +146,6 @@ def known_yaml(schema: type, content: str, edited: bool) -> KnownYaml:
     return found
 
 
-_KEPT: OrderedDict[tuple[type, str], KnownYaml] = OrderedDict()
+_KEPT: OrderedDict[tuple[type, str], CachedYaml] = OrderedDict()
 
 _CHANGING = Lock()

@@ -16,8 +16,8 @@ positive definite.
   proof behind the last one stands in `quadratic_bounds_kernel`.
 
 Source: servoing thesis chapter 3: (3.1), (3.8), (3.26) and 3.4 for the criterion, with e in the
-lever of PBVS as its analysis has it, or the exact matrix, see `LEVERS`; 3.2 and tables A.8 to A.18
-for perturbations; 3.3 for sampling. The certificate is this project's own.
+lever of PBVS as its analysis has it, or the exact matrix, see `OBJECT_POSE_MODELS`; 3.2 and
+tables A.8 to A.18 for perturbations; 3.3 for sampling. The certificate is this project's own.
 """
 
 import lazy_loader

@@ -1,7 +1,7 @@
 from .criterion_at_pose_kernel import evaluate as evaluate
 from .desired_view import FixedObject as FixedObject
 from .desired_view import OppositeCorner as OppositeCorner
-from .no_stable_target import some_target_possible as some_target_possible
+from .no_stable_target import stable_target_exists as stable_target_exists
 from .perturbation_bounds import BASELINE as BASELINE
 from .perturbation_samples_kernel import mixed as mixed
 from .quadratic_bounds_kernel import Blocks as Blocks

@@ -51,7 +51,7 @@ class ModelError:
             getattr(self, name)[some] = getattr(other, name)
 
 
-def some_target_possible(
+def stable_target_exists(
     cables: CableSet,
     bounds: PerturbationBounds,
     poses: Array,

@@ -23,7 +23,7 @@ SPATIAL_SCHEMES = ("2.5d", "ibvs")
 SIDES = ("estimate", "truth")
 """Which model is the nominal one plus the perturbation; the other one is nominal."""
 
-LEVERS = ("error", "object")
+OBJECT_POSE_MODELS = ("error", "object")
 """Lever of PBVS' interaction matrix: e_t as the servoing thesis' stability analysis has it, or p_CO
 as the exact matrix, with which a controller works."""
 
@@ -44,7 +44,7 @@ class StabilityCase:
         p_OK: Points of the object for IBVS, shape (3, k) [m]; None: not known, which is enough as
             long as the object is not perturbed.
         perturbed: One of `SIDES`.
-        lever: One of `LEVERS`.
+        lever: One of `OBJECT_POSE_MODELS`.
         taut: Cables that count, shape (m,) bool; None: all. Slack ones leave the Jacobians.
 
     Source: servoing thesis 3.2, 3.3; slack cables: 5.3.1.
@@ -68,7 +68,11 @@ class StabilityCase:
             StabilityError: Cables with pulleys, unknown names, shapes that do not fit, too few taut
                 cables, or a scheme that the robot's dimension excludes.
         """
-        for name, accepted in (("scheme", SCHEMES), ("perturbed", SIDES), ("lever", LEVERS)):
+        for name, accepted in (
+            ("scheme", SCHEMES),
+            ("perturbed", SIDES),
+            ("lever", OBJECT_POSE_MODELS),
+        ):
             if getattr(self, name) not in accepted:
                 raise StabilityError(
                     f"{name}: found {getattr(self, name)}; accepted: {', '.join(accepted)}"

@@ -22,7 +22,12 @@ from cdpr_drake.stability.perturbation_bounds import PerturbationBounds, vector_
 from cdpr_drake.stability.perturbation_samples_kernel import direction_codes, pose_bits
 from cdpr_drake.stability.sampled_kernel import sampled_margins
 from cdpr_drake.stability.searched_kernel import searched_margins
-from cdpr_drake.stability.stability_case import LEVERS, SCHEMES, SPATIAL_SCHEMES, StabilityCase
+from cdpr_drake.stability.stability_case import (
+    OBJECT_POSE_MODELS,
+    SCHEMES,
+    SPATIAL_SCHEMES,
+    StabilityCase,
+)
 
 VERDICTS = ("sampled", "searched", "certified")
 """Verdicts by growing weight."""
@@ -232,7 +237,7 @@ def _case_arrays(case: StabilityCase, bounds: PerturbationBounds) -> CaseArrays:
         np.array(case.X_PC.translation(), float),
         SCHEMES.index(case.scheme),
         case.planar,
-        LEVERS.index(case.lever),
+        OBJECT_POSE_MODELS.index(case.lever),
         case.perturbed == "truth",
         np.zeros((3, 0)) if case.p_OK is None else np.ascontiguousarray(case.p_OK, float),
         bounds.radii(),

@@ -2,12 +2,12 @@ from .controlled_wrenches import wrench_control as wrench_control
 from .equilibrium import Stability as Stability
 from .equilibrium import equilibria as equilibria
 from .equilibrium import equilibrium_near as equilibrium_near
-from .equilibrium_enumeration import all_rests as all_rests
+from .equilibrium_enumeration import enumerate_equilibria as enumerate_equilibria
 from .equilibrium_program import make_equilibrium_program as make_equilibrium_program
 from .forward_kinematics import ForwardKinematics as ForwardKinematics
 from .inextensible_problem import HangingPlatform as HangingPlatform
 from .sensitivity import pose_sensitivity as pose_sensitivity
 from .start_systems import KINDS as KINDS
-from .static_tensions import hold as hold
+from .static_tensions import find_static_tensions as find_static_tensions
 from .stiffness import natural_modes as natural_modes
 from .stiffness import platform_stiffness as platform_stiffness

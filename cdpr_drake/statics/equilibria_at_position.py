@@ -15,13 +15,17 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.errors import EquilibriumError
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.statics.equilibrium_enumeration import TENSE, body_on, certified, plane_frame
-from cdpr_drake.statics.inextensible_problem import HangingPlatform, Rest, judged_rest
+from cdpr_drake.statics.inextensible_problem import (
+    EquilibriumPose,
+    HangingPlatform,
+    make_equilibrium_pose,
+)
 from cdpr_drake.statics.real_solutions import PathCount
 from cdpr_drake.statics.taut_equilibria import hangs_from_a_point, rests_in_plane, rests_in_space
 
 
 @dataclass(frozen=True, eq=False)
-class PlacedRests:
+class EquilibriaAtPosition:
     """Poses of rest at a position.
 
     Attributes:
@@ -31,12 +35,14 @@ class PlacedRests:
         paths: How the paths to all complex solutions ended.
     """
 
-    rests: list[Rest]
+    rests: list[EquilibriumPose]
     lengths: list[Array]
     paths: PathCount
 
 
-def placed_rests(platform: HangingPlatform, p_WP: Array, taut: list[int]) -> PlacedRests:
+def enumerate_at_position(
+    platform: HangingPlatform, p_WP: Array, taut: list[int]
+) -> EquilibriaAtPosition:
     """All poses of rest with Po at a position, stable or not, on given cables.
 
     Stability is that with the lengths held.
@@ -92,7 +98,7 @@ def placed_rests(platform: HangingPlatform, p_WP: Array, taut: list[int]) -> Pla
         certificate, radius = certified(platform, one, paths, np.arange(0))
         longer = paths.copy()
         longer[np.setdiff1d(np.arange(m), taut)] += 1.0
-        rest = judged_rest(
+        rest = make_equilibrium_pose(
             platform, longer, one.X_WP, tensions, family=False, certificate=certificate,
             radius=radius,
         )  # fmt: skip
@@ -104,4 +110,4 @@ def placed_rests(platform: HangingPlatform, p_WP: Array, taut: list[int]) -> Pla
             "position at which one does"
         )
     order = np.argsort([one.energy for one in rests])
-    return PlacedRests([rests[i] for i in order], [lengths[i] for i in order], count)
+    return EquilibriaAtPosition([rests[i] for i in order], [lengths[i] for i in order], count)

@@ -118,7 +118,7 @@ def equilibrium_near(
     stiffnesses = principal_stiffnesses(part, platform, arm)
     return Equilibrium(
         X_WP=X_WP, tensions=at_rest.tensions, slack=at_rest.slack, energy=energy,
-        unbalanced=unbalanced, stiffnesses=stiffnesses, stability=judge_equilibrium(stiffnesses),
+        unbalanced=unbalanced, stiffnesses=stiffnesses, stability=classify_equilibrium(stiffnesses),
         steps=steps,
     )  # fmt: skip
 
@@ -172,7 +172,7 @@ def principal_stiffnesses(K: Array, platform: RigidPlatform, arm: float) -> Arra
     return np.asarray(np.linalg.eigvalsh(K * np.outer(scale, scale)), float)
 
 
-def judge_equilibrium(stiffnesses: Array) -> Stability:
+def classify_equilibrium(stiffnesses: Array) -> Stability:
     """The verdict on principal stiffnesses, least first [N/m]."""
     finite = stiffnesses[np.isfinite(stiffnesses)]
     if len(finite) == 0:
@@ -270,7 +270,7 @@ def _inextensible(
         energy=platform.potential_energy(X_WP),
         unbalanced=unbalanced,
         stiffnesses=stiffnesses,
-        stability=judge_equilibrium(stiffnesses),
+        stability=classify_equilibrium(stiffnesses),
         steps=elastic.steps,
     )
 

@@ -1,7 +1,7 @@
 """All poses at which a platform rests on inextensible cables of given lengths.
 
-`all_rests` asks every set of cables that may be taut. Where turns lead from one pose of rest to
-others, `member_within_reach` finds one of that family that lets the slack cables be slack.
+`enumerate_equilibria` asks every set of cables that may be taut. Where turns lead from one pose of
+rest to others, `member_within_reach` finds one of that family that lets the slack cables be slack.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from cdpr_drake.statics.equilibrium_certificate import ProvenBox, prove_rest
 from cdpr_drake.statics.inextensible_problem import (
     JUST_TAUT,
     Certificate,
+    EquilibriumPose,
     HangingPlatform,
-    Rest,
-    judged_rest,
+    make_equilibrium_pose,
 )
 from cdpr_drake.statics.real_solutions import PathCount
 from cdpr_drake.statics.start_systems import KINDS
@@ -56,7 +56,7 @@ ANY_TURNS = 500
 
 
 @dataclass(frozen=True, eq=False)
-class AllRests:
+class EquilibriumSet:
     """All poses of rest that were found, the lowest energy first, and how sure it is.
 
     Attributes:
@@ -66,7 +66,7 @@ class AllRests:
         sets: Sets of taut cables that were asked.
     """
 
-    rests: list[Rest]
+    rests: list[EquilibriumPose]
     paths: PathCount
     sets: int
 
@@ -76,11 +76,11 @@ class AllRests:
         return self.paths.lost == 0
 
 
-def all_rests(
+def enumerate_equilibria(
     platform: HangingPlatform,
     lengths: Array,
     report: Callable[[int, int], object] | None = None,
-) -> AllRests:
+) -> EquilibriumSet:
     """All poses of rest, stable or not, with any cables slack.
 
     Every set of at most n cables is asked for the poses that it holds while taut; kept are those
@@ -101,7 +101,7 @@ def all_rests(
     platform.load()
     m, n = platform.cables.count, platform.freedom
     sets = [list(s) for k in range(1, min(m, n) + 1) for s in combinations(range(m), k)]
-    count, rests = PathCount(), list[Rest]()
+    count, rests = PathCount(), list[EquilibriumPose]()
     for done, taut in enumerate(sets):
         if report is not None:
             report(done, len(sets))
@@ -115,10 +115,10 @@ def all_rests(
     rests = _distinct(rests)
     if not rests:
         raise EquilibriumError(_why_none(platform, lengths))
-    return AllRests(sorted(rests, key=lambda one: one.energy), count, len(sets))
+    return EquilibriumSet(sorted(rests, key=lambda one: one.energy), count, len(sets))
 
 
-def is_stable(one: Rest) -> bool:
+def is_stable(one: EquilibriumPose) -> bool:
     """Whether a small push is forgiven."""
     return one.stability == Stability.STABLE
 
@@ -198,7 +198,7 @@ def _points(platform: HangingPlatform, body: Body, lengths: Array) -> list[TautR
 
 def _kept(
     platform: HangingPlatform, lengths: Array, taut: list[int], found: list[TautRest]
-) -> Iterator[Rest]:
+) -> Iterator[EquilibriumPose]:
     """Those with positive tensions and no cable too short, judged and with their certificate."""
     weight = float(np.linalg.norm(platform.load()))
     others = np.setdiff1d(np.arange(len(lengths)), taut)
@@ -218,7 +218,7 @@ def _kept(
         if platform.unbalanced(one.X_WP, tensions) > BALANCED * weight * (1.0 + np.sum(shares)):
             continue
         certificate, radius = certified(platform, one, lengths - paths, others)
-        yield judged_rest(
+        yield make_equilibrium_pose(
             platform, lengths, one.X_WP, tensions, family=one.family, certificate=certificate,
             radius=radius,
         )  # fmt: skip
@@ -248,9 +248,9 @@ def _proof(one: TautRest) -> ProvenBox | None:
     return prove_rest(constants, x, KINDS[name].rows(), KINDS[name].columns())
 
 
-def _distinct(rests: list[Rest]) -> list[Rest]:
+def _distinct(rests: list[EquilibriumPose]) -> list[EquilibriumPose]:
     """One of each: the same pose may be held by several sets of just taut cables."""
-    kept: list[Rest] = []
+    kept: list[EquilibriumPose] = []
     for one in rests:
         for other in kept:
             distance, angle = pose_error(one.X_WP, other.X_WP)
@@ -264,7 +264,7 @@ def _distinct(rests: list[Rest]) -> list[Rest]:
     return kept
 
 
-def _same_family(one: Rest, other: Rest) -> bool:
+def _same_family(one: EquilibriumPose, other: EquilibriumPose) -> bool:
     """Whether poses of families are the same but for the turn."""
     alike = np.max(np.abs(one.tensions - other.tensions)) < 1e-6 * np.max(one.tensions)
     return bool(alike and abs(one.energy - other.energy) < 1e-9 * (1.0 + abs(one.energy)))

@@ -21,15 +21,15 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CableGeometryError, EquilibriumError
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.poses import pose_error, rotation_from_vector
-from cdpr_drake.statics.equilibrium import anchor_arm, judge_equilibrium
+from cdpr_drake.statics.equilibrium import anchor_arm, classify_equilibrium
 from cdpr_drake.statics.equilibrium_enumeration import SAME_PLACE, TENSE, checked_lengths
 from cdpr_drake.statics.inextensible_equilibrium import tension_stiffness
 from cdpr_drake.statics.inextensible_problem import (
     JUST_TAUT,
     Certificate,
+    EquilibriumPose,
     HangingPlatform,
-    Rest,
-    judged_rest,
+    make_equilibrium_pose,
 )
 
 COVERED = 0.995
@@ -52,7 +52,7 @@ BALANCED = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
-class SampledRests:
+class SampledEquilibria:
     """Poses of rest that searches found, the lowest energy first, and what may be missing.
 
     Attributes:
@@ -64,7 +64,7 @@ class SampledRests:
         stopped: Whether the stopping rule ended the search, not the number of searches.
     """
 
-    rests: list[Rest]
+    rests: list[EquilibriumPose]
     searches: int
     ended: int
     expected: float
@@ -72,7 +72,7 @@ class SampledRests:
     stopped: bool
 
 
-def sampled_rests(
+def sample_equilibria(
     platform: HangingPlatform,
     l0: Array,
     *,
@@ -81,7 +81,7 @@ def sampled_rests(
     seed: int = 0,
     starts: list[RigidTransform] | None = None,
     report: Callable[[int, int], object] | None = None,
-) -> SampledRests:
+) -> SampledEquilibria:
     """Poses of rest on straight elastic cables, over pulleys where they have some.
 
     Args:
@@ -97,7 +97,7 @@ def sampled_rests(
         EquilibriumError: Numbers that are not accepted, or no search found a pose of rest.
     """
     l0, random = checked_lengths(platform, l0), np.random.default_rng(seed)
-    found, ended = list[Rest](), 0
+    found, ended = list[EquilibriumPose](), 0
     give = 1.0 / platform.cables.stiffness * elastic
     for start in starts or []:
         reached = cable_paths(start, platform.cables).lengths >= l0 - JUST_TAUT
@@ -129,14 +129,14 @@ def sampled_rests(
             f"equilibria: none found in {searches} searches; accepted: lengths that some pose has"
         )
     ordered = sorted(found, key=lambda one: one.energy)
-    return SampledRests(ordered, searches, ended, float(expected), float(covered), stopped)
+    return SampledEquilibria(ordered, searches, ended, float(expected), float(covered), stopped)
 
 
-def _known(one: Rest, found: list[Rest]) -> bool:
+def _known(one: EquilibriumPose, found: list[EquilibriumPose]) -> bool:
     return any(_same(one, other) for other in found)
 
 
-def _same(one: Rest, other: Rest) -> bool:
+def _same(one: EquilibriumPose, other: EquilibriumPose) -> bool:
     distance, angle = pose_error(one.X_WP, other.X_WP)
     if distance < SAME_PLACE and angle < SAME_PLACE:
         return True
@@ -181,7 +181,7 @@ def _search(
     start: RigidTransform,
     taut: np.ndarray,
     compliance: Array,
-) -> Rest | None:
+) -> EquilibriumPose | None:
     """A search from a pose with some cables taut; others take over where tensions or paths say so.
 
     None where it does not end at a pose of rest.
@@ -272,9 +272,9 @@ def _solve(
 
 def _rest(
     platform: HangingPlatform, X_WP: RigidTransform, tensions: Array, surplus: Array, give: Array
-) -> Rest:
+) -> EquilibriumPose:
     if not np.any(give):
-        rest = judged_rest(
+        rest = make_equilibrium_pose(
             platform, surplus + cable_paths(X_WP, platform.cables).lengths, X_WP, tensions,
             family=False, certificate=Certificate.NUMERICAL, radius=None,
         )  # fmt: skip
@@ -292,9 +292,9 @@ def _rest(
     tangent = np.asarray(np.linalg.eigvalsh(H), float)
     # Turns that move nothing have stiffnesses of rounding errors of the tensions alone.
     tangent[np.abs(tangent) < 1e-12 * float(np.max(np.abs(H)))] = 0.0
-    return Rest(
+    return EquilibriumPose(
         X_WP=X_WP, tensions=tensions, slack=~taut,
         energy=platform.energy(X_WP) + 0.5 * float(np.sum(stretched * tensions[taut])),
         unbalanced=platform.unbalanced(X_WP, tensions), stiffnesses=tangent,
-        stability=judge_equilibrium(tangent), family=bool(np.any(tangent == 0.0)),
+        stability=classify_equilibrium(tangent), family=bool(np.any(tangent == 0.0)),
     )  # fmt: skip

@@ -13,7 +13,7 @@ from cdpr_drake.errors import EquilibriumError
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.geometry.poses import cross_matrix
-from cdpr_drake.statics.equilibrium import Stability, anchor_arm, judge_equilibrium
+from cdpr_drake.statics.equilibrium import Stability, anchor_arm, classify_equilibrium
 from cdpr_drake.statics.inextensible_equilibrium import tension_stiffness
 
 JUST_TAUT = 1e-7
@@ -139,7 +139,7 @@ class Certificate(StrEnum):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Rest:
+class EquilibriumPose:
     """A platform at rest on cables.
 
     Attributes:
@@ -168,7 +168,7 @@ class Rest:
     radius: float | None = None
 
 
-def judged_rest(
+def make_equilibrium_pose(
     platform: HangingPlatform,
     lengths: Array,
     X_WP: RigidTransform,
@@ -177,7 +177,7 @@ def judged_rest(
     family: bool,
     certificate: Certificate,
     radius: float | None,
-) -> Rest:
+) -> EquilibriumPose:
     """A pose of rest on inextensible cables, judged by the Hessian of the potential energy.
 
     The Hessian is that of the Lagrangian along the motions that tense cables leave to first order.
@@ -196,9 +196,9 @@ def judged_rest(
     # A turn that moves nothing has a stiffness of rounding errors, whatever the others have.
     size = float(np.max(np.abs(K))) + float(np.linalg.norm(platform.weight_W)) / arm
     free[np.abs(free) < 1e-9 * size] = 0.0
-    return Rest(
+    return EquilibriumPose(
         X_WP=X_WP, tensions=tensions, slack=lengths - paths.lengths > JUST_TAUT,
         energy=platform.energy(X_WP), unbalanced=platform.unbalanced(X_WP, tensions),
         stiffnesses=np.concatenate([free, np.full(rank, np.inf)]),
-        stability=judge_equilibrium(free), family=family, certificate=certificate, radius=radius,
+        stability=classify_equilibrium(free), family=family, certificate=certificate, radius=radius,
     )  # fmt: skip

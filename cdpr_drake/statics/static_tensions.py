@@ -29,7 +29,7 @@ SETTLED_CHANGE = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
-class Holding:
+class StaticTensions:
     """What holds a platform at rest.
 
     Attributes:
@@ -43,14 +43,14 @@ class Holding:
     unstrained_lengths: Array
 
 
-def hold(
+def find_static_tensions(
     cables: CableSet,
     model: str,
     X_WP: RigidTransform,
     wrench: Array,
     bounds: tuple[float, float],
     motion: MotionType = FREE,
-) -> Holding | None:
+) -> StaticTensions | None:
     """Tensions and lengths that hold the platform, or None where there are none.
 
     Of straight cables the tensions do not change their direction; of sagging ones they do, and so
@@ -83,7 +83,7 @@ def hold(
         if tensions is None:
             return None
         stretch = 1.0 + tensions / cables.stiffness if kind.extensible else 1.0
-        return Holding(tensions, tensions, np.asarray(paths.lengths / stretch, float))
+        return StaticTensions(tensions, tensions, np.asarray(paths.lengths / stretch, float))
     if kind.sags:
         lower = np.maximum(lower, LEAST_TENSION_WEIGHTS * cables.linear_weight * paths.lengths)
     arms = (R @ cables.p_PB).T
@@ -95,7 +95,7 @@ def hold(
         l0 = lengths_for_tensions(cables, model, X_WP, tensions)
         state = cable_state(cables, model, X_WP, l0)
         if np.max(np.abs(tensions - before)) <= SETTLED_CHANGE * np.max(tensions):
-            return Holding(state.tensions, state.drum_tensions, l0)
+            return StaticTensions(state.tensions, state.drum_tensions, l0)
         before = tensions
         u = -(state.forces / state.tensions).T
         J = np.hstack([np.cross(arms, u), u])

@@ -13,7 +13,7 @@ from nicegui import ui
 
 from cdpr_drake.palette import COLORS, SLACK
 from cdpr_drake.studio.guard import SESSION
-from cdpr_drake.studio.panels.panel import message, place_remarks, quietly
+from cdpr_drake.studio.panels.panel import message, place_remarks, show_errors
 from cdpr_drake.studio.panels.table import PANELS
 from cdpr_drake.studio.scene_relay import SCENE
 from cdpr_drake.studio.sessions import Sessions
@@ -76,7 +76,7 @@ def _build(bench: Workbench) -> None:
                 lambda event: setattr(bench, "panel", event.value)
             )
             for panel in PANELS.values():
-                with ui.tab_panel(panel.name), quietly():
+                with ui.tab_panel(panel.name), show_errors():
                     place_remarks(bench, panel)
                     panel.build(bench)
 
@@ -95,6 +95,7 @@ body {{ --q-primary: {COLORS[0]} !important; }}
 body.body--dark {{ --q-primary: {COLORS[4]} !important;
   --studio-line: #43484f; --studio-soft: #a9b0b8; --studio-problem: #ff7b72;
   --studio-track: #969ca3; }}
+body.body--dark .bg-primary .q-btn__content {{ color: #101418; }}
 .nicegui-content {{ padding: 0 !important; }}
 .studio-header {{ padding: 0 0.8rem; gap: 0.6rem; align-items: center; flex-wrap: nowrap;
   min-height: 2.8rem; background: #24476b !important; }}

@@ -35,7 +35,7 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.tensions.closed_form_kernel import MISSED
+from cdpr_drake.tensions.closed_form_kernel import NOT_FOUND
 from cdpr_drake.tensions.null_space_kernel import factor
 from cdpr_drake.tensions.problem import RESIDUAL_TOLERANCE, balance
 from cdpr_drake.tensions.quadratic_program_kernel import FEASIBLE, SINGULAR, nearest_tensions_in
@@ -101,7 +101,7 @@ def log_barrier(
     if converged and residual <= RESIDUAL_TOLERANCE:
         return FEASIBLE
     code = nearest_tensions_in(work, W, w, lower, upper, lower, work[-1][:m])
-    return MISSED if code == FEASIBLE else code
+    return NOT_FOUND if code == FEASIBLE else code
 
 
 @njit(cache=True)

@@ -8,8 +8,8 @@ from numba import njit
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import TensionProblemError
 from cdpr_drake.numerics.kernel_calls import over_rows
-from cdpr_drake.tensions.closed_form_kernel import MISSED
-from cdpr_drake.tensions.dispatch_kernel import judged, solve_one
+from cdpr_drake.tensions.closed_form_kernel import NOT_FOUND
+from cdpr_drake.tensions.dispatch_kernel import checked_code, solve_one
 from cdpr_drake.tensions.methods import method_for
 from cdpr_drake.tensions.quadratic_program_kernel import (
     FEASIBLE,
@@ -45,10 +45,10 @@ def _many(
             code = solve_one(
                 kernel, exact, work, W[k], w[k], lower, upper, reference, row_scale, t[k]
             )
-        code = judged(code, relaxes, W[k], w[k], lower, upper, t[k])
-        if code == MISSED:  # or is there nothing to find?
+        code = checked_code(code, relaxes, W[k], w[k], lower, upper, t[k])
+        if code == NOT_FOUND:  # or is there nothing to find?
             proof = nearest_tensions_in(work, W[k], w[k], lower, upper, reference, other)
-            code = MISSED if proof == FEASIBLE else proof
+            code = NOT_FOUND if proof == FEASIBLE else proof
         codes[k] = code
 
 

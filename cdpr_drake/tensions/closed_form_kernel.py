@@ -11,7 +11,7 @@ from cdpr_drake.tensions.null_space_kernel import balance, factor, null_space
 from cdpr_drake.tensions.problem import VERDICT_ROUNDING
 from cdpr_drake.tensions.quadratic_program_kernel import FEASIBLE, SINGULAR
 
-MISSED = 0
+NOT_FOUND = 0
 """Code of a kernel: it found no tensions within the bounds; others may."""
 
 DYKSTRA_ROUNDS = 20_000
@@ -63,7 +63,7 @@ def pseudo_inverse(
     """
     if not toward(W, w, np.zeros(t.shape[0]), t):
         return SINGULAR
-    return FEASIBLE if within(t, lower, upper) else MISSED
+    return FEASIBLE if within(t, lower, upper) else NOT_FOUND
 
 
 @njit(cache=True)
@@ -80,7 +80,7 @@ def closed_form(
     """
     if not toward(W, w, (lower + upper) / 2.0, t):
         return SINGULAR
-    return FEASIBLE if within(t, lower, upper) else MISSED
+    return FEASIBLE if within(t, lower, upper) else NOT_FOUND
 
 
 @njit(cache=True)
@@ -108,7 +108,7 @@ def improved_closed_form(
         for k in range(count):
             middle[k] = (lower[free[k]] + upper[free[k]]) / 2.0
         if not toward(part, left, middle, some):
-            return SINGULAR if count == m else MISSED
+            return SINGULAR if count == m else NOT_FOUND
         worst, out = 0.0, -1
         for k in range(count):
             i = free[k]
@@ -117,9 +117,9 @@ def improved_closed_form(
             if beyond > rounding and beyond > worst:
                 worst, out = beyond, k
         if out < 0:
-            return FEASIBLE if within(t, lower, upper) else MISSED
+            return FEASIBLE if within(t, lower, upper) else NOT_FOUND
         if count == n:
-            return MISSED
+            return NOT_FOUND
         i = free[out]
         t[i] = lower[i] if t[i] < lower[i] else upper[i]
         for j in range(n):
@@ -127,7 +127,7 @@ def improved_closed_form(
         count -= 1
         for k in range(out, count):
             free[k] = free[k + 1]
-    return MISSED
+    return NOT_FOUND
 
 
 @njit(cache=True)
@@ -183,7 +183,7 @@ def kernel_line(
     middle = (least + most) / 2.0
     for i in range(m):
         t[i] += middle * N[0, i]
-    return FEASIBLE if within(t, lower, upper) else MISSED
+    return FEASIBLE if within(t, lower, upper) else NOT_FOUND
 
 
 @njit(cache=True)
@@ -242,4 +242,4 @@ def alternating_projections(
             raw = t[i] + correction[i]
             point[i] = min(max(raw, lower[i]), upper[i])
             correction[i] = raw - point[i]
-    return MISSED
+    return NOT_FOUND

@@ -10,7 +10,7 @@ from cdpr_drake.geometry.motion_kernel import Motion, floating_motion, planar_mo
 from cdpr_drake.geometry.pulley_kernel import pulley_line
 from cdpr_drake.numerics.kernel_calls import array_addresses, integers_at, matrix_at, vector_at
 from cdpr_drake.tensions.closed_form_kernel import within
-from cdpr_drake.tensions.dispatch_kernel import judged, solve_one
+from cdpr_drake.tensions.dispatch_kernel import checked_code, solve_one
 from cdpr_drake.tensions.quadratic_program_kernel import FEASIBLE, SINGULAR
 
 
@@ -82,7 +82,7 @@ def update_tensions(
         feasible: Becomes 1 or 0, shape (1,).
 
     Returns:
-        As `judged`.
+        As `checked_code`.
     """
     wrench_matrix_at(state, cables, height, W)
     n = W.shape[0]
@@ -91,7 +91,7 @@ def update_tensions(
         w[i] = -desired[i + 2] if n == 3 else -desired[i]
     kernel, exact, relaxes = method
     code = solve_one(kernel, exact, work, W, w, bounds[0], bounds[1], bounds[2], row_scale, t)
-    code = judged(code, relaxes, W, w, bounds[0], bounds[1], t)
+    code = checked_code(code, relaxes, W, w, bounds[0], bounds[1], t)
     feasible[0] = 1.0 if code == FEASIBLE else 0.0
     answered = relaxes and code != SINGULAR and within(t, bounds[0], bounds[1])
     if code == FEASIBLE or answered:

@@ -11,8 +11,8 @@ from numba.extending import intrinsic
 from cdpr_drake.arrays import Array
 from cdpr_drake.numerics.kernel_calls import call_at_address
 from cdpr_drake.numerics.kernel_calls import kernel_address as address
-from cdpr_drake.tensions.closed_form_kernel import MISSED
-from cdpr_drake.tensions.problem import RESIDUAL_TOLERANCE, balance, judge_into
+from cdpr_drake.tensions.closed_form_kernel import NOT_FOUND
+from cdpr_drake.tensions.problem import RESIDUAL_TOLERANCE, balance, check_into
 from cdpr_drake.tensions.quadratic_program_kernel import (
     FEASIBLE,
     INFEASIBLE,
@@ -21,7 +21,7 @@ from cdpr_drake.tensions.quadratic_program_kernel import (
 )
 
 NOT_FINITE = -3
-"""Code of `solve_and_judge`: a wrench matrix or a wrench with NaN or infinity."""
+"""Code of `solve_and_check`: a wrench matrix or a wrench with NaN or infinity."""
 
 _MATRIX, _VECTOR = types.float64[:, ::1], types.float64[::1]
 _SIGNATURE = types.int64(_MATRIX, _MATRIX, *[_VECTOR] * 6)
@@ -52,7 +52,7 @@ def finish(
     From what the kernel returned and whether its method is exact to what `solve_one` returns; all
     other arguments as `TensionMethod.kernel`.
     """
-    if exact and code == MISSED:
+    if exact and code == NOT_FOUND:
         code = nearest_tensions_in(work, W, w, lower, upper, reference, t)
     elif code == FEASIBLE:  # by rounding at most out of bounds
         for i in range(t.shape[0]):
@@ -75,17 +75,17 @@ def solve_one(
         feasible are what the method came to (0), those of least slack (-1, methods that relax), or
         without meaning.
     """
-    code = MISSED
+    code = NOT_FOUND
     if kernel != 0:
         code = _call(kernel, work, W, w, lower, upper, reference, row_scale, t)
     return finish(code, exact, work, W, w, lower, upper, reference, t)
 
 
 @njit(cache=True)
-def judged(
+def checked_code(
     code: int, relaxes: bool, W: Array, w: Array, lower: Array, upper: Array, t: Array
 ) -> int:
-    """The verdict on a code's tensions, by looking at them as `problem.judge_tensions` does.
+    """The verdict on a code's tensions, by looking at them as `problem.check_tensions` does.
 
     Args:
         code: What `solve_one` returned.
@@ -104,11 +104,11 @@ def judged(
     inside, residual = balance(W, w, lower, upper, t)
     if inside and residual <= RESIDUAL_TOLERANCE:
         return FEASIBLE
-    return code if code == INFEASIBLE else MISSED
+    return code if code == INFEASIBLE else NOT_FOUND
 
 
 @njit(cache=True)
-def solve_and_judge(
+def solve_and_check(
     method: tuple[int, bool, bool], work: Array, W: Array, w: Array, lower: Array, upper: Array,
     reference: Array, row_scale: Array, t: Array, active: np.ndarray, slack: Array,
 ) -> tuple[int, float]:  # fmt: skip
@@ -124,8 +124,8 @@ def solve_and_judge(
         reference: See work.
         row_scale: See work.
         t: See work.
-        active: As `judge_into`.
-        slack: As `judge_into`.
+        active: As `check_into`.
+        slack: As `check_into`.
 
     Returns:
         1 feasible, 0 missed although there are some, -1 infeasible, -2 singular W, `NOT_FINITE`;
@@ -144,14 +144,14 @@ def solve_and_judge(
     if code < INFEASIBLE or (code == INFEASIBLE and not relaxes):
         return code, np.nan
     exists = code != INFEASIBLE
-    inside, residual = judge_into(W, w, lower, upper, t, active, slack)
+    inside, residual = check_into(W, w, lower, upper, t, active, slack)
     if inside and residual <= RESIDUAL_TOLERANCE:
         return FEASIBLE, residual
     if not exists:
         return INFEASIBLE, residual
     zero, other = np.zeros(m), np.empty(m)
     return (
-        MISSED
+        NOT_FOUND
         if nearest_tensions_in(work, W, w, lower, upper, zero, other) == FEASIBLE
         else INFEASIBLE
     ), residual

@@ -12,7 +12,7 @@ from cdpr_drake.errors import TensionProblemError
 from cdpr_drake.tensions import objectives
 from cdpr_drake.tensions.barrier_kernel import log_barrier
 from cdpr_drake.tensions.closed_form_kernel import (
-    MISSED,
+    NOT_FOUND,
     closed_form,
     dykstra,
     improved_closed_form,
@@ -20,7 +20,7 @@ from cdpr_drake.tensions.closed_form_kernel import (
     pseudo_inverse,
     puncture,
 )
-from cdpr_drake.tensions.dispatch_kernel import NOT_FINITE, kernel_address, solve_and_judge
+from cdpr_drake.tensions.dispatch_kernel import NOT_FINITE, kernel_address, solve_and_check
 from cdpr_drake.tensions.linear_goals_kernel import infinity_norm, linear_program, optimally_safe
 from cdpr_drake.tensions.null_space_kernel import null_space
 from cdpr_drake.tensions.objectives import Addition
@@ -34,7 +34,7 @@ from cdpr_drake.tensions.problem import (
     TensionProblem,
     TensionSolution,
     TensionStatus,
-    judge_in_place,
+    check_in_place,
     refuse,
 )
 from cdpr_drake.tensions.quadratic_program_kernel import (
@@ -197,8 +197,8 @@ def distribute(problem: TensionProblem, method: str = "quadratic_program") -> Te
     given = work, problem.W, problem.wrench, problem.lower, problem.upper, wanted
     kernel, exact = chosen.solver(m - n)
     # Step by step as in `finish`: one call of all would wait until the exact program is compiled.
-    code = MISSED if kernel is None else kernel(*given, problem.scale_of_rows, t)
-    if exact and code == MISSED:
+    code = NOT_FOUND if kernel is None else kernel(*given, problem.scale_of_rows, t)
+    if exact and code == NOT_FOUND:
         code = nearest_tensions_in(*given, t)
     elif code == FEASIBLE:  # by rounding at most out of bounds
         np.minimum(np.maximum(t, problem.lower, out=t), problem.upper, out=t)
@@ -207,8 +207,8 @@ def distribute(problem: TensionProblem, method: str = "quadratic_program") -> Te
     relaxed = code == INFEASIBLE and chosen.relaxes
     if code == INFEASIBLE and not relaxed:
         return refuse(problem, method)
-    solution = judge_in_place(problem, method, t, exists=not relaxed)
-    if solution.status != TensionStatus.MISSED:
+    solution = check_in_place(problem, method, t, exists=not relaxed)
+    if solution.status != TensionStatus.NOT_FOUND:
         return solution
     return solution if exact_tensions(problem) is not None else refuse(problem, method)
 
@@ -275,7 +275,7 @@ class Distributor:
                 )
         t, slack = np.empty(self._count), np.empty(self._size)
         active = np.empty(self._count, np.int64)
-        code, residual = solve_and_judge(
+        code, residual = solve_and_check(
             self._compiled, np.empty(self._work_shape), W, wrench, lower, upper, wanted,
             row_scale, t, active, slack,
         )  # fmt: skip
@@ -289,7 +289,7 @@ class Distributor:
             raise TensionProblemError(_SINGULAR_TO_ROUNDING)
         if code == INFEASIBLE and not self._relaxes:
             return refuse(self._problem, self._method)
-        status = TensionStatus.MISSED if code == MISSED else TensionStatus.INFEASIBLE
+        status = TensionStatus.NOT_FOUND if code == NOT_FOUND else TensionStatus.INFEASIBLE
         return TensionSolution(self._method, status, t, residual, active, slack)
 
 

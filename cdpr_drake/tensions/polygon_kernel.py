@@ -7,7 +7,7 @@ from numba import njit
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.numerics.kernel_calls import as_number
-from cdpr_drake.tensions.closed_form_kernel import MISSED, kernel_line, within
+from cdpr_drake.tensions.closed_form_kernel import NOT_FOUND, kernel_line, within
 from cdpr_drake.tensions.null_space_kernel import null_space
 from cdpr_drake.tensions.quadratic_program_kernel import FEASIBLE, SINGULAR
 
@@ -28,7 +28,7 @@ def polygon_point(point: int, W: Array, w: Array, lower: Array, upper: Array, t:
         t: Gets the tensions, shape (m,) [N].
 
     Returns:
-        FEASIBLE, SINGULAR, or MISSED where there is no polygon, or rounding lost it.
+        FEASIBLE, SINGULAR, or NOT_FOUND where there is no polygon, or rounding lost it.
 
     Source: servoing thesis 1.3.4 for the barycenter.
     """
@@ -56,7 +56,7 @@ def polygon_point(point: int, W: Array, w: Array, lower: Array, upper: Array, t:
             t[i] += N[0, i] * eta[0] + N[1, i] * eta[1]
         if within(t, lower, upper):
             return FEASIBLE
-    return MISSED
+    return NOT_FOUND
 
 
 EDGE_ROUNDING = 1e-13

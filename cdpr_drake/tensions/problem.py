@@ -33,12 +33,12 @@ class TensionStatus(StrEnum):
     """The verdict on tensions.
 
     FEASIBLE: they balance the wrench within the bounds. INFEASIBLE: no tensions do; a proof.
-    MISSED: the method found none although there are some.
+    NOT_FOUND: the method found none although there are some.
     """
 
     FEASIBLE = "feasible"
     INFEASIBLE = "infeasible"
-    MISSED = "missed"
+    NOT_FOUND = "missed"
 
 
 @dataclass(frozen=True)
@@ -142,7 +142,7 @@ class TensionSolution(Summarized):
     Attributes:
         method: Name of the method.
         status: The verdict.
-        tensions: Shape (m,) [N]. FEASIBLE: the answer. MISSED: what the method came to, outside
+        tensions: Shape (m,) [N]. FEASIBLE: the answer. NOT_FOUND: what the method came to, outside
             the bounds or off balance. INFEASIBLE: NaN, except for a method that relaxes.
         residual: |W t + w| relative to the forces at work; NaN where there are no tensions.
         active: -1 where a tension is on its lower bound, 1 on its upper, else 0, shape (m,).
@@ -213,7 +213,7 @@ def balance(W: Array, w: Array, lower: Array, upper: Array, t: Array) -> tuple[b
 
 
 @njit(cache=True)
-def judge_into(
+def check_into(
     W: Array, w: Array, lower: Array, upper: Array, t: Array, active: np.ndarray, slack: Array
 ) -> tuple[bool, float]:
     """As `balance`; also writes what `TensionSolution` says of `active` and `slack`."""
@@ -236,7 +236,7 @@ def judge_into(
     return inside, residual
 
 
-def judge_tensions(
+def check_tensions(
     problem: TensionProblem, method: str, tensions: Array, exists: bool
 ) -> TensionSolution:
     """The solution that tensions make, by looking at them and not at what a method believes.
@@ -247,22 +247,22 @@ def judge_tensions(
         tensions: Its result, shape (m,) [N].
         exists: Whether feasible tensions are known to exist; only asked when these are not.
     """
-    return judge_in_place(problem, method, np.array(tensions, float), exists)
+    return check_in_place(problem, method, np.array(tensions, float), exists)
 
 
-def judge_in_place(
+def check_in_place(
     problem: TensionProblem, method: str, tensions: Array, exists: bool
 ) -> TensionSolution:
-    """As `judge_tensions`, with tensions that the solution may keep and clip."""
+    """As `check_tensions`, with tensions that the solution may keep and clip."""
     W = problem.W
     active, slack = np.empty(W.shape[1], np.int64), np.empty(W.shape[0])
-    inside, residual = judge_into(
+    inside, residual = check_into(
         W, problem.wrench, problem.lower, problem.upper, tensions, active, slack
     )
     if inside and residual <= RESIDUAL_TOLERANCE:
         status = TensionStatus.FEASIBLE
     else:
-        status = TensionStatus.MISSED if exists else TensionStatus.INFEASIBLE
+        status = TensionStatus.NOT_FOUND if exists else TensionStatus.INFEASIBLE
     return TensionSolution(method, status, tensions, residual, active, slack)
 
 

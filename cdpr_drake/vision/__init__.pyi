@@ -1,4 +1,4 @@
-from .cable_images import seen_slack as seen_slack
+from .cable_images import slack_from_image as slack_from_image
 from .pinhole import Pinhole as Pinhole
 from .target import PointTarget as PointTarget
 from .target import Target as Target

@@ -1,8 +1,9 @@
 """Images of cables, and the surplus lengths that are read from them.
 
 `cable_images` gives points of the cables' curves as a camera E in the world sees them.
-`seen_slack` reads surplus lengths from such an image, and `slack_rates` says how fast to wind them
-in. Below both is the inextensible catenary by its length, and its length by how far it hangs down.
+`slack_from_image` reads surplus lengths from such an image, and `slack_rates` says how fast to wind
+them in. Below both is the inextensible catenary by its length, and its length by how far it hangs
+down.
 
 Source: servoing thesis, perspectives; Irvine, Cable Structures, 1981, 1.1 and 2.1.
 """
@@ -89,7 +90,7 @@ def even_points(curve: Array, count: int) -> Array:
 
 
 @dataclass(frozen=True)
-class SeenSlack:
+class ImageSlack:
     """Surplus lengths as they are seen.
 
     Attributes:
@@ -101,14 +102,14 @@ class SeenSlack:
     deviation: Array
 
 
-def seen_slack(
+def slack_from_image(
     pixels: Array,
     cables: CableSet,
     X_WP: RigidTransform,
     X_WE: RigidTransform,
     pinhole: Pinhole,
     noise: float,
-) -> SeenSlack:
+) -> ImageSlack:
     """Surplus lengths of cables from an image.
 
     A line of sight meets the vertical plane through the ends of its cable in a point; the catenary
@@ -153,7 +154,7 @@ def seen_slack(
         surplus[k], by_drop = surplus_of_drops(x, rise[2] * x / span - z, span, float(rise[2]))
         across = noise / focal * depths[inside] / np.abs(sines[good][inside])
         deviation[k] = float(np.linalg.norm(by_drop * across))
-    return SeenSlack(surplus, deviation)
+    return ImageSlack(surplus, deviation)
 
 
 def slack_rates(

@@ -27,7 +27,7 @@ from cdpr_drake.tensions.slack_correction import (
     polygon_target,
     tension_correction,
 )
-from cdpr_drake.vision.cable_images import seen_slack, slack_rates
+from cdpr_drake.vision.cable_images import slack_from_image, slack_rates
 from cdpr_drake.vision.pinhole import Pinhole
 
 
@@ -101,7 +101,7 @@ class ConstantThreshold:
 
 
 @dataclass(frozen=True, eq=False)
-class AdaptiveGain:
+class AdaptiveCorrection:
     """(5.4): a gain that grows with the surplus over the believed cables, `gain` [1/(N s)]."""
 
     threshold: Array
@@ -267,7 +267,7 @@ class ExpectedLength:
 
 
 @dataclass(frozen=True, eq=False)
-class SeenSlackRate:
+class ImageSlackRate:
     """As `ConstantThreshold`, and as fast as what is seen to hang through needs.
 
     Attributes:
@@ -294,7 +294,7 @@ class SeenSlackRate:
         alone = tension_correction(readings.tensions, self.threshold, self.gain)
         pixels = readings.cable_points.reshape(self.cables.count, 2, -1)
         try:
-            seen = seen_slack(pixels, self.cables, readings.X_WP, *self.camera).surplus
+            seen = slack_from_image(pixels, self.cables, readings.X_WP, *self.camera).surplus
         except CableGeometryError:
             return alone, self.threshold, False
         found = slack_rates(

@@ -10,7 +10,7 @@ from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.sensor_catalogue import DepthSensorModel, load_depth_sensor
 from cdpr_drake.servoing.servo_task import BelievedRobot
 from cdpr_drake.systems.estimators.estimator_kinds import SENSOR_FUSION
-from cdpr_drake.systems.estimators.fusion_task import Eye, FusionTask
+from cdpr_drake.systems.estimators.fusion_task import CameraModel, FusionTask
 from cdpr_drake.systems.estimators.length_estimator import EncoderLengths
 from cdpr_drake.systems.scenarios.visual_servo_scenario import VisualServoSettings
 from cdpr_drake.vision.pinhole import Pinhole
@@ -53,7 +53,7 @@ def fusion_task(
     on_board = external = None
     if tuning.on_board or steers(settings):
         assert isinstance(target, PointTarget)  # the settings were checked
-        on_board = Eye(
+        on_board = CameraModel(
             points=target.points,
             pinhole=pinhole,
             rate=camera.rate,
@@ -67,7 +67,7 @@ def fusion_task(
         mount = robot.camera_mount(tag.mount)
         rate = camera.rate if tag.rate is None else tag.rate
         frames = camera.latency_frames if tag.latency_frames is None else tag.latency_frames
-        external = Eye(
+        external = CameraModel(
             points=tag.target().points,
             pinhole=load_camera(mount.model).pinhole(camera.width, camera.height),
             rate=rate,

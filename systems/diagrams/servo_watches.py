@@ -22,7 +22,7 @@ from cdpr_drake.systems.monitoring.stability_watch import (
 )
 from cdpr_drake.systems.monitoring.tension_watch import BreakingLoadWatch, TensionRange
 from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
-from cdpr_drake.systems.sensors.perception_sensors import LookingSensors
+from cdpr_drake.systems.sensors.perception_sensors import PerceptionSensors
 from cdpr_drake.systems.sensors.sensor_kinds import SENSORS
 from cdpr_drake.systems.worlds.adding import (
     CONTACT_RESULTS,
@@ -202,7 +202,7 @@ def add_servo_log(
     scenario: Scenario,
     blocks: VisualServoBlocks,
     stability: StabilityWatch | None,
-    looking: LookingSensors,
+    looking: PerceptionSensors,
     meters: WorldMeters | None,
 ) -> RunLog:
     """Logs what the summary, the figures and the replay need."""

@@ -6,8 +6,8 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.dynamics.reach_kernel import robot_addresses
-from cdpr_drake.dynamics.robot_kernel import GOOD
+from cdpr_drake.dynamics.advance_events_kernel import robot_addresses
+from cdpr_drake.dynamics.robot_kernel import INTEGRATION_OK
 from cdpr_drake.dynamics.tracking_kernel import TIME, start_tracking, track
 from cdpr_drake.errors import CdprError
 from cdpr_drake.geometry.poses import pose_error
@@ -127,7 +127,7 @@ class TensionLoop(TensionRows):
         )
         if written:
             self.store(rows[:written].copy())
-        if bad != GOOD:
+        if bad != INTEGRATION_OK:
             raise motion_problem(
                 self.control.robot,
                 self.control.cables,

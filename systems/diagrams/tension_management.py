@@ -17,14 +17,14 @@ from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.servoing.servo_task import BelievedRobot
 from cdpr_drake.systems.cameras.cable_camera import CableCamera
 from cdpr_drake.systems.controllers.correction_laws import (
-    AdaptiveGain,
+    AdaptiveCorrection,
     ConstantThreshold,
     CorrectionLaw,
     ExpectedLength,
     FollowedDistribution,
+    ImageSlackRate,
     InsidePolygon,
     LengthThreshold,
-    SeenSlackRate,
 )
 from cdpr_drake.systems.controllers.tension_corrector import TensionCorrector
 from cdpr_drake.systems.controllers.tension_management_settings import (
@@ -156,7 +156,7 @@ def correction_law(
     if settings.kind == CONSTANT:
         return ConstantThreshold(threshold, gain)
     if settings.kind == ADAPTIVE:
-        return AdaptiveGain(threshold, settings.gain_per_length, cables)
+        return AdaptiveCorrection(threshold, settings.gain_per_length, cables)
     if settings.kind == BY_LENGTH:
         assert settings.highest is not None
         assert settings.shortest is not None
@@ -181,7 +181,7 @@ def correction_law(
         )  # fmt: skip
     if settings.kind == IMAGE:
         mount = robot.camera_mount(settings.sight_mount)
-        return SeenSlackRate(
+        return ImageSlackRate(
             threshold, gain, cables,
             (mount.pose.transform(), _sight(robot, settings), settings.sight_noise),
             settings.allowance, settings.closing_time, settings.fastest or fastest,

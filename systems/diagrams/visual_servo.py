@@ -35,7 +35,7 @@ from cdpr_drake.systems.robots.compiled_step import StepRule
 from cdpr_drake.systems.robots.settings import COMPILED
 from cdpr_drake.systems.scenarios.files import VISUAL_SERVO
 from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
-from cdpr_drake.systems.sensors.perception_sensors import LookingSensors, add_looking_sensors
+from cdpr_drake.systems.sensors.perception_sensors import PerceptionSensors, add_perception_sensors
 from cdpr_drake.systems.worlds.adding import WorldInScene, WorldMeters
 from cdpr_drake.systems.worlds.contact import contact_law, contact_step
 
@@ -79,7 +79,7 @@ class VisualServo(VisualServoBlocks):
     monitor: RunMonitor
     log: RunLog
     max_step: float
-    looking: LookingSensors
+    looking: PerceptionSensors
     watch: BreakingLoadWatch | None = None
     tension_range: TensionRange | None = None
     world: WorldInScene | None = None
@@ -134,7 +134,7 @@ class VisualServo(VisualServoBlocks):
         own = block.GetMyMutableContextFromRoot(context)
         wrong = self.scenario.perturbations
         X_WP = self.scenario.initial_pose.transform()
-        block.hang(own, X_WP, wrong.slack, wrong.slack_at_rest)
+        block.set_at_equilibrium(own, X_WP, wrong.slack, wrong.slack_at_rest)
         self.take_lengths(context, block.GetOutputPort("unstrained_lengths").Eval(own))
         if self.world is not None:
             self.world.start(context, block.in_plant)
@@ -171,7 +171,7 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
         stability = add_stability_watch(
             builder, blocks, scenario.stability, pulleys=scenario.controller.pulleys
         )
-    looking = add_looking_sensors(
+    looking = add_perception_sensors(
         builder, block, scenario.sensors, seed=scenario.seed, motion=blocks.motion
     )
     log = add_servo_log(builder, scenario, blocks, stability, looking, watches.meters)

@@ -25,7 +25,7 @@ from cdpr_drake.systems.estimators.image_estimators import (
     ConsecutiveImages,
     FirstImage,
     KnownObject,
-    SeenPlatform,
+    PlatformTagEstimator,
 )
 from cdpr_drake.systems.estimators.length_estimator import EncoderLengths, LengthEstimator
 from cdpr_drake.systems.estimators.pose_estimator import KnownTag
@@ -129,7 +129,7 @@ def _known_tag(task: EstimatorTask) -> System:
 
 def _eye_to_hand(task: EstimatorTask) -> System:
     assert task.platform_tag is not None  # the settings were checked
-    return SeenPlatform(task.robot.X_WP0, *task.platform_tag, task.rate)
+    return PlatformTagEstimator(task.robot.X_WP0, *task.platform_tag, task.rate)
 
 
 def _measured(task: EstimatorTask) -> System:

@@ -23,7 +23,7 @@ SUREST_DEPTH = 1e-5
 
 
 @dataclass(frozen=True, kw_only=True)
-class Eye:
+class CameraModel:
     """A camera as the filter knows it.
 
     Attributes:
@@ -90,8 +90,8 @@ class FusionTask:
     counted: EncoderLengths
     tuning: SensorFusionSettings
     rate: float
-    on_board: Eye | None = None
-    external: Eye | None = None
+    on_board: CameraModel | None = None
+    external: CameraModel | None = None
     X_WE: RigidTransform | None = None
     X_PQ: RigidTransform | None = None
     X_WO: RigidTransform | None = None

@@ -160,7 +160,7 @@ class KnownObject(PoseEstimator):
         return X_WP, extra
 
 
-class SeenPlatform(PoseEstimator):
+class PlatformTagEstimator(PoseEstimator):
     """The pose from a camera in the world that sees a tag on the platform; else the last one.
 
     ================== ============== ==== ==================================================

@@ -11,7 +11,12 @@ from pydrake.math import RigidTransform
 from pydrake.systems.framework import BasicVector, Context
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.estimation.camera_miscalibration import Answer, answers, judged, mixed
+from cdpr_drake.estimation.camera_miscalibration import (
+    Answer,
+    answers,
+    calibration_verdicts,
+    mixture,
+)
 from cdpr_drake.estimation.pose_filter import image_covariance
 from cdpr_drake.estimation.sensor_filter import (
     COUNTED,
@@ -94,8 +99,8 @@ class SensorFusion(PoseEstimator):
     fusion_nis             vector(5)      -        out, normalized innovation squared then,
                                                    over its degrees of freedom; NaN: nothing new
     fusion_covariance      vector(36)     rad, m   out, of the pose's error, a twist of P in P
-    fusion_calibration     vector(30)     -, rad,  out, `Judged.row` of the camera on board, then
-                                          m        of that in the world
+    fusion_calibration     vector(30)     -, rad,  out, `CalibrationVerdict.row` of the camera on
+                                          m        board, then of that in the world
     ====================== ============== ======== ===========================================
 
     An image counts once, at the pose of the time at which it was taken. What is less likely than
@@ -201,7 +206,7 @@ class SensorFusion(PoseEstimator):
         """What the filter believes after its last step, from this system's own context."""
         _, extra = self.memory(context)
         parts = self._split(extra)
-        return mixed(self._answers(self._belief(parts), parts))
+        return mixture(self._answers(self._belief(parts), parts))
 
     def between(self, read: Read, X_WP: RigidTransform, elapsed: float) -> RigidTransform:
         """Moves on with the velocity that holds."""
@@ -229,7 +234,7 @@ class SensorFusion(PoseEstimator):
         if task.tuning.lengths:
             belief = self._count(read, belief, parts, elapsed)
         found = self._answers(belief, parts)
-        whole = mixed(found)
+        whole = mixture(found)
         parts["covariance_mixed"][:] = whole.pose_covariance.ravel()
         if whole.X_WO is not None:
             X_CO = (whole.X_WP @ whole.X_PC).inverse() @ whole.X_WO
@@ -246,7 +251,7 @@ class SensorFusion(PoseEstimator):
 
     def _judged_rows(self, found: list[Answer], parts: dict[str, Array]) -> Array:
         """What is found of both calibrations, NaN of a camera that is not read, shape (2, 15)."""
-        rows = np.array([one.row() for one in judged(found, self._cameras)])
+        rows = np.array([one.row() for one in calibration_verdicts(found, self._cameras)])
         if parts["settled"][0] != 0.0:
             rows[:, 0] = parts["wrong"]
         for row, eye in zip(rows, (self._task.on_board, self._task.external), strict=True):
@@ -325,9 +330,13 @@ class SensorFusion(PoseEstimator):
         if taken.anew:
             # What was told of it is forgotten, so nothing can be weighed by that any longer.
             found = self._answers(belief, parts)
-            taken = take_image(mixed(found), sight_of, read_image, calibration, self._gates, since)
+            taken = take_image(
+                mixture(found), sight_of, read_image, calibration, self._gates, since
+            )
             if parts["settled"][0] == 0.0:
-                parts["wrong"][:] = [one.probability for one in judged(found, self._cameras)]
+                parts["wrong"][:] = [
+                    one.probability for one in calibration_verdicts(found, self._cameras)
+                ]
             parts["settled"][:], parts["wrong"][place] = 1.0, 1.0
         state[_REFUSED] = taken.refused_since
         parts["sources"][place], parts["nis"][place] = taken.status, taken.nis

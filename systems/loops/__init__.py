@@ -2,8 +2,8 @@
 
 `ServoLoop` calls what the blocks of a diagram call, the kernels of the robot and the methods of
 camera, servo, estimators, sensors, monitor and tension corrector that know no context, at the times
-and in the order of Drake's Simulator. `why_diagram` says which scenarios it cannot do, `with_loop`
-chooses. `MotorTracking` tracks a trajectory by motors, and
+and in the order of Drake's Simulator. `diagram_reason` says which scenarios it cannot do,
+`set_loop` chooses. `MotorTracking` tracks a trajectory by motors, and
 `RemoteTensionLoop` steps dynamic control that a process outside closes.
 """
 

@@ -1,3 +1,3 @@
-from .loop_choice import why_diagram as why_diagram
+from .loop_choice import diagram_reason as diagram_reason
 from .remote_tension_loop import RemoteTensionLoop as RemoteTensionLoop
 from .servo_loop import ServoLoop as ServoLoop

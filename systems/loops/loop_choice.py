@@ -18,20 +18,20 @@ from cdpr_drake.systems.scenarios.run_settings import (
     DIAGRAM,
     AnyScenario,
     has_contact,
-    why_many_steps,
-    with_engine,
+    many_steps_reason,
+    set_engine,
 )
 from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
 from cdpr_drake.systems.sensors.sensor_kinds import SENSORS
 
 
-def why_diagram(scenario: Any) -> str:
+def diagram_reason(scenario: Any) -> str:
     """Why only a diagram can do a scenario, in one phrase; empty where a loop can.
 
     Args:
         scenario: A scenario of any kind, checked.
     """
-    reason = _why_no_loop(scenario)
+    reason = _no_loop_reason(scenario)
     if reason:
         return reason
     robot = load_robot(scenario.robot)
@@ -46,8 +46,8 @@ def why_diagram(scenario: Any) -> str:
     return ""
 
 
-def _why_no_loop(scenario: Any) -> str:
-    """As `why_diagram`, as far as settings and robot tell."""
+def _no_loop_reason(scenario: Any) -> str:
+    """As `diagram_reason`, as far as settings and robot tell."""
     if not isinstance(scenario, Scenario):
         return "it is no visual servo"
     if has_contact(scenario):
@@ -86,8 +86,8 @@ def _why_no_loop(scenario: Any) -> str:
     return ""
 
 
-def is_looped(scenario: Any) -> bool:
-    """Whether a loop does a scenario: one asked for, or chosen by `with_loop`."""
+def uses_compiled_loop(scenario: Any) -> bool:
+    """Whether a loop does a scenario: one asked for, or chosen by `set_loop`."""
     return isinstance(scenario, Scenario) and scenario.integration.loop == COMPILED
 
 
@@ -97,7 +97,7 @@ def check_loop(scenario: Scenario) -> Scenario:
     Raises:
         ScenarioError: Only a diagram can.
     """
-    reason = _why_no_loop(scenario)
+    reason = _no_loop_reason(scenario)
     if reason:
         raise ScenarioError(
             f"{scenario.name}: integration.loop: found compiled, but {reason}; accepted: diagram "
@@ -106,16 +106,16 @@ def check_loop(scenario: Scenario) -> Scenario:
     return replace(scenario, integration=replace(scenario.integration, engine=COMPILED))
 
 
-def looped(scenario: Scenario) -> Scenario:
+def choose_compiled_loop(scenario: Scenario) -> Scenario:
     """The scenario by the loop where that is possible and nothing else was asked for, else as it
     was; for studies, which run it many times."""
     integration = scenario.integration
-    if integration.loop != AUTOMATIC or integration.engine == PLANT or why_diagram(scenario):
+    if integration.loop != AUTOMATIC or integration.engine == PLANT or diagram_reason(scenario):
         return scenario
     return replace(scenario, integration=replace(integration, engine=COMPILED, loop=COMPILED))
 
 
-def with_loop(
+def set_loop(
     scenario: AnyScenario, repeated: bool = False, watched: bool = False
 ) -> tuple[AnyScenario, str]:
     """A scenario of which engine and loop are chosen, and a line that says so; empty: the plant.
@@ -132,14 +132,14 @@ def with_loop(
     """
     asked: Any = scenario
     if not isinstance(asked, Scenario):
-        return with_engine(scenario, repeated)
-    if is_looped(asked):
+        return set_engine(scenario, repeated)
+    if uses_compiled_loop(asked):
         return check_loop(asked), f"{asked.name}: by the compiled loop"  # type: ignore[return-value]
-    chosen, words = with_engine(asked, repeated)
-    why = why_many_steps(asked, repeated)
+    chosen, words = set_engine(asked, repeated)
+    why = many_steps_reason(asked, repeated)
     if not why or chosen.integration.engine != COMPILED or asked.integration.loop == DIAGRAM:
         return chosen, words  # type: ignore[return-value]
-    reason = "Meshcat looks into one" if watched else why_diagram(chosen)
+    reason = "Meshcat looks into one" if watched else diagram_reason(chosen)
     if reason:
         return chosen, f"{words or asked.name}; in a diagram, as {reason}"  # type: ignore[return-value]
     words = f"{asked.name}: by the compiled loop, as {why}; else --set integration.loop=diagram"

@@ -47,7 +47,7 @@ def checked_sensor(name: str, scenario: Scenario, robot: Robot) -> SampledSensor
     return sensor
 
 
-class Eye:
+class DelayedCamera:
     """A projected camera and the images in its delay line."""
 
     def __init__(self, camera: ProjectedCamera, read: Read) -> None:

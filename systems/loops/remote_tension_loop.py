@@ -8,14 +8,14 @@ from pydrake.math import RigidTransform
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.commanded_tension_kernel import cable_motions
 from cdpr_drake.control.task_space import tracking_wrench_at
-from cdpr_drake.dynamics.reach_kernel import robot_addresses
-from cdpr_drake.dynamics.robot_kernel import GOOD
+from cdpr_drake.dynamics.advance_events_kernel import robot_addresses
+from cdpr_drake.dynamics.robot_kernel import INTEGRATION_OK
 from cdpr_drake.dynamics.tracking_kernel import (
     ACTS,
     ENDS,
+    LAST_REQUEST_MET,
     LOGS,
-    MET,
-    MISSED,
+    REQUESTS_NOT_MET,
     ROWS,
     STEPS,
     TIME,
@@ -116,7 +116,7 @@ class RemoteTensionLoop(TensionRows):
             bad, now = track_on(
                 self._robot, self._own_law, self._rule.numbers, periods, self._at, until
             )
-            if bad != GOOD:
+            if bad != INTEGRATION_OK:
                 raise motion_problem(
                     self.control.robot, self.control.cables, self._rule.rule, bad, memory.state,
                     time=self.time,
@@ -136,13 +136,13 @@ class RemoteTensionLoop(TensionRows):
         memory = self._memory
         if self._distributor is not None:
             memory.tensions[:] = self._distributor.given_tensions(time, self._see)
-            memory.verdicts[MET] = 1.0
+            memory.verdicts[LAST_REQUEST_MET] = 1.0
             return
         code = update_tensions_at(
             self._distribution.table, memory.state, memory.wrench, memory.tensions, memory.verdicts
         )
         if code != FEASIBLE:
-            memory.verdicts[MISSED] += 1.0
+            memory.verdicts[REQUESTS_NOT_MET] += 1.0
 
     def _see(self, name: str) -> Array:
         """What stands at an output now."""
@@ -165,7 +165,7 @@ class RemoteTensionLoop(TensionRows):
         memory = self._memory
         parts = [
             memory.clock[TIME : TIME + 1], memory.state, memory.wrench, memory.tensions,
-            memory.verdicts[[MET, MISSED]],
+            memory.verdicts[[LAST_REQUEST_MET, REQUESTS_NOT_MET]],
         ]  # fmt: skip
         if "desired_motion" in self.sizes:
             parts.append(self._goal)

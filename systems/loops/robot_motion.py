@@ -8,16 +8,16 @@ from pydrake.math import RigidTransform
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.models import CABLE_MODELS
 from cdpr_drake.cables.simulation_kernel import OUTPUTS, make_room, outputs_kernel
+from cdpr_drake.dynamics.advance_events_kernel import fresh_memory, robot_addresses
 from cdpr_drake.dynamics.advance_kernel import REPORTED
-from cdpr_drake.dynamics.reach_kernel import fresh_memory, robot_addresses
 from cdpr_drake.dynamics.robot_arrays import MOTORS, pack_robot
-from cdpr_drake.dynamics.robot_kernel import GOOD, ideal_rates
+from cdpr_drake.dynamics.robot_kernel import INTEGRATION_OK, ideal_rates
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.models.robot_in_plant import pose_on_joint
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import rigid_platform
 from cdpr_drake.systems.loops.loop_state import Part, held
-from cdpr_drake.systems.robots.assembly import held_start
+from cdpr_drake.systems.robots.assembly import equilibrium_start
 from cdpr_drake.systems.robots.cable_forces import simulated_cables
 from cdpr_drake.systems.robots.compiled_cable_robot import winch_drive
 from cdpr_drake.systems.robots.compiled_step import (
@@ -76,7 +76,7 @@ class RobotMotion:
         )
         size = self._n + m * self._drive.states_per_cable()
         self._where, self._memory = robot_addresses(self._arrays), fresh_memory(size, m)
-        # State, its time and the report, now, and where `reach_explicitly` writes what is next.
+        # State, its time and the report, now, and where `integrate_explicit` writes what is next.
         self._present = np.zeros(size + 1 + REPORTED)
         self._next = self._memory[len(self._present) : 2 * len(self._present)]
         self._state, self.report = self._present[:size], self._present[size + 1 :]
@@ -94,11 +94,11 @@ class RobotMotion:
     def resting(
         self, X_WP: RigidTransform, slack: Array | None = None, at_rest: bool = False
     ) -> Array:
-        """State of platform and winches at rest at a pose [m], shape (n,), as `CableRobot.hang`.
+        """State of platform and winches at rest at a pose [m], shape (n,).
 
-        Raises as that does.
+        As `CableRobot.set_at_equilibrium`, and raises as that does.
         """
-        X_WP, holding = held_start(
+        X_WP, holding = equilibrium_start(
             self.robot, self._set, self._model, X_WP, slack=slack, at_rest=at_rest
         )
         return resting_state(
@@ -144,7 +144,7 @@ class RobotMotion:
         )  # fmt: skip
         self._present[:] = self._next
         self._pose, self._known = None, False
-        if bad != GOOD:
+        if bad != INTEGRATION_OK:
             raise self._problem(bad, time)
 
     def pose(self) -> RigidTransform:

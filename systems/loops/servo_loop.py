@@ -29,8 +29,8 @@ from cdpr_drake.systems.loops.loop_state import (
     restore_arrays,
 )
 from cdpr_drake.systems.loops.parts import (
+    DelayedCamera,
     Estimate,
-    Eye,
     Read,
     Sampled,
     checked_estimator,
@@ -142,7 +142,7 @@ class ServoLoop:
             scenario.camera, model.target, model.mounting, model.pinhole,
             seed=scenario.seed, image_bias=scenario.perturbations.image_bias,
         )  # fmt: skip
-        eye = Eye(camera, read)
+        eye = DelayedCamera(camera, read)
         self._eyes = [eye]
         ports |= {"found": eye.found, "X_CO": eye.pose, model.target.mark: eye.marks}
         task = model.estimator_task(scenario)
@@ -160,7 +160,7 @@ class ServoLoop:
             assert scenario.estimator.known_tag is not None  # the settings were checked
             X_WK = scenario.estimator.known_tag.pose.transform()
             seen: Read = lambda name: X_WK if name == "X_WO" else ports[name]()  # noqa: E731
-            tag = Eye(known_tag_camera(scenario, robot, model.pinhole), seen)
+            tag = DelayedCamera(known_tag_camera(scenario, robot, model.pinhole), seen)
             self._eyes.append(tag)
             ports |= {"X_CK": tag.pose, "known_tag_found": tag.found}
         for name, kind in SENSORS.items():
@@ -255,7 +255,7 @@ class ServoLoop:
     def _update(self) -> None:
         """Lets look and decide whose time has come."""
         struck, now = self._struck, self.time
-        looks: list[tuple[Eye | Sampled, Array]] = []
+        looks: list[tuple[DelayedCamera | Sampled, Array]] = []
         if self._image in struck:
             looks += [(eye, eye.after(now)) for eye in self._eyes]
         looks += [(part, part.after(now)) for clock, part in self._sensors if clock in struck]

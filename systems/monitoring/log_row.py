@@ -33,7 +33,7 @@ class LogRow(LeafSystem):
     port         type                     unit meaning
     ============ ======================== ==== ==============================================
     (any name)   vector or RigidTransform any  in, one per logged quantity
-    row          vector                   any  out, all of them in order, poses as `pose_row`
+    log_row      vector                   any  out, all of them in order, poses as `pose_row`
     ============ ======================== ==== ==============================================
     """
 
@@ -54,7 +54,7 @@ class LogRow(LeafSystem):
             self.columns[name] = slice(start, end)
             self._readers.append((self.columns[name], reader))
         self._row = np.zeros(end)
-        self.DeclareVectorOutputPort("row", end, self._calc)
+        self.DeclareVectorOutputPort("log_row", end, self._calc)
 
     def _pose_reader(self, name: str) -> Callable[[Context], Array]:
         read = self.DeclareAbstractInputPort(name, Value(RigidTransform())).Eval

@@ -1,10 +1,10 @@
 """A robot that looks for a box, takes it, and sets it down where a tag says.
 
-`HandlingTask` is the phases as a function; `HandlingMachine` puts them into a diagram, between
-cameras that look when they are asked to, dead reckoning, a visual servo and a `Gripper`. The box is
-a free body of the plant, which contact holds on the table and the gripper's compliance on the
-platform. Frames: W the world, P the platform, B the box, G the goal (B once it is set down), O and
-T the tags of box and goal, C a camera.
+`PickAndPlaceTask` is the phases as a function; `PickAndPlaceStateMachine` puts them into a diagram,
+between cameras that look when they are asked to, dead reckoning, a visual servo and a `Gripper`.
+The box is a free body of the plant, which contact holds on the table and the gripper's compliance
+on the platform. Frames: W the world, P the platform, B the box, G the goal (B once it is set down),
+O and T the tags of box and goal, C a camera.
 
 Source: servoing thesis 5.4, which names occlusion in pick and place and several cameras against it.
 """

@@ -1,5 +1,5 @@
 from .cameras import pinholes as pinholes
 from .gripper import Gripper as Gripper
-from .handling_machine import HandlingMachine as HandlingMachine
-from .handling_task import HandlingTask as HandlingTask
+from .pick_and_place_state_machine import PickAndPlaceStateMachine as PickAndPlaceStateMachine
+from .pick_and_place_task import PickAndPlaceTask as PickAndPlaceTask
 from .workpiece import stem as stem

@@ -16,8 +16,8 @@ from cdpr_drake.servoing.servo_task import CameraMounting
 from cdpr_drake.systems.cameras.camera_settings import PROJECTED
 from cdpr_drake.systems.cameras.scene_picture import SceneCamera
 from cdpr_drake.systems.cameras.target_measurement import TargetMeasurement
-from cdpr_drake.systems.pick_and_place.handling_machine import HandlingMachine
 from cdpr_drake.systems.pick_and_place.handling_step import camera_poses
+from cdpr_drake.systems.pick_and_place.pick_and_place_state_machine import PickAndPlaceStateMachine
 from cdpr_drake.systems.pick_and_place.tag_cameras import AttentiveDetector, AttentiveProjection
 from cdpr_drake.systems.pick_and_place.workpiece import tag_pose
 from cdpr_drake.systems.robots.cable_robot import CableRobot
@@ -60,7 +60,7 @@ def add_cameras(
     scenario: PickAndPlaceScenario,
     block: CableRobot,
     *,
-    machine: HandlingMachine,
+    machine: PickAndPlaceStateMachine,
     X_WG: RigidTransform,
 ) -> list[TargetMeasurement]:
     """Adds the cameras of box and goal, and connects them with the machine.
@@ -77,7 +77,7 @@ def add_cameras(
     else:
         added = _render(builder, scenario, block, views)
     for view, camera in zip(views, added, strict=True):
-        builder.Connect(machine.GetOutputPort("looks"), camera.GetInputPort("looks"))
+        builder.Connect(machine.GetOutputPort("enabled"), camera.GetInputPort("enabled"))
         seen = "X_CT" if view.number else "X_CO"
         builder.Connect(camera.GetOutputPort("X_CO"), machine.GetInputPort(seen))
         builder.Connect(camera.GetOutputPort("found"), machine.GetInputPort(f"{view.name}_found"))
@@ -138,8 +138,8 @@ def _project(
     builder.Connect(block.GetOutputPort("X_WB"), camera.GetInputPort("X_WB"))
     cover = scenario.cover
     if cover is not None and (COVERED_IN[cover.phase] == OBJECT_TAG) != goal:
-        builder.Connect(block.GetOutputPort("hidden"), camera.GetInputPort("hidden"))
+        builder.Connect(block.GetOutputPort("tag_occluded"), camera.GetInputPort("tag_occluded"))
     else:
         never = builder.AddNamedSystem(f"{view.name}_shown", ConstantVectorSource(np.zeros(1)))
-        builder.Connect(never.get_output_port(), camera.GetInputPort("hidden"))
+        builder.Connect(never.get_output_port(), camera.GetInputPort("tag_occluded"))
     return camera

@@ -81,7 +81,7 @@ class Gripper(LeafSystem):
     ============== ================== ==== ====================================================
     platform_state vector(13)         m    in, as `CableForces` takes it
     box_state      vector(13)         m    in, of the box, from the plant's port
-    closed         vector(1)          -    in, 1 while it shall be closed
+    gripper_closed vector(1)          -    in, 1 while it shall be closed
     forces         vector(nv)         N,   out, generalized, for the plant
                                       N m
     X_WB           RigidTransform     m    out, true pose of the box
@@ -111,7 +111,7 @@ class Gripper(LeafSystem):
         self._hold = self.DeclareDiscreteState(pose_row(RigidTransform()))
         self._platform = self.DeclareVectorInputPort("platform_state", 13)
         self._box = self.DeclareVectorInputPort("box_state", 13)
-        self._closed = self.DeclareVectorInputPort("closed", 1)
+        self._closed = self.DeclareVectorInputPort("gripper_closed", 1)
         self.DeclarePeriodicDiscreteUpdateEvent(1.0 / WATCH_RATE, 0.0, self._update)
         own = {self.discrete_state_ticket(self._memory), self.discrete_state_ticket(self._hold)}
         states = {self.input_port_ticket(port.get_index()) for port in (self._platform, self._box)}

@@ -27,16 +27,19 @@ from cdpr_drake.systems.estimators.estimator_kinds import ESTIMATORS, EstimatorT
 from cdpr_drake.systems.monitoring.log_row import RunLog, add_log
 from cdpr_drake.systems.pick_and_place.cameras import add_cameras, pinholes
 from cdpr_drake.systems.pick_and_place.gripper import GripLaw, Gripper
-from cdpr_drake.systems.pick_and_place.handling_machine import HandlingMachine, X_CdV
 from cdpr_drake.systems.pick_and_place.handling_step import believed_robot, box_step, camera_poses
-from cdpr_drake.systems.pick_and_place.handling_task import (
-    GAP,
-    HandlingGeometry,
-    HandlingRules,
-    HandlingTask,
-    Phase,
+from cdpr_drake.systems.pick_and_place.pick_and_place_state_machine import (
+    PickAndPlaceStateMachine,
+    X_CdV,
 )
-from cdpr_drake.systems.pick_and_place.tag_cover import TagCover
+from cdpr_drake.systems.pick_and_place.pick_and_place_task import (
+    GAP,
+    Phase,
+    PickAndPlaceGeometry,
+    PickAndPlaceRules,
+    PickAndPlaceTask,
+)
+from cdpr_drake.systems.pick_and_place.tag_occlusion import TagOcclusion
 from cdpr_drake.systems.pick_and_place.workpiece import (
     INSTANCE,
     add_goal,
@@ -78,7 +81,7 @@ class PickAndPlace:
     diagram: Diagram
     block: CableRobot
     box: RigidBody
-    machine: HandlingMachine
+    machine: PickAndPlaceStateMachine
     gripper: Gripper
     X_WB: RigidTransform
     X_WG: RigidTransform
@@ -98,7 +101,7 @@ class PickAndPlace:
         """
         context = self.diagram.CreateDefaultContext()
         own = self.block.GetMyMutableContextFromRoot(context)
-        self.block.hang(own, self.scenario.initial_pose.transform())
+        self.block.set_at_equilibrium(own, self.scenario.initial_pose.transform())
         plant_context = self.block.plant.GetMyMutableContextFromRoot(context)
         self.block.plant.SetFreeBodyPose(plant_context, self.box, self.X_WB)
         return context
@@ -132,13 +135,13 @@ def grip_law(scenario: PickAndPlaceScenario) -> GripLaw:
     )
 
 
-def handling_task(scenario: PickAndPlaceScenario, robot: Robot) -> HandlingTask:
+def make_pick_and_place_task(scenario: PickAndPlaceScenario, robot: Robot) -> PickAndPlaceTask:
     """The task with what the robot believes."""
     box, goal, rules = scenario.workpiece, scenario.goal, scenario.handling
     half = 0.5 * float(box.size[2])
     of_object, of_goal = camera_poses(scenario, robot, believed=True)
-    return HandlingTask(
-        HandlingGeometry(
+    return PickAndPlaceTask(
+        PickAndPlaceGeometry(
             X_BO=tag_pose(box.tag, half),
             X_BP=RigidTransform(np.array([0.0, 0.0, half + GAP]) - scenario.gripper.tip),
             X_GT=tag_pose(goal.tag, -half),
@@ -148,7 +151,7 @@ def handling_task(scenario: PickAndPlaceScenario, robot: Robot) -> HandlingTask:
             X_WG=goal.pose.transform(),
             weight=box.mass * (robot.gravity or FREE_FALL),
         ),
-        HandlingRules(
+        PickAndPlaceRules(
             hover=rules.hover,
             distance=rules.distance,
             angle=float(np.radians(rules.angle_deg)),
@@ -180,9 +183,9 @@ def build_pick_and_place(scenario: PickAndPlaceScenario) -> PickAndPlace:
     assert scene.box is not None
     assert scene.gripper is not None
     believed = believed_robot(scenario, robot)
-    task = handling_task(scenario, robot)
+    task = make_pick_and_place_task(scenario, robot)
     machine = builder.AddNamedSystem(
-        "machine", HandlingMachine(task, believed.X_WP0, believed.X_PC)
+        "machine", PickAndPlaceStateMachine(task, believed.X_WP0, believed.X_PC)
     )
     cameras = add_cameras(builder, scenario, block, machine=machine, X_WG=X_WG)
     servo = _add_servo(builder, scenario, robot, believed, machine)
@@ -191,7 +194,7 @@ def build_pick_and_place(scenario: PickAndPlaceScenario) -> PickAndPlace:
         builder.Connect(estimator.GetOutputPort("X_WP"), system.GetInputPort("X_WP"))
     for name in ("holding", "load"):
         builder.Connect(block.GetOutputPort(name), machine.GetInputPort(name))
-    builder.Connect(machine.GetOutputPort("closed"), block.GetInputPort("closed"))
+    builder.Connect(machine.GetOutputPort("gripper_closed"), block.GetInputPort("gripper_closed"))
     builder.Connect(servo.GetOutputPort("cable_velocities"), block.GetInputPort("cable_velocities"))
     if scenario.cover is not None:
         builder.Connect(machine.GetOutputPort("phase"), block.GetInputPort("phase"))
@@ -209,12 +212,12 @@ def build_pick_and_place(scenario: PickAndPlaceScenario) -> PickAndPlace:
         **{name: block.GetOutputPort(name) for name in LOGGED_OF_CABLES},
     }
     if scenario.cover is not None:
-        ports["hidden"] = block.GetOutputPort("hidden")
+        ports["hidden"] = block.GetOutputPort("tag_occluded")
     log = add_log(builder, ports, scenario.log_rate)
     for name in ("X_WP", "X_WB", "tensions", "lengths", "unstrained_lengths"):
         builder.ExportOutput(block.GetOutputPort(name), name)
     if scenario.cover is not None:
-        builder.ExportOutput(block.GetOutputPort("hidden"), "hidden")
+        builder.ExportOutput(block.GetOutputPort("tag_occluded"), "hidden")
     builder.ExportOutput(machine.GetOutputPort("X_WP_aim"), "X_WP_desired")
     diagram = builder.Build()
     diagram.set_name(scenario.name)
@@ -255,7 +258,7 @@ class _Scene:
             number = int(Phase[scenario.cover.phase.upper()])
             cover = builder.AddNamedSystem(
                 "cover",
-                TagCover(
+                TagOcclusion(
                     scene_graph, tag.size, number, scenario.cover.delay, scenario.cover.duration
                 ),
             )
@@ -264,7 +267,7 @@ class _Scene:
                 scene_graph.get_source_pose_port(cover.source_id),
             )
             builder.ExportInput(cover.GetInputPort("phase"), "phase")
-            builder.ExportOutput(cover.GetOutputPort("hidden"), "hidden")
+            builder.ExportOutput(cover.GetOutputPort("tag_occluded"), "tag_occluded")
             X_WO = scenario.places()[0] @ tag_pose(scenario.workpiece.tag, half)
             X_WT = X_WO if self._covers_box() else self._X_WG @ X_GT
             source = builder.AddNamedSystem("covered_tag", ConstantValueSource(Value(X_WT)))
@@ -287,7 +290,7 @@ class _Scene:
         ):
             builder.Connect(plant.get_state_output_port(instance), gripper.GetInputPort(name))
         apply_force(builder, plant, gripper.GetOutputPort("forces"), name="grip")
-        builder.ExportInput(gripper.GetInputPort("closed"), "closed")
+        builder.ExportInput(gripper.GetInputPort("gripper_closed"), "gripper_closed")
         for name in ("X_WB", "holding", "load", "grip"):
             builder.ExportOutput(gripper.GetOutputPort(name), name)
         self.gripper = gripper
@@ -302,7 +305,7 @@ def _add_servo(
     scenario: PickAndPlaceScenario,
     robot: Robot,
     believed: BelievedRobot,
-    machine: HandlingMachine,
+    machine: PickAndPlaceStateMachine,
 ) -> FeatureServo:
     """The visual servo, which looks at what the machine shows it."""
     own, target = scenario.handling, scenario.workpiece.tag.target()
@@ -312,7 +315,7 @@ def _add_servo(
     pinhole = pinholes(scenario, robot)[0]
     servo = builder.AddNamedSystem("servo", FeatureServo(controller, target, pinhole, own.rate))
     builder.Connect(machine.GetOutputPort("X_CV"), servo.GetInputPort("X_CO"))
-    builder.Connect(machine.GetOutputPort("moves"), servo.GetInputPort("found"))
+    builder.Connect(machine.GetOutputPort("platform_moving"), servo.GetInputPort("found"))
     unused = builder.AddNamedSystem("no_marks", ConstantVectorSource(np.zeros(target.size)))
     builder.Connect(unused.get_output_port(), servo.GetInputPort(target.mark))
     return servo

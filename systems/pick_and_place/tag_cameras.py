@@ -19,22 +19,22 @@ from cdpr_drake.vision.target import Target
 class AttentiveDetector(TargetDetector):
     """A `TargetDetector` with one port more; no image is drawn while nobody asks for one.
 
-    ===== ========= ==== ================================
-    port  type      unit meaning
-    ===== ========= ==== ================================
-    looks vector(2) -    in, 1 for each camera that looks
-    ===== ========= ==== ================================
+    ======= ========= ==== ================================
+    port    type      unit meaning
+    ======= ========= ==== ================================
+    enabled vector(2) -    in, 1 for each camera that looks
+    ======= ========= ==== ================================
     """
 
     def __init__(self, target: Target, pinhole: Pinhole, rate: float, number: int) -> None:
-        """For camera `number` of the port looks, images at `rate` [Hz]."""
+        """For camera `number` of the port enabled, images at `rate` [Hz]."""
         super().__init__(target, pinhole, rate)
         self._number = number
-        self._looks = self.DeclareVectorInputPort("looks", 2)
+        self._enabled = self.DeclareVectorInputPort("enabled", 2)
 
     def find_marks(self, context: Context) -> Array | None:
         """The tag's corners in the image at the input, or None."""
-        if not self._looks.Eval(context)[self._number]:
+        if not self._enabled.Eval(context)[self._number]:
             return None
         return super().find_marks(context)
 
@@ -42,13 +42,13 @@ class AttentiveDetector(TargetDetector):
 class AttentiveProjection(ProjectedCamera):
     """A `ProjectedCamera` with ports more, which a box and a cover can hide the tag from.
 
-    ====== ============== ==== ========================================
-    port   type           unit meaning
-    ====== ============== ==== ========================================
-    looks  vector(2)      -    in, 1 for each camera that looks
-    hidden vector(1)      -    in, 1 while something lies over the tag
-    X_WB   RigidTransform m    in, true pose of the box
-    ====== ============== ==== ========================================
+    ============ ============== ==== ========================================
+    port         type           unit meaning
+    ============ ============== ==== ========================================
+    enabled      vector(2)      -    in, 1 for each camera that looks
+    tag_occluded vector(1)      -    in, 1 while something lies over the tag
+    X_WB         RigidTransform m    in, true pose of the box
+    ============ ============== ==== ========================================
 
     Where the tag is it knows from the box's pose or by itself; the port X_WO is not read.
     """
@@ -74,7 +74,7 @@ class AttentiveProjection(ProjectedCamera):
             mounting: Where the camera is.
             pinhole: Its intrinsic parameters.
             rate: Images per second [Hz].
-            number: Of the camera, on the port looks.
+            number: Of the camera, on the port enabled.
             box: Edges of the box, shape (3,) [m].
             X_WO: Tag in the world; None: it is on the box [m].
             X_BO: Tag on the box [m].
@@ -85,13 +85,13 @@ class AttentiveProjection(ProjectedCamera):
         self._number, self._box = number, np.asarray(box, float)
         self._X_PC, self._corners = mounting.X_BC, target.points
         self._X_WO, self._X_BO = X_WO, X_BO
-        self._looks = self.DeclareVectorInputPort("looks", 2)
-        self._hidden = self.DeclareVectorInputPort("hidden", 1)
+        self._enabled = self.DeclareVectorInputPort("enabled", 2)
+        self._hidden = self.DeclareVectorInputPort("tag_occluded", 1)
         self.DeclareAbstractInputPort("X_WB", Value(RigidTransform()))
 
     def find_marks(self, context: Context) -> Array | None:
         """Projected corners with noise, or None if out of view, hidden or not looked for."""
-        if not self._looks.Eval(context)[self._number] or self._hidden.Eval(context)[0]:
+        if not self._enabled.Eval(context)[self._number] or self._hidden.Eval(context)[0]:
             return None
 
         X_WB, X_WP = (self.GetInputPort(name).Eval(context) for name in ("X_WB", "X_WP"))

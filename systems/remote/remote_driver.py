@@ -20,7 +20,7 @@ MOST_AT_ONCE = 100
 """Messages that a run in real time takes at one instant once it is late."""
 
 
-class Pace(StrEnum):
+class SyncMode(StrEnum):
     """How a run waits for its client."""
 
     LOCK_STEP = "lock_step"
@@ -68,7 +68,7 @@ class Driver:
         inputs: Sequence[Port],
         outputs: Sequence[Port],
         *,
-        pace: Pace,
+        pace: SyncMode,
         timeout: float,
         period: float,
         services: Mapping[str, Service],
@@ -131,7 +131,7 @@ class Driver:
             ClientEndedError: The client is gone, silent, or sends what makes no sense.
         """
         try:
-            if self._pace == Pace.REAL_TIME and self._held is not None:
+            if self._pace == SyncMode.REAL_TIME and self._held is not None:
                 return self._held_commands(now, read)
             return self._next_commands(now, read)
         except ClientEndedError:

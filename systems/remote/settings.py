@@ -11,7 +11,7 @@ from typing import Any
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.schema.fields import number, text
-from cdpr_drake.systems.remote.remote_driver import Pace
+from cdpr_drake.systems.remote.remote_driver import SyncMode
 from cdpr_drake.systems.remote.remote_place import SERVO_PLACES, TENSION_PLACES, TWIST
 
 PLACES = (*TENSION_PLACES, *SERVO_PLACES)
@@ -28,8 +28,8 @@ class RemoteSettings:
     )
     pace: str = text(
         "Whether the run waits for each command, or goes on in real time with the last one.",
-        Pace.LOCK_STEP.value,
-        choices=tuple(pace.value for pace in Pace),
+        SyncMode.LOCK_STEP.value,
+        choices=tuple(pace.value for pace in SyncMode),
     )
     timeout: float = number(
         "Silence of the process after which the run ends.", "s", 10.0, above=0.0, at_most=86400.0

@@ -19,7 +19,7 @@ from cdpr_drake.models.robot_holding import check_bundles, hold_robot, rest_as_l
 from cdpr_drake.models.robot_in_plant import RobotInPlant, add_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.scene import add_frame, add_ground
-from cdpr_drake.statics.static_tensions import Holding
+from cdpr_drake.statics.static_tensions import StaticTensions
 from cdpr_drake.systems.robots.cable_forces import PORTS, CableForces
 from cdpr_drake.systems.robots.platform_pose import PlatformPose
 from cdpr_drake.systems.robots.settings import CableRobotSettings
@@ -119,19 +119,21 @@ class CableRobotPorts:
         """The output of that name."""
         return self.outputs[port_name]
 
-    def hang(
+    def set_at_equilibrium(
         self,
         context: Context,
         X_WP: RigidTransform,
         slack: Array | None = None,
         at_rest: bool = False,
     ) -> Array:
-        """As `CableRobot.hang`, from the root context of the diagram that was built."""
+        """As `CableRobot.set_at_equilibrium`, from the root context of the built diagram."""
         plant_context = self.plant.GetMyMutableContextFromRoot(context)
         winch_context = self.winches.GetMyMutableContextFromRoot(context)
         cables, model = self.forces.cable_set(), self.forces.model()
-        X_WP, holding = held_start(self.robot, cables, model, X_WP, slack=slack, at_rest=at_rest)
-        return hang_robot(self, plant_context, winch_context, X_WP, holding)
+        X_WP, holding = equilibrium_start(
+            self.robot, cables, model, X_WP, slack=slack, at_rest=at_rest
+        )
+        return set_robot_at_equilibrium(self, plant_context, winch_context, X_WP, holding)
 
 
 def fill_scene(
@@ -234,12 +236,12 @@ def add_cable_robot(
     return CableRobotPorts(robot, in_plant, plant, scene_graph, forces, winch, inputs, outputs)
 
 
-def hang_robot(
+def set_robot_at_equilibrium(
     block: RobotBlock,
     plant_context: Context,
     winch_context: Context,
     X_WP: RigidTransform,
-    holding: Holding,
+    holding: StaticTensions,
 ) -> Array:
     """Puts a platform at a pose, at rest, with lengths and drum tensions; returns its tensions."""
     block.in_plant.set_pose(plant_context, X_WP)
@@ -247,7 +249,7 @@ def hang_robot(
     return holding.tensions
 
 
-def held_start(
+def equilibrium_start(
     robot: Robot,
     cables: CableSet,
     model: str,
@@ -255,8 +257,10 @@ def held_start(
     *,
     slack: Array | None,
     at_rest: bool,
-) -> tuple[RigidTransform, Holding]:
-    """Where a platform starts, and with which lengths and tensions; see `CableRobot.hang`.
+) -> tuple[RigidTransform, StaticTensions]:
+    """Where a platform starts, and with which lengths and tensions.
+
+    See `CableRobot.set_at_equilibrium`.
 
     Args:
         robot: The robot.

@@ -23,9 +23,9 @@ from cdpr_drake.numerics.explicit_integration import largest_stable_step, vibrat
 from cdpr_drake.systems.robots.assembly import (
     SceneAdder,
     add_cable_robot,
+    equilibrium_start,
     fill_scene,
-    hang_robot,
-    held_start,
+    set_robot_at_equilibrium,
 )
 from cdpr_drake.systems.robots.cable_forces import CableForces
 from cdpr_drake.systems.robots.settings import CableRobotSettings
@@ -67,7 +67,8 @@ class CableRobot(Diagram):
 
     Subsystems: plant, scene_graph, cables, winches, platform_pose. With motors on the winches, the
     block has the inputs and further outputs of `MotorWinch`, tensions connected. A default context
-    has the platform at the robot's home pose with cables that are just not taut; see `hang`.
+    has the platform at the robot's home pose with cables that are just not taut; see
+    `set_at_equilibrium`.
     """
 
     def __init__(
@@ -116,7 +117,7 @@ class CableRobot(Diagram):
         self.winches: Any = blocks.winches
         self.forces: CableForces = blocks.forces
 
-    def hang(
+    def set_at_equilibrium(
         self,
         context: Context,
         X_WP: RigidTransform,
@@ -147,8 +148,10 @@ class CableRobot(Diagram):
             EquilibriumError: The platform does not come to rest with that slack.
         """
         cables, model = self.forces.cable_set(), self.forces.model()
-        X_WP, holding = held_start(self.robot, cables, model, X_WP, slack=slack, at_rest=at_rest)
-        return hang_robot(
+        X_WP, holding = equilibrium_start(
+            self.robot, cables, model, X_WP, slack=slack, at_rest=at_rest
+        )
+        return set_robot_at_equilibrium(
             self,
             self.GetMutableSubsystemContext(self.plant, context),
             self.GetMutableSubsystemContext(self.winches, context),

@@ -14,7 +14,7 @@ from cdpr_drake.errors import CdprError
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.models.robot_in_plant import RobotInPlant
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.systems.robots.assembly import SceneAdder, fill_scene, held_start
+from cdpr_drake.systems.robots.assembly import SceneAdder, equilibrium_start, fill_scene
 from cdpr_drake.systems.robots.cable_forces import simulated_cables
 from cdpr_drake.systems.robots.compiled_motion import MEMORY, CompiledMotion
 from cdpr_drake.systems.robots.compiled_step import CompiledBodies, StepRule
@@ -115,19 +115,21 @@ class CompiledCableRobot(Diagram):
         """Changes how the robot is integrated from now on, in all contexts."""
         self.motion.rule = rule
 
-    def hang(
+    def set_at_equilibrium(
         self,
         context: Context,
         X_WP: RigidTransform,
         slack: Array | None = None,
         at_rest: bool = False,
     ) -> Array:
-        """Puts the platform at rest at a pose and sets lengths that hold it, as `CableRobot.hang`.
+        """Puts the platform at rest at a pose and sets lengths that hold it.
 
-        The state is that of the context's time.
+        As `CableRobot.set_at_equilibrium`; the state is that of the context's time.
         """
         cables, model = self.forces.cable_set(), self.forces.model()
-        X_WP, holding = held_start(self.robot, cables, model, X_WP, slack=slack, at_rest=at_rest)
+        X_WP, holding = equilibrium_start(
+            self.robot, cables, model, X_WP, slack=slack, at_rest=at_rest
+        )
         own = self.GetMutableSubsystemContext(self.motion, context)
         self.motion.hold(own, X_WP, holding.unstrained_lengths, holding.drum_tensions)
         return holding.tensions

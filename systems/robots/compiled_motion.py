@@ -21,10 +21,10 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.cables.commanded_tension_kernel import cable_motions
 from cdpr_drake.cables.models import CABLE_MODELS
 from cdpr_drake.cables.simulation_kernel import OUTPUTS, make_room, outputs_kernel
+from cdpr_drake.dynamics.advance_events_kernel import BACKWARD, fresh_memory, robot_addresses
 from cdpr_drake.dynamics.advance_kernel import REPORTED, robot_energy
-from cdpr_drake.dynamics.reach_kernel import BACKWARD, fresh_memory, robot_addresses
 from cdpr_drake.dynamics.robot_arrays import MOTORS, TENSIONS, Drive, RobotArrays, pack_robot
-from cdpr_drake.dynamics.robot_kernel import GOOD, ideal_rates
+from cdpr_drake.dynamics.robot_kernel import INTEGRATION_OK, ideal_rates
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.models.robot_in_plant import pose_on_joint
@@ -62,7 +62,7 @@ class CompiledMotion(LeafSystem):
                                                     far, in position and rotation
     steps                  vector(2)       -        out, steps taken, and taken back, so far
     motion_memory          vector          any      out, what all others are read from, with
-                                                    `parts`; see `reach_kernel.reach_explicitly`
+                                                    `parts`; see `integrate_explicit`
     ====================== =============== ======== =============================================
 
     The state is discrete: that of the platform and the winches at the last event, and its time. At
@@ -303,7 +303,7 @@ class CompiledMotion(LeafSystem):
                 f"the robot's state is that of {begin[self._size]:g} s, but the context stands at "
                 f"{time:g} s; set the time first, and then hang the robot"
             )
-        if bad != GOOD:
+        if bad != INTEGRATION_OK:
             raise self._problem(bad, memory[self._own], time)
 
     def _problem(self, bad: int, state: Array, time: float) -> Exception:

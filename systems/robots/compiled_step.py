@@ -13,11 +13,11 @@ from pydrake.systems.framework import Context, LeafSystem
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.simulation_kernel import make_room, model_force_and_drums
+from cdpr_drake.dynamics.advance_events_kernel import integrate_explicit, integrate_semi_implicit
 from cdpr_drake.dynamics.explicit_kernel import METHODS
 from cdpr_drake.dynamics.platform_kernel import floating_rates, line_rates, planar_rates
-from cdpr_drake.dynamics.reach_kernel import reach_explicitly, reach_semi_implicitly
 from cdpr_drake.dynamics.robot_arrays import IDEAL, MOTORS, PLATFORM, SPEEDS, Drive, RobotArrays
-from cdpr_drake.dynamics.robot_kernel import LOST
+from cdpr_drake.dynamics.robot_kernel import INTEGRATION_DIVERGED
 from cdpr_drake.errors import CableGeometryError, CdprError, DivergedError
 from cdpr_drake.geometry.cable_paths import cable_paths, impossible_cable
 from cdpr_drake.geometry.cable_set import CableSet
@@ -55,7 +55,9 @@ class PackedRule:
 
     def __init__(self, rule: StepRule) -> None:
         self.rule = rule
-        self.reach = reach_semi_implicitly if rule.method == "semi_implicit" else reach_explicitly
+        self.reach = (
+            integrate_semi_implicit if rule.method == "semi_implicit" else integrate_explicit
+        )
         bound = np.inf if rule.accuracy is None else rule.accuracy
         self.numbers = np.array([float(METHODS[rule.method]), rule.max_step, bound])
 
@@ -120,7 +122,7 @@ def motion_problem(
         state: The last good state, shape (n,).
         time: To when it was to be advanced [s].
     """
-    if bad == LOST:
+    if bad == INTEGRATION_DIVERGED:
         return DivergedError(
             f"before {time:g} s: the motion is not finite any more, by {rule.method} with "
             f"steps of {rule.max_step:g} s; shorter ones may help"

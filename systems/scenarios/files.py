@@ -115,28 +115,28 @@ def _unknown_robot(path: Path, overrides: Sequence[str]) -> tuple[str, ...]:
     if value is None or any(item.partition("=")[0].strip() == "robot" for item in overrides):
         return ()
     try:
-        robot_file(robot_beside(path, value.value))
+        robot_file(resolve_robot_path(path, value.value))
     except RobotFileError as problem:
         return problem.within(f"{path}:{value.start_mark.line + 1}: robot")
     return ()
 
 
-def robot_beside(scenario_path: Path, robot: str) -> str:
+def resolve_robot_path(scenario_path: Path, robot: str) -> str:
     """The robot's name, or the absolute path of its file: beside the scenario's file, if it is
     there, else as it is found from the working folder."""
     name, mark, rails = robot.rpartition(RAILS_MARK)
     if mark and "=" in rails and "/" not in rails:
-        return _beside(scenario_path, name) + mark + rails
-    return _beside(scenario_path, robot)
+        return _resolve(scenario_path, name) + mark + rails
+    return _resolve(scenario_path, robot)
 
 
-def file_beside(scenario_path: Path, file: str) -> str:
-    """The absolute path of a file that a scenario names, found as `robot_beside` finds one."""
+def resolve_file_path(scenario_path: Path, file: str) -> str:
+    """The absolute path of a file that a scenario names, found as by `resolve_robot_path`."""
     beside = scenario_path.parent / file
     return str((beside if beside.exists() else Path(file)).absolute())
 
 
-def _beside(scenario_path: Path, robot: str) -> str:
+def _resolve(scenario_path: Path, robot: str) -> str:
     beside = scenario_path.parent / robot
     folder = "/" in robot and (beside.is_dir() or Path(robot).is_dir())
     if not robot.lower().endswith(ROBOT_SUFFIXES) and not folder:
@@ -169,7 +169,7 @@ def load_with_robot(schema: type[S], name: str, overrides: Sequence[str]) -> tup
         scenario = load_typed(schema, path, error=ScenarioError, overrides=overrides)
     except ScenarioError as problem:
         raise ScenarioError(*problem.problems, *_unknown_robot(path, overrides)) from problem
-    scenario.robot = robot_beside(path, scenario.robot)
+    scenario.robot = resolve_robot_path(path, scenario.robot)
     if scenario.world is not None:
         scenario.world.find_files(path.parent)
     try:
@@ -178,7 +178,7 @@ def load_with_robot(schema: type[S], name: str, overrides: Sequence[str]) -> tup
         raise RobotFileError(*problem.within(f"{path}: robot")) from problem
     trajectory = getattr(scenario, "trajectory", None)
     if trajectory is not None and getattr(trajectory, "file", None) is not None:
-        trajectory.file = file_beside(path, trajectory.file)
+        trajectory.file = resolve_file_path(path, trajectory.file)
     perturbations = getattr(scenario, "perturbations", None)
     if getattr(perturbations, "believed_robot", None) is not None:
         _check_belief(scenario, robot, path)
@@ -188,7 +188,7 @@ def load_with_robot(schema: type[S], name: str, overrides: Sequence[str]) -> tup
 def _check_belief(scenario: Any, robot: Robot, path: Path) -> None:
     """Finds the file of the robot that is believed in, and compares it with the simulated one."""
     perturbations, where = scenario.perturbations, f"{path}: perturbations.believed_robot"
-    perturbations.believed_robot = robot_beside(path, perturbations.believed_robot)
+    perturbations.believed_robot = resolve_robot_path(path, perturbations.believed_robot)
     try:
         believed = load_robot(perturbations.believed_robot)
     except RobotFileError as problem:

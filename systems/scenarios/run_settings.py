@@ -1,6 +1,6 @@
 """What scenarios of every kind share, sections `stop` and `integration`, and the engine's choice.
 
-`StopSettings` and `IntegrationSettings` are the two sections of a visual servo. `with_engine`
+`StopSettings` and `IntegrationSettings` are the two sections of a visual servo. `set_engine`
 chooses which engine moves the robot of a scenario that leaves the choice open.
 
 Drake's YAML loader reads the annotations themselves, so they are not postponed here.
@@ -136,7 +136,7 @@ def engine_of(scenario: Any) -> str:
     return COMPILED if scenario.integration.engine == COMPILED else PLANT
 
 
-def why_many_steps(scenario: Any, repeated: bool) -> str:
+def many_steps_reason(scenario: Any, repeated: bool) -> str:
     """Why a scenario of any kind takes so many steps that its engine matters; empty: it does not.
 
     Args:
@@ -149,7 +149,7 @@ def why_many_steps(scenario: Any, repeated: bool) -> str:
     return f"it lasts longer than {LONG_RUN:g} s" if long else ""
 
 
-def with_engine(scenario: AnyScenario, repeated: bool = False) -> tuple[AnyScenario, str]:
+def set_engine(scenario: AnyScenario, repeated: bool = False) -> tuple[AnyScenario, str]:
     """A scenario of which the engine is chosen, and a line that says so; empty for the plant.
 
     Both engines come to the same ends (`cdpr study engines`), the compiled one sooner. An engine
@@ -163,7 +163,7 @@ def with_engine(scenario: AnyScenario, repeated: bool = False) -> tuple[AnyScena
     if asked.integration.engine == AUTOMATIC and has_contact(scenario):
         why = "its world has contact, which the compiled engine has not"
         return scenario, f"{asked.name}: by the engine plant, as {why}"
-    why = why_many_steps(asked, repeated)
+    why = many_steps_reason(asked, repeated)
     if asked.integration.engine != AUTOMATIC or not why:
         return scenario, ""
     integration = replace(asked.integration, engine=COMPILED)

@@ -1,4 +1,4 @@
-from .perception_sensors import add_looking_sensors as add_looking_sensors
+from .perception_sensors import add_perception_sensors as add_perception_sensors
 from .sampled_sensor import SampledSensor as SampledSensor
 from .scene_shapes import SceneShapes as SceneShapes
 from .sensor_kinds import SENSORS as SENSORS

@@ -34,7 +34,7 @@ from cdpr_drake.trajectories.pose_trajectory import MovingPose
 
 
 @dataclass(kw_only=True)
-class LookingSensors:
+class PerceptionSensors:
     """The sensors that look round, in a builder.
 
     Attributes:
@@ -54,7 +54,7 @@ class LookingSensors:
     logged: dict[str, OutputPort] = field(default_factory=dict)
 
 
-def add_looking_sensors(
+def add_perception_sensors(
     builder: DiagramBuilder,
     robot: RobotBlock,
     suite: SensorSuite,
@@ -62,7 +62,7 @@ def add_looking_sensors(
     seed: int = 0,
     motion: MovingPose | None = None,
     name: str = "",
-) -> LookingSensors:
+) -> PerceptionSensors:
     """Adds what a section `sensors` asks for beside what estimators read.
 
     Args:
@@ -125,7 +125,7 @@ class _Adder:
     def __init__(self, builder: DiagramBuilder, robot: RobotBlock, seed: int, prefix: str) -> None:
         self._builder, self._robot, self._seed, self._prefix = builder, robot, seed, prefix
         self._head_carrier = ""
-        self.added = LookingSensors()
+        self.added = PerceptionSensors()
 
     def _frame(self, carrier: str, sees: str = "perception") -> FrameId:
         """Geometry frame of what carries a sensor, or the head on which it is.

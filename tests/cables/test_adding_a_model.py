@@ -46,7 +46,7 @@ def test_in_a_simulation():
     assert np.all(robot.forces.cable_set().retardation == 0.0)
     simulator = Simulator(robot)
     context = simulator.get_mutable_context()
-    robot.hang(context, HOME)
+    robot.set_at_equilibrium(context, HOME)
     robot.GetInputPort("cable_velocities").FixValue(context, np.zeros(CABLES.count))
     simulator.AdvanceTo(0.1)
     X_WP = robot.GetOutputPort("X_WP").Eval(context)

@@ -7,13 +7,13 @@ from hypothesis import strategies as st
 from pydrake.autodiffutils import AutoDiffXd, ExtractGradient, ExtractValue, InitializeAutoDiff
 
 from cdpr_drake.cables.dispatch_kernel import STRAIGHT
-from cdpr_drake.cables.hanging_kernel import hang
+from cdpr_drake.cables.hanging_kernel import solve_catenary
 from cdpr_drake.cables.models import cable_state
 from cdpr_drake.cables.simulation_autodiff import (
-    hang_any,
     model_force_and_drums_array,
     model_force_array,
     model_outputs_array,
+    solve_catenary_any,
 )
 from cdpr_drake.cables.simulation_kernel import (
     OUTPUTS,
@@ -122,16 +122,18 @@ def test_autodiff_has_the_values_and_the_derivatives_of_differences(name, sags, 
 
 def test_an_implicit_function_keeps_its_value():
     arguments = (3.0, -2.0, 0.075, 1.0, 3.8, 2.9e6, 2.18, 0.0, 0.0)
-    H, V_A, _ = hang(*arguments)
+    H, V_A, _ = solve_catenary(*arguments)
     lifted = [AutoDiffXd(a, np.eye(9)[k]) for k, a in enumerate(arguments)]
-    again_H, again_V, good = hang_any(*lifted)
+    again_H, again_V, good = solve_catenary_any(*lifted)
     assert good
     np.testing.assert_allclose((again_H.value(), again_V.value()), (H, V_A), rtol=1e-9)
     # All parameters: also radius, stiffness and weight.
     for k in (0, 1, 2, 4, 5, 6):
         step = 1e-6 * max(abs(arguments[k]), 0.1)
         ahead, behind = (
-            np.array(hang(*[a + s * step * (i == k) for i, a in enumerate(arguments)])[:2])
+            np.array(
+                solve_catenary(*[a + s * step * (i == k) for i, a in enumerate(arguments)])[:2]
+            )
             for s in (1, -1)
         )
         slope = (ahead - behind) / (2 * step)

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from cdpr_drake.cables.catenary_kernel import free_part, sag_of, stored_energy, stretched_length
-from cdpr_drake.cables.hanging_kernel import hang
+from cdpr_drake.cables.hanging_kernel import solve_catenary
 
 ROUNDING = 1e-11  # asinh and root of numbers up to 1e4, subtracted in the printed formulas
 CHAIN = 1e-6
@@ -44,7 +44,7 @@ def test_end_is_where_irvines_profile_ends(H, V_A, s, w):
 def test_the_whole_profile_is_irvines(ends):
     """Points along a solved cable, through its end."""
     x, z, s = ends
-    H, V_A, good = hang(x, z, 0.0, 1.0, s, 2.9e6, 2.18, 0.0, 0.0)
+    H, V_A, good = solve_catenary(x, z, 0.0, 1.0, s, 2.9e6, 2.18, 0.0, 0.0)
     assert good
     for part in np.linspace(0.05, 1.0, 20) * s:
         here = free_part(H, V_A, part, 2.9e6, 2.18)[:2]
@@ -57,7 +57,7 @@ def test_a_chain_of_200_bars_hangs_the_same(ends):
     """Elastic bars, each carrying its weight in its middle, under the force that was solved for."""
     x, z, s = ends
     ES, w, bars = 2.9e6, 2.18, 200
-    H, V_A, _ = hang(x, z, 0.0, 1.0, s, ES, w, 0.0, 0.0)
+    H, V_A, _ = solve_catenary(x, z, 0.0, 1.0, s, ES, w, 0.0, 0.0)
     place, highest = np.zeros(2), 0.0
     chord = np.array([x, z]) / np.hypot(x, z)
     for k in range(bars):
@@ -104,12 +104,12 @@ def test_length_and_energy_are_the_integrals(H, V_A, s, w):
 def test_a_cable_is_found_from_slack_to_stretched(x, z, share, loose):
     chord = np.hypot(x, z)
     s = chord * (1.0 + share) if loose else chord * (1.0 - 0.01 * share)
-    H, V_A, good = hang(x, z, 0.0, 1.0, s, STIFFNESS, 2.0, 0.0, 0.0)
+    H, V_A, good = solve_catenary(x, z, 0.0, 1.0, s, STIFFNESS, 2.0, 0.0, 0.0)
     assert good
     assert H > 0.0
     np.testing.assert_allclose(free_part(H, V_A, s, STIFFNESS, 2.0)[:2], (x, z), atol=1e-11)
     # From the solution of a neighbour it is the same one.
-    warm = hang(x, z, 0.0, 1.0, s, STIFFNESS, 2.0, 1.1 * H, V_A - 0.1)
+    warm = solve_catenary(x, z, 0.0, 1.0, s, STIFFNESS, 2.0, 1.1 * H, V_A - 0.1)
     np.testing.assert_allclose(warm[:2], (H, V_A), rtol=1e-8, atol=1e-8)
 
 

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from cdpr_drake.cables.catenary_kernel import free_part
-from cdpr_drake.cables.hanging_kernel import SENSITIVITIES, hang, sagging_cable
+from cdpr_drake.cables.hanging_kernel import SENSITIVITIES, sagging_cable, solve_catenary
 from cdpr_drake.geometry.pulley_kernel import tangent
 
 ES, W = 2.9e6, 2.18
@@ -34,7 +34,7 @@ def test_string_on_the_wheel_and_off_it(rho, z, r, sigma, strain):
     """
     assume(rho > 2.5 * r)
     l0 = straight_length(rho, z, r, sigma) / (1.0 + strain)
-    H, V_A, good = hang(rho, z, r, sigma, l0, ES, W, 0.0, 0.0)
+    H, V_A, good = solve_catenary(rho, z, r, sigma, l0, ES, W, 0.0, 0.0)
     assert good
     out = np.empty((SENSITIVITIES, 3))
     H, V_B, t_B, t_A, length, _ = sagging_cable(rho, z, r, sigma, l0, ES, W, H, V_A, out)
@@ -72,7 +72,7 @@ def test_a_heavy_pull_leaves_the_pulley_where_a_straight_cable_does(rho, z, r, s
     assume(rho > 2.5 * r)
     _, sine, cosine = tangent(rho, sigma * z, r)
     l0 = straight_length(rho, z, r, sigma) / 1.001
-    H, V_A, _ = hang(rho, z, r, sigma, l0, ES, 1e-9, 0.0, 0.0)
+    H, V_A, _ = solve_catenary(rho, z, r, sigma, l0, ES, 1e-9, 0.0, 0.0)
     T = np.hypot(H, V_A)
     np.testing.assert_allclose((H / T, -sigma * V_A / T), (sine, cosine), atol=1e-9)
     np.testing.assert_allclose(T, ES * 1e-3, rtol=1e-9)
@@ -81,18 +81,18 @@ def test_a_heavy_pull_leaves_the_pulley_where_a_straight_cable_does(rho, z, r, s
 @given(spans, heights, st.floats(1.0, 2.0), st.floats(1e-3, 1e4))
 def test_hanging_loops_of_any_weight_are_found(x, z, looseness, weight):
     s = looseness * np.hypot(x, z) + 1e-6
-    H, V_A, good = hang(x, z, 0.0, 1.0, s, 1e8, weight, 0.0, 0.0)
+    H, V_A, good = solve_catenary(x, z, 0.0, 1.0, s, 1e8, weight, 0.0, 0.0)
     assert good
     np.testing.assert_allclose(free_part(H, V_A, s, 1e8, weight)[:2], (x, z), atol=1e-10)
 
 
 def test_a_vertical_cable_hangs_by_its_weight():
     """Slack by a metre, straight down: both strands carry themselves."""
-    H, V_A, good = hang(1e-9, -2.0, 0.0, 1.0, 3.0, 1e9, W, 0.0, 0.0)
+    H, V_A, good = solve_catenary(1e-9, -2.0, 0.0, 1.0, 3.0, 1e9, W, 0.0, 0.0)
     assert good
     np.testing.assert_allclose((V_A, V_A + W * 3.0), (-W * 2.5, W * 0.5), atol=1e-6)
     assert 0.0 < H < 1e-6
 
 
 def test_what_cannot_be_solved_says_so():
-    assert not hang(0.05, 0.0, 0.1, 1.0, 1.0, ES, W, 0.0, 0.0)[2]
+    assert not solve_catenary(0.05, 0.0, 0.1, 1.0, 1.0, ES, W, 0.0, 0.0)[2]

@@ -14,7 +14,10 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import unquote, urlsplit
 
+from fontTools.ttLib import TTFont
+
 from tests.chromium import LONGEST_WAIT, chromium, wait_for
+from tests.docs.make_equations_font import FONT
 
 UNREAD = ("code", "pre", "script", "style", "math", "textarea", "svg", "noscript")
 """Elements whose text is no prose."""
@@ -54,6 +57,7 @@ class Page(HTMLParser):
         links: Addresses of links, and of what is fetched to show the page.
         fetched: Those that are fetched.
         prose: Pieces of text that a reader sees, code and equations left out.
+        equations: Characters of equations.
     """
 
     def __init__(self, text: str) -> None:
@@ -62,7 +66,8 @@ class Page(HTMLParser):
         self.links: list[str] = []
         self.fetched: list[str] = []
         self.prose: list[str] = []
-        self._unread = 0
+        self.equations: set[str] = set()
+        self._unread = self._math = 0
         self.feed(text)
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
@@ -76,13 +81,17 @@ class Page(HTMLParser):
             self.fetched.append(address)
         if tag not in WITHOUT_END:
             self._unread += tag in UNREAD
+            self._math += tag == "math"
 
     def handle_endtag(self, tag: str) -> None:
         self._unread -= tag in UNREAD
+        self._math -= tag == "math"
 
     def handle_data(self, data: str) -> None:
         if not self._unread:
             self.prose.append(data)
+        if self._math:
+            self.equations |= {*data.strip()}
 
 
 def raw_markup(page: Page) -> Iterator[str]:
@@ -117,8 +126,10 @@ def page_problems(site: Path) -> Iterator[str]:
     if not files:
         yield f"{site}: holds no page"
     pages = {path: Page(path.read_text(encoding="utf-8")) for path in files}
+    known = {*map(chr, TTFont(FONT).getBestCmap())}
     for path, page in pages.items():
-        for problem in (*raw_markup(page), *dead_links(path, pages)):
+        strange = [f"equation with {sign!r}, not in {FONT.name}" for sign in page.equations - known]
+        for problem in (*raw_markup(page), *dead_links(path, pages), *strange):
             yield f"{path.relative_to(site)}: {problem}"
 
 

@@ -56,6 +56,7 @@ def test_a_good_site_has_no_problem(tmp_path):
         ('<a href="#nowhere">c</a>', "no such place"),
         ('<a href="b.html#nowhere">c</a>', "no such place"),
         ('<script src="https://unpkg.com/shim"></script>', "from a network"),
+        ("<math><mo>&#x2A0C;</mo></math>", "equation with '⨌'"),
     ],
 )
 def test_each_problem_is_found(tmp_path, text, words):

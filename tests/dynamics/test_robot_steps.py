@@ -8,7 +8,12 @@ from cdpr_drake.cables.commanded_tension_kernel import cable_motions
 from cdpr_drake.dynamics.advance_kernel import REPORTED, advance_robot, robot_energy
 from cdpr_drake.dynamics.explicit_kernel import METHODS
 from cdpr_drake.dynamics.robot_arrays import GRAVITY, MOTORS, TENSIONS, Drive
-from cdpr_drake.dynamics.robot_kernel import GOOD, LOST, is_plain, robot_rates
+from cdpr_drake.dynamics.robot_kernel import (
+    INTEGRATION_DIVERGED,
+    INTEGRATION_OK,
+    is_plain,
+    robot_rates,
+)
 from cdpr_drake.dynamics.semi_implicit_kernel import linearise
 from cdpr_drake.models.robot_loader import load_robot
 from tests.dynamics.robots import robot_arrays
@@ -93,10 +98,10 @@ def test_semi_implicit_step_stays_stable_where_the_explicit_one_does_not():
     start = pushed(state)
     rest = robot_energy(arrays, state)
     _, _, bad = advanced(arrays, start, 2.0, 0.01, "runge_kutta3")
-    assert bad == LOST
+    assert bad == INTEGRATION_DIVERGED
     for step in (1e-3, 5e-3, 2e-2):
         end, _, bad = advanced(arrays, start, 2.0, step, "semi_implicit")
-        assert bad == GOOD
+        assert bad == INTEGRATION_OK
         assert robot_energy(arrays, end) < rest + 1.0
         assert np.linalg.norm(end[7:13]) < 1e-2
 
@@ -163,7 +168,7 @@ def test_energy_at_real_stiffness_with_cables_that_go_slack_and_catch(step):
     slack, motions = False, np.zeros((2, 8))
     for _ in range(50):
         end, _, bad = advanced(arrays, start, 0.1, step, "runge_kutta3")
-        assert bad == GOOD
+        assert bad == INTEGRATION_OK
         start = end
         cable_motions(end[:13], arrays.cables, 0.0, motions)
         slack |= np.any(motions[0] < end[13:])
@@ -218,5 +223,5 @@ def test_what_is_lost_leaves_the_state_before_it():
     arrays, state, _ = robot_arrays("acrobot_small")
     state[10:13] = 1e9
     end, _, bad = advanced(arrays, state, 1.0, 1e-3, "runge_kutta3")
-    assert bad == LOST
+    assert bad == INTEGRATION_DIVERGED
     assert np.all(np.isfinite(end))

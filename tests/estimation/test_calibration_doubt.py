@@ -9,9 +9,9 @@ import pytest
 from cdpr_drake.estimation.camera_miscalibration import (
     Calibration,
     answers,
-    judged,
-    learnt_shares,
-    mixed,
+    calibration_verdicts,
+    explained_variance,
+    mixture,
     surprise_of,
 )
 from cdpr_drake.estimation.sensor_filter import (
@@ -148,7 +148,7 @@ def test_a_mixture_has_the_moments_of_its_parts():
     other = replace(moved_by(made, d), covariance=2.0 * made.covariance)
     np.testing.assert_allclose(apart(other, made), d, atol=1e-14)
     first, second = answers(made, ())[0], answers(other, ())[0]
-    whole = mixed([replace(first, probability=0.75), replace(second, probability=0.25)])
+    whole = mixture([replace(first, probability=0.75), replace(second, probability=0.25)])
     np.testing.assert_allclose(apart(whole, made), 0.25 * d, atol=1e-14)
     expected = 1.25 * made.covariance + 0.75 * 0.25 * np.outer(d, d)
     np.testing.assert_allclose(whole.covariance, expected, atol=1e-18)
@@ -171,10 +171,10 @@ def runs():
         seen, errors = readings(seed, wrong)
         base, _ = filtered(start(WRONG, WRONG), seen)
         found = answers(base, cameras())
-        whole = mixed(found)
+        whole = mixture(found)
         sure, _ = filtered(start(TOLD, TOLD), seen)
         true = wrong_by(start(TOLD, TOLD), errors)
-        results = [one.probability for one in judged(found, cameras())]
+        results = [one.probability for one in calibration_verdicts(found, cameras())]
         for made, columns in ((whole, POSE), (whole, slice(15, 27)), (sure, POSE)):
             x = apart(true, made)[columns]
             results.append(x @ np.linalg.solve(made.covariance[columns, columns], x))
@@ -215,20 +215,20 @@ def test_surprise_is_chi_square_where_all_is_as_told(runs):
 
 def test_nothing_is_learnt_where_nothing_is_seen():
     made = start(TOLD, TOLD)
-    np.testing.assert_allclose(learnt_shares(made, EXTERNAL, TOLD), 0.0, atol=1e-12)
+    np.testing.assert_allclose(explained_variance(made, EXTERNAL, TOLD), 0.0, atol=1e-12)
     assert surprise_of(made, cameras()[1]) == (0.0, 0)
     exact = Calibration(EXTERNAL, X_WE, np.zeros(6))
     assert surprise_of(start(TOLD, np.zeros(6)), exact) == (0.0, 0)
     seen, _ = readings(0, (False, False))
     after, _ = filtered(made, seen)
-    assert np.max(learnt_shares(after, ON_BOARD, TOLD)) > 0.5
+    assert np.max(explained_variance(after, ON_BOARD, TOLD)) > 0.5
 
 
 def test_a_found_error_is_in_the_camera_frame_as_told():
     seen, errors = readings(5, (False, True))
     base, _ = filtered(start(TOLD, WRONG), seen)
     sure = (replace(cameras()[0], wrong=None), cameras()[1])
-    one = judged(answers(base, sure), sure)[1]
+    one = calibration_verdicts(answers(base, sure), sure)[1]
     left = one.error - errors[EXTERNAL]
     assert np.all(np.abs(left) < 4.0 * one.deviation)
     true = wrong_by(start(TOLD, WRONG), errors)

@@ -65,7 +65,7 @@ def _wide() -> dict[str, str]:
 
 def study_names() -> list[str]:
     """Names of all studies, from the help of `cdpr study`."""
-    found = re.search(r"Which study: (.*?)\.", command("study", "--help"))
+    found = re.search(r"Which study: (.*?)\.\s", command("study", "--help"))
     if found is None:
         raise SystemExit("cdpr study --help does not list the studies any more")
     return [word.strip() for word in found[1].split(",")]
@@ -105,11 +105,17 @@ def _scenario_items(facts: dict[str, Any]) -> list[Item]:
 
 
 def _written(work: Path, *words: str) -> dict[str, Any]:
-    """Results of a command that writes a folder."""
+    """Results of a command that writes a folder.
+
+    Raises:
+        RuntimeError: It failed, or refused.
+    """
     done = subprocess.run(
         [_program(), *words, "--out", "out"], cwd=work, capture_output=True, text=True,
         check=False, env=_wide(),
     )  # fmt: skip
+    if done.returncode:
+        raise RuntimeError(f"exit code {done.returncode}: {done.stderr.strip()[-500:]}")
     return _answer(done.returncode, done.stderr, work / "out")
 
 

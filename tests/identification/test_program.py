@@ -122,14 +122,14 @@ def test_a_log_without_rotation_says_what_it_cannot_tell():
     made = program(samples(turn=0.0, span=4.0, **NOISE))
     with pytest.raises(IdentificationError, match=r"inertia .* cannot be told.*no rotation"):
         made.Solve()
-    words = " ".join(made.FindUntold())
+    words = " ".join(made.FindUnidentifiable())
     assert "inertia xx" in words
     assert "mass cannot" not in words
 
 
 def test_a_log_at_rest_says_that_there_is_no_rotation():
     made = program(samples(turn=0.0, move=0.0, span=4.0, **NOISE))
-    assert "centre of mass along z" in " ".join(made.FindUntold())
+    assert "centre of mass along z" in " ".join(made.FindUnidentifiable())
 
 
 def stretched(noise=0.0):

@@ -13,8 +13,7 @@ import pytest
 from numba.core import event
 
 from cdpr_drake.kernel_cache import locks as locks_module
-from cdpr_drake.kernel_cache.beside import compile_beside
-from cdpr_drake.kernel_cache.helper import compile_listed
+from cdpr_drake.kernel_cache.background import compile_in_background, compile_listed
 from cdpr_drake.kernel_cache.kernel_list import ListedKernel, is_complete, note_complete
 from cdpr_drake.kernel_cache.locks import (
     LOCK_FILE,
@@ -128,7 +127,7 @@ def test_what_another_process_compiles_is_waited_for(small, compiled, monkeypatc
         other.kill()
         other.wait()
 
-    monkeypatch.setattr("cdpr_drake.kernel_cache.helper.time.sleep", pause)
+    monkeypatch.setattr("cdpr_drake.kernel_cache.background.time.sleep", pause)
     with held_elsewhere(os.environ["NUMBA_CACHE_DIR"], name) as other:
         compile_listed(LISTED, locks)
     assert pauses == [["third"]]
@@ -154,7 +153,7 @@ def fresh(tmp_path, monkeypatch):
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     monkeypatch.setenv("CDPR_COMPILE_HELPERS", "")
     monkeypatch.setattr("cdpr_drake.kernel_cache.locks._locks", None)
-    monkeypatch.setattr("cdpr_drake.kernel_cache.beside._processors", lambda: 2)
+    monkeypatch.setattr("cdpr_drake.kernel_cache.background._processors", lambda: 2)
     return tmp_path
 
 
@@ -170,13 +169,13 @@ def test_a_function_without_a_module_is_of_others():
     assert kernel_lock(twice, (numba.float64,)) is None
 
 
-def test_a_process_beside_ends_with_its_parent(fresh):
+def test_a_process_in_the_background_ends_with_its_parent(fresh):
     """The parent starts it and is killed at once."""
     words = (
-        "import os; from cdpr_drake.kernel_cache import beside; "
-        "beside._processors = lambda: 2; "
-        f"beside.compile_beside({GROUP}); "
-        "print(beside._started[0].pid, flush=True); os.kill(os.getpid(), 9)"
+        "import os; from cdpr_drake.kernel_cache import background; "
+        "background._processors = lambda: 2; "
+        f"background.compile_in_background({GROUP}); "
+        "print(background._started[0].pid, flush=True); os.kill(os.getpid(), 9)"
     )
     done = subprocess.run([sys.executable, "-c", words], stdout=subprocess.PIPE, check=False)
     assert done.returncode == -9
@@ -190,26 +189,26 @@ def test_nothing_is_started_where_it_is_of_no_use(fresh, monkeypatch):
         started.append(groups)
 
     started = []
-    monkeypatch.setattr("cdpr_drake.kernel_cache.beside._start", start)
-    assert compile_beside(GROUP) == 1
+    monkeypatch.setattr("cdpr_drake.kernel_cache.background._start", start)
+    assert compile_in_background(GROUP) == 1
     monkeypatch.setenv("CDPR_COMPILE_HELPERS", "0")
-    assert compile_beside(GROUP) == 0
+    assert compile_in_background(GROUP) == 0
     monkeypatch.setenv("CDPR_COMPILE_HELPERS", "5")
-    assert compile_beside(GROUP) == 1  # one processor is this process's own
-    assert compile_beside([]) == 0
+    assert compile_in_background(GROUP) == 1  # one processor is this process's own
+    assert compile_in_background([]) == 0
     assert not is_complete(GROUP)
     note_complete(GROUP)
-    assert compile_beside(GROUP) == 0
+    assert compile_in_background(GROUP) == 0
     assert len(started) == 2
-    monkeypatch.setattr("cdpr_drake.kernel_cache.beside._processors", lambda: 1)
-    assert compile_beside(["another one"]) == 0
+    monkeypatch.setattr("cdpr_drake.kernel_cache.background._processors", lambda: 1)
+    assert compile_in_background(["another one"]) == 0
 
 
-def test_where_nothing_can_be_kept_nobody_compiles_beside(fresh, monkeypatch):
+def test_where_nothing_can_be_kept_nothing_is_started(fresh, monkeypatch):
     (fresh / "file").touch()
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(fresh / "file" / "below"))
     assert shared_locks() is None
-    assert compile_beside(GROUP) == 0
+    assert compile_in_background(GROUP) == 0
 
 
 def test_a_number_of_processes_that_is_none_is_refused(monkeypatch):
@@ -217,7 +216,7 @@ def test_a_number_of_processes_that_is_none_is_refused(monkeypatch):
 
     monkeypatch.setenv("CDPR_COMPILE_HELPERS", "many")
     with pytest.raises(CdprError, match="CDPR_COMPILE_HELPERS: found 'many'; accepted: a whole"):
-        compile_beside(GROUP)
+        compile_in_background(GROUP)
 
 
 def linked_locks(path):
@@ -249,4 +248,4 @@ def test_a_file_of_locks_that_is_not_ones_own_is_not_used(tmp_path, monkeypatch,
     monkeypatch.setattr(locks_module, "_locks", None)
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     assert shared_locks() is None  # each process compiles for itself
-    assert compile_beside(["acrobot_pbvs"]) == 0
+    assert compile_in_background(["acrobot_pbvs"]) == 0

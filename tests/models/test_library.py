@@ -41,7 +41,7 @@ def test_loads_hangs_steps_and_is_exported(name):
     block = CableRobot(robot)
     simulator = Simulator(block)
     context = simulator.get_mutable_context()
-    block.hang(context, home)
+    block.set_at_equilibrium(context, home)
     block.GetInputPort("cable_velocities").FixValue(context, np.zeros(len(robot.cables)))
     start = block.GetOutputPort("X_WP").Eval(context)
     step = automatic_step(robot, start, "runge_kutta3")

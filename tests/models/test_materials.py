@@ -12,7 +12,7 @@ from cdpr_drake.cli.app import make_app
 from cdpr_drake.errors import CableGeometryError, RobotFileError
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.models.robot_exchange import export_robot
-from cdpr_drake.models.robot_exports import not_written
+from cdpr_drake.models.robot_exports import export_omissions
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_statics import rigid_platform
 from cdpr_drake.models.ups_robot import rod_masses
@@ -146,8 +146,8 @@ def test_mujoco_gets_width_and_stiffness_of_each_tendon(tmp_path):
     np.testing.assert_allclose(again.diameters(), robot.diameters(), rtol=1e-15)
     np.testing.assert_allclose(again.stiffness(), robot.stiffness(), rtol=1e-12)
     own = {f"cables[].material.{key}" for key in ("diameter", "youngs_modulus")}
-    assert not own & set(not_written(robot, "mjcf"))
-    assert own <= set(not_written(robot, "wcrfx"))
+    assert not own & set(export_omissions(robot, "mjcf"))
+    assert own <= set(export_omissions(robot, "wcrfx"))
 
 
 def test_export_says_what_it_leaves_out(tmp_path):

@@ -17,7 +17,7 @@ from cdpr_drake.errors import CableModelError, CalibrationError, RobotFileError,
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.cable_rates import cable_rates_from_base_twist
 from cdpr_drake.geometry.poses import rotation_from_vector
-from cdpr_drake.models.robot_exports import not_written
+from cdpr_drake.models.robot_exports import export_omissions
 from cdpr_drake.models.robot_holding import hold_robot
 from cdpr_drake.models.robot_statics import rigid_platform, tension_problem
 from cdpr_drake.stability.stability_case import StabilityCase
@@ -150,7 +150,7 @@ def test_both_engines_move_it_alike():
         block = kind(ROBOT, HOW)
         simulator = Simulator(block)
         context = simulator.get_mutable_context()
-        block.hang(context, POSE)
+        block.set_at_equilibrium(context, POSE)
         block.GetInputPort("cable_velocities").FixValue(context, command)
         if kind is CableRobot:
             ResetIntegratorFromFlags(simulator, "runge_kutta3", 1e-4).set_fixed_step_mode(True)
@@ -167,7 +167,7 @@ def test_energy_stays_without_damping():
     block = CompiledCableRobot(ROBOT, free)
     simulator = Simulator(block)
     context = simulator.get_mutable_context()
-    block.hang(context, POSE)
+    block.set_at_equilibrium(context, POSE)
     block.GetInputPort("cable_velocities").FixValue(context, np.zeros(8))
     own = block.GetMutableSubsystemContext(block.motion, context)
     state = block.motion.state(own).copy()
@@ -184,7 +184,7 @@ def test_energy_stays_without_damping():
 def test_the_plant_is_differentiable():
     block = CableRobot(ROBOT, HOW)
     context = block.CreateDefaultContext()
-    block.hang(context, POSE)
+    block.set_at_equilibrium(context, POSE)
     port = block.GetInputPort("cable_velocities")
     port.FixValue(context, np.zeros(8))
     linear = Linearize(
@@ -220,7 +220,7 @@ def test_what_cannot_take_them_says_so():
         StabilityCase(CABLES)
     with pytest.raises(CalibrationError, match=r"found a pulley at the platform; accepted"):
         CalibrationModel(tuple(cable.name for cable in ROBOT.cables), CABLES)
-    assert "fixed anchor points" in not_written(ROBOT, "wcrfx")["platform_pulley.radius"]
+    assert "fixed anchor points" in export_omissions(ROBOT, "wcrfx")["platform_pulley.radius"]
 
 
 def test_they_change_which_poses_tensions_can_hold():

@@ -9,7 +9,7 @@ import yaml
 from cdpr_drake.analyses.reporting.provenance import write_run_inputs
 from cdpr_drake.errors import RobotFileError
 from cdpr_drake.geometry.straight_cables import cable_lengths
-from cdpr_drake.models.robot_exports import not_written
+from cdpr_drake.models.robot_exports import export_omissions
 from cdpr_drake.models.robot_loader import load_robot, robot_text
 from cdpr_drake.systems.diagrams.load import load_scenario
 from tests.models.robots import content_of, robot_of
@@ -119,6 +119,6 @@ def test_a_robot_without_rails_says_so():
 
 
 def test_an_export_says_where_exit_points_stand():
-    lost = not_written(robot_of(with_rails()), "sdf")
+    lost = export_omissions(robot_of(with_rails()), "sdf")
     for key in ("axis", "lower", "upper", "at"):
         assert lost[f"cables[].rail.{key}"] == "exit points were written where they stand"

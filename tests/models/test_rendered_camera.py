@@ -90,7 +90,7 @@ class TwoCameras:
         simulator = Simulator(self.diagram)
         context = simulator.get_mutable_context()
         own = self.robot.GetMyMutableContextFromRoot(context)
-        self.robot.hang(own, X_WP)
+        self.robot.set_at_equilibrium(own, X_WP)
         self.robot.GetInputPort("cable_velocities").FixValue(own, np.zeros(8))
         simulator.AdvancePendingEvents()
         return [

@@ -26,9 +26,9 @@ def test_a_hanging_robot_stands_still(name, model):
     context = block.CreateDefaultContext()
     if (name, model) == ("caroca_gazebo", "catenary"):  # 1 kg on eight steel cables of 1 kg each
         with pytest.raises(InfeasibleTensionError, match=r"with at least 1\.5 times its own"):
-            block.hang(context, robot.home.transform())
+            block.set_at_equilibrium(context, robot.home.transform())
         return
-    tensions = block.hang(context, robot.home.transform())
+    tensions = block.set_at_equilibrium(context, robot.home.transform())
     block.GetInputPort("cable_velocities").FixValue(context, np.zeros(len(robot.cables)))
     rates = block.EvalTimeDerivatives(context).CopyToVector()
     assert np.max(np.abs(rates)) < STILL
@@ -78,9 +78,9 @@ def test_a_platform_with_slack_cables_can_start_at_rest(kind):
     context = simulator.get_mutable_context()
     block.GetInputPort("cable_velocities").FixValue(context, np.zeros(8))
     start = robot.home.transform()
-    held = block.hang(context, start)
+    held = block.set_at_equilibrium(context, start)
     lengths = block.GetOutputPort("unstrained_lengths").Eval(context).copy()
-    tensions = block.hang(context, start, PAID_OUT, at_rest=True)
+    tensions = block.set_at_equilibrium(context, start, PAID_OUT, at_rest=True)
     np.testing.assert_allclose(
         block.GetOutputPort("unstrained_lengths").Eval(context), lengths + PAID_OUT, atol=1e-12
     )
@@ -103,7 +103,7 @@ def test_without_slack_at_rest_changes_nothing():
     block = CableRobot(robot)
     contexts = [block.CreateDefaultContext() for _ in range(2)]
     one, other = (
-        block.hang(context, robot.home.transform(), at_rest=at_rest)
+        block.set_at_equilibrium(context, robot.home.transform(), at_rest=at_rest)
         for context, at_rest in zip(contexts, (False, True), strict=True)
     )
     np.testing.assert_array_equal(one, other)
@@ -113,6 +113,6 @@ def test_slack_that_lets_the_platform_fall_out_of_the_frame_is_refused():
     robot = load_robot("acrobot_small")
     block = CableRobot(robot)
     with pytest.raises(CdprError):
-        block.hang(
+        block.set_at_equilibrium(
             block.CreateDefaultContext(), robot.home.transform(), np.full(8, 2.0), at_rest=True
         )

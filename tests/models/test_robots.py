@@ -111,7 +111,7 @@ def test_every_robot_loads_and_hangs_still_at_home(name):
     simulator = Simulator(block)
     context = simulator.get_mutable_context()
     home = robot.home.transform()
-    block.hang(context, home)
+    block.set_at_equilibrium(context, home)
     block.GetInputPort("cable_velocities").FixValue(context, np.zeros(len(robot.cables)))
     ResetIntegratorFromFlags(simulator, "runge_kutta3", automatic_step(robot, home, "runge_kutta3"))
     simulator.get_mutable_integrator().set_fixed_step_mode(True)

@@ -9,9 +9,9 @@ from pydrake.geometry import Cylinder, Mesh, Role, SceneGraph, Sphere
 from pydrake.multibody.plant import MultibodyPlant
 
 from cdpr_drake.analyses.reporting.provenance import write_run_inputs
-from cdpr_drake.analyses.workspaces.workspace_question import surroundings
+from cdpr_drake.analyses.workspaces.workspace_question import interference_bodies
 from cdpr_drake.errors import RobotFileError
-from cdpr_drake.models.robot_exports import not_written
+from cdpr_drake.models.robot_exports import export_omissions
 from cdpr_drake.models.robot_in_plant import add_robot, platform_inertia
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.scene import add_frame
@@ -131,14 +131,14 @@ def test_the_scene_shows_the_shape(kind, tmp_path):
 def test_clearances_reckon_with_the_frames_own_beams():
     ends = np.array([[-0.6, -0.6, 0.0], [0.6, 0.6, 1.2]])
     beams = [{"start": ends[0].tolist(), "end": ends[1].tolist(), "width": 0.02}]
-    around = surroundings(robot_of(content_with(beams=beams)))
+    around = interference_bodies(robot_of(content_with(beams=beams)))
     (row,) = around.fixtures
     R, middle, half = row[:9].reshape(3, 3), row[9:12], row[12:]
     np.testing.assert_allclose(middle, ends.mean(axis=0), atol=EXACT)
     np.testing.assert_allclose(half, [0.01, 0.01, np.linalg.norm(ends[1] - ends[0]) / 2])
     np.testing.assert_allclose(R.T @ R, np.eye(3), atol=EXACT)
     np.testing.assert_allclose(middle + half[2] * R[:, 2], ends[1], atol=EXACT)
-    assert len(surroundings(robot_of(content_with())).fixtures) == 12
+    assert len(interference_bodies(robot_of(content_with())).fixtures) == 12
 
 
 @pytest.mark.parametrize(
@@ -172,10 +172,10 @@ def test_a_mesh_that_encloses_nothing_has_no_inertia(tmp_path):
 
 def test_an_export_says_that_it_writes_the_box():
     robot = robot_of(content_with({"kind": "sphere", "radius": 0.1}))
-    lost = not_written(robot, "urdf")
+    lost = export_omissions(robot, "urdf")
     for key in ("kind", "radius"):
         assert lost[f"platform.shape.{key}"] == "the platform was written as its box"
-    assert "no place" in not_written(robot, "wcrfx")["platform.shape.kind"]
+    assert "no place" in export_omissions(robot, "wcrfx")["platform.shape.kind"]
 
 
 def test_the_folder_of_a_run_has_all_of_the_robot(tmp_path):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.statics.static_query import at_lengths, at_pose
+from cdpr_drake.analyses.statics.static_query import static_at_lengths, static_at_pose
 from cdpr_drake.errors import ForwardKinematicsError
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.poses import rotation_from_vector
@@ -90,9 +90,9 @@ def test_a_point_mass_on_three_cables_hangs_symmetrically():
     up = 3.0 * (k * s**2 + turned * c**2)
     expected = np.sort(np.sqrt(np.array([side, side, up]) / m)) / (2.0 * np.pi)
     np.testing.assert_allclose(modes.frequencies, expected, rtol=RELATIVE)
-    report = at_pose(robot, robot.home.transform(), "elastic", False)
+    report = static_at_pose(robot, robot.home.transform(), "elastic", False)
     np.testing.assert_allclose(report.tensions, t, rtol=RELATIVE)
-    assert at_pose(robot, robot.home.transform(), "inextensible", False).frequencies is None
+    assert static_at_pose(robot, robot.home.transform(), "inextensible", False).frequencies is None
 
 
 def parallelogram():
@@ -120,7 +120,7 @@ def test_an_underactuated_platform_on_four_parallel_cables():
     tilt = [np.sqrt(4 * k * 0.4**2 / inertia[0]), np.sqrt(4 * k * 0.5**2 / inertia[1])]
     elastic = np.sort([*expected, np.sqrt(4 * k / m), *tilt]) / (2 * np.pi)
     np.testing.assert_allclose(modes.frequencies, elastic, rtol=RELATIVE)
-    report = at_pose(robot, robot.home.transform(), "elastic", False)
+    report = static_at_pose(robot, robot.home.transform(), "elastic", False)
     np.testing.assert_allclose(report.tensions, m * G / 4.0, rtol=RELATIVE)
 
 
@@ -128,7 +128,7 @@ def test_the_same_on_cables_that_keep_their_lengths():
     robot = small_robot("hanging_four")
     cables = robot.cable_set().without_pulleys()
     l0 = cable_paths(robot.home.transform(), cables).lengths
-    report = at_lengths(robot, l0, "inextensible", False)
+    report = static_at_lengths(robot, l0, "inextensible", False)
     assert report.frequencies is not None
     assert len(report.frequencies) == 2  # six less four
     stiff = small_robot("hanging_four", cable={
@@ -197,7 +197,7 @@ def test_every_type_rests_with_as_many_modes_as_freedom(name):
     robot = small_robot(name)
     cables = robot.cable_set().without_pulleys()
     l0 = cable_paths(robot.home.transform(), cables).lengths * (1.0 - 1e-4)
-    report = at_lengths(robot, l0, "elastic", False)
+    report = static_at_lengths(robot, l0, "elastic", False)
     motion = robot.motion_type()
     assert len(report.frequencies) == len(report.principal) == motion.freedom
     assert report.stiffness.shape == (motion.freedom, motion.freedom)

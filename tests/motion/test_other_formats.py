@@ -71,7 +71,7 @@ def test_what_a_format_cannot_hold_is_refused_by_name(format, name, words):
 def test_the_world_is_turned_for_formats_with_gravity_along_z(format, tmp_path):
     """The file says by which rotation; turned back, the robot is the one that was written."""
     robot = small_robot("tilted_gravity")
-    said = models.not_written(robot, format)["gravity_direction"]
+    said = models.export_omissions(robot, format)["gravity_direction"]
     assert said.startswith(f"The world was turned by 19.827 deg: {format} has gravity along -z")
     texts = models.export_robot(robot, format).values()
     assert all(said.removesuffix(".") in text for text in texts)
@@ -95,7 +95,7 @@ def test_the_world_is_turned_for_formats_with_gravity_along_z(format, tmp_path):
 def test_a_world_with_gravity_along_z_is_not_turned():
     assert all(
         "turned" not in words
-        for words in models.not_written(small_robot("tripod"), "caspr").values()
+        for words in models.export_omissions(small_robot("tripod"), "caspr").values()
     )
     assert models.world_turn(small_robot("tilted_gravity"), "mjcf") == ""
     assert models.gravity_turn(small_robot("tilted_gravity", gravity=0.0)) is None

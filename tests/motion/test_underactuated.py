@@ -12,7 +12,7 @@ from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import MatrixGain
 
-from cdpr_drake.analyses.statics.static_query import at_lengths, at_pose
+from cdpr_drake.analyses.statics.static_query import static_at_lengths, static_at_pose
 from cdpr_drake.analyses.workspaces.pose_grid import check_grid
 from cdpr_drake.cli.app import main
 from cdpr_drake.errors import (
@@ -126,7 +126,7 @@ def test_it_hangs_swings_and_keeps_its_energy(name, kind):
     simulator = Simulator(diagram)
     context, m = simulator.get_mutable_context(), len(robot.cables)
     diagram.GetInputPort("cable_velocities").FixValue(context, np.zeros(m))
-    diagram.hang(context, robot.home.transform())
+    diagram.set_at_equilibrium(context, robot.home.transform())
     X_WP = diagram.GetOutputPort("X_WP").Eval(context)
     cables = robot.cable_set().without_pulleys()
     l0 = cable_paths(robot.home.transform(), cables).lengths
@@ -176,17 +176,17 @@ def test_what_four_cables_cannot_control():
     assert not control.balances
     assert control.tensions is None
     with pytest.raises(InfeasibleTensionError, match="4 cables for 6 degrees of freedom"):
-        at_pose(robot, robot.home.transform(), "elastic", False)
+        static_at_pose(robot, robot.home.transform(), "elastic", False)
 
 
 def test_a_pose_of_rest_is_held_by_its_tensions():
     robot = small_robot("hanging_four")
     l0 = cable_paths(robot.home.transform(), robot.cable_set()).lengths
-    report = at_lengths(robot, l0, "elastic", False)
+    report = static_at_lengths(robot, l0, "elastic", False)
     control = wrench_balance(robot, report.X_WP).control()
     assert control.balances
     np.testing.assert_allclose(control.tensions, report.tensions, rtol=1e-6)
-    held = at_pose(robot, report.X_WP, "elastic", False)
+    held = static_at_pose(robot, report.X_WP, "elastic", False)
     np.testing.assert_allclose(held.l0, l0, rtol=1e-8)
 
 
@@ -322,7 +322,7 @@ def test_computed_torque_refuses_by_name():
 def test_a_pose_that_a_robot_cannot_have_is_refused(name, pose):
     robot = small_robot(name)
     with pytest.raises(TensionProblemError, match="cannot have"):
-        at_pose(robot, pose, "elastic", False)
+        static_at_pose(robot, pose, "elastic", False)
     near = robot.joint().nearest(pose)
     assert robot.joint().nearest(near).IsNearlyEqualTo(near, 1e-12)
     wrench_balance(robot, near)

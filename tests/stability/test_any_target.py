@@ -13,7 +13,7 @@ from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.stability import no_stable_target as any_target
 from cdpr_drake.stability.criterion import stability_margin
 from cdpr_drake.stability.desired_view import FixedError
-from cdpr_drake.stability.no_stable_target import some_target_possible
+from cdpr_drake.stability.no_stable_target import stable_target_exists
 from cdpr_drake.stability.perturbation_bounds import BASELINE
 from cdpr_drake.stability.stability_case import StabilityCase
 from cdpr_drake.stability.verdict import judge_stability
@@ -70,7 +70,7 @@ def test_the_criterion_has_these_eigenvalues_whatever_is_seen(robot_cables, witn
 
 def test_an_excluded_pose_is_not_stable_for_any_verdict_that_looks_hard(robot_cables):
     poses = unit_poses(60)
-    possible = some_target_possible(robot_cables, LARGE, poses)
+    possible = stable_target_exists(robot_cables, LARGE, poses)
     assert 0 < possible.sum() < len(poses)
     for scheme in ("pbvs", "ibvs"):
         case = StabilityCase(robot_cables, scheme)
@@ -80,17 +80,17 @@ def test_an_excluded_pose_is_not_stable_for_any_verdict_that_looks_hard(robot_ca
 
 def test_a_pose_alone_gets_what_it_gets_among_others(robot_cables):
     poses = unit_poses(12)
-    some = some_target_possible(robot_cables, LARGE, poses)
-    alone = [some_target_possible(robot_cables, LARGE, pose)[0] for pose in poses]
+    some = stable_target_exists(robot_cables, LARGE, poses)
+    alone = [stable_target_exists(robot_cables, LARGE, pose)[0] for pose in poses]
     np.testing.assert_array_equal(some, alone)
 
 
 def test_without_errors_and_with_more_poses_drop_out_only(robot_cables):
     poses = unit_poses(30)
-    none = some_target_possible(robot_cables, BASELINE.scaled(0.0), poses)
+    none = stable_target_exists(robot_cables, BASELINE.scaled(0.0), poses)
     assert none.all()
-    few = some_target_possible(robot_cables, LARGE.scaled(0.5), poses)
-    many = some_target_possible(robot_cables, LARGE, poses)
+    few = stable_target_exists(robot_cables, LARGE.scaled(0.5), poses)
+    many = stable_target_exists(robot_cables, LARGE, poses)
     assert many.sum() <= few.sum()
 
 

@@ -14,8 +14,8 @@ import numpy as np
 
 from cdpr_drake.errors import EquilibriumError
 from cdpr_drake.geometry.poses import pose_error
-from cdpr_drake.statics.equilibrium_enumeration import all_rests
-from cdpr_drake.statics.equilibrium_search import sampled_rests
+from cdpr_drake.statics.equilibrium_enumeration import enumerate_equilibria
+from cdpr_drake.statics.equilibrium_search import sample_equilibria
 from tests.statics.hanging import random_problem
 
 NEAR = 1e-4
@@ -46,14 +46,14 @@ def lost(problems, seed, searches, say=None, first=0):
         platform, lengths = random_problem(random, cables, upright)
         counts.problems += 1
         try:
-            found = all_rests(platform, lengths)
+            found = enumerate_equilibria(platform, lengths)
             rests, counts.lost_paths = found.rests, counts.lost_paths + found.paths.lost
         except EquilibriumError:
             rests, counts.none = [], counts.none + 1
         counts.poses += len(rests)
         counts.unproven += sum(str(one.certificate) == "numerical" for one in rests)
         try:
-            others = sampled_rests(
+            others = sample_equilibria(
                 platform, lengths, elastic=False, most=searches, seed=number
             ).rests
         except EquilibriumError:

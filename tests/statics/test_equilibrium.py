@@ -122,7 +122,7 @@ def test_the_simulation_settles_there():
     damped = replace(robot, cable=replace(robot.cable, retardation_time=2e-3))
     diagram = CableRobot(damped)
     context = diagram.CreateDefaultContext()
-    diagram.hang(context, rest.X_WP)
+    diagram.set_at_equilibrium(context, rest.X_WP)
     diagram.winches.set_unstrained_lengths(
         diagram.GetMutableSubsystemContext(diagram.winches, context), l0
     )

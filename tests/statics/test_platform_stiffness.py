@@ -148,7 +148,7 @@ def test_modes_against_the_time_response(name):
     diagram = CableRobot(robot)
     for k in (0, n - 1):
         context = diagram.CreateDefaultContext()
-        diagram.hang(context, robot.home.transform())
+        diagram.set_at_equilibrium(context, robot.home.transform())
         diagram.winches.set_unstrained_lengths(
             diagram.GetMutableSubsystemContext(diagram.winches, context), l0
         )

@@ -11,7 +11,7 @@ from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.poses import rotation_from_angles
 from cdpr_drake.geometry.straight_cables import gravity_wrench
 from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.statics.static_tensions import hold, lengths_for_tensions
+from cdpr_drake.statics.static_tensions import find_static_tensions, lengths_for_tensions
 
 BALANCE = 1e-6
 """Force [N] and moment [N m] left of 1.5 kN: lengths of 4 m are rounded to 4e-16 m, times a
@@ -36,7 +36,7 @@ def weight(robot, X_WP):
 def test_the_platform_is_at_rest(model, pulleys, X_WP):
     cables = CAROCA.cable_set() if pulleys else CAROCA.cable_set().without_pulleys()
     w = weight(CAROCA, X_WP)
-    found = hold(cables, model, X_WP, w, BOUNDS)
+    found = find_static_tensions(cables, model, X_WP, w, BOUNDS)
     state = cable_state(cables, model, X_WP, found.unstrained_lengths)
     np.testing.assert_allclose(state.wrench, -w, atol=BALANCE)
     np.testing.assert_allclose(state.tensions, found.tensions, atol=BALANCE)
@@ -47,10 +47,10 @@ def test_the_platform_is_at_rest(model, pulleys, X_WP):
 def test_heavy_cables_carry_themselves_too():
     """The tensions at A hold platform and cables, those at B the platform."""
     X_WP, cables = CAROCA.home.transform(), CAROCA.cable_set().without_pulleys()
-    found = hold(cables, "catenary", X_WP, weight(CAROCA, X_WP), BOUNDS)
+    found = find_static_tensions(cables, "catenary", X_WP, weight(CAROCA, X_WP), BOUNDS)
     assert np.all(found.drum_tensions > found.tensions)
     rope = np.sum(cables.linear_weight * found.unstrained_lengths)
-    light = hold(cables, "elastic", X_WP, weight(CAROCA, X_WP), BOUNDS)
+    light = find_static_tensions(cables, "elastic", X_WP, weight(CAROCA, X_WP), BOUNDS)
     gain = np.sum(found.drum_tensions - light.tensions)
     # Half of the cables' weight hangs on the platform, steeply enough to take more than that.
     assert gain > 0.5 * rope
@@ -58,7 +58,7 @@ def test_heavy_cables_carry_themselves_too():
 
 def test_inextensible_cables_have_the_lengths_of_their_ways():
     X_WP, cables = CAROCA.home.transform(), CAROCA.cable_set()
-    found = hold(cables, "inextensible", X_WP, weight(CAROCA, X_WP), BOUNDS)
+    found = find_static_tensions(cables, "inextensible", X_WP, weight(CAROCA, X_WP), BOUNDS)
     np.testing.assert_array_equal(found.unstrained_lengths, cable_paths(X_WP, cables).lengths)
 
 
@@ -66,7 +66,7 @@ def test_none_where_nothing_holds():
     X_WP = RigidTransform([1.9, 3.4, 1.0])
     cables = CAROCA.cable_set().without_pulleys()
     for model in ("elastic", "catenary"):
-        assert hold(cables, model, X_WP, weight(CAROCA, X_WP), BOUNDS) is None
+        assert find_static_tensions(cables, model, X_WP, weight(CAROCA, X_WP), BOUNDS) is None
 
 
 def test_lengths_belong_to_their_tensions():

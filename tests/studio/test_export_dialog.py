@@ -2,7 +2,7 @@
 
 import asyncio
 
-from cdpr_drake.models.robot_exports import not_written, not_written_words
+from cdpr_drake.models.robot_exports import export_omissions, omission_words
 from cdpr_drake.models.robot_loader import load_robot
 from tests.studio.pages import field, opened_page, until
 
@@ -18,6 +18,6 @@ def test_what_was_not_written_is_said_over_the_page(tmp_path):
             return list(user.notify.messages)
 
     said = asyncio.run(scenario())
-    lost = not_written(load_robot("acrobot_large"), "sdf")
+    lost = export_omissions(load_robot("acrobot_large"), "sdf")
     assert "cable.youngs_modulus" in lost
-    assert "\n".join(not_written_words(lost)) in said
+    assert "\n".join(omission_words(lost)) in said

@@ -9,7 +9,7 @@ from cdpr_drake.geometry.poses import pose_from_angles
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_statics import rigid_platform, tension_problem
 from cdpr_drake.statics.equilibrium import equilibrium_near
-from cdpr_drake.statics.static_tensions import hold
+from cdpr_drake.statics.static_tensions import find_static_tensions
 from cdpr_drake.tensions.methods import distribute, feasible_polygon, solution_space
 from cdpr_drake.tensions.slack_correction import (
     null_part,
@@ -95,7 +95,9 @@ def moved(cables, platform, l0, velocities, size=1e-6):
 def test_the_platform_stays_where_elastic_cables_hold_it(problem, middle):
     robot = load_robot("acrobot_large")
     cables, platform = robot.cable_set().without_pulleys(), rigid_platform(robot)
-    l0 = hold(cables, "elastic", X_WP, problem.wrench, (1.0, 60.0)).unstrained_lengths
+    l0 = find_static_tensions(
+        cables, "elastic", X_WP, problem.wrench, (1.0, 60.0)
+    ).unstrained_lengths
     rest = equilibrium_near(cables, "elastic", platform, l0, X_WP)
     base, N = solution_space(problem)
     tensions = base + N @ feasible_polygon(problem)[:, 0]

@@ -228,7 +228,7 @@ def hard_problems(r, top, count=300, seed=0):
 
 CODES = {
     TensionStatus.FEASIBLE: FEASIBLE,
-    TensionStatus.MISSED: 0,
+    TensionStatus.NOT_FOUND: 0,
     TensionStatus.INFEASIBLE: INFEASIBLE,
 }
 

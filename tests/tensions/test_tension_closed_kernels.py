@@ -6,7 +6,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from cdpr_drake.tensions.closed_form_kernel import (
-    MISSED,
+    NOT_FOUND,
     alternating_projections,
     closed_form,
     improved_closed_form,
@@ -66,7 +66,7 @@ def test_the_pseudo_inverse_is_numpys(problem):
     expected = -np.linalg.pinv(W) @ w
     np.testing.assert_allclose(t, expected, rtol=0.0, atol=allowed(W, expected))
     inside = np.all((t >= lower - BOUND_TOLERANCE) & (t <= upper + BOUND_TOLERANCE))
-    assert code == (FEASIBLE if inside else MISSED)
+    assert code == (FEASIBLE if inside else NOT_FOUND)
 
 
 @given(problems())
@@ -77,7 +77,7 @@ def test_the_closed_form_is_nearest_to_the_middle(problem):
     expected = middle - np.linalg.pinv(W) @ (w + W @ middle)
     np.testing.assert_allclose(t, expected, rtol=0.0, atol=allowed(W, expected))
     inside = np.all((t >= lower - BOUND_TOLERANCE) & (t <= upper + BOUND_TOLERANCE))
-    assert code == (FEASIBLE if inside else MISSED)
+    assert code == (FEASIBLE if inside else NOT_FOUND)
 
 
 @given(problems(), st.floats(-30.0, 90.0))
@@ -131,7 +131,7 @@ def test_the_improved_closed_form_by_hand():
     W = np.array([[1.0, 1.0, -1.0]])
     lower, upper = np.array([8.0, 0.0, 0.0]), np.array([10.0, 10.0, 10.0])
     # From the middle (9, 5, 5), 5 too much: t = (9, 5, 5) - 5/3 (1, 1, -1), below 8 in front.
-    assert run(closed_form, W, [-4.0], lower, upper)[0] == MISSED
+    assert run(closed_form, W, [-4.0], lower, upper)[0] == NOT_FOUND
     code, t = run(improved_closed_form, W, [-4.0], lower, upper)
     assert code == FEASIBLE
     # Left: t_2 - t_3 = -4 next to (5, 5).
@@ -142,7 +142,7 @@ def test_the_improved_closed_form_gives_up_when_the_free_cables_do_not_span_the_
     W = np.array([[1.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
     lower, upper = np.array([0.0, 0.0, 0.0]), np.array([10.0, 10.0, 1.0])
     code, _ = run(improved_closed_form, W, [-4.0, -5.0], lower, upper)
-    assert code == MISSED
+    assert code == NOT_FOUND
 
 
 @given(problems(redundancies=(1, 2, 3)))
@@ -251,7 +251,7 @@ def test_dykstra_gives_up_after_its_rounds():
     middle = upper / 2.0
     early, near_corner = run(alternating_projections, W, w, lower, upper, middle, ROUNDS // 2)
     late, nearer = run(alternating_projections, W, w, lower, upper, middle, ROUNDS)
-    assert early == late == MISSED
+    assert early == late == NOT_FOUND
     assert nearest(W, w, lower, upper, middle)[0] == FEASIBLE
     ratio = np.linalg.norm(nearer - upper) / np.linalg.norm(near_corner - upper)
     assert ratio == pytest.approx(np.exp(-1.0), rel=1e-2)
@@ -260,7 +260,9 @@ def test_dykstra_gives_up_after_its_rounds():
 def test_dykstra_never_calls_an_impossible_wrench_feasible():
     W = np.array([[1.0, -1.0]])
     lower, upper = np.zeros(2), np.full(2, 5.0)
-    assert run(alternating_projections, W, [-6.0], lower, upper, upper / 2.0, ROUNDS)[0] == MISSED
+    assert (
+        run(alternating_projections, W, [-6.0], lower, upper, upper / 2.0, ROUNDS)[0] == NOT_FOUND
+    )
 
 
 @pytest.mark.parametrize(

@@ -139,7 +139,7 @@ def test_who_is_exact_misses_none_and_who_is_not_misses_some(method):
         problem = TensionProblem(
             problem.W, -problem.W @ t, problem.lower, problem.upper, problem.reference
         )
-        missed += distribute(problem, method).status == TensionStatus.MISSED
+        missed += distribute(problem, method).status == TensionStatus.NOT_FOUND
     assert METHODS[method].exact == (missed == 0)
 
 
@@ -197,7 +197,7 @@ def test_a_point_in_space_between_four_cables(method):
     level |= {"weighted_vertices": 5.0, "optimally_safe": 5.0, "improved_closed_form": 5.0}
     level |= {"median": 5.0, "log_barrier": 2.0 + 6.0 * EVEN}
     if method == "pseudo_inverse":  # zero, below the bounds
-        assert solution.status == TensionStatus.MISSED
+        assert solution.status == TensionStatus.NOT_FOUND
     else:
         assert solution.status == TensionStatus.FEASIBLE
         near = SMOOTH if method == "log_barrier" else ROUNDING
@@ -211,7 +211,7 @@ def test_pseudo_inverse_and_closed_form_go_out_of_bounds_where_others_do_not():
     problem = acrobot(RigidTransform(PUBLISHED["off the middle"][0]), lower=2.0)
     for method in ("pseudo_inverse", "closed_form"):
         solution = distribute(problem, method)
-        assert solution.status == TensionStatus.MISSED
+        assert solution.status == TensionStatus.NOT_FOUND
         assert solution.residual <= BALANCE  # balanced, but out of bounds
         assert np.min(solution.tensions) < 2.0
     for method in ("improved_closed_form", "quadratic_program", "barycenter", "dykstra"):

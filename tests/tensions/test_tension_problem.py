@@ -13,7 +13,7 @@ from cdpr_drake.tensions.problem import (
     VERDICT_ROUNDING,
     TensionProblem,
     TensionStatus,
-    judge_tensions,
+    check_tensions,
     refuse,
 )
 
@@ -114,7 +114,7 @@ def balanced():
 
 
 def judged_by_numpy(problem, tensions):
-    """What `judge_tensions` finds, written for reading."""
+    """What `check_tensions` finds, written for reading."""
     rounding = VERDICT_ROUNDING * max(np.max(problem.upper), 1.0)
     low, high = problem.lower - rounding, problem.upper + rounding
     inside = np.all(tensions >= low) and np.all(tensions <= high)
@@ -136,12 +136,12 @@ def test_the_verdict_is_what_numpy_finds(seed):
     t[-1] = [lower[-1], np.nan, 1.9, t[-1]][seed // 4 % 4]
     problem = TensionProblem(W, -W @ np.nan_to_num(t), lower, upper)
     given = t.copy()
-    solution = judge_tensions(problem, "some", t, exists=True)
+    solution = check_tensions(problem, "some", t, exists=True)
     np.testing.assert_array_equal(t, given)
     inside, expected, active, slack = judged_by_numpy(problem, t)
     residual = problem.residual(expected)
     feasible = inside and residual <= RESIDUAL_TOLERANCE
-    assert solution.status == (TensionStatus.FEASIBLE if feasible else TensionStatus.MISSED)
+    assert solution.status == (TensionStatus.FEASIBLE if feasible else TensionStatus.NOT_FOUND)
     np.testing.assert_array_equal(solution.tensions, expected)
     np.testing.assert_array_equal(solution.active, active)
     np.testing.assert_allclose(solution.slack, slack, rtol=0.0, atol=SUMMING)
@@ -151,7 +151,7 @@ def test_the_verdict_is_what_numpy_finds(seed):
 def test_good_tensions_are_feasible_whatever_is_believed():
     problem, t = balanced()
     for exists in (True, False):
-        solution = judge_tensions(problem, "some", t, exists)
+        solution = check_tensions(problem, "some", t, exists)
         assert solution.status == TensionStatus.FEASIBLE
         np.testing.assert_array_equal(solution.tensions, t)
         np.testing.assert_array_equal(solution.active, 0)
@@ -162,11 +162,11 @@ def test_good_tensions_are_feasible_whatever_is_believed():
 def test_tensions_off_balance_are_not_feasible(error):
     problem, t = balanced()
     t[0] += error
-    wrong = judge_tensions(problem, "some", t, exists=True)
-    assert wrong.status == TensionStatus.MISSED
+    wrong = check_tensions(problem, "some", t, exists=True)
+    assert wrong.status == TensionStatus.NOT_FOUND
     assert wrong.residual > RESIDUAL_TOLERANCE
     np.testing.assert_allclose(wrong.slack, error * W[:, 0], rtol=1e-6)
-    none = judge_tensions(problem, "some", t, exists=False)
+    none = check_tensions(problem, "some", t, exists=False)
     assert none.status == TensionStatus.INFEASIBLE
 
 
@@ -174,9 +174,9 @@ def test_tensions_off_balance_are_not_feasible(error):
 def test_tensions_out_of_bounds_are_not_feasible(beyond):
     problem, t = balanced()
     tight = changed(wrench=problem.wrench, upper=np.array([9.0, 9.0, 9.0, t[3] - beyond]))
-    assert judge_tensions(tight, "some", t, exists=True).status == TensionStatus.MISSED
+    assert check_tensions(tight, "some", t, exists=True).status == TensionStatus.NOT_FOUND
     tight = changed(wrench=problem.wrench, lower=np.array([t[0] + beyond, 0.0, 0.0, 0.0]))
-    assert judge_tensions(tight, "some", t, exists=False).status == TensionStatus.INFEASIBLE
+    assert check_tensions(tight, "some", t, exists=False).status == TensionStatus.INFEASIBLE
 
 
 def test_tensions_on_their_bounds_are_named_and_put_there():
@@ -184,7 +184,7 @@ def test_tensions_on_their_bounds_are_named_and_put_there():
     lower, upper = np.array([2.0, 0.0, 0.0, 0.0]), np.array([9.0, 9.0, 9.0, 5.0])
     tight = TensionProblem(W, problem.wrench, lower, upper)
     rounding = np.array([-1e-15, 0.0, 0.0, 1e-15])
-    solution = judge_tensions(tight, "some", t + rounding, exists=True)
+    solution = check_tensions(tight, "some", t + rounding, exists=True)
     assert solution.status == TensionStatus.FEASIBLE
     np.testing.assert_array_equal(solution.active, [-1, 0, 0, 1])
     np.testing.assert_array_equal(solution.tensions, t)
@@ -194,12 +194,12 @@ def test_no_tension_at_all_is_feasible_without_a_wrench():
     """Rounding of the size of nothing is not off balance, measured against what cables can do."""
     problem = changed(wrench=np.zeros(2))
     t = np.array([1e-16, 0.0, 3e-16, 0.0])
-    assert judge_tensions(problem, "some", t, exists=True).status == TensionStatus.FEASIBLE
+    assert check_tensions(problem, "some", t, exists=True).status == TensionStatus.FEASIBLE
     assert (
-        judge_tensions(problem, "some", np.zeros(4), exists=True).status == TensionStatus.FEASIBLE
+        check_tensions(problem, "some", np.zeros(4), exists=True).status == TensionStatus.FEASIBLE
     )
     # A millinewton a cable is no rounding.
-    assert judge_tensions(problem, "some", t + 1e-3, exists=True).status == TensionStatus.MISSED
+    assert check_tensions(problem, "some", t + 1e-3, exists=True).status == TensionStatus.NOT_FOUND
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -358,7 +358,7 @@ def test_no_method_is_wrong_about_feasibility(problem):
             forces = np.linalg.norm(np.abs(problem.W) @ problem.upper)
             assert off <= 2.0 * RESIDUAL_TOLERANCE * (np.linalg.norm(problem.wrench) + forces)
             assert margin > -ORACLE_MARGIN, name
-        elif solution.status == TensionStatus.MISSED:
+        elif solution.status == TensionStatus.NOT_FOUND:
             assert not method.exact or abs(margin) <= MARGIN, name
             assert margin > -ORACLE_MARGIN, name
             assert np.all(np.isfinite(solution.tensions)), name

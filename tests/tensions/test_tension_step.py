@@ -8,7 +8,7 @@ from cdpr_drake.geometry.straight_cables import PLANAR_ROWS
 from cdpr_drake.models.robot_in_plant import pose_from_state
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.tensions.batch import distribute_batch
-from cdpr_drake.tensions.closed_form_kernel import MISSED
+from cdpr_drake.tensions.closed_form_kernel import NOT_FOUND
 from cdpr_drake.tensions.control_step_kernel import update_tensions, wrench_matrix_at
 from cdpr_drake.tensions.methods import METHODS
 from cdpr_drake.tensions.quadratic_program_kernel import FEASIBLE, INFEASIBLE, workspace_shape
@@ -53,7 +53,7 @@ def test_wrench_matrix_and_tensions(name, pulleys):
                 W[None], -desired[rows][None], bounds[0], bounds[1], name, bounds[2]
             )
             # A verdict of missed is looked into by the batch only.
-            assert code == codes[0] or (code == MISSED and codes[0] == INFEASIBLE)
+            assert code == codes[0] or (code == NOT_FOUND and codes[0] == INFEASIBLE)
             assert feasible[0] == (code == FEASIBLE)
             if code == FEASIBLE:
                 np.testing.assert_allclose(t, many[0], rtol=1e-10)

@@ -12,7 +12,12 @@ from rich.table import Table
 from scipy.stats import chi2
 
 from cdpr_drake.analyses.reporting.log_files import finite
-from cdpr_drake.analyses.reporting.progress import ALONE, StoppableStudy, StudySession, WorkProgress
+from cdpr_drake.analyses.reporting.progress import (
+    DEFAULT_STUDY_SESSION,
+    StoppableStudy,
+    StudySession,
+    WorkProgress,
+)
 from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
 from cdpr_drake.analyses.reporting.statements import (
     NOT_IN_QUICK,
@@ -261,7 +266,9 @@ class CalibrationStudy(DrawnStudy, StoppableStudy):
         return figure
 
 
-def study_calibration(quick: bool = False, session: StudySession = ALONE) -> CalibrationStudy:
+def study_calibration(
+    quick: bool = False, session: StudySession = DEFAULT_STUDY_SESSION
+) -> CalibrationStudy:
     """Runs the study; each trial is an item of a sweep.
 
     Args:

@@ -28,7 +28,7 @@ from cdpr_drake.stability.perturbation_bounds import PerturbationBounds
 from cdpr_drake.stability.perturbation_samples_kernel import draw_perturbations
 from cdpr_drake.stability.stability_case import StabilityCase
 from cdpr_drake.stability.verdict import VerdictOptions, judge_stability, worst_perturbations
-from cdpr_drake.systems.loops.loop_choice import looped
+from cdpr_drake.systems.loops.loop_choice import choose_compiled_loop
 from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
 from cdpr_drake.workspaces.static_feasibility import StaticCase, statically_feasible
 
@@ -141,7 +141,7 @@ class ClosedLoopTask:
             made = perturbed_scenario(self.scenario, X_WP, perturbation)
             made.estimator.kind = self.loop
             made.sensors.tracker = "ideal"
-            result = run_scenario(looped(made))
+            result = run_scenario(choose_compiled_loop(made))
             rows, believed = result.log["X_WP"], result.log["X_WP_estimated"]
             outcome, time = float(result.outcome), result.sim_time
             errors = seen_errors(result)

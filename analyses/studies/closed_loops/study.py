@@ -12,12 +12,17 @@ import numpy as np
 from matplotlib.figure import Figure
 from rich.table import Table
 
-from cdpr_drake.analyses.reporting.progress import ALONE, StoppableStudy, StudySession, WorkProgress
+from cdpr_drake.analyses.reporting.progress import (
+    DEFAULT_STUDY_SESSION,
+    StoppableStudy,
+    StudySession,
+    WorkProgress,
+)
 from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
 from cdpr_drake.analyses.reporting.statements import (
     NOT_TESTABLE,
     Statement,
-    judged_statements,
+    evaluate_checks,
     statement_table,
     verdict,
 )
@@ -52,7 +57,7 @@ from cdpr_drake.stability.perturbation_bounds import vector_size
 from cdpr_drake.stability.stability_case import StabilityCase
 from cdpr_drake.stability.verdict import VerdictOptions, judge_stability
 from cdpr_drake.systems.diagrams.load import load_scenario
-from cdpr_drake.systems.loops.loop_choice import looped
+from cdpr_drake.systems.loops.loop_choice import choose_compiled_loop
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
 from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
 from cdpr_drake.workspaces.static_feasibility import statically_feasible
@@ -148,7 +153,7 @@ class ClosedLoopStudy(DrawnStudy, StoppableStudy):
     @property
     def statements(self) -> list[Statement]:
         """What the criterion promises, judged."""
-        return judged_statements(JUDGES, self)
+        return evaluate_checks(CHECKS, self)
 
     def as_dict(self) -> dict[str, Any]:
         """Everything for JSON: parameters, versions, starts, summaries, statements."""
@@ -164,7 +169,7 @@ class ClosedLoopStudy(DrawnStudy, StoppableStudy):
             "seed": SEED,
             "bounds": self.bounds,
             "settings": list(SETTINGS),
-            "loop": looped(self.scenario).integration.loop,
+            "loop": choose_compiled_loop(self.scenario).integration.loop,
             "case": plain(self.case),
             "versions": package_versions(),
             "starts": {
@@ -291,13 +296,13 @@ def managed(found: ClosedLoopStudy) -> Statement:
     )
 
 
-JUDGES = (reached, managed)
+CHECKS = (reached, managed)
 """Of the criterion, and of what it leaves out."""
 
 
 def study_closed_loop(
     quick: bool = False,
-    session: StudySession = ALONE,
+    session: StudySession = DEFAULT_STUDY_SESSION,
     scheme: str = "pbvs",
 ) -> ClosedLoopStudy:
     """Runs the study.

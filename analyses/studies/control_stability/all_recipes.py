@@ -11,7 +11,7 @@ import numpy as np
 from rich.table import Table
 
 from cdpr_drake.analyses.reporting.log_files import write_json
-from cdpr_drake.analyses.reporting.progress import ALONE, StudySession, WorkProgress
+from cdpr_drake.analyses.reporting.progress import DEFAULT_STUDY_SESSION, StudySession, WorkProgress
 from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
 from cdpr_drake.analyses.reporting.statements import Statement, new_table, statement_table
 from cdpr_drake.analyses.studies.control_stability.exchanges import (
@@ -162,7 +162,9 @@ class RecipesStudy:
         write_json(folder / "results.json", self.as_dict())
 
 
-def study_recipes(quick: bool = False, session: StudySession = ALONE) -> RecipesStudy:
+def study_recipes(
+    quick: bool = False, session: StudySession = DEFAULT_STUDY_SESSION
+) -> RecipesStudy:
     """Evaluates all recipes on all rows, and what any target leaves.
 
     Args:

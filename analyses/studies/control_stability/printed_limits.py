@@ -8,7 +8,7 @@ Three things hold by the thesis' own definition (3.27) and its spheres of errors
 - the same errors with one common shift of the exit points lie within those of a row r_bp = R as
   soon as R >= r + r_bp - r_A of the baseline. A row that leaves less than that R has exit points
   that are wrong otherwise than in common;
-- outside of `some_target_possible` no target, view or camera makes the criterion positive definite.
+- outside of `stable_target_exists` no target, view or camera makes the criterion positive definite.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ import numpy as np
 
 from cdpr_drake.analyses.studies.published.stability_tables import BASELINE_VALUES, PublishedTable
 from cdpr_drake.geometry.cable_set import CableSet
-from cdpr_drake.stability.no_stable_target import some_target_possible
+from cdpr_drake.stability.no_stable_target import stable_target_exists
 from cdpr_drake.stability.perturbation_bounds import PerturbationBounds
 from cdpr_drake.workspaces.pose_grid import WorkspaceGrid
 
@@ -114,4 +114,4 @@ class AnyTargetTask:
     def __call__(self, start: int, stop: int) -> dict[str, np.ndarray]:
         """Whether the poses start to stop may be stable, shape (n,) bool."""
         poses = self.grid.pose_rows(start, stop)
-        return {"stable": some_target_possible(self.cables, self.bounds, poses)}
+        return {"stable": stable_target_exists(self.cables, self.bounds, poses)}

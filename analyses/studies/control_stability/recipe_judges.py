@@ -12,7 +12,7 @@ from itertools import product
 
 import numpy as np
 
-from cdpr_drake.analyses.reporting.statements import Statement, judged_statements, verdict
+from cdpr_drake.analyses.reporting.statements import Statement, evaluate_checks, verdict
 from cdpr_drake.analyses.studies.control_stability.exchanges import (
     CHOOSING_BOUND,
     PRINTED,
@@ -325,7 +325,7 @@ def _bound_mean(study: RecipeStudy, table: str, bound: str) -> float:
     return float(np.mean([abs(row.shares[RULES[0]] - row.published) for row in rows]))
 
 
-RECIPE_JUDGES: tuple[Callable[[FoundRecipes], Statement], ...] = (
+RECIPE_CHECKS: tuple[Callable[[FoundRecipes], Statement], ...] = (
     best_recipe, unseen_rows, reasons, spheres, shifts, common_exits, rising, points_together,
     anchor_points, exchanged_cables,
 )  # fmt: skip
@@ -334,4 +334,4 @@ RECIPE_JUDGES: tuple[Callable[[FoundRecipes], Statement], ...] = (
 
 def recipe_statements(found: FoundRecipes, quick: bool) -> list[Statement]:
     """Statements for which there are rows; of the `quick` form the others' names."""
-    return judged_statements(RECIPE_JUDGES, found, quick)
+    return evaluate_checks(RECIPE_CHECKS, found, quick)

@@ -15,7 +15,7 @@ import numpy as np
 from rich.table import Table
 
 from cdpr_drake.analyses.reporting.log_files import write_json
-from cdpr_drake.analyses.reporting.progress import ALONE, StudySession, WorkProgress
+from cdpr_drake.analyses.reporting.progress import DEFAULT_STUDY_SESSION, StudySession, WorkProgress
 from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
 from cdpr_drake.analyses.reporting.statements import new_table
 from cdpr_drake.analyses.studies.published.recipe_choices import chosen_on
@@ -151,7 +151,7 @@ class RecipeStudy:
 
 
 def study_recipe(
-    quick: bool = False, session: StudySession = ALONE, recipe: str = IN_USE.name
+    quick: bool = False, session: StudySession = DEFAULT_STUDY_SESSION, recipe: str = IN_USE.name
 ) -> RecipeStudy:
     """Evaluates a recipe on every row; each is a task of a sweep.
 

@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from cdpr_drake.analyses.reporting.statements import Statement, judged_statements, verdict
+from cdpr_drake.analyses.reporting.statements import Statement, evaluate_checks, verdict
 from cdpr_drake.analyses.studies.control_stability.tables import (
     StabilityRow,
     mean_difference,
@@ -81,7 +81,7 @@ class FoundTables:
 
 def control_stability_statements(rows: Sequence[StabilityRow], quick: bool) -> list[Statement]:
     """Statements for which there are rows; of the `quick` form their names."""
-    return judged_statements(JUDGES, FoundTables(rows, quick), quick)
+    return evaluate_checks(CHECKS, FoundTables(rows, quick), quick)
 
 
 def _table_judge(table: PublishedTable) -> Callable[[FoundTables], Statement]:
@@ -247,7 +247,7 @@ def image_based_largest(found: FoundTables) -> Statement:
     )
 
 
-JUDGES: tuple[Callable[[FoundTables], Statement], ...] = (
+CHECKS: tuple[Callable[[FoundTables], Statement], ...] = (
     *map(_table_judge, TABLES),
     platform_size, camera_least, anchors_more, scales, hybrid_larger, image_based_largest,
 )  # fmt: skip

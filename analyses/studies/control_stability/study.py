@@ -10,7 +10,12 @@ import numpy as np
 from matplotlib.figure import Figure
 from rich.table import Table
 
-from cdpr_drake.analyses.reporting.progress import ALONE, StoppableStudy, StudySession, WorkProgress
+from cdpr_drake.analyses.reporting.progress import (
+    DEFAULT_STUDY_SESSION,
+    StoppableStudy,
+    StudySession,
+    WorkProgress,
+)
 from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
 from cdpr_drake.analyses.reporting.statements import Statement, statement_table
 from cdpr_drake.analyses.studies.control_stability.figures import control_stability_drawings
@@ -143,7 +148,7 @@ class _Job:
 
 def study_control_stability(
     quick: bool = False,
-    session: StudySession = ALONE,
+    session: StudySession = DEFAULT_STUDY_SESSION,
 ) -> ControlStabilityStudy:
     """Repeats the tables; each row is a task of a sweep.
 

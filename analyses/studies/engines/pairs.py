@@ -109,7 +109,7 @@ def commanded_path(
     block = kind(robot, settings)
     simulator = Simulator(block)
     context = simulator.get_mutable_context()
-    block.hang(context, X_WP, slack)
+    block.set_at_equilibrium(context, X_WP, slack)
     if isinstance(block, CompiledCableRobot):
         block.integrate_by(rule)
     else:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from cdpr_drake.analyses.reporting.statements import Statement, judged_statements, verdict
+from cdpr_drake.analyses.reporting.statements import Statement, evaluate_checks, verdict
 from cdpr_drake.analyses.studies.engines.pairs import COLUMNS, METHODS
 from cdpr_drake.arrays import Array
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
@@ -153,7 +153,7 @@ def _energy(found: Arrays) -> Statement:
     )
 
 
-JUDGES = (_taut, _shipped, _impacts, _orders, _impact_steps, _energy)
+CHECKS = (_taut, _shipped, _impacts, _orders, _impact_steps, _energy)
 """All of them."""
 
 
@@ -164,4 +164,4 @@ def engine_statements(found: Arrays, quick: bool = False) -> list[Statement]:
         found: Arrays of the finished tasks, by the names that `study_engines` gives them.
         quick: Whether they are all that is coming, of the quick form.
     """
-    return judged_statements(JUDGES, found, quick)
+    return evaluate_checks(CHECKS, found, quick)

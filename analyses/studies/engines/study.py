@@ -11,7 +11,12 @@ import numpy as np
 from matplotlib.figure import Figure
 from rich.table import Table
 
-from cdpr_drake.analyses.reporting.progress import ALONE, StoppableStudy, StudySession, WorkProgress
+from cdpr_drake.analyses.reporting.progress import (
+    DEFAULT_STUDY_SESSION,
+    StoppableStudy,
+    StudySession,
+    WorkProgress,
+)
 from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
 from cdpr_drake.analyses.reporting.statements import Statement, new_table, statement_table
 from cdpr_drake.analyses.studies.engines.figures import engine_figure
@@ -137,7 +142,9 @@ class EnginesStudy(DrawnStudy, StoppableStudy):
         return {"engines": partial(engine_figure, self.found)}
 
 
-def study_engines(quick: bool = False, session: StudySession = ALONE) -> EnginesStudy:
+def study_engines(
+    quick: bool = False, session: StudySession = DEFAULT_STUDY_SESSION
+) -> EnginesStudy:
     """Runs both engines on all of it; each pair of runs is an item of a sweep.
 
     Args:

@@ -14,7 +14,7 @@ from cdpr_drake.analyses.simulation.run_traces import estimate_jump, run_traces
 from cdpr_drake.analyses.simulation.visual_servo_run import RunResult, run_scenario
 from cdpr_drake.arrays import Array
 from cdpr_drake.systems.diagrams.load import load_scenario
-from cdpr_drake.systems.loops.loop_choice import looped
+from cdpr_drake.systems.loops.loop_choice import choose_compiled_loop
 
 CONVERGED = "converged"
 
@@ -114,7 +114,7 @@ def do_case_job(job: CaseJob) -> CaseRun:
 
     By the compiled loop where that can do it, which the summary says.
     """
-    result = run_scenario(looped(load_scenario(job.scenario, job.changes)))
+    result = run_scenario(choose_compiled_loop(load_scenario(job.scenario, job.changes)))
     traces = run_traces(result)
     if job.stability is not None:
         traces |= stability_traces(result, job.stability)

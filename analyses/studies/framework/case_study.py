@@ -12,9 +12,9 @@ from matplotlib.figure import Figure
 from rich.table import Table
 
 from cdpr_drake.analyses.reporting.log_files import finite
-from cdpr_drake.analyses.reporting.progress import ALONE, StudySession, WorkProgress
+from cdpr_drake.analyses.reporting.progress import DEFAULT_STUDY_SESSION, StudySession, WorkProgress
 from cdpr_drake.analyses.reporting.provenance import package_versions
-from cdpr_drake.analyses.reporting.statements import Statement, judged_statements
+from cdpr_drake.analyses.reporting.statements import Statement, evaluate_checks
 from cdpr_drake.analyses.studies.framework.case_definition import CaseStudy
 from cdpr_drake.analyses.studies.framework.case_figures import case_drawings
 from cdpr_drake.analyses.studies.framework.case_run import CaseRun, CaseRuns, do_case_job
@@ -95,7 +95,7 @@ class CaseResult(DrawnStudy):
 def run_case_study(
     case: CaseStudy,
     quick: bool = False,
-    session: StudySession = ALONE,
+    session: StudySession = DEFAULT_STUDY_SESSION,
 ) -> CaseResult:
     """Runs a case study in parallel processes.
 
@@ -147,7 +147,7 @@ def run_case_study(
     interrupted = len(found) < len(jobs)
     if store is not None and not interrupted:
         store.finish(runs)
-    said = judged_statements(case.judges, CaseRuns(runs), quick and not interrupted)
+    said = evaluate_checks(case.judges, CaseRuns(runs), quick and not interrupted)
     statements = tuple(said)
     passed = time.perf_counter() - began
     return CaseResult(case, quick, runs, statements, interrupted, passed)

@@ -8,7 +8,12 @@ from typing import Any
 import numpy as np
 from rich.table import Table
 
-from cdpr_drake.analyses.reporting.statements import Statement, judged, new_table, statement_table
+from cdpr_drake.analyses.reporting.statements import (
+    Statement,
+    new_table,
+    run_checks,
+    statement_table,
+)
 from cdpr_drake.analyses.studies.framework.case_definition import CaseStudy, Configuration
 from cdpr_drake.analyses.studies.framework.case_run import CaseRun, CaseRuns, Metric
 
@@ -38,7 +43,7 @@ def case_tables(
                 known = case.metrics().get(metric)
                 table.add_row(c.label, *_published_row(found, c.name, metric, words, known))
         tables.append(table)
-    tables += judged(case.summaries, found)
+    tables += run_checks(case.summaries, found)
     if statements:
         tables.append(statement_table("What the servoing thesis states", statements))
     return tables

@@ -21,7 +21,7 @@ from rich.table import Table
 from cdpr_drake.analyses.reporting.log_files import finite, write_json
 from cdpr_drake.analyses.reporting.progress import StoppableStudy, StudySession, WorkProgress
 from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
-from cdpr_drake.analyses.reporting.statements import Statement, judged_statements, statement_table
+from cdpr_drake.analyses.reporting.statements import Statement, evaluate_checks, statement_table
 from cdpr_drake.analyses.sweeps.sweep import run_study_sweep
 from cdpr_drake.analyses.sweeps.workers import SweepTask
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS, write_figures
@@ -51,7 +51,7 @@ class DrawnStudy(ABC):
         return write_figures(folder, self.drawings(), formats)
 
 
-Found = Mapping[str, Mapping[str, Array]]
+StudyData = Mapping[str, Mapping[str, Array]]
 """Arrays of what is finished, by the name of the configuration; seeds are their first axis."""
 
 
@@ -75,7 +75,7 @@ class SeededStudy(DrawnStudy, StoppableStudy):
     """Its name for `cdpr study`."""
 
     judges: ClassVar[Sequence[Callable[[Any], Statement]]]
-    """What judges its statements, see `judged_statements`."""
+    """What judges its statements, see `evaluate_checks`."""
 
     source: ClassVar[str] = ""
     """Where what it repeats stands; may be empty."""
@@ -118,7 +118,7 @@ class SeededStudy(DrawnStudy, StoppableStudy):
 
     def statements(self) -> list[Statement]:
         """What is stated, and whether it is so; of the quick form names only where runs lack."""
-        return judged_statements(self.judges, self.found, self.quick and not self.interrupted)
+        return evaluate_checks(self.judges, self.found, self.quick and not self.interrupted)
 
     def about(self) -> dict[str, Any]:
         """What comes first in `as_dict`."""
@@ -141,7 +141,7 @@ class SeededStudy(DrawnStudy, StoppableStudy):
         )
         return told
 
-    def told_setup(self, scenario: str, assumptions: Sequence[str]) -> dict[str, Any]:
+    def setup_dict(self, scenario: str, assumptions: Sequence[str]) -> dict[str, Any]:
         """Of a study whose configurations change one scenario: seeds, versions, what is assumed,
         and the scenario, for `details`."""
         return {
@@ -151,7 +151,7 @@ class SeededStudy(DrawnStudy, StoppableStudy):
             "scenario": yaml_dump_typed(load_scenario(scenario)),
         }
 
-    def told_runs(self, columns: Sequence[str]) -> dict[str, Any]:
+    def runs_dict(self, columns: Sequence[str]) -> dict[str, Any]:
         """The arrays `runs` of all that is finished, whose columns have these names, for
         `details`."""
         return {

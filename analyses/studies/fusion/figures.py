@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from cdpr_drake.analyses.studies.framework.seeded_study import Found
+from cdpr_drake.analyses.studies.framework.seeded_study import StudyData
 from cdpr_drake.analyses.studies.fusion.configurations import Configuration
 from cdpr_drake.analyses.studies.fusion.trials import COLUMNS, RATE
 from cdpr_drake.analyses.visualization.figure_style import bar_style, line_style, new_figure
@@ -18,7 +18,7 @@ SHOWN = ("on_board", "external", "both")
 COVERED = ("on_board covered", "both, on_board covered", "both, external covered")
 
 
-def fusion_figure(found: Found, shown: Sequence[Configuration]) -> Figure:
+def fusion_figure(found: StudyData, shown: Sequence[Configuration]) -> Figure:
     """The figure of finished configurations; without those of a covered camera no panel of them."""
     figure, axes = new_figure(2, 2, (15.0, 11.0), "Two cameras, lengths, an IMU and depths, fused")
     words = {c.name: c.words for c in shown}
@@ -35,7 +35,12 @@ def fusion_figure(found: Found, shown: Sequence[Configuration]) -> Figure:
 
 
 def _draw_times(
-    axes: Any, found: Found, names: Sequence[str], words: Mapping[str, str], key: str, title: str
+    axes: Any,
+    found: StudyData,
+    names: Sequence[str],
+    words: Mapping[str, str],
+    key: str,
+    title: str,
 ) -> None:
     """Means over seeds in time."""
     for number, name in enumerate(names):
@@ -51,7 +56,7 @@ def _draw_times(
         axes.legend(loc="best")
 
 
-def _draw_bars(axes: Any, found: Found, shown: Sequence[Configuration]) -> None:
+def _draw_bars(axes: Any, found: StudyData, shown: Sequence[Configuration]) -> None:
     """Mean errors of the estimate of every configuration, and the largest of each run."""
     for place, one in enumerate(shown):
         numbers = found[one.name]["numbers"]
@@ -70,7 +75,7 @@ def _draw_bars(axes: Any, found: Found, shown: Sequence[Configuration]) -> None:
     axes.legend(loc="best")
 
 
-def _draw_consistency(axes: Any, found: Found, words: Mapping[str, str]) -> None:
+def _draw_consistency(axes: Any, found: StudyData, words: Mapping[str, str]) -> None:
     """Normalized errors in time, mean over seeds."""
     for number, name in enumerate(SHOWN):
         if name in found:

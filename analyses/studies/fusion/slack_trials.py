@@ -14,7 +14,7 @@ from cdpr_drake.models.camera_catalogue import load_camera
 from cdpr_drake.systems.cameras.cable_camera import CableCamera
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.robots.compiled_cable_robot import CompiledCableRobot
-from cdpr_drake.vision.cable_images import seen_slack
+from cdpr_drake.vision.cable_images import slack_from_image
 
 SLACK_SCENARIO = "acrobot_slack_start_tca"
 
@@ -115,7 +115,7 @@ def _seen_errors(result: RunResult, seed: int) -> tuple[Array, int]:
             continue
         pixels = camera.look(pose_from_row(log["X_WP"][k]), log["unstrained_lengths"][k], k)
         try:
-            seen = seen_slack(
+            seen = slack_from_image(
                 pixels.reshape(len(robot.cables), 2, -1), cables,
                 pose_from_row(log["X_WP_estimated"][k]), X_WE, pinhole, NOISE,
             ).surplus[list(CABLES)]  # fmt: skip

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from cdpr_drake.analyses.reporting.statements import Statement, verdict
-from cdpr_drake.analyses.studies.framework.seeded_study import Found
+from cdpr_drake.analyses.studies.framework.seeded_study import StudyData
 from cdpr_drake.analyses.studies.fusion.slack_trials import KINDS, SLACK_COLUMNS, SURPLUSES_CM
 from cdpr_drake.analyses.studies.fusion.trials import COLUMNS
 from cdpr_drake.arrays import Array
@@ -25,7 +25,7 @@ CONSISTENT = 4.0
 """How many standard deviations of a mean of chi-square numbers it may be from their mean."""
 
 
-def column(found: Found, name: str, key: str) -> Array:
+def column(found: StudyData, name: str, key: str) -> Array:
     """A column of a configuration, shape (runs,)."""
     return np.asarray(found[name]["numbers"][:, COLUMNS.index(key)])
 
@@ -34,7 +34,7 @@ def _mm(values: Array) -> str:
     return f"{1e3 * np.mean(values):.1f} mm"
 
 
-def _both_as_good_as_the_better(found: Found) -> Statement:
+def _both_as_good_as_the_better(found: StudyData) -> Statement:
     """Errors with two cameras against those with the one that is better over all seeds.
 
     Which one is the better in a single seed nobody knows beforehand. What the filters expect is
@@ -68,7 +68,7 @@ def _is_consistent(ends: Array) -> bool:
     return bool(abs(np.mean(ends) - 6.0) <= CONSISTENT * np.sqrt(12.0 / len(ends)))
 
 
-def _survives_either_failure(found: Found) -> Statement:
+def _survives_either_failure(found: StudyData) -> Statement:
     """Runs in which a camera fails for 3 s."""
     names = ("both, on_board covered", "both, external covered", "both, on_board frozen",
              "both, external off")  # fmt: skip
@@ -86,7 +86,7 @@ def _survives_either_failure(found: Found) -> Statement:
     )
 
 
-def _wrong_calibration_is_found(found: Found) -> Statement:
+def _wrong_calibration_is_found(found: StudyData) -> Statement:
     """An external camera that is wrong in calibration."""
     names = ("both, external wrong", "both, external wrong, told", "both, external wrong, doubted")
     trusted, told, doubted = (column(found, name, "mean_m") for name in names)
@@ -106,7 +106,7 @@ def _wrong_calibration_is_found(found: Found) -> Statement:
     )
 
 
-def _wrong_calibration_costs_nothing(found: Found) -> Statement:
+def _wrong_calibration_costs_nothing(found: StudyData) -> Statement:
     """What a wrong external camera does to a servo that sees its target."""
     names = (*TOLD_WRONG, "both, external wrong", "both, external wrong, doubted",
              "both, external knocked", "both, external knocked, doubted")  # fmt: skip
@@ -124,7 +124,7 @@ def _wrong_calibration_costs_nothing(found: Found) -> Statement:
     )
 
 
-def _consistent(found: Found) -> Statement:
+def _consistent(found: StudyData) -> Statement:
     """The filter's errors against its covariance."""
     words, good = [], []
     for name in (*THREE, "both, doubted", "both, external knocked, doubted", *TOLD_WRONG):
@@ -140,7 +140,7 @@ def _consistent(found: Found) -> Statement:
     )
 
 
-def _imu_improves_rotation(found: Found) -> Statement:
+def _imu_improves_rotation(found: StudyData) -> Statement:
     """Rotation with and without an inertial sensor."""
     without, with_imu = (column(found, name, "mean_rad") for name in ("external", "external, imu"))
     both, both_imu = (column(found, name, "mean_rad") for name in ("both", "both, imu"))
@@ -155,7 +155,7 @@ def _imu_improves_rotation(found: Found) -> Statement:
     )
 
 
-def _depth_improves_position(found: Found) -> Statement:
+def _depth_improves_position(found: StudyData) -> Statement:
     """Position along the axis with and without depths."""
     shares = [
         float(np.mean(column(found, b, "mean_m")) / np.mean(column(found, a, "mean_m")))
@@ -170,11 +170,11 @@ def _depth_improves_position(found: Found) -> Statement:
     )
 
 
-def _slack(found: Found, kind: str, cm: int, key: str) -> Array:
+def _slack(found: StudyData, kind: str, cm: int, key: str) -> Array:
     return np.asarray(found[f"{kind}, {cm} cm"]["numbers"][:, SLACK_COLUMNS.index(key)])
 
 
-def _rate_by_seen_slack(found: Found) -> Statement:
+def _rate_by_seen_slack(found: StudyData) -> Statement:
     """Time to wind in slack at a rate from images."""
     times = {
         kind: [float(np.mean(_slack(found, kind, cm, "taut_s"))) for cm in SURPLUSES_CM]
@@ -194,7 +194,7 @@ def _rate_by_seen_slack(found: Found) -> Statement:
     )
 
 
-JUDGES = (
+CHECKS = (
     _both_as_good_as_the_better,
     _survives_either_failure,
     _wrong_calibration_is_found,

@@ -11,8 +11,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from rich.table import Table
 
-from cdpr_drake.analyses.reporting.progress import ALONE, StudySession
-from cdpr_drake.analyses.reporting.statements import Statement, judged_statements, new_table
+from cdpr_drake.analyses.reporting.progress import DEFAULT_STUDY_SESSION, StudySession
+from cdpr_drake.analyses.reporting.statements import Statement, evaluate_checks, new_table
 from cdpr_drake.analyses.studies.framework.seeded_study import SeededStudy
 from cdpr_drake.analyses.studies.fusion.configurations import (
     QUICK_SEEDS,
@@ -22,7 +22,7 @@ from cdpr_drake.analyses.studies.fusion.configurations import (
 )
 from cdpr_drake.analyses.studies.fusion.figures import fusion_figure
 from cdpr_drake.analyses.studies.fusion.slack_trials import SLACK_COLUMNS, slack_trials
-from cdpr_drake.analyses.studies.fusion.statements import JUDGES, column
+from cdpr_drake.analyses.studies.fusion.statements import CHECKS, column
 from cdpr_drake.analyses.studies.fusion.trials import COLUMNS, SCENARIO
 from cdpr_drake.analyses.sweeps.workers import SweepTask
 
@@ -49,7 +49,7 @@ class FusionStudy(SeededStudy):
 
     name = "fusion"
     source = "servoing thesis, perspectives"
-    judges = JUDGES
+    judges = CHECKS
     stated = "What is stated"
 
     def shown(self) -> list[Configuration]:
@@ -60,12 +60,12 @@ class FusionStudy(SeededStudy):
         """What is stated, and whether it is so; the quick form's runs end under way and tell
         nothing."""
         told = {} if self.quick else self.found
-        return judged_statements(self.judges, told, self.quick and not self.interrupted)
+        return evaluate_checks(self.judges, told, self.quick and not self.interrupted)
 
     def details(self) -> dict[str, Any]:
         """Parameters, versions, numbers of all runs, but no rows of logs."""
         return {
-            **self.told_setup(SCENARIO, ASSUMPTIONS),
+            **self.setup_dict(SCENARIO, ASSUMPTIONS),
             "configurations": [
                 {
                     "name": c.name,
@@ -137,7 +137,7 @@ class FusionStudy(SeededStudy):
         return {"fusion": partial(fusion_figure, self.found, shown)} if shown else {}
 
 
-def study_fusion(quick: bool = False, session: StudySession = ALONE) -> FusionStudy:
+def study_fusion(quick: bool = False, session: StudySession = DEFAULT_STUDY_SESSION) -> FusionStudy:
     """Runs all configurations over their seeds; each run is an item of a sweep.
 
     Args:

@@ -12,7 +12,12 @@ from rich.table import Table
 from scipy.stats import chi2
 
 from cdpr_drake.analyses.reporting.log_files import finite
-from cdpr_drake.analyses.reporting.progress import ALONE, StoppableStudy, StudySession, WorkProgress
+from cdpr_drake.analyses.reporting.progress import (
+    DEFAULT_STUDY_SESSION,
+    StoppableStudy,
+    StudySession,
+    WorkProgress,
+)
 from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
 from cdpr_drake.analyses.reporting.statements import Statement, new_table, statement_table, verdict
 from cdpr_drake.analyses.studies.framework.seeded_study import DrawnStudy
@@ -206,7 +211,9 @@ class IdentificationStudy(DrawnStudy, StoppableStudy):
         return figure
 
 
-def study_identification(quick: bool = False, session: StudySession = ALONE) -> IdentificationStudy:
+def study_identification(
+    quick: bool = False, session: StudySession = DEFAULT_STUDY_SESSION
+) -> IdentificationStudy:
     """Runs the study; each seed is an item of a sweep.
 
     Args:

@@ -21,7 +21,7 @@ from cdpr_drake.identification.excitation import design_excitation
 from cdpr_drake.identification.parameters import DynamicModel
 from cdpr_drake.identification.program import IdentificationProgram
 from cdpr_drake.identification.regressor import inertia_regressor
-from cdpr_drake.identification.samples import MotionSamples, sample_motion
+from cdpr_drake.identification.samples import LoggedMotion, sample_motion
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.scenarios.tension_control_scenario import TensionScenario
@@ -105,7 +105,7 @@ def noise_trial(scenario: str, seed: int) -> dict[str, Array]:
 def _samples(
     motion: PoseTrajectory, true: Robot, truth: DynamicModel, cables: CableSet,
     random: np.random.Generator | None,
-) -> MotionSamples:  # fmt: skip
+) -> LoggedMotion:  # fmt: skip
     """A log of a motion, smoothed; without random numbers exact, with the same sigmas."""
     time = np.arange(0.0, motion.end_time, 1.0 / LOG_RATE)
     rows = np.array([motion.motion(t) for t in time])

@@ -1,3 +1,3 @@
 from .figures import FIGURES as FIGURES
-from .judges import JUDGES as JUDGES
+from .judges import CHECKS as CHECKS
 from .study import study_mobile_robot as study_mobile_robot

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from cdpr_drake.analyses.studies.framework.seeded_study import Found
+from cdpr_drake.analyses.studies.framework.seeded_study import StudyData
 from cdpr_drake.analyses.studies.mobile_robot.configurations import (
     NUMBERS,
     PUBLISHED_LAPS,
@@ -41,7 +41,7 @@ FIGURES = ("mobile_robot", "choices", *TENSIONS, *PATHS, LENGTHS)
 
 
 def mobile_robot_drawings(
-    found: Found, shown: Sequence[Configuration]
+    found: StudyData, shown: Sequence[Configuration]
 ) -> dict[str, Callable[[], Figure]]:
     """What draws `mobile_robot`, `choices` and those of `tension_drawings` and `lap_drawings`, by
     name, of finished configurations."""
@@ -54,7 +54,7 @@ def mobile_robot_drawings(
     return drawn | tension_drawings(found) | lap_drawings(found)
 
 
-def _laps_figure(found: Found) -> Figure:
+def _laps_figure(found: StudyData) -> Figure:
     figure, axes = new_figure(2, 2, (13.0, 10.0), "A tag on a mobile robot that goes round")
     _draw_laps(axes[0, 0], found)
     _draw_lengths(axes[0, 1], found)
@@ -63,7 +63,7 @@ def _laps_figure(found: Found) -> Figure:
     return figure
 
 
-def _choices_figure(found: Found, shown: Sequence[Configuration]) -> Figure:
+def _choices_figure(found: StudyData, shown: Sequence[Configuration]) -> Figure:
     figure, axes = new_figure(2, 1, (10.0, 13.0), "What is not printed, three values")
     by_lengths = [f"estimator {kind}" for kind in VARIED_ESTIMATORS]
     for one, names, title in (
@@ -76,7 +76,7 @@ def _choices_figure(found: Found, shown: Sequence[Configuration]) -> Figure:
     return figure
 
 
-def _draw_laps(axes: Any, found: Found) -> None:
+def _draw_laps(axes: Any, found: StudyData) -> None:
     """Bars of laps until the end: medians, each run, what is published."""
     names = [f"estimator {k}" for k in PUBLISHED_LAPS] + ["plain"]
     labels = [f"estimator {NUMBERS[k]}" for k in PUBLISHED_LAPS] + ["1, known tag"]
@@ -97,7 +97,7 @@ def _draw_laps(axes: Any, found: Found) -> None:
         axes.legend(loc="upper left")
 
 
-def _draw_lengths(axes: Any, found: Found) -> None:
+def _draw_lengths(axes: Any, found: StudyData) -> None:
     """Largest rise of the sum of lengths over that of the first whole lap, lap by lap."""
     for number, name in enumerate(BOTH):
         if name not in found:
@@ -120,7 +120,7 @@ def _draw_lengths(axes: Any, found: Found) -> None:
         axes.legend(loc="best")
 
 
-def _draw_slack(axes: Any, found: Found) -> None:
+def _draw_slack(axes: Any, found: StudyData) -> None:
     """The most cables slack at once in each lap, over all runs."""
     for number, name in enumerate(BOTH):
         if name in found:
@@ -138,7 +138,7 @@ def _draw_slack(axes: Any, found: Found) -> None:
     axes.legend(loc="best")
 
 
-def _draw_paths(axes: Any, found: Found) -> None:
+def _draw_paths(axes: Any, found: StudyData) -> None:
     """Paths of the platform from above, of the first run."""
     number = 0
     for name in BOTH:
@@ -160,7 +160,7 @@ def _draw_paths(axes: Any, found: Found) -> None:
 
 
 def _draw_choices(
-    axes: Any, found: Found, shown: Sequence[Configuration], names: Sequence[str]
+    axes: Any, found: StudyData, shown: Sequence[Configuration], names: Sequence[str]
 ) -> None:
     """Laps until the end of what was varied, every run; looks by how configurations' names end."""
     shown = [c for c in shown if c.name in found]

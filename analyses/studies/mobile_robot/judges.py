@@ -4,5 +4,5 @@ from __future__ import annotations
 
 from cdpr_drake.analyses.studies.mobile_robot import slack_statements, statements
 
-JUDGES = (*statements.JUDGES, *slack_statements.JUDGES)
+CHECKS = (*statements.CHECKS, *slack_statements.CHECKS)
 """Of laps, lengths and paths, then of slack."""

@@ -17,7 +17,7 @@ from cdpr_drake.geometry.poses import pose_rows_distance
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.systems.diagrams.load import load_scenario
-from cdpr_drake.systems.loops.loop_choice import looped
+from cdpr_drake.systems.loops.loop_choice import choose_compiled_loop
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
 
 SCENARIO = "acrobot_mobile_robot"
@@ -102,7 +102,7 @@ def run_laps(task: LapsTask, seed: int) -> dict[str, Array]:
         assert scenario.target.motion.mobile_robot is not None
         lap_time = scenario.target.motion.mobile_robot.lap_time
         scenario.duration, scenario.log_rate = task.laps * lap_time, LOG_RATE
-        result = run_scenario(looped(scenario))
+        result = run_scenario(choose_compiled_loop(scenario))
     return laps_of(result, task.laps, lap_time)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from cdpr_drake.analyses.reporting.statements import Statement, verdict
-from cdpr_drake.analyses.studies.framework.seeded_study import Found
+from cdpr_drake.analyses.studies.framework.seeded_study import StudyData
 from cdpr_drake.analyses.studies.mobile_robot.configurations import (
     NUMBERS,
     PUBLISHED_LAPS,
@@ -57,14 +57,14 @@ def at_one_place(phases: Array) -> tuple[float, float]:
     return float(np.angle(mean) / (2.0 * np.pi) % 1.0), float(np.abs(mean))
 
 
-def _ending(found: Found, name: str, key: str) -> Array:
+def _ending(found: StudyData, name: str, key: str) -> Array:
     """A column in the lap in which each run that failed did so, shape (runs that failed,)."""
     values, ends = column(found, name, key), found[name]["end"]
     rows = [values[k][np.isfinite(values[k])] for k in np.flatnonzero(failed(ends))]
     return np.array([row[-1] for row in rows if len(row)])
 
 
-def _fails_far_off(found: Found) -> Statement:
+def _fails_far_off(found: StudyData) -> Statement:
     """How far off control integration is when the task fails."""
     name = "estimator control_integration"
     away, turned = _ending(found, name, "estimate_m"), _ending(found, name, "estimate_rad")
@@ -79,7 +79,7 @@ def _fails_far_off(found: Found) -> Statement:
     )
 
 
-def _far_surpasses(found: Found) -> Statement:
+def _far_surpasses(found: StudyData) -> Statement:
     """Errors by control integration against those by lengths."""
     worst = {k: float(np.nanmax(column(found, f"estimator {k}", "estimate_m")))
              for k in PUBLISHED_LAPS}  # fmt: skip
@@ -94,7 +94,7 @@ def _far_surpasses(found: Found) -> Statement:
     )
 
 
-def _spikes(found: Found) -> Statement:
+def _spikes(found: StudyData) -> Statement:
     """Where on the track errors by lengths have spikes."""
     check_laps(found, f"estimator {BY_LENGTHS[0]}", REFERENCE)
     places, sharp = {}, {}
@@ -119,7 +119,7 @@ def _spikes(found: Found) -> Statement:
     )
 
 
-def _spikes_by_slack(found: Found) -> Statement:
+def _spikes_by_slack(found: StudyData) -> Statement:
     """Slack at the spikes of estimates by lengths."""
     check_laps(found, f"estimator {BY_LENGTHS[0]}", REFERENCE)
     most = {k: _ending(found, f"estimator {k}", "slack_at_estimate") for k in BY_LENGTHS}
@@ -138,7 +138,7 @@ def _spikes_by_slack(found: Found) -> Statement:
     )
 
 
-def _worse_and_worse(found: Found) -> Statement:
+def _worse_and_worse(found: StudyData) -> Statement:
     """How fast the path gets worse without correction."""
     away = column(found, "plain", "path_m")
     there = np.isfinite(away[:, 23]) if away.shape[1] > 23 else np.zeros(0, bool)
@@ -158,7 +158,7 @@ def _worse_and_worse(found: Found) -> Statement:
     )
 
 
-def _corners(found: Found) -> Statement:
+def _corners(found: StudyData) -> Statement:
     """Where the path deviates without correction."""
     where = _ending(found, "plain", "path_at")
     ends = found["plain"]["end"]
@@ -177,7 +177,7 @@ def _corners(found: Found) -> Statement:
     )
 
 
-def _noticed_early(found: Found) -> Statement:
+def _noticed_early(found: StudyData) -> Statement:
     """Sum of lengths by lap 10."""
     check_laps(found, "plain", REFERENCE)
     sums = found["plain"]["sums"]
@@ -192,7 +192,7 @@ def _noticed_early(found: Found) -> Statement:
     )
 
 
-def _first_laps(found: Found) -> Statement:
+def _first_laps(found: StudyData) -> Statement:
     """Slack cables without correction, by lap."""
     check_laps(found, "plain", 20)
     one, two = (column(found, "plain", key) for key in ("one_slack", "two_slack"))
@@ -210,7 +210,7 @@ def _first_laps(found: Found) -> Statement:
     )
 
 
-def _underactuated(found: Found) -> Statement:
+def _underactuated(found: StudyData) -> Statement:
     """How long the platform is underactuated in lap 20."""
     check_laps(found, "plain", 20)
     longest = column(found, "plain", "underactuated_s")[:, 19]
@@ -226,7 +226,7 @@ def _underactuated(found: Found) -> Statement:
     )
 
 
-def _last_seconds(found: Found) -> Statement:
+def _last_seconds(found: StudyData) -> Statement:
     """Slack cables before a failure."""
     plain = found["plain"]
     ended = plain["underactuated_at_end"][failed(plain["end"]), 0]
@@ -243,7 +243,7 @@ def _last_seconds(found: Found) -> Statement:
     )
 
 
-def _takes_part(found: Found) -> Statement:
+def _takes_part(found: StudyData) -> Statement:
     """How often correction acts."""
     check_laps(found, "corrected", REFERENCE)
     mean = column(found, "corrected", "at_threshold")[:, 1:]
@@ -261,7 +261,7 @@ def _takes_part(found: Found) -> Statement:
     )
 
 
-def _same_tensions(found: Found) -> Statement:
+def _same_tensions(found: StudyData) -> Statement:
     """Tensions of laps 10, 30 and 700."""
     columns = [TENSION_LAPS.index(10), TENSION_LAPS.index(30), len(TENSION_LAPS)]
     tensions = found["corrected"]["tensions"][:, columns]
@@ -283,7 +283,7 @@ def _same_tensions(found: Found) -> Statement:
     )
 
 
-def _only_the_first(found: Found) -> Statement:
+def _only_the_first(found: StudyData) -> Statement:
     """The first lap's path with correction."""
     check_laps(found, "corrected", REFERENCE)
     away = column(found, "corrected", "path_m")
@@ -297,7 +297,7 @@ def _only_the_first(found: Found) -> Statement:
     )
 
 
-def _lengths_depend(found: Found) -> Statement:
+def _lengths_depend(found: StudyData) -> Statement:
     """How long estimators 4 and 7 last under other choices."""
     words, good = [], {}
     names = {"as chosen": "", **{name: f"{name}, " for name in VARIED}}
@@ -321,7 +321,7 @@ def _lengths_depend(found: Found) -> Statement:
     )
 
 
-JUDGES = (
+CHECKS = (
     _fails_far_off, _far_surpasses, _spikes, _spikes_by_slack, _lengths_depend, _worse_and_worse,
     _corners, _noticed_early, _first_laps, _underactuated, _last_seconds, _takes_part,
     _same_tensions, _only_the_first,

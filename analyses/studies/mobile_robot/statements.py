@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from cdpr_drake.analyses.reporting.statements import Statement, verdict
-from cdpr_drake.analyses.studies.framework.seeded_study import Found
+from cdpr_drake.analyses.studies.framework.seeded_study import StudyData
 from cdpr_drake.analyses.studies.mobile_robot.configurations import (
     ALL_LAPS,
     NUMBERS,
@@ -27,12 +27,12 @@ SAME_PATH = 0.01
 known tag moves the platform by."""
 
 
-def column(found: Found, name: str, key: str) -> Array:
+def column(found: StudyData, name: str, key: str) -> Array:
     """One of `COLUMNS` of a configuration, shape (runs, laps)."""
     return np.asarray(found[name]["laps"][:, :, COLUMNS.index(key)])
 
 
-def check_laps(found: Found, name: str, lap: int) -> None:
+def check_laps(found: StudyData, name: str, lap: int) -> None:
     """Raises KeyError where runs of a configuration were not asked to come to a lap, from 1."""
     if found[name]["laps"].shape[1] < lap:
         raise KeyError(f"{name}: runs of less than {lap} laps")
@@ -45,7 +45,7 @@ def laps_words(ends: Array) -> str:
     return words + ("" if np.all(bad) else f", {int(np.sum(~bad))} of {len(bad)} did not fail")
 
 
-def median_laps(found: Found, name: str) -> float:
+def median_laps(found: StudyData, name: str) -> float:
     """Median of the laps until runs ended; infinite where most did not fail."""
     ends = found[name]["end"]
     return float(np.median(np.where(failed(ends), ends[:, 1], np.inf)))
@@ -61,7 +61,7 @@ def longer(one: float, other: float, times: float = 1.0) -> bool:
     return bool(np.isfinite(other) and one > times * other)
 
 
-def _estimators(found: Found) -> Statement:
+def _estimators(found: StudyData) -> Statement:
     """How long each estimator is followed without a known tag."""
     medians = {k: median_laps(found, f"estimator {k}") for k in PUBLISHED_LAPS}
     good = [near(medians[k], laps) for k, laps in PUBLISHED_LAPS.items()]
@@ -77,7 +77,7 @@ def _estimators(found: Found) -> Statement:
     )
 
 
-def _integration_lasts(found: Found) -> Statement:
+def _integration_lasts(found: StudyData) -> Statement:
     """Laps until failure, control integration against cable lengths."""
     medians = {k: median_laps(found, f"estimator {k}") for k in PUBLISHED_LAPS}
     first = medians.pop("control_integration")
@@ -94,7 +94,7 @@ def _integration_lasts(found: Found) -> Statement:
     )  # fmt: skip
 
 
-def _model_helps(found: Found) -> Statement:
+def _model_helps(found: StudyData) -> Statement:
     """Laps until failure against what the model knows."""
     four, five, six, seven = (
         median_laps(found, f"estimator {k}") for k in list(PUBLISHED_LAPS)[1:]
@@ -108,7 +108,7 @@ def _model_helps(found: Found) -> Statement:
     )
 
 
-def _drift(found: Found) -> Statement:
+def _drift(found: StudyData) -> Statement:
     """How estimates drift."""
     name = "estimator control_integration"
     high, error = column(found, name, "estimate_z_m"), column(found, name, "estimate_m")
@@ -130,7 +130,7 @@ def _drift(found: Found) -> Statement:
     )
 
 
-def _plain(found: Found) -> Statement:
+def _plain(found: StudyData) -> Statement:
     """When tracking fails with a known tag and no correction."""
     check_laps(found, "plain", PUBLISHED_PLAIN)
     return Statement(
@@ -147,7 +147,7 @@ def _plain(found: Found) -> Statement:
     )
 
 
-def _known_tag_helps(found: Found) -> Statement:
+def _known_tag_helps(found: StudyData) -> Statement:
     """Time until failure with and without a known tag."""
     one, other = (median_laps(found, n) for n in ("plain", "estimator control_integration"))
     return Statement(
@@ -170,7 +170,7 @@ def rises(sums: Array, early: int, late: int) -> Array:
     return np.where(whole, np.max(change, axis=1), np.nan)
 
 
-def _lengths(found: Found) -> Statement:
+def _lengths(found: StudyData) -> Statement:
     """How much longer the cables get without correction."""
     sums = found["plain"]["sums"]
     to_20 = rises(sums, REFERENCE, 20)
@@ -198,7 +198,7 @@ def _lengths(found: Found) -> Statement:
     )
 
 
-def _corrected(found: Found) -> Statement:
+def _corrected(found: StudyData) -> Statement:
     """How long the robot is followed with correction."""
     ends, seen = found["corrected"]["end"], column(found, "corrected", "seen")
     laps = found["corrected"]["laps"].shape[1]
@@ -215,7 +215,7 @@ def _corrected(found: Found) -> Statement:
     )
 
 
-def _slack(found: Found) -> Statement:
+def _slack(found: StudyData) -> Statement:
     """How many cables are slack with correction."""
     most = column(found, "corrected", "most_slack")
     laps, never = most.shape[1], bool(np.nanmax(most) <= FREE)
@@ -228,7 +228,7 @@ def _slack(found: Found) -> Statement:
     )
 
 
-def _same_path(found: Found) -> Statement:
+def _same_path(found: StudyData) -> Statement:
     """Paths of later laps, with correction and without."""
     away = column(found, "corrected", "path_m")
     if not np.any(np.isfinite(away[:, REFERENCE:])):
@@ -247,7 +247,7 @@ def _same_path(found: Found) -> Statement:
     )
 
 
-def _depends(found: Found) -> Statement:
+def _depends(found: StudyData) -> Statement:
     """Results under other choices of what is not printed."""
     words, lasts = [], []
     for name, (label, _, _) in VARIED.items():
@@ -266,7 +266,7 @@ def _depends(found: Found) -> Statement:
     )
 
 
-JUDGES = (
+CHECKS = (
     _estimators, _integration_lasts, _model_helps, _drift, _plain, _known_tag_helps, _lengths,
     _corrected, _slack, _same_path, _depends,
 )  # fmt: skip

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from rich.table import Table
 
-from cdpr_drake.analyses.reporting.progress import ALONE, StudySession
+from cdpr_drake.analyses.reporting.progress import DEFAULT_STUDY_SESSION, StudySession
 from cdpr_drake.analyses.reporting.statements import new_table
 from cdpr_drake.analyses.studies.framework.seeded_study import SeededStudy
 from cdpr_drake.analyses.studies.mobile_robot.configurations import (
@@ -20,7 +20,7 @@ from cdpr_drake.analyses.studies.mobile_robot.configurations import (
     configurations,
 )
 from cdpr_drake.analyses.studies.mobile_robot.figures import mobile_robot_drawings
-from cdpr_drake.analyses.studies.mobile_robot.judges import JUDGES
+from cdpr_drake.analyses.studies.mobile_robot.judges import CHECKS
 from cdpr_drake.analyses.studies.mobile_robot.laps import COLUMNS, SCENARIO, failed
 from cdpr_drake.analyses.studies.mobile_robot.statements import column, laps_words
 from cdpr_drake.analyses.sweeps.workers import SweepTask
@@ -50,7 +50,7 @@ class MobileRobotStudy(SeededStudy):
 
     name = "mobile-robot"
     source = "servoing thesis 2.3.7, 5.3.1"
-    judges = JUDGES
+    judges = CHECKS
     stated = "What the thesis states"
 
     def shown(self) -> list[Configuration]:
@@ -60,7 +60,7 @@ class MobileRobotStudy(SeededStudy):
     def details(self) -> dict[str, Any]:
         """Parameters, versions, the worst of all laps."""
         return {
-            **self.told_setup(SCENARIO, ASSUMPTIONS),
+            **self.setup_dict(SCENARIO, ASSUMPTIONS),
             "columns": list(COLUMNS),
             "configurations": [
                 {
@@ -108,7 +108,9 @@ class MobileRobotStudy(SeededStudy):
         return mobile_robot_drawings(self.found, self.shown())
 
 
-def study_mobile_robot(quick: bool = False, session: StudySession = ALONE) -> MobileRobotStudy:
+def study_mobile_robot(
+    quick: bool = False, session: StudySession = DEFAULT_STUDY_SESSION
+) -> MobileRobotStudy:
     """Runs all configurations over their seeds; each run is an item of a sweep.
 
     Args:

@@ -20,7 +20,12 @@ from rich.table import Table
 
 from cdpr_drake.analyses.planning.robot_path_task import RESERVE
 from cdpr_drake.analyses.reporting.log_files import finite
-from cdpr_drake.analyses.reporting.progress import ALONE, StoppableStudy, StudySession, WorkProgress
+from cdpr_drake.analyses.reporting.progress import (
+    DEFAULT_STUDY_SESSION,
+    StoppableStudy,
+    StudySession,
+    WorkProgress,
+)
 from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
 from cdpr_drake.analyses.reporting.statements import Statement, new_table, statement_table, verdict
 from cdpr_drake.analyses.studies.framework.seeded_study import DrawnStudy
@@ -259,7 +264,9 @@ class PlanningStudy(DrawnStudy, StoppableStudy):
         return {"phase_planes": partial(phase_figure, self)} if self.paths else {}
 
 
-def study_planning(quick: bool = False, session: StudySession = ALONE) -> PlanningStudy:
+def study_planning(
+    quick: bool = False, session: StudySession = DEFAULT_STUDY_SESSION
+) -> PlanningStudy:
     """Runs the study; each motion is an item of a sweep.
 
     Args:

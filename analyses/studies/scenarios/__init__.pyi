@@ -1,3 +1,3 @@
-from .statements import JUDGES as JUDGES
+from .statements import CHECKS as CHECKS
 from .study import FIGURES as FIGURES
 from .study import study_scenarios as study_scenarios

@@ -14,7 +14,7 @@ from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
 from cdpr_drake.systems.scenarios.run_settings import ExpectedEnd
 
-Found = Mapping[str, Mapping[str, Array]]
+StudyData = Mapping[str, Mapping[str, Array]]
 
 OVER = ("timeout", "completed")
 """Outcomes of runs that last as long as they may."""
@@ -89,7 +89,7 @@ class Ending:
         return max(np.nan_to_num(share, nan=np.inf) for share, most in told if most is not None)
 
 
-def endings(found: Found) -> list[Ending]:
+def endings(found: StudyData) -> list[Ending]:
     """How the scenarios that are finished ended, in their order."""
     told = []
     for name, arrays in found.items():
@@ -101,7 +101,7 @@ def endings(found: Found) -> list[Ending]:
     return told
 
 
-def _scenarios_expect_an_end(found: Found) -> Statement:
+def _scenarios_expect_an_end(found: StudyData) -> Statement:
     """Whether every file says how it ends."""
     told = _known(found)
     without = [one.name for one in told if one.expected is None]
@@ -114,7 +114,7 @@ def _scenarios_expect_an_end(found: Found) -> Statement:
     )
 
 
-def _scenarios_end_as_expected(found: Found) -> Statement:
+def _scenarios_end_as_expected(found: StudyData) -> Statement:
     """Whether every scenario ends with the outcome that its file expects."""
     told = _known(found)
     wrong = [one for one in told if not one.ends_as_expected()]
@@ -139,7 +139,7 @@ def _told_end(one: Ending) -> str:
     return f"{one.name} ({one.outcome}, {wanted} expected{more})"
 
 
-def _scenarios_end_close_enough(found: Found) -> Statement:
+def _scenarios_end_close_enough(found: StudyData) -> Statement:
     """Whether true errors at the end are within what files expect."""
     told = [one for one in _known(found) if one.is_judged_by_errors()]
     if not told:
@@ -160,7 +160,7 @@ def _scenarios_end_close_enough(found: Found) -> Statement:
     )
 
 
-def _known(found: Found) -> list[Ending]:
+def _known(found: StudyData) -> list[Ending]:
     """Endings of what is finished.
 
     Raises:
@@ -172,5 +172,5 @@ def _known(found: Found) -> list[Ending]:
     return told
 
 
-JUDGES = (_scenarios_expect_an_end, _scenarios_end_as_expected, _scenarios_end_close_enough)
+CHECKS = (_scenarios_expect_an_end, _scenarios_end_as_expected, _scenarios_end_close_enough)
 """What judges the statements."""

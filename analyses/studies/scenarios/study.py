@@ -12,16 +12,21 @@ from rich.table import Table
 
 from cdpr_drake.analyses.reporting.deferred_figures import NothingToDraw
 from cdpr_drake.analyses.reporting.log_files import finite
-from cdpr_drake.analyses.reporting.progress import ALONE, StoppableStudy, StudySession, WorkProgress
+from cdpr_drake.analyses.reporting.progress import (
+    DEFAULT_STUDY_SESSION,
+    StoppableStudy,
+    StudySession,
+    WorkProgress,
+)
 from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
 from cdpr_drake.analyses.reporting.statements import (
     Statement,
-    judged_statements,
+    evaluate_checks,
     new_table,
     statement_table,
 )
 from cdpr_drake.analyses.studies.framework.seeded_study import DrawnStudy
-from cdpr_drake.analyses.studies.scenarios.statements import JUDGES, Ending, endings
+from cdpr_drake.analyses.studies.scenarios.statements import CHECKS, Ending, endings
 from cdpr_drake.analyses.studies.scenarios.task import COLUMNS, ScenarioRun
 from cdpr_drake.analyses.sweeps.sweep import run_study_sweep
 from cdpr_drake.analyses.visualization.figure_style import new_figure
@@ -55,7 +60,7 @@ class ScenariosStudy(DrawnStudy, StoppableStudy):
 
     def statements(self) -> list[Statement]:
         """What had to be shown, and whether it was."""
-        return judged_statements(JUDGES, self.found, self.quick and not self.interrupted)
+        return evaluate_checks(CHECKS, self.found, self.quick and not self.interrupted)
 
     def as_dict(self) -> dict[str, Any]:
         """Everything for JSON: of each scenario how it ended, and what its file expects."""
@@ -171,7 +176,9 @@ def _row_label(one: Ending) -> str:
     return f"{one.name}: {one.outcome.replace('_', ' ')}{any_error}"
 
 
-def study_scenarios(quick: bool = False, session: StudySession = ALONE) -> ScenariosStudy:
+def study_scenarios(
+    quick: bool = False, session: StudySession = DEFAULT_STUDY_SESSION
+) -> ScenariosStudy:
     """Runs every scenario that comes with the package; each is an item of a sweep.
 
     Args:

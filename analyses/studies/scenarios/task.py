@@ -15,7 +15,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CdprError
 from cdpr_drake.systems.cameras.camera_settings import PROJECTED, RENDERED
 from cdpr_drake.systems.diagrams.load import load_scenario
-from cdpr_drake.systems.loops.loop_choice import is_looped, looped, with_loop
+from cdpr_drake.systems.loops.loop_choice import choose_compiled_loop, set_loop, uses_compiled_loop
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
 from cdpr_drake.systems.scenarios.files import scenario_kind
 
@@ -61,11 +61,13 @@ class ScenarioRun:
             CdprError: It cannot be.
         """
         if not self.quick:
-            return with_loop(load_scenario(self.name))[0]
+            return set_loop(load_scenario(self.name))[0]
         asked = load_scenario(self.name, quick_overrides(self.name))
         is_servo = SCENARIO_KINDS[asked.kind].is_servo
-        scenario: Any = looped(asked) if is_servo else with_loop(asked, repeated=True)[0]
-        longest = QUICK_LOOP if is_looped(scenario) else QUICK_DIAGRAM
+        scenario: Any = (
+            choose_compiled_loop(asked) if is_servo else set_loop(asked, repeated=True)[0]
+        )
+        longest = QUICK_LOOP if uses_compiled_loop(scenario) else QUICK_DIAGRAM
         return replace(scenario, duration=min(scenario.duration, longest))
 
     def _run(self) -> tuple[list[float], str]:

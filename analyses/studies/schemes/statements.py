@@ -6,11 +6,11 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from cdpr_drake.analyses.reporting.statements import Statement, judged_statements, verdict
+from cdpr_drake.analyses.reporting.statements import Statement, evaluate_checks, verdict
 from cdpr_drake.analyses.studies.schemes.trials import COLUMNS, TURNS
 from cdpr_drake.arrays import Array
 
-Found = Mapping[str, Mapping[str, Array]]
+StudyData = Mapping[str, Mapping[str, Array]]
 
 FAR = 0.1
 """Retreat beyond which a camera on a robot would have left its workspace [m]."""
@@ -31,22 +31,22 @@ def task_name(what: str, variant: str) -> str:
     return f"{what}, {variant}"
 
 
-def column(found: Found, what: str, variant: str, name: str) -> Array:
+def column(found: StudyData, what: str, variant: str, name: str) -> Array:
     """One of `COLUMNS` of the runs, shape (n,); KeyError where there are none yet."""
     return np.asarray(found[task_name(what, variant)]["runs"])[:, COLUMNS.index(name)]
 
 
-def _failed(found: Found, what: str, variant: str) -> str:
+def _failed(found: StudyData, what: str, variant: str) -> str:
     arrived, lost = (column(found, what, variant, name) for name in ("arrived", "lost"))
     short = int(np.sum((arrived == 0.0) & (lost == 0.0)))
     return f"{int(np.sum(lost))} lost and {short} not there of {len(lost)}"
 
 
-def _worst_retreat(found: Found, variant: str) -> float:
+def _worst_retreat(found: StudyData, variant: str) -> float:
     return float(np.max(column(found, TURN, variant, "retreat_m")))
 
 
-def _image_far(found: Found) -> Statement:
+def _image_far(found: StudyData) -> Statement:
     retreats = column(found, TURN, "ibvs", "retreat_m")
     ends = column(found, TURN, "ibvs", "arrived")
     beyond = [angle for angle, retreat in zip(TURNS, retreats, strict=True) if retreat > FAR]
@@ -69,7 +69,7 @@ def _image_far(found: Found) -> Statement:
     )
 
 
-def _pose_loses(found: Found) -> Statement:
+def _pose_loses(found: StudyData) -> Statement:
     names = ("pbvs", "pbvs-line")
     lost = [float(np.sum(column(found, FREE, name, "lost"))) for name in names]
     words = "; ".join(f"{name} {_failed(found, FREE, name)}" for name in names)
@@ -83,7 +83,7 @@ def _pose_loses(found: Found) -> Statement:
     )
 
 
-def _hybrid_free_of_minima(found: Found) -> Statement:
+def _hybrid_free_of_minima(found: StudyData) -> Statement:
     every = [column(found, what, "2.5d", "arrived") for what in (TURN, FREE, ROBOT)]
     gone = [column(found, what, "2.5d", "lost") for what in (TURN, FREE, ROBOT)]
     short = [int(np.sum((a == 0.0) & (g == 0.0))) for a, g in zip(every, gone, strict=True)]
@@ -99,7 +99,7 @@ def _hybrid_free_of_minima(found: Found) -> Statement:
     )
 
 
-def _partition_decouples(found: Found) -> Statement:
+def _partition_decouples(found: StudyData) -> Statement:
     names = ("partitioned", "partitioned, turned")
     worst = [_worst_retreat(found, name) for name in names]
     arrived = [bool(np.all(column(found, TURN, name, "arrived"))) for name in names]
@@ -124,7 +124,7 @@ def _partition_decouples(found: Found) -> Statement:
     )
 
 
-def _field_keeps_points(found: Found) -> Statement:
+def _field_keeps_points(found: StudyData) -> Statement:
     plain, field = (
         (np.sum(column(found, FREE, name, "lost")), np.sum(column(found, ROBOT, name, "lost")))
         for name in ("partitioned", "partitioned, field")
@@ -146,7 +146,7 @@ def _field_keeps_points(found: Found) -> Statement:
     )
 
 
-def _switching_by_bounds(found: Found) -> Statement:
+def _switching_by_bounds(found: StudyData) -> Statement:
     shares = np.concatenate(
         [column(found, what, "switching", "bound_share") for what in (TURN, FREE, ROBOT)]
     )
@@ -169,18 +169,18 @@ def _switching_by_bounds(found: Found) -> Statement:
     )
 
 
-JUDGES = (
+CHECKS = (
     _image_far, _pose_loses, _hybrid_free_of_minima, _partition_decouples, _field_keeps_points,
     _switching_by_bounds,
 )  # fmt: skip
 """All of them."""
 
 
-def schemes_statements(found: Found, quick: bool = False) -> list[Statement]:
+def schemes_statements(found: StudyData, quick: bool = False) -> list[Statement]:
     """What holds, of all that was run.
 
     Args:
         found: Arrays of the finished tasks, by `task_name`.
         quick: Whether they are all that is coming, of the quick form.
     """
-    return judged_statements(JUDGES, found, quick)
+    return evaluate_checks(CHECKS, found, quick)

@@ -12,14 +12,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from rich.table import Table
 
-from cdpr_drake.analyses.reporting.progress import ALONE, StudySession
+from cdpr_drake.analyses.reporting.progress import DEFAULT_STUDY_SESSION, StudySession
 from cdpr_drake.analyses.reporting.provenance import package_versions
 from cdpr_drake.analyses.reporting.statements import new_table
 from cdpr_drake.analyses.studies.framework.seeded_study import SeededStudy, constants_of
 from cdpr_drake.analyses.studies.schemes import trials
 from cdpr_drake.analyses.studies.schemes.statements import (
+    CHECKS,
     FREE,
-    JUDGES,
     ROBOT,
     TURN,
     column,
@@ -54,7 +54,7 @@ class SchemesStudy(SeededStudy):
     """What the study found, by `task_name`; `seeds` are drawn starts."""
 
     name = "schemes"
-    judges = JUDGES
+    judges = CHECKS
     stated = "What is said of them"
 
     def details(self) -> dict[str, Any]:
@@ -64,7 +64,7 @@ class SchemesStudy(SeededStudy):
             "free_starts": [pose_row(X_CO).tolist() for X_CO in free_starts(self.seeds)],
             "robot_starts": robot_starts(self.seeds),
             "versions": package_versions(),
-            **self.told_runs(COLUMNS),
+            **self.runs_dict(COLUMNS),
         }
 
     def number_tables(self) -> list[Table]:
@@ -160,7 +160,9 @@ def _median(values: Array) -> float:
         return float(np.nanmedian(values))
 
 
-def study_schemes(quick: bool = False, session: StudySession = ALONE) -> SchemesStudy:
+def study_schemes(
+    quick: bool = False, session: StudySession = DEFAULT_STUDY_SESSION
+) -> SchemesStudy:
     """Runs the study; each run is an item of a sweep.
 
     Args:

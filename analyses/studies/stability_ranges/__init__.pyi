@@ -1,3 +1,3 @@
 from .figures import FIGURES as FIGURES
-from .study import JUDGES as JUDGES
+from .study import CHECKS as CHECKS
 from .study import study_stability_ranges as study_stability_ranges

@@ -142,7 +142,7 @@ def rotation(rows: FoundRows) -> Statement:
     )
 
 
-JUDGES = (
+CHECKS = (
     vision_alone, combinations, smaller_range, difference_of_errors, planar_camera_place,
     camera_error, anchor_error, rotation,
 )  # fmt: skip

@@ -102,5 +102,5 @@ def robot_errors(rows: FoundRows) -> Statement:
     )
 
 
-JUDGES = (single_camera_place, camera_turn, seen_object, robot_errors)
+CHECKS = (single_camera_place, camera_turn, seen_object, robot_errors)
 """All of them, in the order of the thesis."""

@@ -176,7 +176,7 @@ def place_rotation(rows: FoundRows) -> Statement:
     )
 
 
-JUDGES = (
+CHECKS = (
     object_place, object_turn, difference, rotational_range, spatial_camera_place,
     errors_and_rotation, turn_and_tilt, place_error, place_rotation,
 )  # fmt: skip

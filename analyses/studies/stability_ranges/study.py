@@ -9,9 +9,14 @@ from typing import Any
 from matplotlib.figure import Figure
 from rich.table import Table
 
-from cdpr_drake.analyses.reporting.progress import ALONE, StoppableStudy, StudySession, WorkProgress
+from cdpr_drake.analyses.reporting.progress import (
+    DEFAULT_STUDY_SESSION,
+    StoppableStudy,
+    StudySession,
+    WorkProgress,
+)
 from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
-from cdpr_drake.analyses.reporting.statements import Statement, judged_statements
+from cdpr_drake.analyses.reporting.statements import Statement, evaluate_checks
 from cdpr_drake.analyses.studies.framework.seeded_study import DrawnStudy
 from cdpr_drake.analyses.studies.published.stability_recipe import DRAWS
 from cdpr_drake.analyses.studies.stability_ranges import (
@@ -72,14 +77,14 @@ class StabilityRangesStudy(DrawnStudy, StoppableStudy):
         return range_drawings(self.rows)
 
 
-JUDGES = (*planar_statements.JUDGES, *spatial_statements.JUDGES, *single_statements.JUDGES)
+CHECKS = (*planar_statements.CHECKS, *spatial_statements.CHECKS, *single_statements.CHECKS)
 """All of them, in the order of the thesis."""
 
 
 def range_statements(rows: Sequence[RangeRow], quick: bool = False) -> list[Statement]:
     """The servoing thesis' statements whose rows are there, in the order of the thesis; of the
     `quick` form also the names of the others."""
-    return judged_statements(JUDGES, FoundRows(rows), quick)
+    return evaluate_checks(CHECKS, FoundRows(rows), quick)
 
 
 def range_items(quick: bool) -> list[RangeItem]:
@@ -91,7 +96,7 @@ def range_items(quick: bool) -> list[RangeItem]:
 
 def study_stability_ranges(
     quick: bool = False,
-    session: StudySession = ALONE,
+    session: StudySession = DEFAULT_STUDY_SESSION,
 ) -> StabilityRangesStudy:
     """Runs the study; each question is a task of a sweep.
 

@@ -9,7 +9,7 @@ import numpy as np
 from cdpr_drake.analyses.reporting.statements import (
     NOT_TESTABLE,
     Statement,
-    judged_statements,
+    evaluate_checks,
     verdict,
 )
 from cdpr_drake.analyses.studies.stability_shapes.items import (
@@ -48,7 +48,7 @@ class FoundShapes:
 
 def shape_statements(shapes: Sequence[Shape], quick: bool) -> list[Statement]:
     """Statements whose workspaces are there."""
-    return judged_statements(JUDGES, FoundShapes(shapes), quick)
+    return evaluate_checks(CHECKS, FoundShapes(shapes), quick)
 
 
 def _corners(shape: Shape) -> bool:
@@ -278,7 +278,7 @@ def points_make_smaller(found: FoundShapes) -> Statement:
 
 ORIENTATIONS = "A position counts that is stable unturned and turned by +-30 deg about x, y and z."
 
-JUDGES = (
+CHECKS = (
     downward, tiny, flat, width_by_camera, hybrid_falls_faster, corners_stay, pyramid,
     flattens_to_yz, combinations, start_inside, goal_outside_twice, points_make_smaller,
 )  # fmt: skip

@@ -9,7 +9,12 @@ from typing import Any
 from matplotlib.figure import Figure
 from rich.table import Table
 
-from cdpr_drake.analyses.reporting.progress import ALONE, StoppableStudy, StudySession, WorkProgress
+from cdpr_drake.analyses.reporting.progress import (
+    DEFAULT_STUDY_SESSION,
+    StoppableStudy,
+    StudySession,
+    WorkProgress,
+)
 from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
 from cdpr_drake.analyses.reporting.statements import Statement, new_table, statement_table
 from cdpr_drake.analyses.studies.framework.seeded_study import DrawnStudy
@@ -97,7 +102,9 @@ class StabilityShapes(DrawnStudy, StoppableStudy):
         return shape_drawings(self.shapes)
 
 
-def study_stability_shapes(quick: bool = False, session: StudySession = ALONE) -> StabilityShapes:
+def study_stability_shapes(
+    quick: bool = False, session: StudySession = DEFAULT_STUDY_SESSION
+) -> StabilityShapes:
     """Computes the workspaces; each is a task of a sweep.
 
     Args:

@@ -1,2 +1,2 @@
-from .statements import JUDGES as JUDGES
+from .statements import CHECKS as CHECKS
 from .study import study_tagless as study_tagless

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from cdpr_drake.analyses.reporting.statements import Statement, verdict
-from cdpr_drake.analyses.studies.framework.seeded_study import Found
+from cdpr_drake.analyses.studies.framework.seeded_study import StudyData
 from cdpr_drake.analyses.studies.tagless.trials import COLUMNS, SCHEMES, TAG, is_lost
 from cdpr_drake.arrays import Array
 from cdpr_drake.vision.texture_pictures import TEXTURES
@@ -14,7 +14,7 @@ WITHIN = 3.0
 """Times the final error with a tag that a textured square may have."""
 
 
-def runs_of(found: Found, scheme: str, target: str) -> Array:
+def runs_of(found: StudyData, scheme: str, target: str) -> Array:
     """`COLUMNS` of the runs of a scheme on a target, shape (n, 6); KeyError where there are none
     yet."""
     return np.asarray(found[task_name(scheme, target)]["runs"])
@@ -31,7 +31,7 @@ def medians(runs: Array) -> Array:
     return np.median(arrived[:, :2], axis=0) if len(arrived) else np.full(2, np.inf)
 
 
-def _accuracy(found: Found, scheme: str) -> Statement:
+def _accuracy(found: StudyData, scheme: str) -> Statement:
     tag = medians(runs_of(found, scheme, TAG))
     ratios = {name: medians(runs_of(found, scheme, name)) / tag for name in TEXTURES}
     count = len(runs_of(found, scheme, TAG))
@@ -46,22 +46,22 @@ def _accuracy(found: Found, scheme: str) -> Statement:
     )
 
 
-def _pbvs(found: Found) -> Statement:
+def _pbvs(found: StudyData) -> Statement:
     """Final errors without tags, PBVS."""
     return _accuracy(found, "pbvs")
 
 
-def _ibvs(found: Found) -> Statement:
+def _ibvs(found: StudyData) -> Statement:
     """Final errors without tags, IBVS."""
     return _accuracy(found, "ibvs")
 
 
-def _hybrid(found: Found) -> Statement:
+def _hybrid(found: StudyData) -> Statement:
     """Final errors without tags, 2 1/2 D."""
     return _accuracy(found, "2.5d")
 
 
-def _losses(found: Found) -> Statement:
+def _losses(found: StudyData) -> Statement:
     """Runs without tags that lose their target or do not arrive."""
     lost: dict[str, list[int]] = {}
     blind: dict[str, int] = {}
@@ -82,5 +82,5 @@ def _losses(found: Found) -> Statement:
     )
 
 
-JUDGES = (_pbvs, _ibvs, _hybrid, _losses)
+CHECKS = (_pbvs, _ibvs, _hybrid, _losses)
 """All of them."""

@@ -11,12 +11,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from rich.table import Table
 
-from cdpr_drake.analyses.reporting.progress import ALONE, StudySession
+from cdpr_drake.analyses.reporting.progress import DEFAULT_STUDY_SESSION, StudySession
 from cdpr_drake.analyses.reporting.provenance import package_versions
 from cdpr_drake.analyses.reporting.statements import new_table
 from cdpr_drake.analyses.studies.framework.seeded_study import SeededStudy, constants_of
 from cdpr_drake.analyses.studies.tagless import trials
-from cdpr_drake.analyses.studies.tagless.statements import JUDGES, medians, runs_of, task_name
+from cdpr_drake.analyses.studies.tagless.statements import CHECKS, medians, runs_of, task_name
 from cdpr_drake.analyses.studies.tagless.trials import (
     COLUMNS,
     RATE,
@@ -42,7 +42,7 @@ class TaglessStudy(SeededStudy):
     """What the study found, by `task_name`; `seeds` are starts of the first scheme."""
 
     name = "tagless"
-    judges = JUDGES
+    judges = CHECKS
 
     def details(self) -> dict[str, Any]:
         """Parameters, versions, starts, numbers of all runs."""
@@ -51,7 +51,7 @@ class TaglessStudy(SeededStudy):
             "parameters": constants_of(trials, str, int, float, tuple),
             "starts": [[place.tolist(), angles.tolist()] for place, angles in drawn],
             "versions": package_versions(),
-            **self.told_runs(COLUMNS),
+            **self.runs_dict(COLUMNS),
         }
 
     def number_tables(self) -> list[Table]:
@@ -124,7 +124,9 @@ class TaglessStudy(SeededStudy):
         )  # fmt: skip
 
 
-def study_tagless(quick: bool = False, session: StudySession = ALONE) -> TaglessStudy:
+def study_tagless(
+    quick: bool = False, session: StudySession = DEFAULT_STUDY_SESSION
+) -> TaglessStudy:
     """Runs the study; each run is an item of a sweep.
 
     Args:

@@ -210,7 +210,7 @@ def _accuracy_30(runs: CaseRuns) -> Statement:
     return _accuracy(runs, ("less_30", "more_30"), "with friction 30 % off")
 
 
-JUDGES: Sequence[Callable[[CaseRuns], Statement]] = (
+CHECKS: Sequence[Callable[[CaseRuns], Statement]] = (
     _accuracy_exact, _accuracy_10, _accuracy_30, _limits, _no_slack, _taut, _relaxed,
 )  # fmt: skip
 
@@ -240,6 +240,6 @@ CASE_9_TORQUE = CaseStudy(
         "controller compensates a share of that friction.",
         "Velocity control is that of case study IX: ideal winches, with tension correction.",
     ),
-    judges=JUDGES,
+    judges=CHECKS,
     own=METRICS,
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 
-from cdpr_drake.analyses.reporting.statements import Statement, judged_statements, verdict
+from cdpr_drake.analyses.reporting.statements import Statement, evaluate_checks, verdict
 from cdpr_drake.analyses.studies.tension_methods.trial import Applied, TrialResult
 
 JUMP = 0.1
@@ -31,10 +31,10 @@ class _Runs:
         return self._runs[experiment, method, gain, applied]
 
 
-def judge_statements(runs: Iterable[TrialResult], quick: bool = False) -> list[Statement]:
+def evaluate_statements(runs: Iterable[TrialResult], quick: bool = False) -> list[Statement]:
     """The statements whose runs are there, in the order of the thesis; of the `quick` form also
     the names of the others."""
-    return judged_statements(JUDGES, _Runs(runs), quick)
+    return evaluate_checks(CHECKS, _Runs(runs), quick)
 
 
 def _lp_jumps(find: _Runs) -> Statement:
@@ -225,7 +225,7 @@ def _closed_form_steady(find: _Runs) -> Statement:
     )
 
 
-JUDGES: tuple[Callable[[_Runs], Statement], ...] = (
+CHECKS: tuple[Callable[[_Runs], Statement], ...] = (
     _lp_jumps,
     _qp_jumps,
     _qp_needs_less,

@@ -9,7 +9,12 @@ from typing import Any
 from matplotlib.figure import Figure
 from rich.table import Table
 
-from cdpr_drake.analyses.reporting.progress import ALONE, StoppableStudy, StudySession, WorkProgress
+from cdpr_drake.analyses.reporting.progress import (
+    DEFAULT_STUDY_SESSION,
+    StoppableStudy,
+    StudySession,
+    WorkProgress,
+)
 from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
 from cdpr_drake.analyses.reporting.statements import Statement
 from cdpr_drake.analyses.statics.tension_query import applicable_methods
@@ -29,7 +34,7 @@ from cdpr_drake.analyses.studies.tension_methods.experiments import (
     make_plan,
 )
 from cdpr_drake.analyses.studies.tension_methods.figures import study_drawings
-from cdpr_drake.analyses.studies.tension_methods.statements import judge_statements
+from cdpr_drake.analyses.studies.tension_methods.statements import evaluate_statements
 from cdpr_drake.analyses.studies.tension_methods.tables import study_tables
 from cdpr_drake.analyses.studies.tension_methods.trial import STEP, TrialResult, TrialTask
 from cdpr_drake.analyses.sweeps.sweep import run_study_sweep
@@ -60,7 +65,7 @@ class TensionStudy(DrawnStudy, StoppableStudy):
     @property
     def statements(self) -> list[Statement]:
         """The thesis' statements that these runs judge."""
-        return judge_statements(self.runs, self.plan.quick and not self.interrupted)
+        return evaluate_statements(self.runs, self.plan.quick and not self.interrupted)
 
     def as_dict(self) -> dict[str, Any]:
         """Everything for JSON: parameters, versions, runs, coverage, statements."""
@@ -86,7 +91,9 @@ class TensionStudy(DrawnStudy, StoppableStudy):
         return study_drawings(self.runs, self.coverage)
 
 
-def study_tension_methods(quick: bool = False, session: StudySession = ALONE) -> TensionStudy:
+def study_tension_methods(
+    quick: bool = False, session: StudySession = DEFAULT_STUDY_SESSION
+) -> TensionStudy:
     """Runs the study; each run, and each method on a grid of poses, is an item of a sweep.
 
     Args:

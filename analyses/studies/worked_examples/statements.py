@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdpr_drake.analyses.reporting.statements import Statement, judged_statements, verdict
+from cdpr_drake.analyses.reporting.statements import Statement, evaluate_checks, verdict
 from cdpr_drake.analyses.studies.worked_examples.motion import DURATION, END, START, SampledMotion
 from cdpr_drake.analyses.studies.worked_examples.tensions import (
     POTT,
@@ -53,7 +53,7 @@ class FoundExamples:
 
 def example_statements(found: FoundExamples, quick: bool) -> list[Statement]:
     """The statements for which enough was finished."""
-    return judged_statements(JUDGES, found, quick)
+    return evaluate_checks(CHECKS, found, quick)
 
 
 def two_programs(found: FoundExamples) -> Statement:
@@ -234,7 +234,7 @@ def median_cheap(found: FoundExamples) -> Statement:
     )
 
 
-JUDGES = (
+CHECKS = (
     two_programs, meets_conditions, printed_coefficients, homing_tensions, border_tensions,
     equally_tensed, two_cables_more, polygon_shrinks, farthest_from_limits, keeps_limits, pushes,
     median_cheap,

@@ -10,7 +10,7 @@ from typing import Any
 from matplotlib.figure import Figure
 from rich.table import Table
 
-from cdpr_drake.analyses.reporting.progress import ALONE, StudySession, WorkProgress
+from cdpr_drake.analyses.reporting.progress import DEFAULT_STUDY_SESSION, StudySession, WorkProgress
 from cdpr_drake.analyses.reporting.provenance import package_versions
 from cdpr_drake.analyses.reporting.statements import Statement, new_table, statement_table
 from cdpr_drake.analyses.studies.framework.seeded_study import DrawnStudy
@@ -108,7 +108,9 @@ class WorkedExamples(DrawnStudy):
         return example_drawings(self.found)
 
 
-def study_worked_examples(quick: bool = False, session: StudySession = ALONE) -> WorkedExamples:
+def study_worked_examples(
+    quick: bool = False, session: StudySession = DEFAULT_STUDY_SESSION
+) -> WorkedExamples:
     """Runs the study.
 
     Args:

@@ -22,7 +22,7 @@ from pydrake.geometry import (
 from pydrake.math import RigidTransform, RotationMatrix
 from scipy.optimize import lsq_linear
 
-from cdpr_drake.analyses.workspaces.workspace_question import surroundings
+from cdpr_drake.analyses.workspaces.workspace_question import interference_bodies
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.poses import rotation_from_angles
 from cdpr_drake.models.robot_loader import load_robot
@@ -58,7 +58,7 @@ class DistanceTask:
         """Arrays of the poses start to stop, shape (n,): which are `wrong`, which were `settled` by
         least squares, and the largest `differences` from who decided [m]."""
         robot = load_robot(self.robot)
-        around = surroundings(robot)
+        around = interference_bodies(robot)
         around = replace(around, radius=np.maximum(around.radius, 1e-4))  # a capsule has one
         positions, rotations = np.empty((stop - start, 3)), np.empty((stop - start, 3, 3))
         for k in range(stop - start):

@@ -10,8 +10,8 @@ import numpy as np
 
 from cdpr_drake.analyses.workspaces.conditions import KINDS
 from cdpr_drake.analyses.workspaces.workspace_question import (
-    Asked,
     WorkspaceQuestion,
+    WorkspaceRequest,
     make_workspace_question,
 )
 from cdpr_drake.errors import CdprError
@@ -145,7 +145,7 @@ def figure_items(quick: bool) -> list[WorkspaceItem]:
             for share in UPPER_SHARES:
                 limits = (lower, share * file_upper)
                 question = make_workspace_question(
-                    name, ["static"], grid, asked=Asked(limits=limits)
+                    name, ["static"], grid, asked=WorkspaceRequest(limits=limits)
                 )
                 words = f"{name}, {limits[0]:g} to {limits[1]:g} N"
                 items.append(WorkspaceItem(words, FIGURE, question, share))
@@ -188,14 +188,14 @@ def _robot_items(name: str, counts: Sequence[int]) -> tuple[list[WorkspaceItem],
         WorkspaceItem(f"{name}, {kind} alone", ALONE, replace(every, kinds=(kind,)))
         for kind in kinds
     ]
-    zero = Asked(required=SpatialSet(), accelerations=SpatialSet())
+    zero = WorkspaceRequest(required=SpatialSet(), accelerations=SpatialSet())
     low = robot.tension_limits(None)[0]
-    checks: list[tuple[str, list[str], Asked]] = [
+    checks: list[tuple[str, list[str], WorkspaceRequest]] = [
         (ZERO, ["static", "dynamic", "wrench-feasible"], zero),
-        (ENDLESS, ["static"], Asked(limits=(low, STRONG))),
+        (ENDLESS, ["static"], WorkspaceRequest(limits=(low, STRONG))),
     ]
     if "wrench-closure" in kinds:
-        heavy = Asked(mass=OTHER_MASS * robot.platform.mass)
+        heavy = WorkspaceRequest(mass=OTHER_MASS * robot.platform.mass)
         checks.append((HEAVY, ["wrench-closure"], heavy))
     items = [WorkspaceItem(f"{name}, {EVERY}", EVERY, every), *alone]
     for group, some, given in checks:
@@ -204,7 +204,7 @@ def _robot_items(name: str, counts: Sequence[int]) -> tuple[list[WorkspaceItem],
     return items, left_out
 
 
-def _refusal(name: str, kind: str, grid: WorkspaceGrid, asked: Asked) -> str:
+def _refusal(name: str, kind: str, grid: WorkspaceGrid, asked: WorkspaceRequest) -> str:
     """Why a robot cannot be asked for a kind; empty if it can."""
     try:
         make_workspace_question(name, [kind], grid, asked=asked)
@@ -213,7 +213,7 @@ def _refusal(name: str, kind: str, grid: WorkspaceGrid, asked: Asked) -> str:
     return ""
 
 
-def _asked_of(robot: Robot, name: str, grid: WorkspaceGrid) -> tuple[Asked, str | None]:
+def _asked_of(robot: Robot, name: str, grid: WorkspaceGrid) -> tuple[WorkspaceRequest, str | None]:
     """What a robot is asked for, and why it has no camera that sees a target, if it has none."""
     asked = sets_of(robot)
     scenario = f"{name.partition('_')[0]}_pbvs"
@@ -226,12 +226,12 @@ def _asked_of(robot: Robot, name: str, grid: WorkspaceGrid) -> tuple[Asked, str 
     return seen, None
 
 
-def sets_of(robot: Robot) -> Asked:
+def sets_of(robot: Robot) -> WorkspaceRequest:
     """Wrenches to resist and accelerations to have, which the kinds of a robot are asked for."""
     force = FORCE_SHARE * robot.platform.mass * robot.gravity
     arm = float(np.sqrt(np.mean(np.sum(robot.cable_set().p_PB ** 2, axis=0))))
     linear, angular = ACCELERATIONS
-    return Asked(
+    return WorkspaceRequest(
         required=SpatialSet(box=np.repeat([force * arm, force], 3)),
         accelerations=SpatialSet(box=np.repeat([angular, linear], 3)),
     )

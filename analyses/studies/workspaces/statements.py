@@ -8,7 +8,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from cdpr_drake.analyses.reporting.statements import Statement, judged_statements, verdict
+from cdpr_drake.analyses.reporting.statements import Statement, evaluate_checks, verdict
 from cdpr_drake.analyses.studies.workspaces.distances import SAME
 from cdpr_drake.analyses.studies.workspaces.items import (
     ALONE,
@@ -103,7 +103,7 @@ def workspace_statements(
         distances: What `DistanceTask` found, by robot.
         quick: Whether they are all that is coming, of the quick form.
     """
-    return judged_statements(JUDGES, FoundSet(found, distances), quick)
+    return evaluate_checks(CHECKS, FoundSet(found, distances), quick)
 
 
 def _count(mask: np.ndarray) -> int:
@@ -316,7 +316,7 @@ def _drake(found: FoundSet) -> Statement:
     )
 
 
-JUDGES = (
+CHECKS = (
     _acrobot, _caroca, _platforms, _upper_limit, _lower_limit, _weight, _closure, _dynamic, _wrench,
     _within, _intersections, _drake,
 )  # fmt: skip

@@ -10,7 +10,12 @@ import numpy as np
 from matplotlib.figure import Figure
 from rich.table import Table
 
-from cdpr_drake.analyses.reporting.progress import ALONE, StoppableStudy, StudySession, WorkProgress
+from cdpr_drake.analyses.reporting.progress import (
+    DEFAULT_STUDY_SESSION,
+    StoppableStudy,
+    StudySession,
+    WorkProgress,
+)
 from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
 from cdpr_drake.analyses.reporting.statements import Statement
 from cdpr_drake.analyses.studies.framework.seeded_study import DrawnStudy
@@ -86,7 +91,9 @@ class WorkspacesStudy(DrawnStudy, StoppableStudy):
         return workspace_drawings(self.found)
 
 
-def study_workspaces(quick: bool = False, session: StudySession = ALONE) -> WorkspacesStudy:
+def study_workspaces(
+    quick: bool = False, session: StudySession = DEFAULT_STUDY_SESSION
+) -> WorkspacesStudy:
     """Runs the study.
 
     Args:

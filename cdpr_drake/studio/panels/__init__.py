@@ -3,10 +3,10 @@
 * `PANELS` is the table. A panel's `build` places its elements into the current slot of NiceGUI. It
   connects to signals of the workbench by `on_page`, which ends the connection when the page is
   closed.
-* What several panels are made of: messages, forms from schemas, tables with bars. `quietly` shows
-  what a handler raises as a message in the page. `SchemaGroups` is the form of a document, made
-  from its schema: units, ranges, errors beside the fields. `cable_table` and `fact_table` are HTML,
-  one element for many numbers.
+* What several panels are made of: messages, forms from schemas, tables with bars. `show_errors`
+  shows what a handler raises as a message in the page. `SchemaGroups` is the form of a document,
+  made from its schema: units, ranges, errors beside the fields. `cable_table` and `fact_table` are
+  HTML, one element for many numbers.
 * Parts of the run panel: the scenario's form, plots that move, and what is looked at.
 """
 

@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 
 from nicegui import ui
 
-from cdpr_drake.studio.panels.panel import quietly
-from cdpr_drake.studio.workbench.command_board import CommandBoard, Computed
+from cdpr_drake.studio.panels.panel import show_errors
+from cdpr_drake.studio.workbench.command_board import CommandBoard, CommandEntry
 from cdpr_drake.studio.workbench.job import JobState
 
 
@@ -41,7 +41,7 @@ class JobBar:
         self.refresh()
 
     @property
-    def computed(self) -> Computed | None:
+    def computed(self) -> CommandEntry | None:
         """What is looked at."""
         return self._board.choices().get(self._board.shown)
 
@@ -58,7 +58,7 @@ class JobBar:
             self._choice.value = self._board.shown or None
         self._show(choices.get(self._board.shown))
 
-    def _show(self, computed: Computed | None) -> None:
+    def _show(self, computed: CommandEntry | None) -> None:
         job = None if computed is None else computed.job
         working = job is not None and not job.state.is_over
         asked = () if computed is None or working else computed.asked
@@ -89,7 +89,7 @@ class JobBar:
 
     def _ask_to_go_on(self) -> None:
         computed = self.computed
-        with quietly():
+        with show_errors():
             if computed is not None:
                 self._board.go_on(computed)
                 self.refresh()

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from nicegui import ui
 
-from cdpr_drake.studio.panels.panel import quietly
+from cdpr_drake.studio.panels.panel import show_errors
 from cdpr_drake.studio.workbench.job import JobState
 from cdpr_drake.studio.workbench.run_board import RunBoard
 from cdpr_drake.studio.workbench.run_job import RunJob
@@ -36,7 +36,7 @@ class SteeringBar:
             board.speed = SPEEDS[str(self._speed.value)]
             job = current()
             if job is not None:
-                with quietly():
+                with show_errors():
                     job.set_speed(board.speed)
 
         self._speed = ui.select(list(SPEEDS), value=now, label="speed", on_change=set_speed)
@@ -51,7 +51,7 @@ class SteeringBar:
         def pressed() -> None:
             job = self._current()
             if job is not None:
-                with quietly():
+                with show_errors():
                     act(job)
 
         button = ui.button(icon=icon, on_click=pressed)

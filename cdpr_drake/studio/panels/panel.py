@@ -1,6 +1,6 @@
 """What a panel is, how it connects to a workbench, and messages in the page.
 
-Errors are messages, too: whatever a handler raises, the server stays alive, see `quietly`.
+Errors are messages, too: whatever a handler raises, the server stays alive, see `show_errors`.
 """
 
 from __future__ import annotations
@@ -98,7 +98,7 @@ def message(problem: BaseException) -> str:
     )
 
 
-def shown(words: str, kind: str = "negative", *, stays: bool = False) -> None:
+def notify(words: str, kind: str = "negative", *, stays: bool = False) -> None:
     """Shows words over the page; `kind` is positive, negative, warning or info.
 
     What is wrong, and what `stays`, is there until it is closed, all else for four seconds.
@@ -114,7 +114,7 @@ def shown(words: str, kind: str = "negative", *, stays: bool = False) -> None:
 
 
 @contextmanager
-def quietly() -> Iterator[None]:
+def show_errors() -> Iterator[None]:
     """Shows what the block raises as a message in the page, and goes on.
 
     Mistakes of this program are shown, too, and logged with their traceback.
@@ -124,4 +124,4 @@ def quietly() -> Iterator[None]:
     except Exception as problem:
         if not isinstance(problem, (CdprError, OSError)):
             _LOG.exception("in a handler of the studio's page")
-        shown(message(problem))
+        notify(message(problem))

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from nicegui import events, ui
 
-from cdpr_drake.studio.panels.panel import quietly, shown
+from cdpr_drake.studio.panels.panel import notify, show_errors
 from cdpr_drake.studio.workbench.session import Workbench
 
 MOVED = "studio_point"
@@ -109,14 +109,14 @@ def add_point_dragging(bench: Workbench) -> None:
     """Lets the points in the page's scene be dragged."""
 
     def moved(event: events.GenericEventArguments) -> None:
-        with quietly():
+        with show_errors():
             point = _read(event.args, len(bench.robot.value.cables))
             if point is None:
                 return
             kind, number, at, done = point
             words = bench.drag_point(kind, number, at, done)
             if words:
-                shown(words)
+                notify(words)
 
     ui.on(MOVED, moved)
     ui.context.client.on_connect(lambda: ui.run_javascript(SCRIPT))

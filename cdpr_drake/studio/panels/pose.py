@@ -10,7 +10,7 @@ from nicegui import ui
 
 from cdpr_drake.geometry.poses import angles_from_rotation
 from cdpr_drake.studio.panels.numbers import cable_table, fact_table, number_words
-from cdpr_drake.studio.panels.panel import message, on_page, quietly
+from cdpr_drake.studio.panels.panel import message, on_page, show_errors
 from cdpr_drake.studio.workbench.pose_answer import PoseAnswer
 from cdpr_drake.studio.workbench.pose_axes import PoseAxis
 from cdpr_drake.studio.workbench.session import Workbench
@@ -39,13 +39,13 @@ def pose_panel(bench: Workbench) -> None:
     problem = ui.label().classes("studio-problem").props('role="status"').mark("pose-problem")
 
     def choose() -> None:
-        with quietly():
+        with show_errors():
             bench.method = str(method.value)
             bench.reference = None if reference.value is None else float(reference.value)
             bench.ask()
 
     def go_home() -> None:
-        with quietly():
+        with show_errors():
             bench.go_home()
             bench.ask()
 
@@ -122,7 +122,7 @@ class _Sliders:
         self._parts.append((slider, field))
 
     def _slid(self, k: int, value: Any) -> None:
-        with quietly():
+        with show_errors():
             if value is not None and np.isfinite(value):
                 self._move(k, float(value))
 
@@ -141,7 +141,7 @@ class _Sliders:
                 f"{axis.upper:g} [{axis.unit}]"
             )
             return
-        with quietly():
+        with show_errors():
             self._move(k, value)
 
     def _move(self, k: int, value: float) -> None:

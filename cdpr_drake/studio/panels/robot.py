@@ -5,7 +5,7 @@ from __future__ import annotations
 from nicegui import events, ui
 
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.studio.panels.panel import on_page, quietly
+from cdpr_drake.studio.panels.panel import on_page, show_errors
 from cdpr_drake.studio.panels.point_dragging import add_point_dragging
 from cdpr_drake.studio.panels.robot_dialogs import (
     export_dialog,
@@ -42,14 +42,14 @@ def robot_panel(bench: Workbench) -> None:
         where.text = f"{bench.file}{state}" if bench.file else "not in a file of the folder yet"
         undo.set_enabled(bench.robot.can_undo)
         redo.set_enabled(bench.robot.can_redo)
-        with quietly():
+        with show_errors():
             groups.refresh()
 
     def pressed(event: events.KeyEventArguments) -> None:
         if not event.action.keydown or not (event.modifiers.ctrl or event.modifiers.meta):
             return
         name = str(event.key).lower()
-        with quietly():
+        with show_errors():
             if name == "y" or (name == "z" and event.modifiers.shift):
                 bench.robot.redo()
             elif name == "z":
@@ -70,7 +70,7 @@ def _save(bench: Workbench) -> None:
 
 def _guarded(action: object) -> object:
     def act() -> None:
-        with quietly():
+        with show_errors():
             assert callable(action)
             action()
 

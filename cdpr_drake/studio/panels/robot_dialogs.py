@@ -12,7 +12,7 @@ from nicegui import events, ui
 
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models.robot_loader import robot_names
-from cdpr_drake.studio.panels.panel import message, quietly, shown
+from cdpr_drake.studio.panels.panel import message, notify, show_errors
 from cdpr_drake.studio.workbench.robot_files import (
     LARGEST_UPLOAD,
     MOST_UPLOADS,
@@ -52,7 +52,7 @@ def _attempt(said: Any, action: Callable[[], None]) -> bool:
 def tell_opened(opened: OpenedRobot) -> None:
     """Says what had to be assumed of a robot from a file of another tool."""
     if opened.notes:
-        shown("\n".join(opened.notes), "info")
+        notify("\n".join(opened.notes), "info")
 
 
 def open_dialog(bench: Workbench) -> None:
@@ -81,7 +81,7 @@ def open_dialog(bench: Workbench) -> None:
             def action() -> None:
                 tell_opened(bench.upload(content))
 
-            with quietly():
+            with show_errors():
                 if _attempt(said, action):
                     dialog.close()
                 else:
@@ -104,7 +104,7 @@ def open_dialog(bench: Workbench) -> None:
 def save_to(bench: Workbench, name: str, overwrite: bool) -> None:
     """Saves the robot, and says so."""
     bench.save(name, overwrite)
-    shown(f"saved as {name}", "positive")
+    notify(f"saved as {name}", "positive")
 
 
 def save_dialog(bench: Workbench) -> None:
@@ -141,7 +141,7 @@ def export_dialog(bench: Workbench) -> None:
                 name, content = _one_file(files)
                 ui.download.content(content, name)
                 if lost:
-                    shown("\n".join(lost), "warning", stays=True)
+                    notify("\n".join(lost), "warning", stays=True)
 
             if _attempt(said, action):
                 dialog.close()

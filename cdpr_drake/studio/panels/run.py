@@ -16,13 +16,13 @@ from cdpr_drake.errors import CdprError
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.studio.panels.live_bar import SteeringBar
-from cdpr_drake.studio.panels.panel import on_page, quietly, robot_argument
+from cdpr_drake.studio.panels.panel import on_page, robot_argument, show_errors
 from cdpr_drake.studio.panels.run_watch import RUN_STYLE, RunWatch
 from cdpr_drake.studio.panels.scenario_form import ScenarioForm
 from cdpr_drake.studio.workbench.finished_run import zipped
 from cdpr_drake.studio.workbench.job import JobState
 from cdpr_drake.studio.workbench.result_subject import subject_of
-from cdpr_drake.studio.workbench.run_board import RunBoard, Shown
+from cdpr_drake.studio.workbench.run_board import RunBoard, RunEntry
 from cdpr_drake.studio.workbench.run_job import RunJob
 from cdpr_drake.studio.workbench.scenario_draft import ROBOT
 from cdpr_drake.studio.workbench.scene import RobotScene, RunScene
@@ -58,9 +58,9 @@ class SceneOfRuns:
         self._scene: RunScene | None = None
         self._of: Path | None = None
         self._busy, self._drawn, self.was_missed = False, 0.0, False
-        self._next: tuple[Shown, Mapping[str, Any], float] | None = None
+        self._next: tuple[RunEntry, Mapping[str, Any], float] | None = None
 
-    def draw(self, shown: Shown, sample: Mapping[str, Any], wait: float) -> None:
+    def draw(self, shown: RunEntry, sample: Mapping[str, Any], wait: float) -> None:
         """Draws a sample of a run, unless one was drawn less than `wait` before [s]."""
         bench = self._bench()
         if bench is None or bench.panel not in ("", "run"):
@@ -75,7 +75,9 @@ class SceneOfRuns:
         dark = bool(bench.dark)
         bench.draw(lambda scene: self._work(scene, shown, sample, dark), self._done)
 
-    def _work(self, scene: RobotScene, shown: Shown, sample: Mapping[str, Any], dark: bool) -> None:
+    def _work(
+        self, scene: RobotScene, shown: RunEntry, sample: Mapping[str, Any], dark: bool
+    ) -> None:
         if self._scene is None or self._of != shown.folder:
             scenario = shown.scenario()
             if scenario is None:
@@ -209,7 +211,7 @@ class RunPanel:
             return
         self._body.clear()
         self._form = None
-        with self._body, quietly():
+        with self._body, show_errors():
             known = name in scenario_names()
             draft = self._board.choose(name if known else str(self._bench.folder.path(name)))
             self._form = ScenarioForm(draft)
@@ -238,14 +240,14 @@ class RunPanel:
         self._own.set_visibility(bool(own))
 
     def _open_own_robot(self) -> None:
-        with quietly():
+        with show_errors():
             if self._board.draft is not None:
                 self._bench.open(self._board.draft.own_robot)
 
     async def _start(self) -> None:
         if self._form is None or not await self._form.check():
             return
-        with quietly():
+        with show_errors():
             self._take_robot()
             if self._board.draft is not None and ROBOT in self._board.draft.changes:
                 robot_argument(self._bench)  # says why there is none
@@ -268,24 +270,24 @@ class RunPanel:
     def _recover_run(self) -> None:
         job = self._watch.job
         if job is not None:
-            with quietly():
+            with show_errors():
                 self._board.recover(job)
 
     async def _send_all(self) -> None:
         shown = self._watch.shown
         if shown is None:
             return
-        with quietly():
+        with show_errors():
             data = await run.io_bound(_packed, shown.folder)
             if data is not None:
                 ui.download(data, f"{shown.folder.name}.zip", "application/zip")
 
     def _tick(self) -> None:
-        with quietly():
+        with show_errors():
             self._watch.tick()
 
     async def _slow_tick(self) -> None:
-        with quietly():
+        with show_errors():
             self._refresh_runs()
             await self._watch.load_finished()
             self._watch.follow_cursor()
@@ -340,7 +342,7 @@ class RunPanel:
             self._recover.visible = failed
 
 
-def _robot_of(shown: Shown) -> Robot | None:
+def _robot_of(shown: RunEntry) -> Robot | None:
     """The robot of a run; None: it cannot be read any more."""
     with suppress(CdprError, OSError):
         scenario = shown.scenario()

@@ -12,11 +12,11 @@ from typing import Any
 from nicegui import run, ui
 
 from cdpr_drake.studio.panels.moving_plots import MovingPlots, Row
-from cdpr_drake.studio.panels.panel import quietly
+from cdpr_drake.studio.panels.panel import show_errors
 from cdpr_drake.studio.workbench.finished_run import FinishedRun, is_run
 from cdpr_drake.studio.workbench.job import JobState, Listener
 from cdpr_drake.studio.workbench.plot_rows import charts_of, plot_row
-from cdpr_drake.studio.workbench.run_board import RunBoard, Shown, outcome_words
+from cdpr_drake.studio.workbench.run_board import RunBoard, RunEntry, outcome_words
 from cdpr_drake.studio.workbench.run_job import RunJob
 
 STATES = {
@@ -26,7 +26,7 @@ STATES = {
 }  # fmt: skip
 """Words for states."""
 
-Draw = Callable[[Shown, Mapping[str, Any], float], None]
+Draw = Callable[[RunEntry, Mapping[str, Any], float], None]
 """Draws a sample of a run into the session's scene, at least a time after the one before [s]."""
 
 SCENE_SHARE, RAREST_SCENE = 3.0, 2.0
@@ -46,7 +46,7 @@ class RunWatch:
             draw: See `Draw`.
         """
         self._board, self._draw = board, draw
-        self._shown: Shown | None = None
+        self._shown: RunEntry | None = None
         self._listener: Listener | None = None
         self._finished: FinishedRun | None = None
         self._loading = False
@@ -79,11 +79,11 @@ class RunWatch:
         return None if self._shown is None else self._shown.job
 
     @property
-    def shown(self) -> Shown | None:
+    def shown(self) -> RunEntry | None:
         """The run that is looked at."""
         return self._shown
 
-    def show(self, shown: Shown | None) -> None:
+    def show(self, shown: RunEntry | None) -> None:
         """Looks at another run."""
         self.forget()
         self._shown, self._finished, self._known = shown, None, ()
@@ -142,7 +142,7 @@ class RunWatch:
         if (shown.job is not None and not shown.job.state.is_over) or not is_run(shown.folder):
             return
         self._loading = True
-        with quietly():
+        with show_errors():
             done = await run.io_bound(self._board.finished, shown.folder)
             if shown is self._shown and done is not None:
                 self._take_finished(done)
@@ -214,9 +214,9 @@ class RunWatch:
         if self._finished is not None and cursor is not None and self._slider.value != cursor:
             self._slider.value = cursor
 
-    async def compare(self, other: Shown | None) -> None:
+    async def compare(self, other: RunEntry | None) -> None:
         """Shows another run behind this one; None: that ends."""
-        with quietly():
+        with show_errors():
             self._others = ([], "")
             if other is not None:
                 done = await run.io_bound(self._board.finished, other.folder)

@@ -11,7 +11,7 @@ from cdpr_drake.palette import nth_look
 from cdpr_drake.schema.fields import FieldRule
 from cdpr_drake.schema.typed_yaml import rules_of
 from cdpr_drake.studio.panels.field_words import hint, in_parts, typed_value
-from cdpr_drake.studio.panels.panel import shown
+from cdpr_drake.studio.panels.panel import notify
 from cdpr_drake.studio.panels.schema_form import Place, SchemaForm, value_at
 from cdpr_drake.studio.workbench.document import Document
 from cdpr_drake.studio.workbench.yaml_edit import with_item, with_value, without_item
@@ -214,7 +214,7 @@ class SchemaGroups:
     def _change(self, edit: Callable[[str], str]) -> None:
         words = self._form.change(edit)
         if words:
-            shown(words)
+            notify(words)
 
     @staticmethod
     def _button(words: str, icon: str, action: Callable[[], None]) -> None:

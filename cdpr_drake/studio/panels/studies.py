@@ -14,7 +14,7 @@ from cdpr_drake.analyses.studies.catalogue import STUDIES
 from cdpr_drake.studio.panels.command_fields import CommandFields, Filled
 from cdpr_drake.studio.panels.job_bar import JobBar
 from cdpr_drake.studio.panels.numbers import fact_table
-from cdpr_drake.studio.panels.panel import quietly, shown
+from cdpr_drake.studio.panels.panel import notify, show_errors
 from cdpr_drake.studio.workbench.command_board import CommandBoard
 from cdpr_drake.studio.workbench.command_form import FieldProblem
 from cdpr_drake.studio.workbench.finished_studies import (
@@ -102,7 +102,7 @@ class _StudiesPanel:
         )
 
     def _start(self) -> None:
-        with quietly():
+        with show_errors():
             try:
                 options = self._fields.arguments()
             except FieldProblem:
@@ -112,7 +112,7 @@ class _StudiesPanel:
             self._bar.refresh()
 
     async def _tick(self) -> None:
-        with quietly():
+        with show_errors():
             self._bar.refresh()
             self._say_mistake()
             computed = self._bar.computed
@@ -199,7 +199,7 @@ def _place_study(study: StudyFolder) -> None:
 
         def show() -> None:
             place.clear()
-            with place, quietly():
+            with place, show_errors():
                 _place_figure(figures[str(chosen.value)], "max-width: 100%; background: white")
 
         chosen.on_value_change(show)
@@ -209,7 +209,7 @@ def _place_study(study: StudyFolder) -> None:
 def _place_figure(path: Path, style: str) -> None:
     """A figure as an image in the page; nothing in it is run, whatever it is."""
     if path.stat().st_size > LARGEST_FIGURE:
-        shown(f"{path.name}: too large to be shown; it is in {path.parent.name}", "warning")
+        notify(f"{path.name}: too large to be shown; it is in {path.parent.name}", "warning")
         return
     data = base64.b64encode(path.read_bytes()).decode("ascii")
     kind = TYPES[path.suffix.lower()]

@@ -15,7 +15,7 @@ from cdpr_drake.stability.stability_case import SCHEMES
 from cdpr_drake.stability.verdict import VERDICTS
 from cdpr_drake.studio.panels.command_fields import Choices, CommandFields, Filled
 from cdpr_drake.studio.panels.job_bar import JobBar
-from cdpr_drake.studio.panels.panel import message, on_page, quietly, robot_argument, shown
+from cdpr_drake.studio.panels.panel import message, notify, on_page, robot_argument, show_errors
 from cdpr_drake.studio.workbench.calculator import Signal
 from cdpr_drake.studio.workbench.command_board import CommandBoard
 from cdpr_drake.studio.workbench.command_form import FieldProblem
@@ -187,14 +187,14 @@ class _WorkspacePanel:
                 "scenario": scenarios,
             },
         }
-        with self._form, quietly():
+        with self._form, show_errors():
             self._fields = CommandFields(
                 self._bench.commands[command], self._view.filled, FIRST[command],
                 choices[command], self._bench.folder,
             )  # fmt: skip
 
     def _start(self) -> None:
-        with quietly():
+        with show_errors():
             if self._fields is None:
                 return
             try:
@@ -210,7 +210,7 @@ class _WorkspacePanel:
             self._bar.refresh()
 
     async def _tick(self) -> None:
-        with quietly():
+        with show_errors():
             self._bar.refresh()
             self._say_mistake()
             computed = self._bar.computed
@@ -228,7 +228,7 @@ class _WorkspacePanel:
                 regions = await run.io_bound(read_regions, folder)
             except Exception as problem:
                 self._view.board.shown = ""
-                shown(message(problem))
+                notify(message(problem))
                 return
             if wanted is not None and regions is not None:  # else the server is ending
                 known = wanted.about

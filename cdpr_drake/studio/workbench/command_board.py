@@ -29,7 +29,7 @@ LARGEST_ASKED = 100_000
 
 
 @dataclass(frozen=True)
-class Computed:
+class CommandEntry:
     """What a command computes or has computed.
 
     Attributes:
@@ -103,7 +103,7 @@ class CommandBoard:
                 self._about_file(folder).write_text(json.dumps(dict(about)), encoding="utf-8")
         return self._submit(folder, arguments)
 
-    def go_on(self, computed: Computed) -> CommandJob | None:
+    def go_on(self, computed: CommandEntry) -> CommandJob | None:
         """Begins a command anew where it was stopped; None: it works, or nobody knows how it was
         asked for."""
         if not computed.asked or (computed.job is not None and not computed.job.state.is_over):
@@ -151,9 +151,9 @@ class CommandBoard:
         except (OSError, RuntimeError, ValueError):
             return False
 
-    def choices(self) -> dict[str, Computed]:
+    def choices(self) -> dict[str, CommandEntry]:
         """What there is, the newest first: jobs of the server, then folders."""
-        found: dict[str, Computed] = {}
+        found: dict[str, CommandEntry] = {}
         for job in reversed(self._jobs.jobs):
             if isinstance(job, CommandJob) and job.folder is not None:
                 key = job.folder.name
@@ -161,12 +161,14 @@ class CommandBoard:
                     words = f"{key}, {job.state.value}"
                     over = job.state.is_over
                     asked = self._how(job.folder) if over else ()
-                    found[key] = Computed(words, job, job.folder, asked, self._about(job.folder))
+                    found[key] = CommandEntry(
+                        words, job, job.folder, asked, self._about(job.folder)
+                    )
         for folder in self._results():
             if folder.name not in found:
                 asked = self._how(folder)
                 words = f"{folder.name}, stopped" if asked else folder.name
-                found[folder.name] = Computed(words, None, folder, asked, self._about(folder))
+                found[folder.name] = CommandEntry(words, None, folder, asked, self._about(folder))
         return found
 
     def _results(self) -> list[Path]:

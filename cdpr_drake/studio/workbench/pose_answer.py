@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.statics.static_query import StaticReport, at_pose
+from cdpr_drake.analyses.statics.static_query import StaticReport, static_at_pose
 from cdpr_drake.analyses.statics.tension_query import applicable_methods, underactuated_answer
 from cdpr_drake.analyses.workspaces.conditions import MEASURES, PoseConditions, Poses
 from cdpr_drake.analyses.workspaces.workspace_question import pose_conditions
@@ -97,7 +97,7 @@ class RobotQuestions:
             found["why_no_tensions"] = str(problem)
         rest, why_no_rest = None, ""
         try:
-            rest = at_pose(robot, X_WP, ELASTIC, pulleys=True)
+            rest = static_at_pose(robot, X_WP, ELASTIC, pulleys=True)
         except CdprError as problem:
             why_no_rest = str(problem)
         try:

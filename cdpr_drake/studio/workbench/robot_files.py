@@ -19,7 +19,7 @@ from cdpr_drake.errors import CdprError, RobotFileError
 from cdpr_drake.models.formats.detection import SUFFIXES as ROBOT_SUFFIXES
 from cdpr_drake.models.formats.detection import is_foreign
 from cdpr_drake.models.robot_exchange import export_robot, import_robot
-from cdpr_drake.models.robot_exports import EXPORTS, not_written, not_written_words
+from cdpr_drake.models.robot_exports import EXPORTS, export_omissions, omission_words
 from cdpr_drake.models.robot_loader import parse_robot, robot_file, robot_names, robot_text
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.studio.workbench.working_folder import WorkingFolder
@@ -185,7 +185,7 @@ def exported(robot: Robot, text: str, format: str) -> tuple[dict[str, str], list
     """
     if format == YAML:
         return {f"{robot.name}.yaml": text}, []
-    return export_robot(robot, format), not_written_words(not_written(robot, format))
+    return export_robot(robot, format), omission_words(export_omissions(robot, format))
 
 
 def export_formats() -> dict[str, str]:

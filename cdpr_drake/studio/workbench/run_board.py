@@ -22,7 +22,7 @@ MOST_FOLDERS = 200
 
 
 @dataclass(frozen=True)
-class Shown:
+class RunEntry:
     """A run to look at.
 
     Attributes:
@@ -101,26 +101,26 @@ class RunBoard:
         arguments = ["simulate", f"--finish={job.folder}", "--json"]
         return self._jobs.submit(CommandJob(title, arguments, self._root, job.folder))
 
-    def choices(self) -> dict[str, Shown]:
+    def choices(self) -> dict[str, RunEntry]:
         """Runs to look at by their keys: jobs of the server, the newest first, then folders."""
-        found: dict[str, Shown] = {}
+        found: dict[str, RunEntry] = {}
         folders = set()
         for job in reversed(self._jobs.jobs):
             if isinstance(job, RunJob) and job.folder is not None:
                 folders.add(job.folder)
                 name = f"{job.folder.name}, {job.state.value}"
-                found[key_of(job)] = Shown(name, job, job.folder)
+                found[key_of(job)] = RunEntry(name, job, job.folder)
         for folder in _results(self._root / RUNS):
             if folder not in folders:
-                found[f"folder {folder.name}"] = Shown(folder.name, None, folder)
+                found[f"folder {folder.name}"] = RunEntry(folder.name, None, folder)
         return found
 
-    def look_at_newest(self, choices: Mapping[str, Shown]) -> None:
+    def look_at_newest(self, choices: Mapping[str, RunEntry]) -> None:
         """Looks at the newest run of the server among the choices, if none of them was chosen."""
         if self.shown not in choices:
             self.shown = next((key for key, run in choices.items() if run.job), "")
 
-    def run(self, key: str) -> Shown | None:
+    def run(self, key: str) -> RunEntry | None:
         """The run of a key; None: there is none any more."""
         return self.choices().get(key)
 

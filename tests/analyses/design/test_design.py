@@ -11,10 +11,10 @@ from matplotlib.figure import Figure
 
 from cdpr_drake.analyses.design.candidates import make_candidates
 from cdpr_drake.analyses.design.confirmation import confirm
-from cdpr_drake.analyses.design.goals import GOALS, judged
+from cdpr_drake.analyses.design.goals import GOALS, evaluate_goals
 from cdpr_drake.analyses.design.maximin import SLOPES
 from cdpr_drake.analyses.design.results import DesignResult, write_design
-from cdpr_drake.analyses.design.search import judge_original, judging_of, search_design
+from cdpr_drake.analyses.design.search import evaluate_original, goal_context, search_design
 from cdpr_drake.analyses.design.settings import DesignSettings, GoalSettings, load_design_settings
 from cdpr_drake.analyses.reporting.progress import StudySession, WorkProgress
 from cdpr_drake.analyses.studies import design as study
@@ -65,8 +65,8 @@ def test_cables_are_left_out_and_winches_change():
     assert robot.winch.motor_torque == pytest.approx(0.4)  # between, in ratios
     assert robot.winch.drum_radius == pytest.approx(0.04)
     assert robot.tension_bounds.upper == pytest.approx(0.4 * 10.0 / 0.04)
-    judging = judging_of(ROBOT, settings.poses, settings)
-    power, speed = judged(robot, judging, ("power", "speed"))
+    judging = goal_context(ROBOT, settings.poses, settings)
+    power, speed = evaluate_goals(robot, judging, ("power", "speed"))
     rate = 3000.0 * 2.0 * np.pi / 60.0
     assert power == pytest.approx(-4 * 0.4 * rate)  # less is better
     assert speed == pytest.approx(rate / 10.0 * 0.04)
@@ -76,15 +76,15 @@ def test_cables_are_left_out_and_winches_change():
 def test_every_goal_is_a_number(name, candidates):
     settings = wanted(name)
     settings.poses.counts = np.array([2.0, 2.0, 2.0])
-    judging = judging_of(ROBOT, settings.poses, settings)
-    (value,) = judge_original(candidates, judging, (name,))
+    judging = goal_context(ROBOT, settings.poses, settings)
+    (value,) = evaluate_original(candidates, judging, (name,))
     assert np.isfinite(value)
 
 
 def test_accuracy_is_that_of_moved_exit_points(candidates):
     settings = wanted("accuracy")
-    judging = judging_of(ROBOT, settings.poses, settings)
-    (value,) = judge_original(candidates, judging, ("accuracy",))
+    judging = goal_context(ROBOT, settings.poses, settings)
+    (value,) = evaluate_original(candidates, judging, ("accuracy",))
     # An exit point that is off by 1 mm moves the platform by millimetres at most, of 24 together.
     assert 1e-4 < -value < 3e-2
 
@@ -120,14 +120,14 @@ def test_a_search_that_was_stopped_goes_on_as_if_it_had_not(tmp_path, candidates
     assert more.progress.found == len(whole.values)
     file = write_design(again, ROBOT, tmp_path)
     best = again.best
-    assert judged(load_robot(str(file)), again.judging, again.names) == pytest.approx(
+    assert evaluate_goals(load_robot(str(file)), again.judging, again.names) == pytest.approx(
         again.values[best]
     )
 
 
 def test_confirmation_proves_less_than_the_grid_says(candidates):
     settings = wanted("static")
-    judging = judging_of(ROBOT, settings.poses, settings)
+    judging = goal_context(ROBOT, settings.poses, settings)
     one = confirm("static", ROBOT, ROBOT, judging, boxes=300)
     assert one.original == one.design
     assert 0.0 <= one.original <= np.prod([1.2, 1.2, 1.2])
@@ -181,7 +181,7 @@ def test_poses_outside_the_frame_are_named(candidates):
     settings = wanted("static")
     settings.poses.upper = np.array([9.0, 0.0, 1.0])
     with pytest.raises(DesignError, match="leaves the frame"):
-        judging_of(ROBOT, settings.poses, settings)
+        goal_context(ROBOT, settings.poses, settings)
 
 
 def test_the_command(capsys, tmp_path, monkeypatch):
@@ -320,7 +320,7 @@ def test_slopes_of_a_design_are_those_of_differences():
     settings.poses.counts = np.array([2.0, 2.0, 1.0])
     settings.force = 1.0
     found = make_candidates(ROBOT, settings, "test")
-    judging = judging_of(ROBOT, settings.poses, settings)
+    judging = goal_context(ROBOT, settings.poses, settings)
     x, step = np.random.default_rng(0).uniform(0.4, 0.6, found.size), 1e-5
 
     def values(at):

@@ -5,7 +5,7 @@ import sys
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.design.evolution import EvolutionSearch, default_population, undominated
+from cdpr_drake.analyses.design.evolution import EvolutionSearch, default_population, pareto_front
 from cdpr_drake.analyses.design.maximin import SlopeSearch
 from cdpr_drake.analyses.design.moved_points import Mirror, MovedPoints
 from cdpr_drake.errors import DesignError
@@ -57,7 +57,7 @@ def test_the_smallest_box_of_those_that_are_tied_counts():
 
 def test_the_front():
     values = np.array([[1, 3], [2, 2], [3, 1], [1, 1], [2, 2], [np.nan, 9], [0, 3]], float)
-    assert undominated(values).tolist() == [True, True, True, False, False, False, False]
+    assert pareto_front(values).tolist() == [True, True, True, False, False, False, False]
 
 
 def test_evolution_finds_the_top_and_replays():

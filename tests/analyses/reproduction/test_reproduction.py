@@ -19,7 +19,7 @@ from rich.table import Table
 from cdpr_drake.analyses.reporting.deferred_figures import write_pictures
 from cdpr_drake.analyses.reporting.log_files import write_json
 from cdpr_drake.analyses.reporting.output_folder import continued_folder
-from cdpr_drake.analyses.reporting.statements import NOT_IN_QUICK, Statement, judged_statements
+from cdpr_drake.analyses.reporting.statements import NOT_IN_QUICK, Statement, evaluate_checks
 from cdpr_drake.analyses.reporting.written_files import MARKER, mark, others_in
 from cdpr_drake.analyses.reproduction import runner
 from cdpr_drake.analyses.reproduction.page import write_report
@@ -297,7 +297,7 @@ def test_in_the_quick_form_what_is_not_there_is_not_judged(tmp_path):
 
 
 def test_a_statement_without_a_verdict_says_what_it_is_about():
-    said = judged_statements([_costs, _unsaid_thing], {}, quick=True)
+    said = evaluate_checks([_costs, _unsaid_thing], {}, quick=True)
     assert [one.words for one in said] == ["What it costs.", "unsaid thing"]
     assert {one.verdict for one in said} == {NOT_IN_QUICK}
 

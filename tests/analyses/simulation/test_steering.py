@@ -10,7 +10,7 @@ import pytest
 from cdpr_drake.analyses.simulation.live_control import check_steered
 from cdpr_drake.analyses.simulation.live_messages import Message, open_connection, receive, send
 from cdpr_drake.analyses.simulation.mark_images import MarksPicture
-from cdpr_drake.analyses.simulation.realtime_rate import Pace
+from cdpr_drake.analyses.simulation.realtime_rate import RealtimeRate
 from cdpr_drake.errors import CdprError, ScenarioError
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.diagrams.load import load_scenario
@@ -29,7 +29,7 @@ class Clock:
 
 def test_pace_waits_for_real_time_and_lets_what_is_late_go_on_from_there():
     clock = Clock()
-    pace = Pace(2.0, clock)
+    pace = RealtimeRate(2.0, clock)
     assert pace.wait(0.0) == 0.0
     assert pace.wait(1.0) == pytest.approx(0.5)  # a second at twice real time
     clock.now += 0.5
@@ -42,7 +42,7 @@ def test_pace_waits_for_real_time_and_lets_what_is_late_go_on_from_there():
 
 
 def test_a_step_goes_so_far_and_stands():
-    pace = Pace(None, Clock())
+    pace = RealtimeRate(None, Clock())
     pace.pause()
     assert pace.wait(1.0) == math.inf
     pace.step(1.0, 0.02)

@@ -1,13 +1,15 @@
 import pytest
 
 from cdpr_drake.analyses.statics.static_figures import static_figure
-from cdpr_drake.analyses.statics.static_query import at_pose
+from cdpr_drake.analyses.statics.static_query import static_at_pose
 from cdpr_drake.models.robot_loader import load_robot
 
 
 @pytest.mark.parametrize("model", ["elastic", "catenary", "inextensible"])
 def test_figure(model):
-    report = at_pose(load_robot("planar"), load_robot("planar").home.transform(), model, True)
+    report = static_at_pose(
+        load_robot("planar"), load_robot("planar").home.transform(), model, True
+    )
     figure = static_figure(report, "title")
     side, above, tensions, *modes = figure.axes
     assert len(modes) == (model != "inextensible")  # those have no vibrations, and no panel

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.statics.static_query import at_lengths, at_pose
+from cdpr_drake.analyses.statics.static_query import static_at_lengths, static_at_pose
 from cdpr_drake.cables.models import cable_state
 from cdpr_drake.cli.app import main
 from cdpr_drake.errors import CdprError
@@ -29,8 +29,8 @@ def call(arguments, capsys):
 @pytest.mark.parametrize("model", ["elastic", "catenary"])
 def test_lengths_of_a_pose_lead_back_to_it(model, pulleys):
     robot = load_robot("acrobot_large")
-    there = at_pose(robot, X_WP, model, pulleys)
-    back = at_lengths(robot, there.l0, model, pulleys)
+    there = static_at_pose(robot, X_WP, model, pulleys)
+    back = static_at_lengths(robot, there.l0, model, pulleys)
     assert pose_error(back.X_WP, X_WP) < (1e-9, 1e-8)
     np.testing.assert_allclose(back.tensions, there.tensions, rtol=1e-4)
     np.testing.assert_allclose(back.frequencies, there.frequencies, rtol=1e-6)
@@ -41,10 +41,10 @@ def test_lengths_of_a_pose_lead_back_to_it(model, pulleys):
 
 def test_inextensible_cables_are_rigid():
     robot = load_robot("acrobot_large")
-    there = at_pose(robot, X_WP, "inextensible", True)
+    there = static_at_pose(robot, X_WP, "inextensible", True)
     assert there.frequencies is None
     assert np.all(np.isinf(there.principal))
-    back = at_lengths(robot, there.l0, "inextensible", True)
+    back = static_at_lengths(robot, there.l0, "inextensible", True)
     assert pose_error(back.X_WP, X_WP) < (1e-6, 1e-6)
     assert np.sum(back.tensions > 0.0) <= 6
     json.dumps(back.as_dict(), allow_nan=False)
@@ -53,8 +53,8 @@ def test_inextensible_cables_are_rigid():
 def test_five_taut_cables_leave_a_soft_motion():
     """Eight equal lengths: three cables are slack, and gravity alone holds one motion."""
     robot = load_robot("acrobot_large")
-    elastic = at_lengths(robot, np.full(8, 1.2), "elastic", True)
-    rigid = at_lengths(robot, np.full(8, 1.2), "inextensible", True)
+    elastic = static_at_lengths(robot, np.full(8, 1.2), "elastic", True)
+    rigid = static_at_lengths(robot, np.full(8, 1.2), "inextensible", True)
     assert np.sum(elastic.tensions > 0.0) == np.sum(rigid.tensions > 0.0) == 5
     assert elastic.principal[0] < 1e-3 * elastic.principal[1]
     assert np.sum(np.isfinite(rigid.principal)) == 1
@@ -124,7 +124,7 @@ def test_bad_input_ends_in_one_line(arguments, words, capsys):
 def test_robots_own_breaking_load():
     robot = load_robot("planar")
     robot = replace(robot, cable=replace(robot.cable, breaking_load=100.0))
-    lengths = at_pose(robot, robot.home.transform(), "elastic", True).l0
-    at_lengths(robot, lengths * (1.0 - 1e-4), "elastic", True)
+    lengths = static_at_pose(robot, robot.home.transform(), "elastic", True).l0
+    static_at_lengths(robot, lengths * (1.0 - 1e-4), "elastic", True)
     with pytest.raises(CdprError, match="at most its breaking load, 100 N"):
-        at_lengths(robot, lengths * (1.0 - 1e-3), "elastic", True)
+        static_at_lengths(robot, lengths * (1.0 - 1e-3), "elastic", True)

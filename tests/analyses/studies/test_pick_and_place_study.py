@@ -5,19 +5,19 @@ import json
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.reporting.progress import ALONE
-from cdpr_drake.analyses.reporting.statements import CONFIRMED, NOT_CONFIRMED, judged_statements
+from cdpr_drake.analyses.reporting.progress import DEFAULT_STUDY_SESSION
+from cdpr_drake.analyses.reporting.statements import CONFIRMED, NOT_CONFIRMED, evaluate_checks
 from cdpr_drake.analyses.studies.catalogue import STUDIES
 from cdpr_drake.analyses.studies.pick_and_place import (
+    CHECKS,
     COLUMNS,
     CONDITIONS,
-    JUDGES,
     HandlingTrial,
     study_pick_and_place,
     within,
 )
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
-from cdpr_drake.systems.pick_and_place.handling_task import Failure, Phase
+from cdpr_drake.systems.pick_and_place.pick_and_place_task import Failure, Phase
 
 
 def row(distance=1e-3, angle_deg=0.5, failed_in=None, failure=Failure.NONE):
@@ -55,18 +55,18 @@ def found(*rows):
     ],
 )
 def test_boxes_have_to_lie_within_two_millimetres_and_a_degree(rows, good):
-    statement = judged_statements(JUDGES, found(*rows))[0]
+    statement = evaluate_checks(CHECKS, found(*rows))[0]
     assert statement.verdict == (CONFIRMED if good else NOT_CONFIRMED)
     assert np.all(within(found(*rows)["in view"]["runs"])) == good
 
 
 def test_a_run_that_failed_says_why_in_the_statement():
-    statement = judged_statements(JUDGES, found(row(), BLIND))[0]
+    statement = evaluate_checks(CHECKS, found(row(), BLIND))[0]
     assert statement.found.startswith("1 of 2; largest 1.00 mm, 0.50 deg; carry: the tag")
 
 
 def test_the_catalogue_names_its_judges():
-    said = judged_statements(JUDGES, found())
+    said = evaluate_checks(CHECKS, found())
     assert tuple(s.name for s in said) == STUDIES["pick-and-place"].judges
     assert [s.verdict for s in said] == [CONFIRMED] * 4
 
@@ -77,7 +77,7 @@ def test_it_runs_its_seeds_and_writes_numbers_and_a_figure(monkeypatch, tmp_path
         return BLIND if trial.condition == "one camera" else row(1e-3 * (1 + seed))
 
     monkeypatch.setattr(HandlingTrial, "row", made_up)
-    study = study_pick_and_place(True, ALONE)
+    study = study_pick_and_place(True, DEFAULT_STUDY_SESSION)
     assert not study.interrupted
     study.write(tmp_path)
     told = json.loads((tmp_path / "results.json").read_text(encoding="utf-8"))

@@ -9,7 +9,7 @@ from concurrent.futures.process import BrokenProcessPool
 import pytest
 
 from cdpr_drake.analyses.sweeps import worker_pool
-from cdpr_drake.analyses.sweeps.worker_pool import StandingPool, run_jobs
+from cdpr_drake.analyses.sweeps.worker_pool import PersistentPool, run_jobs
 from cdpr_drake.analyses.sweeps.workers import run_jobs_somewhere
 from cdpr_drake.errors import SweepError
 from tests.analyses.sweeps.dying_jobs import die_for, newest_dies
@@ -61,20 +61,20 @@ def processes(pool, jobs=8):
 
 
 def test_a_standing_pool_is_the_same_processes_every_time_and_ends_with_its_block():
-    with StandingPool(2) as pool:
+    with PersistentPool(2) as pool:
         first = processes(pool)
         assert 1 <= len(first | processes(pool) | processes(pool)) <= 2
         assert str(os.getpid()) not in first
         started = pool.there._started.processes
         assert all(process.is_alive() for process in started)
     assert not any(process.is_alive() for process in started)
-    with StandingPool(1) as pool:
+    with PersistentPool(1) as pool:
         assert processes(pool) == {str(os.getpid())}
         assert not pool._pool
 
 
 def test_a_standing_pool_lives_on_after_a_death_and_after_an_error():
-    with StandingPool(2) as pool:
+    with PersistentPool(2) as pool:
         lost = []
         found = dict(run_jobs(die_for, [1, -9, 3], standing=pool, on_lost=lost.append))
         assert (found, lost) == ({0: 1, 2: 3}, [1])

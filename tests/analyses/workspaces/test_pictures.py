@@ -8,7 +8,10 @@ import pytest
 
 from cdpr_drake.analyses.visualization.replay import robot_picture
 from cdpr_drake.analyses.workspaces.workspace_figures import planes_figure
-from cdpr_drake.analyses.workspaces.workspace_question import Asked, make_workspace_question
+from cdpr_drake.analyses.workspaces.workspace_question import (
+    WorkspaceRequest,
+    make_workspace_question,
+)
 from cdpr_drake.analyses.workspaces.workspace_results import robot_workspace
 from cdpr_drake.analyses.workspaces.workspace_scene import workspace_page
 from cdpr_drake.models.robot_loader import load_robot
@@ -18,7 +21,7 @@ from cdpr_drake.workspaces.pose_grid import grid_by_count
 def small_workspace(robot, counts=(3, 2, 2), **asked):
     grid = grid_by_count([-0.3, -0.2, 0.2], [0.3, 0.2, 0.4], counts)
     question = make_workspace_question(
-        robot, ["static"], grid, ["capacity-margin"], asked=Asked(**asked)
+        robot, ["static"], grid, ["capacity-margin"], asked=WorkspaceRequest(**asked)
     )
     return robot_workspace(question).workspace
 

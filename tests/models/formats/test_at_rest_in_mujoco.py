@@ -7,7 +7,7 @@ import pytest
 
 from cdpr_drake.errors import InfeasibleTensionError
 from cdpr_drake.models.robot_exchange import export_robot
-from cdpr_drake.models.robot_exports import not_written
+from cdpr_drake.models.robot_exports import export_omissions
 from cdpr_drake.models.robot_holding import hold_robot
 from cdpr_drake.models.robot_loader import load_robot, robot_names
 from tests.models.formats.unusual_robots import UNUSUAL
@@ -47,7 +47,7 @@ def test_it_is_at_rest_at_home_and_motors_add_nothing(name):
         hold_robot(robot, robot.home.transform(), cables, "elastic")
     except InfeasibleTensionError as problem:
         why = f"is no pose of rest, since {problem}"
-    assert not_written(robot, "mjcf").get("home", "") == why
+    assert export_omissions(robot, "mjcf").get("home", "") == why
     assert (np.max(np.abs(data.qacc)) < AT_REST) == (why == "")
 
 
@@ -62,5 +62,7 @@ def test_motors_pull_up_to_the_largest_tension_and_never_push(name):
 
 
 def test_all_robots_of_the_package_that_statics_hold_are_here():
-    held = [name for name in robot_names() if "home" not in not_written(load_robot(name), "mjcf")]
+    held = [
+        name for name in robot_names() if "home" not in export_omissions(load_robot(name), "mjcf")
+    ]
     assert len(held) >= 21

@@ -14,7 +14,7 @@ from cdpr_drake import models
 from cdpr_drake.cli.app import main
 from cdpr_drake.errors import RobotFileError
 from cdpr_drake.models.robot_exchange import export_robot
-from cdpr_drake.models.robot_exports import EXPORTS, HELD, not_written
+from cdpr_drake.models.robot_exports import EXPORTS, HELD, export_omissions
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.schema.fields import text
 from tests.messages import printed
@@ -65,7 +65,7 @@ def test_no_field_is_lost_unsaid(robot, tmp_path):
         again = through(robot, format, tmp_path)
         if again is None:
             continue
-        unsaid = fields_that_differ(robot, again) - set(not_written(robot, format))
+        unsaid = fields_that_differ(robot, again) - set(export_omissions(robot, format))
         assert unsaid <= {key for key in PROSE if getattr(robot, key) == ""}, format
 
 
@@ -77,9 +77,11 @@ def test_in_a_turned_world_all_is_as_that_world_has_it(name, tmp_path):
         if format == "mjcf":  # which has gravity in any direction
             continue
         again = through(robot, format, tmp_path)
-        unsaid = fields_that_differ(seen, again) - set(not_written(seen, format))
+        unsaid = fields_that_differ(seen, again) - set(export_omissions(seen, format))
         assert unsaid <= {key for key in PROSE if getattr(robot, key) == ""}, format
-        assert not_written(robot, format)["gravity_direction"].startswith("The world was turned")
+        assert export_omissions(robot, format)["gravity_direction"].startswith(
+            "The world was turned"
+        )
 
 
 @pytest.mark.parametrize("name", UNUSUAL)
@@ -89,7 +91,7 @@ def test_nothing_is_named_that_comes_back(name, tmp_path):
     for format in formats():
         again = through(robot, format, tmp_path)
         if again is not None:
-            assert set(not_written(robot, format)) <= fields_that_differ(robot, again), format
+            assert set(export_omissions(robot, format)) <= fields_that_differ(robot, again), format
 
 
 def test_the_robot_with_everything_has_everything():
@@ -122,8 +124,8 @@ def test_a_field_that_is_added_later_is_named():
     robot = robot_with_everything()
     values = {field.name: getattr(robot, field.name) for field in fields(robot)}
     for format in EXPORTS:
-        assert not_written(LaterRobot(**values, colour="red"), format)["colour"]
-        assert "colour" not in not_written(LaterRobot(**values), format)
+        assert export_omissions(LaterRobot(**values, colour="red"), format)["colour"]
+        assert "colour" not in export_omissions(LaterRobot(**values), format)
 
 
 def test_the_comparison_sees_what_differs():
@@ -151,7 +153,7 @@ def test_names_with_blanks_quotes_and_other_letters_come_back(format, tmp_path):
     again = through(robot, format, tmp_path)
     assert [cable.name for cable in again.cables][:3] == NAMES[:3]
     assert len({cable.name for cable in again.cables}) == len(NAMES)
-    named = not_written(robot, format).get("cables[].name", "")
+    named = export_omissions(robot, format).get("cables[].name", "")
     for before, after in zip(NAMES, again.cables, strict=True):
         assert (f"{before!r} is {after.name}" in named) == (before != after.name)
 
@@ -162,7 +164,7 @@ def test_letters_that_xml_has_not_leave_a_file_that_is_read(tmp_path):
     for format in ("caspr", "wcrfx"):
         again = through(robot, format, tmp_path)
         assert again.title == "bell "
-        assert {"title", "cables[].name"} <= set(not_written(robot, format))
+        assert {"title", "cables[].name"} <= set(export_omissions(robot, format))
 
 
 @pytest.mark.parametrize("format", ["caspr", "wcrfx"])
@@ -178,7 +180,7 @@ def test_without_pulleys_nothing_is_said_of_them():
     robot = robot_with_everything()
     robot.pulley.radius, robot.pulley.swivel_axis = 0.0, np.array([0.0, 0.0, 1.0])
     robot.tension_bounds.lower = 0.0
-    lost = not_written(robot, "urdf")
+    lost = export_omissions(robot, "urdf")
     assert not {"pulley.radius", "pulley.swivel_axis", "tension_bounds.lower"} & set(lost)
     assert "tension_bounds.upper" in lost
 
@@ -211,7 +213,7 @@ def cdpr(tmp_path, capsys, monkeypatch):
 
 
 def test_the_command_says_what_was_not_written(cdpr):
-    lost = not_written(models.load_robot("cogiro"), "gazebo-yaml")
+    lost = export_omissions(models.load_robot("cogiro"), "gazebo-yaml")
     code, out, err = cdpr("export", "cogiro", "--format", "gazebo-yaml")
     assert code == 0
     assert out == "cogiro.yaml\n"

@@ -151,7 +151,8 @@ def test_what_does_not_stop_is_killed_at_the_end(tmp_path):
 def test_a_job_whose_server_is_killed_keeps_what_it_has_and_ends(tmp_path):
     """The kernel closes the server's end of the pipe then; no other job has it."""
     job = toy(
-        "from cdpr_drake.cli.process import hold_lifeline\nhold_lifeline()\n" + POLITE, tmp_path
+        "from cdpr_drake.cli.process import exit_with_parent\nexit_with_parent()\n" + POLITE,
+        tmp_path,
     )
     job.begin()
     assert until(lambda: job.lines == ["ready"])

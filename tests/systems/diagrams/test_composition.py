@@ -60,7 +60,7 @@ class Two:
         self.plant, self.diagram = plant, builder.Build()
         self.context = self.diagram.CreateDefaultContext()
         for block in self.blocks:
-            block.hang(self.context, block.robot.home.transform())
+            block.set_at_equilibrium(self.context, block.robot.home.transform())
 
     def accelerations(self):
         plant_context = self.plant.GetMyContextFromRoot(self.context)
@@ -76,7 +76,7 @@ def test_two_robots_in_one_plant_move_as_each_alone(name):
     robot = load_robot(name)
     alone = CableRobot(robot, settings)
     context = alone.CreateDefaultContext()
-    alone.hang(context, robot.home.transform())
+    alone.set_at_equilibrium(context, robot.home.transform())
     alone.GetInputPort("cable_velocities").FixValue(context, np.zeros(len(robot.cables)))
     off = RigidTransform([0.002, -0.001, 0.0])
     for block, shift in zip(two.blocks, ([0.0, 0.0, 0.0], [9.0, 0.0, 0.0]), strict=True):
@@ -138,7 +138,7 @@ def test_damped_cables_pull_back_as_they_are_wound(model, output):
     robot = load_robot("caroca")
     block = CableRobot(robot, CableRobotSettings(cables=CableSettings(model=model)))
     context = block.CreateDefaultContext()
-    block.hang(context, robot.home.transform())
+    block.set_at_equilibrium(context, robot.home.transform())
     values = []
     for speed in (0.0, -0.2):
         block.GetInputPort("cable_velocities").FixValue(context, np.full(8, speed))
@@ -181,7 +181,7 @@ def test_tension_control_of_one_robot_beside_another():
     builder.Connect(still.get_output_port(), block.GetInputPort("cable_velocities"))
     diagram = builder.Build()
     context = diagram.CreateDefaultContext()
-    block.hang(context, block.robot.home.transform())
+    block.set_at_equilibrium(context, block.robot.home.transform())
     controlled.set_pose(plant.GetMyMutableContextFromRoot(context), home)
     distributor = blocks.distributor
     own = distributor.GetMyMutableContextFromRoot(context)

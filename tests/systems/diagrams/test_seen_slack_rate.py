@@ -6,7 +6,7 @@ import pytest
 from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.systems.diagrams.load import load_scenario
-from cdpr_drake.systems.loops.loop_choice import why_diagram
+from cdpr_drake.systems.loops.loop_choice import diagram_reason
 
 SLACK = 0.04
 TAUT = 1e-3
@@ -50,4 +50,4 @@ def test_cameras_that_are_not_there_are_refused(section, words):
 
 
 def test_a_loop_without_a_diagram_says_that_it_has_no_such_camera():
-    assert "cables" in why_diagram(slack_run("{kind: image}"))
+    assert "cables" in diagram_reason(slack_run("{kind: image}"))

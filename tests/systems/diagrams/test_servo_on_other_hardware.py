@@ -13,7 +13,7 @@ from cdpr_drake.errors import ScenarioError
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.poses import pose_from_row
 from cdpr_drake.systems.diagrams.load import load_scenario
-from cdpr_drake.systems.loops.loop_choice import why_diagram
+from cdpr_drake.systems.loops.loop_choice import diagram_reason
 from tests.models.robots import content_of
 from tests.models.test_platform_pulleys import robot_content
 from tests.systems.robots.test_bundles import parallelograms
@@ -45,7 +45,7 @@ def written(folder, content):
 def test_a_doubled_cable_goes_with_its_twin(tmp_path):
     options = ["camera.kind=projected", "duration=1.5", SOFT, written(tmp_path, doubled())]
     scenario = load_scenario("acrobot_pbvs", options)
-    assert "several cables on one winch" in why_diagram(scenario)
+    assert "several cables on one winch" in diagram_reason(scenario)
     log = run_scenario(scenario).log
     lengths = log["unstrained_lengths"]
     assert np.ptp(lengths[:, 0]) > 0.01

@@ -10,7 +10,7 @@ from cdpr_drake.geometry.poses import exponential, logarithm, pose_error, pose_f
 from cdpr_drake.models.camera_catalogue import load_camera
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.sensor_catalogue import load_inertial_sensor
-from cdpr_drake.systems.estimators.fusion_task import Eye, FusionTask
+from cdpr_drake.systems.estimators.fusion_task import CameraModel, FusionTask
 from cdpr_drake.systems.estimators.length_estimator import EncoderLengths
 from cdpr_drake.systems.estimators.sensor_fusion import SensorFusion
 from cdpr_drake.systems.estimators.sensor_fusion_settings import SensorFusionSettings, ToldObject
@@ -36,7 +36,9 @@ PINHOLE = load_camera("astra").pinhole(640, 480)
 
 
 def eye(size, latency=0.0, rate=RATE, **more):
-    return Eye(points=tag_corners(size), pinhole=PINHOLE, rate=rate, latency=latency, **more)
+    return CameraModel(
+        points=tag_corners(size), pinhole=PINHOLE, rate=rate, latency=latency, **more
+    )
 
 
 def fusion(X_WP0=START, *, on_board=True, external=True, lengths=True, latency=0.0, **more):

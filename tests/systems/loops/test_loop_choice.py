@@ -9,7 +9,12 @@ from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.estimators.estimator_kinds import ESTIMATORS, EstimatorKind
-from cdpr_drake.systems.loops.loop_choice import is_looped, looped, why_diagram, with_loop
+from cdpr_drake.systems.loops.loop_choice import (
+    choose_compiled_loop,
+    diagram_reason,
+    set_loop,
+    uses_compiled_loop,
+)
 from cdpr_drake.systems.loops.servo_loop import ServoLoop
 
 PROJECTED = "camera.kind=projected"
@@ -17,9 +22,9 @@ PROJECTED = "camera.kind=projected"
 
 def test_repeated_runs_take_the_loop_and_say_so():
     short = load_scenario("acrobot_pbvs", [PROJECTED])
-    assert with_loop(short) == (short, "")
-    scenario, words = with_loop(short, repeated=True)
-    assert is_looped(scenario)
+    assert set_loop(short) == (short, "")
+    scenario, words = set_loop(short, repeated=True)
+    assert uses_compiled_loop(scenario)
     assert scenario.integration.engine == "compiled"
     assert words == (
         "acrobot_pbvs: by the compiled loop, as the run is repeated; else "
@@ -29,18 +34,18 @@ def test_repeated_runs_take_the_loop_and_say_so():
 
 def test_a_long_run_takes_the_loop_unless_somebody_watches():
     long = load_scenario("acrobot_mobile_robot")
-    chosen, words = with_loop(long)
-    assert is_looped(chosen)
+    chosen, words = set_loop(long)
+    assert uses_compiled_loop(chosen)
     assert words == (
         "acrobot_mobile_robot: by the compiled loop, as it lasts longer than 600 s; else "
         "--set integration.loop=diagram"
     )
-    shown, words = with_loop(long, watched=True)
-    assert not is_looped(shown)
+    shown, words = set_loop(long, watched=True)
+    assert not uses_compiled_loop(shown)
     assert "by the compiled engine" in words
     assert "in a diagram, as Meshcat looks into one" in words
     asked = load_scenario("acrobot_mobile_robot", ["integration.loop=diagram"])
-    assert not is_looped(with_loop(asked)[0])
+    assert not uses_compiled_loop(set_loop(asked)[0])
 
 
 @pytest.mark.parametrize(
@@ -52,13 +57,13 @@ def test_a_long_run_takes_the_loop_unless_somebody_watches():
 )
 def test_what_only_a_diagram_can_do_is_said(overrides, reason):
     scenario = load_scenario("acrobot_friction", overrides)
-    assert reason in why_diagram(scenario)
-    chosen, words = with_loop(scenario, repeated=True)
-    assert not is_looped(chosen)
+    assert reason in diagram_reason(scenario)
+    chosen, words = set_loop(scenario, repeated=True)
+    assert not uses_compiled_loop(chosen)
     assert chosen.integration.engine == "compiled"
     assert f"in a diagram, as its {reason.removeprefix('its ')}" in words or reason in words
     asked = load_scenario("acrobot_friction", [*overrides, "integration.loop=compiled"])
-    for refuse in (with_loop, run_scenario):
+    for refuse in (set_loop, run_scenario):
         with pytest.raises(ScenarioError, match=r"integration\.loop: found compiled, but its"):
             refuse(asked)
 
@@ -66,14 +71,14 @@ def test_what_only_a_diagram_can_do_is_said(overrides, reason):
 @pytest.mark.parametrize("choice", ["integration.engine=plant", "integration.loop=diagram"])
 def test_what_is_asked_for_is_left(choice):
     scenario = load_scenario("acrobot_pbvs", [PROJECTED, choice])
-    assert not is_looped(with_loop(scenario, repeated=True)[0])
-    assert not is_looped(looped(scenario))
+    assert not uses_compiled_loop(set_loop(scenario, repeated=True)[0])
+    assert not uses_compiled_loop(choose_compiled_loop(scenario))
 
 
 def test_dynamic_control_has_no_servo_loop():
     scenario = load_scenario("acrobot_computed_torque")
-    assert why_diagram(scenario) == "it is no visual servo"
-    assert not is_looped(with_loop(scenario, repeated=True)[0])
+    assert diagram_reason(scenario) == "it is no visual servo"
+    assert not uses_compiled_loop(set_loop(scenario, repeated=True)[0])
 
 
 def test_a_block_of_a_user_s_is_left_to_the_diagram(monkeypatch):
@@ -87,14 +92,14 @@ def test_a_block_of_a_user_s_is_left_to_the_diagram(monkeypatch):
     kind = EstimatorKind("stuck", lambda task: Stuck(task.robot.X_WP0))
     monkeypatch.setitem(ESTIMATORS, "stuck", kind)
     scenario = load_scenario("acrobot_pbvs", [PROJECTED, "estimator.kind=stuck"])
-    assert "estimator stuck is a block" in why_diagram(scenario)
-    assert not is_looped(with_loop(scenario, repeated=True)[0])
+    assert "estimator stuck is a block" in diagram_reason(scenario)
+    assert not uses_compiled_loop(set_loop(scenario, repeated=True)[0])
     with pytest.raises(ScenarioError, match="only a diagram can step"):
         ServoLoop(scenario)
 
 
 def test_the_summary_names_the_loop():
     scenario = load_scenario("acrobot_pbvs", [PROJECTED, "duration=0.1"])
-    assert summarize(run_scenario(looped(scenario)))["loop"] == "compiled"
+    assert summarize(run_scenario(choose_compiled_loop(scenario)))["loop"] == "compiled"
     summary = summarize(run_scenario(scenario))
     assert (summary["engine"], summary["loop"]) == ("plant", "diagram")

@@ -22,7 +22,7 @@ KNOWN_TAG = (
     "pose: {position: [0.1, 0.1, 0], angles_deg: [0, 0, 0]}}"
 )
 NEED_SECOND_CAMERA = ("eye_to_hand", "sensor_fusion")
-"""Estimators that only a diagram can do, as `why_diagram` says: their camera is a second one."""
+"""Estimators that only a diagram can do, as `diagram_reason` says: their camera is a second one."""
 
 SENSORS = ("sensors.log=[tension, encoder, tracker]", "sensors.tension=tractel")
 

@@ -39,7 +39,7 @@ def test_ports_and_columns_are_in_the_given_order():
     ]
     assert row.columns == {"pair": slice(0, 2), "pose": slice(2, 9), "one": slice(9, 10)}
     assert row.num_output_ports() == 1
-    assert row.GetOutputPort("row").size() == 10
+    assert row.GetOutputPort("log_row").size() == 10
 
 
 def test_a_row_holds_what_stands_on_the_ports():
@@ -50,7 +50,7 @@ def test_a_row_holds_what_stands_on_the_ports():
         row.GetInputPort("pair").FixValue(context, pair)
         row.GetInputPort("pose").FixValue(context, Value(X))
         row.GetInputPort("one").FixValue(context, [6.0])
-        found = row.GetOutputPort("row").Eval(context)
+        found = row.GetOutputPort("log_row").Eval(context)
         np.testing.assert_array_equal(found, [*pair, *pose_row(X), 6.0])
 
 

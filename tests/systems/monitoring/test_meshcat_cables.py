@@ -179,6 +179,6 @@ def test_system_draws_while_a_simulation_runs(robot):
     diagram = builder.Build()
     context = diagram.CreateDefaultContext()
     diagram.GetInputPort("cable_velocities").FixValue(context, np.zeros(8))
-    block.hang(block.GetMyMutableContextFromRoot(context), robot.home.transform())
+    block.set_at_equilibrium(block.GetMyMutableContextFromRoot(context), robot.home.transform())
     Simulator(diagram, context).AdvanceTo(0.02)
     assert meshcat.HasPath("cables/C1")

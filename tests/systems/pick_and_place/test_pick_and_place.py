@@ -16,7 +16,7 @@ from cdpr_drake.analyses.visualization.meshcat_window import open_meshcat
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
-from cdpr_drake.systems.pick_and_place.handling_task import Phase
+from cdpr_drake.systems.pick_and_place.pick_and_place_task import Phase
 from tests.messages import printed
 
 NAME = "acrobot_pick_and_place"

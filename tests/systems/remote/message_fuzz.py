@@ -31,7 +31,7 @@ from cdpr_drake.errors import BridgeError, ClientEndedError
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.remote.messages import LARGEST, decode
 from cdpr_drake.systems.remote.remote_client import RemoteClient
-from cdpr_drake.systems.remote.remote_driver import Driver, Pace, Port
+from cdpr_drake.systems.remote.remote_driver import Driver, Port, SyncMode
 from cdpr_drake.systems.remote.server_socket import ServerSocket
 from cdpr_drake.systems.remote.service import tension_service
 
@@ -59,7 +59,7 @@ RAW = [b"\x01\x00\x02\x00{", b"\x00" * 5, b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\
 class FuzzedServer:
     """A server in a thread, whose runs begin anew when they are ended; `stop` ends it."""
 
-    def __init__(self, pace: Pace) -> None:
+    def __init__(self, pace: SyncMode) -> None:
         """Listens at a free port of this machine."""
         self._stopped = threading.Event()
         self._pace, self.ends = pace, Counter[str]()
@@ -189,7 +189,7 @@ def payload(chance: random.Random) -> bytes:
 class Sender:
     """Sends to one server, and checks what comes back."""
 
-    def __init__(self, pace: Pace, seed: int) -> None:
+    def __init__(self, pace: SyncMode, seed: int) -> None:
         """With a server of its own."""
         self.server, self.chance = FuzzedServer(pace), random.Random(seed)
         self.counts: Counter[str] = Counter()
@@ -345,13 +345,15 @@ def main() -> None:
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("--count", type=int, default=10_000)
     options.add_argument("--seed", type=int, default=0)
-    options.add_argument("--pace", choices=list(Pace), help="only this one, with half the count")
+    options.add_argument(
+        "--pace", choices=list(SyncMode), help="only this one, with half the count"
+    )
     asked = options.parse_args()
-    for number, pace in enumerate(Pace):
+    for number, pace in enumerate(SyncMode):
         if asked.pace not in (None, pace):
             continue
-        sender = Sender(pace, len(Pace) * asked.seed + number)
-        for _ in range(asked.count // len(Pace)):
+        sender = Sender(pace, len(SyncMode) * asked.seed + number)
+        for _ in range(asked.count // len(SyncMode)):
             sender.send()
         sender.close()
         print(json.dumps({"pace": pace, "ends": sender.server.ends, **sender.counts}, indent=2))

@@ -13,7 +13,7 @@ from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.remote.remote_client import RemoteClient
-from cdpr_drake.systems.remote.remote_driver import Driver, Pace
+from cdpr_drake.systems.remote.remote_driver import Driver, SyncMode
 from cdpr_drake.systems.remote.server_socket import ServerSocket
 from cdpr_drake.systems.remote.service import tension_service
 from cdpr_drake.systems.scenarios.tension_control_scenario import TensionScenario
@@ -38,7 +38,7 @@ class Server:
         def connect(remote):
             driver = Driver(
                 self.socket, {"scenario": scenario.name}, remote.inputs, remote.outputs,
-                pace=Pace(scenario.remote.pace), timeout=self.timeout,
+                pace=SyncMode(scenario.remote.pace), timeout=self.timeout,
                 period=1.0 / scenario.controller.rate, services={"distribute": service},
             )  # fmt: skip
             driver.wait(LONG)

@@ -9,7 +9,7 @@ import pytest
 
 from cdpr_drake.errors import ClientEndedError
 from cdpr_drake.systems.remote.remote_client import RemoteClient
-from cdpr_drake.systems.remote.remote_driver import Driver, Pace, Port
+from cdpr_drake.systems.remote.remote_driver import Driver, Port, SyncMode
 from cdpr_drake.systems.remote.server_socket import SLICE, ServerSocket
 from tests.systems.remote.message_fuzz import RAW, Sender
 from tests.systems.remote.served import LONG, beside
@@ -21,7 +21,7 @@ CONNECTIONS = 2300
 """More than ZeroMQ keeps events of for who does not read them, some 2000."""
 
 
-def driver(one, pace=Pace.LOCK_STEP):
+def driver(one, pace=SyncMode.LOCK_STEP):
     port = Port("tensions", 2, "N", "commanded")
     return Driver(one, {}, [port], [port], pace=pace, timeout=LONG, period=1e-3, services={})
 
@@ -159,9 +159,9 @@ def test_strangers_who_never_cease_keep_nobody_waiting():
         driver(flooded).wait(LONG)
 
 
-@pytest.mark.parametrize("pace", list(Pace))
+@pytest.mark.parametrize("pace", list(SyncMode))
 def test_random_messages_in_every_state(pace):
-    sender = Sender(pace, seed=list(Pace).index(pace))
+    sender = Sender(pace, seed=list(SyncMode).index(pace))
     for _ in range(COUNT):
         sender.send()
     sender.close()

@@ -27,7 +27,7 @@ from cdpr_drake.systems.remote.messages import (
     vector,
 )
 from cdpr_drake.systems.remote.remote_client import RemoteClient
-from cdpr_drake.systems.remote.remote_driver import Driver, Pace
+from cdpr_drake.systems.remote.remote_driver import Driver, SyncMode
 from cdpr_drake.systems.remote.server_socket import ServerSocket
 from cdpr_drake.tensions.methods import distribute
 from tests.systems.remote.served import LONG, beside, scenario, server
@@ -251,7 +251,7 @@ def test_strangers_are_answered_and_change_nothing():
 def test_nobody_comes():
     with server() as one:
         driver = Driver(
-            one.socket, {}, [], [], pace=Pace.LOCK_STEP, timeout=1.0, period=1.0, services={}
+            one.socket, {}, [], [], pace=SyncMode.LOCK_STEP, timeout=1.0, period=1.0, services={}
         )
         with pytest.raises(ClientEndedError, match=r"within 0\.01 s"):
             driver.wait(0.01)

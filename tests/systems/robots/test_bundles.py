@@ -10,7 +10,7 @@ from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from cdpr_drake.analyses.workspaces.stability_question import stability_case
 from cdpr_drake.errors import CableGeometryError, CdprError, RobotFileError, StabilityError
 from cdpr_drake.geometry.cable_paths import cable_paths
-from cdpr_drake.models.robot_exports import not_written
+from cdpr_drake.models.robot_exports import export_omissions
 from cdpr_drake.models.robot_holding import check_bundles
 from cdpr_drake.models.sensor_catalogue import load_encoder
 from cdpr_drake.systems.robots.cable_robot import CableRobot, automatic_step
@@ -70,7 +70,7 @@ def moved(kind, how, command, duration, step):
     block = kind(ROBOT, how)
     simulator = Simulator(block)
     context = simulator.get_mutable_context()
-    block.hang(context, HOME)
+    block.set_at_equilibrium(context, HOME)
     l0 = block.GetOutputPort("unstrained_lengths").Eval(context).copy()
     for index in range(block.num_input_ports()):
         port = block.get_input_port(index)
@@ -153,7 +153,7 @@ def test_a_motor_holds_all_cables_on_its_winch():
     block = CompiledCableRobot(ROBOT, settings("velocity"))
     simulator = Simulator(block)
     context = simulator.get_mutable_context()
-    tensions = block.hang(context, HOME)
+    tensions = block.set_at_equilibrium(context, HOME)
     block.GetInputPort("cable_velocities").FixValue(context, np.zeros(3))
     radius = ROBOT.drum().radii(6)[0]
     torques = value(block, context, "applied_torques")
@@ -212,7 +212,7 @@ def test_what_does_not_work_with_bundles_says_so():
     block = CompiledCableRobot(ROBOT, settings("torque"))
     with pytest.raises(CdprError, match=r"semi_implicit for motors with several cables"):
         block.integrate_by(StepRule(method="semi_implicit", max_step=1e-3))
-    assert "a winch of its own" in not_written(ROBOT, "wcrfx")["cables[].winch"]
+    assert "a winch of its own" in export_omissions(ROBOT, "wcrfx")["cables[].winch"]
     winches = MotorWinch(ROBOT.winch_law(), "torque", np.ones(6))
     assert winches.GetInputPort("motor_torques").size() == 3
 

@@ -7,7 +7,7 @@ from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
 from cdpr_drake.cables.catenary_kernel import free_part, stored_energy
 from cdpr_drake.cables.elastic_law import elastic_energy
-from cdpr_drake.cables.hanging_kernel import hang
+from cdpr_drake.cables.hanging_kernel import solve_catenary
 from cdpr_drake.geometry.poses import rotation_from_angles
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.robots.cable_robot import CableRobot
@@ -38,7 +38,7 @@ def released(robot, settings, displacement):
     block = CableRobot(robot, CableRobotSettings(cables=settings))
     simulator = Simulator(block)
     context = simulator.get_mutable_context()
-    block.hang(context, POSE)
+    block.set_at_equilibrium(context, POSE)
     block.GetInputPort("cable_velocities").FixValue(context, np.zeros(8))
     rest = energy(block, context)
     turned = RigidTransform(
@@ -64,7 +64,7 @@ def energy(block, context):
     for i in range(8):
         x, z = np.hypot(along[0, i], along[1, i]), along[2, i]
         ES, w = cables.stiffness[i], cables.linear_weight[i]
-        H, V_A, good = hang(x, z, 0.0, 1.0, l0[i], ES, w, 0.0, 0.0)
+        H, V_A, good = solve_catenary(x, z, 0.0, 1.0, l0[i], ES, w, 0.0, 0.0)
         assert good
         *_, V, S, phi = free_part(H, V_A, l0[i], ES, w)
         total += stored_energy(x, z, l0[i], ES, w, H, V, S, phi)

@@ -46,7 +46,7 @@ def hanging(robot, X_WP):
     block = CableRobot(robot)
     simulator = Simulator(block)
     context = simulator.get_mutable_context()
-    tensions = block.hang(context, X_WP)
+    tensions = block.set_at_equilibrium(context, X_WP)
     block.GetInputPort("cable_velocities").FixValue(context, np.zeros(len(robot.cables)))
     return block, simulator, tensions
 

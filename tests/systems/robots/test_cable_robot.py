@@ -78,7 +78,7 @@ def hanging(robot, mode, command):
     block = CableRobot(robot, CableRobotSettings(winches=motors(mode)))
     simulator = Simulator(block)
     context = simulator.get_mutable_context()
-    tensions = block.hang(context, robot.home.transform())
+    tensions = block.set_at_equilibrium(context, robot.home.transform())
     block.get_input_port(0).FixValue(context, command(block, context, tensions))
     step = automatic_step(
         robot, robot.home.transform(), "runge_kutta3", CableRobotSettings(winches=motors(mode))

@@ -45,7 +45,7 @@ def simulated(kind, robot, how, command, *, duration, step, X_WP=None, slack=Non
     block = kind(robot, how)
     simulator = Simulator(block)
     context = simulator.get_mutable_context()
-    block.hang(context, robot.home.transform() if X_WP is None else X_WP, slack)
+    block.set_at_equilibrium(context, robot.home.transform() if X_WP is None else X_WP, slack)
     lengths = block.GetOutputPort("unstrained_lengths").Eval(context)
     for index in range(block.num_input_ports()):
         port = block.get_input_port(index)
@@ -148,7 +148,7 @@ def hung(**rule):
     block = CompiledCableRobot(robot, rule=StepRule(**rule))
     simulator = Simulator(block)
     context = simulator.get_mutable_context()
-    block.hang(context, robot.home.transform())
+    block.set_at_equilibrium(context, robot.home.transform())
     port = block.GetInputPort("cable_velocities")
     port.FixValue(context, np.zeros(8))
     return block, simulator, context, port
@@ -202,7 +202,7 @@ def test_commands_that_change_continuously_are_sampled():
         builder.Connect(wave.get_output_port(0), block.GetInputPort("cable_velocities"))
         simulator = Simulator(builder.Build())
         own = block.GetMyMutableContextFromRoot(simulator.get_mutable_context())
-        block.hang(own, robot.home.transform())
+        block.set_at_equilibrium(own, robot.home.transform())
         start = block.GetOutputPort("unstrained_lengths").Eval(own).copy()
         simulator.AdvanceTo(0.1)
         exact = start + 1e-4 * (1.0 - np.cos(1.0))
@@ -217,7 +217,7 @@ def test_time_that_is_set_back_is_refused():
     context.SetTime(0.0)
     with pytest.raises(RuntimeError, match=r"state is that of 0\.1 s.* context stands at 0 s"):
         block.GetOutputPort("X_WP").Eval(context)
-    block.hang(context, block.robot.home.transform())
+    block.set_at_equilibrium(context, block.robot.home.transform())
     simulator.Initialize()
     simulator.AdvanceTo(0.1)
 
@@ -278,7 +278,9 @@ def test_commanded_tensions_hold_a_platform_that_they_balance():
     robot = load_robot("acrobot_small")
     cables = robot.cable_set().without_pulleys()
     reference = CompiledCableRobot(robot)
-    tensions = reference.hang(reference.CreateDefaultContext(), robot.home.transform())
+    tensions = reference.set_at_equilibrium(
+        reference.CreateDefaultContext(), robot.home.transform()
+    )
     builder = DiagramBuilder()
     motion = builder.AddSystem(motion_by_tensions(robot, cables, rule=StepRule(max_step=1e-3)))
     source = builder.AddSystem(ConstantVectorSource(tensions))

@@ -31,7 +31,7 @@ def hanging(settings, name="acrobot_small", X_WP=POSE):
     robot = load_robot(name)
     block = CableRobot(robot, CableRobotSettings(cables=settings))
     context = block.CreateDefaultContext()
-    block.hang(context, X_WP)
+    block.set_at_equilibrium(context, X_WP)
     block.GetInputPort("cable_velocities").FixValue(context, np.zeros(len(robot.cables)))
     return block, context
 
@@ -127,7 +127,7 @@ def test_winches_with_motors_convert_too():
         ),
     )
     context = block.CreateDefaultContext()
-    block.hang(context, POSE)
+    block.set_at_equilibrium(context, POSE)
     block.GetInputPort("cable_velocities").FixValue(context, np.zeros(8))
     linear = linearized(block, context)
     assert np.all(np.isfinite(linear.A()))

@@ -63,7 +63,7 @@ def test_platform_cables_and_motors_hold_what_the_torques_put_in():
     )
     simulator = Simulator(block)
     context = simulator.get_mutable_context()
-    tensions = block.hang(context, robot.home.transform())
+    tensions = block.set_at_equilibrium(context, robot.home.transform())
     rho = robot.winch_law().drum.length_per_angle(np.zeros(8))
     torques = -rho * tensions * np.array([1.3, 1.0, 0.9, 1.2, 1.0, 1.1, 0.8, 1.2])
     block.GetInputPort("motor_torques").FixValue(context, torques)
@@ -86,7 +86,7 @@ def test_the_diagram_with_motors_differentiates(mode):
     robot = load_robot("acrobot_small")
     block = CableRobot(robot, CableRobotSettings(winches=WinchSettings(kind="motor", mode=mode)))
     context = block.CreateDefaultContext()
-    tensions = block.hang(context, robot.home.transform())
+    tensions = block.set_at_equilibrium(context, robot.home.transform())
     l0 = block.GetOutputPort("unstrained_lengths").Eval(context)
     rho = robot.winch_law().drum.length_per_angle(np.zeros(8))
     commands = {"torque": -rho * tensions, "velocity": np.full(8, 0.05), "position": l0 + 0.01}

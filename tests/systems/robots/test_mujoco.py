@@ -74,7 +74,7 @@ def largest_difference(robot, X_WP, displacement, ramp, step):
     block = CableRobot(robot, CableRobotSettings(cables=CableSettings(model="elastic")))
     simulator = Simulator(block)
     context = simulator.get_mutable_context()
-    block.hang(context, X_WP)
+    block.set_at_equilibrium(context, X_WP)
     start = RigidTransform(
         rotation_from_angles(displacement[:3]) @ X_WP.rotation(),
         X_WP.translation() + displacement[3:],

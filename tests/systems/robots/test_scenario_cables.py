@@ -66,7 +66,7 @@ def test_an_anchor_point_that_comes_into_the_groove_ends_a_simulation():
     robot = load_robot("acrobot_small")
     block = CableRobot(robot, CableRobotSettings(cables=CableSettings(pulleys=True)))
     context = block.CreateDefaultContext()
-    block.hang(context, robot.home.transform())
+    block.set_at_equilibrium(context, robot.home.transform())
     block.GetInputPort("cable_velocities").FixValue(context, np.zeros(8))
     cable = robot.cables[1]
     X_WP = robot.home.transform()

@@ -69,7 +69,7 @@ def test_a_hanging_robot_with_damping_rests_where_it_hangs():
         robot, CableRobotSettings(damping=DampingSettings(translation=40.0, rotation=0.8))
     )
     context = block.CreateDefaultContext()
-    block.hang(context, robot.home.transform())
+    block.set_at_equilibrium(context, robot.home.transform())
     block.GetInputPort("cable_velocities").FixValue(context, np.zeros(8))
     plant = block.plant
     rates = block.EvalTimeDerivatives(context).CopyToVector()

@@ -3,17 +3,17 @@
 import pytest
 
 from cdpr_drake.systems.diagrams.load import load_scenario
-from cdpr_drake.systems.scenarios.run_settings import engine_of, with_engine
+from cdpr_drake.systems.scenarios.run_settings import engine_of, set_engine
 
 
 @pytest.mark.parametrize("name", ["acrobot_pbvs", "planar_computed_torque"])
 def test_long_and_repeated_runs_take_the_compiled_engine_and_say_so(name):
     short = load_scenario(name, ["duration=600"])
-    assert with_engine(short) == (short, "")
+    assert set_engine(short) == (short, "")
     assert engine_of(short) == "plant"
     for chosen, words in (
-        with_engine(load_scenario(name, ["duration=600.1"])),
-        with_engine(short, repeated=True),
+        set_engine(load_scenario(name, ["duration=600.1"])),
+        set_engine(short, repeated=True),
     ):
         assert engine_of(chosen) == chosen.integration.engine == "compiled"
         assert words.startswith(f"{name}: by the compiled engine")
@@ -22,5 +22,5 @@ def test_long_and_repeated_runs_take_the_compiled_engine_and_say_so(name):
 @pytest.mark.parametrize("engine", ["plant", "compiled"])
 def test_what_is_asked_for_is_left(engine):
     scenario = load_scenario("acrobot_pbvs", ["duration=1e4", f"integration.engine={engine}"])
-    assert with_engine(scenario, repeated=True) == (scenario, "")
+    assert set_engine(scenario, repeated=True) == (scenario, "")
     assert engine_of(scenario) == engine

@@ -87,7 +87,7 @@ def test_on_a_pendulum_it_reads_the_rod():
 def accelerations_of(kind, robot, settings, commands, X_WP, twist):
     block = kind(robot, settings)
     context = block.CreateDefaultContext()
-    block.hang(context, X_WP)
+    block.set_at_equilibrium(context, X_WP)
     for port in range(block.num_input_ports()):
         name = block.get_input_port(port).get_name()
         if name != "commanded_length_rates":

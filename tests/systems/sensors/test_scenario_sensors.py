@@ -15,7 +15,7 @@ from cdpr_drake.errors import ScenarioError
 from cdpr_drake.geometry.poses import pose_from_row, pose_rows_distance, rotation_vector
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.diagrams.visual_servo import build_visual_servo
-from cdpr_drake.systems.loops.loop_choice import why_diagram
+from cdpr_drake.systems.loops.loop_choice import diagram_reason
 from cdpr_drake.systems.monitoring.context_state import has_arrays_only, restore_state, state_arrays
 from tests.messages import printed
 
@@ -161,7 +161,7 @@ def test_readings_oftener_than_steps_are_refused():
 
 def test_a_loop_without_a_diagram_leaves_it_to_a_diagram():
     scenario = load_scenario("acrobot_perception", NO_DEPTH)
-    assert why_diagram(scenario) == "its sensors look at a scene"
+    assert diagram_reason(scenario) == "its sensors look at a scene"
 
 
 def test_odometry_is_right_at_the_start_and_drifts(run):

@@ -25,7 +25,7 @@ def ends_of(servo, time):
     """Where the beams end in W at a time, those that do, shape (k, 3) [m]; and their angles."""
     context = servo.make_context()
     context.SetTime(time)
-    servo.block.hang(
+    servo.block.set_at_equilibrium(
         servo.block.GetMyMutableContextFromRoot(context), servo.scenario.initial_pose.transform()
     )
     sensor = servo.looking.ranges["hokuyo"]

@@ -17,7 +17,7 @@ from cdpr_drake.geometry.poses import pose_from_row
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.diagrams.visual_servo import build_visual_servo
-from cdpr_drake.systems.loops.loop_choice import why_diagram, with_loop
+from cdpr_drake.systems.loops.loop_choice import diagram_reason, set_loop
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
 from cdpr_drake.systems.scenarios.files import scenario_names
 from cdpr_drake.systems.scenarios.run_settings import engine_of, has_contact
@@ -128,12 +128,12 @@ def test_the_compiled_engine_refuses_contact_and_automatic_takes_the_plant():
         load_scenario("acrobot_set_down", ["integration.engine=compiled"])
     scenario = load_scenario("acrobot_set_down", ["duration=1e4"])
     for repeated in (False, True):
-        chosen, words = with_loop(scenario, repeated)
+        chosen, words = set_loop(scenario, repeated)
         assert engine_of(chosen) == "plant"
         assert "its world has contact" in words
-    assert why_diagram(scenario) == "its world has contact"
+    assert diagram_reason(scenario) == "its world has contact"
     with pytest.raises(ScenarioError, match=r"integration.loop.*its world has contact"):
-        with_loop(load_scenario("acrobot_set_down", ["integration.loop=compiled"]))
+        set_loop(load_scenario("acrobot_set_down", ["integration.loop=compiled"]))
 
 
 @pytest.mark.parametrize(

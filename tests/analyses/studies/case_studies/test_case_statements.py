@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.reporting.statements import judged, not_judged
+from cdpr_drake.analyses.reporting.statements import failed_check, run_checks
 from cdpr_drake.analyses.studies.case_studies.case_1 import MOVING_TIME, moving
 from cdpr_drake.analyses.studies.case_studies.case_1_ends import (
     GOAL_KEYS,
@@ -183,9 +183,9 @@ def test_a_judge_that_fails_costs_only_its_own_statement():
 
     names = ("none", "within")
     found = CaseRuns([run(n, position_error_m=0.004) for n in names])
-    said = judged([broken, lambda f: same_accuracy(f, names, "")], found, not_judged)
+    said = run_checks([broken, lambda f: same_accuracy(f, names, "")], found, failed_check)
     assert [s.verdict for s in said] == ["not judged", "not testable"]
     assert "broken" in said[0].words
     assert "shapes differ" in said[0].found
     with pytest.raises(ValueError, match="shapes"):
-        judged([broken], found)
+        run_checks([broken], found)

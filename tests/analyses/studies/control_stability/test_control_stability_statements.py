@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from cdpr_drake.analyses.reporting.statements import CONFIRMED, IN_PART, NOT_CONFIRMED, NOT_IN_QUICK
 from cdpr_drake.analyses.studies.control_stability.statements import (
-    JUDGES,
+    CHECKS,
     control_stability_statements,
 )
 from cdpr_drake.analyses.studies.control_stability.tables import StabilityRow
@@ -28,7 +28,7 @@ def printed_rows(change=lambda share: share):
 
 def test_printed_numbers_confirm_all_but_what_a_table_contradicts():
     said = {s.name: s for s in control_stability_statements(printed_rows(), quick=False)}
-    assert len(said) == len(JUDGES) == len(TABLES) + 6
+    assert len(said) == len(CHECKS) == len(TABLES) + 6
     assert {name for name, s in said.items() if s.verdict != CONFIRMED} == {"anchors_more"}
     assert said["anchors_more"].verdict == IN_PART
     assert "0.394, 0.295, 0.113 m^3" in said["image_based_largest"].found

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from cdpr_drake.analyses.reporting.progress import StudySession
-from cdpr_drake.analyses.reporting.statements import CONFIRMED, NOT_CONFIRMED, judged_statements
+from cdpr_drake.analyses.reporting.statements import CONFIRMED, NOT_CONFIRMED, evaluate_checks
 from cdpr_drake.analyses.studies.fusion.configurations import ALL, QUICK, configurations
 from cdpr_drake.analyses.studies.fusion.slack_trials import SLACK_COLUMNS, slack_trials
-from cdpr_drake.analyses.studies.fusion.statements import JUDGES
+from cdpr_drake.analyses.studies.fusion.statements import CHECKS
 from cdpr_drake.analyses.studies.fusion.study import study_fusion
 from cdpr_drake.analyses.studies.fusion.trials import COLUMNS, FusionTrial, trial_scenario
 
@@ -45,7 +45,7 @@ def test_the_quick_form_goes_on_and_is_written(quick):
     result.write(folder)
     stored = json.loads((folder / "results.json").read_text())
     assert [c["name"] for c in stored["configurations"]] == list(QUICK)
-    assert len(stored["statements"]) == len(JUDGES)
+    assert len(stored["statements"]) == len(CHECKS)
     assert (folder / "fusion.png").stat().st_size > 10_000
     assert all(table.row_count for table in result.tables())
 
@@ -103,13 +103,13 @@ def made_up(change=lambda name, numbers: None):
     ],
 )
 def test_judges_look_at_the_runs(judge, name, key, value):
-    good = {s.name: s.verdict for s in judged_statements(JUDGES, made_up())}
+    good = {s.name: s.verdict for s in evaluate_checks(CHECKS, made_up())}
     assert good[judge] == CONFIRMED
 
     def spoil(one, numbers):
         if one == name:
             numbers[key] = value
 
-    spoiled = {s.name: s.verdict for s in judged_statements(JUDGES, made_up(spoil))}
+    spoiled = {s.name: s.verdict for s in evaluate_checks(CHECKS, made_up(spoil))}
     assert spoiled[judge] != CONFIRMED
     assert NOT_CONFIRMED in spoiled.values() or spoiled[judge] != good[judge]

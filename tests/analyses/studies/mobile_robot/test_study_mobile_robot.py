@@ -10,7 +10,7 @@ from cdpr_drake.analyses.reporting.statements import (
     CONFIRMED,
     IN_PART,
     NOT_CONFIRMED,
-    judged_statements,
+    evaluate_checks,
 )
 from cdpr_drake.analyses.studies.mobile_robot.configurations import (
     PUBLISHED_LAPS,
@@ -19,7 +19,7 @@ from cdpr_drake.analyses.studies.mobile_robot.configurations import (
     configurations,
 )
 from cdpr_drake.analyses.studies.mobile_robot.figures import FIGURES
-from cdpr_drake.analyses.studies.mobile_robot.judges import JUDGES
+from cdpr_drake.analyses.studies.mobile_robot.judges import CHECKS
 from cdpr_drake.analyses.studies.mobile_robot.laps import (
     COLUMNS,
     PHASES,
@@ -112,7 +112,7 @@ def made_up(laps, failed_at=None, high=0.0, growth=0.0, **other):
 
 
 def verdicts(found):
-    return [statement.verdict for statement in judged_statements(JUDGES, found)]
+    return [statement.verdict for statement in evaluate_checks(CHECKS, found)]
 
 
 def published():
@@ -135,7 +135,7 @@ def published():
 def test_what_is_published_is_confirmed_and_its_contrary_is_not():
     found = published()
     assert len(verdicts(found)) == 25
-    assert {s.words: s.verdict for s in judged_statements(JUDGES, found)
+    assert {s.words: s.verdict for s in evaluate_checks(CHECKS, found)
             if s.verdict != CONFIRMED} == {}  # fmt: skip
 
     found["corrected"] = made_up(700, 40, most_slack=3.0, at_threshold=0.0)

@@ -23,7 +23,7 @@ from cdpr_drake.analyses.studies.stability_ranges.item import (
     RangeRow,
     bisected,
 )
-from cdpr_drake.analyses.studies.stability_ranges.planar_statements import JUDGES as PLANAR_JUDGES
+from cdpr_drake.analyses.studies.stability_ranges.planar_statements import CHECKS as PLANAR_CHECKS
 from cdpr_drake.analyses.studies.stability_ranges.robot_limits import (
     LimitedRobot,
     RangeSearch,
@@ -32,8 +32,8 @@ from cdpr_drake.analyses.studies.stability_ranges.robot_limits import (
 )
 from cdpr_drake.analyses.studies.stability_ranges.robots import PLANAR_OTHERS, SPATIAL_OTHERS
 from cdpr_drake.analyses.studies.stability_ranges.single_errors import FULL_VOLUME, KNOWN, NO_TURN
-from cdpr_drake.analyses.studies.stability_ranges.single_statements import JUDGES as SINGLE_JUDGES
-from cdpr_drake.analyses.studies.stability_ranges.spatial_statements import JUDGES as SPATIAL_JUDGES
+from cdpr_drake.analyses.studies.stability_ranges.single_statements import CHECKS as SINGLE_CHECKS
+from cdpr_drake.analyses.studies.stability_ranges.spatial_statements import CHECKS as SPATIAL_CHECKS
 from cdpr_drake.analyses.studies.stability_ranges.study import (
     StabilityRangesStudy,
     range_items,
@@ -121,7 +121,7 @@ def test_larger_limits_are_not_easier() -> None:
 
 def test_quick_form_answers_everything(quick: StabilityRangesStudy, tmp_path: Path) -> None:
     assert not quick.interrupted
-    assert len(quick.statements) == sum(map(len, (PLANAR_JUDGES, SPATIAL_JUDGES, SINGLE_JUDGES)))
+    assert len(quick.statements) == sum(map(len, (PLANAR_CHECKS, SPATIAL_CHECKS, SINGLE_CHECKS)))
     assert quick.tables()
     quick.write(tmp_path)
     assert {path.stem for path in tmp_path.glob("*.png")} == set(FIGURES)

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from cdpr_drake.analyses.reporting.progress import StudySession
-from cdpr_drake.analyses.reporting.statements import judged_statements
+from cdpr_drake.analyses.reporting.statements import evaluate_checks
 from cdpr_drake.analyses.studies.catalogue import STUDIES
 from cdpr_drake.analyses.studies.tagless import trials
-from cdpr_drake.analyses.studies.tagless.statements import JUDGES, task_name
+from cdpr_drake.analyses.studies.tagless.statements import CHECKS, task_name
 from cdpr_drake.analyses.studies.tagless.study import study_tagless
 from cdpr_drake.analyses.studies.tagless.trials import (
     DURATION,
@@ -84,7 +84,7 @@ def test_worse_squares_and_lost_runs_are_not_confirmed():
     found["ibvs map"]["runs"][1] = row(np.nan, np.nan, Outcome.TARGET_LOST)
     found["ibvs map"]["runs"][2] = row(1e-2, 1.0)
     np.testing.assert_array_equal(is_lost(found["ibvs map"]["runs"]), [False, True, True])
-    said = {s.name: s for s in judged_statements(JUDGES, found)}
+    said = {s.name: s for s in evaluate_checks(CHECKS, found)}
     assert said["pbvs"].verdict == "in part"
     assert said["ibvs"].verdict == "confirmed"
     assert said["losses"].verdict == "in part"

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from cdpr_drake.analyses.reporting.statements import CONFIRMED, IN_PART, NOT_CONFIRMED
-from cdpr_drake.analyses.studies.tension_methods.statements import judge_statements
+from cdpr_drake.analyses.studies.tension_methods.statements import evaluate_statements
 from cdpr_drake.analyses.studies.tension_methods.trial import Applied, TensionTrial, run_trial
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
@@ -33,14 +33,14 @@ def made_up(template, experiment, method, gain, **numbers):
 
 
 def verdict(runs, words):
-    (found,) = [s for s in judge_statements(runs) if words in s.words]
+    (found,) = [s for s in evaluate_statements(runs) if words in s.words]
     assert found.found
     return found.verdict
 
 
 def test_nothing_is_said_about_runs_that_were_not_made(template):
-    assert judge_statements([]) == []
-    assert judge_statements([template]) == []
+    assert evaluate_statements([]) == []
+    assert evaluate_statements([template]) == []
 
 
 @pytest.mark.parametrize(("jump", "expected"), [(4.0, CONFIRMED), (1e-4, NOT_CONFIRMED)])

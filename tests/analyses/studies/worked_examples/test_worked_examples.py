@@ -17,7 +17,7 @@ from cdpr_drake.analyses.studies.worked_examples.motion import (
     by_printed_coefficients,
 )
 from cdpr_drake.analyses.studies.worked_examples.statements import (
-    JUDGES,
+    CHECKS,
     border_tensions,
     keeps_limits,
     median_cheap,
@@ -37,7 +37,7 @@ def study():
 
 
 def test_every_statement_is_judged(study):
-    assert [one.name for one in study.statements] == [judge.__name__ for judge in JUDGES]
+    assert [one.name for one in study.statements] == [judge.__name__ for judge in CHECKS]
     verdicts = {one.name: one.verdict for one in study.statements}
     assert verdicts["two_programs"] == verdicts["meets_conditions"] == CONFIRMED
     assert verdicts["homing_tensions"] == verdicts["border_tensions"] == CONFIRMED

@@ -22,7 +22,7 @@ from cdpr_drake.analyses.studies.workspaces.items import (
     ZERO,
     kind_items,
 )
-from cdpr_drake.analyses.studies.workspaces.statements import JUDGES, workspace_statements
+from cdpr_drake.analyses.studies.workspaces.statements import CHECKS, workspace_statements
 from cdpr_drake.analyses.studies.workspaces.study import study_workspaces
 from cdpr_drake.analyses.studies.workspaces.tables import ALL, shares_of
 from cdpr_drake.analyses.workspaces.conditions import KINDS
@@ -112,7 +112,7 @@ def test_figures_take_the_upper_limit_of_the_robot_file(study):
 
 def test_cross_checks_hold(study):
     statements = workspace_statements(study.found, study.distances)
-    assert len(statements) == len(JUDGES)
+    assert len(statements) == len(CHECKS)
     for statement in statements[4:]:
         assert statement.verdict == CONFIRMED, statement.words
 
@@ -208,7 +208,7 @@ def test_a_wrong_distance_is_noticed(monkeypatch):
 
 def test_least_squares_find_the_distances_of_drake_where_its_iterations_end():
     robot = load_robot("caroca")
-    around = distances.surroundings(robot)
+    around = distances.interference_bodies(robot)
     around = replace(around, radius=np.maximum(around.radius, 1e-4))
     position = np.array([0.3, -0.4, 1.2])
     theirs = distances.drake_clearances(around, position, np.eye(3))

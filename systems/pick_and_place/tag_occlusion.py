@@ -17,7 +17,7 @@ from pydrake.geometry import (
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
 
-NAME = "tag_cover"
+NAME = "tag_occlusion"
 COVER_COLOR = np.array([0.25, 0.55, 0.35, 1.0])
 
 ABOVE = 4e-3
@@ -36,7 +36,7 @@ def cover_plate(size: float) -> tuple[Box, RigidTransform]:
     return Box(edge, edge, 1e-3), RigidTransform([0.0, 0.0, ABOVE])
 
 
-class TagCover(LeafSystem):
+class TagOcclusion(LeafSystem):
     """Lies above a tag from a while after a phase began, for a time.
 
     ============= =============== ==== ==================================================
@@ -44,7 +44,7 @@ class TagCover(LeafSystem):
     ============= =============== ==== ==================================================
     phase         vector(2)       -, s in, number of the phase, and when it began
     X_WT          RigidTransform  m    in, true pose of the tag
-    hidden        vector(1)       -    out, 1 while the tag is hidden
+    tag_occluded  vector(1)       -    out, 1 while the tag is hidden
     geometry_pose FramePoseVector m    out, of the plate, for the scene graph
     ============= =============== ==== ==================================================
 
@@ -71,7 +71,7 @@ class TagCover(LeafSystem):
         plate.set_perception_properties(seen)
         scene_graph.RegisterGeometry(self.source_id, self._frame, plate)
         self.DeclarePeriodicDiscreteUpdateEvent(0.01, 0.0, self._update)
-        self.DeclareVectorOutputPort("hidden", 1, self._calc_hidden)
+        self.DeclareVectorOutputPort("tag_occluded", 1, self._calc_hidden)
         self.DeclareAbstractOutputPort(
             "geometry_pose", lambda: Value(FramePoseVector()), self._calc_pose
         )

@@ -6,13 +6,13 @@ import yaml
 
 from cdpr_drake.errors import RobotFileError
 from cdpr_drake.models.robot_loader import load_robot, robot_file
-from cdpr_drake.schema import yaml_files as kept_files
+from cdpr_drake.schema import yaml_files
 from cdpr_drake.systems.diagrams.load import load_scenario
 
 
 @pytest.fixture(autouse=True)
 def nothing_is_kept(monkeypatch):
-    monkeypatch.setattr(kept_files, "_KEPT", type(kept_files._KEPT)())
+    monkeypatch.setattr(yaml_files, "_KEPT", type(yaml_files._KEPT)())
 
 
 @pytest.fixture
@@ -59,7 +59,7 @@ def test_what_is_wrong_is_said_in_the_same_words_again(tmp_path):
         said.append(str(caught.value))
     assert "masss" in said[0]
     assert said[0] == said[1] == said[2]
-    assert all(content != file.read_text() for _, content in kept_files._KEPT)
+    assert all(content != file.read_text() for _, content in yaml_files._KEPT)
 
 
 def test_values_of_one_command_do_not_reach_the_next():
@@ -75,10 +75,10 @@ def test_a_check_is_made_every_time(monkeypatch):
 
 
 def test_few_are_kept_and_no_large_ones(monkeypatch):
-    for number in range(kept_files.MOST + 5):
-        kept_files.known_yaml(dict, f"a: {number}", edited=False)
-    assert len(kept_files._KEPT) == kept_files.MOST
-    large = "a" * (kept_files.SMALL + 1)
-    kept_files.known_yaml(dict, large, edited=False)
-    kept_files.known_yaml(dict, "b: 1", edited=True)
-    assert not {(dict, large), (dict, "b: 1")} & set(kept_files._KEPT)
+    for number in range(yaml_files.MOST + 5):
+        yaml_files.cached_yaml(dict, f"a: {number}", edited=False)
+    assert len(yaml_files._KEPT) == yaml_files.MOST
+    large = "a" * (yaml_files.SMALL + 1)
+    yaml_files.cached_yaml(dict, large, edited=False)
+    yaml_files.cached_yaml(dict, "b: 1", edited=True)
+    assert not {(dict, large), (dict, "b: 1")} & set(yaml_files._KEPT)

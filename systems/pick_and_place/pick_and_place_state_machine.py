@@ -15,12 +15,12 @@ from pydrake.systems.framework import (
     LeafSystem,
 )
 
-from cdpr_drake.systems.pick_and_place.handling_task import (
+from cdpr_drake.systems.pick_and_place.pick_and_place_task import (
     CLOSED,
     LOOKS_AT_GOAL,
     LOOKS_AT_OBJECT,
-    HandlingState,
-    HandlingTask,
+    PickAndPlaceState,
+    PickAndPlaceTask,
     Reading,
 )
 
@@ -29,34 +29,34 @@ X_CdV = RigidTransform(RotationMatrix.MakeXRotation(np.pi), [0.0, 0.0, 0.1])
 does, since only what is apart of it counts."""
 
 
-class HandlingMachine(LeafSystem):
+class PickAndPlaceStateMachine(LeafSystem):
     """Tells the servo where to go, the cameras whether to look, and the gripper whether to close.
 
-    ============ ============== ==== ==========================================================
-    port         type           unit meaning
-    ============ ============== ==== ==========================================================
-    X_WP         RigidTransform m    in, estimated pose of the platform
-    X_CO         RigidTransform m    in, box's tag in its camera
-    object_found vector(1)      -    in, 1 while that is seen
-    X_CT         RigidTransform m    in, goal's tag in its camera
-    goal_found   vector(1)      -    in, 1 while that is seen
-    holding      vector(1)      -    in, 1 while the gripper holds something
-    load         vector(1)      N    in, force that the grip carries along its axis
-    X_CV         RigidTransform m    out, what the servo looks at: seen as `X_CdV` once the platform
-                                     is where it shall be
-    moves        vector(1)      -    out, 1 while the platform shall move; 0 for one step where a
-                                     phase begins, so that the servo begins anew
-    closed       vector(1)      -    out, 1 while the gripper shall be closed
-    looks        vector(2)      -    out, 1 for each camera, box and goal, that shall look
-    phase        vector(2)      -, s out, number of the phase, and when it began
-    X_WP_aim     RigidTransform m    out, where the platform shall go, as poses are estimated
-    ============ ============== ==== ==========================================================
+    =============== ============== ==== ==========================================================
+    port            type           unit meaning
+    =============== ============== ==== ==========================================================
+    X_WP            RigidTransform m    in, estimated pose of the platform
+    X_CO            RigidTransform m    in, box's tag in its camera
+    object_found    vector(1)      -    in, 1 while that is seen
+    X_CT            RigidTransform m    in, goal's tag in its camera
+    goal_found      vector(1)      -    in, 1 while that is seen
+    holding         vector(1)      -    in, 1 while the gripper holds something
+    load            vector(1)      N    in, force that the grip carries along its axis
+    X_CV            RigidTransform m    out, what the servo looks at: seen as `X_CdV` once the
+                                        platform is where it shall be
+    platform_moving vector(1)      -    out, 1 while the platform shall move; 0 for one step where a
+                                        phase begins, so that the servo begins anew
+    gripper_closed  vector(1)      -    out, 1 while the gripper shall be closed
+    enabled         vector(2)      -    out, 1 for each camera, box and goal, that shall look
+    phase           vector(2)      -, s out, number of the phase, and when it began
+    X_WP_aim        RigidTransform m    out, where the platform shall go, as poses are estimated
+    =============== ============== ==== ==========================================================
 
     What is seen came from the images of the step before, and is taken together with the pose that
     was estimated then; where to go is said with the pose that is estimated now.
     """
 
-    def __init__(self, task: HandlingTask, X_WP0: RigidTransform, X_PC: RigidTransform) -> None:
+    def __init__(self, task: PickAndPlaceTask, X_WP0: RigidTransform, X_PC: RigidTransform) -> None:
         """For a task, the pose that is believed at time 0, and the camera of the servo [m]."""
         super().__init__()
         self.task, self._X_PC = task, X_PC
@@ -74,14 +74,14 @@ class HandlingMachine(LeafSystem):
 
         declare("X_CV", self._calc_view, state | pose)
         declare("X_WP_aim", self._calc_aim, state | pose)
-        self.DeclareVectorOutputPort("moves", 1, self._calc_moves, state)
-        self.DeclareVectorOutputPort("closed", 1, self._calc_closed, state)
-        self.DeclareVectorOutputPort("looks", 2, self._calc_looks, state)
+        self.DeclareVectorOutputPort("platform_moving", 1, self._calc_moves, state)
+        self.DeclareVectorOutputPort("gripper_closed", 1, self._calc_closed, state)
+        self.DeclareVectorOutputPort("enabled", 2, self._calc_looks, state)
         self.DeclareVectorOutputPort("phase", 2, self._calc_phase, state)
 
-    def state(self, context: Context) -> HandlingState:
+    def state(self, context: Context) -> PickAndPlaceState:
         """Where the task stands, from this block's own context."""
-        return HandlingState.unpacked(context.get_discrete_state(self._memory).value())
+        return PickAndPlaceState.unpacked(context.get_discrete_state(self._memory).value())
 
     def _read(self, context: Context, name: str) -> Any:
         return self.GetInputPort(name).Eval(context)

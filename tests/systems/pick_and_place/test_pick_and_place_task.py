@@ -7,13 +7,13 @@ import pytest
 from pydrake.math import RigidTransform, RollPitchYaw
 
 from cdpr_drake.geometry.poses import pose_error
-from cdpr_drake.systems.pick_and_place.handling_task import (
+from cdpr_drake.systems.pick_and_place.pick_and_place_task import (
     Failure,
-    HandlingGeometry,
-    HandlingRules,
-    HandlingState,
-    HandlingTask,
     Phase,
+    PickAndPlaceGeometry,
+    PickAndPlaceRules,
+    PickAndPlaceState,
+    PickAndPlaceTask,
     Reading,
 )
 
@@ -32,13 +32,13 @@ def flat(x: float, y: float, z: float, yaw: float = 0.0) -> RigidTransform:
 
 DOWN = RigidTransform(RollPitchYaw(0.0, np.pi, 0.0), [-0.06, 0.0, 0.01])
 
-GEOMETRY = HandlingGeometry(
+GEOMETRY = PickAndPlaceGeometry(
     X_BO=flat(-0.06, 0.0, 0.01), X_BP=flat(0.0, 0.0, 0.09), X_GT=flat(0.0, 0.085, -0.01),
     X_PC_object=DOWN, X_PC_goal=flat(0.0, 0.15, 0.0) @ DOWN,
     X_WB=flat(0.0, 0.0, 0.1), X_WG=flat(0.3, 0.1, 0.1), weight=WEIGHT,
 )  # fmt: skip
 
-RULES = HandlingRules(
+RULES = PickAndPlaceRules(
     hover=0.08, distance=5e-4, angle=0.01, hold=0.2, passing_distance=2e-3, fresh=0.25, blind=2.0,
     pause=0.2, phase_limit=30.0, smoothing=0.1, period=PERIOD,
 )  # fmt: skip
@@ -59,7 +59,7 @@ class World:
     def estimate(self) -> RigidTransform:
         return self.drift @ self.X_WP
 
-    def reading(self, time: float, state: HandlingState) -> Reading:
+    def reading(self, time: float, state: PickAndPlaceState) -> Reading:
         closed = state.phase in (Phase.GRASP, Phase.LIFT, Phase.CARRY, Phase.LOWER)
         if state.phase is Phase.GRASP and self.X_PB is None:
             self.X_PB = self.X_WP.inverse() @ self.X_WB
@@ -80,9 +80,11 @@ class World:
         return tuple(C.inverse() @ T for C, T in zip(cameras, tags, strict=True))
 
 
-def play(world: World, rules: HandlingRules = RULES) -> tuple[HandlingState, list[Phase], World]:
+def play(
+    world: World, rules: PickAndPlaceRules = RULES
+) -> tuple[PickAndPlaceState, list[Phase], World]:
     """Steps until the task has ended; the platform is after each step where it shall be."""
-    task = HandlingTask(GEOMETRY, rules)
+    task = PickAndPlaceTask(GEOMETRY, rules)
     state = task.start(world.estimate())
     phases = [state.phase]
     for step in range(LIMIT):
@@ -132,7 +134,7 @@ def test_a_tag_that_stays_hidden_ends_the_task_with_its_phase(phase):
 
 
 def test_a_view_that_is_lost_and_found_is_counted():
-    task = HandlingTask(GEOMETRY, RULES)
+    task = PickAndPlaceTask(GEOMETRY, RULES)
     world = World()
     state = task.start(world.estimate())
     for step in range(12):
@@ -166,6 +168,6 @@ def test_a_phase_that_takes_too_long_ends_the_task():
 
 def test_a_state_is_the_numbers_that_it_is_kept_as():
     state, _, _ = play(World())
-    again = HandlingState.unpacked(state.packed())
+    again = PickAndPlaceState.unpacked(state.packed())
     np.testing.assert_allclose(again.packed(), state.packed(), rtol=0.0, atol=1e-15)
     assert (again.phase, again.failed_in, again.failure) == (Phase.DONE, Phase.DONE, Failure.NONE)

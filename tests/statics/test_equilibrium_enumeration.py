@@ -9,10 +9,10 @@ from pydrake.math import RigidTransform, RotationMatrix
 from cdpr_drake.errors import EquilibriumError
 from cdpr_drake.geometry.poses import pose_error
 from cdpr_drake.geometry.straight_cables import cable_lengths
-from cdpr_drake.statics.equilibria_at_position import placed_rests
+from cdpr_drake.statics.equilibria_at_position import enumerate_at_position
 from cdpr_drake.statics.equilibrium import Stability
-from cdpr_drake.statics.equilibrium_enumeration import all_rests
-from cdpr_drake.statics.equilibrium_search import sampled_rests
+from cdpr_drake.statics.equilibrium_enumeration import enumerate_equilibria
+from cdpr_drake.statics.equilibrium_search import sample_equilibria
 from cdpr_drake.statics.homotopy_kernel import FOUND
 from cdpr_drake.statics.inextensible_problem import Certificate
 from cdpr_drake.statics.start_systems import KINDS, distinct, follow_all, start_system
@@ -51,7 +51,7 @@ def test_start_systems_are_solved_and_have_as_many_solutions_as_published(name):
 
 def test_a_pendulum_hangs_and_stands():
     platform = hanging([(0, 0, 2)], [(0.1, 0, 0.2)], (0, 0.3, -0.1))
-    low, high = all_rests(platform, np.array([1.2])).rests
+    low, high = enumerate_equilibria(platform, np.array([1.2])).rests
     reach = np.linalg.norm([0.1, -0.3, 0.3])
     for one, height, stability in (
         (low, 0.8 - reach, Stability.NEUTRAL),  # it turns about the vertical
@@ -65,7 +65,7 @@ def test_a_pendulum_hangs_and_stands():
 
 def test_a_pendulum_in_a_plane_is_isolated():
     platform = hanging([(0, 0, 2)], [(0.1, 0, 0.2)], (0.2, 0, -0.1), **UPRIGHT)
-    low, high = all_rests(platform, np.array([1.2])).rests
+    low, high = enumerate_equilibria(platform, np.array([1.2])).rests
     assert (low.stability, high.stability) == (Stability.STABLE, Stability.UNSTABLE)
     assert not low.family
     for one in (low, high):  # it turns about y only
@@ -86,7 +86,7 @@ THREE = [(RADIUS * np.cos(a), RADIUS * np.sin(a), 2.0) for a in 2 * np.pi / 3 * 
 )
 def test_a_point_mass_on_three_cables_rests_once(third, slack, point):
     platform = hanging(THREE, [(0, 0, 0)] * 3, (0, 0, 0), num_turns=0)
-    (only,) = all_rests(platform, np.array([LENGTH, LENGTH, third])).rests
+    (only,) = enumerate_equilibria(platform, np.array([LENGTH, LENGTH, third])).rests
     assert only.X_WP.translation() == pytest.approx(point, abs=EXACT)
     assert only.stability == Stability.STABLE
     assert only.slack.tolist() == [False, False, slack]
@@ -105,7 +105,7 @@ def test_an_isosceles_platform_on_two_cables(length, count):
     exits, anchors = flat([(-1, 2), (1, 2)]), flat([(-0.3, 0), (0.3, 0)])
     platform = hanging(exits, anchors, (0, 0, -0.1), **UPRIGHT)
     lengths = np.full(2, length)
-    found = all_rests(platform, lengths)
+    found = enumerate_equilibria(platform, lengths)
     heights = [2 - np.sqrt(length**2 - (1 - s * 0.3) ** 2) for s in (1, -1)[:count]]
     symmetric = [one for one in found.rests if abs(one.X_WP.translation()[0]) < EXACT]
     assert [one.X_WP.translation()[2] for one in symmetric] == pytest.approx(heights, abs=EXACT)
@@ -125,7 +125,7 @@ def test_two_cables_in_the_plane_miss_nothing_of_the_linkage():
         platform, lengths = random_problem(random, 2, upright=True)
         seen = rests_on_a_linkage(platform, lengths)
         try:
-            found = all_rests(platform, lengths)
+            found = enumerate_equilibria(platform, lengths)
         except EquilibriumError:
             assert not seen
             continue
@@ -146,10 +146,12 @@ def test_a_body_in_space_on_two_cables_has_the_poses_of_the_plane_twice():
     """Either way round: the plane of cables is that of the exit points."""
     exits, anchors = flat([(-1, 2), (1, 2.2)]), flat([(-0.3, 0), (0.3, 0.05)])
     lengths, center = np.array([1.3, 1.4]), (0.05, 0, -0.1)
-    upright = all_rests(hanging(exits, anchors, center, **UPRIGHT), lengths).rests
+    upright = enumerate_equilibria(hanging(exits, anchors, center, **UPRIGHT), lengths).rests
     mirrored = [(-x, 0, z) for x, _, z in anchors]
-    other = all_rests(hanging(exits, mirrored, (-0.05, 0, -0.1), **UPRIGHT), lengths).rests
-    space = all_rests(hanging(exits, anchors, center), lengths).rests
+    other = enumerate_equilibria(
+        hanging(exits, mirrored, (-0.05, 0, -0.1), **UPRIGHT), lengths
+    ).rests
+    space = enumerate_equilibria(hanging(exits, anchors, center), lengths).rests
     heights = sorted(one.energy for one in [*upright, *other])
     assert [one.energy for one in space] == pytest.approx(heights, abs=EXACT)
 
@@ -159,7 +161,7 @@ def test_a_pendulum_turns_to_where_a_slack_cable_reaches():
     exits, anchors = [(0, 0, 2), (1.0, 0, 1.3)], [(0, 0, 0), (-0.4, 0, -0.3)]
     platform = hanging(exits, anchors, (0, 0, -0.3))
     lengths = np.array([1.0, 0.95])
-    found = all_rests(platform, lengths).rests
+    found = enumerate_equilibria(platform, lengths).rests
     (hung,) = [one for one in found if one.tensions[1] == 0 and one.energy < WEIGHT]
     assert hung.family
     assert hung.X_WP.translation() == pytest.approx([0, 0, 1], abs=EXACT)
@@ -176,7 +178,7 @@ def test_random_starts_find_nothing_else():
 
 def test_certificates_need_a_solution_and_say_where_it_is_alone():
     platform, lengths = random_problem(np.random.default_rng(3), 3, upright=False)
-    found = all_rests(platform, lengths)
+    found = enumerate_equilibria(platform, lengths)
     assert found.complete
     assert found.paths.paths == 3 * 2 * 12 + 156
     for one in found.rests:
@@ -196,7 +198,7 @@ def test_lengths_of_more_cables_than_motions_from_one_pose():
     platform = hanging(exits, anchors, (0.02, 0, 0), **UPRIGHT)
     X_WP = RigidTransform(RotationMatrix.MakeYRotation(0.1), [0.1, 0.0, 1.1])
     lengths = cable_lengths(X_WP, platform.cables.p_WA, platform.cables.p_PB)
-    found = all_rests(platform, lengths)
+    found = enumerate_equilibria(platform, lengths)
     here = [one for one in found.rests if pose_error(one.X_WP, X_WP)[0] < 1e-7]
     assert len(here) == 1
     assert here[0].certificate == Certificate.PROVEN_TAUT
@@ -211,7 +213,10 @@ def test_a_tilted_world_changes_nothing():
         cables=replace(platform.cables, p_WA=tilt.matrix() @ platform.cables.p_WA),
         weight_W=tilt.matrix() @ platform.weight_W,
     )
-    plain, other = all_rests(platform, lengths).rests, all_rests(tilted, lengths).rests
+    plain, other = (
+        enumerate_equilibria(platform, lengths).rests,
+        enumerate_equilibria(tilted, lengths).rests,
+    )
     assert len(plain) == len(other)
     for one, two in zip(plain, other, strict=True):
         expected = tilt.matrix() @ one.X_WP.multiply(platform.p_PCo)
@@ -220,8 +225,10 @@ def test_a_tilted_world_changes_nothing():
 
 def test_a_position_gives_back_the_turn_and_the_lengths():
     platform, lengths = random_problem(np.random.default_rng(3), 3, upright=False)
-    one = next(one for one in all_rests(platform, lengths).rests if np.all(one.tensions > 0.0))
-    placed = placed_rests(platform, one.X_WP.translation(), [0, 1, 2])
+    one = next(
+        one for one in enumerate_equilibria(platform, lengths).rests if np.all(one.tensions > 0.0)
+    )
+    placed = enumerate_at_position(platform, one.X_WP.translation(), [0, 1, 2])
     assert placed.paths.paths == 24
     assert placed.paths.lost == 0
     errors = [pose_error(one.X_WP, other.X_WP)[1] for other in placed.rests]
@@ -233,7 +240,7 @@ def test_a_position_gives_back_the_turn_and_the_lengths():
 
 def test_elastic_cables_stretch_by_their_tensions():
     platform = hanging(THREE, [(0, 0, 0)] * 3, (0, 0, 0), num_turns=0)
-    found = sampled_rests(platform, np.full(3, LENGTH), most=200)
+    found = sample_equilibria(platform, np.full(3, LENGTH), most=200)
     (only,) = found.rests
     assert found.stopped
     assert found.expected < 1.5
@@ -261,4 +268,4 @@ def test_elastic_cables_stretch_by_their_tensions():
 def test_lengths_that_no_pose_has_are_named(change, lengths, words):
     platform = replace(hanging(THREE, 0.1 * np.array(THREE), (0, 0, 0)), **change)
     with pytest.raises(EquilibriumError, match=words):
-        all_rests(platform, np.array(lengths))
+        enumerate_equilibria(platform, np.array(lengths))

@@ -12,7 +12,7 @@ from cdpr_drake.tensions.slack_correction import tension_correction
 from cdpr_drake.vision.cable_images import (
     cable_images,
     catenary_drop,
-    seen_slack,
+    slack_from_image,
     slack_rates,
     surplus_of_drops,
 )
@@ -68,14 +68,16 @@ def image(surplus, noise, seed=0):
 
 @pytest.mark.parametrize("surplus", [0.02, 0.04, 0.08])
 def test_slack_is_seen_as_it_is(surplus):
-    exact = seen_slack(image(surplus, 0.0), CABLES, X_WP, X_WE, PINHOLE, 0.5)
+    exact = slack_from_image(image(surplus, 0.0), CABLES, X_WP, X_WE, PINHOLE, 0.5)
     there = np.isfinite(exact.surplus[:2])
     assert np.any(there)
     np.testing.assert_allclose(exact.surplus[:2][there], surplus, atol=CURVE)
     taut = exact.surplus[2:][np.isfinite(exact.surplus[2:])]
     np.testing.assert_allclose(taut, 0.0, atol=CURVE)
     noisy = np.array([
-        seen_slack(image(surplus, 0.5, seed), CABLES, X_WP, X_WE, PINHOLE, 0.5).surplus[:2][there]
+        slack_from_image(
+            image(surplus, 0.5, seed), CABLES, X_WP, X_WE, PINHOLE, 0.5
+        ).surplus[:2][there]
         for seed in range(40)
     ])  # fmt: skip
     # Predicted deviation, within a half of that of 40 pictures.
@@ -85,7 +87,7 @@ def test_slack_is_seen_as_it_is(surplus):
 
 def test_an_error_of_the_pose_is_no_larger_one_of_the_slack():
     wrong = X_WP @ exponential(np.array([0.0, 0.0, 0.0, 3e-3, -3e-3, 3e-3]))
-    found = seen_slack(image(0.04, 0.0), CABLES, wrong, X_WE, PINHOLE, 0.5).surplus[:2]
+    found = slack_from_image(image(0.04, 0.0), CABLES, wrong, X_WE, PINHOLE, 0.5).surplus[:2]
     assert np.nanmax(np.abs(found - 0.04)) < 0.02
 
 
@@ -96,7 +98,7 @@ def test_what_is_not_in_the_image_is_not_seen():
     )
     pixels = cable_images(curves, X_WE @ away, PINHOLE, COUNT, 0.0, np.random.default_rng(0))
     assert np.all(np.isnan(pixels))
-    found = seen_slack(pixels, CABLES, X_WP, X_WE @ away, PINHOLE, 0.5)
+    found = slack_from_image(pixels, CABLES, X_WP, X_WE @ away, PINHOLE, 0.5)
     assert np.all(np.isnan(found.surplus))
 
 

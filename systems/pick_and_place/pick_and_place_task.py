@@ -80,7 +80,7 @@ SUPPORTED = 0.5
 
 
 @dataclass(frozen=True)
-class HandlingGeometry:
+class PickAndPlaceGeometry:
     """What the robot knows of box, goal and itself; true are only the sizes.
 
     Attributes:
@@ -105,7 +105,7 @@ class HandlingGeometry:
 
 
 @dataclass(frozen=True)
-class HandlingRules:
+class PickAndPlaceRules:
     """When phases end; units and meanings as in the scenario's section `handling`.
 
     Attributes:
@@ -136,7 +136,7 @@ class HandlingRules:
 
 
 @dataclass(frozen=True, eq=False)
-class HandlingState:
+class PickAndPlaceState:
     """Where a task stands.
 
     Attributes:
@@ -184,10 +184,10 @@ class HandlingState:
         ])  # fmt: skip
 
     @staticmethod
-    def unpacked(numbers: Array) -> HandlingState:
+    def unpacked(numbers: Array) -> PickAndPlaceState:
         """From the numbers of `packed`."""
         poses = [pose_from_row(row) for row in numbers[6:34].reshape(4, 7)]
-        return HandlingState(
+        return PickAndPlaceState(
             Phase(int(numbers[0])), float(numbers[1]), Phase(int(numbers[2])),
             Failure(int(numbers[3])), float(numbers[4]), float(numbers[5]), poses[0],
             poses[1], poses[2], poses[3], np.array(numbers[34:37]), float(numbers[37]),
@@ -196,7 +196,7 @@ class HandlingState:
 
 
 STATE_SIZE = 40
-"""Numbers of a packed `HandlingState`."""
+"""Numbers of a packed `PickAndPlaceState`."""
 
 
 @dataclass(frozen=True)
@@ -220,22 +220,22 @@ class Reading:
     load: float
 
 
-class HandlingTask:
+class PickAndPlaceTask:
     """The task; see the module."""
 
-    def __init__(self, geometry: HandlingGeometry, rules: HandlingRules) -> None:
+    def __init__(self, geometry: PickAndPlaceGeometry, rules: PickAndPlaceRules) -> None:
         """With what is known and when phases end."""
         self.geometry, self.rules = geometry, rules
 
-    def start(self, X_WP: RigidTransform) -> HandlingState:
+    def start(self, X_WP: RigidTransform) -> PickAndPlaceState:
         """Before the first step, from the believed pose of the platform [m]."""
         known = self.geometry
-        return HandlingState(
+        return PickAndPlaceState(
             Phase.APPROACH, 0.0, Phase.APPROACH, Failure.NONE, -1.0, -1.0,
             known.X_WB, known.X_WG, known.X_BP.inverse(), X_WP, np.zeros(3), 0.0, 0.0, 0.0,
         )  # fmt: skip
 
-    def aim(self, state: HandlingState) -> RigidTransform | None:
+    def aim(self, state: PickAndPlaceState) -> RigidTransform | None:
         """Where the platform shall go, X_WP as it is estimated [m]; None: it rests."""
         phase, known = state.phase, self.geometry
         if phase in RESTS:
@@ -246,7 +246,7 @@ class HandlingTask:
             return state.X_WB @ up @ known.X_BP
         return state.X_WG @ up @ state.X_PB.inverse()
 
-    def step(self, state: HandlingState, reading: Reading) -> HandlingState:
+    def step(self, state: PickAndPlaceState, reading: Reading) -> PickAndPlaceState:
         """The state after a step; the one before it is not changed."""
         state = replace(self._look(state, reading), time=reading.time)
         if state.phase in (Phase.DONE, Phase.FAILED):
@@ -266,7 +266,7 @@ class HandlingTask:
             state, phase=after, failed_in=after, began=reading.time, reached=-1.0, last_seen=-1.0
         )
 
-    def _look(self, state: HandlingState, reading: Reading) -> HandlingState:
+    def _look(self, state: PickAndPlaceState, reading: Reading) -> PickAndPlaceState:
         """Corrects what is believed by what the image of the step before shows."""
         phase, known = state.phase, self.geometry
         seen = self._seen(state, reading)
@@ -289,7 +289,7 @@ class HandlingTask:
             times[0] += 1.0
         return replace(state, last_seen=reading.time, sightings=times, **changes)
 
-    def _seen(self, state: HandlingState, reading: Reading) -> RigidTransform | None:
+    def _seen(self, state: PickAndPlaceState, reading: Reading) -> RigidTransform | None:
         if state.phase in LOOKS_AT_GOAL:
             return reading.X_CT
         return reading.X_CO if state.phase in LOOKS_AT_OBJECT else None
@@ -299,7 +299,7 @@ class HandlingTask:
         share = max(self.rules.smoothing, 1.0 / (times + 1.0))
         return old @ exponential(share * logarithm(old.inverse() @ new))
 
-    def _count_blindness(self, state: HandlingState, reading: Reading) -> HandlingState:
+    def _count_blindness(self, state: PickAndPlaceState, reading: Reading) -> PickAndPlaceState:
         """Counts views that were lost; a phase that has not seen its tag yet has lost nothing."""
         if state.phase not in NEEDS_TAG or state.last_seen < 0.0:
             return state
@@ -312,7 +312,7 @@ class HandlingTask:
             state, losses=state.losses + float(first), blind_time=state.blind_time + more
         )
 
-    def _failure(self, state: HandlingState, reading: Reading) -> Failure:
+    def _failure(self, state: PickAndPlaceState, reading: Reading) -> Failure:
         rules, phase = self.rules, state.phase
         waited = reading.time - max(state.last_seen, state.began)
         if phase in NEEDS_TAG and waited > rules.blind:
@@ -324,7 +324,7 @@ class HandlingTask:
             return Failure.NOT_GRASPED
         return Failure.TOO_LONG if passed > rules.phase_limit else Failure.NONE
 
-    def _reached_since(self, state: HandlingState, reading: Reading) -> float:
+    def _reached_since(self, state: PickAndPlaceState, reading: Reading) -> float:
         """Since when the phase's end is reached [s], or -1."""
         aim = self.aim(state)
         if aim is None:
@@ -345,11 +345,11 @@ class HandlingTask:
             return -1.0
         return state.reached if state.reached >= 0.0 else reading.time
 
-    def _is_over(self, state: HandlingState, reading: Reading) -> bool:
+    def _is_over(self, state: PickAndPlaceState, reading: Reading) -> bool:
         rules = self.rules
         if state.phase in RESTS:
             return self._has_paused(state, reading)
         return state.reached >= 0.0 and reading.time - state.reached >= rules.hold - NOW
 
-    def _has_paused(self, state: HandlingState, reading: Reading) -> bool:
+    def _has_paused(self, state: PickAndPlaceState, reading: Reading) -> bool:
         return reading.time - state.began >= self.rules.pause - NOW

@@ -12,7 +12,7 @@ from numba import njit
 from cdpr_drake.arrays import Array
 from cdpr_drake.dynamics.advance_kernel import advance_explicitly, advance_semi_implicitly
 from cdpr_drake.dynamics.robot_arrays import RobotArrays
-from cdpr_drake.dynamics.robot_kernel import GOOD
+from cdpr_drake.dynamics.robot_kernel import INTEGRATION_OK
 from cdpr_drake.numerics.kernel_calls import (
     array_addresses,
     cube_at,
@@ -26,14 +26,14 @@ METHOD, MAX_STEP, BOUND = range(3)
 and rad], infinite for any."""
 
 BACKWARD = -3
-"""Result of `reach_explicitly` where the time lies before the state's."""
+"""Result of `integrate_explicit` where the time lies before the state's."""
 
 REACHED_MORE = 5
 """Numbers of what is reached behind the state: its time [s] and `advance_kernel.REPORTED`."""
 
 
 def fresh_memory(states: int, cables: int) -> Array:
-    """Memory of `reach_explicitly` that has reached nothing, for states of platform and winches."""
+    """Memory of `integrate_explicit` that has reached nothing, for platform and winches."""
     memory = np.zeros(2 * (states + REACHED_MORE) + 1 + cables)
     memory[2 * (states + REACHED_MORE)] = np.nan
     return memory
@@ -92,7 +92,7 @@ def _begins(present: Array, memory: Array, command: Array, rate: Array, time: fl
 
 
 @njit(cache=True)
-def reach_explicitly(
+def integrate_explicit(
     robot: np.ndarray, rule: Array, present: Array, command: Array, others: Array, time: float,
     memory: Array,
 ) -> int:  # fmt: skip
@@ -111,13 +111,13 @@ def reach_explicitly(
             rest is work space.
 
     Returns:
-        `GOOD`, `BACKWARD`, or as `advance_robot`; then the state that is written is the last good
-        one, and its time not changed.
+        `INTEGRATION_OK`, `BACKWARD`, or as `advance_robot`; then the state that is written is the
+        last good one, and its time not changed.
     """
     size = present.shape[0]
     done = _begins(present, memory, command, others[0], time)
     if done != 0:
-        return GOOD if done == 1 else done
+        return INTEGRATION_OK if done == 1 else done
     new, n, at = memory[size : 2 * size], size - REACHED_MORE, 2 * size
     passed = time - new[n]
     if passed > 0.0:
@@ -125,55 +125,55 @@ def reach_explicitly(
             robot_at(robot), int(rule[METHOD]), new[:n], memory[at + 1 :], others[0],
             others[1], passed, rule[MAX_STEP], rule[BOUND], new[n + 1 :],
         )  # fmt: skip
-        if bad != GOOD:
+        if bad != INTEGRATION_OK:
             return bad
     new[n] = time
     memory[at] = time
-    return GOOD
+    return INTEGRATION_OK
 
 
 @njit(cache=True)
-def reach_explicitly_along(
+def integrate_explicit_along(
     robot: np.ndarray, rule: Array, present: Array, commands: Array, others: Array, times: Array,
     memory: Array, reached: Array,
 ) -> int:  # fmt: skip
-    """`reach_explicitly` from each time to the next, with a command for each way.
+    """`integrate_explicit` from each time to the next, with a command for each way.
 
     Args:
-        robot: As of `reach_explicitly`.
-        rule: As of `reach_explicitly`.
+        robot: As of `integrate_explicit`.
+        rule: As of `integrate_explicit`.
         present: As there at the first time; what is reached at the last one is written into it.
         commands: At the ends of the ways, shape (n, m).
-        others: As of `reach_explicitly`.
+        others: As of `integrate_explicit`.
         times: Where ways begin and end, shape (n + 1,) [s].
-        memory: As of `reach_explicitly`.
+        memory: As of `integrate_explicit`.
         reached: What is present at the end of each way is written here, shape (n, k).
 
     Returns:
-        As `reach_explicitly`, of the last way, or of the first that fails; then what is present
+        As `integrate_explicit`, of the last way, or of the first that fails; then what is present
         stays that of its beginning.
     """
     size = present.shape[0]
     for k in range(commands.shape[0]):
-        bad = reach_explicitly(robot, rule, present, commands[k], others, times[k + 1], memory)
-        if bad != GOOD:
+        bad = integrate_explicit(robot, rule, present, commands[k], others, times[k + 1], memory)
+        if bad != INTEGRATION_OK:
             return bad
         for i in range(size):
             present[i] = memory[size + i]
             reached[k, i] = memory[size + i]
-    return GOOD
+    return INTEGRATION_OK
 
 
 @njit(cache=True)
-def reach_semi_implicitly(
+def integrate_semi_implicit(
     robot: np.ndarray, rule: Array, present: Array, command: Array, others: Array, time: float,
     memory: Array,
 ) -> int:  # fmt: skip
-    """As `reach_explicitly` by the semi-implicit method; of its own, since it compiles longer."""
+    """As `integrate_explicit` by the semi-implicit method; of its own, since it compiles longer."""
     size = present.shape[0]
     done = _begins(present, memory, command, others[0], time)
     if done != 0:
-        return GOOD if done == 1 else done
+        return INTEGRATION_OK if done == 1 else done
     new, n, at = memory[size : 2 * size], size - REACHED_MORE, 2 * size
     passed = time - new[n]
     if passed > 0.0:
@@ -181,8 +181,8 @@ def reach_semi_implicitly(
             robot_at(robot), new[:n], memory[at + 1 :], others[0],
             others[1], passed, rule[MAX_STEP], rule[BOUND], new[n + 1 :],
         )  # fmt: skip
-        if bad != GOOD:
+        if bad != INTEGRATION_OK:
             return bad
     new[n] = time
     memory[at] = time
-    return GOOD
+    return INTEGRATION_OK
