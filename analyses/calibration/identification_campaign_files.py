@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from pydrake.common.yaml import yaml_dump_typed
 from rich.table import Table
 
@@ -96,7 +97,7 @@ def _tracking_table(campaign: DynamicCampaign) -> Table:
     return table
 
 
-def _tracking_figure(campaign: DynamicCampaign) -> Any:
+def _tracking_figure(campaign: DynamicCampaign) -> Figure:
     """Mean and largest errors of tracking, by what is believed in."""
     figure, axes = new_figure(
         1, 2, (12.0, 5.0), f"Tracking of {campaign.scenario.name}, a motion that was not fitted"
