@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -46,8 +47,11 @@ def write_dynamic_campaign(campaign: DynamicCampaign, folder: Path) -> LogFit:
         columns = dict(zip(column_names(log, names), table.T, strict=True))
         write_columns(folder / f"{name}.csv", columns)
     write_scenario(folder / "scenario.yaml", excitation_scenario(campaign))
-    drawings = {**fit.drawings, "tracking": partial(_tracking_figure, campaign)}
-    return replace(fit, tables=(*fit.tables, _tracking_table(campaign)), drawings=drawings)
+    tracking: Callable[[], Figure] = partial(_tracking_figure, campaign)
+    return replace(
+        fit, tables=(*fit.tables, _tracking_table(campaign)),
+        drawings={**fit.drawings, "tracking": tracking},
+    )  # fmt: skip
 
 
 def excitation_scenario(campaign: DynamicCampaign) -> TensionScenario:
