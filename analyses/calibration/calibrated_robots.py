@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from cdpr_drake.analyses.calibration.log_fit import fitted_robot
 from cdpr_drake.calibration.parameters import CalibrationModel
 from cdpr_drake.calibration.result import CalibrationResult
 from cdpr_drake.errors import CalibrationError
@@ -92,7 +93,5 @@ def calibrated_robot(
     frames = [key for key in ("tracker", "marker") if any(n.startswith(f"{key}.") for n in moved)]
     if frames:
         left.append(f"the {' and the '.join(frames)} belong to the log; they are in results.json")
-    words = f"Calibrated: {result.status}, {len(result.names)} parameters."
-    assumptions = f"{robot.assumptions} {words}".strip()
-    made = replace(robot, cables=cables, cameras=cameras, winch=winch, assumptions=assumptions)
-    return made, tuple(left)
+    changes = {"cables": cables, "cameras": cameras, "winch": winch}
+    return fitted_robot(robot, "Calibrated", result, **changes), tuple(left)

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from pydrake.common.yaml import yaml_dump_typed
 from rich.table import Table
 
 from cdpr_drake.analyses.calibration.calibrated_robots import calibrated_robot
 from cdpr_drake.analyses.calibration.calibration_task import Calibration
 from cdpr_drake.analyses.calibration.fit_verdict import MISFIT_FACTOR
-from cdpr_drake.analyses.reporting.log_files import finite, write_json, write_whole
+from cdpr_drake.analyses.calibration.log_fit import LogFit
+from cdpr_drake.analyses.reporting.log_files import finite
 from cdpr_drake.analyses.reporting.provenance import package_versions
 from cdpr_drake.analyses.reporting.statements import new_table
 from cdpr_drake.analyses.visualization.figure_style import bar_style, new_figure
@@ -24,8 +23,8 @@ from cdpr_drake.calibration.result import Outlier
 from cdpr_drake.geometry.poses import pose_row
 from cdpr_drake.palette import nth_look
 
-ROBOT, RESULTS = "robot.yaml", "results.json"
-"""Files of a results folder: the robot as it is believed now, and all numbers."""
+RESULTS = "results.json"
+"""File of a results folder: all numbers."""
 
 SIGNED = 0.2
 """Negative correlations that are larger bear a sign in the figure."""
@@ -114,8 +113,8 @@ def residual_row(one: Outlier) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def calibration_tables(calibration: Calibration) -> list[Table]:
-    """Tables for the terminal: fit, parameters by group, what cannot be told, outliers."""
+def _tables(calibration: Calibration, remarks: Sequence[str]) -> list[Table]:
+    """Fit, parameters by group, what cannot be told, outliers."""
     result = calibration.result
     fit = new_table(
         f"{calibration.task.robot.name}: {result.status}, {calibration.log.count} poses, residuals "
@@ -140,7 +139,7 @@ def calibration_tables(calibration: Calibration) -> list[Table]:
     said = [("frames are not told", words) for words in result.gauge]
     said += [("frames are hardly told", words) for words in result.loose]
     said += [("from the prior alone", words) for words in result.prior_only]
-    said += [("remark", words) for words in calibration_dict(calibration)["remarks"]]
+    said += [("remark", words) for words in remarks]
     if said:
         notes = new_table("To know", ("what", "which"), ())
         for what, words in said:
@@ -258,10 +257,12 @@ def _correlation_figure(calibration: Calibration) -> Figure:
     return matrix
 
 
-def write_calibration(
-    calibration: Calibration, folder: Path, more: Mapping[str, Any] | None = None
-) -> None:
-    """Writes `results.json`, with more numbers, and `robot.yaml` into a folder."""
-    write_json(folder / RESULTS, calibration_dict(calibration, more))
+def calibration_fit(
+    calibration: Calibration, more: Mapping[str, Any] | None = None, tables: Sequence[Table] = ()
+) -> LogFit:
+    """What is told of a calibration, with more numbers and tables."""
     robot, _ = calibrated_robot(calibration.task.robot, calibration.result, calibration.mount)
-    write_whole(folder / ROBOT, yaml_dump_typed(robot))
+    numbers = calibration_dict(calibration, more)
+    shown = (*_tables(calibration, numbers["remarks"]), *tables)
+    drawings = calibration_drawings(calibration)
+    return LogFit(robot, RESULTS, numbers, shown, drawings, not calibration.misfit)

@@ -10,6 +10,7 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.calibration.calibrated_robots import calibration_model, find_mount
 from cdpr_drake.analyses.calibration.log_file import CalibrationLog
+from cdpr_drake.analyses.calibration.log_fit import wound_lengths
 from cdpr_drake.arrays import Array
 from cdpr_drake.calibration.guesses import with_tags
 from cdpr_drake.calibration.parameters import CalibrationModel, parameter_layout
@@ -150,9 +151,7 @@ def prepare(task: CalibrationTask, log: CalibrationLog) -> Prepared:
         CalibrationError: The log does not hold what is asked; names it.
     """
     robot, sigmas = task.robot, task.sigmas
-    lengths = log.lengths
-    if lengths is None and log.angles is not None:
-        lengths = robot.drum().paid_out(log.angles)
+    lengths = wound_lengths(robot, log)
     if lengths is None and log.swivels is None:
         raise CalibrationError(
             f"{log.path}: cable lengths: found none; accepted: columns such as C1_length_m, or "

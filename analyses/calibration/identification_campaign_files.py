@@ -14,11 +14,8 @@ from pydrake.common.yaml import yaml_dump_typed
 from rich.table import Table
 
 from cdpr_drake.analyses.calibration.identification_campaign import DynamicCampaign
-from cdpr_drake.analyses.calibration.identification_report import (
-    ROBOT,
-    identification_drawings,
-    write_identification,
-)
+from cdpr_drake.analyses.calibration.identification_report import identification_fit
+from cdpr_drake.analyses.calibration.log_fit import ROBOT, LogFit
 from cdpr_drake.analyses.reporting.exported_logs import write_columns
 from cdpr_drake.analyses.reporting.log_files import column_names, write_scenario, write_whole
 from cdpr_drake.analyses.reporting.provenance import BELIEVED_FILE
@@ -34,13 +31,14 @@ TRUE_FILE = "true_robot.yaml"
 """The robot as it is, in a campaign's folder."""
 
 
-def write_dynamic_campaign(campaign: DynamicCampaign, folder: Path) -> None:
-    """Writes what `write_identification` does, and logs, robots and scenario.
+def write_dynamic_campaign(campaign: DynamicCampaign, folder: Path) -> LogFit:
+    """Writes what its fit does, and logs, robots and scenario; what is told of it.
 
     `excitation.csv` and `validation.csv` are logs as `cdpr identify` reads them;
     `scenario.yaml` has the true robot follow the excitation, believed to be the one that was found.
     """
-    write_identification(campaign.identification, folder, campaign.as_dict(), campaign.truth)
+    fit = identification_fit(campaign.identification, campaign.as_dict(), campaign.truth)
+    fit.write(folder)
     for name, robot in ((TRUE_FILE, campaign.true), (BELIEVED_FILE, campaign.believed)):
         write_whole(folder / name, yaml_dump_typed(robot))
     names = [cable.name for cable in campaign.true.cables]
@@ -49,12 +47,11 @@ def write_dynamic_campaign(campaign: DynamicCampaign, folder: Path) -> None:
         columns = dict(zip(column_names(log, names), table.T, strict=True))
         write_columns(folder / f"{name}.csv", columns)
     write_scenario(folder / "scenario.yaml", excitation_scenario(campaign))
-
-
-def campaign_drawings(campaign: DynamicCampaign) -> dict[str, Callable[[], Figure]]:
-    """What draws the figures, by name: those of `identification_drawings`, and tracking."""
-    drawings = identification_drawings(campaign.identification, campaign.truth)
-    return {**drawings, "tracking": partial(tracking_figure, campaign)}
+    tracking: Callable[[], Figure] = partial(_tracking_figure, campaign)
+    return replace(
+        fit, tables=(*fit.tables, _tracking_table(campaign)),
+        drawings={**fit.drawings, "tracking": tracking},
+    )  # fmt: skip
 
 
 def excitation_scenario(campaign: DynamicCampaign) -> TensionScenario:
@@ -91,7 +88,7 @@ def _settings(scenario: TensionScenario, motion: PoseTrajectory) -> Any:
     )
 
 
-def tracking_table(campaign: DynamicCampaign) -> Table:
+def _tracking_table(campaign: DynamicCampaign) -> Table:
     """How far the platform is from where it should be, by what is believed in."""
     table = new_table(
         f"Tracking of {campaign.scenario.name}, not fitted", ("robot believed in",),
@@ -104,7 +101,7 @@ def tracking_table(campaign: DynamicCampaign) -> Table:
     return table
 
 
-def tracking_figure(campaign: DynamicCampaign) -> Any:
+def _tracking_figure(campaign: DynamicCampaign) -> Figure:
     """Mean and largest errors of tracking, by what is believed in."""
     figure, axes = new_figure(
         1, 2, (12.0, 5.0), f"Tracking of {campaign.scenario.name}, a motion that was not fitted"

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from pydrake.common.yaml import yaml_dump_typed
 from rich.table import Table
 
 from cdpr_drake.analyses.calibration.identification_task import Identification
 from cdpr_drake.analyses.calibration.identified_robots import identified_robot
-from cdpr_drake.analyses.reporting.log_files import finite, write_json, write_whole
+from cdpr_drake.analyses.calibration.log_fit import LogFit
+from cdpr_drake.analyses.reporting.log_files import finite
 from cdpr_drake.analyses.reporting.provenance import package_versions
 from cdpr_drake.analyses.reporting.statements import new_table
 from cdpr_drake.analyses.visualization.figure_style import bar_style, line_style, new_figure
@@ -22,8 +21,8 @@ from cdpr_drake.identification.parameters import DynamicModel
 from cdpr_drake.identification.result import MISFIT, MISFIT_FACTOR
 from cdpr_drake.palette import BOUND, nth_look
 
-ROBOT, RESULTS = "robot.yaml", "identification.json"
-"""Files of a results folder: the robot as it is believed now, and all numbers."""
+RESULTS = "identification.json"
+"""File of a results folder: all numbers."""
 
 AXES = (
     "moment x [N m]", "moment y [N m]", "moment z [N m]", "force x [N]", "force y [N]",
@@ -123,10 +122,10 @@ def identification_dict(
     } | dict(more or {})  # fmt: skip
 
 
-def identification_tables(
-    identification: Identification, truth: DynamicModel | None = None
+def _tables(
+    identification: Identification, truth: DynamicModel | None, remarks: Sequence[str]
 ) -> list[Table]:
-    """Tables for the terminal."""
+    """Parameters, what is not explained, the largest residuals, remarks."""
     result = identification.result
     true = {} if truth is None else true_values(identification, truth)
     names = ("before", "found", "std. error", *(["true"] if true else []), "unit")
@@ -164,7 +163,6 @@ def identification_tables(
                 f"{off.time:.3f}", off.equation, f"{off.value:.4g}", off.unit, f"{off.sigmas:.1f}"
             )
         tables.append(most)
-    remarks = identification_dict(identification)["remarks"]
     if remarks:
         notes = new_table("To know", ("remark",), ())
         for words in remarks:
@@ -231,13 +229,15 @@ def _parameter_figure(identification: Identification, truth: DynamicModel | None
     return parameters
 
 
-def write_identification(
+def identification_fit(
     identification: Identification,
-    folder: Path,
     more: Mapping[str, Any] | None = None,
     truth: DynamicModel | None = None,
-) -> None:
-    """Writes `identification.json` and `robot.yaml` into a folder."""
-    write_json(folder / RESULTS, identification_dict(identification, more, truth))
+) -> LogFit:
+    """What is told of an identification, with more numbers, beside the truth where it is known."""
     robot, _ = identified_robot(identification.task.robot, identification.result)
-    write_whole(folder / ROBOT, yaml_dump_typed(robot))
+    numbers = identification_dict(identification, more, truth)
+    tables = _tables(identification, truth, numbers["remarks"])
+    drawings = identification_drawings(identification, truth)
+    fits = identification.result.status != MISFIT
+    return LogFit(robot, RESULTS, numbers, tables, drawings, fits)

@@ -9,6 +9,7 @@ import numpy as np
 
 from cdpr_drake.analyses.calibration.identified_robots import dynamic_model, platform_size
 from cdpr_drake.analyses.calibration.log_file import CalibrationLog
+from cdpr_drake.analyses.calibration.log_fit import refuse_late_tracker, wound_lengths
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.commanded_tension_kernel import cable_motions
 from cdpr_drake.errors import IdentificationError
@@ -27,7 +28,7 @@ from cdpr_drake.identification.samples import (
 )
 from cdpr_drake.identification.smoothing import Smoother
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.numerics.time_shift import WORSE, tracker_shift
+from cdpr_drake.numerics.time_shift import tracker_shift
 
 UNKNOWN = ("mass", "center_of_mass", "inertia")
 """What is asked for where nothing else is said."""
@@ -46,9 +47,6 @@ WORTH_A_WORD = 2.0
 
 UNSETTLED = 0.1
 """Standard errors by which the last step moved that are worth a remark."""
-
-LATE = 0.25
-"""A clock is off by more than this share of the time between samples."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -238,15 +236,13 @@ def _samples(task: IdentificationTask, log: CalibrationLog, bandwidth: float) ->
 
 def _counted(task: IdentificationTask, log: CalibrationLog) -> Array:
     """Unstrained lengths as the winches count them, shape (k, m) [m]."""
-    lengths = log.lengths
-    if lengths is None and log.angles is not None:
-        lengths = task.robot.drum().paid_out(log.angles)
+    lengths = wound_lengths(task.robot, log)
     if lengths is None:
         raise IdentificationError(
             f"{log.path}: cable lengths: found none; accepted: what winches count, in columns such "
             "as C1_length_m or C1_motor_angle_rad"
         )
-    return np.asarray(lengths)
+    return lengths
 
 
 def _measure(
@@ -333,7 +329,6 @@ def _check_clock(task: IdentificationTask, log: CalibrationLog, samples: LoggedM
     """
     time = _time(log)
     step = float(np.median(np.diff(time)))
-    found = []
     if log.lengths is not None or log.angles is not None:
         rows = _pose_rows(log)
         states, cables = np.hstack([rows, np.zeros((len(rows), 6))]), task.cables().packed()
@@ -342,15 +337,7 @@ def _check_clock(task: IdentificationTask, log: CalibrationLog, samples: LoggedM
             out = np.empty((2, tracked.shape[1]))
             cable_motions(states[k], cables, 0.0, out)
             tracked[k] = out[0]
-        shift, better = tracker_shift(time, _counted(task, log), tracked)
-        found.append(("cable lengths", shift, better, LATE * step))
-    shift, better = pose_shift(samples, task.cables(), task.robot.gravity_vector())
-    found.append(("tensions", shift, better, LATE * step))
-    for what, shift, better, least in found:
-        if better > WORSE and abs(shift) > least:
-            late = "late" if shift > 0.0 else "early"
-            raise IdentificationError(
-                f"{log.path}: tracker: found it {abs(shift):.4g} s {late} against the {what}, "
-                f"which fit {better:.2g} times better with that shift; accepted: the same clock, "
-                f"or --tracker-late {shift:.4g}"
-            )
+        found = tracker_shift(time, _counted(task, log), tracked)
+        refuse_late_tracker(log, "cable lengths", found, step, IdentificationError)
+    found = pose_shift(samples, task.cables(), task.robot.gravity_vector())
+    refuse_late_tracker(log, "tensions", found, step, IdentificationError)

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from cdpr_drake.analyses.calibration.log_fit import fitted_robot
 from cdpr_drake.errors import IdentificationError
 from cdpr_drake.identification.parameters import DynamicModel
 from cdpr_drake.identification.regressor import central_parameters
@@ -86,7 +87,5 @@ def identified_robot(robot: Robot, result: IdentificationResult) -> tuple[Robot,
                 "friction: the file has one law for all winches, their mean; each is in "
                 "identification.json"
             )
-    words = f"Identified: {result.status}, {len(result.names)} parameters."
-    assumptions = f"{robot.assumptions} {words}".strip()
-    made = replace(robot, platform=platform, cables=cables, winch=winch, assumptions=assumptions)
-    return made, tuple(left)
+    changes = {"platform": platform, "cables": cables, "winch": winch}
+    return fitted_robot(robot, "Identified", result, **changes), tuple(left)

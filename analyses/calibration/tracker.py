@@ -10,10 +10,11 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.calibration.calibration_request import Prepared, unknown_frames
 from cdpr_drake.analyses.calibration.log_file import CalibrationLog
+from cdpr_drake.analyses.calibration.log_fit import refuse_late_tracker
 from cdpr_drake.calibration.guesses import guessed_tracker
 from cdpr_drake.calibration.stations import Point, Stations
 from cdpr_drake.errors import CalibrationError
-from cdpr_drake.numerics.time_shift import WORSE, tracker_shift
+from cdpr_drake.numerics.time_shift import tracker_shift
 
 
 def with_tracker(prepared: Prepared, poses: Sequence[RigidTransform]) -> Prepared:
@@ -47,15 +48,9 @@ def check_clock(prepared: Prepared) -> None:
     seen = [k for k, X in enumerate(poses) if X is not None]
     at = Point(prepared.model, Stations.at([X for X in poses if X is not None]))
     tracked[seen] = at.numbers[:, :, 0]
-    shift, better = tracker_shift(log.time, prepared.lengths, tracked)
+    found = tracker_shift(log.time, prepared.lengths, tracked)
     step = float(np.median(np.diff(log.time)))
-    if better > WORSE and abs(shift) > 0.25 * step:
-        late = "late" if shift > 0.0 else "early"
-        raise CalibrationError(
-            f"{log.path}: tracker: found it {abs(shift):.4g} s {late} against the cable lengths, "
-            f"which fit {better:.2g} times better with that shift; accepted: the same clock, or "
-            f"--tracker-late {shift:.4g}"
-        )
+    refuse_late_tracker(log, "cable lengths", found, step, CalibrationError)
 
 
 def shifted_log(log: CalibrationLog, late: float) -> CalibrationLog:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from dataclasses import fields
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
@@ -16,16 +16,10 @@ from cdpr_drake.analyses.calibration.calibration_campaign import (
     run_campaign,
     servo_again,
 )
-from cdpr_drake.analyses.calibration.calibration_report import (
-    calibration_dict,
-    calibration_drawings,
-    calibration_tables,
-    write_calibration,
-)
+from cdpr_drake.analyses.calibration.calibration_report import calibration_fit
 from cdpr_drake.analyses.calibration.calibration_request import Sigmas
-from cdpr_drake.analyses.calibration.calibration_task import (
-    Calibration,
-)
+from cdpr_drake.analyses.calibration.calibration_task import Calibration
+from cdpr_drake.analyses.calibration.log_fit import ROBOT, LogFit
 from cdpr_drake.analyses.calibration.pose_proposal import next_poses
 from cdpr_drake.analyses.front.calibration import calibrate as run_calibration
 from cdpr_drake.analyses.front.calibration import calibration_inputs
@@ -34,7 +28,6 @@ from cdpr_drake.analyses.reporting.provenance import BELIEVED_FILE, write_run_in
 from cdpr_drake.analyses.reporting.statements import new_table
 from cdpr_drake.calibration.parameters import GROUPS
 from cdpr_drake.cli.log_options import (
-    CommandResults,
     Ending,
     LogOrCampaign,
     ResultsBelowRuns,
@@ -54,7 +47,6 @@ from cdpr_drake.cli.options import (
     parse_formats,
     parse_pose,
 )
-from cdpr_drake.cli.run_endings import MISFIT
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.diagrams.load import load_scenario
@@ -171,23 +163,16 @@ def calibrate(
         "outliers": not keep_outliers,
     }  # fmt: skip
 
-    def work(folder: Path, say: Callable[[str], None]) -> CommandResults:
+    def work(folder: Path, say: Callable[[str], None]) -> LogFit:
         found = run_calibration(
             loaded, read, comma_words(unknown), sigmas=known_sigmas, tags=places, say=say, **options
         )
-        more, proposed = _proposed(found, next_count, folder, say)
-        write_calibration(found, folder, more)
-        return _told(found, more, proposed)
+        fit = calibration_fit(found, *_proposed(found, next_count, folder, say))
+        fit.write(folder)
+        return fit
 
     folder = results_below_runs(out, f"calibrate-{loaded.name}")
     return write_and_tell(f"Calibrating {loaded.name}", folder, ending, work)
-
-
-def _told(found: Calibration, more: Mapping[str, Any], tables: Sequence[Table]) -> CommandResults:
-    """What is told of a calibration, with more numbers and tables."""
-    shown = (*calibration_tables(found), *tables)
-    code = MISFIT if found.misfit else 0
-    return CommandResults(calibration_dict(found, more), shown, calibration_drawings(found), code)
 
 
 class CampaignOptions(NamedTuple):
@@ -215,25 +200,25 @@ def _campaign(name: str, asked: CampaignOptions, out: Path | None, ending: Endin
     if not isinstance(scenario, Scenario):
         raise CdprError(f"--campaign: found {name}, a {scenario.kind}; accepted: a visual servo")
 
-    def work(folder: Path, say: Callable[[str], None]) -> CommandResults:
+    def work(folder: Path, say: Callable[[str], None]) -> LogFit:
         run = run_campaign(scenario, asked.poses, say, asked.goals)
         found = run.calibration
-        write_calibration(found, folder)
-        servo = servo_again(run, str(folder / "robot.yaml"), say)
+        calibration_fit(found).write(folder)
+        servo = servo_again(run, str(folder / ROBOT), say)
         more, proposed = _proposed(found, asked.next_count, folder, say)
         told = {"campaign": run.errors() | {"remarks": list(run.remarks)}, "servo": servo}
-        more |= told
-        write_calibration(found, folder, more)
-        # As in every folder of a run: what is simulated, what is believed, and the scenario.
-        believed = (folder / "robot.yaml").rename(folder / BELIEVED_FILE)
-        servoed = calibrated_scenario(run, str(believed))
-        write_run_inputs(folder, servoed, load_robot(scenario.robot))
         table = new_table(
             f"Servo {scenario.name}", ("robot believed in", "outcome"), ("off line [mm]",)
         )
         for who, row in servo.items():
             table.add_row(who, str(row["outcome"]), f"{1e3 * float(row['off_line_m']):.2f}")
-        return _told(found, more, (*proposed, table))
+        fit = calibration_fit(found, more | told, (*proposed, table))
+        fit.write(folder)
+        # As in every folder of a run: what is simulated, what is believed, and the scenario.
+        believed = (folder / ROBOT).rename(folder / BELIEVED_FILE)
+        servoed = calibrated_scenario(run, str(believed))
+        write_run_inputs(folder, servoed, load_robot(scenario.robot))
+        return fit
 
     folder = results_below_runs(out, f"campaign-{scenario.name}")
     return write_and_tell(f"Campaign of {scenario.name}", folder, ending, work)

@@ -12,28 +12,13 @@ from cdpr_drake.analyses.calibration.identification_campaign import (
     CAMPAIGN_UNKNOWN,
     run_dynamic_campaign,
 )
-from cdpr_drake.analyses.calibration.identification_campaign_files import (
-    campaign_drawings,
-    tracking_table,
-    write_dynamic_campaign,
-)
-from cdpr_drake.analyses.calibration.identification_report import (
-    identification_dict as as_dict,
-)
-from cdpr_drake.analyses.calibration.identification_report import (
-    identification_drawings,
-)
-from cdpr_drake.analyses.calibration.identification_report import (
-    identification_tables as tables,
-)
-from cdpr_drake.analyses.calibration.identification_report import (
-    write_identification as write,
-)
+from cdpr_drake.analyses.calibration.identification_campaign_files import write_dynamic_campaign
+from cdpr_drake.analyses.calibration.identification_report import identification_fit
 from cdpr_drake.analyses.calibration.identification_task import UNKNOWN
 from cdpr_drake.analyses.calibration.log_file import read_log
+from cdpr_drake.analyses.calibration.log_fit import LogFit
 from cdpr_drake.analyses.front.calibration import identify as run_identification
 from cdpr_drake.cli.log_options import (
-    CommandResults,
     Ending,
     LogOrCampaign,
     ResultsBelowRuns,
@@ -52,11 +37,9 @@ from cdpr_drake.cli.options import (
     named_values,
     parse_formats,
 )
-from cdpr_drake.cli.run_endings import MISFIT
 from cdpr_drake.errors import CdprError
 from cdpr_drake.identification.parameters import GROUPS
-from cdpr_drake.identification.result import MISFIT as NO_FIT
-from cdpr_drake.identification.result import MISFIT_FACTOR, IdentificationResult
+from cdpr_drake.identification.result import MISFIT_FACTOR
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.scenarios.tension_control_scenario import TensionScenario
@@ -141,22 +124,17 @@ def identify(
         "outliers": not keep_outliers,
     }  # fmt: skip
 
-    def work(folder: Path, say: Callable[[str], None]) -> CommandResults:
+    def work(folder: Path, say: Callable[[str], None]) -> LogFit:
         found = run_identification(
             loaded, read, UNKNOWN if unknown is None else comma_words(unknown), validate=other,
             tracker_late=tracker_late, say=say, **options,
         )  # fmt: skip
-        write(found, folder)
-        drawings = identification_drawings(found)
-        return CommandResults(as_dict(found), tables(found), drawings, _code(found.result))
+        fit = identification_fit(found)
+        fit.write(folder)
+        return fit
 
     folder = results_below_runs(out, f"identify-{loaded.name}")
     return write_and_tell(f"Identifying {loaded.name}", folder, ending, work)
-
-
-def _code(found: IdentificationResult) -> int:
-    """Exit code of what was found."""
-    return MISFIT if found.status == NO_FIT else 0
 
 
 def _campaign(name: str, unknown: tuple[str, ...], out: Path | None, ending: Ending) -> int:
@@ -167,13 +145,8 @@ def _campaign(name: str, unknown: tuple[str, ...], out: Path | None, ending: End
             f"--campaign: found {name}, a {scenario.kind}; accepted: a scenario of tension_control"
         )
 
-    def work(folder: Path, say: Callable[[str], None]) -> CommandResults:
-        run = run_dynamic_campaign(scenario, unknown, say)
-        write_dynamic_campaign(run, folder)
-        found = run.identification
-        shown = (*tables(found, run.truth), tracking_table(run))
-        numbers = as_dict(found, run.as_dict(), run.truth)
-        return CommandResults(numbers, shown, campaign_drawings(run), _code(found.result))
+    def work(folder: Path, say: Callable[[str], None]) -> LogFit:
+        return write_dynamic_campaign(run_dynamic_campaign(scenario, unknown, say), folder)
 
     folder = results_below_runs(out, f"identify-{scenario.name}")
     return write_and_tell(f"Campaign of {scenario.name}", folder, ending, work)

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 import typer
-from matplotlib.figure import Figure
-from rich.table import Table
 
+from cdpr_drake.analyses.calibration.log_fit import LogFit
 from cdpr_drake.analyses.reporting.folder_lock import free_folder
 from cdpr_drake.analyses.reporting.output_folder import results_folder, shown_path
 from cdpr_drake.analyses.visualization.figure_files import write_figures
 from cdpr_drake.cli.completion import robot_words
-from cdpr_drake.cli.run_endings import report_failures, report_kept_files
+from cdpr_drake.cli.run_endings import MISFIT, report_failures, report_kept_files
 from cdpr_drake.cli.terminal import message_console, print_json, wide_console, working
 from cdpr_drake.errors import CdprError
 
@@ -77,17 +76,7 @@ class Ending(NamedTuple):
     formats: tuple[str, ...]
 
 
-class CommandResults(NamedTuple):
-    """What is told of results that are written: for JSON, for the terminal, as figures, and by an
-    exit code where they are not what was asked for."""
-
-    numbers: dict[str, Any]
-    tables: Sequence[Table]
-    drawings: Mapping[str, Callable[[], Figure]]
-    code: int = 0
-
-
-Work = Callable[[Path, Callable[[str], None]], CommandResults]
+Work = Callable[[Path, Callable[[str], None]], LogFit]
 """Writes results into the folder that it gets; may tell how far it is."""
 
 
@@ -104,25 +93,25 @@ def write_and_tell(title: str, folder: Path, ending: Ending, work: Work) -> int:
         work: Writes them.
 
     Returns:
-        The exit code.
+        The exit code; `MISFIT` where what was found does not fit what was measured.
 
     Raises:
         OutputFolderError: The folder cannot be written, or holds other results.
     """
     console = message_console()
     with results_folder(folder, ending.overwrite) as results, working(console, title) as say:
-        told = work(results.path, say)
+        fit = work(results.path, say)
         published = results.publish()
         say("figures")
-        failed = write_figures(published, told.drawings, ending.formats)
+        failed = write_figures(published, fit.drawings, ending.formats)
     report_kept_files(console, results.kept)
     folder = shown_path(published)
     if ending.as_json:
-        print_json(told.numbers)
+        print_json(fit.numbers)
     else:
         printer = wide_console(140)
-        for table in told.tables:
+        for table in fit.tables:
             printer.print(table)
         printer.print(f"results: {folder}")
     missing = report_failures(console, failed, folder, None)
-    return told.code or missing
+    return missing if fit.fits else MISFIT

@@ -6,20 +6,13 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import solve_triangular
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.identification.correlated_noise import CorrelatedNoise, correlated, once_a_vector
 from cdpr_drake.identification.regressor import SIZE, inertia_regressor, regressor_slopes
 from cdpr_drake.identification.result import Residual
 from cdpr_drake.identification.samples import LoggedMotion
-from cdpr_drake.identification.terms import (
-    Rows,
-    cholesky_factor,
-    correlated,
-    largest_residuals,
-    over_others,
-    whitened,
-)
+from cdpr_drake.identification.terms import Rows, largest_residuals
 
 SURELY = 2.0
 """A velocity or acceleration is more than noise where it is so many times as large."""
@@ -93,12 +86,12 @@ class MotionTerm:
 
     def rows(self, theta: Array) -> Rows:
         """See `Term`."""
-        at, K = self._settled(theta[:SIZE])
+        at, noises = self._settled(theta[:SIZE])
         s, A, b = self.samples, np.zeros((6 * self.samples.count, len(theta))), []
-        for block, each in zip(s.blocks(), K, strict=True):
+        for block, noise in zip(s.blocks(), noises, strict=True):
             Y = at.Y[block].reshape(-1, SIZE)
             right = at.rest[block].ravel() + Y @ theta[:SIZE]
-            both = whitened(each, np.column_stack([Y, right]))
+            both = noise.whitened(np.column_stack([Y, right]))
             A[6 * block.start : 6 * block.stop, :SIZE] = both[:, :-1]
             b.append(both[:, -1])
         return Rows(A, np.concatenate(b))
@@ -108,10 +101,10 @@ class MotionTerm:
 
         Noise in a regressor looks like excitation, and tells nothing.
         """
-        s, (X, _) = self.samples, self.samples.smoothed
+        s = self.samples
         V, A = s.V_WP.copy(), s.A_WP.copy()
         for derivative, table in ((1, V), (2, A)):
-            variances = [np.diag(X.noise(s.time[b], derivative)) for b in s.blocks()]
+            variances = [np.diag(C_x).reshape(3, -1)[derivative] for _, C_x in self.noise]
             noise = np.mean(np.concatenate(variances)) * s.pose_spread**2
             table[:, np.mean(table**2, axis=0) < SURELY**2 * noise] = 0.0
         Y = inertia_regressor(s.R_WP, V, A, self.gravity)
@@ -131,40 +124,43 @@ class MotionTerm:
 
     def largest(self, theta: Array) -> list[Residual]:
         """See `Term`."""
-        at, K = self._settled(theta[:SIZE])
+        at, noises = self._settled(theta[:SIZE])
         s = self.samples
-        off = [over_others(each, at.rest[b].ravel()) for b, each in zip(s.blocks(), K, strict=True)]
+        each = zip(s.blocks(), noises, strict=True)
+        off = [noise.over_others(at.rest[block].ravel()) for block, noise in each]
         value = s.wrench - self.predicted(theta)
         time, which = np.repeat(s.time, 6), np.tile(np.arange(6), s.count)
         return largest_residuals(time, which, value.ravel(), np.concatenate(off), EQUATIONS)
 
-    def _settled(self, pi: Array) -> tuple[_Corrected, list[Array]]:
-        """Equations at the most likely poses and tensions for a body, and their covariances."""
+    @once_a_vector
+    def _settled(self, pi: Array) -> tuple[_Corrected, list[CorrelatedNoise]]:
+        """Equations at the most likely poses and tensions for a body, and their noise."""
         s = self.samples
         poses, pulls = np.zeros((s.count, 3, 6)), np.zeros_like(s.tensions)
         last = None
         for left in range(self.rounds, -1, -1):
             at = self._corrected(pi, poses, pulls)
-            K = [self._covariance(at, n, b) for n, b in enumerate(s.blocks())]
+            noises = [
+                CorrelatedNoise.of(self._covariance(at, n, b)) for n, b in enumerate(s.blocks())
+            ]
             if left == 0:
                 break
-            seen = []
-            for n, b in enumerate(s.blocks()):
-                L = cholesky_factor(K[n])
-                white = solve_triangular(L, at.rest[b].ravel(), lower=True)
-                seen.append(white)
-                v = solve_triangular(L, white, lower=True, trans=1).reshape(-1, 6)
-                C_t, C_x = self.noise[n]
-                pulls[b] = C_t @ np.einsum("aim,ai->am", at.W[b], v) * s.sigma_tensions**2
-                felt = np.einsum("aioq,ai->oaq", at.G[b], v).reshape(-1, 6)
-                poses[b] = np.swapaxes((C_x @ felt).reshape(3, -1, 6), 0, 1)
-            now = np.concatenate(seen)
+            rests = [at.rest[b].ravel() for b in s.blocks()]
+            now = np.concatenate(
+                [noise.whitened(rest) for noise, rest in zip(noises, rests, strict=True)]
+            )
             if last is not None:
                 size = max(1.0, float(np.max(np.abs(now))))
                 if np.max(np.abs(now - last)) < SETTLED * size:
                     break
             last = now
-        return at, K
+            for n, b in enumerate(s.blocks()):
+                v = noises[n].over_covariance(rests[n]).reshape(-1, 6)
+                C_t, C_x = self.noise[n]
+                pulls[b] = C_t @ np.einsum("aim,ai->am", at.W[b], v) * s.sigma_tensions**2
+                felt = np.einsum("aioq,ai->oaq", at.G[b], v).reshape(-1, 6)
+                poses[b] = np.swapaxes((C_x @ felt).reshape(3, -1, 6), 0, 1)
+        return at, noises
 
     def _corrected(self, pi: Array, poses: Array, pulls: Array) -> _Corrected:
         """Equations where the noise is believed to be this, in sigmas and in newtons."""

@@ -40,11 +40,13 @@ are as large as their noise."""
 
 @dataclass(frozen=True, eq=False)
 class _Fit:
-    """A least squares solution: vector, directions that are free, information along them."""
+    """A least squares solution: vector, directions that are free, information along them, and
+    what the belief left unexplained."""
 
     theta: Array
     Z: Array
     H: Array
+    first: list[Array]
     rows: list[Rows]
     weights: list[Array]
     limits: list[float]
@@ -203,7 +205,7 @@ class IdentificationProgram:
                 )
             theta = found.GetSolution(program.decision_variables()) * self.layout.typical
             status, solver = AT_THE_RIM, found.get_solver_id().name()
-        self._check_end(theta, fit.limits)
+        self._check_end(theta, fit)
         return self._result(fit, theta, (status, solver, active), time.perf_counter() - began)
 
     def prog(self) -> MathematicalProgram:
@@ -269,6 +271,7 @@ class IdentificationProgram:
         theta = self.layout.model.vector()
         rows = self._rows(theta)
         limits = [np.inf] * len(rows)
+        first = [r.A @ (theta / typical) - r.b for r in rows]
         for step in range(1, MOST_STEPS + 1):
             rests = [r.A @ (theta / typical) - r.b for r in rows]
             if outliers and step > 1:
@@ -297,23 +300,21 @@ class IdentificationProgram:
             if said < SETTLED or (moved < CLOSE and step > 2):
                 break
         H = (A @ Z).T @ (A @ Z)
-        return _Fit(theta, Z, H, rows, weights, limits, step, said)
+        return _Fit(theta, Z, H, first, rows, weights, limits, step, said)
 
-    def _check_end(self, theta: Array, limits: list[float]) -> None:
+    def _check_end(self, theta: Array, fit: _Fit) -> None:
         """Refuses a vector that explains the measurements less well than the belief.
 
         Raises:
             IdentificationError: It does; says by how much.
         """
-        costs = []
-        for vector in (self.layout.model.vector(), theta):
-            rows = self._rows(vector)
-            x = vector / self.layout.typical
-            costs.append(_cost([r.A @ x - r.b for r in rows], limits))
-        if costs[1] > costs[0] + _indifferent(costs[0], rows):
+        rows, x = self._rows(theta), theta / self.layout.typical
+        end = _cost([r.A @ x - r.b for r in rows], fit.limits)
+        start = _cost(fit.first, fit.limits)
+        if end > start + _indifferent(start, rows):
             raise IdentificationError(
-                f"identification: found parameters with chi-square {costs[1]:.4g}, where those "
-                f"that are believed have {costs[0]:.4g}; accepted: an end that is no worse than "
+                f"identification: found parameters with chi-square {end:.4g}, where those "
+                f"that are believed have {start:.4g}; accepted: an end that is no worse than "
                 "its start, as with fewer unknowns, priors or another belief"
             )
 

@@ -154,7 +154,13 @@ class Smoothed:
         Returns:
             Shape (d s, d s), derivative by derivative.
         """
-        knots = self.smoother.knots
-        one = BSpline(knots, np.eye(len(self.coefficients)), DEGREE)
-        B = np.vstack([one(time, nu=derivative) for derivative in derivatives or (0,)])
-        return np.asarray(B @ cho_solve_banded((self.factor, False), B.T))
+        knots, count = self.smoother.knots, len(self.coefficients)
+        first, last = np.searchsorted(knots[DEGREE + 1 : count], [time.min(), time.max()], "right")
+        felt = slice(first, last + DEGREE + 1)  # coefficients that move any of these times
+        local = BSpline(
+            knots[first : last + 2 * DEGREE + 2], np.eye(last - first + DEGREE + 1), DEGREE
+        )
+        B = np.vstack([local(time, nu=derivative) for derivative in derivatives or (0,)])
+        whole = np.zeros((count, len(B)))
+        whole[felt] = B.T
+        return np.asarray(B @ cho_solve_banded((self.factor, False), whole)[felt])

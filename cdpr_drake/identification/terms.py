@@ -3,8 +3,7 @@
 A `Term` is a kind of measurement: rows A theta = b, weighted by its noise. `prior_rows` makes
 equations in the same vector of what is known of parameters beforehand.
 
-Source: servoing thesis (2.6), (5.7) with the sign of the speed; Cook, Weisberg, Residuals and
-influence in regression, 1982.
+Source: servoing thesis (2.6), (5.7) with the sign of the speed.
 """
 
 from __future__ import annotations
@@ -15,10 +14,9 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg import solve_triangular
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import IdentificationError
+from cdpr_drake.identification.correlated_noise import CorrelatedNoise, correlated, once_a_vector
 from cdpr_drake.identification.parameters import (
     CENTER,
     COMPLIANCE,
@@ -107,16 +105,19 @@ class CableTerm:
         A = np.stack([l0 * (s.tensions + T**2 * second), -l0 * first, np.ones_like(l0)], axis=2)
         return A, s.lengths - l0, np.asarray(s.tensions > self.slack_below)
 
-    def _covariances(self, theta: Array) -> list[Array]:
-        """Of the lengths of each block: of poses, of what winches count, of tensions, which look
-        like strain; shape (s m, s m)."""
+    @once_a_vector
+    def _noises(self, theta: Array) -> list[CorrelatedNoise]:
+        """Of the lengths of taut cables in each block: of poses, of what winches count, of
+        tensions, which look like strain."""
         s, m = self.samples, self.counted.shape[1]
         found = []
         for block, white in zip(s.blocks(), self.noise, strict=True):
             J = np.swapaxes(s.W[block], 1, 2) * s.pose_spread
             strain = theta[SIZE + COMPLIANCE :: PER_CABLE] * self.counted[block] * s.sigma_tensions
             own = np.hypot(self.sigma_lengths, strain)[:, :, None] * np.eye(m)
-            found.append(correlated(white, np.concatenate([J, own], axis=2)))
+            keep = np.flatnonzero(s.tensions[block] > self.slack_below)
+            K = correlated(white, np.concatenate([J, own], axis=2))
+            found.append(CorrelatedNoise.of(K[np.ix_(keep, keep)]))
         return found
 
     def rows(self, theta: Array) -> Rows:
@@ -125,14 +126,14 @@ class CableTerm:
         A, b, taut = self._equations(theta)
         parts = [np.zeros((0, len(theta) + 1))]
         places = [[column(i, what) for what in (COMPLIANCE, LAG, OFFSET)] for i in range(m)]
-        for block, K in zip(self.samples.blocks(), self._covariances(theta), strict=True):
+        for block, noise in zip(self.samples.blocks(), self._noises(theta), strict=True):
             wide = np.zeros((block.stop - block.start, m, len(theta)))
             for i in range(m):
                 wide[:, i, places[i]] = A[block, i]
             keep = taut[block].ravel()
             both = np.column_stack([wide.reshape(-1, len(theta)), b[block].ravel()])[keep]
             if keep.any():
-                parts.append(whitened(K[np.ix_(keep, keep)], both))
+                parts.append(noise.whitened(both))
         table = np.vstack(parts)
         return Rows(table[:, :-1], table[:, -1])
 
@@ -142,11 +143,10 @@ class CableTerm:
         cables = theta[SIZE:].reshape(-1, PER_CABLE)[:, [COMPLIANCE, LAG, OFFSET]]
         value = b - np.einsum("smk,mk->sm", A, cables)
         sigmas = np.zeros_like(value)
-        for block, K in zip(self.samples.blocks(), self._covariances(theta), strict=True):
+        for block, noise in zip(self.samples.blocks(), self._noises(theta), strict=True):
             keep = taut[block]
             if keep.any():
-                own = K[np.ix_(keep.ravel(), keep.ravel())]
-                sigmas[block][keep] = over_others(own, value[block][keep])
+                sigmas[block][keep] = noise.over_others(value[block][keep])
         time, which = np.nonzero(taut)
         equations = [(f"length of {name}", "m") for name in self.cables]
         return largest_residuals(
@@ -215,49 +215,6 @@ class WinchTerm:
         off = s.friction - self._equations(len(theta)) @ theta
         equations = [(f"torque of the winch of {name}", "N m") for name in self.cables]
         return largest_residuals(s.time, s.cable, off, off * self.weights, equations)
-
-
-def correlated(C: Array, G: Array) -> Array:
-    """Covariance of G_a n_a with cov(n_a, n_b) = C_ab 1: from (s, s) and (s, r, q), (s r, s r)."""
-    s, r, q = G.shape
-    flat = G.reshape(s * r, q)
-    return np.asarray((flat @ flat.T) * np.repeat(np.repeat(C, r, axis=0), r, axis=1))
-
-
-def cholesky_factor(K: Array) -> Array:
-    """L with K = L L'.
-
-    Raises:
-        IdentificationError: Some combination of the equations has no noise.
-    """
-    try:
-        return np.asarray(np.linalg.cholesky(K))
-    except np.linalg.LinAlgError:
-        raise IdentificationError(
-            "noise: found equations without any, which cannot be weighted; accepted: a log whose "
-            "poses, tensions and lengths are measured, with their noise"
-        ) from None
-
-
-def whitened(K: Array, x: Array) -> Array:
-    """L^-1 x with K = L L'.
-
-    Raises:
-        IdentificationError: As `cholesky_factor`.
-    """
-    return np.asarray(solve_triangular(cholesky_factor(K), x, lower=True))
-
-
-def over_others(K: Array, rest: Array) -> Array:
-    """By how many standard deviations residuals are off where all others of K are known.
-
-    Each is normal of unit variance, and none is small because noise of other equations hides it:
-    (K^-1 r)_i / sqrt((K^-1)_ii).
-
-    Source: Cook, Weisberg, Residuals and influence in regression, 1982.
-    """
-    back = whitened(K, np.eye(len(K)))
-    return np.asarray(back.T @ (back @ rest) / np.linalg.norm(back, axis=0))
 
 
 def largest_residuals(

@@ -8,6 +8,7 @@ from scipy.stats import chi2
 
 from cdpr_drake.errors import IdentificationError
 from cdpr_drake.geometry.poses import rotation_from_vector
+from cdpr_drake.identification.correlated_noise import CorrelatedNoise
 from cdpr_drake.identification.program import IdentificationProgram
 from cdpr_drake.identification.regressor import inertia_regressor, regressor_slopes
 from cdpr_drake.identification.result import MISFIT, MISFIT_FACTOR
@@ -18,7 +19,6 @@ from cdpr_drake.identification.samples import (
     sample_motion,
     wrench_matrix_slopes,
 )
-from cdpr_drake.identification.terms import over_others
 from tests.identification import free_motions
 from tests.identification.free_motions import CASES, NOISE, G, believed, body, cables, log
 
@@ -184,7 +184,7 @@ def test_slopes_of_the_regressor_are_its_derivatives():
 def test_sigmas_beside_the_others_see_through_common_noise():
     """Two equations with the same noise, of which the difference alone is exact."""
     K = np.array([[1.0, 1.0 - 1e-4], [1.0 - 1e-4, 1.0]])
-    off = over_others(K, np.array([0.5, 0.0]))
+    off = CorrelatedNoise.of(K).over_others(np.array([0.5, 0.0]))
     small = np.sqrt(1.0 - (1.0 - 1e-4) ** 2)
     assert off[0] == pytest.approx(0.5 / small)
     assert off[1] == pytest.approx(-0.5 * (1.0 - 1e-4) / small)

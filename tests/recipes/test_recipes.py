@@ -16,7 +16,7 @@ RULES = ("tests/test_architecture.py", "tests/test_packaging.py")
 """Tests of the whole, which are asked of the copy."""
 
 ABOUT_THE_PROJECT = (
-    "not readme and not links and not citation and not changelog and not folder_says"
+    "not readme and not links and not citation and not changelog and not folder_says and not hook"
 )
 """What of these needs no copy."""
 
