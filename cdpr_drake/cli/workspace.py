@@ -175,9 +175,9 @@ def print_workspace(found: RobotWorkspace, told: dict[str, Any], folder: Path) -
     if "certified" in told:
         proven = told["certified"]
         printer.print(
-            f"certified, cables {proven['cables']}: {proven['inside_share']:.2%} of the box "
-            f"inside, {proven['outside_share']:.2%} outside, {proven['open_share']:.2%} open; "
-            f"{proven['boxes_judged']} boxes"
+            f"certified, cables {proven['cables']}: all poses in {proven['inside_share']:.2%} of "
+            f"the box inside, in {proven['outside_share']:.2%} outside, "
+            f"{proven['open_share']:.2%} open; {proven['boxes_judged']} boxes"
         )
     for name, one in told.get("agreement", {}).items():
         printer.print(
