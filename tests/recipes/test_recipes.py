@@ -61,5 +61,6 @@ def test_all_of_them_followed(tmp_path):
     done = subprocess.run(
         words, cwd=tmp_path, env={**os.environ, "PYTHONPATH": path}, capture_output=True, text=True
     )
-    assert done.returncode == 0, done.stdout[-5000:] + done.stderr[-2000:]
+    print(done.stdout[-5000:], done.stderr[-2000:])  # seen where it fails
+    assert done.returncode == 0
     assert int(re.search(r"(\d+) passed", done.stdout)[1]) > len(RECIPES)
