@@ -142,6 +142,16 @@ def test_arrays_are_told_apart_by_one_bit_and_measured(tmp_path):
     assert found["files"] == ["log.npz", "summary.json"]
 
 
+def test_a_text_among_arrays_is_read_without_versions(tmp_path):
+    """Else every new state of the sources would be another result."""
+    kept = []
+    for version, mass in (("0.1.0 aa", 1.0), ("0.2.0 bb", 1.0), ("0.2.0 bb", 1.5)):
+        np.savez(tmp_path / "a.npz", about=json.dumps({"cdpr_drake": version, "mass": mass}))
+        kept.append(read_results(tmp_path)["a.npz"])
+    assert kept[0] == kept[1] == {"about": {"mass": 1.0}}
+    assert kept[2] != kept[0]
+
+
 def test_every_study_has_a_golden_file():
     """Also those with a point in their name."""
     assert making.study_names() == list(STUDIES)
