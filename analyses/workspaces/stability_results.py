@@ -38,7 +38,7 @@ STATIC = "static"
 """Name of the static feasible workspace among the tasks of the sweep."""
 
 LEVERS_IN_WORDS = {
-    "error": "L_s with [e_t]x, (1.47) as printed",
+    "error": "L_s with [e_t]x, as (1.47) of the servoing thesis prints it",
     "object": "L_s with [s_t]x, exact",
 }
 """What PBVS' interaction matrix has in its rotational columns, by `StabilityCase.lever`."""
