@@ -33,6 +33,7 @@ from cdpr_drake.analyses.studies.case_studies import CASE_STUDIES
 from cdpr_drake.analyses.studies.design import study_design
 from cdpr_drake.analyses.studies.framework.case_definition import PublishedNumber
 from cdpr_drake.analyses.studies.framework.case_study import run_case_study
+from cdpr_drake.analyses.studies.framework.study import Study as FramedStudy
 from cdpr_drake.analyses.studies.identification.study import study_identification
 from cdpr_drake.analyses.studies.planning.study import study_planning
 from cdpr_drake.analyses.studies.published.recipe_variants import RECIPES
@@ -93,6 +94,17 @@ class StudyEntry:
     numbers: tuple[PublishedNumber, ...] = ()
     figures: tuple[str, ...] = ()
     recipes: Mapping[str, Study] = field(default_factory=dict)
+
+
+def entry_of(study: FramedStudy) -> StudyEntry:
+    """The entry of a study in the frame."""
+    return StudyEntry(
+        study,
+        continues=True,
+        repeats=study.seeds is not None,
+        judges=study.names_of_checks(),
+        figures=tuple(study.figures),
+    )
 
 
 STUDIES: dict[str, StudyEntry] = {
@@ -196,13 +208,7 @@ STUDIES: dict[str, StudyEntry] = {
         judges=names_of_checks(schemes.CHECKS),
         figures=("schemes",),
     ),
-    "tagless": StudyEntry(
-        tagless.study_tagless,
-        continues=True,
-        repeats=True,
-        judges=names_of_checks(tagless.CHECKS),
-        figures=("tagless",),
-    ),
+    "tagless": entry_of(tagless.STUDY),
     "calibration": StudyEntry(
         study_calibration, continues=True, repeats=True, figures=("calibration",)
     ),

@@ -1,2 +1,0 @@
-from .statements import CHECKS as CHECKS
-from .study import study_tagless as study_tagless
