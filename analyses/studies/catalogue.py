@@ -187,13 +187,7 @@ STUDIES: dict[str, StudyEntry] = {
         judges=names_of_checks(mobile_robot.CHECKS),
         figures=mobile_robot.FIGURES,
     ),
-    "pick-and-place": StudyEntry(
-        pick_and_place.study_pick_and_place,
-        continues=True,
-        repeats=True,
-        judges=names_of_checks(pick_and_place.CHECKS),
-        figures=("set_down",),
-    ),
+    "pick-and-place": entry_of(pick_and_place.STUDY),
     "fusion": StudyEntry(
         fusion.study_fusion,
         continues=True,
