@@ -94,7 +94,8 @@ def row_of(run: PickAndPlaceRun) -> dict[str, Any]:
     return outcome_of(run.outcome, state.failed_in, state.failure, distance, angle) | {
         "offset_x_m": offset[0], "offset_y_m": offset[1], "offset_z_m": offset[2],
         "time_s": run.sim_time, "losses": state.losses,
-        "unseen_s": np.mean(unseen(log)) * times[-1], "hidden_s": np.mean(hidden) * times[-1], "dead_reckoning_m": np.max(drift),
+        "unseen_s": np.mean(unseen(log)) * times[-1],
+        "hidden_s": np.mean(hidden) * times[-1], "dead_reckoning_m": np.max(drift),
     }  # fmt: skip
 
 
