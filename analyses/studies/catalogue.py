@@ -188,13 +188,7 @@ STUDIES: dict[str, StudyEntry] = {
         figures=mobile_robot.FIGURES,
     ),
     "pick-and-place": entry_of(pick_and_place.STUDY),
-    "fusion": StudyEntry(
-        fusion.study_fusion,
-        continues=True,
-        repeats=True,
-        judges=names_of_checks(fusion.CHECKS),
-        figures=("fusion",),
-    ),
+    "fusion": entry_of(fusion.STUDY),
     "schemes": StudyEntry(
         schemes.study_schemes,
         continues=True,
