@@ -189,13 +189,7 @@ STUDIES: dict[str, StudyEntry] = {
     ),
     "pick-and-place": entry_of(pick_and_place.STUDY),
     "fusion": entry_of(fusion.STUDY),
-    "schemes": StudyEntry(
-        schemes.study_schemes,
-        continues=True,
-        repeats=True,
-        judges=names_of_checks(schemes.CHECKS),
-        figures=("schemes",),
-    ),
+    "schemes": entry_of(schemes.STUDY),
     "tagless": entry_of(tagless.STUDY),
     "calibration": StudyEntry(
         study_calibration, continues=True, repeats=True, figures=("calibration",)
