@@ -173,12 +173,7 @@ STUDIES: dict[str, StudyEntry] = {
         judges=names_of_checks(engines.CHECKS),
         figures=("engines",),
     ),
-    "scenarios": StudyEntry(
-        scenarios.study_scenarios,
-        continues=True,
-        judges=names_of_checks(scenarios.CHECKS),
-        figures=scenarios.FIGURES,
-    ),
+    "scenarios": entry_of(scenarios.STUDY),
     "planning": StudyEntry(study_planning, continues=True, figures=("phase_planes",)),
     "mobile-robot": StudyEntry(
         mobile_robot.study_mobile_robot,
