@@ -30,6 +30,8 @@ from cdpr_drake.analyses.studies.mobile_robot.statements import (
     longer,
     median_laps,
     near,
+    of_estimators,
+    of_tracking,
 )
 from cdpr_drake.arrays import Array
 
@@ -85,10 +87,9 @@ def fails_far_off(runs: Runs) -> Finding:
     )
 
 
-@statement(
+@of_estimators(
     "The error by control integration far surpasses that of the estimators by lengths.",
     "figure 2.16c",
-    source="servoing thesis 2.3.7",
     rule="far: twice; in part: more",
 )
 def far_surpasses(runs: Runs) -> Finding:
@@ -104,11 +105,10 @@ def far_surpasses(runs: Runs) -> Finding:
     )
 
 
-@statement(
+@of_estimators(
     "By lengths the errors have spikes always at the same place of the track, by all "
     "estimators at the same time.",
     "figure 2.17, t = 8, 24, 42 s: 0.5 of the lap",
-    source="servoing thesis 2.3.7",
     rule=f"they agree by at least {SAME_PLACE:g}, by each and of the four; in part: by any",
 )
 def spikes(runs: Runs) -> Finding:
@@ -134,11 +134,10 @@ def spikes(runs: Runs) -> Finding:
     )
 
 
-@statement(
+@of_estimators(
     "Estimates by lengths go wrong where slack is transferred between cables: more than two "
     "are slack for a moment, and a slack one is used.",
     "figures 2.17, 2.18",
-    source="servoing thesis 2.3.7",
     rule=f"in the {BEFORE:g} s before, in most runs, by each estimator",
 )
 def spikes_by_slack(runs: Runs) -> Finding:
@@ -156,11 +155,10 @@ def spikes_by_slack(runs: Runs) -> Finding:
     )
 
 
-@statement(
+@of_tracking(
     "Without correction the path becomes worse faster and faster: from lap 20 to 24 about as "
     "much as from lap 10 to 20.",
     "figure 5.19",
-    source="servoing thesis 5.3.1",
     rule=f"within a factor {FACTOR:g}; in part: faster than in proportion to the laps",
 )
 def worse_and_worse(runs: Runs) -> Finding:
@@ -180,10 +178,9 @@ def worse_and_worse(runs: Runs) -> Finding:
     )
 
 
-@statement(
+@of_tracking(
     "The sharp deviations without correction are on the farthest corners of the track.",
     "figure 5.19",
-    source="servoing thesis 5.3.1",
     rule="each run; in part: more than corners take of a lap",
 )
 def corners(runs: Runs) -> Finding:
@@ -204,10 +201,9 @@ def corners(runs: Runs) -> Finding:
     )
 
 
-@statement(
+@of_tracking(
     "Without correction the sum of lengths has grown noticeably by lap 10.",
     "figure 5.21",
-    source="servoing thesis 5.3.1",
     rule=f"noticeably: {1e3 * NOTICED:g} mm, in each run; in part: in the median",
     basis=FITTED,
 )
@@ -225,11 +221,10 @@ def noticed_early(runs: Runs) -> Finding:
     )
 
 
-@statement(
+@of_tracking(
     "Without correction one cable is slack for most of the first lap, sometimes two; in laps "
     "10 and 20 two are slack all the time.",
     "figure 5.22",
-    source="servoing thesis 5.3.1",
     rule=f"a cable is slack below {SLACK:g} N; most: half; all the time: 95 %",
 )
 def first_laps(runs: Runs) -> Finding:
@@ -247,10 +242,9 @@ def first_laps(runs: Runs) -> Finding:
     )
 
 
-@statement(
+@of_tracking(
     "In lap 20 the transfer of slack leaves the platform underactuated for 1 s.",
     "figure 5.22c",
-    source="servoing thesis 5.3.1",
     rule=f"median within a factor {FACTOR:g}; in part: at all",
 )
 def underactuated(runs: Runs) -> Finding:
@@ -268,11 +262,10 @@ def underactuated(runs: Runs) -> Finding:
     )
 
 
-@statement(
+@of_tracking(
     "Without correction more than two cables are slack for the last six seconds, which leads "
     "to failure.",
     "figure 5.22d",
-    source="servoing thesis 5.3.1",
     rule=f"median within a factor {FACTOR:g}; in part: at all",
 )
 def last_seconds(runs: Runs) -> Finding:
@@ -289,10 +282,9 @@ def last_seconds(runs: Runs) -> Finding:
     )
 
 
-@statement(
+@of_tracking(
     "Correction takes part in every lap: usually one or two tensions are on the threshold.",
     "figure 5.23",
-    source="servoing thesis 5.3.1",
     rule=f"within {SLACK:g} N of the threshold; median; never none; in part: never none",
 )
 def takes_part(runs: Runs) -> Finding:
@@ -312,10 +304,9 @@ def takes_part(runs: Runs) -> Finding:
     )
 
 
-@statement(
+@of_tracking(
     "With correction tensions are the same in laps 10, 30 and 700.",
     "figure 5.23",
-    source="servoing thesis 5.3.1",
     rule="the same: twice what laps 10 and 30 differ by, or the accuracy of the sensors; in part: "
     "four times",
 )
@@ -339,10 +330,9 @@ def same_tensions(runs: Runs) -> Finding:
     )
 
 
-@statement(
+@of_tracking(
     "With correction only the first lap's path differs, as the task begins there.",
     "figure 5.20",
-    source="servoing thesis 5.3.1",
     rule="twice as far; in part: farther",
 )
 def only_the_first(runs: Runs) -> Finding:

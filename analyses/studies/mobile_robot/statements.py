@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from cdpr_drake.analyses.studies.framework.runs import MissingRuns, Runs
@@ -17,6 +19,9 @@ from cdpr_drake.analyses.studies.mobile_robot.configurations import (
 )
 from cdpr_drake.analyses.studies.mobile_robot.laps import FREE, REFERENCE
 from cdpr_drake.arrays import Array
+
+of_estimators = partial(statement, source="servoing thesis 2.3.7")
+of_tracking = partial(statement, source="servoing thesis 5.3.1")
 
 FACTOR = 2.0
 """Laps within this factor of the published ones agree with them: one run was made of each."""
@@ -63,10 +68,9 @@ def longer(one: float, other: float, times: float = 1.0) -> bool:
     return bool(np.isfinite(other) and one > times * other)
 
 
-@statement(
+@of_estimators(
     "Without a known tag tracking fails after some laps, by each estimator.",
     ", ".join(f"{NUMBERS[k]}: {laps}" for k, laps in PUBLISHED_LAPS.items()),
-    source="servoing thesis 2.3.7",
     rule=f"each median within a factor {FACTOR:g}",
     basis=FITTED,
 )
@@ -84,10 +88,9 @@ def estimators(runs: Runs) -> Finding:
     )
 
 
-@statement(
+@of_estimators(
     "Control integration lasts longest, three times as long as the best by lengths.",
     "12 laps and 4",
-    source="servoing thesis 2.3.7",
     rule=f"medians, {3.0 / FACTOR:g} times as long; in part: longer",
     basis=FITTED,
 )
@@ -105,10 +108,9 @@ def integration_lasts(runs: Runs) -> Finding:
     )
 
 
-@statement(
+@of_estimators(
     "By cable lengths, the more the model knows, the later it fails.",
     "4: 2, 5 and 6: 3, 7: 4",
-    source="servoing thesis 2.3.7",
     rule="medians; in part: 7 lasts longer than 4",
 )
 def model_helps(runs: Runs) -> Finding:
@@ -122,11 +124,10 @@ def model_helps(runs: Runs) -> Finding:
     )
 
 
-@statement(
+@of_estimators(
     "The estimate by control integration drifts smoothly, along z by almost 0.3 m in 12 laps; "
     "those by lengths have spikes.",
     "figures 2.16, 2.17",
-    source="servoing thesis 2.3.7",
     rule=f"the drift within a factor {FACTOR:g}; smoother than by lengths; in part: the second",
     basis=FITTED,
 )
@@ -150,11 +151,10 @@ def drift(runs: Runs) -> Finding:
     )
 
 
-@statement(
+@of_tracking(
     "With a known tag each lap and no correction, tracking fails in lap 29, just under ten "
     "minutes.",
     "lap 29",
-    source="servoing thesis 5.3.1",
     rule=f"median within a factor {FACTOR:g}; in part: any fails",
 )
 def plain(runs: Runs) -> Finding:
@@ -170,10 +170,9 @@ def plain(runs: Runs) -> Finding:
     )
 
 
-@statement(
+@of_tracking(
     "The known tag triples the time until failure.",
     "210 s and just under ten minutes",
-    source="servoing thesis 5.3.1",
     rule=f"medians, {3.0 / FACTOR:g} times as long; in part: longer",
 )
 def known_tag_helps(runs: Runs) -> Finding:
@@ -198,11 +197,10 @@ def rises(sums: Array, early: int, late: int) -> Array:
     return np.where(whole, np.max(change, axis=1), np.nan)
 
 
-@statement(
+@of_tracking(
     "Without correction the sum of the cables' lengths grows by 0.15 m from lap 10 to lap 20 "
     "and by 0.3 m more until lap 29, at the worst moment.",
     "figure 5.21",
-    source="servoing thesis 5.3.1",
     rule=f"medians within a factor {LENGTH_FACTOR:g}; in part: one, or any growth",
     basis=FITTED,
 )
@@ -232,10 +230,9 @@ def lengths(runs: Runs) -> Finding:
     )
 
 
-@statement(
+@of_tracking(
     "With correction the robot is followed for 700 laps, 180 minutes.",
     f"{ALL_LAPS} laps",
-    source="servoing thesis 5.3.1",
     rule="all runs come to their end, which is lap 700; in part: the first",
 )
 def corrected(runs: Runs) -> Finding:
@@ -253,10 +250,9 @@ def corrected(runs: Runs) -> Finding:
     )
 
 
-@statement(
+@of_tracking(
     "With correction never more than two cables are slack.",
     f"{FREE}",
-    source="servoing thesis 5.3.1",
     rule="in no run, in 700 laps; in part: in no run",
 )
 def slack(runs: Runs) -> Finding:
@@ -271,10 +267,9 @@ def slack(runs: Runs) -> Finding:
     )
 
 
-@statement(
+@of_tracking(
     "With correction the path stays almost exactly that of lap 10, without it gets worse.",
     "figures 5.19, 5.20",
-    source="servoing thesis 5.3.1",
     rule=f"within {1e3 * SAME_PATH:g} mm; without correction farther",
 )
 def same_path(runs: Runs) -> Finding:
