@@ -471,3 +471,21 @@ def test_the_page_has_all_tolerances_and_marks_what_was_counted(folder):
     page = write_report(folder, [register], rows, {}, quick=False).read_text()
     assert "within 3 mm &lt;half&gt;" in page
     assert page.count("counted above") == 1
+
+
+def test_a_chapter_says_what_stands_and_why_what_fails(folder):
+    register, rows = judged_rows(
+        folder,
+        one=[said("high", [True]), said("near", [True], FITTED)],
+        two=[said("low", [False], cause="hardware"), said("odd", [True, False])],
+    )
+    register = replace(register, corrected={"1": ("(1.2)",), "2": ("(2.1)",)})
+    page = write_report(folder, [register], rows, {}, quick=False).read_text()
+    start = page.index('<h2 id="chapters">')
+    words = page[start : page.index("<h2", start + 1)]
+    assert "<b>Stands, 1</b>: It is high." in words
+    assert "<b>Met, but not put to a test, 1</b>: It is near." in words
+    assert "<b>Corrected, 1</b>: (1.2)." in words
+    assert "<b>Fails, 1</b>, because of the prototype, which has what is in no model" in words
+    assert "<b>Holds in part, 1</b>, for a reason that is not known" in words
+    assert "Chapter 2" in words
