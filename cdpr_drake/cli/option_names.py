@@ -23,8 +23,8 @@ BEFORE = ("allow", "found", "leave out", "needs", "use", "with", "without")
 def with_options(message: str, options: Mapping[str, str]) -> str:
     """A message of the library as who uses a command reads it.
 
-    Arguments are named where a line begins with them, behind `BEFORE`, and, where they have an
-    underscore, which no other word has, anywhere.
+    Arguments are named where a line or, behind a file, its refusal begins with them, behind
+    `BEFORE`, and, where they have an underscore, which no other word has, anywhere.
 
     Args:
         message: Of one or more lines.
@@ -41,8 +41,15 @@ def _line_with_options(line: str, options: Mapping[str, str]) -> str:
     said = ", ".join(options[name] for name in begin.split(", ")) if begin else ""
 
     def option(place: re.Match[str]) -> str:
-        before, name = place[1], place[2]
-        return before + (options[name] if before.strip(" (") or "_" in name else name)
+        before, name = place.groups()
+        meant = before.strip(" (") or "_" in name or _is_refused(place)
+        return before + (options[name] if meant else name)
 
     rest = rf"((?<![\w-])(?:{'|'.join(BEFORE)}) |[ (])({named})"
     return said + re.sub(rest, option, line[len(begin) :])
+
+
+def _is_refused(place: re.Match[str]) -> bool:
+    """Whether what stands there is what was found wrong, as in `log.csv: bandwidth: found 0 Hz`."""
+    line = place.string
+    return line.endswith(":", 0, place.start()) and line.startswith(": found", place.end())

@@ -70,8 +70,10 @@ def named_options(options: Mapping[str, str]) -> Iterator[None]:
     try:
         yield
     except CdprError as problem:
-        if len(problem.args) == 1 and isinstance(problem.args[0], str):
-            problem.args = (with_options(problem.args[0], options),)
+        problem.args = tuple(
+            with_options(words, options) if isinstance(words, str) else words
+            for words in problem.args
+        )
         raise
 
 

@@ -2,6 +2,11 @@
 
 import pytest
 
+from cdpr_drake.analyses.front.calibration import calibrate
+from cdpr_drake.analyses.front.simulated_fits import (
+    calibrate_in_simulation,
+    identify_in_simulation,
+)
 from cdpr_drake.analyses.front.simulation import simulate
 from cdpr_drake.analyses.front.studies import run_study
 from cdpr_drake.analyses.simulation.live_messages import open_connection
@@ -12,7 +17,7 @@ from cdpr_drake.errors import CdprError
 from cdpr_drake.systems.remote.server_socket import ServerSocket
 from tests.messages import printed
 
-SCENARIO = "acrobot_pbvs"
+SCENARIO, TORQUES = "acrobot_pbvs", "acrobot_computed_torque"
 NOWHERE = "192.0.2.1"
 """An address that no machine has."""
 
@@ -40,11 +45,21 @@ NOWHERE = "192.0.2.1"
          ["simulate", SCENARIO, "--meshcat", "--set", "camera.kind=projected", "--host", NOWHERE],
          f"host: found '{NOWHERE}'", f"--host: found '{NOWHERE}'"),
         (lambda: ServerSocket(NOWHERE, 0, lambda: False),
-         ["serve", "acrobot_computed_torque", "--host", NOWHERE, "--port", "0"],
+         ["serve", TORQUES, "--host", NOWHERE, "--port", "0"],
          f"host, port: found {NOWHERE}:0", f"--host, --port: found {NOWHERE}:0"),
         (lambda: open_connection(-5),
          ["simulate", SCENARIO, "--set", "camera.kind=projected", "--steered-by", "-5"],
          "descriptor: found -5", "--steered-by: found -5"),
+        (lambda: simulate(SCENARIO, log_formats=["xls"]),
+         ["simulate", SCENARIO, "--log-format", "xls"],
+         "log_formats: found 'xls'", "--log-format: found 'xls'"),
+        (lambda: calibrate("planar", "log.csv", tags="tags.csv", tag_size=0.1),
+         ["calibrate", "planar", "log.csv", "--tags", "tags.csv", "--tag-size", "0.1"],
+         "tag_size: found beside tags", "--tag-size: found beside tags"),
+        (lambda: calibrate_in_simulation(TORQUES), ["calibrate", "--campaign", TORQUES],
+         f"scenario: found {TORQUES}", f"--campaign: found {TORQUES}"),
+        (lambda: identify_in_simulation(SCENARIO), ["identify", "--campaign", SCENARIO],
+         f"scenario: found {SCENARIO}", f"--campaign: found {SCENARIO}"),
     ],
 )  # fmt: skip
 def test_python_reads_arguments_and_the_command_options(
@@ -80,6 +95,7 @@ OPTIONS = {
         ("one\nlengths: found 3", "one\n--lengths: found 3"),
         ("tags: found none; accepted: tag_size, or rows",
          "tags: found none; accepted: --tag-size, or rows"),
+        ("log.csv: model: found 0; a model", "log.csv: --cable-model: found 0; a model"),
         ("tags: none (tag_size)", "tags: none (--tag-size)"),
         # Words of the sentence, and parts of names and paths, stay.
         ("cable lengths: found none", "cable lengths: found none"),
