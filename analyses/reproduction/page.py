@@ -21,7 +21,7 @@ from cdpr_drake.analyses.reporting.provenance import code_version, package_versi
 from cdpr_drake.analyses.reporting.statements import NOT_IN_QUICK, NOT_JUDGED, NOT_TESTABLE
 from cdpr_drake.analyses.reproduction.numbers import RULE
 from cdpr_drake.analyses.reproduction.rows import CITED, MISSING, NOT_ASKED, SHOWN, ReportRow
-from cdpr_drake.analyses.reproduction.scorecard import Scorecard
+from cdpr_drake.analyses.reproduction.scorecard import Scorecard, chapter_words
 from cdpr_drake.analyses.reproduction.states import StudyState, study_folder
 from cdpr_drake.analyses.studies.published.recipe_choices import CHOICES
 from cdpr_drake.analyses.studies.published.register import Register
@@ -30,9 +30,6 @@ REPORT = "report.html"
 
 RECIPES = "stability-recipes"
 """Study whose tables stand in the section on the recipe."""
-
-OURS = "ours"
-"""Register of what no source states."""
 
 QUICK = (
     "This is the quick form: few runs, one seed, coarse grids. Its verdicts say that the machinery "
@@ -94,7 +91,7 @@ def _scorecard(rows: Sequence[ReportRow], registers: Sequence[Register]) -> str:
             continue
         for (name, chapter), counts in card.chapters.items():
             if name == register.name:
-                lines.append(_counts(_chapter(register, chapter), counts, verdicts))
+                lines.append(_counts(chapter_words(register, chapter), counts, verdicts))
         lines.append(_counts(register.title, total, verdicts, "total"))
     lines.append(_counts("All", card.total(), verdicts, "total"))
     heads = "".join(f'<th class="n">{escape(verdict)}</th>' for verdict in verdicts)
@@ -106,16 +103,6 @@ def _scorecard(rows: Sequence[ReportRow], registers: Sequence[Register]) -> str:
         f"{escape(SHOWN)}: a figure that is drawn here, and of which nothing is judged; "
         f"{escape(CITED)}: told of the work of others.</p>"
     )
-
-
-def _chapter(register: Register, chapter: str) -> str:
-    """A line's name in the scorecard: a chapter's number, or what ours is about."""
-    if register.name == OURS:
-        titles = {section.chapter: section.title for section in register.sections}
-        return titles.get(chapter, f"Study {chapter}")
-    if len(chapter) == 1 and chapter.isalpha():
-        return f"Appendix {chapter}"
-    return f"Chapter {chapter}" if chapter[0].isdigit() else chapter
 
 
 def _counts(words: str, counts: Counter[str], verdicts: Sequence[str], kind: str = "") -> str:
