@@ -56,6 +56,7 @@ from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.tensions.methods import METHODS, distribute
 from cdpr_drake.workspaces.demanded_wrenches import SpatialSet
 from tests.identification.logs import log as motion_log
+from tests.messages import printed
 
 STUB = Path(cdpr.__file__).with_suffix(".pyi")
 HOMES = {
@@ -366,9 +367,9 @@ def test_a_workspace_as_hull_and_boxes_in_a_folder(tmp_path, monkeypatch, capsys
         with pytest.raises(SystemExit) as end:
             main([*command, folder])
         assert end.value.code == 0
-        printed = capsys.readouterr()
-        assert json.loads(printed.out) == told
-        assert words in printed.err
+        shown = printed(capsys)
+        assert json.loads(shown.out) == told
+        assert words in shown.err
     names = [
         sorted(path.name for path in Path(one).iterdir() if path.is_file())
         for one in ("call", "command")

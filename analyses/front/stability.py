@@ -61,22 +61,24 @@ class DrawnStability(StabilityWorkspaces):
 
         return planes_figure(self, bounds)
 
-    def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> dict[str, str]:
+    def write(
+        self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS, say: Say | None = None
+    ) -> dict[str, str]:
         """Writes arrays, `results.json`, then figures and page, into a folder that exists.
+
+        Args:
+            folder: The folder; in the result's own the arrays of the grid are there already.
+            formats: Endings of the files of figures.
+            say: Told what should be known of the page.
 
         Returns:
             Of each picture that could not be written, the file and why, in one line.
         """
-        self.save(folder)
-        return self.write_shown(folder, formats)
-
-    def write_shown(
-        self, folder: Path, formats: Sequence[str], say: Say | None = None
-    ) -> dict[str, str]:
-        """Writes as `write` all but the grid's arrays; says what should be known of the page."""
         from cdpr_drake.analyses.workspaces.stability_figures import stability_pictures
         from cdpr_drake.analyses.workspaces.stability_scene import scene_page
 
+        if folder != self.folder:
+            self.save(folder)
         write_json(folder / RESULTS, self.as_dict())
         page, note = scene_page(self, self.robot)
         if note and say is not None:
@@ -165,7 +167,7 @@ def assess_stability(
         if where is None:
             return found
         with told.doing("Writing results"):
-            failed = found.write_shown(where, formats, told.say)
+            failed = found.write(where, formats, told.say)
     return replace(found, failed=failed)
 
 

@@ -188,22 +188,24 @@ class DrawnWorkspace(RobotWorkspace):
             more.append(("proven", f"{words} open, {len(proven.verdicts)} boxes"))
         return title, [grid, *more, *rows]
 
-    def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> dict[str, str]:
+    def write(
+        self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS, say: Say | None = None
+    ) -> dict[str, str]:
         """Writes arrays, `results.json`, then figures and page, into a folder that exists.
+
+        Args:
+            folder: The folder; in the result's own the arrays of the grid are there already.
+            formats: Endings of the files of figures.
+            say: Told what should be known of the page.
 
         Returns:
             Of each picture that could not be written, the file and why, in one line.
         """
-        self.save(folder)
-        return self.write_shown(folder, formats)
-
-    def write_shown(
-        self, folder: Path, formats: Sequence[str], say: Say | None = None
-    ) -> dict[str, str]:
-        """Writes as `write` all but the grid's arrays; says what should be known of the page."""
         from cdpr_drake.analyses.workspaces.workspace_figures import workspace_pictures
         from cdpr_drake.analyses.workspaces.workspace_scene import workspace_page
 
+        if folder != self.folder:
+            self.save(folder)
         if self.hull is not None:
             save_hull(self.hull, folder)
         if self.boxes is not None:
@@ -388,7 +390,7 @@ def compute_workspace(
             if boxes is not None and shapes.boxes_mesh is not None:
                 with whole_file(Path(shapes.boxes_mesh)) as part:
                     write_boxes(boxes, part)
-            failed = {} if where is None else found.write_shown(where, formats, told.say)
+            failed = {} if where is None else found.write(where, formats, told.say)
     return replace(found, failed=failed)
 
 
