@@ -117,10 +117,9 @@ class ShapeRequest:
                 raise WorkspaceError(f"{name}: needs {needed}; accepted: both")
             if file is not None:
                 mesh_ending(Path(file), endings)
-        if self.unbounded and self.hull is None:
-            raise WorkspaceError("unbounded: needs hull; accepted: both")
-        if self.unbounded and box is not None:
-            raise WorkspaceError("unbounded: found box; accepted: without box")
+        if self.unbounded and (self.hull is None or box is not None):
+            wrong = "needs hull" if self.hull is None else "found box"
+            raise WorkspaceError(f"unbounded: {wrong}; accepted: with hull and without box")
         if self.hull is not None and np.shape(self.hull) != (3,):
             raise WorkspaceError(f"hull: found {self.hull!r}; accepted: x, y, z [m]")
         if self.certify and self.boxes < 1:

@@ -214,9 +214,13 @@ class GridSession(CommandSession):
     It listens to Ctrl-C and SIGTERM only while something is computed.
     """
 
-    def __enter__(self) -> Self:
+    def __init__(self, folder: Path, name: str) -> None:
+        """For one question; arguments as `CommandSession`."""
+        super().__init__(STOPPING, folder, name)
         self._part = ""
         self._last: WorkProgress | None = None
+
+    def __enter__(self) -> Self:
         return self
 
     @contextmanager

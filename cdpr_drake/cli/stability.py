@@ -21,7 +21,6 @@ from cdpr_drake.analyses.simulation.stability_files import stability_of_folder
 from cdpr_drake.analyses.workspaces.stability_results import KINDS, StabilityWorkspaces
 from cdpr_drake.cli.completion import robot_words, scenario_words
 from cdpr_drake.cli.grid_options import (
-    STOPPING,
     GridSession,
     GridWords,
     Orientations,
@@ -190,7 +189,7 @@ def stability(
         question = stability_question(robot, **asked)
         name = f"{question.robot}-{scheme}-{verdict}"
         folder = out if out is not None else default_folder("stability", name, question.arguments())
-        with GridSession(STOPPING, folder, question.robot) as session:
+        with GridSession(folder, question.robot) as session:
             try:
                 found = assess_stability(
                     robot, **asked, folder=folder, workers=scheduler or workers, formats=formats,

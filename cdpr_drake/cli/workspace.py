@@ -25,7 +25,6 @@ from cdpr_drake.analyses.workspaces.conditions import KINDS, MEASURES
 from cdpr_drake.analyses.workspaces.workspace_results import RobotWorkspace
 from cdpr_drake.cli.completion import words_among
 from cdpr_drake.cli.grid_options import (
-    STOPPING,
     ForceToResist,
     GridSession,
     GridWords,
@@ -360,7 +359,7 @@ def workspace(
         some = question.kinds[0] if len(question.kinds) == 1 else f"{len(question.kinds)}-kinds"
         name = f"{question.robot}-{some}"
         folder = out if out is not None else default_folder("workspace", name, question.arguments())
-        with GridSession(STOPPING, folder, question.robot) as session:
+        with GridSession(folder, question.robot) as session:
             try:
                 found = compute_workspace(
                     robot, **asked, hull=center, unbounded=unbounded, rays=rays,
