@@ -5,6 +5,8 @@ from .analyses.front.exchange import import_robot as import_robot
 from .analyses.front.planning import plan_free_motion as plan_free_motion
 from .analyses.front.planning import plan_path as plan_path
 from .analyses.front.session import Session as Session
+from .analyses.front.simulated_fits import calibrate_in_simulation as calibrate_in_simulation
+from .analyses.front.simulated_fits import identify_in_simulation as identify_in_simulation
 from .analyses.front.simulation import continue_run as continue_run
 from .analyses.front.simulation import finish_run as finish_run
 from .analyses.front.simulation import simulate as simulate

@@ -549,6 +549,13 @@ def test_a_calibration(planar, tmp_path):
     np.testing.assert_allclose(moved, [0.005, 0.0, 0.0], atol=1e-4)
     shows_itself(found)
     assert isinstance(found.plot(), Figure)
+    out = tmp_path / "out"
+    kept = cdpr.calibrate(planar, path, asked, folder=out, formats=("svg",))
+    assert kept.folder == out
+    assert {path.name for path in out.glob("*.svg")} == {"calibration.svg", "correlation.svg"}
+    assert json.loads((out / "results.json").read_text()) == as_json(kept)
+    one_line(lambda: cdpr.calibrate(planar, path, asked, folder=out), "allow overwrite")
+    one_line(lambda: cdpr.calibrate(planar, path, asked, propose=0), "propose: found 0")
     one_line(lambda: cdpr.calibrate(planar, path, asked, sigmas={"length": 1.0}), "lengths")
     one_line(lambda: cdpr.calibrate(planar, path, asked, prior={}), "prior", "priors")
     one_line(lambda: cdpr.calibrate(planar, tmp_path / "no.csv"), "no.csv")

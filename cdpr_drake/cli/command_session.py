@@ -13,6 +13,7 @@ from rich.progress import TaskID
 from cdpr_drake.analyses.front.session import Session
 from cdpr_drake.analyses.reporting.output_folder import ResultsFolder, shown_path
 from cdpr_drake.analyses.reporting.progress import WorkProgress
+from cdpr_drake.cli.option_names import SHARED_OPTIONS, with_options
 from cdpr_drake.cli.process import StopRequest
 from cdpr_drake.cli.run_endings import SayContinued, report_kept_files, report_recovered
 from cdpr_drake.cli.terminal import message_console, progress_bar, working
@@ -64,7 +65,7 @@ class CommandSession(Session):
 
     def say(self, words: str) -> None:
         """Prints a line."""
-        self.console.print(words)
+        self.console.print(with_options(words, SHARED_OPTIONS))
 
     def opened(self, results: ResultsFolder) -> None:
         """Says where results of killed runs went."""

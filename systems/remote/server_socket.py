@@ -62,7 +62,7 @@ class ServerSocket:
         except (OSError, UnicodeError, zmq.ZMQError) as problem:
             self.close()
             raise BridgeError(
-                f"--host, --port: found {host}:{port}, {problem}; accepted: an interface of this "
+                f"host, port: found {host}:{port}, {problem}; accepted: an interface of this "
                 "machine and a free port"
             ) from problem
         self.address = self._socket.getsockopt_string(zmq.LAST_ENDPOINT)
