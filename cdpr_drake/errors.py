@@ -140,6 +140,10 @@ class SweepError(CdprError):
     """A sweep cannot start or go on: a scheduler does not answer, or a worker died."""
 
 
+class StoppedError(CdprError):
+    """Work was asked to stop before there was a result; says how far it was."""
+
+
 class ForwardKinematicsError(CdprError):
     """No pose near the guess has these cable lengths, or they do not determine one; by how much."""
 
