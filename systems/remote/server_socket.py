@@ -74,6 +74,10 @@ class ServerSocket:
         self._socket.close()
         self._context.term()
 
+    def ignore_stop(self) -> None:
+        """From now on a request to stop ends no wait."""
+        self._should_stop = lambda: False
+
     def follow(self) -> None:
         """From now on, the client of the message that came last must stay."""
         # Earlier and later connections may have the same number. Events tell of earlier ones; of
