@@ -29,7 +29,7 @@ from cdpr_drake.analyses.reporting.statements import (
 )
 from cdpr_drake.analyses.reproduction.numbers import RULE
 from cdpr_drake.analyses.reproduction.rows import CITED, MISSING, NOT_ASKED, SHOWN, Fact, ReportRow
-from cdpr_drake.analyses.reproduction.scorecard import OWN, Scorecard
+from cdpr_drake.analyses.reproduction.scorecard import OWN, Scorecard, chapter_words
 from cdpr_drake.analyses.reproduction.states import StudyState, study_folder
 from cdpr_drake.analyses.studies.framework.statement import (
     CHOICE,
@@ -132,7 +132,9 @@ def _counted(
         total = sum(mine.values(), Counter[str]())
         if not total:
             continue
-        lines += [_counts(_chapter(register, one), some, verdicts) for one, some in mine.items()]
+        lines += [
+            _counts(chapter_words(register, one), some, verdicts) for one, some in mine.items()
+        ]
         lines.append(_counts(register.title, total, verdicts, "total"))
         every += total if register.name != OWN else Counter()
     lines.append(_counts("All of the sources", every, verdicts, "total"))
@@ -167,7 +169,7 @@ def _chapters(rows: Sequence[ReportRow], registers: Sequence[Register]) -> str:
             lines = _overview(some, register.corrected.get(chapter, ()))
             if lines:
                 items = "".join(f"<li>{line}</li>" for line in lines)
-                words = f"{register.title.partition(',')[0]}: {_chapter(register, chapter)}"
+                words = f"{register.title.partition(',')[0]}: {chapter_words(register, chapter)}"
                 parts.append(f'<h3>{escape(words)}</h3><ul class="plain">{items}</ul>')
     return "".join(parts)
 
@@ -217,16 +219,6 @@ def _in_short(fact: Fact, row: ReportRow) -> str:
 
 SHORT = 110
 """Longest words of a fact in the overview of a chapter."""
-
-
-def _chapter(register: Register, chapter: str) -> str:
-    """A line's name in the scorecard: a chapter's number, or what ours is about."""
-    if register.name == OWN:
-        titles = {section.chapter: section.title for section in register.sections}
-        return titles.get(chapter, f"Study {chapter}")
-    if len(chapter) == 1 and chapter.isalpha():
-        return f"Appendix {chapter}"
-    return f"Chapter {chapter}" if chapter[0].isdigit() else chapter
 
 
 def _counts(words: str, counts: Counter[str], verdicts: Sequence[str], kind: str = "") -> str:
