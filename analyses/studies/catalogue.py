@@ -78,7 +78,6 @@ class StudyEntry:
         run: What runs it.
         continues: Whether it works in its folder from the start, by `run_study_sweep`, and
             continues when it is run again; otherwise the folder appears at the end.
-        spreads: Whether workers of a cluster can do its work.
         repeats: Whether it repeats runs over as many seeds as its session says.
         judges: Names of the statements that it can judge, as its results have them.
         numbers: Printed numbers that it puts beside its own.
@@ -88,7 +87,6 @@ class StudyEntry:
 
     run: Study
     continues: bool = False
-    spreads: bool = True
     repeats: bool = False
     judges: tuple[str, ...] = ()
     numbers: tuple[PublishedNumber, ...] = ()
@@ -114,12 +112,7 @@ STUDIES: dict[str, StudyEntry] = {
         judges=names_of_checks(tension_methods.CHECKS),
         figures=tension_methods.FIGURES,
     ),
-    "worked-examples": StudyEntry(
-        worked_examples.study_worked_examples,
-        spreads=False,
-        judges=names_of_checks(worked_examples.CHECKS),
-        figures=("trajectory", "feasible_polygons"),
-    ),
+    "worked-examples": entry_of(worked_examples.STUDY),
     "stability-closed-loop": StudyEntry(
         closed_loops.study_closed_loop,
         continues=True,
