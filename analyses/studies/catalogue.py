@@ -160,12 +160,7 @@ STUDIES: dict[str, StudyEntry] = {
         figures=workspaces.FIGURES,
     ),
     "design": StudyEntry(study_design, continues=True),
-    "engines": StudyEntry(
-        engines.study_engines,
-        continues=True,
-        judges=names_of_checks(engines.CHECKS),
-        figures=("engines",),
-    ),
+    "engines": entry_of(engines.STUDY),
     "scenarios": StudyEntry(
         scenarios.study_scenarios,
         continues=True,
