@@ -38,7 +38,6 @@ from cdpr_drake.analyses.studies.identification.study import study_identificatio
 from cdpr_drake.analyses.studies.planning.study import study_planning
 from cdpr_drake.analyses.studies.published.recipe_variants import RECIPES
 from cdpr_drake.analyses.studies.tension_cases import TENSION_CASES
-from cdpr_drake.stability.stability_case import SCHEMES
 
 
 class StudyResult(Protocol):
@@ -113,22 +112,7 @@ STUDIES: dict[str, StudyEntry] = {
         figures=tension_methods.FIGURES,
     ),
     "worked-examples": entry_of(worked_examples.STUDY),
-    "stability-closed-loop": StudyEntry(
-        closed_loops.study_closed_loop,
-        continues=True,
-        judges=names_of_checks(closed_loops.CHECKS),
-        figures=("errors", "ways"),
-    ),
-    **{
-        f"stability-closed-loop-{scheme}": StudyEntry(
-            partial(closed_loops.study_closed_loop, scheme=scheme),
-            continues=True,
-            judges=names_of_checks(closed_loops.CHECKS),
-            figures=("errors", "ways"),
-        )
-        for scheme in SCHEMES
-        if scheme != "pbvs"
-    },
+    **{study.name: entry_of(study) for study in closed_loops.STUDIES},
     "control-stability": StudyEntry(
         control_stability.study_control_stability,
         continues=True,
