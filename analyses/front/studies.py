@@ -203,15 +203,12 @@ def run_study(
         session: Who follows the study and may stop it; None: nobody.
 
     Raises:
-        CdprError: There is no such study, it does not repeat, has not this recipe, or its work is
-            done here alone.
+        CdprError: There is no such study, it does not repeat, or has not this recipe.
         OutputFolderError: The folder holds other things, or cannot be written.
     """
     entry, told = chosen_studies([name])[name], session or Session()
     count, scheduler = asked_workers(workers)
     if scheduler is not None:
-        if not entry.spreads:
-            raise CdprError(f"workers: study {name} is computed here; leave it out")
         check_scheduler(scheduler)
     if seeds is not None and not entry.repeats:
         able = studies_that(lambda other: other.repeats)
