@@ -35,7 +35,7 @@ from cdpr_drake.analyses.studies.framework.case_definition import PublishedNumbe
 from cdpr_drake.analyses.studies.framework.case_study import run_case_study
 from cdpr_drake.analyses.studies.framework.study import Study as FramedStudy
 from cdpr_drake.analyses.studies.identification.study import study_identification
-from cdpr_drake.analyses.studies.planning.study import study_planning
+from cdpr_drake.analyses.studies.planning.study import STUDY as PLANNING
 from cdpr_drake.analyses.studies.published.recipe_variants import RECIPES
 from cdpr_drake.analyses.studies.tension_cases import TENSION_CASES
 from cdpr_drake.stability.stability_case import SCHEMES
@@ -179,7 +179,7 @@ STUDIES: dict[str, StudyEntry] = {
         judges=names_of_checks(scenarios.CHECKS),
         figures=scenarios.FIGURES,
     ),
-    "planning": StudyEntry(study_planning, continues=True, figures=("phase_planes",)),
+    "planning": entry_of(PLANNING),
     "mobile-robot": StudyEntry(
         mobile_robot.study_mobile_robot,
         continues=True,
