@@ -28,7 +28,7 @@ from cdpr_drake.analyses.studies import (
     worked_examples,
     workspaces,
 )
-from cdpr_drake.analyses.studies.calibration.study import study_calibration
+from cdpr_drake.analyses.studies.calibration.study import STUDY as CALIBRATION
 from cdpr_drake.analyses.studies.case_studies import CASE_STUDIES
 from cdpr_drake.analyses.studies.design import study_design
 from cdpr_drake.analyses.studies.framework.case_definition import PublishedNumber
@@ -203,9 +203,7 @@ STUDIES: dict[str, StudyEntry] = {
         figures=("schemes",),
     ),
     "tagless": entry_of(tagless.STUDY),
-    "calibration": StudyEntry(
-        study_calibration, continues=True, repeats=True, figures=("calibration",)
-    ),
+    "calibration": entry_of(CALIBRATION),
     "identification": StudyEntry(
         study_identification, continues=True, repeats=True, figures=("identification",)
     ),
