@@ -17,6 +17,7 @@ from cdpr_drake.analyses.studies import (
     control_stability,
     engines,
     fusion,
+    identification,
     mobile_robot,
     pick_and_place,
     scenarios,
@@ -34,7 +35,6 @@ from cdpr_drake.analyses.studies.design import study_design
 from cdpr_drake.analyses.studies.framework.case_definition import PublishedNumber
 from cdpr_drake.analyses.studies.framework.case_study import run_case_study
 from cdpr_drake.analyses.studies.framework.study import Study as FramedStudy
-from cdpr_drake.analyses.studies.identification.study import study_identification
 from cdpr_drake.analyses.studies.planning.study import STUDY as PLANNING
 from cdpr_drake.analyses.studies.published.recipe_variants import RECIPES
 from cdpr_drake.analyses.studies.tension_cases import TENSION_CASES
@@ -204,9 +204,7 @@ STUDIES: dict[str, StudyEntry] = {
     ),
     "tagless": entry_of(tagless.STUDY),
     "calibration": entry_of(CALIBRATION),
-    "identification": StudyEntry(
-        study_identification, continues=True, repeats=True, figures=("identification",)
-    ),
+    "identification": entry_of(identification.STUDY),
     **{
         case.name: StudyEntry(
             partial(run_case_study, case),
