@@ -15,6 +15,7 @@ from cdpr_drake.analyses.reporting.statements import names_of_checks
 from cdpr_drake.analyses.studies import (
     closed_loops,
     control_stability,
+    design,
     engines,
     fusion,
     identification,
@@ -31,7 +32,6 @@ from cdpr_drake.analyses.studies import (
 )
 from cdpr_drake.analyses.studies.calibration.study import STUDY as CALIBRATION
 from cdpr_drake.analyses.studies.case_studies import CASE_STUDIES
-from cdpr_drake.analyses.studies.design import study_design
 from cdpr_drake.analyses.studies.framework.case_definition import PublishedNumber
 from cdpr_drake.analyses.studies.framework.case_study import run_case_study
 from cdpr_drake.analyses.studies.framework.study import Study as FramedStudy
@@ -166,7 +166,7 @@ STUDIES: dict[str, StudyEntry] = {
         judges=names_of_checks(workspaces.CHECKS),
         figures=workspaces.FIGURES,
     ),
-    "design": StudyEntry(study_design, continues=True),
+    "design": entry_of(design.STUDY),
     "engines": StudyEntry(
         engines.study_engines,
         continues=True,
