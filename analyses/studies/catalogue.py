@@ -125,12 +125,7 @@ STUDIES: dict[str, StudyEntry] = {
         continues=True,
         judges=names_of_checks(control_stability.RECIPE_CHECKS),
     ),
-    "stability-ranges": StudyEntry(
-        stability_ranges.study_stability_ranges,
-        continues=True,
-        judges=names_of_checks(stability_ranges.CHECKS),
-        figures=stability_ranges.FIGURES,
-    ),
+    "stability-ranges": entry_of(stability_ranges.STUDY),
     "stability-shapes": StudyEntry(
         stability_shapes.study_stability_shapes,
         continues=True,
