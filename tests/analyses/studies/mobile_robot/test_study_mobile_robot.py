@@ -186,8 +186,8 @@ def test_words_and_rises():
 
 def test_seeds_are_refused_by_studies_that_do_not_repeat(capsys):
     with pytest.raises(SystemExit) as ended:
-        main(["study", "engines", "--quick", "--seeds", "3"])
+        main(["study", "scenarios", "--quick", "--seeds", "3"])
     assert ended.value.code == 2
     said = printed(capsys).err
-    assert "--seeds: accepted with mobile-robot" in said
-    assert "case-*, not with engines" in said
+    assert "--seeds: accepted with" in said
+    assert "case-*, not with scenarios" in said
