@@ -7,6 +7,7 @@ unit ends with it, in SI: `distance_m`, `peak_rad`, `tension_n`.
 
 from __future__ import annotations
 
+import builtins
 import csv
 import io
 import json
@@ -121,7 +122,7 @@ class Runs:
             rows = [run for run in rows if column in run.columns() and run[column] in accepted]
         return Runs(rows, self.planned)
 
-    def __getitem__(self, column: str) -> Array:
+    def __getitem__(self, column: str) -> np.ndarray:
         """Values of a column, shape (n,) or (n, ...); None is NaN.
 
         Raises:
@@ -132,7 +133,7 @@ class Runs:
             values = [np.nan if value is None else value for value in values]
         return np.array(values)
 
-    def list(self, column: str) -> list[Any]:
+    def list(self, column: str) -> builtins.list[Any]:
         """Values of a column as they are, such as curves of different lengths.
 
         Raises:
@@ -205,11 +206,11 @@ class Runs:
         """Units of the columns whose names end with one."""
         return {name: unit for name in self.columns() if (unit := unit_of(name))}
 
-    def columns(self) -> list[str]:
+    def columns(self) -> builtins.list[str]:
         """Names of all columns, in the order in which they first come."""
         return list(dict.fromkeys(name for run in self.rows for name in run.columns()))
 
-    def arrays(self) -> list[str]:
+    def arrays(self) -> builtins.list[str]:
         """Names of the columns that hold arrays."""
         return [
             name
@@ -217,7 +218,7 @@ class Runs:
             if any(isinstance(run.measured.get(name), np.ndarray) for run in self.rows)
         ]
 
-    def table(self) -> list[dict[str, Any]]:
+    def table(self) -> builtins.list[dict[str, Any]]:
         """A dict a row, `case` first, without arrays."""
         arrays = set(self.arrays())
         return [

@@ -25,7 +25,7 @@ CONSISTENT = 4.0
 """How many standard deviations of a mean of chi-square numbers it may be from their mean."""
 
 
-def column(runs: Runs, name: str, key: str) -> Array:
+def column(runs: Runs, name: str, key: str) -> np.ndarray:
     """A column of a configuration, shape (runs,)."""
     return runs(configuration=name, duration_s=DURATION)[key]
 

@@ -119,7 +119,7 @@ def row_of(result: RunResult, laps: int, lap_time: float) -> dict[str, Any]:
         found = np.array([np.interp(when, times, c, right=np.nan) for c in columns])
         return found.T.reshape(PHASES, *values.shape[1:])
 
-    rows_of_laps: list[dict[str, float]] = []
+    rows_of_laps: list[dict[str, Any]] = []
     lengths = np.full((laps, PHASES), np.nan)
     reference = at_phases(REFERENCE - 1, positions)
     for lap in range(min(laps, int(number[-1]) + 1)):

@@ -34,7 +34,7 @@ SAME_PATH = 0.01
 known tag moves the platform by."""
 
 
-def column(runs: Runs, name: str, key: str) -> Array:
+def column(runs: Runs, name: str, key: str) -> np.ndarray:
     """A column of a configuration, shape (runs, ...), such as (runs, laps)."""
     return runs(configuration=name)[key]
 

@@ -7,7 +7,6 @@ import numpy as np
 from cdpr_drake.analyses.studies.framework.runs import Runs
 from cdpr_drake.analyses.studies.framework.statement import OURS, Finding, statement
 from cdpr_drake.analyses.studies.schemes.trials import FREE, ROBOT, TURNS, TURNS_DEG
-from cdpr_drake.arrays import Array
 
 FAR = 0.1
 """Retreat beyond which a camera on a robot would have left its workspace [m]."""
@@ -20,7 +19,7 @@ KEPT = 1.05
 bound is left by till the least time between two switches is over."""
 
 
-def column(runs: Runs, trial: str, scheme: str, name: str) -> Array:
+def column(runs: Runs, trial: str, scheme: str, name: str) -> np.ndarray:
     """A column of a scheme's runs, shape (n,)."""
     return runs(trial=trial, scheme=scheme)[name]
 
