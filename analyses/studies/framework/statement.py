@@ -138,12 +138,7 @@ class Check:
             MissingRuns: Runs that it needs are not there.
         """
         found = self.find(runs)
-        verdict = self._verdict(found)
-        cause = (found.cause or self.cause) if verdict in (IN_PART, NOT_CONFIRMED) else ""
-        return self._judged(
-            found.found, verdict, why=found.why, says=found.says, printed=found.printed,
-            held=sum(map(bool, found.held)), of=len(found.held), cause=cause,
-        )  # fmt: skip
+        return self._judged(found, self._verdict(found))
 
     def _verdict(self, found: Finding) -> str:
         held = [bool(one) for one in found.held]
@@ -154,16 +149,15 @@ class Check:
 
     def unjudged(self, verdict: str, found: str = "") -> Judged:
         """It without what runs say of it."""
-        return self._judged(found, verdict)
+        return self._judged(Finding(found=found, held=()), verdict)
 
-    def _judged(
-        self, found: str, verdict: str, why: str = "", says: str = "", printed: str = "",
-        held: int = 0, of: int = 0, cause: str = "",
-    ) -> Judged:  # fmt: skip
+    def _judged(self, found: Finding, verdict: str) -> Judged:
+        failed = verdict in (IN_PART, NOT_CONFIRMED)
         return Judged(
-            words=says or self.says, printed=printed or self.printed, found=found, verdict=verdict,
-            why=why, name=self.name, source=self.source, rule=self.rule, basis=self.basis,
-            held=held, of=of, same_as=self.same_as, cause=cause,
+            words=found.says or self.says, printed=found.printed or self.printed,
+            found=found.found, verdict=verdict, why=found.why, name=self.name, source=self.source,
+            rule=self.rule, basis=self.basis, held=sum(map(bool, found.held)), of=len(found.held),
+            same_as=self.same_as, cause=(found.cause or self.cause) if failed else "",
         )  # fmt: skip
 
 

@@ -7,7 +7,13 @@ from functools import partial
 import numpy as np
 
 from cdpr_drake.analyses.studies.framework.runs import MissingRuns, Runs
-from cdpr_drake.analyses.studies.framework.statement import FITTED, OURS, Finding, statement
+from cdpr_drake.analyses.studies.framework.statement import (
+    FITTED,
+    OURS,
+    SOURCE,
+    Finding,
+    statement,
+)
 from cdpr_drake.analyses.studies.mobile_robot.configurations import (
     ALL_LAPS,
     CORRECTED,
@@ -73,6 +79,7 @@ def longer(one: float, other: float, times: float = 1.0) -> bool:
     ", ".join(f"{NUMBERS[k]}: {laps}" for k, laps in PUBLISHED_LAPS.items()),
     rule=f"each median within a factor {FACTOR:g}",
     basis=FITTED,
+    cause=SOURCE,
 )
 def estimators(runs: Runs) -> Finding:
     """How long each estimator is followed without a known tag."""
@@ -93,6 +100,7 @@ def estimators(runs: Runs) -> Finding:
     "12 laps and 4",
     rule=f"medians, {3.0 / FACTOR:g} times as long; in part: longer",
     basis=FITTED,
+    cause=SOURCE,
 )
 def integration_lasts(runs: Runs) -> Finding:
     """Laps until failure, control integration against cable lengths."""
@@ -156,6 +164,7 @@ def drift(runs: Runs) -> Finding:
     "minutes.",
     "lap 29",
     rule=f"median within a factor {FACTOR:g}; in part: any fails",
+    cause=SOURCE,
 )
 def plain(runs: Runs) -> Finding:
     """When tracking fails with a known tag and no correction."""
