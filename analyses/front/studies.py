@@ -156,7 +156,7 @@ class Reproduction(Summarized):
         """How many items of each chapter came out how."""
         from cdpr_drake.analyses.reproduction.scorecard import scorecard_figure
 
-        return scorecard_figure(Scorecard.of(self.rows))
+        return scorecard_figure(Scorecard.of(self.rows), published_registers(), self.quick)
 
     def summary(self) -> tuple[str, list[tuple[str, str]]]:
         """What it shows of itself."""

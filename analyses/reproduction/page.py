@@ -8,7 +8,7 @@ import base64
 import json
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -19,12 +19,25 @@ import numpy as np
 
 from cdpr_drake.analyses.reporting.log_files import write_whole
 from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
-from cdpr_drake.analyses.reporting.statements import NOT_IN_QUICK, NOT_JUDGED, NOT_TESTABLE
+from cdpr_drake.analyses.reporting.statements import (
+    CONFIRMED,
+    IN_PART,
+    NOT_CONFIRMED,
+    NOT_IN_QUICK,
+    NOT_JUDGED,
+    NOT_TESTABLE,
+)
 from cdpr_drake.analyses.reproduction.numbers import RULE
-from cdpr_drake.analyses.reproduction.rows import CITED, MISSING, NOT_ASKED, SHOWN, ReportRow
-from cdpr_drake.analyses.reproduction.scorecard import OWN, Scorecard
+from cdpr_drake.analyses.reproduction.rows import CITED, MISSING, NOT_ASKED, SHOWN, Fact, ReportRow
+from cdpr_drake.analyses.reproduction.scorecard import OWN, Scorecard, chapter_words
 from cdpr_drake.analyses.reproduction.states import StudyState, study_folder
-from cdpr_drake.analyses.studies.framework.statement import MET_CONSTRUCTION, MET_FITTED
+from cdpr_drake.analyses.studies.framework.statement import (
+    CHOICE,
+    HARDWARE,
+    MET_CONSTRUCTION,
+    MET_FITTED,
+    SOURCE,
+)
 from cdpr_drake.analyses.studies.published.recipe_choices import CHOICES
 from cdpr_drake.analyses.studies.published.register import Register
 
@@ -59,6 +72,7 @@ def write_report(
         Path of the page.
     """
     parts = [_head(quick), _scorecard(rows, registers), _contents(registers, rows)]
+    parts.append(_chapters(rows, registers))
     parts += [_lacks(rows), _studies(folder, states)]
     for register in registers:
         parts.append(_source(folder, register, [r for r in rows if r.source == register.name]))
@@ -118,7 +132,9 @@ def _counted(
         total = sum(mine.values(), Counter[str]())
         if not total:
             continue
-        lines += [_counts(_chapter(register, one), some, verdicts) for one, some in mine.items()]
+        lines += [
+            _counts(chapter_words(register, one), some, verdicts) for one, some in mine.items()
+        ]
         lines.append(_counts(register.title, total, verdicts, "total"))
         every += total if register.name != OWN else Counter()
     lines.append(_counts("All of the sources", every, verdicts, "total"))
@@ -129,14 +145,80 @@ def _counted(
     )
 
 
-def _chapter(register: Register, chapter: str) -> str:
-    """A line's name in the scorecard: a chapter's number, or what ours is about."""
-    if register.name == OWN:
-        titles = {section.chapter: section.title for section in register.sections}
-        return titles.get(chapter, f"Study {chapter}")
-    if len(chapter) == 1 and chapter.isalpha():
-        return f"Appendix {chapter}"
-    return f"Chapter {chapter}" if chapter[0].isdigit() else chapter
+CAUSES = {
+    SOURCE: "because of the source, which contradicts itself or leaves out what is needed",
+    HARDWARE: "because of the prototype, which has what is in no model",
+    CHOICE: "because of a choice of ours",
+    "": "for a reason that is not known, or not sorted yet",
+}
+"""Words for why facts do not hold."""
+
+NAMED = 6
+"""So many facts of a kind are named in the overview of a chapter; the table has all."""
+
+
+def _chapters(rows: Sequence[ReportRow], registers: Sequence[Register]) -> str:
+    """Of each chapter what stands, what is corrected, what failed and why."""
+    parts = ['<h2 id="chapters">Chapter by chapter</h2>']
+    for register in registers:
+        if register.name == OWN:
+            continue
+        mine = [row for row in rows if row.source == register.name]
+        for chapter in sorted({*(row.chapter for row in mine), *register.corrected}):
+            some = [row for row in mine if row.chapter == chapter]
+            lines = _overview(some, register.corrected.get(chapter, ()))
+            if lines:
+                items = "".join(f"<li>{line}</li>" for line in lines)
+                words = f"{register.title.partition(',')[0]}: {chapter_words(register, chapter)}"
+                parts.append(f'<h3>{escape(words)}</h3><ul class="plain">{items}</ul>')
+    return "".join(parts)
+
+
+def _overview(rows: Sequence[ReportRow], corrected: Sequence[str]) -> list[str]:
+    """Lines on a chapter: its facts by what came of them, each once."""
+    facts: dict[str, tuple[Fact, ReportRow]] = {}
+    for row in rows:
+        for fact in row.facts:
+            if len(row.facts) == 1 or fact.key not in facts:
+                facts.setdefault(fact.key, (fact, row))
+    found = list(facts.values())
+
+    def named(verdicts: Collection[str], cause: str | None = None) -> tuple[int, str]:
+        some = [
+            (fact, row) for fact, row in found
+            if fact.verdict in verdicts and cause in (None, fact.cause)
+        ]  # fmt: skip
+        words = "; ".join(_in_short(fact, row) for fact, row in some[:NAMED])
+        more = f"; and {len(some) - NAMED} more" if len(some) > NAMED else ""
+        return len(some), escape(words + more)
+
+    lines = []
+    for title, verdicts in (
+        ("Stands", (CONFIRMED,)), ("Met, but not put to a test", (MET_FITTED, MET_CONSTRUCTION)),
+    ):  # fmt: skip
+        count, words = named(verdicts)
+        if count:
+            lines.append(f"<b>{title}, {count}</b>: {words}.")
+    if corrected:
+        lines.append(f"<b>Corrected, {len(corrected)}</b>: {escape('; '.join(corrected))}.")
+    for cause, why in CAUSES.items():
+        for title, verdict in (("Fails", NOT_CONFIRMED), ("Holds in part", IN_PART)):
+            count, words = named((verdict,), cause)
+            if count:
+                lines.append(f"<b>{title}, {count}</b>, {why}: {words}.")
+    return lines
+
+
+def _in_short(fact: Fact, row: ReportRow) -> str:
+    """A fact in a few words: those of its row where that rests on it alone."""
+    if len(row.facts) > 1:
+        return fact.key.partition("/")[2].replace("_", " ")
+    words = row.words.rstrip(".")
+    return words if len(words) <= SHORT else f"{words[:SHORT].rpartition(' ')[0]} ..."
+
+
+SHORT = 110
+"""Longest words of a fact in the overview of a chapter."""
 
 
 def _counts(words: str, counts: Counter[str], verdicts: Sequence[str], kind: str = "") -> str:
@@ -149,7 +231,11 @@ def _counts(words: str, counts: Counter[str], verdicts: Sequence[str], kind: str
 
 def _contents(registers: Sequence[Register], rows: Sequence[ReportRow]) -> str:
     there = {row.source for row in rows}
-    links = [("lacks", "What is missing, or not judged"), ("studies", "Studies")]
+    links = [
+        ("chapters", "Chapter by chapter"),
+        ("lacks", "What is missing, or not judged"),
+        ("studies", "Studies"),
+    ]
     links += [(register.name, register.title) for register in registers if register.name in there]
     links += [
         ("recipe", "The recipe of the stability tables"),

@@ -15,8 +15,10 @@ from cdpr_drake.analyses.reporting.statements import names_of_checks
 from cdpr_drake.analyses.studies import (
     closed_loops,
     control_stability,
+    design,
     engines,
     fusion,
+    identification,
     mobile_robot,
     pick_and_place,
     scenarios,
@@ -28,14 +30,12 @@ from cdpr_drake.analyses.studies import (
     worked_examples,
     workspaces,
 )
-from cdpr_drake.analyses.studies.calibration.study import study_calibration
+from cdpr_drake.analyses.studies.calibration.study import STUDY as CALIBRATION
 from cdpr_drake.analyses.studies.case_studies import CASE_STUDIES
-from cdpr_drake.analyses.studies.design import study_design
 from cdpr_drake.analyses.studies.framework.case_definition import PublishedNumber
 from cdpr_drake.analyses.studies.framework.case_study import run_case_study
 from cdpr_drake.analyses.studies.framework.study import Study as FramedStudy
-from cdpr_drake.analyses.studies.identification.study import study_identification
-from cdpr_drake.analyses.studies.planning.study import study_planning
+from cdpr_drake.analyses.studies.planning.study import STUDY as PLANNING
 from cdpr_drake.analyses.studies.published.recipe_variants import RECIPES
 from cdpr_drake.analyses.studies.tension_cases import TENSION_CASES
 
@@ -120,12 +120,7 @@ STUDIES: dict[str, StudyEntry] = {
         continues=True,
         judges=names_of_checks(control_stability.RECIPE_CHECKS),
     ),
-    "stability-ranges": StudyEntry(
-        stability_ranges.study_stability_ranges,
-        continues=True,
-        judges=names_of_checks(stability_ranges.CHECKS),
-        figures=stability_ranges.FIGURES,
-    ),
+    "stability-ranges": entry_of(stability_ranges.STUDY),
     "stability-shapes": StudyEntry(
         stability_shapes.study_stability_shapes,
         continues=True,
@@ -138,44 +133,17 @@ STUDIES: dict[str, StudyEntry] = {
         judges=names_of_checks(workspaces.CHECKS),
         figures=workspaces.FIGURES,
     ),
-    "design": StudyEntry(study_design, continues=True),
+    "design": entry_of(design.STUDY),
     "engines": entry_of(engines.STUDY),
-    "scenarios": StudyEntry(
-        scenarios.study_scenarios,
-        continues=True,
-        judges=names_of_checks(scenarios.CHECKS),
-        figures=scenarios.FIGURES,
-    ),
-    "planning": StudyEntry(study_planning, continues=True, figures=("phase_planes",)),
-    "mobile-robot": StudyEntry(
-        mobile_robot.study_mobile_robot,
-        continues=True,
-        repeats=True,
-        judges=names_of_checks(mobile_robot.CHECKS),
-        figures=mobile_robot.FIGURES,
-    ),
+    "scenarios": entry_of(scenarios.STUDY),
+    "planning": entry_of(PLANNING),
+    "mobile-robot": entry_of(mobile_robot.STUDY),
     "pick-and-place": entry_of(pick_and_place.STUDY),
-    "fusion": StudyEntry(
-        fusion.study_fusion,
-        continues=True,
-        repeats=True,
-        judges=names_of_checks(fusion.CHECKS),
-        figures=("fusion",),
-    ),
-    "schemes": StudyEntry(
-        schemes.study_schemes,
-        continues=True,
-        repeats=True,
-        judges=names_of_checks(schemes.CHECKS),
-        figures=("schemes",),
-    ),
+    "fusion": entry_of(fusion.STUDY),
+    "schemes": entry_of(schemes.STUDY),
     "tagless": entry_of(tagless.STUDY),
-    "calibration": StudyEntry(
-        study_calibration, continues=True, repeats=True, figures=("calibration",)
-    ),
-    "identification": StudyEntry(
-        study_identification, continues=True, repeats=True, figures=("identification",)
-    ),
+    "calibration": entry_of(CALIBRATION),
+    "identification": entry_of(identification.STUDY),
     **{
         case.name: StudyEntry(
             partial(run_case_study, case),

@@ -318,7 +318,7 @@ class StudyResult(StoppableStudy):
             for seed in self.study.seeds_of(case, self.form):
                 row = self._row(case, seed)
                 if row is not None:
-                    rows.append(Run(case.name, seed, case.keys, row))
+                    rows.append(Run(case.name, seed, case.keys, row, case.printed))
         return Runs(rows, partial(self.study.planned, self.form))
 
     def _row(self, case: Case, seed: int | None) -> Row | None:

@@ -8,12 +8,15 @@ import os
 import shutil
 import signal
 import sys
+from collections import Counter
 from dataclasses import dataclass, field, replace
+from itertools import combinations
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
+from matplotlib.colors import to_rgb
 from rich.table import Table
 
 from cdpr_drake.analyses.reporting.deferred_figures import write_pictures
@@ -25,7 +28,7 @@ from cdpr_drake.analyses.reproduction import runner
 from cdpr_drake.analyses.reproduction.page import write_report
 from cdpr_drake.analyses.reproduction.rows import report_rows
 from cdpr_drake.analyses.reproduction.runner import RunSettings, run_studies
-from cdpr_drake.analyses.reproduction.scorecard import Scorecard
+from cdpr_drake.analyses.reproduction.scorecard import LOOKS, VERDICTS, Scorecard, scorecard_figure
 from cdpr_drake.analyses.reproduction.states import (
     StudyState,
     check_folder,
@@ -43,8 +46,11 @@ from cdpr_drake.analyses.studies.framework.statement import (
     judged,
     statement,
 )
-from cdpr_drake.analyses.studies.published.register import read_register
+from cdpr_drake.analyses.studies.published.register import published_registers, read_register
 from cdpr_drake.errors import OutputFolderError
+
+GREY = (0.299, 0.587, 0.114)
+"""What red, green and blue weigh in grey print."""
 
 NUMBER = PublishedNumber(
     group="one", configuration="c", label="C", metric="length_m", heading="length [mm]",
@@ -471,3 +477,37 @@ def test_the_page_has_all_tolerances_and_marks_what_was_counted(folder):
     page = write_report(folder, [register], rows, {}, quick=False).read_text()
     assert "within 3 mm &lt;half&gt;" in page
     assert page.count("counted above") == 1
+
+
+def test_a_chapter_says_what_stands_and_why_what_fails(folder):
+    register, rows = judged_rows(
+        folder,
+        one=[said("high", [True]), said("near", [True], FITTED)],
+        two=[said("low", [False], cause="hardware"), said("odd", [True, False])],
+    )
+    register = replace(register, corrected={"1": ("(1.2)",), "2": ("(2.1)",)})
+    page = write_report(folder, [register], rows, {}, quick=False).read_text()
+    start = page.index('<h2 id="chapters">')
+    words = page[start : page.index("<h2", start + 1)]
+    assert "<b>Stands, 1</b>: It is high." in words
+    assert "<b>Met, but not put to a test, 1</b>: It is near." in words
+    assert "<b>Corrected, 1</b>: (1.2)." in words
+    assert "<b>Fails, 1</b>, because of the prototype, which has what is in no model" in words
+    assert "<b>Holds in part, 1</b>, for a reason that is not known" in words
+    assert "Chapter 2" in words
+
+
+def test_the_picture_of_the_scorecard_counts_every_fact_in_a_look_of_its_own():
+    registers = published_registers()
+    places = dict.fromkeys((one.name, s.chapter) for one in registers for s in one.sections)
+    counts = {place: Counter({v: k + 1 for k, v in enumerate(VERDICTS)}) for place in places}
+    total = sum(range(len(VERDICTS) + 1))
+    (axes,) = scorecard_figure(Scorecard({}, counts, 0), registers, quick=True).axes
+    assert sum(bar.get_width() for bar in axes.patches) == total * len(places)
+    assert len(axes.get_yticks()) == len(places)
+    assert [text.get_text() for text in axes.texts].count(str(total)) == len(places)
+    # In grey print: a hatch, or lightness that differs by a tenth from all others with this hatch.
+    assert set(LOOKS) == set(VERDICTS)
+    for look, other in combinations(LOOKS.values(), 2):
+        if look.hatch == other.hatch:
+            assert abs(np.dot(GREY, np.subtract(to_rgb(look.color), to_rgb(other.color)))) > 0.1
