@@ -105,12 +105,7 @@ def entry_of(study: FramedStudy) -> StudyEntry:
 
 
 STUDIES: dict[str, StudyEntry] = {
-    "tension-methods": StudyEntry(
-        tension_methods.study_tension_methods,
-        continues=True,
-        judges=names_of_checks(tension_methods.CHECKS),
-        figures=tension_methods.FIGURES,
-    ),
+    "tension-methods": entry_of(tension_methods.STUDY),
     "worked-examples": entry_of(worked_examples.STUDY),
     **{study.name: entry_of(study) for study in closed_loops.STUDIES},
     "control-stability": StudyEntry(

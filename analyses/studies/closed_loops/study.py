@@ -94,12 +94,13 @@ def parameters(scheme: str, form: Form) -> Mapping[str, Any]:
 
 def mode_counts(runs: Runs) -> dict[str, Any]:
     """Counts and extremes of the runs of one mode."""
-    good, inside = runs(outcome=CONVERGED), runs(poses_outside_z=0)
-    lost = len(runs(outcome=TARGET_LOST))
+    good, inside = runs["outcome"] == CONVERGED, runs["poses_outside_z"] == 0
+    lost = runs["outcome"] == TARGET_LOST
     return {
-        "runs": len(runs), "converged": len(good), "target_lost": lost,
-        "otherwise": len(runs) - len(good) - lost,
-        "ways_inside_z": len(inside), "ways_inside_z_converged": len(inside(outcome=CONVERGED)),
+        "runs": len(runs), "converged": int(np.sum(good)), "target_lost": int(np.sum(lost)),
+        "otherwise": int(np.sum(~good & ~lost)),
+        "ways_inside_z": int(np.sum(inside)),
+        "ways_inside_z_converged": int(np.sum(inside & good)),
         "poses_checked": runs.total("poses_checked"),
         "poses_outside_z": runs.total("poses_outside_z"),
         "least_margin": runs.smallest("least_margin"),
@@ -107,7 +108,7 @@ def mode_counts(runs: Runs) -> dict[str, Any]:
             f"largest_{name}": runs.largest(name)
             for name in ("error_growth", "error_peak", "estimate_error_m", "estimate_error_rad")
         },
-        "largest_position_error_m": float(np.max(good["position_error_m"], initial=0.0)),
+        "largest_position_error_m": float(np.max(runs["position_error_m"][good], initial=0.0)),
     }  # fmt: skip
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+import numpy.typing as npt
 
 from cdpr_drake.analyses.studies.engines.pairs import ENERGY_STEPS, METHODS
 from cdpr_drake.analyses.studies.framework.runs import Runs
@@ -108,8 +109,8 @@ def _ends(runs: Runs) -> Array:
     return np.asarray(np.abs(runs["final_error_plant_m"] - runs["final_error_compiled_m"]))
 
 
-def _same_outcome(runs: Runs) -> Array:
-    return np.asarray(runs["outcome_plant"] == runs["outcome_compiled"])
+def _same_outcome(runs: Runs) -> npt.NDArray[np.bool_]:
+    return np.asarray(runs["outcome_plant"] == runs["outcome_compiled"], bool)
 
 
 @statement(

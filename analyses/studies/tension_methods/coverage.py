@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
 from cdpr_drake.analyses.reporting.timing import interleaved, seconds_each, seconds_per_call
 from cdpr_drake.analyses.statics.tension_query import applicable_methods
+from cdpr_drake.analyses.studies.framework.runs import Run
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import TensionProblemError
 from cdpr_drake.geometry.poses import pose_from_angles
@@ -27,54 +27,6 @@ TIMED = 50
 
 TRUTH = "linear_program"
 """The method whose verdict counts."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class MethodCoverage:
-    """One method on the grid of one robot.
-
-    Attributes:
-        robot: Name of the robot.
-        method: Name of the method.
-        poses: Poses of the grid.
-        feasible: Poses that can be held, by the linear program.
-        solved: Of these, how many the method solves.
-        wrong: Poses where the method's verdict on existence contradicts the linear program.
-        mean_largest_tension: Mean over the solved poses of the largest tension [N]; NaN for none.
-        microseconds: One call of `distribute` with its checks, on feasible poses, median [us].
-        kernel_microseconds: One pose of the batch form on one core [us].
-    """
-
-    robot: str
-    method: str
-    poses: int
-    feasible: int
-    solved: int
-    wrong: int
-    mean_largest_tension: float
-    microseconds: float
-    kernel_microseconds: float
-
-    @property
-    def share(self) -> float:
-        """Share of the feasible poses that the method solves."""
-        return self.solved / max(self.feasible, 1)
-
-    def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
-        found = asdict(self) | {"share": self.share}
-        return {
-            name: None if isinstance(value, float) and not np.isfinite(value) else value
-            for name, value in found.items()
-        }
-
-
-NUMBERS: dict[str, type] = {
-    each.name: {"int": int, "float": float}[str(each.type)]
-    for each in fields(MethodCoverage)
-    if each.name not in ("robot", "method")
-}
-"""What is a number in a `MethodCoverage`, each with its type, in their order."""
 
 
 def grid_problems(robot_name: str, counts: tuple[int, int, int]) -> list[TensionProblem]:
@@ -106,81 +58,53 @@ def grid_problems(robot_name: str, counts: tuple[int, int, int]) -> list[Tension
     return problems
 
 
-@dataclass(frozen=True)
-class CoverageTask:
-    """Methods on the grid of one robot, as the items of a task of a sweep.
-
-    Attributes:
-        robot: Name of the robot.
-        counts: Positions along x, y and z.
-        methods: Names of the methods.
-    """
-
-    robot: str
-    counts: tuple[int, int, int]
-    methods: tuple[str, ...]
-
-    def __call__(self, start: int, stop: int) -> dict[str, Array]:
-        """`NUMBERS` of these methods, shape (n, k)."""
-        rows = cover(self.robot, self.counts, self.methods[start:stop])
-        return {"numbers": np.array([[float(getattr(r, name)) for name in NUMBERS] for r in rows])}
-
-    def rows(self, arrays: Mapping[str, Array]) -> list[MethodCoverage]:
-        """The rows of which these are the arrays."""
-        return [
-            MethodCoverage(
-                robot=self.robot,
-                method=method,
-                **{name: NUMBERS[name](value) for name, value in zip(NUMBERS, row, strict=True)},
-            )
-            for method, row in zip(self.methods, arrays["numbers"].tolist(), strict=True)
-        ]
-
-
 def cover(
     robot_name: str, counts: tuple[int, int, int], only: Sequence[str] | None = None
-) -> list[MethodCoverage]:
+) -> list[Run]:
     """Methods on a grid.
 
     Args:
         robot_name: Name of the robot.
         counts: Positions along x, y and z.
         only: Names of the methods; None: every applicable one.
+
+    Returns:
+        Of each method, with robot and method as keys, poses of the grid; feasible: that can be
+        held, by the linear program; solved: of these by the method, and their share; wrong: poses
+        where the method's verdict on existence contradicts the linear program;
+        mean_largest_tension_n: over the solved poses; call_us: one call of `distribute` with its
+        checks, on feasible poses, the median; kernel_us: one pose of the batch form on one core.
     """
     problems = grid_problems(robot_name, counts)
     truth = np.array([distribute(p, TRUTH).status == TensionStatus.FEASIBLE for p in problems])
     feasible = [p for p, good in zip(problems, truth, strict=True) if good]
-    rows = []
     methods = applicable_methods(problems[0]) if only is None and problems else only or ()
-    for method in methods:
-        solutions = [distribute(p, method) for p in problems]
-        solved = np.array([s.status == TensionStatus.FEASIBLE for s in solutions])
-        said = np.array([s.status != TensionStatus.INFEASIBLE for s in solutions])
-        largest = [
-            float(np.max(s.tensions)) for s, good in zip(solutions, solved, strict=True) if good
-        ]
-        single, batch = _times(method, feasible[:TIMED])
-        rows.append(
-            MethodCoverage(
-                robot=robot_name,
-                method=method,
-                poses=len(problems),
-                feasible=int(np.sum(truth)),
-                solved=int(np.sum(solved & truth)),
-                wrong=int(np.sum(said != truth)),
-                mean_largest_tension=float(np.mean(largest)) if largest else float("nan"),
-                microseconds=single,
-                kernel_microseconds=batch,
-            )
+    return [
+        Run(
+            f"{robot_name}, {method}", None, {"robot": robot_name, "method": method},
+            _method_row(method, problems, truth) | _times(method, feasible[:TIMED]),
         )
-    return rows
+        for method in methods
+    ]  # fmt: skip
 
 
-def _times(method: str, problems: list[TensionProblem]) -> tuple[float, float]:
-    """Microseconds of one call of `distribute`, and of one pose of the batch form."""
+def _method_row(method: str, problems: Sequence[TensionProblem], truth: Array) -> dict[str, Any]:
+    solutions = [distribute(p, method) for p in problems]
+    solved = np.array([s.status == TensionStatus.FEASIBLE for s in solutions])
+    said = np.array([s.status != TensionStatus.INFEASIBLE for s in solutions])
+    largest = [float(np.max(s.tensions)) for s, good in zip(solutions, solved, strict=True) if good]
+    feasible, found = int(np.sum(truth)), int(np.sum(solved & truth))
+    return {
+        "poses": len(problems), "feasible": feasible, "solved": found,
+        "share": found / max(feasible, 1), "wrong": int(np.sum(said != truth)),
+        "mean_largest_tension_n": float(np.mean(largest)) if largest else None,
+    }  # fmt: skip
+
+
+def _times(method: str, problems: list[TensionProblem]) -> dict[str, Any]:
+    """Times of one call of `distribute`, and of one pose of the batch form."""
     if not problems:
-        return float("nan"), float("nan")
-
+        return {"call_us": None, "kernel_us": None}
     W = np.array([p.W for p in problems])
     w = np.array([p.wrench for p in problems])
     low, high = problems[0].lower, problems[0].upper
@@ -190,4 +114,4 @@ def _times(method: str, problems: list[TensionProblem]) -> tuple[float, float]:
     ]
     # A method that needs long has no use for many repeats.
     single, batch = interleaved(works, 1 if works[0]() * len(problems) > 0.3 else 5)
-    return 1e6 * single, 1e6 * batch / len(problems)
+    return {"call_us": 1e6 * single, "kernel_us": 1e6 * batch / len(problems)}

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from functools import cache
+from typing import Any
 
 import numpy as np
 
@@ -12,7 +13,6 @@ from cdpr_drake.analyses.studies.tension_methods.trial import Applied, TensionTr
 from cdpr_drake.geometry.poses import pose_from_angles
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_statics import tension_problem
-from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
 
 THESIS_ROBOT = "caroca_gazebo"
 OTHER_ROBOT = "acrobot_large"
@@ -49,57 +49,48 @@ EXPERIMENTS = {
 """What the experiments are, by name."""
 
 
-@dataclass(frozen=True, eq=False)
-class TensionPlan:
-    """What the study runs.
-
-    Attributes:
-        specs: The runs, in order.
-        path: How the thesis' path was moved inside; positions of Po.
-        grid: Poses of a grid along x, y and z.
-        quick: Whether this is the short form.
-    """
-
-    specs: tuple[TensionTrial, ...]
-    path: HeldPath
-    grid: tuple[int, int, int]
-    quick: bool
-
-    @property
-    def duration(self) -> float:
-        """Simulated time of all runs, if nothing falls [s]."""
-        return sum(spec.duration for spec in self.specs)
+GRID, QUICK_GRID = (13, 13, 9), (5, 5, 3)
+"""Poses on which methods are compared, along x, y and z."""
 
 
-def make_plan(quick: bool) -> TensionPlan:
-    """The full plan, or a short one that only shows that everything works."""
+@cache
+def thesis_path() -> HeldPath:
+    """How the thesis' path was moved inside; positions of Po."""
     robot = load_robot(THESIS_ROBOT)
+    return held_path(robot, *printed_ends(), robot.home.position)
+
+
+def printed_ends() -> tuple[np.ndarray, np.ndarray]:
+    """Where the thesis' path starts and ends, shape (3,) each, of Po [m]."""
     # The thesis' platform frame lies in the middle of the box, P in the middle of its bottom.
-    middle = np.array([0.0, 0.0, float(robot.platform.size[2]) / 2.0])
-    printed = (np.array(THESIS_START) - middle, np.array(THESIS_END) - middle)
-    path = held_path(robot, *printed, robot.home.position)
-    specs = _thesis(path, quick) + _printed(printed, quick) + _acrobot(quick)
+    middle = np.array([0.0, 0.0, float(load_robot(THESIS_ROBOT).platform.size[2]) / 2.0])
+    return np.array(THESIS_START) - middle, np.array(THESIS_END) - middle
+
+
+def trials(quick: bool) -> list[TensionTrial]:
+    """All runs, or short ones that only show that everything works, in the order of the
+    experiments."""
+    specs = _thesis(thesis_path(), quick) + _printed(printed_ends(), quick) + _acrobot(quick)
     if not quick:
-        specs += _step() + _slow(path)
+        specs += _step() + _slow(thesis_path())
     order = list(EXPERIMENTS)
-    specs.sort(key=lambda spec: order.index(spec.experiment))
-    return TensionPlan(tuple(specs), path, (5, 5, 3) if quick else (13, 13, 9), quick)
+    return sorted(specs, key=lambda spec: order.index(spec.experiment))
 
 
-def _straight(start: np.ndarray, end: np.ndarray, duration: float) -> PoseTrajectory:
+def _straight(start: np.ndarray, end: np.ndarray, duration: float) -> dict[str, Any]:
     poses = tuple(pose_from_angles(p, np.zeros(3)) for p in (start, end))
-    return PoseTrajectory(poses, (duration,))
+    return {"path": poses, "legs": (duration,)}
 
 
 def _thesis(path: HeldPath, quick: bool) -> list[TensionTrial]:
     duration = 1.0 if quick else THESIS_DURATION
-    trajectory = _straight(path.start, path.end, THESIS_DURATION)
+    way = _straight(path.start, path.end, THESIS_DURATION)
 
     def spec(method: str, gain: float, applied: Applied = Applied.HELD) -> TensionTrial:
         return TensionTrial(
             experiment="thesis",
             robot=THESIS_ROBOT,
-            trajectory=trajectory,
+            **way,
             method=method,
             stiffness=gain,
             damping=gain,
@@ -119,12 +110,12 @@ def _thesis(path: HeldPath, quick: bool) -> list[TensionTrial]:
 
 
 def _printed(ends: tuple[np.ndarray, np.ndarray], quick: bool) -> list[TensionTrial]:
-    trajectory = _straight(*ends, THESIS_DURATION)
+    way = _straight(*ends, THESIS_DURATION)
     return [
         TensionTrial(
             experiment="printed",
             robot=THESIS_ROBOT,
-            trajectory=trajectory,
+            **way,
             method=method,
             stiffness=gain,
             damping=gain,
@@ -142,7 +133,7 @@ def _step() -> list[TensionTrial]:
         TensionTrial(
             experiment=experiment,
             robot=THESIS_ROBOT,
-            trajectory=_straight(home, home, 1.0),
+            **_straight(home, home, 1.0),
             method=method,
             stiffness=gain,
             damping=gain,
@@ -160,7 +151,7 @@ def _slow(path: HeldPath) -> list[TensionTrial]:
         TensionTrial(
             experiment="slow",
             robot=THESIS_ROBOT,
-            trajectory=_straight(path.start, path.end, THESIS_DURATION),
+            **_straight(path.start, path.end, THESIS_DURATION),
             method="quadratic_program",
             stiffness=gain,
             damping=gain,
@@ -185,7 +176,8 @@ def _acrobot(quick: bool) -> list[TensionTrial]:
         TensionTrial(
             experiment="acrobot",
             robot=OTHER_ROBOT,
-            trajectory=PoseTrajectory((home, away, home), (leg, leg)),
+            path=(home, away, home),
+            legs=(leg, leg),
             method=method,
             stiffness=100.0,
             damping=20.0,

@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from cdpr_drake.analyses.studies.tension_methods.coverage import MethodCoverage
+from cdpr_drake.analyses.studies.framework.runs import Run, Runs
 from cdpr_drake.analyses.studies.tension_methods.experiments import (
     EXPERIMENTS,
     OTHER_ROBOT,
     THESIS_GAINS,
     THESIS_ROBOT,
 )
-from cdpr_drake.analyses.studies.tension_methods.gain_figures import gain_figures, gains_name
-from cdpr_drake.analyses.studies.tension_methods.trial import Applied, TrialResult
+from cdpr_drake.analyses.studies.tension_methods.trial import Applied, label_of
 from cdpr_drake.analyses.visualization.curves import draw_curve, phase_of
 from cdpr_drake.analyses.visualization.figure_style import bar_style, line_style, new_figure
 from cdpr_drake.models.robot_loader import load_robot
@@ -43,55 +41,33 @@ GAINS = tuple(sorted({100.0, *(gain for gains in THESIS_GAINS.values() for gain 
 
 ROBOTS = (THESIS_ROBOT, OTHER_ROBOT)
 
-FIGURES = (
-    *(f"{name}_{what}" for name in EXPERIMENTS for what in ("errors", "tensions")),
-    *map(gains_name, THESIS_GAINS),
-    "coverage",
-)
-"""Names of all figures that the study can write."""
 
-
-def study_drawings(
-    runs: Sequence[TrialResult], coverage: Sequence[MethodCoverage]
-) -> dict[str, Callable[[], Figure]]:
-    """What draws the figures that the results suffice for, by name."""
-    drawings: dict[str, Callable[[], Figure]] = {}
-    for name in EXPERIMENTS:
-        some = [run for run in runs if run.spec.experiment == name]
-        if some:
-            drawings[f"{name}_errors"] = partial(error_figure, some)
-            drawings[f"{name}_tensions"] = partial(tension_figure, some)
-    drawings |= gain_figures(runs)
-    if coverage:
-        drawings["coverage"] = partial(coverage_figure, coverage)
-    return drawings
-
-
-def error_figure(runs: Sequence[TrialResult]) -> Figure:
+def error_figure(experiment: str, all_runs: Runs) -> Figure:
     """Position errors over time of the runs of one experiment, a panel per method."""
-    methods = list(dict.fromkeys(run.spec.method for run in runs))
-    gains = sorted({*GAINS, *(run.spec.stiffness for run in runs)})
-    figure, panels = _panels(len(methods), f"Position error, {_title(runs)}")
-    for axes, method in zip(panels, methods, strict=True):
+    runs = all_runs(experiment=experiment)
+    methods = dict(runs.by("method"))
+    gains = sorted({*GAINS, *runs.list("kp_per_s2")})
+    figure, panels = _panels(len(methods), f"Position error, {_title(experiment)}")
+    for axes, (method, some) in zip(panels, methods.items(), strict=True):
         fell = []
-        for run in (run for run in runs if run.spec.method == method):
-            name = f"Kp {run.spec.stiffness:g}, {run.spec.applied}"
-            if run.lost:
-                fell.append(f"{name} fell at {run.end_time:.2f} s")
-            if run.lost and run.end_time < SHORT * run.spec.duration:
+        for run in some:
+            name = f"Kp {run['kp_per_s2']:g}, {run['applied']}"
+            if run["lost"]:
+                fell.append(f"{name} fell at {run['end_time_s']:.2f} s")
+            if run["lost"] and run["end_time_s"] < SHORT * run["wanted_duration_s"]:
                 continue
-            number = gains.index(run.spec.stiffness)
+            number = gains.index(run["kp_per_s2"])
             seen = nth_look(number)
             draw_curve(
                 axes,
-                run.times,
-                np.maximum(1e3 * run.errors, LEAST_DRAWN_ERROR),
-                Look(seen.color, DASHES[run.spec.applied], seen.marker),
+                run["times_s"],
+                np.maximum(1e3 * run["errors_m"], LEAST_DRAWN_ERROR),
+                Look(seen.color, DASHES[run["applied"]], seen.marker),
                 name,
                 phase=phase_of(number, len(gains)),
                 markersize=4.0,
             )
-        axes.set(yscale="log", xlim=(0.0, max(run.spec.duration for run in runs)))
+        axes.set(yscale="log", xlim=(0.0, runs.largest("wanted_duration_s")))
         axes.set_title(method_words(method), fontsize=11)
         axes.legend(
             handles=list(axes.lines),
@@ -110,26 +86,28 @@ def error_figure(runs: Sequence[TrialResult]) -> Figure:
     return figure
 
 
-def tension_figure(runs: Sequence[TrialResult]) -> Figure:
+def tension_figure(experiment: str, all_runs: Runs) -> Figure:
     """Tensions of all cables over time, a panel per run of one experiment that stays up.
 
     Of each method with its treatment of bounds, the lowest and the highest gain.
     """
+    runs = all_runs(experiment=experiment)
     # Where some stay up, these say more than those that fall.
-    shown = _lowest_and_highest([run for run in runs if not run.lost] or list(runs))
-    figure, panels = _panels(len(shown), f"Tensions, {_title(runs)}")
+    up = runs(lost=False)
+    shown = _lowest_and_highest(up if len(up) else runs)
+    figure, panels = _panels(len(shown), f"Tensions, {_title(experiment)}")
     for axes, run in zip(panels, shown, strict=True):
-        robot = load_robot(run.spec.robot)
+        robot = load_robot(run["robot"])
         for cable, each in enumerate(robot.cables):
             draw_curve(
-                axes, run.times, run.tensions[:, cable], nth_look(cable), each.name,
+                axes, run["times_s"], run["tensions_n"][:, cable], nth_look(cable), each.name,
                 phase=phase_of(cable, len(robot.cables)), linewidth=1.0, markersize=4.0,
             )  # fmt: skip
-        axes.set_title(method_words(run.spec.label), fontsize=10)
+        axes.set_title(method_words(label_of(run)), fontsize=10)
         low, high = robot.tension_limits()
         style = line_style(BOUND) | {"linewidth": 1.0, "zorder": 1}
         axes.axhline(low, label=f"lower bound {low:g} N", **style)
-        if high <= NEAR * float(np.max(run.tensions, initial=0.0)):
+        if high <= NEAR * float(np.max(run["tensions_n"], initial=0.0)):
             axes.axhline(high, label=f"upper bound {high:g} N", **style)
     _name_axes(panels, "tension [N]")
     legend = {
@@ -146,34 +124,32 @@ def method_words(name: str) -> str:
     return name.replace("_", " ")
 
 
-def _lowest_and_highest(runs: Sequence[TrialResult]) -> list[TrialResult]:
+def _lowest_and_highest(runs: Runs) -> list[Run]:
     """Of the runs that differ in their gains only, those of the lowest and the highest."""
-    groups: dict[tuple[str, Applied], list[TrialResult]] = {}
-    for run in runs:
-        groups.setdefault((run.spec.method, run.spec.applied), []).append(run)
     chosen = []
-    for group in groups.values():
-        group.sort(key=lambda run: run.spec.stiffness)
-        chosen += group[:1] + group[1:][-1:]
+    for _, group in runs.by("method", "applied"):
+        ordered = sorted(group, key=lambda run: run["kp_per_s2"])
+        chosen += ordered[:1] + ordered[1:][-1:]
     return chosen
 
 
-def coverage_figure(coverage: Sequence[MethodCoverage]) -> Figure:
-    """Share of the feasible poses that each method solves, and its time for one."""
-    robots = list(dict.fromkeys(row.robot for row in coverage))
-    methods = list(dict.fromkeys(row.method for row in coverage))
+def coverage_figure(coverage: Iterable[Run]) -> Figure:
+    """Share of the feasible poses that each method solves, and its time for one; see `cover`."""
+    coverage = list(coverage)
+    robots = list(dict.fromkeys(row["robot"] for row in coverage))
+    methods = list(dict.fromkeys(row["method"] for row in coverage))
     figure, (left, right) = new_figure(1, 2, (12.0, 6.5), "Coverage and speed of tension methods")
     height = 0.8 / len(robots)
     for k, robot in enumerate(robots):
-        rows = {row.method: row for row in coverage if row.robot == robot}
+        rows = {row["method"]: row for row in coverage if row["robot"] == robot}
         some = [name for name in methods if name in rows]
         places = np.array([methods.index(name) + (k + 0.5) * height - 0.4 for name in some])
-        shares = [100.0 * rows[name].share for name in some]
-        label = f"{robot}, {rows[some[0]].feasible} of {rows[some[0]].poses} poses feasible"
+        shares = [100.0 * rows[name]["share"] for name in some]
+        label = f"{robot}, {rows[some[0]]['feasible']} of {rows[some[0]]['poses']} poses feasible"
         style = bar_style(look_of(robot, sorted({*ROBOTS, *robots})))
         bars = left.barh(places, shares, height, label=label, **style)
         left.bar_label(bars, [f"{share:.0f}" for share in shares], padding=2, fontsize=8)
-        times = [rows[name].kernel_microseconds for name in some]
+        times = [rows[name]["kernel_us"] for name in some]
         right.barh(places, times, height, label=robot, **style)
     left.set(xlabel="feasible poses solved [%]", xlim=(0.0, 112.0))
     right.set(xlabel="one pose in a batch, on one core [us]")
@@ -185,9 +161,8 @@ def coverage_figure(coverage: Sequence[MethodCoverage]) -> Figure:
     return figure
 
 
-def _title(runs: Sequence[TrialResult]) -> str:
-    name = runs[0].spec.experiment
-    return f"experiment '{name}'\n{EXPERIMENTS[name].rstrip(chr(46))}"
+def _title(experiment: str) -> str:
+    return f"experiment '{experiment}'\n{EXPERIMENTS[experiment].rstrip(chr(46))}"
 
 
 def _panels(count: int, title: str) -> tuple[Figure, list[Axes]]:

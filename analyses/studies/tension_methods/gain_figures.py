@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from functools import partial
-
 import numpy as np
 from matplotlib.figure import Figure
 
+from cdpr_drake.analyses.studies.framework.runs import Runs
 from cdpr_drake.analyses.studies.tension_methods.experiments import THESIS_GAINS, UNCHECKED
-from cdpr_drake.analyses.studies.tension_methods.trial import TrialResult
 from cdpr_drake.analyses.visualization.curves import draw_curve, phase_of
 from cdpr_drake.analyses.visualization.figure_style import line_style, new_figure
 from cdpr_drake.models.robot_loader import load_robot
@@ -37,48 +34,38 @@ def gains_name(method: str) -> str:
     return f"gains_{method}"
 
 
-def gain_figures(runs: Sequence[TrialResult]) -> dict[str, Callable[[], Figure]]:
-    """What draws a figure for each method of the thesis of which there are runs, by name.
+def gains_figure(method: str, runs: Runs) -> Figure:
+    """A method of the thesis, a row for each gain.
 
     Methods that leave the bounds are shown on the printed path with cables that push, which is
     the only way in which they can be followed along it; the others on the path moved inside.
     """
-    drawings: dict[str, Callable[[], Figure]] = {}
-    for method in THESIS_GAINS:
-        wanted = "printed" if method in UNCHECKED else "thesis"
-        some = [r for r in runs if r.spec.method == method and r.spec.experiment == wanted]
-        if some:
-            drawings[gains_name(method)] = partial(_figure, method, some)
-    return drawings
-
-
-def _figure(method: str, runs: Sequence[TrialResult]) -> Figure:
+    wanted = "printed" if method in UNCHECKED else "thesis"
+    shown = sorted(runs(experiment=wanted, method=method), key=lambda run: run["kp_per_s2"])
     gains = THESIS_GAINS[method]
     figure, grid = new_figure(
-        len(runs), 2, (13.0, 1.6 + 3.4 * len(runs)),
+        len(shown), 2, (13.0, 1.6 + 3.4 * len(shown)),
         f"Gazebo thesis, figures 6.{NUMBERS[method][0]} to 6.{NUMBERS[method][-1]}: "
         f"{method.replace('_', ' ')}, position error and cable tensions by gain",
     )  # fmt: skip
-    panels = np.reshape(np.array(grid, object), (len(runs), 2))
-    for (left, right), run in zip(
-        panels, sorted(runs, key=lambda r: r.spec.stiffness), strict=True
-    ):
-        place = gains.index(run.spec.stiffness)
-        words = f"6.{NUMBERS[method][place]}: Kp = Kd = {run.spec.stiffness:g}"
-        draw_curve(left, run.times, 1e6 * run.errors, nth_look(0))
+    panels = np.reshape(np.array(grid, object), (len(shown), 2))
+    for (left, right), run in zip(panels, shown, strict=True):
+        place = gains.index(run["kp_per_s2"])
+        words = f"6.{NUMBERS[method][place]}: Kp = Kd = {run['kp_per_s2']:g}"
+        draw_curve(left, run["times_s"], 1e6 * run["errors_m"], nth_look(0))
         left.set(ylabel="position error [um]", ylim=(0.0, None), title=words)
-        robot = load_robot(run.spec.robot)
+        robot = load_robot(run["robot"])
         for k, cable in enumerate(robot.cables):
             draw_curve(
-                right, run.times, run.tensions[:, k], nth_look(k), cable.name,
+                right, run["times_s"], run["tensions_n"][:, k], nth_look(k), cable.name,
                 phase=phase_of(k, len(robot.cables)), linewidth=1.0, markersize=4.0,
             )  # fmt: skip
         right.axhline(robot.tension_limits()[0], label="lower bound", **line_style(BOUND))
         printed = LARGEST[method][place]
         said = f", printed {printed:g} N" if printed is not None else ""
-        right.set(ylabel="tension [N]", title=f"largest {run.largest_tension:.1f} N{said}")
+        right.set(ylabel="tension [N]", title=f"largest {run['tension_max_n']:.1f} N{said}")
         for axes in (left, right):
-            axes.set_xlim(0.0, run.spec.duration)
+            axes.set_xlim(0.0, run["wanted_duration_s"])
     for axes in panels[-1]:
         axes.set_xlabel("time [s]")
     figure.legend(*panels[0, 1].get_legend_handles_labels(), loc="outside lower center", ncols=9)

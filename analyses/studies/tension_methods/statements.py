@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
+from itertools import pairwise
 
-from cdpr_drake.analyses.reporting.statements import Statement, evaluate_checks, verdict
-from cdpr_drake.analyses.studies.tension_methods.trial import Applied, TrialResult
+from cdpr_drake.analyses.studies.framework.runs import Run, Runs
+from cdpr_drake.analyses.studies.framework.statement import SOURCE, Finding, statement
+from cdpr_drake.analyses.studies.tension_methods.trial import Applied
 
 JUMP = 0.1
 """A smooth motion changes no tension by as much within one control step of 1 ms [N]."""
@@ -17,227 +19,262 @@ STEADY = 1e-4
 """A steady-state error that could be seen in the figure [m]."""
 
 
-class _Runs:
-    """Finds runs by what they are."""
-
-    def __init__(self, runs: Iterable[TrialResult]) -> None:
-        self._runs = {
-            (r.spec.experiment, r.spec.method, r.spec.stiffness, r.spec.applied): r for r in runs
-        }
-
-    def __call__(
-        self, experiment: str, method: str, gain: float, applied: Applied = Applied.HELD
-    ) -> TrialResult:
-        return self._runs[experiment, method, gain, applied]
+def _run(
+    runs: Runs, experiment: str, method: str, gain: float, applied: Applied = Applied.HELD
+) -> Run:
+    return runs.one(experiment=experiment, method=method, kp_per_s2=gain, applied=str(applied))
 
 
-def evaluate_statements(runs: Iterable[TrialResult], quick: bool = False) -> list[Statement]:
-    """The statements whose runs are there, in the order of the thesis; of the `quick` form also
-    the names of the others."""
-    return evaluate_checks(CHECKS, _Runs(runs), quick)
+def _values(
+    runs: Runs, column: str, experiment: str, method: str, gains: Iterable[float],
+    applied: Applied = Applied.HELD,
+) -> list[float]:  # fmt: skip
+    """A column of runs that differ in their gains only."""
+    return [_run(runs, experiment, method, gain, applied)[column] for gain in gains]
 
 
-def _lp_jumps(find: _Runs) -> Statement:
+LP, QP = "linear_program", "quadratic_program"
+GAINS = (100.0, 800.0, 1200.0)
+"""Gains Kp at which all methods are printed [1/s^2]."""
+
+
+@statement(
+    "Tensions of the linear program jump.",
+    "seen in figures 6.8 to 6.10",
+    source="Gazebo thesis 6.4.1",
+    rule=f"by more than {JUMP:g} N within 1 ms at each gain",
+)
+def lp_jumps(runs: Runs) -> Finding:
     """Jumps of the linear program's tensions."""
-    jumps = [find("thesis", "linear_program", gain).largest_jump for gain in (100, 800, 1200)]
-    return Statement(
-        "Tensions of the linear program jump.",
-        "seen in figures 6.8 to 6.10",
-        f"largest jump in 1 ms {_list(jumps)} N",
-        verdict(min(jumps) > JUMP),
-        "Its optimum is a corner of the feasible set and changes from one corner to another.",
+    jumps = _values(runs, "tension_jump_max_n", "thesis", LP, GAINS)
+    return Finding(
+        found=f"largest jump in 1 ms {_list(jumps)} N",
+        held=[jump > JUMP for jump in jumps],
+        some=False,
+        why="Its optimum is a corner of the feasible set and changes from one corner to another.",
     )
 
 
-def _qp_jumps(find: _Runs) -> Statement:
+@statement(
+    "Tensions of the quadratic program jump, too, most at gain 1500.",
+    "seen in figures 6.11 to 6.14",
+    source="Gazebo thesis 6.4.2",
+    rule=f"by more than {JUMP:g} N within 1 ms at each gain",
+)
+def qp_jumps(runs: Runs) -> Finding:
     """Jumps of the quadratic program's tensions."""
-    jumps = [
-        find("thesis", "quadratic_program", gain).largest_jump for gain in (100, 800, 1200, 1500)
-    ]
-    return Statement(
-        "Tensions of the quadratic program jump, too, most at gain 1500.",
-        "seen in figures 6.11 to 6.14",
-        f"largest jump in 1 ms {_list(jumps)} N",
-        verdict(min(jumps) > JUMP, max(jumps) > JUMP),
-        "The 2-norm optimum is continuous where the wrench is. Jumps then come from the loop: a "
-        "published version of the thesis' simulator runs it at 100 Hz, where gains of 800 and more "
-        "are unstable (experiment slow).",
+    jumps = _values(runs, "tension_jump_max_n", "thesis", QP, (*GAINS, 1500.0))
+    return Finding(
+        found=f"largest jump in 1 ms {_list(jumps)} N",
+        held=[jump > JUMP for jump in jumps],
+        why="The 2-norm optimum is continuous where the wrench is. Jumps then come from the loop: "
+        "a published version of the thesis' simulator runs it at 100 Hz, where gains of 800 and "
+        "more are unstable (experiment slow).",
     )
 
 
-def _qp_needs_less(find: _Runs) -> Statement:
+@statement(
+    "The largest tension of the quadratic program is below that of the linear program at "
+    "equal gain.",
+    "100: 32 against 54; 800: 110 against 456; 1200: 342 against 1224 N",
+    source="Gazebo thesis 6.4.1, 6.4.2",
+    rule="at each gain, on the trajectory and from a step",
+)
+def qp_needs_less(runs: Runs) -> Finding:
     """Largest tensions of the quadratic program against the linear program's."""
     pairs = {
-        name: [
-            tuple(
-                find(name, method, gain).largest_tension
-                for method in ("quadratic_program", "linear_program")
-            )
-            for gain in (100, 800, 1200)
-        ]
+        name: list(
+            zip(*(_values(runs, "tension_max_n", name, m, GAINS) for m in (QP, LP)), strict=True)
+        )
         for name in ("thesis", "step")
     }
-    less = [qp < lp for both in pairs.values() for qp, lp in both]
     words = "; ".join(
         f"{name}: " + ", ".join(f"{qp:.2f} against {lp:.2f}" for qp, lp in both)
         for name, both in pairs.items()
     )
-    return Statement(
-        "The largest tension of the quadratic program is below that of the linear program at "
-        "equal gain.",
-        "100: 32 against 54; 800: 110 against 456; 1200: 342 against 1224 N",
-        f"{words} N (gains 100, 800, 1200)",
-        verdict(all(less), any(less)),
-        "On the trajectory by little, since its largest tensions come at the end, near the exit "
-        "points, where there is little to choose.",
+    return Finding(
+        found=f"{words} N (gains 100, 800, 1200)",
+        held=[qp < lp for both in pairs.values() for qp, lp in both],
+        why="On the trajectory by little, since its largest tensions come at the end, near the "
+        "exit points, where there is little to choose.",
     )
 
 
-def _tension_grows(find: _Runs) -> Statement:
+@statement(
+    "Higher gains cost higher tensions.",
+    "quadratic program 32, 110, 342 N",
+    source="Gazebo thesis 6.4.2",
+    rule=f"from gain 100 to 1200 by a factor of {GROWS:g} on the trajectory; in part: from a step",
+    cause=SOURCE,
+)
+def tension_grows(runs: Runs) -> Finding:
     """Largest tensions against the gain."""
-    gains = (100, 800, 1200)
-    still = [find("thesis", "quadratic_program", gain).largest_tension for gain in gains]
-    step = [find("step", "quadratic_program", gain).largest_tension for gain in gains]
-    return Statement(
-        "Higher gains cost higher tensions.",
-        "quadratic program 32, 110, 342 N",
-        f"thesis {_list(still)} N; step {_list(step)} N",
-        verdict(still[2] > 1.05 * still[0], step[2] > 1.05 * step[0]),
-        "With the exact model there is no error for the gain to act on, except where the platform "
-        "starts beside its goal. The thesis does not say where it started.",
+    still, step = (_values(runs, "tension_max_n", name, QP, GAINS) for name in ("thesis", "step"))
+    return Finding(
+        found=f"thesis {_list(still)} N; step {_list(step)} N",
+        held=[still[2] > GROWS * still[0]],
+        some=step[2] > GROWS * step[0],
+        why="With the exact model there is no error for the gain to act on, except where the "
+        "platform starts beside its goal. The thesis does not say where it started.",
     )
 
 
-def _error_falls(find: _Runs) -> Statement:
+@statement(
+    "Higher gains bring smaller position errors (both programs).",
+    "figures 6.8, 6.9, 6.11 to 6.13",
+    source="Gazebo thesis 6.4.1, 6.4.2",
+    rule="the largest error of the quadratic program, from gain to gain",
+)
+def error_falls(runs: Runs) -> Finding:
     """Position errors against the gain."""
-    gains = (100, 800, 1200)
-    errors = [1e6 * find("thesis", "quadratic_program", gain).largest_error for gain in gains]
-    return Statement(
-        "Higher gains bring smaller position errors (both programs).",
-        "figures 6.8, 6.9, 6.11 to 6.13",
-        f"quadratic program, largest error {_list(errors)} um",
-        verdict(errors[0] > errors[1] > errors[2]),
-        "What is left comes from the wrench that is held for a millisecond.",
+    errors = [1e6 * one for one in _values(runs, "position_error_max_m", "thesis", QP, GAINS)]
+    return Finding(
+        found=f"quadratic program, largest error {_list(errors)} um",
+        held=[more > less for more, less in pairwise(errors)],
+        some=False,
+        why="What is left comes from the wrench that is held for a millisecond.",
     )
 
 
-def _no_better(find: _Runs) -> Statement:
+@statement(
+    "Gain 1500 is no appreciable improvement on 1200.",
+    "figure 6.14",
+    source="Gazebo thesis 6.4.2",
+    rule="the largest error falls by less than 5 %; in part: by less than 1 um",
+)
+def no_better(runs: Runs) -> Finding:
     """Gain 1500 against 1200."""
     errors = [
-        1e6 * find("thesis", "quadratic_program", gain).largest_error for gain in (1200, 1500)
+        1e6 * one for one in _values(runs, "position_error_max_m", "thesis", QP, (1200.0, 1500.0))
     ]
-    return Statement(
-        "Gain 1500 is no appreciable improvement on 1200.",
-        "figure 6.14",
-        f"largest error {_list(errors)} um",
-        verdict(errors[1] > 0.95 * errors[0], errors[0] - errors[1] < 1.0),
-        "The error falls as one over the gain, but by less than a micrometre.",
+    return Finding(
+        found=f"largest error {_list(errors)} um",
+        held=[errors[1] > 0.95 * errors[0]],
+        some=errors[0] - errors[1] < 1.0,
+        why="The error falls as one over the gain, but by less than a micrometre.",
     )
 
 
-def _unstable(find: _Runs) -> Statement:
+@statement(
+    "Gain 1200 (linear program) and 1500 (quadratic program) oscillate and come near instability.",
+    "figures 6.10, 6.14",
+    source="Gazebo thesis 6.4.1, 6.4.2",
+    rule="each falls, fails, or has a larger error than at gain 100; in part: what starts 50 mm "
+    "beside it or is controlled at 100 Hz does",
+)
+def unstable(runs: Runs) -> Finding:
     """Gains that come near instability."""
-    ends = {gain: find("slow", "quadratic_program", gain) for gain in (100, 800, 1200, 1500)}
-    calm = find("thesis", "quadratic_program", 100)
-    named = [find("thesis", "linear_program", 1200), find("thesis", "quadratic_program", 1500)]
-    near = [r.lost or r.failures > 0 or r.largest_error > calm.largest_error for r in named]
-    far = find("far_step", "quadratic_program", 1200)
-    bad = [f"{gain:g}" for gain, run in ends.items() if run.lost or run.failures > 0]
-    return Statement(
-        "Gain 1200 (linear program) and 1500 (quadratic program) oscillate and come near "
-        "instability.",
-        "figures 6.10, 6.14",
-        f"at 1 kHz largest errors {_list([1e6 * r.largest_error for r in named])} um, at gain 100 "
-        f"{1e6 * calm.largest_error:.3g} um; from 50 mm beside it "
-        + (f"falls after {far.end_time:.1f} s" if far.lost else "does not fall")
+    ends = {gain: _run(runs, "slow", QP, gain) for gain in (*GAINS, 1500.0)}
+    calm = _run(runs, "thesis", QP, 100.0)["position_error_max_m"]
+    named = [_run(runs, "thesis", LP, 1200.0), _run(runs, "thesis", QP, 1500.0)]
+    near = [_fails(one) or one["position_error_max_m"] > calm for one in named]
+    far = _run(runs, "far_step", QP, 1200.0)
+    bad = [f"{gain:g}" for gain, run in ends.items() if _fails(run)]
+    return Finding(
+        found=f"at 1 kHz largest errors {_list([1e6 * r['position_error_max_m'] for r in named])} "
+        f"um, at gain 100 {1e6 * calm:.3g} um; from 50 mm beside it "
+        + (f"falls after {far['end_time_s']:.1f} s" if far["lost"] else "does not fall")
         + f"; at 100 Hz unstable at gains {', '.join(bad) or 'none'}",
-        verdict(all(near), any(near) or far.lost or bool(bad)),
-        "A sampled loop needs Kd times the sampling time well below 2: 1.2 at 1 kHz, 12 at 100 Hz. "
-        "A suspended platform cannot be pulled down, so an overshooting request above g cannot "
-        "be met.",
+        held=near,
+        some=any(near) or far["lost"] or bool(bad),
+        why="A sampled loop needs Kd times the sampling time well below 2: 1.2 at 1 kHz, 12 at "
+        "100 Hz. A suspended platform cannot be pulled down, so an overshooting request above g "
+        "cannot be met.",
     )
 
 
-def _pseudo_inverse_negative(find: _Runs) -> Statement:
+def _fails(run: Run) -> bool:
+    return bool(run["lost"] or run["failures"] > 0)
+
+
+@statement(
+    "The pseudo-inverse gives negative tensions, at the beginning.",
+    "figures 6.15 to 6.17",
+    source="Gazebo thesis 6.4.3",
+    rule="from the start that was moved inside and from the printed one; in part: the latter",
+)
+def pseudo_inverse_negative(runs: Runs) -> Finding:
     """Negative tensions by the pseudo-inverse."""
-    held = find("thesis", "pseudo_inverse", 100, Applied.PUSHED)
-    printed = find("printed", "pseudo_inverse", 100, Applied.PUSHED)
-    return Statement(
-        "The pseudo-inverse gives negative tensions, at the beginning.",
-        "figures 6.15 to 6.17",
-        f"start moved inside: smallest {held.smallest_tension:.2f} N, below 1 N in "
-        f"{held.failures} of {held.steps} steps; printed start: {printed.smallest_tension:.2f} N, "
-        f"{printed.negative_tensions} negative tensions",
-        verdict(
-            held.smallest_tension < 0.0 and printed.smallest_tension < 0.0,
-            printed.smallest_tension < 0.0,
-        ),
-        "From the printed start, which no tensions hold; inside it breaks the bound of 1 N only.",
+    held, printed = (
+        _run(runs, name, "pseudo_inverse", 100.0, Applied.PUSHED) for name in ("thesis", "printed")
+    )
+    return Finding(
+        found=f"start moved inside: smallest {held['tension_min_n']:.2f} N, below 1 N in "
+        f"{held['failures']} of {held['control_steps']} steps; printed start: "
+        f"{printed['tension_min_n']:.2f} N, {printed['negative_tensions']} negative tensions",
+        held=[held["tension_min_n"] < 0.0, printed["tension_min_n"] < 0.0],
+        some=printed["tension_min_n"] < 0.0,
+        why="From the printed start, which no tensions hold; inside it breaks the bound of 1 N "
+        "only.",
     )
 
 
-def _pseudo_inverse_117(find: _Runs) -> Statement:
+@statement(
+    "The pseudo-inverse's largest tension is the same at all three gains.",
+    "117 N",
+    source="Gazebo thesis 6.4.3",
+    rule="within 1 % of it",
+)
+def pseudo_inverse_117(runs: Runs) -> Finding:
     """The pseudo-inverse's largest tension at each gain."""
-    largest = [
-        find("printed", "pseudo_inverse", gain, Applied.PUSHED).largest_tension
-        for gain in (100, 800, 1200)
-    ]
-    return Statement(
-        "The pseudo-inverse's largest tension is the same at all three gains.",
-        "117 N",
-        f"{_list(largest)} N",
-        verdict(max(largest) - min(largest) < 0.01 * max(largest)),
-        "The same at all gains, but an order of magnitude less: weight and acceleration ask for no "
-        "more. Where its 117 N come from is not known.",
+    largest = _values(runs, "tension_max_n", "printed", "pseudo_inverse", GAINS, Applied.PUSHED)
+    return Finding(
+        found=f"{_list(largest)} N",
+        held=[max(largest) - min(largest) < 0.01 * max(largest)],
+        why="The same at all gains, but an order of magnitude less: weight and acceleration ask "
+        "for no more. Where its 117 N come from is not known.",
     )
 
 
-def _closed_form_negative(find: _Runs) -> Statement:
+@statement(
+    "The closed form gives negative tensions; its largest tensions grow with the gain.",
+    "267, 385, 517 N",
+    source="Gazebo thesis 6.4.4",
+    rule=f"negative at each gain; from gain to gain by a factor of {GROWS:g}",
+)
+def closed_form_negative(runs: Runs) -> Finding:
     """Negative and largest tensions by the closed form."""
-    runs = [find("thesis", "closed_form", gain, Applied.PUSHED) for gain in (100, 800, 1200)]
-    largest = [r.largest_tension for r in runs]
-    grows = largest[1] > GROWS * largest[0] and largest[2] > GROWS * largest[1]
-    negative = all(r.smallest_tension < 0.0 for r in runs)
-    return Statement(
-        "The closed form gives negative tensions; its largest tensions grow with the gain.",
-        "267, 385, 517 N",
-        f"largest {_list(largest)} N, smallest {_list([r.smallest_tension for r in runs])} N",
-        verdict(negative and grows, negative),
-        "Negative and of the printed size, since the middle of 1 and 6500 N is far from what 1 kg "
-        "needs; but the same at all gains.",
+    largest, smallest = (
+        _values(runs, column, "thesis", "closed_form", GAINS, Applied.PUSHED)
+        for column in ("tension_max_n", "tension_min_n")
+    )
+    negative = max(smallest) < 0.0
+    return Finding(
+        found=f"largest {_list(largest)} N, smallest {_list(smallest)} N",
+        held=[negative, all(more > GROWS * less for less, more in pairwise(largest))],
+        some=negative,
+        why="Negative and of the printed size, since the middle of 1 and 6500 N is far from what "
+        "1 kg needs; but the same at all gains.",
     )
 
 
-def _closed_form_steady(find: _Runs) -> Statement:
+@statement(
+    "The closed form at gain 100 ends with a steady-state error.",
+    "figure 6.18",
+    source="Gazebo thesis 6.4.4",
+    rule=f"the mean of the last tenth above {1e3 * STEADY:g} mm where cables may push",
+)
+def closed_form_steady(runs: Runs) -> Finding:
     """What error the closed form leaves."""
-    pushed = find("thesis", "closed_form", 100, Applied.PUSHED)
-    cut = find("thesis", "closed_form", 100, Applied.CUT)
-    return Statement(
-        "The closed form at gain 100 ends with a steady-state error.",
-        "figure 6.18",
-        f"mean error of the last tenth {1e6 * pushed.last_error:.2g} um where cables may push; "
+    pushed, cut = (
+        _run(runs, "thesis", "closed_form", 100.0, how) for how in (Applied.PUSHED, Applied.CUT)
+    )
+    last = pushed["position_error_last_tenth_m"]
+    return Finding(
+        found=f"mean error of the last tenth {1e6 * last:.2g} um where cables may push; "
         "where they cannot, the platform "
-        + (f"falls after {cut.end_time:.2f} s" if cut.lost else "stays up"),
-        verdict(pushed.last_error > STEADY),
-        "Its tensions balance the wrench exactly, so nothing is left with the exact model. A "
+        + (f"falls after {cut['end_time_s']:.2f} s" if cut["lost"] else "stays up"),
+        held=[last > STEADY],
+        why="Its tensions balance the wrench exactly, so nothing is left with the exact model. A "
         "published version of the thesis' simulator balances forces but not moments, which large "
         "opposed tensions may turn into an error; not tried here.",
     )
 
 
-CHECKS: tuple[Callable[[_Runs], Statement], ...] = (
-    _lp_jumps,
-    _qp_jumps,
-    _qp_needs_less,
-    _tension_grows,
-    _error_falls,
-    _no_better,
-    _unstable,
-    _pseudo_inverse_negative,
-    _pseudo_inverse_117,
-    _closed_form_negative,
-    _closed_form_steady,
-)
+CHECKS = (
+    lp_jumps, qp_jumps, qp_needs_less, tension_grows, error_falls, no_better, unstable,
+    pseudo_inverse_negative, pseudo_inverse_117, closed_form_negative, closed_form_steady,
+)  # fmt: skip
 
 
 def _list(values: Iterable[float]) -> str:

@@ -6,19 +6,20 @@ Scenarios of `cdpr simulate` run by `tension_control_run`; both advance by `anal
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
 
 import numpy as np
+from pydrake.math import RigidTransform
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator, SimulatorStatus
 from pydrake.systems.framework import Context, DiscreteValues, EventStatus
 
 from cdpr_drake.analyses.simulation.run_loop import advance
 from cdpr_drake.analyses.simulation.session import RunSession
+from cdpr_drake.analyses.studies.framework.runs import Row, Run
 from cdpr_drake.arrays import Array
 from cdpr_drake.control.task_space import TaskGains
-from cdpr_drake.geometry.poses import pose_row
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.controllers.tension_distributor import TensionDistributor
 from cdpr_drake.systems.diagrams.tension_control import (
@@ -80,7 +81,8 @@ class TensionTrial:
     Attributes:
         experiment: Name of the experiment that the run belongs to.
         robot: Name of the robot.
-        trajectory: The desired motion.
+        path: The poses between which the desired motion goes, at rest in each.
+        legs: Time of each stretch between two [s].
         method: A name of `tensions.METHODS`.
         stiffness: Kp, for rotation and translation [1/s^2].
         damping: Kd, the same [1/s].
@@ -92,7 +94,8 @@ class TensionTrial:
 
     experiment: str
     robot: str
-    trajectory: PoseTrajectory
+    path: tuple[RigidTransform, ...]
+    legs: tuple[float, ...]
     method: str
     stiffness: float
     damping: float
@@ -101,44 +104,25 @@ class TensionTrial:
     rate: float = 1000.0
     offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
-    @property
-    def name(self) -> str:
-        """What no other run of the study is called."""
-        return f"{self.experiment} {self.label}"
-
-    @property
-    def label(self) -> str:
-        """A few words that tell it from the other runs of its experiment."""
-        words = f"{self.method}, Kp {self.stiffness:g}"
-        return words if self.applied == Applied.HELD else f"{words}, {self.applied}"
-
-    def arguments(self) -> dict[str, Any]:
-        """All that the run depends on but the code, for JSON."""
-        return {
-            **self.parameters(),
-            "path": [pose_row(pose).tolist() for pose in self.trajectory.poses],
-            "legs_s": list(self.trajectory.durations),
-        }
-
-    def parameters(self) -> dict[str, Any]:
-        """What a row of the results says of it."""
+    def keys(self) -> dict[str, Any]:
+        """What tells its row from others."""
         return {
             "experiment": self.experiment,
             "robot": self.robot,
             "method": self.method,
             "applied": str(self.applied),
             "kp_per_s2": self.stiffness,
-            "kd_per_s": self.damping,
-            "control_rate_hz": self.rate,
-            "start_offset_m": list(self.offset),
-            "wanted_duration_s": self.duration,
         }
+
+    def trajectory(self) -> PoseTrajectory:
+        """The desired motion."""
+        return PoseTrajectory(self.path, self.legs)
 
     def build(self) -> TensionControl:
         """The diagram."""
         held = self.applied == Applied.HELD
         settings = TensionControlSettings(
-            trajectory=self.trajectory,
+            trajectory=self.trajectory(),
             gains=TaskGains(self.stiffness, self.damping),
             method=self.method,
             rate=self.rate,
@@ -148,74 +132,10 @@ class TensionTrial:
         return build_tension_control(load_robot(self.robot), settings)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class TrialResult:
-    """What a run did; tensions are those that the distribution put out.
-
-    Attributes:
-        spec: What was simulated.
-        end_time: Simulated time, less than the specification's where the platform was lost [s].
-        lost: Whether the platform fell.
-        largest_error: Largest distance of Po from where it should be [m].
-        mean_error: Its mean over time [m].
-        last_error: Its mean over the last tenth of the run [m].
-        largest_tension: [N].
-        smallest_tension: [N].
-        largest_jump: Largest change of one tension from one control step to the next [N].
-        negative_tensions: Number of tensions below zero, over all steps and cables.
-        failures: Control steps whose tensions were out of bounds or not found.
-        steps: Control steps.
-        wall_time: Time that the simulation took [s].
-        times: Some times, shape (k,) [s].
-        errors: The distance at those times, shape (k,) [m].
-        tensions: Tensions at those times, shape (k, m) [N].
-    """
-
-    spec: TensionTrial
-    end_time: float
-    lost: bool
-    largest_error: float
-    mean_error: float
-    last_error: float
-    largest_tension: float
-    smallest_tension: float
-    largest_jump: float
-    negative_tensions: int
-    failures: int
-    steps: int
-    wall_time: float
-    times: Array = field(repr=False)
-    errors: Array = field(repr=False)
-    tensions: Array = field(repr=False)
-
-    def as_dict(self) -> dict[str, Any]:
-        """The run for JSON, without its history."""
-        return {
-            **self.spec.parameters(),
-            "end_time_s": self.end_time,
-            "lost": self.lost,
-            "position_error_max_m": self.largest_error,
-            "position_error_mean_m": self.mean_error,
-            "position_error_last_tenth_m": self.last_error,
-            "tension_max_n": self.largest_tension,
-            "tension_min_n": self.smallest_tension,
-            "tension_jump_max_n": self.largest_jump,
-            "negative_tensions": self.negative_tensions,
-            "failures": self.failures,
-            "control_steps": self.steps,
-            "wall_time_s": self.wall_time,
-        }
-
-
-HISTORY = ("times", "errors", "tensions")
-"""Attributes of a `TrialResult` that are arrays."""
-
-NUMBERS: dict[str, type] = {
-    each.name: {"bool": bool, "int": int, "float": float}[str(each.type)]
-    for each in fields(TrialResult)
-    if each.name not in ("spec", *HISTORY)
-}
-"""Its other attributes but `spec`, each with its type, in their order."""
+def label_of(keys: Run | Mapping[str, Any]) -> str:
+    """A few words that tell a run from the others of its experiment."""
+    words = f"{keys['method']}, Kp {keys['kp_per_s2']:g}"
+    return words if keys["applied"] == Applied.HELD else f"{words}, {keys['applied']}"
 
 
 class _Recorder:
@@ -230,7 +150,7 @@ class _Recorder:
         distributor = control.diagram.GetSubsystemByName("distributor")
         self._tensions = distributor.GetOutputPort("tensions").Eval
         self._distributor_context = distributor.GetMyContextFromRoot(context)
-        self._motion = spec.trajectory.motion
+        self._motion = spec.trajectory().motion
         self.rows = np.empty((rows, 2 + len(control.robot.cables)))
         self.count = 0
         self.lost = False
@@ -251,34 +171,18 @@ class _Recorder:
         return EventStatus.DidNothing()
 
 
-@dataclass(frozen=True, eq=False)
-class TrialTask:
-    """A run as the one item of a task of a sweep.
+def run_trial(spec: TensionTrial) -> Row:
+    """Simulates a specification; tensions are those that the distribution put out.
 
-    Attributes:
-        spec: What to simulate.
-    """
-
-    spec: TensionTrial
-
-    def __call__(self, start: int, stop: int) -> dict[str, Array]:
-        """Arrays of `TrialResult` and `NUMBERS`, with the run as first axis."""
-        run = run_trial(self.spec)
-        numbers = [float(getattr(run, name)) for name in NUMBERS]
-        arrays = {"numbers": np.array(numbers)} | {name: getattr(run, name) for name in HISTORY}
-        return {name: array[np.newaxis] for name, array in arrays.items()}
-
-    def result(self, arrays: Mapping[str, Array]) -> TrialResult:
-        """The run of which these are the arrays."""
-        numbers = {
-            name: NUMBERS[name](value)
-            for name, value in zip(NUMBERS, arrays["numbers"][0].tolist(), strict=True)
-        }
-        return TrialResult(spec=self.spec, **numbers, **{name: arrays[name][0] for name in HISTORY})
-
-
-def run_trial(spec: TensionTrial) -> TrialResult:
-    """Simulates a specification.
+    Returns:
+        kd_per_s, control_rate_hz, start_offset_m, wanted_duration_s: of the specification;
+        end_time_s: less than wanted where the platform was lost; lost: whether it fell;
+        position_error_max_m, position_error_mean_m, position_error_last_tenth_m: distance of Po
+        from where it should be, the last in the last tenth of the run; tension_max_n,
+        tension_min_n; tension_jump_max_n: largest change of one tension from one control step to
+        the next; negative_tensions: over all steps and cables; failures: control steps whose
+        tensions were out of bounds or not found; control_steps; times_s, shape (k,), and at these
+        times errors_m, shape (k,), and tensions_n, shape (k, m).
 
     Raises:
         TensionProblemError: The method does not fit the robot.
@@ -286,7 +190,7 @@ def run_trial(spec: TensionTrial) -> TrialResult:
     control = spec.build()
     context = control.make_context()
     if any(spec.offset):
-        start = spec.trajectory.pose(0.0)
+        start = spec.trajectory().pose(0.0)
         start.set_translation(start.translation() + spec.offset)
         plant_context = control.in_plant.plant.GetMyMutableContextFromRoot(context)
         control.in_plant.set_pose(plant_context, start)
@@ -312,32 +216,24 @@ def run_trial(spec: TensionTrial) -> TrialResult:
         raise KeyboardInterrupt
     failures = int(control.diagram.GetOutputPort("failures").Eval(context)[0])
     rows = recorder.rows[: recorder.count]
-    return _judge(spec, rows, end.outcome == Outcome.DIVERGED, failures, end.wall_time)
+    return _row(spec, rows, end.outcome == Outcome.DIVERGED, failures)
 
 
-def _judge(
-    spec: TensionTrial, rows: Array, lost: bool, failures: int, wall_time: float
-) -> TrialResult:
+def _row(spec: TensionTrial, rows: Array, lost: bool, failures: int) -> Row:
     times, errors, tensions = rows[:, 0], rows[:, 1], rows[:, 2:]
     held = max(1, round(1.0 / (spec.rate * STEP)))  # integration steps per control step
     chosen = tensions[::held]
     jumps = np.abs(np.diff(chosen, axis=0))
     some = slice(None, None, max(1, len(times) // KEPT_ROWS))
-    return TrialResult(
-        spec=spec,
-        end_time=float(times[-1]),
-        lost=lost,
-        largest_error=float(np.max(errors)),
-        mean_error=float(np.mean(errors)),
-        last_error=float(np.mean(errors[-max(1, len(errors) // 10) :])),
-        largest_tension=float(np.max(tensions)),
-        smallest_tension=float(np.min(tensions)),
-        largest_jump=float(np.max(jumps, initial=0.0)),
-        negative_tensions=int(np.sum(chosen < 0.0)),
-        failures=failures,
-        steps=len(chosen),
-        wall_time=wall_time,
-        times=times[some].copy(),
-        errors=errors[some].copy(),
-        tensions=tensions[some].copy(),
-    )
+    return {
+        "kd_per_s": spec.damping, "control_rate_hz": spec.rate, "start_offset_m": spec.offset,
+        "wanted_duration_s": spec.duration, "end_time_s": times[-1], "lost": lost,
+        "position_error_max_m": np.max(errors), "position_error_mean_m": np.mean(errors),
+        "position_error_last_tenth_m": np.mean(errors[-max(1, len(errors) // 10) :]),
+        "tension_max_n": np.max(tensions), "tension_min_n": np.min(tensions),
+        "tension_jump_max_n": np.max(jumps, initial=0.0),
+        "negative_tensions": int(np.sum(chosen < 0.0)), "failures": failures,
+        "control_steps": len(chosen),
+        "times_s": times[some].copy(), "errors_m": errors[some].copy(),
+        "tensions_n": tensions[some].copy(),
+    }  # fmt: skip

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -234,7 +235,7 @@ def methods_row(grid: tuple[int, int, int], repeats: int) -> Row:
     def cost(method: str) -> float:
         return processor_seconds(lambda: distribute_batch(W, w, low, high, method, threads=1))
 
-    seconds = interleaved([lambda method=method: cost(method) for method in COMPARED], repeats)
+    seconds = interleaved([partial(cost, method) for method in COMPARED], repeats)
     found: dict[str, Any] = {"poses": len(problems), "solved": {}, "wrong": {}, "pushing": {}}
     for method in COMPARED:
         solutions = [distribute(problem, method) for problem in problems]

@@ -7,6 +7,7 @@ import numpy as np
 from cdpr_drake.analyses.studies.framework.runs import Run, Runs
 from cdpr_drake.analyses.studies.framework.statement import (
     CONSTRUCTION,
+    SOURCE,
     Check,
     Finding,
     statement,
@@ -84,6 +85,7 @@ def meets_conditions(runs: Runs) -> Finding:
     "equations (6.16) to (6.21)",
     source="Gazebo thesis 6.2",
     rule=f"less than {SAME:g} m, m/s, m/s^2 off",
+    cause=SOURCE,
 )
 def printed_coefficients(runs: Runs) -> Finding:
     """Equations (6.19) to (6.21)."""

@@ -8,14 +8,13 @@ import pytest
 
 from cdpr_drake.analyses.reporting.progress import StudySession, WorkProgress
 from cdpr_drake.analyses.studies.catalogue import STUDIES, StudyEntry
+from cdpr_drake.analyses.studies.framework.study import Form
 from cdpr_drake.analyses.studies.tension_methods.experiments import (
     EXPERIMENTS,
     THESIS_GAINS,
-    make_plan,
+    trials,
 )
-from cdpr_drake.analyses.studies.tension_methods.figures import FIGURES
-from cdpr_drake.analyses.studies.tension_methods.study import study_tension_methods
-from cdpr_drake.analyses.studies.tension_methods.trial import TrialTask
+from cdpr_drake.analyses.studies.tension_methods.study import COVERAGE, STUDY, measure
 from cdpr_drake.cli.app import main
 from tests.messages import printed
 
@@ -26,89 +25,73 @@ TRACKING = 1e-4
 
 
 @pytest.fixture(scope="module")
-def study(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("study")
-    said = []
-    return study_tension_methods(True, StudySession(folder, said.append, workers=1)), folder, said
+def study():
+    return STUDY(True, StudySession(workers=1))
 
 
 def test_short_form_is_complete(study):
-    found, _, said = study
-    assert not found.interrupted
-    assert len(found.runs) == len(found.plan.specs)
-    assert {row.robot for row in found.coverage} == {"caroca_gazebo", "acrobot_large"}
-    assert found.statements
-    done = [progress.done for progress in said]
-    assert done == sorted(done)
-    assert done[-1] <= said[-1].total
+    assert not study.interrupted
+    assert len(study.runs(experiment=tuple(EXPERIMENTS)[:2])) == 10
+    assert set(study.runs(experiment=COVERAGE)["robot"]) == {"caroca_gazebo", "acrobot_large"}
+    verdicts = {one.name: one.verdict for one in study.statements}
+    assert tuple(verdicts) == STUDY.names_of_checks()
+    assert verdicts["pseudo_inverse_negative"] == "in part"
+    assert verdicts["closed_form_steady"] == "not confirmed"
+    assert verdicts["lp_jumps"] == "not judged in the quick form"
 
 
 def test_exact_methods_follow_and_hold_their_bounds(study):
-    found, _, _ = study
-    exact = [r for r in found.runs if r.spec.method in ("linear_program", "quadratic_program")]
+    runs = study.runs(experiment=("thesis", "acrobot"))
+    exact = runs(method=("linear_program", "quadratic_program"))
     assert len(exact) >= 3
-    for run in exact:
-        assert run.largest_error < TRACKING
-        assert run.failures == run.negative_tensions == 0
+    assert exact.largest("position_error_max_m") < TRACKING
+    assert exact.total("failures") == exact.total("negative_tensions") == 0
 
 
 def test_results_can_be_written_and_read(study, tmp_path):
-    found, _, _ = study
-    found.write(tmp_path)
+    assert study.write(tmp_path) == {}
     results = json.loads((tmp_path / RESULTS).read_text())
-    assert results == json.loads(json.dumps(found.as_dict()))
+    assert results == json.loads(json.dumps(study.as_dict()))
     assert results["parameters"]["start_least_shift_m"] > 0.0
-    assert results["versions"]["drake"]
-    names = {path.name for path in tmp_path.glob("*.png")}
-    assert names >= {"thesis_errors.png", "gains_linear_program.png", "coverage.png"}
-    assert {name.removesuffix(".png") for name in names} <= set(FIGURES)
-    titles = [str(table.title) for table in found.tables()]
-    assert any(title.startswith("thesis") for title in titles)
+    assert results["units"]["tension_max_n"] == "N"
+    names = {path.stem for path in tmp_path.glob("*.png")}
+    assert names >= {"thesis_errors", "gains_linear_program", "coverage"}
+    assert names < set(STUDY.figures)
+    titles = [str(table.title) for table in study.tables()]
+    assert [title.partition(":")[0] for title in titles[:4]] == [
+        "thesis", "printed", "acrobot", "caroca_gazebo",
+    ]  # fmt: skip
 
 
 def test_full_plan_has_the_printed_runs():
-    plan = make_plan(quick=False)
-    made = {(s.experiment, s.method, s.stiffness) for s in plan.specs}
+    specs = trials(quick=False)
+    made = {(s.experiment, s.method, s.stiffness) for s in specs}
     for method, gains in THESIS_GAINS.items():
         for gain in gains:
             assert ("thesis", method, gain) in made
-    assert {spec.experiment for spec in plan.specs} == set(EXPERIMENTS)
-    assert all(s.duration == 100.0 for s in plan.specs if s.experiment == "thesis")
+    assert {spec.experiment for spec in specs} == set(EXPERIMENTS)
+    assert all(s.duration == 100.0 for s in specs if s.experiment == "thesis")
+    plan = STUDY.plan(Form())
+    assert {case.keys["experiment"] for case in plan if case.alone} == {COVERAGE}
 
 
-def without_times(results):
-    """Numbers without what depends on the machine."""
-    timed = ("wall_time_s", "items", "microseconds", "kernel_microseconds")
-    if isinstance(results, dict):
-        return {key: without_times(value) for key, value in results.items() if key not in timed}
-    return [without_times(value) for value in results] if isinstance(results, list) else results
-
-
-def test_a_stop_keeps_finished_runs_and_the_same_call_continues(study, tmp_path):
+def test_a_stop_keeps_finished_runs_and_says_what_it_can():
     said = []
-    session = StudySession(tmp_path, said.append, lambda: said[-1].done >= 2, workers=1)
-    found = study_tension_methods(True, session)
+    session = StudySession(None, said.append, lambda: said[-1].done >= 2, workers=1)
+    found = STUDY(True, session)
     assert found.interrupted
     assert len(found.runs) == 2
-    assert not found.coverage
-    assert not found.write(tmp_path)
-    assert len(json.loads((tmp_path / RESULTS).read_text())["runs"]) == 2
+    assert not found.runs.has(experiment=COVERAGE)
+    assert found.statements == []
     assert len(found.tables()) == 1
-    continued = study_tension_methods(True, StudySession(tmp_path, workers=1))
-    assert continued.progress.found == 2
-    assert not continued.interrupted
-    assert without_times(continued.as_dict()) == without_times(study[0].as_dict())
 
 
-def test_a_run_is_the_same_when_it_is_read_again(study):
-    for run in study[0].runs[:2]:
-        again = TrialTask(run.spec)(0, 1)
-        read = TrialTask(run.spec).result(again)
-        assert without_times(read.as_dict()) == without_times(run.as_dict())
-        assert {type(value) for value in read.as_dict().values()} == {
-            type(value) for value in run.as_dict().values()
-        }
-        np.testing.assert_array_equal(read.tensions, run.tensions)
+def test_a_run_is_the_same_when_it_is_run_again(study):
+    run = study.runs.rows[1]
+    (case,) = [one for one in study.cases if one.name == run.case]
+    row = measure(case, 0)
+    np.testing.assert_array_equal(row["tensions_n"], run["tensions_n"])
+    assert row["position_error_max_m"] == run["position_error_max_m"]
 
 
 def command(capsys, *arguments):
@@ -121,7 +104,8 @@ def command(capsys, *arguments):
 @pytest.fixture
 def tiny(monkeypatch, study, tmp_path):
     """In place of the study, one that has a short result at once."""
-    found = replace(study[0], runs=study[0].runs[:1], coverage=())
+    case = study.cases[0]
+    found = replace(study, cases=(case,), finished={case.name: study.finished[case.name]})
     monkeypatch.chdir(tmp_path)
     monkeypatch.setitem(STUDIES, "tension-methods", StudyEntry(lambda *_: found))
     return found

@@ -1,70 +1,129 @@
 """Verdicts on the thesis' statements follow the numbers."""
 
-from dataclasses import replace
+from functools import partial
 
 import pytest
 
 from cdpr_drake.analyses.reporting.statements import CONFIRMED, IN_PART, NOT_CONFIRMED
-from cdpr_drake.analyses.studies.tension_methods.statements import evaluate_statements
-from cdpr_drake.analyses.studies.tension_methods.trial import Applied, TensionTrial, run_trial
-from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
+from cdpr_drake.analyses.studies.framework.runs import MissingRuns, Run, Runs
+from cdpr_drake.analyses.studies.framework.study import Form
+from cdpr_drake.analyses.studies.tension_methods.statements import CHECKS, GAINS, LP, QP
+from cdpr_drake.analyses.studies.tension_methods.study import STUDY
+
+JUDGES = {check.name: check for check in CHECKS}
+
+ROW = {
+    "lost": False, "end_time_s": 1.0, "position_error_max_m": 1e-6,
+    "position_error_last_tenth_m": 1e-7, "tension_max_n": 5.0, "tension_min_n": 1.0,
+    "tension_jump_max_n": 1e-4, "negative_tensions": 0, "failures": 0, "control_steps": 1000,
+}  # fmt: skip
 
 
-@pytest.fixture(scope="module")
-def template():
-    home = load_robot("caroca_gazebo").home.transform()
-    return run_trial(
-        TensionTrial(
-            experiment="thesis",
-            robot="caroca_gazebo",
-            trajectory=PoseTrajectory((home, home), (1.0,)),
-            method="linear_program",
-            stiffness=100.0,
-            damping=100.0,
-            duration=0.01,
-        )
-    )
+def made_up(experiment, method, gain, applied="held", **numbers):
+    keys = {
+        "experiment": experiment, "robot": "caroca_gazebo", "method": method, "applied": applied,
+        "kp_per_s2": gain,
+    }  # fmt: skip
+    return Run(f"{experiment} {method} {gain} {applied}", None, keys, ROW | numbers)
 
 
-def made_up(template, experiment, method, gain, **numbers):
-    spec = replace(template.spec, experiment=experiment, method=method, stiffness=gain)
-    return replace(template, spec=spec, **numbers)
-
-
-def verdict(runs, words):
-    (found,) = [s for s in evaluate_statements(runs) if words in s.words]
+def verdict(name, runs):
+    found = JUDGES[name].judge(Runs(runs))
     assert found.found
     return found.verdict
 
 
-def test_nothing_is_said_about_runs_that_were_not_made(template):
-    assert evaluate_statements([]) == []
-    assert evaluate_statements([template]) == []
+@pytest.mark.parametrize("name", JUDGES)
+def test_nothing_is_said_about_runs_that_were_not_made(name):
+    with pytest.raises(MissingRuns):
+        JUDGES[name].judge(Runs([], partial(STUDY.planned, Form())))
 
 
 @pytest.mark.parametrize(("jump", "expected"), [(4.0, CONFIRMED), (1e-4, NOT_CONFIRMED)])
-def test_jumps_of_the_linear_program(template, jump, expected):
+def test_jumps_of_the_linear_program(jump, expected):
     runs = [
-        made_up(template, "thesis", "linear_program", gain, largest_jump=jump)
-        for gain in (100.0, 800.0, 1200.0)
+        made_up("thesis", LP, gain, tension_jump_max_n=4.0 if gain > 100.0 else jump)
+        for gain in GAINS
     ]
-    assert verdict(runs, "linear program jump") == expected
+    assert verdict("lp_jumps", runs) == expected
+
+
+@pytest.mark.parametrize(
+    ("jump", "expected"), [(4.0, CONFIRMED), (0.1, IN_PART), (None, NOT_CONFIRMED)]
+)
+def test_jumps_of_the_quadratic_program(jump, expected):
+    most = 4.0 if jump else 0.0
+    runs = [
+        made_up("thesis", QP, gain, tension_jump_max_n=most if gain > 100.0 else jump or 0.0)
+        for gain in (*GAINS, 1500.0)
+    ]
+    assert verdict("qp_jumps", runs) == expected
 
 
 @pytest.mark.parametrize(
     ("far", "near", "expected"),
     [(2.0, 2.0, CONFIRMED), (2.0, 0.5, IN_PART), (0.5, 0.5, NOT_CONFIRMED)],
 )
-def test_quadratic_against_linear_program(template, far, near, expected):
+def test_quadratic_against_linear_program(far, near, expected):
     """The linear program's largest tension as a multiple of the quadratic program's."""
     runs = [
-        made_up(template, name, method, gain, largest_tension=tension)
+        made_up(name, method, gain, tension_max_n=tension)
         for name, factor in (("thesis", far), ("step", near))
-        for gain in (100.0, 800.0, 1200.0)
-        for method, tension in (("quadratic_program", 1.0), ("linear_program", factor))
+        for gain in GAINS
+        for method, tension in ((QP, 1.0), (LP, factor))
     ]
-    assert verdict(runs, "below that of the linear program") == expected
+    assert verdict("qp_needs_less", runs) == expected
+
+
+@pytest.mark.parametrize(
+    ("still", "step", "expected"),
+    [(2.0, 2.0, CONFIRMED), (1.0, 2.0, IN_PART), (1.0, 1.0, NOT_CONFIRMED)],
+)
+def test_tensions_grow_with_the_gain(still, step, expected):
+    runs = [
+        made_up(name, QP, gain, tension_max_n=factor if gain > 800.0 else 1.0)
+        for name, factor in (("thesis", still), ("step", step))
+        for gain in GAINS
+    ]
+    assert verdict("tension_grows", runs) == expected
+
+
+@pytest.mark.parametrize(
+    ("errors", "falls", "no_better"),
+    [
+        ((3e-6, 2e-6, 1e-6, 0.99e-6), CONFIRMED, CONFIRMED),
+        ((3e-6, 1e-6, 2e-6, 1.1e-6), NOT_CONFIRMED, IN_PART),
+        ((3e-6, 4e-6, 5e-6, 1e-6), NOT_CONFIRMED, NOT_CONFIRMED),
+    ],
+)
+def test_errors_against_the_gain(errors, falls, no_better):
+    runs = [
+        made_up("thesis", QP, gain, position_error_max_m=error)
+        for gain, error in zip((*GAINS, 1500.0), errors, strict=True)
+    ]
+    assert verdict("error_falls", runs) == falls
+    assert verdict("no_better", runs) == no_better
+
+
+@pytest.mark.parametrize(
+    ("inside", "printed", "expected"),
+    [(-1.0, -1.0, CONFIRMED), (0.5, -1.0, IN_PART), (-1.0, 0.5, NOT_CONFIRMED)],
+)
+def test_negative_tensions_of_the_pseudo_inverse(inside, printed, expected):
+    runs = [
+        made_up(name, "pseudo_inverse", 100.0, "pushed", tension_min_n=least)
+        for name, least in (("thesis", inside), ("printed", printed))
+    ]
+    assert verdict("pseudo_inverse_negative", runs) == expected
+
+
+@pytest.mark.parametrize(("last", "expected"), [(117.0, CONFIRMED), (140.0, NOT_CONFIRMED)])
+def test_the_pseudo_inverse_needs_the_same_at_all_gains(last, expected):
+    runs = [
+        made_up("printed", "pseudo_inverse", gain, "pushed", tension_max_n=tension)
+        for gain, tension in zip(GAINS, (117.0, 117.0, last), strict=True)
+    ]
+    assert verdict("pseudo_inverse_117", runs) == expected
 
 
 @pytest.mark.parametrize(
@@ -75,41 +134,36 @@ def test_quadratic_against_linear_program(template, far, near, expected):
         ((267.0, 385.0, 517.0), 1.0, NOT_CONFIRMED),
     ],
 )
-def test_the_closed_form_is_negative_and_grows(template, largest, smallest, expected):
+def test_the_closed_form_is_negative_and_grows(largest, smallest, expected):
     """Each verdict can be reached: once the first of them could not."""
-    runs = []
-    for gain, tension in zip((100.0, 800.0, 1200.0), largest, strict=True):
-        run = made_up(
-            template, "thesis", "closed_form", gain,
-            largest_tension=tension, smallest_tension=smallest,
-        )  # fmt: skip
-        runs.append(replace(run, spec=replace(run.spec, applied=Applied.PUSHED)))
-    assert verdict(runs, "gives negative tensions") == expected
+    runs = [
+        made_up(
+            "thesis", "closed_form", gain, "pushed", tension_max_n=tension, tension_min_n=smallest
+        )
+        for gain, tension in zip(GAINS, largest, strict=True)
+    ]
+    assert verdict("closed_form_negative", runs) == expected
 
 
 @pytest.mark.parametrize(("error", "expected"), [(1e-3, CONFIRMED), (1e-7, NOT_CONFIRMED)])
-def test_a_steady_error_of_the_closed_form_would_be_seen(template, error, expected):
-    run = made_up(template, "thesis", "closed_form", 100.0, last_error=error)
+def test_a_steady_error_of_the_closed_form_would_be_seen(error, expected):
     runs = [
-        replace(run, spec=replace(run.spec, applied=applied))
-        for applied in (Applied.PUSHED, Applied.CUT)
+        made_up("thesis", "closed_form", 100.0, applied, position_error_last_tenth_m=error)
+        for applied in ("pushed", "cut")
     ]
-    assert verdict(runs, "steady-state error") == expected
+    assert verdict("closed_form_steady", runs) == expected
 
 
 @pytest.mark.parametrize(
     ("error", "failures", "expected"),
     [(1e-3, 0, CONFIRMED), (1e-9, 0, NOT_CONFIRMED), (1e-9, 5, IN_PART)],
 )
-def test_instability_at_high_gains_can_be_confirmed(template, error, failures, expected):
+def test_instability_at_high_gains_can_be_confirmed(error, failures, expected):
     rows = [
-        made_up(template, "thesis", "quadratic_program", 100.0, largest_error=1e-6),
-        made_up(template, "thesis", "linear_program", 1200.0, largest_error=error),
-        made_up(template, "thesis", "quadratic_program", 1500.0, largest_error=error),
-        made_up(template, "far_step", "quadratic_program", 1200.0),
+        made_up("thesis", QP, 100.0),
+        made_up("thesis", LP, 1200.0, position_error_max_m=error),
+        made_up("thesis", QP, 1500.0, position_error_max_m=error),
+        made_up("far_step", QP, 1200.0),
     ]
-    rows += [
-        made_up(template, "slow", "quadratic_program", gain, failures=failures)
-        for gain in (100.0, 800.0, 1200.0, 1500.0)
-    ]
-    assert verdict(rows, "come near instability") == expected
+    rows += [made_up("slow", QP, gain, failures=failures) for gain in (*GAINS, 1500.0)]
+    assert verdict("unstable", rows) == expected
