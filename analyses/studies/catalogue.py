@@ -38,7 +38,6 @@ from cdpr_drake.analyses.studies.framework.study import Study as FramedStudy
 from cdpr_drake.analyses.studies.planning.study import STUDY as PLANNING
 from cdpr_drake.analyses.studies.published.recipe_variants import RECIPES
 from cdpr_drake.analyses.studies.tension_cases import TENSION_CASES
-from cdpr_drake.stability.stability_case import SCHEMES
 
 
 class StudyResult(Protocol):
@@ -78,7 +77,6 @@ class StudyEntry:
         run: What runs it.
         continues: Whether it works in its folder from the start, by `run_study_sweep`, and
             continues when it is run again; otherwise the folder appears at the end.
-        spreads: Whether workers of a cluster can do its work.
         repeats: Whether it repeats runs over as many seeds as its session says.
         judges: Names of the statements that it can judge, as its results have them.
         numbers: Printed numbers that it puts beside its own.
@@ -88,7 +86,6 @@ class StudyEntry:
 
     run: Study
     continues: bool = False
-    spreads: bool = True
     repeats: bool = False
     judges: tuple[str, ...] = ()
     numbers: tuple[PublishedNumber, ...] = ()
@@ -114,28 +111,8 @@ STUDIES: dict[str, StudyEntry] = {
         judges=names_of_checks(tension_methods.CHECKS),
         figures=tension_methods.FIGURES,
     ),
-    "worked-examples": StudyEntry(
-        worked_examples.study_worked_examples,
-        spreads=False,
-        judges=names_of_checks(worked_examples.CHECKS),
-        figures=("trajectory", "feasible_polygons"),
-    ),
-    "stability-closed-loop": StudyEntry(
-        closed_loops.study_closed_loop,
-        continues=True,
-        judges=names_of_checks(closed_loops.CHECKS),
-        figures=("errors", "ways"),
-    ),
-    **{
-        f"stability-closed-loop-{scheme}": StudyEntry(
-            partial(closed_loops.study_closed_loop, scheme=scheme),
-            continues=True,
-            judges=names_of_checks(closed_loops.CHECKS),
-            figures=("errors", "ways"),
-        )
-        for scheme in SCHEMES
-        if scheme != "pbvs"
-    },
+    "worked-examples": entry_of(worked_examples.STUDY),
+    **{study.name: entry_of(study) for study in closed_loops.STUDIES},
     "control-stability": StudyEntry(
         control_stability.study_control_stability,
         continues=True,
@@ -148,12 +125,7 @@ STUDIES: dict[str, StudyEntry] = {
         continues=True,
         judges=names_of_checks(control_stability.RECIPE_CHECKS),
     ),
-    "stability-ranges": StudyEntry(
-        stability_ranges.study_stability_ranges,
-        continues=True,
-        judges=names_of_checks(stability_ranges.CHECKS),
-        figures=stability_ranges.FIGURES,
-    ),
+    "stability-ranges": entry_of(stability_ranges.STUDY),
     "stability-shapes": StudyEntry(
         stability_shapes.study_stability_shapes,
         continues=True,
@@ -166,42 +138,14 @@ STUDIES: dict[str, StudyEntry] = {
         judges=names_of_checks(workspaces.CHECKS),
         figures=workspaces.FIGURES,
     ),
+    "scenarios": entry_of(scenarios.STUDY),
+    "engines": entry_of(engines.STUDY),
+    "mobile-robot": entry_of(mobile_robot.STUDY),
     "design": entry_of(design.STUDY),
-    "engines": StudyEntry(
-        engines.study_engines,
-        continues=True,
-        judges=names_of_checks(engines.CHECKS),
-        figures=("engines",),
-    ),
-    "scenarios": StudyEntry(
-        scenarios.study_scenarios,
-        continues=True,
-        judges=names_of_checks(scenarios.CHECKS),
-        figures=scenarios.FIGURES,
-    ),
     "planning": entry_of(PLANNING),
-    "mobile-robot": StudyEntry(
-        mobile_robot.study_mobile_robot,
-        continues=True,
-        repeats=True,
-        judges=names_of_checks(mobile_robot.CHECKS),
-        figures=mobile_robot.FIGURES,
-    ),
     "pick-and-place": entry_of(pick_and_place.STUDY),
-    "fusion": StudyEntry(
-        fusion.study_fusion,
-        continues=True,
-        repeats=True,
-        judges=names_of_checks(fusion.CHECKS),
-        figures=("fusion",),
-    ),
-    "schemes": StudyEntry(
-        schemes.study_schemes,
-        continues=True,
-        repeats=True,
-        judges=names_of_checks(schemes.CHECKS),
-        figures=("schemes",),
-    ),
+    "fusion": entry_of(fusion.STUDY),
+    "schemes": entry_of(schemes.STUDY),
     "tagless": entry_of(tagless.STUDY),
     "calibration": entry_of(CALIBRATION),
     "identification": entry_of(identification.STUDY),

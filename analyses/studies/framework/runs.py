@@ -50,12 +50,14 @@ class Run:
         seed: Its seed; None in a study without.
         keys: What describes its case.
         measured: What was measured.
+        printed: By column what the source prints, in its words.
     """
 
     case: str
     seed: int | None
     keys: Mapping[str, Any]
     measured: Row
+    printed: Mapping[str, str] = field(default_factory=dict)
 
     def __getitem__(self, column: str) -> Any:
         """A value.

@@ -1,6 +1,6 @@
-"""How large errors may be before a servo's stability is lost: combinations of limits, item by item.
+"""How large errors may be before a servo's stability is lost: each combination a question.
 
-Every item is one question with its own name, depends on no other, and answers with a few numbers.
+Every question has its own name, depends on no other, and is answered with a few numbers.
 
 Source: servoing thesis 3.2 and 3.4.2.
 """

@@ -1,3 +1,1 @@
-from .figures import FIGURES as FIGURES
-from .study import CHECKS as CHECKS
-from .study import study_stability_ranges as study_stability_ranges
+from .study import STUDY as STUDY

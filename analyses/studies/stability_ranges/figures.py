@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from cdpr_drake.analyses.studies.stability_ranges.item import (
+from cdpr_drake.analyses.studies.framework.runs import MissingRuns, Run, Runs
+from cdpr_drake.analyses.studies.stability_ranges.question import (
     PLANAR_ROBOT,
     PLANAR_VISION,
     SINGLE,
     SPATIAL_ROBOT,
     SPATIAL_VISION,
-    RangeRow,
+    found,
+    limits_of,
+    published,
 )
 from cdpr_drake.analyses.studies.stability_ranges.single_errors import (
     CUBES,
@@ -70,47 +73,26 @@ GROUPS = {
 }
 """What varies in a group of columns."""
 
+READINGS = {
+    LOWER_CORNER: "sampled, lower corner", CUBES: "sampled, cubes",
+    NO_TURN: "sampled, theta u = 0", KNOWN: "sampled, object known",
+}  # fmt: skip
+"""Words for other readings of one wrong parameter."""
+
 LEAST_DRAWN_VOLUME = 0.004
 """An empty workspace is drawn as this, to be seen [m^3]."""
 
 SMALLEST = 1e-3
 """Lengths below are drawn as this, on a logarithmic axis [m]."""
 
-FIGURES = (
-    "ranges_planar_II", "ranges_planar_III", "ranges_spatial_I", "ranges_spatial_III",
-    "single_errors",
-)  # fmt: skip
-"""Names of all figures that the study can write."""
 
-
-def range_drawings(rows: Sequence[RangeRow]) -> dict[str, Callable[[], Figure]]:
-    """What draws the figures that the results suffice for, by name."""
-    drawings: dict[str, Callable[[], Figure]] = {}
-    for section, name, title, width, left_out in (
-        (PLANAR_VISION, "ranges_planar_II", "Planar, camera and object wrong", 11.0, None),
-        (PLANAR_ROBOT, "ranges_planar_III", "Planar robot, all errors", 16.0, ("camera", "area")),
-        (SPATIAL_ROBOT, "ranges_spatial_III", "ACROBOT, small platform, all errors", 16.0, ()),
-    ):
-        some = [
-            r
-            for r in rows
-            if r.section == section
-            and (r.group == "II" if left_out is None else r.group not in left_out)
-        ]
-        if some:
-            drawings[name] = partial(combination_figure, some, title, width)
-    for section, name, draw in (
-        (SPATIAL_VISION, "ranges_spatial_I", object_figure),
-        (SINGLE, "single_errors", single_figure),
-    ):
-        some = [r for r in rows if r.section == section]
-        if some:
-            drawings[name] = partial(draw, some)
-    return drawings
-
-
-def combination_figure(rows: Sequence[RangeRow], title: str, width: float) -> Figure:
+def combination_figure(
+    runs: Runs, *, section: str, title: str, width: float = 16.0, left_out: tuple[str, ...] = ()
+) -> Figure:
     """Every combination as a column: the limits given, and the largest that was found, filled."""
+    rows = [run for run in runs(section=section) if run["group"] not in left_out]
+    if not rows:
+        raise MissingRuns(section)
     figure, (top, bottom) = new_figure(
         2, 1, (width, 8.0), f"{title}. One combination in each column; filled: the largest found"
     )
@@ -120,12 +102,12 @@ def combination_figure(rows: Sequence[RangeRow], title: str, width: float) -> Fi
             axes.axvline(x, color="0.88", lw=1.0, zorder=0)
         for number, (name, (label, marker)) in enumerate(words.items()):
             given = [
-                (x, row.limits.get(name)) for x, row in zip(places, rows, strict=True)
-                if name in row.limits
+                (x, limits_of(row)[name]) for x, row in zip(places, rows, strict=True)
+                if name in limits_of(row)
             ]  # fmt: skip
             sought = [
-                (x, row.found) for x, row in zip(places, rows, strict=True)
-                if name in row.sought.split(", ")
+                (x, found(row)) for x, row in zip(places, rows, strict=True)
+                if name in row["sought"].split(", ")
             ]  # fmt: skip
             if not given and not sought:
                 continue
@@ -141,11 +123,12 @@ def combination_figure(rows: Sequence[RangeRow], title: str, width: float) -> Fi
         axes.set_xticks(places, [str(n + 1) for n in range(len(rows))], fontsize=8)
         axes.grid(visible=False, axis="x")
         axes.set_xlim(places[0] - 0.8, places[-1] + 0.8)
-    published = [
-        (x, row.published) for x, row in zip(places, rows, strict=True) if row.published is not None
-    ]
-    if published:
-        x, y = np.array(published, float).T
+    known = [
+        (x, limit) for x, row in zip(places, rows, strict=True)
+        if (limit := published(row)) is not None
+    ]  # fmt: skip
+    if known:
+        x, y = np.array(known, float).T
         bottom.plot(x, y, "_", color=PUBLISHED.color, ms=16, mew=2, label="published")
         _legend_once(bottom)
     _group_names(top, rows, places)
@@ -156,23 +139,23 @@ def combination_figure(rows: Sequence[RangeRow], title: str, width: float) -> Fi
     return figure
 
 
-def _places(rows: Sequence[RangeRow]) -> list[float]:
+def _places(rows: Sequence[Run]) -> list[float]:
     """Places of the columns, with a gap between groups."""
     places, at = [], 0.0
     for before, row in zip([rows[0], *rows], rows, strict=False):
-        at += 1.0 if row.group == before.group else 2.0
+        at += 1.0 if row["group"] == before["group"] else 2.0
         places.append(at)
     return places
 
 
-def _group_names(axes: Axes, rows: Sequence[RangeRow], places: Sequence[float]) -> None:
-    groups = list(dict.fromkeys(row.group for row in rows))
+def _group_names(axes: Axes, rows: Sequence[Run], places: Sequence[float]) -> None:
+    groups = list(dict.fromkeys(row["group"] for row in rows))
     if len(groups) == 1:
         return
     for group in groups:
-        mine = [x for x, row in zip(places, rows, strict=True) if row.group == group]
+        mine = [x for x, row in zip(places, rows, strict=True) if row["group"] == group]
         axes.text(
-            float(np.mean(mine)), 1.02, GROUPS.get((rows[0].section, group), group), fontsize=8,
+            float(np.mean(mine)), 1.02, GROUPS.get((rows[0]["section"], group), group), fontsize=8,
             ha="center", transform=axes.get_xaxis_transform(),
         )  # fmt: skip
 
@@ -183,18 +166,18 @@ def _legend_once(axes: Axes) -> None:
     axes.legend(once.values(), once.keys(), loc="center left", bbox_to_anchor=(1.0, 0.5))
 
 
-def object_figure(rows: Sequence[RangeRow]) -> Figure:
+def object_figure(runs: Runs) -> Figure:
     """Spatial analysis I: largest error of the object's position over the rotations' limits."""
+    some = runs(section=SPATIAL_VISION)
     figure, (left, right) = new_figure(
         1, 2, (15.0, 5.5), "Only the object's pose is wrong: what stays stable"
     )
-    places = [row for row in rows if row.group == "place"]
-    turns = list(dict.fromkeys(row.limits["theta_u"] for row in places))
-    for number, turn in enumerate(turns):
-        mine = [row for row in places if row.limits["theta_u"] == turn and row.found > 0.0]
+    places = [run for run in some if run["group"] == "place"]
+    for number, turn in enumerate(dict.fromkeys(run["theta_u_deg"] for run in places)):
+        mine = [run for run in places if run["theta_u_deg"] == turn and found(run) > 0.0]
         mine_look = nth_look(number)
         left.plot(
-            [row.limits["d_theta_s"] for row in mine], [row.found for row in mine],
+            [run["d_theta_s_deg"] for run in mine], [found(run) for run in mine],
             marker=mine_look.marker, label=f"{turn:g} deg", ms=4, **line_style(mine_look),
         )  # fmt: skip
     left.axhline(PUBLISHED_OBJECT["place"], label="published maximum", **line_style(BOUND))
@@ -203,16 +186,16 @@ def object_figure(rows: Sequence[RangeRow]) -> Figure:
     left.set_ylim(1.2, 2.05)
     left.legend(title="theta up to", ncols=3, loc="lower left")
     for good, marker, words in ((True, "o", "stable"), (False, "x", "not stable")):
-        mine = [row for row in places if (row.found > 0.0) == good]
+        mine = [run for run in places if (found(run) > 0.0) == good]
         right.plot(
-            [row.limits["d_theta_s"] for row in mine], [row.limits["theta_u"] for row in mine],
+            [run["d_theta_s_deg"] for run in mine], [run["theta_u_deg"] for run in mine],
             marker, color=OUTCOMES["converged" if good else "timeout"].color, ls="none",
             label=words,
         )  # fmt: skip
-    limit = [row for row in rows if row.group == "turn"]
+    limit = [run for run in some if run["group"] == "turn"]
     if limit:
         right.plot(
-            [row.limits["d_theta_s"] for row in limit], [row.found for row in limit], "_",
+            [run["d_theta_s_deg"] for run in limit], [found(run) for run in limit], "_",
             color=PUBLISHED.color, ms=14, label="largest theta found",
         )  # fmt: skip
     right.plot([0.0, 100.0], [180.0, 80.0], label="sum 180 deg", **line_style(IDEAL))
@@ -226,35 +209,56 @@ def object_figure(rows: Sequence[RangeRow]) -> Figure:
     return figure
 
 
-def single_figure(rows: Sequence[RangeRow]) -> Figure:
+def single_figure(runs: Runs) -> Figure:
     """3.4.2: published and found volumes, a group of bars for each wrong parameter."""
+    rows = list(runs(section=SINGLE))
     figure, axes = new_figure(1, 1, (9.5, 9.0), f"One wrong parameter, {ROBOT}, PBVS")
-    others = (LOWER_CORNER, CUBES, NO_TURN, KNOWN)
+    columns = {f"{verdict}_m3": (verdict, look) for verdict, look in VERDICTS.items()}
     names = {
-        "published": Look("#a0a0a0"), **VERDICTS,
-        **{name: nth_look(len(VERDICTS) + k) for k, name in enumerate(others)},
+        "published": ("published", Look("#a0a0a0")), **columns,
+        **{
+            column: (words, nth_look(len(VERDICTS) + k))
+            for k, (column, words) in enumerate(READINGS.items())
+        },
     }  # fmt: skip
     for place, row in enumerate(rows):
-        volumes = {"published": row.published, **row.answers}
+        volumes = {"published": published(row), **row.measured}
         mine = [name for name in names if volumes.get(name) is not None]
         size = 0.85 / len(mine)
         for number, name in enumerate(mine):
             y, volume = place + size * (number - (len(mine) - 1) / 2.0), volumes[name] or 0.0
             drawn = max(volume, LEAST_DRAWN_VOLUME)
-            axes.barh(y, drawn, 0.9 * size, label=name, **bar_style(names[name]))
+            words, look = names[name]
+            axes.barh(y, drawn, 0.9 * size, label=words, **bar_style(look))
     handles, labels = axes.get_legend_handles_labels()
     once = dict(zip(labels, handles, strict=True))
     axes.set_yticks(range(len(rows)), [_single_words(row) for row in rows])
     axes.set_ylim(len(rows) - 0.5, -0.5)
     axes.set_xlabel("workspace [m^3]")
     axes.set_xlim(0.0, 1.1 * FULL_VOLUME)
-    figure.legend(
-        [once[n] for n in names if n in once], [n for n in names if n in once],
-        loc="outside lower center", ncols=3,
-    )  # fmt: skip
+    order = [words for words, _ in names.values() if words in once]
+    figure.legend([once[n] for n in order], order, loc="outside lower center", ncols=3)
     return figure
 
 
-def _single_words(row: RangeRow) -> str:
-    ((name, value),) = row.limits.items()
+def _single_words(row: Run) -> str:
+    ((name, value),) = limits_of(row).items()
     return f"{name} = {value:g} {'deg' if name.startswith('d_theta') else 'm'}"
+
+
+FIGURES = {
+    "ranges_planar_II": partial(
+        combination_figure, section=PLANAR_VISION, title="Planar, camera and object wrong",
+        width=11.0, left_out=("I",),
+    ),
+    "ranges_planar_III": partial(
+        combination_figure, section=PLANAR_ROBOT, title="Planar robot, all errors",
+        left_out=("camera", "area"),
+    ),
+    "ranges_spatial_I": object_figure,
+    "ranges_spatial_III": partial(
+        combination_figure, section=SPATIAL_ROBOT, title="ACROBOT, small platform, all errors",
+    ),
+    "single_errors": single_figure,
+}  # fmt: skip
+"""What draws the figures, by name."""

@@ -2,16 +2,31 @@
 
 from __future__ import annotations
 
-from cdpr_drake.analyses.reporting.statements import Statement, verdict
-from cdpr_drake.analyses.studies.stability_ranges.answers import (
+from cdpr_drake.analyses.studies.framework.runs import Runs
+from cdpr_drake.analyses.studies.framework.statement import (
+    CONSTRUCTION,
+    Check,
+    Finding,
+    statement,
+)
+from cdpr_drake.analyses.studies.stability_ranges.question import (
+    FALLS,
     NESTED,
-    FoundRows,
+    PLANAR_ROBOT,
+    PLANAR_VISION,
+    ends_lower,
     falls,
     found,
+    group,
     pairs,
+    published,
 )
-from cdpr_drake.analyses.studies.stability_ranges.item import PLANAR_ROBOT, PLANAR_VISION
 from cdpr_drake.analyses.studies.stability_ranges.vision import PLANAR_NUMBERS
+
+SOURCE = "servoing thesis 3.2.1"
+
+VISION_TOLERANCE = 2e-3
+"""Twice the resolution of the limit of analysis I [m]."""
 
 SIGNIFICANT = 1.1
 """An increase by this factor counts as significant."""
@@ -20,124 +35,157 @@ ROTATION = 46.0
 """Rotation of the platform that the thesis found possible [deg]."""
 
 
-def vision_alone(rows: FoundRows) -> Statement:
+@statement(
+    "Planar, vision alone: stable while the object's place is off by less than 2 m.",
+    "2 m, (3.12)",
+    source=SOURCE,
+    rule=f"within {VISION_TOLERANCE:g} m",
+    basis=CONSTRUCTION,
+)
+def vision_alone(runs: Runs) -> Finding:
     """Analysis I."""
-    limit = rows.named("planar-I").found
-    return Statement(
-        "Planar, vision alone: stable while the object's place is off by less than 2 m.",
-        "2 m, (3.12)",
-        f"{limit:.3f} m",
-        verdict(abs(limit - 2.0) < 2e-3),
-        "Nearly by construction: where the robot is exact, the criterion is the printed condition. "
-        "This tests how it is computed, not the robot.",
+    limit = found(group(runs, PLANAR_VISION, "I", 1).rows[0])
+    return Finding(
+        found=f"{limit:.3f} m",
+        held=[abs(limit - 2.0) < VISION_TOLERANCE],
+        why="Nearly by construction: where the robot is exact, the criterion is the printed "
+        "condition. This tests how it is computed, not the robot.",
     )
 
 
-def combinations(rows: FoundRows) -> Statement:
+@statement(
+    "Planar, camera's mounting wrong, too: combinations 2 and 13 are stable throughout.",
+    source=SOURCE,
+    rule="each up to the printed turn at least",
+)
+def combinations(runs: Runs) -> Finding:
     """Combinations 2 and 13 of analysis II."""
-    known = [row for row in rows.of(PLANAR_VISION, "II") if row.published is not None]
-    words = []
-    for row in known:
-        name = PLANAR_NUMBERS[row.limits["error"], row.limits["r_s"], row.limits["r_pc"]]
-        words.append((name, row))
-    good = [row.found >= float(row.published or 0.0) for row in known]
-    return Statement(
-        "Planar, camera's mounting wrong, too: combinations 2 and 13 are stable throughout.",
-        ", ".join(f"{name} up to {row.published:g} deg" for name, row in words),
-        ", ".join(f"{name} up to {row.found:.1f} deg" for name, row in words),
-        verdict(all(good), any(good)),
-        "Proven for all values in the boxes by the closed form.",
+    known = {
+        PLANAR_NUMBERS[run["error_m"], run["r_s_m"], run["r_pc_m"]]: (found(run), limit)
+        for run in group(runs, PLANAR_VISION, "II")
+        if (limit := published(run)) is not None
+    }
+    return Finding(
+        printed=", ".join(f"{name} up to {limit:g} deg" for name, (_, limit) in known.items()),
+        found=", ".join(f"{name} up to {turn:.1f} deg" for name, (turn, _) in known.items()),
+        held=[turn >= limit for turn, limit in known.values()],
+        why="Proven for all values in the boxes by the closed form.",
     )
 
 
-def smaller_range(rows: FoundRows) -> Statement:
-    """III i."""
-    some = rows.of(PLANAR_ROBOT, "place")
-    return Statement(
-        "Planar III i: the smaller the range of displacement, the larger the tolerated error of "
-        "the platform's place.",
-        "in figure 3.2",
-        pairs(some, "place", "m"),
-        verdict(falls(found(some)), found(some)[-1] < found(some)[0]),
-        NESTED,
-    )
+def falling(
+    name: str, says: str, printed: str, section: str, which: str, limit: str, words: str = ""
+) -> Check:
+    """The larger a limit, the smaller what was found, which nesting all but implies."""
+    unit = "deg about z" if limit == "psi" else "m"
+    source = f"servoing thesis {section.partition(',')[0]}"
+
+    @statement(says, printed, name=name, source=source, rule=FALLS)
+    def check(runs: Runs) -> Finding:
+        some = group(runs, section, which)
+        return Finding(
+            found=words + pairs(some, limit, unit),
+            held=[falls(some)],
+            some=ends_lower(some),
+            why=NESTED,
+        )
+
+    return check
 
 
-def difference_of_errors(rows: FoundRows) -> Statement:
+smaller_range = falling(
+    "smaller_range",
+    "Planar III i: the smaller the range of displacement, the larger the tolerated error of the "
+    "platform's place.",
+    "in figure 3.2", PLANAR_ROBOT, "place", "place",
+)  # fmt: skip
+
+
+@statement(
+    "Planar III ii: the difference between e and its estimate must always be smaller than e.",
+    "always",
+    source=SOURCE,
+    rule="the largest difference that is found is smaller than e",
+)
+def difference_of_errors(runs: Runs) -> Finding:
     """III ii."""
-    some = rows.of(PLANAR_ROBOT, "error")
-    below = [row.found < row.limits["error"] for row in some]
-    return Statement(
-        "Planar III ii: the difference between e and its estimate must always be smaller than e.",
-        "always",
-        "largest difference " + pairs(some, "error", "m"),
-        verdict(all(below)),
-        "No such condition is in the criterion: with e = 0 it allows a difference of up to 2 m "
+    some = group(runs, PLANAR_ROBOT, "error")
+    return Finding(
+        found="largest difference " + pairs(some, "error", "m"),
+        held=[found(run) < run["error_m"] for run in some],
+        some=False,
+        why="No such condition is in the criterion: with e = 0 it allows a difference of up to 2 m "
         "(3.12), and with a longer e less, because e multiplies the other errors. So the condition "
         "is met where e is long, and not needed where it is short.",
     )
 
 
-def planar_camera_place(rows: FoundRows) -> Statement:
+@statement(
+    "Planar III iii: place and turn of the camera on the platform have no effect.",
+    "none",
+    source=SOURCE,
+    rule="the same limit for all places and turns; for all turns",
+)
+def planar_camera_place(runs: Runs) -> Finding:
     """III iii."""
-    some = rows.of(PLANAR_ROBOT, "camera")
-    turned = [row.found for row in some if not row.limits["camera x"]]
-    limits = found(some)
+    some = group(runs, PLANAR_ROBOT, "camera")
+    turned = some(camera_x_m=0.0)
     words = ", ".join(
-        f"{row.name.removeprefix('planar-III-camera-').replace('-', ' ')} {row.found:g}"
-        for row in some
+        f"{run.case.removeprefix('planar-III-camera-').replace('-', ' ')} {found(run):g}"
+        for run in some
     )
-    return Statement(
-        "Planar III iii: place and turn of the camera on the platform have no effect.",
-        "none",
-        f"largest error of the platform's place: {words} [m]",
-        verdict(max(limits) == min(limits), max(turned) == min(turned)),
-        "A turn only turns e, which may have any direction. A place adds to e in L Ad^-1, as if e "
-        "were longer by up to 0.08 m: no effect without errors of the robot's model, a small one "
-        "with them.",
+    return Finding(
+        found=f"largest error of the platform's place: {words} [m]",
+        held=[len(set(map(found, one))) == 1 for one in (some, turned)],
+        why="A turn only turns e, which may have any direction. A place adds to e in L Ad^-1, as "
+        "if e were longer by up to 0.08 m: no effect without errors of the robot's model, a small "
+        "one with them.",
     )
 
 
-def camera_error(rows: FoundRows) -> Statement:
+@statement(
+    "Planar III iv: a smaller error of the camera's place often allows a significantly larger "
+    "range of the platform's rotation.",
+    "often",
+    source=SOURCE,
+    rule=f"by a factor above {SIGNIFICANT:g}, with the rest known well and coarsely",
+)
+def camera_error(runs: Runs) -> Finding:
     """III iv."""
-    fine, coarse = rows.of(PLANAR_ROBOT, "r_pc"), rows.of(PLANAR_ROBOT, "r_pc coarse")
-    gains = [some[0].found / max(some[-1].found, 1e-9) for some in (fine, coarse)]
-    return Statement(
-        "Planar III iv: a smaller error of the camera's place often allows a significantly larger "
-        "range of the platform's rotation.",
-        "often",
-        f"{pairs(coarse, 'r_pc', 'm')} with the rest known coarsely; {pairs(fine, 'r_pc', 'm')} "
-        "with the rest known well",
-        verdict(min(gains) > SIGNIFICANT, max(gains) > SIGNIFICANT),
-        "It matters where the other errors leave little margin.",
+    fine, coarse = (group(runs, PLANAR_ROBOT, name) for name in ("r_pc", "r_pc coarse"))
+    gains = [found(some.rows[0]) / max(found(some.rows[-1]), 1e-9) for some in (fine, coarse)]
+    return Finding(
+        found=f"{pairs(coarse, 'r_pc', 'm')} with the rest known coarsely; "
+        f"{pairs(fine, 'r_pc', 'm')} with the rest known well",
+        held=[gain > SIGNIFICANT for gain in gains],
+        why="It matters where the other errors leave little margin.",
     )
 
 
-def anchor_error(rows: FoundRows) -> Statement:
-    """III v."""
-    some = rows.of(PLANAR_ROBOT, "r_B")
-    return Statement(
-        "Planar III v: smaller errors of the anchor points allow larger errors of the platform's "
-        "rotation.",
-        "in figure 3.2",
-        pairs(some, "r_B", "m"),
-        verdict(falls(found(some)), found(some)[-1] < found(some)[0]),
-        NESTED,
-    )
+anchor_error = falling(
+    "anchor_error",
+    "Planar III v: smaller errors of the anchor points allow larger errors of the platform's "
+    "rotation.",
+    "in figure 3.2", PLANAR_ROBOT, "r_B", "r_B",
+)  # fmt: skip
 
 
-def rotation(rows: FoundRows) -> Statement:
+@statement(
+    "Planar III vi: with small errors and away from the limits of the workspace the platform may "
+    "rotate up to 46 deg; the closer to the middle, the more.",
+    f"{ROTATION:g} deg",
+    source=SOURCE,
+    rule=f"closer to the middle: {FALLS}; in the middle below 1.1 times the printed turn",
+)
+def rotation(runs: Runs) -> Finding:
     """III vi."""
-    some = rows.of(PLANAR_ROBOT, "psi")
-    limits = found(some)
-    closer = falls(limits)
-    return Statement(
-        "Planar III vi: with small errors and away from the limits of the workspace the platform "
-        "may rotate up to 46 deg; the closer to the middle, the more.",
-        f"{ROTATION:g} deg",
-        pairs(some, "place", "m"),
-        verdict(closer and limits[0] < 1.1 * ROTATION, closer and limits[0] >= ROTATION),
-        "46 deg are stable up to the limits of the workspace, and more than that nearer to the "
+    some = group(runs, PLANAR_ROBOT, "psi")
+    middle, closer = found(some.rows[0]), falls(some)
+    return Finding(
+        found=pairs(some, "place", "m"),
+        held=[closer, middle < 1.1 * ROTATION],
+        some=closer and middle >= ROTATION,
+        why="46 deg are stable up to the limits of the workspace, and more than that nearer to the "
         "middle.",
     )
 

@@ -11,7 +11,7 @@ from itertools import product
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
-from cdpr_drake.analyses.studies.stability_ranges.item import bisected
+from cdpr_drake.analyses.studies.stability_ranges.question import bisected
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.poses import pose_from_angles, pose_rows
 from cdpr_drake.models.robot_loader import load_robot
@@ -109,10 +109,10 @@ class RobotLimits:
         """The same with all the named limits at a value."""
         return replace(self, **dict.fromkeys(names, value))
 
-    def as_dict(self) -> dict[str, float]:
-        """Those that are not zero, for tables."""
+    def given(self, *others: str) -> dict[str, float]:
+        """Those that are not zero, without some others."""
         numbers = {f.name: getattr(self, f.name) for f in fields(self)}
-        return {name: value for name, value in numbers.items() if value}
+        return {name: value for name, value in numbers.items() if value and name not in others}
 
 
 @dataclass(frozen=True, eq=False)

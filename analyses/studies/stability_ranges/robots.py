@@ -8,8 +8,15 @@ from functools import partial
 
 import numpy as np
 
+from cdpr_drake.analyses.studies.framework.study import Case
 from cdpr_drake.analyses.studies.published.stability_recipe import DRAWS, recipe_case, recipe_grid
-from cdpr_drake.analyses.studies.stability_ranges.item import PLANAR_ROBOT, SPATIAL_ROBOT, RangeItem
+from cdpr_drake.analyses.studies.stability_ranges.question import (
+    PLANAR_ROBOT,
+    SPATIAL_ROBOT,
+    Answer,
+    question,
+    unit_of_limit,
+)
 from cdpr_drake.analyses.studies.stability_ranges.robot_limits import (
     LimitedRobot,
     RangeSearch,
@@ -145,50 +152,45 @@ SPATIAL_SERIES = (
 """Combinations of analysis III. Places and angles are limits, each with everything within."""
 
 
-def robot_items(quick: bool) -> Iterator[RangeItem]:
+def robot_cases(quick: bool) -> Iterator[Case]:
     """All of them; `quick`: few, coarsely."""
     middle = LimitedRobot(PLANAR, steps=1 if quick else 2, mirrored=True, coarse=quick)
     for series in PLANAR_SERIES:
-        yield from _series_items("planar-III", PLANAR_ROBOT, middle, series, quick)
+        yield from _series_cases("planar-III", PLANAR_ROBOT, middle, series, quick)
     for words, (x, y, angle) in CAMERAS.items():
         robot = LimitedRobot(PLANAR, camera_at(x, y, angle), coarse=quick)
         limits = PLANAR_OTHERS.varied(("place",), 0.3)
-        yield RangeItem(
+        yield question(
             f"planar-III-camera-{words}".replace(" ", "-"), PLANAR_ROBOT, "camera",
-            {"camera x": x, "camera y": y, "camera turn": angle, **_given(limits, ("r_bp",))},
-            "r_bp", "m", compute=partial(robot_limit, robot, limits, ("r_bp",), 0.4, 0.005, False),
+            {"camera_x": x, "camera_y": y, "camera_turn": angle, **limits.given("r_bp")},
+            "r_bp", partial(robot_limit, robot, limits, ("r_bp",), 0.4, 0.005, False),
         )  # fmt: skip
     for words, r_bp in AREAS.items():
         limits = PLANAR_OTHERS.varied(("r_bp",), r_bp)
-        yield RangeItem(
-            f"planar-III-area-{words}", PLANAR_ROBOT, "area", limits.varied(("place", "psi"), 0.0)
-            .as_dict(), "workspace", "%", compute=partial(workspace_area, limits, quick),
+        yield question(
+            f"planar-III-area-{words}", PLANAR_ROBOT, "area", limits.given("place", "psi"),
+            "workspace", partial(workspace_area, limits, quick),
         )  # fmt: skip
     for series in SPATIAL_SERIES:
-        yield from _series_items(
+        yield from _series_cases(
             "spatial-III", SPATIAL_ROBOT, LimitedRobot(SPATIAL, coarse=quick), series, quick
         )
 
 
-def _series_items(
+def _series_cases(
     prefix: str, section: str, robot: LimitedRobot, series: Series, quick: bool
-) -> Iterator[RangeItem]:
-    unit = "m" if series.sought[0].startswith("r_") else "deg"
+) -> Iterator[Case]:
     values = series.values[:: len(series.values) - 1] if quick else series.values
     for value in values:
         limits = series.others.varied(series.varied, value)
-        yield RangeItem(
+        yield question(
             f"{prefix}-{series.group}-{value:g}".replace(" ", "-"), section, series.group,
-            _given(limits, series.sought), ", ".join(series.sought), unit,
-            compute=partial(
+            limits.given(*series.sought), ", ".join(series.sought),
+            partial(
                 robot_limit, robot, limits, series.sought, series.high,
                 (5.0 if quick else 1.0) * series.step, series.proven and not quick,
             ),
         )  # fmt: skip
-
-
-def _given(limits: RobotLimits, sought: tuple[str, ...]) -> dict[str, float]:
-    return {name: value for name, value in limits.as_dict().items() if name not in sought}
 
 
 def robot_limit(
@@ -198,23 +200,25 @@ def robot_limit(
     high: float,
     step: float,
     proven: bool,
-) -> dict[str, float]:
+) -> Answer:
     """The largest of the sought limits by search, and in eighths of it what is certified."""
     found = RangeSearch(robot).largest(limits, sought, high, step)
-    answers = {"searched": found}
+    unit = unit_of_limit(sought[0])
+    answers = {f"searched_{unit}": found}
     if proven and found > 0.0:
         proof = RangeSearch(robot, "certified")
-        answers["certified"] = proof.largest(limits, sought, found, found / 8.0)
+        answers[f"certified_{unit}"] = proof.largest(limits, sought, found, found / 8.0)
     return answers
 
 
-def workspace_area(limits: RobotLimits, quick: bool) -> dict[str, float]:
-    """Share of the planar grid that is stable within the bounds, by verdict [%]."""
+def workspace_area(limits: RobotLimits, quick: bool) -> Answer:
+    """Share of the planar grid that is stable within the bounds, by verdict."""
     case, grid = recipe_case(PLANAR, "pbvs"), recipe_grid(PLANAR, quick)
     options = VerdictOptions(draws=DRAWS, margins=False)
     shares = {}
     for verdict in ("sampled", "searched"):
         stable = judge_stability(case, limits.bounds(), grid.pose_rows(), verdict, options).stable
         inside = np.reshape(stable, grid.shape)[0]
-        shares[verdict] = 100.0 * workspace_volume(inside, grid.axes, VolumeRule.CORNERS).share
+        share = workspace_volume(inside, grid.axes, VolumeRule.CORNERS).share
+        shares[f"{verdict}_percent"] = 100.0 * share
     return shares

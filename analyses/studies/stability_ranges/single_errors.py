@@ -14,13 +14,14 @@ from functools import partial
 
 import numpy as np
 
+from cdpr_drake.analyses.studies.framework.study import Case
 from cdpr_drake.analyses.studies.published.stability_recipe import (
     DRAWS,
     recipe_case,
     recipe_grid,
     single_bounds,
 )
-from cdpr_drake.analyses.studies.stability_ranges.item import SINGLE, RangeItem
+from cdpr_drake.analyses.studies.stability_ranges.question import SINGLE, Answer, question
 from cdpr_drake.stability.desired_view import OppositeCorner, ServoTarget
 from cdpr_drake.stability.perturbation_bounds import PerturbationBounds
 from cdpr_drake.stability.stability_case import StabilityCase
@@ -47,26 +48,27 @@ PUBLISHED = {
 }
 """Published volumes with one bound and all else known exactly [m^3]. Source: 3.4.2."""
 
+SAMPLED = "sampled_m3"
+
 LOWER_CORNER, CUBES, NO_TURN, KNOWN = (
-    "sampled, lower corner", "sampled, cubes", "sampled, theta u = 0", "sampled, object known",
+    "sampled_lower_corner_m3", "sampled_cubes_m3", "sampled_no_turn_m3", "sampled_known_object_m3",
 )  # fmt: skip
-"""Other readings: the target of the tables of 3.3; points each at a corner of its own cube; no
-rotation error; and L_s = L_s_hat, so that the object's error does not enter."""
+"""Columns of other readings: the target of the tables of 3.3; points each at a corner of its own
+cube; no rotation error; and L_s = L_s_hat, so that the object's error does not enter."""
 
 
-def single_items(quick: bool) -> Iterator[RangeItem]:
+def single_cases(quick: bool) -> Iterator[Case]:
     """All of them."""
     for name, published in PUBLISHED.items():
         for value, volume in published.items():
-            yield RangeItem(
+            yield question(
                 f"single-{name}-{value:g}", SINGLE, name, {name.removesuffix("_deg"): value},
-                "workspace", "m^3", compute=partial(single_volume, name, value, quick),
-                published=volume,
+                "workspace", partial(single_volume, name, value, quick), sampled_m3=volume,
             )  # fmt: skip
 
 
-def single_volume(name: str, value: float, quick: bool) -> dict[str, float]:
-    """Volume of the workspace with one bound, by verdict and reading [m^3].
+def single_volume(name: str, value: float, quick: bool) -> Answer:
+    """Volume of the workspace with one bound, by verdict and reading.
 
     An error of the object alone meets no robot: the Jacobians of robot and estimate cancel, and
     with them the position, so that a coarse grid is enough.
@@ -85,7 +87,7 @@ def single_volume(name: str, value: float, quick: bool) -> dict[str, float]:
 
     def volumes(
         bounds: PerturbationBounds, target: ServoTarget, verdicts: tuple[str, ...] = ("sampled",)
-    ) -> dict[str, float]:
+    ) -> Answer:
         case = StabilityCase(robot.cables, target=target)
         poses = grid.pose_rows()
         if verdicts == VERDICTS:
@@ -93,7 +95,7 @@ def single_volume(name: str, value: float, quick: bool) -> dict[str, float]:
         else:
             chunks = {v: judge_stability(case, bounds, poses, v, options) for v in verdicts}
         return {
-            verdict: workspace_volume(
+            f"{verdict}_m3": workspace_volume(
                 np.reshape(chunk.stable, grid.shape)[0], grid.axes, VolumeRule.CORNERS
             ).value
             for verdict, chunk in chunks.items()
@@ -108,6 +110,6 @@ def single_volume(name: str, value: float, quick: bool) -> dict[str, float]:
     if of_object:
         others[NO_TURN] = (bounds, OppositeCorner(grid.lower, grid.upper, np.zeros(3)))
         others[KNOWN] = (PerturbationBounds(), corner)
-    for reading, question in others.items():
-        answers[reading] = volumes(*question)["sampled"]
+    for reading, asked in others.items():
+        answers[reading] = volumes(*asked)[SAMPLED]
     return answers

@@ -6,13 +6,15 @@ import math
 from collections.abc import Iterator
 from functools import partial
 
-from cdpr_drake.analyses.studies.stability_ranges.item import (
-    FOUND,
+from cdpr_drake.analyses.studies.framework.study import Case
+from cdpr_drake.analyses.studies.stability_ranges.question import (
     PLANAR_VISION,
     SPATIAL_CAMERA,
     SPATIAL_VISION,
-    RangeItem,
+    Answer,
     bisected,
+    question,
+    unit_of_limit,
 )
 from cdpr_drake.analyses.studies.stability_ranges.robot_limits import (
     LimitedRobot,
@@ -55,85 +57,77 @@ OBJECT = RobotLimits(low=0.3, high=0.3, error=0.5, r_s=0.1, r_pc=0.02, d_theta_p
 """What the groups of analysis II have in common; of theta u nothing is asked there."""
 
 
-def vision_items(quick: bool) -> Iterator[RangeItem]:
+def vision_cases(quick: bool) -> Iterator[Case]:
     """All of them; `quick`: every third."""
     step = 3 if quick else 1
-    yield RangeItem(
-        "planar-I", PLANAR_VISION, "I", {}, "r_s", "m", compute=partial(planar_place), published=2.0
-    )
+    yield question("planar-I", PLANAR_VISION, "I", {}, "r_s", partial(planar_place), found_m=2.0)
     planar = [(e, *pair) for e in PLANAR_ERRORS for pair in PLANAR_PERTURBATIONS]
     for number, limits in enumerate(planar):
         if number % step and limits not in PLANAR_PUBLISHED:
             continue
         names = dict(zip(("error", "r_s", "r_pc"), limits, strict=True))
-        yield RangeItem(
+        printed = {"found_deg": PLANAR_PUBLISHED[limits]} if limits in PLANAR_PUBLISHED else {}
+        yield question(
             "planar-II-{:g}-{:g}-{:g}".format(*limits), PLANAR_VISION, "II", names,
-            "d_theta_pc", "deg", compute=partial(planar_turn, *limits),
-            published=PLANAR_PUBLISHED.get(limits),
+            "d_theta_pc", partial(planar_turn, *limits), **printed,
         )  # fmt: skip
     for turn in OBJECT_TURNS[::step]:
         for error in OBJECT_TURN_ERRORS[::step]:
-            yield RangeItem(
+            yield question(
                 f"spatial-I-{turn:g}-{error:g}", SPATIAL_VISION, "place",
-                {"theta_u": turn, "d_theta_s": error}, "r_s", "m",
-                compute=partial(object_place, turn, error),
+                {"theta_u": turn, "d_theta_s": error}, "r_s", partial(object_place, turn, error),
             )  # fmt: skip
     for error in TURNS_SOUGHT[::step]:
-        yield RangeItem(
+        yield question(
             f"spatial-I-turn-{error:g}", SPATIAL_VISION, "turn", {"d_theta_s": error}, "theta_u",
-            "deg", compute=partial(object_turn, error),
+            partial(object_turn, error),
         )  # fmt: skip
     groups = {
-        "error": (("r_s",), 3.0, 0.02, "m", (0.1, 0.5, 1.0, 1.5, 2.0, 3.0)),
-        "r_s": (("d_theta_pc",), 120.0, 1.0, "deg", (0.0, 0.25, 0.5, 1.0, 1.5)),
-        "r_pc": (("d_theta_pc",), 120.0, 1.0, "deg", (0.0, 0.05, 0.1, 0.2, 0.5)),
+        "error": (("r_s",), 3.0, 0.02, (0.1, 0.5, 1.0, 1.5, 2.0, 3.0)),
+        "r_s": (("d_theta_pc",), 120.0, 1.0, (0.0, 0.25, 0.5, 1.0, 1.5)),
+        "r_pc": (("d_theta_pc",), 120.0, 1.0, (0.0, 0.05, 0.1, 0.2, 0.5)),
     }
-    for name, (sought, high, resolution, unit, values) in groups.items():
+    for name, (sought, high, resolution, values) in groups.items():
         for value in values[::2] if quick else values:
             chosen = OBJECT.varied((name,), value)
-            yield RangeItem(
+            yield question(
                 f"spatial-II-{name}-{value:g}", SPATIAL_CAMERA, name,
-                _given(chosen, sought), sought[0], unit,
-                compute=partial(camera_limit, chosen, sought, high, resolution),
+                chosen.given(*sought, "low", "high"), sought[0],
+                partial(camera_limit, chosen, sought, high, resolution),
             )  # fmt: skip
 
 
-def _given(limits: RobotLimits, sought: tuple[str, ...]) -> dict[str, float]:
-    return {k: v for k, v in limits.as_dict().items() if k not in (*sought, "low", "high")}
+def planar_place() -> Answer:
+    """Analysis I: the largest error of the object's position."""
+    return {"found_m": bisected(lambda d: planar_margin(0.0, d) > 0.0, 4.0, 1e-3)}
 
 
-def planar_place() -> dict[str, float]:
-    """Analysis I: the largest error of the object's position [m]."""
-    return {FOUND: bisected(lambda d: planar_margin(0.0, d) > 0.0, 4.0, 1e-3)}
-
-
-def planar_turn(error: float, d_error: float, shift: float) -> dict[str, float]:
-    """Analysis II: the largest turn of the camera [deg] with which no value in the boxes fails."""
+def planar_turn(error: float, d_error: float, shift: float) -> Answer:
+    """Analysis II: the largest turn of the camera with which no value in the boxes fails."""
     limits = PlanarVisionLimits(error, d_error, shift)
     found = bisected(lambda a: limits.worst_margin(math.radians(a)) > 0.0, 90.0, 0.1)
-    return {FOUND: found}
+    return {"found_deg": found}
 
 
-def object_place(turn: float, error: float) -> dict[str, float]:
-    """Spatial analysis I: the largest error of the object's position [m], angles in degrees."""
-    return {FOUND: worst_object_error(math.radians(turn), math.radians(error))}
+def object_place(turn: float, error: float) -> Answer:
+    """Spatial analysis I: the largest error of the object's position, angles in degrees."""
+    return {"found_m": worst_object_error(math.radians(turn), math.radians(error))}
 
 
-def object_turn(error: float) -> dict[str, float]:
-    """Spatial analysis I: the largest theta [deg], the object's position exact."""
+def object_turn(error: float) -> Answer:
+    """Spatial analysis I: the largest theta, the object's position exact."""
     return {
-        FOUND: bisected(
+        "found_deg": bisected(
             lambda turn: worst_object_error(math.radians(turn), math.radians(error)) > 0.0,
             180.0, 1.0,
         )
     }  # fmt: skip
 
 
-def camera_limit(
-    limits: RobotLimits, sought: tuple[str, ...], high: float, step: float
-) -> dict[str, float]:
+def camera_limit(limits: RobotLimits, sought: tuple[str, ...], high: float, step: float) -> Answer:
     """Spatial analysis II: the largest of the sought limits, by search and by proof."""
     robot = LimitedRobot(ROBOT)
     found = RangeSearch(robot).largest(limits, sought, high, step)
     proof = RangeSearch(robot, "certified").largest(limits, sought, found, step)
-    return {"searched": found, "certified": proof}
+    unit = unit_of_limit(sought[0])
+    return {f"searched_{unit}": found, f"certified_{unit}": proof}

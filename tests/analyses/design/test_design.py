@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -16,6 +17,7 @@ from cdpr_drake.analyses.design.maximin import SLOPES
 from cdpr_drake.analyses.design.results import DesignResult, write_design
 from cdpr_drake.analyses.design.search import evaluate_original, goal_context, search_design
 from cdpr_drake.analyses.design.settings import DesignSettings, GoalSettings, load_design_settings
+from cdpr_drake.analyses.front.design import optimize_design
 from cdpr_drake.analyses.reporting.progress import StudySession, WorkProgress
 from cdpr_drake.analyses.studies import design as study
 from cdpr_drake.analyses.studies.catalogue import STUDIES
@@ -216,7 +218,8 @@ def test_the_command(capsys, tmp_path, monkeypatch):
         (["--goal", "beauty"], "'beauty' is unknown"),
         (["--goal", "static=0"], "a weight above 0"),
         (["--goal", "static", "--goal", "static"], "each once"),
-        (["--goal", "wrench-feasible"], "found no wrench to resist"),
+        (["--goal", "wrench-feasible"], "--goal wrench-feasible: found no wrench to resist"),
+        (["--goal", "static", "--search", "slopes"], "--search: found slopes for static"),
         (["--goal", "static", "--force", "-1"], "--force"),
         (["--goal", "static", "--parameters", "nowhere.yaml"], "there is no such file"),
     ],
@@ -230,6 +233,39 @@ def test_the_command_refuses(capsys, tmp_path, monkeypatch, words, said):
     assert said in err
     assert len(err) <= 500
     assert not (tmp_path / "found").exists() or not list((tmp_path / "found").glob("*.json"))
+
+
+@pytest.mark.parametrize(
+    ("robot", "goal", "said"),
+    [
+        ("nist_robocrane", "wrench-closure", " wrench-closure: found 6 cables of nist_robocrane"),
+        ("planar", "payload", " payload: found the planar planar, whose plane carries the weight"),
+        ("planar", "wrench-feasible", " wrench-feasible: found no wrench to resist"),
+    ],
+)
+def test_goals_that_a_robot_cannot_be_asked_for_are_named_at_once(
+    capsys, tmp_path, monkeypatch, robot, goal, said
+):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(DesignError, match=f"^goals{said}"):
+        optimize_design(robot, goal, generations=1)
+    with pytest.raises(SystemExit) as ended:
+        main(["design", robot, "--goal", goal, "--out", "found"])
+    assert ended.value.code == 2
+    assert f"cdpr: --goal{said}" in printed(capsys).err
+    Path("goals.yaml").write_text(
+        yaml.safe_dump({"goals": [{"name": goal}]} | {"exit_points": {"reach": [0.1, 0.1, 0.0]}})
+    )
+    with pytest.raises(SystemExit) as ended:
+        main(["design", robot, "--parameters", "goals.yaml", "--out", "other"])
+    assert ended.value.code == 2
+    assert f"cdpr: goals{said}" in printed(capsys).err  # as the file names them
+
+
+def test_a_set_of_too_few_cables_closes_nowhere():
+    judging = goal_context("cogiro", wanted().poses, wanted())
+    found = confirm("wrench-closure", "cogiro", "nist_robocrane", judging, boxes=20)
+    assert found.design == found.design_open == 0.0
 
 
 def test_the_quick_study(tmp_path, monkeypatch):

@@ -51,6 +51,7 @@ def cases(form):
                 name=name,
                 keys={"size": name, "kind": "seeded"},
                 data=factor,
+                printed={"peak_m": "0.3"} if name == "few" else {},
                 most=1 if name == "few" else None,
             )
     yield Case(name="sum", keys={"size": "sum", "kind": "task"}, task=Squares(), items=10)
@@ -172,6 +173,7 @@ def test_runs_are_picked_and_reduced():
     assert np.isnan(runs(size="small")["nothing"][0])
     assert [len(curve) for curve in runs(size="small").list("curve_m")] == [3, 4, 5]
     assert np.isnan(runs.mean("peak_m", size="few", lost=True))
+    assert runs.one(size="few").printed == {"peak_m": "0.3"}
     assert {size: len(some) for size, some in runs.by("size")} == {"small": 3, "large": 3, "few": 1}
 
 
@@ -272,6 +274,7 @@ def test_it_is_written_for_people_and_programs(tmp_path):
     found = run()
     found.write(tmp_path)
     told = json.loads((tmp_path / "results.json").read_text())
+    assert told["items"] == {"done": 17, "of": 17, "by_earlier_sessions": 0}
     assert told["units"] == {"peak_m": "m", "curve_m": "m"}
     assert told["arrays"] == ["curve_m"]
     assert told["runs"][1]["case"] == "small"

@@ -13,17 +13,23 @@ import pytest
 
 from cdpr_drake.analyses.reporting.progress import StudySession, WorkProgress
 from cdpr_drake.analyses.reporting.statements import CONFIRMED, IN_PART, NOT_CONFIRMED
-from cdpr_drake.analyses.studies.stability_ranges import robot_limits
-from cdpr_drake.analyses.studies.stability_ranges import study as module
-from cdpr_drake.analyses.studies.stability_ranges.answers import NESTED, falls
-from cdpr_drake.analyses.studies.stability_ranges.figures import FIGURES
-from cdpr_drake.analyses.studies.stability_ranges.item import (
-    PLANAR_ROBOT,
-    SECTIONS,
-    RangeRow,
-    bisected,
+from cdpr_drake.analyses.studies.framework.runs import Run, Runs
+from cdpr_drake.analyses.studies.framework.statement import (
+    MET_CONSTRUCTION,
+    MET_FITTED,
+    Check,
+    judged,
 )
-from cdpr_drake.analyses.studies.stability_ranges.planar_statements import CHECKS as PLANAR_CHECKS
+from cdpr_drake.analyses.studies.framework.study import Form, StudyResult
+from cdpr_drake.analyses.studies.stability_ranges import robot_limits
+from cdpr_drake.analyses.studies.stability_ranges.question import (
+    NESTED,
+    SECTIONS,
+    bisected,
+    falls,
+    found,
+    published,
+)
 from cdpr_drake.analyses.studies.stability_ranges.robot_limits import (
     LimitedRobot,
     RangeSearch,
@@ -31,15 +37,13 @@ from cdpr_drake.analyses.studies.stability_ranges.robot_limits import (
     camera_at,
 )
 from cdpr_drake.analyses.studies.stability_ranges.robots import PLANAR_OTHERS, SPATIAL_OTHERS
-from cdpr_drake.analyses.studies.stability_ranges.single_errors import FULL_VOLUME, KNOWN, NO_TURN
-from cdpr_drake.analyses.studies.stability_ranges.single_statements import CHECKS as SINGLE_CHECKS
-from cdpr_drake.analyses.studies.stability_ranges.spatial_statements import CHECKS as SPATIAL_CHECKS
-from cdpr_drake.analyses.studies.stability_ranges.study import (
-    StabilityRangesStudy,
-    range_items,
-    range_statements,
-    study_stability_ranges,
+from cdpr_drake.analyses.studies.stability_ranges.single_errors import (
+    FULL_VOLUME,
+    KNOWN,
+    NO_TURN,
+    SAMPLED,
 )
+from cdpr_drake.analyses.studies.stability_ranges.study import STUDY, cases
 from cdpr_drake.errors import OutputFolderError
 from cdpr_drake.stability.criterion_closed_forms import planar_margin
 
@@ -48,9 +52,9 @@ STEP = 0.01
 
 
 @pytest.fixture(scope="module")
-def quick() -> StabilityRangesStudy:
+def quick() -> StudyResult:
     """The quick form."""
-    return study_stability_ranges(quick=True, session=StudySession(workers=1))
+    return STUDY(True, StudySession(workers=1))
 
 
 def test_bisection_finds_the_last_multiple() -> None:
@@ -60,13 +64,12 @@ def test_bisection_finds_the_last_multiple() -> None:
 
 
 @pytest.mark.parametrize("quick_form", [False, True])
-def test_items_have_names_of_their_own_and_pickle(quick_form: bool) -> None:
-    items = range_items(quick_form)
-    assert len({item.name for item in items}) == len(items)
-    assert all(" " not in item.name and "/" not in item.name for item in items)
-    assert {item.section for item in items} == set(SECTIONS)
-    for item in items:
-        assert pickle.loads(pickle.dumps(item)).name == item.name
+def test_questions_pickle_and_are_of_all_sections(quick_form: bool) -> None:
+    questions = STUDY.plan(Form(quick_form))
+    assert {one.keys["section"] for one in questions} == set(SECTIONS)
+    for one in questions:
+        assert " " not in one.name
+        assert pickle.loads(pickle.dumps(one)).name == one.name
 
 
 def test_limits_of_the_object_alone_are_those_of_the_closed_form() -> None:
@@ -119,111 +122,102 @@ def test_larger_limits_are_not_easier() -> None:
     assert certified <= reference
 
 
-def test_quick_form_answers_everything(quick: StabilityRangesStudy, tmp_path: Path) -> None:
+def test_quick_form_answers_everything(quick: StudyResult, tmp_path: Path) -> None:
     assert not quick.interrupted
-    assert len(quick.statements) == sum(map(len, (PLANAR_CHECKS, SPATIAL_CHECKS, SINGLE_CHECKS)))
-    assert quick.tables()
-    quick.write(tmp_path)
-    assert {path.stem for path in tmp_path.glob("*.png")} == set(FIGURES)
-    read = json.loads((tmp_path / "results.json").read_text())
-    assert len(read["rows"]) == len(quick.rows)
-    assert len(read["statements"]) == len(quick.statements)
-    for row in quick.rows:
-        if {"sampled", "searched"} <= set(row.answers):
-            assert row.answers["searched"] <= row.answers["sampled"]
-        if {"certified", "searched"} <= set(row.answers):
-            assert row.answers["certified"] <= row.answers["searched"]
+    assert len(quick.statements) == len(STUDY.checks) == 21
+    assert len(quick.tables()) == len(SECTIONS) + 2
+    assert quick.write(tmp_path) == {}
+    assert {path.stem for path in tmp_path.glob("*.png")} == set(STUDY.figures)
+    told = json.loads((tmp_path / "results.json").read_text())
+    assert told["units"]["certified_m"] == "m"
+    for run in quick.runs:
+        for less, more in (("searched", "sampled"), ("certified", "searched")):
+            for unit in ("m", "deg", "m3", "percent"):
+                if {f"{less}_{unit}", f"{more}_{unit}"} <= set(run.measured):
+                    assert run[f"{less}_{unit}"] <= run[f"{more}_{unit}"]
 
 
-def test_published_numbers(quick: StabilityRangesStudy) -> None:
-    by_name = {row.name: row for row in quick.rows}
-    assert by_name["planar-I"].found == pytest.approx(2.0, abs=2e-3)
-    assert 6.0 <= by_name["planar-II-5-0.5-0.3"].found < 8.0
-    assert 61.0 <= by_name["planar-II-0.5-0.3-0.2"].found < 65.0
-    full = by_name["single-r_pc-0.2"].answers["sampled"]
+def test_published_numbers(quick: StudyResult) -> None:
+    by_name = {run.case: run for run in quick.runs}
+    assert found(by_name["planar-I"]) == pytest.approx(2.0, abs=2e-3)
+    assert 6.0 <= found(by_name["planar-II-5-0.5-0.3"]) < 8.0
+    assert published(by_name["planar-II-0.5-0.3-0.2"]) == 61.0
+    assert 61.0 <= found(by_name["planar-II-0.5-0.3-0.2"]) < 65.0
+    full = by_name["single-r_pc-0.2"][SAMPLED]
     assert full == pytest.approx(FULL_VOLUME, abs=1e-3)
-    assert by_name["single-r_pc-1"].answers["certified"] == full
-    assert by_name["single-d_theta_pc_deg-40"].answers["searched"] == full
-    assert 0.2 * full < by_name["single-d_theta_pc_deg-55"].answers["sampled"] < 0.7 * full
-    assert by_name["single-d_theta_pc_deg-65"].answers["sampled"] == 0.0
-    turned = by_name["single-d_theta_s_deg-90"].answers
-    assert turned["sampled"] == 0.0
+    assert by_name["single-r_pc-1"]["certified_m3"] == full
+    assert by_name["single-d_theta_pc_deg-40"]["searched_m3"] == full
+    assert 0.2 * full < by_name["single-d_theta_pc_deg-55"][SAMPLED] < 0.7 * full
+    assert by_name["single-d_theta_pc_deg-65"][SAMPLED] == 0.0
+    turned = by_name["single-d_theta_s_deg-90"]
+    assert turned[SAMPLED] == 0.0
     assert turned[NO_TURN] == turned[KNOWN] == full
 
 
-def test_statements_follow_from_the_rows(quick: StabilityRangesStudy) -> None:
-    found = {statement.words: statement.verdict for statement in quick.statements}
-    first = next(words for words in found if words.startswith("Planar III i:"))
-    assert found[first] == CONFIRMED
-    second = next(words for words in found if words.startswith("Planar III ii:"))
-    assert found[second] == NOT_CONFIRMED
-    features = next(words for words in found if "feature vector" in words)
-    assert found[features] == IN_PART
-    # Other rows, another verdict.
-    rows = [
-        replace(row, answers={"searched": row.limits["place"]})
-        if row.name.startswith("planar-III-place") and "place" in row.limits
-        else row
-        for row in quick.rows
+def checked(name: str) -> Check:
+    return next(check for check in STUDY.checks if check.name == name)
+
+
+def test_statements_follow_from_the_runs(quick: StudyResult) -> None:
+    said = {one.name: one.verdict for one in quick.statements}
+    assert said["vision_alone"] == MET_CONSTRUCTION
+    assert said["camera_turn"] == MET_FITTED
+    assert said["smaller_range"] == CONFIRMED
+    assert said["difference_of_errors"] == NOT_CONFIRMED
+    assert said["seen_object"] == IN_PART
+    # Other runs, another verdict.
+    changed = [
+        replace(run, measured={"searched_m": run.keys.get("place_m", 0.0)})
+        if run.case.startswith("planar-III-place")
+        else run
+        for run in quick.runs
     ]
-    again = {statement.words: statement.verdict for statement in range_statements(rows)}
-    assert again[first] != CONFIRMED
-    assert range_statements([]) == []
+    assert checked("smaller_range").judge(Runs(changed)).verdict == NOT_CONFIRMED
 
 
-def test_orders_that_hold_by_construction_say_so() -> None:
-    rows = [
-        RangeRow(
-            name=f"r{k}", section=PLANAR_ROBOT, group=group, limits={}, sought="r_bp", unit="m",
-            published=None, answers={"searched": 0.2 - 0.1 * k},
-        )
-        for group in ("place", "r_B")
-        for k in range(2)
-    ]  # fmt: skip
-    statements = range_statements(rows)
-    assert [statement.verdict for statement in statements] == [CONFIRMED, CONFIRMED]
-    assert all(statement.why == NESTED for statement in statements)
+def row(case: str, keys: dict[str, object], *values: float) -> Runs:
+    """Runs of a case's group, in which so much was found."""
+    return Runs([Run(f"{case}{k}", None, keys, {"searched_m": x}) for k, x in enumerate(values)])
+
+
+@pytest.mark.parametrize("name", ["smaller_range", "anchor_error", "turn_and_tilt"])
+def test_orders_that_hold_by_construction_say_so(name: str, quick: StudyResult) -> None:
+    said = next(one for one in quick.statements if one.name == name)
+    assert said.verdict == CONFIRMED
+    assert said.why == NESTED
+
+
+def test_missing_questions_are_no_verdict() -> None:
+    (said,) = judged([checked("smaller_range")], Runs([], lambda: STUDY.planned(Form())))
+    assert said.found.startswith("runs are missing")
 
 
 def test_falls() -> None:
-    assert falls([3.0, 2.0, 2.0])
-    assert not falls([2.0, 2.0])
-    assert not falls([3.0, 1.0, 2.0])
+    assert falls(row("r", {}, 3.0, 2.0, 2.0))
+    assert not falls(row("r", {}, 2.0, 2.0))
+    assert not falls(row("r", {}, 3.0, 1.0, 2.0))
 
 
-@pytest.fixture
-def few(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Some quick questions."""
-    monkeypatch.setattr(module, "range_items", lambda quick: range_items(quick)[:8])
-
-
-def test_a_stopped_study_continues(few: None, tmp_path: Path) -> None:
+def test_a_stopped_study_continues(tmp_path: Path) -> None:
+    few = replace(STUDY, cases=lambda form: list(cases(form))[:8])
     seen: list[WorkProgress] = []
-    first = study_stability_ranges(
-        True,
-        StudySession(tmp_path / "s", seen.append, lambda: bool(seen) and seen[-1].done >= 3, 1),
+    first = few(
+        True, StudySession(tmp_path, seen.append, lambda: bool(seen) and seen[-1].done >= 3, 1)
     )
     assert first.interrupted
-    assert [row.name for row in first.rows] == [item.name for item in range_items(True)[:3]]
-    assert seen[-1].total == 8
-    first.write(tmp_path / "s")
+    assert len(first.runs) == 3
     assert first.tables()
-    second = study_stability_ranges(True, StudySession(folder=tmp_path / "s", workers=1))
-    assert not second.interrupted
+    second = few(True, StudySession(folder=tmp_path, workers=1))
     assert second.progress.found == 3
-    assert second.rows[:3] == first.rows
-    assert len(second.rows) == 8
-    third = study_stability_ranges(True, StudySession(folder=tmp_path / "s", workers=1))
-    assert third.progress.found == third.progress.total == 8
-    assert third.rows == second.rows
+    assert second.runs.rows[:3] == first.runs.rows
+    assert len(second.runs) == 8
 
 
 def test_a_folder_of_other_questions_is_refused(
-    few: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    study_stability_ranges(
-        True, StudySession(folder=tmp_path / "s", should_stop=lambda: True, workers=1)
-    )
+    few = replace(STUDY, cases=lambda form: list(cases(form))[:2])
+    few(True, StudySession(folder=tmp_path, should_stop=lambda: True, workers=1))
     monkeypatch.setattr(robot_limits, "TURN_STEP", 5.0)
-    with pytest.raises(OutputFolderError, match="turn step"):
-        study_stability_ranges(True, StudySession(folder=tmp_path / "s", workers=1))
+    with pytest.raises(OutputFolderError, match="turn_step_deg"):
+        few(True, StudySession(folder=tmp_path, workers=1))
