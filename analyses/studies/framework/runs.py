@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from cdpr_drake.analyses.reporting.log_files import write_whole
 from cdpr_drake.arrays import Array
@@ -121,7 +122,7 @@ class Runs:
             rows = [run for run in rows if column in run.columns() and run[column] in accepted]
         return Runs(rows, self.planned)
 
-    def __getitem__(self, column: str) -> Array:
+    def __getitem__(self, column: str) -> npt.NDArray[Any]:
         """Values of a column, shape (n,) or (n, ...); None is NaN.
 
         Raises:
@@ -205,11 +206,11 @@ class Runs:
         """Units of the columns whose names end with one."""
         return {name: unit for name in self.columns() if (unit := unit_of(name))}
 
-    def columns(self) -> list[str]:
+    def columns(self) -> Sequence[str]:
         """Names of all columns, in the order in which they first come."""
         return list(dict.fromkeys(name for run in self.rows for name in run.columns()))
 
-    def arrays(self) -> list[str]:
+    def arrays(self) -> Sequence[str]:
         """Names of the columns that hold arrays."""
         return [
             name
@@ -217,7 +218,7 @@ class Runs:
             if any(isinstance(run.measured.get(name), np.ndarray) for run in self.rows)
         ]
 
-    def table(self) -> list[dict[str, Any]]:
+    def table(self) -> Sequence[dict[str, Any]]:
         """A dict a row, `case` first, without arrays."""
         arrays = set(self.arrays())
         return [
