@@ -75,7 +75,7 @@ def _camera(seed: int) -> dict[str, Any]:
 
 
 def _half(seed: int) -> dict[str, Any]:
-    row = {}
+    row: dict[str, Any] = {}
     for name, size in (("whole", 1.0), ("half", trials.HALF)):
         along, straight = trials.camera_trial(seed, size).normalized_squares()
         row |= {f"{name}_chi_square": along, f"{name}_chi_square_straight": straight}

@@ -254,7 +254,7 @@ def judged_table(title: str, statements: Sequence[Judged]) -> Table:
     """What sources say, printed and found side by side."""
     table = new_table(title, ("statement", "printed", "found", "verdict", "rule, why"), ())
     for one in statements:
-        notes = " ".join(part for part in (one.rule, one.why) if part)
+        notes = "; ".join(part for part in (one.rule, one.why) if part)
         table.add_row(one.words, one.printed, one.found, one.verdict_words, notes)
         table.add_section()
     return table

@@ -23,6 +23,7 @@ from cdpr_drake.analyses.studies.framework.statement import (
     OURS,
     Finding,
     judged,
+    judged_table,
     scorecard,
     statement,
 )
@@ -285,6 +286,15 @@ def test_it_is_written_for_people_and_programs(tmp_path):
     assert len(rows) == 10
     assert {path.name for path in tmp_path.glob("*.png")} == {"few.png", "all.png"}
     assert len(found.tables()) == 2
+
+
+def test_the_table_of_statements_parts_rule_and_why():
+    @statement("Large is larger.", rule="each run")
+    def check(runs):
+        return Finding(found="", held=[True], why="it is heavier")
+
+    table = judged_table("", judged([check], Runs([])))
+    assert list(table.columns[-1].cells) == ["each run; it is heavier"]
 
 
 def test_figures_of_runs_that_lack_are_left_out(tmp_path):
