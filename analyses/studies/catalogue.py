@@ -149,12 +149,7 @@ STUDIES: dict[str, StudyEntry] = {
         judges=names_of_checks(control_stability.RECIPE_CHECKS),
     ),
     "stability-ranges": entry_of(stability_ranges.STUDY),
-    "stability-shapes": StudyEntry(
-        stability_shapes.study_stability_shapes,
-        continues=True,
-        judges=names_of_checks(stability_shapes.CHECKS),
-        figures=stability_shapes.FIGURES,
-    ),
+    "stability-shapes": entry_of(stability_shapes.STUDY),
     "workspaces": StudyEntry(
         workspaces.study_workspaces,
         continues=True,
