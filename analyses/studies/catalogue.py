@@ -150,12 +150,7 @@ STUDIES: dict[str, StudyEntry] = {
     ),
     "stability-ranges": entry_of(stability_ranges.STUDY),
     "stability-shapes": entry_of(stability_shapes.STUDY),
-    "workspaces": StudyEntry(
-        workspaces.study_workspaces,
-        continues=True,
-        judges=names_of_checks(workspaces.CHECKS),
-        figures=workspaces.FIGURES,
-    ),
+    "workspaces": entry_of(workspaces.STUDY),
     "design": StudyEntry(study_design, continues=True),
     "engines": StudyEntry(
         engines.study_engines,
