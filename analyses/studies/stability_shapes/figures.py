@@ -97,13 +97,13 @@ def nested_figure(runs: Runs, number: str) -> Figure:
         flat, zip("abcdefgh", groups.items(), strict=False), strict=False
     ):
         shown = [*([base] if base is not None else []), *group]
-        for number, one in enumerate(shown):
-            points, look = one.points(), nth_look(number)
+        for k, one in enumerate(shown):
+            points, look = one.points(), nth_look(k)
             printed = one.printed and f" ({one.printed})"
             axes.plot(
-                points[:, 0], points[:, 1], linestyle="", marker="so^"[number],
-                markersize=(6.5, 4.5, 3.0)[number], color=("#b9cfe4", *[look.color] * 2)[number],
-                markerfacecolor=("#b9cfe4", "white", look.color)[number],
+                points[:, 0], points[:, 1], linestyle="", marker="so^"[k],
+                markersize=(6.5, 4.5, 3.0)[k], color=("#b9cfe4", *[look.color] * 2)[k],
+                markerfacecolor=("#b9cfe4", "white", look.color)[k],
                 label=f"{one.name}: {one.share:.1f}{printed} %",
             )  # fmt: skip
         x, y = shown[0].axes[:2]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 
 import numpy as np
@@ -58,7 +59,7 @@ def static_figure(runs: Runs, number: str, robots: tuple[str, ...]) -> Figure:
             )
             handles = draw_solid(
                 axes,
-                surface_quads(static(run), [run["x_m"], run["y_m"], run["z_m"]]),
+                surface_quads(static(run), (run["x_m"], run["y_m"], run["z_m"])),
                 WORKSPACES["SZ"],
                 (robot.frame.lower, robot.frame.upper),
                 robot.cable_set().p_WA,
@@ -144,7 +145,7 @@ def pairs_figure(runs: Runs) -> Figure:
     return figure
 
 
-FIGURES = {
+FIGURES: dict[str, Callable[[Runs], Figure]] = {
     **{
         name: partial(static_figure, number=number, robots=robots)
         for name, (number, robots) in PUBLISHED_FIGURES.items()
