@@ -88,7 +88,9 @@ def _egl() -> Finding:
 
 def _rendering() -> Finding:
     """In a process of its own, since a broken graphics driver ends the process."""
-    remedy = "apt-get install libegl1 libgl1 libgl1-mesa-dri, or use --camera projected"
+    remedy = (
+        "apt-get install libegl1 libgl1 libgl1-mesa-dri, or use cdpr simulate --camera projected"
+    )
     try:
         done = subprocess.run(
             [sys.executable, "-c", _RENDER_PROGRAM],

@@ -5,9 +5,12 @@ from .analyses.front.exchange import import_robot as import_robot
 from .analyses.front.planning import plan_free_motion as plan_free_motion
 from .analyses.front.planning import plan_path as plan_path
 from .analyses.front.session import Session as Session
+from .analyses.front.simulated_fits import calibrate_in_simulation as calibrate_in_simulation
+from .analyses.front.simulated_fits import identify_in_simulation as identify_in_simulation
 from .analyses.front.simulation import continue_run as continue_run
 from .analyses.front.simulation import finish_run as finish_run
 from .analyses.front.simulation import simulate as simulate
+from .analyses.front.stability import assess_stability as assess_stability
 from .analyses.front.statics import find_equilibria as find_equilibria
 from .analyses.front.statics import solve_forward_kinematics as solve_forward_kinematics
 from .analyses.front.statics import solve_static as solve_static
@@ -17,9 +20,9 @@ from .analyses.front.studies import studies as studies
 from .analyses.front.tensions import TENSION_METHODS as TENSION_METHODS
 from .analyses.front.tensions import compare_tensions as compare_tensions
 from .analyses.front.tensions import solve_tensions as solve_tensions
-from .analyses.front.workspaces import assess_stability as assess_stability
 from .analyses.front.workspaces import compute_workspace as compute_workspace
 from .errors import CdprError as CdprError
+from .errors import StoppedError as StoppedError
 from .geometry.cable_set import CableSet as CableSet
 from .models.robot_exchange import export_robot as export_robot
 from .models.robot_in_plant import add_robot as add_robot

@@ -17,16 +17,16 @@ class CdprError(Exception):
 
 
 class DataFileError(CdprError):
-    """A YAML file cannot be read: names the file, line, field, value found and accepted range.
-
-    Attributes:
-        problems: Everything that was found, each in one line; the message has a line for each.
-    """
+    """A YAML file cannot be read: names the file, line, field, value found and accepted range."""
 
     def __init__(self, *problems: str) -> None:
         """With one line or several."""
         super().__init__(*problems)
-        self.problems = problems
+
+    @property
+    def problems(self) -> tuple[str, ...]:
+        """Everything that was found, each in one line; the message has a line for each."""
+        return self.args
 
     def __str__(self) -> str:
         """The problems, one a line."""
@@ -138,6 +138,10 @@ class SensorError(CdprError):
 
 class SweepError(CdprError):
     """A sweep cannot start or go on: a scheduler does not answer, or a worker died."""
+
+
+class StoppedError(CdprError):
+    """Work was asked to stop before there was a result; says how far it was."""
 
 
 class ForwardKinematicsError(CdprError):

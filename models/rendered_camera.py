@@ -62,7 +62,7 @@ def check_rendering() -> None:
         except OSError as problem:
             raise RenderingError(
                 f"the rendered camera needs {library}, found none; install the package "
-                f"{package} (Debian, Ubuntu) and libgl1-mesa-dri, or use --camera projected"
+                f"{package} (Debian, Ubuntu) and libgl1-mesa-dri, or use camera.kind=projected"
             ) from problem
 
 
@@ -120,7 +120,7 @@ def probe_rendering() -> None:
             how = f"ends a process by {signal.Signals(-done.returncode).name}"
     raise RenderingError(
         f"the rendered camera: drawing an image {how}, as broken graphics drivers do; install "
-        "libgl1-mesa-dri (Debian, Ubuntu), look at `cdpr doctor`, or use --camera projected"
+        "libgl1-mesa-dri (Debian, Ubuntu), look at `cdpr doctor`, or use camera.kind=projected"
     )
 
 

@@ -32,7 +32,8 @@ from typing import Any
 from cdpr_drake.analyses.benchmarks.groups import BENCH_GROUPS
 from cdpr_drake.analyses.front import simulation
 from cdpr_drake.analyses.studies import catalogue as studies
-from cdpr_drake.cli import app, doctor, stability, view
+from cdpr_drake.analyses.workspaces import stability_figures
+from cdpr_drake.cli import app, doctor, view
 from cdpr_drake.models import camera_catalogue, sensor_catalogue
 from tests.fuzz_cases import COMMANDS as GOOD
 from tests.fuzz_cases import Case, draw_case, lay_out
@@ -87,9 +88,9 @@ def lighten() -> None:
 
 PICTURES = (
     (simulation, "write_pictures"),
-    (stability, "stability_pictures"),
+    (stability_figures, "stability_pictures"),
 )
-"""What draws figures, by the module that calls it."""
+"""What draws figures, by the module in which it is looked up."""
 
 
 def _no_sleep(seconds: float) -> None:

@@ -6,6 +6,7 @@ import json
 import re
 import subprocess
 import sys
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any, get_args, get_type_hints
@@ -43,6 +44,7 @@ from cdpr_drake.analyses.workspaces.workspace_question import (
     make_workspace_question,
 )
 from cdpr_drake.analyses.workspaces.workspace_results import robot_workspace
+from cdpr_drake.cli.app import main
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_statics import tension_problem, wrench_balance
@@ -54,6 +56,7 @@ from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.tensions.methods import METHODS, distribute
 from cdpr_drake.workspaces.demanded_wrenches import SpatialSet
 from tests.identification.logs import log as motion_log
+from tests.messages import printed
 
 STUB = Path(cdpr.__file__).with_suffix(".pyi")
 HOMES = {
@@ -109,6 +112,7 @@ PROMISED = {
     "VisualServoSettings",
     "RemoteClient",
     "CdprError",
+    "StoppedError",
 }
 
 
@@ -335,6 +339,93 @@ def test_workspaces(planar):
     one_line(lambda: cdpr.compute_workspace(planar, forse=1.0), "forse", "force")
 
 
+def test_a_workspace_as_hull_and_boxes_in_a_folder(tmp_path, monkeypatch, capsys):
+    """The call and the command find, write and print the same, and continue each other's work."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "push.yaml").write_text("box: [0, 0, 0, 1, 1, 1]\n")
+    said, seen = [], []
+    found = cdpr.compute_workspace(
+        "acrobot_large", "wrench-feasible", (3, 3, 3), required="push.yaml", box=BOX,
+        hull=[0, 0, 0.3], rays=300, certify=True, boxes=600, exit_error=1e-4, boxes_mesh="b.vtu",
+        folder="call", formats=("svg",), session=Session(seen.append, say=said.append),
+    )  # fmt: skip
+    told = as_json(found)
+    assert told == json.loads(Path("call/results.json").read_text())
+    assert {one.items for one in seen} == {"poses", "boxes"}
+    assert said == ["Casting rays", "Writing results"]
+    assert found.failed == {}
+    assert not found.interrupted
+    lines = shows_itself(found)
+    assert "hull" in lines
+    command = [
+        "workspace", "acrobot_large", "--kind", "wrench-feasible", "--wrench-set", "push.yaml",
+        "--grid", "3,3,3", "--box=-0.5:0.5,-0.5:0.5,0:1", "--hull", "0,0,0.3", "--rays", "300",
+        "--certify", "--boxes", "600", "--exit-error", "1e-4", "--boxes-mesh", "c.vtu",
+        "--format", "svg", "--workers", "1", "--json", "--out",
+    ]  # fmt: skip
+    for folder, words in (("call", "complete already"), ("command", "cables over")):
+        with pytest.raises(SystemExit) as end:
+            main([*command, folder])
+        assert end.value.code == 0
+        shown = printed(capsys)
+        assert json.loads(shown.out) == told
+        assert words in shown.err
+    names = [
+        sorted(path.name for path in Path(one).iterdir() if path.is_file())
+        for one in ("call", "command")
+    ]
+    assert names[0] == names[1]
+    assert {"workspace.npz", "hull.npz", "boxes.npz", "planes.svg", "workspace.html"} < {*names[0]}
+    for one in ("workspace.npz", "hull.npz", "boxes.npz", "planes.svg", "../b.vtu"):
+        other = Path("command", one.replace("b.vtu", "c.vtu"))
+        assert Path("call", one).read_bytes() == other.read_bytes()
+    Path("copy").mkdir()
+    assert found.write(Path("copy"), ("svg",)) == {}
+    assert Path("copy/workspace.npz").read_bytes() == Path("call/workspace.npz").read_bytes()
+
+
+BOX = ([-0.5, -0.5, 0.0], [0.5, 0.5, 1.0])
+
+
+@pytest.mark.parametrize(
+    ("asked", "words"),
+    [
+        ({"hull": (0, 0)}, ["hull: found (0, 0)"]),
+        ({"hull": (0, 0, 0.3)}, ["hull: found the planar"]),
+        ({"unbounded": True}, ["unbounded: needs hull"]),
+        ({"unbounded": True, "hull": (0, 0, 0.3), "box": BOX}, ["unbounded: found box"]),
+        ({"mesh": "a.stl"}, ["mesh: needs hull"]),
+        ({"certify": True, "boxes_mesh": "a.stl"}, ["a.stl", "vtu"]),
+        ({"certify": True, "boxes": 0}, ["boxes: found 0"]),
+        ({"certify": True, "kinds": ("static", "stable")}, ["certify: found kinds static,stable"]),
+        ({"certify": True, "orientations": "any"}, ["certify: found orientations any"]),
+        ({"certify": True, "method": "closed_form"}, ["certify: found method closed_form"]),
+        ({"certfy": True}, ["certfy", "certify"]),
+        ({"box": (BOX[1], BOX[0])}, ["box: accepted: lower below upper"]),
+        ({"required": "no.yaml"}, ["no.yaml", "no such file"]),
+        ({"required": "no.yaml", "force": 1.0}, ["required: found force or moment too"]),
+    ],
+)
+def test_what_a_workspace_cannot_be_asked_for(planar, tmp_path, asked, words):
+    one_line(lambda: cdpr.compute_workspace(planar, folder=tmp_path / "w", **asked), *words)
+    assert not any(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("verb", ["compute_workspace", "assess_stability"])
+def test_a_question_over_a_grid_that_is_stopped_goes_on(planar, tmp_path, verb):
+    asked = {"assess_stability": {"verdict": "sampled", "options": {"draws": 2}}}.get(verb, {})
+    call = partial(getattr(cdpr, verb), planar, grid=(3, 3, 1), folder=tmp_path / "w", **asked)
+    with pytest.raises(cdpr.StoppedError, match=r"stopped after 0 of (9|18) poses"):
+        call(session=Session(should_stop=lambda: True))
+    assert not (tmp_path / "w" / "results.json").exists()
+    assert as_json(call()) == json.loads((tmp_path / "w" / "results.json").read_text())
+    seen = []
+    again = call(session=Session(seen.append))
+    assert [one.found for one in seen] == [seen[0].total]
+    assert again.folder == tmp_path / "w"
+    assert again.failed == {}
+
+
 def forces(force):
     return SpatialSet(box=np.array([0.0, 0.0, 0.0, force, force, force]))
 
@@ -458,6 +549,13 @@ def test_a_calibration(planar, tmp_path):
     np.testing.assert_allclose(moved, [0.005, 0.0, 0.0], atol=1e-4)
     shows_itself(found)
     assert isinstance(found.plot(), Figure)
+    out = tmp_path / "out"
+    kept = cdpr.calibrate(planar, path, asked, folder=out, formats=("svg",))
+    assert kept.folder == out
+    assert {path.name for path in out.glob("*.svg")} == {"calibration.svg", "correlation.svg"}
+    assert json.loads((out / "results.json").read_text()) == as_json(kept)
+    one_line(lambda: cdpr.calibrate(planar, path, asked, folder=out), "allow overwrite")
+    one_line(lambda: cdpr.calibrate(planar, path, asked, propose=0), "propose: found 0")
     one_line(lambda: cdpr.calibrate(planar, path, asked, sigmas={"length": 1.0}), "lengths")
     one_line(lambda: cdpr.calibrate(planar, path, asked, prior={}), "prior", "priors")
     one_line(lambda: cdpr.calibrate(planar, tmp_path / "no.csv"), "no.csv")

@@ -171,7 +171,7 @@ def prepare(task: CalibrationTask, log: CalibrationLog) -> Prepared:
         if missing:
             raise CalibrationError(
                 f"tags: found no size of tag {', '.join(missing)}, which {log.path} shows; "
-                "accepted: --tag-size, or --tags with a row for each"
+                "accepted: tag_size, or a row for each"
             )
         targets = {tag: TagTarget(tag, task.tags[tag].size) for tag in log.corners}
     model = calibration_model(robot, mount)
@@ -227,5 +227,5 @@ def _check_images(log: CalibrationLog, width: int, height: int) -> None:
             u, v = uv[k][outside[k]][0]
             raise CalibrationError(
                 f"{log.path}: row {k + 1}: tag {tag}: found a corner at ({u:g}, {v:g}) px; "
-                f"accepted: within the image of {width} x {height} px, see --image-size"
+                f"accepted: within the image of {width} x {height} px, see image_size"
             )

@@ -86,7 +86,7 @@ def doubts(result: CalibrationResult, minima: int) -> tuple[str, ...]:
     ends = f"; starts ended in {minima} minima, of which this is the best" if minima > 1 else ""
     return (
         f"{count} outliers beside {result.degrees} degrees of freedom are many: another minimum "
-        f"may fit better, from a --start nearer to the truth{ends}",
+        f"may fit better, from a start nearer to the truth{ends}",
     )
 
 
@@ -103,7 +103,7 @@ def unused_columns(prepared: Prepared) -> tuple[str, ...]:
     if log.poses is None or prepared.lengths is None:
         why[TIME] = "without a tracker and lengths no clock is checked"
     if not prepared.rest:
-        why[TENSIONS] = "the platform is not taken to rest, see --rest; strain of cables alone"
+        why[TENSIONS] = "the platform is not said to rest; strain of cables alone"
     return tuple(
         f"not used: {', '.join(headers[kind])}: {words}"
         for kind, words in why.items()

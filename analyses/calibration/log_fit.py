@@ -98,5 +98,5 @@ def refuse_late_tracker(
         raise error(
             f"{log.path}: tracker: found it {abs(shift):.4g} s {late} against the {against}, "
             f"which fit {better:.2g} times better with that shift; accepted: the same clock, or "
-            f"--tracker-late {shift:.4g}"
+            f"tracker_late {shift:.4g}"
         )

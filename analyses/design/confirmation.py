@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from cdpr_drake.analyses.design.goals import GOALS, GoalContext, servo_stable
+from cdpr_drake.analyses.design.goals import GOALS, GoalContext, can_close, servo_stable
 from cdpr_drake.analyses.workspaces.box_certificates import box_search, certified_boxes
 from cdpr_drake.analyses.workspaces.workspace_question import (
     WorkspaceRequest,
@@ -109,6 +109,10 @@ def confirm(
     volumes, opens, finished = [], [], True
     for name in (original, design):
         robot = load_robot(name)
+        if kind == "wrench-closure" and not can_close(robot):  # such a set of cables was chosen
+            volumes.append(0.0)
+            opens.append(0.0)
+            continue
         if say is not None:
             say(f"proving {kind} of {robot.name}")
         asked = WorkspaceRequest(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +13,7 @@ from cdpr_drake.analyses.workspaces.stability_question import stability_case
 from cdpr_drake.analyses.workspaces.workspace_question import WorkspaceRequest, pose_conditions
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.models import ELASTIC
-from cdpr_drake.errors import CdprError
+from cdpr_drake.errors import CdprError, DesignError
 from cdpr_drake.models.robot_holding import hold_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import rigid_platform
@@ -177,6 +177,42 @@ GOALS: dict[str, Goal] = {
     ),
 }
 """Goals by name."""
+
+
+def can_close(robot: Robot) -> bool:
+    """Whether a robot has enough cables for wrench closure: more than degrees of freedom."""
+    return len(robot.cables) > robot.motion_type().freedom
+
+
+def check_goals(robot: Robot, judging: GoalContext, names: Sequence[str]) -> None:
+    """Refuses goals that a robot cannot be asked for, before anything is searched.
+
+    Args:
+        robot: The robot as it is, with all its cables.
+        judging: Poses and wrenches.
+        names: Names of `GOALS`.
+
+    Raises:
+        DesignError: There is one.
+    """
+    if "wrench-feasible" in names and judging.required is None:
+        raise DesignError(
+            "goals wrench-feasible: found no wrench to resist; accepted: a force or a moment above "
+            "0"
+        )
+    freedom = robot.motion_type().freedom
+    if "wrench-closure" in names and not can_close(robot):
+        raise DesignError(
+            f"goals wrench-closure: found {len(robot.cables)} cables of {robot.name} for {freedom} "
+            f"degrees of freedom; accepted: robots with more than {freedom}"
+        )
+    case = pose_conditions(robot).case
+    moved = [row - 3 for row in case.rows if row >= 3]
+    if "payload" in names and not np.any(np.array(case.down)[moved]):
+        raise DesignError(
+            f"goals payload: found the planar {robot.name}, whose plane carries the weight; "
+            "accepted: robots that hold it by their cables"
+        )
 
 
 def evaluate_goals(robot: Robot, judging: GoalContext, names: tuple[str, ...]) -> Array:

@@ -11,7 +11,7 @@ import numpy as np
 
 from cdpr_drake.analyses.design.candidates import Candidates
 from cdpr_drake.analyses.design.evolution import EvolutionSearch, default_population, pareto_front
-from cdpr_drake.analyses.design.goals import GoalContext, evaluate_goals
+from cdpr_drake.analyses.design.goals import GoalContext, check_goals, evaluate_goals
 from cdpr_drake.analyses.design.maximin import SLOPES, Slopes, SlopeSearch
 from cdpr_drake.analyses.design.settings import BY_SLOPES, DesignSettings, PosesSettings
 from cdpr_drake.analyses.reporting.progress import DEFAULT_STUDY_SESSION, StudySession, WorkProgress
@@ -147,11 +147,9 @@ def evaluate_original(candidates: Candidates, judging: GoalContext, names: Seque
     Raises:
         CdprError: It cannot be asked for a goal; says why.
     """
-    if "wrench-feasible" in names and judging.required is None:
-        raise DesignError(
-            "goal wrench-feasible: found no wrench to resist; accepted: a force or a moment above 0"
-        )
-    return evaluate_goals(parse_robot(candidates.text, Path("robot")), judging, tuple(names))
+    robot = parse_robot(candidates.text, Path("robot"))
+    check_goals(robot, judging, names)
+    return evaluate_goals(robot, judging, tuple(names))
 
 
 def search_design(

@@ -2,25 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import fields, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from rich.table import Table
 
-from cdpr_drake.analyses.calibration.calibrated_robots import calibrated_robot
-from cdpr_drake.analyses.calibration.calibration_report import (
-    calibration_dict,
-    calibration_drawings,
-)
+from cdpr_drake.analyses.calibration.calibration_report import calibration_fit
 from cdpr_drake.analyses.calibration.calibration_request import CalibrationTask, Sigmas, TagPlace
 from cdpr_drake.analyses.calibration.calibration_task import Calibration
 from cdpr_drake.analyses.calibration.calibration_task import calibrate as calibrate_log
-from cdpr_drake.analyses.calibration.identification_report import (
-    identification_dict,
-    identification_drawings,
-)
+from cdpr_drake.analyses.calibration.identification_report import identification_fit
 from cdpr_drake.analyses.calibration.identification_task import (
     UNKNOWN,
     Identification,
@@ -28,20 +22,18 @@ from cdpr_drake.analyses.calibration.identification_task import (
 )
 from cdpr_drake.analyses.calibration.identification_task import identify as identify_log
 from cdpr_drake.analyses.calibration.log_file import CalibrationLog, read_log
+from cdpr_drake.analyses.calibration.pose_proposal import next_poses
 from cdpr_drake.analyses.calibration.tag_file import read_tags
 from cdpr_drake.analyses.calibration.tracker import shifted_log
+from cdpr_drake.analyses.front.fitted_robots import FittedRobot, Keeping, kept_fit
+from cdpr_drake.analyses.front.session import Say, Session
+from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
 from cdpr_drake.errors import CalibrationError, IdentificationError
 from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import as_pose
 from cdpr_drake.schema.typed_yaml import closest
-from cdpr_drake.summaries import Summarized, as_kind
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-Say = Callable[[str], None]
-"""Told what is done now."""
+from cdpr_drake.summaries import as_kind
 
 GEOMETRY = ("exit_points", "anchor_points")
 """What `calibrate` looks for where nothing else is said."""
@@ -49,24 +41,14 @@ GEOMETRY = ("exit_points", "anchor_points")
 MOST_PARAMETERS = 7
 """So many are shown where an identification shows itself."""
 
-OPTIONS = ("priors", "mount", "image_size", "start", "rest", "outliers")
-"""What `calibrate` takes by name besides."""
+ASKED = ("priors", "mount", "image_size", "start", "rest", "outliers")
+KEPT = ("propose", "overwrite", "formats")
+"""What `calibrate` takes by name besides: fields of its task, and what is done with results."""
 
 
-class RobotCalibration(Summarized, Calibration):
+@dataclass(frozen=True, eq=False, repr=False)
+class RobotCalibration(FittedRobot, Calibration):
     """A `Calibration` that shows and draws itself."""
-
-    def as_dict(self) -> dict[str, Any]:
-        """For JSON, as `cdpr calibrate --json` prints it."""
-        return calibration_dict(self)
-
-    def plot(self) -> Figure:
-        """Residuals and parameters."""
-        return next(iter(calibration_drawings(self).values()))()
-
-    def robot(self) -> Robot:
-        """The calibrated robot."""
-        return calibrated_robot(self.task.robot, self.result, self.mount)[0]
 
     def summary(self) -> tuple[str, list[tuple[str, str]]]:
         """What it shows of itself."""
@@ -82,16 +64,9 @@ class RobotCalibration(Summarized, Calibration):
         ]
 
 
-class RobotIdentification(Summarized, Identification):
+@dataclass(frozen=True, eq=False, repr=False)
+class RobotIdentification(FittedRobot, Identification):
     """An `Identification` that shows and draws itself."""
-
-    def as_dict(self) -> dict[str, Any]:
-        """For JSON, as `cdpr identify --json` prints it."""
-        return identification_dict(self)
-
-    def plot(self) -> Figure:
-        """Wrenches as measured and as predicted."""
-        return next(iter(identification_drawings(self).values()))()
 
     def summary(self) -> tuple[str, list[tuple[str, str]]]:
         """What it shows of itself: the first parameters, found and believed."""
@@ -118,7 +93,9 @@ def calibrate(
     tags: Mapping[int, TagPlace] | Path | str | None = None,
     tag_size: float | None = None,
     tracker_late: float | None = None,
+    folder: Path | str | None = None,
     say: Say | None = None,
+    session: Session | None = None,
     **options: Any,
 ) -> RobotCalibration:
     """Finds a robot's constants in a log of what was measured at poses of its platform.
@@ -131,9 +108,13 @@ def calibrate(
         tags: What is known of tags by number, or a file of it.
         tag_size: In the place of it: edge of all tags [m].
         tracker_late: By how much the tracker's poses are late [s].
+        folder: Where results.json, robot.yaml and figures are written; None: nowhere.
         say: Told what is done now.
+        session: In the place of it: who follows the calibration.
         options: Fields of `CalibrationTask`: `priors`, `mount`, `image_size`, `start`, `rest`,
-            `outliers`.
+            `outliers`. `propose`: also proposes so many poses that would tell most next.
+            `overwrite`: whether results in the folder may be replaced. `formats`: endings of the
+            files of figures.
 
     Returns:
         What was found; its status is "misfit" where it does not fit what was measured.
@@ -141,19 +122,56 @@ def calibrate(
     Raises:
         CalibrationError: The log does not hold, or does not tell, what is asked; names it.
         DataFileError: A file cannot be read.
+        OutputFolderError: The folder holds other things, or cannot be written.
     """
     loaded = as_robot(robot)
-    _check_names(options, OPTIONS, CalibrationError)
-    read, places = calibration_inputs(loaded, log, tags, tag_size, tracker_late)
-    if options.get("start") is not None:
-        options["start"] = as_pose(loaded, options["start"])
+    _check_names(options, (*ASKED, *KEPT), CalibrationError)
+    read, places = _inputs(loaded, log, tags, tag_size, tracker_late)
+    asked = {name: options[name] for name in ASKED if name in options}
+    if asked.get("start") is not None:
+        asked["start"] = as_pose(loaded, asked["start"])
     task = CalibrationTask(
-        robot=loaded, unknown=_words(unknown), sigmas=_sigmas(sigmas), tags=places, **options
+        robot=loaded, unknown=_words(unknown), sigmas=_sigmas(sigmas), tags=places, **asked
     )
-    return as_kind(RobotCalibration, calibrate_log(task, read, say or _silent))
+
+    def work(folder: Path | None, say: Say) -> RobotCalibration:
+        found = calibrate_log(task, read, say)
+        fit = calibration_fit(found, *proposed_poses(found, options.get("propose"), folder, say))
+        if folder is not None:
+            fit.write(folder)
+        return as_kind(RobotCalibration, found, fit=fit)
+
+    keeping = Keeping(
+        folder, options.get("overwrite", False), options.get("formats", DEFAULT_FORMATS)
+    )
+    return kept_fit(keeping, session or Session(say=say), f"Calibrating {loaded.name}", work)
 
 
-def calibration_inputs(
+def proposed_poses(
+    found: Calibration, count: int | None, folder: Path | None, say: Say
+) -> tuple[dict[str, Any], list[Table]]:
+    """The poses that would tell most next, written; what JSON and terminal say of them.
+
+    Args:
+        found: What was found so far.
+        count: So many; None: none.
+        folder: Where next_poses.csv goes; None: nowhere.
+        say: Told what is done now.
+
+    Raises:
+        CalibrationError: None are wanted, or the robot that was found rests at too few poses.
+    """
+    if count is None:
+        return {}, []
+    if count < 1:
+        raise CalibrationError(f"propose: found {count}; accepted: at least 1")
+    proposed = next_poses(found, count, say)
+    if folder is not None:
+        proposed.write(folder)
+    return {"next_poses": proposed.as_dict()}, [proposed.table()]
+
+
+def _inputs(
     robot: Robot,
     log: CalibrationLog | Path | str,
     tags: Mapping[int, TagPlace] | Path | str | None,
@@ -180,7 +198,11 @@ def identify(
     *,
     validate: CalibrationLog | Path | str | None = None,
     tracker_late: float | None = None,
+    folder: Path | str | None = None,
+    overwrite: bool = False,
+    formats: Sequence[str] = DEFAULT_FORMATS,
     say: Say | None = None,
+    session: Session | None = None,
     **options: Any,
 ) -> RobotIdentification:
     """Finds a robot's dynamics in a log of a motion.
@@ -191,13 +213,18 @@ def identify(
         unknown: Groups of `identification.parameters.GROUPS`.
         validate: Log of another motion, which is predicted and not fitted, or its file.
         tracker_late: By how much the tracker's poses are late [s]; None: they must be in time.
+        folder: Where identification.json, robot.yaml and figures are written; None: nowhere.
+        overwrite: Whether results in the folder may be replaced.
+        formats: Endings of the files of figures.
         say: Told what is done now.
+        session: In the place of it: who follows the identification.
         options: Fields of `IdentificationTask`: `common`, `priors`, `bandwidth` [Hz],
             `sigma_lengths` [m], `pulleys`, `outliers`.
 
     Raises:
         IdentificationError: A log does not hold, or does not tell, what is asked; names it.
         DataFileError: A file cannot be read.
+        OutputFolderError: The folder holds other things, or cannot be written.
     """
     loaded = as_robot(robot)
     known = [field.name for field in fields(IdentificationTask)]
@@ -206,7 +233,16 @@ def identify(
     other = None if validate is None else _read(loaded, validate, tracker_late)
     given = {"check_clock": tracker_late is None} | options
     task = IdentificationTask(robot=loaded, unknown=_words(unknown), **given)
-    return as_kind(RobotIdentification, identify_log(task, read, other, say or _silent))
+
+    def work(folder: Path | None, say: Say) -> RobotIdentification:
+        found = identify_log(task, read, other, say)
+        fit = identification_fit(found)
+        if folder is not None:
+            fit.write(folder)
+        return as_kind(RobotIdentification, found, fit=fit)
+
+    keeping = Keeping(folder, overwrite, formats)
+    return kept_fit(keeping, session or Session(say=say), f"Identifying {loaded.name}", work)
 
 
 def _read(robot: Robot, log: CalibrationLog | Path | str, late: float | None) -> CalibrationLog:
@@ -233,7 +269,3 @@ def _check_names(
     for name in given:
         if name not in known:
             raise error(f"{name!r} is unknown; {closest(name, known)}")
-
-
-def _silent(words: str) -> None:
-    """Tells nobody."""

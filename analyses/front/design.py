@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
+from contextlib import AbstractContextManager
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -20,8 +20,7 @@ from cdpr_drake.analyses.design.settings import (
     GoalSettings,
     load_design_settings,
 )
-from cdpr_drake.analyses.front.session import Session, asked_workers
-from cdpr_drake.analyses.reporting.output_folder import continued_folder
+from cdpr_drake.analyses.front.session import Session, asked_workers, kept_folder
 from cdpr_drake.analyses.reporting.progress import StudySession
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
 from cdpr_drake.errors import DesignError
@@ -90,7 +89,8 @@ def optimize_design(
         OutputFolderError: The folder belongs to other arguments, or cannot be written.
     """
     told, (count, scheduler) = session or Session(), asked_workers(workers)
-    with robot_reference(robot) as name, _kept(folder, told) as where:
+    with robot_reference(robot) as name, _kept(folder, told) as there:
+        where = Path(there)
         loaded = load_robot(name)
         asked, words = _settings(loaded, settings, source)
         if generations is not None:
@@ -120,16 +120,9 @@ def optimize_design(
     return replace(found, folder=where, file=file, failed=failed)
 
 
-@contextmanager
-def _kept(folder: Path | str | None, session: Session) -> Iterator[Path]:
+def _kept(folder: Path | str | None, session: Session) -> AbstractContextManager[Path | str]:
     """The folder, or one that goes with the block."""
-    if folder is None:
-        with TemporaryDirectory() as nowhere:
-            yield Path(nowhere)
-        return
-    with continued_folder(Path(folder)) as results:
-        session.opened(results)
-        yield Path(folder)
+    return TemporaryDirectory() if folder is None else kept_folder(folder, session)
 
 
 def _settings(

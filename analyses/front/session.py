@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from pathlib import Path
 from typing import Any, Protocol
 
-from cdpr_drake.analyses.reporting.output_folder import ResultsFolder
+from cdpr_drake.analyses.reporting.output_folder import ResultsFolder, continued_folder
 from cdpr_drake.analyses.simulation.scenario_kinds import ScenarioKind
 from cdpr_drake.analyses.visualization.live_view import Prepare
 from cdpr_drake.systems.remote.remote_place import Remote
@@ -71,8 +72,8 @@ class Session:
     def opened(self, results: ResultsFolder) -> None:
         """Takes the results folder when it is there, before anything is computed."""
 
-    def computing(self) -> AbstractContextManager[object]:
-        """What is entered around the computation."""
+    def computing(self, part: str = "") -> AbstractContextManager[object]:
+        """What is entered around the computation; after the first around further parts, by name."""
         return nullcontext()
 
     def doing(self, words: str) -> AbstractContextManager[Say]:
@@ -83,6 +84,18 @@ class Session:
     def prepare(self, kind: ScenarioKind, scenario: Any) -> Prepare | None:
         """What gets a run's simulator and diagram before it starts; None: nobody."""
         return None
+
+
+@contextmanager
+def kept_folder(folder: Path | str, session: Session) -> Iterator[Path]:
+    """A folder that keeps what is finished, for nobody else inside the block.
+
+    Raises:
+        OutputFolderError: As `continued_folder`.
+    """
+    with continued_folder(Path(folder)) as results:
+        session.opened(results)
+        yield Path(folder)
 
 
 def asked_workers(workers: int | str | None) -> tuple[int | None, str | None]:

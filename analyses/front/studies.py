@@ -156,7 +156,7 @@ class Reproduction(Summarized):
         """How many items of each chapter came out how."""
         from cdpr_drake.analyses.reproduction.scorecard import scorecard_figure
 
-        return scorecard_figure(Scorecard.of(self.rows))
+        return scorecard_figure(Scorecard.of(self.rows), published_registers(), self.quick)
 
     def summary(self) -> tuple[str, list[tuple[str, str]]]:
         """What it shows of itself."""
@@ -203,15 +203,12 @@ def run_study(
         session: Who follows the study and may stop it; None: nobody.
 
     Raises:
-        CdprError: There is no such study, it does not repeat, has not this recipe, or its work is
-            done here alone.
+        CdprError: There is no such study, it does not repeat, or has not this recipe.
         OutputFolderError: The folder holds other things, or cannot be written.
     """
     entry, told = chosen_studies([name])[name], session or Session()
     count, scheduler = asked_workers(workers)
     if scheduler is not None:
-        if not entry.spreads:
-            raise CdprError(f"workers: study {name} is computed here; leave it out")
         check_scheduler(scheduler)
     if seeds is not None and not entry.repeats:
         able = studies_that(lambda other: other.repeats)

@@ -1,27 +1,43 @@
-"""Where a robot can work, and where its visual servo is stable, over a grid of poses."""
+"""Where a robot can work: over a grid of poses, by a hull, and by boxes that are proven."""
 
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Mapping, Sequence
-from dataclasses import fields, replace
+from contextlib import nullcontext
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cdpr_drake.analyses.workspaces.stability_defaults import load_bounds, workspace_defaults
-from cdpr_drake.analyses.workspaces.stability_question import (
-    StabilityQuestion,
-    make_question,
-    scenario_task,
+from cdpr_drake.analyses.front.session import Say, Session, asked_workers, kept_folder
+from cdpr_drake.analyses.reporting.deferred_figures import write_pictures
+from cdpr_drake.analyses.reporting.left_folders import RESULTS
+from cdpr_drake.analyses.reporting.log_files import write_json
+from cdpr_drake.analyses.reporting.progress import WorkProgress
+from cdpr_drake.analyses.reporting.written_files import whole_file
+from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
+from cdpr_drake.analyses.workspaces.box_certificates import (
+    BoxSearch,
+    agreement_numbers,
+    agreements,
+    box_numbers,
+    box_search,
+    certified_boxes,
+    save_boxes,
+    write_boxes,
 )
-from cdpr_drake.analyses.workspaces.stability_results import (
-    StabilityWorkspaces,
-    stability_workspaces,
+from cdpr_drake.analyses.workspaces.stability_defaults import workspace_defaults
+from cdpr_drake.analyses.workspaces.workspace_files import load_obstacles, load_wrench_set
+from cdpr_drake.analyses.workspaces.workspace_hulls import (
+    HullBound,
+    hull_bound,
+    hull_numbers,
+    question_hull,
+    save_hull,
 )
-from cdpr_drake.analyses.workspaces.static_feasible import static_case
-from cdpr_drake.analyses.workspaces.workspace_files import load_obstacles
 from cdpr_drake.analyses.workspaces.workspace_question import (
     WorkspaceQuestion,
     WorkspaceRequest,
@@ -30,14 +46,16 @@ from cdpr_drake.analyses.workspaces.workspace_question import (
 )
 from cdpr_drake.analyses.workspaces.workspace_results import RobotWorkspace, robot_workspace
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import StabilityError, WorkspaceError, WorkspaceGridError
+from cdpr_drake.errors import StoppedError, WorkspaceError, WorkspaceGridError
 from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.schema.typed_yaml import closest
-from cdpr_drake.stability.perturbation_bounds import PerturbationBounds
-from cdpr_drake.stability.verdict import VerdictOptions
 from cdpr_drake.summaries import as_kind
+from cdpr_drake.workspaces.box_grid_agreement import BoxAgreement
+from cdpr_drake.workspaces.certified_boxes import CertifiedBoxes
 from cdpr_drake.workspaces.demanded_wrenches import SpatialSet
+from cdpr_drake.workspaces.hull import WorkspaceHull
+from cdpr_drake.workspaces.mesh_files import GRID_ENDINGS, MESH_ENDINGS, mesh_ending, write_hull
 from cdpr_drake.workspaces.pose_grid import WorkspaceGrid, grid_by_count, grid_by_step
 
 if TYPE_CHECKING:
@@ -49,17 +67,107 @@ Box = tuple[Array, Array]
 AROUND = ("obstacles", "exit_free", "anchor_free")
 WRENCHES = ("force", "moment")
 ASKED = (
-    *(field.name for field in fields(WorkspaceRequest) if field.name != "around"),
+    *(one.name for one in fields(WorkspaceRequest) if one.name != "around"),
     *AROUND, *WRENCHES,
 )  # fmt: skip
 """What `compute_workspace` can be asked for by name."""
 
-HELD = ("limits", "mass", "wrench")
-"""What cables have to hold in `assess_stability`, by name."""
+
+@dataclass(frozen=True)
+class ShapeRequest:
+    """What else is found of a workspace than the poses of its grid.
+
+    Attributes:
+        hull: Centre from which rays see its hull, shape (3,) [m]; None: no hull is asked for.
+        unbounded: Whether nothing bounds the hull; else it is `box` of `compute_workspace`, or the
+            robot's frame, unless that was assumed when the robot was imported.
+        rays: Rays of the hull, at most.
+        tolerance: How near to the border of the workspace they end [m].
+        mesh: File for the hull's triangles, of an ending in `MESH_ENDINGS`; None: none.
+        certify: Whether boxes of `box`, or of the robot's frame, are proven inside or outside; of
+            one kind.
+        boxes: Boxes that are judged, at most.
+        exit_error: Proven for exit points off by up to so much [m].
+        anchor_error: The same of anchor points [m].
+        boxes_mesh: File for the boxes as cells of VTK, of an ending in `GRID_ENDINGS`; None: none.
+    """
+
+    hull: Array | Sequence[float] | None = None
+    unbounded: bool = False
+    rays: int = 10_000
+    tolerance: float = 1e-3
+    mesh: Path | str | None = None
+    certify: bool = False
+    boxes: int = 200_000
+    exit_error: float = 0.0
+    anchor_error: float = 0.0
+    boxes_mesh: Path | str | None = None
+
+    def check(self, box: Box | None) -> None:
+        """Refuses what does not go together, before anything is computed.
+
+        Raises:
+            WorkspaceError: Names it.
+        """
+        for name, file, needed, there, endings in (
+            ("mesh", self.mesh, "hull", self.hull is not None, MESH_ENDINGS),
+            ("boxes_mesh", self.boxes_mesh, "certify", self.certify, GRID_ENDINGS),
+        ):
+            if file is not None and not there:
+                raise WorkspaceError(f"{name}: needs {needed}; accepted: both")
+            if file is not None:
+                mesh_ending(Path(file), endings)
+        if self.unbounded and (self.hull is None or box is not None):
+            wrong = "needs hull" if self.hull is None else "found box"
+            raise WorkspaceError(f"unbounded: {wrong}; accepted: with hull and without box")
+        if self.hull is not None and np.shape(self.hull) != (3,):
+            raise WorkspaceError(f"hull: found {self.hull!r}; accepted: x, y, z [m]")
+        if self.certify and self.boxes < 1:
+            raise WorkspaceError(f"boxes: found {self.boxes}; accepted: at least 1")
 
 
+SHAPES = tuple(one.name for one in fields(ShapeRequest))
+"""What else `compute_workspace` can be asked for by name."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
 class DrawnWorkspace(RobotWorkspace):
-    """A `RobotWorkspace` that draws itself."""
+    """A `RobotWorkspace` that draws and writes itself, with hull and boxes where asked for.
+
+    Attributes:
+        robot: The robot.
+        hull: Its hull; None: it was not asked for.
+        bound: Where the rays of the hull end at the latest.
+        boxes: Boxes proven inside or outside; None: they were not asked for.
+        search: What was cut into boxes.
+        agreement: What the boxes say of the grid, and of the ends of the hull's rays.
+        folder: Where it was written; None: nowhere.
+        failed: Of each picture that could not be written, the file and why.
+    """
+
+    robot: Robot
+    hull: WorkspaceHull | None = None
+    bound: HullBound | None = None
+    boxes: CertifiedBoxes | None = None
+    search: BoxSearch | None = None
+    agreement: Mapping[str, BoxAgreement] = field(default_factory=dict)
+    folder: Path | None = None
+    failed: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether the search for boxes was stopped before the end."""
+        return self.boxes is not None and not self.boxes.finished
+
+    def as_dict(self) -> dict[str, Any]:
+        """Everything for JSON, as `cdpr workspace --json` prints it."""
+        told = super().as_dict()
+        if self.hull is not None:
+            told["hull"] = hull_numbers(self.hull, self.bound)
+        if self.boxes is not None:
+            told["certified"] = box_numbers(self.boxes, self.search)
+            told["agreement"] = agreement_numbers(self.agreement)
+        return told
 
     def plot(self, measure: str | None = None) -> Figure:
         """Planes of the grid, coloured by what holds, or by a measure."""
@@ -67,15 +175,45 @@ class DrawnWorkspace(RobotWorkspace):
 
         return planes_figure(self, measure)
 
+    def summary(self) -> tuple[str, list[tuple[str, str]]]:
+        """What it shows of itself: shares and volumes of the first kinds, of hull and boxes."""
+        title, (grid, *rows) = super().summary()
+        more = []
+        if self.hull is not None:
+            words = f"{self.hull.volume:.4g} m^3, {len(self.hull.vertices)} rays"
+            more.append(("hull", words))
+        if (proven := self.boxes) is not None:
+            words = f"{proven.inside:.2%} inside, {proven.outside:.2%} outside, {proven.open:.2%}"
+            more.append(("proven", f"{words} open, {len(proven.verdicts)} boxes"))
+        return title, [grid, *more, *rows]
 
-class DrawnStability(StabilityWorkspaces):
-    """`StabilityWorkspaces` that draw themselves."""
+    def write(
+        self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS, say: Say | None = None
+    ) -> dict[str, str]:
+        """Writes arrays, `results.json`, then figures and page, into a folder that exists.
 
-    def plot(self, bounds: str | None = None) -> Figure:
-        """Planes of the grid, coloured by what holds under bounds of a name; None: the first."""
-        from cdpr_drake.analyses.workspaces.stability_figures import planes_figure
+        Args:
+            folder: The folder; in the result's own the arrays of the grid are there already.
+            formats: Endings of the files of figures.
+            say: Told what should be known of the page.
 
-        return planes_figure(self, bounds)
+        Returns:
+            Of each picture that could not be written, the file and why, in one line.
+        """
+        from cdpr_drake.analyses.workspaces.workspace_figures import workspace_pictures
+        from cdpr_drake.analyses.workspaces.workspace_scene import workspace_page
+
+        if folder != self.folder:
+            self.save(folder)
+        if self.hull is not None:
+            save_hull(self.hull, folder)
+        if self.boxes is not None:
+            save_boxes(self.boxes, folder)
+        write_json(folder / RESULTS, self.as_dict())
+        page, note = workspace_page(self, self.robot, self.hull, self.boxes)
+        if note and say is not None:
+            say(f"note: {note}")
+        return write_pictures(folder, workspace_pictures(self, formats, self.boxes) | page)
 
 
 def default_box(
@@ -96,9 +234,7 @@ def default_box(
     lower, upper, step = defaults.lower, defaults.upper, defaults.step
     if box is None:
         return lower, upper, step
-    low, high = (np.asarray(corner, float) for corner in box)
-    if low.shape != (3,) or high.shape != (3,) or not np.all(low < high):
-        raise WorkspaceGridError("box: accepted: lower below upper corner, shape (3,) each [m]")
+    low, high = _corners(box)
     free = lower < upper
     by = np.where(free, step * (high - low) / np.where(free, upper - lower, 1.0), step)
     return np.where(free, low, lower), np.where(free, high, upper), by
@@ -146,14 +282,17 @@ def workspace_question(
     """What `compute_workspace` computes; arguments as there."""
     for name in asked:
         if name not in ASKED:
-            raise WorkspaceError(f"{name!r} is unknown; {closest(name, ASKED)}")
+            raise WorkspaceError(f"{name!r} is unknown; {closest(name, (*ASKED, *SHAPES))}")
     loaded = as_robot(robot)
     own = {"pulleys": True} | {k: v for k, v in asked.items() if k not in (*AROUND, *WRENCHES)}
     force, moment = (asked.get(name) for name in WRENCHES)
+    required = own.get("required")
     if force is not None or moment is not None:
-        if own.get("required") is not None:
+        if required is not None:
             raise WorkspaceError("required: found force or moment too; accepted: one way")
         own["required"] = wrench_box(force, moment)
+    elif isinstance(required, str | Path):
+        own["required"] = load_wrench_set(Path(required))
     obstacles = asked.get("obstacles")
     if isinstance(obstacles, str | Path):
         obstacles = load_obstacles(Path(obstacles))
@@ -175,7 +314,9 @@ def compute_workspace(
     orientations: str = "all",
     box: Box | None = None,
     folder: Path | str | None = None,
-    workers: int | None = 1,
+    workers: int | str | None = 1,
+    formats: Sequence[str] = DEFAULT_FORMATS,
+    session: Session | None = None,
     **asked: Any,
 ) -> DrawnWorkspace:
     """Where a robot can work: kinds of workspaces, what they have in common, and measures.
@@ -188,25 +329,86 @@ def compute_workspace(
             default grid.
         measures: Names of `MEASURES` of the same module.
         orientations: Where kinds must hold: in all of the grid's orientations, or in any.
-        box: Lower and upper corner in W, shape (3,) each, in the place of the default box [m].
-        folder: Where finished work and the result are kept and found; None: nowhere.
-        workers: Processes; None: one for each processor.
+        box: Lower and upper corner in W, shape (3,) each, in the place of the robot's frame [m]:
+            where the default grid and certified boxes lie, and the hull ends.
+        folder: Where finished work, results, figures and page are kept, and work is continued
+            from; None: nowhere.
+        workers: Processes, or the address of a Dask scheduler; None: one for each processor.
+        formats: Endings of the files of figures.
+        session: Who follows it and may stop it; None: nobody.
         asked: What kinds shall be asked for: `limits` (2,) [N], `mass` [kg], `wrench` (6,)
             [N m, N], `force` [N] and `moment` [N m] to resist along and about each axis, or
-            `required`, a SpatialSet; `accelerations`, `velocities`, `clearance` [m], `obstacles`,
-            rows of boxes or a file; `exit_free`, `anchor_free` [m], `scenario`, `pulleys`,
-            `method`, see `WorkspaceRequest` and `interference_bodies`.
+            `required`, a SpatialSet or a file; `accelerations`, `velocities`, `clearance` [m],
+            `obstacles`, rows of boxes or a file; `exit_free`, `anchor_free` [m], `scenario`,
+            `pulleys`, `method`, see `WorkspaceRequest` and `interference_bodies`. And what else is
+            found: `hull` (3,) [m], `certify` and more fields of `ShapeRequest`.
 
     Raises:
+        StoppedError: The session stopped it before the grid was finished.
         CdprError: Something is unknown, missing, out of range, or not possible for the robot.
         OutputFolderError: The folder belongs to other arguments, or cannot be written.
     """
+    told, (count, scheduler) = session or Session(), asked_workers(workers)
+    shapes = ShapeRequest(**{name: asked.pop(name) for name in SHAPES if name in asked})
+    box = None if box is None else _corners(box)
+    shapes.check(box)
     question = workspace_question(
         robot, kinds, grid, measures=measures, orientations=orientations, box=box, **asked
     )
-    found = robot_workspace(question, _folder(folder), workers).workspace
-    assert found is not None  # nobody stopped it
-    return as_kind(DrawnWorkspace, found)
+    loaded = as_robot(robot)
+    search = None
+    if shapes.certify:
+        search = box_search(question, loaded, (shapes.exit_error, shapes.anchor_error), box)
+    hull = bound = boxes = None
+    if shapes.hull is not None:
+        bound = hull_bound(loaded, box, shapes.unbounded)
+        with told.doing("Casting rays"):
+            hull = question_hull(
+                question, loaded, np.asarray(shapes.hull, float), shapes.rays, shapes.tolerance,
+                bound,
+            )  # fmt: skip
+    with nullcontext() if folder is None else kept_folder(folder, told) as where:
+        with told.computing():
+            run = robot_workspace(question, where, count, scheduler, told.progress, told.stop)
+        if run.workspace is None:
+            raise stopped(run.progress)
+        if search is not None:
+            with told.computing("certify"):
+                boxes = _certified(search, shapes.boxes, where, told)
+        found = as_kind(
+            DrawnWorkspace, run.workspace, robot=loaded, hull=hull, bound=bound, boxes=boxes,
+            search=search, folder=where,
+            agreement={} if boxes is None else agreements(run.workspace, hull, boxes),
+        )  # fmt: skip
+        if where is None and shapes.mesh is None and shapes.boxes_mesh is None:
+            return found
+        with told.doing("Writing results"):
+            if hull is not None and shapes.mesh is not None:
+                with whole_file(Path(shapes.mesh)) as part:
+                    write_hull(hull, part)
+            if boxes is not None and shapes.boxes_mesh is not None:
+                with whole_file(Path(shapes.boxes_mesh)) as part:
+                    write_boxes(boxes, part)
+            failed = {} if where is None else found.write(where, formats, told.say)
+    return replace(found, failed=failed)
+
+
+def _certified(
+    search: BoxSearch, most: int, folder: Path | None, session: Session
+) -> CertifiedBoxes:
+    """Certified boxes; where the session stops the search, what is proven by then."""
+    begin = time.monotonic()
+
+    def tell(judged: int, open_share: float) -> None:
+        passed, words = time.monotonic() - begin, f"{open_share:.1%} open"
+        session.progress(WorkProgress(words, judged, most, passed, rate="boxes/s", items="boxes"))
+
+    return certified_boxes(search, most, folder, on_progress=tell, should_stop=session.stop)
+
+
+def stopped(progress: WorkProgress) -> StoppedError:
+    """What is raised of work that a session stopped there."""
+    return StoppedError(f"stopped after {progress.done} of {progress.total} {progress.items}")
 
 
 def wrench_box(force: float | None, moment: float | None) -> SpatialSet:
@@ -221,74 +423,11 @@ def wrench_box(force: float | None, moment: float | None) -> SpatialSet:
     return SpatialSet(box=np.array([*[moment or 0.0] * 3, *[force or 0.0] * 3]))
 
 
-def stability_question(
-    robot: Robot | str | Path,
-    scheme: str = "pbvs",
-    verdict: str = "searched",
-    *,
-    bounds: PerturbationBounds | Path | str | None = None,
-    vary: Mapping[str, Sequence[float]] | None = None,
-    grid: WorkspaceGrid | Sequence[int] | None = None,
-    scenario: str | None = None,
-    options: VerdictOptions | Mapping[str, Any] | None = None,
-    **held: Any,
-) -> StabilityQuestion:
-    """What `assess_stability` computes; arguments as there."""
-    for name in held:
-        if name not in HELD:
-            raise StabilityError(f"{name!r} is unknown; {closest(name, HELD)}")
-    return make_question(
-        robot, scheme=scheme, verdict=verdict,
-        bounds=load_bounds(Path(bounds)) if isinstance(bounds, str | Path) else bounds,
-        vary=vary, grid=pose_grid(robot, grid), options=_options(options),
-        statics=static_case(as_robot(robot), **held),
-        task=None if scenario is None else scenario_task(robot, scenario),
-    )  # fmt: skip
-
-
-def assess_stability(
-    robot: Robot | str | Path,
-    scheme: str = "pbvs",
-    verdict: str = "searched",
-    *,
-    bounds: PerturbationBounds | Path | str | None = None,
-    vary: Mapping[str, Sequence[float]] | None = None,
-    grid: WorkspaceGrid | Sequence[int] | None = None,
-    scenario: str | None = None,
-    options: VerdictOptions | Mapping[str, Any] | None = None,
-    folder: Path | str | None = None,
-    workers: int | None = 1,
-    **held: Any,
-) -> DrawnStability:
-    """Where a visual servo is stable in spite of perturbations, and the platform can be held.
-
-    Args:
-        robot: The robot, or its name or path.
-        scheme: pbvs, pbvs-line, 2.5d or ibvs.
-        verdict: sampled, searched or certified.
-        bounds: Perturbation bounds, or a file of them; None: those of the servoing thesis.
-        vary: Values of single bounds, each with the others as they are [m, rad], in degrees where
-            the name ends in _deg.
-        grid: Poses, as `compute_workspace` takes them.
-        scenario: Whose object, desired view and camera count; None: as in the servoing thesis.
-        options: How hard to look: `VerdictOptions`, or some of its fields by name.
-        folder: Where finished work and the result are kept and found; None: nowhere.
-        workers: Processes; None: one for each processor.
-        held: What the cables have to hold: `limits` (2,) [N], `mass` [kg], `wrench` (6,) [N m, N].
-
-    Raises:
-        CdprError: Something is unknown, out of range, or not possible for the robot.
-        OutputFolderError: The folder belongs to other arguments, or cannot be written.
-
-    Source: servoing thesis 3.3, (3.27), (3.28).
-    """
-    question = stability_question(
-        robot, scheme, verdict, bounds=bounds, vary=vary, grid=grid, scenario=scenario,
-        options=options, **held,
-    )  # fmt: skip
-    found = stability_workspaces(question, _folder(folder), workers).workspaces
-    assert found is not None  # nobody stopped it
-    return as_kind(DrawnStability, found)
+def _corners(box: Box) -> Box:
+    low, high = (np.asarray(corner, float) for corner in box)
+    if low.shape != (3,) or high.shape != (3,) or not np.all(low < high):
+        raise WorkspaceGridError("box: accepted: lower below upper corner, shape (3,) each [m]")
+    return low, high
 
 
 def _name(robot: Robot | str | Path) -> str:
@@ -297,17 +436,3 @@ def _name(robot: Robot | str | Path) -> str:
 
 def _words(names: str | Sequence[str]) -> tuple[str, ...]:
     return (names,) if isinstance(names, str) else tuple(names)
-
-
-def _folder(folder: Path | str | None) -> Path | None:
-    return None if folder is None else Path(folder)
-
-
-def _options(options: VerdictOptions | Mapping[str, Any] | None) -> VerdictOptions:
-    if isinstance(options, VerdictOptions):
-        return options
-    known = [field.name for field in fields(VerdictOptions)]
-    for name in options or {}:
-        if name not in known:
-            raise StabilityError(f"options: {name!r} is unknown; {closest(name, known)}")
-    return replace(VerdictOptions(), **(options or {}))

@@ -168,7 +168,7 @@ def results_folder(
             raise OutputFolderError(f"{final}: found a file; accepted: a folder")
         if any(final.iterdir()) and not overwrite:
             raise OutputFolderError(
-                f"{final}: holds files already; name another folder or allow --overwrite"
+                f"{final}: holds files already; name another folder or allow overwrite"
             )
         _check_replaceable(final)
     made = [parent for parent in final.parents if not parent.exists()]
@@ -212,8 +212,8 @@ def _say_left(problem: BaseException, results: ResultsFolder) -> None:
     """Notes where what was finished or simulated is, and removes what is neither."""
     if not results.published and holds_log(results.path):
         problem.add_note(
-            f"what was simulated is in {results.keep_log()}; cdpr simulate --finish "
-            "of that folder makes log, summary and figures of it, --continue goes on"
+            f"what was simulated is in {results.keep_log()}; finish_run makes log, summary and "
+            "figures of that folder, continue_run goes on"
         )
     elif not results.published and (results.path / RESULTS).is_file():
         problem.add_note(f"what was finished is in {results.publish()}")

@@ -6,8 +6,9 @@ is seen (`embedded`); `STYLE` is how it looks, on a screen and on paper.
 
 import base64
 import json
+import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -18,11 +19,25 @@ import numpy as np
 
 from cdpr_drake.analyses.reporting.log_files import write_whole
 from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
-from cdpr_drake.analyses.reporting.statements import NOT_IN_QUICK, NOT_JUDGED, NOT_TESTABLE
+from cdpr_drake.analyses.reporting.statements import (
+    CONFIRMED,
+    IN_PART,
+    NOT_CONFIRMED,
+    NOT_IN_QUICK,
+    NOT_JUDGED,
+    NOT_TESTABLE,
+)
 from cdpr_drake.analyses.reproduction.numbers import RULE
-from cdpr_drake.analyses.reproduction.rows import CITED, MISSING, NOT_ASKED, SHOWN, ReportRow
-from cdpr_drake.analyses.reproduction.scorecard import Scorecard
+from cdpr_drake.analyses.reproduction.rows import CITED, MISSING, NOT_ASKED, SHOWN, Fact, ReportRow
+from cdpr_drake.analyses.reproduction.scorecard import OWN, Scorecard, chapter_words
 from cdpr_drake.analyses.reproduction.states import StudyState, study_folder
+from cdpr_drake.analyses.studies.framework.statement import (
+    CHOICE,
+    HARDWARE,
+    MET_CONSTRUCTION,
+    MET_FITTED,
+    SOURCE,
+)
 from cdpr_drake.analyses.studies.published.recipe_choices import CHOICES
 from cdpr_drake.analyses.studies.published.register import Register
 
@@ -30,9 +45,6 @@ REPORT = "report.html"
 
 RECIPES = "stability-recipes"
 """Study whose tables stand in the section on the recipe."""
-
-OURS = "ours"
-"""Register of what no source states."""
 
 QUICK = (
     "This is the quick form: few runs, one seed, coarse grids. Its verdicts say that the machinery "
@@ -60,10 +72,11 @@ def write_report(
         Path of the page.
     """
     parts = [_head(quick), _scorecard(rows, registers), _contents(registers, rows)]
+    parts.append(_chapters(rows, registers))
     parts += [_lacks(rows), _studies(folder, states)]
     for register in registers:
         parts.append(_source(folder, register, [r for r in rows if r.source == register.name]))
-    parts += [_recipe(states), _details(folder, states)]
+    parts += [_recipe(states), _rules(rows), _details(folder, states)]
     words = "\n".join(["<!doctype html>", '<html lang="en">', *parts, "</main></body></html>\n"])
     path = folder / REPORT
     write_whole(path, words)
@@ -85,37 +98,127 @@ def _head(quick: bool) -> str:
 
 
 def _scorecard(rows: Sequence[ReportRow], registers: Sequence[Register]) -> str:
+    """Facts by chapter, and folded below them the items that rest on them."""
     card = Scorecard.of(rows)
-    verdicts = card.shown()
-    lines = []
-    for register in registers:
-        total = card.total(register.name)
-        if not total:
-            continue
-        for (name, chapter), counts in card.chapters.items():
-            if name == register.name:
-                lines.append(_counts(_chapter(register, chapter), counts, verdicts))
-        lines.append(_counts(register.title, total, verdicts, "total"))
-    lines.append(_counts("All", card.total(), verdicts, "total"))
-    heads = "".join(f'<th class="n">{escape(verdict)}</th>' for verdict in verdicts)
+    facts = _counted(card.facts, card.shown_facts(), registers, "facts")
+    items = _counted(card.chapters, card.shown(), registers, "items")
     return (
         '<h2 id="scorecard" style="break-before: auto">Scorecard</h2>'
-        '<table class="scorecard"><thead><tr><th></th>'
-        f'<th class="n">items</th>{heads}</tr></thead><tbody>{"".join(lines)}</tbody></table>'
+        f'{facts}<p class="lead">A fact is one check of a study, or one printed number, and is '
+        "counted once, where it comes first; what no source states, but we ask for, is apart. Of "
+        f"the facts of the sources {card.independent} are confirmed by runs that could have said "
+        f"otherwise. {escape(MET_FITTED)}: parameters were chosen with the number in sight; "
+        f"{escape(MET_CONSTRUCTION)}: nothing else could have come out.</p>"
+        "<details><summary>Figures, tables, numbers and sentences, of which several may rest on "
+        f"one fact</summary>{items}</details>"
         f'<p class="lead">{escape(RULE)} Statements are judged by their studies, which say how. '
         f"{escape(SHOWN)}: a figure that is drawn here, and of which nothing is judged; "
         f"{escape(CITED)}: told of the work of others.</p>"
     )
 
 
-def _chapter(register: Register, chapter: str) -> str:
-    """A line's name in the scorecard: a chapter's number, or what ours is about."""
-    if register.name == OURS:
-        titles = {section.chapter: section.title for section in register.sections}
-        return titles.get(chapter, f"Study {chapter}")
-    if len(chapter) == 1 and chapter.isalpha():
-        return f"Appendix {chapter}"
-    return f"Chapter {chapter}" if chapter[0].isdigit() else chapter
+def _counted(
+    chapters: Mapping[tuple[str, str], Counter[str]],
+    verdicts: Sequence[str],
+    registers: Sequence[Register],
+    what: str,
+) -> str:
+    """A table of counts, sources and what is ours apart."""
+    lines, every = [], Counter[str]()
+    for register in registers:
+        mine = {
+            chapter: some for (name, chapter), some in chapters.items() if name == register.name
+        }
+        total = sum(mine.values(), Counter[str]())
+        if not total:
+            continue
+        lines += [
+            _counts(chapter_words(register, one), some, verdicts) for one, some in mine.items()
+        ]
+        lines.append(_counts(register.title, total, verdicts, "total"))
+        every += total if register.name != OWN else Counter()
+    lines.append(_counts("All of the sources", every, verdicts, "total"))
+    heads = "".join(f'<th class="n">{escape(verdict)}</th>' for verdict in verdicts)
+    return (
+        f'<table class="scorecard"><thead><tr><th></th><th class="n">{what}</th>{heads}</tr>'
+        f"</thead><tbody>{''.join(lines)}</tbody></table>"
+    )
+
+
+CAUSES = {
+    SOURCE: "because of the source, which contradicts itself or leaves out what is needed",
+    HARDWARE: "because of the prototype, which has what is in no model",
+    CHOICE: "because of a choice of ours",
+    "": "for a reason that is not known, or not sorted yet",
+}
+"""Words for why facts do not hold."""
+
+NAMED = 6
+"""So many facts of a kind are named in the overview of a chapter; the table has all."""
+
+
+def _chapters(rows: Sequence[ReportRow], registers: Sequence[Register]) -> str:
+    """Of each chapter what stands, what is corrected, what failed and why."""
+    parts = ['<h2 id="chapters">Chapter by chapter</h2>']
+    for register in registers:
+        if register.name == OWN:
+            continue
+        mine = [row for row in rows if row.source == register.name]
+        for chapter in sorted({*(row.chapter for row in mine), *register.corrected}):
+            some = [row for row in mine if row.chapter == chapter]
+            lines = _overview(some, register.corrected.get(chapter, ()))
+            if lines:
+                items = "".join(f"<li>{line}</li>" for line in lines)
+                words = f"{register.title.partition(',')[0]}: {chapter_words(register, chapter)}"
+                parts.append(f'<h3>{escape(words)}</h3><ul class="plain">{items}</ul>')
+    return "".join(parts)
+
+
+def _overview(rows: Sequence[ReportRow], corrected: Sequence[str]) -> list[str]:
+    """Lines on a chapter: its facts by what came of them, each once."""
+    facts: dict[str, tuple[Fact, ReportRow]] = {}
+    for row in rows:
+        for fact in row.facts:
+            if len(row.facts) == 1 or fact.key not in facts:
+                facts.setdefault(fact.key, (fact, row))
+    found = list(facts.values())
+
+    def named(verdicts: Collection[str], cause: str | None = None) -> tuple[int, str]:
+        some = [
+            (fact, row) for fact, row in found
+            if fact.verdict in verdicts and cause in (None, fact.cause)
+        ]  # fmt: skip
+        words = "; ".join(_in_short(fact, row) for fact, row in some[:NAMED])
+        more = f"; and {len(some) - NAMED} more" if len(some) > NAMED else ""
+        return len(some), escape(words + more)
+
+    lines = []
+    for title, verdicts in (
+        ("Stands", (CONFIRMED,)), ("Met, but not put to a test", (MET_FITTED, MET_CONSTRUCTION)),
+    ):  # fmt: skip
+        count, words = named(verdicts)
+        if count:
+            lines.append(f"<b>{title}, {count}</b>: {words}.")
+    if corrected:
+        lines.append(f"<b>Corrected, {len(corrected)}</b>: {escape('; '.join(corrected))}.")
+    for cause, why in CAUSES.items():
+        for title, verdict in (("Fails", NOT_CONFIRMED), ("Holds in part", IN_PART)):
+            count, words = named((verdict,), cause)
+            if count:
+                lines.append(f"<b>{title}, {count}</b>, {why}: {words}.")
+    return lines
+
+
+def _in_short(fact: Fact, row: ReportRow) -> str:
+    """A fact in a few words: those of its row where that rests on it alone."""
+    if len(row.facts) > 1:
+        return fact.key.partition("/")[2].replace("_", " ")
+    words = row.words.rstrip(".")
+    return words if len(words) <= SHORT else f"{words[:SHORT].rpartition(' ')[0]} ..."
+
+
+SHORT = 110
+"""Longest words of a fact in the overview of a chapter."""
 
 
 def _counts(words: str, counts: Counter[str], verdicts: Sequence[str], kind: str = "") -> str:
@@ -128,10 +231,15 @@ def _counts(words: str, counts: Counter[str], verdicts: Sequence[str], kind: str
 
 def _contents(registers: Sequence[Register], rows: Sequence[ReportRow]) -> str:
     there = {row.source for row in rows}
-    links = [("lacks", "What is missing, or not judged"), ("studies", "Studies")]
+    links = [
+        ("chapters", "Chapter by chapter"),
+        ("lacks", "What is missing, or not judged"),
+        ("studies", "Studies"),
+    ]
     links += [(register.name, register.title) for register in registers if register.name in there]
     links += [
         ("recipe", "The recipe of the stability tables"),
+        ("rules", "Tolerances"),
         ("details", "Tables of the studies"),
     ]
     items = "".join(f'<li><a href="#{name}">{escape(title)}</a></li>' for name, title in links)
@@ -237,16 +345,17 @@ def _without(register: Register) -> str:
 def _table(rows: Sequence[ReportRow]) -> str:
     lines = []
     for row in rows:
-        kind = row.verdict.replace(" ", "-")
+        kind = re.sub("[^a-z]+", "-", row.verdict).strip("-")
         links = ", ".join(escape(study) for study in row.studies)
         why = "; ".join(part for part in (row.why, row.lacks and f"missing: {row.lacks}") if part)
         label = escape(row.label)
         if row.figures:
             label = f'<a href="#{escape(_anchor(row.figures[0]))}">{label}</a>'
         label = f"{label}<br><small>{links}</small>" if links else label
+        verdict = escape(row.verdict) + ("<br><small>counted above</small>" if row.repeats else "")
         lines.append(
             f"<tr><td>{label}</td><td>{escape(row.words)}</td><td>{escape(row.printed)}</td>"
-            f'<td>{escape(row.found)}</td><td><div class="v {kind}">{escape(row.verdict)}</div>'
+            f'<td>{escape(row.found)}</td><td><div class="v {kind}">{verdict}</div>'
             f"</td><td>{escape(why)}</td></tr>"
         )
     widths = "".join(
@@ -306,6 +415,21 @@ def _recipe(states: Mapping[str, StudyState]) -> str:
         + ("".join(map(_words, _plain_tables(states[RECIPES]))) if RECIPES in states else
            f'<p class="lead">The study {RECIPES} was not asked for.</p>')
     )  # fmt: skip
+
+
+def _rules(rows: Sequence[ReportRow]) -> str:
+    """What had to be within which bounds, of every fact that says so."""
+    facts = {fact.key: fact for row in rows for fact in row.facts if fact.rule}
+    lines = "".join(
+        f"<tr><td>{escape(key)}</td><td>{escape(fact.rule)}</td><td>{escape(fact.verdict)}</td></tr>"
+        for key, fact in sorted(facts.items())
+    )
+    return (
+        '<h2 id="rules">Tolerances</h2><p class="lead">What a statement had to keep to hold, and '
+        "why that much. Of printed numbers one rule holds for all: it stands below the scorecard."
+        "</p><table><thead><tr><th>study and check</th><th>rule</th><th>verdict</th></tr></thead>"
+        f"<tbody>{lines}</tbody></table>"
+    )
 
 
 def _plain_tables(state: StudyState) -> list[Mapping[str, Any]]:
@@ -389,7 +513,9 @@ tr.total td { font-weight: 600; border-top: 2px solid #8b9099; }
 .items col.label { width: 8%; } .items col.words { width: 20%; } .items col.printed { width: 13%; }
 .items col.found { width: 21%; } .items col.verdict { width: 10%; } .items col.why { width: 28%; }
 .v { font-weight: 600; white-space: normal; padding-left: 10px; border-left: 6px solid #8b9099; }
-.v.confirmed { border-left-color: #009e73; } .v.in-part { border-left: 6px double #c98500; }
+.v.confirmed { border-left-color: #009e73; }
+.v.met-fitted, .v.met-by-construction { border-left: 6px double #009e73; }
+.v.in-part { border-left: 6px double #c98500; }
 .v.not-confirmed, .v.study-failed { border-left: 6px dashed #b3312c; }
 .v.missing { border-left: 6px dotted #b3312c; }
 .quick { background: #fff6dd; border: 1px solid #d9b44a; padding: 8px 12px; max-width: 900px; }

@@ -19,6 +19,11 @@ from cdpr_drake.analyses.reproduction.states import (
     study_folder,
 )
 from cdpr_drake.analyses.studies.catalogue import StudyEntry
+from cdpr_drake.analyses.studies.framework.statement import (
+    MET_CONSTRUCTION,
+    MET_FITTED,
+    TEST,
+)
 from cdpr_drake.analyses.studies.published.register import PublishedItem, PublishedSection, Register
 
 SHOWN = "shown"
@@ -32,7 +37,27 @@ NOT_FINISHED = "not finished"
 NOT_ASKED = "not asked for"
 """The study that answers it was not among those to be run."""
 
-_JUDGED = (CONFIRMED, IN_PART, NOT_CONFIRMED)
+_GOOD = (CONFIRMED, MET_FITTED, MET_CONSTRUCTION)
+_JUDGED = (*_GOOD, IN_PART, NOT_CONFIRMED)
+
+
+@dataclass(frozen=True)
+class Fact:
+    """What one check found, or one printed number; rows that rest on it may be several.
+
+    Attributes:
+        key: "study/check", or "study/configuration/metric".
+        verdict: What came of it.
+        basis: What it rests on, see `framework.statement`.
+        rule: What had to be within which bounds.
+        cause: Why it does not hold, see `framework.statement`; empty: it does, or nobody knows.
+    """
+
+    key: str
+    verdict: str
+    basis: str = TEST
+    rule: str = ""
+    cause: str = ""
 
 
 @dataclass(frozen=True)
@@ -53,6 +78,8 @@ class ReportRow:
         studies: Which studies answer it.
         figures: Files of figures that show it, below the reproduction's folder.
         differs: By what these differ from the published one; may be empty.
+        facts: What it rests on.
+        repeats: Whether rows before it rest on all of these already.
     """
 
     source: str
@@ -68,6 +95,8 @@ class ReportRow:
     studies: tuple[str, ...] = ()
     figures: tuple[str, ...] = ()
     differs: str = ""
+    facts: tuple[Fact, ...] = ()
+    repeats: bool = False
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
@@ -83,6 +112,14 @@ class _Answer:
     printed: str = ""
     found: str = ""
     why: str = ""
+    basis: str = TEST
+    rule: str = ""
+    same_as: str = ""
+    cause: str = ""
+
+    def fact(self, key: str) -> Fact:
+        """It as a fact, under the key where it is judged first."""
+        return Fact(self.same_as or key, self.verdict, self.basis, self.rule, self.cause)
 
 
 class _Found:
@@ -122,10 +159,23 @@ class _Found:
                 continue
             if said["verdict"] == NOT_IN_QUICK:
                 return replace(self.lack(study), words=said["words"])
-            return _Answer(
-                said["verdict"], said["words"], said["printed"], said["found"], said["why"]
-            )
+            return self.said(said)
         return self.lack(study)
+
+    def said(self, said: Mapping[str, Any]) -> _Answer:
+        """What a statement of a study's results says; what a fact that is judged elsewhere too
+        rests on is said there."""
+        answer = _Answer(
+            said["verdict"], said["words"], said["printed"], said["found"], said["why"],
+            said.get("basis", TEST), said.get("rule", ""), said.get("same_as", ""),
+            said.get("cause", ""),
+        )  # fmt: skip
+        if answer.same_as:
+            study, _, name = answer.same_as.partition("/")
+            for first in self.results(study).get("statements", ()):
+                if first.get("name") == name:
+                    return replace(answer, basis=first.get("basis", TEST))
+        return answer
 
     def figure(self, key: str) -> str | None:
         """Path of a figure below the folder; None where it was not drawn."""
@@ -158,7 +208,18 @@ def report_rows(
                 rows += _numbers(register, section, key, found)
         for study in register.own:
             rows += _own(register, study, found)
-    return rows
+    return _marked(rows)
+
+
+def _marked(rows: Sequence[ReportRow]) -> list[ReportRow]:
+    """Rows, those marked that rest on nothing but what rows before them rest on."""
+    seen: set[str] = set()
+    marked = []
+    for row in rows:
+        keys = {fact.key for fact in row.facts}
+        marked.append(replace(row, repeats=bool(keys) and keys <= seen))
+        seen |= keys
+    return marked
 
 
 def _item(
@@ -179,7 +240,7 @@ def _item(
     return ReportRow(
         register.name, section.chapter, section.number, item.label, words, answer.printed,
         answer.found, answer.verdict, why, item.missing, tuple(studies), tuple(figures),
-        item.differs,
+        item.differs, tuple(one.fact(key) for key, one in answers.items()),
     )  # fmt: skip
 
 
@@ -205,8 +266,10 @@ def _together(
     if judged:
         # What is left to judge may spoil a confirmation, but makes none of what was not confirmed.
         left = len(judged) < len(verdicts)
-        alike = len(set(judged)) == 1 and not (left and judged[0] == CONFIRMED)
-        whole = judged[0] if alike else IN_PART
+        good = all(verdict in _GOOD for verdict in judged)
+        alike = (good or len(set(judged)) == 1) and not (left and good)
+        # All of it holds as well as the weakest of its parts does.
+        whole = max(judged, key=_JUDGED.index) if alike else IN_PART
         return _Answer(whole, found=words, why=_reasons(answers))
     if verdicts:
         return _Answer(verdicts[0], found=words, why=next(iter(answers.values())).why)
@@ -264,6 +327,7 @@ def _numbers(
             register.name, section.chapter, section.number, "number",
             f"{number.label}: {number.heading}", number.printed, words, verdict, why,
             studies=(study,),
+            facts=(Fact(f"{study}/{number.configuration}/{number.metric}", verdict),),
         )  # fmt: skip
 
 
@@ -282,4 +346,5 @@ def _own(register: Register, study: str, found: _Found) -> Iterator[ReportRow]:
         yield ReportRow(
             register.name, study, study, "statement", one["words"], one["printed"], one["found"],
             one["verdict"], one["why"], studies=(study,),
+            facts=(found.said(one).fact(f"{study}/{one.get('name') or one['words']}"),),
         )  # fmt: skip

@@ -116,7 +116,7 @@ def check_folder(folder: Path, quick: bool) -> None:
             words = {True: "the quick form", False: "the full form"}
             raise OutputFolderError(
                 f"{folder}: holds a reproduction in {words[before]}, {words[quick]} is asked for; "
-                "name another folder or allow --overwrite"
+                "name another folder or allow overwrite"
             )
         return
     # By who was killed at once.

@@ -95,7 +95,7 @@ def read_checkpoint(folder: Path, asked: dict[str, Any]) -> Checkpoint:
     if not path.is_file():
         raise CheckpointError(
             f"{folder.parent}: holds no checkpoint: the run was ended too soon after its start; "
-            "cdpr simulate --finish makes results of its log"
+            "finish_run makes results of its log"
         )
     try:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
@@ -119,6 +119,6 @@ def read_checkpoint(folder: Path, asked: dict[str, Any]) -> Checkpoint:
             f"{path}: is that of another run: "
             + "; ".join(different[:NAMED])
             + (f"; and {more} more" if more > 0 else "")
-            + "; cdpr simulate --finish makes results of what there is"
+            + "; finish_run makes results of what there is"
         )
     return found

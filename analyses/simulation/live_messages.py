@@ -56,7 +56,7 @@ def open_connection(descriptor: int) -> Connection:
         return Connection(descriptor)
     except (OSError, ValueError) as problem:
         raise CdprError(
-            f"--steered-by: found {descriptor}; accepted: the number of an open socket"
+            f"descriptor: found {descriptor}; accepted: the number of an open socket"
         ) from problem
 
 

@@ -141,7 +141,7 @@ def elastic_equilibria(
     if np.isfinite(found.expected):
         words += f": {found.expected:.1f} expected"
     if not found.stopped:
-        words += "; the stopping rule asks for more --searches"
+        words += "; the stopping rule asks for more searches"
     given = np.asarray(l0, float)
     return replace(_report(robot, platform, found.rests, given, evidence, words), model="elastic")
 

@@ -15,8 +15,10 @@ from cdpr_drake.analyses.reporting.statements import names_of_checks
 from cdpr_drake.analyses.studies import (
     closed_loops,
     control_stability,
+    design,
     engines,
     fusion,
+    identification,
     mobile_robot,
     pick_and_place,
     scenarios,
@@ -28,17 +30,14 @@ from cdpr_drake.analyses.studies import (
     worked_examples,
     workspaces,
 )
-from cdpr_drake.analyses.studies.calibration.study import study_calibration
+from cdpr_drake.analyses.studies.calibration.study import STUDY as CALIBRATION
 from cdpr_drake.analyses.studies.case_studies import CASE_STUDIES
-from cdpr_drake.analyses.studies.design import study_design
 from cdpr_drake.analyses.studies.framework.case_definition import PublishedNumber
 from cdpr_drake.analyses.studies.framework.case_study import run_case_study
 from cdpr_drake.analyses.studies.framework.study import Study as FramedStudy
-from cdpr_drake.analyses.studies.identification.study import study_identification
-from cdpr_drake.analyses.studies.planning.study import study_planning
+from cdpr_drake.analyses.studies.planning.study import STUDY as PLANNING
 from cdpr_drake.analyses.studies.published.recipe_variants import RECIPES
 from cdpr_drake.analyses.studies.tension_cases import TENSION_CASES
-from cdpr_drake.stability.stability_case import SCHEMES
 
 
 class StudyResult(Protocol):
@@ -78,7 +77,6 @@ class StudyEntry:
         run: What runs it.
         continues: Whether it works in its folder from the start, by `run_study_sweep`, and
             continues when it is run again; otherwise the folder appears at the end.
-        spreads: Whether workers of a cluster can do its work.
         repeats: Whether it repeats runs over as many seeds as its session says.
         judges: Names of the statements that it can judge, as its results have them.
         numbers: Printed numbers that it puts beside its own.
@@ -88,7 +86,6 @@ class StudyEntry:
 
     run: Study
     continues: bool = False
-    spreads: bool = True
     repeats: bool = False
     judges: tuple[str, ...] = ()
     numbers: tuple[PublishedNumber, ...] = ()
@@ -114,28 +111,8 @@ STUDIES: dict[str, StudyEntry] = {
         judges=names_of_checks(tension_methods.CHECKS),
         figures=tension_methods.FIGURES,
     ),
-    "worked-examples": StudyEntry(
-        worked_examples.study_worked_examples,
-        spreads=False,
-        judges=names_of_checks(worked_examples.CHECKS),
-        figures=("trajectory", "feasible_polygons"),
-    ),
-    "stability-closed-loop": StudyEntry(
-        closed_loops.study_closed_loop,
-        continues=True,
-        judges=names_of_checks(closed_loops.CHECKS),
-        figures=("errors", "ways"),
-    ),
-    **{
-        f"stability-closed-loop-{scheme}": StudyEntry(
-            partial(closed_loops.study_closed_loop, scheme=scheme),
-            continues=True,
-            judges=names_of_checks(closed_loops.CHECKS),
-            figures=("errors", "ways"),
-        )
-        for scheme in SCHEMES
-        if scheme != "pbvs"
-    },
+    "worked-examples": entry_of(worked_examples.STUDY),
+    **{study.name: entry_of(study) for study in closed_loops.STUDIES},
     "control-stability": StudyEntry(
         control_stability.study_control_stability,
         continues=True,
@@ -151,49 +128,17 @@ STUDIES: dict[str, StudyEntry] = {
     "stability-ranges": entry_of(stability_ranges.STUDY),
     "stability-shapes": entry_of(stability_shapes.STUDY),
     "workspaces": entry_of(workspaces.STUDY),
-    "design": StudyEntry(study_design, continues=True),
-    "engines": StudyEntry(
-        engines.study_engines,
-        continues=True,
-        judges=names_of_checks(engines.CHECKS),
-        figures=("engines",),
-    ),
-    "scenarios": StudyEntry(
-        scenarios.study_scenarios,
-        continues=True,
-        judges=names_of_checks(scenarios.CHECKS),
-        figures=scenarios.FIGURES,
-    ),
-    "planning": StudyEntry(study_planning, continues=True, figures=("phase_planes",)),
-    "mobile-robot": StudyEntry(
-        mobile_robot.study_mobile_robot,
-        continues=True,
-        repeats=True,
-        judges=names_of_checks(mobile_robot.CHECKS),
-        figures=mobile_robot.FIGURES,
-    ),
+    "design": entry_of(design.STUDY),
+    "engines": entry_of(engines.STUDY),
+    "scenarios": entry_of(scenarios.STUDY),
+    "planning": entry_of(PLANNING),
+    "mobile-robot": entry_of(mobile_robot.STUDY),
     "pick-and-place": entry_of(pick_and_place.STUDY),
-    "fusion": StudyEntry(
-        fusion.study_fusion,
-        continues=True,
-        repeats=True,
-        judges=names_of_checks(fusion.CHECKS),
-        figures=("fusion",),
-    ),
-    "schemes": StudyEntry(
-        schemes.study_schemes,
-        continues=True,
-        repeats=True,
-        judges=names_of_checks(schemes.CHECKS),
-        figures=("schemes",),
-    ),
+    "fusion": entry_of(fusion.STUDY),
+    "schemes": entry_of(schemes.STUDY),
     "tagless": entry_of(tagless.STUDY),
-    "calibration": StudyEntry(
-        study_calibration, continues=True, repeats=True, figures=("calibration",)
-    ),
-    "identification": StudyEntry(
-        study_identification, continues=True, repeats=True, figures=("identification",)
-    ),
+    "calibration": entry_of(CALIBRATION),
+    "identification": entry_of(identification.STUDY),
     **{
         case.name: StudyEntry(
             partial(run_case_study, case),

@@ -1,14 +1,14 @@
 """Study of what moving points is worth: ACROBOT for wrenches to resist, CAROCA for visual servoing.
 
 Exit points move by up to 10 cm, anchor points of CAROCA by up to 5 cm, with the half-turn symmetry
-of both robots kept. `study_design` runs a search for each robot and proves its best design: what
-was gained is proven, not taken from the search.
+of both robots kept. A search is run for each robot, and its best design proven: what was gained is
+proven, not taken from the search.
 """
 
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -21,10 +21,11 @@ from cdpr_drake.analyses.design.confirmation import Confirmation, confirm
 from cdpr_drake.analyses.design.results import DesignResult, write_design
 from cdpr_drake.analyses.design.search import DesignSearch, search_design
 from cdpr_drake.analyses.design.settings import DesignSettings, GoalSettings, MirrorSettings
-from cdpr_drake.analyses.reporting.log_files import write_json
 from cdpr_drake.analyses.reporting.progress import DEFAULT_STUDY_SESSION, StudySession, WorkProgress
-from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
-from cdpr_drake.analyses.reporting.statements import Statement, statement_table, verdict
+from cdpr_drake.analyses.reporting.provenance import code_version
+from cdpr_drake.analyses.studies.framework.runs import Runs, pack_row
+from cdpr_drake.analyses.studies.framework.statement import OURS, Check, Finding, statement
+from cdpr_drake.analyses.studies.framework.study import Case, Form, Study, StudyResult
 from cdpr_drake.analyses.sweeps.folder import SweepFolder
 from cdpr_drake.analyses.sweeps.sweep import STARTING
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
@@ -80,58 +81,66 @@ ITEMS = (
 )
 
 
+def cases(form: Form) -> Iterator[Case]:
+    """The robots."""
+    for item in ITEMS:
+        yield Case(name=item.robot, keys={"robot": item.robot, "goal": item.goal})
+
+
+def _gained(item: DesignItem) -> Check:
+    """Whether the design of a robot is better, by what was proven."""
+
+    @statement(
+        f"{item.robot}, points moved within {100.0 * REACH:g} cm: more {item.goal}",
+        rule="more is proven of the design than can be true of the robot; in part: than is proven",
+        basis=OURS,
+        name=f"{item.robot}_gain",
+    )
+    def check(runs: Runs) -> Finding:
+        one = runs.one(robot=item.robot)
+        gain = "" if one["gain"] is None else f", {100.0 * one['gain']:+.1f} %"
+        sure = one["sure_whatever_is_open"]
+        return Finding(
+            found=f"{one['original']:.4g} to {one['design']:.4g} {one['unit']}{gain}",
+            held=[sure],
+            some=one["design"] > one["original"],
+            why="" if sure else "proven volumes; open boxes could turn it round",
+        )
+
+    return check
+
+
 @dataclass(frozen=True, eq=False)
-class DesignStudy:
+class DesignStudyResult(StudyResult):
     """What the study found.
 
     Attributes:
-        quick: Whether it was the quick form.
         results: Searches, finished or not.
-        progress: Where it stood at the end.
     """
 
-    quick: bool
     results: tuple[DesignResult, ...]
-    progress: WorkProgress
 
     @property
     def interrupted(self) -> bool:
         """Whether it was stopped before the end."""
         return len(self.results) < len(ITEMS) or any(one.interrupted for one in self.results)
 
-    @property
-    def statements(self) -> list[Statement]:
-        """Whether each design is better, by what was proven."""
-        found = []
-        for result in self.results:
-            for one in result.confirmed:
-                gain = "" if one.gain is None else f", {100.0 * one.gain:+.1f} %"
-                words = f"{result.robot}, points moved within {100.0 * REACH:g} cm: more {one.goal}"
-                numbers = f"{one.original:.4g} to {one.design:.4g} {one.unit}{gain}"
-                why = "" if one.sure else "proven volumes; open boxes could turn it round"
-                better = one.design > one.original
-                found.append(Statement(words, "", numbers, verdict(one.sure, better), why))
-        return found
-
     def as_dict(self) -> dict[str, Any]:
-        """Everything for JSON."""
-        return {
-            "study": "design",
-            "quick": self.quick,
-            "interrupted": self.interrupted,
-            "wall_time_s": self.progress.wall_time,
-            "versions": package_versions(),
-            "designs": {one.robot: one.as_dict() for one in self.results},
-            "statements": [one.as_dict() for one in self.statements],
+        """Everything for JSON; `numbers` has the searches, by robot."""
+        left_out = ("wall_time_s", "versions")
+        searches = {
+            one.robot: {name: v for name, v in one.as_dict().items() if name not in left_out}
+            for one in self.results
         }
+        return super().as_dict() | {"numbers": searches}
 
     def tables(self) -> list[Table]:
         """Tables for the terminal."""
-        tables = [table for one in self.results for table in one.tables()]
-        return [*tables, statement_table("What was gained, by proof", self.statements)]
+        return [*(table for one in self.results for table in one.tables()), *super().tables()]
 
     def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> dict[str, str]:
-        """Writes robot file and designs of each robot, `results.json`, then the figures of all.
+        """Writes robot file and designs of each robot, `runs.csv` and `results.json`, then the
+        figures of all.
 
         Returns:
             Of each figure that could not be written, the file and why, in one line.
@@ -141,28 +150,51 @@ class DesignStudy:
             if one.search.best is not None:
                 write_design(one.search, one.robot, folder / one.robot)
             one.write_data(folder / one.robot)
-        write_json(folder / "results.json", self.as_dict())
-        failed = {}
+        failed = super().write(folder, formats)
         for one in self.results:
             for name, why in one.write_figures(folder / one.robot, formats).items():
                 failed[f"{one.robot}/{name}"] = why
         return failed
 
 
-def study_design(quick: bool = False, session: StudySession = DEFAULT_STUDY_SESSION) -> DesignStudy:
-    """Runs the study.
+class DesignStudy(Study):
+    """The study: a search with generations for each robot, in a folder of its own, then a proof."""
 
-    Args:
-        quick: Few generations, coarse grids, few boxes, to see that everything works.
-        session: How it is run.
+    def __call__(
+        self, quick: bool = False, session: StudySession = DEFAULT_STUDY_SESSION
+    ) -> DesignStudyResult:
+        """Runs it.
 
-    Raises:
-        OutputFolderError: The folder belongs to other arguments, or cannot be written.
-        CdprError: A robot cannot be asked.
-    """
-    if session.folder is not None:
-        about = {"cdpr_drake": code_version(), "study": "design", "quick": quick}
-        SweepFolder(session.folder, about)
+        Args:
+            quick: Few generations, coarse grids, few boxes, to see that everything works.
+            session: How it is run.
+
+        Raises:
+            OutputFolderError: The folder belongs to other arguments, or cannot be written.
+            CdprError: A robot cannot be asked.
+        """
+        if session.folder is not None:
+            about = {"cdpr_drake": code_version(), "study": self.name, "quick": quick}
+            SweepFolder(session.folder, about)
+        results, progress = _searched(quick, session)
+        rows = {
+            result.robot: pack_row(_row(result, proof))
+            for result in results
+            for proof in result.confirmed
+            if proof.finished
+        }
+        form = Form(quick)
+        return DesignStudyResult(self, form, tuple(self.plan(form)), rows, progress, results)
+
+
+def _row(result: DesignResult, proof: Confirmation) -> dict[str, Any]:
+    """What was proven of a robot and of its best design, in `unit`, and of how many designs."""
+    judged = {"designs_judged": len(result.search.values)}
+    return {name: value for name, value in proof.as_dict().items() if name != "goal"} | judged
+
+
+def _searched(quick: bool, session: StudySession) -> tuple[tuple[DesignResult, ...], WorkProgress]:
+    """Searches and proofs of the robots one after the other, and where they stood at the end."""
     results: list[DesignResult] = []
     last = WorkProgress(STARTING, 0, 1, 0.0, rate="designs/s", items="designs")
     for number, item in enumerate(ITEMS):
@@ -193,7 +225,7 @@ def study_design(quick: bool = False, session: StudySession = DEFAULT_STUDY_SESS
         results.append(DesignResult(item.robot, search, proven))
         if search.interrupted or (stop is not None and stop()):
             break
-    return DesignStudy(quick, tuple(results), last)
+    return tuple(results), last
 
 
 def _proven(
@@ -206,3 +238,16 @@ def _proven(
             should_stop=session.should_stop,
         )  # fmt: skip
     return () if one is None else (one,)
+
+
+STUDY = DesignStudy(
+    name="design",
+    title="What moving points of robots is worth",
+    cases=cases,
+    checks=[_gained(item) for item in ITEMS],
+    stated="What was gained, by proof",
+    parameters=lambda form: {
+        "reach_m": REACH, "force_n": FORCE, "boxes": QUICK_BOXES if form.quick else BOXES,
+    },
+    unit="percent",
+)  # fmt: skip

@@ -132,7 +132,7 @@ def run_jobs_somewhere(
     except BrokenProcessPool as problem:
         raise SweepError(
             "a worker process died (out of memory?); what was finished is kept: run again to "
-            "continue, perhaps with fewer --workers"
+            "continue, perhaps with fewer processes"
         ) from problem
 
 
@@ -216,12 +216,12 @@ def _dask(address: str) -> Iterator[tuple[Submit, int]]:
     Raises:
         SweepError: Dask is not installed, or the scheduler does not answer or has no workers.
     """
-    local = "leave out --scheduler to compute on this machine"
+    local = "leave out workers to compute on this machine"
     try:
         from distributed import Client
     except ImportError as problem:
         raise SweepError(
-            f"--scheduler {address}: needs Dask; install cdpr_drake[cluster], or {local}"
+            f"workers {address}: needs Dask; install cdpr_drake[cluster], or {local}"
         ) from problem
 
     class ClosingClient(Client):  # type: ignore[misc, unused-ignore]
@@ -242,13 +242,13 @@ def _dask(address: str) -> Iterator[tuple[Submit, int]]:
         client = ClosingClient(address, timeout=SCHEDULER_TIMEOUT, set_as_default=False)
     except Exception as problem:  # whatever Dask makes of an address
         raise SweepError(
-            f"--scheduler {address}: does not answer ({_first_line(problem)}); accepted: the "
+            f"workers {address}: does not answer ({_first_line(problem)}); accepted: the "
             f"address of a Dask scheduler, such as tcp://host:8786, or {local}"
         ) from problem
     try:
         threads = sum(client.nthreads().values())
         if threads == 0:
-            raise SweepError(f"--scheduler {address}: has no workers; start some, or {local}")
+            raise SweepError(f"workers {address}: has no workers; start some, or {local}")
         try:
             version = code_version()
             yield (
@@ -259,7 +259,7 @@ def _dask(address: str) -> Iterator[tuple[Submit, int]]:
             if client.status == "running" and not _is_lost(problem):
                 raise
             raise SweepError(
-                f"--scheduler {address}: was lost on the way ({_first_line(problem)}); what was "
+                f"workers {address}: was lost on the way ({_first_line(problem)}); what was "
                 f"finished is kept: run again to continue, or {local}"
             ) from problem
     finally:

@@ -32,7 +32,7 @@ def open_meshcat(host: str = LOCAL, port: int | None = None) -> Meshcat:
         MeshcatError: The host is not this machine, or the port is taken or not accepted.
     """
     if port is not None and not PORTS[0] <= port <= PORTS[1]:
-        raise MeshcatError(f"--port: found {port}; accepted: {PORTS[0]} to {PORTS[1]}")
+        raise MeshcatError(f"port: found {port}; accepted: {PORTS[0]} to {PORTS[1]}")
     if host not in EVERYWHERE:
         _check_host(host)
     try:
@@ -41,7 +41,7 @@ def open_meshcat(host: str = LOCAL, port: int | None = None) -> Meshcat:
     except RuntimeError as problem:
         where = "any of the ports 7000 to 7099" if port is None else f"port {port}"
         raise MeshcatError(
-            f"--host, --port: {host} cannot listen at {where}, taken perhaps; name another port"
+            f"host, port: {host} cannot listen at {where}, taken perhaps; name another port"
         ) from problem
 
 
@@ -61,7 +61,7 @@ def _check_host(host: str) -> None:
             probe.bind(address)
     except (OSError, UnicodeError) as problem:
         raise MeshcatError(
-            f"--host: found {host!r}: {getattr(problem, 'strerror', None) or problem}; accepted: a "
+            f"host: found {host!r}: {getattr(problem, 'strerror', None) or problem}; accepted: a "
             "name or address of this machine, or * for all of them"
         ) from problem
 

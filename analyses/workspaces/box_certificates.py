@@ -95,15 +95,16 @@ def box_search(
             of which a proof says nothing.
     """
     known = [kind.value for kind in CertifiedKind]
-    if len(question.kinds) != 1 or question.kinds[0] not in known or question.rule != "all":
+    if len(question.kinds) != 1 or question.kinds[0] not in known:
         raise WorkspaceError(
-            f"--certify: found --kind {','.join(question.kinds)}, --orientations {question.rule}; "
-            f"accepted: one of {', '.join(known)}, and all"
+            f"certify: found kinds {','.join(question.kinds)}; accepted: one of {', '.join(known)}"
         )
+    if question.rule != "all":
+        raise WorkspaceError(f"certify: found orientations {question.rule}; accepted: all")
     about = question.about
     if about.method is not None:
         raise WorkspaceError(
-            f"--certify: found --method {about.method}; accepted: no method, for it is proven that "
+            f"certify: found method {about.method}; accepted: no method, for it is proven that "
             "there are tensions, not that a method finds them"
         )
     task = CertifyTask(

@@ -17,6 +17,9 @@ from cdpr_drake.analyses.sweeps.workers import check_scheduler
 ARRAYS = "workspace.npz"
 """All arrays of a result, with what they were computed for as JSON in the array `about`."""
 
+ITEMS = "poses"
+"""Words for what is counted."""
+
 
 class GridResult(Protocol):
     """What comes of a question."""
@@ -37,7 +40,7 @@ class SweepOptions:
         workers: Number of local processes, with one this process does it; None: one for each
             processor.
         scheduler: Address of a Dask scheduler, whose workers compute instead.
-        on_progress: Called after every chunk.
+        on_progress: Called at the start and after every chunk, or once where all was there.
         should_stop: Asked often; True ends the sweep once the chunks under way are finished.
     """
 
@@ -90,9 +93,13 @@ def run_poses(
     kept = None if how.folder is None else SweepFolder(how.folder, arguments)
     if how.folder is not None and (how.folder / ARRAYS).is_file():
         total = sum(count for _, count in tasks.values())
-        return PoseRun(load(how.folder), WorkProgress("", total, total, 0.0, found=total))
+        result = load(how.folder)
+        progress = WorkProgress("", total, total, 0.0, found=total, items=ITEMS)
+        if how.on_progress is not None:
+            how.on_progress(progress)
+        return PoseRun(result, progress)
     swept = run_sweep(
-        dict(tasks), chunk, kept, items="poses", workers=how.workers, scheduler=how.scheduler,
+        dict(tasks), chunk, kept, items=ITEMS, workers=how.workers, scheduler=how.scheduler,
         on_progress=how.on_progress, should_stop=how.should_stop,
     )  # fmt: skip
     if swept.arrays is None:

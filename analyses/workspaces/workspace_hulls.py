@@ -29,7 +29,7 @@ def question_holds(question: WorkspaceQuestion) -> Callable[[Array], np.ndarray]
         WorkspaceError: It has a kind that knows the poses of its grid only.
     """
     if "stable" in question.kinds:
-        raise WorkspaceError("--hull: found --kind stable; accepted: kinds other than that")
+        raise WorkspaceError("hull: found kinds stable; accepted: kinds other than that")
     turns = np.array([rotation_from_angles(a).matrix() for a in question.grid.angles])
     every = question.rule == "all"
 
@@ -120,7 +120,7 @@ def question_hull(
     """
     if robot.motion_type().num_moves < 3:
         raise WorkspaceError(
-            f"--hull: found the planar {robot.name}; accepted: robots that move in space"
+            f"hull: found the planar {robot.name}; accepted: robots that move in space"
         )
     bound = hull_bound(robot) if bound is None else bound
     return workspace_hull(

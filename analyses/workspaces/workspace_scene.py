@@ -1,32 +1,14 @@
-"""A workspace as grid, hull and boxes: in the robot's scene as a page, its numbers, its files.
-
-`workspace_page` writes the page for the browser; `WorkspaceDrawings` has all ways in which a
-workspace was drawn, and writes their files.
-"""
+"""A workspace as grid, hull and boxes in the robot's scene, as a page for the browser."""
 
 from __future__ import annotations
-
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 from pydrake.geometry import Rgba
 
 from cdpr_drake.analyses.reporting.deferred_figures import Pictures
-from cdpr_drake.analyses.reporting.written_files import whole_file
 from cdpr_drake.analyses.visualization.replay import RobotPicture
 from cdpr_drake.analyses.visualization.solids import add_solid
-from cdpr_drake.analyses.workspaces.box_certificates import (
-    BoxSearch,
-    agreement_numbers,
-    agreements,
-    box_numbers,
-    save_boxes,
-    write_boxes,
-)
 from cdpr_drake.analyses.workspaces.stability_scene import held_picture, home_tensions
-from cdpr_drake.analyses.workspaces.workspace_hulls import HullBound, hull_numbers, save_hull
 from cdpr_drake.analyses.workspaces.workspace_results import ALL, RobotWorkspace
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CdprError
@@ -34,7 +16,6 @@ from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.workspaces.box_expansion_kernel import INSIDE, OPEN, OUTSIDE
 from cdpr_drake.workspaces.certified_boxes import CertifiedBoxes
 from cdpr_drake.workspaces.hull import WorkspaceHull
-from cdpr_drake.workspaces.mesh_files import write_hull
 from cdpr_drake.workspaces.volume import surface_quads, triangles
 
 PAGE = "workspace.html"
@@ -152,53 +133,3 @@ def _cuboids(middles: Array, halves: Array) -> tuple[Array, np.ndarray]:
     vertices = (middles[:, np.newaxis] + halves[:, np.newaxis] * signs).reshape(-1, 3)
     faces = one + 8 * np.arange(len(middles))[:, np.newaxis, np.newaxis]
     return vertices, faces.reshape(-1, 3)
-
-
-@dataclass(frozen=True, eq=False)
-class WorkspaceDrawings:
-    """A workspace as grid, hull and boxes.
-
-    Attributes:
-        workspace: The grid.
-        hull: The hull; None: it was not asked for.
-        boxes: The boxes; None: they were not asked for.
-        bound: What bounded the hull; None: unknown.
-        search: What was cut into boxes; None: unknown.
-    """
-
-    workspace: RobotWorkspace
-    hull: WorkspaceHull | None = None
-    boxes: CertifiedBoxes | None = None
-    bound: HullBound | None = None
-    search: BoxSearch | None = None
-
-    def as_dict(self) -> dict[str, Any]:
-        """Numbers of all for JSON, and whether they say the same."""
-        told = self.workspace.as_dict()
-        if self.hull is not None:
-            told["hull"] = hull_numbers(self.hull, self.bound)
-        if self.boxes is not None:
-            told["certified"] = box_numbers(self.boxes, self.search)
-            found = agreements(self.workspace, self.hull, self.boxes)
-            told["agreement"] = agreement_numbers(found)
-        return told
-
-    def write(
-        self, folder: Path, mesh: Path | None = None, boxes_mesh: Path | None = None
-    ) -> dict[str, Any]:
-        """Writes hull and boxes into a folder that exists, and to further files; the numbers.
-
-        Raises:
-            WorkspaceError: A further file cannot be written by what is installed.
-        """
-        if self.hull is not None:
-            save_hull(self.hull, folder)
-            if mesh is not None:
-                with whole_file(mesh) as part:
-                    write_hull(self.hull, part)
-        if self.boxes is not None:
-            save_boxes(self.boxes, folder)
-            if boxes_mesh is not None:
-                with whole_file(boxes_mesh) as part:
-                    write_boxes(self.boxes, part)
-        return self.as_dict()

@@ -21,6 +21,7 @@ import typer
 from typer.core import TyperGroup
 
 from cdpr_drake.cli.completion import PROGRAM, asked_words, stand_in
+from cdpr_drake.cli.option_names import SHARED_OPTIONS, with_options
 from cdpr_drake.cli.process import INTERRUPTED, SIGNALS, compile_ahead, exit_with_parent
 from cdpr_drake.errors import CdprError
 from cdpr_drake.kernel_cache.locks import share_compilation
@@ -175,7 +176,8 @@ def _is_error(record: logging.LogRecord) -> bool:
 
 def _notes(problem: BaseException) -> str:
     """What was noted on a problem on its way here, such as where the log of a run is kept."""
-    return "".join(f"; {note}" for note in getattr(problem, "__notes__", ()))
+    notes = getattr(problem, "__notes__", ())
+    return "".join(f"; {with_options(note, SHARED_OPTIONS)}" for note in notes)
 
 
 def _refuse(words: str) -> NoReturn:
@@ -256,7 +258,7 @@ def _main(given: Sequence[str], imported: Callable[[], None] = lambda: None) -> 
         where = f"{problem.filename}: " if problem.filename else ""
         _refuse(f"{where}{problem.strerror or problem}{_notes(problem)}")
     except CdprError as problem:
-        _refuse(f"{problem}{_notes(problem)}")
+        _refuse(f"{with_options(str(problem), SHARED_OPTIONS)}{_notes(problem)}")
     except _UsageProblem as problem:
         _refuse(_usage_words(problem))
     except (MemoryError, ArithmeticError, RuntimeError, ImportError) as problem:

@@ -2,33 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import fields
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any
 
 import typer
-from pydrake.math import RigidTransform
-from rich.table import Table
 
-from cdpr_drake.analyses.calibration.calibration_campaign import (
-    calibrated_scenario,
-    run_campaign,
-    servo_again,
-)
-from cdpr_drake.analyses.calibration.calibration_report import calibration_fit
 from cdpr_drake.analyses.calibration.calibration_request import Sigmas
-from cdpr_drake.analyses.calibration.calibration_task import Calibration
-from cdpr_drake.analyses.calibration.log_fit import ROBOT, LogFit
-from cdpr_drake.analyses.calibration.pose_proposal import next_poses
 from cdpr_drake.analyses.front.calibration import calibrate as run_calibration
-from cdpr_drake.analyses.front.calibration import calibration_inputs
-from cdpr_drake.analyses.planning.path_files import read_path
-from cdpr_drake.analyses.reporting.provenance import BELIEVED_FILE, write_run_inputs
-from cdpr_drake.analyses.reporting.statements import new_table
+from cdpr_drake.analyses.front.simulated_fits import POSES, calibrate_in_simulation
 from cdpr_drake.calibration.parameters import GROUPS
+from cdpr_drake.cli.command_session import CommandSession
 from cdpr_drake.cli.log_options import (
-    Ending,
+    STOPPING,
     LogOrCampaign,
     ResultsBelowRuns,
     RobotOrCampaign,
@@ -37,12 +23,13 @@ from cdpr_drake.cli.log_options import (
     comma_words,
     results_below_runs,
     robot_and_log,
-    write_and_tell,
+    tell_fit,
 )
 from cdpr_drake.cli.options import (
     FigureFormats,
     Overwrite,
     ResultsAsJson,
+    named_options,
     named_values,
     parse_formats,
     parse_pose,
@@ -50,7 +37,12 @@ from cdpr_drake.cli.options import (
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.diagrams.load import load_scenario
-from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
+
+OPTIONS = {
+    "unknown": "--unknown", "priors": "--prior", "tags": "--tags", "tag_size": "--tag-size",
+    "mount": "--mount", "image_size": "--image-size", "tracker_late": "--tracker-late",
+}  # fmt: skip
+"""Options by the arguments of `calibrate`."""
 
 UNKNOWN = "exit_points,anchor_points"
 """What is asked for where nothing else is said."""
@@ -123,7 +115,7 @@ def calibrate(
             "that tell most, is calibrated from what is recorded there, and servoes again."
         ),
     ] = None,
-    poses: Annotated[int, typer.Option(help="Poses of a campaign.", min=6, max=200)] = 30,
+    poses: Annotated[int, typer.Option(help="Poses of a campaign.", min=6, max=200)] = POSES,
     poses_from: Annotated[
         Path | None,
         typer.Option(help="Poses of a campaign as of cdpr plan --path, such as next_poses.csv."),
@@ -145,83 +137,35 @@ def calibrate(
     figure_format: FigureFormats = "png",
 ) -> int:
     """Finds a robot's constants in a log of what was measured at poses of its platform."""
-    ending = Ending(as_json, overwrite, parse_formats(figure_format))
+    kept: dict[str, Any] = {
+        "propose": next_count, "overwrite": overwrite, "formats": parse_formats(figure_format),
+    }  # fmt: skip
     if campaign is not None:
         check_campaign(robot, log)
-        goals = None if poses_from is None else read_path(poses_from).poses
-        asked = CampaignOptions(poses, goals, next_count)
-        return _campaign(campaign, asked, out, ending)
+        scenario = load_scenario(campaign)
+        folder = results_below_runs(out, f"campaign-{scenario.name}")
+        session = CommandSession(STOPPING, folder)
+        with named_options({"scenario": "--campaign"}):
+            simulated = calibrate_in_simulation(
+                scenario, poses_from or poses, folder=folder, session=session, **kept
+            )
+        return tell_fit(simulated, session, as_json)
     if poses_from is not None:
         raise CdprError("--poses-from: found without --campaign; accepted: with it")
     name, file = robot_and_log("calibrate", robot, log)
     loaded = load_robot(name)
-    known_sigmas = named_values("--sigma", sigma, [f.name for f in fields(Sigmas)])
-    read, places = calibration_inputs(loaded, file, tags, tag_size, tracker_late)
-    options: dict[str, Any] = {
-        "priors": named_values("--prior", prior), "mount": mount, "image_size": _size(image_size),
-        "start": None if start is None else parse_pose(start), "rest": rest,
-        "outliers": not keep_outliers,
-    }  # fmt: skip
-
-    def work(folder: Path, say: Callable[[str], None]) -> LogFit:
-        found = run_calibration(
-            loaded, read, comma_words(unknown), sigmas=known_sigmas, tags=places, say=say, **options
-        )
-        fit = calibration_fit(found, *_proposed(found, next_count, folder, say))
-        fit.write(folder)
-        return fit
-
     folder = results_below_runs(out, f"calibrate-{loaded.name}")
-    return write_and_tell(f"Calibrating {loaded.name}", folder, ending, work)
-
-
-class CampaignOptions(NamedTuple):
-    """Where a campaign goes: so many poses, or these; and how many more it proposes."""
-
-    poses: int
-    goals: list[RigidTransform] | None
-    next_count: int | None
-
-
-def _proposed(
-    found: Calibration, count: int | None, folder: Path, say: Callable[[str], None]
-) -> tuple[dict[str, Any], list[Table]]:
-    """Writes the poses that would tell most next; what JSON and terminal say of them."""
-    if count is None:
-        return {}, []
-    proposed = next_poses(found, count, say)
-    proposed.write(folder)
-    return {"next_poses": proposed.as_dict()}, [proposed.table()]
-
-
-def _campaign(name: str, asked: CampaignOptions, out: Path | None, ending: Ending) -> int:
-    """Runs a campaign with the robot of a scenario."""
-    scenario = load_scenario(name)
-    if not isinstance(scenario, Scenario):
-        raise CdprError(f"--campaign: found {name}, a {scenario.kind}; accepted: a visual servo")
-
-    def work(folder: Path, say: Callable[[str], None]) -> LogFit:
-        run = run_campaign(scenario, asked.poses, say, asked.goals)
-        found = run.calibration
-        calibration_fit(found).write(folder)
-        servo = servo_again(run, str(folder / ROBOT), say)
-        more, proposed = _proposed(found, asked.next_count, folder, say)
-        told = {"campaign": run.errors() | {"remarks": list(run.remarks)}, "servo": servo}
-        table = new_table(
-            f"Servo {scenario.name}", ("robot believed in", "outcome"), ("off line [mm]",)
-        )
-        for who, row in servo.items():
-            table.add_row(who, str(row["outcome"]), f"{1e3 * float(row['off_line_m']):.2f}")
-        fit = calibration_fit(found, more | told, (*proposed, table))
-        fit.write(folder)
-        # As in every folder of a run: what is simulated, what is believed, and the scenario.
-        believed = (folder / ROBOT).rename(folder / BELIEVED_FILE)
-        servoed = calibrated_scenario(run, str(believed))
-        write_run_inputs(folder, servoed, load_robot(scenario.robot))
-        return fit
-
-    folder = results_below_runs(out, f"campaign-{scenario.name}")
-    return write_and_tell(f"Campaign of {scenario.name}", folder, ending, work)
+    session = CommandSession(STOPPING, folder)
+    with named_options(OPTIONS):
+        found = run_calibration(
+            loaded, file, comma_words(unknown),
+            sigmas=named_values("--sigma", sigma, [f.name for f in fields(Sigmas)]), tags=tags,
+            tag_size=tag_size, tracker_late=tracker_late, folder=folder, session=session,
+            priors=named_values("--prior", prior), mount=mount, image_size=_size(image_size),
+            start=None if start is None else parse_pose(start), rest=rest,
+            outliers=not keep_outliers, **kept,
+        )  # fmt: skip
+    return tell_fit(found, session, as_json)
 
 
 def _size(words: str | None) -> tuple[int, int] | None:

@@ -13,6 +13,7 @@ from rich.progress import TaskID
 from cdpr_drake.analyses.front.session import Session
 from cdpr_drake.analyses.reporting.output_folder import ResultsFolder, shown_path
 from cdpr_drake.analyses.reporting.progress import WorkProgress
+from cdpr_drake.cli.option_names import SHARED_OPTIONS, with_options
 from cdpr_drake.cli.process import StopRequest
 from cdpr_drake.cli.run_endings import SayContinued, report_kept_files, report_recovered
 from cdpr_drake.cli.terminal import message_console, progress_bar, working
@@ -26,6 +27,7 @@ class CommandSession(Session):
     Attributes:
         console: Of stderr.
         request: Whether somebody asked to stop.
+        folder: Where results go, as the user named it.
         name: Of what is computed.
         total: All work; None: it is not known.
     """
@@ -43,7 +45,7 @@ class CommandSession(Session):
         """
         super().__init__()
         self.console, self.request = message_console(), StopRequest(stopping)
-        self.name, self.total = name, total
+        self.folder, self.name, self.total = folder, name, total
         self._results: ResultsFolder | None = None
         self._bar: Bar | None = None
         self._task = TaskID(0)
@@ -63,7 +65,7 @@ class CommandSession(Session):
 
     def say(self, words: str) -> None:
         """Prints a line."""
-        self.console.print(words)
+        self.console.print(with_options(words, SHARED_OPTIONS))
 
     def opened(self, results: ResultsFolder) -> None:
         """Says where results of killed runs went."""
@@ -75,10 +77,11 @@ class CommandSession(Session):
         report_kept_files(self.console, [] if self._results is None else self._results.kept)
 
     @contextmanager
-    def computing(self) -> Iterator[None]:
-        """Shows the bar."""
+    def computing(self, part: str = "") -> Iterator[None]:
+        """Shows the bar; a further part has one of its own."""
         with progress_bar(self.console) as self._bar:
-            self._task = self._bar.add_task(self.name, total=self.total, state="starting")
+            total = None if part else self.total
+            self._task = self._bar.add_task(part or self.name, total=total, state="starting")
             yield
 
     def doing(self, words: str) -> AbstractContextManager[Callable[[str], None]]:

@@ -25,7 +25,14 @@ from cdpr_drake.analyses.reporting.progress import WorkProgress
 from cdpr_drake.cli.command_session import CommandSession
 from cdpr_drake.cli.completion import words_among
 from cdpr_drake.cli.grid_options import ForceToResist, MomentToResist, default_folder
-from cdpr_drake.cli.options import FigureFormats, ResultsAsJson, RobotName, Scheduler, parse_formats
+from cdpr_drake.cli.options import (
+    FigureFormats,
+    ResultsAsJson,
+    RobotName,
+    Scheduler,
+    named_options,
+    parse_formats,
+)
 from cdpr_drake.cli.process import INTERRUPTED
 from cdpr_drake.cli.run_endings import report_failures
 from cdpr_drake.cli.terminal import print_json, wide_console
@@ -114,10 +121,15 @@ def design(
     loaded = load_robot(robot)
     if parameters is None and loaded.is_planar():
         settings.exit_points.reach = np.array([REACH, REACH, 0.0])
+    options = {"goals": "--goal"} if goal else {}
+    options |= {} if by is None else {"search": "--search"}
     candidates = make_candidates(robot, settings, source)
     arguments = {"robot": candidates.text, "settings": repr(replace(settings, generations=1))}
     folder = out if out is not None else default_folder("design", loaded.name, arguments)
-    with DesignSession(STOPPING, folder, f"design {loaded.name}") as session:
+    with (
+        named_options(options),  # fields of the file bear their own names
+        DesignSession(STOPPING, folder, f"design {loaded.name}") as session,
+    ):
         found = optimize_design(
             robot, settings, folder, boxes=QUICK_BOXES if quick else boxes,
             workers=scheduler or workers, formats=formats, source=source, session=session,

@@ -1,8 +1,8 @@
 """Questions over a grid of poses on the command line: their options, their grids, their sweep.
 
 One set of options for all such commands (`GridWords` to `Workers`), and what their words mean:
-`parse_grid` and `parse_turns` make the grid. `watched` runs the sweep over it, shows where it
-stands, and lets Ctrl-C end it.
+`parse_grid` and `parse_turns` make the grid. `GridSession` shows where the sweep over it stands,
+and lets Ctrl-C end it.
 """
 
 from __future__ import annotations
@@ -10,22 +10,22 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Callable
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
-from typing import Annotated, Any, Protocol, TypeVar
+from typing import Annotated, Any, Self
 
 import numpy as np
 import typer
-from rich.console import Console
 
 from cdpr_drake.analyses.reporting.progress import WorkProgress
 from cdpr_drake.analyses.sweeps.sweep import STARTING
+from cdpr_drake.cli.command_session import CommandSession
 from cdpr_drake.cli.options import parse_numbers
 from cdpr_drake.cli.process import INTERRUPTED, StopRequest
-from cdpr_drake.cli.terminal import progress_bar
-from cdpr_drake.errors import CdprError, WorkspaceError, WorkspaceGridError
+from cdpr_drake.errors import CdprError, StoppedError, WorkspaceError, WorkspaceGridError
 from cdpr_drake.workspaces.pose_grid import WorkspaceGrid, axis_by_count, axis_by_step
 
 GridWords = Annotated[
@@ -204,72 +204,57 @@ def parse_turns(items: list[str]) -> list[str]:
 STOPPING = "Stopping after the chunks under way; Ctrl-C again drops them"
 """Answer to the first Ctrl-C."""
 
-
-class _Run(Protocol):
-    @property
-    def progress(self) -> WorkProgress: ...
+STOPPING_BOXES = "Stopping; what is proven is kept"
+"""The same while boxes are proven."""
 
 
-Run = TypeVar("Run", bound=_Run)
+class GridSession(CommandSession):
+    """What a terminal shows of a question over a grid; Ctrl-C leaves what is finished.
 
-
-def watched(
-    title: str,
-    folder: Path,
-    console: Console,
-    run: Callable[[Callable[[WorkProgress], None], StopRequest], Run],
-    dropped: Callable[[WorkProgress], Run],
-) -> Run:
-    """Runs a sweep, shows how far it is, and leaves what is finished to Ctrl-C.
-
-    Args:
-        title: Words before the progress.
-        folder: Where finished chunks are kept.
-        console: Where to show it.
-        run: Takes a function to be told where the sweep stands, and a request to stop to ask.
-        dropped: What came of a sweep of which nothing but its last progress is known.
+    It listens to Ctrl-C and SIGTERM only while something is computed.
     """
-    stop = StopRequest(STOPPING)
-    with stop.listening(), progress_bar(console) as bar:
-        task = bar.add_task(title, total=None, state=STARTING)
-        said: list[str] = []
-        seen: list[WorkProgress] = []
 
-        def show(progress: WorkProgress) -> None:
-            seen[:] = [progress]
-            if not said:
-                said.append(_continues(progress, folder))
-                if said[0]:
-                    bar.console.print(said[0])
-            state = f"{progress.done}/{progress.total} poses, {progress.speed:.0f} per s"
-            bar.update(
-                task,
-                completed=progress.done,
-                total=progress.total,
-                state=STARTING if progress.done == progress.found else state,
-            )
+    def __init__(self, folder: Path, name: str) -> None:
+        """For one question; arguments as `CommandSession`."""
+        super().__init__(STOPPING, folder, name)
+        self._part = ""
+        self._last: WorkProgress | None = None
 
-        try:
-            result = run(show, stop)
-        except KeyboardInterrupt:  # the second one; what is under way is lost
-            if not seen:
-                raise
-            result = dropped(seen[0])
-    if not said and result.progress.found:
-        console.print(f"{folder}: complete already, nothing was computed")
-    return result
+    def __enter__(self) -> Self:
+        return self
 
+    @contextmanager
+    def computing(self, part: str = "") -> Iterator[None]:
+        """Shows the bar; what Ctrl-C ends twice before the grid is finished has been stopped."""
+        self._part, self.request = part, StopRequest(STOPPING_BOXES if part else STOPPING)
+        with self.request.listening():
+            try:
+                with super().computing(part):
+                    yield
+            except KeyboardInterrupt as problem:  # the second one; what is under way is lost
+                if part or self._last is None:
+                    raise
+                raise StoppedError("stopped") from problem
 
-def interrupted(progress: WorkProgress, folder: Path, console: Console) -> int:
-    """Says how a sweep that was stopped goes on; returns the exit code."""
-    console.print(
-        f"Interrupted after {progress.done} of {progress.total} poses; run again with "
-        f"the same arguments to continue in {folder}"
-    )
-    return INTERRUPTED
+    def progress(self, progress: WorkProgress) -> None:
+        """Moves the bar; keeps how far the grid is."""
+        self._last = self._last if self._part else progress
+        super().progress(progress)
 
+    def fields(self, progress: WorkProgress) -> dict[str, Any]:
+        """Of the bar."""
+        state = f"{progress.done}/{progress.total} {progress.items}, {progress.speed:.0f} per s"
+        if self._part:
+            state += f", {progress.what}"
+        elif progress.done == progress.found:
+            state = STARTING
+        return {"completed": progress.done, "total": progress.total, "state": state}
 
-def _continues(progress: WorkProgress, folder: Path) -> str:
-    if not progress.found:
-        return ""
-    return f"Continuing in {folder}: {progress.found} of {progress.total} poses were there already"
+    def interrupted(self) -> int:
+        """Says how a grid that was stopped goes on; returns the exit code."""
+        assert self._last is not None
+        self.say(
+            f"Interrupted after {self._last.done} of {self._last.total} poses; run again with "
+            f"the same arguments to continue in {self.folder}"
+        )
+        return INTERRUPTED

@@ -2,24 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from cdpr_drake.analyses.calibration.identification_campaign import (
-    CAMPAIGN_UNKNOWN,
-    run_dynamic_campaign,
-)
-from cdpr_drake.analyses.calibration.identification_campaign_files import write_dynamic_campaign
-from cdpr_drake.analyses.calibration.identification_report import identification_fit
+from cdpr_drake.analyses.calibration.identification_campaign import CAMPAIGN_UNKNOWN
 from cdpr_drake.analyses.calibration.identification_task import UNKNOWN
-from cdpr_drake.analyses.calibration.log_file import read_log
-from cdpr_drake.analyses.calibration.log_fit import LogFit
 from cdpr_drake.analyses.front.calibration import identify as run_identification
+from cdpr_drake.analyses.front.simulated_fits import identify_in_simulation
+from cdpr_drake.cli.command_session import CommandSession
 from cdpr_drake.cli.log_options import (
-    Ending,
+    STOPPING,
     LogOrCampaign,
     ResultsBelowRuns,
     RobotOrCampaign,
@@ -28,21 +22,26 @@ from cdpr_drake.cli.log_options import (
     comma_words,
     results_below_runs,
     robot_and_log,
-    write_and_tell,
+    tell_fit,
 )
 from cdpr_drake.cli.options import (
     FigureFormats,
     Overwrite,
     ResultsAsJson,
+    named_options,
     named_values,
     parse_formats,
 )
-from cdpr_drake.errors import CdprError
 from cdpr_drake.identification.parameters import GROUPS
 from cdpr_drake.identification.result import MISFIT_FACTOR
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.diagrams.load import load_scenario
-from cdpr_drake.systems.scenarios.tension_control_scenario import TensionScenario
+
+OPTIONS = {
+    "unknown": "--unknown", "common": "--common", "priors": "--prior", "bandwidth": "--bandwidth",
+    "sigma_lengths": "--sigma-lengths", "tracker_late": "--tracker-late", "scenario": "--campaign",
+}  # fmt: skip
+"""Options by the arguments of `identify`."""
 
 
 def help_words() -> str:
@@ -108,45 +107,28 @@ def identify(
     figure_format: FigureFormats = "png",
 ) -> int:
     """Finds a robot's dynamics in a log of a motion."""
-    ending = Ending(as_json, overwrite, parse_formats(figure_format))
+    kept: dict[str, Any] = {"overwrite": overwrite, "formats": parse_formats(figure_format)}
+    asked = None if unknown is None else comma_words(unknown)
     if campaign is not None:
         check_campaign(robot, log)
-        asked = CAMPAIGN_UNKNOWN if unknown is None else comma_words(unknown)
-        return _campaign(campaign, asked, out, ending)
+        scenario = load_scenario(campaign)
+        folder = results_below_runs(out, f"identify-{scenario.name}")
+        session = CommandSession(STOPPING, folder)
+        with named_options(OPTIONS):
+            simulated = identify_in_simulation(
+                scenario, CAMPAIGN_UNKNOWN if asked is None else asked, folder=folder,
+                session=session, **kept,
+            )  # fmt: skip
+        return tell_fit(simulated, session, as_json)
     name, file = robot_and_log("identify", robot, log)
     loaded = load_robot(name)
-    names = [cable.name for cable in loaded.cables]
-    read = read_log(file, names)
-    other = None if validate is None else read_log(validate, names)
-    options: dict[str, Any] = {
-        "common": comma_words(common), "priors": named_values("--prior", prior),
-        "bandwidth": bandwidth, "sigma_lengths": sigma_lengths, "pulleys": pulleys,
-        "outliers": not keep_outliers,
-    }  # fmt: skip
-
-    def work(folder: Path, say: Callable[[str], None]) -> LogFit:
-        found = run_identification(
-            loaded, read, UNKNOWN if unknown is None else comma_words(unknown), validate=other,
-            tracker_late=tracker_late, say=say, **options,
-        )  # fmt: skip
-        fit = identification_fit(found)
-        fit.write(folder)
-        return fit
-
     folder = results_below_runs(out, f"identify-{loaded.name}")
-    return write_and_tell(f"Identifying {loaded.name}", folder, ending, work)
-
-
-def _campaign(name: str, unknown: tuple[str, ...], out: Path | None, ending: Ending) -> int:
-    """Runs a campaign with the robot of a scenario."""
-    scenario = load_scenario(name)
-    if not isinstance(scenario, TensionScenario):
-        raise CdprError(
-            f"--campaign: found {name}, a {scenario.kind}; accepted: a scenario of tension_control"
-        )
-
-    def work(folder: Path, say: Callable[[str], None]) -> LogFit:
-        return write_dynamic_campaign(run_dynamic_campaign(scenario, unknown, say), folder)
-
-    folder = results_below_runs(out, f"identify-{scenario.name}")
-    return write_and_tell(f"Campaign of {scenario.name}", folder, ending, work)
+    session = CommandSession(STOPPING, folder)
+    with named_options(OPTIONS):
+        found = run_identification(
+            loaded, file, UNKNOWN if asked is None else asked, validate=validate,
+            tracker_late=tracker_late, folder=folder, session=session, common=comma_words(common),
+            priors=named_values("--prior", prior), bandwidth=bandwidth,
+            sigma_lengths=sigma_lengths, pulleys=pulleys, outliers=not keep_outliers, **kept,
+        )  # fmt: skip
+    return tell_fit(found, session, as_json)

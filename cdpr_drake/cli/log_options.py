@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, NamedTuple
+from typing import Annotated
 
 import typer
 
-from cdpr_drake.analyses.calibration.log_fit import LogFit
+from cdpr_drake.analyses.front.fitted_robots import FittedRobot
 from cdpr_drake.analyses.reporting.folder_lock import free_folder
-from cdpr_drake.analyses.reporting.output_folder import results_folder, shown_path
-from cdpr_drake.analyses.visualization.figure_files import write_figures
+from cdpr_drake.cli.command_session import CommandSession, shown
 from cdpr_drake.cli.completion import robot_words
-from cdpr_drake.cli.run_endings import MISFIT, report_failures, report_kept_files
-from cdpr_drake.cli.terminal import message_console, print_json, wide_console, working
+from cdpr_drake.cli.run_endings import MISFIT, report_failures
+from cdpr_drake.cli.terminal import print_json, wide_console
 from cdpr_drake.errors import CdprError
 
 RobotOrCampaign = Annotated[
@@ -35,6 +33,8 @@ TrackerLate = Annotated[
 ResultsBelowRuns = Annotated[
     Path | None, typer.Option(help="Results folder; without it, a new one below runs/.")
 ]
+STOPPING = ""
+"""Nothing is answered to Ctrl-C, which ends a fit at once."""
 
 
 def check_campaign(robot: str | None, log: Path | None) -> None:
@@ -68,50 +68,25 @@ def comma_words(option: str) -> tuple[str, ...]:
     return tuple(word.strip() for word in option.split(",") if word.strip())
 
 
-class Ending(NamedTuple):
-    """What is done with results: printed as JSON, put over others, drawn in these formats."""
-
-    as_json: bool
-    overwrite: bool
-    formats: tuple[str, ...]
-
-
-Work = Callable[[Path, Callable[[str], None]], LogFit]
-"""Writes results into the folder that it gets; may tell how far it is."""
-
-
-def write_and_tell(title: str, folder: Path, ending: Ending, work: Work) -> int:
-    """Has results written into a folder; prints JSON, or tables and where the results are.
-
-    Figures come last, when the results have their place: one that cannot be written costs nothing
-    else.
+def tell_fit(found: FittedRobot, session: CommandSession, as_json: bool) -> int:
+    """Prints JSON, or tables and where the results are.
 
     Args:
-        title: What is done, for whoever waits.
-        folder: Of the results.
-        ending: What is done with them.
-        work: Writes them.
+        found: What was found, in its folder.
+        session: Who followed it.
+        as_json: Whether JSON is wanted.
 
     Returns:
         The exit code; `MISFIT` where what was found does not fit what was measured.
-
-    Raises:
-        OutputFolderError: The folder cannot be written, or holds other results.
     """
-    console = message_console()
-    with results_folder(folder, ending.overwrite) as results, working(console, title) as say:
-        fit = work(results.path, say)
-        published = results.publish()
-        say("figures")
-        failed = write_figures(published, fit.drawings, ending.formats)
-    report_kept_files(console, results.kept)
-    folder = shown_path(published)
-    if ending.as_json:
-        print_json(fit.numbers)
+    session.say_kept()
+    folder = shown(found.folder)
+    if as_json:
+        print_json(found.as_dict())
     else:
         printer = wide_console(140)
-        for table in fit.tables:
+        for table in found.tables():
             printer.print(table)
         printer.print(f"results: {folder}")
-    missing = report_failures(console, failed, folder, None)
-    return missing if fit.fits else MISFIT
+    missing = report_failures(session.console, found.failed, folder, None)
+    return missing if found.fits else MISFIT

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,6 +14,7 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.cli.completion import robot_words
+from cdpr_drake.cli.option_names import with_options
 from cdpr_drake.errors import CdprError, OutputFolderError
 from cdpr_drake.geometry.poses import pose_from_angles
 
@@ -55,6 +55,8 @@ Scheduler = Annotated[
     str | None,
     typer.Option(help="Dask scheduler whose workers compute, tcp://host:port; without it, here."),
 ]
+LISTENING = {"host": "--host", "port": "--port"}
+"""Options by the arguments of what listens."""
 POSE = typer.Option(help="Platform, x,y,z [m] or x,y,z,phi,theta,psi [m, deg].")
 
 
@@ -62,30 +64,17 @@ POSE = typer.Option(help="Platform, x,y,z [m] or x,y,z,phi,theta,psi [m, deg].")
 def named_options(options: Mapping[str, str]) -> Iterator[None]:
     """Says options where what is refused inside the block says Python's arguments.
 
-    It does so where a message begins with them, and after "found", "without" and "needs".
-
     Args:
-        options: Options by the words for arguments.
+        options: Options by the words for arguments, as `with_options` takes them.
     """
     try:
         yield
     except CdprError as problem:
-        if len(problem.args) == 1 and isinstance(problem.args[0], str):
-            problem.args = (_with_options(problem.args[0], options),)
+        problem.args = tuple(
+            with_options(words, options) if isinstance(words, str) else words
+            for words in problem.args
+        )
         raise
-
-
-def _with_options(message: str, options: Mapping[str, str]) -> str:
-    known = "|".join(map(re.escape, sorted(options, key=len, reverse=True)))
-    named = rf"(?:{known})(?=[:;, ]|$)"
-    head = re.match(rf"{named}(?:, {named})*", message)
-    begin = "" if head is None else head[0]
-    said = ", ".join(options[name] for name in begin.split(", ")) if begin else ""
-    return said + re.sub(
-        rf"\b(found|without|needs) ({named})",
-        lambda place: f"{place[1]} {options[place[2]]}",
-        message[len(begin) :],
-    )
 
 
 def parse_numbers(option: str, words: str, sizes: tuple[int, ...], meaning: str) -> list[float]:

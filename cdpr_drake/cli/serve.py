@@ -11,7 +11,7 @@ from cdpr_drake.analyses.front.simulation import simulate
 from cdpr_drake.analyses.reporting.folder_lock import free_folder
 from cdpr_drake.analyses.simulation.scenario_kinds import SCENARIO_KINDS
 from cdpr_drake.cli.completion import scenario_words, words_among
-from cdpr_drake.cli.options import FigureFormats, Overwrite, parse_formats
+from cdpr_drake.cli.options import LISTENING, FigureFormats, Overwrite, named_options, parse_formats
 from cdpr_drake.cli.process import StopRequest
 from cdpr_drake.cli.run_endings import CLIENT_ENDED
 from cdpr_drake.cli.simulate import STOPPING, SimulationSession, tell_run
@@ -120,7 +120,8 @@ class _Client:
     def __init__(self, scenario: Any, host: str, port: int, wait: float, stop: StopRequest) -> None:
         self._scenario, self._wait = scenario, wait
         self._driver: Driver | None = None
-        self._socket = Socket(host, port, stop)
+        with named_options(LISTENING):
+            self._socket = Socket(host, port, stop)
         if not is_loopback(host):
             message_console().print(
                 f"warning: {self._socket.address} is open to other machines: whoever reaches it "

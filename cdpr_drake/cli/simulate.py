@@ -27,6 +27,7 @@ from cdpr_drake.analyses.visualization.meshcat_window import LOCAL, open_meshcat
 from cdpr_drake.cli.command_session import CommandSession, shown
 from cdpr_drake.cli.completion import scenario_words, words_among
 from cdpr_drake.cli.options import (
+    LISTENING,
     FigureFormats,
     Host,
     Overwrite,
@@ -259,13 +260,15 @@ class SimulationSession(CommandSession):
         """Opens Meshcat and says where, or lets who holds the other end of a socket steer."""
         self.name, self.total = scenario.name, scenario.duration
         if self._steered_by is not None:
-            connection = open_connection(self._steered_by)
+            with named_options({"descriptor": "--steered-by"}):
+                connection = open_connection(self._steered_by)
             request = self.request
             return Steering(scenario, connection, should_stop=request, ask_stop=request.ask).prepare
         if self._listens is None:
             return None
         host, port = self._listens
-        meshcat = open_meshcat(host, port)
+        with named_options(LISTENING):
+            meshcat = open_meshcat(host, port)
         self.say(f"{scenario.name} at {page_address(meshcat, host)}")
         return kind.live(scenario, meshcat)
 

@@ -8,28 +8,20 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from rich.box import SIMPLE_HEAD
-from rich.console import Console
 from rich.table import Table
 
-from cdpr_drake.analyses.front.workspaces import default_box, stability_question
-from cdpr_drake.analyses.reporting.deferred_figures import write_pictures
-from cdpr_drake.analyses.reporting.log_files import write_json
-from cdpr_drake.analyses.reporting.output_folder import continued_folder, shown_path
+from cdpr_drake.analyses.front.stability import assess_stability, stability_question
+from cdpr_drake.analyses.front.workspaces import default_box
+from cdpr_drake.analyses.reporting.output_folder import shown_path
 from cdpr_drake.analyses.simulation.stability_files import stability_of_folder
-from cdpr_drake.analyses.workspaces.stability_figures import stability_pictures
-from cdpr_drake.analyses.workspaces.stability_results import (
-    KINDS,
-    StabilityRun,
-    StabilityWorkspaces,
-    stability_workspaces,
-)
-from cdpr_drake.analyses.workspaces.stability_scene import scene_page
+from cdpr_drake.analyses.workspaces.stability_results import KINDS, StabilityWorkspaces
 from cdpr_drake.cli.completion import robot_words, scenario_words
 from cdpr_drake.cli.grid_options import (
+    GridSession,
     GridWords,
     Orientations,
     Out,
@@ -37,10 +29,8 @@ from cdpr_drake.cli.grid_options import (
     check_mass,
     check_workers,
     default_folder,
-    interrupted,
     parse_grid,
     parse_turns,
-    watched,
 )
 from cdpr_drake.cli.options import (
     FigureFormats,
@@ -57,9 +47,7 @@ from cdpr_drake.cli.options import (
 )
 from cdpr_drake.cli.run_endings import report_failures
 from cdpr_drake.cli.terminal import message_console, print_json, wide_console, working
-from cdpr_drake.errors import CdprError, OutputFolderError
-from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.errors import CdprError, OutputFolderError, StoppedError
 from cdpr_drake.stability.verdict import VerdictOptions
 
 
@@ -104,10 +92,6 @@ def show_stability_along(
         table.add_row(label, words)
     wide_console().print(table)
     return code
-
-
-RESULTS = "results.json"
-"""Arguments, versions and volumes."""
 
 
 def stability(
@@ -194,39 +178,30 @@ def stability(
     check_workers(workers)
     check_mass(mass, zero=True)
     formats = parse_formats(figure_format)
-    loaded = load_robot(robot)
     with named_options({f"scenario {scenario}": f"--scenario {scenario}"}):
-        question = stability_question(
-            robot, scheme, verdict, bounds=bounds, vary=parse_vary(vary or []),
-            grid=parse_grid(grid, parse_turns(orientation or []), *default_box(robot)),
-            scenario=scenario,
-            options=VerdictOptions(draws=draws, seed=seed, searches=searches, pieces=pieces),
-            limits=parse_limits(limits), mass=mass, wrench=parse_wrench(wrench),
-        )  # fmt: skip
-    name = f"{question.robot}-{scheme}-{verdict}"
-    folder = out if out is not None else default_folder("stability", name, question.arguments())
-    console = message_console()
-    with continued_folder(folder):  # nobody else writes there meanwhile
-        run = watched(
-            question.robot,
-            folder,
-            console,
-            lambda show, stop: stability_workspaces(
-                question, folder, workers, scheduler, show, stop
-            ),
-            lambda progress: StabilityRun(None, progress),
-        )
-        failed: dict[str, str] = {}
-        if run.workspaces is not None:
-            failed = _write(run.workspaces, folder, loaded, console, formats)
-    if run.workspaces is None:
-        return interrupted(run.progress, folder, console)
-    found = run.workspaces
+        asked: dict[str, Any] = {
+            "scheme": scheme, "verdict": verdict, "bounds": bounds, "vary": parse_vary(vary or []),
+            "grid": parse_grid(grid, parse_turns(orientation or []), *default_box(robot)),
+            "scenario": scenario, "limits": parse_limits(limits), "mass": mass,
+            "wrench": parse_wrench(wrench),
+            "options": VerdictOptions(draws=draws, seed=seed, searches=searches, pieces=pieces),
+        }  # fmt: skip
+        question = stability_question(robot, **asked)
+        name = f"{question.robot}-{scheme}-{verdict}"
+        folder = out if out is not None else default_folder("stability", name, question.arguments())
+        with GridSession(folder, question.robot) as session:
+            try:
+                found = assess_stability(
+                    robot, **asked, folder=folder, workers=scheduler or workers, formats=formats,
+                    session=session,
+                )  # fmt: skip
+            except StoppedError:
+                return session.interrupted()
     if as_json:
         print_json(found.as_dict())
     else:
         _print_table(found, folder)
-    return report_failures(console, failed, shown_path(folder.resolve()), None)
+    return report_failures(session.console, found.failed, shown_path(folder.resolve()), None)
 
 
 BESIDE_ALONG = ("along", "threshold", "out", "as_json", "figure_format")
@@ -243,23 +218,6 @@ def _refuse_beside_along(context: typer.Context) -> None:
                 f"--along: found beside {shown}; accepted with --threshold, --out, --json and "
                 "--format only"
             )
-
-
-def _write(
-    found: StabilityWorkspaces,
-    folder: Path,
-    robot: Robot,
-    console: Console,
-    formats: Sequence[str],
-) -> dict[str, str]:
-    """Writes numbers, then pictures; returns which of these could not be written, and why."""
-    with working(console, "Writing results"):
-        write_json(folder / RESULTS, found.as_dict())
-        page, note = scene_page(found, robot)
-        failed = write_pictures(folder, stability_pictures(found, robot, formats) | page)
-    if note:
-        console.print(f"note: {note}")
-    return failed
 
 
 def parse_vary(items: list[str]) -> dict[str, list[float]]:

@@ -42,7 +42,7 @@ STOPPING = (
 MOST_SEEDS = 10_000
 """Runs of each configuration at the most: every one of them is listed before the first begins."""
 
-OPTIONS = {"seeds": "--seeds", "recipe": "--recipe", "workers": "--scheduler"}
+OPTIONS = {"seeds": "--seeds", "recipe": "--recipe"}
 """Options by the arguments of `run_study`."""
 
 PIPE_WIDTH = 160

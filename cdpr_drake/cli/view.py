@@ -11,7 +11,7 @@ import typer
 
 from cdpr_drake.analyses.visualization.meshcat_window import LOCAL, open_meshcat, page_address
 from cdpr_drake.analyses.visualization.replay import robot_picture
-from cdpr_drake.cli.options import Host, Port, RobotName
+from cdpr_drake.cli.options import LISTENING, Host, Port, RobotName, named_options
 from cdpr_drake.cli.robot_folder import write_files
 from cdpr_drake.cli.terminal import message_console, working
 from cdpr_drake.errors import CdprError, OutputFolderError
@@ -40,7 +40,8 @@ def view(
         raise OutputFolderError(f"--html: found {html}; accepted: a file that ends in .html")
     if html is not None and not html.absolute().parent.is_dir():
         raise OutputFolderError(f"{html}: found no folder to write to; accepted: one that exists")
-    meshcat = open_meshcat(host or LOCAL, port)
+    with named_options(LISTENING):
+        meshcat = open_meshcat(host or LOCAL, port)
     with working(message_console(), f"Drawing {loaded.name}"):
         picture = robot_picture(loaded, meshcat)
     if picture.problem:

@@ -6,7 +6,6 @@ its results.
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -16,24 +15,18 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
-from cdpr_drake.analyses.front.workspaces import default_box, workspace_question
-from cdpr_drake.analyses.reporting.deferred_figures import write_pictures
-from cdpr_drake.analyses.reporting.log_files import write_json
-from cdpr_drake.analyses.reporting.output_folder import continued_folder, shown_path
-from cdpr_drake.analyses.sweeps.sweep import STARTING
-from cdpr_drake.analyses.workspaces.box_certificates import BoxSearch, box_search, certified_boxes
-from cdpr_drake.analyses.workspaces.conditions import KINDS, MEASURES
-from cdpr_drake.analyses.workspaces.workspace_files import load_wrench_set
-from cdpr_drake.analyses.workspaces.workspace_hulls import hull_bound, question_hull
-from cdpr_drake.analyses.workspaces.workspace_results import (
-    RobotWorkspace,
-    WorkspaceRun,
-    robot_workspace,
+from cdpr_drake.analyses.front.workspaces import (
+    compute_workspace,
+    default_box,
+    workspace_question,
 )
-from cdpr_drake.analyses.workspaces.workspace_scene import WorkspaceDrawings, workspace_page
+from cdpr_drake.analyses.reporting.output_folder import shown_path
+from cdpr_drake.analyses.workspaces.conditions import KINDS, MEASURES
+from cdpr_drake.analyses.workspaces.workspace_results import RobotWorkspace
 from cdpr_drake.cli.completion import words_among
 from cdpr_drake.cli.grid_options import (
     ForceToResist,
+    GridSession,
     GridWords,
     MomentToResist,
     Orientations,
@@ -42,10 +35,8 @@ from cdpr_drake.cli.grid_options import (
     check_mass,
     check_workers,
     default_folder,
-    interrupted,
     parse_grid,
     parse_turns,
-    watched,
 )
 from cdpr_drake.cli.options import (
     FigureFormats,
@@ -61,15 +52,13 @@ from cdpr_drake.cli.options import (
     parse_numbers,
     parse_wrench,
 )
-from cdpr_drake.cli.process import INTERRUPTED, StopRequest
+from cdpr_drake.cli.process import INTERRUPTED
 from cdpr_drake.cli.run_endings import report_failures
-from cdpr_drake.cli.terminal import message_console, print_json, progress_bar, wide_console, working
-from cdpr_drake.errors import WorkspaceError
-from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.cli.terminal import print_json, wide_console
+from cdpr_drake.errors import StoppedError, WorkspaceError
 from cdpr_drake.tensions.methods import METHODS
-from cdpr_drake.workspaces.certified_boxes import CertifiedBoxes
 from cdpr_drake.workspaces.demanded_wrenches import SpatialSet
-from cdpr_drake.workspaces.mesh_files import GRID_ENDINGS, MESH_ENDINGS, mesh_ending
+from cdpr_drake.workspaces.mesh_files import GRID_ENDINGS, MESH_ENDINGS
 
 FARTHEST = 1e6
 """Largest coordinate of a corner of --box [m]."""
@@ -228,15 +217,14 @@ def say_contradictions(console: Console, told: dict[str, Any]) -> int:
     return code
 
 
-RESULTS = "results.json"
-"""Arguments, versions, volumes and ranges."""
-
-
 OPTIONS = {
     "kinds": "--kind", "measures": "--measure", "orientations": "--orientations",
     "clearance": "--clearance", "method": "--method", "accelerations": "--acceleration",
     "the argument scenario": "--scenario", "force": "--force", "moment": "--moment",
-    "required, force or moment": "--wrench-set, --force or --moment",
+    "required": "--wrench-set", "required, force or moment": "--wrench-set, --force or --moment",
+    "hull": "--hull", "unbounded": "--unbounded", "box": "--box", "mesh": "--mesh",
+    "certify": "--certify", "boxes": "--boxes", "boxes_mesh": "--boxes-mesh",
+    "exit_error": "--exit-error", "anchor_error": "--anchor-error",
 }  # fmt: skip
 """Options by the arguments of `compute_workspace`."""
 
@@ -353,100 +341,42 @@ def workspace(
     formats = parse_formats(figure_format)
     check_workers(workers)
     check_mass(mass, zero=False)
-    _check_files(hull, mesh, certify, boxes_mesh)
     region = parse_box(box)
-    if unbounded and (hull is None or region is not None):
-        found = "no --hull" if hull is None else "--box"
-        raise WorkspaceError(f"--unbounded: found {found}; accepted: with --hull, without --box")
-    loaded = load_robot(robot)
-    if wrench_set is not None and (force is not None or moment is not None):
-        raise WorkspaceError("--wrench-set: found --force or --moment too; accepted: one way")
-    required = None if wrench_set is None else load_wrench_set(wrench_set)
+    center = None if hull is None else parse_numbers("--hull", hull, (3,), "x,y,z [m]")
     with named_options(OPTIONS | {f"scenario {scenario}": f"--scenario {scenario}"}):
-        question = workspace_question(
-            robot, kind.split(","),
-            parse_grid(grid, parse_turns(orientation or []), *default_box(robot, region)),
-            measures=() if measure is None else measure.split(","), orientations=orientations,
-            limits=parse_limits(limits), mass=mass, wrench=parse_wrench(wrench),
-            required=required, force=force, moment=moment,
-            accelerations=parse_accelerations(acceleration),
-            velocities=parse_velocities(velocity or []), clearance=clearance, obstacles=obstacles,
-            exit_free=exit_free, anchor_free=anchor_free, scenario=scenario, pulleys=pulleys,
-            method=method,
-        )  # fmt: skip
-    console = message_console()
-    search = None
-    if certify:
-        if boxes < 1:
-            raise WorkspaceError(f"--boxes: found {boxes}; accepted: at least 1")
-        search = box_search(question, loaded, (exit_error, anchor_error), region)
-    seen, bound = None, None
-    if hull is not None:
-        bound = hull_bound(loaded, region, unbounded)
-        center = np.array(parse_numbers("--hull", hull, (3,), "x,y,z [m]"))
-        with working(console, "Casting rays"):
-            seen = question_hull(question, loaded, center, rays, tolerance, bound)
-    some = question.kinds[0] if len(question.kinds) == 1 else f"{len(question.kinds)}-kinds"
-    name = f"{question.robot}-{some}"
-    folder = out if out is not None else default_folder("workspace", name, question.arguments())
-    with continued_folder(folder):  # nobody else writes there meanwhile
-        run = watched(
-            question.robot,
-            folder,
-            console,
-            lambda show, stop: robot_workspace(question, folder, workers, scheduler, show, stop),
-            lambda progress: WorkspaceRun(None, progress),
-        )
-        if run.workspace is None:
-            return interrupted(run.progress, folder, console)
-        proven = None if search is None else _certified(search, boxes, folder, console)
-        drawn = WorkspaceDrawings(run.workspace, seen, proven, bound, search)
-        with working(console, "Writing results"):
-            told = drawn.write(folder, mesh, boxes_mesh)
-            write_json(folder / RESULTS, told)
-            from cdpr_drake.analyses.workspaces.workspace_figures import workspace_pictures
-
-            page, note = workspace_page(run.workspace, loaded, seen, proven)
-            pictures = workspace_pictures(run.workspace, formats, proven)
-            failed = write_pictures(folder, pictures | page)
-    say_what_was_asked(console, told, loaded.frame.assumed and region is None)
-    if note:
-        console.print(f"note: {note}")
+        asked: dict[str, Any] = {
+            "kinds": kind.split(","),
+            "grid": parse_grid(grid, parse_turns(orientation or []), *default_box(robot, region)),
+            "measures": () if measure is None else measure.split(","),
+            "orientations": orientations, "box": region, "limits": parse_limits(limits),
+            "mass": mass, "wrench": parse_wrench(wrench), "required": wrench_set, "force": force,
+            "moment": moment, "accelerations": parse_accelerations(acceleration),
+            "velocities": parse_velocities(velocity or []), "clearance": clearance,
+            "obstacles": obstacles, "exit_free": exit_free, "anchor_free": anchor_free,
+            "scenario": scenario, "pulleys": pulleys, "method": method,
+        }  # fmt: skip
+        question = workspace_question(robot, **asked)
+        some = question.kinds[0] if len(question.kinds) == 1 else f"{len(question.kinds)}-kinds"
+        name = f"{question.robot}-{some}"
+        folder = out if out is not None else default_folder("workspace", name, question.arguments())
+        with GridSession(folder, question.robot) as session:
+            try:
+                found = compute_workspace(
+                    robot, **asked, hull=center, unbounded=unbounded, rays=rays,
+                    tolerance=tolerance, mesh=mesh, certify=certify, boxes=boxes,
+                    exit_error=exit_error, anchor_error=anchor_error, boxes_mesh=boxes_mesh,
+                    folder=folder, workers=scheduler or workers, formats=formats, session=session,
+                )  # fmt: skip
+            except StoppedError:
+                return session.interrupted()
+    told = found.as_dict()
+    say_what_was_asked(session.console, told, found.robot.frame.assumed and region is None)
     if as_json:
         print_json(told)
     else:
-        print_workspace(run.workspace, told, folder)
-    code = report_failures(console, failed, shown_path(folder.resolve()), None)
-    if proven is not None and not proven.finished:
-        console.print("Interrupted; run again with the same arguments to go on with the boxes")
+        print_workspace(found, told, folder)
+    code = report_failures(session.console, found.failed, shown_path(folder.resolve()), None)
+    if found.interrupted:
+        session.say("Interrupted; run again with the same arguments to go on with the boxes")
         code = INTERRUPTED
-    return say_contradictions(console, told) or code
-
-
-def _check_files(
-    hull: str | None, mesh: Path | None, certify: bool, boxes_mesh: Path | None
-) -> None:
-    """Refuses files of what was not asked for, or of another kind."""
-    if mesh is not None:
-        if hull is None:
-            raise WorkspaceError("--mesh: found no --hull; accepted: both")
-        mesh_ending(mesh, MESH_ENDINGS)
-    if boxes_mesh is not None:
-        if not certify:
-            raise WorkspaceError("--boxes-mesh: found no --certify; accepted: both")
-        mesh_ending(boxes_mesh, GRID_ENDINGS)
-
-
-def _certified(search: BoxSearch, boxes: int, folder: Path, console: Console) -> CertifiedBoxes:
-    """Certified boxes, with progress; Ctrl-C ends the search with what is proven by then."""
-    stop = StopRequest("Stopping; what is proven is kept")
-    with stop.listening(), progress_bar(console) as bar:
-        task = bar.add_task("certify", total=boxes, state=STARTING)
-        start = time.monotonic()
-
-        def show(judged: int, open_share: float) -> None:
-            speed = judged / max(time.monotonic() - start, 1e-3)
-            state = f"{judged} boxes, {speed:.0f} per s, {open_share:.1%} open"
-            bar.update(task, completed=judged, state=state)
-
-        return certified_boxes(search, boxes, folder, on_progress=show, should_stop=stop)
+    return say_contradictions(session.console, told) or code

@@ -145,7 +145,7 @@ class IdentificationProgram:
         """
         _positive("prior", std)
         if group not in GROUPS:
-            raise IdentificationError(f"prior: found {group!r}; accepted: {', '.join(GROUPS)}")
+            raise IdentificationError(f"priors: found {group!r}; accepted: {', '.join(GROUPS)}")
         self._priors += prior_rows(self.layout.model, group, std)
 
     def names(self) -> tuple[str, ...]:

@@ -186,7 +186,7 @@ def _find(node: yaml.MappingNode, key: str) -> int | None:
 def _override(
     schema: type, root: yaml.MappingNode, item: str, error: type[DataFileError]
 ) -> tuple[str, yaml.Node]:
-    """Edits the node graph in place as `--set key.subkey=value` asks.
+    """Edits the node graph in place as an override key.subkey=value asks.
 
     Returns:
         Words that say where the value comes from, and the new node.
@@ -194,13 +194,13 @@ def _override(
     key, equals, value = item.partition("=")
     key = key.strip()
     if not equals or not key:
-        raise error(f"--set {printable(item)}: accepted: key=value, as in --set seed=3")
+        raise error(f"overrides {printable(item)}: accepted: key=value, as in seed=3")
     node, here = root, schema
     names = key.split(".")
     for depth, name in enumerate(names[:-1]):
         rule, bare = _known_rule(here, names, depth, error)
         if rule.kind != "section":
-            raise error(f"--set {key}: {'.'.join(names[: depth + 1])} has no keys of its own")
+            raise error(f"overrides {key}: {'.'.join(names[: depth + 1])} has no keys of its own")
         index = _find(node, name)
         child = None if index is None else node.value[index][1]
         if not isinstance(child, yaml.MappingNode):
@@ -211,14 +211,14 @@ def _override(
     try:
         new = yaml.compose(value, Loader=yaml.SafeLoader)
     except (yaml.YAMLError, ValueError, RecursionError) as problem:
-        raise error(f"--set {key}: found {value!r}, which is not YAML") from problem
+        raise error(f"overrides {key}: found {value!r}, which is not YAML") from problem
     large = too_many_nodes(new)
     if large:
-        raise error(f"--set {key}: {large}")
+        raise error(f"overrides {key}: {large}")
     if new is None:
         new = yaml.ScalarNode(_NULL_TAG, "null")
     _put(node, names[-1], new)
-    return f"--set {key}", new
+    return f"overrides {key}", new
 
 
 def _known_rule(
@@ -229,7 +229,7 @@ def _known_rule(
     if names[depth] not in rules:
         where = ".".join(names[:depth]) or "the scenario"
         raise error(
-            f"--set {printable('.'.join(names))}: there is no key {printable(names[depth])} "
+            f"overrides {printable('.'.join(names))}: there is no key {printable(names[depth])} "
             f"in {printable(where)}; "
             f"{closest(names[depth], rules)}"
         )
@@ -269,7 +269,7 @@ class _Checker:
     def fail(self, node: yaml.Node | None, key: str, problem: str) -> None:
         origin = self._origins.get(id(node))
         if origin is not None:
-            inner = "" if origin == f"--set {key}" else f"{key}: "
+            inner = "" if origin == f"overrides {key}" else f"{key}: "
             self._problems.add(f"{origin}: {inner}{problem}")
             return
         mark = None if node is None else node.start_mark

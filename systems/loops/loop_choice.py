@@ -142,6 +142,7 @@ def set_loop(
     reason = "Meshcat looks into one" if watched else diagram_reason(chosen)
     if reason:
         return chosen, f"{words or asked.name}; in a diagram, as {reason}"  # type: ignore[return-value]
-    words = f"{asked.name}: by the compiled loop, as {why}; else --set integration.loop=diagram"
+    other = "with overrides integration.loop=diagram"
+    words = f"{asked.name}: by the compiled loop, as {why}; else {other}"
     made = replace(chosen, integration=replace(chosen.integration, loop=COMPILED))
     return made, words  # type: ignore[return-value]

@@ -13,7 +13,7 @@ from cdpr_drake.errors import BridgeError, CdprError, ClientEndedError
 from cdpr_drake.systems.remote.messages import JSON, MSGPACK, decode, encode, listed, shown, vector
 from cdpr_drake.systems.remote.server_socket import GONE, ServerSocket
 
-GRACE = 1.0
+GRACE = 5.0
 """Time for which a client that is busy while the run ends is waited for, to tell it [s]."""
 
 MOST_AT_ONCE = 100
@@ -172,8 +172,10 @@ class Driver:
         return self._held
 
     def end(self, facts: Mapping[str, Any]) -> None:
-        """Tells the client how the run ended; one that is busy is waited for, `GRACE` at most."""
+        """Tells the client how the run ended; one that is busy is waited for, `GRACE` at most,
+        also where a request to stop has ended the run."""
         deadline = time.monotonic() + GRACE
+        self._socket.ignore_stop()
         try:
             if self._who is not None and not self._over:
                 self._listen_until(lambda: self._pending is not None, lambda: deadline)

@@ -62,7 +62,7 @@ class ServerSocket:
         except (OSError, UnicodeError, zmq.ZMQError) as problem:
             self.close()
             raise BridgeError(
-                f"--host, --port: found {host}:{port}, {problem}; accepted: an interface of this "
+                f"host, port: found {host}:{port}, {problem}; accepted: an interface of this "
                 "machine and a free port"
             ) from problem
         self.address = self._socket.getsockopt_string(zmq.LAST_ENDPOINT)
@@ -73,6 +73,10 @@ class ServerSocket:
         self._monitor.close()
         self._socket.close()
         self._context.term()
+
+    def ignore_stop(self) -> None:
+        """From now on a request to stop ends no wait."""
+        self._should_stop = lambda: False
 
     def follow(self) -> None:
         """From now on, the client of the message that came last must stay."""

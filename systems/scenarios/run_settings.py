@@ -167,5 +167,6 @@ def set_engine(scenario: AnyScenario, repeated: bool = False) -> tuple[AnyScenar
     if asked.integration.engine != AUTOMATIC or not why:
         return scenario, ""
     integration = replace(asked.integration, engine=COMPILED)
-    words = f"{asked.name}: by the compiled engine, as {why}; else --set integration.engine=plant"
+    other = "with overrides integration.engine=plant"
+    words = f"{asked.name}: by the compiled engine, as {why}; else {other}"
     return replace(asked, integration=integration), words

@@ -141,7 +141,7 @@ def test_a_killed_study_continues(capsys, tmp_path, whole):
 @pytest.mark.parametrize(
     ("name", "words"),
     [
-        ("worked-examples", ["--scheduler", "worked-examples"]),
+        ("worked-examples", ["tcp://127.0.0.1:9"]),
         ("workspaces", ["tcp://127.0.0.1:9"]),
         ("case-9", ["tcp://127.0.0.1:9"]),
     ],

@@ -162,12 +162,12 @@ def test_files_that_are_no_logs_end_with_2(tmp_path, capsys, text, words):
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (["--unknown", "weight"], "found 'weight'"),
-        (["--bandwidth", "0"], "bandwidth: found 0 Hz"),
+        (["--unknown", "weight"], "--unknown: found 'weight'"),
+        (["--bandwidth", "0"], "--bandwidth: found 0 Hz"),
         (["--unknown", "stiffness"], "cable lengths: found none"),
         (["--unknown", "friction"], "motor torques: found none"),
         (["--prior", "mass"], "--prior: found 'mass'"),
-        (["--prior", "weight=1"], "prior: found 'weight'"),
+        (["--prior", "weight=1"], "--prior: found 'weight'"),
     ],
 )
 def test_impossible_requests_end_with_2(logs, capsys, options, words):

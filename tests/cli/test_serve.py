@@ -7,6 +7,7 @@ import socket
 import subprocess
 import sys
 import threading
+import time
 from contextlib import closing
 from importlib.resources import files
 from pathlib import Path
@@ -27,6 +28,9 @@ MOST_LINES = 40
 
 LONG = 1800.0
 """Longer than anything takes on a machine that is busy, compilation included [s]."""
+
+BUSY = 0.5
+"""Time that a client takes for a step [s]; a server that stops has to wait for it."""
 
 FOLLOWED = 1e-3
 """Distance that a PD law with a feedforward keeps from a quintic [m]."""
@@ -92,6 +96,7 @@ def test_what_was_simulated_is_written(capsys, tmp_path, ending):
                     client.step(tensions=np.full(8, np.nan))
                 return
             os.kill(os.getpid(), signal.SIGTERM)
+            time.sleep(BUSY)
             while now.end is None:
                 now = client.step(tensions=np.full(8, 5.0))
             ends.append(now.end["outcome"])

@@ -157,7 +157,7 @@ def test_a_missing_library_is_named_with_its_package_and_the_way_around(
         message = str(caught.value)
         assert missing in message
         assert f"package {package} " in message
-        assert "--camera projected" in message
+        assert "camera.kind=projected" in message
         assert "\n" not in message
 
 
@@ -170,7 +170,7 @@ def test_a_driver_that_ends_the_process_is_one_line_with_the_way_around(monkeypa
     crash = "import os, signal; os.kill(os.getpid(), signal.SIGSEGV)"
     monkeypatch.setattr(rendered_camera, "_PROBE_PROGRAM", crash)
     for _ in range(2):  # nothing is kept of a failure
-        with pytest.raises(RenderingError, match=r"by SIGSEGV.*--camera projected") as caught:
+        with pytest.raises(RenderingError, match=r"by SIGSEGV.*camera.kind=projected") as caught:
             probe_rendering()
         assert "\n" not in str(caught.value)
 
@@ -179,7 +179,7 @@ def test_a_driver_that_hangs_is_one_line(monkeypatch):
     monkeypatch.setattr(rendered_camera, "_state", rendered_camera._State(has_renderer=True))
     monkeypatch.setattr(rendered_camera, "_PROBE_PROGRAM", "import time; time.sleep(60)")
     monkeypatch.setattr(rendered_camera, "PROBE_TIMEOUT", 0.2)
-    with pytest.raises(RenderingError, match=r"no image within 0\.2 s.*--camera projected"):
+    with pytest.raises(RenderingError, match=r"no image within 0\.2 s.*camera.kind=projected"):
         probe_rendering()
 
 

@@ -23,7 +23,7 @@ def only_the_error_class(content, *overrides):
         except DataFileError as caught:
             problem = caught
         for line in () if problem is None else problem.problems:
-            assert line.startswith((str(path), "--set"))
+            assert line.startswith((str(path), "overrides "))
             assert len(line.splitlines()) == 1
 
 

@@ -57,29 +57,29 @@ def test_an_override_can_give_a_missing_key(load):
 @pytest.mark.parametrize(
     ("item", "words"),
     [
-        ("mass=-3", "--set mass: found -3; accepted: a number > 0 [kg]"),
-        ("mass=.nan", "--set mass: found .nan; accepted: a number > 0 [kg]"),
-        ("mass=", "--set mass: found null; accepted: a number > 0 [kg]"),
-        ("mass={a: [1]}", "--set mass: found {a: [1]}; accepted: a number > 0 [kg]"),
-        ("size=[1, -2, 3]", "--set size: size[1]: found -2; accepted: 3 numbers > 0 [m]"),
+        ("mass=-3", "overrides mass: found -3; accepted: a number > 0 [kg]"),
+        ("mass=.nan", "overrides mass: found .nan; accepted: a number > 0 [kg]"),
+        ("mass=", "overrides mass: found null; accepted: a number > 0 [kg]"),
+        ("mass={a: [1]}", "overrides mass: found {a: [1]}; accepted: a number > 0 [kg]"),
+        ("size=[1, -2, 3]", "overrides size: size[1]: found -2; accepted: 3 numbers > 0 [m]"),
         (
             "drum={turn: 1}",
-            "--set drum: drum.turn: unknown key; did you mean turns? known: radius, turns",
+            "overrides drum: drum.turn: unknown key; did you mean turns? known: radius, turns",
         ),
-        ("parts=[{}]", "--set parts: parts[0].label: missing; accepted: text"),
-        ("size=[1, 2]", "--set size: found [1, 2]; accepted: 3 numbers > 0 [m]"),
-        ("drum.turns=0", "--set drum.turns: found 0; accepted: a whole number >= 1"),
-        ("drum=3", "--set drum: found 3; accepted: a mapping"),
-        ("mass", "--set mass: accepted: key=value, as in --set seed=3"),
-        ("=3", "--set =3: accepted: key=value, as in --set seed=3"),
-        ("", "--set : accepted: key=value, as in --set seed=3"),
-        ("mass=[", "--set mass: found '[', which is not YAML"),
-        ("mass=1\n---\n2", "--set mass: found '1\\n---\\n2', which is not YAML"),
-        ("mass.x=1", "--set mass.x: mass has no keys of its own"),
-        ("parts.label=1", "--set parts.label: parts has no keys of its own"),
+        ("parts=[{}]", "overrides parts: parts[0].label: missing; accepted: text"),
+        ("size=[1, 2]", "overrides size: found [1, 2]; accepted: 3 numbers > 0 [m]"),
+        ("drum.turns=0", "overrides drum.turns: found 0; accepted: a whole number >= 1"),
+        ("drum=3", "overrides drum: found 3; accepted: a mapping"),
+        ("mass", "overrides mass: accepted: key=value, as in seed=3"),
+        ("=3", "overrides =3: accepted: key=value, as in seed=3"),
+        ("", "overrides : accepted: key=value, as in seed=3"),
+        ("mass=[", "overrides mass: found '[', which is not YAML"),
+        ("mass=1\n---\n2", "overrides mass: found '1\\n---\\n2', which is not YAML"),
+        ("mass.x=1", "overrides mass.x: mass has no keys of its own"),
+        ("parts.label=1", "overrides parts.label: parts has no keys of its own"),
         (
             "drum.turn=1",
-            "--set drum.turn: there is no key turn in drum; did you mean turns? "
+            "overrides drum.turn: there is no key turn in drum; did you mean turns? "
             "known: radius, turns",
         ),
     ],
@@ -90,7 +90,9 @@ def test_an_override_that_is_not_accepted_is_named(load, item, words):
 
 def test_an_unknown_key_in_an_override_comes_with_all_that_exist(load):
     words = message_of(load, SMALL, "maas=3")
-    assert words.startswith("--set maas: there is no key maas in the scenario; did you mean mass? ")
+    assert words.startswith(
+        "overrides maas: there is no key maas in the scenario; did you mean mass? "
+    )
     assert words.endswith("drum, brake, parts")
 
 

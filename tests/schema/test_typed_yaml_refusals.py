@@ -201,13 +201,13 @@ def test_all_problems_of_a_file_are_said_at_once(load, tmp_path):
         load("name: first\n" + "\n".join(lines), "drum.turns=0", "dram=1")
     file = str(tmp_path / "machine.yaml")
     assert [problem.removeprefix(file).partition(";")[0] for problem in caught.value.problems] == [
-        "--set dram: there is no key dram in the scenario",
+        "overrides dram: there is no key dram in the scenario",
         ":2: share: found 7",
         ":3: sizes: unknown key",
         ":4: size[2]: found x",
         ":5: parts[1].at: found [1, 2]",
         ":5: parts[1].label: missing",
-        "--set drum.turns: found 0",
+        "overrides drum.turns: found 0",
         ":1: mass: missing",
     ]
     assert str(caught.value).splitlines() == list(caught.value.problems)

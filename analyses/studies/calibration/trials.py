@@ -50,6 +50,8 @@ PLACE_SIGMA, TURN_SIGMA = 2e-4, 5e-4
 TAG_SIZE, IMAGE = 0.06, (640, 480)
 TAG_PLACES = tuple((x, y) for x in (-0.2, 0.0, 0.2) for y in (-0.15, 0.15))
 START_OFF, START_TURNED = 0.3, np.radians(20.0)
+HALF = 0.5
+"""Size of noise and of all that is off in the trials that show what is not linear."""
 LENGTH_SHARE, TENSION_SIGMA = 1e-3, 0.1
 """Of the self-calibration: noise of lengths over the length, and of tensions [N]."""
 

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from cdpr_drake.analyses.studies.framework.runs import Runs
 from cdpr_drake.analyses.visualization.figure_style import line_style, new_figure
-from cdpr_drake.arrays import Array
 from cdpr_drake.palette import OTHER_OUTCOME, OUTCOMES, Look
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
 
@@ -17,22 +15,17 @@ LEAST_DRAWN_SHARE = 1e-4
 """Smaller errors are not drawn."""
 
 
-def error_figure(curves: Mapping[str, Array], runs: Mapping[str, Array]) -> Figure:
-    """|e| of every loop over time.
-
-    Args:
-        curves: |e| over the runs by mode, shape (n, k).
-        runs: Numbers of the runs by mode, the outcome first.
-    """
-    modes = list(runs)
+def error_figure(runs: Runs) -> Figure:
+    """|e| of every loop over time."""
+    modes = dict(runs.by("mode"))
     figure, panels = new_figure(
         1,
         len(modes),
-        (_width(modes), 5.0),
+        (_width(len(modes)), 5.0),
         "Feature error |e| of every closed loop, relative to its start",
     )
-    for axes, mode in zip(np.ravel(panels), modes, strict=True):
-        for curve, outcome in zip(curves[mode], runs[mode][:, 0], strict=True):
+    for axes, (mode, some) in zip(np.ravel(panels), modes.items(), strict=True):
+        for curve, outcome in zip(some["curve"], some.list("outcome"), strict=True):
             share = np.maximum(curve / max(curve[0], 1e-12), LEAST_DRAWN_SHARE)
             progress = np.linspace(0.0, 1.0, len(curve))
             style = line_style(_look(outcome)) | {"linewidth": 0.6, "alpha": 0.6}
@@ -46,23 +39,18 @@ def error_figure(curves: Mapping[str, Array], runs: Mapping[str, Array]) -> Figu
     return figure
 
 
-def way_figure(ways: Mapping[str, Array], runs: Mapping[str, Array]) -> Figure:
-    """Paths of the platform of every loop.
-
-    Args:
-        ways: Poses on the way by mode, shape (n, k, 7).
-        runs: Numbers of the runs by mode, the outcome first.
-    """
-    modes = list(runs)
+def way_figure(runs: Runs) -> Figure:
+    """Paths of the platform of every loop."""
+    modes = dict(runs.by("mode"))
     figure, panels = new_figure(
         2,
         len(modes),
-        (_width(modes), 8.4),
+        (_width(len(modes)), 8.4),
         "Paths of the platform, Po, in the world frame W, from above and from the side",
     )
     grid = np.reshape(panels, (2, len(modes)))
-    for column, mode in enumerate(modes):
-        for way, outcome in zip(ways[mode], runs[mode][:, 0], strict=True):
+    for column, (mode, some) in enumerate(modes.items()):
+        for way, outcome in zip(some["way"], some.list("outcome"), strict=True):
             for axes, up in zip(grid[:, column], (5, 6), strict=True):
                 look = _look(outcome)
                 style = line_style(look) | {"linewidth": 0.6, "alpha": 0.6}
@@ -76,24 +64,21 @@ def way_figure(ways: Mapping[str, Array], runs: Mapping[str, Array]) -> Figure:
     return figure
 
 
-def _width(modes: Sequence[str]) -> float:
-    return max(7.0, 3.5 * len(modes))  # room for the title
+def _width(modes: int) -> float:
+    return max(7.0, 3.5 * modes)  # room for the title
 
 
-def _look(outcome: float) -> Look:
-    return OUTCOMES.get(Outcome(int(outcome)).name.lower(), OTHER_OUTCOME)
+def _look(outcome: str) -> Look:
+    return OUTCOMES.get(outcome, OTHER_OUTCOME)
 
 
-def _legend(figure: object, runs: Mapping[str, Array]) -> None:
-    there = sorted({int(value) for table in runs.values() for value in table[:, 0]})
+def _legend(figure: Figure, runs: Runs) -> None:
+    there = sorted(runs.counts("outcome"), key=lambda word: Outcome[word.upper()])
     handles = [
         Line2D(
-            [],
-            [],
-            marker=_look(value).marker,
-            label=Outcome(value).name.lower().replace("_", " "),
-            **line_style(_look(value)),
+            [], [], marker=_look(word).marker, label=word.replace("_", " "),
+            **line_style(_look(word)),
         )
-        for value in there
-    ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=4)  # type: ignore[attr-defined]
+        for word in there
+    ]  # fmt: skip
+    figure.legend(handles=handles, loc="outside lower center", ncols=4)

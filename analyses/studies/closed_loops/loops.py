@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -15,7 +16,12 @@ from cdpr_drake.analyses.studies.closed_loops.servo_models import (
     perturbed_scenario,
     perturbed_servo,
 )
+from cdpr_drake.analyses.studies.framework.runs import Row
+from cdpr_drake.analyses.studies.framework.study import Case
+from cdpr_drake.analyses.workspaces.stability_defaults import workspace_defaults
+from cdpr_drake.analyses.workspaces.static_feasible import static_case
 from cdpr_drake.arrays import Array
+from cdpr_drake.errors import StabilityError
 from cdpr_drake.geometry.poses import (
     pose_error,
     pose_from_angles,
@@ -24,16 +30,36 @@ from cdpr_drake.geometry.poses import (
     pose_rows_distance,
 )
 from cdpr_drake.models.camera_catalogue import load_camera
-from cdpr_drake.stability.perturbation_bounds import PerturbationBounds
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.stability.desired_view import FixedObject
+from cdpr_drake.stability.perturbation_bounds import PerturbationBounds, vector_size
 from cdpr_drake.stability.perturbation_samples_kernel import draw_perturbations
 from cdpr_drake.stability.stability_case import StabilityCase
 from cdpr_drake.stability.verdict import VerdictOptions, judge_stability, worst_perturbations
+from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.loops.loop_choice import choose_compiled_loop
+from cdpr_drake.systems.monitoring.run_monitor import Outcome
 from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
-from cdpr_drake.workspaces.static_feasibility import StaticCase, statically_feasible
+from cdpr_drake.workspaces.static_feasibility import statically_feasible
 
-LOOPS = ("kinematic", "shifted", "control_integration")
-"""How the loop is closed: kinematics alone, or the simulated robot with an estimator."""
+ROBOT = "acrobot_large"
+VERDICT = "searched"
+SEED = 1
+OPTIONS = VerdictOptions(seed=SEED)
+
+SETTINGS = (
+    f"robot={ROBOT}",
+    "camera.kind=projected",
+    "camera.pixel_noise=0",
+    "target.pose.position=[0, 0, 0]",
+    "desired.position=[0, 0, 0.3]",
+    "duration=60",
+)
+"""What differs from the scenario acrobot_pbvs: the tag lies in the middle of the floor, so that it
+is seen from much of the workspace, and images have no noise, so that perturbations are all."""
+
+LOWEST = 0.15
+"""Starts keep this height, so that the tag is in front of the camera [m]."""
 
 MODES = {
     "kinematic": "what the criterion is about: kinematics, estimate off by a constant error",
@@ -43,7 +69,8 @@ MODES = {
     "shifted, worst": "as shifted, with the worst perturbation that a search finds",
     "shifted, worst, managed": "as shifted, worst, with tension management",
 }
-"""How the loop is closed and under which perturbation; elsewhere its directions are random."""
+"""How the loop is closed, kinematics alone or the simulated robot with an estimator, and under what
+perturbation; elsewhere its directions are random."""
 
 PLAIN, MANAGED = "shifted, worst", "shifted, worst, managed"
 """Two of them, without and with tension management."""
@@ -51,26 +78,6 @@ PLAIN, MANAGED = "shifted, worst", "shifted, worst, managed"
 MANAGEMENT = "tension_management={kind: constant, threshold: [1.0], gain: 0.003}"
 """What the managed loops add; the gain is for cables as stiff as their fibre, for which the
 published one is too high."""
-
-COLUMNS = (
-    "outcome",
-    "time_s",
-    "position_error_m",
-    "rotation_error_rad",
-    "error_growth",
-    "least_margin",
-    "poses_checked",
-    "poses_outside_z",
-    "estimate_error_m",
-    "estimate_error_rad",
-    "taut_at_end",
-    "error_peak",
-)
-"""Numbers of a run: `Outcome`; time (kinematic: times the gain); true errors at the end; largest
-rise of |e| between two samples, as a share of its start; least margin of Pi for the run's own
-perturbation on its path; poses of the path that were judged, and those not in Z; largest error of
-the pose estimate; cables that pull at the end (kinematic: all of them); largest |e| over |e| at the
-start."""
 
 WAY_POSES = 10
 """Poses of a path that are judged by the verdict, both ends among them."""
@@ -86,89 +93,121 @@ TILT_DEG, YAW_DEG = 15.0, 45.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class ClosedLoopTask:
-    """Sweep task: does the servo converge from the starts?
+class LoopSetup:
+    """What all loops of a scheme have in common.
 
     Attributes:
         scenario: The task of the servo; starts and perturbations are put in.
+        managed: The same with tension management.
+        servo: The servo without perturbation.
         case: The same for the verdict.
         bounds: What limits the perturbations.
-        starts: Poses of the platform, rows as `pose_row`, shape (n, 7).
-        verdict: How poses of the path are judged.
-        options: How hard to look.
-        loop: One of `LOOPS`.
-        seed: Seed of the perturbations.
-        worst: Whether every perturbation is the worst that a search finds at the start, instead
-            of one in random directions.
+        box: Lower and upper corner of where Po may start, shape (3,) each [m].
     """
 
     scenario: Scenario
+    managed: Scenario
+    servo: PerturbedServo
     case: StabilityCase
     bounds: PerturbationBounds
-    starts: Array
-    verdict: str
-    options: VerdictOptions
-    loop: str
-    seed: int
-    worst: bool = False
+    box: tuple[Array, Array]
 
-    def __call__(self, start: int, stop: int) -> dict[str, np.ndarray]:
-        """`runs`, shape (n, columns), `curve`, (n, CURVE), `way`, (n, WAY_POSES, 7)."""
-        found = [self._run(number) for number in range(start, stop)]
-        names = ("runs", "curve", "way")
-        return {name: np.array([one[k] for one in found]) for k, name in enumerate(names)}
 
-    def perturbation(self, number: int) -> Perturbation:
-        """The perturbation of one start: random, as large as the bounds allow, or the worst."""
-        pose = self.starts[number]
-        if self.worst:
-            _, found = worst_perturbations(self.case, self.bounds, pose[None], self.options)
-            return Perturbation.from_vector(found[0])
-        drawn = draw_perturbations(pose, self.bounds, self.case.m, 1, self.seed)
-        return Perturbation.from_vector(drawn[0])
+@cache
+def loop_setup(scheme: str) -> LoopSetup:
+    """What all loops of a scheme have in common."""
+    settings = [*SETTINGS, f"controller.scheme={scheme}"]
+    scenario = load_scenario("acrobot_pbvs", settings)
+    robot = load_robot(ROBOT)
+    defaults = workspace_defaults(robot, ROBOT)
+    none = Perturbation.from_vector(np.zeros(vector_size(len(robot.cables))))
+    servo = perturbed_servo(scenario, none)
+    case = StabilityCase(
+        robot.cable_set().without_pulleys(),
+        scheme,
+        X_PC=servo.X_PC,
+        target=FixedObject(servo.X_WO, scenario.desired.transform()),
+        lever="object",
+    )
+    return LoopSetup(
+        scenario=scenario,
+        managed=load_scenario("acrobot_pbvs", [*settings, MANAGEMENT]),
+        servo=servo,
+        case=case,
+        bounds=defaults.bounds,
+        box=(np.maximum(defaults.lower, [-np.inf, -np.inf, LOWEST]), defaults.upper),
+    )
 
-    def _run(self, number: int) -> tuple[Array, Array, Array]:
-        X_WP = pose_from_row(self.starts[number])
-        perturbation = self.perturbation(number)
-        servo = perturbed_servo(self.scenario, perturbation)
-        if self.loop == "kinematic":
-            path = kinematic_path(servo, X_WP)
-            rows = np.array([pose_row(X) for X in path.poses])
-            believed = np.array([pose_row(perturbation.platform(X)) for X in path.poses])
-            outcome, errors, time = float(path.outcome), path.errors, STEP * len(rows)
-            taut = self.case.m
-        else:
-            made = perturbed_scenario(self.scenario, X_WP, perturbation)
-            made.estimator.kind = self.loop
-            made.sensors.tracker = "ideal"
-            result = run_scenario(choose_compiled_loop(made))
-            rows, believed = result.log["X_WP"], result.log["X_WP_estimated"]
-            outcome, time = float(result.outcome), result.sim_time
-            errors = seen_errors(result)
-            taut = int(np.sum(result.log["slack"][-1] == 0.0))
-        way = np.linspace(0, len(rows) - 1, WAY_POSES).round().astype(int)
-        judged = judge_stability(self.case, self.bounds, rows[way], self.verdict, self.options)
-        margins = [servo.margin(pose_from_row(rows[k]), pose_from_row(believed[k])) for k in way]
-        final = pose_error(servo.X_CO(pose_from_row(rows[-1])), self.scenario.desired.transform())
-        off, turned = pose_rows_distance(rows, believed)
-        growth = float(np.max(np.diff(errors), initial=0.0)) / max(float(errors[0]), 1e-12)
-        numbers = np.array(
-            [
-                outcome,
-                time,
-                *final,
-                growth,
-                min(margins),
-                WAY_POSES,
-                np.sum(~judged.stable),
-                np.max(off),
-                np.max(turned),
-                taut,
-                float(np.max(errors)) / max(float(errors[0]), 1e-12),
-            ]
-        )
-        samples = np.linspace(0, len(errors) - 1, CURVE).round().astype(int)
-        return numbers, errors[samples], rows[way]
+
+def measure(case: Case, seed: int) -> Row:
+    """Closes a loop from the start of this number: does the servo converge?
+
+    Args:
+        case: Its keys are the mode, one of `MODES`, and the scheme; its data are the starts.
+        seed: Number of the start.
+
+    Returns:
+        outcome; time_s (kinematic: times the gain); position_error_m, rotation_error_rad: true
+        errors at the end; error_growth: largest rise of |e| between two samples, as a share of its
+        start; least_margin of Pi for the run's own perturbation on its path; poses_checked of the
+        path, and of these poses_outside_z; estimate_error_m, estimate_error_rad: largest errors of
+        the pose estimate; taut_at_end: cables that pull then (kinematic: all of them); error_peak:
+        largest |e| over |e| at the start; start_pose as `pose_row`; curve: |e|, shape (CURVE,);
+        way, shape (WAY_POSES, 7).
+    """
+    mode, setup = case.keys["mode"], loop_setup(case.keys["scheme"])
+    start = np.array(case.data[seed])
+    perturbation = perturbation_of(setup, start, worst="worst" in mode)
+    scenario = setup.managed if mode == MANAGED else setup.scenario
+    servo, X_WP = perturbed_servo(scenario, perturbation), pose_from_row(start)
+    loop = mode.partition(",")[0]
+    if loop == "kinematic":
+        path = kinematic_path(servo, X_WP)
+        rows = np.array([pose_row(X) for X in path.poses])
+        believed = np.array([pose_row(perturbation.platform(X)) for X in path.poses])
+        outcome, errors, time = path.outcome, path.errors, STEP * len(rows)
+        taut = setup.case.m
+    else:
+        made = perturbed_scenario(scenario, X_WP, perturbation)
+        made.estimator.kind = loop
+        made.sensors.tracker = "ideal"
+        result = run_scenario(choose_compiled_loop(made))
+        rows, believed = result.log["X_WP"], result.log["X_WP_estimated"]
+        outcome, errors, time = Outcome(result.outcome), seen_errors(result), result.sim_time
+        taut = int(np.sum(result.log["slack"][-1] == 0.0))
+    way = np.linspace(0, len(rows) - 1, WAY_POSES).round().astype(int)
+    judged = judge_stability(setup.case, setup.bounds, rows[way], VERDICT, OPTIONS)
+    margins = [servo.margin(pose_from_row(rows[k]), pose_from_row(believed[k])) for k in way]
+    final = pose_error(servo.X_CO(pose_from_row(rows[-1])), scenario.desired.transform())
+    off, turned = pose_rows_distance(rows, believed)
+    first = max(float(errors[0]), 1e-12)
+    samples = np.linspace(0, len(errors) - 1, CURVE).round().astype(int)
+    return {
+        "outcome": outcome.name.lower(), "time_s": time,
+        "position_error_m": final[0], "rotation_error_rad": final[1],
+        "error_growth": float(np.max(np.diff(errors), initial=0.0)) / first,
+        "least_margin": min(margins),
+        "poses_checked": WAY_POSES, "poses_outside_z": int(np.sum(~judged.stable)),
+        "estimate_error_m": np.max(off), "estimate_error_rad": np.max(turned),
+        "taut_at_end": taut, "error_peak": float(np.max(errors)) / first,
+        "start_pose": start.tolist(), "curve": errors[samples], "way": rows[way],
+    }  # fmt: skip
+
+
+def perturbation_of(setup: LoopSetup, start: Array, *, worst: bool) -> Perturbation:
+    """The perturbation of a start: random, as large as the bounds allow, or the worst one.
+
+    Args:
+        setup: The loops.
+        start: As `pose_row`.
+        worst: Whether it is the worst that a search finds at the start, instead of one in random
+            directions.
+    """
+    if worst:
+        _, found = worst_perturbations(setup.case, setup.bounds, start[None], OPTIONS)
+    else:
+        found = draw_perturbations(start, setup.bounds, setup.case.m, 1, SEED)
+    return Perturbation.from_vector(found[0])
 
 
 def seen_errors(result: RunResult) -> Array:
@@ -198,32 +237,30 @@ class Starts:
     not_stable: int
 
 
-def stable_starts(
-    servo: PerturbedServo,
-    case: StabilityCase,
-    statics: StaticCase,
-    bounds: PerturbationBounds,
-    *,
-    box: tuple[Array, Array],
-    count: int,
-    verdict: str,
-    options: VerdictOptions,
-    seed: int,
-) -> Starts:
+@cache
+def stable_starts(scheme: str, count: int) -> Starts:
     """Random poses of SZ from which the target is seen, position and angles evenly distributed.
 
     Args:
-        servo: The servo, for its camera and target.
-        case: The same for the verdict.
-        statics: What the cables hold.
-        bounds: What limits the perturbations.
-        box: Lower and upper corner of where Po may be, shape (3,) each [m].
-        count: How many poses.
-        verdict: How they are judged.
-        options: How hard to look.
-        seed: Seed of the poses.
+        scheme: Visual servoing scheme.
+        count: How many poses; the first are the same for any count.
+
+    Raises:
+        StabilityError: The desired pose is not stable, or cannot be held.
     """
-    random = np.random.default_rng([seed, 7])
+    setup = loop_setup(scheme)
+    servo, case, bounds = setup.servo, setup.case, setup.bounds
+    statics = static_case(servo.robot)
+    goal = desired_platform(servo)
+    goal_held = statically_feasible(
+        statics, goal.translation()[None], goal.rotation().matrix()[None]
+    )[0]
+    if not (
+        goal_held
+        and judge_stability(case, bounds, pose_row(goal)[None], VERDICT, OPTIONS).stable[0]
+    ):
+        raise StabilityError("closed loop: the desired pose is not stable, or cannot be held")
+    random = np.random.default_rng([SEED, 7])
     settings = servo.scenario.camera
     mount = servo.robot.camera_mount(settings.mount)
     pinhole = load_camera(mount.model).pinhole(settings.width, settings.height)
@@ -231,7 +268,7 @@ def stable_starts(
     rows: list[Array] = []
     drawn = not_held = not_seen = not_stable = 0
     while len(rows) < count:
-        positions = random.uniform(*box, (CANDIDATES, 3))
+        positions = random.uniform(*setup.box, (CANDIDATES, 3))
         angles = random.uniform(-widest, widest, (CANDIDATES, 3))
         poses = [pose_from_angles(p, a) for p, a in zip(positions, angles, strict=True)]
         turns = np.array([X.rotation().matrix() for X in poses])
@@ -241,7 +278,7 @@ def stable_starts(
         candidates = np.array([pose_row(poses[k]) for k in asked]).reshape(-1, 7)
         stable = np.zeros(0, bool)
         if len(candidates):
-            stable = judge_stability(case, bounds, candidates, verdict, options).stable
+            stable = judge_stability(case, bounds, candidates, VERDICT, OPTIONS).stable
         rows += list(candidates[stable])
         drawn += CANDIDATES
         not_held += int(np.sum(~held))

@@ -1,2 +1,1 @@
-from .statements import CHECKS as CHECKS
-from .study import study_engines as study_engines
+from .study import STUDY as STUDY

@@ -1,14 +1,14 @@
-"""Runs by the plant and by the compiled engine, how far they part, and the tasks of a sweep.
+"""Runs by the plant and by the compiled engine, and how far they part, as rows of the study.
 
 `run_pair` runs a scenario by both engines. `commanded_path` runs a robot by one of them, with a
-cable velocity for each period, and `state_distance` says how far two of these part. Of the tasks
-each item is a pair of runs or a row of them.
+cable velocity for each period, and `state_distance` says how far two of these part.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -16,39 +16,31 @@ from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
 from cdpr_drake.analyses.simulation.tension_control_run import TensionRun, run_tension_scenario
 from cdpr_drake.analyses.simulation.visual_servo_run import RunResult, run_scenario
+from cdpr_drake.analyses.studies.framework.runs import Row
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.poses import pose_rows_distance
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.monitoring.run_monitor import Outcome
 from cdpr_drake.systems.robots.cable_robot import SEMI_IMPLICIT, CableRobot, automatic_step
 from cdpr_drake.systems.robots.compiled_cable_robot import CompiledCableRobot
 from cdpr_drake.systems.robots.compiled_step import StepRule
 from cdpr_drake.systems.robots.settings import COMPILED, PLANT, CableRobotSettings, CableSettings
 from cdpr_drake.systems.scenarios.files import TENSION_CONTROL, scenario_kind
 
-COLUMNS = (
-    "outcome_plant",
-    "outcome_compiled",
-    "time_plant_s",
-    "time_compiled_s",
-    "distance_m",
-    "angle_rad",
-    "final_distance_m",
-    "final_angle_rad",
-    "final_error_plant_m",
-    "final_error_compiled_m",
-    "tension_difference_n",
-    "largest_tension_n",
-    "slack_share",
-)
-"""Numbers of a pair of runs: how each ended, how far their paths and tensions part at most and at
-the end, how far each ended from its goal, and the share of cables and rows that were slack."""
 
+def run_pair(name: str, overrides: Sequence[str]) -> Row:
+    """A scenario, run once by each engine; the camera of a servo is projected.
 
-def run_pair(name: str, overrides: Sequence[str]) -> Array:
-    """`COLUMNS` of a scenario, run once by each engine; the camera of a servo is projected."""
+    Returns:
+        outcome_plant, outcome_compiled, time_plant_s, time_compiled_s: how and when each ended;
+        distance_m, angle_rad: how far their paths part at most; final_distance_m, final_angle_rad:
+        at the end; final_error_plant_m, final_error_compiled_m: how far each ended from its goal;
+        tension_difference_n: at most; largest_tension_n; slack_share: share of cables and rows
+        that were slack, of the plant.
+    """
     tensions = scenario_kind(name) == TENSION_CONTROL
     more = [] if tensions else ["camera.kind=projected"]
     runs: list[RunResult | TensionRun] = []
@@ -60,12 +52,18 @@ def run_pair(name: str, overrides: Sequence[str]) -> Array:
     distance, angle = pose_rows_distance(one.log["X_WP"][:count], other.log["X_WP"][:count])
     end = pose_rows_distance(one.log["X_WP"][-1:], other.log["X_WP"][-1:])
     difference = np.abs(one.log["tensions"][:count] - other.log["tensions"][:count])
-    return np.array([
-        one.outcome, other.outcome, one.sim_time, other.sim_time,
-        np.max(distance), np.max(angle), end[0][0], end[1][0],
-        final_error(one), final_error(other),
-        np.max(difference), np.max(one.log["tensions"]), np.mean(one.log["slack"]),
-    ], float)  # fmt: skip
+    row: dict[str, Any] = {}
+    for engine, run in ((PLANT, one), (COMPILED, other)):
+        row[f"outcome_{engine}"] = Outcome(run.outcome).name.lower()
+        row[f"time_{engine}_s"] = run.sim_time
+        row[f"final_error_{engine}_m"] = final_error(run)
+    return row | {
+        "distance_m": np.max(distance), "angle_rad": np.max(angle),
+        "final_distance_m": end[0][0], "final_angle_rad": end[1][0],
+        "tension_difference_n": np.max(difference),
+        "largest_tension_n": np.max(one.log["tensions"]),
+        "slack_share": np.mean(one.log["slack"]),
+    }  # fmt: skip
 
 
 def final_error(run: RunResult | TensionRun) -> float:
@@ -182,34 +180,6 @@ ENERGY_SLACK = 5e-4
 """Length paid out on all cables at its start: it falls into them [m]."""
 
 
-@dataclass(frozen=True)
-class ScenarioTask:
-    """A shipped scenario by both engines; one item."""
-
-    name: str
-    overrides: tuple[str, ...] = ()
-
-    def __call__(self, start: int, stop: int) -> dict[str, Array]:
-        """`COLUMNS` of the pairs, shape (n, len(COLUMNS))."""
-        return {
-            "pairs": np.array([run_pair(self.name, self.overrides) for _ in range(start, stop)])
-        }
-
-
-@dataclass(frozen=True)
-class ImpactTask:
-    """The servo with cables paid out at random; the item is the seed."""
-
-    def __call__(self, start: int, stop: int) -> dict[str, Array]:
-        """`COLUMNS` of the pairs, shape (n, len(COLUMNS))."""
-        return {
-            "pairs": np.array([
-                run_pair(IMPACTS, [slack_override(seed), f"seed={seed}"])
-                for seed in range(start, stop)
-            ])
-        }  # fmt: skip
-
-
 def slack_override(seed: int) -> str:
     """Lengths that are paid out at the start, by a seed, as an override of a scenario."""
     slack = np.random.default_rng(seed).uniform(0.0, MOST_SLACK, 8)
@@ -246,46 +216,38 @@ def taut_velocities(robot: Robot, settings: CableRobotSettings, seed: int) -> Ar
     return np.asarray(np.diff(lengths, axis=0) / TAUT_PERIOD)
 
 
-@dataclass(frozen=True)
-class TautTask:
-    """Robots that are drawn, on slow loops with cables taut; the item is the seed."""
+def taut_row(seed: int) -> Row:
+    """A robot that is drawn, on a slow loop with cables taut, by both engines.
 
-    def __call__(self, start: int, stop: int) -> dict[str, Array]:
-        """Largest distance [m], angle [rad] and relative energy difference, and least tension [N],
-        shape (n, 4)."""
-        return {"taut": np.array([self._one(seed) for seed in range(start, stop)])}
-
-    def _one(self, seed: int) -> list[float]:
-        robot, settings = drawn_robot(seed)
-        home = robot.home.transform()
-        velocities = taut_velocities(robot, settings, seed)
-        step = TAUT_SHARE * automatic_step(robot, home, "runge_kutta3", settings)
-        found = [
-            commanded_path(
-                kind, robot, settings, home, velocities, TAUT_PERIOD, rule=StepRule(max_step=step)
-            )
-            for kind in (CableRobot, CompiledCableRobot)
-        ]
-        (one, l0, tensions), (other, l0_other, _) = found
-        distance, angle = state_distance(one, other)
-        motion = CompiledCableRobot(robot, settings).motion
-        energies = [
-            np.array([motion.energy_of(np.concatenate(row)) for row in zip(*rows, strict=True)])
-            for rows in ((one, l0), (other, l0_other))
-        ]
-        size = robot.platform.mass * 9.81 * AMPLITUDE
-        difference = np.max(np.abs(energies[0] - energies[1])) / size
-        return [
-            float(np.max(distance)), float(np.max(angle)), float(difference),
-            float(np.min(tensions)),
-        ]  # fmt: skip
+    Returns:
+        distance_m, angle_rad, energy_difference: the largest ones, the last over the energy that
+        lifts the platform by the motion; least_tension_n.
+    """
+    robot, settings = drawn_robot(seed)
+    home = robot.home.transform()
+    velocities = taut_velocities(robot, settings, seed)
+    rule = StepRule(max_step=TAUT_SHARE * automatic_step(robot, home, "runge_kutta3", settings))
+    (one, l0, tensions), (other, l0_other, _) = (
+        commanded_path(kind, robot, settings, home, velocities, TAUT_PERIOD, rule=rule)
+        for kind in (CableRobot, CompiledCableRobot)
+    )
+    distance, angle = state_distance(one, other)
+    motion = CompiledCableRobot(robot, settings).motion
+    energies = [
+        np.array([motion.energy_of(np.concatenate(row)) for row in zip(*rows, strict=True)])
+        for rows in ((one, l0), (other, l0_other))
+    ]
+    size = robot.platform.mass * 9.81 * AMPLITUDE
+    return {
+        "distance_m": np.max(distance), "angle_rad": np.max(angle),
+        "energy_difference": np.max(np.abs(energies[0] - energies[1])) / size,
+        "least_tension_n": np.min(tensions),
+    }  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
-class OrderTask:
-    """ACROBOT by each method at one step after the other; all of it is one item.
-
-    It stands at home, and its winches run.
+class OrderTrial:
+    """ACROBOT at home, its winches run, by each method at one step after the other.
 
     Attributes:
         softer: How much softer than the robot's its cables are.
@@ -308,17 +270,18 @@ class OrderTask:
         """The steps [s]."""
         return [self.largest / 2**k for k in range(STEPS)]
 
-    def __call__(self, start: int, stop: int) -> dict[str, Array]:
-        """Distance to the plant at a small step, by step and `METHODS`, shape (1, 5, 3) [m]."""
+    def row(self) -> Row:
+        """The largest distance to the plant at a small step, distances_m, and the order of
+        convergence between the first step and the last, orders, by method; the former by step."""
         rule = StepRule(method=EXPLICIT, max_step=self.reference)
-        reference, rows = self._path(CableRobot, rule), []
-        for step in self.steps():
-            row = []
-            for method in METHODS:
-                found = self._path(CompiledCableRobot, StepRule(method=method, max_step=step))
-                row.append(float(np.max(state_distance(found, reference)[0])))
-            rows.append(row)
-        return {"distance": np.array([rows])[: stop - start]}
+        reference, steps = self._path(CableRobot, rule), self.steps()
+        found: dict[str, list[float]] = {method: [] for method in METHODS}
+        for method, distances in found.items():
+            for step in steps:
+                path = self._path(CompiledCableRobot, StepRule(method=method, max_step=step))
+                distances.append(float(np.max(state_distance(path, reference)[0])))
+        orders = {method: order_of(distances) for method, distances in found.items()}
+        return {"steps_s": steps, "distances_m": found, "orders": orders}
 
     def _path(self, kind: type[CableRobot | CompiledCableRobot], rule: StepRule) -> Array:
         robot = load_robot("acrobot_small")
@@ -332,46 +295,50 @@ class OrderTask:
         return states
 
 
-TAUT_ORDERS = OrderTask()
-CATCHING_ORDERS = OrderTask(slack=2e-2)
-REAL_ORDERS = OrderTask(
-    softer=1.0, model="kelvin_voigt", slack=5e-4, duration=0.04, largest=4e-4, reference=2e-6
-)
-"""A fall of half a millimetre into the real cables, and the first impacts."""
+def order_of(errors: Sequence[float]) -> float:
+    """Order of convergence between the first step and the last, each half of the one before."""
+    return float(np.log2(errors[0] / errors[-1]) / (len(errors) - 1))
 
 
-@dataclass(frozen=True)
-class EnergyTask:
-    """ACROBOT on its real cables, undamped and slack at the start, halted; the item is the step.
+ORDERS = {
+    "taut": OrderTrial(),
+    "catching": OrderTrial(slack=2e-2),
+    "catching real": OrderTrial(
+        softer=1.0, model="kelvin_voigt", slack=5e-4, duration=0.04, largest=4e-4, reference=2e-6
+    ),
+}
+"""Where orders are measured, by what cables do; the last a fall of half a millimetre into the real
+cables, and the first impacts."""
 
-    Attributes:
+
+def energy_row(step: float, duration: float) -> Row:
+    """ACROBOT on its real cables, undamped and slack at the start, halted.
+
+    Args:
+        step: Of the integration [s].
         duration: For how long [s].
+
+    Returns:
+        Changes of the energy over that of the fall: largest_gain and least_gain by runge_kutta3,
+        semi_implicit_gain, the largest; slack_cables: most at a time; largest_tension_n.
     """
-
-    duration: float
-
-    def __call__(self, start: int, stop: int) -> dict[str, Array]:
-        """Changes of the energy over that of the fall, shape (n, 5): the largest and the least by
-        runge_kutta3, the largest by semi_implicit; most cables slack, largest tension [N]."""
-        return {"energy": np.array([self._one(step) for step in ENERGY_STEPS[start:stop]])}
-
-    def _one(self, step: float) -> list[float]:
-        robot = load_robot("acrobot_small")
-        settings = CableRobotSettings(cables=CableSettings(model="elastic"))
-        motion = CompiledCableRobot(robot, settings).motion
-        fall = robot.platform.mass * robot.gravity * ENERGY_SLACK
-        row: list[float] = []
-        slack = tension = 0.0
-        for method in (EXPLICIT, SEMI_IMPLICIT):
-            states, l0, tensions = commanded_path(
-                CompiledCableRobot, robot, settings, robot.home.transform(),
-                np.zeros((round(self.duration / 0.01), 8)), 0.01,
-                rule=StepRule(method=method, max_step=step), slack=np.full(8, ENERGY_SLACK),
-            )  # fmt: skip
-            energies = [motion.energy_of(np.concatenate(r)) for r in zip(states, l0, strict=True)]
-            row.append(float(np.max(np.array(energies) - energies[0]) / fall))
-            if method == EXPLICIT:
-                row.append(float(np.min(np.array(energies) - energies[0]) / fall))
-                slack = float(np.max(np.sum(tensions == 0.0, axis=1)))
-                tension = float(np.max(tensions))
-        return [*row, slack, tension]
+    robot = load_robot("acrobot_small")
+    settings = CableRobotSettings(cables=CableSettings(model="elastic"))
+    motion = CompiledCableRobot(robot, settings).motion
+    fall = robot.platform.mass * robot.gravity * ENERGY_SLACK
+    gains, tensions = {}, {}
+    for method in (EXPLICIT, SEMI_IMPLICIT):
+        states, l0, tensions[method] = commanded_path(
+            CompiledCableRobot, robot, settings, robot.home.transform(),
+            np.zeros((round(duration / 0.01), 8)), 0.01,
+            rule=StepRule(method=method, max_step=step), slack=np.full(8, ENERGY_SLACK),
+        )  # fmt: skip
+        energies = [motion.energy_of(np.concatenate(r)) for r in zip(states, l0, strict=True)]
+        gains[method] = np.array(energies) - energies[0]
+    return {
+        "largest_gain": np.max(gains[EXPLICIT]) / fall,
+        "least_gain": np.min(gains[EXPLICIT]) / fall,
+        "semi_implicit_gain": np.max(gains[SEMI_IMPLICIT]) / fall,
+        "slack_cables": int(np.max(np.sum(tensions[EXPLICIT] == 0.0, axis=1))),
+        "largest_tension_n": np.max(tensions[EXPLICIT]),
+    }

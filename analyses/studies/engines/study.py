@@ -2,47 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
-from functools import partial
+from collections.abc import Iterator, Mapping
 from typing import Any
 
-import numpy as np
-from matplotlib.figure import Figure
-from rich.table import Table
-
-from cdpr_drake.analyses.reporting.progress import (
-    DEFAULT_STUDY_SESSION,
-    StoppableStudy,
-    StudySession,
-    WorkProgress,
-)
-from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
-from cdpr_drake.analyses.reporting.statements import Statement, new_table, statement_table
 from cdpr_drake.analyses.studies.engines.figures import engine_figure
 from cdpr_drake.analyses.studies.engines.pairs import (
-    CATCHING_ORDERS,
-    COLUMNS,
     ENERGY_DURATION,
     ENERGY_STEPS,
+    IMPACTS,
     METHODS,
-    REAL_ORDERS,
-    TAUT_ORDERS,
-    EnergyTask,
-    ImpactTask,
-    ScenarioTask,
-    TautTask,
+    ORDERS,
+    energy_row,
+    run_pair,
+    slack_override,
+    taut_row,
 )
-from cdpr_drake.analyses.studies.engines.statements import (
-    column,
-    engine_statements,
-    scenario_names_in,
-)
-from cdpr_drake.analyses.studies.framework.seeded_study import DrawnStudy
-from cdpr_drake.analyses.sweeps.sweep import run_study_sweep
-from cdpr_drake.arrays import Array
+from cdpr_drake.analyses.studies.engines.statements import CHECKS
+from cdpr_drake.analyses.studies.framework.runs import Row
+from cdpr_drake.analyses.studies.framework.study import Case, Form, Study
+from cdpr_drake.analyses.studies.framework.summary import Cell, Summary
 from cdpr_drake.systems.diagrams.load import load_scenario
-from cdpr_drake.systems.monitoring.run_monitor import Outcome
 from cdpr_drake.systems.scenarios.files import TENSION_CONTROL, scenario_kind, scenario_names
 from cdpr_drake.systems.scenarios.run_settings import has_contact
 
@@ -59,130 +38,79 @@ QUICK_SCENARIOS = ("acrobot_pbvs", "planar_computed_torque", "planar_pbvs")
 QUICK_DURATION = 0.5
 """Scenarios of the quick form, and how long they run [s]."""
 
-ORDER_TASKS = {
-    "order taut": TAUT_ORDERS,
-    "order catching": CATCHING_ORDERS,
-    "order catching real": REAL_ORDERS,
-}
-"""Where orders of convergence are measured, by the names of the tasks."""
+QUICK_ENERGY = 0.5
+"""How long the undamped robot bounces in the quick form [s]."""
 
 
-@dataclass(frozen=True, eq=False)
-class EnginesStudy(DrawnStudy, StoppableStudy):
-    """What the study found.
+def cases(form: Form) -> Iterator[Case]:
+    """Scenarios, taut motions and impacts over seeds, orders by what cables do, steps."""
+    for name in QUICK_SCENARIOS if form.quick else scenario_names():
+        scenario = load_scenario(name)
+        if has_contact(scenario):
+            continue  # one engine only has contact: there is nothing to compare
+        changes = (f"duration={LONGEST}",) if scenario.duration > LONGEST else ()
+        if form.quick and scenario_kind(name) != TENSION_CONTROL:
+            changes = (f"duration={QUICK_DURATION}",)
+        keys = {"kind": "scenario", "scenario": name}
+        yield Case(name=f"scenario {name}", keys=keys, changes=changes, most=1)
+    yield Case(name="taut motions", keys={"kind": "taut"}, seeds=MOTIONS)
+    for name, trial in ORDERS.items():
+        yield Case(name=f"order {name}", keys={"kind": "order", "order": name}, data=trial, most=1)
+    for step in ENERGY_STEPS:
+        yield Case(
+            name=f"energy {step:g} s",
+            keys={"kind": "energy", "step_s": step},
+            data=QUICK_ENERGY if form.quick else ENERGY_DURATION,
+            most=1,
+        )
+    few = form.quick and form.asked_seeds is None
+    yield Case(name="impacts", keys={"kind": "impacts"}, most=QUICK_RUNS if few else None)
 
-    Attributes:
-        quick: Whether it was the quick form.
-        found: Arrays of the finished tasks.
-        progress: Where it stood at the end, and what earlier sessions had left of it.
-    """
 
-    quick: bool
-    found: dict[str, dict[str, Array]]
-    progress: WorkProgress
+def measure(case: Case, seed: int) -> Row:
+    """A row of `run_pair`, `taut_row`, `OrderTrial` or `energy_row`."""
+    kind = case.keys["kind"]
+    if kind == "taut":
+        return taut_row(seed)
+    if kind == "order":
+        row: Row = case.data.row()
+        return row
+    if kind == "energy":
+        return energy_row(case.keys["step_s"], case.data)
+    if kind == "impacts":
+        return run_pair(IMPACTS, [slack_override(seed), f"seed={seed}"])
+    return run_pair(case.keys["scenario"], case.changes)
 
-    def statements(self) -> list[Statement]:
-        """What had to be shown, and whether it was."""
-        return engine_statements(self.found, self.quick and not self.interrupted)
 
-    def as_dict(self) -> dict[str, Any]:
-        """Everything for JSON: arguments, versions, pairs of runs, statements."""
-        found = self.found
-        return {
-            "study": "engines",
-            "quick": self.quick,
-            "interrupted": self.interrupted,
-            "items": self.progress.counts(),
-            "versions": package_versions(),
-            "methods": list(METHODS),
-            "steps_s": {name: task.steps() for name, task in ORDER_TASKS.items()},
-            "energy_steps_s": list(ENERGY_STEPS),
-            "columns": list(COLUMNS),
-            "results": {
-                name: {key: np.asarray(values).tolist() for key, values in arrays.items()}
-                for name, arrays in found.items()
+def parameters(form: Form) -> Mapping[str, Any]:
+    """What is compared."""
+    return {"methods": METHODS, "energy_steps_s": ENERGY_STEPS, "impacts": IMPACTS}
+
+
+STUDY = Study(
+    name="engines",
+    title="The plant and the compiled engine beside each other",
+    cases=cases,
+    measure=measure,
+    seeds=(RUNS, QUICK_MOTIONS),
+    parameters=parameters,
+    stated="What the engines have to show",
+    checks=CHECKS,
+    tables=[
+        Summary(
+            "Scenarios by both engines",
+            ("scenario", "outcome_plant", "outcome_compiled"),
+            {
+                "plant ends at [s]": Cell("mean", "time_plant_s", ".2f"),
+                "compiled [s]": Cell("mean", "time_compiled_s", ".2f"),
+                "path [um]": Cell("largest", "distance_m", ".3g"),
+                "end [um]": Cell("largest", "final_distance_m", ".3g"),
+                "error of plant [um]": Cell("largest", "final_error_plant_m", ".4g"),
+                "of compiled [um]": Cell("largest", "final_error_compiled_m", ".4g"),
+                "slack": Cell("mean", "slack_share", ".2f"),
             },
-            "statements": [statement.as_dict() for statement in self.statements()],
-        }
-
-    def tables(self) -> list[Table]:
-        """Tables for the terminal."""
-        tables = []
-        names = scenario_names_in(self.found)
-        if names:
-            table = new_table(
-                "Scenarios by both engines",
-                ("scenario", "plant", "compiled"),
-                ("ends at [s]", "path [um]", "end [um]", "error at the end [um]", "slack"),
-            )
-            for name in names:
-                pairs = self.found[f"scenario {name}"]["pairs"]
-                row = {key: float(column(pairs, key)[0]) for key in COLUMNS}
-                table.add_row(
-                    name,
-                    *(
-                        Outcome(int(row[f"outcome_{engine}"])).name.lower()
-                        for engine in ("plant", "compiled")
-                    ),
-                    f"{row['time_plant_s']:.2f} / {row['time_compiled_s']:.2f}",
-                    f"{1e6 * row['distance_m']:.3g}",
-                    f"{1e6 * row['final_distance_m']:.3g}",
-                    f"{1e6 * row['final_error_plant_m']:.4g} / "
-                    f"{1e6 * row['final_error_compiled_m']:.4g}",
-                    f"{row['slack_share']:.2f}",
-                )
-            tables.append(table)
-        statements = self.statements()
-        if statements:
-            tables.append(statement_table("What the engines have to show", statements))
-        return tables
-
-    def drawings(self) -> Mapping[str, Callable[[], Figure]]:
-        """The one figure of the finished tasks."""
-        return {"engines": partial(engine_figure, self.found)}
-
-
-def study_engines(
-    quick: bool = False, session: StudySession = DEFAULT_STUDY_SESSION
-) -> EnginesStudy:
-    """Runs both engines on all of it; each pair of runs is an item of a sweep.
-
-    Args:
-        quick: Few runs, short ones, to see that everything works.
-        session: How it is run.
-
-    Raises:
-        OutputFolderError: The folder belongs to other arguments, or cannot be written.
-        SweepError: A local process died.
-    """
-    tasks = _tasks(quick)
-    arguments = {
-        "cdpr_drake": code_version(),
-        "study": "engines",
-        "quick": quick,
-        "tasks": {
-            name: {"kind": type(task).__name__, "items": count, **asdict(task)}
-            for name, (task, count) in tasks.items()
-        },
-    }
-    result = run_study_sweep(tasks, 1, "runs", arguments, session)
-    return EnginesStudy(quick, result.finished, result.progress)
-
-
-def _tasks(quick: bool) -> dict[str, tuple[Any, int]]:
-    names = QUICK_SCENARIOS if quick else scenario_names()
-    # One engine only has contact: there is nothing to compare.
-    names = tuple(name for name in names if not has_contact(load_scenario(name)))
-    short = (f"duration={QUICK_DURATION}",) if quick else ()
-    tasks: dict[str, tuple[Any, int]] = {}
-    for name in names:
-        full = scenario_kind(name) == TENSION_CONTROL
-        cut = (f"duration={LONGEST}",) if load_scenario(name).duration > LONGEST else ()
-        tasks[f"scenario {name}"] = (ScenarioTask(name, cut if full else short or cut), 1)
-    tasks |= {
-        "taut motions": (TautTask(), QUICK_MOTIONS if quick else MOTIONS),
-        **{name: (task, 1) for name, task in ORDER_TASKS.items()},
-        "energy": (EnergyTask(0.5 if quick else ENERGY_DURATION), len(ENERGY_STEPS)),
-        "impacts": (ImpactTask(), QUICK_RUNS if quick else RUNS),
-    }
-    return tasks
+            where={"kind": "scenario"},
+        )
+    ],
+    figures={"engines": engine_figure},
+)

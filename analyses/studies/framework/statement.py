@@ -43,6 +43,10 @@ GOOD = {
 }  # fmt: skip
 """Verdict where all parts hold, by what the statement rests on."""
 
+SOURCE, HARDWARE, CHOICE = "source", "hardware", "ours"
+"""Why a statement does not hold: the source contradicts itself or leaves out what is needed; its
+prototype has what is not in a model; a choice of ours, which an experiment has to try."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Finding:
@@ -53,6 +57,7 @@ class Finding:
         held: Of each part of the sentence, whether it holds; none: runs cannot decide it.
         some: Whether it holds in part, where that is not whether any part does.
         why: What is known of the difference.
+        cause: SOURCE, HARDWARE or CHOICE, where the statement's own does not fit.
         says: The sentence, where it depends on the runs.
         printed: The source's numbers, where these do.
     """
@@ -61,6 +66,7 @@ class Finding:
     held: Sequence[bool]
     some: bool | None = None
     why: str = ""
+    cause: str = ""
     says: str = ""
     printed: str = ""
 
@@ -76,6 +82,7 @@ class Judged(Statement):
         held: How many parts hold.
         of: How many there are.
         same_as: "study/check" that judges the same fact; empty: none.
+        cause: Where it does not hold, or in part, SOURCE, HARDWARE or CHOICE; empty: not known.
     """
 
     source: str = ""
@@ -84,6 +91,7 @@ class Judged(Statement):
     held: int = 0
     of: int = 0
     same_as: str = ""
+    cause: str = ""
 
     @property
     def verdict_words(self) -> str:
@@ -105,6 +113,7 @@ class Check:
         rule: What has to be within which bounds for a part to hold.
         basis: TEST, FITTED, CONSTRUCTION or OURS.
         same_as: "study/check" that judges the same fact.
+        cause: Why it does not hold, where it does not: SOURCE, HARDWARE or CHOICE.
     """
 
     name: str
@@ -115,11 +124,12 @@ class Check:
     rule: str = ""
     basis: str = TEST
     same_as: str = ""
+    cause: str = ""
 
     def __post_init__(self) -> None:
-        """Raises ValueError for a basis that is unknown."""
-        if self.basis not in GOOD:
-            raise ValueError(f"basis: found {self.basis!r}; accepted: {', '.join(GOOD)}")
+        """Raises ValueError for a basis or cause that is unknown."""
+        _check_known("basis", self.basis, tuple(GOOD))
+        _check_known("cause", self.cause, ("", SOURCE, HARDWARE, CHOICE))
 
     def judge(self, runs: Runs) -> Judged:
         """What the runs say of it.
@@ -128,9 +138,11 @@ class Check:
             MissingRuns: Runs that it needs are not there.
         """
         found = self.find(runs)
+        verdict = self._verdict(found)
+        cause = (found.cause or self.cause) if verdict in (IN_PART, NOT_CONFIRMED) else ""
         return self._judged(
-            found.found, self._verdict(found), why=found.why, says=found.says,
-            printed=found.printed, held=sum(map(bool, found.held)), of=len(found.held),
+            found.found, verdict, why=found.why, says=found.says, printed=found.printed,
+            held=sum(map(bool, found.held)), of=len(found.held), cause=cause,
         )  # fmt: skip
 
     def _verdict(self, found: Finding) -> str:
@@ -146,13 +158,18 @@ class Check:
 
     def _judged(
         self, found: str, verdict: str, why: str = "", says: str = "", printed: str = "",
-        held: int = 0, of: int = 0,
+        held: int = 0, of: int = 0, cause: str = "",
     ) -> Judged:  # fmt: skip
         return Judged(
             words=says or self.says, printed=printed or self.printed, found=found, verdict=verdict,
             why=why, name=self.name, source=self.source, rule=self.rule, basis=self.basis,
-            held=held, of=of, same_as=self.same_as,
+            held=held, of=of, same_as=self.same_as, cause=cause,
         )  # fmt: skip
+
+
+def _check_known(what: str, value: str, accepted: Sequence[str]) -> None:
+    if value not in accepted:
+        raise ValueError(f"{what}: found {value!r}; accepted: {', '.join(map(repr, accepted))}")
 
 
 def statement(
@@ -163,6 +180,7 @@ def statement(
     rule: str = "",
     basis: str = TEST,
     same_as: str = "",
+    cause: str = "",
     name: str = "",
 ) -> Callable[[Callable[[Runs], Finding]], Check]:
     """Makes a function that looks at runs the check of a sentence.
@@ -174,6 +192,7 @@ def statement(
         rule: What has to be within which bounds for a part to hold.
         basis: TEST, FITTED, CONSTRUCTION or OURS.
         same_as: "study/check" that judges the same fact.
+        cause: Why it does not hold, where it does not: SOURCE, HARDWARE or CHOICE.
         name: Of the check; empty: the function's, without a leading underscore.
     """
 
@@ -181,7 +200,7 @@ def statement(
         known = name or find.__name__.lstrip("_")
         return Check(
             name=known, says=says, printed=printed, find=find, source=source, rule=rule,
-            basis=basis, same_as=same_as,
+            basis=basis, same_as=same_as, cause=cause,
         )  # fmt: skip
 
     return made

@@ -55,6 +55,10 @@ from cdpr_drake.models.rendered_camera import probe_rendering
 
 Arrays = Mapping[str, np.ndarray]
 
+RUNS, ITEMS = "runs", "items"
+"""What a study does where it says nothing else, and how many are done of them in its results, which
+have the rows under "runs"."""
+
 TableMaker = Callable[[Runs], Table | Sequence[Table]]
 FigureMaker = Callable[[Runs], Figure]
 
@@ -175,7 +179,7 @@ class Study:
     parameters: Callable[[Form], Mapping[str, Any]] | None = None
     numbers: Callable[[Runs], Mapping[str, Any]] | None = None
     chunk: int = 1
-    unit: str = "runs"
+    unit: str = RUNS
     before: str = ""
 
     def __call__(
@@ -346,7 +350,7 @@ class StudyResult(StoppableStudy):
             "source": study.source,
             "quick": self.quick,
             "interrupted": self.interrupted,
-            study.unit: self.progress.counts(),
+            ITEMS if study.unit == RUNS else study.unit: self.progress.counts(),
             "versions": package_versions(),
             "parameters": {} if study.parameters is None else plain(study.parameters(self.form)),
             "assumptions": list(study.assumptions),

@@ -18,8 +18,8 @@ REDUCTIONS: dict[str, Callable[[Any], Any]] = {
 """What makes one number of a column, by name."""
 
 FACTORS = {
-    ("m", "mm"): 1e3, ("m", "cm"): 1e2, ("rad", "deg"): 180.0 / np.pi, ("s", "ms"): 1e3,
-    ("s", "us"): 1e6, ("rad/s", "deg/s"): 180.0 / np.pi, ("m/s", "mm/s"): 1e3,
+    ("m", "mm"): 1e3, ("m", "cm"): 1e2, ("m", "um"): 1e6, ("rad", "deg"): 180.0 / np.pi,
+    ("s", "ms"): 1e3, ("s", "us"): 1e6, ("rad/s", "deg/s"): 180.0 / np.pi, ("m/s", "mm/s"): 1e3,
 }  # fmt: skip
 """From the unit of a column to that of a heading."""
 

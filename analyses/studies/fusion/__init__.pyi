@@ -1,2 +1,1 @@
-from .statements import CHECKS as CHECKS
-from .study import study_fusion as study_fusion
+from .study import STUDY as STUDY

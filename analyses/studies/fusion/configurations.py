@@ -1,12 +1,14 @@
-"""What the study runs: sources, and what is wrong with them."""
+"""What the study runs: sources, and what is wrong with them; ways to take up slack."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
 
-from cdpr_drake.analyses.studies.fusion.trials import FusionTrial
+from cdpr_drake.analyses.studies.framework.study import Case, Form
+from cdpr_drake.analyses.studies.fusion.slack_trials import SURPLUSES, WAYS
 
-SEEDS, QUICK_SEEDS = 10, 1
+SERVO, SLACK = "servo", "slack"
+"""What is run: a servo on the fused pose, a start with slack cables."""
 
 DURATION, QUICK_DURATION = 12.0, 1.0
 """Time of a run [s]; the servo arrives after about 8."""
@@ -45,87 +47,67 @@ def _fault(camera: str, kind: str) -> tuple[str, ...]:
 _SERVO, _WORLD = "camera", "estimator.platform_tag"
 
 
-@dataclass(frozen=True)
-class Configuration:
-    """A configuration of the study.
-
-    Attributes:
-        name: Key in the results.
-        words: For tables.
-        changes: Items "key=value" of the scenario.
-    """
-
-    name: str
-    words: str
-    changes: tuple[str, ...]
-
-    def trial(self, quick: bool) -> FusionTrial:
-        """What is run of it."""
-        return FusionTrial(self.changes, QUICK_DURATION if quick else DURATION)
-
-
-ALL = (
-    Configuration("on_board", "camera on board", ON_BOARD),
-    Configuration("external", "camera in the world", EXTERNAL),
-    Configuration("both", "both", ()),
-    Configuration(
-        "on_board covered", "on board, covered for 3 s", (*ON_BOARD, *_fault(_SERVO, "dead"))
+CONFIGURATIONS: dict[str, tuple[str, tuple[str, ...]]] = {
+    "on_board": ("camera on board", ON_BOARD),
+    "external": ("camera in the world", EXTERNAL),
+    "both": ("both", ()),
+    "on_board covered": ("on board, covered for 3 s", (*ON_BOARD, *_fault(_SERVO, "dead"))),
+    "external covered": ("in the world, covered for 3 s", (*EXTERNAL, *_fault(_WORLD, "dead"))),
+    "both, on_board covered": ("both, on board covered", _fault(_SERVO, "dead")),
+    "both, external covered": ("both, in the world covered", _fault(_WORLD, "dead")),
+    "both, on_board frozen": ("both, on board frozen", _fault(_SERVO, "frozen")),
+    "both, external off": ("both, in the world off by 3 cm", _fault(_WORLD, "off")),
+    "on_board wrong": ("on board, 2 cm and 1 deg wrong", (*ON_BOARD, *ON_BOARD_WRONG)),
+    "external wrong": ("in the world, 2 cm and 1 deg wrong", (*EXTERNAL, *EXTERNAL_WRONG)),
+    "both, on_board wrong": ("both, on board wrong", ON_BOARD_WRONG),
+    "both, external wrong": ("both, in the world wrong", EXTERNAL_WRONG),
+    "both, external wrong, no gates": (
+        "the same, nothing left out", (*EXTERNAL_WRONG, *NO_GATES),
     ),
-    Configuration(
-        "external covered", "in the world, covered for 3 s", (*EXTERNAL, *_fault(_WORLD, "dead"))
+    "both, external knocked": ("both, in the world knocked after 3 s", KNOCKED),
+    "both, doubted": ("both, doubted", DOUBTED),
+    "both, on_board wrong, told": (
+        "both, on board wrong, as told", (*ON_BOARD_WRONG, *ON_BOARD_TOLD),
     ),
-    Configuration("both, on_board covered", "both, on board covered", _fault(_SERVO, "dead")),
-    Configuration("both, external covered", "both, in the world covered", _fault(_WORLD, "dead")),
-    Configuration("both, on_board frozen", "both, on board frozen", _fault(_SERVO, "frozen")),
-    Configuration("both, external off", "both, in the world off by 3 cm", _fault(_WORLD, "off")),
-    Configuration("on_board wrong", "on board, 2 cm and 1 deg wrong", (*ON_BOARD, *ON_BOARD_WRONG)),
-    Configuration(
-        "external wrong", "in the world, 2 cm and 1 deg wrong", (*EXTERNAL, *EXTERNAL_WRONG)
+    "both, external wrong, told": (
+        "both, in the world wrong, as told", (*EXTERNAL_WRONG, *EXTERNAL_TOLD),
     ),
-    Configuration("both, on_board wrong", "both, on board wrong", ON_BOARD_WRONG),
-    Configuration("both, external wrong", "both, in the world wrong", EXTERNAL_WRONG),
-    Configuration(
-        "both, external wrong, no gates", "the same, nothing left out", (*EXTERNAL_WRONG, *NO_GATES)
+    "both, external wrong, doubted": (
+        "both, in the world wrong, both doubted", (*EXTERNAL_WRONG, *DOUBTED),
     ),
-    Configuration("both, external knocked", "both, in the world knocked after 3 s", KNOCKED),
-    Configuration("both, doubted", "both, doubted", DOUBTED),
-    Configuration(
-        "both, on_board wrong, told",
-        "both, on board wrong, as told",
-        (*ON_BOARD_WRONG, *ON_BOARD_TOLD),
-    ),
-    Configuration(
-        "both, external wrong, told",
-        "both, in the world wrong, as told",
-        (*EXTERNAL_WRONG, *EXTERNAL_TOLD),
-    ),
-    Configuration(
-        "both, external wrong, doubted",
-        "both, in the world wrong, both doubted",
-        (*EXTERNAL_WRONG, *DOUBTED),
-    ),
-    Configuration(
-        "both, external wrong, told, on_board covered",
+    "both, external wrong, told, on_board covered": (
         "both, in the world wrong, as told, on board covered",
         (*EXTERNAL_WRONG, *EXTERNAL_TOLD, "camera.fault={kind: dead, start: 2.0, duration: 1000}"),
     ),
-    Configuration(
-        "both, external knocked, doubted",
-        "both, in the world knocked, both doubted",
-        (*KNOCKED, *DOUBTED),
+    "both, external knocked, doubted": (
+        "both, in the world knocked, both doubted", (*KNOCKED, *DOUBTED),
     ),
-    Configuration("both, imu", "both and an IMU", IMU),
-    Configuration("both, depth", "both and depths", DEPTH),
-    Configuration("external, imu", "in the world and an IMU", (*EXTERNAL, *IMU)),
-    Configuration("external, depth", "in the world and depths", (*EXTERNAL, *DEPTH)),
-    Configuration("all", "both, an IMU and depths", (*IMU, *DEPTH)),
-)
-"""All of them; encoders and tension sensors are read by each."""
+    "both, imu": ("both and an IMU", IMU),
+    "both, depth": ("both and depths", DEPTH),
+    "external, imu": ("in the world and an IMU", (*EXTERNAL, *IMU)),
+    "external, depth": ("in the world and depths", (*EXTERNAL, *DEPTH)),
+    "all": ("both, an IMU and depths", (*IMU, *DEPTH)),
+}  # fmt: skip
+"""Words and changes of the scenario by name; encoders and tension sensors are read by each."""
 
 QUICK = ("on_board", "external", "both")
 """Those of the quick form."""
 
 
-def configurations(quick: bool) -> list[Configuration]:
-    """All of them, or the few of the quick form."""
-    return [c for c in ALL if not quick or c.name in QUICK]
+def cases(form: Form) -> Iterator[Case]:
+    """All of them, or the few of the quick form, which end under way, and a start with slack."""
+    for name in QUICK if form.quick else CONFIGURATIONS:
+        words, changes = CONFIGURATIONS[name]
+        duration = QUICK_DURATION if form.quick else DURATION
+        yield Case(
+            name=name,
+            keys={
+                "trial": SERVO, "configuration": name, "sources": words, "duration_s": duration,
+            },
+            changes=changes,
+        )  # fmt: skip
+    for way in WAYS:
+        for surplus in SURPLUSES:
+            if not form.quick or (way, surplus) == ("image", SURPLUSES[0]):
+                name = f"{way}, {100.0 * surplus:g} cm"
+                yield Case(name=name, keys={"trial": SLACK, "way": way, "surplus_m": surplus})

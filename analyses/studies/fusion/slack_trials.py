@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from cdpr_drake.analyses.simulation.visual_servo_run import RunResult, run_scenario
+from cdpr_drake.analyses.studies.framework.study import Case
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CableGeometryError
 from cdpr_drake.geometry.poses import pose_from_row
@@ -18,7 +19,7 @@ from cdpr_drake.vision.cable_images import slack_from_image
 
 SLACK_SCENARIO = "acrobot_slack_start_tca"
 
-KINDS = {
+WAYS = {
     "constant": "{kind: constant, threshold: [1.0], gain: 0.04}",
     "adaptive": "{kind: adaptive, gain_per_length: 2}",
     "length": "{kind: length}",
@@ -26,8 +27,8 @@ KINDS = {
 }
 """Ways to take up slack: the published one, its variants that know lengths, what a camera sees."""
 
-SURPLUSES_CM = (2, 4, 8)
-"""Lengths that two cables are too long by at the start [cm]."""
+SURPLUSES = (0.02, 0.04, 0.08)
+"""Lengths that two cables are too long by at the start [m]."""
 
 CABLES = (0, 1)
 
@@ -46,36 +47,22 @@ WRONG = (
 )
 """What is believed wrongly, as in case study IX."""
 
-SLACK_COLUMNS = ("taut_s", "fastest_m_s", "estimate_m", "seen_error_m", "seen_bias_m", "seen_share")
-"""What is kept of each run: when the last slack cable became taut [s]; the fastest correction
-[m/s]; the largest error of the pose estimate [m]; of the slack that a camera sees while there is
-some, the mean size of the error and the mean error [m], and the share of images with it."""
 
+def measure_slack(case: Case, seed: int) -> dict[str, Any]:
+    """A start with slack cables.
 
-@dataclass(frozen=True)
-class SlackTrial:
-    """A way to take up slack; the item is the seed.
-
-    Attributes:
-        kind: One of `KINDS`.
-        surplus: Length that cables 1 and 2 are too long by [m].
+    Returns:
+        taut_s: when the last slack cable became taut; fastest_m_s: the fastest correction;
+        estimate_m: the largest error of the pose estimate; of the slack that a camera sees while
+        there is some, seen_error_m and seen_bias_m: the mean size of the error and the mean error,
+        and seen_share: the share of images with it.
     """
-
-    kind: str
-    surplus: float
-
-    def __call__(self, start: int, stop: int) -> dict[str, Array]:
-        """Numbers of `run_slack`, a row for each seed."""
-        return {"numbers": np.array([run_slack(self, seed) for seed in range(start, stop)])}
-
-
-def run_slack(trial: SlackTrial, seed: int) -> Array:
-    """`SLACK_COLUMNS` of a run, shape (6,)."""
-    slack = [trial.surplus if k in CABLES else 0.0 for k in range(8)]
+    way, surplus = case.keys["way"], case.keys["surplus_m"]
+    slack = [surplus if k in CABLES else 0.0 for k in range(8)]
     changes = [
         "camera.kind=projected", "integration.engine=compiled", f"duration={DURATION}",
         f"log_rate={LOG_RATE}", f"seed={seed}", "stop.target_lost=1000",
-        f"perturbations.slack={slack}", f"tension_management={KINDS[trial.kind]}", *WRONG,
+        f"perturbations.slack={slack}", f"tension_management={WAYS[way]}", *WRONG,
     ]  # fmt: skip
     result = run_scenario(load_scenario(SLACK_SCENARIO, changes))
     log, columns = result.log, list(CABLES)
@@ -84,16 +71,14 @@ def run_slack(trial: SlackTrial, seed: int) -> Array:
     apart = np.linalg.norm(log["X_WP"][:, 4:] - log["X_WP_estimated"][:, 4:], axis=1)
     errors, looked = _seen_errors(result, seed)
     seen = errors[np.isfinite(errors)]
-    return np.array(
-        [
-            log["time"][rows[-1]] if len(rows) else 0.0,
-            np.max(-log["tension_corrections"]),
-            np.max(apart),
-            np.mean(np.abs(seen)) if len(seen) else np.nan,
-            np.mean(seen) if len(seen) else np.nan,
-            len(seen) / looked if looked else np.nan,
-        ]
-    )
+    return {
+        "taut_s": log["time"][rows[-1]] if len(rows) else 0.0,
+        "fastest_m_s": np.max(-log["tension_corrections"]),
+        "estimate_m": np.max(apart),
+        "seen_error_m": np.mean(np.abs(seen)) if len(seen) else np.nan,
+        "seen_bias_m": np.mean(seen) if len(seen) else np.nan,
+        "seen_share": len(seen) / looked if looked else np.nan,
+    }
 
 
 def _seen_errors(result: RunResult, seed: int) -> tuple[Array, int]:
@@ -123,13 +108,3 @@ def _seen_errors(result: RunResult, seed: int) -> tuple[Array, int]:
             continue
         found += (seen - surplus)[surplus > TAUT].tolist()
     return np.array(found), len(found)
-
-
-def slack_trials(quick: bool) -> dict[str, SlackTrial]:
-    """All of them by name, or the one of the quick form."""
-    return {
-        f"{kind}, {cm} cm": SlackTrial(kind, cm / 100.0)
-        for kind in KINDS
-        for cm in SURPLUSES_CM
-        if not quick or (kind, cm) == ("image", 2)
-    }

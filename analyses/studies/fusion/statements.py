@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from cdpr_drake.analyses.reporting.statements import Statement, verdict
-from cdpr_drake.analyses.studies.framework.seeded_study import StudyData
-from cdpr_drake.analyses.studies.fusion.slack_trials import KINDS, SLACK_COLUMNS, SURPLUSES_CM
-from cdpr_drake.analyses.studies.fusion.trials import COLUMNS
+from cdpr_drake.analyses.studies.framework.runs import MissingRuns, Runs
+from cdpr_drake.analyses.studies.framework.statement import OURS, Finding, statement
+from cdpr_drake.analyses.studies.fusion.configurations import DURATION
+from cdpr_drake.analyses.studies.fusion.slack_trials import SURPLUSES, WAYS
 from cdpr_drake.arrays import Array
 
 THREE = ("on_board", "external", "both")
@@ -25,41 +25,44 @@ CONSISTENT = 4.0
 """How many standard deviations of a mean of chi-square numbers it may be from their mean."""
 
 
-def column(found: StudyData, name: str, key: str) -> Array:
+def column(runs: Runs, name: str, key: str) -> Array:
     """A column of a configuration, shape (runs,)."""
-    return np.asarray(found[name]["numbers"][:, COLUMNS.index(key)])
+    return runs(configuration=name, duration_s=DURATION)[key]
 
 
 def _mm(values: Array) -> str:
     return f"{1e3 * np.mean(values):.1f} mm"
 
 
-def _both_as_good_as_the_better(found: StudyData) -> Statement:
+@statement(
+    "An onboard and an external camera could be combined: the pose is then known no worse than "
+    "by the better one alone.",
+    rule="mean error with both at most that with the better one; in part: no more than by chance, "
+    "two standard deviations of the mean difference",
+)
+def both_as_good_as_the_better(runs: Runs) -> Finding:
     """Errors with two cameras against those with the one that is better over all seeds.
 
     Which one is the better in a single seed nobody knows beforehand. What the filters expect is
     told, but does not count: a filter with more readings always expects less.
     """
-    errors = {name: column(found, name, "mean_m") for name in THREE}
+    errors = {name: column(runs, name, "mean_m") for name in THREE}
     if len(errors["both"]) < 2:
-        raise KeyError("one seed has no spread")
+        raise MissingRuns("a second seed, as one has no spread")
     better = min(THREE[:2], key=lambda name: float(np.mean(errors[name])))
     more = errors["both"] - errors[better]
     mean, chance = float(np.mean(more)), 2.0 * float(np.std(more, ddof=1)) / np.sqrt(len(more))
     means = ", ".join(
-        f"{words} {_mm(errors[name])} (expected {_mm(column(found, name, 'expected_m'))})"
+        f"{words} {_mm(errors[name])} (expected {_mm(column(runs, name, 'expected_m'))})"
         for name, words in zip(THREE, ("on board", "in the world", "both"), strict=True)
     )
     lucky = errors["both"] / np.minimum(errors["on_board"], errors["external"])
-    return Statement(
-        "An onboard and an external camera could be combined: the pose is then known no worse than "
-        "by the better one alone.",
-        "perspectives",
-        f"mean error of the pose over {len(more)} seeds: {means}; both less the better one "
+    return Finding(
+        found=f"mean error of the pose over {len(more)} seeds: {means}; both less the better one "
         f"{1e3 * mean:+.1f} mm, by chance up to {1e3 * chance:.1f}; over the luckier one of each "
         f"seed {np.median(lucky):.2f} (median), {np.max(lucky):.2f} at most",
-        verdict(mean <= 0.0, mean <= chance),
-        "In part: no more than by chance, two standard deviations of the mean difference.",
+        held=[mean <= 0.0],
+        some=mean <= chance,
     )
 
 
@@ -68,140 +71,159 @@ def _is_consistent(ends: Array) -> bool:
     return bool(abs(np.mean(ends) - 6.0) <= CONSISTENT * np.sqrt(12.0 / len(ends)))
 
 
-def _survives_either_failure(found: StudyData) -> Statement:
+@statement(
+    "Either camera may fail for 3 s under way: the servo goes on and arrives.",
+    rule=f"every servo ends within {1e3 * ARRIVED:g} mm; none stops for more than 0.1 s",
+)
+def survives_either_failure(runs: Runs) -> Finding:
     """Runs in which a camera fails for 3 s."""
     names = ("both, on_board covered", "both, external covered", "both, on_board frozen",
              "both, external off")  # fmt: skip
-    ends = {name: column(found, name, "servo_m") for name in names}
-    still = {name: column(found, name, "lost_s") for name in names}
+    ends = {name: column(runs, name, "servo_m") for name in names}
+    still = {name: column(runs, name, "lost_s") for name in names}
     arrived = all(np.all(values <= ARRIVED) for values in ends.values())
     moving = all(np.all(values <= 0.1) for values in still.values())
     worst = ", ".join(f"{name[6:]} {1e3 * np.max(v):.2f} mm" for name, v in ends.items())
-    return Statement(
-        "Either camera may fail for 3 s under way: the servo goes on and arrives.",
-        "perspectives",
-        f"largest distance at the end: {worst}; longest stop "
+    return Finding(
+        found=f"largest distance at the end: {worst}; longest stop "
         f"{max(float(np.max(v)) for v in still.values()):.2f} s",
-        verdict(arrived and moving, arrived or moving),
+        held=[arrived, moving],
     )
 
 
-def _wrong_calibration_is_found(found: StudyData) -> Statement:
+@statement(
+    "The measurement accuracy of an external camera needs to be high for it to be beneficial; "
+    "one that is 2 cm and 1 deg wrong is found out beside one on board.",
+    source="servoing thesis, perspectives, chapter 2",
+    rule=f"told that it may be wrong: at most {EQUAL:g} times the error of the right one on board "
+    "alone, and found wrong with more than 50 %; in part: less error than untold",
+)
+def wrong_calibration_is_found(runs: Runs) -> Finding:
     """An external camera that is wrong in calibration."""
     names = ("both, external wrong", "both, external wrong, told", "both, external wrong, doubted")
-    trusted, told, doubted = (column(found, name, "mean_m") for name in names)
-    alone, good = column(found, "external wrong", "mean_m"), column(found, "on_board", "mean_m")
-    sure = np.mean(column(found, names[1], "wrong_external"))
-    return Statement(
-        "The measurement accuracy of an external camera needs to be high for it to be beneficial; "
-        "one that is 2 cm and 1 deg wrong is found out beside one on board.",
-        "perspectives, chapter 2",
-        f"mean error of the pose: in the world alone {_mm(alone)}, both {_mm(trusted)}; told that "
-        f"it may be so far off {_mm(told)}, found wrong with {sure:.0%}; either camera doubted a "
-        f"little {_mm(doubted)}; on board alone, right, {_mm(good)}",
-        verdict(
-            bool(np.mean(told) <= EQUAL * np.mean(good) and sure > 0.5),
-            bool(np.mean(told) < np.mean(trusted)),
-        ),
+    trusted, told, doubted = (column(runs, name, "mean_m") for name in names)
+    alone, good = column(runs, "external wrong", "mean_m"), column(runs, "on_board", "mean_m")
+    sure = np.mean(column(runs, names[1], "wrong_external"))
+    return Finding(
+        found=f"mean error of the pose: in the world alone {_mm(alone)}, both {_mm(trusted)}; told "
+        f"that it may be so far off {_mm(told)}, found wrong with {sure:.0%}; either camera "
+        f"doubted a little {_mm(doubted)}; on board alone, right, {_mm(good)}",
+        held=[bool(np.mean(told) <= EQUAL * np.mean(good)), bool(sure > 0.5)],
+        some=bool(np.mean(told) < np.mean(trusted)),
     )
 
 
-def _wrong_calibration_costs_nothing(found: StudyData) -> Statement:
+@statement(
+    "A camera in the world that is wrong does not move the target in the camera on board: a "
+    "servo that sees the target arrives.",
+    rule=f"every servo ends within {1e3 * ARRIVED:g} mm; in part: the median one",
+    basis=OURS,
+)
+def wrong_calibration_costs_nothing(runs: Runs) -> Finding:
     """What a wrong external camera does to a servo that sees its target."""
     names = (*TOLD_WRONG, "both, external wrong", "both, external wrong, doubted",
              "both, external knocked", "both, external knocked, doubted")  # fmt: skip
-    ends = {name: column(found, name, "servo_m") for name in names}
-    covered = column(found, "both, external wrong, told, on_board covered", "servo_m")
+    ends = {name: column(runs, name, "servo_m") for name in names}
+    covered = column(runs, "both, external wrong, told, on_board covered", "servo_m")
     worst = max(float(np.max(values)) for values in ends.values())
-    return Statement(
-        "A camera in the world that is wrong does not move the target in the camera on board: a "
-        "servo that sees the target arrives.",
-        "ours",
-        f"largest distance at the end, wrong from the start or from 3 s on: {1e3 * worst:.2f} mm; "
-        f"with the camera on board covered from 2 s to the end {1e3 * np.mean(covered):.1f} mm "
-        f"({1e3 * np.max(covered):.1f})",
-        verdict(worst <= ARRIVED, float(np.median(list(ends.values()))) <= ARRIVED),
+    return Finding(
+        found="largest distance at the end, wrong from the start or from 3 s on: "
+        f"{1e3 * worst:.2f} mm; with the camera on board covered from 2 s to the end "
+        f"{1e3 * np.mean(covered):.1f} mm ({1e3 * np.max(covered):.1f})",
+        held=[float(np.max(values)) <= ARRIVED for values in ends.values()],
+        some=float(np.median(list(ends.values()))) <= ARRIVED,
     )
 
 
-def _consistent(found: StudyData) -> Statement:
+@statement(
+    "The filter is as uncertain as it is wrong: its normalized error squared is 6 in the mean.",
+    rule=f"each within {CONSISTENT:g} standard deviations of a mean of so many chi-square numbers",
+    basis=OURS,
+)
+def consistent(runs: Runs) -> Finding:
     """The filter's errors against its covariance."""
     words, good = [], []
     for name in (*THREE, "both, doubted", "both, external knocked, doubted", *TOLD_WRONG):
-        ends = column(found, name, "nees")
+        ends = column(runs, name, "nees")
         good.append(_is_consistent(ends))
         words.append(f"{name} {np.mean(ends):.1f}")
-    return Statement(
-        "The filter is as uncertain as it is wrong: its normalized error squared is 6 in the mean.",
-        "ours",
-        f"at the end, {'; '.join(words)}; within {CONSISTENT * np.sqrt(12.0 / len(ends)):.1f} for "
-        "so many runs",
-        verdict(all(good), any(good)),
+    return Finding(
+        found=f"at the end, {'; '.join(words)}; within "
+        f"{CONSISTENT * np.sqrt(12.0 / len(ends)):.1f} for so many runs",
+        held=good,
     )
 
 
-def _imu_improves_rotation(found: StudyData) -> Statement:
+@statement(
+    "Sensor fusion can be useful: an IMU can provide the moving-platform orientation.",
+    rule="by 5 % at least, beside a camera in the world and beside both",
+)
+def imu_improves_rotation(runs: Runs) -> Finding:
     """Rotation with and without an inertial sensor."""
-    without, with_imu = (column(found, name, "mean_rad") for name in ("external", "external, imu"))
-    both, both_imu = (column(found, name, "mean_rad") for name in ("both", "both, imu"))
+    without, with_imu = (column(runs, name, "mean_rad") for name in ("external", "external, imu"))
+    both, both_imu = (column(runs, name, "mean_rad") for name in ("both", "both, imu"))
     shares = [float(np.mean(b) / np.mean(a)) for a, b in ((without, with_imu), (both, both_imu))]
-    return Statement(
-        "Sensor fusion can be useful: an IMU can provide the moving-platform orientation.",
-        "perspectives",
-        f"mean error of rotation with it over that without: in the world {shares[0]:.2f} "
+    return Finding(
+        found=f"mean error of rotation with it over that without: in the world {shares[0]:.2f} "
         f"({np.degrees(np.mean(with_imu)):.2f} deg), both {shares[1]:.2f} "
         f"({np.degrees(np.mean(both_imu)):.2f} deg)",
-        verdict(max(shares) < 0.95, min(shares) < 0.95),
+        held=[share < 0.95 for share in shares],
     )
 
 
-def _depth_improves_position(found: StudyData) -> Statement:
+@statement(
+    "Sensor fusion can be useful: depth sensors can measure the distance along its axis.",
+    rule="by 5 % at least, beside a camera in the world and beside both",
+)
+def depth_improves_position(runs: Runs) -> Finding:
     """Position along the axis with and without depths."""
     shares = [
-        float(np.mean(column(found, b, "mean_m")) / np.mean(column(found, a, "mean_m")))
+        float(np.mean(column(runs, b, "mean_m")) / np.mean(column(runs, a, "mean_m")))
         for a, b in (("external", "external, depth"), ("both", "both, depth"))
     ]
-    return Statement(
-        "Sensor fusion can be useful: depth sensors can measure the distance along its axis.",
-        "perspectives",
-        f"mean error of position with depths of a Kinect over that without: in the world "
+    return Finding(
+        found=f"mean error of position with depths of a Kinect over that without: in the world "
         f"{shares[0]:.2f}, both {shares[1]:.2f}",
-        verdict(max(shares) < 0.95, min(shares) < 0.95),
+        held=[share < 0.95 for share in shares],
     )
 
 
-def _slack(found: StudyData, kind: str, cm: int, key: str) -> Array:
-    return np.asarray(found[f"{kind}, {cm} cm"]["numbers"][:, SLACK_COLUMNS.index(key)])
+def _slack(runs: Runs, way: str, surplus: float, key: str) -> Array:
+    return runs(way=way, surplus_m=surplus)[key]
 
 
-def _rate_by_seen_slack(found: StudyData) -> Statement:
+@statement(
+    "By detecting the amount of slack on a cable the TCA correction rate can be adjusted to "
+    "decrease a large slack more rapidly.",
+    rule="8 cm are gone first of all ways, and in less than 0.6 of the time of the constant rate; "
+    "in part: first",
+)
+def rate_by_seen_slack(runs: Runs) -> Finding:
     """Time to wind in slack at a rate from images."""
     times = {
-        kind: [float(np.mean(_slack(found, kind, cm, "taut_s"))) for cm in SURPLUSES_CM]
-        for kind in KINDS
+        way: [float(np.mean(_slack(runs, way, length, "taut_s"))) for length in SURPLUSES]
+        for way in WAYS
     }
-    others = [times[kind][-1] for kind in KINDS if kind != "image"]
-    wrong = np.concatenate([_slack(found, "image", cm, "seen_error_m") for cm in SURPLUSES_CM])
+    others = [times[way][-1] for way in WAYS if way != "image"]
+    wrong = np.concatenate([_slack(runs, "image", length, "seen_error_m") for length in SURPLUSES])
     words = "; ".join(f"{k} {', '.join(f'{t:.2f}' for t in v)} s" for k, v in times.items())
     large, first = times["image"][-1], times["image"][-1] < min(others)
-    return Statement(
-        "By detecting the amount of slack on a cable the TCA correction rate can be adjusted to "
-        "decrease a large slack more rapidly.",
-        "perspectives",
-        f"2, 4 and 8 cm gone after: {words}; seen slack is wrong by {1e3 * np.nanmean(wrong):.1f} "
-        "mm in the mean",
-        verdict(first and large < 0.6 * times["constant"][-1], first),
+    return Finding(
+        found=f"2, 4 and 8 cm gone after: {words}; seen slack is wrong by "
+        f"{1e3 * np.nanmean(wrong):.1f} mm in the mean",
+        held=[first, large < 0.6 * times["constant"][-1]],
+        some=first,
     )
 
 
 CHECKS = (
-    _both_as_good_as_the_better,
-    _survives_either_failure,
-    _wrong_calibration_is_found,
-    _wrong_calibration_costs_nothing,
-    _consistent,
-    _imu_improves_rotation,
-    _depth_improves_position,
-    _rate_by_seen_slack,
+    both_as_good_as_the_better,
+    survives_either_failure,
+    wrong_calibration_is_found,
+    wrong_calibration_costs_nothing,
+    consistent,
+    imu_improves_rotation,
+    depth_improves_position,
+    rate_by_seen_slack,
 )
-"""All judges of the study."""
+"""All statements of the study."""

@@ -1,30 +1,21 @@
-"""Runs the study, and what it leaves: numbers, tables, a figure."""
+"""The study: its runs, tables, figure."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from functools import partial
+from collections.abc import Callable, Mapping
 from typing import Any
 
-import numpy as np
-from matplotlib.figure import Figure
-from rich.table import Table
+from pydrake.common.yaml import yaml_dump_typed
 
-from cdpr_drake.analyses.reporting.progress import DEFAULT_STUDY_SESSION, StudySession
-from cdpr_drake.analyses.reporting.statements import Statement, evaluate_checks, new_table
-from cdpr_drake.analyses.studies.framework.seeded_study import SeededStudy
-from cdpr_drake.analyses.studies.fusion.configurations import (
-    QUICK_SEEDS,
-    SEEDS,
-    Configuration,
-    configurations,
-)
+from cdpr_drake.analyses.studies.framework.runs import Runs
+from cdpr_drake.analyses.studies.framework.study import Case, Form, Study
+from cdpr_drake.analyses.studies.framework.summary import Cell, Summary
+from cdpr_drake.analyses.studies.fusion.configurations import SERVO, SLACK, cases
 from cdpr_drake.analyses.studies.fusion.figures import fusion_figure
-from cdpr_drake.analyses.studies.fusion.slack_trials import SLACK_COLUMNS, slack_trials
-from cdpr_drake.analyses.studies.fusion.statements import CHECKS, column
-from cdpr_drake.analyses.studies.fusion.trials import COLUMNS, SCENARIO
-from cdpr_drake.analyses.sweeps.workers import SweepTask
+from cdpr_drake.analyses.studies.fusion.slack_trials import measure_slack
+from cdpr_drake.analyses.studies.fusion.statements import CHECKS
+from cdpr_drake.analyses.studies.fusion.trials import SCENARIO, measure_fusion
+from cdpr_drake.systems.diagrams.load import load_scenario
 
 ASSUMPTIONS = (
     "Nothing of this is printed but that it could be done. Where the tag on the platform is, its "
@@ -43,115 +34,66 @@ ASSUMPTIONS = (
 )
 
 
-@dataclass(frozen=True, eq=False)
-class FusionStudy(SeededStudy):
-    """What the study found, see `run_trial`."""
+def measure(case: Case, seed: int) -> dict[str, Any]:
+    """A run of a servo, or of a start with slack cables."""
+    return (measure_slack if case.keys["trial"] == SLACK else measure_fusion)(case, seed)
 
-    name = "fusion"
-    source = "servoing thesis, perspectives"
-    judges = CHECKS
-    stated = "What is stated"
 
-    def shown(self) -> list[Configuration]:
-        """The configurations that are finished."""
-        return [c for c in configurations(self.quick) if c.name in self.found]
+def parameters(form: Form) -> Mapping[str, Any]:
+    """The scenario that configurations change."""
+    return {"scenario": yaml_dump_typed(load_scenario(SCENARIO))}
 
-    def statements(self) -> list[Statement]:
-        """What is stated, and whether it is so; the quick form's runs end under way and tell
-        nothing."""
-        told = {} if self.quick else self.found
-        return evaluate_checks(self.judges, told, self.quick and not self.interrupted)
 
-    def details(self) -> dict[str, Any]:
-        """Parameters, versions, numbers of all runs, but no rows of logs."""
-        return {
-            **self.setup_dict(SCENARIO, ASSUMPTIONS),
-            "configurations": [
-                {
-                    "name": c.name,
-                    "label": c.words,
-                    "changes": list(c.changes),
-                    "nis": self.found[c.name]["nis"].tolist(),
-                    **{key: column(self.found, c.name, key).tolist() for key in COLUMNS},
-                }
-                for c in self.shown()
-            ],
-            "slack": [
-                {
-                    "name": name,
-                    **{
-                        key: self.found[name]["numbers"][:, k].tolist()
-                        for k, key in enumerate(SLACK_COLUMNS)
-                    },
-                }
-                for name in slack_trials(self.quick)
-                if name in self.found
-            ],
-        }
+def _mean_and_worst(column: str, unit: str, digits: int) -> Callable[[Runs], str]:
+    """Words of a column: the mean, and in brackets the largest."""
 
-    def number_tables(self) -> list[Table]:
-        """Errors by configuration, and of the ways to take up slack."""
-        table = new_table(
+    def words(runs: Runs) -> str:
+        cells = (Cell(reduction, column, f".{digits}f") for reduction in ("mean", "largest"))
+        mean, largest = (cell.words(runs, unit) for cell in cells)
+        return f"{mean} ({largest})"
+
+    return words
+
+
+STUDY = Study(
+    name="fusion",
+    title="Two cameras, lengths, an IMU and depths fused, each failing or wrong in its turn",
+    source="servoing thesis, perspectives",
+    cases=cases,
+    measure=measure,
+    seeds=(10, 1),
+    parameters=parameters,
+    assumptions=ASSUMPTIONS,
+    checks=CHECKS,
+    stated="What is stated",
+    tables=[
+        Summary(
             "Fusion of sensors, means over seeds and in brackets the worst",
             ("sources",),
-            ("at the target [mm]", "estimate at the end [mm]", "mean [mm]", "mean [deg]",
-             "largest [mm]", "NEES", "world left out"),
-        )  # fmt: skip
-        for c in self.shown():
-            table.add_row(
-                c.words, self._words(c, "servo_m", 1e3, 2), self._words(c, "final_m", 1e3, 1),
-                self._words(c, "mean_m", 1e3, 1), self._words(c, "mean_rad", 180.0 / np.pi, 2),
-                self._words(c, "largest_m", 1e3, 1), self._words(c, "nees", 1.0, 1),
-                f"{np.mean(column(self.found, c.name, 'external_left_out')):.0%}",
-            )  # fmt: skip
-        return [table, *self._slack_tables()]
-
-    def _slack_tables(self) -> list[Table]:
-        """Of the ways to take up slack that are finished; none where none is."""
-        names = [name for name in slack_trials(self.quick) if name in self.found]
-        if not names:
-            return []
-        table = new_table(
+            {
+                "at the target [mm]": _mean_and_worst("servo_m", "mm", 2),
+                "estimate at the end [mm]": _mean_and_worst("final_m", "mm", 1),
+                "mean [mm]": _mean_and_worst("mean_m", "mm", 1),
+                "mean [deg]": _mean_and_worst("mean_rad", "deg", 2),
+                "largest [mm]": _mean_and_worst("largest_m", "mm", 1),
+                "NEES": _mean_and_worst("nees", "", 1),
+                "world left out": Cell("mean", "external_left_out", ".0%"),
+            },
+            where={"trial": SERVO},
+        ),
+        Summary(
             "Two cables slack at the start, means over seeds",
-            ("way",),
-            ("taut after [s]", "fastest [m/s]", "estimate [mm]", "seen slack wrong by [mm]",
-             "its bias [mm]", "seen"),
-        )  # fmt: skip
-        for name in names:
-            taut, fastest, estimate, error, bias, share = np.mean(
-                self.found[name]["numbers"], axis=0
-            )
-            table.add_row(
-                name, f"{taut:.2f}", f"{fastest:.2f}", f"{1e3 * estimate:.1f}",
-                f"{1e3 * error:.1f}", f"{1e3 * bias:+.1f}", f"{share:.0%}",
-            )  # fmt: skip
-        return [table]
-
-    def _words(self, c: Configuration, key: str, scale: float, digits: int) -> str:
-        values = scale * column(self.found, c.name, key)
-        return f"{np.mean(values):.{digits}f} ({np.max(values):.{digits}f})"
-
-    def drawings(self) -> dict[str, Callable[[], Figure]]:
-        """The figure `fusion`."""
-        shown = self.shown()
-        return {"fusion": partial(fusion_figure, self.found, shown)} if shown else {}
-
-
-def study_fusion(quick: bool = False, session: StudySession = DEFAULT_STUDY_SESSION) -> FusionStudy:
-    """Runs all configurations over their seeds; each run is an item of a sweep.
-
-    Args:
-        quick: Three configurations for a second and one start with slack, once each, to see that
-            everything works.
-        session: How it is run, and how many seeds.
-
-    Raises:
-        OutputFolderError: The folder belongs to other arguments, or cannot be written.
-        SweepError: A local process died.
-    """
-    seeds = session.seeds or (QUICK_SEEDS if quick else SEEDS)
-    tasks: dict[str, tuple[SweepTask, int]] = {
-        **{c.name: (c.trial(quick), seeds) for c in configurations(quick)},
-        **{name: (trial, seeds) for name, trial in slack_trials(quick).items()},
-    }
-    return FusionStudy.run(tasks, quick, seeds, session)
+            ("way", "surplus_m"),
+            {
+                "taut after [s]": Cell("mean", "taut_s", ".2f"),
+                "fastest [m/s]": Cell("mean", "fastest_m_s", ".2f"),
+                "estimate [mm]": Cell("mean", "estimate_m", ".1f"),
+                "seen slack wrong by [mm]": Cell("mean", "seen_error_m", ".1f"),
+                "its bias [mm]": Cell("mean", "seen_bias_m", "+.1f"),
+                "seen": Cell("mean", "seen_share", ".0%"),
+            },
+            where={"trial": SLACK},
+        ),
+    ],
+    figures={"fusion": fusion_figure},
+)

@@ -1,3 +1,1 @@
-from .figures import FIGURES as FIGURES
-from .judges import CHECKS as CHECKS
-from .study import study_mobile_robot as study_mobile_robot
+from .study import STUDY as STUDY

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
 
-from cdpr_drake.analyses.studies.mobile_robot.laps import LapsTask
-
-SEEDS, QUICK_SEEDS = 10, 1
+from cdpr_drake.analyses.studies.framework.study import Case, Form
 
 ALL_LAPS, QUICK_LAPS = 700, 2
 """Laps with tension correction."""
@@ -61,66 +59,49 @@ VARIED: dict[str, tuple[str, tuple[str, ...], float]] = {
 """What is not printed, less and more than chosen: words, changes, friction."""
 
 
-@dataclass(frozen=True)
-class Configuration:
-    """A configuration of the study.
+PLAIN_RUN, CORRECTED = "plain", "corrected"
+"""Names of the configurations with a known tag, as chosen."""
 
-    Attributes:
-        name: Key in the results.
-        words: For tables.
-        task: What is run.
-        published: What the thesis prints, in words; may be empty.
-    """
-
-    name: str
-    words: str
-    task: LapsTask
-    published: str = ""
+PUBLISHED = {
+    **{f"estimator {kind}": f"fails after {laps} laps" for kind, laps in PUBLISHED_LAPS.items()},
+    PLAIN_RUN: f"fails in lap {PUBLISHED_PLAIN}",
+    CORRECTED: "700 laps, never more than two cables slack",
+}
+"""What the thesis prints, by configuration, in words."""
 
 
-def configurations(quick: bool) -> list[Configuration]:
-    """All of them, or the few of the quick form."""
-    some = [
-        Configuration(
-            f"estimator {kind}",
-            f"no known tag, estimator {NUMBERS[kind]}, {kind.replace('_', ' ')}",
-            LapsTask(
-                (PLAIN, NO_KNOWN_TAG, f"estimator.kind={kind}"),
-                QUICK_LAPS if quick else ESTIMATOR_LAPS,
-            ),
-            f"fails after {laps} laps",
-        )
-        for kind, laps in PUBLISHED_LAPS.items()
-        if not quick or kind == "cable_lengths"
-    ]
-    some += [
-        Configuration(
-            "plain", "no correction", LapsTask((PLAIN,), QUICK_LAPS if quick else PLAIN_LAPS),
-            f"fails in lap {PUBLISHED_PLAIN}",
-        ),
-        Configuration(
-            "corrected", "with correction", LapsTask((), QUICK_LAPS if quick else ALL_LAPS),
-            "700 laps, never more than two cables slack",
-        ),
-    ]  # fmt: skip
-    if quick:
-        return some
+def cases(form: Form) -> Iterator[Case]:
+    """All configurations, or the few of the quick form for two laps."""
+    for kind in ("cable_lengths",) if form.quick else PUBLISHED_LAPS:
+        words = f"no known tag, estimator {NUMBERS[kind]}, {kind.replace('_', ' ')}"
+        laps = QUICK_LAPS if form.quick else ESTIMATOR_LAPS
+        yield _case(f"estimator {kind}", words, laps, _estimator(kind))
+    laps, all_laps = (QUICK_LAPS,) * 2 if form.quick else (PLAIN_LAPS, ALL_LAPS)
+    yield _case(PLAIN_RUN, "no correction", laps, (PLAIN,))
+    yield _case(CORRECTED, "with correction", all_laps, ())
+    if form.quick:
+        return
     for name, (words, changes, friction) in VARIED.items():
-        for other, correction in (("plain", (PLAIN,)), ("corrected", ())):
-            some.append(
-                Configuration(
-                    f"{name}, {other}", f"{words}, {other}",
-                    LapsTask((*changes, *correction), VARIED_LAPS, friction),
-                )
-            )  # fmt: skip
+        for other, correction in ((PLAIN_RUN, (PLAIN,)), (CORRECTED, ())):
+            some = (*changes, *correction)
+            yield _case(f"{name}, {other}", f"{words}, {other}", VARIED_LAPS, some, friction)
         for kind in VARIED_ESTIMATORS:
-            some.append(
-                Configuration(
-                    f"{name}, estimator {kind}", f"{words}, estimator {NUMBERS[kind]}",
-                    LapsTask(
-                        (*changes, PLAIN, NO_KNOWN_TAG, f"estimator.kind={kind}"),
-                        ESTIMATOR_LAPS, friction,
-                    ),
-                )
-            )  # fmt: skip
-    return some
+            some = (*changes, *_estimator(kind))
+            label = f"{words}, estimator {NUMBERS[kind]}"
+            yield _case(f"{name}, estimator {kind}", label, ESTIMATOR_LAPS, some, friction)
+
+
+def _estimator(kind: str) -> tuple[str, ...]:
+    """What makes a run of an estimator without a known tag."""
+    return PLAIN, NO_KNOWN_TAG, f"estimator.kind={kind}"
+
+
+def _case(
+    name: str, words: str, laps: int, changes: tuple[str, ...], friction: float = 1.0
+) -> Case:
+    return Case(
+        name=name,
+        keys={"configuration": name, "words": words, "asked_laps": laps, "friction": friction},
+        changes=changes,
+        printed={"laps_done": PUBLISHED[name]} if name in PUBLISHED else {},
+    )

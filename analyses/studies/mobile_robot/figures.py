@@ -2,29 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from cdpr_drake.analyses.studies.framework.seeded_study import StudyData
+from cdpr_drake.analyses.studies.framework.runs import MissingRuns, Runs
 from cdpr_drake.analyses.studies.mobile_robot.configurations import (
+    CORRECTED,
     NUMBERS,
+    PLAIN_RUN,
+    PUBLISHED,
     PUBLISHED_LAPS,
     PUBLISHED_PLAIN,
     VARIED_ESTIMATORS,
-    Configuration,
 )
-from cdpr_drake.analyses.studies.mobile_robot.lap_figures import LENGTHS, PATHS, lap_drawings
-from cdpr_drake.analyses.studies.mobile_robot.laps import COLUMNS, FREE, PHASES, SHOWN
-from cdpr_drake.analyses.studies.mobile_robot.tension_figures import (
-    SHOWN as TENSIONS,
-)
-from cdpr_drake.analyses.studies.mobile_robot.tension_figures import (
-    tension_drawings,
-)
+from cdpr_drake.analyses.studies.mobile_robot.laps import FREE, PHASES, SHOWN
 from cdpr_drake.analyses.visualization.figure_style import (
     bar_style,
     line_style,
@@ -33,58 +27,49 @@ from cdpr_drake.analyses.visualization.figure_style import (
 )
 from cdpr_drake.palette import SHADED, nth_look
 
-BOTH = ("plain", "corrected")
-WORDS = {"plain": "no correction", "corrected": "with correction"}
-
-FIGURES = ("mobile_robot", "choices", *TENSIONS, *PATHS, LENGTHS)
-"""Names of all figures that the study can write."""
+WORDS = {PLAIN_RUN: "no correction", CORRECTED: "with correction"}
 
 
-def mobile_robot_drawings(
-    found: StudyData, shown: Sequence[Configuration]
-) -> dict[str, Callable[[], Figure]]:
-    """What draws `mobile_robot`, `choices` and those of `tension_drawings` and `lap_drawings`, by
-    name, of finished configurations."""
-    drawn: dict[str, Callable[[], Figure]] = {}
-    if found:
-        drawn["mobile_robot"] = partial(_laps_figure, found)
-    main = {"plain", "corrected", *(f"estimator {kind}" for kind in PUBLISHED_LAPS)}
-    if any(c.name not in main for c in shown):
-        drawn["choices"] = partial(_choices_figure, found, shown)
-    return drawn | tension_drawings(found) | lap_drawings(found)
-
-
-def _laps_figure(found: StudyData) -> Figure:
+def laps_figure(runs: Runs) -> Figure:
+    """Laps until failure, sums of lengths, slack cables, paths."""
     figure, axes = new_figure(2, 2, (13.0, 10.0), "A tag on a mobile robot that goes round")
-    _draw_laps(axes[0, 0], found)
-    _draw_lengths(axes[0, 1], found)
-    _draw_slack(axes[1, 0], found)
-    _draw_paths(axes[1, 1], found)
+    _draw_laps(axes[0, 0], runs)
+    _draw_lengths(axes[0, 1], runs)
+    _draw_slack(axes[1, 0], runs)
+    _draw_paths(axes[1, 1], runs)
     return figure
 
 
-def _choices_figure(found: StudyData, shown: Sequence[Configuration]) -> Figure:
+def choices_figure(runs: Runs) -> Figure:
+    """Laps until failure under other choices of what is not printed.
+
+    Raises:
+        MissingRuns: None was run.
+    """
+    there = dict(runs.by("configuration"))
+    if not set(there) - set(PUBLISHED):
+        raise MissingRuns("other choices")
     figure, axes = new_figure(2, 1, (10.0, 13.0), "What is not printed, three values")
     by_lengths = [f"estimator {kind}" for kind in VARIED_ESTIMATORS]
     for one, names, title in (
-        (axes[0], BOTH, "known tag each lap, control integration"),
+        (axes[0], list(WORDS), "known tag each lap, control integration"),
         (axes[1], by_lengths, "no known tag, estimators by cable lengths"),
     ):
-        chosen = [c for c in shown if c.name.endswith(tuple(names))]
-        _draw_choices(one, found, chosen, names)
+        shown = {name: some for name, some in there.items() if name.endswith(tuple(names))}
+        _draw_choices(one, shown, names)
         one.set_title(title, loc="right")
     return figure
 
 
-def _draw_laps(axes: Any, found: StudyData) -> None:
+def _draw_laps(axes: Any, runs: Runs) -> None:
     """Bars of laps until the end: medians, each run, what is published."""
-    names = [f"estimator {k}" for k in PUBLISHED_LAPS] + ["plain"]
+    names = [f"estimator {k}" for k in PUBLISHED_LAPS] + [PLAIN_RUN]
     labels = [f"estimator {NUMBERS[k]}" for k in PUBLISHED_LAPS] + ["1, known tag"]
     published = [*PUBLISHED_LAPS.values(), PUBLISHED_PLAIN]
     for place, (name, laps) in enumerate(zip(names, published, strict=True)):
         first = place == 0
-        if name in found:
-            ends = found[name]["end"][:, 1]
+        if runs.has(configuration=name):
+            ends = runs(configuration=name)["laps_done"]
             axes.bar(place, np.median(ends), 0.6, **bar_style(nth_look(0)),
                      label="median" if first else None)  # fmt: skip
             axes.plot(np.full(len(ends), place), ends, linestyle="", marker="x",
@@ -97,12 +82,12 @@ def _draw_laps(axes: Any, found: StudyData) -> None:
         axes.legend(loc="upper left")
 
 
-def _draw_lengths(axes: Any, found: StudyData) -> None:
+def _draw_lengths(axes: Any, runs: Runs) -> None:
     """Largest rise of the sum of lengths over that of the first whole lap, lap by lap."""
-    for number, name in enumerate(BOTH):
-        if name not in found:
+    for number, name in enumerate(WORDS):
+        if not runs.has(configuration=name):
             continue
-        sums = found[name]["sums"]
+        sums = runs(configuration=name)["sums_m"]
         start = np.take(sums, [min(1, sums.shape[1] - 1)], axis=1)
         rise = sums - start
         worst = np.full((len(rise), rise.shape[1]), np.nan)
@@ -120,11 +105,11 @@ def _draw_lengths(axes: Any, found: StudyData) -> None:
         axes.legend(loc="best")
 
 
-def _draw_slack(axes: Any, found: StudyData) -> None:
+def _draw_slack(axes: Any, runs: Runs) -> None:
     """The most cables slack at once in each lap, over all runs."""
-    for number, name in enumerate(BOTH):
-        if name in found:
-            table = found[name]["laps"][:, :, COLUMNS.index("most_slack")]
+    for number, name in enumerate(WORDS):
+        if runs.has(configuration=name):
+            table = runs(configuration=name)["most_slack"]
             there = np.any(np.isfinite(table), axis=0)
             laps = np.arange(1, table.shape[1] + 1)[there]
             axes.step(laps, np.nanmax(table[:, there], axis=0), where="mid",
@@ -138,13 +123,14 @@ def _draw_slack(axes: Any, found: StudyData) -> None:
     axes.legend(loc="best")
 
 
-def _draw_paths(axes: Any, found: StudyData) -> None:
+def _draw_paths(axes: Any, runs: Runs) -> None:
     """Paths of the platform from above, of the first run."""
     number = 0
-    for name in BOTH:
-        if name not in found:
+    for name in WORDS:
+        if not runs.has(configuration=name):
             continue
-        paths, done = found[name]["paths"][0], found[name]["end"][0, 1]
+        run = runs(configuration=name).rows[0]
+        paths, done = run["paths_m"], run["laps_done"]
         for path, lap in zip(paths, (*SHOWN, max(int(done + 1e-9), 1)), strict=True):
             there = np.all(np.isfinite(path), axis=1)
             if not np.any(there) or (lap in SHOWN and path is paths[-1]):
@@ -159,18 +145,15 @@ def _draw_paths(axes: Any, found: StudyData) -> None:
         axes.legend(loc="best", fontsize=8)
 
 
-def _draw_choices(
-    axes: Any, found: StudyData, shown: Sequence[Configuration], names: Sequence[str]
-) -> None:
+def _draw_choices(axes: Any, shown: Mapping[str, Runs], names: Sequence[str]) -> None:
     """Laps until the end of what was varied, every run; looks by how configurations' names end."""
-    shown = [c for c in shown if c.name in found]
-    for place, one in enumerate(shown):
-        ends = found[one.name]["end"][:, 1]
-        look = nth_look(next(k for k, name in enumerate(names) if one.name.endswith(name)))
+    for place, (name, some) in enumerate(shown.items()):
+        ends = some["laps_done"]
+        look = nth_look(next(k for k, end in enumerate(names) if name.endswith(end)))
         axes.barh(place, np.median(ends), 0.6, **bar_style(look))
         axes.plot(ends, np.full(len(ends), place), linestyle="", marker="x",
                   color=nth_look(7).color)  # fmt: skip
-    axes.set_yticks(range(len(shown)), [one.words for one in shown])
+    axes.set_yticks(range(len(shown)), [some.rows[0]["words"] for some in shown.values()])
     axes.set_xscale("log")
     plain_numbers(axes.xaxis)
     axes.set_xlim(1.0, max(axes.get_xlim()[1], 40.0))

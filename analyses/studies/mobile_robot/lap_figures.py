@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from functools import partial
-
 import numpy as np
 from matplotlib.figure import Figure
 
+from cdpr_drake.analyses.studies.framework.runs import MissingRuns, Runs
 from cdpr_drake.analyses.studies.mobile_robot.laps import PHASES, SHOWN
 from cdpr_drake.analyses.visualization.curves import draw_curve, phase_of
 from cdpr_drake.analyses.visualization.figure_style import line_style, new_figure
-from cdpr_drake.arrays import Array
 from cdpr_drake.palette import nth_look
 
 PATHS = {
@@ -20,9 +17,6 @@ PATHS = {
 }
 """Figures by name: configuration, title."""
 
-LENGTHS = "lengths_by_lap"
-"""Name of the figure of the sums of lengths."""
-
 LENGTH_LAPS = (10, 20)
 """Laps of which sums are drawn, beside the last one that was begun."""
 
@@ -30,23 +24,13 @@ LOOKS = {"plain": ("no correction", 0), "corrected": ("with correction", 4)}
 """Words, and number of the first look."""
 
 
-def lap_drawings(found: Mapping[str, Mapping[str, Array]]) -> dict[str, Callable[[], Figure]]:
-    """What draws the figures that the finished configurations suffice for, by name."""
-    drawn: dict[str, Callable[[], Figure]] = {
-        name: partial(_paths, found[configuration], title)
-        for name, (configuration, title) in PATHS.items()
-        if configuration in found
-    }
-    if any(name in found for name in LOOKS):
-        drawn[LENGTHS] = partial(_lengths, found)
-    return drawn
-
-
-def _paths(arrays: Mapping[str, Array], title: str) -> Figure:
-    """Paths of the first run in the laps `SHOWN` and its last whole one."""
+def paths_figure(name: str, runs: Runs) -> Figure:
+    """Paths of the first run of a configuration in the laps `SHOWN` and its last whole one."""
+    configuration, title = PATHS[name]
+    run = runs(configuration=configuration).rows[0]
     figure, axes = new_figure(1, 1, (9.0, 7.6), f"{title}, first run")
-    last = max(int(arrays["end"][0, 1] + 1e-9), 1)
-    laps = dict(zip((*SHOWN, last), arrays["paths"][0], strict=True))
+    last = max(int(run["laps_done"] + 1e-9), 1)
+    laps = dict(zip((*SHOWN, last), run["paths_m"], strict=True))
     for number, (lap, path) in enumerate(sorted(laps.items())):
         there = np.all(np.isfinite(path), axis=1)
         if not np.any(there):
@@ -64,16 +48,18 @@ def _paths(arrays: Mapping[str, Array], title: str) -> Figure:
     return figure
 
 
-def _lengths(found: Mapping[str, Mapping[str, Array]]) -> Figure:
+def lengths_figure(runs: Runs) -> Figure:
     """Sums of lengths over single laps, of the first run without and with correction."""
+    if not any(runs.has(configuration=name) for name in LOOKS):
+        raise MissingRuns(", ".join(LOOKS))
     figure, axes = new_figure(
         1, 1, (11.0, 6.6), "Figure 5.21: sum of the cable lengths during single laps, first run"
     )
     where = (np.arange(PHASES) + 0.5) / PHASES
     for name, (words, first) in LOOKS.items():
-        if name not in found:
+        if not runs.has(configuration=name):
             continue
-        sums = found[name]["sums"][0]
+        sums = runs(configuration=name).rows[0]["sums_m"]
         begun = np.flatnonzero(np.any(np.isfinite(sums), axis=1)) + 1
         laps = sorted({*(lap for lap in LENGTH_LAPS if lap in begun), *begun[-1:].tolist()})
         for number, lap in enumerate(laps):

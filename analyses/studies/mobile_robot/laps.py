@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import tempfile
-from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from pydrake.common.yaml import yaml_dump_typed
 
 from cdpr_drake.analyses.simulation.visual_servo_run import RunResult, run_scenario
-from cdpr_drake.analyses.studies.framework.seeded_study import over_seeds
+from cdpr_drake.analyses.studies.framework.study import Case
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.poses import pose_rows_distance
 from cdpr_drake.models.robot_loader import load_robot
@@ -49,64 +48,30 @@ THRESHOLD = 1.0
 BEFORE = 1.0
 """Time before the worst estimate of a lap in which slack cables are counted [s]."""
 
-COLUMNS = (
-    "most_slack", "estimate_m", "estimate_rad", "estimate_z_m", "seen", "tension_n", "path_m",
-    "one_slack", "two_slack", "underactuated_s", "at_threshold", "estimate_at", "slack_at_estimate",
-    "path_at",
-)  # fmt: skip
-"""What is kept of each lap: the most cables slack at once; largest error of the pose estimate,
-position [m] and rotation [rad], and how far it is too high at the end [m]; share of images with the
-tag; largest tension [N]; largest distance from the path of lap `REFERENCE` [m]; share of the lap
-with a slack cable, and with two or more; longest time with more than two [s]; mean number of cables
-within `SLACK` of `THRESHOLD`; where in the lap the estimate is worst, from 0 to 1, and the most
-cables slack at once in the time `BEFORE` that; where the path is farthest away, from 0 to 1."""
 
+def measure(case: Case, seed: int) -> dict[str, Any]:
+    """The scenario with changes, for some laps, see `row_of`.
 
-@dataclass(frozen=True)
-class LapsTask:
-    """The scenario with changes, for some laps; the item is the seed.
-
-    Attributes:
-        changes: Items "key=value" of the scenario.
-        laps: After which it ends.
-        friction: Of the winches, over that of the robot's file.
+    Args:
+        case: Its keys have asked_laps, after which it ends, and friction of the winches over that
+            of the robot's file.
+        seed: Its seed.
     """
-
-    changes: tuple[str, ...]
-    laps: int
-    friction: float = 1.0
-
-    def __call__(self, start: int, stop: int) -> dict[str, Array]:
-        """Arrays of `run_laps`, stacked."""
-        return over_seeds(partial(run_laps, self), start, stop)
-
-
-def run_laps(task: LapsTask, seed: int) -> dict[str, Array]:
-    """A run of a task.
-
-    Returns:
-        end: outcome, and laps until it ended, shape (2,); laps: `COLUMNS` of each lap, shape
-        (laps, 14); sums: of the unstrained lengths at moments of each lap, shape (laps, `PHASES`)
-        [m]; paths: positions of the platform at these moments of the laps `SHOWN` and the last
-        whole one, shape (4, `PHASES`, 3) [m]; tensions: at these moments of the laps
-        `TENSION_LAPS` and the last whole one, shape (6, `PHASES`, m) [N]; underactuated_at_end:
-        for how long more than two cables had been slack when it ended, shape (1,) [s]. What did
-        not happen is NaN.
-    """
+    laps, friction = case.keys["asked_laps"], case.keys["friction"]
     with tempfile.TemporaryDirectory() as folder:
-        changes = [*task.changes, f"seed={seed}"]
-        if task.friction != 1.0:
-            changes.append(f"robot={_with_friction(Path(folder), task.friction)}")
+        changes = [*case.changes, f"seed={seed}"]
+        if friction != 1.0:
+            changes.append(f"robot={with_friction(Path(folder), friction)}")
         scenario = load_scenario(SCENARIO, changes)
         assert scenario.target.motion is not None
         assert scenario.target.motion.mobile_robot is not None
         lap_time = scenario.target.motion.mobile_robot.lap_time
-        scenario.duration, scenario.log_rate = task.laps * lap_time, LOG_RATE
+        scenario.duration, scenario.log_rate = laps * lap_time, LOG_RATE
         result = run_scenario(choose_compiled_loop(scenario))
-    return laps_of(result, task.laps, lap_time)
+    return row_of(result, laps, lap_time)
 
 
-def _with_friction(folder: Path, factor: float) -> Path:
+def with_friction(folder: Path, factor: float) -> Path:
     """A file of the scenario's robot with other friction of its winches."""
     robot: Robot = load_robot("acrobot_large")
     friction = robot.winch.friction
@@ -118,8 +83,24 @@ def _with_friction(folder: Path, factor: float) -> Path:
     return file
 
 
-def laps_of(result: RunResult, laps: int, lap_time: float) -> dict[str, Array]:
-    """What `run_laps` keeps of a run, for so many laps of a time [s]."""
+def row_of(result: RunResult, laps: int, lap_time: float) -> dict[str, Any]:
+    """What is kept of a run, for so many laps of a time [s]; what did not happen is NaN.
+
+    Returns:
+        outcome; failed: whether it ended before its laps were done; laps_done: until it ended;
+        underactuated_at_end_s: for how long more than two cables had been slack then. Of each lap,
+        shape (laps,): most_slack: the most cables slack at once; estimate_m, estimate_rad: largest
+        error of the pose estimate; estimate_z_m: how far it is too high at the end; seen: share of
+        images with the tag; tension_n: largest tension; path_m: largest distance from the path of
+        lap `REFERENCE`; one_slack, two_slack: share of the lap with a slack cable, and with two or
+        more; underactuated_s: longest time with more than two; at_threshold: mean number of cables
+        within `SLACK` of `THRESHOLD`; estimate_at: where in the lap the estimate is worst, from 0
+        to 1; slack_at_estimate: the most cables slack at once in the time `BEFORE` that; path_at:
+        where the path is farthest away, from 0 to 1. sums_m: of the unstrained lengths at moments
+        of each lap, shape (laps, `PHASES`); paths_m: positions of the platform at these moments of
+        the laps `SHOWN` and the last whole one, shape (4, `PHASES`, 3); tensions_n: at these
+        moments of the laps `TENSION_LAPS` and the last whole one, shape (6, `PHASES`, m).
+    """
     log = result.log
     times, poses, estimates = log["time"], log["X_WP"], log["X_WP_estimated"]
     sums, tensions = np.sum(log["unstrained_lengths"], axis=1), log["tensions"]
@@ -138,7 +119,7 @@ def laps_of(result: RunResult, laps: int, lap_time: float) -> dict[str, Array]:
         found = np.array([np.interp(when, times, c, right=np.nan) for c in columns])
         return found.T.reshape(PHASES, *values.shape[1:])
 
-    table = np.full((laps, len(COLUMNS)), np.nan)
+    rows_of_laps: list[dict[str, float]] = []
     lengths = np.full((laps, PHASES), np.nan)
     reference = at_phases(REFERENCE - 1, positions)
     for lap in range(min(laps, int(number[-1]) + 1)):
@@ -147,24 +128,33 @@ def laps_of(result: RunResult, laps: int, lap_time: float) -> dict[str, Array]:
         away = np.linalg.norm(at_phases(lap, positions) - reference, axis=1)
         worst = rows[np.argmax(distance[rows])]
         before = (times > times[worst] - BEFORE) & (times <= times[worst])
-        table[lap] = [
-            np.max(slack[rows]), np.max(distance[rows]), np.max(angle[rows]), high[rows][-1],
-            np.mean(seen[rows]), np.max(tensions[rows]),
-            np.max(away) if np.all(np.isfinite(away)) else np.nan,
-            np.mean(slack[rows] >= 1), np.mean(slack[rows] >= 2), np.max(under[rows]),
-            np.mean(near[rows]), times[worst] / lap_time - lap, np.max(slack[before]),
-            phases[np.argmax(away)] / lap_time if np.all(np.isfinite(away)) else np.nan,
-        ]  # fmt: skip
+        whole = np.all(np.isfinite(away))
+        rows_of_laps.append({
+            "most_slack": np.max(slack[rows]), "estimate_m": np.max(distance[rows]),
+            "estimate_rad": np.max(angle[rows]), "estimate_z_m": high[rows][-1],
+            "seen": np.mean(seen[rows]), "tension_n": np.max(tensions[rows]),
+            "path_m": np.max(away) if whole else np.nan,
+            "one_slack": np.mean(slack[rows] >= 1), "two_slack": np.mean(slack[rows] >= 2),
+            "underactuated_s": np.max(under[rows]), "at_threshold": np.mean(near[rows]),
+            "estimate_at": times[worst] / lap_time - lap,
+            "slack_at_estimate": np.max(slack[before]),
+            "path_at": phases[np.argmax(away)] / lap_time if whole else np.nan,
+        })  # fmt: skip
     done = result.sim_time / lap_time
     last = max(int(done + 1e-9), 1)
-    paths = [at_phases(lap - 1, positions) for lap in (*SHOWN, last)]
+    never = [np.nan] * (laps - len(rows_of_laps))
     return {
-        "tensions": np.array([at_phases(lap - 1, tensions) for lap in (*TENSION_LAPS, last)]),
-        "underactuated_at_end": under[-1:],
-        "end": np.array([float(result.outcome), done]),
-        "laps": table,
-        "sums": lengths,
-        "paths": np.array(paths),
+        "outcome": Outcome(result.outcome).name.lower(),
+        "failed": bool(result.outcome != Outcome.TIMEOUT),
+        "laps_done": done,
+        "underactuated_at_end_s": under[-1],
+        **{
+            name: np.array([*(row[name] for row in rows_of_laps), *never], float)
+            for name in rows_of_laps[0]
+        },
+        "sums_m": lengths,
+        "paths_m": np.array([at_phases(lap - 1, positions) for lap in (*SHOWN, last)]),
+        "tensions_n": np.array([at_phases(lap - 1, tensions) for lap in (*TENSION_LAPS, last)]),
     }
 
 
@@ -178,8 +168,3 @@ def times_beyond(times: Array, beyond: np.ndarray) -> Array:
     last = np.maximum.accumulate(np.where(beyond, -1, np.arange(len(times))))
     since = np.where(last >= 0, times[np.maximum(last, 0)], times[0])
     return np.where(beyond, times - since, 0.0)
-
-
-def failed(ends: Array) -> np.ndarray:
-    """Which runs ended before their laps were done, from their "end", shape (n, 2)."""
-    return np.asarray(ends[:, 0] != float(Outcome.TIMEOUT))

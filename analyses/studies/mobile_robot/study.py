@@ -1,29 +1,28 @@
-"""Runs the study, and what it leaves: numbers, tables, figures."""
+"""The study: its runs, table, figures."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
-from rich.table import Table
+from pydrake.common.yaml import yaml_dump_typed
 
-from cdpr_drake.analyses.reporting.progress import DEFAULT_STUDY_SESSION, StudySession
-from cdpr_drake.analyses.reporting.statements import new_table
-from cdpr_drake.analyses.studies.framework.seeded_study import SeededStudy
-from cdpr_drake.analyses.studies.mobile_robot.configurations import (
-    QUICK_SEEDS,
-    SEEDS,
-    Configuration,
-    configurations,
+from cdpr_drake.analyses.studies.framework.runs import Runs
+from cdpr_drake.analyses.studies.framework.study import Form, Study
+from cdpr_drake.analyses.studies.framework.summary import Summary
+from cdpr_drake.analyses.studies.mobile_robot import slack_statements, statements
+from cdpr_drake.analyses.studies.mobile_robot.configurations import PUBLISHED, cases
+from cdpr_drake.analyses.studies.mobile_robot.figures import choices_figure, laps_figure
+from cdpr_drake.analyses.studies.mobile_robot.lap_figures import (
+    PATHS,
+    lengths_figure,
+    paths_figure,
 )
-from cdpr_drake.analyses.studies.mobile_robot.figures import mobile_robot_drawings
-from cdpr_drake.analyses.studies.mobile_robot.judges import CHECKS
-from cdpr_drake.analyses.studies.mobile_robot.laps import COLUMNS, SCENARIO, failed
-from cdpr_drake.analyses.studies.mobile_robot.statements import column, laps_words
-from cdpr_drake.analyses.sweeps.workers import SweepTask
+from cdpr_drake.analyses.studies.mobile_robot.laps import SCENARIO, measure
+from cdpr_drake.analyses.studies.mobile_robot.tension_figures import TENSIONS, tensions_figure
+from cdpr_drake.systems.diagrams.load import load_scenario
 
 ASSUMPTIONS = (
     "The track is not printed: a rectangle of 0.26 x 0.16 m with rounded corners, as fast as the "
@@ -44,85 +43,60 @@ ASSUMPTIONS = (
 )
 
 
-@dataclass(frozen=True, eq=False)
-class MobileRobotStudy(SeededStudy):
-    """What the study found, see `run_laps`."""
-
-    name = "mobile-robot"
-    source = "servoing thesis 2.3.7, 5.3.1"
-    judges = CHECKS
-    stated = "What the thesis states"
-
-    def shown(self) -> list[Configuration]:
-        """The configurations that are finished."""
-        return [c for c in configurations(self.quick) if c.name in self.found]
-
-    def details(self) -> dict[str, Any]:
-        """Parameters, versions, the worst of all laps."""
-        return {
-            **self.setup_dict(SCENARIO, ASSUMPTIONS),
-            "columns": list(COLUMNS),
-            "configurations": [
-                {
-                    "name": c.name,
-                    "label": c.words,
-                    "changes": list(c.task.changes),
-                    "friction": c.task.friction,
-                    "laps": c.task.laps,
-                    "published": c.published,
-                    "laps_until_end": self.found[c.name]["end"][:, 1].tolist(),
-                    "failed": failed(self.found[c.name]["end"]).tolist(),
-                    **{key: self._extreme(c.name, key) for key in COLUMNS},
-                }
-                for c in self.shown()
-            ],
-        }
-
-    def _extreme(self, name: str, key: str) -> float:
-        """The worst of a column over all laps and runs."""
-        values = column(self.found, name, key)
-        there = values[np.isfinite(values)]
-        if len(there) == 0:
-            return float("nan")
-        return float(np.min(there) if key == "seen" else np.max(there))
-
-    def number_tables(self) -> list[Table]:
-        """The worst of all laps, by configuration."""
-        table = new_table(
-            "A tag on a mobile robot",
-            ("configuration", "published", "laps until failure"),
-            ("most slack", "estimate [mm]", "estimate [deg]", "tension [N]"),
-        )
-        for c in self.shown():
-            table.add_row(
-                c.words, c.published, laps_words(self.found[c.name]["end"]),
-                f"{self._extreme(c.name, 'most_slack'):.0f}",
-                f"{1e3 * self._extreme(c.name, 'estimate_m'):.0f}",
-                f"{np.degrees(self._extreme(c.name, 'estimate_rad')):.1f}",
-                f"{self._extreme(c.name, 'tension_n'):.1f}",
-            )  # fmt: skip
-        return [table]
-
-    def drawings(self) -> dict[str, Callable[[], Figure]]:
-        """See `mobile_robot_drawings`."""
-        return mobile_robot_drawings(self.found, self.shown())
+def parameters(form: Form) -> Mapping[str, Any]:
+    """The scenario that configurations change."""
+    return {"scenario": yaml_dump_typed(load_scenario(SCENARIO))}
 
 
-def study_mobile_robot(
-    quick: bool = False, session: StudySession = DEFAULT_STUDY_SESSION
-) -> MobileRobotStudy:
-    """Runs all configurations over their seeds; each run is an item of a sweep.
+def extreme(runs: Runs, column: str) -> float:
+    """The worst of a column over all laps and runs; NaN where there is none."""
+    values = runs[column]
+    there = values[np.isfinite(values)]
+    if len(there) == 0:
+        return float("nan")
+    return float(np.min(there) if column == "seen" else np.max(there))
 
-    Args:
-        quick: Few configurations, once each, two laps, to see that everything works.
-        session: How it is run, and how many seeds.
 
-    Raises:
-        OutputFolderError: The folder belongs to other arguments, or cannot be written.
-        SweepError: A local process died.
-    """
-    seeds = session.seeds or (QUICK_SEEDS if quick else SEEDS)
-    tasks: dict[str, tuple[SweepTask, int]] = {
-        c.name: (c.task, seeds) for c in configurations(quick)
+def extremes(runs: Runs) -> dict[str, Any]:
+    """The worst of all laps, by configuration and column."""
+    columns = [name for name in runs.arrays() if runs.rows[0][name].ndim == 1]
+    return {
+        name: {column: extreme(some, column) for column in columns}
+        for name, some in runs.by("configuration")
     }
-    return MobileRobotStudy.run(tasks, quick, seeds, session)
+
+
+STUDY = Study(
+    name="mobile-robot",
+    title="A tag on a mobile robot that goes round, followed until that fails, or for three hours",
+    source="servoing thesis 2.3.7, 5.3.1",
+    cases=cases,
+    measure=measure,
+    seeds=(10, 1),
+    parameters=parameters,
+    assumptions=ASSUMPTIONS,
+    numbers=extremes,
+    checks=(*statements.CHECKS, *slack_statements.CHECKS),
+    stated="What the thesis states",
+    tables=[
+        Summary(
+            "A tag on a mobile robot",
+            ("words",),
+            {
+                "published": lambda runs: PUBLISHED.get(runs.rows[0].case, ""),
+                "laps until failure": statements.laps_words,
+                "most slack": lambda runs: f"{extreme(runs, 'most_slack'):.0f}",
+                "estimate [mm]": lambda runs: f"{1e3 * extreme(runs, 'estimate_m'):.0f}",
+                "estimate [deg]": lambda runs: f"{np.degrees(extreme(runs, 'estimate_rad')):.1f}",
+                "tension [N]": lambda runs: f"{extreme(runs, 'tension_n'):.1f}",
+            },
+        )
+    ],
+    figures={
+        "mobile_robot": laps_figure,
+        "choices": choices_figure,
+        **{name: partial(tensions_figure, name) for name in TENSIONS},
+        **{name: partial(paths_figure, name) for name in PATHS},
+        "lengths_by_lap": lengths_figure,
+    },
+)

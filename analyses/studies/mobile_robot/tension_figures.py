@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from functools import partial
-
 import numpy as np
 from matplotlib.figure import Figure
 
+from cdpr_drake.analyses.studies.framework.runs import Run, Runs
 from cdpr_drake.analyses.studies.mobile_robot.laps import PHASES, TENSION_LAPS, THRESHOLD
 from cdpr_drake.analyses.visualization.curves import draw_curve, phase_of
 from cdpr_drake.analyses.visualization.figure_style import line_style, new_figure
 from cdpr_drake.arrays import Array
 from cdpr_drake.palette import BOUND, nth_look
 
-SHOWN: dict[str, tuple[str, str, tuple[int, ...]]] = {
+TENSIONS: dict[str, tuple[str, str, tuple[int, ...]]] = {
     "tensions_estimator": ("estimator cable_lengths", "figure 2.18, Est. 4, no known tag", (1, 2)),
     "tensions_plain": ("plain", "figure 5.22, no correction", (1, 10, 20)),
     "tensions_corrected": ("corrected", "figure 5.23, with correction", (1, 10, 30)),
@@ -22,28 +20,18 @@ SHOWN: dict[str, tuple[str, str, tuple[int, ...]]] = {
 """Figures by name: configuration, words, laps that the thesis shows beside the last one."""
 
 
-def tension_drawings(
-    found: Mapping[str, Mapping[str, Array]],
-) -> dict[str, Callable[[], Figure]]:
-    """What draws the figures that the finished configurations suffice for, of the first run of
-    each, by name."""
-    return {
-        name: partial(_figure, found[configuration], words, laps)
-        for name, (configuration, words, laps) in SHOWN.items()
-        if configuration in found
-    }
-
-
-def panels_of(arrays: Mapping[str, Array], laps: tuple[int, ...]) -> dict[int, Array]:
-    """Tensions of laps that the first run got to, and of its last whole one, (PHASES, m) [N]."""
-    tensions = arrays["tensions"][0]
+def panels_of(run: Run, laps: tuple[int, ...]) -> dict[int, Array]:
+    """Tensions of laps that a run got to, and of its last whole one, (PHASES, m) [N]."""
+    tensions = run["tensions_n"]
     panels = {lap: tensions[TENSION_LAPS.index(lap)] for lap in laps}
-    panels[max(int(arrays["end"][0, 1] + 1e-9), 1)] = tensions[-1]
+    panels[max(int(run["laps_done"] + 1e-9), 1)] = tensions[-1]
     return {lap: rows for lap, rows in sorted(panels.items()) if np.any(np.isfinite(rows))}
 
 
-def _figure(arrays: Mapping[str, Array], words: str, laps: tuple[int, ...]) -> Figure:
-    panels = panels_of(arrays, laps)
+def tensions_figure(name: str, runs: Runs) -> Figure:
+    """One of `TENSIONS`, of the first run of its configuration."""
+    configuration, words, laps = TENSIONS[name]
+    panels = panels_of(runs(configuration=configuration).rows[0], laps)
     rows = -(-len(panels) // 2)
     figure, grid = new_figure(
         rows, 2, (14.0, 1.8 + 3.6 * rows), f"Cable tensions behind a mobile robot, {words}"

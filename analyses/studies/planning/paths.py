@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,6 @@ from cdpr_drake.analyses.planning.robot_path_task import (
     robot_limits,
 )
 from cdpr_drake.analyses.studies.planning.convex_timing import convex_time
-from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.poses import pose_from_angles
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.planning.path_timing import plan_along_path
@@ -87,41 +86,7 @@ PATHS = (
 )
 
 
-@dataclass(frozen=True)
-class PathResult:
-    """What was found along a path.
-
-    Attributes:
-        name: Of the path.
-        corners: Of the path.
-        duration: Of the plan [s].
-        convex: Of the convex program [s].
-        least_share: Share of the limit that is nearest, where it is least along the plan.
-        largest_share: The same where it is most; above 1 between stations only.
-        reached: Share of the instants at which a limit is reached, see `REACHED`.
-        tracked: As `TrackedPlan.as_dict`.
-    """
-
-    name: str
-    corners: str
-    duration: float
-    convex: float
-    least_share: float
-    largest_share: float
-    reached: float
-    tracked: dict[str, Any]
-
-    @property
-    def difference(self) -> float:
-        """Of the plan's time from that of the convex program, relative."""
-        return self.duration / self.convex - 1.0
-
-    def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
-        return asdict(self) | {"difference": self.difference}
-
-
-def run_path(spec: PathSpec, stations: int, intervals: int) -> tuple[PathResult, dict[str, Array]]:
+def run_path(spec: PathSpec, stations: int, intervals: int) -> dict[str, Any]:
     """Plans along a path, tracks the plan, and asks the convex program.
 
     Args:
@@ -130,8 +95,12 @@ def run_path(spec: PathSpec, stations: int, intervals: int) -> tuple[PathResult,
         intervals: Of the convex program.
 
     Returns:
-        What was found, and curves for figures: stations [m], ds/dt of the plan and the largest
-        ds/dt that the limits admit at a point by itself [m/s].
+        plan_time_s, convex_time_s, and their relative difference; least_share, largest_share: of
+        the limit that is nearest, where it is least and most along the plan, above 1 between
+        stations only; reached: share of the instants at which a limit is reached, see `REACHED`;
+        what `TrackedPlan.as_dict` tells; tracked_share: of the limit that is used most; curves
+        stations_m, and there ds/dt of the plan, speed_m_s, and the largest that the limits admit
+        at a point by itself, largest_speed_m_s.
 
     Raises:
         PlanningError: The path cannot be followed, or the convex program was not solved.
@@ -142,16 +111,18 @@ def run_path(spec: PathSpec, stations: int, intervals: int) -> tuple[PathResult,
     plan = plan_along_path(task, make_path(robot, spec.poses(), spec.corners), stations)
     uses = np.max(plan.samples().uses, axis=1)
     tracked = track_plan(robot, plan, robot_limits(robot, given))
-    result = PathResult(
-        name=spec.name, corners=spec.corners, duration=plan.duration,
-        convex=convex_time(robot, task, plan.path, intervals),
-        least_share=float(np.min(uses)), largest_share=float(np.max(uses)),
-        reached=float(np.mean(uses >= REACHED)), tracked=tracked.as_dict(),
-    )  # fmt: skip
+    convex = convex_time(robot, task, plan.path, intervals)
     motion = plan.trajectory
-    curves = {
-        "s": motion.stations,
-        "speed": np.sqrt(motion.squared_speeds),
-        "largest": np.sqrt(plan.largest),
+    return {
+        "plan_time_s": plan.duration,
+        "convex_time_s": convex,
+        "difference": plan.duration / convex - 1.0,
+        "least_share": np.min(uses),
+        "largest_share": np.max(uses),
+        "reached": np.mean(uses >= REACHED),
+        **tracked.as_dict(),
+        "tracked_share": max(tracked.uses().values()),
+        "stations_m": motion.stations,
+        "speed_m_s": np.sqrt(motion.squared_speeds),
+        "largest_speed_m_s": np.sqrt(plan.largest),
     }
-    return result, curves

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -30,7 +29,8 @@ SLOW, FAST = 1.5, 0.45
 HORIZONS = (5, 10, 20)
 """Steps ahead."""
 
-RATES = {"computed torque": 1000.0, "predictive": 100.0}
+COMPUTED_TORQUE, PREDICTIVE = "computed torque", "predictive"
+RATES = {COMPUTED_TORQUE: 1000.0, PREDICTIVE: 100.0}
 """Steps of control per second [Hz]."""
 
 GAINS = TaskGains(stiffness=100.0, damping=20.0)
@@ -39,37 +39,20 @@ PAUSE, REST = 0.1, 0.5
 """Rest before and after [s]."""
 
 
-@dataclass(frozen=True)
-class TrackResult:
-    """How a controller tracked a motion.
+def track_quintic(duration: float, steps: int) -> dict[str, Any]:
+    """A quintic motion tracked by computed torque (0 steps) or by predictive control.
 
-    Attributes:
-        controller: Which one.
-        steps: Ahead; 0 for computed torque.
+    Args:
         duration: Of the motion [s].
-        rms: Root mean square distance of Po from the motion [m].
-        largest: Largest distance [m].
-        failures: Steps of control at which no tensions within the limits were found.
+        steps: Ahead.
+
+    Returns:
+        rms_m, largest_m: distance of Po from the motion; failures: steps of control at which no
+        tensions within the limits were found.
     """
-
-    controller: str
-    steps: int
-    duration: float
-    rms: float
-    largest: float
-    failures: int
-
-    def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
-        return asdict(self)
-
-
-def track_quintic(duration: float, steps: int) -> TrackResult:
-    """A quintic motion tracked by computed torque (0 steps) or by predictive control."""
     robot = load_robot(ROBOT)
     motion = PoseTrajectory((RigidTransform(START), RigidTransform(GOAL)), (duration,), PAUSE)
-    name = "predictive" if steps else "computed torque"
-    rate = RATES[name]
+    rate = RATES[PREDICTIVE if steps else COMPUTED_TORQUE]
     control = build_tension_control(
         robot,
         TensionControlSettings(
@@ -83,7 +66,8 @@ def track_quintic(duration: float, steps: int) -> TrackResult:
     simulator.AdvanceTo(PAUSE + duration + REST)
     log = control.read_log(simulator.get_context())
     apart, _ = pose_rows_distance(log["X_WP"], log["X_WP_desired"])
-    return TrackResult(
-        name, steps, duration, float(np.sqrt(np.mean(apart**2))), float(np.max(apart)),
-        int(log["failures"][-1, 0]),
-    )  # fmt: skip
+    return {
+        "rms_m": np.sqrt(np.mean(apart**2)),
+        "largest_m": np.max(apart),
+        "failures": int(log["failures"][-1, 0]),
+    }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -32,7 +32,7 @@ def _four_cables() -> Robot:
 
 
 @dataclass(frozen=True)
-class SwingCase:
+class SwingMotion:
     """A motion from rest to rest.
 
     Attributes:
@@ -52,16 +52,16 @@ class SwingCase:
     bounds: tuple[float, float] | None = None
 
 
-CASES = (
-    SwingCase(
+MOTIONS = (
+    SwingMotion(
         "planar, cables of rubber", example_robot, (-0.1, 0.05, 0.3), (0.15, -0.05, 0.3), 0.45,
         (10.0, 60.0),
     ),
-    SwingCase(
+    SwingMotion(
         "planar, its true cables", lambda: load_robot("planar"), (0.0, 0.0, 0.3), (0.005, 0.0, 0.3),
         0.03, (10.0, 60.0),
     ),
-    SwingCase(
+    SwingMotion(
         "acrobot_large on four of eight cables", _four_cables, (-0.1, 0.0, 0.2), (0.1, 0.0, 0.2),
         0.5,
     ),
@@ -77,43 +77,23 @@ LONGER = (1.0, 1.25, 1.5, 2.0)
 """Durations that multiple shooting tries until there is a motion, over that of the case."""
 
 
-@dataclass(frozen=True)
-class SwingResult:
-    """What was left of a motion's swing.
+def run_swing(number: int) -> dict[str, Any]:
+    """Plans and simulates a motion with every shaper, by multiple shooting, and without.
 
-    Attributes:
-        name: Of the case.
-        slowest: Least frequency of the platform at rest, of start, middle and goal [Hz].
-        way: Of Po [m].
-        left: By shaper, by name of `SHOTS`, and "none": largest distance of Po after the command
-            ended [m].
-        off: By the same, the largest on cables whose stiffness is off, see `OFF` [m].
-        end_times: By the same, when it ended [s].
-        refused: By name of `SHOTS`, why there is no such motion.
-        slow: Largest distance after a motion that is not shaped and takes as long as the one that
-            ZVD shapes [m].
-    """
+    Args:
+        number: In `MOTIONS`.
 
-    name: str
-    slowest: float
-    way: float
-    left: dict[str, float]
-    off: dict[str, float]
-    end_times: dict[str, float]
-    refused: dict[str, str]
-    slow: float
-
-    def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
-        return asdict(self)
-
-
-def run_swing(case: SwingCase) -> SwingResult:
-    """Plans and simulates a case with every shaper, by multiple shooting, and without.
+    Returns:
+        slowest_hz: least frequency of the platform at rest, of start, middle and goal; way_m: of
+        Po; left_m: by shaper, by name of `SHOTS`, and "none", the largest distance of Po after the
+        command ended; off_m: the same on cables whose stiffness is off, see `OFF`; end_times_s:
+        when it ended; refused: by name of `SHOTS`, why there is no such motion; slow_m: largest
+        distance after a motion that is not shaped and takes as long as the one that ZVD shapes.
 
     Raises:
         PlanningError: The motion cannot be wound.
     """
+    case = MOTIONS[number]
     robot, ends = case.robot(), (RigidTransform(case.start), RigidTransform(case.goal))
     motions, refused = {}, {}
     for kind in (None, *SHAPERS):
@@ -134,12 +114,15 @@ def run_swing(case: SwingCase) -> SwingResult:
     slow = plan_shaped_rest(robot, *ends, end_times["ZVD"], None, bounds=case.bounds)
     way = motion.goal.X_WP.translation() - motion.start.X_WP.translation()
     wrong = [CableSettings(stiffness_ratio=ratio) for ratio in OFF]
-    return SwingResult(
-        name=case.name, slowest=float(np.min(motion.frequencies)), way=float(np.linalg.norm(way)),
-        left={name: simulate_swing(one, WATCH).left() for name, one in motions.items()},
-        off={
+    return {
+        "slowest_hz": np.min(motion.frequencies),
+        "way_m": np.linalg.norm(way),
+        "left_m": {name: simulate_swing(one, WATCH).left() for name, one in motions.items()},
+        "off_m": {
             name: max(simulate_swing(one, WATCH, cables).left() for cables in wrong)
             for name, one in motions.items()
         },
-        end_times=end_times, refused=refused, slow=simulate_swing(slow, WATCH).left(),
-    )  # fmt: skip
+        "end_times_s": end_times,
+        "refused": refused,
+        "slow_m": simulate_swing(slow, WATCH).left(),
+    }

@@ -13,12 +13,13 @@ Each source is a YAML file beside this module: sections in the order of the sour
 `not_drawn` lists figures with a result that is not drawn here, and `why`; `no_result` the figures
 and tables that show no result: photographs, schemes, parameters. So every figure and table of a
 source is in its file once; a test holds that. Under `own` a file lists studies whose statements are
-of no source.
+of no source. `corrected` lists, by chapter, equations and tables that do not hold as printed.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -100,6 +101,8 @@ class Register:
         not_drawn: Figures with a result that no study draws.
         no_result: Labels of figures and tables that show no result.
         own: Studies all of whose statements are of no source.
+        corrected: By chapter, what does not hold as printed; what is used instead stands in the
+            documentation.
     """
 
     name: str
@@ -108,6 +111,7 @@ class Register:
     not_drawn: tuple[NotDrawn, ...] = ()
     no_result: tuple[str, ...] = ()
     own: tuple[str, ...] = ()
+    corrected: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
 
 def read_register(name: str, content: dict[str, Any]) -> Register:
@@ -119,6 +123,7 @@ def read_register(name: str, content: dict[str, Any]) -> Register:
         not_drawn=tuple(NotDrawn(**one) for one in content.get("not_drawn", ())),
         no_result=tuple(content.get("no_result", ())),
         own=tuple(content.get("own", ())),
+        corrected={key: tuple(some) for key, some in content.get("corrected", {}).items()},
     )
 
 

@@ -1,44 +1,31 @@
-"""Runs the study, and what it leaves: numbers, tables, a figure."""
+"""The study: its runs, tables, figure."""
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from rich.table import Table
 
-from cdpr_drake.analyses.reporting.progress import DEFAULT_STUDY_SESSION, StudySession
-from cdpr_drake.analyses.reporting.provenance import package_versions
-from cdpr_drake.analyses.reporting.statements import new_table
-from cdpr_drake.analyses.studies.framework.seeded_study import SeededStudy, constants_of
+from cdpr_drake.analyses.studies.framework.runs import Runs
+from cdpr_drake.analyses.studies.framework.study import Case, Form, Study
+from cdpr_drake.analyses.studies.framework.summary import Cell, Summary
 from cdpr_drake.analyses.studies.schemes import trials
-from cdpr_drake.analyses.studies.schemes.statements import (
-    CHECKS,
-    FREE,
-    ROBOT,
-    TURN,
-    column,
-    task_name,
-)
+from cdpr_drake.analyses.studies.schemes.statements import CHECKS
 from cdpr_drake.analyses.studies.schemes.trials import (
-    COLUMNS,
+    FREE,
     PERIOD,
+    ROBOT,
     TURNS,
+    TURNS_DEG,
     VARIANTS,
-    FreeTask,
-    RobotTask,
-    TurnTask,
     free_starts,
+    measure,
     robot_starts,
 )
-from cdpr_drake.analyses.sweeps.workers import SweepTask
 from cdpr_drake.analyses.visualization.figure_style import line_style, new_figure
-from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.poses import pose_row
 from cdpr_drake.palette import nth_look
 
@@ -48,138 +35,129 @@ STARTS, QUICK_STARTS = 100, 8
 DRAWN = {"ibvs", "pbvs-line", "partitioned", "partitioned, turned", "switching"}
 """Schemes in the panels over turns; pbvs and 2.5d do there what pbvs-line does."""
 
-
-@dataclass(frozen=True, eq=False)
-class SchemesStudy(SeededStudy):
-    """What the study found, by `task_name`; `seeds` are drawn starts."""
-
-    name = "schemes"
-    judges = CHECKS
-    stated = "What is said of them"
-
-    def details(self) -> dict[str, Any]:
-        """Parameters, versions, starts, numbers of all runs."""
-        return {
-            "parameters": constants_of(trials, str, int, float, tuple, dict),
-            "free_starts": [pose_row(X_CO).tolist() for X_CO in free_starts(self.seeds)],
-            "robot_starts": robot_starts(self.seeds),
-            "versions": package_versions(),
-            **self.runs_dict(COLUMNS),
-        }
-
-    def number_tables(self) -> list[Table]:
-        """How the runs ended, by what was run and scheme."""
-        tables = []
-        for what in (TURN, FREE, ROBOT):
-            table = new_table(
-                f"{what}: medians of those that arrived, worst of all", ("scheme",),
-                ("runs", "arrived", "lost", "time [s]", "image path [px]", "worst retreat [m]",
-                 "switched", "share of bound"),
-            )  # fmt: skip
-            for variant in self._finished(what):
-                runs = np.asarray(self.found[task_name(what, variant)]["runs"])
-                arrived, lost, time, path, retreat, switches, share, _ = runs.T
-                table.add_row(
-                    variant, f"{len(runs)}", f"{np.sum(arrived):.0f}", f"{np.sum(lost):.0f}",
-                    f"{_median(time):.2f}", f"{_median(path):.0f}", f"{np.max(retreat):.3g}",
-                    "" if np.all(np.isnan(switches)) else f"{np.sum(switches > 0.0)}",
-                    "" if np.all(np.isnan(share)) else f"{np.nanmax(share):.3f}",
-                )  # fmt: skip
-            if table.row_count:
-                tables.append(table)
-        return tables
-
-    def _finished(self, what: str) -> list[str]:
-        """Variants that were run."""
-        return [variant for variant in VARIANTS if task_name(what, variant) in self.found]
-
-    def drawings(self) -> dict[str, Callable[[], Figure]]:
-        """The figure `schemes`."""
-        return {"schemes": self._figure} if self.found else {}
-
-    def _figure(self) -> Figure:
-        figure, axes = new_figure(2, 2, (14.0, 10.0), "Schemes of visual servoing")
-        self._draw_retreats(axes[0, 0])
-        self._draw_turn(axes[0, 1])
-        for axis, what in ((axes[1, 0], FREE), (axes[1, 1], ROBOT)):
-            self._draw_failures(axis, what)
-        return figure
-
-    def _draw_retreats(self, axis: Axes) -> None:
-        """How far the camera retreats on a turn, by its angle."""
-        for k, variant in enumerate(VARIANTS):
-            if variant in DRAWN and variant in self._finished(TURN):
-                retreat = np.maximum(column(self.found, TURN, variant, "retreat_m"), NOTHING)
-                look = nth_look(k)
-                axis.semilogy(TURNS[: len(retreat)], retreat, label=variant, **line_style(look),
-                              marker=look.marker, markersize=4)  # fmt: skip
-        axis.set(xlabel="turn about the optical axis [deg]",
-                 ylabel=f"retreat [m]; {NOTHING:g} is none",
-                 title="How much farther than start and goal the camera goes")  # fmt: skip
-        if axis.get_legend_handles_labels()[0]:
-            axis.legend()
-
-    def _draw_turn(self, axis: Axes) -> None:
-        """Depth over time on the largest turn."""
-        for k, variant in enumerate(VARIANTS):
-            if variant in DRAWN and variant in self._finished(TURN):
-                depths = np.asarray(self.found[task_name(TURN, variant)]["depths"])[-1]
-                times = PERIOD * np.arange(len(depths))
-                axis.semilogy(times, depths, label=variant, **line_style(nth_look(k)))
-        axis.set(xlabel="time [s]", ylabel="depth of the dots [m]", ylim=(0.03, 10.0),
-                 title=f"A turn by {TURNS[-1]} deg")  # fmt: skip
-
-    def _draw_failures(self, axis: Axes, what: str) -> None:
-        """Shares of runs that lost the target or did not arrive, side by side."""
-        names = self._finished(what)
-        for place, variant in enumerate(names):
-            arrived, lost = (
-                column(self.found, what, variant, name) for name in ("arrived", "lost")
-            )
-            gone, short = 100.0 * np.mean(lost), 100.0 * np.mean((arrived == 0.0) & (lost == 0.0))
-            look = nth_look(VARIANTS_AT[variant])
-            axis.bar(place, gone, color=look.color, edgecolor="black")
-            axis.bar(place, short, bottom=gone, color="white", edgecolor="black", hatch="//")
-            axis.annotate(f"{gone:.0f} + {short:.0f}", (place, gone + short), ha="center",
-                          va="bottom")  # fmt: skip
-        axis.set_xticks(range(len(names)), names, rotation=30, ha="right", rotation_mode="anchor")
-        axis.set(ylabel="runs [%]", title=f"{what}: target lost (full) + not there (hatched)")
-        axis.set_ylim(0.0, max(5.0, 1.2 * axis.get_ylim()[1]))
-
-
 NOTHING = 1e-5
 """Retreat that is drawn where there is none, or less [m]."""
 
-VARIANTS_AT = {variant: k for k, variant in enumerate(VARIANTS)}
-"""Place of each, which is that of its look."""
+LOOKS = {scheme: nth_look(k) for k, scheme in enumerate(VARIANTS)}
 
 
-def _median(values: Array) -> float:
-    with warnings.catch_warnings():  # none arrived
-        warnings.simplefilter("ignore", RuntimeWarning)
-        return float(np.nanmedian(values))
+def cases(form: Form) -> Iterator[Case]:
+    """Each scheme on each turn, once, and from drawn starts, whose numbers are seeds."""
+    for scheme in VARIANTS:
+        for turn in TURNS_DEG:
+            keys = {"trial": TURNS, "scheme": scheme, "turn_deg": turn}
+            yield Case(name=f"{TURNS}, {scheme}, {turn} deg", keys=keys, most=1)
+    for trial in (FREE, ROBOT):
+        for scheme in VARIANTS:
+            yield Case(name=f"{trial}, {scheme}", keys={"trial": trial, "scheme": scheme})
 
 
-def study_schemes(
-    quick: bool = False, session: StudySession = DEFAULT_STUDY_SESSION
-) -> SchemesStudy:
-    """Runs the study; each run is an item of a sweep.
-
-    Args:
-        quick: Fewer drawn starts.
-        session: How it is run, and from how many starts.
-
-    Raises:
-        OutputFolderError: The folder belongs to other arguments, or cannot be written.
-        SweepError: A local process died.
-    """
-    seeds = session.seeds or (QUICK_STARTS if quick else STARTS)
-    kinds: dict[str, tuple[type[TurnTask | FreeTask | RobotTask], int]] = {
-        TURN: (TurnTask, len(TURNS)), FREE: (FreeTask, seeds), ROBOT: (RobotTask, seeds),
-    }  # fmt: skip
-    chosen: dict[str, tuple[SweepTask, int]] = {
-        task_name(what, variant): (make(variant), count)
-        for what, (make, count) in kinds.items()
-        for variant in VARIANTS
+def parameters(form: Form) -> Mapping[str, Any]:
+    """Constants of the trials, and the starts that are drawn."""
+    count = form.asked_seeds or (QUICK_STARTS if form.quick else STARTS)
+    kinds = (str, int, float, tuple, dict)
+    constants = {name: one for name, one in vars(trials).items() if name.isupper()}
+    return {
+        **{name.lower(): one for name, one in constants.items() if isinstance(one, kinds)},
+        "free_starts": [pose_row(X_CO).tolist() for X_CO in free_starts(count)],
+        "robot_starts": robot_starts(count),
     }
-    return SchemesStudy.run(chosen, quick, seeds, session)
+
+
+def figure(runs: Runs) -> Figure:
+    """Retreats and depths on turns, failures from drawn starts."""
+    drawn, axes = new_figure(2, 2, (14.0, 10.0), "Schemes of visual servoing")
+    _draw_retreats(axes[0, 0], runs)
+    _draw_turn(axes[0, 1], runs)
+    for axis, trial in ((axes[1, 0], FREE), (axes[1, 1], ROBOT)):
+        _draw_failures(axis, runs, trial)
+    return drawn
+
+
+def _turns(runs: Runs, **where: Any) -> Iterator[tuple[str, Runs]]:
+    """Turns of the schemes that are drawn."""
+    for scheme in VARIANTS:
+        if scheme in DRAWN and runs.has(trial=TURNS, scheme=scheme, **where):
+            yield scheme, runs(trial=TURNS, scheme=scheme, **where)
+
+
+def _draw_retreats(axis: Axes, runs: Runs) -> None:
+    """How far the camera retreats on a turn, by its angle."""
+    for scheme, some in _turns(runs):
+        look, retreat = LOOKS[scheme], np.maximum(some["retreat_m"], NOTHING)
+        axis.semilogy(some["turn_deg"], retreat, label=scheme, **line_style(look),
+                      marker=look.marker, markersize=4)  # fmt: skip
+    axis.set(xlabel="turn about the optical axis [deg]",
+             ylabel=f"retreat [m]; {NOTHING:g} is none",
+             title="How much farther than start and goal the camera goes")  # fmt: skip
+    if axis.get_legend_handles_labels()[0]:
+        axis.legend()
+
+
+def _draw_turn(axis: Axes, runs: Runs) -> None:
+    """Depth over time on the largest turn."""
+    for scheme, some in _turns(runs, turn_deg=TURNS_DEG[-1]):
+        (depths,) = some.list("depths_m")
+        times = PERIOD * np.arange(len(depths))
+        axis.semilogy(times, depths, label=scheme, **line_style(LOOKS[scheme]))
+    axis.set(xlabel="time [s]", ylabel="depth of the dots [m]", ylim=(0.03, 10.0),
+             title=f"A turn by {TURNS_DEG[-1]} deg")  # fmt: skip
+
+
+def _draw_failures(axis: Axes, runs: Runs, trial: str) -> None:
+    """Shares of runs that lost the target or did not arrive, side by side."""
+    there = dict(runs(trial=trial).by("scheme")) if runs.has(trial=trial) else {}
+    for place, (scheme, some) in enumerate(there.items()):
+        gone = 100.0 * np.mean(some["lost"])
+        short = 100.0 * np.mean(~some["arrived"] & ~some["lost"])
+        axis.bar(place, gone, color=LOOKS[scheme].color, edgecolor="black")
+        axis.bar(place, short, bottom=gone, color="white", edgecolor="black", hatch="//")
+        axis.annotate(f"{gone:.0f} + {short:.0f}", (place, gone + short), ha="center",
+                      va="bottom")  # fmt: skip
+    axis.set_xticks(range(len(there)), list(there), rotation=30, ha="right", rotation_mode="anchor")
+    axis.set(ylabel="runs [%]", title=f"{trial}: target lost (full) + not there (hatched)")
+    axis.set_ylim(0.0, max(5.0, 1.2 * axis.get_ylim()[1]))
+
+
+def _switched(runs: Runs) -> str:
+    """How many runs switched, of a scheme that does."""
+    switches = runs["switches"]
+    return "" if np.all(np.isnan(switches)) else f"{np.sum(switches > 0.0)}"
+
+
+def _share(runs: Runs) -> str:
+    """The largest share of a bound, of a scheme that has one."""
+    share = runs["bound_share"]
+    return "" if np.all(np.isnan(share)) else f"{np.nanmax(share):.3f}"
+
+
+STUDY = Study(
+    name="schemes",
+    title="Schemes of visual servoing beside each other, from the same starts",
+    source="servoing thesis 1.4.1",
+    cases=cases,
+    measure=measure,
+    seeds=(STARTS, QUICK_STARTS),
+    parameters=parameters,
+    checks=CHECKS,
+    stated="What is said of them",
+    tables=[
+        Summary(
+            f"{trial}: medians of those that arrived, worst of all",
+            ("scheme",),
+            {
+                "runs": Cell("runs"),
+                "arrived": Cell("total", "arrived"),
+                "lost": Cell("total", "lost"),
+                "time [s]": Cell("median", "time_s", ".2f", {"arrived": True}),
+                "image path [px]": Cell("median", "image_path_px", ".0f", {"arrived": True}),
+                "worst retreat [m]": Cell("largest", "retreat_m", ".3g"),
+                "switched": _switched,
+                "share of bound": _share,
+            },
+            where={"trial": trial},
+        )
+        for trial in (TURNS, FREE, ROBOT)
+    ],
+    figures={"schemes": figure},
+)

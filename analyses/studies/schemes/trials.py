@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.simulation.visual_servo_run import RunResult, run_scenario
+from cdpr_drake.analyses.studies.framework.study import Case
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.poses import exponential, pose_from_angles, pose_from_row
 from cdpr_drake.models.robot_loader import load_robot
@@ -24,6 +25,9 @@ from cdpr_drake.systems.monitoring.run_monitor import Outcome
 from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
 from cdpr_drake.vision.pinhole import Pinhole
 from cdpr_drake.vision.target import PointTarget
+
+TURNS, FREE, ROBOT = "turns", "free camera", "ACROBOT"
+"""What is run."""
 
 SCENARIO = "acrobot_ibvs"
 """Its camera of 640 x 480 px and its four dots, a square of 60 mm."""
@@ -53,7 +57,7 @@ LAW = (
 )  # fmt: skip
 """The same constant gain for all: errors of different units would make adaptive ones differ."""
 
-TURNS = (*range(15, 180, 15), 179)
+TURNS_DEG = (*range(15, 180, 15), 179)
 """Turns about the optical axis from the desired pose [deg]; at 180 their sense is a matter of
 rounding."""
 
@@ -84,96 +88,40 @@ WRONG = (
 
 SEED = 23
 
-COLUMNS = (
-    "arrived", "lost", "time_s", "image_path_px", "retreat_m", "switches", "bound_share", "room_px",
-)  # fmt: skip
-"""Numbers of a run: whether it arrived; whether the target left the image; how long it took; mean
-length of the dots' paths in the image; how much farther from the dots the camera went than start
-and goal are; switches; largest share of its bound that L_P or L_I reached; least distance of a dot
-from the image's edges. Of the last four NaN where a scheme has none, and of times and paths of runs
-that did not arrive."""
-
 PERIOD = 0.04
 """Between two steps of a free camera [s]."""
 
 
-class RunNumbers(NamedTuple):
-    """What `COLUMNS` say, in their order and units."""
+def measure(case: Case, seed: int) -> dict[str, Any]:
+    """A run of a scheme: a turn, or a start with a number.
 
-    arrived: float
-    lost: float
-    time: float
-    image_path: float
-    retreat: float
-    switches: float
-    bound_share: float
-    room: float
-
-
-@dataclass(frozen=True)
-class TurnTask:
-    """A free camera that is turned about its axis; items are numbers of `TURNS`.
-
-    Attributes:
-        variant: One of `VARIANTS`.
+    Returns:
+        arrived; lost: whether the target left the image; time_s: how long it took; image_path_px:
+        mean length of the dots' paths in the image; retreat_m: how much farther from the dots the
+        camera went than start and goal are; switches, and bound_share: largest share of its bound
+        that L_P or L_I reached, of a scheme that switches; room_px: least distance of a dot from
+        the image's edges; of turns depths_m and dots_px by step, shape (n,) and (n, 2, 4). Times
+        and paths of runs that did not arrive are NaN.
     """
-
-    variant: str
-
-    def __call__(self, start: int, stop: int) -> dict[str, Array]:
-        """`COLUMNS` of the runs, and the depths by step [m], and dots by step [px]."""
-        free = FreeCamera(self.variant)
-        runs = [free.run(turned(angle), bounded=False) for angle in TURNS[start:stop]]
-        return stacked(runs)
-
-
-@dataclass(frozen=True)
-class FreeTask:
-    """A free camera from starts that are drawn; items are their numbers.
-
-    Attributes:
-        variant: One of `VARIANTS`.
-    """
-
-    variant: str
-
-    def __call__(self, start: int, stop: int) -> dict[str, Array]:
-        """`COLUMNS` of the runs."""
-        free = FreeCamera(self.variant)
-        runs = [free.run(X_CO, bounded=True) for X_CO in free_starts(stop)[start:stop]]
-        return {"runs": stacked(runs)["runs"]}
+    trial, scheme = case.keys["trial"], case.keys["scheme"]
+    if trial == ROBOT:
+        return row_of_robot(run_scenario(load_scenario(SCENARIO, robot_overrides(scheme, seed))))
+    if trial == TURNS:
+        return FreeCamera(scheme).run(turned(case.keys["turn_deg"]), bounded=False)
+    row = FreeCamera(scheme).run(free_starts(seed + 1)[seed], bounded=True)
+    return {name: value for name, value in row.items() if name not in ("depths_m", "dots_px")}
 
 
-@dataclass(frozen=True)
-class RobotTask:
-    """ACROBOT with a wrong model from starts that are drawn; items are their numbers.
-
-    Attributes:
-        variant: One of `VARIANTS`.
-    """
-
-    variant: str
-
-    def overrides(self, number: int) -> list[str]:
-        """What differs from the scenario."""
-        place, angles, yaw = robot_starts(number + 1)[number]
-        return [
-            *VARIANTS[self.variant], *LAW, *WRONG, f"seed={number}", f"duration={ROBOT_TIME}",
-            f"initial_pose.position={place}", f"initial_pose.angles_deg={angles}",
-            f"target.pose.position={[MIDDLE[0], MIDDLE[1], 0.0]}",
-            f"target.pose.angles_deg={[0.0, 0.0, yaw]}", "camera.kind=projected", "log_rate=25",
-            "integration.engine=compiled", "integration.loop=compiled",
-        ]  # fmt: skip
-
-    def __call__(self, start: int, stop: int) -> dict[str, Array]:
-        """`COLUMNS` of the runs."""
-        return robot_runs(self, start, stop)
-
-
-def robot_runs(task: RobotTask, start: int, stop: int) -> dict[str, Array]:
-    """As `RobotTask` says."""
-    results = (run_scenario(load_scenario(SCENARIO, task.overrides(k))) for k in range(start, stop))
-    return {"runs": np.array([_of_robot(result) for result in results])}
+def robot_overrides(scheme: str, number: int) -> list[str]:
+    """What differs from the scenario in a run of ACROBOT."""
+    place, angles, yaw = robot_starts(number + 1)[number]
+    return [
+        *VARIANTS[scheme], *LAW, *WRONG, f"seed={number}", f"duration={ROBOT_TIME}",
+        f"initial_pose.position={place}", f"initial_pose.angles_deg={angles}",
+        f"target.pose.position={[MIDDLE[0], MIDDLE[1], 0.0]}",
+        f"target.pose.angles_deg={[0.0, 0.0, yaw]}", "camera.kind=projected", "log_rate=25",
+        "integration.engine=compiled", "integration.loop=compiled",
+    ]  # fmt: skip
 
 
 class FreeCamera:
@@ -191,8 +139,8 @@ class FreeCamera:
         )
         self.X_CdO: RigidTransform = self.scenario.desired.transform()
 
-    def run(self, X_CO: RigidTransform, bounded: bool) -> tuple[RunNumbers, Array, Array]:
-        """Its numbers, depths of O, shape (n,) [m], and dots, shape (n, 2, 4) [px].
+    def run(self, X_CO: RigidTransform, bounded: bool) -> dict[str, Any]:
+        """Its row, see `measure`, with depths of O and dots by step.
 
         Args:
             X_CO: The dots in the camera at the start [m].
@@ -218,20 +166,8 @@ class FreeCamera:
         first = len(there) - there[::-1].index(False) if False in there else 0
         arrived = not lost and there[-1]
         mode = np.array(modes) if servo.law.switching is not None else None
-        time = first * PERIOD if arrived else np.nan
-        return self._numbers(poses, arrived, lost, time, mode)
-
-    def _numbers(
-        self, poses: list[RigidTransform], arrived: bool, lost: bool, time: float,
-        mode: Array | None,
-    ) -> tuple[RunNumbers, Array, Array]:  # fmt: skip
-        numbers, depths, dots = measured(poses, self.X_CdO, self.target, self.pinhole)
-        path, retreat, room = numbers
-        row = RunNumbers(
-            float(arrived), float(lost), time, path if arrived else np.nan, retreat,
-            *_of_mode(mode), room,
-        )  # fmt: skip
-        return row, depths, dots
+        row = measured(poses, self.X_CdO, self.target, self.pinhole)
+        return _ended(row, arrived, lost, first * PERIOD, mode)
 
 
 def _is_there(X_CO: RigidTransform, X_CdO: RigidTransform) -> bool:
@@ -241,8 +177,8 @@ def _is_there(X_CO: RigidTransform, X_CdO: RigidTransform) -> bool:
 
 def measured(
     poses: list[RigidTransform], X_CdO: RigidTransform, target: PointTarget, pinhole: Pinhole
-) -> tuple[tuple[float, float, float], Array, Array]:
-    """Path in the image [px], retreat [m], room to the edges [px]; depths [m], dots [px]."""
+) -> dict[str, Any]:
+    """Path in the image, retreat, room to the edges, depths, dots; see `measure`."""
     depths = np.array([X.translation()[2] for X in poses])
     p_CK = np.array([X @ target.points for X in poses])
     in_front = np.maximum(p_CK[:, 2:], 1e-6)
@@ -253,7 +189,23 @@ def measured(
     retreat = float(np.max(away) - max(away[0], np.linalg.norm(X_CdO.translation())))
     size = np.array([[pinhole.width], [pinhole.height]])
     room = float(np.min([dots + 0.5, size - 0.5 - dots]))
-    return (path, retreat, room), depths, dots
+    return {
+        "image_path_px": path, "retreat_m": retreat, "room_px": room, "depths_m": depths,
+        "dots_px": dots,
+    }  # fmt: skip
+
+
+def _ended(
+    row: dict[str, Any], arrived: bool, lost: bool, time: float, mode: Array | None
+) -> dict[str, Any]:
+    """A row with how its run ended; without times and paths of one that did not arrive."""
+    switches, share = _of_mode(mode)
+    if not arrived:
+        time = row["image_path_px"] = np.nan
+    return {
+        "arrived": arrived, "lost": lost, "time_s": time, "switches": switches,
+        "bound_share": share, **row,
+    }  # fmt: skip
 
 
 def _of_mode(mode: Array | None) -> tuple[float, float]:
@@ -265,7 +217,8 @@ def _of_mode(mode: Array | None) -> tuple[float, float]:
     return float(mode[-1, 1]), share
 
 
-def _of_robot(run: RunResult) -> RunNumbers:
+def row_of_robot(run: RunResult) -> dict[str, Any]:
+    """The row of a run of ACROBOT, see `measure`."""
     log, servo = run.log, run.servo
     poses = [
         servo.X_CO(pose_from_row(row), time)
@@ -273,22 +226,12 @@ def _of_robot(run: RunResult) -> RunNumbers:
     ]
     target, pinhole = servo.target, servo.pinhole
     assert isinstance(target, PointTarget)
-    (path, retreat, room), _, _ = measured(poses, servo.X_CdO, target, pinhole)
-    arrived = run.outcome == Outcome.CONVERGED
-    return RunNumbers(
-        float(arrived), float(run.outcome == Outcome.TARGET_LOST),
-        run.sim_time if arrived else np.nan, path if arrived else np.nan, retreat,
-        *_of_mode(log.get("servo_mode")), room,
+    row = measured(poses, servo.X_CdO, target, pinhole)
+    del row["depths_m"], row["dots_px"]
+    return _ended(
+        row, run.outcome == Outcome.CONVERGED, run.outcome == Outcome.TARGET_LOST, run.sim_time,
+        log.get("servo_mode"),
     )  # fmt: skip
-
-
-def stacked(runs: list[tuple[RunNumbers, Array, Array]]) -> dict[str, Array]:
-    """Runs as arrays with the run as first axis; NaN after a run's end."""
-    steps = round(FREE_TIME / PERIOD) + 1
-    depths, dots = np.full((len(runs), steps), np.nan), np.full((len(runs), steps, 2, 4), np.nan)
-    for k, (_, depth, dot) in enumerate(runs):
-        depths[k, : len(depth)], dots[k, : len(dot)] = depth, dot
-    return {"runs": np.array([run[0] for run in runs]), "depths": depths, "dots": dots}
 
 
 def turned(angle: float) -> RigidTransform:

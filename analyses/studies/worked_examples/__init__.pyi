@@ -1,2 +1,1 @@
-from .statements import CHECKS as CHECKS
-from .study import study_worked_examples as study_worked_examples
+from .study import STUDY as STUDY

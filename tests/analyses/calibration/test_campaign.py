@@ -1,10 +1,14 @@
+import json
+
 import numpy as np
 import pytest
 
 from cdpr_drake.analyses.calibration.calibration_campaign import calibrated_scenario, run_campaign
 from cdpr_drake.analyses.calibration.candidate_poses import rest_poses
+from cdpr_drake.analyses.front.simulated_fits import calibrate_in_simulation
+from cdpr_drake.analyses.planning.path_files import read_path
 from cdpr_drake.analyses.reporting.provenance import BELIEVED_FILE, write_run_inputs
-from cdpr_drake.errors import CalibrationError
+from cdpr_drake.errors import CalibrationError, OutputFolderError
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.diagrams.beliefs import believed_robot
 from cdpr_drake.systems.diagrams.load import load_scenario
@@ -25,6 +29,22 @@ def test_a_campaign_with_slack_cables_and_one_tag_makes_the_robot_better(campaig
     assert errors["exit_points_before_m"] == pytest.approx(0.01)
     assert errors["exit_points_after_m"] < 0.006
     assert campaign.calibration.result.spread() < 1.5
+
+
+def test_the_servo_believes_what_was_found_and_all_is_written(tmp_path):
+    scenario, out = load_scenario("acrobot_pbvs_line", CHANGES), tmp_path / "out"
+    found = calibrate_in_simulation(scenario, 8, propose=3, folder=out)
+    told = json.loads((out / "results.json").read_text())
+    assert json.loads(json.dumps(found.as_dict())) == told
+    assert found.folder == out
+    assert list(found.servo) == ["believed before", "calibrated", "true"] == list(told["servo"])
+    assert len(read_path(out / "next_poses.csv").poses) == 3 == len(told["next_poses"]["poses"])
+    again = load_scenario(str(out / "scenario.yaml"))
+    assert again.perturbations.believed_robot == str(out / BELIEVED_FILE)
+    assert {path.stem for path in out.glob("*.png")} == {"calibration", "correlation"}
+    assert "servo, calibrated" in repr(found)
+    with pytest.raises(OutputFolderError, match="allow overwrite"):
+        calibrate_in_simulation(scenario, 8, folder=out)
 
 
 def test_a_campaign_goes_where_it_is_sent(campaign):

@@ -5,12 +5,11 @@ import numpy as np
 import pytest
 
 from cdpr_drake.analyses.calibration import identification_campaign as campaign
-from cdpr_drake.analyses.calibration.identification_campaign import run_dynamic_campaign
-from cdpr_drake.analyses.calibration.identification_campaign_files import write_dynamic_campaign
 from cdpr_drake.analyses.calibration.identification_task import IdentificationTask, identify
 from cdpr_drake.analyses.calibration.log_file import read_log
+from cdpr_drake.analyses.front.simulated_fits import identify_in_simulation
 from cdpr_drake.analyses.simulation.tension_control_run import run_tension_scenario
-from cdpr_drake.errors import ScenarioError
+from cdpr_drake.errors import CdprError, ScenarioError
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.diagrams.load import load_scenario
 
@@ -25,12 +24,27 @@ def folder(tmp_path_factory):
         scenario = load_scenario("acrobot_computed_torque", SHORT)
         first = replace(scenario.trajectory.stretches[0], duration=1.5)
         scenario.trajectory.stretches = [first]
-        run = run_dynamic_campaign(scenario)
+        folder = tmp_path_factory.mktemp("campaigns") / "one"
+        run = identify_in_simulation(scenario, folder=folder)
     finally:
         campaign.POSES = kept
-    folder = tmp_path_factory.mktemp("campaign")
-    write_dynamic_campaign(run, folder)
     return folder, run
+
+
+def test_it_is_written_and_shows_itself(folder):
+    place, run = folder
+    assert run.folder == place
+    assert run.fits
+    assert not run.failed
+    assert json.loads(json.dumps(run.as_dict())) == json.loads(
+        (place / "identification.json").read_text()
+    )
+    assert {path.stem for path in place.glob("*.png")} == {"validation", "parameters", "tracking"}
+    assert "tracking, identified" in repr(run)
+    assert len(repr(run).splitlines()) <= 10
+    assert run.robot().platform.mass == run.found.platform.mass
+    with pytest.raises(CdprError, match="'trackin' is unknown; did you mean tracking"):
+        run.plot("trackin")
 
 
 def test_tracking_is_that_of_the_true_robot_with_what_was_found(folder):

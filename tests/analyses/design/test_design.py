@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,15 +11,18 @@ import yaml
 from matplotlib.figure import Figure
 
 from cdpr_drake.analyses.design.candidates import make_candidates
-from cdpr_drake.analyses.design.confirmation import confirm
+from cdpr_drake.analyses.design.confirmation import Confirmation, confirm
 from cdpr_drake.analyses.design.goals import GOALS, evaluate_goals
 from cdpr_drake.analyses.design.maximin import SLOPES
 from cdpr_drake.analyses.design.results import DesignResult, write_design
 from cdpr_drake.analyses.design.search import evaluate_original, goal_context, search_design
 from cdpr_drake.analyses.design.settings import DesignSettings, GoalSettings, load_design_settings
+from cdpr_drake.analyses.front.design import optimize_design
 from cdpr_drake.analyses.reporting.progress import StudySession, WorkProgress
 from cdpr_drake.analyses.studies import design as study
 from cdpr_drake.analyses.studies.catalogue import STUDIES
+from cdpr_drake.analyses.studies.framework.runs import pack_row
+from cdpr_drake.analyses.studies.framework.study import Form
 from cdpr_drake.cli.app import main
 from cdpr_drake.errors import CdprError, DesignError
 from cdpr_drake.models.robot_loader import load_robot
@@ -214,7 +218,8 @@ def test_the_command(capsys, tmp_path, monkeypatch):
         (["--goal", "beauty"], "'beauty' is unknown"),
         (["--goal", "static=0"], "a weight above 0"),
         (["--goal", "static", "--goal", "static"], "each once"),
-        (["--goal", "wrench-feasible"], "found no wrench to resist"),
+        (["--goal", "wrench-feasible"], "--goal wrench-feasible: found no wrench to resist"),
+        (["--goal", "static", "--search", "slopes"], "--search: found slopes for static"),
         (["--goal", "static", "--force", "-1"], "--force"),
         (["--goal", "static", "--parameters", "nowhere.yaml"], "there is no such file"),
     ],
@@ -230,6 +235,39 @@ def test_the_command_refuses(capsys, tmp_path, monkeypatch, words, said):
     assert not (tmp_path / "found").exists() or not list((tmp_path / "found").glob("*.json"))
 
 
+@pytest.mark.parametrize(
+    ("robot", "goal", "said"),
+    [
+        ("nist_robocrane", "wrench-closure", " wrench-closure: found 6 cables of nist_robocrane"),
+        ("planar", "payload", " payload: found the planar planar, whose plane carries the weight"),
+        ("planar", "wrench-feasible", " wrench-feasible: found no wrench to resist"),
+    ],
+)
+def test_goals_that_a_robot_cannot_be_asked_for_are_named_at_once(
+    capsys, tmp_path, monkeypatch, robot, goal, said
+):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(DesignError, match=f"^goals{said}"):
+        optimize_design(robot, goal, generations=1)
+    with pytest.raises(SystemExit) as ended:
+        main(["design", robot, "--goal", goal, "--out", "found"])
+    assert ended.value.code == 2
+    assert f"cdpr: --goal{said}" in printed(capsys).err
+    Path("goals.yaml").write_text(
+        yaml.safe_dump({"goals": [{"name": goal}]} | {"exit_points": {"reach": [0.1, 0.1, 0.0]}})
+    )
+    with pytest.raises(SystemExit) as ended:
+        main(["design", robot, "--parameters", "goals.yaml", "--out", "other"])
+    assert ended.value.code == 2
+    assert f"cdpr: goals{said}" in printed(capsys).err  # as the file names them
+
+
+def test_a_set_of_too_few_cables_closes_nowhere():
+    judging = goal_context("cogiro", wanted().poses, wanted())
+    found = confirm("wrench-closure", "cogiro", "nist_robocrane", judging, boxes=20)
+    assert found.design == found.design_open == 0.0
+
+
 def test_the_quick_study(tmp_path, monkeypatch):
     pytest.importorskip("cmaes")
     few = {"counts": ((2, 2, 2), (2, 2, 2)), "generations": (1, 1)}
@@ -239,7 +277,9 @@ def test_the_quick_study(tmp_path, monkeypatch):
     result = STUDIES["design"].run(True, StudySession(tmp_path / "study"))
     assert not result.interrupted
     assert [one.robot for one in result.results] == ["acrobot_large", "caroca"]
-    assert len(result.statements) == 2
+    assert [one.name for one in result.statements] == ["acrobot_large_gain", "caroca_gain"]
+    assert {one.of for one in result.statements} == {1}
+    assert len(result.runs) == 2
     saved = Figure.savefig
 
     def cut(figure, path, **options):
@@ -257,6 +297,27 @@ def test_the_quick_study(tmp_path, monkeypatch):
         there = {path.name for path in folder.iterdir()}
         assert {"designs.csv", "results.json"} <= there
         assert there & figures == (set() if one.robot == "acrobot_large" else figures)
+
+
+def found(rows, results=()):
+    """The study with these rows."""
+    form, progress = Form(), WorkProgress("", 1.0, 1.0, 0.0)
+    finished = {name: pack_row(row) for name, row in rows.items()}
+    cases = tuple(study.STUDY.plan(form))
+    return study.DesignStudyResult(study.STUDY, form, cases, finished, progress, results)
+
+
+@pytest.mark.parametrize(
+    ("design", "verdict"), [(1.4, "confirmed"), (1.2, "in part"), (0.9, "not confirmed")]
+)
+def test_the_study_says_what_was_gained_for_sure(design, verdict):
+    proof = Confirmation("static", "boxes", "m^3", 1.0, design, 0.3, 0.0, True)
+    done = tuple(SimpleNamespace(interrupted=False) for _ in study.ITEMS)
+    one, other = found({"acrobot_large": proof.as_dict()}, done).statements
+    assert one.verdict_words == verdict
+    assert one.found == f"1 to {design:.4g} m^3, {100 * (design - 1):+.1f} %"
+    assert (other.verdict, other.found) == ("not judged", "runs are missing: robot caroca")
+    assert len(found({"acrobot_large": proof.as_dict()}).statements) == 1  # interrupted
 
 
 def test_the_study_writes_no_figure_before_the_data_of_all_robots(tmp_path):
@@ -280,8 +341,7 @@ def test_the_study_writes_no_figure_before_the_data_of_all_robots(tmp_path):
             written.append(f"{folder.name} figures")
             return {"progress.png": "full"}
 
-    progress = WorkProgress("", 1.0, 1.0, 0.0)
-    failed = study.DesignStudy(True, (Noted("a"), Noted("b")), progress).write(tmp_path)
+    failed = found({}, (Noted("a"), Noted("b"))).write(tmp_path)
     assert written == ["a data", "b data", "a figures", "b figures"]
     assert failed == {"a/progress.png": "full", "b/progress.png": "full"}
 

@@ -158,7 +158,7 @@ def test_a_published_run_that_fails_keeps_its_name_and_its_log(tmp_path):
 
 def test_old_results_are_kept(tmp_path):
     target = ours(tmp_path / "out", old="1")
-    with pytest.raises(OutputFolderError, match="--overwrite"), results_folder(target):
+    with pytest.raises(OutputFolderError, match="allow overwrite"), results_folder(target):
         pass
     assert seen(target) == ["old"]
 

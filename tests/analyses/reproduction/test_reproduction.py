@@ -8,12 +8,15 @@ import os
 import shutil
 import signal
 import sys
+from collections import Counter
 from dataclasses import dataclass, field, replace
+from itertools import combinations
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
+from matplotlib.colors import to_rgb
 from rich.table import Table
 
 from cdpr_drake.analyses.reporting.deferred_figures import write_pictures
@@ -25,12 +28,29 @@ from cdpr_drake.analyses.reproduction import runner
 from cdpr_drake.analyses.reproduction.page import write_report
 from cdpr_drake.analyses.reproduction.rows import report_rows
 from cdpr_drake.analyses.reproduction.runner import RunSettings, run_studies
-from cdpr_drake.analyses.reproduction.scorecard import Scorecard
-from cdpr_drake.analyses.reproduction.states import check_folder, read_state, write_state
+from cdpr_drake.analyses.reproduction.scorecard import LOOKS, VERDICTS, Scorecard, scorecard_figure
+from cdpr_drake.analyses.reproduction.states import (
+    StudyState,
+    check_folder,
+    read_state,
+    study_folder,
+    write_state,
+)
 from cdpr_drake.analyses.studies.catalogue import StudyEntry
 from cdpr_drake.analyses.studies.framework.case_definition import PublishedNumber
-from cdpr_drake.analyses.studies.published.register import read_register
+from cdpr_drake.analyses.studies.framework.runs import Runs
+from cdpr_drake.analyses.studies.framework.statement import (
+    FITTED,
+    OURS,
+    Finding,
+    judged,
+    statement,
+)
+from cdpr_drake.analyses.studies.published.register import published_registers, read_register
 from cdpr_drake.errors import OutputFolderError
+
+GREY = (0.299, 0.587, 0.114)
+"""What red, green and blue weigh in grey print."""
 
 NUMBER = PublishedNumber(
     group="one", configuration="c", label="C", metric="length_m", heading="length [mm]",
@@ -406,3 +426,88 @@ def test_a_folder_of_the_other_form_or_of_others_is_refused(folder, tmp_path):
 def test_states_compare_without_how_they_were_come_by(folder):
     state = run_studies(entries(good=Toy()), folder, RunSettings())["good"]
     assert replace(state, taken_over=True) == state
+
+
+def judged_rows(folder, **studies):
+    """Rows of a register with each statement of some studies, and a table that rests on all."""
+    states = {}
+    for name, said in studies.items():
+        study_folder(folder, name).mkdir(parents=True)
+        write_json(study_folder(folder, name) / "results.json", {"statements": said})
+        states[name] = StudyState(name, "finished", quick=False, code="1")
+    answers = [f"{study}/{one['name']}" for study, said in studies.items() for one in said]
+    register = read_register("toy", {"title": "Toy", "sections": [{
+        "section": "1.1", "title": "One", "statements": answers,
+        "items": [{"label": "Table 1.1", "says": "All", "answers": answers}],
+    }]})  # fmt: skip
+    return register, report_rows(
+        [register], folder, dict.fromkeys(states, StudyEntry(Toy())), states
+    )
+
+
+def said(name, held, basis="test", **more):
+    check = statement(f"It is {name}.", name=name, basis=basis, **more)(
+        lambda runs: Finding(found="so", held=held)
+    )
+    return judged([check], Runs([]))[0].as_dict()
+
+
+def test_a_fact_is_counted_once_however_many_items_rest_on_it(folder):
+    _, rows = judged_rows(
+        folder,
+        one=[said("high", [True]), said("near", [True], FITTED), said("wide", [True], OURS)],
+        two=[said("again", [True], same_as="one/high"), said("low", [True, False])],
+    )
+    assert [row.repeats for row in rows] == [False, False, False, True, False, True]
+    card = Scorecard.of(rows)
+    assert card.total_facts() == {"confirmed": 1, "met (fitted)": 1, "in part": 1}
+    assert card.total_facts("ours") == {"confirmed": 1}
+    assert card.independent == 1
+    assert card.total().total() == 6
+    assert rows[-1].verdict == "in part"
+
+
+def test_a_table_is_as_good_as_the_weakest_of_what_it_rests_on(folder):
+    _, rows = judged_rows(folder, one=[said("high", [True]), said("near", [True], FITTED)])
+    assert rows[-1].verdict == "met (fitted)"
+
+
+def test_the_page_has_all_tolerances_and_marks_what_was_counted(folder):
+    register, rows = judged_rows(folder, one=[said("high", [True], rule="within 3 mm <half>")])
+    page = write_report(folder, [register], rows, {}, quick=False).read_text()
+    assert "within 3 mm &lt;half&gt;" in page
+    assert page.count("counted above") == 1
+
+
+def test_a_chapter_says_what_stands_and_why_what_fails(folder):
+    register, rows = judged_rows(
+        folder,
+        one=[said("high", [True]), said("near", [True], FITTED)],
+        two=[said("low", [False], cause="hardware"), said("odd", [True, False])],
+    )
+    register = replace(register, corrected={"1": ("(1.2)",), "2": ("(2.1)",)})
+    page = write_report(folder, [register], rows, {}, quick=False).read_text()
+    start = page.index('<h2 id="chapters">')
+    words = page[start : page.index("<h2", start + 1)]
+    assert "<b>Stands, 1</b>: It is high." in words
+    assert "<b>Met, but not put to a test, 1</b>: It is near." in words
+    assert "<b>Corrected, 1</b>: (1.2)." in words
+    assert "<b>Fails, 1</b>, because of the prototype, which has what is in no model" in words
+    assert "<b>Holds in part, 1</b>, for a reason that is not known" in words
+    assert "Chapter 2" in words
+
+
+def test_the_picture_of_the_scorecard_counts_every_fact_in_a_look_of_its_own():
+    registers = published_registers()
+    places = dict.fromkeys((one.name, s.chapter) for one in registers for s in one.sections)
+    counts = {place: Counter({v: k + 1 for k, v in enumerate(VERDICTS)}) for place in places}
+    total = sum(range(len(VERDICTS) + 1))
+    (axes,) = scorecard_figure(Scorecard({}, counts, 0), registers, quick=True).axes
+    assert sum(bar.get_width() for bar in axes.patches) == total * len(places)
+    assert len(axes.get_yticks()) == len(places)
+    assert [text.get_text() for text in axes.texts].count(str(total)) == len(places)
+    # In grey print: a hatch, or lightness that differs by a tenth from all others with this hatch.
+    assert set(LOOKS) == set(VERDICTS)
+    for look, other in combinations(LOOKS.values(), 2):
+        if look.hatch == other.hatch:
+            assert abs(np.dot(GREY, np.subtract(to_rgb(look.color), to_rgb(other.color)))) > 0.1

@@ -138,7 +138,7 @@ def test_every_kind_refuses_runs_that_would_never_end(name):
 def test_rates_that_nothing_follows_are_refused(name, key):
     """Such runs once stood still."""
     load_scenario(name, [f"{key}=1e5"])
-    with pytest.raises(ScenarioError, match=f"--set {key}: found 9e15; .* <= 100000"):
+    with pytest.raises(ScenarioError, match=f"overrides {key}: found 9e15; .* <= 100000"):
         load_scenario(name, [f"{key}=9e15"])
 
 

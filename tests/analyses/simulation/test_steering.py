@@ -64,7 +64,7 @@ def test_messages_arrive_as_they_were_with_numbers_that_browsers_know():
 
 
 def test_what_is_no_socket_is_refused():
-    with pytest.raises(CdprError, match="--steered-by: found -5; accepted: the number of an open"):
+    with pytest.raises(CdprError, match="descriptor: found -5; accepted: the number of an open"):
         open_connection(-5)
 
 

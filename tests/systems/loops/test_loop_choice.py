@@ -28,7 +28,7 @@ def test_repeated_runs_take_the_loop_and_say_so():
     assert scenario.integration.engine == "compiled"
     assert words == (
         "acrobot_pbvs: by the compiled loop, as the run is repeated; else "
-        "--set integration.loop=diagram"
+        "with overrides integration.loop=diagram"
     )
 
 
@@ -38,7 +38,7 @@ def test_a_long_run_takes_the_loop_unless_somebody_watches():
     assert uses_compiled_loop(chosen)
     assert words == (
         "acrobot_mobile_robot: by the compiled loop, as it lasts longer than 600 s; else "
-        "--set integration.loop=diagram"
+        "with overrides integration.loop=diagram"
     )
     shown, words = set_loop(long, watched=True)
     assert not uses_compiled_loop(shown)

@@ -5,19 +5,12 @@ import pytest
 
 from cdpr_drake.analyses.simulation.run_stability import stability_along
 from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
+from cdpr_drake.analyses.studies.closed_loops.loops import SETTINGS, loop_setup, perturbation_of
 from cdpr_drake.analyses.studies.closed_loops.servo_models import (
-    Perturbation,
     perturbed_scenario,
     perturbed_servo,
 )
-from cdpr_drake.analyses.studies.closed_loops.study import ROBOT, SEED, SETTINGS
-from cdpr_drake.analyses.workspaces.stability_defaults import workspace_defaults
 from cdpr_drake.geometry.poses import pose_from_angles, pose_row
-from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.stability.desired_view import FixedObject
-from cdpr_drake.stability.perturbation_bounds import vector_size
-from cdpr_drake.stability.stability_case import StabilityCase
-from cdpr_drake.stability.verdict import VerdictOptions, worst_perturbations
 from cdpr_drake.systems.diagrams.load import load_scenario
 
 SCHEME = "pbvs-line"
@@ -34,22 +27,11 @@ LONG_ENOUGH = 16.0
 @pytest.fixture(scope="module")
 def worst():
     """The worst errors that a search finds at the start, as in the study."""
-    robot = load_robot(ROBOT)
-    scenario = load_scenario("acrobot_pbvs", [*SETTINGS, f"controller.scheme={SCHEME}"])
-    none = Perturbation.from_vector(np.zeros(vector_size(len(robot.cables))))
-    servo = perturbed_servo(scenario, none)
-    case = StabilityCase(
-        robot.cable_set().without_pulleys(),
-        SCHEME,
-        X_PC=servo.X_PC,
-        target=FixedObject(servo.X_WO, scenario.desired.transform()),
-        lever="object",
-    )
-    bounds = workspace_defaults(robot, ROBOT).bounds
-    rows = pose_row(START)[None]
-    margins, found = worst_perturbations(case, bounds, rows, VerdictOptions(seed=SEED))
-    assert margins[0] > 0.0  # stable, says the criterion, which takes every cable as taut
-    return Perturbation.from_vector(found[0])
+    setup = loop_setup(SCHEME)
+    found = perturbation_of(setup, pose_row(START), worst=True)
+    # Stable, says the criterion, which takes every cable as taut.
+    assert perturbed_servo(setup.scenario, found).margin(START) > 0.0
+    return found
 
 
 @pytest.mark.parametrize("managed", [False, True])

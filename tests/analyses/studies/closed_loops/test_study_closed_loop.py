@@ -1,33 +1,27 @@
-"""The study of closed loops, in its quick form."""
+"""The study of closed loops: its starts, its loops, what it says of them."""
 
 import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 
 from cdpr_drake.analyses.reporting.progress import StudySession
 from cdpr_drake.analyses.studies.catalogue import STUDIES
 from cdpr_drake.analyses.studies.closed_loops.loops import (
-    COLUMNS,
+    CURVE,
     MANAGED,
     MODES,
     PLAIN,
-    ClosedLoopTask,
+    WAY_POSES,
+    measure,
+    stable_starts,
 )
-from cdpr_drake.analyses.studies.closed_loops.study import (
-    QUICK_STARTS,
-    SEED,
-    VERDICT,
-    managed,
-    study_closed_loop,
-)
+from cdpr_drake.analyses.studies.closed_loops.study import QUICK_STARTS, closed_loop_study
 from cdpr_drake.analyses.workspaces.stability_defaults import workspace_defaults
 from cdpr_drake.errors import OutputFolderError
 from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.stability.verdict import VerdictOptions
-from cdpr_drake.systems.monitoring.run_monitor import Outcome
+from cdpr_drake.stability.stability_case import SCHEMES
 
 ROUNDING = 1e-12
 """Of a quotient of the same two numbers."""
@@ -35,167 +29,132 @@ ROUNDING = 1e-12
 CONVERGED = 1e-3
 """Largest distance from the desired pose at the end of a run that converged [m]."""
 
-
-STOP_AFTER = 3
-"""Loops of the first session, in the middle of the second mode."""
+STUDY = closed_loop_study("pbvs")
 
 
-@pytest.fixture(scope="module")
-def sessions(tmp_path_factory):
-    """The study in two sessions, and the reports of the second one."""
-    folder = tmp_path_factory.mktemp("study") / "parts"
-    reports = []
-    first = study_closed_loop(
-        True, StudySession(folder, reports.append, lambda: reports[-1].done >= STOP_AFTER, 1)
-    )
-    first.write(folder)  # as the command does
-    reports = []
-    return (
-        first,
-        study_closed_loop(True, StudySession(folder=folder, on_progress=reports.append, workers=1)),
-        reports,
-        folder,
-    )
+def run(measure=measure, study=STUDY, **session):
+    return replace(study, measure=measure)(True, StudySession(workers=1, **session))
 
 
 @pytest.fixture(scope="module")
-def study(sessions):
-    return sessions[1]
+def study():
+    return run()
 
 
-def test_a_stopped_study_continues_where_it_stopped(sessions):
-    first, second, reports, folder = sessions
-    assert first.interrupted
-    assert list(first.runs) == ["kinematic"]  # of the second mode one start is missing
-    np.testing.assert_array_equal(first.starts.poses, second.starts.poses)
-    np.testing.assert_array_equal(first.runs["kinematic"], second.runs["kinematic"])
-    assert not second.interrupted
-    assert next(report.found for report in reports if report.found) == STOP_AFTER
-    assert reports[-1].done == reports[-1].total == len(MODES) * QUICK_STARTS
-    again = study_closed_loop(True, StudySession(folder=folder, workers=1))
-    assert again.progress.found == again.progress.total
-    for mode in MODES:
-        np.testing.assert_array_equal(again.runs[mode], second.runs[mode])
-        np.testing.assert_array_equal(again.curves[mode], second.curves[mode])
+def made_up(case, seed):
+    """A loop that converges."""
+    curve = np.linspace(1.0, 0.0, CURVE)
+    return {
+        "outcome": "converged", "time_s": 5.0, "position_error_m": 1e-4,
+        "rotation_error_rad": 1e-4, "error_growth": 0.0, "least_margin": 0.5,
+        "poses_checked": WAY_POSES, "poses_outside_z": 0, "estimate_error_m": 0.03,
+        "estimate_error_rad": 0.05, "taut_at_end": 8, "error_peak": 1.0,
+        "start_pose": case.data[seed], "curve": curve, "way": np.zeros((WAY_POSES, 7)),
+    }  # fmt: skip
 
 
-def test_a_folder_of_another_study_is_refused(sessions):
-    folder = sessions[-1]
-    with pytest.raises(OutputFolderError, match=r"controller.scheme is .pbvs. there, .ibvs. here"):
-        study_closed_loop(True, StudySession(folder=folder, workers=1), scheme="ibvs")
-    with pytest.raises(OutputFolderError, match="quick is true there, false here"):
-        study_closed_loop(False, StudySession(folder=folder, should_stop=lambda: True))
+def ending(modes, **ends):
+    """Made-up loops, of which the first of some modes ends otherwise."""
+
+    def loop(case, seed):
+        other = ends if case.keys["mode"] in modes and seed == 0 else {}
+        return made_up(case, seed) | other
+
+    return {one.name: one for one in run(loop).statements}
 
 
-def test_it_is_known_by_name():
-    assert STUDIES["stability-closed-loop"].run is study_closed_loop
-    for scheme in ("pbvs-line", "2.5d", "ibvs"):
-        entry = STUDIES[f"stability-closed-loop-{scheme}"]
-        stopped = entry.run(True, StudySession(should_stop=lambda: True))
-        assert entry.continues
-        assert (stopped.scheme, stopped.scenario.controller.scheme) == (scheme, scheme)
-        assert len(stopped.starts.poses) == QUICK_STARTS
+def test_a_folder_of_another_study_is_refused(tmp_path):
+    run(made_up, folder=tmp_path)
+    with pytest.raises(OutputFolderError, match=r"scheme is .pbvs. there, .ibvs. here"):
+        run(made_up, closed_loop_study("ibvs"), folder=tmp_path)
 
 
-def test_starts_lie_in_the_workspace(study):
-    poses = study.starts.poses
-    assert poses.shape == (QUICK_STARTS, 7)
+def test_each_scheme_is_known_by_name():
+    for scheme in SCHEMES:
+        name = "stability-closed-loop" + ("" if scheme == "pbvs" else f"-{scheme}")
+        found = STUDIES[name].run(True, StudySession(should_stop=lambda: True))
+        assert found.interrupted
+        assert len(found.runs) == 0
+        assert found.as_dict()["parameters"]["scheme"] == scheme
+        assert len(found.cases[0].data) == QUICK_STARTS
+        assert {case.keys["scheme"] for case in found.cases} == {scheme}
+
+
+def test_starts_lie_in_the_workspace():
+    starts = stable_starts("pbvs", QUICK_STARTS)
+    assert starts.poses.shape == (QUICK_STARTS, 7)
     defaults = workspace_defaults(load_robot("acrobot_large"), "acrobot_large")
-    assert np.all(poses[:, 4:] >= defaults.lower)
-    assert np.all(poses[:, 4:] <= defaults.upper)
-    s = study.starts
+    assert np.all(starts.poses[:, 4:] >= defaults.lower)
+    assert np.all(starts.poses[:, 4:] <= defaults.upper)
+    s = starts
     assert s.drawn >= s.not_held + s.not_seen + s.not_stable + QUICK_STARTS
+    np.testing.assert_array_equal(starts.poses, stable_starts("pbvs", 3).poses[:QUICK_STARTS])
 
 
-def test_runs_converge_or_lose_the_tag(study):
-    for mode in MODES:
-        outcomes = study.column(mode, "outcome")
-        assert set(outcomes) <= {float(Outcome.CONVERGED), float(Outcome.TARGET_LOST)}
-        good = outcomes == Outcome.CONVERGED
-        assert np.all(study.column(mode, "position_error_m")[good] < CONVERGED)
-    assert np.max(study.column("kinematic", "error_growth")) == 0.0
-    assert np.all(study.column("kinematic", "error_peak") == 1.0)
-    for mode in study.curves:  # samples of the same errors
-        peaks = np.max(study.curves[mode] / study.curves[mode][:, :1], axis=1)
-        assert np.all(peaks <= study.column(mode, "error_peak") * (1.0 + ROUNDING))
+def test_loops_converge_or_lose_the_tag(study):
+    assert [mode for mode, _ in study.runs.by("mode")] == list(MODES)
+    assert set(study.runs.counts("outcome")) <= {"converged", "target_lost"}
+    assert study.runs.largest("position_error_m", outcome="converged") < CONVERGED
+    assert study.runs.largest("error_growth", mode="kinematic") == 0.0
+    assert study.runs.largest("error_peak", mode="kinematic") == 1.0
+    for row in study.runs:  # samples of the same errors
+        assert np.max(row["curve"] / row["curve"][0]) <= row["error_peak"] * (1.0 + ROUNDING)
 
 
 def test_the_shifted_estimate_stays_as_wrong_as_the_bounds_allow(study):
-    np.testing.assert_allclose(study.column("shifted", "estimate_error_m"), 0.03, rtol=1e-6)
-    np.testing.assert_allclose(
-        study.column("shifted", "estimate_error_rad"), np.radians(3.0), rtol=1e-6
-    )
+    shifted = study.runs(mode="shifted")
+    np.testing.assert_allclose(shifted["estimate_error_m"], 0.03, rtol=1e-6)
+    np.testing.assert_allclose(shifted["estimate_error_rad"], np.radians(3.0), rtol=1e-6)
 
 
-def test_a_run_does_not_depend_on_the_others(study):
-    # The first from before the interruption, the others from after it.
-    for loop in ("kinematic", "control_integration"):
-        task = ClosedLoopTask(
-            scenario=study.scenario,
-            case=study.case,
-            bounds=workspace_defaults(load_robot("acrobot_large"), "acrobot_large").bounds,
-            starts=study.starts.poses,
-            verdict=VERDICT,
-            options=VerdictOptions(seed=SEED),
-            loop=loop,
-            seed=SEED,
-        )
-        again = task(1, 2)
-        np.testing.assert_array_equal(again["runs"][0], study.runs[loop][1])
-        np.testing.assert_array_equal(again["way"][0], study.ways[loop][1])
+def test_a_loop_does_not_depend_on_the_others(study):
+    for mode in ("kinematic", "control_integration"):
+        (case,) = [one for one in study.cases if one.name == mode]
+        row = study.runs(mode=mode).rows[1]
+        again = measure(case, 1)
+        assert again["time_s"] == row["time_s"]
+        np.testing.assert_array_equal(again["way"], row["way"])
 
 
-def test_what_hangs_on_slack_cables_is_judged_by_how_it_ends_with_managed_tensions(study):
-    assert managed(study).verdict == "not testable"  # none of the short form hangs
-    hung, arrived, hangs = (study.runs[PLAIN].copy() for _ in range(3))
-    outcome, taut = COLUMNS.index("outcome"), COLUMNS.index("taut_at_end")
-    hung[:, [outcome, taut]] = [[Outcome.TIMEOUT, 5.0], [Outcome.CONVERGED, 8.0]]
-    arrived[:, outcome] = Outcome.CONVERGED
-    hangs[:, outcome] = Outcome.TIMEOUT
-    for ends, said in ((arrived, "confirmed"), (hangs, "not confirmed")):
-        found = managed(replace(study, runs={PLAIN: hung, MANAGED: ends}))
-        assert found.verdict == said
-        assert "start 0 at" in found.found
-        assert "m on 5 cables" in found.found
-    assert "1 and 0 of 2 converge without and with it, 1 without it alone" in found.found
-    with pytest.raises(KeyError):
-        managed(replace(study, runs={PLAIN: hung}))
+def test_what_hangs_on_slack_cables_is_judged_by_how_it_ends_with_managed_tensions():
+    assert ending(())["managed"].verdict == "not testable"
+    hangs = {"outcome": "timeout", "taut_at_end": 5}
+    arrives, stays = ending((PLAIN,), **hangs)["managed"], ending((PLAIN, MANAGED), **hangs)
+    assert (arrives.verdict, stays["managed"].verdict) == ("confirmed", "not confirmed")
+    assert "start 0 at" in arrives.found
+    assert "m on 5 cables, with it converged; 1 and 2 of 2 converge" in arrives.found
+    assert "1 and 1 of 2 converge without and with it, 0 without it alone" in stays["managed"].found
+
+
+@pytest.mark.parametrize(
+    ("ends", "verdict"),
+    [
+        ({}, "confirmed"),
+        ({"outcome": "target_lost", "poses_outside_z": 1}, "in part"),
+        ({"outcome": "target_lost"}, "not confirmed"),
+    ],
+)
+def test_a_loop_has_to_arrive_where_its_way_stays_inside(ends, verdict):
+    assert ending(("shifted",), **ends)["reached"].verdict == verdict
+    assert ending((MANAGED,), **ends)["reached"].verdict == "confirmed"  # not what it is about
+
+
+def test_statements_wait_for_their_modes(tmp_path):
+    asked = iter([False] * QUICK_STARTS + [True] * 100)
+    stopped = run(made_up, folder=tmp_path, should_stop=lambda: next(asked))
+    assert [one.name for one in stopped.statements] == ["reached"]
+    continued = run(made_up, folder=tmp_path)
+    assert continued.progress.found == QUICK_STARTS
+    assert len(continued.statements) == 2
 
 
 def test_results_and_figures_are_written(study, tmp_path):
-    study.write(tmp_path)
+    assert study.write(tmp_path) == {}
     names = {path.name for path in tmp_path.iterdir()}
-    assert names == {"results.json", "runs.npz", "errors.png", "ways.png"}
+    assert names == {"results.json", "runs.csv", "errors.png", "ways.png"}
     found = json.loads((tmp_path / "results.json").read_text())
-    for run in found["runs"]:
-        assert run["converged"] + run["target_lost"] + run["otherwise"] == QUICK_STARTS
-        assert len(run["not_converged"]) == QUICK_STARTS - run["converged"]
-    assert study.tables()
-
-
-def test_one_figure_that_fails_is_named_and_costs_no_other(study, tmp_path, monkeypatch):
-    saved = Figure.savefig
-
-    def cut(figure, path, **options):
-        if "errors" in path.name:
-            path.write_bytes(b"half")
-            raise OSError(28, "No space left on device")
-        saved(figure, path, **options)
-
-    monkeypatch.setattr(Figure, "savefig", cut)
-    assert study.write(tmp_path) == {"errors.png": "[Errno 28] No space left on device"}
-    names = {path.name for path in tmp_path.iterdir()}
-    assert names == {"results.json", "runs.npz", "ways.png"}
-
-
-def test_without_runs_there_are_data_and_no_failures(study, tmp_path):
-    none = replace(study, runs={}, curves={}, ways={})
-    assert none.write(tmp_path) == {}
-    assert {path.name for path in tmp_path.iterdir()} == {"results.json", "runs.npz"}
-
-
-def test_it_stops_when_asked():
-    found = study_closed_loop(quick=True, session=StudySession(workers=1, should_stop=lambda: True))
-    assert found.interrupted
-    assert not found.runs
-    assert found.as_dict()["runs"] == []
+    for counts in found["numbers"]["modes"].values():
+        parts = (counts["converged"], counts["target_lost"], counts["otherwise"])
+        assert sum(parts) == counts["runs"] == QUICK_STARTS
+    lost = run(lambda case, seed: made_up(case, seed) | {"outcome": "target_lost"})
+    assert [len(found.tables()) for found in (run(made_up), lost)] == [2, 3]

@@ -1,102 +1,148 @@
-"""The study of engines: what it runs, what it states, that it stops and goes on."""
+"""The study of engines: what it runs, what it states of what was found."""
 
-import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from cdpr_drake.analyses.reporting.progress import StudySession
 from cdpr_drake.analyses.reporting.statements import CONFIRMED, NOT_CONFIRMED
-from cdpr_drake.analyses.studies.engines import study as module
-from cdpr_drake.analyses.studies.engines.pairs import COLUMNS, OrderTask, TautTask, slack_override
-from cdpr_drake.analyses.studies.engines.statements import engine_statements, orders
-from cdpr_drake.analyses.studies.engines.study import study_engines
-from cdpr_drake.systems.monitoring.run_monitor import Outcome
+from cdpr_drake.analyses.studies.engines.pairs import (
+    ENERGY_STEPS,
+    METHODS,
+    ORDERS,
+    order_of,
+    run_pair,
+    slack_override,
+    taut_row,
+)
+from cdpr_drake.analyses.studies.engines.study import (
+    QUICK_DURATION,
+    QUICK_MOTIONS,
+    QUICK_RUNS,
+    QUICK_SCENARIOS,
+    STUDY,
+    measure,
+)
+from cdpr_drake.analyses.studies.framework.study import Form
+
+PAIR = {
+    "outcome_plant": "converged", "outcome_compiled": "converged", "time_plant_s": 1.0,
+    "time_compiled_s": 1.0, "distance_m": 1e-6, "angle_rad": 0.0, "final_distance_m": 1e-9,
+    "final_angle_rad": 0.0, "final_error_plant_m": 0.0, "final_error_compiled_m": 0.0,
+    "tension_difference_n": 0.0, "largest_tension_n": 1.0, "slack_share": 0.0,
+}  # fmt: skip
 
 
-@pytest.fixture(scope="module")
-def study(tmp_path_factory):
-    """The quick form without its servos of full length, stopped once and continued."""
-    with pytest.MonkeyPatch.context() as patch:
-        tasks = module._tasks
-        left_out = {"impacts"}
-        patch.setattr(
-            module,
-            "_tasks",
-            lambda quick: {k: task for k, task in tasks(quick).items() if k not in left_out},
-        )
-        patch.setattr(module, "QUICK_MOTIONS", 1)
-        patch.setattr(module, "QUICK_SCENARIOS", ("acrobot_pbvs", "planar_computed_torque"))
-        folder = tmp_path_factory.mktemp("study")
-        asked = []
-
-        def stop():
-            asked.append(0)
-            return len(asked) > 1
-
-        first = study_engines(True, StudySession(folder, should_stop=stop, workers=1))
-        assert first.interrupted
-        assert first.found
-        return study_engines(True, StudySession(folder, workers=1))
+def same(case, seed):
+    """Engines that agree."""
+    kind = case.keys["kind"]
+    if kind == "taut":
+        return {
+            "distance_m": 1e-8, "angle_rad": 1e-8, "energy_difference": 1e-8,
+            "least_tension_n": 1.0,
+        }  # fmt: skip
+    if kind == "order":
+        return order_row(case, 2.0**-3)
+    if kind == "energy":
+        return {
+            "largest_gain": 0.0, "least_gain": -0.01, "semi_implicit_gain": 0.0,
+            "slack_cables": 3, "largest_tension_n": 1.0,
+        }  # fmt: skip
+    return PAIR
 
 
-def test_it_continues_where_it_stopped(study):
-    assert not study.interrupted
-    assert study.progress.found > 0
-
-
-def test_methods_have_their_orders_and_taut_motions_agree(study):
-    found = {s.words: s for s in study.statements()}
-    (taut,) = [s for words, s in found.items() if words.startswith("While cables stay taut")]
-    (order,) = [s for words, s in found.items() if words.startswith("Methods have")]
-    (shipped,) = [s for words, s in found.items() if words.startswith("Every scenario")]
-    (energy,) = [s for words, s in found.items() if words.startswith("At real stiffness")]
-    (steps,) = [s for words, s in found.items() if words.startswith("How far they part")]
-    for statement in (taut, order, shipped, energy, steps):
-        assert statement.verdict == CONFIRMED, statement
-
-
-def test_results_and_figure_are_written(study, tmp_path):
-    study.write(tmp_path)
-    assert {path.name for path in tmp_path.iterdir()} == {"results.json", "engines.png"}
-    found = json.loads((tmp_path / "results.json").read_text())
-    assert found["columns"] == list(COLUMNS)
-    assert len(found["results"]["scenario acrobot_pbvs"]["pairs"][0]) == len(COLUMNS)
-    assert study.tables()
-
-
-def pair(**changes):
-    row = dict.fromkeys(COLUMNS, 0.0)
-    row |= {"outcome_plant": Outcome.CONVERGED, "outcome_compiled": Outcome.CONVERGED}
-    return np.array([list((row | changes).values())], float)
-
-
-def test_engines_that_part_are_told_so():
-    bad = {
-        "taut motions": {"taut": np.array([[2e-6, 0.0, 0.0, 1.0]])},
-        "scenario a": {"pairs": pair(outcome_compiled=Outcome.TIMEOUT)},
-        "impacts": {"pairs": pair(final_error_compiled_m=1e-3)},
-        "order taut": {"distance": np.ones((1, 2, 3)) * [[2.0], [1.0]]},
-        "order catching": {"distance": np.ones((1, 2, 3))},
-        "order catching real": {"distance": np.ones((1, 2, 3))},
-        "energy": {"energy": np.array([[0.5, -0.1, 0.0, 3.0, 1.0]])},
+def order_row(case, ratio):
+    errors = (ratio ** np.arange(5)).tolist()
+    return {
+        "steps_s": case.data.steps(),
+        "distances_m": dict.fromkeys(METHODS, errors),
+        "orders": dict.fromkeys(METHODS, order_of(errors)),
     }
-    statements = engine_statements(bad)
-    assert len(statements) == len(bad) - 1
-    assert {statement.verdict for statement in statements} == {NOT_CONFIRMED}
+
+
+def parted(case, seed):
+    """Engines that part in everything."""
+    row = same(case, seed)
+    kind = case.keys["kind"]
+    if kind == "order":
+        return order_row(case, 1.0)
+    return (
+        row
+        | {
+            "taut": {"distance_m": 2e-6},
+            "scenario": {"outcome_compiled": "timeout"},
+            "impacts": {"final_error_compiled_m": 1e-3},
+            "energy": {"largest_gain": 0.5, "least_gain": -0.1},
+        }[kind]
+    )
+
+
+def study(measure, quick=True, **session):
+    return replace(STUDY, measure=measure)(quick, StudySession(workers=1, **session))
+
+
+@pytest.mark.parametrize(("measure", "verdict"), [(same, CONFIRMED), (parted, NOT_CONFIRMED)])
+def test_engines_that_part_are_told_so(measure, verdict, tmp_path):
+    found = study(measure)
+    assert {one.name: one.verdict for one in found.statements} == dict.fromkeys(
+        STUDY.names_of_checks(), verdict
+    )
+    assert found.write(tmp_path) == {}
+    assert (tmp_path / "engines.png").exists()
+    assert [len(table.columns) for table in found.tables()] == [10, 5]
+
+
+@pytest.mark.parametrize(
+    "worse", [{"time_compiled_s": 1.1}, {"final_error_compiled_m": 1e-4}, {"slack_share": 1.0}]
+)
+def test_each_part_of_what_ships_counts(worse):
+    found = study(lambda case, seed: same(case, seed) | worse)
+    (shipped,) = [one for one in found.statements if one.name == "shipped"]
+    assert (shipped.verdict == CONFIRMED) == ("slack_share" in worse)
+    assert shipped.of == len(QUICK_SCENARIOS)
+
+
+def test_it_runs_what_the_form_says():
+    quick = study(same).runs.counts("kind")
+    assert quick == {
+        "scenario": len(QUICK_SCENARIOS), "taut": QUICK_MOTIONS, "order": len(ORDERS),
+        "energy": len(ENERGY_STEPS), "impacts": QUICK_RUNS,
+    }  # fmt: skip
+    assert study(same, seeds=4).runs.counts("kind") == quick | {"taut": 4, "impacts": 4}
+    full = {case.name: case for case in STUDY.plan(Form())}
+    assert STUDY.count(full["impacts"], Form()) == 200
+    assert STUDY.count(full["taut motions"], Form()) == 30
+    assert STUDY.count(full["energy 0.0001 s"], Form()) == 1
+    assert f"duration={QUICK_DURATION}" not in full["scenario acrobot_pbvs"].changes
+
+
+def test_methods_have_their_orders_and_taut_motions_agree():
+    plan = {case.name: case for case in STUDY.plan(Form(quick=True))}
+    scenario = replace(plan["scenario acrobot_pbvs"], changes=("duration=0.1",))
+    cases = [plan["order taut"], replace(plan["taut motions"], most=1), scenario]
+    found = replace(STUDY, cases=lambda form: cases, checks=STUDY.checks[:2] + STUDY.checks[3:4])
+    result = found(True, StudySession(workers=1))
+    assert {one.name: one.verdict for one in result.statements} == {
+        "taut": CONFIRMED, "shipped": CONFIRMED, "orders": CONFIRMED,
+    }  # fmt: skip
+
+
+def test_energies_of_a_short_fall():
+    (case,) = [one for one in STUDY.plan(Form(quick=True)) if one.name == "energy 0.0001 s"]
+    row = measure(replace(case, data=0.05), 0)
+    assert row["largest_gain"] < 0.01
+    assert row["slack_cables"] == 8
 
 
 def test_an_order_is_that_of_a_power():
-    distance = np.array([OrderTask().steps()]).T ** np.array([[1.0, 2.0, 3.0]])
-    np.testing.assert_allclose(orders(distance), [1.0, 2.0, 3.0])
+    steps = np.array(ORDERS["taut"].steps())
+    np.testing.assert_allclose([order_of(steps**p) for p in (1.0, 2.0, 3.0)], [1.0, 2.0, 3.0])
 
 
-def test_an_item_does_not_depend_on_the_others():
-    np.testing.assert_array_equal(TautTask()(0, 2)["taut"][1], TautTask()(1, 2)["taut"][0])
+def test_a_row_does_not_depend_on_the_others():
+    assert taut_row(1) == taut_row(1) != taut_row(0)
     assert slack_override(3) == slack_override(3) != slack_override(4)
-
-
-def test_it_stops_when_asked():
-    stopped = study_engines(True, StudySession(workers=1, should_stop=lambda: True))
-    assert stopped.interrupted
-    assert stopped.as_dict()["statements"] == []
+    pair = run_pair("planar_pbvs", ["duration=0.1"])
+    assert pair["outcome_plant"] == pair["outcome_compiled"] == "timeout"
+    assert set(pair) == set(PAIR)

@@ -285,6 +285,7 @@ def test_it_is_written_for_people_and_programs(tmp_path):
     found = run()
     found.write(tmp_path)
     told = json.loads((tmp_path / "results.json").read_text())
+    assert told["items"] == {"done": 17, "of": 17, "by_earlier_sessions": 0}
     assert told["units"] == {"peak_m": "m", "curve_m": "m"}
     assert told["arrays"] == ["curve_m"]
     assert told["runs"][1]["case"] == "small"

@@ -1,17 +1,19 @@
 """The study of fusion: its quick form, which goes on after a stop, and judges on made-up runs."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from cdpr_drake.analyses.reporting.progress import StudySession
-from cdpr_drake.analyses.reporting.statements import CONFIRMED, NOT_CONFIRMED, evaluate_checks
-from cdpr_drake.analyses.studies.fusion.configurations import ALL, QUICK, configurations
-from cdpr_drake.analyses.studies.fusion.slack_trials import SLACK_COLUMNS, slack_trials
+from cdpr_drake.analyses.reporting.statements import CONFIRMED, NOT_IN_QUICK
+from cdpr_drake.analyses.studies.framework.statement import judged
+from cdpr_drake.analyses.studies.framework.study import Form
+from cdpr_drake.analyses.studies.fusion.configurations import CONFIGURATIONS, QUICK
 from cdpr_drake.analyses.studies.fusion.statements import CHECKS
-from cdpr_drake.analyses.studies.fusion.study import study_fusion
-from cdpr_drake.analyses.studies.fusion.trials import COLUMNS, FusionTrial, trial_scenario
+from cdpr_drake.analyses.studies.fusion.study import STUDY
+from cdpr_drake.analyses.studies.fusion.trials import trial_scenario
 
 
 @pytest.fixture(scope="module")
@@ -19,10 +21,8 @@ def quick(tmp_path_factory):
     """The quick form and its folder, stopped after the first run and gone on with."""
     folder = tmp_path_factory.mktemp("study") / "fusion"
     done = []
-    begun = study_fusion(
-        True, StudySession(folder, done.append, lambda: any(p.done for p in done), workers=1)
-    )
-    return begun, study_fusion(True, StudySession(folder, workers=1)), folder
+    begun = STUDY(True, StudySession(folder, done.append, lambda: any(p.done for p in done), 1))
+    return begun, STUDY(True, StudySession(folder, workers=1)), folder
 
 
 def test_the_quick_form_goes_on_and_is_written(quick):
@@ -30,21 +30,21 @@ def test_the_quick_form_goes_on_and_is_written(quick):
     assert begun.interrupted
     assert not result.interrupted
     assert result.progress.found >= 1
-    assert set(result.found) == {*QUICK, "image, 2 cm"}
-    slack = dict(zip(SLACK_COLUMNS, result.found["image, 2 cm"]["numbers"][0], strict=True))
+    assert [run.case for run in result.runs] == [*QUICK, "image, 2 cm"]
+    slack = result.runs.one(way="image")
     assert 0.0 < slack["taut_s"] < 1.0
     assert slack["seen_error_m"] < 0.01
     assert slack["seen_share"] > 0.9
-    for arrays in (result.found[name] for name in QUICK):
-        assert np.all(np.isfinite(arrays["distance"][:, :-1]))
-        assert np.all(arrays["numbers"][:, COLUMNS.index("lengths")] == 1.0)
-    used = {name: result.found[name]["numbers"][0] for name in QUICK}
-    assert used["on_board"][COLUMNS.index("external")] == 0.0
-    assert used["external"][COLUMNS.index("on_board")] == 0.0
-    assert used["both"][COLUMNS.index("external")] > 0.9
+    used = {name: result.runs.one(configuration=name) for name in QUICK}
+    for run in used.values():
+        assert np.all(np.isfinite(run["estimate_m"][:-1]))
+        assert run["lengths"] == 1.0
+    assert used["on_board"]["external"] == 0.0
+    assert used["external"]["on_board"] == 0.0
+    assert used["both"]["external"] > 0.9
     result.write(folder)
     stored = json.loads((folder / "results.json").read_text())
-    assert [c["name"] for c in stored["configurations"]] == list(QUICK)
+    assert {one["verdict"] for one in stored["statements"]} == {NOT_IN_QUICK}
     assert len(stored["statements"]) == len(CHECKS)
     assert (folder / "fusion.png").stat().st_size > 10_000
     assert all(table.row_count for table in result.tables())
@@ -52,44 +52,45 @@ def test_the_quick_form_goes_on_and_is_written(quick):
 
 def test_what_is_wrong_is_drawn_by_seed_and_every_configuration_loads():
     start = [
-        trial_scenario(FusionTrial((), 1.0), seed).perturbations.initial_pose.position
-        for seed in (1, 1, 2)
+        trial_scenario((), 1.0, seed).perturbations.initial_pose.position for seed in (1, 1, 2)
     ]
     np.testing.assert_array_equal(start[0], start[1])
     assert np.linalg.norm(start[0] - start[2]) > 1e-4
-    for one in configurations(quick=False):
-        trial_scenario(one.trial(quick=False), 0)
+    for _, changes in CONFIGURATIONS.values():
+        trial_scenario(changes, 12.0, 0)
 
 
-def made_up(change=lambda name, numbers: None):
-    """Runs of which everything stated is so, but for a change."""
-    found = {}
-    for one in ALL:
-        numbers = dict.fromkeys(COLUMNS, 0.0) | {
-            "mean_m": 4e-3, "mean_rad": 0.01, "nees": 6.0, "servo_m": 1e-4, "expected_m": 4e-3,
-            "wrong_external": 0.9,
-        }  # fmt: skip
-        if one.name in ("on_board", "external", "external wrong"):
-            numbers["mean_m"] = numbers["expected_m"] = 6e-3
-        if "imu" in one.name or "depth" in one.name:
-            numbers["mean_m"], numbers["mean_rad"] = 3e-3, 0.005
-        if one.name in ("both, external wrong", "both, external wrong, no gates"):
-            numbers["mean_m"] = 15e-3
-        change(one.name, numbers)
-        row = np.array([numbers[key] for key in COLUMNS])
-        found[one.name] = {"numbers": np.repeat(row[np.newaxis], 4, 0)}
-    for name, trial in slack_trials(quick=False).items():
-        numbers = dict.fromkeys(SLACK_COLUMNS, 0.0) | {
-            "taut_s": 0.5 if trial.kind == "image" else 20.0 * trial.surplus
-        }
-        change(name, numbers)
-        row = np.array([numbers[key] for key in SLACK_COLUMNS])
-        found[name] = {"numbers": np.repeat(row[np.newaxis], 4, 0)}
-    return found
+def made_up(case, seed):
+    """A run of which everything stated is so."""
+    name = case.name
+    if "way" in case.keys:
+        taut = 0.5 if case.keys["way"] == "image" else 20.0 * case.keys["surplus_m"]
+        return {"taut_s": taut, "seen_error_m": 0.0}
+    row = {
+        "mean_m": 4e-3, "mean_rad": 0.01, "nees": 6.0, "servo_m": 1e-4, "expected_m": 4e-3,
+        "wrong_external": 0.9, "lost_s": 0.0,
+    }  # fmt: skip
+    if name in ("on_board", "external", "external wrong"):
+        row["mean_m"] = row["expected_m"] = 6e-3
+    if "imu" in name or "depth" in name:
+        row["mean_m"], row["mean_rad"] = 3e-3, 0.005
+    if name in ("both, external wrong", "both, external wrong, no gates"):
+        row["mean_m"] = 15e-3
+    return row
+
+
+@pytest.fixture(scope="module")
+def good():
+    """Made-up runs of the full form."""
+    return replace(STUDY, measure=made_up)(False, StudySession(workers=1, seeds=2)).runs
+
+
+def test_what_is_stated_is_confirmed(good):
+    assert {one.verdict for one in judged(CHECKS, good)} == {CONFIRMED}
 
 
 @pytest.mark.parametrize(
-    ("judge", "name", "key", "value"),
+    ("check", "name", "key", "value"),
     [
         ("both_as_good_as_the_better", "both", "mean_m", 0.02),
         ("wrong_calibration_is_found", "both, external wrong, told", "mean_m", 0.02),
@@ -98,18 +99,27 @@ def made_up(change=lambda name, numbers: None):
         ("imu_improves_rotation", "both, imu", "mean_rad", 0.02),
         ("depth_improves_position", "external, depth", "mean_m", 0.02),
         ("survives_either_failure", "both, external off", "servo_m", 0.02),
+        ("survives_either_failure", "both, external off", "lost_s", 0.2),
         ("consistent", "both", "nees", 60.0),
         ("rate_by_seen_slack", "image, 8 cm", "taut_s", 3.0),
     ],
 )
-def test_judges_look_at_the_runs(judge, name, key, value):
-    good = {s.name: s.verdict for s in evaluate_checks(CHECKS, made_up())}
-    assert good[judge] == CONFIRMED
+def test_checks_look_at_the_runs(good, check, name, key, value):
+    spoiled = [
+        replace(run, measured={**run.measured, key: value}) if run.case == name else run
+        for run in good
+    ]
+    (said,) = judged([one for one in CHECKS if one.name == check], replace(good, rows=spoiled))
+    assert said.verdict not in (CONFIRMED, "not judged")
 
-    def spoil(one, numbers):
-        if one == name:
-            numbers[key] = value
 
-    spoiled = {s.name: s.verdict for s in evaluate_checks(CHECKS, made_up(spoil))}
-    assert spoiled[judge] != CONFIRMED
-    assert NOT_CONFIRMED in spoiled.values() or spoiled[judge] != good[judge]
+def test_one_seed_has_no_spread(good):
+    (said,) = judged(CHECKS[:1], good(seed=0), complete=True)
+    assert (said.verdict, said.found) == (
+        "not judged", "runs are missing: a second seed, as one has no spread",
+    )  # fmt: skip
+
+
+def test_cases_are_those_of_before():
+    assert len(STUDY.plan(Form())) == len(CONFIGURATIONS) + 12
+    assert len(STUDY.plan(Form(quick=True))) == 4

@@ -8,65 +8,80 @@ import pytest
 
 from cdpr_drake.analyses.reporting.progress import StudySession
 from cdpr_drake.analyses.reporting.statements import CONFIRMED, IN_PART, NOT_CONFIRMED
-from cdpr_drake.analyses.studies.worked_examples import study as study_module
-from cdpr_drake.analyses.studies.worked_examples.motion import (
+from cdpr_drake.analyses.studies.framework.runs import Runs
+from cdpr_drake.analyses.studies.framework.statement import MET_CONSTRUCTION
+from cdpr_drake.analyses.studies.framework.study import Form
+from cdpr_drake.analyses.studies.worked_examples import examples
+from cdpr_drake.analyses.studies.worked_examples.examples import (
     DURATION,
     END,
+    METHODS,
     START,
+    TRAJECTORY,
     by_conditions,
     by_printed_coefficients,
 )
-from cdpr_drake.analyses.studies.worked_examples.statements import (
-    CHECKS,
-    border_tensions,
-    keeps_limits,
-    median_cheap,
-    two_programs,
-)
-from cdpr_drake.analyses.studies.worked_examples.study import study_worked_examples
+from cdpr_drake.analyses.studies.worked_examples.study import STUDY
 
 ROUNDING = 1e-9
 """Of polynomials in a time up to 100 s [m]."""
+
+ONE = StudySession(workers=1)
 
 
 @pytest.fixture(scope="module")
 def study():
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(study_module, "QUICK_GRID", (2, 2, 2))
-        return study_worked_examples(True)
+        patch.setattr(examples, "QUICK_GRID", (2, 2, 2))
+        return STUDY(True, ONE)
+
+
+def verdicts(runs):
+    return {check.name: check.judge(runs).verdict for check in STUDY.checks}
+
+
+def changed(study, example, **columns):
+    """The runs with other numbers of an example."""
+    rows = [
+        replace(run, measured={**run.measured, **columns}) if run.case == example else run
+        for run in study.runs
+    ]
+    return Runs(rows, study.runs.planned)
 
 
 def test_every_statement_is_judged(study):
-    assert [one.name for one in study.statements] == [judge.__name__ for judge in CHECKS]
-    verdicts = {one.name: one.verdict for one in study.statements}
-    assert verdicts["two_programs"] == verdicts["meets_conditions"] == CONFIRMED
-    assert verdicts["homing_tensions"] == verdicts["border_tensions"] == CONFIRMED
-    assert verdicts["printed_coefficients"] == NOT_CONFIRMED
-    assert verdicts["farthest_from_limits"] == IN_PART
+    found = {one.name: one.verdict for one in study.statements}
+    assert tuple(found) == STUDY.names_of_checks()
+    assert found["two_programs"] == CONFIRMED
+    assert found["meets_conditions"] == MET_CONSTRUCTION
+    assert found["homing_tensions"] == found["border_tensions"] == CONFIRMED
+    assert found["printed_coefficients"] == NOT_CONFIRMED
+    assert found["farthest_from_limits"] == IN_PART
 
 
 def test_the_second_program_is_the_polynomial_of_the_conditions():
-    motion = by_conditions()
-    s = motion.times / DURATION
+    positions, _, _ = by_conditions()
+    s = np.linspace(0.0, 1.0, len(positions))
     blend = (s**3 * (10.0 - 15.0 * s + 6.0 * s**2))[:, None]
-    np.testing.assert_allclose(motion.positions, START + blend * (END - START), atol=ROUNDING)
+    np.testing.assert_allclose(positions, START + blend * (END - START), atol=ROUNDING)
+    assert DURATION == 100.0
 
 
 def test_the_printed_coefficients_lead_elsewhere():
     # 10 + 15 + 6 times the way, in the place of 10 - 15 + 6.
-    end = by_printed_coefficients().positions[-1]
+    end = by_printed_coefficients()[0][-1]
     np.testing.assert_allclose(end, START + 31.0 * (END - START), atol=ROUNDING)
 
 
 def test_verdicts_can_fail(study):
-    found = study.found
-    motions = dict(found.motions, conditions=by_printed_coefficients())
-    assert two_programs(replace(found, motions=motions)).verdict == NOT_CONFIRMED
-    swapped = dict(found.polygons, border=found.polygons["homing"])
-    assert border_tensions(replace(found, polygons=swapped)).verdict == NOT_CONFIRMED
-    one = found.methods["barycenter"]
-    methods = dict(found.methods, barycenter=replace(one, wrong=1))
-    assert keeps_limits(replace(found, methods=methods)).verdict == NOT_CONFIRMED
+    printed = by_printed_coefficients()[0]
+    said = verdicts(changed(study, TRAJECTORY, class_positions_m=printed))
+    assert said["two_programs"] == said["meets_conditions"] == NOT_CONFIRMED
+    swapped = verdicts(changed(study, "border", **study.runs.one(example="homing").measured))
+    for name in ("border_tensions", "two_cables_more", "polygon_shrinks"):
+        assert swapped[name] == NOT_CONFIRMED
+    said = verdicts(changed(study, METHODS, wrong={"barycenter": 1}, pushing={"pseudo_inverse": 0}))
+    assert said["keeps_limits"] == said["pushes"] == NOT_CONFIRMED
 
 
 @pytest.mark.parametrize(
@@ -74,27 +89,26 @@ def test_verdicts_can_fail(study):
 )
 def test_a_cost_is_compared_with_that_of_the_barycenter(study, cost, said):
     costs = {"improved_closed_form": cost, "median": 3.0, "barycenter": 10.0}
-    methods = {
-        name: replace(study.found.methods[name], microseconds=value)
-        for name, value in costs.items()
-    }
-    assert median_cheap(replace(study.found, methods=methods)).verdict == said
+    assert verdicts(changed(study, METHODS, cost_us=costs))["median_cheap"] == said
 
 
 def test_it_leaves_numbers_and_figures(study, tmp_path):
     study.write(tmp_path, ("png",))
     results = json.loads((tmp_path / "results.json").read_text())
-    assert results["polygons"]["homing"]["area_n2"] > results["polygons"]["border"]["area_n2"]
+    areas = {row["example"]: row.get("area_n2") for row in results["runs"]}
+    assert areas["homing"] > areas["border"]
     assert {path.stem for path in tmp_path.glob("*.png")} == {"trajectory", "feasible_polygons"}
     assert len(study.tables()) == 2
 
 
 def test_it_stops_where_it_is_asked_to():
-    asked = []
-    session = StudySession(should_stop=lambda: bool(asked) or asked.append(1))
-    study = study_worked_examples(True, session)
-    assert study.interrupted
-    assert study.found.motions
-    assert not study.found.polygons
-    names = [one.name for one in study.statements]
+    asked = iter([False] + [True] * 100)
+    stopped = STUDY(True, replace(ONE, should_stop=lambda: next(asked)))
+    assert stopped.interrupted
+    assert [run.case for run in stopped.runs] == [TRAJECTORY]
+    names = [one.name for one in stopped.statements]
     assert names == ["two_programs", "meets_conditions", "printed_coefficients"]
+
+
+def test_what_is_timed_is_done_alone():
+    assert [case.name for case in STUDY.plan(Form()) if case.alone] == [METHODS]

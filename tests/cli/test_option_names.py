@@ -1,0 +1,121 @@
+"""Refusals name arguments in Python and options in commands."""
+
+import pytest
+
+from cdpr_drake.analyses.front.calibration import calibrate
+from cdpr_drake.analyses.front.simulated_fits import (
+    calibrate_in_simulation,
+    identify_in_simulation,
+)
+from cdpr_drake.analyses.front.simulation import simulate
+from cdpr_drake.analyses.front.studies import run_study
+from cdpr_drake.analyses.simulation.live_messages import open_connection
+from cdpr_drake.analyses.visualization.meshcat_window import open_meshcat
+from cdpr_drake.cli.app import main
+from cdpr_drake.cli.option_names import SHARED_OPTIONS, with_options
+from cdpr_drake.errors import CdprError
+from cdpr_drake.systems.remote.server_socket import ServerSocket
+from tests.messages import printed
+
+SCENARIO, TORQUES = "acrobot_pbvs", "acrobot_computed_torque"
+NOWHERE = "192.0.2.1"
+"""An address that no machine has."""
+
+
+@pytest.mark.parametrize(
+    ("call", "arguments", "python", "command"),
+    [
+        (lambda: simulate(SCENARIO, ["seed=x"]), ["simulate", SCENARIO, "--set", "seed=x"],
+         "overrides seed: found x", "--set seed: found x"),
+        (lambda: simulate(SCENARIO, ["seed=x", "a=1"]),
+         ["simulate", SCENARIO, "--set", "seed=x", "--set", "a=1"],
+         "overrides a: there is no key", "--set a: there is no key"),
+        (lambda: simulate(SCENARIO, folder="there"), ["simulate", SCENARIO, "--out", "there"],
+         "allow overwrite", "allow --overwrite"),
+        (lambda: run_study("case-9", workers="tcp://127.0.0.1:1"),
+         ["study", "case-9", "--scheduler", "tcp://127.0.0.1:1"],
+         "workers tcp://127.0.0.1:1: does not answer",
+         "--scheduler tcp://127.0.0.1:1: does not answer"),
+        (lambda: run_study("case-9", workers="tcp://127.0.0.1:1"),
+         ["workspace", "planar", "--grid", "2,2,1", "--scheduler", "tcp://127.0.0.1:1"],
+         "leave out workers", "leave out --scheduler"),
+        (lambda: open_meshcat(port=1), ["view", "planar", "--port", "1"],
+         "port: found 1;", "--port: found 1;"),
+        (lambda: open_meshcat(NOWHERE),
+         ["simulate", SCENARIO, "--meshcat", "--set", "camera.kind=projected", "--host", NOWHERE],
+         f"host: found '{NOWHERE}'", f"--host: found '{NOWHERE}'"),
+        (lambda: ServerSocket(NOWHERE, 0, lambda: False),
+         ["serve", TORQUES, "--host", NOWHERE, "--port", "0"],
+         f"host, port: found {NOWHERE}:0", f"--host, --port: found {NOWHERE}:0"),
+        (lambda: open_connection(-5),
+         ["simulate", SCENARIO, "--set", "camera.kind=projected", "--steered-by", "-5"],
+         "descriptor: found -5", "--steered-by: found -5"),
+        (lambda: simulate(SCENARIO, log_formats=["xls"]),
+         ["simulate", SCENARIO, "--log-format", "xls"],
+         "log_formats: found 'xls'", "--log-format: found 'xls'"),
+        (lambda: calibrate("planar", "log.csv", tags="tags.csv", tag_size=0.1),
+         ["calibrate", "planar", "log.csv", "--tags", "tags.csv", "--tag-size", "0.1"],
+         "tag_size: found beside tags", "--tag-size: found beside tags"),
+        (lambda: calibrate_in_simulation(TORQUES), ["calibrate", "--campaign", TORQUES],
+         f"scenario: found {TORQUES}", f"--campaign: found {TORQUES}"),
+        (lambda: identify_in_simulation(SCENARIO), ["identify", "--campaign", SCENARIO],
+         f"scenario: found {SCENARIO}", f"--campaign: found {SCENARIO}"),
+    ],
+)  # fmt: skip
+def test_python_reads_arguments_and_the_command_options(
+    call, arguments, python, command, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "there").mkdir()
+    (tmp_path / "there" / "notes.txt").touch()
+    with pytest.raises(CdprError) as refused:
+        call()
+    assert python in str(refused.value)
+    assert "--" not in str(refused.value)
+    with pytest.raises(SystemExit) as ended:
+        main(arguments)
+    assert ended.value.code == 2
+    said = printed(capsys).err
+    assert command in said
+    assert python not in said.replace(command, "")
+
+
+OPTIONS = {
+    "lengths": "--lengths", "position": "--position", "model": "--cable-model",
+    "tag_size": "--tag-size",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("message", "translated"),
+    [
+        ("lengths: found 3", "--lengths: found 3"),
+        ("lengths, position: found both", "--lengths, --position: found both"),
+        ("model: found model in it", "--cable-model: found --cable-model in it"),
+        ("one\nlengths: found 3", "one\n--lengths: found 3"),
+        ("tags: found none; accepted: tag_size, or rows",
+         "tags: found none; accepted: --tag-size, or rows"),
+        ("log.csv: model: found 0; a model", "log.csv: --cable-model: found 0; a model"),
+        ("tags: none (tag_size)", "tags: none (--tag-size)"),
+        # Words of the sentence, and parts of names and paths, stay.
+        ("cable lengths: found none", "cable lengths: found none"),
+        ("logs/tag_size.csv: not there", "logs/tag_size.csv: not there"),
+        ("a/tag_size: not there", "a/tag_size: not there"),
+        ("my tag_sizes: found 3", "my tag_sizes: found 3"),
+        ("lengths.csv: not there", "lengths.csv: not there"),
+    ],
+)  # fmt: skip
+def test_options_stand_where_arguments_are_named(message, translated):
+    assert with_options(message, OPTIONS) == translated
+    assert with_options(translated, OPTIONS) == translated
+
+
+def test_functions_become_commands():
+    words = "finish_run makes log and figures of that folder, continue_run goes on"
+    assert with_options(words, SHARED_OPTIONS) == (
+        "cdpr simulate --finish makes log and figures of that folder, "
+        "cdpr simulate --continue goes on"
+    )
+    assert with_options("or use camera.kind=projected", SHARED_OPTIONS) == (
+        "or use --camera projected"
+    )
