@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
@@ -113,11 +113,8 @@ STUDIES: dict[str, StudyEntry] = {
     ),
     "worked-examples": entry_of(worked_examples.STUDY),
     **{study.name: entry_of(study) for study in closed_loops.STUDIES},
-    "control-stability": StudyEntry(
-        control_stability.study_control_stability,
-        continues=True,
-        judges=names_of_checks(control_stability.CHECKS),
-        figures=control_stability.FIGURES,
+    "control-stability": replace(
+        entry_of(control_stability.STUDY),
         recipes={name: partial(control_stability.study_recipe, recipe=name) for name in RECIPES},
     ),
     "stability-recipes": StudyEntry(
