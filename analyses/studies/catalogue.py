@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
@@ -108,11 +108,8 @@ STUDIES: dict[str, StudyEntry] = {
     "tension-methods": entry_of(tension_methods.STUDY),
     "worked-examples": entry_of(worked_examples.STUDY),
     **{study.name: entry_of(study) for study in closed_loops.STUDIES},
-    "control-stability": StudyEntry(
-        control_stability.study_control_stability,
-        continues=True,
-        judges=names_of_checks(control_stability.CHECKS),
-        figures=control_stability.FIGURES,
+    "control-stability": replace(
+        entry_of(control_stability.STUDY),
         recipes={name: partial(control_stability.study_recipe, recipe=name) for name in RECIPES},
     ),
     "stability-recipes": StudyEntry(
@@ -121,18 +118,8 @@ STUDIES: dict[str, StudyEntry] = {
         judges=names_of_checks(control_stability.RECIPE_CHECKS),
     ),
     "stability-ranges": entry_of(stability_ranges.STUDY),
-    "stability-shapes": StudyEntry(
-        stability_shapes.study_stability_shapes,
-        continues=True,
-        judges=names_of_checks(stability_shapes.CHECKS),
-        figures=stability_shapes.FIGURES,
-    ),
-    "workspaces": StudyEntry(
-        workspaces.study_workspaces,
-        continues=True,
-        judges=names_of_checks(workspaces.CHECKS),
-        figures=workspaces.FIGURES,
-    ),
+    "stability-shapes": entry_of(stability_shapes.STUDY),
+    "workspaces": entry_of(workspaces.STUDY),
     "design": entry_of(design.STUDY),
     "engines": entry_of(engines.STUDY),
     "scenarios": entry_of(scenarios.STUDY),

@@ -10,6 +10,7 @@ from dataclasses import replace
 import pytest
 
 from cdpr_drake.analyses.reporting.progress import StudySession
+from cdpr_drake.analyses.studies.catalogue import STUDIES
 from cdpr_drake.analyses.studies.control_stability import study as module
 from cdpr_drake.analyses.studies.published.stability_tables import TABLES
 from cdpr_drake.cli.app import main
@@ -33,9 +34,13 @@ def short(table):
     return replace(table, rows={name: table.rows[name] for name in BOUNDS})
 
 
+SHORT = replace(module.STUDY, chunk=CHUNK)
+
+
 def shorten(monkeypatch):
     monkeypatch.setattr(module, "TABLES", [short(TABLES[0])])
-    monkeypatch.setattr(module, "CHUNK", CHUNK)
+    entry = replace(STUDIES["control-stability"], run=SHORT)
+    monkeypatch.setitem(STUDIES, "control-stability", entry)
 
 
 @pytest.fixture(autouse=True)
@@ -49,8 +54,8 @@ def whole():
     """Rows of the study in one go."""
     with pytest.MonkeyPatch.context() as patch:
         shorten(patch)
-        found = module.study_control_stability(quick=True, session=StudySession(workers=1))
-    return json.loads(json.dumps(found.as_dict()["rows"]))
+        found = SHORT(quick=True, session=StudySession(workers=1))
+    return json.loads(json.dumps(found.as_dict()["runs"]))
 
 
 def study(capsys, *arguments):
@@ -85,10 +90,10 @@ def test_an_interrupted_study_names_the_command_that_continues_it(
     # A row has 81 poses, so every fifth chunk has one pose.
     found -= (STOPPED_AFTER // 5) * (CHUNK - 1)
     assert f"{found} of {total} poses were there already" in err
-    assert json.loads(out)["rows"] == whole
+    assert json.loads(out)["runs"] == whole
     code, again, err = study(capsys, *command[2:])
     assert "complete already, nothing was computed" in err
-    assert json.loads(again)["rows"] == json.loads(out)["rows"]
+    assert json.loads(again)["runs"] == json.loads(out)["runs"]
 
 
 def test_other_arguments_are_refused_and_overwrite_begins_anew(capsys, monkeypatch, tmp_path):
@@ -115,10 +120,12 @@ KILLED = killed_after(
     STOPPED_AFTER,
     f"""
 from dataclasses import replace
+from cdpr_drake.analyses.studies.catalogue import STUDIES
 from cdpr_drake.analyses.studies.control_stability import study as module
 table = module.TABLES[0]
 module.TABLES = [replace(table, rows={{name: table.rows[name] for name in {BOUNDS}}})]
-module.CHUNK = {CHUNK}
+entry = STUDIES["control-stability"]
+STUDIES["control-stability"] = replace(entry, run=replace(module.STUDY, chunk={CHUNK}))
 """,
 )
 
@@ -135,7 +142,7 @@ def test_a_killed_study_continues(capsys, tmp_path, whole):
     assert code == 0
     assert "poses were there already" in err
     assert json.loads(out)["poses"]["by_earlier_sessions"] >= STOPPED_AFTER
-    assert json.loads(out)["rows"] == whole
+    assert json.loads(out)["runs"] == whole
 
 
 @pytest.mark.parametrize(

@@ -2,113 +2,95 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from rich.table import Table
 
 from cdpr_drake.analyses.reporting.statements import new_table
-from cdpr_drake.analyses.studies.published.stability_tables import PublishedTable
+from cdpr_drake.analyses.studies.framework.runs import Run, Runs
+from cdpr_drake.analyses.studies.published.stability_tables import TABLES, PublishedTable
 from cdpr_drake.stability.verdict import VERDICTS
 
 LARGE_CAMERA_TURN = 30.0
 """From this error of the camera's orientation on, no recipe meets the tables of PBVS [deg]."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class StabilityRow:
-    """One row of a table.
+SHARE = "share"
+"""Stands for the name of a bound in rows of coverage, which take this part of the baseline."""
 
-    Attributes:
-        table: Name of the table.
-        bound: Name of the bound that the row sets, angles with _deg; of a row of coverage "share".
-        value: Its value [m, deg], or the part of the baseline bounds.
-        published: Published share of the full workspace [%]; None for a row of coverage.
-        shares: Share of the full workspace by verdict, cells with all corners stable [%].
-        poses: Stable poses of the grid by verdict.
-        grid: Poses of the grid.
-        ordered: Whether at every pose certified implies searched and searched implies sampled.
-    """
-
-    table: str
-    bound: str
-    value: float
-    published: float | None
-    shares: dict[str, float]
-    poses: dict[str, int]
-    grid: int
-    ordered: bool
+COARSE, FULL = "coarse", "full"
+"""Grids, of the quick form and of the full one."""
 
 
-def rows_of(table: PublishedTable, rows: Sequence[StabilityRow]) -> list[StabilityRow]:
+def published(run: Run) -> float:
+    """The printed share of the full workspace [%]."""
+    return float(run.printed["sampled_percent"])
+
+
+def rows_of(table: PublishedTable, runs: Runs) -> Runs:
     """Those rows that repeat a printed one of the table."""
-    return [row for row in rows if row.table == table.name and row.published is not None]
+    some = [run for run in runs if run["table"] == table.name and run.printed]
+    return Runs(some, runs.planned)
 
 
-def rows_covered(table: PublishedTable, rows: Sequence[StabilityRow]) -> str:
+def rows_covered(table: PublishedTable, runs: Runs) -> str:
     """Words on how much of a table rows repeat, such as `all 44 printed rows`."""
-    count = len(rows_of(table, rows))
+    count = len(rows_of(table, runs))
     return f"{'all' if count == table.size else f'{count} of'} {table.size} printed rows"
 
 
-def mean_difference(rows: Sequence[StabilityRow], verdict: str) -> float:
+def mean_difference(runs: Iterable[Run], verdict: str) -> float:
     """Mean of |computed - published| over rows in points; NaN if there is none.
 
     Args:
-        rows: Rows; those without a published value do not count.
+        runs: Rows that repeat printed ones.
         verdict: Whose shares.
     """
-    found = [abs(row.shares[verdict] - row.published) for row in rows if row.published is not None]
+    found = [abs(run[f"{verdict}_percent"] - published(run)) for run in runs]
     return float(np.mean(found)) if found else float("nan")
 
 
-def small_camera_turns(rows: Sequence[StabilityRow]) -> list[StabilityRow]:
+def small_camera_turns(runs: Iterable[Run]) -> list[Run]:
     """The rows without those of d_theta_pc from `LARGE_CAMERA_TURN` on."""
-    return [row for row in rows if row.bound != "d_theta_pc_deg" or row.value < LARGE_CAMERA_TURN]
+    return [
+        run for run in runs if run["bound"] != "d_theta_pc_deg" or run["value"] < LARGE_CAMERA_TURN
+    ]
 
 
-def control_stability_tables(
-    asked: Sequence[PublishedTable], rows: Sequence[StabilityRow], quick: bool
-) -> list[Table]:
+def stability_tables(runs: Runs) -> list[Table]:
     """One table per published one, then differences and coverage of the certificate."""
-    tables = []
-    for table in asked:
-        mine = rows_of(table, rows)
-        if mine:
-            tables.append(_one(table, mine, quick))
-    if rows:
-        tables.append(_summary(asked, rows, quick))
-    return tables
+    if not len(runs):
+        return []
+    asked = [table for table in TABLES if any(run["table"] == table.name for run in runs)]
+    coarse = any(run["grid"] == COARSE for run in runs)
+    tables = [_one(table, mine, coarse) for table in asked if len(mine := rows_of(table, runs))]
+    return [*tables, _summary(asked, runs, coarse)]
 
 
-def _one(asked: PublishedTable, rows: Sequence[StabilityRow], quick: bool) -> Table:
+def _one(asked: PublishedTable, runs: Runs, coarse: bool) -> Table:
     table = new_table(
-        f"{asked.title}, {rows_covered(asked, rows)}; share of the full workspace in per cent",
+        f"{asked.title}, {rows_covered(asked, runs)}; share of the full workspace in per cent",
         ("bound", "value"),
         ("published", *VERDICTS, "sampled - published"),
     )
-    if quick:
+    if coarse:
         table.caption = "Coarse grid: not to be compared with the published numbers."
-    before = ""
-    for row in rows:
-        if row.published is None:
-            continue
-        if before not in ("", row.bound):
+    for bound, some in runs.by("bound"):
+        if len(table.rows):
             table.add_section()
-        name = row.bound.removesuffix("_deg") if row.bound != before else ""
-        before = row.bound
-        table.add_row(
-            name,
-            f"{row.value:g} {'deg' if row.bound.endswith('_deg') else 'm'}",
-            f"{row.published:.1f}",
-            *(f"{row.shares[verdict]:.1f}" for verdict in VERDICTS),
-            f"{row.shares['sampled'] - row.published:+.1f}",
-        )
+        for number, run in enumerate(some):
+            table.add_row(
+                "" if number else bound.removesuffix("_deg"),
+                f"{run['value']:g} {'deg' if bound.endswith('_deg') else 'm'}",
+                f"{published(run):.1f}",
+                *(f"{run[f'{verdict}_percent']:.1f}" for verdict in VERDICTS),
+                f"{run['sampled_percent'] - published(run):+.1f}",
+            )
     return table
 
 
-def _summary(asked: Sequence[PublishedTable], rows: Sequence[StabilityRow], quick: bool) -> Table:
+def _summary(asked: Sequence[PublishedTable], runs: Runs, coarse: bool) -> Table:
     table = new_table(
         "Mean absolute difference to the published shares in points, and certified poses",
         ("table",),
@@ -124,30 +106,28 @@ def _summary(asked: Sequence[PublishedTable], rows: Sequence[StabilityRow], quic
         "survive the search, perturbations cut into pieces; the column certified and the rows of "
         "the tables take them as a whole."
     )
-    if quick:
+    if coarse:
         table.caption += " Coarse grid: the differences mean nothing."
-    printed = [row for one in asked for row in rows_of(one, rows)]
+    printed = [run for one in asked for run in rows_of(one, runs)]
     size = sum(one.size for one in asked)
-    table.add_row("all of these", *_differences(printed, size), "", "", _ordered(rows))
+    table.add_row("all of these", *_differences(printed, size), "", "", _ordered(runs))
     for one in asked:
-        mine = [row for row in rows if row.table == one.name]
-        if not mine:
-            continue
+        mine = runs(table=one.name)
         coverage = {
-            row.value: 100.0 * row.poses["certified"] / max(row.poses["searched"], 1)
-            for row in mine
-            if row.published is None
+            run["value"]: 100.0 * run["certified_poses"] / max(run["searched_poses"], 1)
+            for run in mine
+            if not run.printed
         }
         table.add_row(
             one.title,
-            *_differences(rows_of(one, rows), one.size),
+            *_differences(list(rows_of(one, runs)), one.size),
             *(f"{coverage[x]:.1f} %" if x in coverage else "" for x in (1.0, 0.25)),
             _ordered(mine),
         )
     return table
 
 
-def _differences(rows: Sequence[StabilityRow], size: int) -> list[str]:
+def _differences(rows: Sequence[Run], size: int) -> list[str]:
     """Number of rows, mean differences by verdict, and that of `some rows`."""
     some = small_camera_turns(rows)
     means = [_number(mean_difference(rows, verdict)) for verdict in VERDICTS]
@@ -158,8 +138,8 @@ def _differences(rows: Sequence[StabilityRow], size: int) -> list[str]:
     ]
 
 
-def _ordered(rows: Sequence[StabilityRow]) -> str:
-    return "yes" if all(row.ordered for row in rows) else "NO"
+def _ordered(runs: Runs) -> str:
+    return "yes" if all(run["ordered"] for run in runs) else "NO"
 
 
 def _number(value: float) -> str:

@@ -133,7 +133,7 @@ class Runs:
             values = [np.nan if value is None else value for value in values]
         return np.array(values)
 
-    def list(self, column: str) -> builtins.list[Any]:
+    def list(self, column: str) -> Sequence[Any]:
         """Values of a column as they are, such as curves of different lengths.
 
         Raises:
@@ -283,6 +283,14 @@ class Runs:
     def _unknown(self, column: str) -> UnknownName:
         names = dict.fromkeys([*self.columns(), *self.planned()])
         return UnknownName(f"column {column!r} is unknown; {closest(column, names)}")
+
+    def list(self, column: str) -> list[Any]:
+        """Values of a column as they are, such as curves of different lengths.
+
+        Raises:
+            UnknownName: A row has no such column.
+        """
+        return [run[column] for run in self.rows]
 
 
 def unit_of(column: str) -> str:

@@ -89,7 +89,8 @@ class Case:
         seeds: How often it is measured in place of the study's number.
         most: How often at most, whatever is asked.
         rendered: Whether it needs a renderer.
-        task: What computes it in parts in the place of `measure`; see `Study.reduce`.
+        task: What computes it in parts in the place of `measure`; see `Study.reduce`. Where it
+            has a method `arguments`, this tells what its numbers depend on, for JSON.
         items: Of the task.
         same_task: Name of the case before it whose task gives its arrays too.
         alone: Whether it measures times: last, in this process, with nothing beside it.
@@ -430,7 +431,10 @@ def _hashable(value: Any) -> Any:
 
 
 def _plain_call(value: Any) -> Any:
-    """A value for JSON; of a partial the function's name and its arguments."""
+    """A value for JSON; of a partial the function's name and its arguments, of what tells its
+    `arguments()` these."""
     if isinstance(value, partial):
         return {"function": value.func.__name__, "arguments": [*value.args, value.keywords]}
+    if hasattr(value, "arguments"):
+        return value.arguments()
     return value

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 
 import numpy as np
@@ -246,7 +246,7 @@ def _single_words(row: Run) -> str:
     return f"{name} = {value:g} {'deg' if name.startswith('d_theta') else 'm'}"
 
 
-FIGURES = {
+FIGURES: dict[str, Callable[[Runs], Figure]] = {
     "ranges_planar_II": partial(
         combination_figure, section=PLANAR_VISION, title="Planar, camera and object wrong",
         width=11.0, left_out=("I",),

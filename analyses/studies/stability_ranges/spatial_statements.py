@@ -137,7 +137,8 @@ def spatial_camera_place(runs: Runs) -> Finding:
 )
 def errors_and_rotation(runs: Runs) -> Finding:
     """III i."""
-    less, about_z, words = [], [], []
+    less: list[bool] = []
+    about_z, words = [], []
     for known, heading in (("", "coarse knowledge"), (" well", "good knowledge of all the rest")):
         for name in ("r_bp", "r_pc"):
             some = [group(runs, SPATIAL_ROBOT, f"{name} {way}{known}") for way in ("psi", "tilt")]

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from functools import partial
 
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from cdpr_drake.analyses.studies.framework.runs import Runs
+from cdpr_drake.analyses.studies.framework.study import Form
 from cdpr_drake.analyses.studies.stability_shapes.items import (
     BASELINE,
     NESTED,
     NESTED_FIGURE,
     PLANAR_FIGURE,
     Shape,
-    shape_items,
+    shape_cases,
 )
 from cdpr_drake.analyses.visualization.figure_style import bare_figure, new_figure
 from cdpr_drake.analyses.visualization.solids import draw_solid
@@ -35,47 +36,39 @@ def figure_name(number: str) -> str:
     return f"shapes_{number.replace('.', '_')}"
 
 
-FIGURES = tuple(dict.fromkeys(figure_name(item.figure) for item in shape_items()))
-"""Names of all figures that the study can write."""
-
-
-def shape_drawings(shapes: Sequence[Shape]) -> dict[str, Callable[[], Figure]]:
-    """What draws `shapes_3_13` and so on, by name, of what was finished."""
-    drawn: dict[str, Callable[[], Figure]] = {}
-    for number in dict.fromkeys(one.item.figure for one in shapes):
-        some = [one for one in shapes if one.item.figure == number]
-        draw = {PLANAR_FIGURE: planar_figure, NESTED_FIGURE: nested_figure}
-        drawn[figure_name(number)] = partial(draw.get(number, solids_figure), some)
-    return drawn
-
-
-def solids_figure(some: Sequence[Shape]) -> Figure:
+def shapes(runs: Runs, number: str) -> list[Shape]:
     """The workspaces of one of the thesis' figures."""
-    item = some[0].item
-    robot = load_robot(item.robot)
+    return [Shape(run) for run in runs(figure=number)]
+
+
+def solids_figure(runs: Runs, number: str) -> Figure:
+    """The workspaces of one of the thesis' figures."""
+    some = shapes(runs, number)
+    first = some[0].run
+    robot = load_robot(first["robot"])
     columns = min(COLUMNS, len(some))
     rows = -(-len(some) // columns)
     figure = bare_figure(
         (max(4.3 * columns, LEAST_WIDTH), 1.3 + 4.1 * rows),
-        f"Control stability workspaces, {item.scheme} on {item.robot}, "
-        f"as figure {item.figure} of the servoing thesis",
+        f"Control stability workspaces, {first['scheme']} on {first['robot']}, "
+        f"as figure {number} of the servoing thesis",
     )
     handles: list[Line2D] = []
     for place, one in enumerate(some, start=1):
         axes = figure.add_subplot(rows, columns, place, projection="3d", computed_zorder=False)
         handles += draw_solid(
-            axes, surface_quads(one.inside, one.grid.axes), WORKSPACES["SZ"],
+            axes, surface_quads(one.inside, one.axes), WORKSPACES["SZ"],
             (robot.frame.lower, robot.frame.upper), robot.cable_set().p_WA,
         )  # fmt: skip
-        if one.item.places is not None:
-            start, goal = one.item.places
-            axes.plot(*one.item.places.T, color=IDEAL.color, linestyle=IDEAL.dash, zorder=5)
+        if (places := one.run["places_m"]) is not None:
+            start, goal = places
+            axes.plot(*places.T, color=IDEAL.color, linestyle=IDEAL.dash, zorder=5)
             handles += axes.plot(*start, "o", color=PLATFORM.color, zorder=6, label="start",
                                  markeredgecolor="white")  # fmt: skip
             handles += axes.plot(*goal, DESIRED.marker, color=DESIRED.color, markersize=9,
                                  markeredgecolor="white", zorder=6, label="goal")  # fmt: skip
-        printed = "" if one.item.printed is None else f", published {one.item.printed:g} %"
-        axes.set_title(f"{one.item.name}\n{one.share:.1f} %{printed}", fontsize=10, y=1.0, pad=0)
+        printed = one.printed and f", published {one.printed} %"
+        axes.set_title(f"{one.name}\n{one.share:.1f} %{printed}", fontsize=10, y=1.0, pad=0)
     figure.legend(
         handles=list({one.get_label(): one for one in handles}.values()),
         loc="outside lower center", ncols=4, title_fontsize=9,
@@ -84,9 +77,9 @@ def solids_figure(some: Sequence[Shape]) -> Figure:
     return figure
 
 
-def nested_figure(some: Sequence[Shape]) -> Figure:
+def nested_figure(runs: Runs, number: str) -> Figure:
     """The planar robot's workspaces under one larger bound each, over the baseline."""
-    found = {one.item.name: one for one in some}
+    found = {one.name: one for one in shapes(runs, number)}
     base = found.get(BASELINE)
     groups = {
         bound: [one for name, one in found.items() if name.partition("=")[0] == bound]
@@ -104,16 +97,16 @@ def nested_figure(some: Sequence[Shape]) -> Figure:
         flat, zip("abcdefgh", groups.items(), strict=False), strict=False
     ):
         shown = [*([base] if base is not None else []), *group]
-        for number, one in enumerate(shown):
-            points, look = one.points(), nth_look(number)
-            printed = "" if one.item.printed is None else f" ({one.item.printed:g})"
+        for k, one in enumerate(shown):
+            points, look = one.points(), nth_look(k)
+            printed = one.printed and f" ({one.printed})"
             axes.plot(
-                points[:, 0], points[:, 1], linestyle="", marker="so^"[number],
-                markersize=(6.5, 4.5, 3.0)[number], color=("#b9cfe4", *[look.color] * 2)[number],
-                markerfacecolor=("#b9cfe4", "white", look.color)[number],
-                label=f"{one.item.name}: {one.share:.1f}{printed} %",
+                points[:, 0], points[:, 1], linestyle="", marker="so^"[k],
+                markersize=(6.5, 4.5, 3.0)[k], color=("#b9cfe4", *[look.color] * 2)[k],
+                markerfacecolor=("#b9cfe4", "white", look.color)[k],
+                label=f"{one.name}: {one.share:.1f}{printed} %",
             )  # fmt: skip
-        x, y = shown[0].grid.axes[:2]
+        x, y = shown[0].axes[:2]
         axes.set(
             xlim=(x[0] - 0.05, x[-1] + 0.05), ylim=(y[0] - 0.05, y[-1] + 0.05), aspect="equal",
             xlabel="x in W [m]", title=f"({letter}) {bound}",
@@ -127,8 +120,9 @@ def nested_figure(some: Sequence[Shape]) -> Figure:
     return figure
 
 
-def planar_figure(some: Sequence[Shape]) -> Figure:
+def planar_figure(runs: Runs, number: str) -> Figure:
     """The planar robot's workspaces, one beside the other."""
+    some = shapes(runs, number)
     figure, panels = new_figure(
         1,
         len(some),
@@ -140,10 +134,19 @@ def planar_figure(some: Sequence[Shape]) -> Figure:
         look = nth_look(k)
         axes.plot(points[:, 0], points[:, 1], linestyle="", marker="s", markersize=5.0,
                   color=look.color)  # fmt: skip
-        x, y = one.grid.axes[:2]
+        x, y = one.axes[:2]
         axes.set(
             xlim=(x[0] - 0.05, x[-1] + 0.05), ylim=(y[0] - 0.05, y[-1] + 0.05), aspect="equal",
             xlabel="x in W [m]", ylabel="y in W [m]",
-            title=f"{one.item.name}: {one.share:.1f} %",
+            title=f"{one.name}: {one.share:.1f} %",
         )  # fmt: skip
     return figure
+
+
+DRAWN = {PLANAR_FIGURE: planar_figure, NESTED_FIGURE: nested_figure}
+
+FIGURES = {
+    figure_name(number): partial(DRAWN.get(number, solids_figure), number=number)
+    for number in dict.fromkeys(str(case.keys["figure"]) for case in shape_cases(Form(quick=True)))
+}
+"""What draws the figures, by name."""

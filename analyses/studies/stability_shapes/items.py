@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import partial
+from typing import Any
 
 import numpy as np
 
+from cdpr_drake.analyses.studies.framework.runs import Run
+from cdpr_drake.analyses.studies.framework.study import Case, Form
 from cdpr_drake.analyses.studies.published.stability_recipe import (
     recipe_bounds,
     recipe_case,
@@ -69,6 +72,8 @@ SINGLE_VOLUME = (0.514, 1.014)
 SINGLE_PLACES = np.array([[0.097, -0.026, 0.323], [0.164, 0.066, 0.1]])
 """Where the platform of section 3.4.2 starts; where it ends is lost in the text: above the tag."""
 
+UNTURNED = np.zeros((1, 3))
+
 PLANAR_FIGURE = "3.10"
 
 COMBINATIONS = {
@@ -104,41 +109,72 @@ TURNED_TABLE = "A.13"
 """The small platform of ACROBOT under 2 1/2 D."""
 
 
-@dataclass(frozen=True, eq=False)
-class ShapeItem:
+def shape_case(
+    figure: str,
+    name: str,
+    robot: str,
+    scheme: str,
+    bounds: PerturbationBounds,
+    *,
+    quick: bool,
+    angles: Array = UNTURNED,
+    printed: float | None = None,
+    target: ServoTarget | None = None,
+    places: Array | None = None,
+) -> Case:
     """A workspace to compute.
 
-    Attributes:
+    Args:
         figure: The thesis' number of the figure.
         name: Of the panel, such as `r_bp=0.5`; once in a figure.
         robot: Name of the robot.
         scheme: Of visual servoing.
         bounds: What limits the perturbations.
+        quick: Whether on a coarse grid.
         angles: Orientations in all of which a position must be stable, shape (k, 3) [rad].
         printed: Published share of the full workspace [%]; None where there is none.
         target: What is servoed to; None: that of the recipe.
         places: Start and goal of the platform that are drawn, shape (2, 3) [m]; None where none
             are printed.
     """
+    known = recipe_case(robot, scheme)
+    if target is not None:  # with it goes the camera's place of section 3.4.2, see there
+        known = StabilityCase(known.cables, scheme, target=target)
+    grid = WorkspaceGrid(recipe_grid(robot, quick).axes, angles)
+    return Case(
+        name=f"{figure} {name}",
+        keys={"figure": figure, "panel": name, "robot": robot, "scheme": scheme},
+        data={"bounds": bounds.as_dict(), "places_m": places},
+        task=SampledTask(known, bounds, grid, recipe_options(robot)),
+        items=grid.size,
+        printed={} if printed is None else {"share_percent": f"{printed:g}"},
+    )
 
-    figure: str
-    name: str
-    robot: str
-    scheme: str
-    bounds: PerturbationBounds
-    angles: Array
-    printed: float | None = None
-    target: ServoTarget | None = None
-    places: Array | None = None
 
-    @property
-    def key(self) -> str:
-        """Name of its task."""
-        return f"{self.figure} {self.name}"
+def shape_row(case: Case, arrays: Mapping[str, np.ndarray]) -> dict[str, Any]:
+    """The workspace by the verdicts on its poses.
 
-    def grid(self, quick: bool) -> WorkspaceGrid:
-        """Its poses."""
-        return WorkspaceGrid(recipe_grid(self.robot, quick).axes, self.angles)
+    Returns:
+        share_percent: of the whole box; positions_inside of positions; bounds; orientations_rad;
+        inside: which positions are stable in all orientations, shape (nx, ny, nz); x_m, y_m, z_m:
+        of the grid; places_m: start and goal, shape (2, 3), or None.
+    """
+    assert isinstance(case.task, SampledTask)
+    grid = case.task.grid
+    inside = np.all(arrays["stable"].reshape(grid.shape), axis=0)
+    volume, full = (
+        workspace_volume(one, grid.axes, VolumeRule.CORNERS).value
+        for one in (inside, np.ones_like(inside))
+    )
+    return {
+        "share_percent": 100.0 * volume / full,
+        "positions_inside": int(np.sum(inside)),
+        "positions": inside.size,
+        "orientations_rad": grid.angles.tolist(),
+        "inside": inside,
+        **dict(zip(("x_m", "y_m", "z_m"), grid.axes, strict=True)),
+        **case.data,
+    }
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,36 +182,44 @@ class Shape:
     """A workspace that was computed.
 
     Attributes:
-        item: What it is of.
-        grid: Its poses.
-        inside: Which positions are stable in all orientations, shape (nx, ny, nz).
+        run: Its row.
     """
 
-    item: ShapeItem
-    grid: WorkspaceGrid
-    inside: np.ndarray
+    run: Run
 
-    @cached_property
-    def volume(self) -> float:
-        """Of the cells with all corners inside [m^3], in a plane [m^2]."""
-        return workspace_volume(self.inside, self.grid.axes, VolumeRule.CORNERS).value
+    @property
+    def name(self) -> str:
+        """Of its panel."""
+        return str(self.run["panel"])
+
+    @property
+    def inside(self) -> np.ndarray:
+        """Which positions are stable in all orientations, shape (nx, ny, nz)."""
+        return np.asarray(self.run["inside"])
+
+    @property
+    def axes(self) -> tuple[Array, Array, Array]:
+        """Of the grid [m]."""
+        return self.run["x_m"], self.run["y_m"], self.run["z_m"]
 
     @property
     def share(self) -> float:
         """Of the whole box [%]."""
-        whole = np.ones_like(self.inside)
-        return 100.0 * self.volume / workspace_volume(
-            whole, self.grid.axes, VolumeRule.CORNERS
-        ).value  # fmt: skip
+        return float(self.run["share_percent"])
+
+    @property
+    def printed(self) -> str:
+        """Published share of the whole box [%]; empty where there is none."""
+        return self.run.printed.get("share_percent", "")
 
     def points(self) -> Array:
         """Positions inside, shape (k, 3) [m]."""
-        return np.stack(np.meshgrid(*self.grid.axes, indexing="ij"), -1)[self.inside]
+        return np.stack(np.meshgrid(*self.axes, indexing="ij"), -1)[self.inside]
 
     def top(self) -> float:
         """The highest plane with a point inside, above the lowest plane [m]; -inf if empty."""
         heights = np.flatnonzero(np.any(self.inside, axis=(0, 1)))
-        z = self.grid.axes[2]
+        z = self.axes[2]
         return float(z[heights[-1]] - z[0]) if len(heights) else -math.inf
 
     def areas(self) -> Array:
@@ -185,81 +229,51 @@ class Shape:
     def holds(self, place: Array) -> bool:
         """Whether the grid's position nearest to a place, shape (3,) [m], is inside."""
         nearest = tuple(
-            int(np.argmin(np.abs(axis - x))) for axis, x in zip(self.grid.axes, place, strict=True)
+            int(np.argmin(np.abs(axis - x))) for axis, x in zip(self.axes, place, strict=True)
         )
         return bool(self.inside[nearest])
 
-    def as_dict(self) -> dict[str, object]:
-        """For JSON."""
-        return {
-            "figure": self.item.figure,
-            "name": self.item.name,
-            "robot": self.item.robot,
-            "scheme": self.item.scheme,
-            "bounds": self.item.bounds.as_dict(),
-            "orientations_rad": self.item.angles.tolist(),
-            "share_percent": self.share,
-            "published_percent": self.item.printed,
-            "positions_inside": int(np.sum(self.inside)),
-            "positions": self.inside.size,
-        }
 
-
-def shape_items() -> Iterator[ShapeItem]:
-    """All of them, figure by figure."""
+def shape_cases(form: Form) -> Iterator[Case]:
+    """All of them, figure by figure; in the quick form on coarse grids."""
+    shape = partial(shape_case, quick=form.quick)
     tables: Mapping[str, PublishedTable] = {table.name: table for table in TABLES}
-    still = np.zeros((1, 3))
     for figure, (name, rows) in PANELS.items():
         table = tables[name]
         for bound, value in (("r_bp", BASELINE_VALUES["r_bp"]), *rows):
-            yield _row(figure, table, bound, value)
+            yield _row(shape, figure, table, bound, value)
     for bound, value in (
         ("r_bp", BASELINE_VALUES["r_bp"]),
         *((bound, value) for bound, values in NESTED.items() for value in values),
     ):
-        yield _row(NESTED_FIGURE, tables[NESTED_TABLE], bound, value)
+        yield _row(shape, NESTED_FIGURE, tables[NESTED_TABLE], bound, value)
     for combination, bounds in COMBINATIONS.items():
-        yield ShapeItem(PLANAR_FIGURE, combination, "planar", "pbvs", bounds, still)
+        yield shape(PLANAR_FIGURE, combination, "planar", "pbvs", bounds)
     table = tables[TURNED_TABLE]
     turns = np.vstack([np.zeros((1, 3)), TURN * np.eye(3), -TURN * np.eye(3)])
     for name, bounds in SETS.items():
-        yield ShapeItem(
-            TURNED_FIGURE, name, table.robot, table.scheme, bounds, turns, places=TURNED_PLACES
-        )
+        yield shape(
+            TURNED_FIGURE, name, table.robot, table.scheme, bounds,
+            angles=turns, places=TURNED_PLACES,
+        )  # fmt: skip
     # Without the turns, as in figure 3.20a, but of the platform of case VII.
-    yield ShapeItem(
-        TURNED_FIGURE, BASELINE, table.robot, table.scheme,
-        recipe_bounds(table, "r_bp", BASELINE_VALUES["r_bp"]), still,
-        table.rows["r_bp"][BASELINE_VALUES["r_bp"]],
-    )  # fmt: skip
+    yield _row(shape, TURNED_FIGURE, table, "r_bp", BASELINE_VALUES["r_bp"])
     whole = recipe_grid(SINGLE_ROBOT)
-    yield ShapeItem(
+    yield shape(
         SINGLE_FIGURE, "d_theta_pc=55 deg alone", SINGLE_ROBOT, "pbvs",
-        PerturbationBounds(d_theta_pc=math.radians(55.0)), still,
-        round(100.0 * SINGLE_VOLUME[0] / SINGLE_VOLUME[1], 1),
+        PerturbationBounds(d_theta_pc=math.radians(55.0)),
+        printed=round(100.0 * SINGLE_VOLUME[0] / SINGLE_VOLUME[1], 1),
         target=OppositeCorner(whole.lower, whole.upper), places=SINGLE_PLACES,
     )  # fmt: skip
 
 
-def _row(figure: str, table: PublishedTable, bound: str, value: float) -> ShapeItem:
+def _row(
+    shape: Callable[..., Case], figure: str, table: PublishedTable, bound: str, value: float
+) -> Case:
     """A row of a table as a panel of a figure."""
     first = bound == "r_bp" and value == BASELINE_VALUES["r_bp"]
     words = f"{bound.removesuffix('_deg')}={value:g}" + (" deg" if bound.endswith("_deg") else "")
-    return ShapeItem(
+    return shape(
         figure, BASELINE if first else words, table.robot, table.scheme,
-        recipe_bounds(table, bound, value), np.zeros((1, 3)), table.rows[bound][value],
+        recipe_bounds(table, bound, value), printed=table.rows[bound][value],
     )  # fmt: skip
-
-
-def shape_task(item: ShapeItem, quick: bool) -> SampledTask:
-    """What computes an item."""
-    case = recipe_case(item.robot, item.scheme)
-    if item.target is not None:  # with it goes the camera's place of section 3.4.2, see there
-        case = StabilityCase(case.cables, item.scheme, target=item.target)
-    return SampledTask(case, item.bounds, item.grid(quick), recipe_options(item.robot))
-
-
-def shape_of(item: ShapeItem, quick: bool, stable: np.ndarray) -> Shape:
-    """The workspace by the verdicts on an item's poses."""
-    grid = item.grid(quick)
-    return Shape(item, grid, np.all(stable.reshape(grid.shape), axis=0))

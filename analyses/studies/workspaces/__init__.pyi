@@ -1,3 +1,1 @@
-from .figures import FIGURES as FIGURES
-from .statements import CHECKS as CHECKS
-from .study import study_workspaces as study_workspaces
+from .study import STUDY as STUDY

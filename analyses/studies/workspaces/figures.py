@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
 
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from cdpr_drake.analyses.studies.workspaces.items import EVERY, FIGURE, FoundWorkspace
-from cdpr_drake.analyses.studies.workspaces.tables import ALL, ALL_BUT_CLOSURE, shares_of
+from cdpr_drake.analyses.studies.framework.runs import Runs
+from cdpr_drake.analyses.studies.workspaces.items import (
+    ALL,
+    ALL_BUT_CLOSURE,
+    EVERY,
+    FIGURE,
+    static,
+)
 from cdpr_drake.analyses.visualization.figure_style import bar_style, bare_figure, new_figure
 from cdpr_drake.analyses.visualization.solids import draw_solid
 from cdpr_drake.analyses.workspaces.conditions import KINDS
@@ -27,37 +33,17 @@ PUBLISHED_FIGURES = {
 DARK = 55.0
 """Numbers on cells of a larger share are white [%]."""
 
-FIGURES = (*PUBLISHED_FIGURES, "kinds", "pairs")
-"""Names of all figures that the study can write."""
 
-
-def workspace_drawings(found: Sequence[FoundWorkspace]) -> dict[str, Callable[[], Figure]]:
-    """What draws the figures that the results suffice for, by name."""
-    drawn: dict[str, Callable[[], Figure]] = {}
-    for name, (number, robots) in PUBLISHED_FIGURES.items():
-        some = [
-            one for one in found
-            if one.item.group == FIGURE and one.item.upper_share == 1.0
-            and one.item.robot in robots
-        ]  # fmt: skip
-        if some:
-            drawn[name] = partial(static_figure, some, number)
-    kinds = [one for one in found if one.item.group == EVERY]
-    if kinds:
-        drawn["kinds"] = partial(kinds_figure, kinds)
-        drawn["pairs"] = partial(pairs_figure, kinds)
-    return drawn
-
-
-def static_figure(some: Sequence[FoundWorkspace], number: str) -> Figure:
+def static_figure(runs: Runs, number: str, robots: tuple[str, ...]) -> Figure:
     """Static workspaces as solids in the frame, a row for each robot.
 
     Args:
-        some: Static workspaces with the robot file's upper limit.
+        runs: Of the study.
         number: Number of the thesis' figure.
+        robots: Which, with the limit of their files.
     """
-    robots = list(dict.fromkeys(one.item.robot for one in some))
-    columns = max(sum(one.item.robot == robot for one in some) for robot in robots)
+    some = runs(group=FIGURE, upper_share=1.0, robot=robots)
+    columns = max(some.counts("robot").values())
     figure = bare_figure(
         (5.2 * columns, 0.9 + 4.9 * len(robots)),
         f"Static feasible workspace, as figure {number} of the servoing thesis",
@@ -65,27 +51,22 @@ def static_figure(some: Sequence[FoundWorkspace], number: str) -> Figure:
     handles: list[Line2D] = []
     for row, name in enumerate(robots):
         robot = load_robot(name)
-        mine = sorted(
-            (one for one in some if one.item.robot == name), key=lambda one: one.item.limits[0]
-        )
-        for column, one in enumerate(mine):
+        mine = sorted(some(robot=name), key=lambda run: float(run["lower_limit_n"]))
+        for column, run in enumerate(mine):
             place = 1 + row * columns + column
             axes = figure.add_subplot(
                 len(robots), columns, place, projection="3d", computed_zorder=False
             )
-            inside = one.places(one.holds["static"])
             handles = draw_solid(
                 axes,
-                surface_quads(inside, one.item.question.grid.axes),
+                surface_quads(static(run), (run["x_m"], run["y_m"], run["z_m"])),
                 WORKSPACES["SZ"],
                 (robot.frame.lower, robot.frame.upper),
                 robot.cable_set().p_WA,
             )
-            volume = one.volume(one.holds["static"])
-            low, high = one.item.limits
             axes.set_title(
-                f"{name}, {low:g} to {high:g} N\n{volume.value:.3g} m³, "
-                f"{100.0 * volume.share:.1f} % of the frame",
+                f"{name}, {run['lower_limit_n']:g} to {run['upper_limit_n']:g} N\n"
+                f"{run['volume_m3']:.3g} m³, {100.0 * run['frame_share']:.1f} % of the frame",
                 fontsize=11, y=1.0, pad=0,
             )  # fmt: skip
     figure.legend(
@@ -99,19 +80,20 @@ def static_figure(some: Sequence[FoundWorkspace], number: str) -> Figure:
     return figure
 
 
-def kinds_figure(kinds: Sequence[FoundWorkspace]) -> Figure:
+def kinds_figure(runs: Runs) -> Figure:
     """Share of the frame's poses where each kind holds, a bar for each robot."""
+    kinds = runs(group=EVERY)
     names = [*KINDS, ALL_BUT_CLOSURE, ALL]
-    robots = [one.item.robot for one in kinds]
+    robots = kinds.list("robot")
     figure, axes = new_figure(1, 1, (10.0, 9.5), "Where each kind holds, of the poses in the frame")
     size = 0.85 / len(kinds)
     for number, one in enumerate(kinds):
-        shares = shares_of(one)
+        shares = one["pose_shares"]
         asked = [k for k, name in enumerate(names) if name in shares]
         places = [k + size * (number - (len(kinds) - 1) / 2.0) for k in asked]
         axes.barh(
             places, [100.0 * shares[names[k]] for k in asked], 0.9 * size,
-            label=one.item.robot, **bar_style(look_of(one.item.robot, robots)),
+            label=one["robot"], **bar_style(look_of(one["robot"], robots)),
         )  # fmt: skip
         for k, name in enumerate(names):
             if name not in shares:
@@ -126,8 +108,9 @@ def kinds_figure(kinds: Sequence[FoundWorkspace]) -> Figure:
     return figure
 
 
-def pairs_figure(kinds: Sequence[FoundWorkspace]) -> Figure:
+def pairs_figure(runs: Runs) -> Figure:
     """Share of the frame's poses where two kinds hold, a matrix for each robot."""
+    kinds = runs(group=EVERY)
     columns = min(3, len(kinds))
     rows = -(-len(kinds) // columns)
     figure, grid = new_figure(
@@ -138,12 +121,12 @@ def pairs_figure(kinds: Sequence[FoundWorkspace]) -> Figure:
     panels = list(np.ravel(grid))
     image = None
     for number, (axes, one) in enumerate(zip(panels, kinds, strict=False)):
-        names = list(KINDS)
+        names, together = list(KINDS), one["pose_shares_of_pairs"]
         shares = np.full((len(names), len(names)), np.nan)
         for a, first in enumerate(names):
             for b, second in enumerate(names[: a + 1]):
-                if first in one.holds and second in one.holds:
-                    shares[a, b] = 100.0 * np.mean(one.holds[first] & one.holds[second])
+                if first in together and second in together:
+                    shares[a, b] = 100.0 * together[first][second]
         image = axes.imshow(shares, cmap="Greens", vmin=0.0, vmax=100.0)
         for (a, b), share in np.ndenumerate(shares):
             if np.isfinite(share):
@@ -153,12 +136,21 @@ def pairs_figure(kinds: Sequence[FoundWorkspace]) -> Figure:
         lowest = number + columns >= len(kinds)
         axes.set_xticks(range(len(names)), names if lowest else [], rotation=90, fontsize=9)
         axes.set_yticks(range(len(names)), names if number % columns == 0 else [], fontsize=9)
-        axes.set_title(
-            f"{one.item.robot}\n{ALL_BUT_CLOSURE}: {100.0 * shares_of(one)[ALL_BUT_CLOSURE]:.1f} %",
-            fontsize=11,
-        )
+        most = 100.0 * one["pose_shares"][ALL_BUT_CLOSURE]
+        axes.set_title(f"{one['robot']}\n{ALL_BUT_CLOSURE}: {most:.1f} %", fontsize=11)
     for axes in panels[len(kinds) :]:
         axes.remove()
     if image is not None:
         figure.colorbar(image, ax=panels[: len(kinds)], label="share of the poses [%]")
     return figure
+
+
+FIGURES: dict[str, Callable[[Runs], Figure]] = {
+    **{
+        name: partial(static_figure, number=number, robots=robots)
+        for name, (number, robots) in PUBLISHED_FIGURES.items()
+    },
+    "kinds": kinds_figure,
+    "pairs": pairs_figure,
+}
+"""What draws the figures, by name."""

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
+from cdpr_drake.analyses.studies.framework.runs import Run
+from cdpr_drake.analyses.studies.framework.study import Case, Form
+from cdpr_drake.analyses.studies.workspaces.distances import POSES, QUICK_POSES, DistanceTask
+from cdpr_drake.analyses.studies.workspaces.distances import ROBOTS as DISTANCE_ROBOTS
 from cdpr_drake.analyses.workspaces.conditions import KINDS
 from cdpr_drake.analyses.workspaces.workspace_question import (
     WorkspaceQuestion,
@@ -19,7 +25,7 @@ from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.workspaces.demanded_wrenches import SpatialSet
 from cdpr_drake.workspaces.pose_grid import WorkspaceGrid, grid_by_count
-from cdpr_drake.workspaces.volume import VolumeRule, WorkspaceVolume, workspace_volume
+from cdpr_drake.workspaces.volume import VolumeRule, workspace_volume
 
 PUBLISHED_LOWER = {
     "acrobot_small": (0.0, 1.0),
@@ -56,74 +62,143 @@ CAMERA_KIND = "target-visible"
 STRONG = 1e9
 """Upper tension limit that stands for none [N]."""
 
-FIGURE, EVERY, ALONE, ZERO, HEAVY, ENDLESS = (
-    "figure", "every kind", "alone", "zero sets", "other mass", "no upper limit",
+FIGURE, EVERY, ALONE, ZERO, HEAVY, ENDLESS, DISTANCES = (
+    "figure", "every kind", "alone", "zero sets", "other mass", "no upper limit", "distances",
 )  # fmt: skip
-"""What items are for."""
+"""What cases are for."""
 
 
-@dataclass(frozen=True, eq=False)
-class WorkspaceItem:
-    """A question of the study, a task of its sweep.
+@dataclass(frozen=True)
+class QuestionTask:
+    """Sweep task: the answers of a question.
 
     Attributes:
+        question: The question.
+    """
+
+    question: WorkspaceQuestion
+
+    def __call__(self, start: int, stop: int) -> dict[str, np.ndarray]:
+        """Where each kind holds of the poses start to stop, shape (n,)."""
+        return self.question.task()(start, stop)
+
+    def arguments(self) -> dict[str, Any]:
+        """All that the answers depend on, for JSON."""
+        return self.question.arguments()
+
+
+def question_case(
+    name: str,
+    group: str,
+    question: WorkspaceQuestion,
+    upper_share: float = 1.0,
+    left_out: Mapping[str, str] = MappingProxyType({}),
+) -> Case:
+    """A question of the study.
+
+    Args:
         name: Unique in the study.
         group: `FIGURE`, `EVERY`, `ALONE`, `ZERO`, `HEAVY` or `ENDLESS`.
         question: The question.
         upper_share: Upper tension limit over that of the robot's file.
+        left_out: Kinds that the robot cannot be asked for, with the reason.
     """
-
-    name: str
-    group: str
-    question: WorkspaceQuestion
-    upper_share: float = 1.0
-
-    @property
-    def robot(self) -> str:
-        """Name of the robot."""
-        return self.question.robot
-
-    @property
-    def limits(self) -> tuple[float, float]:
-        """Smallest and largest tension [N]."""
-        case = self.question.about.case
-        return float(case.lower[0]), float(case.upper[0])
+    statics = question.about.case
+    keys = {
+        "group": group, "robot": question.robot, "lower_limit_n": float(statics.lower[0]),
+        "upper_limit_n": float(statics.upper[0]), "upper_share": upper_share,
+    }  # fmt: skip
+    task = QuestionTask(question)
+    return Case(name=name, keys=keys, data=dict(left_out), task=task, items=question.grid.size)
 
 
-@dataclass(frozen=True, eq=False)
-class FoundWorkspace:
-    """An item with its answers.
+def distance_case(robot: str, poses: int) -> Case:
+    """A comparison of clearances with Drake's distances."""
+    keys = {"group": DISTANCES, "robot": robot}
+    return Case(name=f"{robot}, distances", keys=keys, task=DistanceTask(robot), items=poses)
 
-    Attributes:
-        item: The item.
-        holds: Where each kind holds, over all poses of the grid, shape (n,).
+
+def workspace_row(case: Case, arrays: Mapping[str, np.ndarray]) -> dict[str, Any]:
+    """What was found.
+
+    Returns:
+        Of distances: poses, how many of them differ, how many were settled by least squares,
+        difference_m: the largest. Else points: along each axis; x_m, y_m, z_m: of the grid;
+        kinds; holds_KIND: where each holds, shape (nx, ny, nz). Of a figure volume_m3 and
+        frame_m3, and shares of the poses and of the frame. Of every kind what it was asked for,
+        pose_shares, frame_shares and pose_shares_of_pairs, and left_out: kinds with the reason.
     """
+    if not isinstance(case.task, QuestionTask):
+        return {
+            "poses": len(arrays["wrong"]),
+            "differ": int(np.count_nonzero(arrays["wrong"])),
+            "settled": int(np.count_nonzero(arrays["settled"])),
+            "difference_m": np.max(arrays["differences"]),
+        }
+    question = case.task.question
+    shape, axes, group = question.grid.shape[1:], question.grid.axes, case.keys["group"]
+    holds = {kind: arrays[kind].astype(bool).reshape(shape) for kind in question.kinds}
+    row = {
+        "points": list(shape),
+        "kinds": list(question.kinds),
+        **{f"holds_{kind}": one for kind, one in holds.items()},
+        **dict(zip(("x_m", "y_m", "z_m"), axes, strict=True)),
+    }
+    if group == FIGURE:
+        volume = workspace_volume(holds["static"], axes, VolumeRule.CORNERS)
+        row |= {
+            "pose_share": np.mean(holds["static"]), "volume_m3": volume.value,
+            "frame_m3": volume.full, "frame_share": volume.share,
+        }  # fmt: skip
+    elif group == EVERY:
+        row |= _kind_row(question, holds) | {"left_out": case.data}
+    return row
 
-    item: WorkspaceItem
-    holds: dict[str, np.ndarray]
 
-    @property
-    def all_kinds(self) -> np.ndarray:
-        """Where all its kinds hold, shape (n,)."""
-        return np.asarray(np.logical_and.reduce(list(self.holds.values())))
+def _kind_row(question: WorkspaceQuestion, holds: Mapping[str, np.ndarray]) -> dict[str, Any]:
+    about, axes = question.about, question.grid.axes
+    assert about.required is not None
+    assert about.motion is not None
+    return {
+        "required_box_nm_n": about.required.box.tolist(),
+        "acceleration_box_rad_s2_m_s2": about.motion.accelerations.box.tolist(),
+        "scenario": question.scenario,
+        "pose_shares": shares_of(holds),
+        "frame_shares": {
+            kind: workspace_volume(one, axes, VolumeRule.CORNERS).share
+            for kind, one in holds.items()
+        },
+        "pose_shares_of_pairs": {
+            a: {b: float(np.mean(holds[a] & holds[b])) for b in holds} for a in holds
+        },
+    }
 
-    def places(self, holds: np.ndarray) -> np.ndarray:
-        """A kind on the axes of the grid, shape (nx, ny, nz)."""
-        return np.asarray(holds).reshape(self.item.question.grid.shape[1:])
 
-    def volume(self, holds: np.ndarray) -> WorkspaceVolume:
-        """Volume of the cells with all corners inside, of the frame; an area in a plane."""
-        axes = self.item.question.grid.axes
-        return workspace_volume(self.places(holds), axes, VolumeRule.CORNERS)
+ALL = "all"
+"""What all kinds of a robot have in common."""
+
+ALL_BUT_CLOSURE = "all but wrench-closure"
+"""The same without the kind that robots hanging on their cables never have."""
 
 
-@dataclass(frozen=True)
-class LeftOut:
-    """A kind that a robot cannot be asked for."""
+def shares_of(holds: Mapping[str, np.ndarray]) -> dict[str, float]:
+    """Shares of the poses where each kind holds, where all but one do, and all."""
+    others = [one for kind, one in holds.items() if kind != "wrench-closure"]
+    return {
+        **{kind: float(np.mean(one)) for kind, one in holds.items()},
+        ALL_BUT_CLOSURE: float(np.mean(np.logical_and.reduce(others))),
+        ALL: float(np.mean(np.logical_and.reduce(list(holds.values())))),
+    }
 
-    robot: str
-    kind: str
-    why: str
+
+def holds_of(run: Run) -> dict[str, np.ndarray]:
+    """Where each kind holds, on the axes of the grid, shape (nx, ny, nz)."""
+    return {kind: run[f"holds_{kind}"] for kind in run["kinds"]}
+
+
+def static(run: Run) -> np.ndarray:
+    """Where the static kind holds, shape (nx, ny, nz)."""
+    return np.asarray(run["holds_static"])
 
 
 def frame_grid(robot: Robot, counts: Sequence[int]) -> WorkspaceGrid:
@@ -132,9 +207,8 @@ def frame_grid(robot: Robot, counts: Sequence[int]) -> WorkspaceGrid:
     return grid_by_count(lower, upper, counts)
 
 
-def figure_items(quick: bool) -> list[WorkspaceItem]:
+def figure_cases(quick: bool) -> Iterator[Case]:
     """Static workspaces of figures 1.17 and 1.18, with the upper limit of the file and others."""
-    items = []
     for name, lowers in PUBLISHED_LOWER.items():
         robot = load_robot(name)
         step = STEPS[name] * (QUICK_STEPS if quick else 1.0)
@@ -148,8 +222,7 @@ def figure_items(quick: bool) -> list[WorkspaceItem]:
                     name, ["static"], grid, asked=WorkspaceRequest(limits=limits)
                 )
                 words = f"{name}, {limits[0]:g} to {limits[1]:g} N"
-                items.append(WorkspaceItem(words, FIGURE, question, share))
-    return items
+                yield question_case(words, FIGURE, question, share)
 
 
 ROBOTS = (
@@ -159,35 +232,34 @@ ROBOTS = (
 """Robots of the two theses, of which every kind is looked at."""
 
 
-def kind_items(quick: bool) -> tuple[list[WorkspaceItem], list[LeftOut]]:
-    """Every kind for every robot of `ROBOTS`, what checks it, and kinds that are not possible."""
-    items: list[WorkspaceItem] = []
-    left_out: list[LeftOut] = []
+def study_cases(form: Form) -> Iterator[Case]:
+    """All questions: figures, every kind for every robot of `ROBOTS` with what checks it, and
+    distances."""
+    yield from figure_cases(form.quick)
     for name in ROBOTS:
-        mine, without = _robot_items(name, QUICK_POINTS if quick else KIND_POINTS)
-        items += mine
-        left_out += without
-    return items, left_out
+        yield from robot_cases(name, QUICK_POINTS if form.quick else KIND_POINTS)
+    for name in DISTANCE_ROBOTS:
+        yield distance_case(name, QUICK_POSES if form.quick else POSES)
 
 
-def _robot_items(name: str, counts: Sequence[int]) -> tuple[list[WorkspaceItem], list[LeftOut]]:
+def robot_cases(name: str, counts: Sequence[int]) -> Iterator[Case]:
+    """Every kind that a robot can be asked for, and what checks it."""
     robot = load_robot(name)
     grid = frame_grid(robot, counts)
     asked, problem = _asked_of(robot, name, grid)
-    left_out = [] if problem is None else [LeftOut(name, CAMERA_KIND, problem)]
+    left_out = {} if problem is None else {CAMERA_KIND: problem}
     wanted = [kind for kind in KINDS if kind != CAMERA_KIND or problem is None]
     try:
         every = make_workspace_question(name, wanted, grid, asked=asked)
     except CdprError:
         refused = {kind: _refusal(name, kind, grid, asked) for kind in wanted}
-        left_out += [LeftOut(name, kind, why) for kind, why in refused.items() if why]
+        left_out |= {kind: why for kind, why in refused.items() if why}
         wanted = [kind for kind, why in refused.items() if not why]
         every = make_workspace_question(name, wanted, grid, asked=asked)
     kinds = every.kinds
-    alone = [
-        WorkspaceItem(f"{name}, {kind} alone", ALONE, replace(every, kinds=(kind,)))
-        for kind in kinds
-    ]
+    yield question_case(f"{name}, {EVERY}", EVERY, every, left_out=left_out)
+    for kind in kinds:
+        yield question_case(f"{name}, {kind} alone", ALONE, replace(every, kinds=(kind,)))
     zero = WorkspaceRequest(required=SpatialSet(), accelerations=SpatialSet())
     low = robot.tension_limits(None)[0]
     checks: list[tuple[str, list[str], WorkspaceRequest]] = [
@@ -197,11 +269,9 @@ def _robot_items(name: str, counts: Sequence[int]) -> tuple[list[WorkspaceItem],
     if "wrench-closure" in kinds:
         heavy = WorkspaceRequest(mass=OTHER_MASS * robot.platform.mass)
         checks.append((HEAVY, ["wrench-closure"], heavy))
-    items = [WorkspaceItem(f"{name}, {EVERY}", EVERY, every), *alone]
     for group, some, given in checks:
         question = make_workspace_question(name, some, grid, asked=given)
-        items.append(WorkspaceItem(f"{name}, {group}", group, question))
-    return items, left_out
+        yield question_case(f"{name}, {group}", group, question)
 
 
 def _refusal(name: str, kind: str, grid: WorkspaceGrid, asked: WorkspaceRequest) -> str:

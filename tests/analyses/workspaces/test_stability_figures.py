@@ -7,8 +7,8 @@ from matplotlib.collections import QuadMesh
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from cdpr_drake.analyses.studies.control_stability.figures import table_figure
-from cdpr_drake.analyses.studies.control_stability.tables import StabilityRow
-from cdpr_drake.analyses.studies.published.stability_recipe import recipe_grid
+from cdpr_drake.analyses.studies.control_stability.tables import COARSE, FULL
+from cdpr_drake.analyses.studies.framework.runs import Run, Runs
 from cdpr_drake.analyses.studies.published.stability_tables import TABLES
 from cdpr_drake.analyses.workspaces.stability_figures import (
     COLORS,
@@ -133,22 +133,15 @@ def test_curves_that_lie_on_each_other_can_both_be_seen():
 @pytest.mark.parametrize("quick", [True, False])
 def test_tables_tell_verdicts_apart_and_say_that_a_grid_is_coarse(quick):
     table = next(table for table in TABLES if table.name == "A.8")
-    grid = recipe_grid(table.robot, quick).size
-    shares, poses = dict.fromkeys(VERDICTS, 50.0), dict.fromkeys(VERDICTS, 9)
     rows = [
-        StabilityRow(
-            table="A.8",
-            bound=bound,
-            value=value,
-            published=60.0,
-            shares=shares,
-            poses=poses,
-            grid=grid,
-            ordered=True,
+        Run(
+            f"{bound}={value}", None,
+            {"table": "A.8", "bound": bound, "value": value, "grid": COARSE if quick else FULL},
+            {f"{verdict}_percent": 50.0 for verdict in VERDICTS}, {"sampled_percent": "60"},
         )
         for bound, value in (("r_bp", 0.05), ("r_A", 0.01), ("r_A", 0.03))
-    ]
-    figure = table_figure(table, rows)
+    ]  # fmt: skip
+    figure = table_figure(Runs(rows), table)
     assert ("not to be compared" in figure.get_suptitle()) == quick
     assert "3 of 44 printed rows" in figure.get_suptitle()
     for axes in figure.axes:

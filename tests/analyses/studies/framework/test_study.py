@@ -165,6 +165,18 @@ def test_a_case_over_items_is_reduced_to_a_row_and_its_task_done_once():
     assert found.runs.one(size="end")["value"] == 81.0
 
 
+def test_a_task_may_tell_what_its_numbers_depend_on():
+    @dataclass(frozen=True)
+    class Told(Squares):
+        secret: object = None
+
+        def arguments(self):
+            return {"squares": "of items"}
+
+    case = Case(name="a", task=Told(object()), items=2)
+    assert case.arguments() == {"task": {"squares": "of items"}, "items": 2}
+
+
 def test_runs_are_picked_and_reduced():
     runs = run().runs(kind="seeded")
     assert runs.largest("peak_m", size=("small", "large")) == 1.0 + 2.0 / 3.0

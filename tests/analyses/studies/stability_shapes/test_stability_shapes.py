@@ -1,16 +1,24 @@
 """Shapes of workspaces: what is asked for, verdicts on made-up shapes, a run that goes on."""
 
 import json
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
 
 from cdpr_drake.analyses.reporting.progress import StudySession
-from cdpr_drake.analyses.reporting.statements import CONFIRMED, IN_PART, NOT_CONFIRMED
+from cdpr_drake.analyses.reporting.statements import (
+    CONFIRMED,
+    IN_PART,
+    NOT_CONFIRMED,
+    NOT_TESTABLE,
+)
+from cdpr_drake.analyses.studies.framework.runs import Run, Runs
+from cdpr_drake.analyses.studies.framework.statement import MET_FITTED
+from cdpr_drake.analyses.studies.framework.study import Form
 from cdpr_drake.analyses.studies.published.stability_tables import TABLES
 from cdpr_drake.analyses.studies.stability_shapes import statements as said
-from cdpr_drake.analyses.studies.stability_shapes import study as study_module
 from cdpr_drake.analyses.studies.stability_shapes.figures import (
     FIGURES,
     nested_figure,
@@ -23,21 +31,21 @@ from cdpr_drake.analyses.studies.stability_shapes.items import (
     SETS,
     TURN,
     TURNED_FIGURE,
-    Shape,
-    shape_items,
-    shape_of,
+    shape_row,
 )
-from cdpr_drake.analyses.studies.stability_shapes.study import study_stability_shapes
+from cdpr_drake.analyses.studies.stability_shapes.study import STUDY
 
-ITEMS = {(item.figure, item.name): item for item in shape_items()}
+CASES = {(one.keys["figure"], one.keys["panel"]): one for one in STUDY.plan(Form(quick=True))}
 
 
-def shape(figure, name, holds):
-    """A workspace of the positions for which `holds(x, y, z)` is true."""
-    item = ITEMS[figure, name]
-    grid = item.grid(quick=True)
+def shape(figure, panel, holds):
+    """The row of a workspace of the positions for which `holds(x, y, z)` is true."""
+    case = CASES[figure, panel]
+    grid = case.task.grid
     x, y, z = np.meshgrid(*grid.axes, indexing="ij")
-    return Shape(item, grid, np.broadcast_to(holds(x, y, z), x.shape).copy())
+    inside = np.broadcast_to(holds(x, y, z), grid.shape)
+    row = shape_row(case, {"stable": inside.ravel()})
+    return Run(case.name, None, case.keys, row, case.printed)
 
 
 def everywhere(x, y, z):
@@ -49,60 +57,60 @@ def below(height):
 
 
 def made_up(**changed):
-    """All workspaces full, but for those that are named `figure name`."""
+    """All workspaces full, but for those that are named `figure panel`."""
     assert set(changed) <= set(full())
     others = {key: shape(*key.split(" ", 1), holds) for key, holds in changed.items()}
-    return said.FoundShapes((full() | others).values())
+    return Runs(list((full() | others).values()))
 
 
 @cache
 def full():
     """All workspaces without a limit."""
-    return {f"{figure} {name}": shape(figure, name, everywhere) for figure, name in ITEMS}
+    return {f"{figure} {panel}": shape(figure, panel, everywhere) for figure, panel in CASES}
 
 
 def test_nested_workspaces_lie_over_the_baseline_a_panel_for_each_bound():
     half = [shape("3.8", name, lambda x, y, z: x > 0.0) for name in ("r_bp=0.1", "r_s=0.5")]
-    figure = nested_figure([shape("3.8", BASELINE, everywhere), *half])
+    figure = nested_figure(Runs([shape("3.8", BASELINE, everywhere), *half]), "3.8")
     assert [axes.get_title() for axes in figure.axes] == ["(a) r_bp", "(b) r_s"]
     for axes, one in zip(figure.axes, half, strict=True):
         whole, part = axes.lines
-        assert len(whole.get_xdata()) == one.inside.size
+        assert len(whole.get_xdata()) == one["positions"]
         assert np.min(part.get_xdata()) > 0.0
         words = [text.get_text() for text in axes.get_legend().get_texts()]
         assert words[0].startswith("baseline: 100.0 (95.4) %")
-        assert words[1].startswith(one.item.name)
+        assert words[1].startswith(one["panel"])
 
 
 def test_start_and_goal_are_drawn_where_they_are_printed():
-    (axes,) = solids_figure([shape("3.32", "d_theta_pc=55 deg alone", everywhere)]).axes
+    runs = Runs([shape("3.32", "d_theta_pc=55 deg alone", everywhere)])
+    (axes,) = solids_figure(runs, "3.32").axes
     assert "published 50.7" in axes.get_title()
     starts = [line for line in axes.lines if line.get_marker() == "o"]
     assert len(starts) == 1
 
 
-def test_panels_are_rows_of_the_tables_and_named_once():
-    assert len({item.key for item in shape_items()}) == len(ITEMS) == len(list(shape_items()))
+def test_panels_are_rows_of_the_tables():
     tables = {table.name: table for table in TABLES}
     for figure, (name, rows) in PANELS.items():
         for bound, value in rows:
             label = f"{bound.removesuffix('_deg')}={value:g}" + " deg" * bound.endswith("_deg")
-            assert ITEMS[figure, label].printed == tables[name].rows[bound][value]
+            printed = CASES[figure, label].printed["share_percent"]
+            assert float(printed) == tables[name].rows[bound][value]
     for name in SETS:
-        item = ITEMS[TURNED_FIGURE, name]
-        assert len(item.angles) == 7
-        assert np.max(np.linalg.norm(item.angles, axis=1)) == pytest.approx(TURN)
+        angles = CASES[TURNED_FIGURE, name].task.grid.angles
+        assert len(angles) == 7
+        assert np.max(np.linalg.norm(angles, axis=1)) == pytest.approx(TURN)
 
 
 def test_a_position_counts_that_holds_in_every_orientation():
-    item = ITEMS[TURNED_FIGURE, "D1"]
-    grid = item.grid(quick=True)
-    stable = np.ones(grid.shape, bool)
+    case = CASES[TURNED_FIGURE, "D1"]
+    stable = np.ones(case.task.grid.shape, bool)
     stable[3, 0, 0, 0] = False
-    one = shape_of(item, True, stable.ravel())
-    assert not one.inside[0, 0, 0]
-    assert int(np.sum(~one.inside)) == 1
-    assert one.share < 100.0
+    row = shape_row(case, {"stable": stable.ravel()})
+    assert not row["inside"][0, 0, 0]
+    assert row["positions"] - row["positions_inside"] == 1
+    assert row["share_percent"] < 100.0
 
 
 def low_corners(x, y, z):
@@ -117,7 +125,7 @@ def slab(x, y, z):
     return np.abs(x) <= 0.2
 
 
-CASES = [
+MADE_UP = [
     (said.corners_stay, {f"{f} r_bp=0.5": low_corners for f in said.ACROBOT_FIGURES}, CONFIRMED),
     (said.corners_stay, {f"{f} r_bp=0.5": cone for f in said.ACROBOT_FIGURES[:1]}, IN_PART),
     (said.corners_stay, {}, NOT_CONFIRMED),
@@ -130,8 +138,8 @@ CASES = [
     (said.tiny, {"3.13 r_A=0.1": lambda x, y, z: x**2 + y**2 + z**2 < 0.02}, CONFIRMED),
     (said.tiny, {}, IN_PART),
     (said.tiny, {"3.13 r_A=0.1": lambda x, y, z: z < -1.0}, NOT_CONFIRMED),
-    (said.downward, {key: below(0.3) for key in (f"3.13 {i.name}" for i in shape_items()
-                     if i.figure == "3.13" and i.name != BASELINE)}, CONFIRMED),
+    (said.downward, {key: below(0.3) for key in (" ".join(one) for one in CASES
+                     if one[0] == "3.13" and one[1] != BASELINE)}, CONFIRMED),
     (said.downward, {}, NOT_CONFIRMED),
     (said.flat, {"3.15 r_bp=0.3": below(1.5), "3.15 r_bp=1": below(0.7)}, CONFIRMED),
     (said.flat, {"3.15 r_bp=0.3": below(1.5)}, IN_PART),
@@ -139,8 +147,11 @@ CASES = [
     (said.width_by_camera, {"3.15 d_theta_pc=20 deg": lambda x, y, z: np.abs(x) < 0.6}, CONFIRMED),
     (said.width_by_camera, {"3.15 d_theta_pc=20 deg": below(1.0)}, NOT_CONFIRMED),
     (said.hybrid_falls_faster, {"3.13 d_theta_bp=10 deg": slab, "3.20 d_theta_bp=30 deg": slab,
-                                "3.20 r_bp=0.5": slab, "3.13 r_A=0.1": slab}, CONFIRMED),
+                                "3.20 r_bp=0.5": slab, "3.13 r_A=0.1": slab}, MET_FITTED),
     (said.hybrid_falls_faster, {}, IN_PART),
+    (said.downward, {key: lambda x, y, z: z < -1.0 for key in (" ".join(one) for one in CASES
+                     if one[0] == "3.13" and one[1] != BASELINE)}, NOT_CONFIRMED),
+    (said.combinations, {}, NOT_TESTABLE),
     (said.start_inside, {}, CONFIRMED),
     (said.start_inside, {"4.2 D1": below(0.0)}, IN_PART),
     (said.goal_outside_twice, {"4.2 D2": slab, "4.2 D3": slab}, CONFIRMED),
@@ -151,27 +162,26 @@ CASES = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("judge", "changed", "expected"), CASES)
-def test_made_up_shapes(judge, changed, expected):
-    assert judge(made_up(**changed)).verdict == expected
+@pytest.mark.parametrize(("check", "changed", "expected"), MADE_UP)
+def test_made_up_shapes(check, changed, expected):
+    assert check.judge(made_up(**changed)).verdict == expected
 
 
-def test_it_stops_goes_on_and_is_written(tmp_path, monkeypatch):
-    some = [ITEMS["3.10", "Cb. 2"], ITEMS["3.10", "Cb. 13"]]
-    monkeypatch.setattr(study_module, "shape_items", lambda: iter(some))
-    monkeypatch.setattr(study_module, "CHUNK", 50)
+def test_it_stops_goes_on_and_is_written(tmp_path):
+    some = [CASES["3.10", "Cb. 2"], CASES["3.10", "Cb. 13"]]
+    study = replace(STUDY, cases=lambda form: some, chunk=50)
     folder, seen = tmp_path / "shapes", []
     stop = StudySession(folder, seen.append, lambda: bool(seen) and seen[-1].done > 0, 1)
-    first = study_stability_shapes(True, stop)
+    first = study(True, stop)
     assert first.interrupted
-    second = study_stability_shapes(True, StudySession(folder, workers=1))
+    second = study(True, StudySession(folder, workers=1))
     assert not second.interrupted
     assert second.progress.found == first.progress.done
-    assert [one.share > 0.0 for one in second.shapes] == [True, False]
+    assert [share > 0.0 for share in second.runs["share_percent"]] == [True, False]
     second.write(folder, ("png",))
     stored = json.loads((folder / "results.json").read_text())
-    assert [one["name"] for one in stored["workspaces"]] == ["Cb. 2", "Cb. 13"]
+    assert [one["panel"] for one in stored["runs"]] == ["Cb. 2", "Cb. 13"]
     assert {one["name"] for one in stored["statements"]} >= {"combinations"}
     assert {path.stem for path in folder.glob("*.png")} == {"shapes_3_10"} < set(FIGURES)
     assert len(second.tables()) == 2
-    assert len(planar_figure(second.shapes).axes) == 2
+    assert len(planar_figure(second.runs, "3.10").axes) == 2

@@ -8,23 +8,25 @@ import pytest
 
 from cdpr_drake.analyses.reporting.progress import StudySession
 from cdpr_drake.analyses.reporting.statements import CONFIRMED, NOT_CONFIRMED
-from cdpr_drake.analyses.studies.catalogue import STUDIES
+from cdpr_drake.analyses.studies.framework.runs import Runs
+from cdpr_drake.analyses.studies.framework.statement import judged
+from cdpr_drake.analyses.studies.framework.study import Form
 from cdpr_drake.analyses.studies.workspaces import distances
 from cdpr_drake.analyses.studies.workspaces import items as items_module
-from cdpr_drake.analyses.studies.workspaces import study as study_module
 from cdpr_drake.analyses.studies.workspaces.figures import static_figure
 from cdpr_drake.analyses.studies.workspaces.items import (
+    ALL,
     ALONE,
     ENDLESS,
     EVERY,
     FIGURE,
     HEAVY,
     ZERO,
-    kind_items,
+    holds_of,
+    study_cases,
 )
-from cdpr_drake.analyses.studies.workspaces.statements import CHECKS, workspace_statements
-from cdpr_drake.analyses.studies.workspaces.study import study_workspaces
-from cdpr_drake.analyses.studies.workspaces.tables import ALL, shares_of
+from cdpr_drake.analyses.studies.workspaces.statements import CHECKS
+from cdpr_drake.analyses.studies.workspaces.study import STUDY
 from cdpr_drake.analyses.workspaces.conditions import KINDS
 from cdpr_drake.errors import OutputFolderError
 from cdpr_drake.models.robot_loader import load_robot
@@ -39,7 +41,7 @@ def few():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(items_module, "ROBOTS", ROBOTS)
         patch.setattr(items_module, "QUICK_STEPS", 8.0)
-        patch.setattr(study_module, "QUICK_POSES", 4)
+        patch.setattr(items_module, "QUICK_POSES", 4)
         yield
 
 
@@ -48,33 +50,29 @@ def study(tmp_path_factory):
     """The quick form, stopped once and continued."""
     folder = tmp_path_factory.mktemp("study")
     seen = []
-    first = study_workspaces(
-        True, StudySession(folder, seen.append, lambda: bool(seen) and seen[-1].done > 2000, 1)
-    )
+    stop = StudySession(folder, seen.append, lambda: bool(seen) and seen[-1].done > 2000, 1)
+    first = STUDY(True, stop)
     assert first.interrupted
-    assert first.found
-    second = study_workspaces(True, StudySession(folder, workers=1))
+    assert len(first.runs)
+    second = STUDY(True, StudySession(folder, workers=1))
     assert second.progress.found == first.progress.done > 2000
-    for one, other in zip(first.found, second.found, strict=False):
-        assert one.item.name == other.item.name
-        for kind, holds in one.holds.items():
-            np.testing.assert_array_equal(holds, other.holds[kind])
+    for one, other in zip(first.runs, second.runs, strict=False):
+        assert one.case == other.case
+        for kind, holds in holds_of(one).items():
+            np.testing.assert_array_equal(holds, holds_of(other)[kind])
     return second
-
-
-def test_it_is_a_study_that_continues():
-    assert STUDIES["workspaces"].continues
 
 
 def test_every_robot_has_every_kind_that_it_can_have(study):
     assert not study.interrupted
-    every = {one.item.robot: one for one in study.found if one.item.group == EVERY}
+    every = {run["robot"]: run for run in study.runs(group=EVERY)}
     assert tuple(every) == ROBOTS
-    assert set(every["planar"].holds) == set(KINDS)
-    assert set(KINDS) - set(every["caroca_gazebo"].holds) == {"target-visible"}
-    (left_out,) = study.left_out
-    assert (left_out.robot, left_out.kind) == ("caroca_gazebo", "target-visible")
-    assert left_out.why.startswith("caroca_pbvs.yaml: camera.mount")
+    assert set(every["planar"]["kinds"]) == set(KINDS)
+    assert every["planar"]["left_out"] == {}
+    assert set(KINDS) - set(every["caroca_gazebo"]["kinds"]) == {"target-visible"}
+    ((kind, why),) = every["caroca_gazebo"]["left_out"].items()
+    assert kind == "target-visible"
+    assert why.startswith("caroca_pbvs.yaml: camera.mount")
 
 
 def test_a_kind_that_is_refused_is_left_out_and_named(monkeypatch):
@@ -87,18 +85,16 @@ def test_a_kind_that_is_refused_is_left_out_and_named(monkeypatch):
 
     monkeypatch.setattr(items_module, "ROBOTS", ("planar",))
     monkeypatch.setattr(items_module, "make_workspace_question", refuse)
-    items, left_out = kind_items(True)
-    assert [(one.kind, one.why) for one in left_out] == [("wrench-closure", "no closure here")]
-    assert not [item for item in items if item.group == HEAVY]
-    (every,) = [item for item in items if item.group == EVERY]
-    assert set(every.question.kinds) == set(KINDS) - {"wrench-closure"}
+    by_group = {case.keys["group"]: case for case in study_cases(Form(quick=True))}
+    assert HEAVY not in by_group
+    assert by_group[EVERY].data == {"wrench-closure": "no closure here"}
+    assert set(by_group[EVERY].task.question.kinds) == set(KINDS) - {"wrench-closure"}
 
 
 def test_figures_take_the_upper_limit_of_the_robot_file(study):
     own = [
-        (one.item.robot, one.item.limits)
-        for one in study.found
-        if one.item.group == FIGURE and one.item.upper_share == 1.0
+        (run["robot"], (run["lower_limit_n"], run["upper_limit_n"]))
+        for run in study.runs(group=FIGURE, upper_share=1.0)
     ]
     assert own == [
         ("acrobot_small", (0.0, 60.0)),
@@ -111,9 +107,8 @@ def test_figures_take_the_upper_limit_of_the_robot_file(study):
 
 
 def test_cross_checks_hold(study):
-    statements = workspace_statements(study.found, study.distances)
-    assert len(statements) == len(CHECKS)
-    for statement in statements[4:]:
+    assert len(study.statements) == len(CHECKS)
+    for statement in study.statements[4:]:
         assert statement.verdict == CONFIRMED, statement.words
 
 
@@ -133,49 +128,48 @@ WRONG = {
 def test_each_cross_check_can_fail(study, words):
     group, kind, value = WRONG[words]
     wrong = []
-    for one in study.found:
+    for run in study.runs:
         # Of the figures those with the higher lower limit.
-        mine = group != FIGURE or one.item.limits[0] > 0.0
-        if one.item.group == group and kind in one.holds and mine:
-            holds = one.holds | {kind: np.full(one.holds[kind].shape, bool(value))}
-            wrong.append(replace(one, holds=holds))
-        else:
-            wrong.append(one)
-    (statement,) = [s for s in workspace_statements(wrong) if s.words.startswith(words)]
-    assert statement.verdict == NOT_CONFIRMED
+        mine = run["group"] == group and (group != FIGURE or run["lower_limit_n"] > 0.0)
+        column = f"holds_{kind}"
+        if mine and column in run.measured:
+            holds = {column: np.full(run[column].shape, bool(value))}
+            run = replace(run, measured=run.measured | holds)
+        wrong.append(run)
+    (check,) = [one for one in CHECKS if one.says.startswith(words)]
+    assert check.judge(Runs(wrong)).verdict == NOT_CONFIRMED
 
 
 def test_what_is_not_finished_is_not_judged(study):
-    some = [one for one in study.found if one.item.group == FIGURE]
-    assert len(workspace_statements(some)) == 5
-    assert workspace_statements(()) == []
+    some = study.runs(group=FIGURE)
+    assert len(judged(CHECKS, some, complete=False)) == 5
+    assert judged(CHECKS, Runs((), some.planned), complete=False) == []
 
 
 def test_shares_are_those_of_the_poses(study):
-    (planar,) = [o for o in study.found if o.item.group == EVERY and o.item.robot == "planar"]
-    shares = shares_of(planar)
-    assert shares["wrench-closure"] == np.mean(planar.holds["wrench-closure"]) > 0.3
-    assert shares[ALL] <= min(shares[kind] for kind in planar.holds)
-    assert planar.volume(np.ones(planar.item.question.grid.size, bool)).share == 1.0
-    assert planar.volume(planar.holds["static"]).unit == "m^2"
+    planar = study.runs.one(group=EVERY, robot="planar")
+    shares = planar["pose_shares"]
+    assert shares["wrench-closure"] == np.mean(planar["holds_wrench-closure"]) > 0.3
+    assert shares[ALL] <= min(shares[kind] for kind in planar["kinds"])
 
 
 def test_it_writes_numbers_and_figures(study, tmp_path):
     study.write(tmp_path, ("svg",))
     told = json.loads((tmp_path / "results.json").read_text())
-    assert told["figures"][0]["frame_m3"] == pytest.approx(1.2**3)
-    pairs = told["kinds"]["planar"]["pose_shares_of_pairs"]
-    assert pairs["static"]["static"] == told["kinds"]["planar"]["pose_shares"]["static"]
+    assert told["runs"][0]["frame_m3"] == pytest.approx(1.2**3)
+    (planar,) = [one for one in told["runs"] if one["case"] == f"planar, {EVERY}"]
+    pairs = planar["pose_shares_of_pairs"]
+    assert pairs["static"]["static"] == planar["pose_shares"]["static"]
     assert pairs["static"]["stable"] == pairs["stable"]["static"]
     assert {path.name for path in tmp_path.iterdir()} == {
-        "results.json", "static_acrobot.svg", "static_caroca.svg", "kinds.svg", "pairs.svg",
+        "results.json", "runs.csv", "static_acrobot.svg", "static_caroca.svg", "kinds.svg",
+        "pairs.svg",
     }  # fmt: skip
     assert len(study.tables()) == 3
 
 
 def test_the_figure_of_the_thesis_has_its_panels(study):
-    some = [one for one in study.found if one.item.group == FIGURE and one.item.upper_share == 1.0]
-    figure = static_figure([one for one in some if one.item.robot != "caroca"], "1.17")
+    figure = static_figure(study.runs, "1.17", ("acrobot_small", "acrobot_large"))
     titles = [axes.get_title().splitlines()[0] for axes in figure.axes]
     assert titles == [
         "acrobot_small, 0 to 60 N", "acrobot_small, 1 to 60 N",
@@ -186,10 +180,10 @@ def test_the_figure_of_the_thesis_has_its_panels(study):
 def test_a_folder_of_other_questions_is_refused(tmp_path, monkeypatch):
     folder = tmp_path / "s"
     monkeypatch.setattr(items_module, "PUBLISHED_LOWER", {})
-    study_workspaces(True, StudySession(folder, should_stop=lambda: True, workers=1))
+    STUDY(True, StudySession(folder, should_stop=lambda: True, workers=1))
     monkeypatch.setattr(items_module, "FORCE_SHARE", 0.2)
     with pytest.raises(OutputFolderError):
-        study_workspaces(True, StudySession(folder, workers=1))
+        STUDY(True, StudySession(folder, workers=1))
 
 
 @pytest.mark.parametrize("robot", distances.ROBOTS)
