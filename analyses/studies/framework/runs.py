@@ -284,14 +284,6 @@ class Runs:
         names = dict.fromkeys([*self.columns(), *self.planned()])
         return UnknownName(f"column {column!r} is unknown; {closest(column, names)}")
 
-    def list(self, column: str) -> list[Any]:
-        """Values of a column as they are, such as curves of different lengths.
-
-        Raises:
-            UnknownName: A row has no such column.
-        """
-        return [run[column] for run in self.rows]
-
 
 def unit_of(column: str) -> str:
     """Unit of a column, from the end of its name; empty where it has none."""
