@@ -1,8 +1,7 @@
-"""What all case studies share: their definition, their runs in parallel, tables and figures.
+"""The frame of every study: cases, rows of named columns, statements, tables.
 
-A `CaseStudy` names configurations of scenarios and the judges of what a thesis states of them;
-`run_case_study` runs them with several seeds and writes what they leave. A `SeededStudy` is the
-frame of studies with runs of their own: configurations over seeds, continued, judged, written. The
+A `Study` names its cases, what measures one, and what looks at the `Runs` that come of it. A
+`CaseStudy` names configurations of scenarios; `run_case_study` runs them with several seeds. The
 studies themselves are beside this package, in `analyses.studies`.
 """
 

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from matplotlib.figure import Figure
 from rich.table import Table
 
-from cdpr_drake.analyses.reporting.log_files import finite
+from cdpr_drake.analyses.reporting.log_files import finite, write_json
 from cdpr_drake.analyses.reporting.progress import DEFAULT_STUDY_SESSION, StudySession, WorkProgress
 from cdpr_drake.analyses.reporting.provenance import package_versions
 from cdpr_drake.analyses.reporting.statements import Statement, evaluate_checks
@@ -20,9 +21,9 @@ from cdpr_drake.analyses.studies.framework.case_figures import case_drawings
 from cdpr_drake.analyses.studies.framework.case_run import CaseRun, CaseRuns, do_case_job
 from cdpr_drake.analyses.studies.framework.case_tables import case_tables, configuration_numbers
 from cdpr_drake.analyses.studies.framework.run_store import RunStore
-from cdpr_drake.analyses.studies.framework.seeded_study import DrawnStudy
 from cdpr_drake.analyses.sweeps.worker_pool import default_workers
 from cdpr_drake.analyses.sweeps.workers import run_jobs_somewhere
+from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS, write_figures
 from cdpr_drake.models.rendered_camera import probe_rendering
 
 SIMULATED = "s of simulated time"
@@ -30,7 +31,7 @@ SIMULATED = "s of simulated time"
 
 
 @dataclass(frozen=True, eq=False)
-class CaseResult(DrawnStudy):
+class CaseResult:
     """What a case study found.
 
     Attributes:
@@ -86,6 +87,15 @@ class CaseResult(DrawnStudy):
     def tables(self) -> list[Table]:
         """Tables for the terminal."""
         return case_tables(self.case, self.runs, self.statements)
+
+    def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> dict[str, str]:
+        """Writes `results.json`, then the figures, into a folder that exists.
+
+        Returns:
+            Of each figure that could not be written, the file and why, in one line.
+        """
+        write_json(folder / "results.json", self.as_dict())
+        return write_figures(folder, self.drawings(), formats)
 
     def drawings(self) -> Mapping[str, Callable[[], Figure]]:
         """See `case_drawings`; all traces are in the study's `traces.npz`."""
