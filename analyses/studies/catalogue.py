@@ -32,8 +32,7 @@ from cdpr_drake.analyses.studies import (
 )
 from cdpr_drake.analyses.studies.calibration.study import STUDY as CALIBRATION
 from cdpr_drake.analyses.studies.case_studies import CASE_STUDIES
-from cdpr_drake.analyses.studies.framework.case_definition import PublishedNumber
-from cdpr_drake.analyses.studies.framework.case_study import run_case_study
+from cdpr_drake.analyses.studies.framework.case_definition import Plan, PublishedNumber
 from cdpr_drake.analyses.studies.framework.study import Study as FramedStudy
 from cdpr_drake.analyses.studies.planning.study import STUDY as PLANNING
 from cdpr_drake.analyses.studies.published.recipe_variants import RECIPES
@@ -100,6 +99,7 @@ def entry_of(study: FramedStudy) -> StudyEntry:
         continues=True,
         repeats=study.seeds is not None,
         judges=study.names_of_checks(),
+        numbers=study.cases.published() if isinstance(study.cases, Plan) else (),
         figures=tuple(study.figures),
     )
 
@@ -131,17 +131,7 @@ STUDIES: dict[str, StudyEntry] = {
     "tagless": entry_of(tagless.STUDY),
     "calibration": entry_of(CALIBRATION),
     "identification": entry_of(identification.STUDY),
-    **{
-        case.name: StudyEntry(
-            partial(run_case_study, case),
-            continues=True,
-            repeats=True,
-            judges=names_of_checks(case.judges),
-            numbers=case.published(),
-            figures=case.figures(),
-        )
-        for case in (*CASE_STUDIES, *TENSION_CASES)
-    },
+    **{study.name: entry_of(study) for study in (*CASE_STUDIES, *TENSION_CASES)},
 }
 """Studies by name, in the order in which the command line lists them."""
 

@@ -1,9 +1,8 @@
-"""What all case studies share: their definition, their runs in parallel, tables and figures.
+"""What all studies share: cases that are run and continued, rows, statements, tables, figures.
 
-A `CaseStudy` names configurations of scenarios and the judges of what a thesis states of them;
-`run_case_study` runs them with several seeds and writes what they leave. A `SeededStudy` is the
-frame of studies with runs of their own: configurations over seeds, continued, judged, written. The
-studies themselves are beside this package, in `analyses.studies`.
+A `Study` is the frame of all; `configuration_study` makes one whose cases are configurations of a
+scenario, with figures and tables as a thesis has them. The studies themselves are beside this
+package, in `analyses.studies`.
 """
 
 import lazy_loader
