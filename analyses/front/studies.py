@@ -161,11 +161,11 @@ class Reproduction(Summarized):
     def summary(self) -> tuple[str, list[tuple[str, str]]]:
         """What it shows of itself."""
         card = Scorecard.of(self.rows)
-        total = card.total()
-        counts = ", ".join(f"{total[verdict]} {verdict}" for verdict in card.shown())
+        total = card.total_facts()
+        counts = ", ".join(f"{count} {verdict}" for verdict, count in total.items())
         failed = [name for name, state in self.states.items() if state.status == "failed"]
         return f"Reproduction by {len(self.states)} studies", [
-            ("items", counts or "none"),
+            ("facts", counts or "none"),
             ("failed", ", ".join(failed) or "none"),
             ("report", str(self.page)),
         ]

@@ -124,7 +124,7 @@ def _counted(
     what: str,
 ) -> str:
     """A table of counts, sources and what is ours apart."""
-    lines, every = [], Counter[str]()
+    lines, own, every = [], [], Counter[str]()
     for register in registers:
         mine = {
             chapter: some for (name, chapter), some in chapters.items() if name == register.name
@@ -132,12 +132,12 @@ def _counted(
         total = sum(mine.values(), Counter[str]())
         if not total:
             continue
-        lines += [
-            _counts(chapter_words(register, one), some, verdicts) for one, some in mine.items()
-        ]
-        lines.append(_counts(register.title, total, verdicts, "total"))
+        some_lines = lines if register.name != OWN else own
+        for chapter, some in mine.items():
+            some_lines.append(_counts(chapter_words(register, chapter), some, verdicts))
+        some_lines.append(_counts(register.title, total, verdicts, "total"))
         every += total if register.name != OWN else Counter()
-    lines.append(_counts("All of the sources", every, verdicts, "total"))
+    lines = [*lines, _counts("All of the sources", every, verdicts, "total"), *own]
     heads = "".join(f'<th class="n">{escape(verdict)}</th>' for verdict in verdicts)
     return (
         f'<table class="scorecard"><thead><tr><th></th><th class="n">{what}</th>{heads}</tr>'
@@ -177,7 +177,7 @@ def _chapters(rows: Sequence[ReportRow], registers: Sequence[Register]) -> str:
 def _overview(rows: Sequence[ReportRow], corrected: Sequence[str]) -> list[str]:
     """Lines on a chapter: its facts by what came of them, each once."""
     facts: dict[str, tuple[Fact, ReportRow]] = {}
-    for row in rows:
+    for row in sorted(rows, key=lambda row: row.label not in ("statement", "number")):
         for fact in row.facts:
             if len(row.facts) == 1 or fact.key not in facts:
                 facts.setdefault(fact.key, (fact, row))

@@ -1,42 +1,18 @@
-"""The studies that `cdpr study` knows."""
+"""The studies that `cdpr study` knows, by name; a study's module is loaded when it is asked for."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from functools import partial
+from collections.abc import Callable, Iterator, Mapping, MutableMapping, Sequence
+from dataclasses import dataclass, field
+from importlib import import_module
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol, cast
 
-from rich.table import Table
+if TYPE_CHECKING:
+    from rich.table import Table
 
-from cdpr_drake.analyses.reporting.progress import StudySession
-from cdpr_drake.analyses.reporting.statements import names_of_checks
-from cdpr_drake.analyses.studies import (
-    closed_loops,
-    control_stability,
-    design,
-    engines,
-    fusion,
-    identification,
-    mobile_robot,
-    pick_and_place,
-    scenarios,
-    schemes,
-    stability_ranges,
-    stability_shapes,
-    tagless,
-    tension_methods,
-    worked_examples,
-    workspaces,
-)
-from cdpr_drake.analyses.studies.calibration.study import STUDY as CALIBRATION
-from cdpr_drake.analyses.studies.case_studies import CASE_STUDIES
-from cdpr_drake.analyses.studies.framework.case_definition import Plan, PublishedNumber
-from cdpr_drake.analyses.studies.framework.study import Study as FramedStudy
-from cdpr_drake.analyses.studies.planning.study import STUDY as PLANNING
-from cdpr_drake.analyses.studies.published.recipe_variants import RECIPES
-from cdpr_drake.analyses.studies.tension_cases import TENSION_CASES
+    from cdpr_drake.analyses.reporting.progress import StudySession
+    from cdpr_drake.analyses.studies.framework.case_definition import PublishedNumber
 
 
 class StudyResult(Protocol):
@@ -92,8 +68,94 @@ class StudyEntry:
     recipes: Mapping[str, Study] = field(default_factory=dict)
 
 
-def entry_of(study: FramedStudy) -> StudyEntry:
-    """The entry of a study in the frame."""
+MODULES = {
+    "tension-methods": "tension_methods.study",
+    "worked-examples": "worked_examples.study",
+    "stability-closed-loop": "closed_loops.study",
+    "stability-closed-loop-pbvs-line": "closed_loops.study",
+    "stability-closed-loop-2.5d": "closed_loops.study",
+    "stability-closed-loop-ibvs": "closed_loops.study",
+    "control-stability": "control_stability.study",
+    "stability-recipes": "control_stability.all_recipes",
+    "stability-ranges": "stability_ranges.study",
+    "stability-shapes": "stability_shapes.study",
+    "workspaces": "workspaces.study",
+    "design": "design",
+    "engines": "engines.study",
+    "scenarios": "scenarios",
+    "planning": "planning.study",
+    "mobile-robot": "mobile_robot.study",
+    "pick-and-place": "pick_and_place",
+    "fusion": "fusion.study",
+    "schemes": "schemes.study",
+    "tagless": "tagless",
+    "calibration": "calibration.study",
+    "identification": "identification",
+    "case-1": "case_studies.case_1",
+    "case-2": "case_studies.case_2",
+    "case-3": "case_studies.case_3",
+    "case-4": "case_studies.case_4",
+    "case-5": "case_studies.case_5",
+    "case-6": "case_studies.case_6",
+    "case-7": "case_studies.case_7",
+    "case-8": "case_studies.case_8",
+    "case-a6": "case_studies.case_a6",
+    "case-9": "tension_cases.case_9",
+    "case-9-torque": "tension_cases.case_9_torque",
+    "case-10": "tension_cases.case_10",
+    "tension-tracking": "tension_cases.tension_tracking",
+}
+"""Modules of this room by study, in the order in which the command line lists them.
+
+A module has its study as `STUDY`, several as `STUDIES`, what is no `Study` of the frame as `ENTRY`;
+other recipes of it as `RECIPE_STUDIES`.
+"""
+
+
+class Catalogue(MutableMapping[str, StudyEntry]):
+    """Entries by name; their modules are loaded when an entry is asked for, not for names."""
+
+    def __init__(self, modules: Mapping[str, str]) -> None:
+        """With the modules of the studies."""
+        self._modules = dict(modules)
+        self._entries: dict[str, StudyEntry] = {}
+
+    def __getitem__(self, name: str) -> StudyEntry:
+        if name not in self._entries:
+            self._entries[name] = _entry(name, self._modules[name])
+        return self._entries[name]
+
+    def __setitem__(self, name: str, entry: StudyEntry) -> None:
+        self._modules.setdefault(name, "")
+        self._entries[name] = entry
+
+    def __delitem__(self, name: str) -> None:
+        del self._modules[name]
+        self._entries.pop(name, None)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._modules
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._modules)
+
+    def __len__(self) -> int:
+        return len(self._modules)
+
+
+STUDIES = Catalogue(MODULES)
+"""All studies."""
+
+
+def _entry(name: str, place: str) -> StudyEntry:
+    """The entry of a study of a module."""
+    from cdpr_drake.analyses.studies.framework.case_definition import Plan
+
+    module = import_module(f"cdpr_drake.analyses.studies.{place}")
+    if hasattr(module, "ENTRY"):
+        return cast("StudyEntry", module.ENTRY)
+    found = [*getattr(module, "STUDIES", ()), getattr(module, "STUDY", None)]
+    study = next(one for one in found if one is not None and one.name == name)
     return StudyEntry(
         study,
         continues=True,
@@ -101,39 +163,9 @@ def entry_of(study: FramedStudy) -> StudyEntry:
         judges=study.names_of_checks(),
         numbers=study.cases.published() if isinstance(study.cases, Plan) else (),
         figures=tuple(study.figures),
+        recipes=getattr(module, "RECIPE_STUDIES", {}),
     )
 
-
-STUDIES: dict[str, StudyEntry] = {
-    "tension-methods": entry_of(tension_methods.STUDY),
-    "worked-examples": entry_of(worked_examples.STUDY),
-    **{study.name: entry_of(study) for study in closed_loops.STUDIES},
-    "control-stability": replace(
-        entry_of(control_stability.STUDY),
-        recipes={name: partial(control_stability.study_recipe, recipe=name) for name in RECIPES},
-    ),
-    "stability-recipes": StudyEntry(
-        control_stability.study_recipes,
-        continues=True,
-        judges=names_of_checks(control_stability.RECIPE_CHECKS),
-    ),
-    "stability-ranges": entry_of(stability_ranges.STUDY),
-    "stability-shapes": entry_of(stability_shapes.STUDY),
-    "workspaces": entry_of(workspaces.STUDY),
-    "design": entry_of(design.STUDY),
-    "engines": entry_of(engines.STUDY),
-    "scenarios": entry_of(scenarios.STUDY),
-    "planning": entry_of(PLANNING),
-    "mobile-robot": entry_of(mobile_robot.STUDY),
-    "pick-and-place": entry_of(pick_and_place.STUDY),
-    "fusion": entry_of(fusion.STUDY),
-    "schemes": entry_of(schemes.STUDY),
-    "tagless": entry_of(tagless.STUDY),
-    "calibration": entry_of(CALIBRATION),
-    "identification": entry_of(identification.STUDY),
-    **{study.name: entry_of(study) for study in (*CASE_STUDIES, *TENSION_CASES)},
-}
-"""Studies by name, in the order in which the command line lists them."""
 
 RESULTS = "results.json"
 """A study's numbers."""

@@ -109,16 +109,22 @@ class ReproductionSession(CommandSession):
 def _print(rows: Sequence[ReportRow], states: Mapping[str, StudyState], page: Path) -> None:
     """The scorecard, what failed, and where the report is."""
     card = Scorecard.of(rows)
-    verdicts = card.shown()
-    table = new_table("What was published, repeated", ("source", "chapter"), ("items", *verdicts))
-    for (source, chapter), counts in card.chapters.items():
+    verdicts = card.shown_facts()
+    title = "What was published, repeated: facts, each counted once"
+    table = new_table(title, ("source", "chapter"), ("facts", *verdicts))
+    for (source, chapter), counts in card.facts.items():
         cells = [str(counts[verdict] or "") for verdict in verdicts]
         table.add_row(source.replace("_", " "), chapter, str(counts.total()), *cells)
     table.add_section()
-    total = card.total()
-    table.add_row("all", "", str(total.total()), *(str(total[verdict]) for verdict in verdicts))
+    total = card.total_facts()
+    cells = [str(total[verdict]) for verdict in verdicts]
+    table.add_row("all sources", "", str(total.total()), *cells)
     printer = wide_console(160)
     printer.print(table)
+    printer.print(
+        f"{card.independent} facts of the sources are confirmed by runs that could have said "
+        f"otherwise; {card.total().total()} figures, tables, numbers and sentences rest on them"
+    )
     printer.print(f"{len(states)} studies, report: {page}")
 
 

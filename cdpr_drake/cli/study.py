@@ -11,7 +11,8 @@ import typer
 
 from cdpr_drake.analyses.front.studies import chosen_studies, run_study
 from cdpr_drake.analyses.reporting.folder_lock import free_folder
-from cdpr_drake.analyses.studies.catalogue import STUDIES, studies_that
+from cdpr_drake.analyses.studies.catalogue import STUDIES
+from cdpr_drake.analyses.studies.published.recipe_variants import RECIPES
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
 from cdpr_drake.cli.command_session import CommandSession, shown
 from cdpr_drake.cli.completion import words_among
@@ -27,11 +28,8 @@ from cdpr_drake.cli.process import INTERRUPTED
 from cdpr_drake.cli.run_endings import report_failures
 from cdpr_drake.cli.terminal import print_json, wide_console
 
-RECIPES = sorted({recipe for entry in STUDIES.values() for recipe in entry.recipes})
-"""Names of recipes of all studies."""
-
-REPEATING = studies_that(lambda entry: entry.repeats)
-"""Studies that take a number of seeds, in words."""
+NAMES = sorted(RECIPES)
+"""Of the recipes of control-stability."""
 
 STOPPING = (
     "Stopping: waits for what has been begun, then writes what is finished; Ctrl-C again ends this "
@@ -53,8 +51,7 @@ def help_words() -> str:
     """What `cdpr study --help` says above the options."""
     return (
         "Runs a study and writes results.json and figures; Ctrl-C keeps what is finished.\n\n"
-        f"{studies_that(lambda entry: entry.continues)} continue where they were stopped or "
-        "killed when they are run again with the same --out."
+        "Run again with the same --out, it continues where it was stopped or killed."
     )
 
 
@@ -71,7 +68,9 @@ def study(
     quick: Annotated[bool, typer.Option(help="A short form, to see that it works.")] = False,
     seeds: Annotated[
         int | None,
-        typer.Option(help=f"Runs of each configuration; for {REPEATING}.", min=1, max=MOST_SEEDS),
+        typer.Option(
+            help="Runs of each configuration, where a study repeats them.", min=1, max=MOST_SEEDS
+        ),
     ] = None,
     workers: Annotated[
         int | None, typer.Option(help="Processes; without it, one for each processor.", min=1)
@@ -83,8 +82,8 @@ def study(
     recipe: Annotated[
         str | None,
         typer.Option(
-            help=f"Another recipe alone, on all rows, for control-stability: {', '.join(RECIPES)}.",
-            autocompletion=words_among(RECIPES),
+            help=f"Another recipe alone, on all rows, for control-stability: {', '.join(NAMES)}.",
+            autocompletion=words_among(NAMES),
         ),
     ] = None,
 ) -> int:

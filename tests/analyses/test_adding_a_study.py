@@ -51,4 +51,3 @@ def test_a_row_of_the_catalogue_is_a_study(capsys, monkeypatch, tmp_path, contin
     assert "toy table" in out
     words = run(capsys, "--help")[1]
     assert "toy." in words  # the last name of the list
-    assert ("toy and case-* continue" in words) == continues

@@ -10,9 +10,8 @@ from cdpr_drake.analyses.studies.case_studies.path_figures import CAROCA_LAYOUTS
 from cdpr_drake.analyses.studies.framework.case_definition import PULLEYS, Configuration, Plan
 from cdpr_drake.analyses.studies.framework.case_run import converged
 from cdpr_drake.analyses.studies.framework.case_study import configuration_study
-from cdpr_drake.analyses.studies.framework.runs import Runs
+from cdpr_drake.analyses.studies.framework.runs import Run, Runs
 from cdpr_drake.analyses.studies.framework.statement import Finding, statement
-from cdpr_drake.arrays import Array
 
 PRINTED_FACTOR = 2.0
 """Distances within this factor of the printed ones agree with them."""
@@ -99,12 +98,12 @@ SMOOTHER = 0.8
 """A control output is smoother that is at most so rough as without filter."""
 
 
-def roughness(traces: dict[str, Array]) -> float:
+def roughness(run: Run) -> float:
     """Root mean square of the change of cable velocities from one step of 0.05 s to the next, over
     the time in which the path is tracked [m/s]."""
-    times = np.arange(0.0, min(TRACKED, float(traces["time"][-1])), STEP)
-    rows = np.searchsorted(traces["time"], times - 1e-9)
-    return float(np.sqrt(np.mean(np.diff(traces["cable_velocities"][rows], axis=0) ** 2)))
+    times = np.arange(0.0, min(TRACKED, float(run["time"][-1])), STEP)
+    rows = np.searchsorted(run["time"], times - 1e-9)
+    return float(np.sqrt(np.mean(np.diff(run["cable_velocities"][rows], axis=0) ** 2)))
 
 
 @statement(

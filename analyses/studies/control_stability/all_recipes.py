@@ -13,7 +13,13 @@ from rich.table import Table
 from cdpr_drake.analyses.reporting.log_files import write_json
 from cdpr_drake.analyses.reporting.progress import DEFAULT_STUDY_SESSION, StudySession, WorkProgress
 from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
-from cdpr_drake.analyses.reporting.statements import Statement, new_table, statement_table
+from cdpr_drake.analyses.reporting.statements import (
+    Statement,
+    names_of_checks,
+    new_table,
+    statement_table,
+)
+from cdpr_drake.analyses.studies.catalogue import StudyEntry
 from cdpr_drake.analyses.studies.control_stability.exchanges import (
     ExchangeRow,
     exchange_rows,
@@ -25,6 +31,7 @@ from cdpr_drake.analyses.studies.control_stability.printed_limits import (
     nested_pairs,
 )
 from cdpr_drake.analyses.studies.control_stability.recipe_judges import (
+    RECIPE_CHECKS,
     FoundRecipes,
     recipe_statements,
 )
@@ -223,6 +230,9 @@ def study_recipes(
         quick, asked, recipes, rows, shares, exchange_rows(exchanged, result.finished),
         result.progress,
     )  # fmt: skip
+
+
+ENTRY = StudyEntry(study_recipes, continues=True, judges=names_of_checks(RECIPE_CHECKS))
 
 
 def _recipe_as_dict(recipe: Recipe) -> dict[str, Any]:

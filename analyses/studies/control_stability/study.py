@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from cdpr_drake.analyses.studies.control_stability.figures import FIGURES
+from cdpr_drake.analyses.studies.control_stability.recipes import study_recipe
 from cdpr_drake.analyses.studies.control_stability.statements import CHECKS
 from cdpr_drake.analyses.studies.control_stability.tables import (
     COARSE,
@@ -20,6 +22,7 @@ from cdpr_drake.analyses.studies.control_stability.tables import (
 from cdpr_drake.analyses.studies.framework.runs import Runs
 from cdpr_drake.analyses.studies.framework.study import Case, Form, Study
 from cdpr_drake.analyses.studies.published.recipe_choices import CHOICES
+from cdpr_drake.analyses.studies.published.recipe_variants import RECIPES
 from cdpr_drake.analyses.studies.published.stability_recipe import (
     RECIPE,
     recipe_bounds,
@@ -164,3 +167,6 @@ STUDY = Study(
     tables=[stability_tables],
     figures=FIGURES,
 )
+
+RECIPE_STUDIES = {name: partial(study_recipe, recipe=name) for name in RECIPES}
+"""The tables by other recipes, by name."""

@@ -1,8 +1,8 @@
-"""What all studies share: cases that are run and continued, rows, statements, tables, figures.
+"""The frame of every study: cases, rows of named columns, statements, tables.
 
-A `Study` is the frame of all; `configuration_study` makes one whose cases are configurations of a
-scenario, with figures and tables as a thesis has them. The studies themselves are beside this
-package, in `analyses.studies`.
+A `Study` names its cases, what measures one, and what looks at the `Runs` that come of it;
+`configuration_study` makes one whose cases are configurations of a scenario. The studies themselves
+are beside this package, in `analyses.studies`.
 """
 
 import lazy_loader

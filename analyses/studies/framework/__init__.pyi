@@ -4,3 +4,12 @@ from .case_panels import last as last
 from .case_study import configuration_study as configuration_study
 from .experiments import between as between
 from .experiments import turned as turned
+from .runs import Run as Run
+from .runs import Runs as Runs
+from .statement import Finding as Finding
+from .study import Case as Case
+from .study import Form as Form
+from .study import Study as Study
+from .study import StudyResult as StudyResult
+from .summary import Cell as Cell
+from .summary import Summary as Summary

@@ -320,7 +320,11 @@ class StudyResult(StoppableStudy):
                 row = self._row(case, seed)
                 if row is not None:
                     rows.append(Run(case.name, seed, case.keys, row, case.printed))
-        return Runs(rows, partial(self.study.planned, self.form))
+        return Runs(rows, lambda: self._planned)
+
+    @cached_property
+    def _planned(self) -> Keys:
+        return self.study.planned(self.form)
 
     def _row(self, case: Case, seed: int | None) -> Row | None:
         if case.task is None and not case.same_task:

@@ -74,7 +74,7 @@ def combinations(runs: Runs) -> Finding:
 
 
 def falling(
-    name: str, says: str, printed: str, section: str, which: str, limit: str, words: str = ""
+    name: str, says: str, printed: str, *, section: str, which: str, limit: str, words: str = ""
 ) -> Check:
     """The larger a limit, the smaller what was found, which nesting all but implies."""
     unit = "deg about z" if limit == "psi" else "m"
@@ -97,7 +97,7 @@ smaller_range = falling(
     "smaller_range",
     "Planar III i: the smaller the range of displacement, the larger the tolerated error of the "
     "platform's place.",
-    "in figure 3.2", PLANAR_ROBOT, "place", "place",
+    "in figure 3.2", section=PLANAR_ROBOT, which="place", limit="place",
 )  # fmt: skip
 
 
@@ -166,7 +166,7 @@ anchor_error = falling(
     "anchor_error",
     "Planar III v: smaller errors of the anchor points allow larger errors of the platform's "
     "rotation.",
-    "in figure 3.2", PLANAR_ROBOT, "r_B", "r_B",
+    "in figure 3.2", section=PLANAR_ROBOT, which="r_B", limit="r_B",
 )  # fmt: skip
 
 

@@ -105,7 +105,7 @@ def difference(runs: Runs) -> Finding:
 rotational_range = falling(
     "rotational_range",
     "Spatial II ii: the smaller that difference, the larger the rotational range.",
-    "not in numbers", SPATIAL_CAMERA, "r_s", "r_s", "turn of the camera ",
+    "not in numbers", section=SPATIAL_CAMERA, which="r_s", limit="r_s", words="turn of the camera ",
 )  # fmt: skip
 
 
@@ -161,7 +161,7 @@ def errors_and_rotation(runs: Runs) -> Finding:
 turn_and_tilt = falling(
     "turn_and_tilt",
     "Spatial III ii: the smaller the rotation about z, the larger that about x and y.",
-    "not in numbers", SPATIAL_ROBOT, "psi tilt", "psi",
+    "not in numbers", section=SPATIAL_ROBOT, which="psi tilt", limit="psi",
 )  # fmt: skip
 
 

@@ -2,18 +2,23 @@
 
 from functools import cache
 
-from cdpr_drake.analyses.studies.case_studies import CASE_STUDIES
+from cdpr_drake.analyses.studies.catalogue import MODULES, STUDIES
 from cdpr_drake.analyses.studies.framework.case_run import METRICS
 from cdpr_drake.analyses.studies.framework.runs import Run, Runs
-from cdpr_drake.analyses.studies.tension_cases import TENSION_CASES
 from cdpr_drake.systems.cameras.camera_settings import PROJECTED
+
+CASE_STUDIES = tuple(
+    STUDIES[name].run
+    for name, place in MODULES.items()
+    if place.startswith(("case_studies", "tension_cases"))
+)
+"""All studies of configurations."""
 
 
 @cache
 def configurations():
     """Names of all configurations of all case studies."""
-    studies = (*CASE_STUDIES, *TENSION_CASES)
-    return tuple(dict.fromkeys(c.name for study in studies for c in study.cases.configurations))
+    return tuple(dict.fromkeys(c.name for one in CASE_STUDIES for c in one.cases.configurations))
 
 
 def made_run(name, outcome="converged", seed=0, metrics=METRICS, **row):

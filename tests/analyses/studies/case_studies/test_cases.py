@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from cdpr_drake.analyses.reporting.progress import StudySession
-from cdpr_drake.analyses.studies.case_studies import CASE_STUDIES
 from cdpr_drake.analyses.studies.case_studies.case_3 import overshoot, turns
 from cdpr_drake.analyses.studies.framework.study import Form
-from cdpr_drake.analyses.studies.tension_cases import TENSION_CASES
+from tests.analyses.studies.made_runs import CASE_STUDIES
 
 ENDS = {
     "case-1": {"a_1": "converged", "a_3": "converged"},
@@ -34,7 +33,7 @@ ENDS = {
 }
 
 
-@pytest.mark.parametrize("case", [*CASE_STUDIES, *TENSION_CASES], ids=lambda case: case.name)
+@pytest.mark.parametrize("case", CASE_STUDIES, ids=lambda case: case.name)
 def test_quick_form(case, tmp_path):
     names = {c.name for c in case.cases.configurations}  # which the quick form has all
     assert {one.name for one in case.plan(Form(quick=True))} == names

@@ -147,9 +147,6 @@ def _short(monkeypatch):
     monkeypatch.setattr(module, "TABLES", [table])
     monkeypatch.setattr(module, "QUICK_TABLES", ("A.8",))
     monkeypatch.setattr(module, "CHUNK", 20)
-    monkeypatch.setattr(original, "TABLES", [table])
-    monkeypatch.setattr(original, "QUICK_TABLES", ("A.8",))
-    monkeypatch.setattr(original, "_jobs", lambda *_: [])
 
 
 @pytest.mark.usefixtures("_short")
@@ -164,13 +161,15 @@ def test_a_recipe_continues_and_gives_what_the_study_gives(tmp_path):
     assert np.isnan(found.difference("corners", fitted=False))
     for row in found.rows:
         assert row.shares["corners"] <= row.shares["cell hulls"] + 1e-9
-    job = original._Job(TABLES[0], "r_bp", 0.1, recipe_bounds(TABLES[0], "r_bp", 0.1))
+    grid = recipe_grid("planar", quick=True)
     task = original.VerdictsTask(
-        recipe_case("planar", "pbvs"), job.bounds, original.recipe_grid("planar", True),
-        original.recipe_options("planar"),
+        recipe_case("planar", "pbvs"), recipe_bounds(TABLES[0], "r_bp", 0.1), grid,
+        recipe_options("planar"),
     )  # fmt: skip
-    row = original._row(job, task.grid, task(0, task.grid.size))
-    assert found.rows[1].shares["corners"] == pytest.approx(row.shares["sampled"], abs=1e-12)
+    keys = {"table": "A.8", "grid": original.COARSE}
+    case = original.Case(name="r_bp=0.1", keys=keys, data=grid.shape, items=grid.size)
+    row = original.stability_row(case, task(0, grid.size))
+    assert found.rows[1].shares["corners"] == pytest.approx(row["sampled_percent"], abs=1e-12)
     found.write(tmp_path)
     read = json.loads((tmp_path / "results.json").read_text())
     assert read["recipe"]["name"] == IN_USE.name

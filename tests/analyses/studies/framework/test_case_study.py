@@ -9,7 +9,6 @@ from matplotlib.figure import Figure
 
 from cdpr_drake.analyses.reporting.deferred_figures import NothingToDraw
 from cdpr_drake.analyses.reporting.progress import StudySession
-from cdpr_drake.analyses.studies.case_studies import CASE_STUDIES
 from cdpr_drake.analyses.studies.framework import case_panels as panels
 from cdpr_drake.analyses.studies.framework.case_definition import Configuration, Plan
 from cdpr_drake.analyses.studies.framework.case_figures import case_figures
@@ -20,11 +19,10 @@ from cdpr_drake.analyses.studies.framework.case_tables import configuration_numb
 from cdpr_drake.analyses.studies.framework.runs import MissingRuns, Runs
 from cdpr_drake.analyses.studies.framework.statement import Finding, statement
 from cdpr_drake.analyses.studies.framework.study import Form
-from cdpr_drake.analyses.studies.tension_cases import TENSION_CASES
 from cdpr_drake.analyses.visualization.figure_style import new_figure
 from cdpr_drake.errors import OutputFolderError
 from cdpr_drake.systems.diagrams.load import load_scenario
-from tests.analyses.studies.made_runs import made_run
+from tests.analyses.studies.made_runs import CASE_STUDIES, made_run
 
 
 @statement("The error is small.")
@@ -221,7 +219,7 @@ def test_checks_do_not_see_rendered_runs():
     assert error_is_small.judge(Runs((rendered, good))).verdict == "not confirmed"
 
 
-@pytest.mark.parametrize("study", [*CASE_STUDIES, *TENSION_CASES], ids=lambda study: study.name)
+@pytest.mark.parametrize("study", CASE_STUDIES, ids=lambda study: study.name)
 def test_every_configuration_is_a_scenario_that_loads(study):
     plan = study.cases
     names = {c.name for c in plan.configurations}

@@ -5,7 +5,6 @@ from functools import partial
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.studies.case_studies import CASE_STUDIES
 from cdpr_drake.analyses.studies.framework.case_figures import shown_of
 from cdpr_drake.analyses.studies.framework.case_layouts import (
     CableLayout,
@@ -15,10 +14,9 @@ from cdpr_drake.analyses.studies.framework.case_layouts import (
 )
 from cdpr_drake.analyses.studies.framework.case_panels import bars, metric
 from cdpr_drake.analyses.studies.framework.runs import MissingRuns
-from cdpr_drake.analyses.studies.tension_cases import TENSION_CASES
-from tests.analyses.studies.made_runs import made_run, made_runs
+from tests.analyses.studies.made_runs import CASE_STUDIES, made_run, made_runs
 
-CASES = {study.name: study.cases for study in (*CASE_STUDIES, *TENSION_CASES)}
+CASES = {study.name: study.cases for study in CASE_STUDIES}
 CASE = CASES["case-5"]
 
 PATH = np.linspace([0.0, 0.0, 1.0], [1.0, 2.0, 0.5], 12)

@@ -2,50 +2,52 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Sequence
-from dataclasses import dataclass
-from pathlib import Path
+from collections.abc import Iterator
 from typing import Any
 
-from rich.table import Table
+from matplotlib.figure import Figure
 
-from cdpr_drake.analyses.reporting.progress import StudySession
+from cdpr_drake.analyses.studies.framework.runs import Runs
+from cdpr_drake.analyses.studies.framework.statement import OURS, Finding, statement
+from cdpr_drake.analyses.studies.framework.study import Case, Form, Study
+from cdpr_drake.analyses.studies.framework.summary import Cell, Summary
+from cdpr_drake.analyses.visualization.figure_style import new_figure
 from cdpr_drake.models.robot_loader import load_robot
 
 
-@dataclass(frozen=True)
-class HomeHeights:
-    """What the study found.
-
-    Attributes:
-        heights: By robot, of Po above the origin of W [m].
-        interrupted: Whether it was stopped before the end.
-    """
-
-    heights: dict[str, float]
-    interrupted: bool = False
-
-    def as_dict(self) -> dict[str, Any]:
-        """Everything for JSON."""
-        return {"study": "home-heights", "heights_m": self.heights}
-
-    def tables(self) -> list[Table]:
-        """One row a robot."""
-        table = Table("robot", "height [m]", title="home heights")
-        for name, height in self.heights.items():
-            table.add_row(name, f"{height:.3f}")
-        return [table]
-
-    def write(self, folder: Path, formats: Sequence[str] = ()) -> None:
-        """Writes the numbers."""
-        folder.mkdir(exist_ok=True)
-        (folder / "results.json").write_text(json.dumps(self.as_dict()), encoding="utf-8")
+def cases(form: Form) -> Iterator[Case]:
+    """A case for each robot; the quick form has one."""
+    for name in ("acrobot_large",) if form.quick else ("acrobot_large", "caroca"):
+        yield Case(name=name, keys={"robot": name})
 
 
-def study_home_heights(quick: bool, session: StudySession) -> HomeHeights:
-    """Reads the robots' files; the quick form one."""
-    names = ("acrobot_large",) if quick else ("acrobot_large", "caroca")
-    heights = {name: float(load_robot(name).home.transform().translation()[2]) for name in names}
-    stopped = session.should_stop is not None and session.should_stop()
-    return HomeHeights(heights, stopped)
+def measure(case: Case, seed: int) -> dict[str, Any]:
+    """The height of Po above the origin of W."""
+    X_WP = load_robot(case.keys["robot"]).home.transform()
+    return {"height_m": float(X_WP.translation()[2])}
+
+
+@statement("Every robot hangs above the floor.", "", rule="above 0 m", basis=OURS)
+def above(runs: Runs) -> Finding:
+    """Heights of all robots."""
+    lowest = runs.smallest("height_m")
+    return Finding(found=f"lowest {lowest:.3f} m", held=(runs["height_m"] > 0.0).tolist())
+
+
+def heights_figure(runs: Runs) -> Figure:
+    """A bar for each robot."""
+    figure, axes = new_figure(1, 1, (6.0, 4.0), "Heights at home")
+    axes.bar(runs.list("robot"), runs["height_m"], color="#4c72b0")
+    axes.set(ylabel="height of P above W [m]")
+    return figure
+
+
+STUDY = Study(
+    name="home-heights",
+    title="How high the robots hang at home",
+    cases=cases,
+    measure=measure,
+    checks=(above,),
+    tables=[Summary("home heights", ("robot",), {"height [m]": Cell("mean", "height_m", ".3f")})],
+    figures={"heights": heights_figure},
+)

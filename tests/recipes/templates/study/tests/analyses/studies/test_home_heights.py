@@ -21,9 +21,13 @@ def test_the_command_knows_it(capsys, monkeypatch, tmp_path):
     out = tmp_path / "heights"
     code, words = run(capsys, "home-heights", "--quick", "--json", "--out", str(out))
     height = float(cdpr.load_robot("acrobot_large").home.transform().translation()[2])
-    expected = {"study": "home-heights", "heights_m": {"acrobot_large": height}}
-    assert (code, json.loads(words)) == (0, expected)
-    assert json.loads((out / "results.json").read_text()) == expected
+    told = json.loads(words)
+    assert (code, told["runs"]) == (
+        0, [{"case": "acrobot_large", "robot": "acrobot_large", "height_m": height}],
+    )  # fmt: skip
+    assert told["statements"][0]["verdict"] == "confirmed"
+    assert json.loads((out / "results.json").read_text()) == told
+    assert (out / "heights.png").exists()
     code, words = run(capsys, "home-heights", "--out", str(tmp_path / "other"))
     assert code == 0
     assert "caroca" in words
@@ -32,4 +36,4 @@ def test_the_command_knows_it(capsys, monkeypatch, tmp_path):
 
 def test_the_front_door_knows_it():
     assert "home-heights" in cdpr.studies()
-    assert set(cdpr.run_study("home-heights", quick=True).as_dict()["heights_m"])
+    assert cdpr.run_study("home-heights", quick=True).as_dict()["units"] == {"height_m": "m"}
