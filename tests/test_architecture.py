@@ -22,8 +22,6 @@ MOST_POSITIONAL, MOST_ARGUMENTS = 6, 10
 WITH_CODE = {
     "cdpr_drake",  # where kernels are kept is told before numba is imported
     "cdpr_drake.cli",  # as is what Ctrl-C does meanwhile
-    "cdpr_drake.analyses.studies.case_studies",
-    "cdpr_drake.analyses.studies.tension_cases",
 }
 """Packages whose `__init__` does more than say what the room is for and what is public."""
 

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from typing import Any
+
+import numpy as np
 
 from cdpr_drake.analyses.reporting.statements import (
     CONFIRMED,
@@ -35,35 +38,36 @@ _FAILS = ("fails",)
 """Words for any outcome but success."""
 
 
-def judge_number(number: PublishedNumber, ours: Mapping[str, Any]) -> tuple[str, str, str]:
+def judge_number(
+    number: PublishedNumber, runs: Sequence[Mapping[str, Any]]
+) -> tuple[str, str, str]:
     """Judges one printed number.
 
     Args:
         number: What is printed.
-        ours: What was found of its configuration, see `CaseResult.as_dict`.
+        runs: Rows of its configuration, of which there is one at least; see `Runs.table`.
 
     Returns:
         Our number in words, with its spread over the runs; verdict; by how much it differs, and
         where it is not confirmed, what is known of why.
     """
-    words, found, how = _judged(number, ours)
+    words, found, how = _judged(number, runs)
     reason = number.why if found in (IN_PART, NOT_CONFIRMED) else ""
     return words, found, "; ".join(part for part in (how, reason) if part)
 
 
-def _judged(number: PublishedNumber, ours: Mapping[str, Any]) -> tuple[str, str, str]:
+def _judged(number: PublishedNumber, runs: Sequence[Mapping[str, Any]]) -> tuple[str, str, str]:
+    found = [run.get(number.metric) for run in runs]
     if number.metric == "outcome":
-        return _outcome(number.printed, str(ours["outcomes"]), int(ours["runs"]))
-    found = ours.get(number.metric) or {}
-    values = [found.get(key) for key in ("mean", "min", "max")]
-    if any(value is None for value in values):
+        return _outcome(number.printed, Counter(found))
+    values = [float(value) for value in found if value is not None]
+    if len(values) < len(runs):
         return "-", NOT_TESTABLE, "no such number in these runs"
-    mean, least, most = (number.factor * float(value) for value in values if value is not None)
+    mean, least, most = (number.factor * float(of(values)) for of in (np.mean, np.min, np.max))
     form = number.format
-    runs = int(ours["runs"])
     words = f"{mean:{form}}"
-    if runs > 1:
-        words += f" ({least:{form}} to {most:{form}}, {runs} runs)"
+    if len(runs) > 1:
+        words += f" ({least:{form}} to {most:{form}}, {len(runs)} runs)"
     if bound := _UPPER.fullmatch(number.printed):
         limit = float(bound.group(1) or bound.group(2))
         how = f"our largest over the printed bound {most / limit:.2f}"
@@ -80,16 +84,14 @@ def _judged(number: PublishedNumber, ours: Mapping[str, Any]) -> tuple[str, str,
     return words, NOT_JUDGED, "printed in words"
 
 
-def _outcome(printed: str, outcomes: str, runs: int) -> tuple[str, str, str]:
+def _outcome(printed: str, counts: Counter[Any]) -> tuple[str, str, str]:
     """Judges an outcome; what is printed beyond it is not judged, and said."""
     wanted = re.split(r"[ ,]", printed, maxsplit=1)[0]
-    counts = {
-        name: int(count) for count, name in (part.split(" ", 1) for part in outcomes.split(", "))
-    }
+    runs, outcomes = counts.total(), ", ".join(f"{n} {name}" for name, n in counts.items())
     if printed in _FAILS:
-        good = runs - counts.get("converged", 0)
+        good = runs - counts["converged"]
     elif wanted in ("converged", "target_lost"):
-        good = counts.get(wanted, 0)
+        good = counts[wanted]
     else:
         return outcomes, NOT_JUDGED, "printed in words; see the statements of the section"
     found = CONFIRMED if good == runs else IN_PART if good else NOT_CONFIRMED

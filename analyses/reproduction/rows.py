@@ -25,6 +25,7 @@ from cdpr_drake.analyses.studies.framework.statement import (
     TEST,
 )
 from cdpr_drake.analyses.studies.published.register import PublishedItem, PublishedSection, Register
+from cdpr_drake.systems.cameras.camera_settings import PROJECTED
 
 SHOWN = "shown"
 """A figure that is drawn here, too, and of which nothing is judged."""
@@ -311,13 +312,11 @@ def _numbers(
             lack.verdict, lack.why, studies=(study,),
         )  # fmt: skip
         return
-    configurations = {
-        one["name"]: one["found"] for one in found.results(study).get("configurations", ())
-    }
+    rows = [row for row in found.results(study).get("runs", ()) if row["camera"] == PROJECTED]
     for number in entry.numbers:
         if group and number.group != group:
             continue
-        ours = configurations.get(number.configuration)
+        ours = [row for row in rows if row["configuration"] == number.configuration]
         if ours:
             words, verdict, why = judge_number(number, ours)
         else:

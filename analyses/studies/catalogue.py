@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, MutableMapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, cast
@@ -150,34 +149,21 @@ STUDIES = Catalogue(MODULES)
 
 def _entry(name: str, place: str) -> StudyEntry:
     """The entry of a study of a module."""
+    from cdpr_drake.analyses.studies.framework.case_definition import Plan
+
     module = import_module(f"cdpr_drake.analyses.studies.{place}")
     if hasattr(module, "ENTRY"):
         return cast("StudyEntry", module.ENTRY)
     found = [*getattr(module, "STUDIES", ()), getattr(module, "STUDY", None)]
-    study = next((one for one in found if one is not None and one.name == name), None)
-    if study is None:
-        return _case_entry(getattr(module, name.replace("-", "_").upper()))
+    study = next(one for one in found if one is not None and one.name == name)
     return StudyEntry(
         study,
         continues=True,
         repeats=study.seeds is not None,
         judges=study.names_of_checks(),
+        numbers=study.cases.published() if isinstance(study.cases, Plan) else (),
         figures=tuple(study.figures),
         recipes=getattr(module, "RECIPE_STUDIES", {}),
-    )
-
-
-def _case_entry(case: Any) -> StudyEntry:
-    from cdpr_drake.analyses.reporting.statements import names_of_checks
-    from cdpr_drake.analyses.studies.framework.case_study import run_case_study
-
-    return StudyEntry(
-        partial(run_case_study, case),
-        continues=True,
-        repeats=True,
-        judges=names_of_checks(case.judges),
-        numbers=case.published(),
-        figures=case.figures(),
     )
 
 

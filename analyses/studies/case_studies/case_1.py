@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from cdpr_drake.analyses.reporting.statements import Statement, verdict
 from cdpr_drake.analyses.studies.case_studies.case_1_ends import (
     ENDS,
     FACTOR,
@@ -21,9 +20,12 @@ from cdpr_drake.analyses.studies.case_studies.case_4 import (
     LIFT,
     PRINTED_BELIEF,
 )
-from cdpr_drake.analyses.studies.framework.case_definition import PULLEYS, CaseStudy, Configuration
-from cdpr_drake.analyses.studies.framework.case_run import CaseRuns
+from cdpr_drake.analyses.studies.framework.case_definition import PULLEYS, Configuration, Plan
+from cdpr_drake.analyses.studies.framework.case_run import converged, outcomes
+from cdpr_drake.analyses.studies.framework.case_study import configuration_study
 from cdpr_drake.analyses.studies.framework.experiments import as_transform, pose_item
+from cdpr_drake.analyses.studies.framework.runs import Runs
+from cdpr_drake.analyses.studies.framework.statement import Finding, statement
 
 ESTIMATORS = {
     "1": ("control_integration", "Est. 1, control"),
@@ -123,140 +125,169 @@ def _names(prefix: str, keys: tuple[str, ...]) -> list[str]:
     return [f"{prefix}_{key}" for key in keys]
 
 
-def _open_loop(runs: CaseRuns) -> Statement:
-    error = {key: 1e3 * runs.mean(f"o_{key}", "estimate_max_m") for key in "1234567"}
+@statement(
+    "Without visual servoing, control integration and cable lengths say that the plan was "
+    "followed, which it was not, by about a centimetre; they hardly differ.",
+    "14 and 12.1 mm",
+)
+def _open_loop(runs: Runs) -> Finding:
+    error = {key: 1e3 * runs.mean("estimate_max_m", configuration=f"o_{key}") for key in "1234567"}
     near = [error[key] for key in ("1", *LENGTHS)]
-    return Statement(
-        "Without visual servoing, control integration and cable lengths say that the plan was "
-        "followed, which it was not, by about a centimetre; they hardly differ.",
-        "14 and 12.1 mm",
-        ", ".join(f"{key}: {value:.1f}" for key, value in error.items()) + " mm",
-        verdict(max(near) < 1.5 * min(near) and min(near) > ABOUT_A_CENTIMETRE, min(near) > 1.0),
-        "The wrong points of the cables are drawn anew in each run.",
+    return Finding(
+        found=", ".join(f"{key}: {value:.1f}" for key, value in error.items()) + " mm",
+        held=[max(near) < 1.5 * min(near), min(near) > ABOUT_A_CENTIMETRE],
+        some=min(near) > 1.0,
+        why="The wrong points of the cables are drawn anew in each run.",
     )
 
 
-def returns(runs: CaseRuns) -> Statement:
+@statement(
+    "Without visual servoing estimates end nearly right, since the platform comes back to "
+    "where it began.",
+    "Est. 1 1.3 mm, 0.55 deg; by lengths 1 mm, 0.55 deg",
+    rule=f"Confirmed within a factor {FACTOR:g}; in part: less than half of the largest error on "
+    "the way. Wrong points of the cables are drawn for each run.",
+)
+def returns(runs: Runs) -> Finding:
     """Section 2.3.1: where the platform comes back to, the estimate is right again."""
     ends = {
-        key: [1e3 * run.traces["estimate_distance"][-1] for run in runs.of(f"o_{key}")]
+        key: [1e3 * run["estimate_distance"][-1] for run in runs(configuration=f"o_{key}")]
         for key in ("1", *LENGTHS)
     }
     angles = {
-        key: [np.degrees(run.traces["estimate_angle"][-1]) for run in runs.of(f"o_{key}")]
+        key: [np.degrees(run["estimate_angle"][-1]) for run in runs(configuration=f"o_{key}")]
         for key in ends
     }
     far = {key: float(np.mean(values)) for key, values in ends.items()}
     turned = {key: float(np.mean(values)) for key, values in angles.items()}
-    most = {key: 1e3 * runs.mean(f"o_{key}", "estimate_max_m") for key in ends}
+    most = {key: 1e3 * runs.mean("estimate_max_m", configuration=f"o_{key}") for key in ends}
     close = [met(far[key], 1.3 if key == "1" else 1.0) and met(turned[key], 0.55) for key in far]
-    return Statement(
-        "Without visual servoing estimates end nearly right, since the platform comes back to "
-        "where it began.",
-        "Est. 1 1.3 mm, 0.55 deg; by lengths 1 mm, 0.55 deg",
-        ", ".join(
+    return Finding(
+        found=", ".join(
             f"{key}: {far[key]:.1f} ({min(ends[key]):.1f} to {max(ends[key]):.1f}) mm, "
             f"{turned[key]:.2f} deg"
             for key in far
         ),
-        verdict(all(close), all(far[key] < most[key] / FACTOR for key in far)),
-        f"Confirmed within a factor {FACTOR:g}; in part: less than half of the largest error on "
-        "the way. Wrong points of the cables are drawn for each run.",
+        held=close,
+        some=all(far[key] < most[key] / FACTOR for key in far),
     )
 
 
-def _all_straight(runs: CaseRuns) -> Statement:
-    image = {key: runs.mean(f"a_{key}", "image_max_px") for key in "1234567"}
-    return Statement(
-        "On ACROBOT, all estimators keep the object within 15 px of the straight line.",
-        "at most 15 px; Est. 1, 2, 3 at most 10 px",
-        ", ".join(f"{key}: {value:.1f}" for key, value in image.items()) + " px",
-        verdict(max(image.values()) <= 15.0, min(image.values()) <= 15.0),
+@statement(
+    "On ACROBOT, all estimators keep the object within 15 px of the straight line.",
+    "at most 15 px; Est. 1, 2, 3 at most 10 px",
+)
+def _all_straight(runs: Runs) -> Finding:
+    image = {key: runs.mean("image_max_px", configuration=f"a_{key}") for key in "1234567"}
+    return Finding(
+        found=", ".join(f"{key}: {value:.1f}" for key, value in image.items()) + " px",
+        held=[max(image.values()) <= 15.0],
+        some=min(image.values()) <= 15.0,
     )
 
 
-def _images_worst(runs: CaseRuns) -> Statement:
-    error = {key: 1e3 * runs.mean(f"c_{key}", "estimate_max_m") for key in "1234567"}
+@statement(
+    "On CAROCA, the estimates from images are the worst, those with pulleys the best.",
+    "images beyond 0.1 m, Est. 1, 4, 5 about 0.07 m, Est. 6, 7 below 0.04 m",
+)
+def _images_worst(runs: Runs) -> Finding:
+    error = {key: 1e3 * runs.mean("estimate_max_m", configuration=f"c_{key}") for key in "1234567"}
     others = [error[key] for key in error if key not in IMAGE]
-    return Statement(
-        "On CAROCA, the estimates from images are the worst, those with pulleys the best.",
-        "images beyond 0.1 m, Est. 1, 4, 5 about 0.07 m, Est. 6, 7 below 0.04 m",
-        ", ".join(f"{key}: {value:.0f}" for key, value in error.items()) + " mm",
-        verdict(
-            min(error[key] for key in IMAGE) > max(others)
-            and max(error["6"], error["7"]) < min(error["1"], error["4"], error["5"]),
+    return Finding(
+        found=", ".join(f"{key}: {value:.0f}" for key, value in error.items()) + " mm",
+        held=[
+            min(error[key] for key in IMAGE) > max(others),
             max(error["6"], error["7"]) < min(error["1"], error["4"], error["5"]),
-        ),
-        "What an image estimates is as good as the image's object: here the corners carry 0.1 px "
-        "of noise and the camera's parameters are exact, the prototype's were not.",
+        ],
+        some=max(error["6"], error["7"]) < min(error["1"], error["4"], error["5"]),
+        why="What an image estimates is as good as the image's object: here the corners carry 0.1 "
+        "px of noise and the camera's parameters are exact, the prototype's were not.",
     )
 
 
-def _images_fail(runs: CaseRuns) -> Statement:
-    ends = {key: runs.outcomes(f"cp_{key}") for key in "1234567"}
-    images = [runs.converged(f"cp_{key}") for key in IMAGE]
-    rest = [runs.converged(f"cp_{key}") for key in ("1", *LENGTHS)]
-    return Statement(
-        "On CAROCA with a wrong initial pose, the task fails with the estimates from images only.",
-        "section 2.3.5",
-        "; ".join(f"{key}: {words}" for key, words in ends.items()),
-        verdict(not any(images) and all(rest), not any(images)),
-        "In part: runs with the estimates from images fail, and others, too: "
-        + (", ".join(k for k in ("1", *LENGTHS) if not runs.converged(f"cp_{k}")) or "none")
+@statement(
+    "On CAROCA with a wrong initial pose, the task fails with the estimates from images only.",
+    "section 2.3.5",
+)
+def _images_fail(runs: Runs) -> Finding:
+    ends = {key: outcomes(runs, f"cp_{key}") for key in "1234567"}
+    images = [converged(runs, f"cp_{key}") for key in IMAGE]
+    rest = [converged(runs, f"cp_{key}") for key in ("1", *LENGTHS)]
+    return Finding(
+        found="; ".join(f"{key}: {words}" for key, words in ends.items()),
+        held=[not any(images), all(rest)],
+        some=not any(images),
+        why="In part: runs with the estimates from images fail, and others, too: "
+        + (", ".join(k for k in ("1", *LENGTHS) if not converged(runs, f"cp_{k}")) or "none")
         + ". All share a first pose that is 0.4 m wrong.",
     )
 
 
-def _images_worst_perturbed(runs: CaseRuns) -> Statement:
-    error = {key: 1e3 * runs.mean(f"cp_{key}", "estimate_max_m") for key in "1234567"}
+@statement(
+    "With a wrong initial pose on CAROCA, the estimates from images are the worst: their "
+    "error grows.",
+    "figure 2.10c",
+)
+def _images_worst_perturbed(runs: Runs) -> Finding:
+    error = {key: 1e3 * runs.mean("estimate_max_m", configuration=f"cp_{key}") for key in "1234567"}
     worst = sorted(error, key=lambda key: -error[key])[:2]
-    return Statement(
-        "With a wrong initial pose on CAROCA, the estimates from images are the worst: their "
-        "error grows.",
-        "figure 2.10c",
-        ", ".join(f"{key}: {value:.0f}" for key, value in error.items()) + " mm",
-        verdict(set(worst) == set(IMAGE), any(key in worst for key in IMAGE)),
+    return Finding(
+        found=", ".join(f"{key}: {value:.0f}" for key, value in error.items()) + " mm",
+        held=[set(worst) == set(IMAGE)],
+        some=any(key in worst for key in IMAGE),
     )
 
 
-def _jumps(runs: CaseRuns) -> Statement:
+@statement(
+    "Estimates from cable lengths jump where slack moves between cables; control integration "
+    "does not.",
+    "figures 2.12, 2.17",
+    rule="Largest change of the estimate's error between two rows of the log, 0.02 s apart",
+)
+def _jumps(runs: Runs) -> Finding:
     pairs = {
-        "moving object": [1e3 * runs.mean(f"m_{key}", "estimate_jump_m") for key in ("1", "4")],
-        "CAROCA": [1e3 * runs.mean(f"cp_{key}", "estimate_jump_m") for key in ("1", "4")],
+        "moving object": [
+            1e3 * runs.mean("estimate_jump_m", configuration=f"m_{key}") for key in ("1", "4")
+        ],
+        "CAROCA": [
+            1e3 * runs.mean("estimate_jump_m", configuration=f"cp_{key}") for key in ("1", "4")
+        ],
     }
-    return Statement(
-        "Estimates from cable lengths jump where slack moves between cables; control integration "
-        "does not.",
-        "figures 2.12, 2.17",
-        "; ".join(f"{name}: control {a:.2f}, lengths {b:.2f} mm" for name, (a, b) in pairs.items()),
-        verdict(
-            all(b > 3.0 * a for a, b in pairs.values()), any(b > 3.0 * a for a, b in pairs.values())
+    return Finding(
+        found="; ".join(
+            f"{name}: control {a:.2f}, lengths {b:.2f} mm" for name, (a, b) in pairs.items()
         ),
-        "Largest change of the estimate's error between two rows of the log, 0.02 s apart.",
+        held=[b > 3.0 * a for a, b in pairs.values()],
     )
 
 
-def moving(runs: CaseRuns) -> Statement:
+@statement(
+    "Following a moving object, control integration lasts longest (12 laps), then Est. 7 (4), "
+    "Est. 5 and 6 (3), Est. 4 (2).",
+    "section 2.3.7",
+    rule="Estimators that last until the run is stopped are not told apart, and have not failed as "
+    f"stated. Confirmed: this order, and laps within a factor of {FACTOR:g}.",
+)
+def moving(runs: Runs) -> Finding:
     """Which estimator follows the moving object longest; lasting to the end is no order."""
-    laps = {key: runs.mean(f"m_{key}", "time_s") / LAP for key in PRINTED_LAPS}
-    lasting = {k for k in laps if any(run.outcome == "timeout" for run in runs.of(f"m_{k}"))}
+    laps = {key: runs.mean("time_s", configuration=f"m_{key}") / LAP for key in PRINTED_LAPS}
+    lasting = {
+        k for k in laps if any(run["outcome"] == "timeout" for run in runs(configuration=f"m_{k}"))
+    }
     first = laps["1"] > max(laps[key] for key in LENGTHS) and not lasting & set(LENGTHS)
     order = laps["7"] > max(laps["5"], laps["6"]) and min(laps["5"], laps["6"]) > laps["4"]
-    return Statement(
-        "Following a moving object, control integration lasts longest (12 laps), then Est. 7 (4), "
-        "Est. 5 and 6 (3), Est. 4 (2).",
-        "section 2.3.7",
-        ", ".join(f"{key}: {value:.1f}" for key, value in laps.items())
+    return Finding(
+        found=", ".join(f"{key}: {value:.1f}" for key, value in laps.items())
         + f" laps of at most {MOVING_TIME / LAP:g}; "
-        + "; ".join(f"{key}: {runs.outcomes(f'm_{key}')}" for key in laps),
-        verdict(
-            first and order and not lasting
-            and all(met(laps[key], printed) for key, printed in PRINTED_LAPS.items()),
+        + "; ".join(f"{key}: {outcomes(runs, f'm_{key}')}" for key in laps),
+        held=[
             first,
-        ),
-        "Estimators that last until the run is stopped are not told apart, and have not failed as "
-        f"stated. Confirmed: this order, and laps within a factor of {FACTOR:g}.",
-    )  # fmt: skip
+            order,
+            not lasting,
+            all(met(laps[key], printed) for key, printed in PRINTED_LAPS.items()),
+        ],
+        some=first,
+    )
 
 
 _SEVEN = tuple("1234567")
@@ -274,58 +305,61 @@ PRINTED_ACROBOT = {
 }
 """Section 2.3.2, figure 2.4: bounds that the values stay below."""
 
-CASE_1 = CaseStudy(
-    name="case-1",
-    title="Estimates of the platform's pose in PBVS",
-    source="servoing thesis 2.3, figures 2.4 to 2.18, table 2.1",
-    scenario="acrobot_pbvs",
-    changes=(PULLEYS,),
-    configurations=(
-        *_group(
-            OPEN_LOOP,
-            "o",
-            (*_SEVEN, "f"),
-            ("estimator.compare=[]",),
-            PRINTED_OPEN_LOOP,
-            "acrobot_open_loop",
+STUDY = configuration_study(
+    Plan(
+        name="case-1",
+        title="Estimates of the platform's pose in PBVS",
+        scenario="acrobot_pbvs",
+        changes=(PULLEYS,),
+        configurations=(
+            *_group(
+                OPEN_LOOP,
+                "o",
+                (*_SEVEN, "f"),
+                ("estimator.compare=[]",),
+                PRINTED_OPEN_LOOP,
+                "acrobot_open_loop",
+            ),
+            *_group(ACROBOT, "a", (*_SEVEN, "m", "f"), (), PRINTED_ACROBOT),
+            *to_goal(ESTIMATORS),
+            *_group(ACROBOT_PERTURBED, "ap", (*_SEVEN, "f"), (PERTURBED,), {}),
+            *_group(
+                CAROCA,
+                "c",
+                (*_SEVEN, "f"),
+                (DAMPING,),
+                {
+                    "1": {"estimate_max_m": "70"},
+                    "2": {"image_max_px": "35", "estimate_max_m": "> 100"},
+                    "3": {"image_max_px": "35", "estimate_max_m": "> 100"},
+                    "6": {"estimate_max_m": "40"},
+                    "7": {"estimate_max_m": "40"},
+                },
+                "caroca_pbvs",
+                why="what an image estimates is as good as the image: here corners carry 0.1 px of "
+                "noise and the camera's parameters are exact; lengths are as good as the simulated "
+                "robot",
+            ),
+            *_group(
+                CAROCA_PERTURBED,
+                "cp",
+                (*_SEVEN, "f"),
+                CAROCA_WRONG,
+                {"2": {"outcome": "fails"}, "3": {"outcome": "fails"}},
+                "caroca_pbvs",
+            ),
+            *_group(
+                MOVING,
+                "m",
+                ("1", *LENGTHS, "f"),
+                FOLLOWING,
+                {"1": {"time_s": "210"}, "7": {"time_s": "70"}},
+            ),
         ),
-        *_group(ACROBOT, "a", (*_SEVEN, "m", "f"), (), PRINTED_ACROBOT),
-        *to_goal(ESTIMATORS),
-        *_group(ACROBOT_PERTURBED, "ap", (*_SEVEN, "f"), (PERTURBED,), {}),
-        *_group(
-            CAROCA,
-            "c",
-            (*_SEVEN, "f"),
-            (DAMPING,),
-            {
-                "1": {"estimate_max_m": "70"},
-                "2": {"image_max_px": "35", "estimate_max_m": "> 100"},
-                "3": {"image_max_px": "35", "estimate_max_m": "> 100"},
-                "6": {"estimate_max_m": "40"},
-                "7": {"estimate_max_m": "40"},
-            },
-            "caroca_pbvs",
-            why="what an image estimates is as good as the image: here corners carry 0.1 px of "
-            "noise and the camera's parameters are exact; lengths are as good as the simulated "
-            "robot",
-        ),
-        *_group(
-            CAROCA_PERTURBED,
-            "cp",
-            (*_SEVEN, "f"),
-            CAROCA_WRONG,
-            {"2": {"outcome": "fails"}, "3": {"outcome": "fails"}},
-            "caroca_pbvs",
-        ),
-        *_group(
-            MOVING,
-            "m",
-            ("1", *LENGTHS, "f"),
-            FOLLOWING,
-            {"1": {"time_s": "210"}, "7": {"time_s": "70"}},
-        ),
+        rendered=("a_1", "a_7", "c_1"),
+        layouts=CASE_1_LAYOUTS,
     ),
-    rendered=("a_1", "a_7", "c_1"),
+    source="servoing thesis 2.3, figures 2.4 to 2.18, table 2.1",
     assumptions=(
         "The simulated robots have pulleys and elastic cables; which of them an estimator knows is "
         "its own matter. The controller's model has neither.",
@@ -342,8 +376,7 @@ CASE_1 = CaseStudy(
         "the mobile robot is not printed.",
     ),
     drawings={"accuracy_at_goal": accuracy_figure},
-    layouts=CASE_1_LAYOUTS,
-    judges=(
+    checks=(
         _open_loop,
         returns,
         _all_straight,

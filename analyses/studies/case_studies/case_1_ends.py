@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from cdpr_drake.analyses.reporting.statements import Statement, verdict
 from cdpr_drake.analyses.studies.framework.case_definition import Configuration
-from cdpr_drake.analyses.studies.framework.case_run import CaseRun, CaseRuns
+from cdpr_drake.analyses.studies.framework.runs import MissingRuns, Run, Runs
+from cdpr_drake.analyses.studies.framework.statement import Check, Finding, statement
 from cdpr_drake.analyses.visualization.figure_style import bar_style, new_figure
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.pose_accuracy import Repeatability, repeatability
@@ -76,13 +76,18 @@ def to_goal(estimators: Mapping[str, tuple[str, str]]) -> tuple[Configuration, .
     return (blind, *servo)
 
 
-def repeatable(runs: CaseRuns) -> Statement:
+@statement(
+    "Repeatability and accuracy of the final position over all estimators (table 2.1).",
+    "ACROBOT 1.0 and 1.7 mm, perturbed 0.9 and 1.9 mm; CAROCA 1.5 mm, perturbed 1.6 mm",
+    rule=f"Confirmed: all within a factor of {FACTOR:g}; in part: none above it",
+)
+def repeatable(runs: Runs) -> Finding:
     """Table 2.1: both sides count, for far better than printed is another robot, too."""
     found = {}
     for prefix in PRINTED_ENDS:
         converged, _ = _converged(runs, prefix)
-        ends = [run.traces["camera_path"][-1] for run in converged]
-        goals = [run.traces["camera_line"][-1] for run in converged]
+        ends = [run["camera_path"][-1] for run in converged]
+        goals = [run["camera_line"][-1] for run in converged]
         if not ends:
             found[prefix] = (np.inf, np.inf, 0)
             continue
@@ -102,21 +107,23 @@ def repeatable(runs: CaseRuns) -> Statement:
         for value, printed in zip(found[prefix], numbers, strict=False)
         if printed is not None
     ]
-    return Statement(
-        "Repeatability and accuracy of the final position over all estimators (table 2.1).",
-        "ACROBOT 1.0 and 1.7 mm, perturbed 0.9 and 1.9 mm; CAROCA 1.5 mm, perturbed 1.6 mm",
-        words,
-        verdict(
-            all(met(*pair) for pair in pairs),
-            all(value <= FACTOR * printed for value, printed in pairs),
-        ),
-        "a: ACROBOT, c: CAROCA, p: perturbed; runs that converged, and without the estimates from "
-        f"images in the last, as in the thesis. Confirmed: all within a factor of {FACTOR:g}; in "
-        "part: none above it. Below it the simulation lacks what the prototype's ends differ by.",
+    return Finding(
+        found=words,
+        held=[met(*pair) for pair in pairs],
+        some=all(value <= FACTOR * printed for value, printed in pairs),
+        why="a: ACROBOT, c: CAROCA, p: perturbed; runs that converged, and without the estimates "
+        "from images in the last, as in the thesis. Below it the simulation lacks what the "
+        "prototype's ends differ by.",
     )
 
 
-def turns_repeat(runs: CaseRuns) -> Statement:
+@statement(
+    "Repeatability and accuracy of the final rotation over all estimators (table 2.1).",
+    "ACROBOT 0.42 and 0.68 deg, perturbed 0.49 and 0.59 deg; CAROCA 0.17 deg, perturbed 0.31 deg",
+    rule=f"As of the positions: confirmed within a factor of {FACTOR:g}, in part where none is "
+    "above it",
+)
+def turns_repeat(runs: Runs) -> Finding:
     """Table 2.1, its rotations; both sides count, as of its positions."""
     found = {prefix: _ends(runs, prefix) for prefix in PRINTED_TURNS}
     degrees = {
@@ -134,51 +141,51 @@ def turns_repeat(runs: CaseRuns) -> Statement:
         for value, printed in zip(degrees[prefix], numbers, strict=True)
         if printed is not None
     ]
-    return Statement(
-        "Repeatability and accuracy of the final rotation over all estimators (table 2.1).",
-        "ACROBOT 0.42 and 0.68 deg, perturbed 0.49 and 0.59 deg; CAROCA 0.17 deg, perturbed "
-        "0.31 deg",
-        "; ".join(
+    return Finding(
+        found="; ".join(
             _none_of(runs, p)
             if one is None
             else "{}: {:.3f} and {:.3f} deg ({} runs)".format(p, *degrees[p], one.count)
             for p, one in found.items()
         ),
-        verdict(
-            all(met(*pair) for pair in pairs),
-            all(value <= FACTOR * printed for value, printed in pairs),
-        ),
-        f"As of the positions: confirmed within a factor of {FACTOR:g}, in part where none is "
-        "above it. Below it the simulation lacks what the prototype's ends differ by: its camera "
-        "is exact but for 0.1 px in the corners, and the tracker that measured has no error.",
+        held=[met(*pair) for pair in pairs],
+        some=all(value <= FACTOR * printed for value, printed in pairs),
+        why="Below it the simulation lacks what the prototype's ends differ by: its camera is "
+        "exact but for 0.1 px in the corners, and the tracker that measured has no error.",
     )
 
 
-def _converged(runs: CaseRuns, prefix: str) -> tuple[list[CaseRun], int]:
+def _converged(runs: Runs, prefix: str) -> tuple[list[Run], int]:
     """Converged runs of a row of table 2.1, all estimators together, and how many there are in all.
 
     Raises:
-        KeyError: One of its configurations was not run.
+        MissingRuns: One of its configurations was not run.
     """
     keys = "1234567" if prefix != "cp" else "14567"
-    every = [run for key in keys for run in runs.of(f"{prefix}_{key}")]
-    return [run for run in every if run.outcome == "converged"], len(every)
+    every = [run for key in keys for run in runs(configuration=f"{prefix}_{key}")]
+    return [run for run in every if run["outcome"] == "converged"], len(every)
 
 
-def _none_of(runs: CaseRuns, prefix: str) -> str:
+def _none_of(runs: Runs, prefix: str) -> str:
     """Words for a row of which no run converged: its number is none that can be met."""
     return f"{prefix}: none of {_converged(runs, prefix)[1]} runs converged"
 
 
-def _ends(runs: CaseRuns, prefix: str) -> Repeatability | None:
+def _ends(runs: Runs, prefix: str) -> Repeatability | None:
     """Ends of the camera in the converged runs of a row of table 2.1; None without any."""
-    ends = [run.traces["camera_ends"] for run in _converged(runs, prefix)[0]]
+    ends = [run["camera_ends"] for run in _converged(runs, prefix)[0]]
     if not ends:
         return None
     return repeatability([pose_from_row(end) for end, _ in ends], pose_from_row(ends[0][1]))
 
 
-def servo_pays(runs: CaseRuns) -> Statement:
+@statement(
+    "At the same goal PBVS is five times more accurate in position and four times in "
+    "orientation than open loop (figure 2.14).",
+    "5 and 4 times; 10 and 30 runs",
+    rule=f"Confirmed within a factor {FACTOR:g}; in part: better in both",
+)
+def servo_pays(runs: Runs) -> Finding:
     """Figure 2.14."""
     errors = _errors_at_goal(runs)
     ratios = [
@@ -186,37 +193,35 @@ def servo_pays(runs: CaseRuns) -> Statement:
         for far, near in zip(errors["open loop"], errors["PBVS"], strict=True)
     ]
     good = [met(ratio, printed) for ratio, printed in zip(ratios, PRINTED_BETTER, strict=True)]
-    return Statement(
-        "At the same goal PBVS is five times more accurate in position and four times in "
-        "orientation than open loop (figure 2.14).",
-        "5 and 4 times; 10 and 30 runs",
-        "; ".join(
+    return Finding(
+        found="; ".join(
             f"{words} {np.mean(p):.2f} mm ({np.min(p):.2f} to {np.max(p):.2f}), "
             f"{np.mean(r):.2f} deg ({np.min(r):.2f} to {np.max(r):.2f}), {len(p)} runs"
             for words, (p, r) in errors.items()
         )
         + f"; {ratios[0]:.1f} and {ratios[1]:.1f} times",
-        verdict(all(good), min(ratios) > 1.0),
-        f"Confirmed within a factor {FACTOR:g}; in part: better in both. True errors; by how much "
-        "the model's points are wrong, which decides how far open loop ends away, is chosen "
-        "(5 mm), and PBVS ends where its measured error stays below the threshold.",
+        held=good,
+        some=min(ratios) > 1.0,
+        why="True errors; by how much the model's points are wrong, which decides how far open "
+        "loop ends away, is chosen (5 mm), and PBVS ends where its measured error stays below the "
+        "threshold.",
     )
 
 
-def _errors_at_goal(runs: CaseRuns) -> dict[str, tuple[Array, Array]]:
+def _errors_at_goal(runs: Runs) -> dict[str, tuple[Array, Array]]:
     """True errors at the end by controller, of all its runs: positions [mm], rotations [deg]."""
     errors = {}
     names = {"open loop": ("g_blind",), "PBVS": tuple(f"g_{key}" for key in GOAL_KEYS)}
     for words, some in names.items():
         positions, rotations = (
-            np.concatenate([runs.values(name, metric) for name in some])
+            np.concatenate([runs(configuration=name)[metric] for name in some])
             for metric in ("position_error_m", "rotation_error_rad")
         )
         errors[words] = 1e3 * positions, np.degrees(rotations)
     return errors
 
 
-def accuracy_figure(runs: CaseRuns) -> Figure:
+def accuracy_figure(runs: Runs) -> Figure:
     """Figure 2.14: bars of the errors at the goal, means with their range."""
     errors = _errors_at_goal(runs)
     figure, panels = new_figure(
@@ -237,41 +242,45 @@ def accuracy_figure(runs: CaseRuns) -> Figure:
     return figure
 
 
-def repeats_by_estimator(runs: CaseRuns) -> Statement:
+@statement(
+    "With a wrong initial pose mean and largest error of Est. 1, 5, 6, 7 are very close and "
+    "repeat almost ideally; Est. 4 repeats within about 1 cm and 2 deg.",
+    "section 2.3.3, figure 2.7b",
+    rule=f"Very close: within {100.0 * (CLOSE - 1.0):g} %; almost ideally: within {IDEAL[0]:g} mm "
+    f"and {IDEAL[1]:g} deg; Est. 4 within a factor {FACTOR:g}",
+)
+def repeats_by_estimator(runs: Runs) -> Finding:
     """Section 2.3.3, figure 2.7b."""
     means: dict[str, float] = {}
     largest: dict[str, float] = {}
     spans: dict[str, tuple[float, float]] = {}
     for key in ("1", *LENGTHS):
-        some = runs.of(f"ap_{key}")
-        far = 1e3 * runs.values(f"ap_{key}", "estimate_max_m")
-        turned = np.degrees(runs.values(f"ap_{key}", "estimate_max_rad"))
-        means[key] = 1e3 * float(np.mean([np.mean(r.traces["estimate_distance"]) for r in some]))
+        some = runs(configuration=f"ap_{key}")
+        far = 1e3 * some["estimate_max_m"]
+        turned = np.degrees(some["estimate_max_rad"])
+        means[key] = 1e3 * float(np.mean([np.mean(r["estimate_distance"]) for r in some]))
         largest[key] = float(np.mean(far))
         spans[key] = float(np.ptp(far)), float(np.ptp(turned))
         if len(some) < 2:
-            raise KeyError("one run does not repeat")
+            raise MissingRuns("one run does not repeat")
     steady = ("1", "5", "6", "7")
     close = all(largest[key] <= CLOSE * means[key] for key in steady)
     ideal = all(spans[key][0] <= IDEAL[0] and spans[key][1] <= IDEAL[1] for key in steady)
     fourth = all(met(value, printed) for value, printed in zip(spans["4"], ABOUT, strict=True))
-    return Statement(
-        "With a wrong initial pose mean and largest error of Est. 1, 5, 6, 7 are very close and "
-        "repeat almost ideally; Est. 4 repeats within about 1 cm and 2 deg.",
-        "section 2.3.3, figure 2.7b",
-        "; ".join(
+    return Finding(
+        found="; ".join(
             f"{key}: mean {means[key]:.1f}, largest {largest[key]:.1f} mm, repeats within "
             f"{spans[key][0]:.1f} mm, {spans[key][1]:.2f} deg"
             for key in means
         ),
-        verdict(close and ideal and fourth, close or ideal),
-        f"Very close: within {100.0 * (CLOSE - 1.0):g} %; almost ideally: within {IDEAL[0]:g} mm "
-        f"and {IDEAL[1]:g} deg; Est. 4 within a factor {FACTOR:g}. In simulation nothing sets "
-        "Est. 4 apart from Est. 5: the seeds change the noise of the image alone.",
+        held=[close, ideal, fourth],
+        some=close or ideal,
+        why="In simulation nothing sets Est. 4 apart from Est. 5: the seeds change the noise of "
+        "the image alone.",
     )
 
 
-ENDS: Sequence[Callable[[CaseRuns], Statement]] = (
+ENDS: Sequence[Check] = (
     repeatable, turns_repeat, servo_pays, repeats_by_estimator,
 )  # fmt: skip
 """Judges of where runs end."""

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from cdpr_drake.analyses.reporting.statements import Statement, verdict
 from cdpr_drake.analyses.studies.case_studies.path_figures import FINAL_POSES, three_layouts
-from cdpr_drake.analyses.studies.framework.case_definition import PULLEYS, CaseStudy, Configuration
-from cdpr_drake.analyses.studies.framework.case_run import CaseRuns
+from cdpr_drake.analyses.studies.framework.case_definition import PULLEYS, Configuration, Plan
+from cdpr_drake.analyses.studies.framework.case_run import converged, outcomes
 from cdpr_drake.analyses.studies.framework.case_statements import same_accuracy
+from cdpr_drake.analyses.studies.framework.case_study import configuration_study
+from cdpr_drake.analyses.studies.framework.runs import Runs
+from cdpr_drake.analyses.studies.framework.statement import Finding, statement
 
 SETUP = (
     "initial_pose={position: [0.097, -0.026, 0.323], angles_deg: [20, -20, 45]}",
@@ -38,35 +40,45 @@ PAIRS = (("none", "blind_none"), ("within", "blind_within"))
 """Servo and controller without camera under the same perturbation."""
 
 
-def _accuracy(runs: CaseRuns) -> Statement:
-    return same_accuracy(runs, ("none", "within", "beyond"), "figures 3.31a and 3.31c")
+_accuracy = same_accuracy(("none", "within", "beyond"), "figures 3.31a and 3.31c")
 
 
-def _camera_pays(runs: CaseRuns) -> Statement:
-    errors = [tuple(1e3 * runs.mean(name, "position_error_m") for name in pair) for pair in PAIRS]
-    return Statement(
-        "Without a camera, even the errors of the model move the final pose visibly; the servo's "
-        "is the same in both cases.",
-        "figure 3.31",
-        f"no perturbation: servo {errors[0][0]:.2f} mm, without camera {errors[0][1]:.1f} mm; "
-        f"within bounds: {errors[1][0]:.2f} and {errors[1][1]:.1f} mm",
-        verdict(all(blind > VISIBLE for _, blind in errors)),
-        "That the servo's error is the same is not testable: its runs end at the threshold of "
-        "0.5 mm. What is judged is that the error without camera is more than five times that.",
+@statement(
+    "Without a camera, even the errors of the model move the final pose visibly; the servo's "
+    "is the same in both cases.",
+    "figure 3.31",
+    rule="What is judged is that the error without camera is more than five times that",
+)
+def _camera_pays(runs: Runs) -> Finding:
+    errors = [
+        tuple(1e3 * runs.mean("position_error_m", configuration=name) for name in pair)
+        for pair in PAIRS
+    ]
+    return Finding(
+        found=f"no perturbation: servo {errors[0][0]:.2f} mm, without camera {errors[0][1]:.1f} "
+        f"mm; within bounds: {errors[1][0]:.2f} and {errors[1][1]:.1f} mm",
+        held=[blind > VISIBLE for _, blind in errors],
+        some=False,
+        why="That the servo's error is the same is not testable: its runs end at the threshold of "
+        "0.5 mm.",
     )
 
 
-def _beyond(runs: CaseRuns) -> Statement:
-    return Statement(
-        "Within the bounds the task ends; with twice the perturbation it fails, the tag leaving "
-        "the image.",
-        "figure 3.28",
-        f"within: {runs.outcomes('within')}; beyond: {runs.outcomes('beyond')}",
-        verdict(
-            runs.converged("within") and all(r.outcome != "converged" for r in runs.of("beyond")),
-            runs.converged("within"),
-        ),
-        "The criterion is sufficient, not necessary, and what happens depends on the direction.",
+@statement(
+    "Within the bounds the task ends; with twice the perturbation it fails, the tag leaving "
+    "the image.",
+    "figure 3.28",
+)
+def _beyond(runs: Runs) -> Finding:
+    return Finding(
+        found=f"within: {outcomes(runs, 'within')}; beyond: {outcomes(runs, 'beyond')}",
+        held=[
+            converged(runs, "within"),
+            all(r["outcome"] != "converged" for r in runs(configuration="beyond")),
+        ],
+        some=converged(runs, "within"),
+        why="The criterion is sufficient, not necessary, and what happens depends on the "
+        "direction.",
     )
 
 
@@ -90,69 +102,84 @@ def _focus(zoom: str) -> tuple[str, str]:
     return f"camera.focus_zoom={zoom}", f"camera.focus_period={FOCUS_PERIOD:g}"
 
 
-def existing_bend(runs: CaseRuns) -> Statement:
+@statement(
+    "Even without added perturbation the path in the image is not straight; the camera with "
+    "its auto-focus appears to contribute most.",
+    "section 3.4.1, figure 3.28a",
+    rule=f"Not straight: {CROOKED:g} times the distance of exact runs",
+)
+def existing_bend(runs: Runs) -> Finding:
     """What bends the path without added perturbation."""
-    exact = runs.mean("exact", "image_max_px")
+    exact = runs.mean("image_max_px", configuration="exact")
     single = {
-        "points and pulleys": runs.mean("none", "image_max_px"),
-        "first pose": runs.mean("by_hand", "image_max_px"),
-        **{f"auto-focus {z}": runs.mean(name, "image_max_px") for z, name in ZOOMS.items()},
+        "points and pulleys": runs.mean("image_max_px", configuration="none"),
+        "first pose": runs.mean("image_max_px", configuration="by_hand"),
+        **{
+            f"auto-focus {z}": runs.mean("image_max_px", configuration=name)
+            for z, name in ZOOMS.items()
+        },
     }
-    both = runs.mean("existing", "image_max_px")
+    both = runs.mean("image_max_px", configuration="existing")
     model = max(single["points and pulleys"], single["first pose"])
-    largest = [runs.mean(name, "image_max_px") > model for name in ZOOMS.values()]
+    largest = [runs.mean("image_max_px", configuration=name) > model for name in ZOOMS.values()]
     crooked = both > CROOKED * exact
-    return Statement(
-        "Even without added perturbation the path in the image is not straight; the camera with "
-        "its auto-focus appears to contribute most.",
-        "section 3.4.1, figure 3.28a",
-        f"exact {exact:.1f} px, {runs.outcomes('exact')}; "
+    return Finding(
+        found=f"exact {exact:.1f} px, {outcomes(runs, 'exact')}; "
         + ", ".join(f"{words} {value:.1f}" for words, value in single.items())
-        + f" px; all together, auto-focus 0.02, {both:.1f} px, {runs.outcomes('existing')}",
-        verdict(crooked and all(largest), crooked or any(largest)),
-        f"Not straight: {CROOKED:g} times the distance of exact runs. By how much the webcam "
-        f"zooms is not printed: three shares, each in {FOCUS_PERIOD:g} s. A focal length that is "
-        "wrong scales what is seen about the image's middle, and so the depth; the direction to "
-        "the object is hardly wrong where that is near the middle.",
+        + f" px; all together, auto-focus 0.02, {both:.1f} px, {outcomes(runs, 'existing')}",
+        held=[crooked, all(largest)],
+        some=crooked or any(largest),
+        why=f"By how much the webcam zooms is not printed: three shares, each in {FOCUS_PERIOD:g} "
+        "s. A focal length that is wrong scales what is seen about the image's middle, and so the "
+        "depth; the direction to the object is hardly wrong where that is near the middle.",
     )
 
 
-CASE_2 = CaseStudy(
-    name="case-2",
-    title="PBVS on ACROBOT",
-    source="servoing thesis 3.4.1, figures 3.28 to 3.31",
-    scenario="acrobot_pbvs",
-    changes=(*SETUP, MODEL, PULLEYS),
-    configurations=(
-        Configuration("none", "no perturbation added", published={"outcome": "converged"}),
-        Configuration(
-            "within", "0.1 m, 5 deg (within bounds)", (WITHIN,), published={"outcome": "converged"}
+STUDY = configuration_study(
+    Plan(
+        name="case-2",
+        title="PBVS on ACROBOT",
+        scenario="acrobot_pbvs",
+        changes=(*SETUP, MODEL, PULLEYS),
+        configurations=(
+            Configuration("none", "no perturbation added", published={"outcome": "converged"}),
+            Configuration(
+                "within",
+                "0.1 m, 5 deg (within bounds)",
+                (WITHIN,),
+                published={"outcome": "converged"},
+            ),
+            Configuration(
+                "beyond",
+                "0.2 m, 10 deg (beyond bounds)",
+                (BEYOND,),
+                published={"outcome": "target_lost"},
+                why="the direction of the shift is not printed and drawn for each run; whether the "
+                "tag leaves the image depends on it",
+            ),
+            Configuration("blind_none", "without camera", (BLIND,)),
+            Configuration(
+                "blind_within",
+                "without camera, 0.1 m, 5 deg",
+                (BLIND, WITHIN),
+            ),
+            Configuration(
+                "exact",
+                "exact",
+                ("perturbations.anchor_points=0", "cables.pulleys=false"),
+                EXISTING,
+            ),
+            Configuration("by_hand", "first pose by hand", (BY_HAND,), EXISTING),
+            *(
+                Configuration(name, f"auto-focus {zoom}", _focus(zoom), EXISTING)
+                for zoom, name in ZOOMS.items()
+            ),
+            Configuration("existing", "all of these", (BY_HAND, *_focus("0.02")), EXISTING),
         ),
-        Configuration(
-            "beyond",
-            "0.2 m, 10 deg (beyond bounds)",
-            (BEYOND,),
-            published={"outcome": "target_lost"},
-            why="the direction of the shift is not printed and drawn for each run; whether the tag "
-            "leaves the image depends on it",
-        ),
-        Configuration("blind_none", "without camera", (BLIND,)),
-        Configuration(
-            "blind_within",
-            "without camera, 0.1 m, 5 deg",
-            (BLIND, WITHIN),
-        ),
-        Configuration(
-            "exact", "exact", ("perturbations.anchor_points=0", "cables.pulleys=false"), EXISTING
-        ),
-        Configuration("by_hand", "first pose by hand", (BY_HAND,), EXISTING),
-        *(
-            Configuration(name, f"auto-focus {zoom}", _focus(zoom), EXISTING)
-            for zoom, name in ZOOMS.items()
-        ),
-        Configuration("existing", "all of these", (BY_HAND, *_focus("0.02")), EXISTING),
+        rendered=("none",),
+        layouts=three_layouts(28, "ACROBOT") | FINAL_POSES,
     ),
-    rendered=("none",),
+    source="servoing thesis 3.4.1, figures 3.28 to 3.31",
     assumptions=(
         "The tag lies on the ground below the printed desired pose; its size is 0.04 m, so that "
         "it is seen at both poses. Camera: the industrial one; with the webcam's field of view "
@@ -162,6 +189,5 @@ CASE_2 = CaseStudy(
         "anchor points and of the pulleys; those of the first pose and of the auto-focus are in "
         "runs of their own.",
     ),
-    judges=(_accuracy, _camera_pays, _beyond, existing_bend),
-    layouts=three_layouts(28, "ACROBOT") | FINAL_POSES,
+    checks=(_accuracy, _camera_pays, _beyond, existing_bend),
 )

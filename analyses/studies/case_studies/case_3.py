@@ -6,10 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from cdpr_drake.analyses.reporting.statements import Statement, verdict
 from cdpr_drake.analyses.studies.case_studies.path_figures import turned_layouts
-from cdpr_drake.analyses.studies.framework.case_definition import CaseStudy, Configuration
-from cdpr_drake.analyses.studies.framework.case_run import CaseRuns
+from cdpr_drake.analyses.studies.framework.case_definition import Configuration, Plan
+from cdpr_drake.analyses.studies.framework.case_run import converged, outcomes
+from cdpr_drake.analyses.studies.framework.case_study import configuration_study
+from cdpr_drake.analyses.studies.framework.runs import Runs
+from cdpr_drake.analyses.studies.framework.statement import Finding, statement
 from cdpr_drake.arrays import Array
 
 SETUP = (
@@ -47,27 +49,31 @@ def _turned(angle_deg: float, published: str) -> Configuration:
     )
 
 
-def _spiral(runs: CaseRuns) -> Statement:
+@statement(
+    "Turned by 85 deg, the object leaves the image in an outward spiral.",
+    "figure 3.33 (simulation)",
+)
+def _spiral(runs: Runs) -> Finding:
     names = ("turned_85", "turned_85_constant")
     found, outward = [], []
     for name in names:
-        (run, *_) = runs.of(name)
-        path, goal = run.traces["image_path"], run.traces["image_line"][1]
+        (run, *_) = runs(configuration=name)
+        path, goal = run["image_path"], run["image_line"][1]
         radius = np.linalg.norm(path - goal, axis=1)
         wound = turns(path, goal)
         outward.append(wound > 1.0 and radius[-1] > 2.0 * radius.min())
         found.append(
-            f"{run.outcome} after {wound:.1f} turns, distance from the goal {radius.min():.0f} px "
+            f"{run['outcome']} after {wound:.1f} turns, distance from the goal "
+            f"{radius.min():.0f} px "
             f"at the least, {radius[-1]:.0f} px at the end"
         )
-    return Statement(
-        "Turned by 85 deg, the object leaves the image in an outward spiral.",
-        "figure 3.33 (simulation)",
-        f"adaptive gain: {found[0]}; constant gain: {found[1]}",
-        verdict(all(outward), any(outward) and not any(runs.converged(name) for name in names)),
-        "cos 85 deg leaves little damping, and the delay of the loop takes it at high gains. The "
-        "printed adaptive gain is low far from the goal: the object circles in slowly and has not "
-        "arrived when the time is over. A constant gain spirals outward.",
+    return Finding(
+        found=f"adaptive gain: {found[0]}; constant gain: {found[1]}",
+        held=outward,
+        some=any(outward) and not any(converged(runs, name) for name in names),
+        why="cos 85 deg leaves little damping, and the delay of the loop takes it at high gains. "
+        "The printed adaptive gain is low far from the goal: the object circles in slowly and has "
+        "not arrived when the time is over. A constant gain spirals outward.",
     )
 
 
@@ -85,51 +91,60 @@ SWING = 0.1
 """An overshoot by more than this counts as swinging."""
 
 
-def _overshoot(runs: CaseRuns, name: str) -> float:
-    return max(overshoot(run.traces["error"][:, 3:5]) for run in runs.of(name))
+def _overshoot(runs: Runs, name: str) -> float:
+    return max(overshoot(run["error"][:, 3:5]) for run in runs(configuration=name))
 
 
-def _swings(runs: CaseRuns) -> Statement:
+@statement(
+    "Turned by 55 deg, the ideal robot converges, some errors swinging with falling amplitude.",
+    "figure 3.34 (simulation); the prototype loses the object",
+)
+def _swings(runs: Runs) -> Finding:
     beyond = _overshoot(runs, "turned_55")
-    return Statement(
-        "Turned by 55 deg, the ideal robot converges, some errors swinging with falling amplitude.",
-        "figure 3.34 (simulation); the prototype loses the object",
-        f"{runs.outcomes('turned_55')}; x and y go beyond zero by {100.0 * beyond:.1f} % of the "
-        "first error",
-        verdict(runs.converged("turned_55") and beyond > SWING, runs.converged("turned_55")),
+    return Finding(
+        found=f"{outcomes(runs, 'turned_55')}; x and y go beyond zero by {100.0 * beyond:.1f} % "
+        "of the first error",
+        held=[converged(runs, "turned_55"), beyond > SWING],
+        some=converged(runs, "turned_55"),
     )
 
 
-def _mild(runs: CaseRuns) -> Statement:
+@statement(
+    "Turned by 16 deg, it converges without swinging.",
+    "figure 3.35 (simulation and prototype)",
+)
+def _mild(runs: Runs) -> Finding:
     beyond = _overshoot(runs, "turned_16")
-    return Statement(
-        "Turned by 16 deg, it converges without swinging.",
-        "figure 3.35 (simulation and prototype)",
-        f"{runs.outcomes('turned_16')}; x and y go beyond zero by {100.0 * beyond:.1f} % of the "
-        "first error",
-        verdict(runs.converged("turned_16") and beyond < SWING, runs.converged("turned_16")),
+    return Finding(
+        found=f"{outcomes(runs, 'turned_16')}; x and y go beyond zero by {100.0 * beyond:.1f} % "
+        "of the first error",
+        held=[converged(runs, "turned_16"), beyond < SWING],
+        some=converged(runs, "turned_16"),
     )
 
 
-CASE_3 = CaseStudy(
-    name="case-3",
-    title="PBVS on ACROBOT with a turned camera",
-    source="servoing thesis 3.4.2, figures 3.32 to 3.35",
-    scenario="acrobot_pbvs",
-    changes=SETUP,
-    configurations=(
-        Configuration("none", "no perturbation", ()),
-        _turned(16.0, "converged"),
-        _turned(55.0, "converged in simulation, target_lost on the prototype"),
-        _turned(85.0, "target_lost"),
-        replace(
+STUDY = configuration_study(
+    Plan(
+        name="case-3",
+        title="PBVS on ACROBOT with a turned camera",
+        scenario="acrobot_pbvs",
+        changes=SETUP,
+        configurations=(
+            Configuration("none", "no perturbation", ()),
+            _turned(16.0, "converged"),
+            _turned(55.0, "converged in simulation, target_lost on the prototype"),
             _turned(85.0, "target_lost"),
-            name="turned_85_constant",
-            label="turned by 85 deg, constant gain",
-            changes=(*_turned(85.0, "").changes, "controller.lambda_infinity=1.7"),
+            replace(
+                _turned(85.0, "target_lost"),
+                name="turned_85_constant",
+                label="turned by 85 deg, constant gain",
+                changes=(*_turned(85.0, "").changes, "controller.lambda_infinity=1.7"),
+            ),
         ),
+        rendered=("turned_16",),
+        layouts=turned_layouts({33: "turned_85", 34: "turned_55", 35: "turned_16"}),
     ),
-    rendered=("turned_16",),
+    source="servoing thesis 3.4.2, figures 3.32 to 3.35",
     assumptions=(
         "The desired state is lost in the text. The tag lies on the ground where the printed "
         "initial poses of platform and object put it; it is wanted 0.09 m below the camera, as in "
@@ -139,6 +154,5 @@ CASE_3 = CaseStudy(
         "delay.",
         "Size of the tag: 0.04 m. Camera: the industrial one, in place of the webcam.",
     ),
-    judges=(_spiral, _swings, _mild),
-    layouts=turned_layouts({33: "turned_85", 34: "turned_55", 35: "turned_16"}),
+    checks=(_spiral, _swings, _mild),
 )

@@ -7,12 +7,14 @@ Source: servoing thesis 3.4.5.
 
 from __future__ import annotations
 
-from cdpr_drake.analyses.reporting.statements import Statement, verdict
 from cdpr_drake.analyses.studies.case_studies.path_figures import four_layouts
-from cdpr_drake.analyses.studies.framework.case_definition import PULLEYS, CaseStudy, Configuration
-from cdpr_drake.analyses.studies.framework.case_run import CaseRuns
+from cdpr_drake.analyses.studies.framework.case_definition import PULLEYS, Configuration, Plan
+from cdpr_drake.analyses.studies.framework.case_run import converged, outcomes
 from cdpr_drake.analyses.studies.framework.case_statements import same_accuracy
+from cdpr_drake.analyses.studies.framework.case_study import configuration_study
 from cdpr_drake.analyses.studies.framework.experiments import as_transform, pose_item
+from cdpr_drake.analyses.studies.framework.runs import Runs
+from cdpr_drake.analyses.studies.framework.statement import Finding, statement
 
 START = as_transform(((0.118, -0.104, 0.459), (16.0, 13.8, 20.6)))
 """Printed initial pose of the platform in W."""
@@ -59,58 +61,65 @@ def _shifted(name: str, distance: float, angle_deg: float, outcome: str) -> Conf
     )
 
 
-def _tolerates(runs: CaseRuns) -> Statement:
-    good = [runs.converged(name) for name in NAMES[:3]]
-    return Statement(
-        "IBVS ends its task under the perturbations of E1 to E3.",
-        "figures 3.41 to 3.44",
-        "; ".join(f"{name}: {runs.outcomes(name)}" for name in NAMES[:3]),
-        verdict(all(good), any(good)),
+@statement(
+    "IBVS ends its task under the perturbations of E1 to E3.",
+    "figures 3.41 to 3.44",
+)
+def _tolerates(runs: Runs) -> Finding:
+    good = [converged(runs, name) for name in NAMES[:3]]
+    return Finding(
+        found="; ".join(f"{name}: {outcomes(runs, name)}" for name in NAMES[:3]),
+        held=good,
     )
 
 
-def _not_all(runs: CaseRuns) -> Statement:
-    return Statement(
-        "Under that of E4 it does not end: it swings about the goal.",
-        "figures 3.41d to 3.43d",
-        f"E4: {runs.outcomes('E4')}",
-        verdict(
-            not any(run.outcome == "converged" for run in runs.of("E4")), not runs.converged("E4")
-        ),
-        "The direction counts as much as the size, and is not printed.",
+@statement(
+    "Under that of E4 it does not end: it swings about the goal.",
+    "figures 3.41d to 3.43d",
+)
+def _not_all(runs: Runs) -> Finding:
+    return Finding(
+        found=f"E4: {outcomes(runs, 'E4')}",
+        held=[not any(run["outcome"] == "converged" for run in runs(configuration="E4"))],
+        some=not converged(runs, "E4"),
+        why="The direction counts as much as the size, and is not printed.",
     )
 
 
-def _curved(runs: CaseRuns) -> Statement:
-    image = [runs.mean(name, "image_max_px") for name in NAMES]
-    return Statement(
-        "The larger the perturbation, the more the paths curve.",
-        "figure 3.41",
-        "largest distance of the pattern's middle from its straight line "
+@statement(
+    "The larger the perturbation, the more the paths curve.",
+    "figure 3.41",
+)
+def _curved(runs: Runs) -> Finding:
+    image = [runs.mean("image_max_px", configuration=name) for name in NAMES]
+    return Finding(
+        found="largest distance of the pattern's middle from its straight line "
         + ", ".join(f"{value:.0f}" for value in image)
         + " px",
-        verdict(image == sorted(image), image[0] < min(image[1:])),
+        held=[image == sorted(image)],
+        some=image[0] < min(image[1:]),
     )
 
 
-def _accuracy(runs: CaseRuns) -> Statement:
-    return same_accuracy(runs, NAMES, "section 3.4.5")
+_accuracy = same_accuracy(NAMES, "section 3.4.5")
 
 
-CASE_6 = CaseStudy(
-    name="case-6",
-    title="IBVS on ACROBOT",
-    source="servoing thesis 3.4.5, figures 3.41 to 3.44",
-    scenario="acrobot_pbvs",
-    changes=(*SETUP, PULLEYS),
-    configurations=(
-        Configuration("E1", "E1: no perturbation", published={"outcome": "converged"}),
-        _shifted("E2", 0.08, 10.0, "converged"),
-        _shifted("E3", 0.145, 19.0, "converged, 4 s later"),
-        _shifted("E4", 0.28, 37.0, "swings about the goal"),
+STUDY = configuration_study(
+    Plan(
+        name="case-6",
+        title="IBVS on ACROBOT",
+        scenario="acrobot_pbvs",
+        changes=(*SETUP, PULLEYS),
+        configurations=(
+            Configuration("E1", "E1: no perturbation", published={"outcome": "converged"}),
+            _shifted("E2", 0.08, 10.0, "converged"),
+            _shifted("E3", 0.145, 19.0, "converged, 4 s later"),
+            _shifted("E4", 0.28, 37.0, "swings about the goal"),
+        ),
+        rendered=("E1",),
+        layouts=four_layouts("3", 41, NAMES, "first pose wrong"),
     ),
-    rendered=("E1",),
+    source="servoing thesis 3.4.5, figures 3.41 to 3.44",
     assumptions=ASSUMPTIONS,
-    judges=(_tolerates, _not_all, _curved, _accuracy),
-    layouts=four_layouts("3", 41, NAMES, "first pose wrong"),
+    checks=(_tolerates, _not_all, _curved, _accuracy),
 )

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from cdpr_drake.analyses.reporting.statements import Statement, verdict
 from cdpr_drake.analyses.studies.case_studies.case_4 import ASSUMPTIONS, CAROCA_SERVO, DAMPING
 from cdpr_drake.analyses.studies.case_studies.case_5 import HYBRID
 from cdpr_drake.analyses.studies.case_studies.path_figures import CAROCA_LAYOUTS
-from cdpr_drake.analyses.studies.framework.case_definition import PULLEYS, CaseStudy, Configuration
-from cdpr_drake.analyses.studies.framework.case_run import CaseRuns
-from cdpr_drake.arrays import Array
+from cdpr_drake.analyses.studies.framework.case_definition import PULLEYS, Configuration, Plan
+from cdpr_drake.analyses.studies.framework.case_run import converged
+from cdpr_drake.analyses.studies.framework.case_study import configuration_study
+from cdpr_drake.analyses.studies.framework.runs import Run, Runs
+from cdpr_drake.analyses.studies.framework.statement import Finding, statement
 
 PRINTED_FACTOR = 2.0
 """Distances within this factor of the printed ones agree with them."""
@@ -20,47 +21,61 @@ PLANNED = (
 )
 
 
-def _image(runs: CaseRuns) -> Statement:
-    servo, tracking = (runs.mean(name, "image_max_px") for name in ("servo", "tracking"))
-    return Statement(
-        "With tracking, the path in the image is straight to 5 px, more than 5 times better.",
-        "figure 4.7b",
-        f"{tracking:.1f} px, without {servo:.1f} px",
-        verdict(tracking < 5.0 and servo > 5.0 * tracking, tracking < 5.0),
-        "The largest values come where slack moves from cable to cable and the platform swings by "
-        "millimetres, close to the object; the prototype's damping is not known. Means: "
-        f"{runs.mean('tracking', 'image_mean_px'):.1f} px, without "
-        f"{runs.mean('servo', 'image_mean_px'):.1f} px. " + PLANNED,
+@statement(
+    "With tracking, the path in the image is straight to 5 px, more than 5 times better.",
+    "figure 4.7b",
+)
+def _image(runs: Runs) -> Finding:
+    servo, tracking = (
+        runs.mean("image_max_px", configuration=name) for name in ("servo", "tracking")
+    )
+    return Finding(
+        found=f"{tracking:.1f} px, without {servo:.1f} px",
+        held=[tracking < 5.0, servo > 5.0 * tracking],
+        some=tracking < 5.0,
+        why="The largest values come where slack moves from cable to cable and the platform "
+        "swings by millimetres, close to the object; the prototype's damping is not known. Means: "
+        f"{runs.mean('image_mean_px', configuration='tracking'):.1f} px, without "
+        f"{runs.mean('image_mean_px', configuration='servo'):.1f} px. " + PLANNED,
     )
 
 
-def _camera(runs: CaseRuns) -> Statement:
-    servo, tracking = (1e3 * runs.mean(name, "camera_max_m") for name in ("servo", "tracking"))
-    return Statement(
-        "With tracking, the camera stays within 1.5 cm of its line of 2.3 m, 4 times better.",
-        "figure 4.7d",
-        f"{tracking:.1f} mm, without {servo:.1f} mm",
-        verdict(tracking < 15.0 and servo > 4.0 * tracking, tracking < 15.0),
-        PLANNED,
+@statement(
+    "With tracking, the camera stays within 1.5 cm of its line of 2.3 m, 4 times better.",
+    "figure 4.7d",
+)
+def _camera(runs: Runs) -> Finding:
+    servo, tracking = (
+        1e3 * runs.mean("camera_max_m", configuration=name) for name in ("servo", "tracking")
+    )
+    return Finding(
+        found=f"{tracking:.1f} mm, without {servo:.1f} mm",
+        held=[tracking < 15.0, servo > 4.0 * tracking],
+        some=tracking < 15.0,
+        why=PLANNED,
     )
 
 
-def mean_distance(runs: CaseRuns) -> Statement:
+@statement(
+    "With tracking the camera is 7.1 mm from its line in the mean, with a standard deviation "
+    "of 3.4 mm.",
+    "7.1 and 3.4 mm",
+)
+def mean_distance(runs: Runs) -> Finding:
     """Section 4.5."""
-    away = [1e3 * run.traces["camera_deviation"] for run in runs.of("tracking")]
+    away = [1e3 * run["camera_deviation"] for run in runs(configuration="tracking")]
     means, spreads = [float(np.mean(d)) for d in away], [float(np.std(d)) for d in away]
     mean, spread = float(np.mean(means)), float(np.mean(spreads))
     close = [
         one <= PRINTED_FACTOR * printed
         for one, printed in zip((mean, spread), (7.1, 3.4), strict=True)
     ]
-    return Statement(
-        "With tracking the camera is 7.1 mm from its line in the mean, with a standard deviation "
-        "of 3.4 mm.",
-        "7.1 and 3.4 mm",
-        f"{mean:.1f} and {spread:.1f} mm; means of the runs {min(means):.1f} to {max(means):.1f}",
-        verdict(all(close) and mean >= 7.1 / PRINTED_FACTOR, close[0]),
-        f"Confirmed within a factor {PRINTED_FACTOR:g}; in part: a mean not above it. Over the "
+    return Finding(
+        found=f"{mean:.1f} and {spread:.1f} mm; means of the runs {min(means):.1f} to "
+        f"{max(means):.1f}",
+        held=[all(close), mean >= 7.1 / PRINTED_FACTOR],
+        some=close[0],
+        why=f"Confirmed within a factor {PRINTED_FACTOR:g}; in part: a mean not above it. Over the "
         "rows of the log, equally spaced in time. " + PLANNED,
     )
 
@@ -83,59 +98,71 @@ SMOOTHER = 0.8
 """A control output is smoother that is at most so rough as without filter."""
 
 
-def roughness(traces: dict[str, Array]) -> float:
+def roughness(run: Run) -> float:
     """Root mean square of the change of cable velocities from one step of 0.05 s to the next, over
     the time in which the path is tracked [m/s]."""
-    times = np.arange(0.0, min(TRACKED, float(traces["time"][-1])), STEP)
-    rows = np.searchsorted(traces["time"], times - 1e-9)
-    return float(np.sqrt(np.mean(np.diff(traces["cable_velocities"][rows], axis=0) ** 2)))
+    times = np.arange(0.0, min(TRACKED, float(run["time"][-1])), STEP)
+    rows = np.searchsorted(run["time"], times - 1e-9)
+    return float(np.sqrt(np.mean(np.diff(run["cable_velocities"][rows], axis=0) ** 2)))
 
 
-def filter_smooths(runs: CaseRuns) -> Statement:
+@statement(
+    "A smoothing filter on the error makes the control output of CAROCA smoother.",
+    "section 4.4.2, proposed, not done",
+    rule=f"Smoother: by {100.0 * (1.0 - SMOOTHER):.0f} % at least, and the task ends",
+)
+def filter_smooths(runs: Runs) -> Finding:
     """What section 4.4.2 proposes, and does not do."""
-    plain = [1e3 * roughness(run.traces) for run in runs.of("tracking")]
+    plain = [1e3 * roughness(run) for run in runs(configuration="tracking")]
     found, paths, ended = {}, {}, True
     for constant, name in FILTERS.items():
-        found[constant] = float(np.mean([1e3 * roughness(run.traces) for run in runs.of(name)]))
-        paths[constant] = 1e3 * runs.mean(name, "camera_max_m")
-        ended = ended and runs.converged(name)
+        found[constant] = float(np.mean([1e3 * roughness(run) for run in runs(configuration=name)]))
+        paths[constant] = 1e3 * runs.mean("camera_max_m", configuration=name)
+        ended = ended and converged(runs, name)
     before = float(np.mean(plain))
     smoother = [value <= SMOOTHER * before for value in found.values()]
-    return Statement(
-        "A smoothing filter on the error makes the control output of CAROCA smoother.",
-        "section 4.4.2, proposed, not done",
-        f"cable velocities change by {before:.2f} mm/s from step to step (rms), filtered by "
+    return Finding(
+        found=f"cable velocities change by {before:.2f} mm/s from step to step (rms), filtered by "
         + ", ".join(f"{constant} s {value:.2f}" for constant, value in found.items())
-        + f" mm/s; camera {1e3 * runs.mean('tracking', 'camera_max_m'):.1f} mm from its line, "
+        + f" mm/s; camera {1e3 * runs.mean('camera_max_m', configuration='tracking'):.1f} mm "
+        "from its line, "
         "filtered " + ", ".join(f"{value:.1f}" for value in paths.values()) + " mm",
-        verdict(all(smoother) and ended, any(smoother)),
-        f"Smoother: by {100.0 * (1.0 - SMOOTHER):.0f} % at least, and the task ends. First-order "
-        "filter of the error of the features; its time constant is not printed, three are run.",
+        held=[all(smoother), ended],
+        some=any(smoother),
+        why="First-order filter of the error of the features; its time constant is not printed, "
+        "three are run.",
     )
 
 
-CASE_8 = CaseStudy(
-    name="case-8",
-    title="Trajectory planning and tracking on CAROCA",
-    source="servoing thesis 4.4, figures 4.7 and 4.8",
-    scenario="caroca_pbvs",
-    changes=(*CAROCA_SERVO, *HYBRID, PULLEYS, DAMPING),
-    configurations=(
-        Configuration("servo", "2 1/2 D", published={"image_max_px": "25", "camera_max_m": "70"}),
-        Configuration(
-            "tracking", "tracking", TRACKING, published={"image_max_px": "5", "camera_max_m": "15"}
-        ),
-        *(
+STUDY = configuration_study(
+    Plan(
+        name="case-8",
+        title="Trajectory planning and tracking on CAROCA",
+        scenario="caroca_pbvs",
+        changes=(*CAROCA_SERVO, *HYBRID, PULLEYS, DAMPING),
+        configurations=(
             Configuration(
-                name,
-                f"tracking, filter {constant} s",
-                (*TRACKING, f"controller.smoothing={constant}"),
-            )
-            for constant, name in FILTERS.items()
+                "servo", "2 1/2 D", published={"image_max_px": "25", "camera_max_m": "70"}
+            ),
+            Configuration(
+                "tracking",
+                "tracking",
+                TRACKING,
+                published={"image_max_px": "5", "camera_max_m": "15"},
+            ),
+            *(
+                Configuration(
+                    name,
+                    f"tracking, filter {constant} s",
+                    (*TRACKING, f"controller.smoothing={constant}"),
+                )
+                for constant, name in FILTERS.items()
+            ),
         ),
+        rendered=("tracking",),
+        layouts=CAROCA_LAYOUTS,
     ),
-    rendered=("tracking",),
+    source="servoing thesis 4.4, figures 4.7 and 4.8",
     assumptions=ASSUMPTIONS,
-    judges=(_image, _camera, mean_distance, filter_smooths),
-    layouts=CAROCA_LAYOUTS,
+    checks=(_image, _camera, mean_distance, filter_smooths),
 )

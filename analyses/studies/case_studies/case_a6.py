@@ -5,13 +5,15 @@ from __future__ import annotations
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.reporting.statements import Statement, verdict
 from cdpr_drake.analyses.studies.case_studies.case_6 import ASSUMPTIONS, SETUP
 from cdpr_drake.analyses.studies.case_studies.path_figures import four_layouts
-from cdpr_drake.analyses.studies.framework.case_definition import PULLEYS, CaseStudy, Configuration
-from cdpr_drake.analyses.studies.framework.case_run import CaseRuns
+from cdpr_drake.analyses.studies.framework.case_definition import PULLEYS, Configuration, Plan
+from cdpr_drake.analyses.studies.framework.case_run import converged, outcomes
 from cdpr_drake.analyses.studies.framework.case_statements import same_accuracy
+from cdpr_drake.analyses.studies.framework.case_study import configuration_study
 from cdpr_drake.analyses.studies.framework.experiments import as_transform, camera_belief
+from cdpr_drake.analyses.studies.framework.runs import Runs
+from cdpr_drake.analyses.studies.framework.statement import Finding, statement
 
 X_PC = as_transform(((-0.0631, 0.0, 0.01), (0.0, 180.0, 0.0)))
 """True pose of the camera on the small platform."""
@@ -49,94 +51,111 @@ def _points(kind: str, name: str, distance: float, time: str = "") -> Configurat
     )
 
 
-def _any_camera(runs: CaseRuns) -> Statement:
+@statement(
+    "Any of the wrong camera positions leaves it stable, with a small effect.",
+    "figures A.14 to A.17",
+)
+def _any_camera(runs: Runs) -> Finding:
     names = ("camera_E2", "camera_E3", "camera_E4")
-    image = [runs.mean(name, "image_max_px") for name in names]
-    return Statement(
-        "Any of the wrong camera positions leaves it stable, with a small effect.",
-        "figures A.14 to A.17",
-        "; ".join(f"{name[-2:]}: {runs.outcomes(name)}" for name in names)
+    image = [runs.mean("image_max_px", configuration=name) for name in names]
+    return Finding(
+        found="; ".join(f"{name[-2:]}: {outcomes(runs, name)}" for name in names)
         + f"; paths curve by {image[0]:.0f}, {image[1]:.0f}, {image[2]:.0f} px",
-        verdict(all(runs.converged(name) for name in names)),
+        held=[converged(runs, name) for name in names],
+        some=False,
     )
 
 
-def _anchors_more_than_camera(runs: CaseRuns) -> Statement:
-    anchor, camera = (runs.mean(name, "image_max_px") for name in ("anchor_E3", "camera_E2"))
-    return Statement(
-        "Wrong anchor points matter more than a wrong camera position.",
-        "section A.6.2",
-        f"paths curve by {anchor:.0f} px with anchor points 0.073 m wrong, {camera:.0f} px with "
-        "the camera 0.064 m wrong",
-        verdict(anchor > camera),
+@statement(
+    "Wrong anchor points matter more than a wrong camera position.",
+    "section A.6.2",
+)
+def _anchors_more_than_camera(runs: Runs) -> Finding:
+    anchor, camera = (
+        runs.mean("image_max_px", configuration=name) for name in ("anchor_E3", "camera_E2")
+    )
+    return Finding(
+        found=f"paths curve by {anchor:.0f} px with anchor points 0.073 m wrong, {camera:.0f} px "
+        "with the camera 0.064 m wrong",
+        held=[anchor > camera],
     )
 
 
-def _anchors_more_than_exits(runs: CaseRuns) -> Statement:
-    anchor, exits = (runs.mean(name, "image_max_px") for name in ("anchor_E4", "exit_E3"))
-    near, far = (runs.mean(name, "image_max_px") for name in ("anchor_E2", "exit_E2"))
-    return Statement(
-        "Wrong anchor points matter more than wrong exit points.",
-        "section A.6.3",
-        f"paths curve by {anchor:.0f} px (anchor 0.108 m) against {exits:.0f} px (exit 0.103 m), "
-        f"{near:.0f} px (0.038 m) against {far:.0f} px (0.032 m)",
-        verdict(anchor > exits and near > far, anchor > exits or near > far),
+@statement(
+    "Wrong anchor points matter more than wrong exit points.",
+    "section A.6.3",
+)
+def _anchors_more_than_exits(runs: Runs) -> Finding:
+    anchor, exits = (
+        runs.mean("image_max_px", configuration=name) for name in ("anchor_E4", "exit_E3")
+    )
+    near, far = (runs.mean("image_max_px", configuration=name) for name in ("anchor_E2", "exit_E2"))
+    return Finding(
+        found=f"paths curve by {anchor:.0f} px (anchor 0.108 m) against {exits:.0f} px (exit "
+        f"0.103 m), {near:.0f} px (0.038 m) against {far:.0f} px (0.032 m)",
+        held=[anchor > exits, near > far],
     )
 
 
-def _grows(runs: CaseRuns) -> Statement:
-    image = [runs.mean(f"anchor_{name}", "image_max_px") for name in ("E2", "E3", "E4")]
-    return Statement(
-        "The more the anchor points are wrong, the more the paths curve.",
-        "figures A.18, A.21",
-        ", ".join(f"{value:.0f}" for value in image) + " px",
-        verdict(image == sorted(image)),
-        "; ".join(f"{name}: {runs.outcomes(f'anchor_{name}')}" for name in ("E2", "E3", "E4"))
+@statement(
+    "The more the anchor points are wrong, the more the paths curve.",
+    "figures A.18, A.21",
+)
+def _grows(runs: Runs) -> Finding:
+    image = [
+        runs.mean("image_max_px", configuration=f"anchor_{name}") for name in ("E2", "E3", "E4")
+    ]
+    return Finding(
+        found=", ".join(f"{value:.0f}" for value in image) + " px",
+        held=[image == sorted(image)],
+        why="; ".join(f"{name}: {outcomes(runs, f'anchor_{name}')}" for name in ("E2", "E3", "E4"))
         + ". "
         "A run that loses the object ends before its path can curve further. Each point is wrong "
         "in a direction of its own, drawn for each run.",
     )
 
 
-def _accuracy(runs: CaseRuns) -> Statement:
-    return same_accuracy(runs, [c.name for c in CASE_A6.configurations], "section A.6")
-
-
-CASE_A6 = CaseStudy(
-    name="case-a6",
-    title="IBVS on ACROBOT with a wrong model",
-    source="servoing thesis A.6, figures A.14 to A.25",
-    scenario="acrobot_pbvs",
-    changes=(*SETUP, PULLEYS),
-    configurations=(
-        Configuration(
-            "camera_E1",
-            "E1: no perturbation",
-            group=CAMERA,
-            published={"outcome": "converged", "time_s": "17"},
-        ),
-        _camera_at("E2", (0.0, 0.0, 0.0)),
-        _camera_at("E3", (0.0631, 0.0, -0.01)),
-        _camera_at("E4", (0.0, -0.08, -0.02)),
-        _points("anchor", "E2", 0.038),
-        _points("anchor", "E3", 0.073),
-        _points("anchor", "E4", 0.108, "14"),
-        _points("exit", "E2", 0.032),
-        _points("exit", "E3", 0.103),
+CONFIGURATIONS = (
+    Configuration(
+        "camera_E1",
+        "E1: no perturbation",
+        group=CAMERA,
+        published={"outcome": "converged", "time_s": "17"},
     ),
-    rendered=("camera_E1",),
+    _camera_at("E2", (0.0, 0.0, 0.0)),
+    _camera_at("E3", (0.0631, 0.0, -0.01)),
+    _camera_at("E4", (0.0, -0.08, -0.02)),
+    _points("anchor", "E2", 0.038),
+    _points("anchor", "E3", 0.073),
+    _points("anchor", "E4", 0.108, "14"),
+    _points("exit", "E2", 0.032),
+    _points("exit", "E3", 0.103),
+)
+_accuracy = same_accuracy([c.name for c in CONFIGURATIONS], "section A.6")
+
+
+STUDY = configuration_study(
+    Plan(
+        name="case-a6",
+        title="IBVS on ACROBOT with a wrong model",
+        scenario="acrobot_pbvs",
+        changes=(*SETUP, PULLEYS),
+        configurations=CONFIGURATIONS,
+        rendered=("camera_E1",),
+        layouts={
+            **four_layouts(
+                "a", 14, [f"camera_{name}" for name in ("E1", "E2", "E3", "E4")], "camera wrong"
+            ),
+            **four_layouts(
+                "a",
+                18,
+                ["camera_E1", *(f"anchor_{name}" for name in ("E2", "E3", "E4"))],
+                "anchor points wrong",
+            ),
+            **four_layouts("a", 22, ["camera_E1", "exit_E2", "exit_E3"], "exit points wrong"),
+        },
+    ),
+    source="servoing thesis A.6, figures A.14 to A.25",
     assumptions=ASSUMPTIONS,
-    judges=(_any_camera, _anchors_more_than_camera, _anchors_more_than_exits, _grows, _accuracy),
-    layouts={
-        **four_layouts(
-            "a", 14, [f"camera_{name}" for name in ("E1", "E2", "E3", "E4")], "camera wrong"
-        ),
-        **four_layouts(
-            "a",
-            18,
-            ["camera_E1", *(f"anchor_{name}" for name in ("E2", "E3", "E4"))],
-            "anchor points wrong",
-        ),
-        **four_layouts("a", 22, ["camera_E1", "exit_E2", "exit_E3"], "exit points wrong"),
-    },
+    checks=(_any_camera, _anchors_more_than_camera, _anchors_more_than_exits, _grows, _accuracy),
 )

@@ -1,8 +1,8 @@
 """The frame of every study: cases, rows of named columns, statements, tables.
 
-A `Study` names its cases, what measures one, and what looks at the `Runs` that come of it. A
-`CaseStudy` names configurations of scenarios; `run_case_study` runs them with several seeds. The
-studies themselves are beside this package, in `analyses.studies`.
+A `Study` names its cases, what measures one, and what looks at the `Runs` that come of it;
+`configuration_study` makes one whose cases are configurations of a scenario. The studies themselves
+are beside this package, in `analyses.studies`.
 """
 
 import lazy_loader

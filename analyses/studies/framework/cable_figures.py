@@ -34,9 +34,9 @@ def cable_panels(title: str, shown: Shown, name: str) -> Figure | None:
         name: Of `QUANTITIES`, or "velocities".
     """
     quantity, label, factor = (QUANTITIES | VELOCITIES)[name]
-    if any(quantity not in run.traces for _, run, _ in shown):
+    if any(quantity not in run.columns() for _, run, _ in shown):
         return None
-    cables = load_robot(shown[0][1].summary["robot"]).cables
+    cables = load_robot(shown[0][1]["summary"]["robot"]).cables
     rows = -(-len(cables) // COLUMNS)
     words = f"{label[0].upper()}{label[1:].partition(' [')[0]}"
     figure = bare_figure((14.0, 2.6 * rows + 2.2), f"{words}, cable by cable\n{title}")
@@ -45,11 +45,14 @@ def cable_panels(title: str, shown: Shown, name: str) -> Figure | None:
         axes = grid.flat[k]
         for number, (configuration, run, look) in enumerate(shown):
             draw_curve(
-                axes, run.traces["time"], run.traces[quantity][:, k], look, configuration.label,
+                axes, run["time"], run[quantity][:, k], look, configuration.label,
                 scale=factor, phase=phase_of(number, len(shown)), linewidth=1.0, markersize=4.0,
             )  # fmt: skip
-        limits = [run.traces.get("tension_thresholds") for _, run, _ in shown]
-        known = [rows for rows in limits if rows is not None]
+        known = [
+            run["tension_thresholds"]
+            for _, run, _ in shown
+            if "tension_thresholds" in run.columns()
+        ]
         if name == "cable_tensions" and known:
             axes.axhline(known[0][-1, k], **line_style(BOUND), label="threshold")
         axes.set_title(cable.name, fontsize=10)

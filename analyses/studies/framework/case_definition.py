@@ -1,29 +1,14 @@
-"""What a case study is: configurations of one scenario, with what was published about them."""
+"""Configurations of one scenario as cases of a study, with what was published about them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
-from matplotlib.figure import Figure
-from rich.table import Table
-
-from cdpr_drake.analyses.reporting.statements import Statement
-from cdpr_drake.analyses.studies.framework.cable_figures import QUANTITIES
 from cdpr_drake.analyses.studies.framework.case_layouts import Layout
-from cdpr_drake.analyses.studies.framework.case_run import (
-    METRICS,
-    CaseJob,
-    CaseRuns,
-    Metric,
-    OwnMetric,
-)
-
-QUICK_REPETITIONS = 1
-"""Repetitions of a configuration in the quick form."""
-
-PROJECTED = "camera.kind=projected"
-RENDERED = "camera.kind=rendered"
+from cdpr_drake.analyses.studies.framework.case_run import METRICS, Metric, OwnMetric, Recipe
+from cdpr_drake.analyses.studies.framework.study import Case, Form
+from cdpr_drake.systems.cameras.camera_settings import PROJECTED, RENDERED
 
 PULLEYS = "cables.pulleys=true"
 """The simulated robot has the pulleys of the prototype; the controller knows nothing of them."""
@@ -93,67 +78,58 @@ class PublishedNumber:
 
 
 @dataclass(frozen=True, kw_only=True)
-class CaseStudy:
-    """A case study.
+class Plan:
+    """Which configurations a study runs, and what is shown of them; called with a form of the
+    study it gives their cases.
 
     Attributes:
-        name: Its name for `cdpr study`.
-        title: What it shows, in one line.
-        source: Where it stands in the thesis.
+        title: What the study shows, in one line.
+        name: Its name.
         scenario: Scenario that the configurations change.
         changes: Changes that all configurations share.
         configurations: The configurations, in the order of the thesis.
-        repetitions: Runs of each, with seeds 0, 1, ...
         rendered: Names of configurations that also run once with rendered images.
-        quick: Names of configurations of the quick form, once each; all, if there are none.
-        assumptions: What the thesis leaves open, and what was chosen.
-        judges: Functions that judge a statement of the thesis; KeyError where runs are missing.
+        quick: Names of configurations of the quick form; all, if there are none.
         own: Metrics of this study alone, by name.
-        summaries: Functions that put runs into a table of their own; KeyError as of `judges`.
-        drawings: What draws figures of the study's own, by name; KeyError as of `judges`.
         layouts: Published figures that are drawn in their own layout, by the name of the file.
         stability: Tension from which a cable counts in the stability criterion along the run [N];
             None: the traces do not have it.
     """
 
-    name: str
     title: str
-    source: str
+    name: str
     scenario: str
     configurations: tuple[Configuration, ...]
     changes: tuple[str, ...] = ()
-    repetitions: int = 5
     rendered: tuple[str, ...] = ()
     quick: tuple[str, ...] = ()
-    assumptions: tuple[str, ...] = ()
-    judges: Sequence[Callable[[CaseRuns], Statement]] = ()
     own: Mapping[str, OwnMetric] = field(default_factory=dict)
-    summaries: Sequence[Callable[[CaseRuns], Table]] = ()
-    drawings: Mapping[str, Callable[[CaseRuns], Figure]] = field(default_factory=dict)
     layouts: Mapping[str, Layout] = field(default_factory=dict)
     stability: float | None = None
 
-    def jobs(self, quick: bool, seeds: int | None = None) -> list[CaseJob]:
-        """The runs of this study: rendered ones first, then every configuration repeated, so often
-        as `seeds` says, or the study itself."""
-        some = self.quick if quick and self.quick else [c.name for c in self.configurations]
+    def __call__(self, form: Form) -> Iterator[Case]:
+        """The cases: rendered ones first, which take longest and are not in the quick form."""
+        some = self.quick if form.quick and self.quick else [c.name for c in self.configurations]
         chosen = [c for c in self.configurations if c.name in some]
-        jobs = []
-        if not quick:
-            jobs += [self._job(c, 0, RENDERED) for c in chosen if c.name in self.rendered]
-        for c in chosen:
-            usual = c.repetitions or self.repetitions
-            repetitions = seeds or (QUICK_REPETITIONS if quick else usual)
-            jobs += [self._job(c, seed, PROJECTED) for seed in range(repetitions)]
-        return jobs
+        if not form.quick:
+            yield from (self._case(c, RENDERED) for c in chosen if c.name in self.rendered)
+        yield from (self._case(c, PROJECTED) for c in chosen)
 
-    def _job(self, configuration: Configuration, seed: int, camera: str) -> CaseJob:
-        changes = (*self.changes, *configuration.changes, camera, f"seed={seed}")
-        scenario = configuration.scenario or self.scenario
+    def _case(self, configuration: Configuration, camera: str) -> Case:
         rendered = camera == RENDERED
-        return CaseJob(
-            configuration.name, scenario, changes, seed, rendered, self.own, self.stability
-        )
+        return Case(
+            name=f"{configuration.name}, {camera}" if rendered else configuration.name,
+            keys={"configuration": configuration.name, "group": configuration.group,
+                  "camera": camera},
+            label=configuration.label,
+            changes=(*self.changes, *configuration.changes, f"camera.kind={camera}"),
+            data=Recipe(configuration.scenario or self.scenario, self.own, self.stability),
+            seeds=configuration.repetitions,
+            most=1 if rendered else None,
+            rendered=rendered,
+            printed={} if rendered else configuration.published,
+            why=configuration.why,
+        )  # fmt: skip
 
     def metrics(self) -> dict[str, Metric]:
         """What describes its runs, by name."""
@@ -164,25 +140,19 @@ class CaseStudy:
         outcome, known = Metric("outcome", 1.0, "s"), self.metrics()
         return tuple(
             PublishedNumber(
-                group=c.group,
-                configuration=c.name,
-                label=c.label,
+                group=case.keys["group"],
+                configuration=case.keys["configuration"],
+                label=case.label,
                 metric=name,
                 heading=known.get(name, outcome).heading,
                 factor=known.get(name, outcome).factor,
                 format=known.get(name, outcome).format,
                 printed=printed,
-                why=c.why,
+                why=case.why,
             )
-            for c in self.configurations
-            for name, printed in c.published.items()
+            for case in self(Form())
+            for name, printed in case.printed.items()
         )
-
-    def figures(self) -> tuple[str, ...]:
-        """Names of all figures that it can write, without endings."""
-        names = [*EVERY_GROUP, *((*QUANTITIES, "stability") if self.stability is not None else ())]
-        drawn = [f"{name}{group_suffix(group)}" for group in self.groups() for name in names]
-        return (*drawn, *self.layouts, *self.drawings)
 
     def groups(self) -> dict[str, list[Configuration]]:
         """Configurations by experiment, in their order."""

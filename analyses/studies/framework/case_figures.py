@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from cdpr_drake.analyses.reporting.deferred_figures import NothingToDraw
 from cdpr_drake.analyses.simulation.stability_files import draw_steps
 from cdpr_drake.analyses.studies.framework.cable_figures import QUANTITIES, cable_panels
 from cdpr_drake.analyses.studies.framework.case_definition import (
-    CaseStudy,
+    EVERY_GROUP,
     Configuration,
+    Plan,
     group_suffix,
 )
+from cdpr_drake.analyses.studies.framework.case_layouts import Layout
 from cdpr_drake.analyses.studies.framework.case_panels import (
     Scene,
     Shown,
@@ -28,7 +29,8 @@ from cdpr_drake.analyses.studies.framework.case_panels import (
     legend_below,
     sorted_legend,
 )
-from cdpr_drake.analyses.studies.framework.case_run import CaseRun, CaseRuns
+from cdpr_drake.analyses.studies.framework.runs import MissingRuns, Runs
+from cdpr_drake.analyses.studies.framework.study import FigureMaker
 from cdpr_drake.analyses.visualization.curves import draw_curve, phase_of, shade
 from cdpr_drake.analyses.visualization.figure_style import (
     bar_style,
@@ -37,90 +39,90 @@ from cdpr_drake.analyses.visualization.figure_style import (
     new_figure,
 )
 from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.palette import BOUND, LOST, Look, nth_look
+from cdpr_drake.palette import BOUND, LOST, nth_look
 
 
-def case_drawings(case: CaseStudy, runs: Sequence[CaseRun]) -> dict[str, Callable[[], Figure]]:
-    """What draws the figures of every experiment of a case study, and those in the published
-    layout, by name; raises NothingToDraw where runs for it are missing."""
-    drawings: dict[str, Callable[[], Figure]] = {}
-    for group, configurations in case.groups().items():
-        names = {c.name for c in configurations}
-        mine = [run for run in runs if run.job.configuration in names]
-        about = f"{case.title} ({case.name})"
-        title = f"{about}\n{group}" if group else about
-        for name, draw in _group_drawings(title, configurations, mine):
-            drawings[f"{name}{group_suffix(group)}"] = partial(_drawn, draw)
-    found = CaseRuns(runs)
-    published: dict[str, Callable[[CaseRuns], Figure]] = {
-        name: partial(layout.figure, partial(shown_of, case, found))
-        for name, layout in case.layouts.items()
+def case_figures(plan: Plan) -> dict[str, FigureMaker]:
+    """What draws the figures of every experiment of a study, and those in the published layout, by
+    the name of the file; MissingRuns where runs for it are missing."""
+    names = [*EVERY_GROUP, *((*QUANTITIES, "stability") if plan.stability is not None else ())]
+    drawn: dict[str, FigureMaker] = {
+        f"{name}{group_suffix(group)}": partial(group_figure, plan, group, name)
+        for group in plan.groups()
+        for name in names
     }
-    for name, draw_found in (published | dict(case.drawings)).items():
-        drawings[name] = partial(_drawn_of_runs, draw_found, found)
-    return drawings
+    return drawn | {
+        name: partial(layout_figure, plan, layout) for name, layout in plan.layouts.items()
+    }
 
 
-def _drawn(draw: Callable[[], Figure | None]) -> Figure:
-    """A figure; NothingToDraw where there is none."""
-    figure = draw()
-    if figure is None:
-        raise NothingToDraw
-    return figure
+def layout_figure(plan: Plan, layout: Layout, runs: Runs) -> Figure:
+    """A figure in the published layout."""
+    return layout.figure(partial(shown_of, plan, runs), runs)
 
 
-def _drawn_of_runs(draw: Callable[[CaseRuns], Figure], runs: CaseRuns) -> Figure:
-    """A figure of runs; NothingToDraw where some that it needs are missing (KeyError)."""
-    try:
-        return draw(runs)
-    except KeyError as problem:
-        raise NothingToDraw from problem
-
-
-def shown_of(case: CaseStudy, runs: CaseRuns, names: Sequence[str]) -> Shown:
-    """Those of some configurations that were run, with their first projected run and the look
-    that they have in their experiment's figures."""
+def shown_of(plan: Plan, runs: Runs, names: Sequence[str]) -> Shown:
+    """Those of some configurations that were run, with their first run and the look that they have
+    in their experiment's figures."""
     looks = {
         c.name: (c, nth_look(number))
-        for group in case.groups().values()
+        for group in plan.groups().values()
         for number, c in enumerate(group)
     }
-    return [(looks[n][0], runs.of(n)[0], looks[n][1]) for n in names if runs.has(n)]
+    return [
+        (looks[name][0], runs(configuration=name).rows[0], looks[name][1])
+        for name in names
+        if runs.has(configuration=name)
+    ]
 
 
-def _group_drawings(
-    title: str, configurations: Sequence[Configuration], runs: Sequence[CaseRun]
-) -> Iterator[tuple[str, Callable[[], Figure | None]]]:
-    """What draws the figures of one experiment, by name; None where there is nothing to show.
+def group_figure(plan: Plan, group: str, name: str, runs: Runs) -> Figure:
+    """A figure of one experiment.
 
-    Projected runs come before rendered ones.
+    Args:
+        plan: Of the study.
+        group: The experiment.
+        name: Of `EVERY_GROUP` or `QUANTITIES`, or "stability".
+        runs: With projected images.
+
+    Raises:
+        MissingRuns: There is nothing to show.
     """
-    shown: list[tuple[Configuration, CaseRun, Look]] = []
-    for number, configuration in enumerate(configurations):
-        mine = [run for run in runs if run.job.configuration == configuration.name]
-        mine.sort(key=lambda run: run.job.rendered)
-        if mine:
-            shown.append((configuration, mine[0], nth_look(number)))
+    configurations = plan.groups()[group]
+    shown = shown_of(plan, runs, [c.name for c in configurations])
     if not shown:
-        return
-    found = CaseRuns(runs)
-    yield "image_paths", partial(image_figure, title, shown, found)
-    yield "camera_paths", partial(camera_figure, title, shown, found)
-    yield "pose_estimates", partial(estimate_figure, title, shown)
-    for name, quantity, label, factor in (
-        ("errors", "error", "feature error [units in the legend]", 1.0),
-        ("cable_velocities", "cable_velocities", "cable velocity [mm/s]", 1e3),
-    ):
-        yield name, partial(small_multiples, title, shown, quantity, label, factor)
-    for name in QUANTITIES:
-        yield name, partial(cable_panels, title, shown, name)
-    if all("jacobian_rank" in run.traces for _, run, _ in shown):
-        yield "stability", partial(stability_multiples, title, shown)
-    for name, bars in (("deviations", _DEVIATIONS), ("estimates", _ESTIMATES)):
-        yield name, partial(bar_figure, title, configurations, runs, bars)
+        raise MissingRuns(f"figure {name}")
+    about = f"{plan.title} ({plan.name})"
+    title = f"{about}\n{group}" if group else about
+    if name in ("image_paths", "camera_paths"):
+        draw = image_figure if name == "image_paths" else camera_figure
+        return draw(title, shown, runs)
+    if name == "pose_estimates":
+        return estimate_figure(title, shown)
+    if name in MULTIPLES:
+        return small_multiples(title, shown, *MULTIPLES[name])
+    if name == "stability":
+        if not all("jacobian_rank" in run.columns() for _, run, _ in shown):
+            raise MissingRuns("jacobian_rank")
+        return stability_multiples(title, shown)
+    found = (
+        cable_panels(title, shown, name)
+        if name in QUANTITIES
+        else bar_figure(title, configurations, runs, BARS[name])
+    )
+    if found is None:
+        raise MissingRuns(f"figure {name}")
+    return found
 
 
-def image_figure(title: str, shown: Shown, runs: CaseRuns) -> Figure:
+MULTIPLES = {
+    "errors": ("error", "feature error [units in the legend]", 1.0),
+    "cable_velocities": ("cable_velocities", "cable velocity [mm/s]", 1e3),
+}
+"""Figures with a small picture a configuration: column, label, factor."""
+
+
+def image_figure(title: str, shown: Shown, runs: Runs) -> Figure:
     """Paths of the object's centre in the image, and their distance from the straight line."""
     figure, (image, deviation) = new_figure(
         1, 2, (14.0, 6.5), f"Path of the object's centre in the image\n{title}"
@@ -132,7 +134,7 @@ def image_figure(title: str, shown: Shown, runs: CaseRuns) -> Figure:
     return figure
 
 
-def camera_figure(title: str, shown: Shown, runs: CaseRuns) -> Figure:
+def camera_figure(title: str, shown: Shown, runs: Runs) -> Figure:
     """Paths of the camera in space, and their distance from the straight line."""
     figure = bare_figure((14.0, 7.0), f"Path of the camera, Co, in the world frame W\n{title}")
     space: Any = figure.add_subplot(1, 2, 1, projection="3d")
@@ -150,12 +152,12 @@ def estimate_figure(title: str, shown: Shown) -> Figure:
         1, 2, (14.0, 6.0), f"Estimated pose of the platform against the true one\n{title}"
     )
     for number, (configuration, run, look) in enumerate(shown):
-        traces, phase = run.traces, phase_of(number, len(shown))
+        phase = phase_of(number, len(shown))
         for axes, name, scale, label in (
             (distance, "estimate_distance", 1e3, configuration.label),
             (angle, "estimate_angle", 180.0 / np.pi, None),
         ):
-            draw_curve(axes, traces["time"], traces[name], look, label, scale=scale, phase=phase)
+            draw_curve(axes, run["time"], run[name], look, label, scale=scale, phase=phase)
     distance.set(xlabel="time [s]", ylabel="distance [mm]", ylim=(0, None))
     angle.set(xlabel="time [s]", ylabel="angle [deg]", ylim=(0, None))
     legend_below(figure, *distance.get_legend_handles_labels())
@@ -172,16 +174,15 @@ def small_multiples(title: str, shown: Shown, quantity: str, label: str, factor:
     grid = figure.subplots(rows, columns, squeeze=False, sharey=True)
     legend: dict[str, Any] = {}
     for axes, (configuration, run, _) in zip(grid.flat, shown, strict=False):
-        traces = run.traces
-        values = traces[quantity]
+        values = run[quantity]
         count = values.shape[1]
         if quantity == "error":
-            names = [feature_words(name) for name in run.features]
+            names = [feature_words(name) for name in run["features"]]
         else:
-            names = [cable.name for cable in load_robot(run.summary["robot"]).cables]
+            names = [cable.name for cable in load_robot(run["summary"]["robot"]).cables]
         for k, name in enumerate(names):
             draw_curve(
-                axes, traces["time"], values[:, k], nth_look(k), name,
+                axes, run["time"], values[:, k], nth_look(k), name,
                 scale=factor, phase=phase_of(k, count), linewidth=1.0, markersize=4.0,
             )  # fmt: skip
         handles, labels = axes.get_legend_handles_labels()
@@ -208,14 +209,11 @@ def stability_multiples(title: str, shown: Shown) -> Figure:
     figure = bare_figure(size, f"Cables that pull; red: the platform is underactuated\n{title}")
     grid = figure.subplots(rows, columns, squeeze=False, sharey=True)
     for axes, (configuration, run, _) in zip(grid.flat, shown, strict=False):
-        traces, planar = (
-            run.traces,
-            load_robot(run.summary["robot"]).motion_type().is_horizontal_body,
-        )
-        times, freedom = traces["stability_time"], 3 if planar else 6
-        lost = traces["jacobian_rank"] < freedom
+        planar = load_robot(run["summary"]["robot"]).motion_type().is_horizontal_body
+        times, freedom = run["stability_time"], 3 if planar else 6
+        lost = run["jacobian_rank"] < freedom
         shade(axes, times, lost, None, LOST)
-        draw_steps(axes, times, traces["taut_cables"], lost)
+        draw_steps(axes, times, run["taut_cables"], lost)
         axes.axhline(freedom, **line_style(BOUND))
         axes.set_title(configuration.label, fontsize=10)
         axes.set(xlim=(times[0], times[-1]), ylim=(-0.2, None))
@@ -229,22 +227,25 @@ def stability_multiples(title: str, shown: Shown) -> Figure:
     return figure
 
 
-_DEVIATIONS = (
-    ("image_max_px", "image, largest [px]", 1.0),
-    ("image_mean_px", "image, mean [px]", 1.0),
-    ("camera_max_m", "camera, largest [mm]", 1e3),
-    ("camera_mean_m", "camera, mean [mm]", 1e3),
-)
-_ESTIMATES = (
-    ("estimate_max_m", "pose estimate, largest error [mm]", 1e3),
-    ("estimate_max_rad", "pose estimate, largest error [deg]", 180.0 / np.pi),
-)
+BARS = {
+    "deviations": (
+        ("image_max_px", "image, largest [px]", 1.0),
+        ("image_mean_px", "image, mean [px]", 1.0),
+        ("camera_max_m", "camera, largest [mm]", 1e3),
+        ("camera_mean_m", "camera, mean [mm]", 1e3),
+    ),
+    "estimates": (
+        ("estimate_max_m", "pose estimate, largest error [mm]", 1e3),
+        ("estimate_max_rad", "pose estimate, largest error [deg]", 180.0 / np.pi),
+    ),
+}
+"""Figures with bars: metrics, labels, factors."""
 
 
 def bar_figure(
     title: str,
     configurations: Sequence[Configuration],
-    runs: Sequence[CaseRun],
+    runs: Runs,
     bars: Sequence[tuple[str, str, float]],
 ) -> Figure | None:
     """Means over the repetitions, with their range as whiskers; None where nothing was measured."""
@@ -275,11 +276,9 @@ def bar_figure(
     return figure
 
 
-def _values(configuration: Configuration, runs: Sequence[CaseRun], metric: str) -> list[float]:
-    """A metric of the projected runs of a configuration, where it has one."""
-    values = [
-        run.metrics[metric]
-        for run in runs
-        if run.job.configuration == configuration.name and not run.job.rendered
-    ]
+def _values(configuration: Configuration, runs: Runs, metric: str) -> list[float]:
+    """A metric of the runs of a configuration, where they have one."""
+    if not runs.has(configuration=configuration.name):
+        return []
+    values = runs(configuration=configuration.name).list(metric)
     return [value for value in values if value is not None]

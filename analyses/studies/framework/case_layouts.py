@@ -21,7 +21,7 @@ from cdpr_drake.analyses.studies.framework.case_panels import (
     legend_below,
     sorted_legend,
 )
-from cdpr_drake.analyses.studies.framework.case_run import CaseRuns
+from cdpr_drake.analyses.studies.framework.runs import MissingRuns, Runs
 from cdpr_drake.analyses.visualization.figure_style import bare_figure, styled
 
 PANEL = (6.6, 5.0)
@@ -66,17 +66,17 @@ class PanelLayout:
     rows: tuple[tuple[Panel, ...], ...]
     height: float = 1.0
 
-    def figure(self, find: Find, runs: CaseRuns) -> Figure:
+    def figure(self, find: Find, runs: Runs) -> Figure:
         """Draws it from runs; panels of which nothing was run are left out.
 
         Raises:
-            KeyError: Nothing of it was run, or runs have not what a panel shows.
+            MissingRuns: Nothing of it was run, or runs have not what a panel shows.
         """
         rows = [[(panel, find(panel.of)) for panel in row] for row in self.rows]
         rows = [[(panel, shown) for panel, shown in row if shown] for row in rows]
         rows = [row for row in rows if row]
         if not rows:
-            raise KeyError(self.title)
+            raise MissingRuns(self.title)
         width = max(len(row) for row in rows)
         size = (max(PANEL[0] * width, 8.0), self.height * PANEL[1] * len(rows) + 1.6)
         figure, columns = bare_figure(size, self.title), lcm(*(len(row) for row in rows))
@@ -106,16 +106,16 @@ class CableLayout:
     quantity: str
     of: tuple[str, ...]
 
-    def figure(self, find: Find, runs: CaseRuns) -> Figure:
+    def figure(self, find: Find, runs: Runs) -> Figure:
         """Draws it from runs.
 
         Raises:
-            KeyError: Nothing of it was run, or runs have not that quantity.
+            MissingRuns: Nothing of it was run, or runs have not that quantity.
         """
         shown = find(self.of)
         figure = cable_panels(self.title, list(shown), self.quantity) if shown else None
         if figure is None:
-            raise KeyError(self.title)
+            raise MissingRuns(self.title)
         return figure
 
 

@@ -8,7 +8,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from cdpr_drake.analyses.studies.framework.case_run import CaseRun, CaseRuns
+from cdpr_drake.analyses.studies.framework.runs import MissingRuns, Run, Runs
 from cdpr_drake.analyses.visualization.curves import draw_curve, path_rows, phase_of
 from cdpr_drake.analyses.visualization.figure_style import bar_style, line_style
 from cdpr_drake.analyses.visualization.path_figures import set_box
@@ -36,7 +36,7 @@ class Labelled(Protocol):
         """Words for legends."""
 
 
-Shown = Sequence[tuple[Labelled, CaseRun, Look]]
+Shown = Sequence[tuple[Labelled, Run, Look]]
 """What a panel shows: configurations, the first run of each, how it looks in all figures."""
 
 
@@ -50,7 +50,7 @@ class Scene:
     """
 
     shown: Shown
-    runs: CaseRuns
+    runs: Runs
 
 
 Draw = Callable[[Any, Scene], None]
@@ -60,7 +60,7 @@ Draw = Callable[[Any, Scene], None]
 def draw_image_paths(axes: Any, scene: Scene) -> None:
     """Paths of the object's centre in the image, beside the straight lines."""
     for number, (one, run, look) in enumerate(scene.shown):
-        draw_path(axes, run.traces["image_path"], look, one.label)
+        draw_path(axes, run["image_path"], look, one.label)
         _image_line(axes, run, number == 0)
     _image_frame(axes, scene.shown[0][1])
 
@@ -69,10 +69,12 @@ def draw_corner_paths(axes: Any, scene: Scene) -> None:
     """Paths of the object's four points in the image: where they start, end and should end.
 
     Raises:
-        KeyError: The object has not four points.
+        MissingRuns: The object has not four points.
     """
     _, run, _ = scene.shown[0]
-    paths, goals = run.traces["corner_paths"], run.traces["corner_goals"]
+    if "corner_paths" not in run.columns():
+        raise MissingRuns("an object with four points")
+    paths, goals = run["corner_paths"], run["corner_goals"]
     for k in range(POINTS):
         look = nth_look(k)
         draw_path(axes, paths[:, k], look, f"point {k + 1}")
@@ -87,8 +89,8 @@ def corners_at(time: float) -> Draw:
 
     def draw(axes: Any, scene: Scene) -> None:
         _, run, _ = scene.shown[0]
-        row = int(np.argmin(np.abs(run.traces["image_time"] - time)))
-        corners = run.traces["corner_paths"][row]
+        row = int(np.argmin(np.abs(run["image_time"] - time)))
+        corners = run["corner_paths"][row]
         axes.plot(*corners[[*range(POINTS), 0]].T, color=PLATFORM.color, linestyle=SOLID,
                   label="tag")  # fmt: skip
         axes.plot(*corners[0], "o", color=PLATFORM.color, label="its first corner")
@@ -103,7 +105,7 @@ def draw_image_deviation(axes: Any, scene: Scene) -> None:
     """Distances of the object's centre from its straight line in the image over time."""
     for number, (one, run, look) in enumerate(scene.shown):
         draw_curve(
-            axes, run.traces["image_time"], run.traces["image_deviation"], look, one.label,
+            axes, run["image_time"], run["image_deviation"], look, one.label,
             phase=phase_of(number, len(scene.shown)),
         )  # fmt: skip
     axes.set(xlabel="time [s]", ylabel="distance from the straight line [px]", ylim=(0, None))
@@ -113,14 +115,14 @@ def draw_camera_paths(axes: Any, scene: Scene) -> None:
     """Paths of the camera in space, 3D axes, beside the straight lines."""
     points = []
     for number, (one, run, look) in enumerate(scene.shown):
-        draw_path(axes, run.traces["camera_path"], look, one.label)
+        draw_path(axes, run["camera_path"], look, one.label)
         line = line_style(IDEAL) | {"linewidth": 1.0}
-        axes.plot(*run.traces["camera_line"].T, **line, label=_once(number, "straight line"))
+        axes.plot(*run["camera_line"].T, **line, label=_once(number, "straight line"))
         axes.plot(
-            *run.traces["camera_line"][1:].T, DESIRED.marker, color=DESIRED.color, markersize=10,
+            *run["camera_line"][1:].T, DESIRED.marker, color=DESIRED.color, markersize=10,
             label=_once(number, "desired"),
         )  # fmt: skip
-        points += [run.traces["camera_path"], run.traces["camera_line"]]
+        points += [run["camera_path"], run["camera_line"]]
     fit_box(axes, np.vstack(points))
 
 
@@ -133,26 +135,26 @@ def draw_camera_deviation(axes: Any, scene: Scene) -> None:
 def draw_platform_paths(axes: Any, scene: Scene) -> None:
     """Paths of the platform in space, 3D axes."""
     for one, run, look in scene.shown:
-        draw_path(axes, run.traces["platform_path"], look, one.label)
-    fit_box(axes, np.vstack([run.traces["platform_path"] for _, run, _ in scene.shown]))
+        draw_path(axes, run["platform_path"], look, one.label)
+    fit_box(axes, np.vstack([run["platform_path"] for _, run, _ in scene.shown]))
 
 
 def draw_platform_from_above(axes: Any, scene: Scene) -> None:
     """Paths of the platform as seen from above."""
     for one, run, look in scene.shown:
-        draw_path(axes, run.traces["platform_path"][:, :2], look, one.label)
+        draw_path(axes, run["platform_path"][:, :2], look, one.label)
     axes.set(xlabel="x in W [m]", ylabel="y in W [m]")
     axes.set_aspect("equal", adjustable="datalim")
 
 
 def draw_estimated_paths(axes: Any, scene: Scene) -> None:
     """Estimated paths of the platform in space beside the true one of the first run, 3D axes."""
-    true = scene.shown[0][1].traces["platform_path"]
+    true = scene.shown[0][1]["platform_path"]
     axes.plot(*true[path_rows(true)].T, color=PLATFORM.color, linestyle=SOLID, linewidth=4.0,
               alpha=0.35, label="measured path")  # fmt: skip
     for one, run, look in scene.shown:
-        draw_path(axes, run.traces["estimate_path"], look, one.label)
-    points = [run.traces["estimate_path"] for _, run, _ in scene.shown]
+        draw_path(axes, run["estimate_path"], look, one.label)
+    points = [run["estimate_path"] for _, run, _ in scene.shown]
     fit_box(axes, np.vstack([true, *points]))
 
 
@@ -170,12 +172,12 @@ def draw_estimate_angle(axes: Any, scene: Scene) -> None:
 
 def draw_positions(axes: Any, scene: Scene) -> None:
     """True and estimated place of the platform over time, by coordinate."""
-    traces = scene.shown[0][1].traces
+    run = scene.shown[0][1]
     for k, axis in enumerate("xyz"):
         look = nth_look(k)
-        true, estimated = traces["platform_path"][:, k], traces["estimate_path"][:, k]
-        draw_curve(axes, traces["time"], true, Look(look.color), f"{axis}, measured")
-        draw_curve(axes, traces["time"], estimated, Look("#303030", ":", look.marker),
+        true, estimated = run["platform_path"][:, k], run["estimate_path"][:, k]
+        draw_curve(axes, run["time"], true, Look(look.color), f"{axis}, measured")
+        draw_curve(axes, run["time"], estimated, Look("#303030", ":", look.marker),
                    f"{axis}, estimated", phase=phase_of(k, 3), linewidth=1.6)  # fmt: skip
     axes.set(xlabel="time [s]", ylabel="position of the platform [m]")
 
@@ -183,8 +185,8 @@ def draw_positions(axes: Any, scene: Scene) -> None:
 def draw_errors(axes: Any, scene: Scene) -> None:
     """Components of the feature error over time, of one configuration."""
     _, run, _ = scene.shown[0]
-    names = [feature_words(name) for name in run.features]
-    _components(axes, run.traces["time"], run.traces["error"], names, 1.0)
+    names = [feature_words(name) for name in run["features"]]
+    _components(axes, run["time"], run["error"], names, 1.0)
     units = dict.fromkeys(name.rpartition("[")[2].rstrip("]") for name in names)
     axes.set_ylabel(f"feature error [{', '.join(units)}]")
 
@@ -192,16 +194,16 @@ def draw_errors(axes: Any, scene: Scene) -> None:
 def draw_velocities(axes: Any, scene: Scene) -> None:
     """Velocities of all cables over time, of one configuration."""
     _, run, _ = scene.shown[0]
-    names = [cable.name for cable in load_robot(run.summary["robot"]).cables]
-    _components(axes, run.traces["time"], run.traces["cable_velocities"], names, 1e3)
+    names = [cable.name for cable in load_robot(run["summary"]["robot"]).cables]
+    _components(axes, run["time"], run["cable_velocities"], names, 1e3)
     axes.set_ylabel("cable velocity [mm/s]")
 
 
 def draw_taut(axes: Any, scene: Scene) -> None:
     """Numbers of cables that pull over time."""
     for number, (one, run, look) in enumerate(scene.shown):
-        times = run.traces["stability_time"]
-        draw_curve(axes, times, run.traces["taut_cables"].astype(float), look, one.label,
+        times = run["stability_time"]
+        draw_curve(axes, times, run["taut_cables"].astype(float), look, one.label,
                    phase=phase_of(number, len(scene.shown)), drawstyle="steps-post")  # fmt: skip
     axes.axhline(6.0, **line_style(BOUND), label="six hold the platform")
     axes.set(xlabel="time [s]", ylabel="cables that pull [-]", ylim=(None, 8.4))
@@ -210,9 +212,9 @@ def draw_taut(axes: Any, scene: Scene) -> None:
 def draw_stable(axes: Any, scene: Scene) -> None:
     """Whether the criterion of stability holds over time; curves a little apart."""
     for number, (one, run, look) in enumerate(scene.shown):
-        margin = run.traces["stability_margin"]
+        margin = run["stability_margin"]
         holds = (np.nan_to_num(margin, nan=-1.0) > 0.0).astype(float)
-        draw_curve(axes, run.traces["stability_time"], holds - 0.06 * number, look, one.label,
+        draw_curve(axes, run["stability_time"], holds - 0.06 * number, look, one.label,
                    phase=phase_of(number, len(scene.shown)), drawstyle="steps-post")  # fmt: skip
     axes.set_yticks([0.0, 1.0], ["does not hold", "holds"])
     axes.set(xlabel="time [s]", ylim=(-0.25, 1.25))
@@ -221,8 +223,8 @@ def draw_stable(axes: Any, scene: Scene) -> None:
 def draw_final_places(axes: Any, scene: Scene) -> None:
     """Where the camera of each run ends as seen from above, against where it should."""
     for one, _, look in scene.shown:
-        for number, run in enumerate(scene.runs.of(one.name)):
-            end, goal = map(pose_from_row, run.traces["camera_ends"])
+        for number, run in enumerate(scene.runs(configuration=one.name)):
+            end, goal = map(pose_from_row, run["camera_ends"])
             away = 1e3 * (end.translation() - goal.translation())
             turn = end.rotation().matrix()[:2, 0]
             axes.quiver(*away[:2], *turn, angles="xy", color=look.color, width=0.006, scale=9.0)
@@ -236,15 +238,15 @@ def draw_final_places(axes: Any, scene: Scene) -> None:
     axes.set_aspect("equal", adjustable="datalim")
 
 
-Value = Callable[[CaseRun], float | None]
+Value = Callable[[Run], float | None]
 """A number of a run, in the unit of the bars' axis; None where it has none."""
 
 
 def metric(name: str, factor: float = 1.0) -> Value:
     """A metric of a run, see `METRICS`, times a factor."""
 
-    def value(run: CaseRun) -> float | None:
-        found = run.metrics[name]
+    def value(run: Run) -> float | None:
+        found = run[name]
         return None if found is None else factor * found
 
     return value
@@ -252,7 +254,7 @@ def metric(name: str, factor: float = 1.0) -> Value:
 
 def trace(name: str, of: Callable[[Array], Any], factor: float = 1.0) -> Value:
     """What is reckoned of a trace, times a factor."""
-    return lambda run: factor * float(of(run.traces[name]))
+    return lambda run: factor * float(of(run[name]))
 
 
 def last(values: Array) -> float:
@@ -273,7 +275,9 @@ def bars(label: str, values: dict[str, Value], letters: bool = False) -> Draw:
         width = 0.8 / len(values)
         for k, (words, value) in enumerate(values.items()):
             for place, (one, _, _) in enumerate(scene.shown):
-                found = [n for run in scene.runs.of(one.name) if (n := value(run)) is not None]
+                found = [
+                    n for run in scene.runs(configuration=one.name) if (n := value(run)) is not None
+                ]
                 if not found:
                     continue
                 mean = float(np.mean(found))
@@ -339,17 +343,17 @@ def legend_below(figure: Any, handles: list[Any], labels: list[str]) -> None:
         legend = figure.legend(handles, labels, loc="outside lower center", ncols=columns)
 
 
-def _image_line(axes: Any, run: CaseRun, first: bool) -> None:
+def _image_line(axes: Any, run: Run, first: bool) -> None:
     line = line_style(IDEAL) | {"linewidth": 1.0, "zorder": 0}
-    axes.plot(*run.traces["image_line"].T, **line, label="straight line" if first else None)
+    axes.plot(*run["image_line"].T, **line, label="straight line" if first else None)
     axes.plot(
-        *run.traces["image_line"][1], DESIRED.marker, color=DESIRED.color, markersize=12, zorder=5,
+        *run["image_line"][1], DESIRED.marker, color=DESIRED.color, markersize=12, zorder=5,
         label="desired" if first else None,
     )  # fmt: skip
 
 
-def _image_frame(axes: Any, run: CaseRun) -> None:
-    width, height = run.traces["image_size"]
+def _image_frame(axes: Any, run: Run) -> None:
+    width, height = run["image_size"]
     axes.set(
         xlim=(0.0, width),
         ylim=(height, 0.0),
@@ -362,7 +366,7 @@ def _image_frame(axes: Any, run: CaseRun) -> None:
 def _over_time(axes: Any, scene: Scene, name: str, factor: float) -> None:
     for number, (one, run, look) in enumerate(scene.shown):
         draw_curve(
-            axes, run.traces["time"], run.traces[name], look, one.label,
+            axes, run["time"], run[name], look, one.label,
             scale=factor, phase=phase_of(number, len(scene.shown)),
         )  # fmt: skip
 

@@ -1,8 +1,8 @@
-"""One run of a case study, and what is kept of it."""
+"""One run of a configuration, and what is kept of it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -12,6 +12,8 @@ from cdpr_drake.analyses.simulation.run_stability import stability_along
 from cdpr_drake.analyses.simulation.run_summary import summarize
 from cdpr_drake.analyses.simulation.run_traces import estimate_jump, run_traces
 from cdpr_drake.analyses.simulation.visual_servo_run import RunResult, run_scenario
+from cdpr_drake.analyses.studies.framework.runs import Runs
+from cdpr_drake.analyses.studies.framework.study import Case
 from cdpr_drake.arrays import Array
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.loops.loop_choice import choose_compiled_loop
@@ -54,84 +56,55 @@ class OwnMetric(Metric):
 
 
 @dataclass(frozen=True)
-class CaseJob:
-    """A run to do: a scenario, what changes in it, and what it is called in the study.
+class Recipe:
+    """How a configuration is run, beside the changes of its scenario.
 
-    `own` are a study's own metrics by name; with a tension `stability` [N] the traces have the
-    criterion along the run, see `stability_traces`.
+    Attributes:
+        scenario: Name of the scenario.
+        own: A study's own metrics by name.
+        stability: Tension from which a cable counts in the criterion along the run [N], see
+            `stability_traces`; None: the traces do not have it.
     """
 
-    configuration: str
     scenario: str
-    changes: tuple[str, ...]
-    seed: int
-    rendered: bool
     own: Mapping[str, OwnMetric] = field(default_factory=dict)
     stability: float | None = None
 
+    def arguments(self) -> dict[str, Any]:
+        """What the numbers of a run depend on, for JSON."""
+        return {"scenario": self.scenario, "own": list(self.own), "stability": self.stability}
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class CaseRun:
-    """A run that was done.
 
-    Attributes:
-        job: What was asked for.
-        outcome: How it ended, in the words of `summary.json`.
-        message: Why, where there is more to say.
-        metrics: Numbers by the names of `METRICS`; None where there is none.
-        summary: The run's summary, as `cdpr simulate` writes it.
-        traces: Arrays for figures, see `run_traces`.
-        features: Names of the components of "error" in the traces.
-        stop_position: Measured distance at which a run counts as converged [m].
+LEFT_OUT = ("wall_time_s", "realtime_factor", "versions")
+"""What of a run's summary is another in each session, or the same for the whole study."""
+
+
+def measure_run(case: Case, seed: int) -> dict[str, Any]:
+    """Runs a configuration, by the compiled loop where that can do it, which the summary says.
+
+    Returns:
+        outcome, message; the metrics of `METRICS` and the study's own, SI units, None where there
+        is none; summary, as `cdpr simulate` writes it, without `LEFT_OUT`; features,
+        names of the components of "error"; stop_position_m, the measured distance at which a run
+        counts as converged; the arrays of `run_traces` and of `stability_traces`.
     """
-
-    job: CaseJob
-    outcome: str
-    message: str
-    metrics: dict[str, float | None]
-    summary: dict[str, Any]
-    traces: dict[str, Array]
-    features: tuple[str, ...]
-    stop_position: float
-
-    def as_dict(self) -> dict[str, Any]:
-        """Everything but the traces, for JSON."""
-        return {
-            "configuration": self.job.configuration,
-            "seed": self.job.seed,
-            "camera": "rendered" if self.job.rendered else "projected",
-            "scenario": self.job.scenario,
-            "changes": list(self.job.changes),
-            "outcome": self.outcome,
-            "message": self.message,
-            "metrics": self.metrics,
-            "summary": self.summary,
-        }
-
-
-def do_case_job(job: CaseJob) -> CaseRun:
-    """Runs a job; a free function of plain data, so that a worker process can do it.
-
-    By the compiled loop where that can do it, which the summary says.
-    """
-    result = run_scenario(choose_compiled_loop(load_scenario(job.scenario, job.changes)))
+    recipe: Recipe = case.data
+    scenario = load_scenario(recipe.scenario, [*case.changes, f"seed={seed}"])
+    result = run_scenario(choose_compiled_loop(scenario))
     traces = run_traces(result)
-    if job.stability is not None:
-        traces |= stability_traces(result, job.stability)
+    if recipe.stability is not None:
+        traces |= stability_traces(result, recipe.stability)
     summary = summarize(result)
-    return CaseRun(
-        job=job,
-        outcome=summary["outcome"],
-        message=summary["message"],
-        metrics={
-            **_metrics(summary, traces),
-            **{name: metric.of(traces) for name, metric in job.own.items()},
-        },
-        summary=summary,
-        traces=traces,
-        features=tuple(result.servo.feature_names),
-        stop_position=result.servo.scenario.stop.position,
-    )
+    return {
+        "outcome": summary["outcome"],
+        "message": summary["message"],
+        **_metrics(summary, traces),
+        **{name: metric.of(traces) for name, metric in recipe.own.items()},
+        "summary": {name: value for name, value in summary.items() if name not in LEFT_OUT},
+        "features": list(result.servo.feature_names),
+        "stop_position_m": result.servo.scenario.stop.position,
+        **traces,
+    }
 
 
 def stability_traces(result: RunResult, threshold: float) -> dict[str, Array]:
@@ -171,45 +144,11 @@ def _metrics(summary: dict[str, Any], traces: dict[str, Array]) -> dict[str, flo
     }
 
 
-class CaseRuns:
-    """Finds runs by their configuration; projected ones unless said."""
+def converged(runs: Runs, configuration: str) -> bool:
+    """Whether all runs of a configuration converged."""
+    return all(run["outcome"] == CONVERGED for run in runs(configuration=configuration))
 
-    def __init__(self, runs: Iterable[CaseRun]) -> None:
-        """With the runs that were done."""
-        self._runs: dict[tuple[str, bool], list[CaseRun]] = {}
-        for run in runs:
-            self._runs.setdefault((run.job.configuration, run.job.rendered), []).append(run)
 
-    def of(self, configuration: str, rendered: bool = False) -> Sequence[CaseRun]:
-        """The runs of a configuration.
-
-        Raises:
-            KeyError: There are none.
-        """
-        return self._runs[configuration, rendered]
-
-    def has(self, configuration: str, rendered: bool = False) -> bool:
-        """Whether a configuration was run."""
-        return (configuration, rendered) in self._runs
-
-    def values(self, configuration: str, metric: str) -> Array:
-        """A metric of all runs of a configuration, NaN where it has none."""
-        values = [run.metrics[metric] for run in self.of(configuration)]
-        return np.array([np.nan if v is None else v for v in values], float)
-
-    def mean(self, configuration: str, metric: str) -> float:
-        """Mean of a metric over the runs of a configuration, in SI units."""
-        return float(np.mean(self.values(configuration, metric)))
-
-    def largest(self, configuration: str, metric: str) -> float:
-        """Largest of a metric over the runs of a configuration, in SI units."""
-        return float(np.max(self.values(configuration, metric)))
-
-    def converged(self, configuration: str) -> bool:
-        """Whether all runs of a configuration converged."""
-        return all(run.outcome == CONVERGED for run in self.of(configuration))
-
-    def outcomes(self, configuration: str) -> str:
-        """Words such as `5 converged` or `3 converged, 2 target_lost`."""
-        found = [run.outcome for run in self.of(configuration)]
-        return ", ".join(f"{found.count(name)} {name}" for name in dict.fromkeys(found))
+def outcomes(runs: Runs, configuration: str) -> str:
+    """Words such as `5 converged` or `3 converged, 2 target_lost`."""
+    return runs.counted("outcome", configuration=configuration)

@@ -1,90 +1,69 @@
-"""Tables of case studies: what was published, beside what was found."""
+"""Tables of configurations: what was published, beside what was found."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from rich.table import Table
 
-from cdpr_drake.analyses.reporting.statements import (
-    Statement,
-    new_table,
-    run_checks,
-    statement_table,
-)
-from cdpr_drake.analyses.studies.framework.case_definition import CaseStudy, Configuration
-from cdpr_drake.analyses.studies.framework.case_run import CaseRun, CaseRuns, Metric
+from cdpr_drake.analyses.reporting.statements import new_table
+from cdpr_drake.analyses.studies.framework.case_definition import Configuration, Plan
+from cdpr_drake.analyses.studies.framework.case_run import Metric, outcomes
+from cdpr_drake.analyses.studies.framework.runs import Runs
+from cdpr_drake.systems.cameras.camera_settings import PROJECTED, RENDERED
+
+CAMERAS = {PROJECTED: "projected camera", RENDERED: "rendered images, one run each"}
+"""What tables say of the camera."""
 
 
-def case_tables(
-    case: CaseStudy, runs: Sequence[CaseRun], statements: Sequence[Statement]
-) -> list[Table]:
-    """Numbers of all configurations, the rendered runs, what was published, the study's own
-    summaries, the statements."""
-    found = CaseRuns(runs)
-    tables = []
-    for group, configurations in case.groups().items():
-        for rendered in (False, True):
-            some = [c for c in configurations if found.has(c.name, rendered)]
+def case_tables(plan: Plan, runs: Runs) -> list[Table]:
+    """Numbers of all configurations, the rendered runs, what was published."""
+    tables, by_camera = [], dict(runs.by("camera"))
+    for group, configurations in plan.groups().items():
+        for camera, words in CAMERAS.items():
+            found = by_camera.get(camera, Runs(()))
+            some = [c for c in configurations if found.has(configuration=c.name)]
             if some:
-                title = f"{case.title}: {group}" if group else case.title
-                tables.append(_numbers(title, some, found, rendered, case.metrics()))
-    published = [c for c in case.configurations if c.published and found.has(c.name)]
-    if published:
-        table = new_table(
-            "Published | here (mean over the runs, +- half of the range)",
-            ("configuration", "what"),
-            ("published", "here"),
-        )
-        for c in published:
-            for metric, words in c.published.items():
-                known = case.metrics().get(metric)
-                table.add_row(c.label, *_published_row(found, c.name, metric, words, known))
-        tables.append(table)
-    tables += run_checks(case.summaries, found)
-    if statements:
-        tables.append(statement_table("What the servoing thesis states", statements))
-    return tables
+                title = f"{plan.title}: {group}" if group else plan.title
+                tables.append(_numbers(f"{title}; {words}", some, found, plan.metrics()))
+                if camera == PROJECTED:
+                    tables[-1].caption = "Means over the runs, which are in results.json."
+    return tables + _published(plan, by_camera.get(PROJECTED, Runs(())))
 
 
-def _published_row(
-    found: CaseRuns, configuration: str, metric: str, words: str, known: Metric | None
-) -> tuple[str, str, str]:
-    if metric == "outcome":
-        return "outcome", words, found.outcomes(configuration)
-    assert known is not None
-    return known.heading, words, _cell(found.values(configuration, metric), known, spread=True)
+def _published(plan: Plan, found: Runs) -> list[Table]:
+    """What is printed of configurations beside what was found; none where nothing is."""
+    some = [c for c in plan.configurations if c.published and found.has(configuration=c.name)]
+    table = new_table(
+        "Published | here (mean over the runs, +- half of the range)",
+        ("configuration", "what"),
+        ("published", "here"),
+    )
+    for c in some:
+        for name, words in c.published.items():
+            if name == "outcome":
+                table.add_row(c.label, name, words, outcomes(found, c.name))
+                continue
+            metric, values = plan.metrics()[name], found(configuration=c.name)[name]
+            table.add_row(c.label, metric.heading, words, _cell(values, metric, spread=True))
+    return [table] if some else []
 
 
 def _numbers(
     title: str,
     configurations: Sequence[Configuration],
-    found: CaseRuns,
-    rendered: bool,
+    found: Runs,
     metrics: Mapping[str, Metric],
 ) -> Table:
-    camera = "rendered images, one run each" if rendered else "projected camera"
     headings = [metric.heading for metric in metrics.values()]
-    table = new_table(f"{title}; {camera}", ("configuration", "outcome"), headings)
+    table = new_table(title, ("configuration", "outcome"), headings)
     for c in configurations:
-        runs = found.of(c.name, rendered)
-        names = [run.outcome for run in runs]
-        outcomes = ", ".join(f"{names.count(n)} {n}" for n in dict.fromkeys(names))
-        cells = [
-            _cell(np.array([_number(run, name) for run in runs]), metric)
-            for name, metric in metrics.items()
-        ]
-        table.add_row(c.label, outcomes, *cells)
-    if not rendered:
-        table.caption = "Means over the runs; their ranges are in results.json."
+        runs = found(configuration=c.name)
+        cells = [_cell(runs[name], metric) for name, metric in metrics.items()]
+        table.add_row(c.label, outcomes(found, c.name), *cells)
     return table
-
-
-def _number(run: CaseRun, metric: str) -> float:
-    value = run.metrics[metric]
-    return float("nan") if value is None else value
 
 
 def _cell(values: np.ndarray, known: Metric, spread: bool = False) -> str:
@@ -96,31 +75,23 @@ def _cell(values: np.ndarray, known: Metric, spread: bool = False) -> str:
     return mean if len(values) == 1 or not spread else f"{mean} +- {format(half, known.format)}"
 
 
-def configuration_numbers(
-    found: CaseRuns, configuration: str, metrics: Iterable[str]
-) -> dict[str, Any]:
-    """Statistics over the projected runs of a configuration, SI units; empty where there are none.
+def configuration_numbers(found: Runs, configuration: str) -> dict[str, Any]:
+    """Accuracy and repeatability of the platform's last position in the runs of a configuration.
 
     Returns:
-        outcomes in words; by metric its mean, smallest and largest; accuracy and repeatability of
-        the platform's last position: distance of the mean position from the mean goal, and largest
-        distance from the mean position [m] (servoing thesis, figure 2.13).
+        accuracy_m, distance of the mean position from the mean goal; repeatability_m, largest
+        distance from the mean position.
+
+    Raises:
+        MissingRuns: There are none.
+
+    Source: servoing thesis, figure 2.13.
     """
-    try:
-        runs = found.of(configuration)
-    except KeyError:
-        return {}
-    numbers: dict[str, Any] = {"outcomes": found.outcomes(configuration), "runs": len(runs)}
-    for metric in metrics:
-        values = found.values(configuration, metric)
-        numbers[metric] = {
-            "mean": float(values.mean()),
-            "min": float(values.min()),
-            "max": float(values.max()),
-        }
-    ends = np.array([run.traces["camera_path"][-1] for run in runs])
-    goal = np.array([run.traces["camera_line"][-1] for run in runs]).mean(axis=0)
+    runs = found(configuration=configuration)
+    ends = np.array([run["camera_path"][-1] for run in runs])
+    goal = np.array([run["camera_line"][-1] for run in runs]).mean(axis=0)
     middle = ends.mean(axis=0)
-    numbers["accuracy_m"] = float(np.linalg.norm(middle - goal))
-    numbers["repeatability_m"] = float(np.max(np.linalg.norm(ends - middle, axis=1)))
-    return numbers
+    return {
+        "accuracy_m": float(np.linalg.norm(middle - goal)),
+        "repeatability_m": float(np.max(np.linalg.norm(ends - middle, axis=1))),
+    }

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cdpr_drake.analyses.studies.framework.case_definition import CaseStudy, Configuration
+from cdpr_drake.analyses.studies.framework.case_definition import Configuration, Plan
+from cdpr_drake.analyses.studies.framework.case_study import configuration_study
 from cdpr_drake.analyses.studies.tension_cases.case_10_estimates import ESTIMATES
 from cdpr_drake.analyses.studies.tension_cases.case_10_statements import (
     METRICS,
@@ -93,26 +94,31 @@ def _worse_sensors() -> list[Configuration]:
     ]
 
 
-CASE_10 = CaseStudy(
-    name="case-10",
-    title="Slack cables on CAROCA, with and without tension correction",
+STUDY = configuration_study(
+    Plan(
+        name="case-10",
+        title="Slack cables on CAROCA, with and without tension correction",
+        scenario="caroca_slack_start",
+        changes=(
+            "perturbations.initial_pose_shift={distance: 0.02, angle_deg: 1.5}",
+            "perturbations.exit_points=0.005",
+            "perturbations.anchor_points=0.002",
+            "sensors.log=[tension]",
+            "integration.engine=compiled",
+        ),
+        configurations=(
+            *experiments(SLACK_CABLES, ON, _published()),
+            *_other_cables(),
+            *_softer(),
+            *_worse_sensors(),
+        ),
+        rendered=("E8",),
+        own={**slack_metrics(THRESHOLD), **METRICS},
+        layouts=CASE_10_LAYOUTS,
+        stability=THRESHOLD,
+    ),
     source="servoing thesis 5.3.2, figures 5.24 to 5.26",
-    scenario="caroca_slack_start",
-    changes=(
-        "perturbations.initial_pose_shift={distance: 0.02, angle_deg: 1.5}",
-        "perturbations.exit_points=0.005",
-        "perturbations.anchor_points=0.002",
-        "sensors.log=[tension]",
-        "integration.engine=compiled",
-    ),
-    configurations=(
-        *experiments(SLACK_CABLES, ON, _published()),
-        *_other_cables(),
-        *_softer(),
-        *_worse_sensors(),
-    ),
     repetitions=10,
-    rendered=("E8",),
     assumptions=(
         "Which cables are paid out is not printed: C2 and C7, whose tensions begin just below the "
         "threshold; C1 and C2, C7 alone, C7 and C8 are run beside them.",
@@ -131,7 +137,7 @@ CASE_10 = CaseStudy(
         "1.5 deg, exit points by 5 mm, anchor points by 2 mm, in directions drawn for each seed.",
         "The robot is moved by the compiled engine, see `cdpr study engines`.",
     ),
-    judges=(
+    checks=(
         *STATEMENTS,
         *ESTIMATES,
         chosen(
@@ -153,7 +159,4 @@ CASE_10 = CaseStudy(
             "that they are substantially different at other poses; accuracy 75 N",
         ),
     ),
-    own={**slack_metrics(THRESHOLD), **METRICS},
-    stability=THRESHOLD,
-    layouts=CASE_10_LAYOUTS,
 )

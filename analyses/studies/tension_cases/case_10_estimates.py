@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
 
-from cdpr_drake.analyses.reporting.statements import Statement, verdict
-from cdpr_drake.analyses.studies.framework.case_run import CaseRuns
+from cdpr_drake.analyses.studies.framework.runs import MissingRuns, Runs
+from cdpr_drake.analyses.studies.framework.statement import Check, Finding, statement
 from cdpr_drake.analyses.studies.tension_cases.case_10_statements import SAME_PX, THRESHOLDS
 from cdpr_drake.analyses.studies.tension_cases.slack_experiments import (
     CORRECTED,
@@ -28,86 +28,96 @@ JUST_BELOW = 75.0
 [N]."""
 
 
-def same_without_slack(runs: CaseRuns) -> Statement:
+@statement(
+    "Without slack the estimate ends the same with and without correction.",
+    "figure 5.26",
+)
+def same_without_slack(runs: Runs) -> Finding:
     """Whether the correction leaves the estimate alone."""
-    places = [runs.mean(name, "estimate_end_m") for name in ("E1", "E2")]
-    turns = [runs.mean(name, "estimate_end_rad") for name in ("E1", "E2")]
+    places = [runs.mean("estimate_end_m", configuration=name) for name in ("E1", "E2")]
+    turns = [runs.mean("estimate_end_rad", configuration=name) for name in ("E1", "E2")]
     good = abs(places[1] - places[0]) < SAME_M, abs(turns[1] - turns[0]) < SAME_RAD
-    return Statement(
-        "Without slack the estimate ends the same with and without correction.",
-        "figure 5.26",
-        "; ".join(
+    return Finding(
+        found="; ".join(
             f"{name} {1e3 * place:.0f} mm, {np.degrees(turn):.1f} deg"
             for name, place, turn in zip(("E1", "E2"), places, turns, strict=True)
         ),
-        verdict(all(good), any(good)),
-        f"The same: within {1e3 * SAME_M:g} mm and {np.degrees(SAME_RAD):g} deg, in the mean.",
+        held=good,
+        why=f"The same: within {1e3 * SAME_M:g} mm and {np.degrees(SAME_RAD):g} deg, in the mean.",
     )
 
 
-def last_is_worse(runs: CaseRuns) -> Statement:
+@statement(
+    "With correction the estimate is about the same with 2, 4 and 6 cm, and worse with 8 cm.",
+    "figure 5.26",
+    rule=f"About the same: within {1e3 * SAME_M:g} mm, in the mean. While slack is wound up the "
+    "platform turns, the longer the more slack there is, and control integration keeps what "
+    "it did not see.",
+)
+def last_is_worse(runs: Runs) -> Finding:
     """How the estimate depends on slack with correction."""
     found = several(runs, CORRECTED[1:], "estimate_end_m")
     if CORRECTED[-1] not in found:
-        raise KeyError("no run with 8 cm")
+        raise MissingRuns("no run with 8 cm")
     worst = found[CORRECTED[-1]]
     others = [value for name, value in found.items() if name != CORRECTED[-1]]
     same, worse = max(others) - min(others) < SAME_M, worst > max(others)
-    return Statement(
-        "With correction the estimate is about the same with 2, 4 and 6 cm, and worse with 8 cm.",
-        "figure 5.26",
-        listed(found, "mm", factor=1e3),
-        verdict(same and worse, same or worse),
-        f"About the same: within {1e3 * SAME_M:g} mm, in the mean. While slack is wound up the "
-        "platform turns, the longer the more slack there is, and control integration keeps what "
-        "it did not see.",
+    return Finding(
+        found=listed(found, "mm", factor=1e3),
+        held=[same, worse],
     )
 
 
-def position(runs: CaseRuns) -> Statement:
+@statement(
+    "Without correction the estimate's position is better in E3 than in all others, and gets "
+    "worse with slack, 6 cm in E7.",
+    "figure 5.26",
+)
+def position(runs: Runs) -> Finding:
     """How the position's estimate depends on slack without correction."""
     found = several(runs, PLAIN[1:4], "estimate_end_m")
     everyone = means(runs, (*PLAIN, *CORRECTED), "estimate_end_m")
     growing = all(b > a for a, b in pairwise(found.values()))
     least = min(everyone, key=everyone.__getitem__) == "E3"
     reached = near(1e3 * found.get("E7", np.nan), 60.0)
-    return Statement(
-        "Without correction the estimate's position is better in E3 than in all others, and gets "
-        "worse with slack, 6 cm in E7.",
-        "figure 5.26",
-        listed(everyone, "mm", factor=1e3),
-        verdict(growing and least and reached, growing or reached),
-        "What the first estimate is off by is a chosen perturbation, see the assumptions.",
+    return Finding(
+        found=listed(everyone, "mm", factor=1e3),
+        held=[growing, least, reached],
+        some=growing or reached,
+        why="What the first estimate is off by is a chosen perturbation, see the assumptions.",
     )
 
 
-def first_moment(runs: CaseRuns) -> Statement:
+@statement(
+    "Adding slack turns the platform a little, which moves the first image of the tag; the "
+    "readings of C2 and C7 are just below their thresholds then.",
+    "figures 5.24a, 5.25",
+)
+def first_moment(runs: Runs) -> Finding:
     """What slack does before the servo starts."""
     names = there(runs, PLAIN[1:])
     below, shift = {}, {}
-    start = np.mean([run.traces["image_path"][0] for run in runs.of("E1")], axis=0)
+    start = np.mean([run["image_path"][0] for run in runs(configuration="E1")], axis=0)
     for name in names:
-        first = np.mean([run.traces["measured_tensions"][0] for run in runs.of(name)], axis=0)
+        first = np.mean([run["measured_tensions"][0] for run in runs(configuration=name)], axis=0)
         below[name] = [float(THRESHOLDS[k] - first[k]) for k in (1, 6)]
-        images = [run.traces["image_path"][0] for run in runs.of(name)]
+        images = [run["image_path"][0] for run in runs(configuration=name)]
         shift[name] = float(np.linalg.norm(np.mean(images, axis=0) - start))
     good = [0.0 < value < JUST_BELOW for pair in below.values() for value in pair]
     moved = [value > 0.0 for value in shift.values()]
     little = [value < SAME_PX for value in shift.values()]
-    return Statement(
-        "Adding slack turns the platform a little, which moves the first image of the tag; the "
-        "readings of C2 and C7 are just below their thresholds then.",
-        "figures 5.24a, 5.25",
-        f"first image moved by {listed(shift, 'px', 1)}; below the threshold "
+    return Finding(
+        found=f"first image moved by {listed(shift, 'px', 1)}; below the threshold "
         + ", ".join(f"{name} {a:.0f}, {b:.0f} N" for name, (a, b) in below.items()),
-        verdict(all(good) and all(moved), any(good) or all(little)),
-        f"Just below: by less than {JUST_BELOW:g} N, the sensors' accuracy; in "
+        held=[all(good), all(moved)],
+        some=any(good) or all(little),
+        why=f"Just below: by less than {JUST_BELOW:g} N, the sensors' accuracy; in "
         f"{sum(little)} of {len(little)} the image moves by less than {SAME_PX:g} px. Both follow "
         "from how much cables give and from which are slack, which is chosen.",
     )
 
 
-ESTIMATES: Sequence[Callable[[CaseRuns], Statement]] = (
+ESTIMATES: Sequence[Check] = (
     same_without_slack, last_is_worse, position, first_moment,
 )  # fmt: skip
 """Judges of start and estimates, beside `case_10_statements.STATEMENTS`."""

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
 
-from cdpr_drake.analyses.reporting.statements import NOT_TESTABLE, Statement, verdict
-from cdpr_drake.analyses.studies.framework.case_run import CaseRuns, OwnMetric
+from cdpr_drake.analyses.studies.framework.case_run import OwnMetric
+from cdpr_drake.analyses.studies.framework.runs import MissingRuns, Runs
+from cdpr_drake.analyses.studies.framework.statement import (
+    CONSTRUCTION,
+    FITTED,
+    Check,
+    Finding,
+    statement,
+)
 from cdpr_drake.analyses.studies.tension_cases.slack_experiments import (
     CORRECTED,
     FACTOR,
@@ -82,140 +89,178 @@ METRICS = {
 """What is reported of this study's cables."""
 
 
-def failures(runs: CaseRuns, name: str) -> int:
+def failures(runs: Runs, name: str) -> int:
     """Runs of a configuration that lost their target."""
-    return sum(run.outcome == FAILED for run in runs.of(name))
+    return sum(run["outcome"] == FAILED for run in runs(configuration=name))
 
 
-def no_slack(runs: CaseRuns) -> Statement:
+@statement(
+    "Without slack the paths with and without correction are almost the same.",
+    "figure 5.24",
+    rule=f"The same within {SAME_PX:g} px and {SAME_MM:g} mm.",
+)
+def no_slack(runs: Runs) -> Finding:
     """Whether the correction leaves runs without slack alone."""
     found = {
-        metric: [runs.mean(name, metric) for name in ("E1", "E2")]
+        metric: [runs.mean(metric, configuration=name) for name in ("E1", "E2")]
         for metric in ("image_max_px", "camera_max_m")
     }
     (u, v), (a, b) = found["image_max_px"], found["camera_max_m"]
     same = abs(u - v) < SAME_PX, 1e3 * abs(a - b) < SAME_MM
-    return Statement(
-        "Without slack the paths with and without correction are almost the same.",
-        "figure 5.24",
-        f"E1 {u:.0f} px, {1e3 * a:.0f} mm; E2 {v:.0f} px, {1e3 * b:.0f} mm",
-        verdict(all(same), any(same)),
-        f"The same within {SAME_PX:g} px and {SAME_MM:g} mm.",
+    return Finding(
+        found=f"E1 {u:.0f} px, {1e3 * a:.0f} mm; E2 {v:.0f} px, {1e3 * b:.0f} mm",
+        held=same,
     )
 
 
-def growing(runs: CaseRuns) -> Statement:
+@statement(
+    "Without correction the paths in the image and of the camera deviate the more the more "
+    "slack there is.",
+    "figure 5.24",
+)
+def growing(runs: Runs) -> Finding:
     """Whether more slack means a longer way without correction."""
     image, camera = (several(runs, PLAIN, m) for m in ("image_max_px", "camera_max_m"))
     grows = [all(b > a for a, b in pairwise(found.values())) for found in (image, camera)]
-    return Statement(
-        "Without correction the paths in the image and of the camera deviate the more the more "
-        "slack there is.",
-        "figure 5.24",
-        f"{listed(image, 'px')}; {listed(camera, 'mm', factor=1e3)}",
-        verdict(all(grows), any(grows)),
+    return Finding(
+        found=f"{listed(image, 'px')}; {listed(camera, 'mm', factor=1e3)}",
+        held=grows,
     )
 
 
-def paths(runs: CaseRuns) -> Statement:
+@statement(
+    "With 6 cm the paths deviate by 80 px and 100 mm without correction, by 35 px and 20 mm "
+    "with it; with 8 cm and correction by 90 px and 40 mm.",
+    "figure 5.24",
+    rule=f"Agreeing within a factor {FACTOR:g}",
+)
+def paths(runs: Runs) -> Finding:
     """How far paths deviate with 6 and 8 cm."""
     words, good = [], []
     for name in there(runs, list(PUBLISHED_PATHS)):
         printed = PUBLISHED_PATHS[name]
-        found = runs.mean(name, "image_max_px"), 1e3 * runs.mean(name, "camera_max_m")
+        found = (
+            runs.mean("image_max_px", configuration=name),
+            1e3 * runs.mean("camera_max_m", configuration=name),
+        )
         words.append(f"{name} {found[0]:.0f} px, {found[1]:.0f} mm")
         good += [near(one, other) for one, other in zip(found, printed, strict=True)]
     better = (
-        runs.has("E7")
-        and runs.has("E8")
+        runs.has(configuration="E7")
+        and runs.has(configuration="E8")
         and all(
-            runs.mean("E8", metric) < runs.mean("E7", metric)
+            runs.mean(metric, configuration="E8") < runs.mean(metric, configuration="E7")
             for metric in ("image_max_px", "camera_max_m")
         )
     )
-    return Statement(
-        "With 6 cm the paths deviate by 80 px and 100 mm without correction, by 35 px and 20 mm "
-        "with it; with 8 cm and correction by 90 px and 40 mm.",
-        "figure 5.24",
-        "; ".join(words),
-        verdict(all(good), better or any(good)),
-        f"Agreeing within a factor {FACTOR:g}. In pixels of an image 1600 px wide. Stiffness of "
-        "the cables and what the controller believes wrongly are not printed, see the other "
-        "stiffnesses: stiffer cables are corrected the sooner, and fail with less slack.",
+    return Finding(
+        found="; ".join(words),
+        held=good,
+        some=better or any(good),
+        why="In pixels of an image 1600 px wide. Stiffness of the cables and what the controller "
+        "believes wrongly are not printed, see the other stiffnesses: stiffer cables are "
+        "corrected the sooner, and fail with less slack.",
     )
 
 
-def fails(runs: CaseRuns) -> Statement:
+@statement(
+    "The task fails with 8 cm without correction, and in no other experiment.",
+    "section 5.3.2, figure 5.24",
+    basis=FITTED,
+)
+def fails(runs: Runs) -> Finding:
     """Which runs lose their target."""
     names = there(runs, [*PLAIN[1:], *CORRECTED])
     lost = {name: failures(runs, name) for name in names}
     alone = all(n == 0 for name, n in lost.items() if name != "E9")
-    every = "E9" in lost and lost["E9"] == len(runs.of("E9"))
-    return Statement(
-        "The task fails with 8 cm without correction, and in no other experiment.",
-        "section 5.3.2, figure 5.24",
-        ", ".join(f"{name} {n}/{len(runs.of(name))} lost" for name, n in lost.items()),
-        verdict(alone and every, alone or every),
-        "The printed exception from the good trajectories, E10, must mean E9: E10 is corrected, "
-        "and its path is printed to the end.",
+    every = "E9" in lost and lost["E9"] == len(runs(configuration="E9"))
+    return Finding(
+        found=", ".join(
+            f"{name} {n}/{len(runs(configuration=name))} lost" for name, n in lost.items()
+        ),
+        held=[alone, every],
+        why="The printed exception from the good trajectories, E10, must mean E9: E10 is "
+        "corrected, and its path is printed to the end.",
     )
 
 
-def c7(runs: CaseRuns) -> Statement:
+@statement(
+    "C7 is slack for about 10 s without correction, for less than 2 s with it.",
+    "section 5.3.2, figure 5.25",
+    rule=f"Until it pulls with {THRESHOLD:g} N for the first time; about 10 s: within a factor "
+    f"{FACTOR:g}",
+    basis=FITTED,
+)
+def c7(runs: Runs) -> Finding:
     """How long C7 is slack."""
     without = means(runs, PLAIN[1:], "c7_taut_s")
     with_it = means(runs, CORRECTED[1:], "c7_taut_s")
     long = [near(time, 10.0) for time in without.values()]
     short = [time < 2.0 for time in with_it.values()]
-    return Statement(
-        "C7 is slack for about 10 s without correction, for less than 2 s with it.",
-        "section 5.3.2, figure 5.25",
-        f"{listed(without, 's', 1)}; {listed(with_it, 's', 1)}",
-        verdict(all(long) and all(short), any(long) and any(short)),
-        f"Until it pulls with {THRESHOLD:g} N for the first time; about 10 s: within a factor "
-        f"{FACTOR:g}. Cables that give take up the first centimetres by themselves: with 2 cm C7 "
-        "starts slack only if they are stiffer than those here.",
+    return Finding(
+        found=f"{listed(without, 's', 1)}; {listed(with_it, 's', 1)}",
+        held=[all(long), all(short)],
+        some=any(long) and any(short),
+        why="Cables that give take up the first centimetres by themselves: with 2 cm C7 starts "
+        "slack only if they are stiffer than those here.",
     )
 
 
-def c3(runs: CaseRuns) -> Statement:
+@statement(
+    "At about 4 s C3 reaches its threshold; without correction its tension falls below and "
+    "stays there, with correction it stays on the threshold.",
+    "section 5.3.2, figure 5.25",
+    rule=f"About 4 s: within a factor {FACTOR:g}; on the threshold: below it for less than half "
+    "of the shortest time without",
+)
+def c3(runs: Runs) -> Finding:
     """What C3 does after some seconds."""
     begins = means(runs, PLAIN[1:], "c3_first_s")
     without = means(runs, PLAIN[1:], "c3_slack_s")
     with_it = means(runs, CORRECTED[1:], "c3_slack_s")
     times = [near(time, 4.0) for time in begins.values()]
     kept = max(with_it.values()) < 0.5 * min(without.values())
-    return Statement(
-        "At about 4 s C3 reaches its threshold; without correction its tension falls below and "
-        "stays there, with correction it stays on the threshold.",
-        "section 5.3.2, figure 5.25",
-        f"slack from {listed(begins, 's', 1)}; for {listed(without, 's', 1)}; with correction "
-        f"{listed(with_it, 's', 1)}",
-        verdict(all(times) and kept, any(times) or kept),
-        f"About 4 s: within a factor {FACTOR:g}; on the threshold: below it for less than half of "
-        "the shortest time without. Runs that lose the target end before the others.",
+    return Finding(
+        found=f"slack from {listed(begins, 's', 1)}; for {listed(without, 's', 1)}; with "
+        f"correction {listed(with_it, 's', 1)}",
+        held=[all(times), kept],
+        some=any(times) or kept,
+        why="Runs that lose the target end before the others.",
     )
 
 
-def c1(runs: CaseRuns) -> Statement:
+@statement(
+    "The reading of C1 never reaches its threshold.",
+    "section 5.3.2, figure 5.25",
+)
+def c1(runs: Runs) -> Finding:
     """Whether C1 is ever corrected."""
     least = means(runs, [*PLAIN, *CORRECTED], "c1_reading_n")
     never = [reading > 0.0 for reading in least.values()]
-    return Statement(
-        "The reading of C1 never reaches its threshold.",
-        "section 5.3.2, figure 5.25",
-        f"least reading beyond the threshold: {listed(least, 'N')}",
-        verdict(all(never), any(never)),
+    return Finding(
+        found=f"least reading beyond the threshold: {listed(least, 'N')}",
+        held=never,
     )
 
 
-def estimate(runs: CaseRuns) -> Statement:
+@statement(
+    "Without correction the rotation of the pose estimate is the worse the more slack there "
+    "is, over 20 deg at the failure of E9, where the position is off by 50 mm; with "
+    "correction it is better.",
+    "figure 5.26",
+)
+def estimate(runs: Runs) -> Finding:
     """How wrong the pose estimate ends."""
     at_end = [
-        {name: (runs.mean(name, "estimate_end_m"), runs.mean(name, "estimate_end_rad"))
-         for name in there(runs, names)}
+        {
+            name: tuple(
+                runs.mean(metric, configuration=name)
+                for metric in ("estimate_end_m", "estimate_end_rad")
+            )
+            for name in there(runs, names)
+        }
         for names in (CORRECTED, PLAIN)
-    ]  # fmt: skip
+    ]
     with_it, without = at_end
     angles = [angle for _, angle in without.values()]
     turns_more = all(b > a for a, b in pairwise(angles)) and len(angles) > 1
@@ -230,32 +275,29 @@ def estimate(runs: CaseRuns) -> Statement:
         ", ".join(f"{name} {1e3 * d:.0f} mm, {np.degrees(a):.1f} deg" for name, (d, a) in f.items())
         for f in at_end
     ]
-    return Statement(
-        "Without correction the rotation of the pose estimate is the worse the more slack there "
-        "is, over 20 deg at the failure of E9, where the position is off by 50 mm; with "
-        "correction it is better.",
-        "figure 5.26",
-        f"with {words[0]}; without {words[1]}",
-        verdict(turns_more and less and bool(printed), turns_more or less),
-        "Of runs that lose the target at that moment, of others at the end, which is later. What "
-        "the first estimate is off by is a chosen perturbation, see the assumptions.",
+    return Finding(
+        found=f"with {words[0]}; without {words[1]}",
+        held=[turns_more, less, bool(printed)],
+        some=turns_more or less,
+        why="Of runs that lose the target at that moment, of others at the end, which is later. "
+        "What the first estimate is off by is a chosen perturbation, see the assumptions.",
     )
 
 
-def needed(runs: CaseRuns) -> Statement:
+@statement(
+    "Correction is needed during most of the trajectory.",
+    "section 5.3.2",
+)
+def needed(runs: Runs) -> Finding:
     """How much of a run is corrected."""
     shares = means(runs, CORRECTED[1:], "correcting")
-    return Statement(
-        "Correction is needed during most of the trajectory.",
-        "section 5.3.2",
-        f"some cable is corrected: {listed(shares, '%', factor=100.0)} of the time",
-        verdict(all(v > 0.5 for v in shares.values()), any(v > 0.5 for v in shares.values())),
+    return Finding(
+        found=f"some cable is corrected: {listed(shares, '%', factor=100.0)} of the time",
+        held=[v > 0.5 for v in shares.values()],
     )
 
 
-def chosen(
-    name: str, pairs: Sequence[str], words: str, printed: str
-) -> Callable[[CaseRuns], Statement]:
+def chosen(name: str, pairs: Sequence[str], words: str, printed: str) -> Check:
     """Judge of what is not printed and was chosen: runs without and with correction beside others.
 
     Args:
@@ -266,45 +308,45 @@ def chosen(
         printed: What the thesis says of it.
     """
 
-    def judge(runs: CaseRuns) -> Statement:
+    @statement(f"{words} Without | with correction, 6 cm.", printed, name=name, basis=CONSTRUCTION)
+    def judge(runs: Runs) -> Finding:
         found, better = [], []
         for pair in pairs:
             named = pair if "/" in pair else f"{pair}_plain/{pair}_corrected"
             one, other = named.split("/")
-            if not (runs.has(one) and runs.has(other)):
+            if not (runs.has(configuration=one) and runs.has(configuration=other)):
                 continue
             numbers = [_path_words(runs, name) for name in (one, other)]
             label = other.removesuffix("_corrected")
             found.append(f"{label}: {numbers[0]} | {numbers[1]}")
             better.append(
-                runs.mean(other, "estimate_max_rad") < runs.mean(one, "estimate_max_rad")
+                runs.mean("estimate_max_rad", configuration=other)
+                < runs.mean("estimate_max_rad", configuration=one)
                 and failures(runs, other) <= failures(runs, one)
             )
         if len(found) < 2:
-            raise KeyError("nothing to compare")
-        return Statement(
-            f"{words} Without | with correction, 6 cm.",
-            printed,
-            "; ".join(found),
-            NOT_TESTABLE,
-            f"Nothing to confirm. In {sum(better)} of {len(better)} the correction makes the "
+            raise MissingRuns("nothing to compare")
+        return Finding(
+            found="; ".join(found),
+            held=[],
+            why=f"Nothing to confirm. In {sum(better)} of {len(better)} the correction makes the "
             "estimate's rotation better and loses no more targets.",
         )
 
-    judge.__name__ = name
     return judge
 
 
-def _path_words(runs: CaseRuns, name: str) -> str:
+def _path_words(runs: Runs, name: str) -> str:
     lost = failures(runs, name)
     return (
-        f"{runs.mean(name, 'image_max_px'):.0f} px, {1e3 * runs.mean(name, 'camera_max_m'):.0f} mm"
-        f", estimate {np.degrees(runs.mean(name, 'estimate_max_rad')):.0f} deg"
+        f"{runs.mean('image_max_px', configuration=name):.0f} px, "
+        f"{1e3 * runs.mean('camera_max_m', configuration=name):.0f} mm"
+        f", estimate {np.degrees(runs.mean('estimate_max_rad', configuration=name)):.0f} deg"
         + (f", {lost} lost" if lost else "")
     )
 
 
-STATEMENTS: Sequence[Callable[[CaseRuns], Statement]] = (
+STATEMENTS: Sequence[Check] = (
     no_slack, growing, paths, fails, c7, c3, c1, estimate, needed,
 )  # fmt: skip
 """What is judged of E1 to E10."""

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from cdpr_drake.analyses.reporting.statements import Statement, verdict
-from cdpr_drake.analyses.studies.framework.case_definition import CaseStudy, Configuration
-from cdpr_drake.analyses.studies.framework.case_run import CaseRuns
+from cdpr_drake.analyses.studies.framework.case_definition import Configuration, Plan
+from cdpr_drake.analyses.studies.framework.case_study import configuration_study
+from cdpr_drake.analyses.studies.framework.runs import MissingRuns, Runs
+from cdpr_drake.analyses.studies.framework.statement import Finding, statement
 from cdpr_drake.analyses.studies.tension_cases.case_9_figures import DRAWINGS, sensor_accuracy
 from cdpr_drake.analyses.studies.tension_cases.case_9_statements import (
     PUBLISHED_TIMES,
@@ -67,53 +68,60 @@ def _softer(ratio: str, corrected: bool) -> Configuration:
     )
 
 
-def stiffness(runs: CaseRuns) -> Statement:
+@statement(
+    "The gain of 0.04 m/(N s) at 25 Hz was tuned on the robot; nothing is said of stiffness.",
+    "section 5.3.1",
+)
+def stiffness(runs: Runs) -> Finding:
     """How far the correction depends on how much the cables give."""
     softer = {"0.01": "E6", **{ratio: f"stiffness_{ratio}_corrected" for ratio in SOFTNESS}}
-    if not any(runs.has(softer[ratio]) for ratio in SOFTNESS):
-        raise KeyError("no other stiffness")
+    if not any(runs.has(configuration=softer[ratio]) for ratio in SOFTNESS):
+        raise MissingRuns("no other stiffness")
     estimates = {
-        ratio: runs.mean(name, "estimate_max_m")
+        ratio: runs.mean("estimate_max_m", configuration=name)
         for ratio, name in sorted(softer.items(), key=lambda item: float(item[0]))
-        if runs.has(name)
+        if runs.has(configuration=name)
     }
     stable = [estimate < RIGHT for estimate in estimates.values()]
-    return Statement(
-        "The gain of 0.04 m/(N s) at 25 Hz was tuned on the robot; nothing is said of stiffness.",
-        "section 5.3.1",
-        "largest error of the estimate, corrected: "
+    return Finding(
+        found="largest error of the estimate, corrected: "
         + ", ".join(f"x {ratio}: {1e3 * value:.0f} mm" for ratio, value in estimates.items()),
-        verdict(all(stable), any(stable)),
-        "A cable a newton below its threshold is wound up by 1.6 mm a step. With the modulus of "
-        "the fibre, 111 GPa, that alone is a pull of hundreds of newtons: the correction winds up "
-        "one cable after the other and lifts the platform. What holds the cables of the real robot "
-        "must give far more than its fibres.",
+        held=stable,
+        why="A cable a newton below its threshold is wound up by 1.6 mm a step. With the modulus "
+        "of the fibre, 111 GPa, that alone is a pull of hundreds of newtons: the correction winds "
+        "up one cable after the other and lifts the platform. What holds the cables of the real "
+        "robot must give far more than its fibres.",
     )
 
 
 METRICS = slack_metrics(THRESHOLD)
 
-CASE_9 = CaseStudy(
-    name="case-9",
-    title="Slack cables on ACROBOT, with and without tension correction",
+STUDY = configuration_study(
+    Plan(
+        name="case-9",
+        title="Slack cables on ACROBOT, with and without tension correction",
+        scenario="acrobot_slack_start",
+        changes=(
+            "perturbations.initial_pose_shift={distance: 0.02, angle_deg: 1.5}",
+            "perturbations.exit_points=0.002",
+            "perturbations.anchor_points=0.001",
+            "sensors.log=[tension]",
+            "integration.engine=compiled",
+            "duration=10",
+        ),
+        configurations=(
+            *experiments(SLACK_CABLES, ON, _published()),
+            *variants(SLACK_CABLES),
+            *by_torque(SLACK_CABLES),
+            *(_softer(ratio, corrected) for ratio in SOFTNESS for corrected in (False, True)),
+        ),
+        rendered=("E6",),
+        own=METRICS,
+        layouts=CASE_9_LAYOUTS,
+        stability=THRESHOLD,
+    ),
     source="servoing thesis 5.3.1, figures 5.11 to 5.18, table 5.1",
-    scenario="acrobot_slack_start",
-    changes=(
-        "perturbations.initial_pose_shift={distance: 0.02, angle_deg: 1.5}",
-        "perturbations.exit_points=0.002",
-        "perturbations.anchor_points=0.001",
-        "sensors.log=[tension]",
-        "integration.engine=compiled",
-        "duration=10",
-    ),
-    configurations=(
-        *experiments(SLACK_CABLES, ON, _published()),
-        *variants(SLACK_CABLES),
-        *by_torque(SLACK_CABLES),
-        *(_softer(ratio, corrected) for ratio in SOFTNESS for corrected in (False, True)),
-    ),
     repetitions=10,
-    rendered=("E6",),
     assumptions=(
         "Stiffness and damping of the cables as mounted are not printed: a hundredth of the "
         "modulus of the fibre, and a retardation time of 2 ms, are fitted: the printed gain of the "
@@ -127,10 +135,7 @@ CASE_9 = CaseStudy(
         "Tensions are read by the prototype's sensors, with their published errors.",
         "The robot is moved by the compiled engine, see `cdpr study engines`.",
     ),
-    judges=(*STATEMENTS, *TRANSFER, sensor_accuracy, advice, stiffness),
+    checks=(*STATEMENTS, *TRANSFER, sensor_accuracy, advice, stiffness),
     drawings=DRAWINGS,
-    layouts=CASE_9_LAYOUTS,
-    own=METRICS,
     summaries=(which_to_take,),
-    stability=THRESHOLD,
 )

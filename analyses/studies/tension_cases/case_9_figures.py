@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.optimize import lsq_linear
 
-from cdpr_drake.analyses.reporting.statements import Statement, verdict
-from cdpr_drake.analyses.studies.framework.case_run import CaseRuns
+from cdpr_drake.analyses.studies.framework.runs import Runs
+from cdpr_drake.analyses.studies.framework.statement import Finding, statement
 from cdpr_drake.analyses.studies.tension_cases.case_9_statements import (
     PUBLISHED_TENSIONS,
     THRESHOLD,
@@ -37,13 +37,13 @@ PRINTED_RESIDUALS = {
 EXPERIMENTS = tuple(PRINTED_RESIDUALS)
 
 
-def problem_at_end(runs: CaseRuns) -> TensionProblem:
+def problem_at_end(runs: Runs) -> TensionProblem:
     """Holding the platform, above the threshold, where the first run of E2 ends.
 
     Raises:
-        KeyError: E2 was not run.
+        MissingRuns: E2 was not run.
     """
-    row = runs.of("E2")[0].traces["X_WP"][-1]
+    row = runs(configuration="E2").rows[0]["X_WP"][-1]
     robot = load_robot("acrobot_large")
     return tension_problem(robot, pose_from_row(row), limits=(THRESHOLD, 60.0))
 
@@ -73,15 +73,15 @@ def residual_range(problem: TensionProblem, tensions: Array, accuracy: float) ->
     return np.array([np.linalg.norm(here), np.sqrt(2.0 * box.cost), most])
 
 
-def _ranges(runs: CaseRuns) -> dict[str, Array]:
+def _ranges(runs: Runs) -> dict[str, Array]:
     """Residuals and their ranges by experiment, means over the runs, shape (3,) [N]."""
     problem = {
         name: [
             tension_problem(
-                load_robot("acrobot_large"), pose_from_row(run.traces["X_WP"][-1]),
+                load_robot("acrobot_large"), pose_from_row(run["X_WP"][-1]),
                 limits=(THRESHOLD, 60.0),
             )
-            for run in runs.of(name)
+            for run in runs(configuration=name)
         ]
         for name in there(runs, EXPERIMENTS)
     }  # fmt: skip
@@ -97,23 +97,25 @@ def _ranges(runs: CaseRuns) -> dict[str, Array]:
     }
 
 
-def sensor_accuracy(runs: CaseRuns) -> Statement:
+@statement(
+    "The sensors' accuracy of 0.3 N has a considerable effect on the residual.",
+    "figure 5.15",
+    rule="Considerable: what it can make of the residual spans more than the residual itself.",
+)
+def sensor_accuracy(runs: Runs) -> Finding:
     """How far the accuracy of the sensors decides on residuals."""
     found = _ranges(runs)
     wide = [most - least > here for here, least, most in found.values()]
-    return Statement(
-        "The sensors' accuracy of 0.3 N has a considerable effect on the residual.",
-        "figure 5.15",
-        "; ".join(
+    return Finding(
+        found="; ".join(
             f"{name} {here:.2f} N, {least:.2f} to {most:.2f}"
             for name, (here, least, most) in found.items()
         ),
-        verdict(all(wide), any(wide)),
-        "Considerable: what it can make of the residual spans more than the residual itself.",
+        held=wide,
     )
 
 
-def polygon_figure(runs: CaseRuns) -> Figure:
+def polygon_figure(runs: Runs) -> Figure:
     """Figure 5.14: the feasible polygon at the end, tensions of each experiment in its plane."""
     problem = problem_at_end(runs)
     particular, N = solution_space(problem)
@@ -153,7 +155,7 @@ def polygon_figure(runs: CaseRuns) -> Figure:
     return figure
 
 
-def residual_figure(runs: CaseRuns) -> Figure:
+def residual_figure(runs: Runs) -> Figure:
     """Figure 5.15: residuals, and what the sensors' accuracy can make of them."""
     found = _ranges(runs)
     figure, axes = new_figure(

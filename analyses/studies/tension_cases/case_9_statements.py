@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
 
-from cdpr_drake.analyses.reporting.statements import NOT_TESTABLE, Statement, verdict
-from cdpr_drake.analyses.studies.framework.case_run import CaseRun, CaseRuns
+from cdpr_drake.analyses.studies.framework.runs import MissingRuns, Run, Runs
+from cdpr_drake.analyses.studies.framework.statement import FITTED, Check, Finding, statement
 from cdpr_drake.analyses.studies.tension_cases.slack_experiments import (
     CORRECTED,
     FACTOR,
@@ -49,13 +49,15 @@ SENSOR = 0.24
 SLACK_PLAIN = PLAIN[1:]
 """Experiments without correction that begin with slack."""
 
-FITTED = ("E1", "E2", "E5", "E6", "E9", "E10")
+IN_SIGHT = ("E1", "E2", "E5", "E6", "E9", "E10")
 """Experiments that were in sight when stiffness and damping were chosen."""
 
 
-def final_tensions(runs: CaseRuns, name: str) -> Array:
+def final_tensions(runs: Runs, name: str) -> Array:
     """Measured tensions at the end of all runs of a configuration, shape (n, m) [N]."""
-    return np.array([np.mean(r.traces["measured_tensions"][-25:], axis=0) for r in runs.of(name)])
+    return np.array(
+        [np.mean(r["measured_tensions"][-25:], axis=0) for r in runs(configuration=name)]
+    )
 
 
 def in_polygon(X_WP_row: Array, tensions: Array) -> tuple[bool, Array, float]:
@@ -75,22 +77,29 @@ def in_polygon(X_WP_row: Array, tensions: Array) -> tuple[bool, Array, float]:
     return inside, eta, float(np.linalg.norm(on_plane - tensions))
 
 
-def gone(runs: CaseRuns) -> Statement:
+@statement(
+    "With correction 2, 4 and 8 cm of slack are gone after 0.4, 0.8 and about 1.6 s.",
+    "section 5.3.1, figure 5.18",
+    rule=f"Agreeing within a factor {FACTOR:g}. The longer of both cables' times to "
+    f"{THRESHOLD:g} N counts.",
+    basis=FITTED,
+)
+def gone(runs: Runs) -> Finding:
     """How fast slack goes with correction."""
     names = {CORRECTED[SLACKS_CM.index(slack)]: slack for slack in PUBLISHED_TIMES}
     times = means(runs, list(names), "time_to_taut_s")
     good = [near(time, PUBLISHED_TIMES[names[name]]) for name, time in times.items()]
-    return Statement(
-        "With correction 2, 4 and 8 cm of slack are gone after 0.4, 0.8 and about 1.6 s.",
-        "section 5.3.1, figure 5.18",
-        ", ".join(f"{names[name]} cm {time:.2f} s" for name, time in times.items()),
-        verdict(all(good), any(good)),
-        f"Agreeing within a factor {FACTOR:g}. The longer of both cables' times to "
-        f"{THRESHOLD:g} N counts.",
+    return Finding(
+        found=", ".join(f"{names[name]} cm {time:.2f} s" for name, time in times.items()),
+        held=good,
     )
 
 
-def moves(runs: CaseRuns) -> Statement:
+@statement(
+    "Without correction the slack moves from C1, C2 to C5, C6 and is there at the end.",
+    "figure 5.13, table 5.1",
+)
+def moves(runs: Runs) -> Finding:
     """Where slack goes without correction."""
     names = there(runs, SLACK_PLAIN)
     ends = {name: final_tensions(runs, name).mean(axis=0) for name in names}
@@ -99,177 +108,200 @@ def moves(runs: CaseRuns) -> Statement:
         f"{name} C1, C2 {t[0]:.1f}, {t[1]:.1f}, C5, C6 {t[4]:.1f}, {t[5]:.1f} N"
         for name, t in ends.items()
     )
-    return Statement(
-        "Without correction the slack moves from C1, C2 to C5, C6 and is there at the end.",
-        "figure 5.13, table 5.1",
-        words,
-        verdict(moved),
+    return Finding(
+        found=words,
+        held=[moved],
     )
 
 
-def underactuated(runs: CaseRuns) -> Statement:
+@statement(
+    "Without correction the platform is underactuated for about 2 s with 2 cm and 4 s with "
+    "8 cm, the longer the more slack there is.",
+    "figure 5.18",
+    rule=f"A cable below {THRESHOLD:g} N does not count, as in the thesis.",
+    basis=FITTED,
+)
+def underactuated(runs: Runs) -> Finding:
     """How long too few cables pull without correction."""
     times = means(runs, SLACK_PLAIN, "underactuated_s")
     growing = all(b >= a for a, b in pairwise(times.values()))
     published = {SLACK_PLAIN[0]: 2.0, SLACK_PLAIN[-1]: 4.0}
     good = [near(times[name], p) for name, p in published.items() if name in times]
     if not good:
-        raise KeyError("neither E3 nor E9")
-    return Statement(
-        "Without correction the platform is underactuated for about 2 s with 2 cm and 4 s with "
-        "8 cm, the longer the more slack there is.",
-        "figure 5.18",
-        listed(times, "s", 1),
-        verdict(all(good) and growing, growing),
-        f"A cable below {THRESHOLD:g} N does not count, as in the thesis.",
+        raise MissingRuns("neither E3 nor E9")
+    return Finding(
+        found=listed(times, "s", 1),
+        held=[all(good), growing],
+        some=growing,
     )
 
 
-def rank_kept(runs: CaseRuns) -> Statement:
+@statement(
+    "With correction the platform becomes underactuated at no point of the trajectory.",
+    "section 5.3.1, figure 5.18",
+    rule=f"Judged from {SETTLED:g} s on, when the slack of the start should be gone.",
+)
+def rank_kept(runs: Runs) -> Finding:
     """Whether enough cables pull with correction."""
     names = there(runs, CORRECTED)
-    ranks = {name: float(np.min(runs.values(name, "least_rank_late"))) for name in names}
-    early = max(runs.largest(name, "underactuated_s") for name in names)
-    return Statement(
-        "With correction the platform becomes underactuated at no point of the trajectory.",
-        "section 5.3.1, figure 5.18",
-        f"least rank after {SETTLED:g} s, over all runs: {listed(ranks, '')}; before, at most "
-        f"{early:.2f} s underactuated",
-        verdict(all(r == 6 for r in ranks.values()), sum(r == 6 for r in ranks.values()) > 1),
-        f"Judged from {SETTLED:g} s on, when the slack of the start should be gone.",
+    ranks = {name: float(np.min(runs(configuration=name)["least_rank_late"])) for name in names}
+    early = max(runs.largest("underactuated_s", configuration=name) for name in names)
+    return Finding(
+        found=f"least rank after {SETTLED:g} s, over all runs: {listed(ranks, '')}; before, at "
+        f"most {early:.2f} s underactuated",
+        held=[r == 6 for r in ranks.values()],
+        some=sum(r == 6 for r in ranks.values()) > 1,
     )
 
 
-def least(runs: CaseRuns, names: Sequence[str], metric: str) -> float:
+def least(runs: Runs, names: Sequence[str], metric: str) -> float:
     """The least of a metric over configurations, each with as many runs as it has so far."""
-    return float(np.nanmin(np.concatenate([runs.values(name, metric) for name in names])))
+    return float(np.nanmin(np.concatenate([runs(configuration=name)[metric] for name in names])))
 
 
-def stable(runs: CaseRuns) -> Statement:
+@statement(
+    "With correction the system stays stable all along the trajectory.",
+    "figure 5.18",
+)
+def stable(runs: Runs) -> Finding:
     """Whether the criterion holds with correction."""
     names = there(runs, CORRECTED)
-    all_runs = [run for name in names for run in runs.of(name)]
+    all_runs = [run for name in names for run in runs(configuration=name)]
     taut = least(runs, names, "least_margin_taut")
     late = least(runs, names, "least_margin_late")
-    worst = min(all_runs, key=lambda run: float(run.metrics["least_margin_late"] or 0.0))
-    return Statement(
-        "With correction the system stays stable all along the trajectory.",
-        "figure 5.18",
-        f"least margin once the slack of the start is gone {taut:.2f}; after {SETTLED:g} s "
+    worst = min(all_runs, key=lambda run: float(run["least_margin_late"] or 0.0))
+    return Finding(
+        found=f"least margin once the slack of the start is gone {taut:.2f}; after {SETTLED:g} s "
         f"{late:.2f}: {worst_moment(worst)}",
-        verdict(taut > 0.0 and late > 0.0, taut > 0.0 or late > 0.0),
-        "The margin is the smallest eigenvalue of the symmetric part of Pi. Rank 6 is not enough "
-        "for it: two cables of which one replaces the other leave six that are nearly singular, "
-        "and what the controller believes wrongly grows by the inverse of that.",
+        held=[taut > 0.0, late > 0.0],
+        why="The margin is the smallest eigenvalue of the symmetric part of Pi. Rank 6 is not "
+        "enough for it: two cables of which one replaces the other leave six that are nearly "
+        "singular, and what the controller believes wrongly grows by the inverse of that.",
     )
 
 
-def worst_moment(run: CaseRun) -> str:
+def worst_moment(run: Run) -> str:
     """Words on the moment of a run, after `SETTLED`, at which its margin is least: the cables
     below `THRESHOLD`, and how singular the others are beside all of them."""
-    traces = run.traces
+    traces = run
     late = np.flatnonzero(traces["stability_time"] >= SETTLED)
     if len(late) == 0:
         return "no run lasts as long"
     at = late[np.argmin(traces["stability_margin"][late])]
     time = traces["stability_time"][at]
     row = int(np.searchsorted(traces["time"], time - 1e-9))
-    robot = load_robot(run.summary["robot"])
+    robot = load_robot(run["summary"]["robot"])
     J = cable_jacobian(pose_from_row(traces["X_WP"][row]), robot.cable_set().without_pulleys())
     pulls = traces["tensions"][row] >= THRESHOLD
     missing = [c.name for c, pull in zip(robot.cables, pulls, strict=True) if not pull]
     if not missing:
-        return f"{run.job.configuration}, seed {run.job.seed}, at {time:.2f} s, with all cables"
+        return f"{run['configuration']}, seed {run.seed}, at {time:.2f} s, with all cables"
     least = [np.linalg.svd(rows, compute_uv=False)[-1] for rows in (J[pulls], J)]
     return (
-        f"{run.job.configuration}, seed {run.job.seed}, at {time:.2f} s, without "
+        f"{run['configuration']}, seed {run.seed}, at {time:.2f} s, without "
         f"{' and '.join(missing)}; least singular value of the others' Jacobian {least[0]:.3f}, "
         f"of all {least[1]:.3f}"
     )
 
 
-def estimate(runs: CaseRuns) -> Statement:
+@statement(
+    "With correction the pose estimate at the end is off by the same in all runs, about 30 mm; "
+    "without it is the worse the more slack there was, almost 100 mm with 8 cm.",
+    "figure 5.17",
+)
+def estimate(runs: Runs) -> Finding:
     """How wrong the pose estimate ends."""
     with_it, without = (several(runs, names, "estimate_end_m") for names in (CORRECTED, PLAIN))
     same = max(with_it.values()) - min(with_it.values()) < 0.02
     growing = all(b > a for a, b in pairwise(without.values()))
     worst = "E9" in without and 0.06 < without["E9"] < 0.14
     better = max(with_it.values()) < max(without.values())
-    return Statement(
-        "With correction the pose estimate at the end is off by the same in all runs, about 30 mm; "
-        "without it is the worse the more slack there was, almost 100 mm with 8 cm.",
-        "figure 5.17",
-        f"with {listed(with_it, 'mm', factor=1e3)}; without {listed(without, 'mm', factor=1e3)}",
-        verdict(same and growing and worst, better),
-        "What the first estimate is off by is a chosen perturbation of 20 mm and 1.5 deg.",
+    return Finding(
+        found=f"with {listed(with_it, 'mm', factor=1e3)}; without "
+        f"{listed(without, 'mm', factor=1e3)}",
+        held=[same, growing, worst],
+        some=better,
+        why="What the first estimate is off by is a chosen perturbation of 20 mm and 1.5 deg.",
     )
 
 
-def image(runs: CaseRuns) -> Statement:
+@statement(
+    "The path in the image deviates about the same in all runs with correction, and the more "
+    "the more slack there is without.",
+    "figure 5.16",
+    rule="About the same: the largest at most twice the least and a pixel",
+)
+def image(runs: Runs) -> Finding:
     """How far the path in the image is from its straight line."""
     with_it, without = (several(runs, names, "image_max_px") for names in (CORRECTED, PLAIN))
     same = max(with_it.values()) < 2.0 * min(with_it.values()) + 1.0
     growing = all(b > a for a, b in pairwise(without.values()))
-    return Statement(
-        "The path in the image deviates about the same in all runs with correction, and the more "
-        "the more slack there is without.",
-        "figure 5.16",
-        f"with {listed(with_it, 'px')}; without {listed(without, 'px')}",
-        verdict(same and growing, growing),
-        "About the same: the largest at most twice the least and a pixel. With much slack the "
-        "correction takes longer to remove it, and until then the path is off as without.",
+    return Finding(
+        found=f"with {listed(with_it, 'px')}; without {listed(without, 'px')}",
+        held=[same, growing],
+        some=growing,
+        why="With much slack the correction takes longer to remove it, and until then the path is "
+        "off as without.",
     )
 
 
-def polygon(runs: CaseRuns) -> Statement:
+@statement(
+    "All runs with correction end with tensions inside the feasible polygon above 1 N; E3, E5, "
+    "E7 and E9 end outside.",
+    "figure 5.14",
+)
+def polygon(runs: Runs) -> Finding:
     """Whether tensions at the end are feasible."""
     inside: dict[str, list[bool]] = {}
     residuals: dict[str, float] = {}
     for name in there(runs, [f"E{number}" for number in PUBLISHED_TENSIONS]):
         found = [
-            in_polygon(run.traces["X_WP"][-1], tensions)
-            for run, tensions in zip(runs.of(name), final_tensions(runs, name), strict=True)
+            in_polygon(run["X_WP"][-1], tensions)
+            for run, tensions in zip(
+                runs(configuration=name), final_tensions(runs, name), strict=True
+            )
         ]
         inside[name] = [one[0] for one in found]
         residuals[name] = float(np.mean([one[2] for one in found]))
     good = all(all(v) for name, v in inside.items() if name in CORRECTED)
     bad = not any(any(v) for name, v in inside.items() if name in SLACK_PLAIN)
-    return Statement(
-        "All runs with correction end with tensions inside the feasible polygon above 1 N; E3, E5, "
-        "E7 and E9 end outside.",
-        "figure 5.14",
-        ", ".join(f"{name} {sum(v)}/{len(v)} inside" for name, v in inside.items())
+    return Finding(
+        found=", ".join(f"{name} {sum(v)}/{len(v)} inside" for name, v in inside.items())
         + f"; mean residuals {listed(residuals, 'N', 2)}",
-        verdict(good and bad, good or bad),
-        "The printed residuals of 0.68 to 1.63 N are those of a real robot at rest; here they are "
-        "what the sensors' noise leaves, and what swings. That they are always lower with "
+        held=[good, bad],
+        why="The printed residuals of 0.68 to 1.63 N are those of a real robot at rest; here they "
+        "are what the sensors' noise leaves, and what swings. That they are always lower with "
         "correction contradicts the printed table itself (E8 1.63 > E7 1.09 N).",
     )
 
 
-def table(runs: CaseRuns) -> Statement:
+@statement(
+    "Tensions at the end of E1 to E10, eight of each.",
+    "table 5.1",
+    rule="Confirmed within 1 N, in part within 2 N, in the mean of the numbers, between 0 and 10 "
+    "N, that were not in sight when stiffness and damping of the cables were chosen: those of E3, "
+    "E4, E7 and E8",
+)
+def table(runs: Runs) -> Finding:
     """Tensions at the end, all of them."""
     printed = {f"E{number}": np.array(row) for number, row in PUBLISHED_TENSIONS.items()}
     off = {
         name: float(np.mean(np.abs(final_tensions(runs, name).mean(axis=0) - printed[name])))
         for name in there(runs, list(printed))
     }
-    blind = [v for name, v in off.items() if name not in FITTED]
+    blind = [v for name, v in off.items() if name not in IN_SIGHT]
     mean = float(np.mean(blind)) if blind else float("nan")
-    return Statement(
-        "Tensions at the end of E1 to E10, eight of each.",
-        "table 5.1",
-        f"mean distance of those that nothing was fitted on {mean:.2f} N, of all "
+    return Finding(
+        found=f"mean distance of those that nothing was fitted on {mean:.2f} N, of all "
         f"{np.mean(list(off.values())):.2f} N: {listed(off, 'N', 1)}",
-        verdict(mean < 1.0, mean < 2.0) if blind else NOT_TESTABLE,
-        "Confirmed within 1 N, in part within 2 N, in the mean of the numbers, between 0 and 10 N, "
-        "that were not in sight when stiffness and damping of the cables were chosen: those of E3, "
-        f"E4, E7 and E8. They were chosen among a few with {', '.join(FITTED[:-1])} and "
-        f"{FITTED[-1]} in sight.",
+        held=[mean < 1.0] if blind else [],
+        some=bool(blind) and mean < 2.0,
+        why=f"They were chosen among a few with {', '.join(IN_SIGHT[:-1])} and {IN_SIGHT[-1]} in "
+        "sight.",
     )
 
 
-STATEMENTS: Sequence[Callable[[CaseRuns], Statement]] = (
+STATEMENTS: Sequence[Check] = (
     gone, moves, underactuated, rank_kept, stable, estimate, image, polygon, table,
 )  # fmt: skip
 """What is judged of E1 to E10."""

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
 import numpy as np
 
-from cdpr_drake.analyses.reporting.statements import Statement, verdict
-from cdpr_drake.analyses.studies.framework.case_definition import CaseStudy, Configuration
-from cdpr_drake.analyses.studies.framework.case_run import CaseRuns, OwnMetric
+from cdpr_drake.analyses.studies.framework.case_definition import Configuration, Plan
+from cdpr_drake.analyses.studies.framework.case_run import OwnMetric
+from cdpr_drake.analyses.studies.framework.case_study import configuration_study
+from cdpr_drake.analyses.studies.framework.runs import Runs
+from cdpr_drake.analyses.studies.framework.statement import OURS, Check, Finding, statement
 from cdpr_drake.analyses.studies.tension_cases.slack_metrics import (
     chatter,
     estimate_at_end,
@@ -111,128 +113,148 @@ def _names(frictions: Sequence[str]) -> list[str]:
     return [f"torque_{slack}cm_{friction}" for slack in SLACKS_CM for friction in frictions]
 
 
-def _reports(runs: CaseRuns, names: Sequence[str]) -> list[dict[str, Any]]:
+def _reports(runs: Runs, names: Sequence[str]) -> list[dict[str, Any]]:
     """What the controls of all runs counted at every step."""
-    return [run.summary["torque_control"] for name in names for run in runs.of(name)]
+    return [run["summary"]["torque_control"] for name in names for run in runs(configuration=name)]
 
 
-def _accuracy(runs: CaseRuns, frictions: Sequence[str], words: str) -> Statement:
-    names = _names(frictions)
-    position = max(runs.largest(name, "position_error_m") for name in names)
-    rotation = max(runs.largest(name, "rotation_error_rad") for name in names)
-    velocity = max(runs.largest(f"velocity_{s}cm", "position_error_m") for s in SLACKS_CM)
-    turned = max(runs.largest(f"velocity_{s}cm", "rotation_error_rad") for s in SLACKS_CM)
-    return Statement(
+def _accuracy(name: str, frictions: Sequence[str], words: str) -> Check:
+    @statement(
         f"By torque the servo ends as accurately as by velocity, 0.5 mm and 0.5 deg, {words}.",
         "chosen",
-        f"largest error at the end {1e3 * position:.2f} mm, {np.degrees(rotation):.2f} deg; by "
-        f"velocity {1e3 * velocity:.2f} mm, {np.degrees(turned):.2f} deg",
-        verdict(position <= ACCURATE_M and rotation <= ACCURATE_RAD),
-        "Over all slacks and seeds.",
+        rule="over all slacks and seeds",
+        basis=OURS,
+        name=name,
     )
+    def judge(runs: Runs) -> Finding:
+        torque, velocity = tuple(_names(frictions)), tuple(f"velocity_{s}cm" for s in SLACKS_CM)
+        position = runs.largest("position_error_m", configuration=torque)
+        rotation = runs.largest("rotation_error_rad", configuration=torque)
+        other = runs(configuration=velocity)
+        return Finding(
+            found=f"largest error at the end {1e3 * position:.2f} mm, {np.degrees(rotation):.2f} "
+            f"deg; by velocity {1e3 * other.largest('position_error_m'):.2f} mm, "
+            f"{np.degrees(other.largest('rotation_error_rad')):.2f} deg",
+            held=[position <= ACCURATE_M, rotation <= ACCURATE_RAD],
+            some=False,
+        )
+
+    return judge
 
 
-def _limits(runs: CaseRuns) -> Statement:
+@statement(
+    f"Tensions are within {LOWER:g} to {UPPER:g} N at every step from when all cables pull, "
+    "and so are their wanted rates.",
+    "chosen",
+    basis=OURS,
+)
+def _limits(runs: Runs) -> Finding:
     names = _names(tuple(FRICTIONS))
     reports = _reports(runs, names)
-    last = max(float(np.nanmax(runs.values(name, "below_after_s"))) for name in names)
+    last = max(float(np.nanmax(runs(configuration=name)["below_after_s"])) for name in names)
     excess = [r["largest_excess_n"] for r in reports]
     within = [r["within_limits"] and r["rates_within_limit"] for r in reports]
     known = [e for e in excess if e is not None]
-    return Statement(
-        f"Tensions are within {LOWER:g} to {UPPER:g} N at every step from when all cables pull, "
-        "and so are their wanted rates.",
-        "chosen",
-        f"{sum(within)} of {len(within)} runs; largest excess {max(known, default=np.nan):.2f} N, "
+    return Finding(
+        found=f"{sum(within)} of {len(within)} runs; largest excess "
+        f"{max(known, default=np.nan):.2f} N, "
         f"lowest {min(r['lowest_tension_n'] or np.nan for r in reports):.2f} N, highest "
         f"{max(r['highest_tension_n'] for r in reports):.2f} N; largest rate "
         f"{max(r['largest_rate_n_per_s'] for r in reports):.0f} N/s; in the log's rows the last "
         f"one below is {1e3 * last:.0f} ms after all cables first pulled",
-        verdict(all(within), any(within)),
-        "Of the true tensions, at every step of the simulation, not only where the log has rows. "
-        "Before, cables that are slack at the start have none. The winch of the cable that comes "
-        "taut last must not be stopped at that moment, as the others let go then: its wanted "
-        "tension begins where the loop winds on as before, and its rate counts from there. With "
-        "one that began at the lower limit the cable reached 1 N, fell to 0.94 N and came back "
-        "after 9 ms, in 2 of 250 runs.",
+        held=within,
+        why="Of the true tensions, at every step of the simulation, not only where the log has "
+        "rows. Before, cables that are slack at the start have none. The winch of the cable that "
+        "comes taut last must not be stopped at that moment, as the others let go then: its "
+        "wanted tension begins where the loop winds on as before, and its rate counts from there. "
+        "With one that began at the lower limit the cable reached 1 N, fell to 0.94 N and came "
+        "back after 9 ms, in 2 of 250 runs.",
     )
 
 
-def _no_slack(runs: CaseRuns) -> Statement:
+@statement(
+    "No cable is slack again once the slack of the start is gone.",
+    "chosen",
+    basis=OURS,
+)
+def _no_slack(runs: Runs) -> Finding:
     names = _names(tuple(FRICTIONS))
-    after = {name: float(np.max(runs.values(name, "slack_after_s"))) for name in names}
-    return Statement(
-        "No cable is slack again once the slack of the start is gone.",
-        "chosen",
-        f"largest of all runs {max(after.values()):.2f} cable seconds",
-        verdict(all(value == 0.0 for value in after.values())),
+    after = {name: float(np.max(runs(configuration=name)["slack_after_s"])) for name in names}
+    return Finding(
+        found=f"largest of all runs {max(after.values()):.2f} cable seconds",
+        held=[value == 0.0 for value in after.values()],
+        some=False,
     )
 
 
-def _taut(runs: CaseRuns) -> Statement:
-    by_torque = {s: runs.mean(f"torque_{s}cm_exact", "time_to_taut_s") for s in SLACKS_CM[1:]}
-    by_velocity = {s: runs.mean(f"velocity_{s}cm", "time_to_taut_s") for s in SLACKS_CM[1:]}
+@statement(
+    "By torque slack is wound up without a correction beside the servo, at 0.05 m/s.",
+    "chosen",
+    basis=OURS,
+    rule="Agreeing within half of the slack over that speed: the platform moves meanwhile.",
+)
+def _taut(runs: Runs) -> Finding:
+    by_torque = {
+        s: runs.mean("time_to_taut_s", configuration=f"torque_{s}cm_exact") for s in SLACKS_CM[1:]
+    }
+    by_velocity = {
+        s: runs.mean("time_to_taut_s", configuration=f"velocity_{s}cm") for s in SLACKS_CM[1:]
+    }
     near = [abs(time - s / 5.0) <= 0.5 * s / 5.0 for s, time in by_torque.items()]
-    return Statement(
-        "By torque slack is wound up without a correction beside the servo, at 0.05 m/s.",
-        "chosen",
-        "; ".join(
+    return Finding(
+        found="; ".join(
             f"{s} cm {time:.2f} s (velocity, corrected {by_velocity[s]:.2f} s)"
             for s, time in by_torque.items()
         ),
-        verdict(all(near), any(near)),
-        "Agreeing within half of the slack over that speed: the platform moves meanwhile.",
+        held=near,
     )
 
 
-def _relaxed(runs: CaseRuns) -> Statement:
+@statement(
+    "Wrenches that no tensions within the limits give are rare, and they are flagged.",
+    "chosen",
+    basis=OURS,
+    rule="Rare is below 5 % of the steps of any run.",
+)
+def _relaxed(runs: Runs) -> Finding:
     reports = _reports(runs, _names(tuple(FRICTIONS)))
     shares = [r["relaxed_share"] for r in reports]
-    return Statement(
-        "Wrenches that no tensions within the limits give are rare, and they are flagged.",
-        "chosen",
-        f"share of steps with the fallback: mean {100 * np.mean(shares):.2f} %, largest "
+    return Finding(
+        found=f"share of steps with the fallback: mean {100 * np.mean(shares):.2f} %, largest "
         f"{100 * max(shares):.2f} %; in {sum(s > 0 for s in shares)} of {len(shares)} runs",
-        verdict(max(shares) < 0.05),
-        "Rare is below 5 % of the steps of any run.",
+        held=[max(shares) < 0.05],
     )
 
 
-def _accuracy_exact(runs: CaseRuns) -> Statement:
-    return _accuracy(runs, ("exact",), "with friction known exactly")
-
-
-def _accuracy_10(runs: CaseRuns) -> Statement:
-    return _accuracy(runs, ("less_10", "more_10"), "with friction 10 % off")
-
-
-def _accuracy_30(runs: CaseRuns) -> Statement:
-    return _accuracy(runs, ("less_30", "more_30"), "with friction 30 % off")
-
-
-CHECKS: Sequence[Callable[[CaseRuns], Statement]] = (
-    _accuracy_exact, _accuracy_10, _accuracy_30, _limits, _no_slack, _taut, _relaxed,
+CHECKS: Sequence[Check] = (
+    _accuracy("accuracy_exact", ("exact",), "with friction known exactly"),
+    _accuracy("accuracy_10", ("less_10", "more_10"), "with friction 10 % off"),
+    _accuracy("accuracy_30", ("less_30", "more_30"), "with friction 30 % off"),
+    _limits, _no_slack, _taut, _relaxed,
 )  # fmt: skip
 
-CASE_9_TORQUE = CaseStudy(
-    name="case-9-torque",
-    title="Slack cables on ACROBOT, servoed by motor torques",
+STUDY = configuration_study(
+    Plan(
+        name="case-9-torque",
+        title="Slack cables on ACROBOT, servoed by motor torques",
+        scenario="acrobot_torque_servo",
+        changes=(
+            "perturbations.initial_pose_shift={distance: 0.02, angle_deg: 1.5}",
+            "perturbations.exit_points=0.002",
+            "perturbations.anchor_points=0.001",
+            "integration.engine=compiled",
+            "duration=14",
+        ),
+        configurations=tuple(
+            configuration
+            for slack in SLACKS_CM
+            for configuration in (_velocity(slack), *(_torque(slack, f) for f in FRICTIONS))
+        ),
+        rendered=("torque_4cm_exact",),
+        own=METRICS,
+    ),
     source="servoing thesis 5.2.3, Fig. 5.7, which was not tried there; slack as in 5.3.1",
-    scenario="acrobot_torque_servo",
-    changes=(
-        "perturbations.initial_pose_shift={distance: 0.02, angle_deg: 1.5}",
-        "perturbations.exit_points=0.002",
-        "perturbations.anchor_points=0.001",
-        "integration.engine=compiled",
-        "duration=14",
-    ),
-    configurations=tuple(
-        configuration
-        for slack in SLACKS_CM
-        for configuration in (_velocity(slack), *(_torque(slack, f) for f in FRICTIONS))
-    ),
     repetitions=10,
-    rendered=("torque_4cm_exact",),
     assumptions=(
         "The thesis proposes torque control and did not implement it: all gains are chosen.",
         "Cables, poses, slack and what is believed wrongly are those of case study IX here.",
@@ -240,6 +262,5 @@ CASE_9_TORQUE = CaseStudy(
         "controller compensates a share of that friction.",
         "Velocity control is that of case study IX: ideal winches, with tension correction.",
     ),
-    judges=CHECKS,
-    own=METRICS,
+    checks=CHECKS,
 )

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
 from scipy.signal import find_peaks
 
-from cdpr_drake.analyses.reporting.statements import Statement, verdict
-from cdpr_drake.analyses.studies.framework.case_run import CaseRun, CaseRuns
+from cdpr_drake.analyses.studies.framework.runs import MissingRuns, Run, Runs
+from cdpr_drake.analyses.studies.framework.statement import Check, Finding, statement
 from cdpr_drake.analyses.studies.tension_cases.case_9_statements import (
     SLACK_PLAIN,
     THRESHOLD,
@@ -44,19 +44,25 @@ PEAK = 0.3
 """Share of the largest deviation that a spike rises above what is on either side of it."""
 
 
-def pairs(runs: CaseRuns, name: str, other: str) -> list[tuple[CaseRun, CaseRun]]:
+def pairs(runs: Runs, name: str, other: str) -> list[tuple[Run, Run]]:
     """Runs of two configurations with the same seed, so far as both are there."""
-    by_seed = {run.job.seed: run for run in runs.of(other)}
-    return [(run, by_seed[run.job.seed]) for run in runs.of(name) if run.job.seed in by_seed]
+    by_seed = {run.seed: run for run in runs(configuration=other)}
+    return [(run, by_seed[run.seed]) for run in runs(configuration=name) if run.seed in by_seed]
 
 
-def longer_at_end(run: CaseRun, other: CaseRun) -> Array:
+def longer_at_end(run: Run, other: Run) -> Array:
     """By how much cables of a run are longer than those of another at the end, shape (m,) [m]."""
-    ends = [np.mean(r.traces["unstrained_lengths"][-LATE:], axis=0) for r in (run, other)]
+    ends = [np.mean(r["unstrained_lengths"][-LATE:], axis=0) for r in (run, other)]
     return np.asarray(ends[0] - ends[1])
 
 
-def transferred(runs: CaseRuns) -> Statement:
+@statement(
+    "Without correction C1, C2 of E5 and E9 end as long as in E1, C5 and C6 longer in "
+    "proportion to the slack.",
+    "figure 5.11",
+    rule="As long: within a quarter of the slack; longer: by more than half of it.",
+)
+def transferred(runs: Runs) -> Finding:
     """Whose cables the slack is in at the end."""
     found = {
         name: np.mean([longer_at_end(*pair) for pair in pairs(runs, name, "E1")], axis=0)
@@ -67,29 +73,31 @@ def transferred(runs: CaseRuns) -> Statement:
         slack = SLACKS_CM[PLAIN.index(name)] / 100.0
         good.append(bool(np.all(np.abs(change[:2]) < 0.25 * slack)))
         good.append(bool(np.all(change[4:6] > 0.5 * slack)))
-    return Statement(
-        "Without correction C1, C2 of E5 and E9 end as long as in E1, C5 and C6 longer in "
-        "proportion to the slack.",
-        "figure 5.11",
-        "; ".join(
+    return Finding(
+        found="; ".join(
             f"{name} longer than E1 by {1e3 * d[0]:.0f}, {1e3 * d[1]:.0f} mm, C5, C6 by "
             f"{1e3 * d[4]:.0f}, {1e3 * d[5]:.0f} mm"
             for name, d in found.items()
         ),
-        verdict(all(good), any(good)),
-        "As long: within a quarter of the slack; longer: by more than half of it.",
+        held=good,
     )
 
 
-def undisturbed(runs: CaseRuns) -> Statement:
+@statement(
+    "With correction lengths and velocities of C5 and C6 in E6 and E10 stay those of E2: no "
+    "slack comes to them.",
+    "figures 5.11, 5.12",
+    rule=f"The same: within {1e3 * SAME_LENGTH:g} mm and {1e3 * SAME_SPEED:g} mm/s.",
+)
+def undisturbed(runs: Runs) -> Finding:
     """Whether the correction leaves other cables alone."""
     lengths, speeds = {}, {}
     for name in there(runs, ("E6", "E10")):
         apart, faster = [], []
         for run, other in pairs(runs, name, "E2"):
-            n = min(len(run.traces["time"]), len(other.traces["time"]))
+            n = min(len(run["time"]), len(other["time"]))
             change = {
-                key: run.traces[key][:n, 4:6] - other.traces[key][:n, 4:6]
+                key: run[key][:n, 4:6] - other[key][:n, 4:6]
                 for key in ("unstrained_lengths", "cable_velocities")
             }
             apart.append(float(np.max(np.abs(change["unstrained_lengths"]))))
@@ -97,14 +105,10 @@ def undisturbed(runs: CaseRuns) -> Statement:
         lengths[name], speeds[name] = float(np.mean(apart)), float(np.mean(faster))
     good = [value < SAME_LENGTH for value in lengths.values()]
     good += [value < SAME_SPEED for value in speeds.values()]
-    return Statement(
-        "With correction lengths and velocities of C5 and C6 in E6 and E10 stay those of E2: no "
-        "slack comes to them.",
-        "figures 5.11, 5.12",
-        f"largest difference of length {listed(lengths, 'mm', 1, 1e3)}; mean difference of "
+    return Finding(
+        found=f"largest difference of length {listed(lengths, 'mm', 1, 1e3)}; mean difference of "
         f"velocity {listed(speeds, 'mm/s', 1, 1e3)}",
-        verdict(all(good), any(good)),
-        f"The same: within {1e3 * SAME_LENGTH:g} mm and {1e3 * SAME_SPEED:g} mm/s.",
+        held=good,
     )
 
 
@@ -118,38 +122,48 @@ def from_middle(X_WP_row: Array, tensions: Array) -> float:
     return float(np.linalg.norm(eta - middle))
 
 
-def outward(runs: CaseRuns) -> Statement:
+@statement(
+    "With correction the tensions at the end are the farther from the barycenter the more "
+    "slack there was; E2 is the closest.",
+    "figure 5.14",
+)
+def outward(runs: Runs) -> Finding:
     """How far from the middle of the polygon runs with correction end."""
     found = {
         name: float(
             np.mean([
-                from_middle(run.traces["X_WP"][-1], tensions)
-                for run, tensions in zip(runs.of(name), final_tensions(runs, name), strict=True)
+                from_middle(run["X_WP"][-1], tensions)
+                for run, tensions in zip(
+                    runs(configuration=name), final_tensions(runs, name), strict=True
+                )
             ])
         )
         for name in there(runs, CORRECTED)
     }  # fmt: skip
     if len(found) < 2:
-        raise KeyError("one experiment alone shows no trend")
+        raise MissingRuns("one experiment alone shows no trend")
     growing = all(b > a for a, b in pairwise(found.values()))
     first = found.get("E2") == min(found.values())
-    return Statement(
-        "With correction the tensions at the end are the farther from the barycenter the more "
-        "slack there was; E2 is the closest.",
-        "figure 5.14",
-        listed(found, "N", 2),
-        verdict(growing and first, growing or first),
-        "Distances in eta.",
+    return Finding(
+        found=listed(found, "N", 2),
+        held=[growing, first],
+        why="Distances in eta.",
     )
 
 
-def residuals(runs: CaseRuns) -> Statement:
+@statement(
+    "The residual of the tensions at the end is always lower with correction, lowest in E2.",
+    "figure 5.15, table 5.1",
+)
+def residuals(runs: Runs) -> Finding:
     """Whether tensions hold the platform better with correction."""
     found = {
         name: float(
             np.mean([
-                in_polygon(run.traces["X_WP"][-1], tensions)[2]
-                for run, tensions in zip(runs.of(name), final_tensions(runs, name), strict=True)
+                in_polygon(run["X_WP"][-1], tensions)[2]
+                for run, tensions in zip(
+                    runs(configuration=name), final_tensions(runs, name), strict=True
+                )
             ])
         )
         for name in there(runs, (*PLAIN, *CORRECTED))
@@ -160,82 +174,96 @@ def residuals(runs: CaseRuns) -> Statement:
         if a in found and b in found
     ]
     if not lower:
-        raise KeyError("no pair of experiments")
+        raise MissingRuns("no pair of experiments")
     least = min(found, key=found.__getitem__)
-    return Statement(
-        "The residual of the tensions at the end is always lower with correction, lowest in E2.",
-        "figure 5.15, table 5.1",
-        f"{listed(found, 'N', 2)}; lower in {sum(lower)} of {len(lower)} pairs, lowest in {least}",
-        verdict(all(lower) and least == "E2", any(lower)),
-        "The printed table itself contradicts it (E8 1.63 > E7 1.09 N).",
+    return Finding(
+        found=f"{listed(found, 'N', 2)}; lower in {sum(lower)} of {len(lower)} pairs, lowest in "
+        f"{least}",
+        held=[all(lower), least == "E2"],
+        some=any(lower),
+        why="The printed table itself contradicts it (E8 1.63 > E7 1.09 N).",
     )
 
 
-def without_slack(runs: CaseRuns) -> Statement:
+@statement(
+    "Without slack the system is stable throughout, with and without correction.",
+    "figure 5.18a",
+)
+def without_slack(runs: Runs) -> Finding:
     """Whether the criterion holds where nothing was paid out."""
     least = {
-        name: min(float(np.min(run.traces["stability_margin"])) for run in runs.of(name))
+        name: min(float(np.min(run["stability_margin"])) for run in runs(configuration=name))
         for name in there(runs, ("E1", "E2"))
     }
     good = [value > 0.0 for value in least.values()]
-    return Statement(
-        "Without slack the system is stable throughout, with and without correction.",
-        "figure 5.18a",
-        f"least margin of all runs {listed(least, '', 2)}",
-        verdict(all(good), any(good)),
+    return Finding(
+        found=f"least margin of all runs {listed(least, '', 2)}",
+        held=good,
     )
 
 
-def three_and_four(runs: CaseRuns) -> Statement:
+@statement(
+    "In E3 three cables are slack in the middle of the trajectory, at some moments four.",
+    "figure 5.18b",
+    rule=f"Slack below {THRESHOLD:g} N; the middle is all but the first and the last tenth.",
+)
+def three_and_four(runs: Runs) -> Finding:
     """How many cables are slack in the middle of E3."""
     most, share = [], []
-    for run in runs.of("E3"):
-        slack = 8 - run.traces["taut_cables"]
+    for run in runs(configuration="E3"):
+        slack = 8 - run["taut_cables"]
         middle = slice(len(slack) // 10, -len(slack) // 10)
         most.append(int(np.max(slack[middle])))
         share.append(float(np.mean(slack[middle] >= 3)))
-    return Statement(
-        "In E3 three cables are slack in the middle of the trajectory, at some moments four.",
-        "figure 5.18b",
-        f"three or more for {100 * np.mean(share):.0f} % of the middle (mean); the most "
+    return Finding(
+        found=f"three or more for {100 * np.mean(share):.0f} % of the middle (mean); the most "
         f"{min(most)} to {max(most)}",
-        verdict(min(most) >= 4, max(most) >= 3),
-        f"Slack below {THRESHOLD:g} N; the middle is all but the first and the last tenth.",
+        held=[min(most) >= 4],
+        some=max(most) >= 3,
     )
 
 
-def no_criterion(runs: CaseRuns) -> Statement:
+@statement(
+    "While the platform is underactuated the criterion of stability is not fulfilled.",
+    "section 5.3.1, figure 5.18",
+)
+def no_criterion(runs: Runs) -> Finding:
     """Whether the criterion fails wherever too few cables pull."""
     rows = failing = 0
     for name in there(runs, (*PLAIN, *CORRECTED)):
-        for run in runs.of(name):
-            under = run.traces["jacobian_rank"] < 6
+        for run in runs(configuration=name):
+            under = run["jacobian_rank"] < 6
             rows += int(np.sum(under))
-            failing += int(np.sum(run.traces["stability_margin"][under] <= 0.0))
+            failing += int(np.sum(run["stability_margin"][under] <= 0.0))
     if not rows:
-        raise KeyError("no run is underactuated")
-    return Statement(
-        "While the platform is underactuated the criterion of stability is not fulfilled.",
-        "section 5.3.1, figure 5.18",
-        f"at {failing} of {rows} moments with fewer than six independent cables",
-        verdict(failing == rows, failing > rows // 2),
+        raise MissingRuns("no run is underactuated")
+    return Finding(
+        found=f"at {failing} of {rows} moments with fewer than six independent cables",
+        held=[failing == rows],
+        some=failing > rows // 2,
     )
 
 
-def rotation(runs: CaseRuns) -> Statement:
+@statement(
+    "The estimate's rotation is off by 2 deg at the end with correction, by 5 deg in E9.",
+    "figure 5.17",
+)
+def rotation(runs: Runs) -> Finding:
     """How far the estimate's rotation is off at the end."""
     with_it = means(runs, CORRECTED, "estimate_end_rad")
-    last = runs.mean("E9", "estimate_end_rad") if runs.has("E9") else np.nan
+    last = (
+        runs.mean("estimate_end_rad", configuration="E9")
+        if runs.has(configuration="E9")
+        else np.nan
+    )
     degrees = np.degrees(list(with_it.values()))
     good = [bool(np.all([near(float(value), 2.0) for value in degrees]))]
     good.append(near(float(np.degrees(last)), 5.0))
-    return Statement(
-        "The estimate's rotation is off by 2 deg at the end with correction, by 5 deg in E9.",
-        "figure 5.17",
-        f"with {listed({k: float(np.degrees(v)) for k, v in with_it.items()}, 'deg', 1)}; E9 "
+    return Finding(
+        found=f"with {listed({k: float(np.degrees(v)) for k, v in with_it.items()}, 'deg', 1)}; E9 "
         f"{np.degrees(last):.1f} deg",
-        verdict(all(good), any(good)),
-        "What the first estimate is off by is chosen, 1.5 deg.",
+        held=good,
+        why="What the first estimate is off by is chosen, 1.5 deg.",
     )
 
 
@@ -245,24 +273,27 @@ def spikes(deviation: Array) -> int:
     return len(find_peaks(seen, prominence=PEAK * np.max(seen))[0]) if len(seen) else 0
 
 
-def two_spikes(runs: CaseRuns) -> Statement:
+@statement(
+    "Without correction the platform falls to another set of cables twice: the path in the "
+    "image of E5, E7 and E9 has two spikes.",
+    "figure 5.16",
+    rule=f"A spike rises by {100 * PEAK:g} % of the largest deviation above what is beside it.",
+)
+def two_spikes(runs: Runs) -> Finding:
     """How often the platform falls to other cables."""
     found = {
-        name: [spikes(run.traces["image_deviation"]) for run in runs.of(name)]
+        name: [spikes(run["image_deviation"]) for run in runs(configuration=name)]
         for name in there(runs, SLACK_PLAIN[1:])
     }
     medians = {name: float(np.median(counts)) for name, counts in found.items()}
-    return Statement(
-        "Without correction the platform falls to another set of cables twice: the path in the "
-        "image of E5, E7 and E9 has two spikes.",
-        "figure 5.16",
-        f"spikes (medians): {listed(medians, '')}",
-        verdict(all(m == 2.0 for m in medians.values()), any(m >= 2.0 for m in medians.values())),
-        f"A spike rises by {100 * PEAK:g} % of the largest deviation above what is beside it.",
+    return Finding(
+        found=f"spikes (medians): {listed(medians, '')}",
+        held=[m == 2.0 for m in medians.values()],
+        some=any(m >= 2.0 for m in medians.values()),
     )
 
 
-TRANSFER: Sequence[Callable[[CaseRuns], Statement]] = (
+TRANSFER: Sequence[Check] = (
     transferred, undisturbed, outward, residuals, without_slack, three_and_four, no_criterion,
     rotation, two_spikes,
 )  # fmt: skip

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from cdpr_drake.analyses.studies.framework.case_definition import Configuration
-from cdpr_drake.analyses.studies.framework.case_run import CaseRuns
+from cdpr_drake.analyses.studies.framework.runs import MissingRuns, Runs
 
 SLACKS_CM = (0, 2, 4, 6, 8)
 """Surplus of two cables at the start of E1 and E2, E3 and E4, ... [cm]."""
@@ -57,36 +57,36 @@ def experiments(
     return tuple(found)
 
 
-def means(runs: CaseRuns, names: Sequence[str], metric: str) -> dict[str, float]:
+def means(runs: Runs, names: Sequence[str], metric: str) -> dict[str, float]:
     """A metric's means over the runs of those configurations that were run, in their order.
 
     Raises:
-        KeyError: None of them was.
+        MissingRuns: None of them was.
     """
-    return {name: runs.mean(name, metric) for name in there(runs, names)}
+    return {name: runs.mean(metric, configuration=name) for name in there(runs, names)}
 
 
-def several(runs: CaseRuns, names: Sequence[str], metric: str) -> dict[str, float]:
+def several(runs: Runs, names: Sequence[str], metric: str) -> dict[str, float]:
     """As `means`, for what is said of how experiments compare.
 
     Raises:
-        KeyError: One alone was run, or none.
+        MissingRuns: One alone was run, or none.
     """
     found = means(runs, names, metric)
     if len(found) < 2:
-        raise KeyError(f"one experiment alone says nothing of others: {', '.join(found)}")
+        raise MissingRuns(f"one experiment alone says nothing of others: {', '.join(found)}")
     return found
 
 
-def there(runs: CaseRuns, names: Sequence[str]) -> list[str]:
+def there(runs: Runs, names: Sequence[str]) -> list[str]:
     """Those of some configurations that were run; a short form has some of them only.
 
     Raises:
-        KeyError: None of them was.
+        MissingRuns: None of them was.
     """
-    found = [name for name in names if runs.has(name)]
+    found = [name for name in names if runs.has(configuration=name)]
     if not found:
-        raise KeyError(f"none of {', '.join(names)}")
+        raise MissingRuns(f"none of {', '.join(names)}")
     return found
 
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 from rich.table import Table
 
-from cdpr_drake.analyses.reporting.statements import Statement, new_table, verdict
+from cdpr_drake.analyses.reporting.statements import new_table
 from cdpr_drake.analyses.studies.framework.case_definition import Configuration
-from cdpr_drake.analyses.studies.framework.case_run import CaseRuns
+from cdpr_drake.analyses.studies.framework.runs import MissingRuns, Runs
+from cdpr_drake.analyses.studies.framework.statement import Finding, statement
 from cdpr_drake.analyses.studies.tension_cases.slack_experiments import slack_change, there
 from cdpr_drake.arrays import Array
 
@@ -106,17 +107,17 @@ def by_torque(cables: tuple[int, ...]) -> tuple[Configuration, ...]:
     )  # fmt: skip
 
 
-def compared(runs: CaseRuns) -> dict[str, dict[str, float]]:
+def compared(runs: Runs) -> dict[str, dict[str, float]]:
     """The numbers of `COLUMNS` by configuration, in SI units.
 
     Raises:
-        KeyError: No way was run.
+        MissingRuns: No way was run.
     """
     found = {}
     for name in there(runs, [name for name in COMPARED if name != "E5"]) and there(
         runs, list(COMPARED)
     ):
-        found[name] = {metric: _one(metric, runs.values(name, metric)) for metric in COLUMNS}
+        found[name] = {metric: _one(metric, runs(configuration=name)[metric]) for metric in COLUMNS}
     return found
 
 
@@ -135,7 +136,7 @@ def usable(numbers: dict[str, float]) -> bool:
     )
 
 
-def which_to_take(runs: CaseRuns) -> Table:
+def which_to_take(runs: Runs) -> Table:
     """Every way beside the others; the best number of each column among usable ones has a star."""
     found = compared(runs)
     good = {name: numbers for name, numbers in found.items() if usable(numbers)}
@@ -158,9 +159,15 @@ def which_to_take(runs: CaseRuns) -> Table:
     return table
 
 
-def advice(runs: CaseRuns) -> Statement:
+@statement(
+    "More complex methods were not implemented, as the simple one gives very good results.",
+    "section 5.3",
+)
+def advice(runs: Runs) -> Finding:
     """Whether the simplest way is enough."""
     found = compared(runs)
+    if "E6" not in found:
+        raise MissingRuns("configuration E6")
     good = [name for name, numbers in found.items() if usable(numbers)]
     simple = found["E6"]
     better = {
@@ -173,11 +180,10 @@ def advice(runs: CaseRuns) -> Statement:
         for name, metrics in better.items()
         if metrics
     ]
-    return Statement(
-        "More complex methods were not implemented, as the simple one gives very good results.",
-        "section 5.3",
-        f"usable: {', '.join(COMPARED[name] for name in good) or 'none'}",
-        verdict("E6" in good and not clearly, "E6" in good),
-        "Here all were run, see the table. By more than a fifth better than the simple one in "
+    return Finding(
+        found=f"usable: {', '.join(COMPARED[name] for name in good) or 'none'}",
+        held=["E6" in good, not clearly],
+        some="E6" in good,
+        why="Here all were run, see the table. By more than a fifth better than the simple one in "
         f"something: {'; '.join(clearly) or 'none'}.",
     )

@@ -10,10 +10,12 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from cdpr_drake.analyses.reporting.statements import Statement, verdict
-from cdpr_drake.analyses.studies.framework.case_definition import PULLEYS, CaseStudy, Configuration
-from cdpr_drake.analyses.studies.framework.case_run import CaseRuns, OwnMetric
+from cdpr_drake.analyses.studies.framework.case_definition import PULLEYS, Configuration, Plan
+from cdpr_drake.analyses.studies.framework.case_run import OwnMetric, converged
+from cdpr_drake.analyses.studies.framework.case_study import configuration_study
 from cdpr_drake.analyses.studies.framework.experiments import SETS, SETUP, TRACKING
+from cdpr_drake.analyses.studies.framework.runs import Runs
+from cdpr_drake.analyses.studies.framework.statement import Finding, statement
 from cdpr_drake.analyses.studies.tension_cases.slack_metrics import (
     cable_power,
     chatter,
@@ -77,22 +79,25 @@ def configurations(sets: Mapping[str, tuple[str, ...]]) -> tuple[Configuration, 
 
 
 def compared(
-    runs: CaseRuns, sets: Sequence[str], metric: str, variants: Sequence[str] = tuple(VARIANTS)
+    runs: Runs, sets: Sequence[str], metric: str, variants: Sequence[str] = tuple(VARIANTS)
 ) -> dict[str, float]:
     """Mean of a metric over sets, by variant, in SI units.
 
     Raises:
-        KeyError: A set was not run with all variants.
+        MissingRuns: A set was not run with all variants.
     """
-    return {v: float(np.mean([runs.mean(f"{s}_{v}", metric) for s in sets])) for v in variants}
+    return {
+        v: float(np.mean([runs.mean(metric, configuration=f"{s}_{v}") for s in sets]))
+        for v in variants
+    }
 
 
-def usable(runs: CaseRuns, sets: Sequence[str]) -> list[str]:
+def usable(runs: Runs, sets: Sequence[str]) -> list[str]:
     """Variants with which all runs of all sets converge, hardly ever with a slack cable."""
     slack = compared(runs, sets, "slack_share")
     return [
         v for v in VARIANTS
-        if slack[v] <= HARDLY and all(runs.converged(f"{s}_{v}") for s in sets)
+        if slack[v] <= HARDLY and all(converged(runs, f"{s}_{v}") for s in sets)
     ]  # fmt: skip
 
 
@@ -100,25 +105,34 @@ def _numbers(values: Mapping[str, float], factor: float, form: str) -> str:
     return ", ".join(f"{name} {factor * value:{form}}" for name, value in values.items())
 
 
-def _combined(runs: CaseRuns) -> Statement:
+@statement(
+    "Tension correction and trajectory tracking together give high accuracy, an ideal path "
+    "and cables that are all in tension.",
+    "Perspectives",
+)
+def _combined(runs: Runs) -> Finding:
     slack = compared(runs, DISTURBED, "slack_share")
     camera = compared(runs, DISTURBED, "camera_max_m")
-    ends = {v: all(runs.converged(f"{s}_{v}") for s in DISTURBED) for v in VARIANTS}
+    ends = {v: all(converged(runs, f"{s}_{v}") for s in DISTURBED) for v in VARIANTS}
     good = [v for v in usable(runs, DISTURBED) if camera[v] <= WORSE * camera["none"]]
-    return Statement(
-        "Tension correction and trajectory tracking together give high accuracy, an ideal path "
-        "and cables that are all in tension.",
-        "Perspectives",
-        f"share of the time with a slack cable, in %: {_numbers(slack, 100.0, '.0f')}; camera off "
-        f"its line, largest, in mm: {_numbers(camera, 1e3, '.1f')}; not all converge: "
+    return Finding(
+        found=f"share of the time with a slack cable, in %: {_numbers(slack, 100.0, '.0f')}; "
+        f"camera off its line, largest, in mm: {_numbers(camera, 1e3, '.1f')}; not all converge: "
         f"{', '.join(v for v, all_of in ends.items() if not all_of) or 'none'}",
-        verdict("constant" in good, bool(good)),
-        f"Holds for: {', '.join(good) or 'none'}. With the printed threshold of 1 N it depends on "
-        "the platform: a light one, whose cables have no more than that, is pulled about.",
+        held=["constant" in good],
+        some=bool(good),
+        why=f"Holds for: {', '.join(good) or 'none'}. With the printed threshold of 1 N it "
+        "depends on the platform: a light one, whose cables have no more than that, is pulled "
+        "about.",
     )
 
 
-def _better(runs: CaseRuns) -> Statement:
+@statement(
+    "Set points from the feasible polygon, which leave the platform alone, are better than "
+    "thresholds and than following a distribution.",
+    "Perspectives",
+)
+def _better(runs: Runs) -> Finding:
     chosen = [v for v in usable(runs, DISTURBED) if v != "none"]
     image = compared(runs, DISTURBED, "image_max_px")
     rms = compared(runs, DISTURBED, "feature_error_rms")
@@ -129,30 +143,31 @@ def _better(runs: CaseRuns) -> Statement:
     others = [v for v in order if v not in polygon]
     best = bool(polygon) and (not others or image[polygon[0]] <= image[others[0]] / WORSE)
     even = bool(polygon) and (not others or image[polygon[0]] <= WORSE * image[others[0]])
-    return Statement(
-        "Set points from the feasible polygon, which leave the platform alone, are better than "
-        "thresholds and than following a distribution.",
-        "Perspectives",
-        f"image off its line, largest, in px: {_numbers(image, 1.0, '.0f')}; feature error, rms "
-        f"in 1e-3: {_numbers(rms, 1e3, '.2f')}; chatter in N: {_numbers(trembling, 1.0, '.2f')}; "
-        f"winch power in W: {_numbers(power, 1.0, '.3f')}",
-        verdict(best, even),
-        f"Of those that converge and are hardly ever slack, from the best: {', '.join(order)}.",
+    return Finding(
+        found=f"image off its line, largest, in px: {_numbers(image, 1.0, '.0f')}; feature error, "
+        f"rms in 1e-3: {_numbers(rms, 1e3, '.2f')}; chatter in N: "
+        f"{_numbers(trembling, 1.0, '.2f')}; winch power in W: {_numbers(power, 1.0, '.3f')}",
+        held=[best],
+        some=even,
+        why=f"Of those that converge and are hardly ever slack, from the best: {', '.join(order)}.",
     )
 
 
-def _small_polygon(runs: CaseRuns) -> Statement:
+@statement(
+    "As the feasible polygon of a suspended robot is small, tensions in its middle or at its "
+    "edge hardly change how it behaves.",
+    "section 5.2.1",
+    rule=f"Hardly: by less than {100.0 * (WORSE - 1.0):.0f} %.",
+)
+def _small_polygon(runs: Runs) -> Finding:
     image = compared(runs, DISTURBED, "image_max_px")
     camera = compared(runs, DISTURBED, "camera_max_m")
     change = [abs(x["middle"] / x["edge"] - 1.0) for x in (image, camera)]
-    return Statement(
-        "As the feasible polygon of a suspended robot is small, tensions in its middle or at its "
-        "edge hardly change how it behaves.",
-        "section 5.2.1",
-        f"from edge to middle: image {image['edge']:.0f} to {image['middle']:.0f} px, camera "
+    return Finding(
+        found=f"from edge to middle: image {image['edge']:.0f} to {image['middle']:.0f} px, camera "
         f"{1e3 * camera['edge']:.1f} to {1e3 * camera['middle']:.1f} mm",
-        verdict(max(change) <= WORSE - 1.0, min(change) <= WORSE - 1.0),
-        f"Hardly: by less than {100.0 * (WORSE - 1.0):.0f} %.",
+        held=[max(change) <= WORSE - 1.0],
+        some=min(change) <= WORSE - 1.0,
     )
 
 
@@ -165,22 +180,28 @@ OWN: dict[str, OwnMetric] = {
 }
 """What is reported beside what every case study reports."""
 
-TENSION_TRACKING = CaseStudy(
-    name="tension-tracking",
-    title="Tension management beside trajectory tracking on ACROBOT",
-    source="servoing thesis, Perspectives; perturbation sets of 4.3.1",
-    scenario="acrobot_pbvs",
-    changes=(
-        *SETUP, *TRACKING, PULLEYS,
-        "cables.stiffness_ratio=0.01",
-        "cables.retardation_time=0.002",
-        "sensors={tension: vlu850, log: [tension]}",
-        "integration.engine=compiled",
-        "duration=20",
+STUDY = configuration_study(
+    Plan(
+        name="tension-tracking",
+        title="Tension management beside trajectory tracking on ACROBOT",
+        scenario="acrobot_pbvs",
+        changes=(
+            *SETUP,
+            *TRACKING,
+            PULLEYS,
+            "cables.stiffness_ratio=0.01",
+            "cables.retardation_time=0.002",
+            "sensors={tension: vlu850, log: [tension]}",
+            "integration.engine=compiled",
+            "duration=20",
+        ),
+        configurations=configurations({name: SETS[name] for name in DISTURBED}),
+        rendered=("d2_middle",),
+        own=OWN,
+        stability=1.0,
     ),
-    configurations=configurations({name: SETS[name] for name in DISTURBED}),
+    source="servoing thesis, Perspectives; perturbation sets of 4.3.1",
     repetitions=10,
-    rendered=("d2_middle",),
     assumptions=(
         "The thesis runs d1 to d4 with the small platform, of 1.5 kg, which has no tension "
         "sensors; here it has those of the large one.",
@@ -191,7 +212,5 @@ TENSION_TRACKING = CaseStudy(
         "found by trying some with d2, d3 and d4, seed 0.",
         "Images are projected; the robot is moved by the compiled engine.",
     ),
-    judges=(_combined, _better, _small_polygon),
-    own=OWN,
-    stability=1.0,
-)  # fmt: skip
+    checks=(_combined, _better, _small_polygon),
+)

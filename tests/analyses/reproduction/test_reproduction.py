@@ -101,11 +101,11 @@ class ToyResult:
     interrupted: bool = False
 
     def as_dict(self):
-        found = {"outcomes": "2 converged", "runs": 2}
-        found["length_m"] = {"mean": 0.0021, "min": 0.0019, "max": 0.0023}
+        run = {"configuration": "c", "camera": "projected", "outcome": "converged"}
+        rendered = {**run, "camera": "rendered", "length_m": 1.0}
         return {
             "statements": [one.as_dict() for one in self.statements],
-            "configurations": [{"name": "c", "found": found}],
+            "runs": [run | {"length_m": length} for length in (0.0019, 0.0023)] + [rendered],
             "assumptions": ["a < b"],
         }
 

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.reporting.statements import failed_check, run_checks
 from cdpr_drake.analyses.studies.case_studies.case_1 import MOVING_TIME, moving
 from cdpr_drake.analyses.studies.case_studies.case_1_ends import (
     GOAL_KEYS,
@@ -13,21 +12,17 @@ from cdpr_drake.analyses.studies.case_studies.case_1_ends import (
     servo_pays,
     turns_repeat,
 )
-from cdpr_drake.analyses.studies.framework.case_run import METRICS, CaseJob, CaseRun, CaseRuns
 from cdpr_drake.analyses.studies.framework.case_statements import same_accuracy
+from cdpr_drake.analyses.studies.framework.runs import MissingRuns
 from cdpr_drake.analyses.studies.tension_cases.case_9_statements import least
+from tests.analyses.studies.made_runs import made_run, made_runs
 
 
 def run(name, outcome="converged", end=None, **metrics):
     """A run that was not made; `end` is where the camera ends beside its goal [m]."""
     place = np.zeros(3) if end is None else np.array(end)
-    traces = {"camera_path": np.array([np.ones(3), place]), "camera_line": np.zeros((2, 3))}
-    numbers = {**dict.fromkeys(METRICS, 0.0), **metrics}
-    job = CaseJob(name, "acrobot_pbvs", (), 0, False)
-    return CaseRun(
-        job=job, outcome=outcome, message="", metrics=numbers, summary={}, traces=traces,
-        features=(), stop_position=0.005,
-    )  # fmt: skip
+    path = np.array([np.ones(3), place])
+    return made_run(name, outcome, camera_path=path, camera_line=np.zeros((2, 3)), **metrics)
 
 
 @pytest.mark.parametrize(
@@ -37,12 +32,12 @@ def run(name, outcome="converged", end=None, **metrics):
 def test_an_accuracy_below_the_threshold_at_which_runs_end_confirms_nothing(errors, expected):
     names = ("none", "within")
     runs = [run(n, position_error_m=e) for n, e in zip(names, errors, strict=True)]
-    assert same_accuracy(CaseRuns(runs), names, "").verdict == expected
+    assert same_accuracy(names, "").judge(made_runs(runs)).verdict == expected
 
 
 def test_one_configuration_that_converges_has_nothing_to_compare():
     runs = [run("none", position_error_m=0.001), run("beyond", "target_lost")]
-    assert same_accuracy(CaseRuns(runs), ("none", "beyond"), "").verdict == "not testable"
+    assert same_accuracy(("none", "beyond"), "").judge(made_runs(runs)).verdict == "not testable"
 
 
 MOVING_CASES = [
@@ -66,7 +61,7 @@ def test_lasting_until_the_end_of_the_run_is_no_order(times, expected):
         )
         for key, time in zip("14567", times, strict=True)
     ]
-    assert moving(CaseRuns(runs)).verdict == expected
+    assert moving.judge(made_runs(runs)).verdict == expected
 
 
 def test_twelve_laps_fit_into_the_run():
@@ -94,7 +89,7 @@ def table_runs(scatter, offset):
     ],
 )
 def test_far_better_than_printed_is_no_confirmation(scatter, offset, expected):
-    assert repeatable(CaseRuns(table_runs(scatter, offset))).verdict == expected
+    assert repeatable.judge(made_runs(table_runs(scatter, offset))).verdict == expected
 
 
 def turned_runs(scatter, offset):
@@ -107,7 +102,7 @@ def turned_runs(scatter, offset):
                 half = np.radians(offset + sign * scatter) / 2.0
                 one = run(f"{prefix}_{key}")
                 end = np.array([np.cos(half), np.sin(half), 0, 0, 0, 0, 0])
-                one.traces["camera_ends"] = np.array([end, goal])
+                one.measured["camera_ends"] = np.array([end, goal])
                 found.append(one)
     return found
 
@@ -122,18 +117,21 @@ def turned_runs(scatter, offset):
     ],
 )
 def test_rotations_of_table_2_1_are_judged_as_its_positions(scatter, offset, expected):
-    assert turns_repeat(CaseRuns(turned_runs(scatter, offset))).verdict == expected
+    assert turns_repeat.judge(made_runs(turned_runs(scatter, offset))).verdict == expected
 
 
 def test_a_row_of_table_2_1_of_which_no_run_converged_is_not_met():
     lost = [run(f"cp_{key}", outcome="target_lost") for key in "1234567"]
-    placed = [one for one in table_runs(1e-3, 1.8e-3) if not one.job.configuration.startswith("cp")]
-    turned = [one for one in turned_runs(0.3, 0.6) if not one.job.configuration.startswith("cp")]
-    for found in repeatable(CaseRuns(placed + lost)), turns_repeat(CaseRuns(turned + lost)):
+    placed = [one for one in table_runs(1e-3, 1.8e-3) if not one.case.startswith("cp")]
+    turned = [one for one in turned_runs(0.3, 0.6) if not one.case.startswith("cp")]
+    for found in (
+        repeatable.judge(made_runs(placed + lost)),
+        turns_repeat.judge(made_runs(turned + lost)),
+    ):
         assert found.verdict == "not confirmed"
         assert "cp: none of 5 runs converged" in found.found
-    with pytest.raises(KeyError):
-        repeatable(CaseRuns(placed))
+    with pytest.raises(MissingRuns):
+        repeatable.judge(made_runs(placed))
 
 
 @pytest.mark.parametrize(
@@ -142,11 +140,11 @@ def test_a_row_of_table_2_1_of_which_no_run_converged_is_not_met():
 )
 def test_how_many_times_better_a_servo_is(far, near, expected):
     errors = {"g_blind": far} | {f"g_{key}": near for key in GOAL_KEYS}
-    runs = CaseRuns(
+    runs = made_runs(
         run(name, position_error_m=1e-3 * e, rotation_error_rad=1e-3 * e)
         for name, e in errors.items()
     )
-    said = servo_pays(runs)
+    said = servo_pays.judge(runs)
     assert said.verdict == expected
     assert f"{far / near:.1f} and {far / near:.1f} times" in said.found
     assert len(accuracy_figure(runs).axes) == 2
@@ -165,27 +163,13 @@ def test_how_estimates_repeat(spread, fourth, expected):
                 f"ap_{key}", estimate_max_m=0.07 + sign * apart,
                 estimate_max_rad=0.1 + sign * (0.03 if key == "4" else 1e-3),
             )  # fmt: skip
-            one.traces["estimate_distance"] = np.full(
+            one.measured["estimate_distance"] = np.full(
                 3, 0.068 if expected != "not confirmed" else 0.01
             )
             runs.append(one)
-    assert repeats_by_estimator(CaseRuns(runs)).verdict == expected
+    assert repeats_by_estimator.judge(made_runs(runs)).verdict == expected
 
 
 def test_the_least_of_configurations_that_have_run_unequally_often():
     runs = [run("E1", margin=2.0), run("E1", margin=1.0), run("E2", margin=1.5)]
-    assert least(CaseRuns(runs), ["E1", "E2"], "margin") == 1.0
-
-
-def test_a_judge_that_fails_costs_only_its_own_statement():
-    def broken(_):
-        raise ValueError("shapes differ")
-
-    names = ("none", "within")
-    found = CaseRuns([run(n, position_error_m=0.004) for n in names])
-    said = run_checks([broken, lambda f: same_accuracy(f, names, "")], found, failed_check)
-    assert [s.verdict for s in said] == ["not judged", "not testable"]
-    assert "broken" in said[0].words
-    assert "shapes differ" in said[0].found
-    with pytest.raises(ValueError, match="shapes"):
-        run_checks([broken], found)
+    assert least(made_runs(runs), ["E1", "E2"], "margin") == 1.0

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from cdpr_drake.analyses.reporting.progress import StudySession
-from cdpr_drake.analyses.studies.case_studies import CASE_STUDIES
 from cdpr_drake.analyses.studies.case_studies.case_3 import overshoot, turns
-from cdpr_drake.analyses.studies.framework.case_study import run_case_study
-from cdpr_drake.analyses.studies.tension_cases import TENSION_CASES
+from cdpr_drake.analyses.studies.framework.study import Form
+from tests.analyses.studies.made_runs import CASE_STUDIES
 
 ENDS = {
     "case-1": {"a_1": "converged", "a_3": "converged"},
@@ -34,23 +33,22 @@ ENDS = {
 }
 
 
-@pytest.mark.parametrize("case", [*CASE_STUDIES, *TENSION_CASES], ids=lambda case: case.name)
+@pytest.mark.parametrize("case", CASE_STUDIES, ids=lambda case: case.name)
 def test_quick_form(case, tmp_path):
-    short = replace(case, quick=tuple(ENDS[case.name]))  # the quick form has all configurations
-    assert {job.configuration for job in case.jobs(quick=True)} == {
-        c.name for c in case.configurations
-    }
-    found = run_case_study(short, quick=True, session=StudySession(workers=1))
-    ends = {run.job.configuration: run.outcome for run in found.runs}
+    names = {c.name for c in case.cases.configurations}  # which the quick form has all
+    assert {one.name for one in case.plan(Form(quick=True))} == names
+    short = replace(case, cases=replace(case.cases, quick=tuple(ENDS[case.name])))
+    found = short(quick=True, session=StudySession(workers=1))
+    ends = {run["configuration"]: run["outcome"] for run in found.runs}
     assert ends == ENDS[case.name]
     if case.name == "case-7":
         found.write(tmp_path)
         assert (tmp_path / "deviations.png").is_file()
-        servo, tracking = (run.metrics["camera_max_m"] for run in found.runs)
+        servo, tracking = found.runs["camera_max_m"]
         # The thesis' point: under the same perturbation, tracking deviates several times less.
         assert servo > 2.0 * tracking
     if case.name == "tension-tracking":
-        none, middle = (run.metrics for run in found.runs)
+        none, middle = found.runs
         assert none["slack_share"] > 0.5
         assert middle["slack_share"] < 0.05
         assert middle["image_max_px"] < none["image_max_px"]

@@ -1,12 +1,10 @@
 """Figures in the layout of published ones: what they are of, and how they are filled."""
 
 from functools import partial
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.studies.case_studies import CASE_STUDIES
 from cdpr_drake.analyses.studies.framework.case_figures import shown_of
 from cdpr_drake.analyses.studies.framework.case_layouts import (
     CableLayout,
@@ -15,10 +13,10 @@ from cdpr_drake.analyses.studies.framework.case_layouts import (
     paths_layout,
 )
 from cdpr_drake.analyses.studies.framework.case_panels import bars, metric
-from cdpr_drake.analyses.studies.framework.case_run import CaseRuns
-from cdpr_drake.analyses.studies.tension_cases import TENSION_CASES
+from cdpr_drake.analyses.studies.framework.runs import MissingRuns
+from tests.analyses.studies.made_runs import CASE_STUDIES, made_run, made_runs
 
-CASES = {case.name: case for case in (*CASE_STUDIES, *TENSION_CASES)}
+CASES = {study.name: study.cases for study in CASE_STUDIES}
 CASE = CASES["case-5"]
 
 PATH = np.linspace([0.0, 0.0, 1.0], [1.0, 2.0, 0.5], 12)
@@ -33,15 +31,13 @@ def run(name, seed=0, off=3.0):
         "image_deviation": np.full(12, off), "camera_path": PATH, "camera_line": PATH[[0, -1]],
         "camera_deviation": np.full(12, 1e-3 * off),
     }  # fmt: skip
-    return SimpleNamespace(
-        job=SimpleNamespace(configuration=name, rendered=False, seed=seed),
-        traces=traces, metrics={"image_max_px": off}, summary={"robot": "caroca"},
-    )  # fmt: skip
+    traces |= {"image_max_px": off, "summary": {"robot": "caroca"}}
+    return made_run(name, seed=seed, **traces)
 
 
 @pytest.fixture(scope="module")
 def runs():
-    return CaseRuns([run("none"), run("none", 1, 5.0), run("within", 0, 9.0)])
+    return made_runs([run("none"), run("none", 1, 5.0), run("within", 0, 9.0)])
 
 
 @pytest.mark.parametrize("name", sorted(CASES))
@@ -71,7 +67,7 @@ def test_paths_are_four_panels_of_the_configurations_that_were_run(runs):
 
 def test_a_layout_of_which_nothing_was_run_is_not_drawn(runs):
     layout = paths_layout("four panels", ("beyond",))
-    with pytest.raises(KeyError, match="four panels"):
+    with pytest.raises(MissingRuns, match="four panels"):
         layout.figure(partial(shown_of, CASE, runs), runs)
 
 

@@ -1,14 +1,12 @@
 """Figures 5.11 to 5.15: residuals by another way, and that made-up runs are drawn."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.studies.framework.cable_figures import cable_panels
 from cdpr_drake.analyses.studies.framework.case_definition import Configuration
-from cdpr_drake.analyses.studies.framework.case_run import CaseRuns
+from cdpr_drake.analyses.studies.framework.runs import MissingRuns
 from cdpr_drake.analyses.studies.tension_cases.case_9_figures import (
     ACCURACY,
     EXPERIMENTS,
@@ -23,6 +21,7 @@ from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_statics import tension_problem
 from cdpr_drake.palette import nth_look
 from cdpr_drake.tensions.methods import solution_space
+from tests.analyses.studies.made_runs import made_run, made_runs
 
 POSE = RigidTransform([-0.11, -0.20, 0.366])
 """The printed last position."""
@@ -39,15 +38,12 @@ def run_of(name, tensions=None):
         "time": np.linspace(0.0, 1.0, 30), "measured_tensions": rows,
         "unstrained_lengths": np.ones((30, 8)), "X_WP": np.tile(pose_row(POSE), (30, 1)),
     }  # fmt: skip
-    return SimpleNamespace(
-        job=SimpleNamespace(configuration=name, rendered=False, seed=0),
-        traces=traces, summary={"robot": "acrobot_large"},
-    )  # fmt: skip
+    return made_run(name, summary={"robot": "acrobot_large"}, **traces)
 
 
 @pytest.fixture(scope="module")
 def runs():
-    return CaseRuns(run_of(name) for name in EXPERIMENTS)
+    return made_runs(run_of(name) for name in EXPERIMENTS)
 
 
 @pytest.fixture(scope="module")
@@ -89,8 +85,8 @@ def test_tensions_that_balance_have_no_residual_and_no_accuracy_no_range(problem
 def test_figures_need_the_runs_that_they_show(runs):
     assert polygon_figure(runs).axes
     assert residual_figure(runs).axes
-    with pytest.raises(KeyError):
-        polygon_figure(CaseRuns([run_of("E1")]))
+    with pytest.raises(MissingRuns):
+        polygon_figure(made_runs([run_of("E1")]))
 
 
 def test_accuracy_matters_where_residuals_are_small_only(problem):
@@ -98,8 +94,8 @@ def test_accuracy_matters_where_residuals_are_small_only(problem):
     balanced = particular + N @ [1.0, 2.0]
     pulled = np.linalg.pinv(problem.W) @ np.array([0.0, 0.0, 0.0, 0.0, 0.0, 40.0])
     for tensions, expected in ((balanced, "confirmed"), (balanced + pulled, "not confirmed")):
-        runs = CaseRuns(run_of(name, tensions) for name in EXPERIMENTS)
-        assert sensor_accuracy(runs).verdict == expected
+        runs = made_runs(run_of(name, tensions) for name in EXPERIMENTS)
+        assert sensor_accuracy.judge(runs).verdict == expected
 
 
 def test_a_panel_for_each_cable():
@@ -111,5 +107,5 @@ def test_a_panel_for_each_cable():
     titles = [axes.get_title() for axes in figure.axes]
     assert titles == [cable.name for cable in load_robot("acrobot_large").cables]
     np.testing.assert_array_equal(figure.axes[4].lines[1].get_ydata(), np.zeros(30))
-    del shown[1][1].traces["measured_tensions"]
+    del shown[1][1].measured["measured_tensions"]
     assert cable_panels("made up", shown, "cable_tensions") is None

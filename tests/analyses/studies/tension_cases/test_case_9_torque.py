@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.studies.framework.case_run import CaseJob, CaseRun, CaseRuns
 from cdpr_drake.analyses.studies.tension_cases.case_9_torque import (
-    CASE_9_TORQUE,
+    CHECKS,
     FRICTIONS,
     SLACKS_CM,
     below_after_taut,
     lowest_after_taut,
     slack_after_taut,
 )
+from tests.analyses.studies.made_runs import made_run, made_runs
 
 
 def traces(*rows):
@@ -50,13 +50,8 @@ def made(worst, **metrics):
             if name == "torque_8cm_more_30":
                 numbers |= metrics
                 torque |= worst
-            job = CaseJob(name, "acrobot_torque_servo", (), 0, False)
-            run = CaseRun(
-                job=job, outcome="timeout", message="", metrics=numbers, traces={}, features=(),
-                summary={"torque_control": torque}, stop_position=0.0003,
-            )  # fmt: skip
-            runs.append(run)
-    return [judge(CaseRuns(runs)).verdict for judge in CASE_9_TORQUE.judges]
+            runs.append(made_run(name, "timeout", summary={"torque_control": torque}, **numbers))
+    return [check.judge(made_runs(runs)).verdict for check in CHECKS]
 
 
 def test_what_is_good_is_confirmed_and_one_bad_run_of_all_is_not():

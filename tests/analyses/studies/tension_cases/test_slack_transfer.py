@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.studies.framework.case_run import CaseJob, CaseRun, CaseRuns
 from cdpr_drake.analyses.studies.tension_cases import case_9_transfer as nine
 from cdpr_drake.analyses.studies.tension_cases.case_10_estimates import (
     ESTIMATES,
@@ -13,6 +12,7 @@ from cdpr_drake.analyses.studies.tension_cases.case_10_estimates import (
 )
 from cdpr_drake.analyses.studies.tension_cases.case_10_statements import THRESHOLDS
 from cdpr_drake.analyses.studies.tension_cases.slack_experiments import CORRECTED, PLAIN, SLACKS_CM
+from tests.analyses.studies.made_runs import made_run, made_runs
 
 ROWS = 200
 DEVIATIONS = {"E1": 24, "E3": 20, "E5": 40, "E7": 60, "E9": 50, "E2": 24, "E4": 30, "E6": 31,
@@ -43,19 +43,13 @@ def run_of(name, **changed):
         "estimate_end_rad": np.radians(5.0 if name == "E9" else 2.0),
         "estimate_end_m": 1e-3 * DEVIATIONS[name],
     }
-    for key, value in changed.items():
-        (metrics if key in metrics else traces)[key] = value
-    job = CaseJob(name, "made_up", (), 0, False)
-    return CaseRun(
-        job=job, outcome="timeout", message="", metrics=metrics, traces=traces, features=(),
-        summary={}, stop_position=0.001,
-    )  # fmt: skip
+    return made_run(name, "timeout", **{**metrics, **traces, **changed})
 
 
 def runs(*others):
     """All experiments, with others in the place of some."""
     made = {name: run_of(name) for name in (*PLAIN, *CORRECTED)}
-    return CaseRuns({**made, **{run.job.configuration: run for run in others}}.values())
+    return made_runs({**made, **{run.case: run for run in others}}.values())
 
 
 @pytest.mark.parametrize(
@@ -74,10 +68,10 @@ def runs(*others):
     ],
 )
 def test_what_is_published_is_confirmed_and_its_contrary_is_not(judge, contrary):
-    assert judge(runs()).verdict == "confirmed"
-    assert judge(runs(*contrary)).verdict != "confirmed"
+    assert judge.judge(runs()).verdict == "confirmed"
+    assert judge.judge(runs(*contrary)).verdict != "confirmed"
 
 
 def test_estimates_are_compared_with_and_without_correction():
-    assert [judge(runs()).verdict for judge in ESTIMATES] == ["confirmed"] * 4
+    assert [judge.judge(runs()).verdict for judge in ESTIMATES] == ["confirmed"] * 4
     assert nine.spikes(np.array([0.0, 1.0, 0.0, 0.1, 0.0, 1.0, np.nan, 0.2])) == 2

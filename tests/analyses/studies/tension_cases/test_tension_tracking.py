@@ -2,15 +2,15 @@
 
 import pytest
 
-from cdpr_drake.analyses.studies.framework.case_run import CaseJob, CaseRun, CaseRuns
 from cdpr_drake.analyses.studies.tension_cases import tension_tracking
 from cdpr_drake.analyses.studies.tension_cases.tension_tracking import (
     DISTURBED,
-    TENSION_TRACKING,
+    STUDY,
     VARIANTS,
     compared,
     usable,
 )
+from tests.analyses.studies.made_runs import made_run, made_runs
 
 GOOD = {"slack_share": 0.0, "image_max_px": 20.0, "camera_max_m": 0.003}
 
@@ -20,23 +20,18 @@ def made_up(changed, outcome=None):
     runs = []
     for one in DISTURBED:
         for variant in VARIANTS:
-            numbers = {**dict.fromkeys(TENSION_TRACKING.metrics(), 1.0), **GOOD}
+            numbers = {**dict.fromkeys(STUDY.cases.metrics(), 1.0), **GOOD}
             numbers |= changed.get(variant, {})
-            job = CaseJob(f"{one}_{variant}", "acrobot_pbvs", (), 0, False)
-            runs.append(
-                CaseRun(
-                    job=job, outcome=(outcome or {}).get(variant, "converged"), message="",
-                    metrics=numbers, summary={}, traces={}, features=(), stop_position=0.005,
-                )
-            )  # fmt: skip
-    return CaseRuns(runs)
+            end = (outcome or {}).get(variant, "converged")
+            runs.append(made_run(f"{one}_{variant}", end, **numbers))
+    return made_runs(runs)
 
 
 def test_every_set_is_run_with_every_variant_ten_times_and_more():
-    names = {c.name for c in TENSION_TRACKING.configurations}
+    names = {c.name for c in STUDY.cases.configurations}
     assert names == {f"{one}_{variant}" for one in DISTURBED for variant in VARIANTS}
     assert DISTURBED == ("d1", "d2", "d3", "d4")
-    assert TENSION_TRACKING.repetitions >= 10
+    assert STUDY.seeds[0] >= 10
 
 
 def test_what_is_slack_or_does_not_converge_is_not_usable():
@@ -55,7 +50,7 @@ def test_what_is_slack_or_does_not_converge_is_not_usable():
     ],
 )
 def test_better_is_what_deviates_less_and_is_usable(changed, expected):
-    assert tension_tracking._better(made_up(changed)).verdict == expected
+    assert tension_tracking._better.judge(made_up(changed)).verdict == expected
 
 
 @pytest.mark.parametrize(
@@ -67,7 +62,7 @@ def test_better_is_what_deviates_less_and_is_usable(changed, expected):
     ],
 )
 def test_correction_and_tracking_go_together(changed, expected):
-    assert tension_tracking._combined(made_up(changed)).verdict == expected
+    assert tension_tracking._combined.judge(made_up(changed)).verdict == expected
 
 
 @pytest.mark.parametrize(
@@ -76,4 +71,4 @@ def test_correction_and_tracking_go_together(changed, expected):
 )
 def test_a_polygon_is_small_where_its_middle_changes_nothing(image, camera, expected):
     runs = made_up({"middle": {"image_max_px": image, "camera_max_m": camera}})
-    assert tension_tracking._small_polygon(runs).verdict == expected
+    assert tension_tracking._small_polygon.judge(runs).verdict == expected
