@@ -124,7 +124,9 @@ def _counted(
     what: str,
 ) -> str:
     """A table of counts, sources and what is ours apart."""
-    lines, own, every = [], [], Counter[str]()
+    lines: list[str] = []
+    own: list[str] = []
+    every: Counter[str] = Counter()
     for register in registers:
         mine = {
             chapter: some for (name, chapter), some in chapters.items() if name == register.name

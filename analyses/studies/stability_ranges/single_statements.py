@@ -17,7 +17,7 @@ from cdpr_drake.analyses.studies.stability_ranges.single_errors import (
 
 SOURCE = "servoing thesis 3.4.2"
 
-EMPTY_SHARE, HALF_TOLERANCE = 0.01, 0.25
+EMPTY_SHARE, HALF_TOLERANCE = 0.01, 0.1
 """Share that counts as nothing, and distance from one half that counts as about half."""
 
 VOLUME_TOLERANCE = 0.05

@@ -148,7 +148,8 @@ MADE_UP = [
     (said.width_by_camera, {"3.15 d_theta_pc=20 deg": below(1.0)}, NOT_CONFIRMED),
     (said.hybrid_falls_faster, {"3.13 d_theta_bp=10 deg": slab, "3.20 d_theta_bp=30 deg": slab,
                                 "3.20 r_bp=0.5": slab, "3.13 r_A=0.1": slab}, MET_FITTED),
-    (said.hybrid_falls_faster, {}, IN_PART),
+    (said.hybrid_falls_faster, {"3.13 d_theta_bp=10 deg": slab}, IN_PART),
+    (said.hybrid_falls_faster, {}, NOT_CONFIRMED),
     (said.downward, {key: lambda x, y, z: z < -1.0 for key in (" ".join(one) for one in CASES
                      if one[0] == "3.13" and one[1] != BASELINE)}, NOT_CONFIRMED),
     (said.combinations, {}, NOT_TESTABLE),

@@ -61,15 +61,20 @@ def test_jumps_of_the_quadratic_program(jump, expected):
 
 
 @pytest.mark.parametrize(
-    ("far", "near", "expected"),
-    [(2.0, 2.0, CONFIRMED), (2.0, 0.5, IN_PART), (0.5, 0.5, NOT_CONFIRMED)],
+    ("thesis", "step", "expected"),
+    [
+        ((1.7, 4.1, 3.6), (2.0, 2.0, 2.0), CONFIRMED),
+        ((1.01, 1.01, 1.01), (2.0, 2.0, 2.0), IN_PART),  # below, but by too little
+        ((1.7, 4.1, 3.6), (0.5, 0.5, 0.5), IN_PART),
+        ((0.1, 0.1, 0.1), (0.5, 0.5, 0.5), NOT_CONFIRMED),
+    ],
 )
-def test_quadratic_against_linear_program(far, near, expected):
-    """The linear program's largest tension as a multiple of the quadratic program's."""
+def test_quadratic_against_linear_program(thesis, step, expected):
+    """The linear program's largest tensions as multiples of the quadratic program's."""
     runs = [
         made_up(name, method, gain, tension_max_n=tension)
-        for name, factor in (("thesis", far), ("step", near))
-        for gain in GAINS
+        for name, factors in (("thesis", thesis), ("step", step))
+        for gain, factor in zip(GAINS, factors, strict=True)
         for method, tension in ((QP, 1.0), (LP, factor))
     ]
     assert verdict("qp_needs_less", runs) == expected
@@ -77,13 +82,17 @@ def test_quadratic_against_linear_program(far, near, expected):
 
 @pytest.mark.parametrize(
     ("still", "step", "expected"),
-    [(2.0, 2.0, CONFIRMED), (1.0, 2.0, IN_PART), (1.0, 1.0, NOT_CONFIRMED)],
+    [
+        ((1.0, 1.9, 3.5), 2.0, CONFIRMED),
+        ((1.0, 1.06, 1.12), 2.0, IN_PART),
+        ((1.0, 1.06, 1.12), 1.0, NOT_CONFIRMED),
+    ],
 )
 def test_tensions_grow_with_the_gain(still, step, expected):
     runs = [
-        made_up(name, QP, gain, tension_max_n=factor if gain > 800.0 else 1.0)
-        for name, factor in (("thesis", still), ("step", step))
-        for gain in GAINS
+        made_up(name, QP, gain, tension_max_n=tension)
+        for name, tensions in (("thesis", still), ("step", (1.0, 1.0, step)))
+        for gain, tension in zip(GAINS, tensions, strict=True)
     ]
     assert verdict("tension_grows", runs) == expected
 
@@ -92,17 +101,28 @@ def test_tensions_grow_with_the_gain(still, step, expected):
     ("errors", "falls", "no_better"),
     [
         ((3e-6, 2e-6, 1e-6, 0.99e-6), CONFIRMED, CONFIRMED),
+        ((3e-6, 2.97e-6, 2.94e-6, 2.9e-6), NOT_CONFIRMED, CONFIRMED),
         ((3e-6, 1e-6, 2e-6, 1.1e-6), NOT_CONFIRMED, IN_PART),
         ((3e-6, 4e-6, 5e-6, 1e-6), NOT_CONFIRMED, NOT_CONFIRMED),
     ],
 )
 def test_errors_against_the_gain(errors, falls, no_better):
     runs = [
-        made_up("thesis", QP, gain, position_error_max_m=error)
+        made_up("thesis", method, gain, position_error_max_m=error)
+        for method in (LP, QP)
         for gain, error in zip((*GAINS, 1500.0), errors, strict=True)
     ]
     assert verdict("error_falls", runs) == falls
     assert verdict("no_better", runs) == no_better
+
+
+def test_errors_of_one_program_do_not_stand_for_both():
+    runs = [
+        made_up("thesis", method, gain, position_error_max_m=error)
+        for method, errors in ((LP, (1e-6, 1e-6, 1e-6)), (QP, (3e-6, 2e-6, 1e-6)))
+        for gain, error in zip(GAINS, errors, strict=True)
+    ]
+    assert verdict("error_falls", runs) == NOT_CONFIRMED
 
 
 @pytest.mark.parametrize(
@@ -117,11 +137,14 @@ def test_negative_tensions_of_the_pseudo_inverse(inside, printed, expected):
     assert verdict("pseudo_inverse_negative", runs) == expected
 
 
-@pytest.mark.parametrize(("last", "expected"), [(117.0, CONFIRMED), (140.0, NOT_CONFIRMED)])
-def test_the_pseudo_inverse_needs_the_same_at_all_gains(last, expected):
+@pytest.mark.parametrize(
+    ("first", "last", "expected"),
+    [(117.0, 117.0, CONFIRMED), (11.7, 11.7, IN_PART), (11.7, 117.0, NOT_CONFIRMED)],
+)
+def test_the_pseudo_inverse_needs_the_same_at_all_gains(first, last, expected):
     runs = [
         made_up("printed", "pseudo_inverse", gain, "pushed", tension_max_n=tension)
-        for gain, tension in zip(GAINS, (117.0, 117.0, last), strict=True)
+        for gain, tension in zip(GAINS, (first, first, last), strict=True)
     ]
     assert verdict("pseudo_inverse_117", runs) == expected
 

@@ -85,9 +85,9 @@ def test_verdicts_can_fail(study):
 
 
 @pytest.mark.parametrize(
-    ("cost", "said"), [(1.0, CONFIRMED), (8.0, IN_PART), (10.0, NOT_CONFIRMED)]
+    ("cost", "said"), [(1.0, CONFIRMED), (80.0, IN_PART), (120.0, NOT_CONFIRMED)]
 )
-def test_a_cost_is_compared_with_that_of_the_barycenter(study, cost, said):
+def test_a_cost_is_compared_with_the_period_of_a_controller(study, cost, said):
     costs = {"improved_closed_form": cost, "median": 3.0, "barycenter": 10.0}
     assert verdicts(changed(study, METHODS, cost_us=costs))["median_cheap"] == said
 
