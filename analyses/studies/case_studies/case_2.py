@@ -127,8 +127,7 @@ def existing_bend(runs: Runs) -> Finding:
         found=f"exact {exact:.1f} px, {outcomes(runs, 'exact')}; "
         + ", ".join(f"{words} {value:.1f}" for words, value in single.items())
         + f" px; all together, auto-focus 0.02, {both:.1f} px, {outcomes(runs, 'existing')}",
-        held=[crooked, all(largest)],
-        some=crooked or any(largest),
+        held=[crooked, *largest],
         why=f"By how much the webcam zooms is not printed: three shares, each in {FOCUS_PERIOD:g} "
         "s. A focal length that is wrong scales what is seen about the image's middle, and so the "
         "depth; the direction to the object is hardly wrong where that is near the middle.",

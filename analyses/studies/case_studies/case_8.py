@@ -127,7 +127,7 @@ def filter_smooths(runs: Runs) -> Finding:
         + f" mm/s; camera {1e3 * runs.mean('camera_max_m', configuration='tracking'):.1f} mm "
         "from its line, "
         "filtered " + ", ".join(f"{value:.1f}" for value in paths.values()) + " mm",
-        held=[all(smoother), ended],
+        held=[*smoother, ended],
         some=any(smoother),
         why="First-order filter of the error of the features; its time constant is not printed, "
         "three are run.",
