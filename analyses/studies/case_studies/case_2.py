@@ -157,11 +157,7 @@ STUDY = configuration_study(
                 "tag leaves the image depends on it",
             ),
             Configuration("blind_none", "without camera", (BLIND,)),
-            Configuration(
-                "blind_within",
-                "without camera, 0.1 m, 5 deg",
-                (BLIND, WITHIN),
-            ),
+            Configuration("blind_within", "without camera, 0.1 m, 5 deg", (BLIND, WITHIN)),
             Configuration(
                 "exact",
                 "exact",

@@ -61,22 +61,15 @@ def _shifted(name: str, distance: float, angle_deg: float, outcome: str) -> Conf
     )
 
 
-@statement(
-    "IBVS ends its task under the perturbations of E1 to E3.",
-    "figures 3.41 to 3.44",
-)
+@statement("IBVS ends its task under the perturbations of E1 to E3.", "figures 3.41 to 3.44")
 def _tolerates(runs: Runs) -> Finding:
     good = [converged(runs, name) for name in NAMES[:3]]
     return Finding(
-        found="; ".join(f"{name}: {outcomes(runs, name)}" for name in NAMES[:3]),
-        held=good,
+        found="; ".join(f"{name}: {outcomes(runs, name)}" for name in NAMES[:3]), held=good
     )
 
 
-@statement(
-    "Under that of E4 it does not end: it swings about the goal.",
-    "figures 3.41d to 3.43d",
-)
+@statement("Under that of E4 it does not end: it swings about the goal.", "figures 3.41d to 3.43d")
 def _not_all(runs: Runs) -> Finding:
     return Finding(
         found=f"E4: {outcomes(runs, 'E4')}",
@@ -85,10 +78,7 @@ def _not_all(runs: Runs) -> Finding:
     )
 
 
-@statement(
-    "The larger the perturbation, the more the paths curve.",
-    "figure 3.41",
-)
+@statement("The larger the perturbation, the more the paths curve.", "figure 3.41")
 def _curved(runs: Runs) -> Finding:
     image = [runs.mean("image_max_px", configuration=name) for name in NAMES]
     return Finding(

@@ -135,8 +135,7 @@ def _better(runs: Runs) -> Finding:
 
 
 @statement(
-    "Without perturbation, both stay close to the straight lines.",
-    "at most 10 px and 10 mm",
+    "Without perturbation, both stay close to the straight lines.", "at most 10 px and 10 mm"
 )
 def _same_without(runs: Runs) -> Finding:
     image = [

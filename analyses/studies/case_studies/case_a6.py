@@ -66,10 +66,7 @@ def _any_camera(runs: Runs) -> Finding:
     )
 
 
-@statement(
-    "Wrong anchor points matter more than a wrong camera position.",
-    "section A.6.2",
-)
+@statement("Wrong anchor points matter more than a wrong camera position.", "section A.6.2")
 def _anchors_more_than_camera(runs: Runs) -> Finding:
     anchor, camera = (
         runs.mean("image_max_px", configuration=name) for name in ("anchor_E3", "camera_E2")
@@ -81,10 +78,7 @@ def _anchors_more_than_camera(runs: Runs) -> Finding:
     )
 
 
-@statement(
-    "Wrong anchor points matter more than wrong exit points.",
-    "section A.6.3",
-)
+@statement("Wrong anchor points matter more than wrong exit points.", "section A.6.3")
 def _anchors_more_than_exits(runs: Runs) -> Finding:
     anchor, exits = (
         runs.mean("image_max_px", configuration=name) for name in ("anchor_E4", "exit_E3")
@@ -97,10 +91,7 @@ def _anchors_more_than_exits(runs: Runs) -> Finding:
     )
 
 
-@statement(
-    "The more the anchor points are wrong, the more the paths curve.",
-    "figures A.18, A.21",
-)
+@statement("The more the anchor points are wrong, the more the paths curve.", "figures A.18, A.21")
 def _grows(runs: Runs) -> Finding:
     image = [
         runs.mean("image_max_px", configuration=f"anchor_{name}") for name in ("E2", "E3", "E4")

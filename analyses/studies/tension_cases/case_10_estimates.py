@@ -28,10 +28,7 @@ JUST_BELOW = 75.0
 [N]."""
 
 
-@statement(
-    "Without slack the estimate ends the same with and without correction.",
-    "figure 5.26",
-)
+@statement("Without slack the estimate ends the same with and without correction.", "figure 5.26")
 def same_without_slack(runs: Runs) -> Finding:
     """Whether the correction leaves the estimate alone."""
     places = [runs.mean("estimate_end_m", configuration=name) for name in ("E1", "E2")]
@@ -62,10 +59,7 @@ def last_is_worse(runs: Runs) -> Finding:
     worst = found[CORRECTED[-1]]
     others = [value for name, value in found.items() if name != CORRECTED[-1]]
     same, worse = max(others) - min(others) < SAME_M, worst > max(others)
-    return Finding(
-        found=listed(found, "mm", factor=1e3),
-        held=[same, worse],
-    )
+    return Finding(found=listed(found, "mm", factor=1e3), held=[same, worse])
 
 
 @statement(

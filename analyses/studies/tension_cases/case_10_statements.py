@@ -108,8 +108,7 @@ def no_slack(runs: Runs) -> Finding:
     (u, v), (a, b) = found["image_max_px"], found["camera_max_m"]
     same = abs(u - v) < SAME_PX, 1e3 * abs(a - b) < SAME_MM
     return Finding(
-        found=f"E1 {u:.0f} px, {1e3 * a:.0f} mm; E2 {v:.0f} px, {1e3 * b:.0f} mm",
-        held=same,
+        found=f"E1 {u:.0f} px, {1e3 * a:.0f} mm; E2 {v:.0f} px, {1e3 * b:.0f} mm", held=same
     )
 
 
@@ -122,10 +121,7 @@ def growing(runs: Runs) -> Finding:
     """Whether more slack means a longer way without correction."""
     image, camera = (several(runs, PLAIN, m) for m in ("image_max_px", "camera_max_m"))
     grows = [all(b > a for a, b in pairwise(found.values())) for found in (image, camera)]
-    return Finding(
-        found=f"{listed(image, 'px')}; {listed(camera, 'mm', factor=1e3)}",
-        held=grows,
-    )
+    return Finding(found=f"{listed(image, 'px')}; {listed(camera, 'mm', factor=1e3)}", held=grows)
 
 
 @statement(
@@ -229,18 +225,12 @@ def c3(runs: Runs) -> Finding:
     )
 
 
-@statement(
-    "The reading of C1 never reaches its threshold.",
-    "section 5.3.2, figure 5.25",
-)
+@statement("The reading of C1 never reaches its threshold.", "section 5.3.2, figure 5.25")
 def c1(runs: Runs) -> Finding:
     """Whether C1 is ever corrected."""
     least = means(runs, [*PLAIN, *CORRECTED], "c1_reading_n")
     never = [reading > 0.0 for reading in least.values()]
-    return Finding(
-        found=f"least reading beyond the threshold: {listed(least, 'N')}",
-        held=never,
-    )
+    return Finding(found=f"least reading beyond the threshold: {listed(least, 'N')}", held=never)
 
 
 @statement(
@@ -284,10 +274,7 @@ def estimate(runs: Runs) -> Finding:
     )
 
 
-@statement(
-    "Correction is needed during most of the trajectory.",
-    "section 5.3.2",
-)
+@statement("Correction is needed during most of the trajectory.", "section 5.3.2")
 def needed(runs: Runs) -> Finding:
     """How much of a run is corrected."""
     shares = means(runs, CORRECTED[1:], "correcting")

@@ -144,11 +144,7 @@ def outward(runs: Runs) -> Finding:
         raise MissingRuns("one experiment alone shows no trend")
     growing = all(b > a for a, b in pairwise(found.values()))
     first = found.get("E2") == min(found.values())
-    return Finding(
-        found=listed(found, "N", 2),
-        held=[growing, first],
-        why="Distances in eta.",
-    )
+    return Finding(found=listed(found, "N", 2), held=[growing, first], why="Distances in eta.")
 
 
 @statement(
@@ -186,8 +182,7 @@ def residuals(runs: Runs) -> Finding:
 
 
 @statement(
-    "Without slack the system is stable throughout, with and without correction.",
-    "figure 5.18a",
+    "Without slack the system is stable throughout, with and without correction.", "figure 5.18a"
 )
 def without_slack(runs: Runs) -> Finding:
     """Whether the criterion holds where nothing was paid out."""
@@ -196,10 +191,7 @@ def without_slack(runs: Runs) -> Finding:
         for name in there(runs, ("E1", "E2"))
     }
     good = [value > 0.0 for value in least.values()]
-    return Finding(
-        found=f"least margin of all runs {listed(least, '', 2)}",
-        held=good,
-    )
+    return Finding(found=f"least margin of all runs {listed(least, '', 2)}", held=good)
 
 
 @statement(
