@@ -8,7 +8,7 @@ from cdpr_drake.analyses.studies.framework.case_run import converged, outcomes
 from cdpr_drake.analyses.studies.framework.case_statements import same_accuracy
 from cdpr_drake.analyses.studies.framework.case_study import configuration_study
 from cdpr_drake.analyses.studies.framework.runs import Runs
-from cdpr_drake.analyses.studies.framework.statement import Finding, statement
+from cdpr_drake.analyses.studies.framework.statement import SOURCE, Finding, statement
 
 SETUP = (
     "initial_pose={position: [0.097, -0.026, 0.323], angles_deg: [20, -20, 45]}",
@@ -68,6 +68,7 @@ def _camera_pays(runs: Runs) -> Finding:
     "Within the bounds the task ends; with twice the perturbation it fails, the tag leaving "
     "the image.",
     "figure 3.28",
+    cause=SOURCE,
 )
 def _beyond(runs: Runs) -> Finding:
     return Finding(

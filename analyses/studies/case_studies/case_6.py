@@ -14,7 +14,7 @@ from cdpr_drake.analyses.studies.framework.case_statements import same_accuracy
 from cdpr_drake.analyses.studies.framework.case_study import configuration_study
 from cdpr_drake.analyses.studies.framework.experiments import as_transform, pose_item
 from cdpr_drake.analyses.studies.framework.runs import Runs
-from cdpr_drake.analyses.studies.framework.statement import Finding, statement
+from cdpr_drake.analyses.studies.framework.statement import SOURCE, Finding, statement
 
 START = as_transform(((0.118, -0.104, 0.459), (16.0, 13.8, 20.6)))
 """Printed initial pose of the platform in W."""
@@ -69,7 +69,11 @@ def _tolerates(runs: Runs) -> Finding:
     )
 
 
-@statement("Under that of E4 it does not end: it swings about the goal.", "figures 3.41d to 3.43d")
+@statement(
+    "Under that of E4 it does not end: it swings about the goal.",
+    "figures 3.41d to 3.43d",
+    cause=SOURCE,
+)
 def _not_all(runs: Runs) -> Finding:
     return Finding(
         found=f"E4: {outcomes(runs, 'E4')}",

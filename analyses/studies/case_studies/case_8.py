@@ -11,7 +11,7 @@ from cdpr_drake.analyses.studies.framework.case_definition import PULLEYS, Confi
 from cdpr_drake.analyses.studies.framework.case_run import converged
 from cdpr_drake.analyses.studies.framework.case_study import configuration_study
 from cdpr_drake.analyses.studies.framework.runs import Run, Runs
-from cdpr_drake.analyses.studies.framework.statement import Finding, statement
+from cdpr_drake.analyses.studies.framework.statement import HARDWARE, Finding, statement
 
 PRINTED_FACTOR = 2.0
 """Distances within this factor of the printed ones agree with them."""
@@ -24,6 +24,7 @@ PLANNED = (
 @statement(
     "With tracking, the path in the image is straight to 5 px, more than 5 times better.",
     "figure 4.7b",
+    cause=HARDWARE,
 )
 def _image(runs: Runs) -> Finding:
     servo, tracking = (

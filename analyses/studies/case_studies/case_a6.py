@@ -13,7 +13,7 @@ from cdpr_drake.analyses.studies.framework.case_statements import same_accuracy
 from cdpr_drake.analyses.studies.framework.case_study import configuration_study
 from cdpr_drake.analyses.studies.framework.experiments import as_transform, camera_belief
 from cdpr_drake.analyses.studies.framework.runs import Runs
-from cdpr_drake.analyses.studies.framework.statement import Finding, statement
+from cdpr_drake.analyses.studies.framework.statement import SOURCE, Finding, statement
 
 X_PC = as_transform(((-0.0631, 0.0, 0.01), (0.0, 180.0, 0.0)))
 """True pose of the camera on the small platform."""
@@ -91,7 +91,11 @@ def _anchors_more_than_exits(runs: Runs) -> Finding:
     )
 
 
-@statement("The more the anchor points are wrong, the more the paths curve.", "figures A.18, A.21")
+@statement(
+    "The more the anchor points are wrong, the more the paths curve.",
+    "figures A.18, A.21",
+    cause=SOURCE,
+)
 def _grows(runs: Runs) -> Finding:
     image = [
         runs.mean("image_max_px", configuration=f"anchor_{name}") for name in ("E2", "E3", "E4")

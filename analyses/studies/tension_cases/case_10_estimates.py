@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from cdpr_drake.analyses.studies.framework.runs import MissingRuns, Runs
-from cdpr_drake.analyses.studies.framework.statement import Check, Finding, statement
+from cdpr_drake.analyses.studies.framework.statement import CHOICE, Check, Finding, statement
 from cdpr_drake.analyses.studies.tension_cases.case_10_statements import SAME_PX, THRESHOLDS
 from cdpr_drake.analyses.studies.tension_cases.slack_experiments import (
     CORRECTED,
@@ -86,6 +86,7 @@ def position(runs: Runs) -> Finding:
     "Adding slack turns the platform a little, which moves the first image of the tag; the "
     "readings of C2 and C7 are just below their thresholds then.",
     "figures 5.24a, 5.25",
+    cause=CHOICE,
 )
 def first_moment(runs: Runs) -> Finding:
     """What slack does before the servo starts."""

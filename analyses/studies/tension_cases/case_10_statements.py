@@ -10,8 +10,10 @@ import numpy as np
 from cdpr_drake.analyses.studies.framework.case_run import OwnMetric
 from cdpr_drake.analyses.studies.framework.runs import MissingRuns, Runs
 from cdpr_drake.analyses.studies.framework.statement import (
+    CHOICE,
     CONSTRUCTION,
     FITTED,
+    SOURCE,
     Check,
     Finding,
     statement,
@@ -129,6 +131,7 @@ def growing(runs: Runs) -> Finding:
     "with it; with 8 cm and correction by 90 px and 40 mm.",
     "figure 5.24",
     rule=f"Agreeing within a factor {FACTOR:g}",
+    cause=SOURCE,
 )
 def paths(runs: Runs) -> Finding:
     """How far paths deviate with 6 and 8 cm."""
@@ -186,6 +189,7 @@ def fails(runs: Runs) -> Finding:
     rule=f"Until it pulls with {THRESHOLD:g} N for the first time; about 10 s: within a factor "
     f"{FACTOR:g}",
     basis=FITTED,
+    cause=CHOICE,
 )
 def c7(runs: Runs) -> Finding:
     """How long C7 is slack."""

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.signal import find_peaks
 
 from cdpr_drake.analyses.studies.framework.runs import MissingRuns, Run, Runs
-from cdpr_drake.analyses.studies.framework.statement import Check, Finding, statement
+from cdpr_drake.analyses.studies.framework.statement import SOURCE, Check, Finding, statement
 from cdpr_drake.analyses.studies.tension_cases.case_9_statements import (
     SLACK_PLAIN,
     THRESHOLD,
@@ -150,6 +150,7 @@ def outward(runs: Runs) -> Finding:
 @statement(
     "The residual of the tensions at the end is always lower with correction, lowest in E2.",
     "figure 5.15, table 5.1",
+    cause=SOURCE,
 )
 def residuals(runs: Runs) -> Finding:
     """Whether tensions hold the platform better with correction."""
