@@ -9,7 +9,13 @@ from matplotlib.figure import Figure
 
 from cdpr_drake.analyses.studies.framework.case_definition import Configuration
 from cdpr_drake.analyses.studies.framework.runs import MissingRuns, Run, Runs
-from cdpr_drake.analyses.studies.framework.statement import Check, Finding, statement
+from cdpr_drake.analyses.studies.framework.statement import (
+    CHOICE,
+    HARDWARE,
+    Check,
+    Finding,
+    statement,
+)
 from cdpr_drake.analyses.visualization.figure_style import bar_style, new_figure
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.pose_accuracy import Repeatability, repeatability
@@ -80,6 +86,7 @@ def to_goal(estimators: Mapping[str, tuple[str, str]]) -> tuple[Configuration, .
     "Repeatability and accuracy of the final position over all estimators (table 2.1).",
     "ACROBOT 1.0 and 1.7 mm, perturbed 0.9 and 1.9 mm; CAROCA 1.5 mm, perturbed 1.6 mm",
     rule=f"Confirmed: all within a factor of {FACTOR:g}; in part: none above it",
+    cause=HARDWARE,
 )
 def repeatable(runs: Runs) -> Finding:
     """Table 2.1: both sides count, for far better than printed is another robot, too."""
@@ -122,6 +129,7 @@ def repeatable(runs: Runs) -> Finding:
     "ACROBOT 0.42 and 0.68 deg, perturbed 0.49 and 0.59 deg; CAROCA 0.17 deg, perturbed 0.31 deg",
     rule=f"As of the positions: confirmed within a factor of {FACTOR:g}, in part where none is "
     "above it",
+    cause=HARDWARE,
 )
 def turns_repeat(runs: Runs) -> Finding:
     """Table 2.1, its rotations; both sides count, as of its positions."""
@@ -184,6 +192,7 @@ def _ends(runs: Runs, prefix: str) -> Repeatability | None:
     "orientation than open loop (figure 2.14).",
     "5 and 4 times; 10 and 30 runs",
     rule=f"Confirmed within a factor {FACTOR:g}; in part: better in both",
+    cause=CHOICE,
 )
 def servo_pays(runs: Runs) -> Finding:
     """Figure 2.14."""

@@ -8,7 +8,7 @@ from cdpr_drake.analyses.studies.framework.case_run import converged, outcomes
 from cdpr_drake.analyses.studies.framework.case_statements import same_accuracy
 from cdpr_drake.analyses.studies.framework.case_study import configuration_study
 from cdpr_drake.analyses.studies.framework.runs import Runs
-from cdpr_drake.analyses.studies.framework.statement import Finding, statement
+from cdpr_drake.analyses.studies.framework.statement import SOURCE, Finding, statement
 
 SETUP = (
     "initial_pose={position: [0.097, -0.026, 0.323], angles_deg: [20, -20, 45]}",
@@ -68,6 +68,7 @@ def _camera_pays(runs: Runs) -> Finding:
     "Within the bounds the task ends; with twice the perturbation it fails, the tag leaving "
     "the image.",
     "figure 3.28",
+    cause=SOURCE,
 )
 def _beyond(runs: Runs) -> Finding:
     return Finding(
@@ -127,8 +128,7 @@ def existing_bend(runs: Runs) -> Finding:
         found=f"exact {exact:.1f} px, {outcomes(runs, 'exact')}; "
         + ", ".join(f"{words} {value:.1f}" for words, value in single.items())
         + f" px; all together, auto-focus 0.02, {both:.1f} px, {outcomes(runs, 'existing')}",
-        held=[crooked, all(largest)],
-        some=crooked or any(largest),
+        held=[crooked, *largest],
         why=f"By how much the webcam zooms is not printed: three shares, each in {FOCUS_PERIOD:g} "
         "s. A focal length that is wrong scales what is seen about the image's middle, and so the "
         "depth; the direction to the object is hardly wrong where that is near the middle.",
@@ -158,11 +158,7 @@ STUDY = configuration_study(
                 "tag leaves the image depends on it",
             ),
             Configuration("blind_none", "without camera", (BLIND,)),
-            Configuration(
-                "blind_within",
-                "without camera, 0.1 m, 5 deg",
-                (BLIND, WITHIN),
-            ),
+            Configuration("blind_within", "without camera, 0.1 m, 5 deg", (BLIND, WITHIN)),
             Configuration(
                 "exact",
                 "exact",

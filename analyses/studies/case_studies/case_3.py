@@ -110,8 +110,7 @@ def _swings(runs: Runs) -> Finding:
 
 
 @statement(
-    "Turned by 16 deg, it converges without swinging.",
-    "figure 3.35 (simulation and prototype)",
+    "Turned by 16 deg, it converges without swinging.", "figure 3.35 (simulation and prototype)"
 )
 def _mild(runs: Runs) -> Finding:
     beyond = _overshoot(runs, "turned_16")

@@ -14,7 +14,7 @@ from cdpr_drake.analyses.studies.framework.experiments import (
     turned,
 )
 from cdpr_drake.analyses.studies.framework.runs import Runs
-from cdpr_drake.analyses.studies.framework.statement import Finding, statement
+from cdpr_drake.analyses.studies.framework.statement import SOURCE, Finding, statement
 
 LIFT = 0.133
 """How far all heights are raised so that the tag lies on the ground [m]."""
@@ -63,6 +63,7 @@ _accuracy = same_accuracy(("none", "within", "beyond"), "section 3.4.3")
     "Within the bounds it takes 2 s longer, beyond them half as long again.",
     "46 s beyond the bounds, 50 % more than the others",
     rule="Confirmed: a quarter longer; in part: longer",
+    cause=SOURCE,
 )
 def _slower(runs: Runs) -> Finding:
     times = [runs.mean("time_s", configuration=name) for name in ("none", "within", "beyond")]

@@ -26,22 +26,17 @@ HYBRID = ("controller.scheme=2.5d",)
 def _straighter(runs: Runs) -> Finding:
     hybrid, pose = (runs.mean("image_max_px", configuration=name) for name in ("none", "pbvs"))
     return Finding(
-        found=f"largest distance {hybrid:.1f} px, PBVS {pose:.1f} px",
-        held=[hybrid < pose],
+        found=f"largest distance {hybrid:.1f} px, PBVS {pose:.1f} px", held=[hybrid < pose]
     )
 
 
 @statement(
-    "Without perturbation, the camera's path is nearly straight.",
-    "at most 70 mm over 2.3 m",
+    "Without perturbation, the camera's path is nearly straight.", "at most 70 mm over 2.3 m"
 )
 def _camera(runs: Runs) -> Finding:
     found = 1e3 * runs.largest("camera_max_m", configuration="none")
     pose = 1e3 * runs.mean("camera_max_m", configuration="pbvs")
-    return Finding(
-        found=f"at most {found:.0f} mm; PBVS {pose:.0f} mm",
-        held=[found <= 70.0],
-    )
+    return Finding(found=f"at most {found:.0f} mm; PBVS {pose:.0f} mm", held=[found <= 70.0])
 
 
 @statement(

@@ -14,7 +14,7 @@ from cdpr_drake.analyses.studies.framework.case_statements import same_accuracy
 from cdpr_drake.analyses.studies.framework.case_study import configuration_study
 from cdpr_drake.analyses.studies.framework.experiments import as_transform, pose_item
 from cdpr_drake.analyses.studies.framework.runs import Runs
-from cdpr_drake.analyses.studies.framework.statement import Finding, statement
+from cdpr_drake.analyses.studies.framework.statement import SOURCE, Finding, statement
 
 START = as_transform(((0.118, -0.104, 0.459), (16.0, 13.8, 20.6)))
 """Printed initial pose of the platform in W."""
@@ -61,35 +61,28 @@ def _shifted(name: str, distance: float, angle_deg: float, outcome: str) -> Conf
     )
 
 
-@statement(
-    "IBVS ends its task under the perturbations of E1 to E3.",
-    "figures 3.41 to 3.44",
-)
+@statement("IBVS ends its task under the perturbations of E1 to E3.", "figures 3.41 to 3.44")
 def _tolerates(runs: Runs) -> Finding:
     good = [converged(runs, name) for name in NAMES[:3]]
     return Finding(
-        found="; ".join(f"{name}: {outcomes(runs, name)}" for name in NAMES[:3]),
-        held=good,
+        found="; ".join(f"{name}: {outcomes(runs, name)}" for name in NAMES[:3]), held=good
     )
 
 
 @statement(
     "Under that of E4 it does not end: it swings about the goal.",
     "figures 3.41d to 3.43d",
+    cause=SOURCE,
 )
 def _not_all(runs: Runs) -> Finding:
     return Finding(
         found=f"E4: {outcomes(runs, 'E4')}",
-        held=[not any(run["outcome"] == "converged" for run in runs(configuration="E4"))],
-        some=not converged(runs, "E4"),
+        held=[run["outcome"] != "converged" for run in runs(configuration="E4")],
         why="The direction counts as much as the size, and is not printed.",
     )
 
 
-@statement(
-    "The larger the perturbation, the more the paths curve.",
-    "figure 3.41",
-)
+@statement("The larger the perturbation, the more the paths curve.", "figure 3.41")
 def _curved(runs: Runs) -> Finding:
     image = [runs.mean("image_max_px", configuration=name) for name in NAMES]
     return Finding(

@@ -11,7 +11,7 @@ from cdpr_drake.analyses.studies.framework.case_definition import PULLEYS, Confi
 from cdpr_drake.analyses.studies.framework.case_run import converged
 from cdpr_drake.analyses.studies.framework.case_study import configuration_study
 from cdpr_drake.analyses.studies.framework.runs import Run, Runs
-from cdpr_drake.analyses.studies.framework.statement import Finding, statement
+from cdpr_drake.analyses.studies.framework.statement import HARDWARE, Finding, statement
 
 PRINTED_FACTOR = 2.0
 """Distances within this factor of the printed ones agree with them."""
@@ -24,6 +24,7 @@ PLANNED = (
 @statement(
     "With tracking, the path in the image is straight to 5 px, more than 5 times better.",
     "figure 4.7b",
+    cause=HARDWARE,
 )
 def _image(runs: Runs) -> Finding:
     servo, tracking = (
@@ -127,7 +128,7 @@ def filter_smooths(runs: Runs) -> Finding:
         + f" mm/s; camera {1e3 * runs.mean('camera_max_m', configuration='tracking'):.1f} mm "
         "from its line, "
         "filtered " + ", ".join(f"{value:.1f}" for value in paths.values()) + " mm",
-        held=[all(smoother), ended],
+        held=[*smoother, ended],
         some=any(smoother),
         why="First-order filter of the error of the features; its time constant is not printed, "
         "three are run.",

@@ -13,7 +13,7 @@ from cdpr_drake.analyses.studies.framework.case_statements import same_accuracy
 from cdpr_drake.analyses.studies.framework.case_study import configuration_study
 from cdpr_drake.analyses.studies.framework.experiments import as_transform, camera_belief
 from cdpr_drake.analyses.studies.framework.runs import Runs
-from cdpr_drake.analyses.studies.framework.statement import Finding, statement
+from cdpr_drake.analyses.studies.framework.statement import SOURCE, Finding, statement
 
 X_PC = as_transform(((-0.0631, 0.0, 0.01), (0.0, 180.0, 0.0)))
 """True pose of the camera on the small platform."""
@@ -66,10 +66,7 @@ def _any_camera(runs: Runs) -> Finding:
     )
 
 
-@statement(
-    "Wrong anchor points matter more than a wrong camera position.",
-    "section A.6.2",
-)
+@statement("Wrong anchor points matter more than a wrong camera position.", "section A.6.2")
 def _anchors_more_than_camera(runs: Runs) -> Finding:
     anchor, camera = (
         runs.mean("image_max_px", configuration=name) for name in ("anchor_E3", "camera_E2")
@@ -81,10 +78,7 @@ def _anchors_more_than_camera(runs: Runs) -> Finding:
     )
 
 
-@statement(
-    "Wrong anchor points matter more than wrong exit points.",
-    "section A.6.3",
-)
+@statement("Wrong anchor points matter more than wrong exit points.", "section A.6.3")
 def _anchors_more_than_exits(runs: Runs) -> Finding:
     anchor, exits = (
         runs.mean("image_max_px", configuration=name) for name in ("anchor_E4", "exit_E3")
@@ -100,6 +94,7 @@ def _anchors_more_than_exits(runs: Runs) -> Finding:
 @statement(
     "The more the anchor points are wrong, the more the paths curve.",
     "figures A.18, A.21",
+    cause=SOURCE,
 )
 def _grows(runs: Runs) -> Finding:
     image = [

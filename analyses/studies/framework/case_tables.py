@@ -52,10 +52,7 @@ def _published(plan: Plan, found: Runs) -> list[Table]:
 
 
 def _numbers(
-    title: str,
-    configurations: Sequence[Configuration],
-    found: Runs,
-    metrics: Mapping[str, Metric],
+    title: str, configurations: Sequence[Configuration], found: Runs, metrics: Mapping[str, Metric]
 ) -> Table:
     headings = [metric.heading for metric in metrics.values()]
     table = new_table(title, ("configuration", "outcome"), headings)

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from cdpr_drake.analyses.studies.framework.runs import MissingRuns, Runs
-from cdpr_drake.analyses.studies.framework.statement import Check, Finding, statement
+from cdpr_drake.analyses.studies.framework.statement import CHOICE, Check, Finding, statement
 from cdpr_drake.analyses.studies.tension_cases.case_10_statements import SAME_PX, THRESHOLDS
 from cdpr_drake.analyses.studies.tension_cases.slack_experiments import (
     CORRECTED,
@@ -28,10 +28,7 @@ JUST_BELOW = 75.0
 [N]."""
 
 
-@statement(
-    "Without slack the estimate ends the same with and without correction.",
-    "figure 5.26",
-)
+@statement("Without slack the estimate ends the same with and without correction.", "figure 5.26")
 def same_without_slack(runs: Runs) -> Finding:
     """Whether the correction leaves the estimate alone."""
     places = [runs.mean("estimate_end_m", configuration=name) for name in ("E1", "E2")]
@@ -62,10 +59,7 @@ def last_is_worse(runs: Runs) -> Finding:
     worst = found[CORRECTED[-1]]
     others = [value for name, value in found.items() if name != CORRECTED[-1]]
     same, worse = max(others) - min(others) < SAME_M, worst > max(others)
-    return Finding(
-        found=listed(found, "mm", factor=1e3),
-        held=[same, worse],
-    )
+    return Finding(found=listed(found, "mm", factor=1e3), held=[same, worse])
 
 
 @statement(
@@ -92,6 +86,7 @@ def position(runs: Runs) -> Finding:
     "Adding slack turns the platform a little, which moves the first image of the tag; the "
     "readings of C2 and C7 are just below their thresholds then.",
     "figures 5.24a, 5.25",
+    cause=CHOICE,
 )
 def first_moment(runs: Runs) -> Finding:
     """What slack does before the servo starts."""

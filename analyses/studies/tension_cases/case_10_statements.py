@@ -10,8 +10,10 @@ import numpy as np
 from cdpr_drake.analyses.studies.framework.case_run import OwnMetric
 from cdpr_drake.analyses.studies.framework.runs import MissingRuns, Runs
 from cdpr_drake.analyses.studies.framework.statement import (
+    CHOICE,
     CONSTRUCTION,
     FITTED,
+    SOURCE,
     Check,
     Finding,
     statement,
@@ -108,8 +110,7 @@ def no_slack(runs: Runs) -> Finding:
     (u, v), (a, b) = found["image_max_px"], found["camera_max_m"]
     same = abs(u - v) < SAME_PX, 1e3 * abs(a - b) < SAME_MM
     return Finding(
-        found=f"E1 {u:.0f} px, {1e3 * a:.0f} mm; E2 {v:.0f} px, {1e3 * b:.0f} mm",
-        held=same,
+        found=f"E1 {u:.0f} px, {1e3 * a:.0f} mm; E2 {v:.0f} px, {1e3 * b:.0f} mm", held=same
     )
 
 
@@ -122,10 +123,7 @@ def growing(runs: Runs) -> Finding:
     """Whether more slack means a longer way without correction."""
     image, camera = (several(runs, PLAIN, m) for m in ("image_max_px", "camera_max_m"))
     grows = [all(b > a for a, b in pairwise(found.values())) for found in (image, camera)]
-    return Finding(
-        found=f"{listed(image, 'px')}; {listed(camera, 'mm', factor=1e3)}",
-        held=grows,
-    )
+    return Finding(found=f"{listed(image, 'px')}; {listed(camera, 'mm', factor=1e3)}", held=grows)
 
 
 @statement(
@@ -133,6 +131,7 @@ def growing(runs: Runs) -> Finding:
     "with it; with 8 cm and correction by 90 px and 40 mm.",
     "figure 5.24",
     rule=f"Agreeing within a factor {FACTOR:g}",
+    cause=SOURCE,
 )
 def paths(runs: Runs) -> Finding:
     """How far paths deviate with 6 and 8 cm."""
@@ -190,6 +189,7 @@ def fails(runs: Runs) -> Finding:
     rule=f"Until it pulls with {THRESHOLD:g} N for the first time; about 10 s: within a factor "
     f"{FACTOR:g}",
     basis=FITTED,
+    cause=CHOICE,
 )
 def c7(runs: Runs) -> Finding:
     """How long C7 is slack."""
@@ -229,18 +229,12 @@ def c3(runs: Runs) -> Finding:
     )
 
 
-@statement(
-    "The reading of C1 never reaches its threshold.",
-    "section 5.3.2, figure 5.25",
-)
+@statement("The reading of C1 never reaches its threshold.", "section 5.3.2, figure 5.25")
 def c1(runs: Runs) -> Finding:
     """Whether C1 is ever corrected."""
     least = means(runs, [*PLAIN, *CORRECTED], "c1_reading_n")
     never = [reading > 0.0 for reading in least.values()]
-    return Finding(
-        found=f"least reading beyond the threshold: {listed(least, 'N')}",
-        held=never,
-    )
+    return Finding(found=f"least reading beyond the threshold: {listed(least, 'N')}", held=never)
 
 
 @statement(
@@ -284,10 +278,7 @@ def estimate(runs: Runs) -> Finding:
     )
 
 
-@statement(
-    "Correction is needed during most of the trajectory.",
-    "section 5.3.2",
-)
+@statement("Correction is needed during most of the trajectory.", "section 5.3.2")
 def needed(runs: Runs) -> Finding:
     """How much of a run is corrected."""
     shares = means(runs, CORRECTED[1:], "correcting")

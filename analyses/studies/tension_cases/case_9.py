@@ -7,7 +7,7 @@ import numpy as np
 from cdpr_drake.analyses.studies.framework.case_definition import Configuration, Plan
 from cdpr_drake.analyses.studies.framework.case_study import configuration_study
 from cdpr_drake.analyses.studies.framework.runs import MissingRuns, Runs
-from cdpr_drake.analyses.studies.framework.statement import Finding, statement
+from cdpr_drake.analyses.studies.framework.statement import HARDWARE, Finding, statement
 from cdpr_drake.analyses.studies.tension_cases.case_9_figures import DRAWINGS, sensor_accuracy
 from cdpr_drake.analyses.studies.tension_cases.case_9_statements import (
     PUBLISHED_TIMES,
@@ -71,6 +71,7 @@ def _softer(ratio: str, corrected: bool) -> Configuration:
 @statement(
     "The gain of 0.04 m/(N s) at 25 Hz was tuned on the robot; nothing is said of stiffness.",
     "section 5.3.1",
+    cause=HARDWARE,
 )
 def stiffness(runs: Runs) -> Finding:
     """How far the correction depends on how much the cables give."""

@@ -90,8 +90,7 @@ def gone(runs: Runs) -> Finding:
     times = means(runs, list(names), "time_to_taut_s")
     good = [near(time, PUBLISHED_TIMES[names[name]]) for name, time in times.items()]
     return Finding(
-        found=", ".join(f"{names[name]} cm {time:.2f} s" for name, time in times.items()),
-        held=good,
+        found=", ".join(f"{names[name]} cm {time:.2f} s" for name, time in times.items()), held=good
     )
 
 
@@ -108,10 +107,7 @@ def moves(runs: Runs) -> Finding:
         f"{name} C1, C2 {t[0]:.1f}, {t[1]:.1f}, C5, C6 {t[4]:.1f}, {t[5]:.1f} N"
         for name, t in ends.items()
     )
-    return Finding(
-        found=words,
-        held=[moved],
-    )
+    return Finding(found=words, held=[moved])
 
 
 @statement(
@@ -129,11 +125,7 @@ def underactuated(runs: Runs) -> Finding:
     good = [near(times[name], p) for name, p in published.items() if name in times]
     if not good:
         raise MissingRuns("neither E3 nor E9")
-    return Finding(
-        found=listed(times, "s", 1),
-        held=[all(good), growing],
-        some=growing,
-    )
+    return Finding(found=listed(times, "s", 1), held=[all(good), growing], some=growing)
 
 
 @statement(
@@ -159,10 +151,7 @@ def least(runs: Runs, names: Sequence[str], metric: str) -> float:
     return float(np.nanmin(np.concatenate([runs(configuration=name)[metric] for name in names])))
 
 
-@statement(
-    "With correction the system stays stable all along the trajectory.",
-    "figure 5.18",
-)
+@statement("With correction the system stays stable all along the trajectory.", "figure 5.18")
 def stable(runs: Runs) -> Finding:
     """Whether the criterion holds with correction."""
     names = there(runs, CORRECTED)

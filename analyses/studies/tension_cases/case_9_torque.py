@@ -172,11 +172,7 @@ def _limits(runs: Runs) -> Finding:
     )
 
 
-@statement(
-    "No cable is slack again once the slack of the start is gone.",
-    "chosen",
-    basis=OURS,
-)
+@statement("No cable is slack again once the slack of the start is gone.", "chosen", basis=OURS)
 def _no_slack(runs: Runs) -> Finding:
     names = _names(tuple(FRICTIONS))
     after = {name: float(np.max(runs(configuration=name)["slack_after_s"])) for name in names}

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.signal import find_peaks
 
 from cdpr_drake.analyses.studies.framework.runs import MissingRuns, Run, Runs
-from cdpr_drake.analyses.studies.framework.statement import Check, Finding, statement
+from cdpr_drake.analyses.studies.framework.statement import SOURCE, Check, Finding, statement
 from cdpr_drake.analyses.studies.tension_cases.case_9_statements import (
     SLACK_PLAIN,
     THRESHOLD,
@@ -144,16 +144,13 @@ def outward(runs: Runs) -> Finding:
         raise MissingRuns("one experiment alone shows no trend")
     growing = all(b > a for a, b in pairwise(found.values()))
     first = found.get("E2") == min(found.values())
-    return Finding(
-        found=listed(found, "N", 2),
-        held=[growing, first],
-        why="Distances in eta.",
-    )
+    return Finding(found=listed(found, "N", 2), held=[growing, first], why="Distances in eta.")
 
 
 @statement(
     "The residual of the tensions at the end is always lower with correction, lowest in E2.",
     "figure 5.15, table 5.1",
+    cause=SOURCE,
 )
 def residuals(runs: Runs) -> Finding:
     """Whether tensions hold the platform better with correction."""
@@ -186,8 +183,7 @@ def residuals(runs: Runs) -> Finding:
 
 
 @statement(
-    "Without slack the system is stable throughout, with and without correction.",
-    "figure 5.18a",
+    "Without slack the system is stable throughout, with and without correction.", "figure 5.18a"
 )
 def without_slack(runs: Runs) -> Finding:
     """Whether the criterion holds where nothing was paid out."""
@@ -196,10 +192,7 @@ def without_slack(runs: Runs) -> Finding:
         for name in there(runs, ("E1", "E2"))
     }
     good = [value > 0.0 for value in least.values()]
-    return Finding(
-        found=f"least margin of all runs {listed(least, '', 2)}",
-        held=good,
-    )
+    return Finding(found=f"least margin of all runs {listed(least, '', 2)}", held=good)
 
 
 @statement(

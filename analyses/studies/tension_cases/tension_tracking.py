@@ -34,10 +34,7 @@ RATE = 200
 VARIANTS: dict[str, tuple[str, str]] = {
     "none": ("none", "null"),
     "printed": ("constant, 1 N", f"{{gain: 0.04, rate: {RATE}}}"),
-    "constant": (
-        f"constant, {BOUND:g} N",
-        f"{{gain: 0.04, threshold: [{BOUND:g}], rate: {RATE}}}",
-    ),
+    "constant": (f"constant, {BOUND:g} N", f"{{gain: 0.04, threshold: [{BOUND:g}], rate: {RATE}}}"),
     "distribution": (
         "follows the barycenter",
         f"{{kind: distribution, method: barycenter, threshold: [{BOUND:g}], "
@@ -67,12 +64,7 @@ WORSE = 1.1
 def configurations(sets: Mapping[str, tuple[str, ...]]) -> tuple[Configuration, ...]:
     """Every variant under every set of changes; a set is an experiment of its own."""
     return tuple(
-        Configuration(
-            f"{name}_{variant}",
-            words,
-            (*changes, f"tension_management={section}"),
-            name,
-        )
+        Configuration(f"{name}_{variant}", words, (*changes, f"tension_management={section}"), name)
         for name, changes in sets.items()
         for variant, (words, section) in VARIANTS.items()
     )
