@@ -58,7 +58,14 @@ def camera_belief(X_PC: RigidTransform, belief: RigidTransform) -> str:
 
 
 def _list(values: Array) -> str:
-    return "[" + ", ".join(f"{value:.9g}" for value in values) + "]"
+    return "[" + ", ".join(map(_number, values)) + "]"
+
+
+def _number(value: float) -> str:
+    """Nine digits, as every reader of YAML takes them for a number: 1.0e-05, not 1e-05."""
+    mantissa, exponent, power = f"{value:.9g}".partition("e")
+    dot = ".0" if exponent and "." not in mantissa else ""
+    return f"{mantissa}{dot}{exponent}{power}"
 
 
 START = as_transform(((0.107, -0.026, 0.35), (20.0, -20.0, 0.0)))

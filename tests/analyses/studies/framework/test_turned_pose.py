@@ -2,7 +2,7 @@
 
 import numpy as np
 import yaml
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from cdpr_drake.analyses.studies.framework.experiments import (
@@ -40,6 +40,7 @@ def test_between_undoes_turned(pose, distance, degrees):
 
 
 @given(poses)
+@example(((1e-5, 0.0, 2e-7), (1e-5, 0.0, 0.0)))  # YAML takes 1e-05 for a word, 1.0e-05 for a number
 def test_an_item_means_the_pose(pose):
     X = as_transform(pose)
     key, _, words = pose_item("initial_pose", X).partition("=")
