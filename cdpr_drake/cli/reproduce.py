@@ -123,7 +123,7 @@ def _print(rows: Sequence[ReportRow], states: Mapping[str, StudyState], page: Pa
     printer.print(table)
     printer.print(
         f"{card.independent} facts of the sources are confirmed by runs that could have said "
-        f"otherwise; {card.total().total()} figures, tables, numbers and sentences rest on them"
+        f"otherwise; the report has {card.total().total()} figures, tables, numbers and sentences"
     )
     printer.print(f"{len(states)} studies, report: {page}")
 
