@@ -17,9 +17,13 @@ from cdpr_drake.analyses.reporting.progress import StudySession, WorkProgress
 from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
 from cdpr_drake.analyses.reproduction.page import write_report
 from cdpr_drake.analyses.reproduction.rows import ReportRow, report_rows
-from cdpr_drake.analyses.reproduction.runner import RunSettings, run_studies
+from cdpr_drake.analyses.reproduction.runner import RunSettings, earlier_words, run_studies
 from cdpr_drake.analyses.reproduction.scorecard import Scorecard
-from cdpr_drake.analyses.reproduction.states import StudyState, check_folder
+from cdpr_drake.analyses.reproduction.states import (
+    StudyState,
+    check_folder,
+    check_reproduction,
+)
 from cdpr_drake.analyses.studies.catalogue import (
     STUDIES,
     StudyEntry,
@@ -28,6 +32,7 @@ from cdpr_drake.analyses.studies.catalogue import (
     write_study,
 )
 from cdpr_drake.analyses.studies.published.register import published_registers
+from cdpr_drake.analyses.sweeps.earlier_runs import check_earlier
 from cdpr_drake.analyses.sweeps.workers import check_scheduler
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
 from cdpr_drake.errors import CdprError
@@ -186,6 +191,7 @@ def run_study(
     workers: int | str | None = None,
     overwrite: bool = False,
     formats: Sequence[str] = DEFAULT_FORMATS,
+    runs_from: Path | str | None = None,
     session: Session | None = None,
 ) -> StudyRun:
     """Runs a study.
@@ -200,12 +206,16 @@ def run_study(
         workers: Processes, or the address of a Dask scheduler; None: one for each processor.
         overwrite: Whether results in the folder may be replaced.
         formats: Endings of the files of figures.
+        runs_from: Results folder of the same study by an earlier version of the code: runs of cases
+            that are asked for alike are taken over, which the results say; None: all are computed.
         session: Who follows the study and may stop it; None: nobody.
 
     Raises:
         CdprError: There is no such study, it does not repeat, or has not this recipe.
-        OutputFolderError: The folder holds other things, or cannot be written.
+        OutputFolderError: The folder holds other things, or cannot be written, or `runs_from` is
+            no folder of this study in this form.
     """
+    earlier = None if runs_from is None else Path(runs_from)
     entry, told = chosen_studies([name])[name], session or Session()
     count, scheduler = asked_workers(workers)
     if scheduler is not None:
@@ -213,12 +223,17 @@ def run_study(
     if seeds is not None and not entry.repeats:
         able = studies_that(lambda other: other.repeats)
         raise CdprError(f"seeds: accepted with {able}, not with {name}")
+    if earlier is not None:
+        if folder is None or not entry.continues:
+            raise CdprError("runs_from: accepted with a folder, of studies that continue there")
+        check_earlier(earlier, {"quick": quick} if recipe else {"study": name, "quick": quick})
     entry = _by_recipe(name, recipe)
 
     def run(where: Path | None) -> StudyResult:
         with told.computing():
             return entry.run(
-                quick, StudySession(where, told.progress, told.stop, count, seeds, scheduler)
+                quick,
+                StudySession(where, told.progress, told.stop, count, seeds, scheduler, earlier),
             )
 
     if folder is None:
@@ -231,6 +246,8 @@ def run_study(
             failed = write_study(result, results.path, formats)
             results.unfinished = result.interrupted
             where = results.publish()
+    if words := earlier_words(result):
+        told.say(f"{name}: {words}")
     return StudyRun(name, result, where, failed)
 
 
@@ -275,6 +292,7 @@ def reproduce(
     workers: int | None = None,
     overwrite: bool = False,
     formats: Sequence[str] = DEFAULT_FORMATS,
+    runs_from: Path | str | None = None,
     session: Session | None = None,
 ) -> Reproduction:
     """Runs every study, and writes one report on all that was published beside what is found.
@@ -288,6 +306,9 @@ def reproduce(
         workers: Processes; None: one for each processor.
         overwrite: Whether other results in the folder may be replaced.
         formats: Endings of the files of figures; png, which the report shows, is always there.
+        runs_from: Folder of a reproduction by an earlier version of the code: its runs are taken
+            over where a study's cases are asked for alike, which the report says; None: all are
+            computed.
         session: Who follows it, told of a `StudyOfMany`, and may stop it; None: nobody.
 
     Raises:
@@ -300,7 +321,10 @@ def reproduce(
         told.progress(StudyOfMany(name, number, len(chosen), progress))
 
     wanted = tuple(dict.fromkeys(("png", *formats)))
-    settings = RunSettings(quick, workers, tell, told.say, told.stop, wanted)
+    before = None if runs_from is None else Path(runs_from)
+    if before is not None:
+        check_reproduction(before, quick)
+    settings = RunSettings(quick, workers, tell, told.say, told.stop, wanted, before)
     with continued_folder(Path(folder), overwrite) as results:
         check_folder(results.path, quick)
         told.opened(results)

@@ -70,6 +70,8 @@ class StudySession:
             catalogue; None: as often as the study does by itself. Its numbers depend on this.
         scheduler: Address of a Dask scheduler, whose workers compute instead; only for studies that
             continue.
+        earlier: Folder of the same study whose runs are taken over, where their cases are the same,
+            though other code computed them; None: none.
     """
 
     folder: Path | None = None
@@ -78,6 +80,7 @@ class StudySession:
     workers: int | None = None
     seeds: int | None = None
     scheduler: str | None = None
+    earlier: Path | None = None
 
     def tell(self, progress: WorkProgress) -> None:
         """Passes on where the study stands."""

@@ -29,8 +29,10 @@ from cdpr_drake.analyses.reproduction.states import (
     write_state,
 )
 from cdpr_drake.analyses.studies.catalogue import StudyEntry, StudyResult, write_study
+from cdpr_drake.analyses.sweeps.earlier_runs import EarlierRuns, check_earlier
 from cdpr_drake.analyses.sweeps.worker_pool import default_workers
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
+from cdpr_drake.errors import OutputFolderError
 
 
 @dataclass(frozen=True)
@@ -41,6 +43,7 @@ class RunSettings:
         quick: Whether in their quick form.
         workers: Processes of each; None: one for each processor.
         formats: Endings of the files of each figure; the page shows those in PNG.
+        runs_from: Folder of a reproduction whose runs are taken over; None: none.
         tell: Called with the study's name, how many are done, and where it stands.
         say: Called with a line when a study is taken over, run again, finished or failed.
         should_stop: Asked often; True ends what is running, and nothing more is begun.
@@ -52,6 +55,7 @@ class RunSettings:
     say: Callable[[str], None] = lambda _: None
     should_stop: Callable[[], bool] = lambda: False
     formats: tuple[str, ...] = DEFAULT_FORMATS
+    runs_from: Path | None = None
 
 
 def run_studies(
@@ -135,7 +139,8 @@ def _run(
         path.parent.mkdir(exist_ok=True)
         result, failed = _into_folder(name, entry, path, changed, settings)
         status = STOPPED if result.interrupted else FINISHED
-        state = replace(state, status=status, error=failed, tables=_tables(result))
+        notes = "; ".join(part for part in (note, earlier_words(result)) if part)
+        state = replace(state, status=status, error=failed, tables=_tables(result), note=notes)
     except KeyboardInterrupt as problem:  # the second one: what is under way is lost
         state = replace(state, status=STOPPED)
         for words in getattr(problem, "__notes__", ()):
@@ -166,7 +171,10 @@ def _into_folder(
         prepared = results_folder(path, overwrite=True, recover=False)
     workers = settings.workers or default_workers()
     with prepared as results:
-        session = StudySession(results.path, told, settings.should_stop, workers)
+        session = StudySession(
+            results.path, told, settings.should_stop, workers,
+            earlier=_earlier(name, entry, settings),
+        )  # fmt: skip
         result = entry.run(settings.quick, session)
         failed = write_study(result, results.path, settings.formats)
         results.unfinished = result.interrupted
@@ -174,6 +182,29 @@ def _into_folder(
     for kept in results.kept:
         settings.say(f"{name}: not written by cdpr, or changed since, and kept in {kept.folder}")
     return result, "; ".join(f"{name}: {why}" for name, why in failed.items())[:300]
+
+
+def _earlier(name: str, entry: StudyEntry, settings: RunSettings) -> Path | None:
+    """Where earlier runs of a study are; where there are none, that is said."""
+    if settings.runs_from is None:
+        return None
+    path = study_folder(settings.runs_from, name)
+    try:
+        if not entry.continues:
+            raise OutputFolderError(f"{path}: this study keeps no runs")
+        check_earlier(path, {"study": name, "quick": settings.quick})
+    except OutputFolderError as problem:
+        settings.say(f"{name}: all is computed: {problem}")
+        return None
+    return path
+
+
+def earlier_words(result: StudyResult) -> str:
+    """Which runs of a study were computed by earlier code; empty: none."""
+    earlier, progress = getattr(result, "earlier", None), getattr(result, "progress", None)
+    if not isinstance(earlier, EarlierRuns) or not isinstance(progress, WorkProgress):
+        return ""
+    return earlier.words()
 
 
 def _tables(result: StudyResult) -> tuple[dict[str, Any], ...]:

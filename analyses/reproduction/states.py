@@ -93,6 +93,31 @@ def read_results(folder: Path, study: str) -> dict[str, Any] | None:
     return content if isinstance(content, dict) else None
 
 
+def check_reproduction(folder: Path, quick: bool) -> None:
+    """Finds a folder to be a reproduction's in a form.
+
+    Args:
+        folder: The folder.
+        quick: Whether the quick form is asked for.
+
+    Raises:
+        OutputFolderError: It is none, or one of the other form.
+    """
+    about = folder / ABOUT
+    if not about.is_file():
+        raise OutputFolderError(f"{folder}: found no reproduction; accepted: one of cdpr reproduce")
+    try:
+        before = bool(json.loads(about.read_text(encoding="utf-8"))["quick"])
+    except (ValueError, KeyError, TypeError) as problem:
+        raise OutputFolderError(f"{about}: found no JSON of a reproduction") from problem
+    if before != quick:
+        words = {True: "the quick form", False: "the full form"}
+        raise OutputFolderError(
+            f"{folder}: holds a reproduction in {words[before]}, {words[quick]} is asked for; "
+            "name another folder or allow overwrite"
+        )
+
+
 def check_folder(folder: Path, quick: bool) -> None:
     """Makes the folder of a reproduction, or finds it to be one of the same form.
 
@@ -106,18 +131,8 @@ def check_folder(folder: Path, quick: bool) -> None:
     """
     if folder.exists() and not folder.is_dir():
         raise OutputFolderError(f"{folder}: found a file; accepted: a folder")
-    about = folder / ABOUT
-    if about.is_file():
-        try:
-            before = bool(json.loads(about.read_text(encoding="utf-8"))["quick"])
-        except (ValueError, KeyError, TypeError) as problem:
-            raise OutputFolderError(f"{about}: found no JSON of a reproduction") from problem
-        if before != quick:
-            words = {True: "the quick form", False: "the full form"}
-            raise OutputFolderError(
-                f"{folder}: holds a reproduction in {words[before]}, {words[quick]} is asked for; "
-                "name another folder or allow overwrite"
-            )
+    if (folder / ABOUT).is_file():
+        check_reproduction(folder, quick)
         return
     # By who was killed at once.
     begun = (MARKER, JOURNAL, *(part_of(folder / name).name for name in (MARKER, ABOUT)))
@@ -128,6 +143,6 @@ def check_folder(folder: Path, quick: bool) -> None:
     try:
         folder.mkdir(exist_ok=True)
         mark(folder)
-        write_json(about, {"quick": quick})
+        write_json(folder / ABOUT, {"quick": quick})
     except OSError as problem:
         raise OutputFolderError(f"{folder}: cannot be written: {problem.strerror}") from problem

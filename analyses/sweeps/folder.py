@@ -39,7 +39,28 @@ LONGEST_VALUE = 40
 """A value of more characters is not written out in an error."""
 
 
-class SweepFolder:
+class KeptChunks:
+    """Chunks on disk, and all arrays of a sweep that was finished, to be read."""
+
+    def __init__(self, folder: Path) -> None:
+        """Reads what is in one file; chunks are read when they are asked for."""
+        self.folder = folder.absolute()
+        self._whole: dict[str, dict[str, np.ndarray]] = {}
+        for key, array in (load_arrays(self.folder / PARTS) or {}).items():
+            task, _, name = key.rpartition("/")
+            self._whole.setdefault(task, {})[name] = array
+
+    def load(self, task: str, start: int, stop: int) -> dict[str, np.ndarray] | None:
+        """The arrays of items start to stop of a task; None if not there or damaged."""
+        if task in self._whole:
+            return {name: array[start:stop] for name, array in self._whole[task].items()}
+        return load_arrays(self._chunk(task, start, stop))
+
+    def _chunk(self, task: str, start: int, stop: int) -> Path:
+        return self.folder / CHUNKS / f"{task}-{start:07d}-{stop:07d}.npz"
+
+
+class SweepFolder(KeptChunks):
     """Chunks on disk under the arguments that they were computed for.
 
     A chunk's file appears whole or not at all, so whatever ends the program, what is there can
@@ -59,21 +80,18 @@ class SweepFolder:
         """
         self.folder = folder.absolute()
         words = json.dumps(arguments, indent=2, allow_nan=False)
-        self._whole: dict[str, dict[str, np.ndarray]] = {}
         try:
             self._open(words)
         except OSError as problem:
             raise OutputFolderError(
                 f"{self.folder}: cannot be written: {problem.strerror}"
             ) from problem
-        for key, array in (load_arrays(self.folder / PARTS) or {}).items():
-            task, _, name = key.rpartition("/")
-            self._whole.setdefault(task, {})[name] = array
+        super().__init__(folder)
 
     def _open(self, words: str) -> None:
         stored = self.folder / ARGUMENTS
         if stored.is_file():
-            different = list(differences(_read(stored), json.loads(words)))
+            different = list(differences(read_arguments(stored), json.loads(words)))
             if different:
                 more = len(different) - NAMED_DIFFERENCES
                 raise OutputFolderError(
@@ -98,12 +116,6 @@ class SweepFolder:
                 path.unlink()
         if not stored.is_file():
             write_whole(stored, words + "\n")
-
-    def load(self, task: str, start: int, stop: int) -> dict[str, np.ndarray] | None:
-        """The arrays of items start to stop of a task; None if not there or damaged."""
-        if task in self._whole:
-            return {name: array[start:stop] for name, array in self._whole[task].items()}
-        return load_arrays(self._chunk(task, start, stop))
 
     def store(self, task: str, start: int, stop: int, arrays: dict[str, np.ndarray]) -> None:
         """Keeps the arrays of a chunk.
@@ -149,9 +161,6 @@ class SweepFolder:
                     path.unlink()
             chunks.rmdir()
 
-    def _chunk(self, task: str, start: int, stop: int) -> Path:
-        return self.folder / CHUNKS / f"{task}-{start:07d}-{stop:07d}.npz"
-
 
 def load_arrays(path: Path) -> dict[str, np.ndarray] | None:
     """Reads what `store_arrays` wrote; None if it is not there or damaged."""
@@ -188,7 +197,13 @@ def differences(there: Any, here: Any, key: str = "") -> Iterator[str]:
         yield f"{key} is {_words(there)} there, {_words(here)} here"
 
 
-def _read(path: Path) -> Any:
+def read_arguments(path: Path) -> Any:
+    """What a sweep was asked for.
+
+    Raises:
+        OutputFolderError: The file holds no JSON.
+        OSError: It cannot be read.
+    """
     try:
         return json.loads(path.read_text(encoding="utf-8"))
     except ValueError as problem:

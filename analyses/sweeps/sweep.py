@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from itertools import chain
 from typing import Any
 
 import numpy as np
 
 from cdpr_drake.analyses.reporting.progress import StudySession, WorkProgress
+from cdpr_drake.analyses.sweeps.earlier_runs import EarlierRuns, read_taken, take_over
 from cdpr_drake.analyses.sweeps.folder import SweepFolder
 from cdpr_drake.analyses.sweeps.worker_pool import PersistentPool
 from cdpr_drake.analyses.sweeps.workers import SweepChunk, SweepTask, check_scheduler, computed
@@ -29,10 +30,12 @@ class SweepResult:
     Attributes:
         finished: Arrays, over all of its items, of each task that was finished.
         progress: Where the sweep stood at the end.
+        earlier: Runs that were taken over from an earlier folder.
     """
 
     finished: dict[str, dict[str, np.ndarray]]
     progress: WorkProgress
+    earlier: EarlierRuns = field(default_factory=EarlierRuns)
 
     @property
     def arrays(self) -> dict[str, dict[str, np.ndarray]] | None:
@@ -139,13 +142,15 @@ def run_study_sweep(
     arguments: dict[str, Any],
     session: StudySession,
     alone: Collection[str] = (),
+    case_of: Mapping[str, str] | None = None,
 ) -> SweepResult:
     """As `run_sweep`, by whom a study's session says, in its folder.
 
     A study that uses it and says so in `analyses.studies.catalogue.STUDIES` continues when it is
     run again:
     its folder is opened for `arguments`, all that the numbers depend on, for JSON. All chunks are
-    in one file in the end.
+    in one file in the end. `case_of` names by task its case in the arguments, so that runs of an
+    earlier folder can be taken over.
 
     Raises:
         OutputFolderError: The folder belongs to other arguments, which are named, holds other
@@ -155,10 +160,17 @@ def run_study_sweep(
     if session.scheduler is not None:
         check_scheduler(session.scheduler)
     kept = None if session.folder is None else SweepFolder(session.folder, arguments)
+    earlier = EarlierRuns()
+    if kept is not None and session.earlier is not None:
+        earlier = take_over(
+            kept, session.earlier, tasks, chunk_size, arguments, case_of or {}, alone
+        )
+    elif kept is not None:
+        earlier = read_taken(kept.folder, len(tasks))
     result = run_sweep(
         tasks, chunk_size, kept, items=items, workers=session.workers, scheduler=session.scheduler,
         on_progress=session.on_progress, should_stop=session.should_stop, alone=alone,
     )  # fmt: skip
     if kept is not None and result.arrays is not None:
         kept.finish(result.arrays)
-    return result
+    return replace(result, earlier=earlier)

@@ -55,6 +55,13 @@ Scheduler = Annotated[
     str | None,
     typer.Option(help="Dask scheduler whose workers compute, tcp://host:port; without it, here."),
 ]
+RunsFrom = Annotated[
+    Path | None,
+    typer.Option(
+        help="Results folder by an earlier version of the code, whose runs of the same cases are "
+        "taken over; the results say so."
+    ),
+]
 LISTENING = {"host": "--host", "port": "--port"}
 """Options by the arguments of what listens."""
 POSE = typer.Option(help="Platform, x,y,z [m] or x,y,z,phi,theta,psi [m, deg].")

@@ -21,7 +21,13 @@ from cdpr_drake.analyses.reproduction.states import StudyState
 from cdpr_drake.analyses.studies.catalogue import STUDIES
 from cdpr_drake.cli.command_session import CommandSession
 from cdpr_drake.cli.completion import words_among
-from cdpr_drake.cli.options import FigureFormats, Overwrite, ResultsAsJson, parse_formats
+from cdpr_drake.cli.options import (
+    FigureFormats,
+    Overwrite,
+    ResultsAsJson,
+    RunsFrom,
+    parse_formats,
+)
 from cdpr_drake.cli.process import INTERRUPTED, StopRequest
 from cdpr_drake.cli.run_endings import INCOMPLETE, STUDY_FAILED
 from cdpr_drake.cli.terminal import print_json, wide_console, working
@@ -57,6 +63,7 @@ def reproduce(
     figure_format: FigureFormats = "png",
     as_json: ResultsAsJson = False,
     overwrite: Overwrite = False,
+    runs_from: RunsFrom = None,
 ) -> int:
     """Runs every study and writes one report on all that was published beside what is found.
 
@@ -71,7 +78,7 @@ def reproduce(
     with ReproductionSession(STOPPING, folder, "reproduce") as session:
         found = reproduce_all(
             folder, quick, asked, workers=workers, overwrite=overwrite, formats=formats,
-            session=session,
+            runs_from=runs_from, session=session,
         )  # fmt: skip
     session.say_kept()
     states = found.states
@@ -84,6 +91,7 @@ def reproduce(
         + (["--only", only] if only else [])
         + (["--workers", str(workers)] if workers else [])
         + (["--format", figure_format] if figure_format != "png" else [])
+        + (["--runs-from", str(runs_from)] if runs_from else [])
     )
     return _ending(session.console, found.left, states, again)
 

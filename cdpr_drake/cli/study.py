@@ -20,6 +20,7 @@ from cdpr_drake.cli.options import (
     FigureFormats,
     Overwrite,
     ResultsAsJson,
+    RunsFrom,
     Scheduler,
     named_options,
     parse_formats,
@@ -40,7 +41,7 @@ STOPPING = (
 MOST_SEEDS = 10_000
 """Runs of each configuration at the most: every one of them is listed before the first begins."""
 
-OPTIONS = {"seeds": "--seeds", "recipe": "--recipe"}
+OPTIONS = {"seeds": "--seeds", "recipe": "--recipe", "runs_from": "--runs-from"}
 """Options by the arguments of `run_study`."""
 
 PIPE_WIDTH = 160
@@ -79,6 +80,7 @@ def study(
     overwrite: Overwrite = False,
     figure_format: FigureFormats = "png",
     scheduler: Scheduler = None,
+    runs_from: RunsFrom = None,
     recipe: Annotated[
         str | None,
         typer.Option(
@@ -98,7 +100,7 @@ def study(
     ):
         found = run_study(
             name, folder, quick, seeds=seeds, recipe=recipe, workers=scheduler or workers,
-            overwrite=overwrite, formats=formats, session=session,
+            overwrite=overwrite, formats=formats, runs_from=runs_from, session=session,
         )  # fmt: skip
     console, folder = session.console, shown(found.folder)
     session.say_kept()
@@ -115,7 +117,7 @@ def study(
             words += f"; to continue:\n{_command(name, folder, quick, as_json, formats)}"
             given = {
                 "--seeds": seeds, "--workers": workers, "--scheduler": scheduler,
-                "--recipe": recipe,
+                "--recipe": recipe, "--runs-from": runs_from,
             }  # fmt: skip
             for option, value in given.items():
                 words += f" {option} {value}" if value is not None else ""

@@ -47,6 +47,7 @@ from cdpr_drake.analyses.studies.framework.statement import (
     judged_table,
     scorecard,
 )
+from cdpr_drake.analyses.sweeps.earlier_runs import EarlierRuns
 from cdpr_drake.analyses.sweeps.sweep import run_study_sweep
 from cdpr_drake.analyses.sweeps.workers import SweepTask
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS, write_figures
@@ -207,8 +208,11 @@ class Study:
         result = run_study_sweep(
             tasks, self.chunk, self.unit, self._arguments(cases, form), session,
             alone=_names(tasks, (case.name for case in cases if case.alone)),
+            case_of={name: case.name for case in cases for name in self._tasks([case], form)},
         )  # fmt: skip
-        return StudyResult(self, form, tuple(cases), result.finished, result.progress)
+        return StudyResult(
+            self, form, tuple(cases), result.finished, result.progress, earlier=result.earlier
+        )
 
     def plan(self, form: Form) -> list[Case]:
         """Its cases in a form.
@@ -284,6 +288,7 @@ class StudyResult(StoppableStudy):
         cases: What was to be measured.
         finished: Arrays of the tasks that are finished, by name.
         progress: Where it stood at the end, and what earlier sessions had left of it.
+        earlier: Runs that were taken over from an earlier folder.
     """
 
     study: Study
@@ -291,6 +296,7 @@ class StudyResult(StoppableStudy):
     cases: tuple[Case, ...]
     finished: Mapping[str, Arrays]
     progress: WorkProgress
+    earlier: EarlierRuns = field(default_factory=EarlierRuns, kw_only=True)
 
     @property
     def quick(self) -> bool:
@@ -356,6 +362,7 @@ class StudyResult(StoppableStudy):
             "interrupted": self.interrupted,
             ITEMS if study.unit == RUNS else study.unit: self.progress.counts(),
             "versions": package_versions(),
+            **({"by_earlier_code": counts} if (counts := self.earlier.counts()) else {}),
             "parameters": {} if study.parameters is None else plain(study.parameters(self.form)),
             "assumptions": list(study.assumptions),
             "cases": [self._case(case) for case in self.cases],
