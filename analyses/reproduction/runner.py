@@ -12,7 +12,7 @@ from typing import Any
 from rich.table import Table
 
 from cdpr_drake.analyses.reporting.log_files import write_whole
-from cdpr_drake.analyses.reporting.output_folder import continued_folder, results_folder
+from cdpr_drake.analyses.reporting.output_folder import continued_folder
 from cdpr_drake.analyses.reporting.progress import StudySession, WorkProgress
 from cdpr_drake.analyses.reporting.provenance import code_version
 from cdpr_drake.analyses.reporting.written_files import claim
@@ -159,13 +159,8 @@ def _into_folder(
     def told(progress: WorkProgress) -> None:
         settings.tell(name, 0, progress)
 
-    if entry.continues:
-        prepared = continued_folder(path, overwrite=changed)
-    else:
-        # What a killed session left hidden is nobody's: it is computed again, to the same numbers.
-        prepared = results_folder(path, overwrite=True, recover=False)
     workers = settings.workers or default_workers()
-    with prepared as results:
+    with continued_folder(path, overwrite=changed) as results:
         session = StudySession(results.path, told, settings.should_stop, workers)
         result = entry.run(settings.quick, session)
         failed = write_study(result, results.path, settings.formats)

@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -309,9 +310,52 @@ def test_the_table_of_statements_parts_rule_and_why():
     assert list(table.columns[-1].cells) == ["each run; it is heavier"]
 
 
-def test_figures_of_runs_that_lack_are_left_out(tmp_path):
-    assert run(quick=True).write(tmp_path) == {}
+def lacking(runs):
+    """Asks for what no form has."""
+    raise MissingRuns("size huge")
+
+
+def left_out(folder):
+    return json.loads((folder / "results.json").read_text())["left_out"]
+
+
+def test_figures_and_tables_of_runs_that_lack_are_left_out_of_the_quick_form_and_named(tmp_path):
+    quick = run(quick=True, tables=[*STUDY.tables, lacking])
+    assert quick.write(tmp_path) == {}
     assert {path.name for path in tmp_path.glob("*.png")} == {"all.png"}
+    assert left_out(tmp_path) == {
+        "figures": {"few": "runs are missing: size few"},
+        "tables": {"lacking": "runs are missing: size huge"},
+    }
+    assert [table.title for table in quick.tables()] == ["Peaks", STUDY.stated]
+
+
+def test_figures_and_tables_of_runs_that_lack_in_a_whole_full_form_are_failures(tmp_path):
+    whole = run(figures={"odd": lacking}, tables=[lacking, partial(lacking), *STUDY.tables])
+    assert whole.write(tmp_path, ("png", "svg")) == dict.fromkeys(
+        ("odd.png", "odd.svg"), "runs are missing: size huge"
+    )
+    assert not list(tmp_path.glob("odd*"))
+    assert left_out(tmp_path)["figures"] == {"odd": "runs are missing: size huge"}
+    first, second, *others = whole.tables()
+    for table in (first, second):
+        assert table.title == "lacking"
+        assert [list(column.cells) for column in table.columns] == [["runs are missing: size huge"]]
+    assert [table.title for table in others] == ["Peaks", STUDY.stated]
+
+
+def test_a_stopped_full_form_has_no_failures(tmp_path):
+    asked = iter([False] * 2 + [True] * 100)
+    session = StudySession(workers=1, should_stop=lambda: next(asked))
+    stopped = run(session=session, figures={"odd": lacking}, tables=[lacking])
+    assert stopped.write(tmp_path) == {}
+    assert set(left_out(tmp_path)["figures"]) == {"odd"}
+    assert len(stopped.tables()) == len(stopped.statements[:1])
+
+
+def test_a_whole_study_leaves_nothing_out(tmp_path):
+    assert run().write(tmp_path) == {}
+    assert left_out(tmp_path) == {"figures": {}, "tables": {}}
 
 
 def test_a_stopped_study_continues_to_the_same_bytes(tmp_path):
