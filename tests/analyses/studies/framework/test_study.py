@@ -190,6 +190,16 @@ def test_runs_are_picked_and_reduced():
     assert {size: len(some) for size, some in runs.by("size")} == {"small": 3, "large": 3, "few": 1}
 
 
+def test_means_by_the_values_of_a_key():
+    runs = run().runs
+    means = runs.means("peak_m", size=("large", "small"))
+    assert means.tolist() == [runs.mean("peak_m", size=size) for size in ("large", "small")]
+    with pytest.raises(UnknownName, match="did you mean"):
+        runs.means("peak_m", size=("large", "smal"))
+    with pytest.raises(MissingRuns):
+        run(quick=True).runs.means("peak_m", size=("small", "few"))
+
+
 @pytest.mark.parametrize(
     "where", [{"size": "smal"}, {"siz": "small"}, {"size": "small", "los": True}]
 )
@@ -399,7 +409,29 @@ def test_names_of_cases_are_unique_and_files():
             cases_of.plan(Form())
 
 
-def test_a_frame_for_those_who_have_pandas(monkeypatch):
+def test_without_pandas_a_frame_is_refused_with_the_file_that_has_the_same(monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "pandas", None)
     with pytest.raises(ImportError, match=r"runs\.csv"):
         Runs([Run("a", None, {}, {"x": 1.0})]).frame()
+
+
+def test_a_frame_for_those_who_have_pandas(tmp_path):
+    """It has the rows of the file: numbers, words, truth values, nothing for None, no arrays."""
+    pd = pytest.importorskip("pandas")
+    runs = run().runs
+    frame = runs.frame()
+    assert len(frame) == len(runs)
+    assert list(frame.columns) == [
+        "case", "size", "kind", "seed", "peak_m", "lost", "outcome", "nothing", "parts", "value",
+    ]  # fmt: skip
+    small = frame[frame["size"] == "small"]
+    np.testing.assert_array_equal(small["peak_m"].to_numpy(), runs(size="small")["peak_m"])
+    assert small["lost"].tolist() == [False, True, False]
+    assert small["nothing"].isna().tolist() == [True, False, False]
+    assert frame.groupby("size")["peak_m"].mean()["large"] == runs.mean("peak_m", size="large")
+    assert frame["value"].dropna().tolist() == [285.0, 81.0]
+    runs.write_csv(tmp_path / "runs.csv")
+    read = pd.read_csv(tmp_path / "runs.csv")
+    assert list(read.columns) == list(frame.columns)
+    for column in ("case", "peak_m", "value"):
+        pd.testing.assert_series_equal(read[column], frame[column], check_dtype=False)
