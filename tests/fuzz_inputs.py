@@ -76,9 +76,8 @@ class _Nothing:
 
 def lighten() -> None:
     """Replaces what takes long by something short, in this process."""
-    for name, entry in list(studies.STUDIES.items()):
-        short = studies.StudyEntry(lambda quick, session: _Nothing(), entry.continues)
-        studies.STUDIES[name] = short
+    for name in list(studies.STUDIES):
+        studies.STUDIES[name] = studies.StudyEntry(lambda quick, session: _Nothing())
     for name in BENCH_GROUPS:
         BENCH_GROUPS[name] = lambda quick: []
     for module, name in (*PICTURES, (view, "time"), (doctor, "examine")):

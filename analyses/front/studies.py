@@ -12,7 +12,7 @@ from rich.table import Table
 
 from cdpr_drake.analyses.front.session import Session, asked_workers
 from cdpr_drake.analyses.reporting.log_files import write_json
-from cdpr_drake.analyses.reporting.output_folder import continued_folder, results_folder
+from cdpr_drake.analyses.reporting.output_folder import continued_folder
 from cdpr_drake.analyses.reporting.progress import StudySession, WorkProgress
 from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
 from cdpr_drake.analyses.reproduction.page import write_report
@@ -224,8 +224,8 @@ def run_study(
         able = studies_that(lambda other: other.repeats)
         raise CdprError(f"seeds: accepted with {able}, not with {name}")
     if earlier is not None:
-        if folder is None or not entry.continues:
-            raise CdprError("runs_from: accepted with a folder, of studies that continue there")
+        if folder is None:
+            raise CdprError("runs_from: accepted with a folder")
         check_earlier(earlier, {"quick": quick} if recipe else {"study": name, "quick": quick})
     entry = _by_recipe(name, recipe)
 
@@ -238,8 +238,7 @@ def run_study(
 
     if folder is None:
         return StudyRun(name, run(None))
-    prepared = continued_folder if entry.continues else results_folder
-    with prepared(Path(folder), overwrite) as results:
+    with continued_folder(Path(folder), overwrite) as results:
         told.opened(results)
         result = run(results.path)
         with told.doing("Writing results"):

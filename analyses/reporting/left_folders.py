@@ -72,16 +72,16 @@ def _just_made(folder: Path) -> bool:
     return all(path.name == part_of(Path(MARKER)).name for path in folder.iterdir())
 
 
-def clear_hidden(final: Path, recover: bool = True) -> tuple[list[Path], list[KeptFiles]]:
+def clear_hidden(final: Path) -> tuple[list[Path], list[KeptFiles]]:
     """Removes hidden folders of killed runs; returns where those with data went, and what is kept.
 
-    With `recover`, those with data are shown; otherwise they are removed as well.
+    Those with data are shown.
     What is kept was among older results of which the program that replaced them was killed.
     """
     recovered, kept = [], []
     for stale in hidden_folders(final):
         finished = any((stale / name).is_file() for name in FINISHED)
-        if recover and (finished or holds_log(stale)):
+        if finished or holds_log(stale):
             ending = "recovered" if finished else "unfinished"
             shown = free_folder(final.with_name(f"{final.name}-{ending}"))
             stale.chmod(0o755)

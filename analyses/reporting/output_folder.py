@@ -142,9 +142,7 @@ def _rename_own(folder: Path, name: Path) -> Path:
 
 
 @contextmanager
-def results_folder(
-    folder: Path, overwrite: bool = False, *, recover: bool = True
-) -> Iterator[ResultsFolder]:
+def results_folder(folder: Path, overwrite: bool = False) -> Iterator[ResultsFolder]:
     """A fresh hidden folder to write to, which gets its name when its data is finished.
 
     Entering it before a long computation finds out in time whether results can be written. Where
@@ -155,8 +153,6 @@ def results_folder(
     Args:
         folder: Where the results shall be.
         overwrite: Whether results of this program that are there already may be replaced.
-        recover: Whether hidden folders that killed runs left are shown where they hold data; if
-            not, they are removed, for who computes the same again.
 
     Raises:
         OutputFolderError: The folder holds something, is a file, a mount point, the working folder
@@ -180,7 +176,7 @@ def results_folder(
     work = None
     try:
         with locked(final):
-            recovered, kept = clear_hidden(final, recover)
+            recovered, kept = clear_hidden(final)
             try:
                 work = final.with_name(f".{final.name}{WORK}{secrets.token_hex(4)}")
                 claim(work, ending="/")

@@ -40,36 +40,19 @@ class WorkProgress:
         return {done: self.done, "of": self.total, "by_earlier_sessions": self.found}
 
 
-class StoppableStudy:
-    """What studies share that may be stopped and keep where they stood.
-
-    Attributes:
-        progress: Where it stood at the end, and what earlier sessions had left of it.
-    """
-
-    progress: WorkProgress
-
-    @property
-    def interrupted(self) -> bool:
-        """Whether it was stopped before the end."""
-        return self.progress.done < self.progress.total
-
-
 @dataclass(frozen=True)
 class StudySession:
     """How a study is run; its numbers do not depend on it, but for `seeds`.
 
     Attributes:
-        folder: Where what is finished is kept while it runs, and found again by studies that
-            continue; None: nowhere.
+        folder: Where what is finished is kept while it runs, and found again; None: nowhere.
         on_progress: Called at the start and after every piece of work.
         should_stop: Asked often; True ends the study, and what was finished is kept.
         workers: Number of local processes, with one this process does it; None: one for each
             processor.
         seeds: How often what depends on chance is repeated, by studies that say so in the
             catalogue; None: as often as the study does by itself. Its numbers depend on this.
-        scheduler: Address of a Dask scheduler, whose workers compute instead; only for studies that
-            continue.
+        scheduler: Address of a Dask scheduler, whose workers compute instead.
         earlier: Folder of the same study whose runs are taken over, where their cases are the same,
             though other code computed them; None: none.
     """

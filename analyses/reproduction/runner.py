@@ -12,7 +12,7 @@ from typing import Any
 from rich.table import Table
 
 from cdpr_drake.analyses.reporting.log_files import write_whole
-from cdpr_drake.analyses.reporting.output_folder import continued_folder, results_folder
+from cdpr_drake.analyses.reporting.output_folder import continued_folder
 from cdpr_drake.analyses.reporting.progress import StudySession, WorkProgress
 from cdpr_drake.analyses.reporting.provenance import code_version
 from cdpr_drake.analyses.reporting.written_files import claim
@@ -164,17 +164,11 @@ def _into_folder(
     def told(progress: WorkProgress) -> None:
         settings.tell(name, 0, progress)
 
-    if entry.continues:
-        prepared = continued_folder(path, overwrite=changed)
-    else:
-        # What a killed session left hidden is nobody's: it is computed again, to the same numbers.
-        prepared = results_folder(path, overwrite=True, recover=False)
     workers = settings.workers or default_workers()
-    with prepared as results:
+    with continued_folder(path, overwrite=changed) as results:
         session = StudySession(
-            results.path, told, settings.should_stop, workers,
-            earlier=_earlier(name, entry, settings),
-        )  # fmt: skip
+            results.path, told, settings.should_stop, workers, earlier=_earlier(name, settings)
+        )
         result = entry.run(settings.quick, session)
         failed = write_study(result, results.path, settings.formats)
         results.unfinished = result.interrupted
@@ -184,14 +178,12 @@ def _into_folder(
     return result, "; ".join(f"{name}: {why}" for name, why in failed.items())[:300]
 
 
-def _earlier(name: str, entry: StudyEntry, settings: RunSettings) -> Path | None:
+def _earlier(name: str, settings: RunSettings) -> Path | None:
     """Where earlier runs of a study are; where there are none, that is said."""
     if settings.runs_from is None:
         return None
     path = study_folder(settings.runs_from, name)
     try:
-        if not entry.continues:
-            raise OutputFolderError(f"{path}: this study keeps no runs")
         check_earlier(path, {"study": name, "quick": settings.quick})
     except OutputFolderError as problem:
         settings.say(f"{name}: all is computed: {problem}")

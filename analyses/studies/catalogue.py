@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, MutableMapping, Sequenc
 from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, cast
+from typing import TYPE_CHECKING, Any, Protocol
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -46,12 +46,11 @@ class Study(Protocol):
 
 @dataclass(frozen=True)
 class StudyEntry:
-    """A study and how it uses its folder.
+    """A study, and what is known of it before it is run.
 
     Attributes:
-        run: What runs it.
-        continues: Whether it works in its folder from the start, by `run_study_sweep`, and
-            continues when it is run again; otherwise the folder appears at the end.
+        run: What runs it; it works in its folder from the start, and continues when it is run
+            again.
         repeats: Whether it repeats runs over as many seeds as its session says.
         judges: Names of the statements that it can judge, as its results have them.
         numbers: Printed numbers that it puts beside its own.
@@ -60,7 +59,6 @@ class StudyEntry:
     """
 
     run: Study
-    continues: bool = False
     repeats: bool = False
     judges: tuple[str, ...] = ()
     numbers: tuple[PublishedNumber, ...] = ()
@@ -107,8 +105,7 @@ MODULES = {
 }
 """Modules of this room by study, in the order in which the command line lists them.
 
-A module has its study as `STUDY`, several as `STUDIES`, what is no `Study` of the frame as `ENTRY`;
-other recipes of it as `RECIPE_STUDIES`.
+A module has its study as `STUDY`, several as `STUDIES`.
 """
 
 
@@ -152,18 +149,15 @@ def _entry(name: str, place: str) -> StudyEntry:
     from cdpr_drake.analyses.studies.framework.case_definition import Plan
 
     module = import_module(f"cdpr_drake.analyses.studies.{place}")
-    if hasattr(module, "ENTRY"):
-        return cast("StudyEntry", module.ENTRY)
     found = [*getattr(module, "STUDIES", ()), getattr(module, "STUDY", None)]
     study = next(one for one in found if one is not None and one.name == name)
     return StudyEntry(
         study,
-        continues=True,
         repeats=study.seeds is not None,
         judges=study.names_of_checks(),
         numbers=study.cases.published() if isinstance(study.cases, Plan) else (),
         figures=tuple(study.figures),
-        recipes=getattr(module, "RECIPE_STUDIES", {}),
+        recipes=study.recipes,
     )
 
 

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from cdpr_drake.analyses.workspaces.pose_grid import grid_arguments, plain
 from cdpr_drake.stability.perturbation_bounds import PerturbationBounds
 from cdpr_drake.stability.stability_case import StabilityCase
 from cdpr_drake.stability.verdict import (
@@ -32,6 +34,16 @@ class GridTask:
     bounds: PerturbationBounds
     grid: WorkspaceGrid
     options: VerdictOptions
+
+    def arguments(self) -> dict[str, Any]:
+        """What its numbers depend on, for JSON."""
+        return {
+            "kind": type(self).__name__,
+            "case": plain(self.case),
+            "bounds": plain(self.bounds),
+            "grid": grid_arguments(self.grid),
+            "options": plain(self.options),
+        }
 
     def judged(self, start: int, stop: int, verdict: str) -> StabilityChunk:
         """What one of `stability.verdict.VERDICTS` says of the poses start to stop."""

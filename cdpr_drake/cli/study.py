@@ -112,15 +112,14 @@ def study(
             printer.print(table)
         printer.print(f"results: {folder}")
     if found.interrupted:
-        words = f"Interrupted; what was finished is in {folder}"
-        if STUDIES[name].continues:
-            words += f"; to continue:\n{_command(name, folder, quick, as_json, formats)}"
-            given = {
-                "--seeds": seeds, "--workers": workers, "--scheduler": scheduler,
-                "--recipe": recipe, "--runs-from": runs_from,
-            }  # fmt: skip
-            for option, value in given.items():
-                words += f" {option} {value}" if value is not None else ""
+        words = f"Interrupted; what was finished is in {folder}; to continue:\n"
+        words += _command(name, folder, quick, as_json, formats)
+        given = {
+            "--seeds": seeds, "--workers": workers, "--scheduler": scheduler,
+            "--recipe": recipe, "--runs-from": runs_from,
+        }  # fmt: skip
+        for option, value in given.items():
+            words += f" {option} {value}" if value is not None else ""
         console.print(words)
         report_failures(console, found.failed, folder, None)
         return INTERRUPTED

@@ -38,11 +38,10 @@ def run(capsys, *arguments):
     return ended.value.code, printed(capsys).out
 
 
-@pytest.mark.parametrize("continues", [False, True])
-def test_a_row_of_the_catalogue_is_a_study(capsys, monkeypatch, tmp_path, continues):
+def test_a_row_of_the_catalogue_is_a_study(capsys, monkeypatch, tmp_path):
     monkeypatch.setenv("COLUMNS", "400")
     assert run(capsys, "toy", "--out", str(tmp_path / "none"))[0] == 2
-    monkeypatch.setitem(STUDIES, "toy", StudyEntry(study_toy, continues))
+    monkeypatch.setitem(STUDIES, "toy", StudyEntry(study_toy))
     code, out = run(capsys, "toy", "--quick", "--json", "--out", str(tmp_path / "toy"))
     assert (code, json.loads(out)) == (0, {"study": "toy", "quick": True})
     assert json.loads((tmp_path / "toy" / "results.json").read_text())["quick"]

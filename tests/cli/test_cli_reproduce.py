@@ -54,7 +54,7 @@ def test_a_study_that_fails_is_named_and_so_is_the_exit_code(capsys, monkeypatch
     def broken(quick, session):
         raise RuntimeError("no such thing")
 
-    monkeypatch.setitem(STUDIES, "case-8", StudyEntry(broken, continues=True))
+    monkeypatch.setitem(STUDIES, "case-8", StudyEntry(broken))
     code, out, err = reproduce(capsys, "--only", "case-8", "--out", str(tmp_path / "r"))
     assert code == 5
     assert "cdpr: study failed: case-8: RuntimeError: no such thing" in err

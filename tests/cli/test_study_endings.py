@@ -11,7 +11,7 @@ import pytest
 
 from cdpr_drake.analyses.front import studies as reproduce
 from cdpr_drake.analyses.reporting.log_files import write_json
-from cdpr_drake.analyses.reporting.progress import StoppableStudy, WorkProgress
+from cdpr_drake.analyses.reporting.progress import WorkProgress
 from cdpr_drake.analyses.studies.catalogue import STUDIES, StudyEntry
 from cdpr_drake.analyses.sweeps.sweep import run_study_sweep
 from cdpr_drake.analyses.visualization.figure_files import write_figures
@@ -43,9 +43,13 @@ DRAWN = {"bad": bad_figure, "good": good_figure}
 
 
 @dataclass(frozen=True, eq=False)
-class ToyResult(StoppableStudy):
+class ToyResult:
     found: dict
     progress: WorkProgress
+
+    @property
+    def interrupted(self):
+        return self.progress.done < self.progress.total
 
     def as_dict(self):
         squares = self.found.get("squares", {}).get("squares", np.zeros(0))
@@ -69,7 +73,7 @@ def study_toy(quick, session):
 def _toy(monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "400")
-    monkeypatch.setitem(STUDIES, "toy", StudyEntry(study_toy, continues=True))
+    monkeypatch.setitem(STUDIES, "toy", StudyEntry(study_toy))
 
 
 @pytest.fixture
@@ -184,7 +188,7 @@ def test_what_fails_says_where_the_older_results_are(run, monkeypatch, tmp_path,
             session.folder.mkdir()
         raise CdprError("no graphics here")
 
-    monkeypatch.setitem(STUDIES, "toy", StudyEntry(failing, continues=True))
+    monkeypatch.setitem(STUDIES, "toy", StudyEntry(failing))
     code, _, err = run("study", "toy", "--out", "r", "--overwrite")
     assert (code, "no graphics here" in err) == (2, True)
     kept = tmp_path / ("r-before" if begun else "r")
@@ -258,7 +262,7 @@ def report(folder):
 def test_a_second_ctrl_c_ends_the_study_and_the_report_has_what_is_there(
     run, monkeypatch, tmp_path, number
 ):
-    monkeypatch.setitem(STUDIES, "more", StudyEntry(study_toy, continues=True))
+    monkeypatch.setitem(STUDIES, "more", StudyEntry(study_toy))
     monkeypatch.setitem(DRAWN, "bad", good_figure)
     begun = []
 

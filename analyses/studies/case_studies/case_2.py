@@ -50,10 +50,7 @@ _accuracy = same_accuracy(("none", "within", "beyond"), "figures 3.31a and 3.31c
     rule="What is judged is that the error without camera is more than five times that",
 )
 def _camera_pays(runs: Runs) -> Finding:
-    errors = [
-        tuple(1e3 * runs.mean("position_error_m", configuration=name) for name in pair)
-        for pair in PAIRS
-    ]
+    errors = [1e3 * runs.means("position_error_m", configuration=pair) for pair in PAIRS]
     return Finding(
         found=f"no perturbation: servo {errors[0][0]:.2f} mm, without camera {errors[0][1]:.1f} "
         f"mm; within bounds: {errors[1][0]:.2f} and {errors[1][1]:.1f} mm",
@@ -111,24 +108,18 @@ def _focus(zoom: str) -> tuple[str, str]:
 )
 def existing_bend(runs: Runs) -> Finding:
     """What bends the path without added perturbation."""
-    exact = runs.mean("image_max_px", configuration="exact")
-    single = {
-        "points and pulleys": runs.mean("image_max_px", configuration="none"),
-        "first pose": runs.mean("image_max_px", configuration="by_hand"),
-        **{
-            f"auto-focus {z}": runs.mean("image_max_px", configuration=name)
-            for z, name in ZOOMS.items()
-        },
-    }
-    both = runs.mean("image_max_px", configuration="existing")
-    model = max(single["points and pulleys"], single["first pose"])
-    largest = [runs.mean("image_max_px", configuration=name) > model for name in ZOOMS.values()]
+    exact, both, points, pose = runs.means(
+        "image_max_px", configuration=("exact", "existing", "none", "by_hand")
+    )
+    focus = runs.means("image_max_px", configuration=ZOOMS.values())
+    single = {"points and pulleys": points, "first pose": pose}
+    single |= {f"auto-focus {z}": value for z, value in zip(ZOOMS, focus, strict=True)}
     crooked = both > CROOKED * exact
     return Finding(
         found=f"exact {exact:.1f} px, {outcomes(runs, 'exact')}; "
         + ", ".join(f"{words} {value:.1f}" for words, value in single.items())
         + f" px; all together, auto-focus 0.02, {both:.1f} px, {outcomes(runs, 'existing')}",
-        held=[crooked, *largest],
+        held=[crooked, *(focus > max(points, pose))],
         why=f"By how much the webcam zooms is not printed: three shares, each in {FOCUS_PERIOD:g} "
         "s. A focal length that is wrong scales what is seen about the image's middle, and so the "
         "depth; the direction to the object is hardly wrong where that is near the middle.",

@@ -84,13 +84,13 @@ def _not_all(runs: Runs) -> Finding:
 
 @statement("The larger the perturbation, the more the paths curve.", "figure 3.41")
 def _curved(runs: Runs) -> Finding:
-    image = [runs.mean("image_max_px", configuration=name) for name in NAMES]
+    image = runs.means("image_max_px", configuration=NAMES)
     return Finding(
         found="largest distance of the pattern's middle from its straight line "
         + ", ".join(f"{value:.0f}" for value in image)
         + " px",
-        held=[image == sorted(image)],
-        some=image[0] < min(image[1:]),
+        held=[list(image) == sorted(image)],
+        some=bool(image[0] < min(image[1:])),
     )
 
 

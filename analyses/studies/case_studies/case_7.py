@@ -88,28 +88,29 @@ def simulation(runs: Runs) -> Finding:
     names = [
         f"simulated_{name}_{kind}" for name in SIMULATED_SETS for kind in ("servo", "tracking")
     ]
-    image = {name: runs.mean("image_max_px", configuration=name) for name in names}
-    camera = {name: 1e3 * runs.mean("camera_max_m", configuration=name) for name in names}
-    clean, far, near = names[:2], names[2], names[3]
+    image = runs.means("image_max_px", configuration=names)
+    camera = 1e3 * runs.means("camera_max_m", configuration=names)
     good = [
-        max(image[name] for name in clean) <= 5.0,
-        max(camera[name] for name in clean) <= 7.0,
-        image[far] < 20.0,
-        60.0 / FACTOR <= camera[far] <= 60.0 * FACTOR,
-        image[near] <= 5.0,
-        camera[near] <= 10.0,
+        max(image[:2]) <= 5.0,
+        max(camera[:2]) <= 7.0,
+        image[2] < 20.0,
+        60.0 / FACTOR <= camera[2] <= 60.0 * FACTOR,
+        image[3] <= 5.0,
+        camera[3] <= 10.0,
     ]
     return Finding(
-        found="; ".join(f"{name} {image[name]:.1f} px, {camera[name]:.1f} mm" for name in names),
+        found="; ".join(
+            f"{name} {px:.1f} px, {mm:.1f} mm"
+            for name, px, mm in zip(names, image, camera, strict=True)
+        ),
         held=good,
         why="Its camera is pixelated; ours has noise of 0.1 px in the corners.",
     )
 
 
 def _ratio(runs: Runs, name: str, metric: str) -> float:
-    return runs.mean(metric, configuration=f"{name}_servo") / runs.mean(
-        metric, configuration=f"{name}_tracking"
-    )
+    servo, tracking = runs.means(metric, configuration=(f"{name}_servo", f"{name}_tracking"))
+    return float(servo / tracking)
 
 
 @statement(
@@ -161,7 +162,7 @@ def _same_without(runs: Runs) -> Finding:
     "that are printed for runs without perturbation",
 )
 def _space(runs: Runs) -> Finding:
-    found = [1e3 * runs.mean("camera_max_m", configuration=f"{name}_tracking") for name in SETS]
+    found = 1e3 * runs.means("camera_max_m", configuration=[f"{s}_tracking" for s in SETS])
     return Finding(
         found=", ".join(f"{name} {value:.1f}" for name, value in zip(SETS, found, strict=True))
         + " mm",

@@ -57,7 +57,7 @@ def _points(kind: str, name: str, distance: float, time: str = "") -> Configurat
 )
 def _any_camera(runs: Runs) -> Finding:
     names = ("camera_E2", "camera_E3", "camera_E4")
-    image = [runs.mean("image_max_px", configuration=name) for name in names]
+    image = runs.means("image_max_px", configuration=names)
     return Finding(
         found="; ".join(f"{name[-2:]}: {outcomes(runs, name)}" for name in names)
         + f"; paths curve by {image[0]:.0f}, {image[1]:.0f}, {image[2]:.0f} px",
@@ -68,9 +68,7 @@ def _any_camera(runs: Runs) -> Finding:
 
 @statement("Wrong anchor points matter more than a wrong camera position.", "section A.6.2")
 def _anchors_more_than_camera(runs: Runs) -> Finding:
-    anchor, camera = (
-        runs.mean("image_max_px", configuration=name) for name in ("anchor_E3", "camera_E2")
-    )
+    anchor, camera = runs.means("image_max_px", configuration=("anchor_E3", "camera_E2"))
     return Finding(
         found=f"paths curve by {anchor:.0f} px with anchor points 0.073 m wrong, {camera:.0f} px "
         "with the camera 0.064 m wrong",
@@ -80,10 +78,9 @@ def _anchors_more_than_camera(runs: Runs) -> Finding:
 
 @statement("Wrong anchor points matter more than wrong exit points.", "section A.6.3")
 def _anchors_more_than_exits(runs: Runs) -> Finding:
-    anchor, exits = (
-        runs.mean("image_max_px", configuration=name) for name in ("anchor_E4", "exit_E3")
+    anchor, exits, near, far = runs.means(
+        "image_max_px", configuration=("anchor_E4", "exit_E3", "anchor_E2", "exit_E2")
     )
-    near, far = (runs.mean("image_max_px", configuration=name) for name in ("anchor_E2", "exit_E2"))
     return Finding(
         found=f"paths curve by {anchor:.0f} px (anchor 0.108 m) against {exits:.0f} px (exit "
         f"0.103 m), {near:.0f} px (0.038 m) against {far:.0f} px (0.032 m)",
@@ -97,14 +94,12 @@ def _anchors_more_than_exits(runs: Runs) -> Finding:
     cause=SOURCE,
 )
 def _grows(runs: Runs) -> Finding:
-    image = [
-        runs.mean("image_max_px", configuration=f"anchor_{name}") for name in ("E2", "E3", "E4")
-    ]
+    names = ("anchor_E2", "anchor_E3", "anchor_E4")
+    image = runs.means("image_max_px", configuration=names)
     return Finding(
         found=", ".join(f"{value:.0f}" for value in image) + " px",
-        held=[image == sorted(image)],
-        why="; ".join(f"{name}: {outcomes(runs, f'anchor_{name}')}" for name in ("E2", "E3", "E4"))
-        + ". "
+        held=[list(image) == sorted(image)],
+        why="; ".join(f"{name[-2:]}: {outcomes(runs, name)}" for name in names) + ". "
         "A run that loses the object ends before its path can curve further. Each point is wrong "
         "in a direction of its own, drawn for each run.",
     )

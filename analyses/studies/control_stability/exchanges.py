@@ -6,13 +6,18 @@ rows of one bound alone. What they choose can be confirmed by the rows of the ot
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from itertools import combinations
 
-import numpy as np
-
-from cdpr_drake.analyses.studies.control_stability.recipes import RULES, RecipeStudy
+from cdpr_drake.analyses.studies.control_stability.recipes import (
+    EXCHANGED,
+    RULES,
+    table_grid,
+)
+from cdpr_drake.analyses.studies.control_stability.tables import mean_difference, published
+from cdpr_drake.analyses.studies.framework.runs import MissingRuns, Run, Runs
+from cdpr_drake.analyses.studies.framework.study import Case, Form
 from cdpr_drake.analyses.studies.published.recipe_variants import (
     EXCHANGED_CABLES,
     FULLY_CONSTRAINED,
@@ -21,13 +26,11 @@ from cdpr_drake.analyses.studies.published.recipe_variants import (
 from cdpr_drake.analyses.studies.published.stability_recipe import (
     recipe_bounds,
     recipe_case,
-    recipe_grid,
     recipe_options,
 )
 from cdpr_drake.analyses.studies.published.stability_tables import BASELINE_VALUES, TABLES
 from cdpr_drake.analyses.workspaces.stability_tasks import SampledTask
 from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.workspaces.volume import workspace_volume
 
 CHOOSING_BOUND = "r_bp"
 """Its rows choose; it concerns no single point, so it does not matter how points are wrong."""
@@ -35,24 +38,10 @@ CHOOSING_BOUND = "r_bp"
 PRINTED = "none"
 """Name of the numbering as it is printed."""
 
+PAIRS = ((0, 0), *combinations(range(8), 2))
+"""Numbers of the cables in each other's place, from 0: none, then every exchange of two."""
+
 TABLE = next(table for table in TABLES if table.robot == FULLY_CONSTRAINED)
-
-
-@dataclass(frozen=True)
-class ExchangeRow:
-    """A printed row, and what is left of the workspace after an exchange.
-
-    Attributes:
-        exchange: The exit points in each other's place, as "A2 A8", or `PRINTED`.
-        value: Value of the bound [m].
-        printed: Printed share [%].
-        share: Ours [%].
-    """
-
-    exchange: str
-    value: float
-    printed: float
-    share: float
 
 
 def exchange_name(one: int, other: int) -> str:
@@ -60,63 +49,55 @@ def exchange_name(one: int, other: int) -> str:
     return PRINTED if one == other else f"A{one + 1} A{other + 1}"
 
 
-def exchange_tasks(quick: bool) -> dict[str, tuple[str, float, SampledTask]]:
-    """Exchange, value of the bound and sweep task by the task's name."""
+def exchange_cases(form: Form) -> Iterator[Case]:
+    """The rows that choose, with every exchange and none."""
     case = recipe_case(FULLY_CONSTRAINED, TABLE.scheme, EXCHANGED_CABLES)
     cables = load_robot(FULLY_CONSTRAINED).cable_set().without_pulleys()
-    grid, options = recipe_grid(FULLY_CONSTRAINED, quick), recipe_options(FULLY_CONSTRAINED)
-    tasks = {}
-    for pair in ((0, 0), *combinations(range(cables.count), 2)):
+    word, options = form.grid, recipe_options(FULLY_CONSTRAINED)
+    grid = table_grid(FULLY_CONSTRAINED, word)
+    for pair in PAIRS:
+        name = exchange_name(*pair)
         other = replace(case, cables=exchanged_anchors(cables, *pair))
-        for value in TABLE.rows[CHOOSING_BOUND]:
+        for value, share in TABLE.rows[CHOOSING_BOUND].items():
             bounds = recipe_bounds(TABLE, CHOOSING_BOUND, value, EXCHANGED_CABLES)
-            name = exchange_name(*pair)
-            task = SampledTask(other, bounds, grid, options)
-            tasks[f"exchange {name} {value:g}"] = (name, value, task)
-    return tasks
+            yield Case(
+                name=f"exchange {name} {value:g}",
+                keys={
+                    "question": EXCHANGED, "exchange": name, "table": TABLE.name,
+                    "bound": CHOOSING_BOUND, "value": value, "grid": word,
+                },
+                task=SampledTask(other, bounds, grid, options),
+                items=grid.size,
+                printed={"box_percent": f"{share:g}"},
+            )  # fmt: skip
 
 
-def exchange_rows(
-    tasks: Mapping[str, tuple[str, float, SampledTask]],
-    finished: Mapping[str, Mapping[str, np.ndarray]],
-) -> tuple[ExchangeRow, ...]:
-    """Rows of the tasks that are finished."""
-    rows = []
-    for name, (exchange, value, task) in tasks.items():
-        if name in finished:
-            inside = np.asarray(finished[name]["stable"], bool).reshape(task.grid.shape)[0]
-            share = 100.0 * workspace_volume(inside, task.grid.axes, RULES[0]).share
-            printed = TABLE.rows[CHOOSING_BOUND][value]
-            rows.append(ExchangeRow(exchange, value, printed, share))
-    return tuple(rows)
-
-
-def exchange_means(rows: tuple[ExchangeRow, ...]) -> dict[str, float]:
+def exchange_means(runs: Runs) -> dict[str, float]:
     """Mean absolute difference over the rows that choose, the smallest first [points].
 
     Raises:
-        KeyError: A row is missing.
+        MissingRuns: A row is missing.
     """
-    apart: dict[str, list[float]] = {}
-    for row in rows:
-        apart.setdefault(row.exchange, []).append(abs(row.share - row.printed))
-    count = len(TABLE.rows[CHOOSING_BOUND])
-    if not apart or any(len(some) < count for some in apart.values()):
-        raise KeyError(CHOOSING_BOUND)
-    means = {name: float(np.mean(some)) for name, some in apart.items()}
+    rows = runs(question=EXCHANGED)
+    if len(rows) < len(PAIRS) * len(TABLE.rows[CHOOSING_BOUND]):
+        raise MissingRuns(CHOOSING_BOUND)
+    means = {name: mean_difference(some, "box") for name, some in rows.by("exchange")}
     return dict(sorted(means.items(), key=lambda item: item[1]))
 
 
-def other_rows(one: RecipeStudy) -> list[float]:
+def other_rows(rows: Iterable[Run]) -> list[float]:
     """Differences of the rows of A.11 that do not choose, without repetitions of the baseline.
+
+    Args:
+        rows: Of a recipe.
 
     Returns:
         Absolute differences [points].
     """
     return [
-        abs(row.shares[RULES[0]] - row.published)
-        for row in one.rows
-        if row.table == TABLE.name
-        and row.bound != CHOOSING_BOUND
-        and row.value != BASELINE_VALUES[row.bound]
+        abs(run[f"{RULES[0]}_percent"] - published(run))
+        for run in rows
+        if run["table"] == TABLE.name
+        and run["bound"] != CHOOSING_BOUND
+        and run["value"] != BASELINE_VALUES[run["bound"]]
     ]

@@ -10,12 +10,12 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from cdpr_drake.analyses.studies.control_stability.tables import (
-    COARSE,
     published,
     rows_covered,
     rows_of,
 )
 from cdpr_drake.analyses.studies.framework.runs import MissingRuns, Runs
+from cdpr_drake.analyses.studies.framework.summary import COARSE
 from cdpr_drake.analyses.studies.published.stability_tables import TABLES, PublishedTable
 from cdpr_drake.analyses.visualization.figure_style import (
     COVERED_LINE,

@@ -11,13 +11,13 @@ from __future__ import annotations
 import numpy as np
 
 from cdpr_drake.analyses.studies.control_stability.tables import (
-    FULL,
     mean_difference,
     published,
     rows_of,
 )
 from cdpr_drake.analyses.studies.framework.runs import MissingRuns, Runs
 from cdpr_drake.analyses.studies.framework.statement import FITTED, Check, Finding, statement
+from cdpr_drake.analyses.studies.framework.summary import FULL
 from cdpr_drake.analyses.studies.published.recipe_choices import chosen_on
 from cdpr_drake.analyses.studies.published.stability_tables import TABLES, PublishedTable
 

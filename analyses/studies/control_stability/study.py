@@ -4,17 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict
-from functools import partial
 from typing import Any
 
 import numpy as np
 
 from cdpr_drake.analyses.studies.control_stability.figures import FIGURES
-from cdpr_drake.analyses.studies.control_stability.recipes import study_recipe
+from cdpr_drake.analyses.studies.control_stability.recipes import BY_NAME, recipe_study, table_grid
 from cdpr_drake.analyses.studies.control_stability.statements import CHECKS
 from cdpr_drake.analyses.studies.control_stability.tables import (
-    COARSE,
-    FULL,
     SHARE,
     rows_of,
     stability_tables,
@@ -27,7 +24,6 @@ from cdpr_drake.analyses.studies.published.stability_recipe import (
     RECIPE,
     recipe_bounds,
     recipe_case,
-    recipe_grid,
     recipe_options,
     single_bounds,
 )
@@ -64,25 +60,22 @@ def asked(form: Form) -> list[PublishedTable]:
 def cases(form: Form) -> Iterator[Case]:
     """All 468 printed rows and rows of coverage; in the quick form few, on coarse grids."""
     for table in asked(form):
-        yield from table_cases(table, form.quick)
+        yield from table_cases(table, form)
 
 
-def table_cases(table: PublishedTable, quick: bool) -> Iterator[Case]:
+def table_cases(table: PublishedTable, form: Form) -> Iterator[Case]:
     """The rows of a table; what several ask alike, as at the baseline, is computed once."""
-    grid, case = recipe_grid(table.robot, quick), recipe_case(table.robot, table.scheme)
+    grid, case = table_grid(table.robot, form.grid), recipe_case(table.robot, table.scheme)
     alike: dict[tuple[PerturbationBounds, int], str] = {}
-    for bound, value, bounds in _rows(table, quick):
+    for bound, value, bounds in _rows(table, form.quick):
         of_coverage = bound == SHARE
-        pieces = (QUICK_PIECES if quick else COVERAGE_PIECES) if of_coverage else ROW_PIECES
+        pieces = (QUICK_PIECES if form.quick else COVERAGE_PIECES) if of_coverage else ROW_PIECES
         options = recipe_options(table.robot, pieces)
         name = f"{table.name} {bound}={value:g}"
         first = alike.setdefault((bounds, options.pieces), name)
         yield Case(
             name=name,
-            keys={
-                "table": table.name, "bound": bound, "value": value,
-                "grid": COARSE if quick else FULL,
-            },
+            keys={"table": table.name, "bound": bound, "value": value, "grid": form.grid},
             data=grid.shape,
             task=VerdictsTask(case, bounds, grid, options) if first == name else None,
             items=grid.size,
@@ -112,8 +105,8 @@ def stability_row(case: Case, stable: Mapping[str, np.ndarray]) -> dict[str, Any
         and poses of the grid, VERDICT_poses; poses: of the grid; ordered: whether at every pose
         certified implies searched and searched implies sampled.
     """
-    table = next(table for table in TABLES if table.name == case.keys["table"])
-    axes = recipe_grid(table.robot, case.keys["grid"] == COARSE).axes
+    table = BY_NAME[case.keys["table"]]
+    axes = table_grid(table.robot, case.keys["grid"]).axes
     sampled, searched, certified = (stable[verdict] for verdict in VERDICTS)
     shares = {
         f"{verdict}_percent": 100.0
@@ -166,7 +159,5 @@ STUDY = Study(
     checks=CHECKS,
     tables=[stability_tables],
     figures=FIGURES,
+    recipes={name: recipe_study(recipe) for name, recipe in RECIPES.items()},
 )
-
-RECIPE_STUDIES = {name: partial(study_recipe, recipe=name) for name in RECIPES}
-"""The tables by other recipes, by name."""

@@ -2,7 +2,7 @@
 
 A reason is computed, not told: the rows of a bound count as ruled out for a recipe if one of them
 
-- prints more than any target, view and camera leaves with the recipe's cables (`LimitRow`);
+- prints more than any target, view and camera leaves with the recipe's cables (`excluded`);
 - prints more than a row whose errors it contains (`nested_pairs`);
 - prints less than a row that contains its errors, if the recipe moves exit points in common
   (`covering_pairs`).
@@ -12,51 +12,36 @@ A table is explained if the rows of all other bounds are met.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
 from rich.table import Table
 
 from cdpr_drake.analyses.reporting.statements import new_table
 from cdpr_drake.analyses.studies.control_stability.printed_limits import (
-    DIGIT,
     NestedPair,
     covering_pairs,
+    excluded,
     nested_pairs,
 )
-from cdpr_drake.analyses.studies.control_stability.recipes import RULES, RecipeStudy
-from cdpr_drake.analyses.studies.published.recipe_variants import FULLY_CONSTRAINED, RECIPES, Recipe
+from cdpr_drake.analyses.studies.control_stability.recipes import (
+    ANY_TARGET,
+    BY_NAME,
+    ROW,
+    difference,
+)
+from cdpr_drake.analyses.studies.control_stability.tables import published
+from cdpr_drake.analyses.studies.framework.runs import Runs
+from cdpr_drake.analyses.studies.framework.summary import note_coarse
+from cdpr_drake.analyses.studies.published.recipe_variants import (
+    FULLY_CONSTRAINED,
+    IN_USE,
+    RECIPES,
+    Recipe,
+)
 from cdpr_drake.analyses.studies.published.stability_tables import PublishedTable
 
 MET = 5.0
 """A table whose mean absolute difference is not larger counts as met [points]."""
-
-
-@dataclass(frozen=True)
-class LimitRow:
-    """A printed row and what any target leaves at most.
-
-    Attributes:
-        table: Name of the table.
-        bound: Name of the bound.
-        value: Its value [m].
-        printed: Printed share [%].
-        at_most: What is left by the largest of the volume's rules [%].
-        arrangement: Name of the recipe whose anchor points were taken.
-    """
-
-    table: str
-    bound: str
-    value: float
-    printed: float
-    at_most: float
-    arrangement: str = "present"
-
-    @property
-    def excluded(self) -> bool:
-        """Whether more is printed than is left."""
-        return self.printed > self.at_most + DIGIT
 
 
 @dataclass(frozen=True)
@@ -83,34 +68,62 @@ class TableReason:
         return bool(self.rows) and self.rest <= MET
 
 
-def table_reasons(
-    one: RecipeStudy, tables: Sequence[PublishedTable], limits: Sequence[LimitRow]
-) -> list[TableReason]:
-    """Of each table that a recipe does not meet."""
+def by_mean(runs: Runs) -> dict[str, Runs]:
+    """Rows by recipe, the smallest mean over all rows first.
+
+    Raises:
+        MissingRuns: There are none yet.
+    """
+    apart = dict(runs(question=ROW).by("recipe"))
+    return dict(sorted(apart.items(), key=lambda item: difference(item[1])))
+
+
+def reasons_of(runs: Runs) -> list[TableReason]:
+    """Of the tables that the recipe in use does not meet, and the best one.
+
+    Raises:
+        MissingRuns: There are no rows yet.
+    """
+    rows = by_mean(runs)
+    limits = runs(question=ANY_TARGET) if runs.has(question=ANY_TARGET) else Runs(())
+    return [
+        reason
+        for name in dict.fromkeys((IN_USE.name, *list(rows)[:1]))
+        if name in rows
+        for reason in table_reasons(RECIPES[name], rows[name], limits)
+    ]
+
+
+def table_reasons(recipe: Recipe, rows: Runs, limits: Runs) -> list[TableReason]:
+    """Of each table that a recipe does not meet.
+
+    Args:
+        recipe: The recipe.
+        rows: Its rows.
+        limits: What any target leaves.
+    """
     found = []
-    for table in tables:
-        mean = one.difference(RULES[0], table.name)
-        if not mean > MET:
+    for table, mine in rows.by("table"):
+        mean = difference(mine)
+        if mean <= MET:
             continue
-        rows = ruled_out(one.recipe, table, limits)
-        rest = [
-            abs(row.shares[RULES[0]] - row.published)
-            for row in one.rows
-            if row.table == table.name and row.bound not in rows
-        ]
-        found.append(TableReason(one.recipe.name, table.name, mean, rows, float(np.mean(rest))))
+        words = ruled_out(recipe, BY_NAME[table], limits)
+        rest = difference(run for run in mine if run["bound"] not in words)
+        found.append(TableReason(recipe.name, table, mean, words, rest))
     return found
 
 
-def ruled_out(recipe: Recipe, table: PublishedTable, limits: Sequence[LimitRow]) -> dict[str, str]:
+def ruled_out(recipe: Recipe, table: PublishedTable, limits: Runs) -> dict[str, str]:
     """What rules rows of a table out for a recipe, in words, by bound."""
     words: dict[str, list[str]] = {}
-    for row in limits:
+    for run in limits:
         # Recipes have other cables for this robot alone.
-        same = RECIPES[row.arrangement].anchors == recipe.anchors
-        if row.table == table.name and row.excluded and (same or table.robot != FULLY_CONSTRAINED):
-            words.setdefault(row.bound, []).append(
-                f"{row.value:g} m prints {row.printed:.1f}, any target leaves {row.at_most:.1f}"
+        same = RECIPES[run["arrangement"]].anchors == recipe.anchors
+        mine = run["table"] == table.name and (same or table.robot != FULLY_CONSTRAINED)
+        if mine and excluded(run):
+            words.setdefault(run["bound"], []).append(
+                f"{run['value']:g} m prints {published(run):.1f}, any target leaves "
+                f"{run['at_most_percent']:.1f}"
             )
     pairs = [(pair, "more") for pair in nested_pairs(table) if pair.contradictory]
     if recipe.directions(table.robot, table.scheme, "r_A") == "common":
@@ -128,8 +141,12 @@ def pair_words(pair: NestedPair, word: str) -> str:
     )
 
 
-def reasons_table(reasons: Sequence[TableReason], quick: bool) -> Table:
-    """A line per bound that is ruled out."""
+def reasons_table(runs: Runs) -> Table:
+    """A line per bound that is ruled out.
+
+    Raises:
+        MissingRuns: There are no rows yet.
+    """
     table = new_table(
         f"Tables above {MET:g} points, and which of their bounds are ruled out",
         ("recipe", "table", "bound", "what rules its rows out"), ("points", "other bounds"),
@@ -137,12 +154,10 @@ def reasons_table(reasons: Sequence[TableReason], quick: bool) -> Table:
     table.caption = (
         f"A table is explained if the rows of the other bounds are off by at most {MET:g} points."
     )
-    if quick:
-        table.caption += " Coarse grid."
-    for reason in reasons:
+    for reason in reasons_of(runs):
         for bound, words in (reason.rows or {"none": "nothing was found"}).items():
             table.add_row(
                 reason.recipe, reason.table, bound, words,
                 f"{reason.mean:.1f}", f"{reason.rest:.1f}",
             )  # fmt: skip
-    return table
+    return note_coarse(table, runs)

@@ -9,6 +9,7 @@ from rich.table import Table
 
 from cdpr_drake.analyses.reporting.statements import new_table
 from cdpr_drake.analyses.studies.framework.runs import Run, Runs
+from cdpr_drake.analyses.studies.framework.summary import note_coarse
 from cdpr_drake.analyses.studies.published.stability_tables import TABLES, PublishedTable
 from cdpr_drake.stability.verdict import VERDICTS
 
@@ -19,13 +20,11 @@ LARGE_CAMERA_TURN = 30.0
 SHARE = "share"
 """Stands for the name of a bound in rows of coverage, which take this part of the baseline."""
 
-COARSE, FULL = "coarse", "full"
-"""Grids, of the quick form and of the full one."""
-
 
 def published(run: Run) -> float:
-    """The printed share of the full workspace [%]."""
-    return float(run.printed["sampled_percent"])
+    """The printed share of the full workspace of a row that repeats one [%]."""
+    (share,) = run.printed.values()
+    return float(share)
 
 
 def rows_of(table: PublishedTable, runs: Runs) -> Runs:
@@ -45,7 +44,7 @@ def mean_difference(runs: Iterable[Run], verdict: str) -> float:
 
     Args:
         runs: Rows that repeat printed ones.
-        verdict: Whose shares.
+        verdict: Whose shares, by the first words of their column.
     """
     found = [abs(run[f"{verdict}_percent"] - published(run)) for run in runs]
     return float(np.mean(found)) if found else float("nan")
@@ -63,19 +62,17 @@ def stability_tables(runs: Runs) -> list[Table]:
     if not len(runs):
         return []
     asked = [table for table in TABLES if any(run["table"] == table.name for run in runs)]
-    coarse = any(run["grid"] == COARSE for run in runs)
-    tables = [_one(table, mine, coarse) for table in asked if len(mine := rows_of(table, runs))]
-    return [*tables, _summary(asked, runs, coarse)]
+    tables = [_one(table, mine) for table in asked if len(mine := rows_of(table, runs))]
+    return [*tables, _summary(asked, runs)]
 
 
-def _one(asked: PublishedTable, runs: Runs, coarse: bool) -> Table:
+def _one(asked: PublishedTable, runs: Runs) -> Table:
     table = new_table(
         f"{asked.title}, {rows_covered(asked, runs)}; share of the full workspace in per cent",
         ("bound", "value"),
         ("published", *VERDICTS, "sampled - published"),
     )
-    if coarse:
-        table.caption = "Coarse grid: not to be compared with the published numbers."
+    note_coarse(table, runs, "not to be compared with the published numbers.")
     for bound, some in runs.by("bound"):
         if len(table.rows):
             table.add_section()
@@ -90,7 +87,7 @@ def _one(asked: PublishedTable, runs: Runs, coarse: bool) -> Table:
     return table
 
 
-def _summary(asked: Sequence[PublishedTable], runs: Runs, coarse: bool) -> Table:
+def _summary(asked: Sequence[PublishedTable], runs: Runs) -> Table:
     table = new_table(
         "Mean absolute difference to the published shares in points, and certified poses",
         ("table",),
@@ -106,8 +103,7 @@ def _summary(asked: Sequence[PublishedTable], runs: Runs, coarse: bool) -> Table
         "survive the search, perturbations cut into pieces; the column certified and the rows of "
         "the tables take them as a whole."
     )
-    if coarse:
-        table.caption += " Coarse grid: the differences mean nothing."
+    note_coarse(table, runs, "the differences mean nothing.")
     printed = [run for one in asked for run in rows_of(one, runs)]
     size = sum(one.size for one in asked)
     table.add_row("all of these", *_differences(printed, size), "", "", _ordered(runs))

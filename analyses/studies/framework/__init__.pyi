@@ -13,3 +13,4 @@ from .study import Study as Study
 from .study import StudyResult as StudyResult
 from .summary import Cell as Cell
 from .summary import Summary as Summary
+from .summary import note_coarse as note_coarse

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from cdpr_drake.analyses.reporting.deferred_figures import NothingToDraw
 from cdpr_drake.analyses.simulation.stability_files import draw_steps
 from cdpr_drake.analyses.studies.framework.cable_figures import QUANTITIES, cable_panels
 from cdpr_drake.analyses.studies.framework.case_definition import (
@@ -86,7 +87,8 @@ def group_figure(plan: Plan, group: str, name: str, runs: Runs) -> Figure:
         runs: With projected images.
 
     Raises:
-        MissingRuns: There is nothing to show.
+        MissingRuns: None of the experiment was run, or runs have not that quantity.
+        NothingToDraw: Bars of what no run measures.
     """
     configurations = plan.groups()[group]
     shown = shown_of(plan, runs, [c.name for c in configurations])
@@ -105,14 +107,15 @@ def group_figure(plan: Plan, group: str, name: str, runs: Runs) -> Figure:
         if not all("jacobian_rank" in run.columns() for _, run, _ in shown):
             raise MissingRuns("jacobian_rank")
         return stability_multiples(title, shown)
-    found = (
-        cable_panels(title, shown, name)
-        if name in QUANTITIES
-        else bar_figure(title, configurations, runs, BARS[name])
-    )
-    if found is None:
+    if name in BARS:
+        bars = bar_figure(title, configurations, runs, BARS[name])
+        if bars is None:  # every experiment of all studies is tried with all bars
+            raise NothingToDraw
+        return bars
+    panels = cable_panels(title, shown, name)
+    if panels is None:
         raise MissingRuns(f"figure {name}")
-    return found
+    return panels
 
 
 MULTIPLES = {

@@ -11,7 +11,7 @@ import csv
 import io
 import json
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -177,6 +177,16 @@ class Runs:
     def mean(self, column: str, **where: Any) -> float:
         """Mean of a column; NaN of no run."""
         return self._reduced(np.mean, column, where)
+
+    def means(self, column: str, **where: Iterable[Any]) -> Array:
+        """Mean of a column for each value of a key column, such as `configuration=names`.
+
+        Raises:
+            MissingRuns: Runs with one of the values are not there.
+            UnknownName: A column or value is in no plan.
+        """
+        ((key, values),) = where.items()
+        return np.array([self.mean(column, **{key: value}) for value in values])
 
     def median(self, column: str, **where: Any) -> float:
         """Median of a column; NaN of no run."""

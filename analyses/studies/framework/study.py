@@ -12,6 +12,7 @@ in cases that measure times, which are done last, alone.
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, partial
@@ -26,11 +27,11 @@ from cdpr_drake.analyses.reporting.deferred_figures import NothingToDraw
 from cdpr_drake.analyses.reporting.log_files import finite, write_json
 from cdpr_drake.analyses.reporting.progress import (
     DEFAULT_STUDY_SESSION,
-    StoppableStudy,
     StudySession,
     WorkProgress,
 )
 from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
+from cdpr_drake.analyses.reporting.statements import new_table
 from cdpr_drake.analyses.studies.framework.runs import (
     Keys,
     MissingRuns,
@@ -47,6 +48,7 @@ from cdpr_drake.analyses.studies.framework.statement import (
     judged_table,
     scorecard,
 )
+from cdpr_drake.analyses.studies.framework.summary import COARSE, FULL
 from cdpr_drake.analyses.sweeps.earlier_runs import EarlierRuns
 from cdpr_drake.analyses.sweeps.sweep import run_study_sweep
 from cdpr_drake.analyses.sweeps.workers import SweepTask
@@ -75,6 +77,11 @@ class Form:
 
     quick: bool = False
     asked_seeds: int | None = None
+
+    @property
+    def grid(self) -> str:
+        """Value of the key column `grid`, where a study has coarse grids in its quick form."""
+        return COARSE if self.quick else FULL
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -155,14 +162,16 @@ class Study:
         seeds: How often each case is measured, in the full form and in the quick one; None: once.
         checks: What sources say of it.
         stated: Title of the table of statements.
-        tables: What puts runs into tables; left out where runs lack (`MissingRuns`).
-        figures: What draws runs, by the name of the file; left out likewise.
+        tables: What puts runs into tables; MissingRuns where runs lack.
+        figures: What draws runs, by the name of the file; likewise, or NothingToDraw where what
+            there is to draw depends on what came out.
         assumptions: What the source leaves open, and what was chosen.
         parameters: What all cases have in common, for JSON, by form.
         numbers: More numbers for JSON, of the runs that are there.
         chunk: Items of a task that are computed at once.
         unit: Words for the items of all tasks.
         before: Said while cases are made, where that takes long; empty: nothing.
+        recipes: The same by other recipes, by name, each a study of its own.
     """
 
     name: str
@@ -182,6 +191,7 @@ class Study:
     chunk: int = 1
     unit: str = RUNS
     before: str = ""
+    recipes: Mapping[str, Study] = field(default_factory=dict)
 
     def __call__(
         self, quick: bool = False, session: StudySession = DEFAULT_STUDY_SESSION
@@ -221,8 +231,8 @@ class Study:
             ValueError: Two have the same name, or one is no file name.
         """
         cases = list(self.cases(form))
-        names = [case.name for case in cases]
-        bad = [name for name in names if names.count(name) > 1 or "/" in name or not name]
+        names = Counter(case.name for case in cases)
+        bad = [name for name, count in names.items() if count > 1 or "/" in name or not name]
         if bad:
             raise ValueError(f"study {self.name}: cases {bad}; accepted: each once, without /")
         return cases
@@ -279,7 +289,7 @@ class Study:
 
 
 @dataclass(frozen=True, eq=False)
-class StudyResult(StoppableStudy):
+class StudyResult:
     """What a study found.
 
     Attributes:
@@ -297,6 +307,11 @@ class StudyResult(StoppableStudy):
     finished: Mapping[str, Arrays]
     progress: WorkProgress
     earlier: EarlierRuns = field(default_factory=EarlierRuns, kw_only=True)
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether it was stopped before the end."""
+        return self.progress.done < self.progress.total
 
     @property
     def quick(self) -> bool:
@@ -372,6 +387,7 @@ class StudyResult(StoppableStudy):
             "numbers": {} if study.numbers is None else self._numbers(),
             "statements": [one.as_dict() for one in self.statements],
             "scorecard": scorecard(self.statements),
+            "left_out": self._left_out(),
         }
         cleaned: dict[str, Any] = finite(told)
         return cleaned
@@ -391,40 +407,94 @@ class StudyResult(StoppableStudy):
         except MissingRuns:
             return {}
 
-    def tables(self) -> list[Table]:
-        """Tables for the terminal, that of the statements last."""
-        found: list[Table] = []
+    @property
+    def _nothing_lacks(self) -> bool:
+        """Whether it has all runs of the full form."""
+        return not self.quick and not self.interrupted
+
+    @cached_property
+    def _made(self) -> list[tuple[str, Sequence[Table] | Exception]]:
+        """Names of what makes tables, and what they made, or what they ended in."""
+        found: list[tuple[str, Sequence[Table] | Exception]] = []
         for make in self.study.tables:
             try:
                 made = make(self.runs)
-            except MissingRuns:
-                continue
-            found += [made] if isinstance(made, Table) else made
+                found.append((_name_of(make), [made] if isinstance(made, Table) else made))
+            except Exception as problem:
+                found.append((_name_of(make), problem))
+        return found
+
+    def tables(self) -> list[Table]:
+        """Tables for the terminal, that of the statements last.
+
+        One that lacks runs is left out; where all runs of the full form are there, a table of its
+        name says what it lacks.
+        """
+        found: list[Table] = []
+        for name, made in self._made:
+            if not isinstance(made, Exception):
+                found += made
+            elif not isinstance(made, MissingRuns):
+                raise made
+            elif self._nothing_lacks:
+                found.append(new_table(name, ("not made",), ()))
+                found[-1].add_row(_lacking(made))
         if self.statements:
             found.append(judged_table(self.study.stated, self.statements))
         return found
 
     def drawings(self) -> dict[str, Callable[[], Figure]]:
-        """What draws its figures, by name; NothingToDraw where runs lack."""
-        return {name: partial(self._draw, make) for name, make in self.study.figures.items()}
+        """What draws its figures, by name.
 
-    def _draw(self, make: FigureMaker) -> Figure:
+        Each raises NothingToDraw where runs lack; MissingRuns where all of the full form are there.
+        """
+        return {name: partial(self._draw, name, make) for name, make in self.study.figures.items()}
+
+    def _draw(self, name: str, make: FigureMaker) -> Figure:
         if not len(self.runs):
             raise NothingToDraw
         try:
             return make(self.runs)
         except MissingRuns as missing:
-            raise NothingToDraw from missing
+            self._undrawn[name] = words = _lacking(missing)
+            raise MissingRuns(words) if self._nothing_lacks else NothingToDraw from missing
+
+    @cached_property
+    def _undrawn(self) -> dict[str, str]:
+        """What figures lack, by name, of those that were to be drawn until now."""
+        return {}
+
+    def _left_out(self) -> dict[str, dict[str, str]]:
+        """Of figures and tables that were not made what they lack."""
+        tables = {name: _lacking(made) for name, made in self._made if isinstance(made, Exception)}
+        return {"figures": dict(self._undrawn), "tables": tables}
 
     def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> dict[str, str]:
-        """Writes `runs.csv`, `results.json`, then the figures, into a folder that exists.
+        """Writes `runs.csv`, `results.json`, then the figures, into a folder that exists; then
+        `results.json` again with the names of figures that lack runs, where some do.
 
         Returns:
             Of each figure that could not be written, the file and why, in one line.
         """
         self.runs.write_csv(folder / "runs.csv")
         write_json(folder / "results.json", self.as_dict())
-        return write_figures(folder, self.drawings(), formats)
+        failed = write_figures(folder, self.drawings(), formats)
+        if self._undrawn:
+            write_json(folder / "results.json", self.as_dict())
+        return failed
+
+
+def _lacking(problem: Exception) -> str:
+    """Why something was not made, in one line."""
+    words = (str(problem) or type(problem).__name__).splitlines()[0][:200]
+    return f"runs are missing: {words}" if isinstance(problem, MissingRuns) else words
+
+
+def _name_of(make: TableMaker) -> str:
+    """Title of a summary; else the function's name."""
+    while isinstance(make, partial):
+        make = make.func
+    return str(getattr(make, "title", "") or getattr(make, "__name__", type(make).__name__))
 
 
 def _task_name(case: Case, seed: int | None) -> str:

@@ -26,6 +26,23 @@ FACTORS = {
 EMPTY = "-"
 """Cell of no run, or of a number that is not finite."""
 
+COARSE, FULL = "coarse", "full"
+"""Values of the key column `grid`: grids of the quick form and of the full one."""
+
+
+def note_coarse(table: Table, runs: Runs, words: str = "the differences mean little.") -> Table:
+    """A table of runs, with a caption that says where some are of coarse grids.
+
+    Args:
+        table: The table.
+        runs: What it shows.
+        words: What that means for it.
+    """
+    if any(run.keys.get("grid") == COARSE for run in runs):
+        before = [str(table.caption)] if table.caption else []
+        table.caption = "\n".join([*before, f"Coarse grid: {words}"])
+    return table
+
 
 @dataclass(frozen=True)
 class Cell:

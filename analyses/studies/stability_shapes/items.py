@@ -143,12 +143,15 @@ def shape_case(
     grid = WorkspaceGrid(recipe_grid(robot, quick).axes, angles)
     return Case(
         name=f"{figure} {name}",
-        keys={"figure": figure, "panel": name, "robot": robot, "scheme": scheme},
+        keys={
+            "figure": figure, "panel": name, "robot": robot, "scheme": scheme,
+            "grid": Form(quick).grid,
+        },
         data={"bounds": bounds.as_dict(), "places_m": places},
         task=SampledTask(known, bounds, grid, recipe_options(robot)),
         items=grid.size,
         printed={} if printed is None else {"share_percent": f"{printed:g}"},
-    )
+    )  # fmt: skip
 
 
 def shape_row(case: Case, arrays: Mapping[str, np.ndarray]) -> dict[str, Any]:

@@ -10,6 +10,7 @@ from rich.table import Table
 from cdpr_drake.analyses.reporting.statements import new_table
 from cdpr_drake.analyses.studies.framework.runs import Runs
 from cdpr_drake.analyses.studies.framework.study import Form, Study
+from cdpr_drake.analyses.studies.framework.summary import note_coarse
 from cdpr_drake.analyses.studies.published.stability_recipe import RECIPE, recipe_options
 from cdpr_drake.analyses.studies.stability_shapes.figures import FIGURES
 from cdpr_drake.analyses.studies.stability_shapes.items import Shape, shape_cases, shape_row
@@ -37,7 +38,7 @@ def shares_table(runs: Runs) -> Table:
     for run in runs:
         words = (run[key] for key in ("figure", "robot", "scheme", "panel"))
         table.add_row(*words, Shape(run).printed, f"{run['share_percent']:.1f}")
-    return table
+    return note_coarse(table, runs, "not to be compared with the published numbers.")
 
 
 def parameters(form: Form) -> Mapping[str, Any]:

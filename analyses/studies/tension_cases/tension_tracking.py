@@ -79,7 +79,7 @@ def compared(
         MissingRuns: A set was not run with all variants.
     """
     return {
-        v: float(np.mean([runs.mean(metric, configuration=f"{s}_{v}") for s in sets]))
+        v: float(np.mean(runs.means(metric, configuration=[f"{s}_{v}" for s in sets])))
         for v in variants
     }
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -234,10 +235,10 @@ ROBOTS = (
 
 def study_cases(form: Form) -> Iterator[Case]:
     """All questions: figures, every kind for every robot of `ROBOTS` with what checks it, and
-    distances."""
-    yield from figure_cases(form.quick)
-    for name in ROBOTS:
-        yield from robot_cases(name, QUICK_POINTS if form.quick else KIND_POINTS)
+    distances; in the quick form on coarse grids, but distances, which are of drawn poses."""
+    points = QUICK_POINTS if form.quick else KIND_POINTS
+    for case in chain(figure_cases(form.quick), *(robot_cases(name, points) for name in ROBOTS)):
+        yield replace(case, keys={**case.keys, "grid": form.grid})
     for name in DISTANCE_ROBOTS:
         yield distance_case(name, QUICK_POSES if form.quick else POSES)
 

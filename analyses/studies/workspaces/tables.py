@@ -6,6 +6,7 @@ from rich.table import Table
 
 from cdpr_drake.analyses.reporting.statements import new_table
 from cdpr_drake.analyses.studies.framework.runs import Runs
+from cdpr_drake.analyses.studies.framework.summary import note_coarse
 from cdpr_drake.analyses.studies.workspaces.items import ALL, ALL_BUT_CLOSURE, EVERY, FIGURE
 from cdpr_drake.analyses.workspaces.conditions import KINDS
 
@@ -28,7 +29,7 @@ def figure_table(runs: Runs) -> Table:
             f"{100.0 * run['frame_share']:.1f}",
             " x ".join(map(str, run["points"])),
         )
-    return table
+    return note_coarse(table, runs, "volumes of the full form differ.")
 
 
 def kind_table(runs: Runs) -> Table:
@@ -47,4 +48,4 @@ def kind_table(runs: Runs) -> Table:
         f"- {run['robot']}, {kind}: {why}" for run in kinds for kind, why in run["left_out"].items()
     ]
     table.caption = "\n".join(left_out) or None
-    return table
+    return note_coarse(table, runs, "shares of the full form differ.")

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-
 from nicegui import ui
 
 from cdpr_drake.studio.panels.panel import show_errors
@@ -14,17 +12,14 @@ from cdpr_drake.studio.workbench.job import JobState
 class JobBar:
     """Which results are looked at, how far the command is, and what it may be asked for."""
 
-    def __init__(
-        self, board: CommandBoard, label: str, continues: Callable[[Sequence[str]], bool]
-    ) -> None:
+    def __init__(self, board: CommandBoard, label: str) -> None:
         """Places it into the current slot.
 
         Args:
             board: What the session looks at.
             label: Of the list of results.
-            continues: Whether a command of these arguments that was stopped can go on.
         """
-        self._board, self._continues = board, continues
+        self._board = board
         self._names: dict[str, str] = {}
         name = board.name
         with ui.row().classes("w-full items-center no-wrap"):
@@ -63,7 +58,7 @@ class JobBar:
         working = job is not None and not job.state.is_over
         asked = () if computed is None or working else computed.asked
         self._stop.set_enabled(working and job is not None and job.state != JobState.STOPPING)
-        self._go_on.set_visibility(bool(asked) and self._continues(asked))
+        self._go_on.set_visibility(bool(asked))
         self._bar.set_visibility(working)
         words = "stopped with an earlier server" if asked and job is None else ""
         if job is not None:

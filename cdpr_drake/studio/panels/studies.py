@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 from weakref import WeakKeyDictionary
@@ -78,11 +77,11 @@ class _StudiesPanel:
             self._name.on_value_change(self._choose)
             start = ui.button("Start", icon="play_circle", on_click=self._start).props("no-caps")
             start.mark("start-study")
-        self._note = ui.label().classes("studio-soft").mark("study-note")
+        ui.label("Stopped, it keeps what is finished, and can be continued.").classes("studio-soft")
         self._fields = CommandFields(
             bench.commands["study"], view.filled, ("quick", "seeds"), {}, bench.folder
         )
-        self._bar = JobBar(view.board, "results", _continues)
+        self._bar = JobBar(view.board, "results")
         self._body = ui.element("div").classes("w-full").mark("study-results")
         with ui.expansion("Finished studies in the working folder", value=True) as gallery:
             gallery.classes("w-full studio-group")
@@ -94,12 +93,6 @@ class _StudiesPanel:
         if not self._name.value:
             return
         self._view.name = str(self._name.value)
-        entry = STUDIES[self._view.name]
-        self._note.text = (
-            "Stopped, it keeps what is finished, and can be continued."
-            if entry.continues
-            else "Stopped, it keeps what is finished; it does not continue, but starts anew."
-        )
 
     def _start(self) -> None:
         with show_errors():
@@ -161,12 +154,6 @@ class _StudiesPanel:
     def _open(self, name: str) -> None:
         self._view.board.shown = name
         self._bar.refresh()
-
-
-def _continues(arguments: Sequence[str]) -> bool:
-    """Whether the study of a command goes on where it was stopped."""
-    entry = STUDIES.get(arguments[1])
-    return entry is not None and entry.continues
 
 
 def _changed(folder: Path) -> float:

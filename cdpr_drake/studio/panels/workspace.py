@@ -161,7 +161,7 @@ class _WorkspacePanel:
         self._form = ui.element("div").classes("w-full")
         what.on_value_change(lambda: self._place_form(str(what.value)))
         self._place_form(view.command)
-        self._bar = JobBar(view.board, "results", lambda _: True)
+        self._bar = JobBar(view.board, "results")
         self._note = ui.label().classes("studio-soft").mark("regions-note")
         self._body = ui.element("div").classes("w-full")
         self._shown: Regions | None = None

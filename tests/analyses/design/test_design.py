@@ -291,6 +291,9 @@ def test_the_quick_study(tmp_path, monkeypatch):
     failed = result.write(tmp_path / "study")
     figures = {"progress.png", "points.png"}
     assert set(failed) == {f"acrobot_large/{name}" for name in figures}
+    names, *rows = (tmp_path / "study" / "runs.csv").read_text().splitlines()
+    assert names.startswith("case,robot,goal,")
+    assert [row.split(",")[0] for row in rows] == [one.robot for one in small]
     for one in small:
         folder = tmp_path / "study" / one.robot
         assert load_robot(str(folder / "design" / "robot.yaml"))

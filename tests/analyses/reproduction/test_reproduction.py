@@ -22,7 +22,7 @@ from rich.table import Table
 from cdpr_drake.analyses.reporting.deferred_figures import write_pictures
 from cdpr_drake.analyses.reporting.log_files import write_json
 from cdpr_drake.analyses.reporting.output_folder import continued_folder
-from cdpr_drake.analyses.reporting.statements import NOT_IN_QUICK, Statement, evaluate_checks
+from cdpr_drake.analyses.reporting.statements import Statement
 from cdpr_drake.analyses.reporting.written_files import MARKER, mark, others_in
 from cdpr_drake.analyses.reproduction import runner
 from cdpr_drake.analyses.reproduction.page import write_report
@@ -150,7 +150,7 @@ def folder(tmp_path):
 
 def entries(**studies):
     return {
-        name: StudyEntry(study, continues=True, judges=study.names, numbers=(NUMBER,))
+        name: StudyEntry(study, judges=study.names, numbers=(NUMBER,))
         for name, study in studies.items()
     }
 
@@ -220,7 +220,7 @@ def listed_study(quick, session):
     return ListedResult([])
 
 
-def reproduce(folder, continues, killed_at=None):
+def reproduce(folder, killed_at=None):
     """Runs one study as `cdpr reproduce` does; a number kills the process before that change."""
     if killed_at is not None:
         seen = []
@@ -234,7 +234,7 @@ def reproduce(folder, continues, killed_at=None):
         sys.addaudithook(kill_at)
     with continued_folder(folder):
         check_folder(folder, quick=False)
-        study = StudyEntry(listed_study, continues=continues, judges=())
+        study = StudyEntry(listed_study)
         run_studies({"one": study}, folder, RunSettings())
 
 
@@ -243,12 +243,9 @@ def all_files(folder):
 
 
 @pytest.mark.parametrize("older", [False, True])
-@pytest.mark.parametrize("continues", [True, False])
-def test_whatever_instant_kills_it_all_files_are_known_and_none_stays_over(
-    tmp_path, continues, older
-):
+def test_whatever_instant_kills_it_all_files_are_known_and_none_stays_over(tmp_path, older):
     """The folder is left at each change of it in turn, and then continued; no list loses a file."""
-    reproduce(tmp_path / "whole", continues)
+    reproduce(tmp_path / "whole")
     whole, instant, ended = all_files(tmp_path / "whole"), 0, -signal.SIGKILL
     if older:  # by other code
         state = read_state(tmp_path / "whole", "one")
@@ -259,14 +256,14 @@ def test_whatever_instant_kills_it_all_files_are_known_and_none_stays_over(
         if older:
             shutil.copytree(tmp_path / "whole", folder)
         process = multiprocessing.get_context("fork").Process(
-            target=reproduce, args=(folder, continues, instant)
+            target=reproduce, args=(folder, instant)
         )
         process.start()
         process.join()
         ended = process.exitcode
         if (folder / MARKER).exists():
             assert others_in(folder) == [], f"killed before change {instant}"
-        reproduce(folder, continues)
+        reproduce(folder)
         assert others_in(folder) == [], f"continued after change {instant}"
         # Older results are kept until all that was asked for is there.
         left = [name for name in all_files(folder) if not name.startswith("studies/one-before")]
@@ -316,24 +313,6 @@ def test_in_the_quick_form_what_is_not_there_is_not_judged(tmp_path):
     assert found.count("not judged in the quick form") == 3  # deep, low, and an unseen figure
 
 
-def test_a_statement_without_a_verdict_says_what_it_is_about():
-    said = evaluate_checks([_costs, _unsaid_thing], {}, quick=True)
-    assert [one.words for one in said] == ["What it costs.", "unsaid thing"]
-    assert {one.verdict for one in said} == {NOT_IN_QUICK}
-
-
-def _costs(found):
-    """What it costs.
-
-    More of it.
-    """
-    raise KeyError("not there")
-
-
-def _unsaid_thing(found):
-    raise KeyError("not there")
-
-
 def test_the_page_holds_its_figures_and_escapes_words(folder):
     studies = entries(good=Toy(("high",)), bad=Toy(fails=True))
     states = run_studies(studies, folder, RunSettings())
@@ -377,7 +356,7 @@ def test_figures_that_are_asked_for_in_another_format_are_drawn_again(folder):
         session.folder.mkdir(exist_ok=True)
         return Both([])
 
-    studies = {"good": StudyEntry(study, continues=True)}
+    studies = {"good": StudyEntry(study)}
     for asked in (("png",), ("png", "pdf"), ("png", "pdf"), ("png",)):
         state = run_studies(studies, folder, RunSettings(formats=asked))["good"]
         formats.append((state.taken_over, (folder / "studies/good/view.pdf").is_file()))
@@ -398,7 +377,7 @@ def test_a_study_whose_figures_could_not_be_written_is_not_taken_over(folder):
         sessions.append(session)
         return results.pop(0)([])
 
-    studies = {"good": StudyEntry(study, continues=True)}
+    studies = {"good": StudyEntry(study)}
     first = run_studies(studies, folder, RunSettings())["good"]
     assert (first.status, first.error) == (
         "finished",

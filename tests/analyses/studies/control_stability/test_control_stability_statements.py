@@ -9,10 +9,11 @@ from cdpr_drake.analyses.reporting.statements import (
 )
 from cdpr_drake.analyses.studies.control_stability.statements import CHECKS
 from cdpr_drake.analyses.studies.control_stability.study import STUDY
-from cdpr_drake.analyses.studies.control_stability.tables import COARSE, FULL, SHARE
+from cdpr_drake.analyses.studies.control_stability.tables import SHARE
 from cdpr_drake.analyses.studies.framework.runs import Run, Runs
 from cdpr_drake.analyses.studies.framework.statement import MET_FITTED, judged
 from cdpr_drake.analyses.studies.framework.study import Form
+from cdpr_drake.analyses.studies.framework.summary import COARSE, FULL
 from cdpr_drake.analyses.studies.published.recipe_choices import chosen_on
 from cdpr_drake.analyses.studies.published.stability_tables import TABLES
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from dataclasses import replace
 
 import numpy as np
@@ -10,19 +11,38 @@ import pytest
 from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.reporting.progress import StudySession
-from cdpr_drake.analyses.studies.control_stability import all_recipes as together
-from cdpr_drake.analyses.studies.control_stability import exchanges
-from cdpr_drake.analyses.studies.control_stability import recipes as module
+from cdpr_drake.analyses.reporting.statements import NOT_IN_QUICK
 from cdpr_drake.analyses.studies.control_stability import study as original
+from cdpr_drake.analyses.studies.control_stability.all_recipes import STUDY as ALL
+from cdpr_drake.analyses.studies.control_stability.arrangements import ARRANGEMENTS
+from cdpr_drake.analyses.studies.control_stability.exchanges import (
+    PAIRS,
+    exchange_means,
+    other_rows,
+)
 from cdpr_drake.analyses.studies.control_stability.printed_limits import (
     covering_pairs,
+    excluded,
     nested_pairs,
     rising_rows,
 )
-from cdpr_drake.analyses.studies.control_stability.table_reasons import LimitRow, table_reasons
+from cdpr_drake.analyses.studies.control_stability.recipes import (
+    ANY_TARGET,
+    ARRANGED,
+    EXCHANGED,
+    ROW,
+    RULES,
+    difference,
+    recipe_study,
+)
+from cdpr_drake.analyses.studies.control_stability.table_reasons import table_reasons
+from cdpr_drake.analyses.studies.framework.runs import MissingRuns, Run, Runs
+from cdpr_drake.analyses.studies.framework.study import Case, Form
+from cdpr_drake.analyses.studies.framework.summary import COARSE
 from cdpr_drake.analyses.studies.published.recipe_variants import (
     EXCHANGE,
     IN_USE,
+    OTHER_ANCHORS,
     PRESENT,
     RECIPES,
     exchanged_anchors,
@@ -39,7 +59,6 @@ from cdpr_drake.geometry.cable_paths import cable_jacobian
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.stability.desired_view import OppositeCorner
 from cdpr_drake.stability.verdict import judge_stability
-from cdpr_drake.workspaces.pose_grid import grid_by_count
 from tests.messages import printed
 
 FULLY = "acrobot_fully_constrained"
@@ -114,15 +133,23 @@ def test_rows_of_one_bound_choose_the_exchange():
 
 
 def test_an_exchange_is_judged_by_the_rows_that_did_not_choose():
-    rows = tuple(
-        exchanges.ExchangeRow(name, value, printed, printed - apart)
-        for name, apart in (("none", 20.0), ("A2 A8", 3.0), ("A1 A2", 15.0))
+    apart = {"A2 A8": 3.0, "none": 20.0}
+    rows = [
+        Run(
+            f"{number} {value}", None,
+            {"question": EXCHANGED, "exchange": name, "value": value},
+            {"box_percent": printed - apart.get(name, 15.0)}, {"box_percent": f"{printed:g}"},
+        )
+        for number, name in enumerate(("A2 A8", "none", *map(str, range(2, len(PAIRS)))))
         for value, printed in A11.rows["r_bp"].items()
-    )
-    assert exchanges.exchange_means(rows) == pytest.approx({"A2 A8": 3.0, "A1 A2": 15, "none": 20})
-    with pytest.raises(KeyError):
-        exchanges.exchange_means(rows[:-1])
-    rest = exchanges.other_rows(_study_of(IN_USE, A11, {"r_bp": 0.0, "r_B": 90.0}))
+    ]  # fmt: skip
+    means = exchange_means(Runs(rows))
+    assert means["A2 A8"] == pytest.approx(3.0)
+    assert next(iter(means)) == "A2 A8"
+    assert next(reversed(means)) == "none"
+    with pytest.raises(MissingRuns):
+        exchange_means(Runs(rows[:-1]))
+    rest = other_rows(rows_of(A11, {"r_bp": 0.0, "r_B": 90.0}))
     assert len(rest) == A11.size - 6 - 5  # without r_bp, and the baseline of five bounds
     assert max(rest) == pytest.approx(90.0)  # r_B = 0.1 m prints 0
 
@@ -141,40 +168,57 @@ def test_recipes_differ_in_what_they_name():
     assert recipe_bounds(TABLES[1], "r_A", 0.1, independent).exits == "corners"
 
 
-@pytest.fixture
-def _short(monkeypatch):
-    table = replace(TABLES[0], rows={"r_bp": {0.03: 95.4, 0.1: 36.5}, "r_pc": {0.01: 95.4}})
-    monkeypatch.setattr(module, "TABLES", [table])
-    monkeypatch.setattr(module, "QUICK_TABLES", ("A.8",))
-    monkeypatch.setattr(module, "CHUNK", 20)
+def some_of(study, *asked, chunk=20):
+    """A study of the cases whose keys have one of some sets of values, each asked by itself."""
+
+    def cases(form):
+        found = [
+            case
+            for case in study.cases(form)
+            if any(where.items() <= case.keys.items() for where in asked)
+        ]
+        there = {case.name for case in found}
+        assert all(case.same_task in ("", *there) for case in found)
+        return found
+
+    return replace(study, cases=cases, chunk=chunk)
 
 
-@pytest.mark.usefixtures("_short")
+CHOOSING = {"table": "A.11", "bound": "r_bp"}
+
+
 def test_a_recipe_continues_and_gives_what_the_study_gives(tmp_path):
+    study = some_of(
+        recipe_study(IN_USE), CHOOSING, {"table": "A.11", "bound": "r_pc", "value": 0.01}
+    )
     asked = iter(range(3))
     session = StudySession(tmp_path / "r", should_stop=lambda: next(asked, None) is None, workers=1)
-    assert module.study_recipe(quick=True, session=session).interrupted
-    found = module.study_recipe(quick=True, session=StudySession(tmp_path / "r", workers=1))
+    assert study(quick=True, session=session).interrupted
+    found = study(quick=True, session=StudySession(tmp_path / "r", workers=1))
     assert found.progress.found > 0
-    assert [row.fitted for row in found.rows] == [True] * 3
-    assert found.rows[0].shares == found.rows[2].shares  # the baseline, computed once
-    assert np.isnan(found.difference("corners", fitted=False))
-    for row in found.rows:
-        assert row.shares["corners"] <= row.shares["cell hulls"] + 1e-9
-    grid = recipe_grid("planar", quick=True)
+    assert found.runs.list("fitted") == [True] * 7
+    baseline, again = found.runs.rows[0], found.runs.rows[-1]
+    assert baseline.measured == again.measured  # the baseline, computed once
+    assert found.cases[-1].same_task == found.cases[0].name
+    assert np.isnan(difference(found.runs, fitted=False))
+    for run in found.runs:
+        assert run["corners_percent"] <= run["cell_hulls_percent"] + 1e-9
+    grid = recipe_grid(FULLY, quick=True)
     task = original.VerdictsTask(
-        recipe_case("planar", "pbvs"), recipe_bounds(TABLES[0], "r_bp", 0.1), grid,
-        recipe_options("planar"),
-    )  # fmt: skip
-    keys = {"table": "A.8", "grid": original.COARSE}
-    case = original.Case(name="r_bp=0.1", keys=keys, data=grid.shape, items=grid.size)
+        recipe_case(FULLY, "pbvs"), recipe_bounds(A11, "r_bp", 0.1), grid, recipe_options(FULLY)
+    )
+    keys = {"table": "A.11", "grid": COARSE}
+    case = Case(name="r_bp=0.1", keys=keys, data=grid.shape, items=grid.size)
     row = original.stability_row(case, task(0, grid.size))
-    assert found.rows[1].shares["corners"] == pytest.approx(row["sampled_percent"], abs=1e-12)
+    [mine] = found.runs(bound="r_bp", value=0.1)
+    assert mine["corners_percent"] == pytest.approx(row["sampled_percent"], abs=1e-12)
     found.write(tmp_path)
     read = json.loads((tmp_path / "results.json").read_text())
-    assert read["recipe"]["name"] == IN_USE.name
-    assert set(read["mean_absolute_difference_points"]) == set(module.RULES)
-    assert found.tables()[0].row_count == 1
+    assert read["parameters"]["recipe"]["name"] == IN_USE.name
+    assert set(read["numbers"]["mean_absolute_difference_points"]) == set(RULES)
+    [table] = found.tables()
+    assert table.row_count == 1
+    assert str(table.caption).endswith("Coarse grid: the differences mean little.")
 
 
 @pytest.mark.parametrize(
@@ -239,72 +283,101 @@ def test_printed_rows_that_a_common_shift_of_exit_points_cannot_give():
     assert rising_rows(upwards) == [("r_bp", 0.1, 0.2)]
 
 
-def _study_of(recipe, table, shares):
-    """A study of a table with the shares given by bound, others as printed."""
-    rows = tuple(
-        module.RecipeRow(
-            table.name, bound, value, printed, False, {"corners": shares.get(bound, printed)}
-        )
-        for bound, rows in table.rows.items()
-        for value, printed in rows.items()
-    )
-    return module.RecipeStudy(recipe, False, (table,), rows, None)
+def rows_of(table, shares):
+    """Rows of a table with the shares given by bound, others as printed."""
+    return Runs(
+        [
+            Run(
+                f"{bound}={value:g}", None,
+                {"table": table.name, "bound": bound, "value": value},
+                {"corners_percent": shares.get(bound, printed)},
+                {"corners_percent": f"{printed:g}"},
+            )
+            for bound, rows in table.rows.items()
+            for value, printed in rows.items()
+        ]
+    )  # fmt: skip
+
+
+def limit(table, bound, value, printed, at_most, arrangement="present"):
+    """What any target leaves of a row."""
+    keys = {"table": table, "bound": bound, "value": value, "arrangement": arrangement}
+    words = {"at_most_percent": f"{printed:g}"}
+    return Run(f"{bound}={value:g}", None, keys, {"at_most_percent": at_most}, words)
 
 
 def test_a_table_is_explained_by_bounds_that_are_ruled_out_and_by_nothing_else():
     table = next(table for table in TABLES if table.name == "A.15")
-    [reason] = table_reasons(_study_of(IN_USE, table, {"r_A": 0.0, "r_B": 0.0}), [table], [])
+    [reason] = table_reasons(IN_USE, rows_of(table, {"r_A": 0.0, "r_B": 0.0}), Runs(()))
     assert set(reason.rows) == {"r_A"}  # from printed numbers alone
     assert not reason.explained
-    limits = [LimitRow("A.15", "r_B", 0.4, 64.0, 0.0), LimitRow("A.15", "r_B", 0.005, 94.0, 100.0)]
-    [reason] = table_reasons(_study_of(IN_USE, table, {"r_A": 0.0, "r_B": 0.0}), [table], limits)
+    limits = Runs([limit("A.15", "r_B", 0.4, 64.0, 0.0), limit("A.15", "r_B", 0.005, 94.0, 100.0)])
+    [reason] = table_reasons(IN_USE, rows_of(table, {"r_A": 0.0, "r_B": 0.0}), limits)
     assert reason.rows["r_B"] == "0.4 m prints 64.0, any target leaves 0.0"
     assert reason.explained
     assert reason.rest == 0.0
-    [reason] = table_reasons(_study_of(IN_USE, table, {"r_bp": 0.0}), [table], limits)
+    [reason] = table_reasons(IN_USE, rows_of(table, {"r_bp": 0.0}), limits)
     assert not reason.explained  # what is missed is another bound
-    assert table_reasons(_study_of(IN_USE, table, {}), [table], limits) == []
+    assert table_reasons(IN_USE, rows_of(table, {}), limits) == []
     # What other anchor points exclude does not count for the recipe's own.
-    limits = [LimitRow("A.11", "r_B", 0.05, 52.1, 0.0, "present")]
-    [reason] = table_reasons(_study_of(IN_USE, A11, {"r_B": 0.0, "r_A": 0.0}), [A11], limits)
+    limits = Runs([limit("A.11", "r_B", 0.05, 52.1, 0.0)])
+    [reason] = table_reasons(IN_USE, rows_of(A11, {"r_B": 0.0, "r_A": 0.0}), limits)
     assert reason.rows == {}
 
 
-@pytest.mark.usefixtures("_short")
-def test_all_recipes_are_one_study_and_rows_alike_are_computed_once(monkeypatch, tmp_path):
-    table = replace(module.TABLES[0], rows={"r_A": {0.005: 95.4}, "r_B": {0.005: 95.4}})
-    eleventh = replace(A11, rows={"r_A": {0.005: 97.0}, "r_B": {0.05: 52.1}})
-    monkeypatch.setattr(together, "TABLES", [table, eleventh])
-    monkeypatch.setattr(together, "QUICK_TABLES", ("A.8", "A.11"))
-    names = ("present", "other-corners-independent", "caroca-single")
-    monkeypatch.setattr(exchanges, "TABLE", replace(A11, rows={"r_bp": {0.03: 97.0}}))
-    monkeypatch.setattr(exchanges, "combinations", lambda *_: [(3, 5)])
-    monkeypatch.setattr(together, "RECIPES", {name: RECIPES[name] for name in names})
-    monkeypatch.setattr(together, "OTHER_ANCHORS", names[1:2])
-    monkeypatch.setattr(
-        together, "recipe_grid",
-        lambda *_: grid_by_count([-0.3, -0.3, 0.2], [0.3, 0.3, 0.8], [2, 2, 2]),
-    )  # fmt: skip
-    monkeypatch.setattr(module, "recipe_grid", together.recipe_grid)
-    monkeypatch.setattr(exchanges, "recipe_grid", together.recipe_grid)
-    found = together.study_recipes(quick=True, session=StudySession(tmp_path / "r", workers=1))
-    assert not found.interrupted
-    shares = {
-        name: [row.shares["corners"] for row in one.rows] for name, one in found.recipes.items()
+def test_all_recipes_are_one_study_and_rows_alike_are_computed_once():
+    cases = ALL.plan(Form(quick=True))
+    count = Counter(case.keys["question"] for case in cases)
+    limits = sum(len(A11.rows[bound]) for bound in ("r_A", "r_B"))
+    assert count == {
+        ROW: len(RECIPES) * A11.size,
+        ANY_TARGET: (1 + len(OTHER_ANCHORS)) * limits,
+        ARRANGED: len(ARRANGEMENTS),
+        EXCHANGED: len(PAIRS) * len(A11.rows["r_bp"]),
     }
-    assert shares["present"] == shares["caroca-single"]
-    # Two rows of A.8, two and two of A.11, of which the third recipe asks for none of its own;
-    # two limits of two arrangements; all arrangements at the baseline; an exchange and none.
-    assert found.progress.total == 8 * (2 + 4 + 4 + 32 + 2)
-    assert [row.exchange for row in found.exchanges] == ["none", "A4 A6"]
-    assert len(found.arrangements) == 32
-    assert {row.arrangement for row in found.limits} == set(names[:2])
+    first = {case.keys["recipe"]: case for case in cases if case.keys["question"] == ROW}
+    # On this robot the recipe asks what `present` does, and so computes nothing.
+    mine = [case for case in cases if case.keys.get("recipe") == "caroca-single"]
+    assert all(case.same_task.startswith("present A.11") for case in mine)
+    assert set(first) == set(RECIPES)
+
+
+def test_the_full_form_has_every_row_by_every_recipe():
+    cases = ALL.plan(Form())
+    rows = Counter(case.keys["recipe"] for case in cases if case.keys["question"] == ROW)
+    assert rows == dict.fromkeys(RECIPES, 468)
+    limits = [case for case in cases if case.keys["question"] == ANY_TARGET]
+    assert "A.8" not in {case.keys["table"] for case in limits}
+    # What any target leaves is the same for every scheme.
+    assert {case.keys["table"] for case in limits if case.task} == {"A.9", "A.10", "A.11", "A.12"}
+
+
+def test_what_recipes_are_held_against_is_computed_and_told(tmp_path):
+    names = ("present", "other-corners-independent")
+    found = some_of(
+        ALL,
+        *({"question": ROW, "recipe": name, "bound": "r_A", "value": 0.005} for name in names),
+        {"question": ANY_TARGET, "bound": "r_B", "value": 0.05},
+        {"question": ARRANGED, "anchors": "upper, opposite; other x"},
+        {"question": EXCHANGED, "exchange": "none", "value": 0.03},
+        chunk=2000,
+    )(quick=True, session=StudySession(workers=1))
+    assert not found.interrupted
     # Half a decimetre at each anchor point leaves no pose of the other arrangement.
-    excluded = {row.arrangement for row in found.limits if row.excluded and row.bound == "r_B"}
-    assert names[1] in excluded
+    limits = found.runs(question=ANY_TARGET)
+    assert names[1] in {run["arrangement"] for run in limits if excluded(run)}
+    assert all(0.0 <= run["box_percent"] <= 100.0 for run in found.runs(question=EXCHANGED))
     assert [statement.name for statement in found.statements] == [
         "best_recipe", "unseen_rows", "reasons", "spheres", "shifts", "common_exits", "rising",
         "points_together", "anchor_points", "exchanged_cables",
     ]  # fmt: skip
-    assert found.tables()[0].row_count == len(names) + 1
-    assert json.loads(json.dumps(found.as_dict()))["nested_rows"] == []  # no r_bp
+    judged = {one.name for one in found.statements if one.verdict != NOT_IN_QUICK}
+    assert judged == {"shifts", "common_exits", "rising"}  # from printed numbers alone
+    tables = found.tables()
+    assert tables[0].row_count == len(names) + 1
+    assert {"Coarse grid" in str(tables[number].caption) for number in (0, 1, 2, 3, 5)} == {True}
+    assert "Coarse grid" not in str(tables[4].caption)  # nor is a grid in it
+    found.write(tmp_path)
+    told = json.loads((tmp_path / "results.json").read_text())
+    assert {pair["table"] for pair in told["numbers"]["nested_rows"]} >= {"A.15", "A.18"}
+    assert len((tmp_path / "runs.csv").read_text().splitlines()) == len(found.runs) + 1

@@ -14,7 +14,6 @@ from cdpr_drake.analyses.reporting.progress import StudySession, WorkProgress
 from cdpr_drake.analyses.studies.control_stability import study as module
 from cdpr_drake.analyses.studies.control_stability.study import STUDY
 from cdpr_drake.analyses.studies.control_stability.tables import (
-    FULL,
     SHARE,
     mean_difference,
     rows_of,
@@ -22,6 +21,7 @@ from cdpr_drake.analyses.studies.control_stability.tables import (
 )
 from cdpr_drake.analyses.studies.framework.runs import Run, Runs
 from cdpr_drake.analyses.studies.framework.study import Study, StudyResult
+from cdpr_drake.analyses.studies.framework.summary import FULL
 from cdpr_drake.analyses.studies.published.stability_recipe import (
     recipe_bounds,
     recipe_case,
@@ -120,7 +120,7 @@ def of_tables(*names: str) -> Study:
     """The study of some tables."""
     some = [table for table in TABLES if table.name in names]
     return replace(
-        STUDY, cases=lambda form: [one for t in some for one in module.table_cases(t, form.quick)]
+        STUDY, cases=lambda form: [one for t in some for one in module.table_cases(t, form)]
     )
 
 

@@ -155,6 +155,12 @@ def test_what_traces_do_not_have_is_not_drawn(result, name):
         case_figures(plan)[name](result[0].runs)
 
 
+def test_bars_of_what_no_run_measures_are_no_failure(result):
+    bare = [replace(run, measured={"outcome": run["outcome"]}) for run in result[0].runs]
+    with pytest.raises(NothingToDraw):
+        case_figures(SHORT.cases)["estimates"](Runs(bare))
+
+
 def test_results_are_written(result):
     found, folder, _ = result
     stored = json.loads((folder / "results.json").read_text())

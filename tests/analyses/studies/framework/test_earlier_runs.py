@@ -139,12 +139,12 @@ def test_the_front_door_refuses_before_anything_is_written(earlier, tmp_path):
 
 
 def test_a_reproduction_says_whose_runs_a_study_has(tmp_path, monkeypatch):
-    entries = {"tiny": StudyEntry(UNTIMED, continues=True)}
+    entries = {"tiny": StudyEntry(UNTIMED)}
     lines = []
     monkeypatch.setattr(frame, "code_version", lambda: OLD)
     run_studies(entries, made(tmp_path / "before"), RunSettings(workers=1))
     monkeypatch.setattr(frame, "code_version", lambda: NEW)
-    entries["lacking"] = StudyEntry(replace(UNTIMED, name="lacking"), continues=True)
+    entries["lacking"] = StudyEntry(replace(UNTIMED, name="lacking"))
     settings = RunSettings(workers=1, say=lines.append, runs_from=tmp_path / "before")
     states = run_studies(entries, made(tmp_path / "after"), settings)
     assert states["tiny"].note == f"runs that earlier code computed: 4 of 4 by {OLD}"

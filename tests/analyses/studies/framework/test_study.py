@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -189,6 +190,16 @@ def test_runs_are_picked_and_reduced():
     assert {size: len(some) for size, some in runs.by("size")} == {"small": 3, "large": 3, "few": 1}
 
 
+def test_means_by_the_values_of_a_key():
+    runs = run().runs
+    means = runs.means("peak_m", size=("large", "small"))
+    assert means.tolist() == [runs.mean("peak_m", size=size) for size in ("large", "small")]
+    with pytest.raises(UnknownName, match="did you mean"):
+        runs.means("peak_m", size=("large", "smal"))
+    with pytest.raises(MissingRuns):
+        run(quick=True).runs.means("peak_m", size=("small", "few"))
+
+
 @pytest.mark.parametrize(
     "where", [{"size": "smal"}, {"siz": "small"}, {"size": "small", "los": True}]
 )
@@ -309,9 +320,52 @@ def test_the_table_of_statements_parts_rule_and_why():
     assert list(table.columns[-1].cells) == ["each run; it is heavier"]
 
 
-def test_figures_of_runs_that_lack_are_left_out(tmp_path):
-    assert run(quick=True).write(tmp_path) == {}
+def lacking(runs):
+    """Asks for what no form has."""
+    raise MissingRuns("size huge")
+
+
+def left_out(folder):
+    return json.loads((folder / "results.json").read_text())["left_out"]
+
+
+def test_figures_and_tables_of_runs_that_lack_are_left_out_of_the_quick_form_and_named(tmp_path):
+    quick = run(quick=True, tables=[*STUDY.tables, lacking])
+    assert quick.write(tmp_path) == {}
     assert {path.name for path in tmp_path.glob("*.png")} == {"all.png"}
+    assert left_out(tmp_path) == {
+        "figures": {"few": "runs are missing: size few"},
+        "tables": {"lacking": "runs are missing: size huge"},
+    }
+    assert [table.title for table in quick.tables()] == ["Peaks", STUDY.stated]
+
+
+def test_figures_and_tables_of_runs_that_lack_in_a_whole_full_form_are_failures(tmp_path):
+    whole = run(figures={"odd": lacking}, tables=[lacking, partial(lacking), *STUDY.tables])
+    assert whole.write(tmp_path, ("png", "svg")) == dict.fromkeys(
+        ("odd.png", "odd.svg"), "runs are missing: size huge"
+    )
+    assert not list(tmp_path.glob("odd*"))
+    assert left_out(tmp_path)["figures"] == {"odd": "runs are missing: size huge"}
+    first, second, *others = whole.tables()
+    for table in (first, second):
+        assert table.title == "lacking"
+        assert [list(column.cells) for column in table.columns] == [["runs are missing: size huge"]]
+    assert [table.title for table in others] == ["Peaks", STUDY.stated]
+
+
+def test_a_stopped_full_form_has_no_failures(tmp_path):
+    asked = iter([False] * 2 + [True] * 100)
+    session = StudySession(workers=1, should_stop=lambda: next(asked))
+    stopped = run(session=session, figures={"odd": lacking}, tables=[lacking])
+    assert stopped.write(tmp_path) == {}
+    assert set(left_out(tmp_path)["figures"]) == {"odd"}
+    assert len(stopped.tables()) == len(stopped.statements[:1])
+
+
+def test_a_whole_study_leaves_nothing_out(tmp_path):
+    assert run().write(tmp_path) == {}
+    assert left_out(tmp_path) == {"figures": {}, "tables": {}}
 
 
 def test_a_stopped_study_continues_to_the_same_bytes(tmp_path):
@@ -355,7 +409,29 @@ def test_names_of_cases_are_unique_and_files():
             cases_of.plan(Form())
 
 
-def test_a_frame_for_those_who_have_pandas(monkeypatch):
+def test_without_pandas_a_frame_is_refused_with_the_file_that_has_the_same(monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "pandas", None)
     with pytest.raises(ImportError, match=r"runs\.csv"):
         Runs([Run("a", None, {}, {"x": 1.0})]).frame()
+
+
+def test_a_frame_for_those_who_have_pandas(tmp_path):
+    """It has the rows of the file: numbers, words, truth values, nothing for None, no arrays."""
+    pd = pytest.importorskip("pandas")
+    runs = run().runs
+    frame = runs.frame()
+    assert len(frame) == len(runs)
+    assert list(frame.columns) == [
+        "case", "size", "kind", "seed", "peak_m", "lost", "outcome", "nothing", "parts", "value",
+    ]  # fmt: skip
+    small = frame[frame["size"] == "small"]
+    np.testing.assert_array_equal(small["peak_m"].to_numpy(), runs(size="small")["peak_m"])
+    assert small["lost"].tolist() == [False, True, False]
+    assert small["nothing"].isna().tolist() == [True, False, False]
+    assert frame.groupby("size")["peak_m"].mean()["large"] == runs.mean("peak_m", size="large")
+    assert frame["value"].dropna().tolist() == [285.0, 81.0]
+    runs.write_csv(tmp_path / "runs.csv")
+    read = pd.read_csv(tmp_path / "runs.csv")
+    assert list(read.columns) == list(frame.columns)
+    for column in ("case", "peak_m", "value"):
+        pd.testing.assert_series_equal(read[column], frame[column], check_dtype=False)
