@@ -8,6 +8,7 @@ from cdpr_drake.analyses.studies.case_studies.case_1_ends import (
     ENDS,
     FACTOR,
     LENGTHS,
+    POINTS,
     TO_GOAL,
     accuracy_figure,
     met,
@@ -92,6 +93,7 @@ FOLLOWING = (
     "controller.lambda_0=2",
     "controller.lambda_infinity=2",
     f"duration={MOVING_TIME:g}",
+    *POINTS,
     _lap(),
 )
 """The platform stays above an object that runs on an ellipse, and never arrives."""
