@@ -102,6 +102,7 @@ MODULES = {
     "case-9-torque": "tension_cases.case_9_torque",
     "case-10": "tension_cases.case_10",
     "tension-tracking": "tension_cases.tension_tracking",
+    "image-width": "image_width",
 }
 """Modules of this room by study, in the order in which the command line lists them.
 

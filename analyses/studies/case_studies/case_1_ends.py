@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from cdpr_drake.analyses.studies.framework.case_definition import Configuration
+from cdpr_drake.analyses.studies.framework.experiments import wrong_points
 from cdpr_drake.analyses.studies.framework.runs import MissingRuns, Run, Runs
 from cdpr_drake.analyses.studies.framework.statement import (
     CHOICE,
@@ -39,7 +40,7 @@ TO_GOAL = "one goal"
 GOAL_KEYS = ("1", "2", "3", "4", "5", "6")
 """Estimators of its runs with PBVS, five runs each, thirty in all."""
 
-POINTS = ("perturbations.exit_points=0.005", "perturbations.anchor_points=0.005")
+POINTS = wrong_points()
 """What the model has wrong in section 2.3.1, for both controllers."""
 
 BLIND = "open_loop={waypoints: [{pose: {position: [0.284, -0.197, 0.08]}, duration: 10}]}"

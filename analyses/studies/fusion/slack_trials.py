@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from cdpr_drake.analyses.simulation.visual_servo_run import RunResult, run_scenario
+from cdpr_drake.analyses.studies.framework.experiments import wrong_points
 from cdpr_drake.analyses.studies.framework.study import Case
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CableGeometryError
@@ -42,8 +43,7 @@ POINTS, NOISE = 15, 0.5
 
 WRONG = (
     "perturbations.initial_pose_shift={distance: 0.002, angle_deg: 0.2}",
-    "perturbations.exit_points=0.002",
-    "perturbations.anchor_points=0.001",
+    *wrong_points(),
 )
 """What is believed wrongly, as in case study IX."""
 

@@ -1,7 +1,9 @@
-"""What the study runs: estimators, correction or none, and what is not printed, three values."""
+"""What the study runs: estimators, correction or none, what is not printed at three values, and the
+tag at other distances and sizes."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 from cdpr_drake.analyses.studies.framework.study import Case, Form
@@ -58,6 +60,27 @@ VARIED: dict[str, tuple[str, tuple[str, ...], float]] = {
 }
 """What is not printed, less and more than chosen: words, changes, friction."""
 
+CHOSEN_VIEW = (0.30, 0.06)
+"""Distance and edge of the tag in the scenario [m]."""
+
+VIEWS: dict[str, tuple[float, float]] = {
+    "view 0.20 m, 60 mm": (0.20, 0.06),
+    "view 0.20 m, 90 mm": (0.20, 0.09),
+    "view 0.16 m, 30 mm": (0.16, 0.03),
+    "view 0.16 m, 60 mm": (0.16, 0.06),
+}
+"""Distance and edge of the tag [m], neither of which is printed: 0.16 m is that of case study I,
+0.20 m the nearest at which the lens focuses, table A.4."""
+
+VIEWED_ESTIMATORS = ("control_integration", *VARIED_ESTIMATORS)
+"""Estimators that follow the tag in other views."""
+
+VIEW_ANGLE = 59.4
+"""Angle of view along the image's short side [deg]. Source: table A.4."""
+
+BELOW = 0.04
+"""Height of the platform's origin above the tag, less the camera's distance [m]: with that of the
+scenario, 0.34 m above the ground and 0.30 m above the tag, the run begins near the tag's middle."""
 
 PLAIN_RUN, CORRECTED = "plain", "corrected"
 """Names of the configurations with a known tag, as chosen."""
@@ -89,6 +112,32 @@ def cases(form: Form) -> Iterator[Case]:
             some = (*changes, *_estimator(kind))
             label = f"{words}, estimator {NUMBERS[kind]}"
             yield _case(f"{name}, estimator {kind}", label, ESTIMATOR_LAPS, some, friction)
+    for name, (distance, edge) in VIEWS.items():
+        for kind in VIEWED_ESTIMATORS:
+            some = (*view_changes(distance, edge), *_estimator(kind))
+            label = f"{name}, estimator {NUMBERS[kind]}"
+            yield _case(f"{name}, estimator {kind}", label, ESTIMATOR_LAPS, some)
+
+
+def view_margin(distance: float, edge: float) -> float:
+    """How far a tag in the middle of the image may go along its short side until a corner leaves it
+    [m].
+
+    Args:
+        distance: Of the tag from the camera [m].
+        edge: Of the tag, parallel to the image [m].
+    """
+    return distance * math.tan(math.radians(VIEW_ANGLE / 2.0)) - edge / 2.0
+
+
+def view_changes(distance: float, edge: float) -> tuple[str, ...]:
+    """Items for a tag of an edge that is followed at a distance [m]; the tag keeps its height, the
+    platform begins and stays higher or lower."""
+    return (
+        f"target.size={edge:g}",
+        f"desired={{position: [0, 0, {distance:g}], angles_deg: [180, 0, 180]}}",
+        f"initial_pose={{position: [0.0, -0.08, {distance + BELOW:g}]}}",
+    )
 
 
 def _estimator(kind: str) -> tuple[str, ...]:

@@ -17,8 +17,11 @@ from cdpr_drake.analyses.studies.mobile_robot.configurations import (
     PUBLISHED_LAPS,
     PUBLISHED_PLAIN,
     VARIED_ESTIMATORS,
+    VIEWED_ESTIMATORS,
+    VIEWS,
 )
 from cdpr_drake.analyses.studies.mobile_robot.laps import FREE, PHASES, SHOWN
+from cdpr_drake.analyses.studies.mobile_robot.view_statements import view_prefixes
 from cdpr_drake.analyses.visualization.figure_style import (
     bar_style,
     line_style,
@@ -46,7 +49,11 @@ def choices_figure(runs: Runs) -> Figure:
     Raises:
         MissingRuns: None was run.
     """
-    there = dict(runs.by("configuration"))
+    there = {
+        name: some
+        for name, some in runs.by("configuration")
+        if name.partition(", ")[0] not in VIEWS
+    }
     if not set(there) - set(PUBLISHED):
         raise MissingRuns("other choices")
     figure, axes = new_figure(2, 1, (10.0, 13.0), "What is not printed, three values")
@@ -58,6 +65,45 @@ def choices_figure(runs: Runs) -> Figure:
         shown = {name: some for name, some in there.items() if name.endswith(tuple(names))}
         _draw_choices(one, shown, names)
         one.set_title(title, loc="right")
+    return figure
+
+
+def views_figure(runs: Runs) -> Figure:
+    """Laps until the end over how far the tag may drift in the image, by estimator.
+
+    Raises:
+        MissingRuns: No other view was run.
+    """
+    views = view_prefixes()
+    names = [f"{prefix}estimator {VIEWED_ESTIMATORS[0]}" for prefix, _ in views.values()]
+    if not all(runs.has(configuration=name) for name in names):
+        raise MissingRuns("other views")
+    figure, axes = new_figure(1, 1, (9.0, 6.0), "How long the tag is followed, by its view")
+    for number, kind in enumerate(VIEWED_ESTIMATORS):
+        look = nth_look(number)
+        points = [
+            (1e3 * margin, runs(configuration=f"{prefix}estimator {kind}")["laps_done"])
+            for prefix, margin in views.values()
+        ]
+        axes.plot([x for x, _ in points], [np.median(ends) for _, ends in points],
+                  marker=look.marker, label=f"estimator {NUMBERS[kind]}, median",
+                  **line_style(look))  # fmt: skip
+        for x, ends in points:
+            axes.plot(np.full(len(ends), x), ends, linestyle="", marker="x", color=look.color,
+                      markersize=4)  # fmt: skip
+        axes.axhline(PUBLISHED_LAPS[kind], linewidth=0.8, linestyle=":", color=look.color)
+        axes.annotate(
+            f"published, estimator {NUMBERS[kind]}",
+            (1.0, PUBLISHED_LAPS[kind]),
+            xycoords=("axes fraction", "data"),
+            ha="right",
+            va="bottom",
+            fontsize=8,
+        )
+    axes.set(xlabel="margin of the tag along the image's short side [mm]", yscale="log",
+             ylabel="laps until tracking ends, or the run does (crosses: each run)")  # fmt: skip
+    plain_numbers(axes.yaxis)
+    axes.legend(loc="best")
     return figure
 
 

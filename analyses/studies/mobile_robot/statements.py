@@ -112,7 +112,8 @@ def integration_lasts(runs: Runs) -> Finding:
         some=longer(first, max(medians.values())),
         why="Medians; inf: most runs did not fail. Winches run off as was fitted to the drift of "
         "control integration, and encoders see that: estimates by lengths keep what integration "
-        "loses. What made them fail within 4 laps is not printed, see the choices.",
+        "loses. What made them fail within 4 laps is not printed; of size and distance of the tag "
+        "see view_decides, of other choices lengths_depend.",
     )
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from cdpr_drake.analyses.studies.framework.case_definition import Configuration, Plan
 from cdpr_drake.analyses.studies.framework.case_run import OwnMetric
 from cdpr_drake.analyses.studies.framework.case_study import configuration_study
+from cdpr_drake.analyses.studies.framework.experiments import wrong_points
 from cdpr_drake.analyses.studies.framework.runs import Runs
 from cdpr_drake.analyses.studies.framework.statement import OURS, Check, Finding, statement
 from cdpr_drake.analyses.studies.tension_cases.slack_metrics import (
@@ -236,8 +237,7 @@ STUDY = configuration_study(
         scenario="acrobot_torque_servo",
         changes=(
             "perturbations.initial_pose_shift={distance: 0.02, angle_deg: 1.5}",
-            "perturbations.exit_points=0.002",
-            "perturbations.anchor_points=0.001",
+            *wrong_points(),
             "integration.engine=compiled",
             "duration=14",
         ),

@@ -13,6 +13,9 @@ from cdpr_drake.analyses.studies.mobile_robot.configurations import (
     PUBLISHED_LAPS,
     VARIED,
     VARIED_ESTIMATORS,
+    VIEWED_ESTIMATORS,
+    VIEWS,
+    view_margin,
 )
 from cdpr_drake.analyses.studies.mobile_robot.laps import (
     PHASES,
@@ -26,6 +29,7 @@ from cdpr_drake.analyses.studies.mobile_robot.study import STUDY
 from cdpr_drake.cli.app import main
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.diagrams.visual_servo import build_visual_servo
 from tests.messages import printed
 
 LOCAL = StudySession(workers=1, seeds=1)
@@ -52,7 +56,7 @@ def test_the_quick_form_follows_for_two_laps_and_is_written(quick):
         assert run["seen"][1] == 1.0
     result.write(folder)
     drawn = {path.stem for path in folder.glob("*.png")}
-    assert drawn == set(STUDY.figures) - {"choices"}
+    assert drawn == set(STUDY.figures) - {"choices", "views"}
     stored = json.loads((folder / "results.json").read_text())
     assert "lap_time" in stored["parameters"]["scenario"]
     assert stored["numbers"]["plain"]["most_slack"] >= 0.0
@@ -66,7 +70,7 @@ def test_the_quick_form_follows_for_two_laps_and_is_written(quick):
 
 def test_every_configuration_is_a_scenario_that_is_accepted(tmp_path):
     full = STUDY.plan(Form())
-    assert len(full) == len(PUBLISHED_LAPS) + 2 + 4 * len(VARIED)
+    assert len(full) == len(PUBLISHED_LAPS) + 2 + 4 * len(VARIED) + 3 * len(VIEWS)
     for case in full:
         load_scenario("acrobot_mobile_robot", case.changes)
     file = with_friction(tmp_path, 3.0)
@@ -120,6 +124,10 @@ def published():
         rows[f"{name}, plain"], rows[f"{name}, corrected"] = made_up(60, 20), made_up(60)
         for kind in VARIED_ESTIMATORS:
             rows[f"{name}, estimator {kind}"] = made_up(30, PUBLISHED_LAPS[kind])
+    for name, view in VIEWS.items():
+        for kind in VIEWED_ESTIMATORS:
+            share = view_margin(*view) / view_margin(0.30, 0.06)
+            rows[f"{name}, estimator {kind}"] = made_up(30, share * PUBLISHED_LAPS[kind])
     return rows
 
 
@@ -130,7 +138,7 @@ FITTED = {"estimators", "integration_lasts", "drift", "lengths", "noticed_early"
 def test_what_is_published_is_confirmed_and_its_contrary_is_not():
     rows = published()
     said = {one.name: one.verdict for one in statements(rows)}
-    assert len(said) == 25
+    assert len(said) == 26
     assert {name for name, verdict in said.items() if verdict == "met (fitted)"} == FITTED
     assert {said[name] for name in said.keys() - FITTED} == {"confirmed"}
 
@@ -143,6 +151,9 @@ def test_what_is_published_is_confirmed_and_its_contrary_is_not():
         rows[f"{name}, corrected"] = made_up(60, 20)
         for kind in VARIED_ESTIMATORS:
             rows[f"{name}, estimator {kind}"] = made_up(30)
+    for name in VIEWS:
+        for kind in VIEWED_ESTIMATORS:
+            rows[f"{name}, estimator {kind}"] = made_up(30, 20)
     said = {one.name: (one.verdict, one.found) for one in statements(rows)}
     lacking = {name for name, (_, found) in said.items() if found.startswith("runs are missing")}
     assert lacking == {"fails_far_off", "spikes_by_slack", "corners", "last_seconds"}
@@ -169,6 +180,24 @@ def test_corners_phases_and_times():
     times, beyond = np.arange(5.0), np.array([False, True, True, False, True])
     assert times_beyond(times, beyond).tolist() == [0.0, 1.0, 2.0, 0.0, 1.0]
     assert times_beyond(times, np.ones(5, bool))[-1] == 4.0
+
+
+def test_margin_of_a_view_is_where_its_corner_leaves_the_image():
+    distance, edge = 0.2, 0.06
+    servo = build_visual_servo(load_scenario("acrobot_mobile_robot", ["camera.kind=projected"]))
+    margin, pinhole = view_margin(distance, edge), servo.pinhole
+    corner = np.array([[0.0], [margin + edge / 2.0], [distance]])
+    assert pinhole.project(corner)[1, 0] == pytest.approx(pinhole.height, rel=0.01)
+    assert view_margin(0.2, 0.09) < margin < view_margin(0.3, 0.06)
+
+
+def test_views_without_an_effect_are_not_confirmed():
+    rows = published()
+    for name in VIEWS:
+        rows[f"{name}, estimator control_integration"] = made_up(30, 12)
+    said = {one.name: one for one in statements(rows)}
+    assert said["view_decides"].verdict == "in part"  # the laps agree, and no view changes them
+    assert (said["view_decides"].held, said["view_decides"].of) == (1, 2)
 
 
 def test_words_and_rises():
