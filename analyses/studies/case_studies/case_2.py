@@ -48,6 +48,7 @@ _accuracy = same_accuracy(("none", "within", "beyond"), "figures 3.31a and 3.31c
     "is the same in both cases.",
     "figure 3.31",
     rule="What is judged is that the error without camera is more than five times that",
+    cause=SOURCE,
 )
 def _camera_pays(runs: Runs) -> Finding:
     errors = [1e3 * runs.means("position_error_m", configuration=pair) for pair in PAIRS]
@@ -105,6 +106,7 @@ def _focus(zoom: str) -> tuple[str, str]:
     "its auto-focus appears to contribute most.",
     "section 3.4.1, figure 3.28a",
     rule=f"Not straight: {CROOKED:g} times the distance of exact runs",
+    cause=SOURCE,
 )
 def existing_bend(runs: Runs) -> Finding:
     """What bends the path without added perturbation."""
@@ -130,6 +132,8 @@ STUDY = configuration_study(
     Plan(
         name="case-2",
         title="PBVS on ACROBOT",
+        why="Directions of the perturbations are not printed and drawn for each run.",
+        cause=SOURCE,
         scenario="acrobot_pbvs",
         changes=(*SETUP, MODEL, PULLEYS),
         configurations=(

@@ -14,19 +14,31 @@ from cdpr_drake.analyses.studies.framework.case_run import converged, outcomes
 from cdpr_drake.analyses.studies.framework.case_statements import same_accuracy
 from cdpr_drake.analyses.studies.framework.case_study import configuration_study
 from cdpr_drake.analyses.studies.framework.runs import Runs
-from cdpr_drake.analyses.studies.framework.statement import Finding, statement
+from cdpr_drake.analyses.studies.framework.statement import HARDWARE, Finding, statement
 
 HYBRID = ("controller.scheme=2.5d",)
+
+
+STRAIGHTER = 0.9
+"""A path is straighter that is off its line by at most this share of the other's distance: means of
+runs differ by some per cent with the seeds."""
 
 
 @statement(
     "Without perturbation, the path in the image is straighter than with PBVS.",
     "figures 3.36a and 3.39a",
+    rule=f"its largest distance from the line at most {STRAIGHTER:g} of that with PBVS; in part: "
+    "less than that",
+    cause=HARDWARE,
+    why="What bends both paths of the prototype is what its controller does not know: pulleys, sag "
+    "and a first pose measured by hand; what of it there was is not printed.",
 )
 def _straighter(runs: Runs) -> Finding:
     hybrid, pose = (runs.mean("image_max_px", configuration=name) for name in ("none", "pbvs"))
     return Finding(
-        found=f"largest distance {hybrid:.1f} px, PBVS {pose:.1f} px", held=[hybrid < pose]
+        found=f"largest distance {hybrid:.1f} px, PBVS {pose:.1f} px",
+        held=[hybrid <= STRAIGHTER * pose],
+        some=hybrid < pose,
     )
 
 

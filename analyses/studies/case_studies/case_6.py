@@ -61,7 +61,12 @@ def _shifted(name: str, distance: float, angle_deg: float, outcome: str) -> Conf
     )
 
 
-@statement("IBVS ends its task under the perturbations of E1 to E3.", "figures 3.41 to 3.44")
+@statement(
+    "IBVS ends its task under the perturbations of E1 to E3.",
+    "figures 3.41 to 3.44",
+    cause=SOURCE,
+    why="Directions of the perturbations are not printed and drawn for each run.",
+)
 def _tolerates(runs: Runs) -> Finding:
     good = [converged(runs, name) for name in NAMES[:3]]
     return Finding(
@@ -82,7 +87,12 @@ def _not_all(runs: Runs) -> Finding:
     )
 
 
-@statement("The larger the perturbation, the more the paths curve.", "figure 3.41")
+@statement(
+    "The larger the perturbation, the more the paths curve.",
+    "figure 3.41",
+    cause=SOURCE,
+    why="Directions of the perturbations are not printed and drawn for each run.",
+)
 def _curved(runs: Runs) -> Finding:
     image = runs.means("image_max_px", configuration=NAMES)
     return Finding(
@@ -101,6 +111,8 @@ STUDY = configuration_study(
     Plan(
         name="case-6",
         title="IBVS on ACROBOT",
+        why="Directions of the perturbations are not printed and drawn for each run.",
+        cause=SOURCE,
         scenario="acrobot_pbvs",
         changes=(*SETUP, PULLEYS),
         configurations=(

@@ -28,7 +28,13 @@ from cdpr_drake.analyses.studies.closed_loops.loops import (
     stable_starts,
 )
 from cdpr_drake.analyses.studies.framework.runs import MissingRuns, Runs
-from cdpr_drake.analyses.studies.framework.statement import OURS, Check, Finding, statement
+from cdpr_drake.analyses.studies.framework.statement import (
+    OURS,
+    SOURCE,
+    Check,
+    Finding,
+    statement,
+)
 from cdpr_drake.analyses.studies.framework.study import Case, Form, Study
 from cdpr_drake.analyses.studies.framework.summary import Cell, Summary
 from cdpr_drake.models.robot_loader import load_robot
@@ -154,6 +160,7 @@ def _reached(scheme: str) -> Check:
         name="reached",
         source="servoing thesis (3.27), 3.4",
         rule="every loop of each mode converges; in part: all whose way stays inside do",
+        cause=SOURCE,
     )
     def check(runs: Runs) -> Finding:
         """(3.27), of loops whose way stays inside, and of all."""

@@ -16,7 +16,13 @@ from cdpr_drake.analyses.studies.control_stability.tables import (
     rows_of,
 )
 from cdpr_drake.analyses.studies.framework.runs import MissingRuns, Runs
-from cdpr_drake.analyses.studies.framework.statement import FITTED, Check, Finding, statement
+from cdpr_drake.analyses.studies.framework.statement import (
+    FITTED,
+    SOURCE,
+    Check,
+    Finding,
+    statement,
+)
 from cdpr_drake.analyses.studies.framework.summary import FULL
 from cdpr_drake.analyses.studies.published.recipe_choices import chosen_on
 from cdpr_drake.analyses.studies.published.stability_tables import TABLES, PublishedTable
@@ -28,6 +34,12 @@ SAME = 5.0
 """Shares that differ by less are the same [points]."""
 
 VERDICT = "sampled"
+
+UNPRINTED = (
+    "The servo's target and how errors were drawn are not printed; the recipe in use was chosen on "
+    "some rows of the tables."
+)
+"""Why a share may be another one."""
 
 
 def share(runs: Runs, name: str, bound: str, value: float) -> float:
@@ -52,19 +64,30 @@ def common(runs: Runs, one: str, other: str, bound: str) -> list[tuple[float, fl
     return [(v, share(runs, one, bound, v), share(runs, other, bound, v)) for v in values]
 
 
+def telling_bounds(table: PublishedTable) -> list[str]:
+    """Bounds whose printed shares differ from the first by more than `MET` in the mean: rows of the
+    others are met by any recipe that meets the baseline."""
+    return [
+        bound
+        for bound, rows in table.rows.items()
+        if np.mean([abs(share - next(iter(rows.values()))) for share in rows.values()]) > MET
+    ]
+
+
 def _table_check(table: PublishedTable) -> Check:
     @statement(
         f"Table {table.title}, {table.size} rows.",
         f"{table.size} shares of {table.full:g} {'m^2' if table.name == 'A.8' else 'm^3'}",
         name="table_" + table.name.replace(".", "").lower(),
-        rule=f"mean absolute difference of at most {MET:g} points over all rows; in part: for "
-        "some bounds",
+        rule=f"mean absolute difference of at most {MET:g} points over all rows; in part: over "
+        "those of a bound that changes printed shares by more",
         basis=FITTED,
+        cause=SOURCE,
     )
     def check(runs: Runs) -> Finding:
         rows = rows_of(table, runs(grid=FULL, table=table.name))
-        if not len(rows):
-            raise MissingRuns(table.name)
+        if len(rows) < table.size:
+            raise MissingRuns(f"{table.size - len(rows)} rows of {table.name}")
         by_bound = {bound: mean_difference(some, VERDICT) for bound, some in rows.by("bound")}
         whole = mean_difference(rows, VERDICT)
         worst = max(rows, key=lambda run: abs(run[f"{VERDICT}_percent"] - published(run)))
@@ -79,9 +102,9 @@ def _table_check(table: PublishedTable) -> Check:
             + ", ".join(f"{bound} {value:.1f}" for bound, value in by_bound.items())
             + f"; largest at {worst['bound']} = {worst['value']:g}: "
             f"{worst[f'{VERDICT}_percent']:.1f} instead of {published(worst):.1f} %",
-            held=[whole <= MET, len(rows) == table.size],
-            some=any(value <= MET for value in by_bound.values()),
-            why=f"Of the recipe: {'; '.join(parts)}.",
+            held=[whole <= MET],
+            some=any(by_bound[bound] <= MET for bound in telling_bounds(table)),
+            why=f"Of the recipe: {'; '.join(parts)}. {UNPRINTED}",
         )
 
     return check
@@ -93,6 +116,7 @@ def _table_check(table: PublishedTable) -> Check:
     rule=f"never smaller, at times larger, where shares within {SAME:g} points are the same; in "
     "part: larger in most pairs",
     basis=FITTED,
+    cause=SOURCE,
 )
 def platform_size(runs: Runs) -> Finding:
     """The large platform against the small one."""
@@ -110,7 +134,7 @@ def platform_size(runs: Runs) -> Finding:
         f"{less.count(False)}; 2 1/2 D at r_B = 0.02 m {hybrid[0]:.1f} and {hybrid[1]:.1f} %",
         held=[all(less), any(more)],
         some=sum(more) > len(pairs) / 2,
-        why=f"Shares within {SAME:g} points count as the same.",
+        why=f"Shares within {SAME:g} points count as the same. {UNPRINTED}",
     )
 
 
@@ -120,6 +144,7 @@ def platform_size(runs: Runs) -> Finding:
     "the only exception: A.15",
     rule=f"less than {SAME:g} points; under 2 1/2 D on CAROCA more",
     basis=FITTED,
+    cause=SOURCE,
 )
 def camera_least(runs: Runs) -> Finding:
     """Errors of the camera's place."""
@@ -136,7 +161,7 @@ def camera_least(runs: Runs) -> Finding:
         + f"; A.15 {hybrid:.1f} points",
         held=[*good, hybrid > SAME],
         some=any(good),
-        why=f"Little: less than {SAME:g} points.",
+        why=f"Little: less than {SAME:g} points. {UNPRINTED}",
     )
 
 
@@ -145,6 +170,7 @@ def camera_least(runs: Runs) -> Finding:
     "3.3.5",
     rule=f"or within {SAME:g} points; in part: in most pairs",
     basis=FITTED,
+    cause=SOURCE,
 )
 def anchors_more(runs: Runs) -> Finding:
     """Anchor points against exit points."""
@@ -171,6 +197,7 @@ def anchors_more(runs: Runs) -> Finding:
     "3.3.5",
     rule="larger in each pair of tables, among the tested bounds; in part: in most",
     basis=FITTED,
+    cause=SOURCE,
 )
 def scales(runs: Runs) -> Finding:
     """Bounds grow with the robot."""
@@ -185,7 +212,7 @@ def scales(runs: Runs) -> Finding:
         f"{', '.join(words)} m",
         held=larger,
         some=sum(larger) > len(larger) / 2,
-        why="Among the bounds of the tables.",
+        why=f"Among the bounds of the tables. {UNPRINTED}",
     )
 
 
@@ -195,6 +222,7 @@ def scales(runs: Runs) -> Finding:
     "40.2 instead of 0.3 % at r_A = 0.1 m; nothing instead of 24.1 % at r_B = 0.04 m",
     rule="the order of each pair",
     basis=FITTED,
+    cause=SOURCE,
 )
 def hybrid_larger(runs: Runs) -> Finding:
     """2 1/2 D against PBVS."""
@@ -211,7 +239,7 @@ def hybrid_larger(runs: Runs) -> Finding:
         f"% at the baseline; {far[0]:.1f} and {far[1]:.1f} % at r_bp = 0.5 m; {exits[0]:.1f} and "
         f"{exits[1]:.1f} % at r_A = 0.1 m; {anchors[0]:.1f} and {anchors[1]:.1f} % at r_B = 0.04 m",
         held=good,
-        why="PBVS first.",
+        why=f"PBVS first. {UNPRINTED}",
     )
 
 
@@ -222,6 +250,8 @@ def hybrid_larger(runs: Runs) -> Finding:
     "m^3 at r_A = 0.1 m (IBVS, 2 1/2 D, PBVS)",
     rule="each order; more than 50 %; less than 2 m^3",
     basis=FITTED,
+    cause=SOURCE,
+    why=UNPRINTED,
 )
 def image_based_largest(runs: Runs) -> Finding:
     """IBVS against the others, and how little it loses on CAROCA."""

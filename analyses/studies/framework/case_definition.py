@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from cdpr_drake.analyses.studies.framework.case_layouts import Layout
 from cdpr_drake.analyses.studies.framework.case_run import METRICS, Metric, OwnMetric, Recipe
+from cdpr_drake.analyses.studies.framework.statement import check_cause
 from cdpr_drake.analyses.studies.framework.study import Case, Form
 from cdpr_drake.systems.cameras.camera_settings import PROJECTED, RENDERED
 
@@ -38,6 +39,10 @@ class Configuration:
         published: By metric, see `METRICS`, what the thesis prints, in its words.
         repetitions: Runs of it in the full form; None: as many as of the others.
         why: Why its numbers may differ from the published ones.
+        cause: Of what kind that is, see `framework.statement`; empty: nobody knows.
+
+    Raises:
+        ValueError: The cause is unknown.
     """
 
     name: str
@@ -48,6 +53,11 @@ class Configuration:
     published: Mapping[str, str] = field(default_factory=dict)
     repetitions: int | None = None
     why: str = ""
+    cause: str = ""
+
+    def __post_init__(self) -> None:
+        """Checks the cause."""
+        check_cause(self.cause)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,6 +74,7 @@ class PublishedNumber:
         format: Of the number in those.
         printed: What is printed, in its words.
         why: Why ours may differ; may be empty.
+        cause: Of what kind that is, see `framework.statement`; empty: nobody knows.
     """
 
     group: str
@@ -75,6 +86,7 @@ class PublishedNumber:
     format: str
     printed: str
     why: str = ""
+    cause: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,6 +106,11 @@ class Plan:
         layouts: Published figures that are drawn in their own layout, by the name of the file.
         stability: Tension from which a cable counts in the stability criterion along the run [N];
             None: the traces do not have it.
+        why: Why numbers of configurations may differ that say nothing themselves.
+        cause: Of what kind that is, see `framework.statement`.
+
+    Raises:
+        ValueError: The cause is unknown.
     """
 
     title: str
@@ -106,6 +123,12 @@ class Plan:
     own: Mapping[str, OwnMetric] = field(default_factory=dict)
     layouts: Mapping[str, Layout] = field(default_factory=dict)
     stability: float | None = None
+    why: str = ""
+    cause: str = ""
+
+    def __post_init__(self) -> None:
+        """Checks the cause."""
+        check_cause(self.cause)
 
     def __call__(self, form: Form) -> Iterator[Case]:
         """The cases: rendered ones first, which take longest and are not in the quick form."""
@@ -128,7 +151,8 @@ class Plan:
             most=1 if rendered else None,
             rendered=rendered,
             printed={} if rendered else configuration.published,
-            why=configuration.why,
+            why=configuration.why or self.why,
+            cause=configuration.cause or self.cause,
         )  # fmt: skip
 
     def metrics(self) -> dict[str, Metric]:
@@ -149,6 +173,7 @@ class Plan:
                 format=known.get(name, outcome).format,
                 printed=printed,
                 why=case.why,
+                cause=case.cause,
             )
             for case in self(Form())
             for name, printed in case.printed.items()

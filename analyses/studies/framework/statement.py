@@ -114,6 +114,7 @@ class Check:
         basis: TEST, FITTED, CONSTRUCTION or OURS.
         same_as: "study/check" that judges the same fact.
         cause: Why it does not hold, where it does not: SOURCE, HARDWARE or CHOICE.
+        why: What is known of the difference, where it does not hold and the finding does not say.
     """
 
     name: str
@@ -125,11 +126,12 @@ class Check:
     basis: str = TEST
     same_as: str = ""
     cause: str = ""
+    why: str = ""
 
     def __post_init__(self) -> None:
         """Raises ValueError for a basis or cause that is unknown."""
         _check_known("basis", self.basis, tuple(GOOD))
-        _check_known("cause", self.cause, ("", SOURCE, HARDWARE, CHOICE))
+        check_cause(self.cause)
 
     def judge(self, runs: Runs) -> Judged:
         """What the runs say of it.
@@ -155,10 +157,16 @@ class Check:
         failed = verdict in (IN_PART, NOT_CONFIRMED)
         return Judged(
             words=found.says or self.says, printed=found.printed or self.printed,
-            found=found.found, verdict=verdict, why=found.why, name=self.name, source=self.source,
+            found=found.found, verdict=verdict, why=found.why or (self.why if failed else ""),
+            name=self.name, source=self.source,
             rule=self.rule, basis=self.basis, held=sum(map(bool, found.held)), of=len(found.held),
             same_as=self.same_as, cause=(found.cause or self.cause) if failed else "",
         )  # fmt: skip
+
+
+def check_cause(cause: str) -> None:
+    """Raises ValueError for a cause that is unknown; empty is none."""
+    _check_known("cause", cause, ("", SOURCE, HARDWARE, CHOICE))
 
 
 def _check_known(what: str, value: str, accepted: Sequence[str]) -> None:
@@ -175,6 +183,7 @@ def statement(
     basis: str = TEST,
     same_as: str = "",
     cause: str = "",
+    why: str = "",
     name: str = "",
 ) -> Callable[[Callable[[Runs], Finding]], Check]:
     """Makes a function that looks at runs the check of a sentence.
@@ -187,6 +196,7 @@ def statement(
         basis: TEST, FITTED, CONSTRUCTION or OURS.
         same_as: "study/check" that judges the same fact.
         cause: Why it does not hold, where it does not: SOURCE, HARDWARE or CHOICE.
+        why: What is known of the difference, where it does not hold and the finding does not say.
         name: Of the check; empty: the function's, without a leading underscore.
     """
 
@@ -194,7 +204,7 @@ def statement(
         known = name or find.__name__.lstrip("_")
         return Check(
             name=known, says=says, printed=printed, find=find, source=source, rule=rule,
-            basis=basis, same_as=same_as, cause=cause,
+            basis=basis, same_as=same_as, cause=cause, why=why,
         )  # fmt: skip
 
     return made

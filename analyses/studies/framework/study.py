@@ -104,6 +104,7 @@ class Case:
         alone: Whether it measures times: last, in this process, with nothing beside it.
         printed: By column what the source prints, in its words.
         why: What is known of the difference from what is printed.
+        cause: Of what kind that is, see `framework.statement`; empty: nobody knows.
     """
 
     name: str
@@ -120,6 +121,7 @@ class Case:
     alone: bool = False
     printed: Mapping[str, str] = field(default_factory=dict)
     why: str = ""
+    cause: str = ""
 
     def arguments(self) -> dict[str, Any]:
         """All that its rows depend on, for JSON."""
@@ -396,7 +398,7 @@ class StudyResult:
         told = {
             "name": case.name, "label": case.label, "keys": plain(case.keys),
             "changes": list(case.changes), "runs": len(self.study.seeds_of(case, self.form)),
-            "printed": dict(case.printed), "why": case.why,
+            "printed": dict(case.printed), "why": case.why, "cause": case.cause,
         }  # fmt: skip
         return {key: value for key, value in told.items() if value not in ("", [], {})}
 

@@ -5,11 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from cdpr_drake.analyses.studies.framework.runs import Runs
-from cdpr_drake.analyses.studies.framework.statement import OURS, Finding, statement
+from cdpr_drake.analyses.studies.framework.statement import OURS, SOURCE, Finding, statement
 from cdpr_drake.analyses.studies.schemes.trials import FREE, ROBOT, TURNS, TURNS_DEG
 
 FAR = 0.1
 """Retreat beyond which a camera on a robot would have left its workspace [m]."""
+
+TEXTBOOK = (
+    "The sentence repeats the literature, without a robot, a start or a number; the starts here "
+    "were drawn."
+)
+"""Why it need not hold of these."""
 
 STAYS = 0.005
 """Retreat that counts as none [m]."""
@@ -38,6 +44,7 @@ def _worst_retreat(runs: Runs, scheme: str) -> float:
     "IBVS is not suited for large-scale motion, because it can get stuck in a local minimum.",
     rule=f"it retreats by more than {FAR:g} m; a turn does not arrive; a drawn start that keeps "
     "the target does not arrive; in part: the first",
+    cause=SOURCE,
 )
 def image_far(runs: Runs) -> Finding:
     """Retreats of image-based servoing, and where it stays."""
@@ -82,6 +89,8 @@ def pose_loses(runs: Runs) -> Finding:
 @statement(
     "2 1/2 D visual servoing does not get stuck in local minima.",
     rule="all that keep the target arrive; in part: all but 5 %",
+    cause=SOURCE,
+    why=TEXTBOOK,
 )
 def hybrid_free_of_minima(runs: Runs) -> Finding:
     """Runs that kept their target and did not arrive."""
@@ -103,6 +112,7 @@ def hybrid_free_of_minima(runs: Runs) -> Finding:
     "The partitioned approach decouples motions along x and y from those along z.",
     rule=f"retreat on turns below {1e3 * STAYS:g} mm, and all arrive, with goals as published and "
     f"turned; from drawn starts below {FAR:g} m",
+    cause=SOURCE,
 )
 def partition_decouples(runs: Runs) -> Finding:
     """Retreats of partitioned servoing."""
@@ -131,6 +141,8 @@ def partition_decouples(runs: Runs) -> Finding:
 @statement(
     "Of partitioned servoing the first task is to keep the features in the field of view.",
     rule="the field halves the losses; in part: there are fewer",
+    cause=SOURCE,
+    why=TEXTBOOK,
 )
 def field_keeps_points(runs: Runs) -> Finding:
     """Losses with and without a field at the image's edges."""
@@ -158,6 +170,8 @@ def field_keeps_points(runs: Runs) -> Finding:
     "by some Lyapunov functions of theirs.",
     rule=f"bounds are kept within a share of {KEPT:g}; it arrives at the largest turn; ibvs does "
     "not; it switches; in part: one of the first two",
+    cause=SOURCE,
+    why=TEXTBOOK,
 )
 def switching_by_bounds(runs: Runs) -> Finding:
     """Shares of bounds, and switches."""

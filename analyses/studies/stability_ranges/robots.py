@@ -65,6 +65,10 @@ CAMERAS = {
 """Where the planar robot's camera sits: x, y [m] and angle [deg]; the platform's half size is
 0.055 m."""
 
+CAMERA_STEP = 0.0002
+"""Resolution of the limits that are compared between these [m], a 500th of them; 0.005 m, a 20th,
+left it to one step whether they are the same."""
+
 AREAS = {"narrow": 0.03, "wide": 0.1}
 """Errors of the platform's position of two bounds whose workspaces are compared [m], as figure 3.10
 does with combinations 2 and 16 of figure 3.2. Their limits are not published in numbers, so that
@@ -163,7 +167,7 @@ def robot_cases(quick: bool) -> Iterator[Case]:
         yield question(
             f"planar-III-camera-{words}".replace(" ", "-"), PLANAR_ROBOT, "camera",
             {"camera_x": x, "camera_y": y, "camera_turn": angle, **limits.given("r_bp")},
-            "r_bp", partial(robot_limit, robot, limits, ("r_bp",), 0.4, 0.005, False),
+            "r_bp", partial(robot_limit, robot, limits, ("r_bp",), 0.4, CAMERA_STEP, False),
         )  # fmt: skip
     for words, r_bp in AREAS.items():
         limits = PLANAR_OTHERS.varied(("r_bp",), r_bp)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from cdpr_drake.analyses.studies.framework.runs import Runs
-from cdpr_drake.analyses.studies.framework.statement import FITTED, Finding, statement
+from cdpr_drake.analyses.studies.framework.statement import FITTED, SOURCE, Finding, statement
 from cdpr_drake.analyses.studies.stability_ranges.question import SINGLE, group, published
 from cdpr_drake.analyses.studies.stability_ranges.single_errors import (
     FULL_VOLUME,
@@ -15,7 +15,7 @@ from cdpr_drake.analyses.studies.stability_ranges.single_errors import (
     SAMPLED,
 )
 
-SOURCE = "servoing thesis 3.4.2"
+SECTION = "servoing thesis 3.4.2"
 
 EMPTY_SHARE, HALF_TOLERANCE = 0.01, 0.1
 """Share that counts as nothing, and distance from one half that counts as about half."""
@@ -34,8 +34,9 @@ def _full(volume: float) -> bool:
 @statement(
     "One wrong parameter: the error of the camera's place changes nothing, even 1 m.",
     "1.014 m^3 at 0.2 m and 1 m",
-    source=SOURCE,
+    source=SECTION,
     rule=f"{ALL}, by every verdict",
+    cause=SOURCE,
 )
 def single_camera_place(runs: Runs) -> Finding:
     """r_pc."""
@@ -52,10 +53,11 @@ def single_camera_place(runs: Runs) -> Finding:
 @statement(
     "The camera may be turned by 40 deg; 55 deg leave about half of the workspace, 65 deg nothing.",
     "1.014, 0.514, 0 m^3",
-    source=SOURCE,
+    source=SECTION,
     rule=f"sampled: {ALL}; half of it within {HALF_TOLERANCE:g} of all; less than "
     f"{EMPTY_SHARE:g} of it",
     basis=FITTED,
+    cause=SOURCE,
 )
 def camera_turn(runs: Runs) -> Finding:
     """d_theta_pc."""
@@ -77,8 +79,9 @@ def camera_turn(runs: Runs) -> Finding:
 @statement(
     "The workspace does not depend on errors of the feature vector, up to 0.5 m and 90 deg.",
     "1.014 m^3 both",
-    source=SOURCE,
+    source=SECTION,
     rule=ALL,
+    cause=SOURCE,
 )
 def seen_object(runs: Runs) -> Finding:
     """r_s and d_theta_s."""
@@ -94,8 +97,9 @@ def seen_object(runs: Runs) -> Finding:
 
 @statement(
     "Volumes with one error of exit points, anchor points, the platform's orientation or place.",
-    source=SOURCE,
+    source=SECTION,
     rule=f"each within {VOLUME_TOLERANCE:g} m^3",
+    cause=SOURCE,
 )
 def robot_errors(runs: Runs) -> Finding:
     """Everything else."""

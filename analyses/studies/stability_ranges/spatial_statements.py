@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from cdpr_drake.analyses.studies.framework.runs import Runs
-from cdpr_drake.analyses.studies.framework.statement import Finding, statement
+from cdpr_drake.analyses.studies.framework.statement import SOURCE, Finding, statement
 from cdpr_drake.analyses.studies.stability_ranges.planar_statements import falling
 from cdpr_drake.analyses.studies.stability_ranges.question import (
     FALLS,
@@ -20,7 +20,7 @@ from cdpr_drake.analyses.studies.stability_ranges.question import (
 )
 from cdpr_drake.analyses.studies.stability_ranges.vision import PUBLISHED_OBJECT
 
-SOURCE = "servoing thesis 3.2.2"
+SECTION = "servoing thesis 3.2.2"
 
 PLACE_TOLERANCE = 0.05
 """Within which the largest error of the object's place counts as met [m]."""
@@ -37,8 +37,9 @@ ACROSS = f"Across: {NESTED[0].lower()}{NESTED[1:]} Heights are not nested."
 @statement(
     "Spatial I: the object's place may be off by at most 1.5 m.",
     f"{PUBLISHED_OBJECT['place']:g} m, figure 3.3",
-    source=SOURCE,
+    source=SECTION,
     rule=f"within {PLACE_TOLERANCE:g} m",
+    cause=SOURCE,
 )
 def object_place(runs: Runs) -> Finding:
     """Largest error of the object's position of analysis I."""
@@ -63,8 +64,9 @@ def object_place(runs: Runs) -> Finding:
 @statement(
     "Spatial I: theta may be at most 160 deg, and its error at most 90 deg.",
     "160 deg and 90 deg",
-    source=SOURCE,
+    source=SECTION,
     rule="theta is at most as printed, whatever its error",
+    cause=SOURCE,
 )
 def object_turn(runs: Runs) -> Finding:
     """Largest theta and error of theta of analysis I."""
@@ -87,8 +89,9 @@ def object_turn(runs: Runs) -> Finding:
     "Spatial II i: stable as long as the difference between e and its estimate is not larger than "
     "e.",
     "as long as",
-    source=SOURCE,
+    source=SECTION,
     rule="the largest difference that is found is not smaller than e",
+    cause=SOURCE,
 )
 def difference(runs: Runs) -> Finding:
     """II i."""
@@ -112,8 +115,9 @@ rotational_range = falling(
 @statement(
     "Spatial II iii: the error of the camera's place has no effect up to 0.2 m.",
     "none",
-    source=SOURCE,
+    source=SECTION,
     rule="it takes less than 1 deg",
+    cause=SOURCE,
 )
 def spatial_camera_place(runs: Runs) -> Finding:
     """II iii."""
@@ -132,8 +136,9 @@ def spatial_camera_place(runs: Runs) -> Finding:
     "Spatial III i: the smaller the errors of the platform's or the camera's place, the larger the "
     "range of rotation, above all about z.",
     "not in numbers",
-    source=SOURCE,
+    source=SECTION,
     rule=f"{FALLS}; the range about z loses more",
+    cause=SOURCE,
 )
 def errors_and_rotation(runs: Runs) -> Finding:
     """III i."""
@@ -169,8 +174,9 @@ turn_and_tilt = falling(
     "Spatial III iii: the closer the platform to the origin, on the ground in the middle, the "
     "larger the tolerated error of its place.",
     "not in numbers",
-    source=SOURCE,
+    source=SECTION,
     rule=FALLS,
+    cause=SOURCE,
 )
 def place_error(runs: Runs) -> Finding:
     """III iii."""
@@ -185,8 +191,9 @@ def place_error(runs: Runs) -> Finding:
 @statement(
     "Spatial III iv: likewise, the closer to the origin, the larger the range of rotation.",
     "not in numbers",
-    source=SOURCE,
+    source=SECTION,
     rule=FALLS,
+    cause=SOURCE,
 )
 def place_rotation(runs: Runs) -> Finding:
     """III iv."""

@@ -8,12 +8,18 @@ from cdpr_drake.analyses.studies.framework.case_definition import Configuration,
 from cdpr_drake.analyses.studies.framework.case_study import configuration_study
 from cdpr_drake.analyses.studies.framework.experiments import wrong_points
 from cdpr_drake.analyses.studies.framework.runs import MissingRuns, Runs
-from cdpr_drake.analyses.studies.framework.statement import HARDWARE, Finding, statement
+from cdpr_drake.analyses.studies.framework.statement import (
+    HARDWARE,
+    SOURCE,
+    Finding,
+    statement,
+)
 from cdpr_drake.analyses.studies.tension_cases.case_9_figures import DRAWINGS, sensor_accuracy
 from cdpr_drake.analyses.studies.tension_cases.case_9_statements import (
     PUBLISHED_TIMES,
     STATEMENTS,
     THRESHOLD,
+    UNPRINTED,
 )
 from cdpr_drake.analyses.studies.tension_cases.case_9_transfer import TRANSFER
 from cdpr_drake.analyses.studies.tension_cases.slack_experiments import (
@@ -102,6 +108,8 @@ STUDY = configuration_study(
     Plan(
         name="case-9",
         title="Slack cables on ACROBOT, with and without tension correction",
+        why=UNPRINTED,
+        cause=SOURCE,
         scenario="acrobot_slack_start",
         changes=(
             "perturbations.initial_pose_shift={distance: 0.02, angle_deg: 1.5}",

@@ -9,10 +9,17 @@ import numpy as np
 from scipy.signal import find_peaks
 
 from cdpr_drake.analyses.studies.framework.runs import MissingRuns, Run, Runs
-from cdpr_drake.analyses.studies.framework.statement import SOURCE, Check, Finding, statement
+from cdpr_drake.analyses.studies.framework.statement import (
+    CONSTRUCTION,
+    SOURCE,
+    Check,
+    Finding,
+    statement,
+)
 from cdpr_drake.analyses.studies.tension_cases.case_9_statements import (
     SLACK_PLAIN,
     THRESHOLD,
+    UNPRINTED,
     final_tensions,
     in_polygon,
 )
@@ -61,6 +68,8 @@ def longer_at_end(run: Run, other: Run) -> Array:
     "proportion to the slack.",
     "figure 5.11",
     rule="As long: within a quarter of the slack; longer: by more than half of it.",
+    cause=SOURCE,
+    why=UNPRINTED,
 )
 def transferred(runs: Runs) -> Finding:
     """Whose cables the slack is in at the end."""
@@ -88,6 +97,8 @@ def transferred(runs: Runs) -> Finding:
     "slack comes to them.",
     "figures 5.11, 5.12",
     rule=f"The same: within {1e3 * SAME_LENGTH:g} mm and {1e3 * SAME_SPEED:g} mm/s.",
+    cause=SOURCE,
+    why=UNPRINTED,
 )
 def undisturbed(runs: Runs) -> Finding:
     """Whether the correction leaves other cables alone."""
@@ -126,6 +137,7 @@ def from_middle(X_WP_row: Array, tensions: Array) -> float:
     "With correction the tensions at the end are the farther from the barycenter the more "
     "slack there was; E2 is the closest.",
     "figure 5.14",
+    cause=SOURCE,
 )
 def outward(runs: Runs) -> Finding:
     """How far from the middle of the polygon runs with correction end."""
@@ -144,7 +156,9 @@ def outward(runs: Runs) -> Finding:
         raise MissingRuns("one experiment alone shows no trend")
     growing = all(b > a for a, b in pairwise(found.values()))
     first = found.get("E2") == min(found.values())
-    return Finding(found=listed(found, "N", 2), held=[growing, first], why="Distances in eta.")
+    return Finding(
+        found=listed(found, "N", 2), held=[growing, first], why=f"Distances in eta. {UNPRINTED}"
+    )
 
 
 @statement(
@@ -183,7 +197,10 @@ def residuals(runs: Runs) -> Finding:
 
 
 @statement(
-    "Without slack the system is stable throughout, with and without correction.", "figure 5.18a"
+    "Without slack the system is stable throughout, with and without correction.",
+    "figure 5.18a",
+    cause=SOURCE,
+    why=UNPRINTED,
 )
 def without_slack(runs: Runs) -> Finding:
     """Whether the criterion holds where nothing was paid out."""
@@ -199,6 +216,8 @@ def without_slack(runs: Runs) -> Finding:
     "In E3 three cables are slack in the middle of the trajectory, at some moments four.",
     "figure 5.18b",
     rule=f"Slack below {THRESHOLD:g} N; the middle is all but the first and the last tenth.",
+    cause=SOURCE,
+    why=UNPRINTED,
 )
 def three_and_four(runs: Runs) -> Finding:
     """How many cables are slack in the middle of E3."""
@@ -219,6 +238,7 @@ def three_and_four(runs: Runs) -> Finding:
 @statement(
     "While the platform is underactuated the criterion of stability is not fulfilled.",
     "section 5.3.1, figure 5.18",
+    basis=CONSTRUCTION,
 )
 def no_criterion(runs: Runs) -> Finding:
     """Whether the criterion fails wherever too few cables pull."""
@@ -234,12 +254,15 @@ def no_criterion(runs: Runs) -> Finding:
         found=f"at {failing} of {rows} moments with fewer than six independent cables",
         held=[failing == rows],
         some=failing > rows // 2,
+        why="Pi has the rank of the Jacobian: where that is less than six, Pi leaves a twist x "
+        "out, x' Pi x = 0, and is not positive definite, whatever else is so.",
     )
 
 
 @statement(
     "The estimate's rotation is off by 2 deg at the end with correction, by 5 deg in E9.",
     "figure 5.17",
+    cause=SOURCE,
 )
 def rotation(runs: Runs) -> Finding:
     """How far the estimate's rotation is off at the end."""
@@ -271,6 +294,8 @@ def spikes(deviation: Array) -> int:
     "image of E5, E7 and E9 has two spikes.",
     "figure 5.16",
     rule=f"A spike rises by {100 * PEAK:g} % of the largest deviation above what is beside it.",
+    cause=SOURCE,
+    why=UNPRINTED,
 )
 def two_spikes(runs: Runs) -> Finding:
     """How often the platform falls to other cables."""

@@ -8,7 +8,7 @@ from rich.table import Table
 from cdpr_drake.analyses.reporting.statements import new_table
 from cdpr_drake.analyses.studies.framework.case_definition import Configuration
 from cdpr_drake.analyses.studies.framework.runs import MissingRuns, Runs
-from cdpr_drake.analyses.studies.framework.statement import Finding, statement
+from cdpr_drake.analyses.studies.framework.statement import SOURCE, Finding, statement
 from cdpr_drake.analyses.studies.tension_cases.slack_experiments import slack_change, there
 from cdpr_drake.arrays import Array
 
@@ -162,6 +162,7 @@ def which_to_take(runs: Runs) -> Table:
 @statement(
     "More complex methods were not implemented, as the simple one gives very good results.",
     "section 5.3",
+    cause=SOURCE,
 )
 def advice(runs: Runs) -> Finding:
     """Whether the simplest way is enough."""

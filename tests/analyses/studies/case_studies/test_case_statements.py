@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from cdpr_drake.analyses.studies.case_studies import case_5, case_a6
 from cdpr_drake.analyses.studies.case_studies.case_1 import MOVING_TIME, moving
 from cdpr_drake.analyses.studies.case_studies.case_1_ends import (
     GOAL_KEYS,
@@ -173,3 +174,33 @@ def test_how_estimates_repeat(spread, fourth, expected):
 def test_the_least_of_configurations_that_have_run_unequally_often():
     runs = [run("E1", margin=2.0), run("E1", margin=1.0), run("E2", margin=1.5)]
     assert least(made_runs(runs), ["E1", "E2"], "margin") == 1.0
+
+
+@pytest.mark.parametrize(
+    ("hybrid", "pbvs", "expected"),
+    [(5.0, 9.0, "confirmed"), (8.8, 9.0, "in part"), (9.1, 9.0, "not confirmed")],
+)
+def test_straighter_by_a_hair_is_straighter_in_part(hybrid, pbvs, expected):
+    runs = [run("none", image_max_px=hybrid), run("pbvs", image_max_px=pbvs)]
+    (check,) = [one for one in case_5.STUDY.checks if one.name == "straighter"]
+    said = check.judge(made_runs(runs))
+    assert said.verdict == expected
+    assert (said.cause == "hardware") == (expected != "confirmed")
+
+
+@pytest.mark.parametrize(
+    ("curved", "outcome", "expected"),
+    [
+        (30.0, "converged", "confirmed"),
+        (250.0, "converged", "in part"),  # stable, but the effect is not small
+        (30.0, "target_lost", "not confirmed"),
+    ],
+)
+def test_a_camera_that_is_believed_elsewhere_has_a_small_effect(curved, outcome, expected):
+    line = np.array([[100.0, 100.0], [500.0, 400.0]])
+    runs = [run("camera_E1", image_max_px=10.0, image_line=line)] + [
+        run(f"camera_{name}", outcome, image_max_px=curved, image_line=line)
+        for name in ("E2", "E3", "E4")
+    ]
+    (check,) = [one for one in case_a6.STUDY.checks if one.name == "any_camera"]
+    assert check.judge(made_runs(runs)).verdict == expected

@@ -39,6 +39,7 @@ from cdpr_drake.analyses.studies.stability_ranges.robots import PLANAR_OTHERS, S
 from cdpr_drake.analyses.studies.stability_ranges.single_errors import (
     FULL_VOLUME,
     KNOWN,
+    LOWER_CORNER,
     NO_TURN,
     SAMPLED,
 )
@@ -220,3 +221,67 @@ def test_a_folder_of_other_questions_is_refused(
     monkeypatch.setattr(robot_limits, "TURN_STEP", 5.0)
     with pytest.raises(OutputFolderError, match="turn_step_deg"):
         few(True, StudySession(folder=tmp_path, workers=1))
+
+
+CAMERA_PLACES = {
+    "in-the-middle": (0.0, 0.0, 0.0), "on-an-edge": (0.055, 0.0, 0.0),
+    "turned-45-deg": (0.0, 0.0, 45.0), "turned-90-deg": (0.0, 0.0, 90.0),
+}  # fmt: skip
+
+
+def cameras(**limits: float) -> Runs:
+    """Runs of cameras at these places; `limits` differ from 0.1 m."""
+    rows = []
+    for name, (x, y, turn) in CAMERA_PLACES.items():
+        keys = {
+            "section": "3.2.1, planar: analysis III", "group": "camera", "sought": "r_bp",
+            "camera_x_m": x, "camera_y_m": y, "camera_turn_deg": turn,
+        }  # fmt: skip
+        searched = limits.get(name.replace("-", "_"), 0.1)
+        rows.append(Run(f"planar-III-camera-{name}", None, keys, {"searched_m": searched}))
+    return Runs(rows)
+
+
+@pytest.mark.parametrize(
+    ("limits", "held", "of"),
+    [
+        ({}, 2, 2),
+        ({"turned_45_deg": 0.1002}, 2, 2),  # one step of the search, by its luck
+        ({"on_an_edge": 0.098}, 1, 2),
+        ({"turned_90_deg": 0.098}, 1, 2),
+        ({"on_an_edge": 0.08, "turned_90_deg": 0.12}, 0, 2),
+    ],
+)
+def test_one_step_of_the_search_is_no_effect_of_the_camera(
+    limits: dict[str, float], held: int, of: int
+) -> None:
+    said = checked("planar_camera_place").judge(cameras(**limits))
+    assert (said.held, said.of) == (held, of)
+
+
+def test_cameras_are_compared_by_steps_finer_than_what_counts() -> None:
+    steps = [one.data.args[4] for one in STUDY.plan(Form()) if one.keys["group"] == "camera"]
+    assert len(steps) == 6
+    assert max(steps) <= 0.01 * 0.1 / 5.0
+
+
+@pytest.mark.parametrize(
+    ("volumes", "held"),
+    [
+        ((1.014, 0.514, 0.0), (True, True, True)),
+        ((1.014, 0.35, 0.0), (True, False, True)),
+        ((0.9, 0.514, 0.0), (False, True, True)),
+        ((0.9, 1.014, 0.1), (False, False, False)),
+    ],
+)
+def test_each_part_of_the_turned_camera_can_fail(
+    volumes: tuple[float, ...], held: tuple[bool, ...]
+) -> None:
+    rows = [
+        Run(f"single-{k}", None,
+            {"section": SECTIONS[-1], "group": "d_theta_pc_deg", "sought": "workspace"},
+            {SAMPLED: volume, "searched_m3": volume, LOWER_CORNER: volume})
+        for k, volume in enumerate(volumes)
+    ]  # fmt: skip
+    said = checked("camera_turn").find(Runs(rows))
+    assert tuple(said.held) == held

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from cdpr_drake.analyses.studies.framework.statement import MET_CONSTRUCTION
 from cdpr_drake.analyses.studies.tension_cases import case_9_transfer as nine
 from cdpr_drake.analyses.studies.tension_cases.case_10_estimates import (
     ESTIMATES,
@@ -12,9 +13,14 @@ from cdpr_drake.analyses.studies.tension_cases.case_10_estimates import (
 )
 from cdpr_drake.analyses.studies.tension_cases.case_10_statements import THRESHOLDS
 from cdpr_drake.analyses.studies.tension_cases.slack_experiments import CORRECTED, PLAIN, SLACKS_CM
+from cdpr_drake.stability.criterion import stability_margin
 from tests.analyses.studies.made_runs import made_run, made_runs
 
 ROWS = 200
+
+ROUNDING = 1e-12
+"""Of an eigenvalue that is zero, of a matrix of numbers about 1 [-]."""
+
 DEVIATIONS = {"E1": 24, "E3": 20, "E5": 40, "E7": 60, "E9": 50, "E2": 24, "E4": 30, "E6": 31,
               "E8": 32, "E10": 45}  # fmt: skip
 """Estimates of case X at the end [mm]."""
@@ -59,7 +65,6 @@ def runs(*others):
         (nine.undisturbed, [run_of("E6", unstrained_lengths=np.full((ROWS, 8), 1.1))]),
         (nine.without_slack, [run_of("E1", stability_margin=np.full(ROWS, -0.1))]),
         (nine.three_and_four, [run_of("E3", taut_cables=np.full(ROWS, 6))]),
-        (nine.no_criterion, [run_of("E9", stability_margin=np.ones(ROWS))]),
         (nine.rotation, [run_of("E9", estimate_end_rad=0.0)]),
         (nine.two_spikes, [run_of("E7", image_deviation=np.linspace(0.0, 1.0, ROWS))]),
         (last_is_worse, [run_of("E10", estimate_end_m=0.03)]),
@@ -70,6 +75,18 @@ def runs(*others):
 def test_what_is_published_is_confirmed_and_its_contrary_is_not(judge, contrary):
     assert judge.judge(runs()).verdict == "confirmed"
     assert judge.judge(runs(*contrary)).verdict != "confirmed"
+
+
+def test_a_criterion_without_rank_fails_by_construction():
+    said = nine.no_criterion.judge(runs())
+    assert said.verdict == MET_CONSTRUCTION
+    wrong = nine.no_criterion.judge(runs(run_of("E9", stability_margin=np.ones(ROWS))))
+    assert wrong.verdict == "in part"
+    # No matrix with a twist that it leaves out is positive definite.
+    rng = np.random.default_rng(0)
+    for rank in range(1, 6):
+        Pi = rng.normal(size=(6, rank)) @ rng.normal(size=(rank, 6))
+        assert stability_margin(Pi) <= ROUNDING
 
 
 def test_estimates_are_compared_with_and_without_correction():

@@ -85,10 +85,18 @@ def test_verdicts_can_fail(study):
 
 
 @pytest.mark.parametrize(
-    ("cost", "said"), [(1.0, CONFIRMED), (80.0, IN_PART), (120.0, NOT_CONFIRMED)]
+    ("cost", "other", "said"),
+    [
+        (1.0, 10.0, CONFIRMED),
+        (4.5, 5.0, IN_PART),  # cheap, but hardly cheaper than the other that is named
+        (80.0, 400.0, IN_PART),
+        (120.0, 400.0, NOT_CONFIRMED),
+    ],
 )
-def test_a_cost_is_compared_with_the_period_of_a_controller(study, cost, said):
-    costs = {"improved_closed_form": cost, "median": 3.0, "barycenter": 10.0}
+def test_a_cost_is_compared_with_a_controller_s_period_and_the_other_method(
+    study, cost, other, said
+):
+    costs = {"improved_closed_form": cost, "median": 3.0, "barycenter": other}
     assert verdicts(changed(study, METHODS, cost_us=costs))["median_cheap"] == said
 
 

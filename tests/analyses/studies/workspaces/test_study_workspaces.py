@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from cdpr_drake.analyses.reporting.progress import StudySession
-from cdpr_drake.analyses.reporting.statements import CONFIRMED, NOT_CONFIRMED
+from cdpr_drake.analyses.reporting.statements import CONFIRMED, IN_PART, NOT_CONFIRMED
 from cdpr_drake.analyses.studies.framework.runs import Runs
 from cdpr_drake.analyses.studies.framework.statement import judged
 from cdpr_drake.analyses.studies.framework.study import Form
@@ -23,6 +23,7 @@ from cdpr_drake.analyses.studies.workspaces.items import (
     HEAVY,
     ZERO,
     holds_of,
+    static,
     study_cases,
 )
 from cdpr_drake.analyses.studies.workspaces.statements import CHECKS
@@ -138,6 +139,47 @@ def test_each_cross_check_can_fail(study, words):
         wrong.append(run)
     (check,) = [one for one in CHECKS if one.says.startswith(words)]
     assert check.judge(Runs(wrong)).verdict == NOT_CONFIRMED
+
+
+def figures_of(study, fine, half):
+    """The study's runs where the higher lower limit leaves so much of 1 m^3, by both grids."""
+    volumes = {"points_m3": (1.0, fine), "half_points_m3": (1.0, half)}
+    return Runs(
+        [
+            replace(run, measured=run.measured | {
+                name: of[int(run["lower_limit_n"] > 0.0)] for name, of in volumes.items()
+            })
+            for run in study.runs(group=FIGURE)
+        ],
+        study.runs.planned,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("robot", ["acrobot", "caroca"])
+@pytest.mark.parametrize(
+    ("fine", "half", "expected"),
+    [
+        (0.907, 0.9065, CONFIRMED),
+        (0.907, 0.893, IN_PART),
+        (0.894, 0.876, IN_PART),
+        (0.894, 0.893, NOT_CONFIRMED),
+        (0.8, 0.76, NOT_CONFIRMED),
+    ],
+)
+def test_where_the_grid_decides_whether_a_workspace_remains_large_it_is_said(
+    study, robot, fine, half, expected
+):
+    (check,) = [one for one in CHECKS if one.name == robot]
+    assert check.judge(figures_of(study, fine, half)).verdict == expected
+
+
+def test_half_as_many_cells_are_every_second_point(study):
+    for run in study.runs(group=FIGURE, upper_share=1.0):
+        assert all(n % 2 for n in run["points"])
+        inside, weight = static(run)[::2, ::2, ::2].astype(float), run["frame_m3"]
+        for _ in range(3):
+            inside = np.trapezoid(inside, dx=1.0 / (len(inside) - 1), axis=0)
+        assert run["half_points_m3"] == pytest.approx(weight * inside)
 
 
 def test_what_is_not_finished_is_not_judged(study):
