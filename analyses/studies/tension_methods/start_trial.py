@@ -130,6 +130,14 @@ class StartTrial:
             "between": self.between,
         }
 
+    def name(self) -> str:
+        """A name that no other run has."""
+        words = (
+            self.experiment, self.method, f"Kp {self.gain:g}", f"from {self.start}",
+            self.balance, f"{self.rate:g} Hz", self.between,
+        )  # fmt: skip
+        return " ".join(word for word in words if word)
+
     def start_error(self) -> float:
         """How far it starts from its path's start [m]."""
         return float(np.linalg.norm(self.position - self.path[0]))
