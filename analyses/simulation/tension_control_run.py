@@ -113,6 +113,7 @@ def make_control(scenario: TensionScenario) -> TensionControl:
             cables=scenario.cable_set(robot),
             believed_cables=scenario.believed_cables(believed),
             dynamics=None if belief is None else platform_dynamics(believed),
+            balance=scenario.controller.balance,
             rule=scenario.step_rule(),
             remote=None if scenario.remote is None else scenario.remote.place,
             distributor=distributor,

@@ -1,7 +1,8 @@
 """Control of the platform by wrenches, tensions and torques.
 
 Computed torque in task space: w = M (a_d + Kd e_v + Kp e) + C v - f_g as a spatial force on the
-platform about Po in W. Visual servoing by torque: the servo's wanted twist gives a wanted
+platform about Po in W; or its force alone, as on a point mass, where moments are not held
+(`force_balance`). Visual servoing by torque: the servo's wanted twist gives a wanted
 acceleration, that a wrench, that tensions, and these motor torques by a loop around measured
 tensions; `TorqueServoLaw` is all of it. `goal_pose` is where a camera sees that the platform shall
 be, `GoalPlan` how it gets there.

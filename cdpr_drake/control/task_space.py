@@ -10,6 +10,7 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.tree import SpatialInertia
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.control.force_balance import write_point_mass_wrench
 from cdpr_drake.errors import ControlGainError
 from cdpr_drake.geometry.motion_kernel import Motion, floating_motion, planar_motion
 from cdpr_drake.geometry.poses import pose_row
@@ -27,11 +28,14 @@ class PlatformDynamics:
         gravity: Acceleration along -z of W [m/s^2].
         motions: Components of a spatial vector in W, ordered (rotation, translation), that the
             platform can move: all six, or `PLANAR_ROWS` of `geometry.straight_cables` for 2T1R.
+        point_mass: Whether it is taken for a point mass in its centre of mass, which a force moves
+            and nothing turns, see `force_balance`.
     """
 
     M_PPo_P: SpatialInertia
     gravity: float = 9.81
     motions: tuple[int, ...] = ALL_ROWS
+    point_mass: bool = False
 
     def packed(self) -> Array:
         """For the kernels of this module, shape (`DYNAMICS_SIZE`,)."""
@@ -39,13 +43,20 @@ class PlatformDynamics:
         G = self.M_PPo_P.CalcRotationalInertia().CopyToFullMatrix3()
         moves = np.zeros(6)
         moves[list(self.motions)] = 1.0
-        parts = ([mass], p_PPcm, np.diag(G), [G[0, 1], G[0, 2], G[1, 2]], [self.gravity], moves)
+        parts = (
+            [mass], p_PPcm, np.diag(G), [G[0, 1], G[0, 2], G[1, 2]], [self.gravity], moves,
+            [float(self.point_mass)],
+        )  # fmt: skip
         return np.concatenate(parts)
 
 
-DYNAMICS_SIZE = 17
+DYNAMICS_SIZE = 18
 """Of packed dynamics: mass [kg], p_PPcm (3) [m], moments (xx, yy, zz) and products (xy, xz, yz) of
-inertia about Po in P [kg m^2], gravity [m/s^2], and six flags, 1 where a component can move."""
+inertia about Po in P [kg m^2], gravity [m/s^2], six flags, 1 where a component can move, and one
+that is 1 where it is taken for a point mass."""
+
+POINT_MASS = DYNAMICS_SIZE - 1
+"""Place of that last flag."""
 
 
 @dataclass(frozen=True)
@@ -111,7 +122,8 @@ def computed_torque(
 
     Returns:
         F_P_W about Po, shape (6,) [N m, N]; 0 in components that cannot move, whose errors and
-        desired accelerations do not count.
+        desired accelerations do not count. Of a point mass the force of
+        `force_balance.point_mass_force` through the centre of mass, with its moment about Po.
 
     Source: Gazebo thesis (6.4), (6.5), which leaves out velocity terms, takes Po for the centre of
     mass, and whose (2.17) gives the sign of the weight.
@@ -217,6 +229,9 @@ def tracking_wrench_at(table: np.ndarray, time: float, state: Array, out: Array)
 def _wrench(
     q: Motion, X: Motion, desired: Array, dynamics: Array, gains: Array, out: Array
 ) -> None:
+    if dynamics[POINT_MASS] != 0.0:
+        write_point_mass_wrench(X, desired, dynamics, gains, out)
+        return
     # q_D times the conjugate of q; either sign of a quaternion and, for q_D, any size will do.
     pw, px, py, pz = q
     dw, dx, dy, dz = desired[0], desired[1], desired[2], desired[3]

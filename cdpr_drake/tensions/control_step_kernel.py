@@ -15,14 +15,22 @@ from cdpr_drake.tensions.quadratic_program_kernel import FEASIBLE, SINGULAR
 
 
 @njit(cache=True)
-def _write_wrench_matrix(X: Motion, cables: Array, W: Array) -> None:
-    """Columns (moment about Po, force) of unit tensions; planar: (moment about z, f_x, f_y)."""
+def _write_wrench_matrix(X: Motion, cables: Array, planar: bool, W: Array) -> None:
+    """Columns (moment about Po, force) of unit tensions; planar: (moment about z, f_x, f_y).
+
+    Without the rows of moments where W has none.
+    """
     for i in range(cables.shape[0]):
         _, ux, uy, uz, rx, ry, rz = pulley_line(X, cables[i])
-        if W.shape[0] == 3:
-            W[0, i] = -(rx * uy - ry * ux)
-            W[1, i] = -ux
-            W[2, i] = -uy
+        if planar:
+            if W.shape[0] == 3:
+                W[0, i] = -(rx * uy - ry * ux)
+            W[W.shape[0] - 2, i] = -ux
+            W[W.shape[0] - 1, i] = -uy
+        elif W.shape[0] == 3:
+            W[0, i] = -ux
+            W[1, i] = -uy
+            W[2, i] = -uz
         else:
             W[0, i] = -(ry * uz - rz * uy)
             W[1, i] = -(rz * ux - rx * uz)
@@ -40,12 +48,13 @@ def wrench_matrix_at(state: Array, cables: Array, height: float, W: Array) -> No
         state: State of the platform as the plant gives it, shape (13,), or (6,) for 2T1R.
         cables: Packed cables, shape (m, 17), see `CableSet.packed`.
         height: Height of the plane of a 2T1R platform [m]; not used otherwise.
-        W: Gets the matrix, shape (6, m), or (3, m) for 2T1R.
+        W: Gets the matrix, shape (6, m), or (3, m) for 2T1R; without moments, where forces alone
+            are balanced, (3, m), or (2, m).
     """
-    if W.shape[0] == 3:
-        _write_wrench_matrix(planar_motion(state, height), cables, W)
+    if state.shape[0] == 6:
+        _write_wrench_matrix(planar_motion(state, height), cables, True, W)
     else:
-        _write_wrench_matrix(floating_motion(state), cables, W)
+        _write_wrench_matrix(floating_motion(state), cables, False, W)
 
 
 @njit(cache=True)
@@ -75,7 +84,7 @@ def update_tensions(
             methods that need no reference, or where a method starts.
         row_scale: As `TensionMethod.kernel`, shape (n,).
         work: Work space of `quadratic_program_kernel.workspace_shape`.
-        W: Gets the wrench matrix, shape (6, m), or (3, m) for 2T1R.
+        W: Gets the wrench matrix, as `wrench_matrix_at`.
         t: Gets what the method computes, shape (m,) [N].
         held: Becomes t if that is feasible, or if it is within the bounds by a method that
             relaxes, shape (m,) [N].
@@ -87,8 +96,9 @@ def update_tensions(
     wrench_matrix_at(state, cables, height, W)
     n = W.shape[0]
     w = np.empty(n)
+    first = (5 if state.shape[0] == 6 else 6) - n  # a planar platform has f_z not
     for i in range(n):
-        w[i] = -desired[i + 2] if n == 3 else -desired[i]
+        w[i] = -desired[first + i]
     code, _ = solve(method, work, W, w, bounds[0], bounds[1], bounds[2], row_scale, t)
     feasible[0] = 1.0 if code == FEASIBLE else 0.0
     answered = method[2] and code != SINGULAR and within(t, bounds[0], bounds[1])

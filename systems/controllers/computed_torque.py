@@ -5,10 +5,13 @@ Source: see `control.task_space.computed_torque`.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from pydrake.common.value import AbstractValue, Value
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
+from cdpr_drake.control.force_balance import FORCE, WRENCH
 from cdpr_drake.control.task_space import (
     PlatformDynamics,
     TaskGains,
@@ -21,8 +24,12 @@ from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
 
 
-def platform_dynamics(robot: Robot) -> PlatformDynamics:
+def platform_dynamics(robot: Robot, balance: str = WRENCH) -> PlatformDynamics:
     """The dynamics of a robot's platform, exactly as the plant has them.
+
+    Args:
+        robot: The robot.
+        balance: A name of `force_balance.BALANCES`; by forces alone it is taken for a point mass.
 
     Raises:
         RobotFileError: It is of a motion type that computed torque does not know, or its gravity
@@ -34,7 +41,7 @@ def platform_dynamics(robot: Robot) -> PlatformDynamics:
             f"robot {robot.name}: gravity_direction: found {robot.gravity_direction.tolist()}; "
             "accepted by computed torque: along -z of W"
         )
-    return PlatformDynamics(platform_inertia(robot), robot.gravity, motions)
+    return PlatformDynamics(platform_inertia(robot), robot.gravity, motions, balance == FORCE)
 
 
 class PoseTracking(LeafSystem):
@@ -50,6 +57,9 @@ class PoseTracking(LeafSystem):
     X_WP_desired   RigidTransform m     out, pose where it should be now
     ============== ============== ===== ========================================================
 
+    Where forces alone are balanced, the wrench is a force through the centre of mass, which follows
+    where the desired pose has it; the platform turns as it will.
+
     Trajectory and controller in one: in a fast loop a call of a block costs more than what it
     computes. The wrench follows the state at once; what holds it samples it.
 
@@ -62,6 +72,8 @@ class PoseTracking(LeafSystem):
         trajectory: PoseTrajectory,
         gains: TaskGains,
         dynamics: PlatformDynamics | None = None,
+        *,
+        balance: str = WRENCH,
     ) -> None:
         """For a robot whose plant is finalized.
 
@@ -70,13 +82,17 @@ class PoseTracking(LeafSystem):
             trajectory: The desired motion.
             gains: Kp and Kd.
             dynamics: What the controller believes of the platform; None for the exact model.
+            balance: What tensions balance, a name of `force_balance.BALANCES`.
         """
         super().__init__()
         robot = in_plant.robot
+        believed = dynamics or platform_dynamics(robot)
+        if balance == FORCE:
+            believed = replace(believed, point_mass=True)
         self._joint, self._trajectory = robot.joint(), trajectory
         self._step = TrackingStep(
             trajectory.stretches(),
-            (dynamics or platform_dynamics(robot)).packed(),
+            believed.packed(),
             gains.packed(),
             float(robot.plane_height or 0.0),
         )

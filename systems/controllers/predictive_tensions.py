@@ -8,6 +8,8 @@ import numpy as np
 from pydrake.systems.framework import Context, DiscreteValues
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.control.force_balance import WRENCH
+from cdpr_drake.errors import PlanningError
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.models.robot_in_plant import RobotInPlant, pose_from_state
 from cdpr_drake.planning.horizon import Horizon, View
@@ -40,8 +42,16 @@ class PredictiveTensions:
         rate: float,
         reference: Array | None,
         cables: CableSet,
+        *,
+        balance: str = WRENCH,
     ) -> PredictiveDistributor:
-        """The block; arguments as those of `TensionDistributor`."""
+        """The block; arguments as those of `TensionDistributor`.
+
+        Raises:
+            PlanningError: It shall balance forces alone.
+        """
+        if balance != WRENCH:
+            raise PlanningError(f"balance: found {balance}; accepted by predictive: {WRENCH}")
         return PredictiveDistributor(in_plant, method, limits, rate, reference, cables, ahead=self)
 
 

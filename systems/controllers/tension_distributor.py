@@ -6,6 +6,7 @@ import numpy as np
 from pydrake.systems.framework import Context, DiscreteStateIndex, DiscreteValues, LeafSystem
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.control.force_balance import FORCE, WRENCH, balanced_rows, force_problem
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.models.robot_in_plant import RobotInPlant
 from cdpr_drake.models.robot_statics import tension_problem
@@ -33,6 +34,8 @@ class TensionDistributor(LeafSystem):
     are the lower limits. Methods that relax, `slack_relaxed` and `log_barrier`, answer a request
     that cannot be met with tensions within the limits of which the wrench is nearest, or near it;
     it is counted as not met all the same. `log_barrier` starts at the tensions of the last step.
+    By forces alone the moments of the wrench count for nothing, and the redundancy is larger by as
+    many as there are.
     """
 
     def __init__(
@@ -43,6 +46,8 @@ class TensionDistributor(LeafSystem):
         rate: float = 1000.0,
         reference: Array | None = None,
         cables: CableSet | None = None,
+        *,
+        balance: str = WRENCH,
     ) -> None:
         """For a robot whose plant is finalized.
 
@@ -53,6 +58,7 @@ class TensionDistributor(LeafSystem):
             rate: Updates per second [Hz].
             reference: Wanted tensions, shape (m,) [N], for `reference_program`.
             cables: What it believes of the cables; None: the robot's, from fixed exit points.
+            balance: What tensions balance, a name of `force_balance.BALANCES`.
 
         Raises:
             TensionProblemError: Unknown method, limits that make no sense, or a method that the
@@ -61,13 +67,16 @@ class TensionDistributor(LeafSystem):
         super().__init__()
         robot, plant = in_plant.robot, in_plant.plant
         home = tension_problem(robot, robot.home.transform(), limits=limits, reference=reference)
+        motions = robot.servo_rows("tension distribution in a simulation")
+        self._rows = list(balanced_rows(motions, balance))
+        if balance == FORCE:
+            home = force_problem(home, len(motions) - len(self._rows))
         n, m = home.W.shape
         self.rate = rate
         chosen = method_for(method, m - n, reference is not None)
         self._method = method
         wanted = reference if chosen.needs_reference else None
         bounds = np.vstack([home.lower, home.upper, np.zeros(m) if wanted is None else wanted])
-        self._rows = list(robot.servo_rows("tension distribution in a simulation"))
         cables = robot.cable_set().without_pulleys() if cables is None else cables
         self._step = TensionStep(
             chosen.compiled(m - n),

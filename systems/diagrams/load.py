@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from pydrake.math import RigidTransform
 
+from cdpr_drake.control.force_balance import FORCE, WRENCH, force_problem
 from cdpr_drake.errors import (
     CableGeometryError,
     Problems,
@@ -65,6 +66,11 @@ def _check_tension_scenario(scenario: TensionScenario, robot: Robot, path: Path)
                     f"{path}: perturbations.believed_robot: found beside {key}; accepted: one of "
                     "both"
                 )
+    if scenario.predictive is not None and scenario.controller.balance != WRENCH:
+        raise ScenarioError(
+            f"{path}: controller.balance: found {scenario.controller.balance} beside predictive; "
+            f"accepted: {WRENCH}"
+        )
     problems, said = Problems(ScenarioError), set()
     for key, X_WP in poses.items():
         words = _why_not_held(X_WP, scenario, robot)
@@ -126,6 +132,8 @@ def _why_not_held(X_WP: RigidTransform, scenario: TensionScenario, robot: Robot)
             reference=scenario.reference_tensions(robot),
             cables=cables,
         )
+        if scenario.controller.balance == FORCE:
+            problem_there = force_problem(problem_there, robot.motion_type().num_turns)
         solution = distribute(problem_there, "quadratic_program")
         distribute(problem_there, scenario.distribution.method)
     except (CableGeometryError, TensionProblemError) as problem:

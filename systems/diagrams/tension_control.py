@@ -13,6 +13,7 @@ from pydrake.systems.primitives import Demultiplexer
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.commanded_tension_kernel import cable_motions
+from cdpr_drake.control.force_balance import WRENCH
 from cdpr_drake.control.task_space import PlatformDynamics, TaskGains
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.geometry.poses import pose_error, pose_from_row, pose_row
@@ -170,6 +171,7 @@ class TensionControlSettings:
         cables: The cables as they really are; None: the robot's, from fixed exit points.
         believed_cables: What the distributor believes of them; None: as they are.
         dynamics: What the controller believes of the platform; None: as it is.
+        balance: What tensions balance, a name of `force_balance.BALANCES`.
         distributor: Makes the block that distributes, from the arguments of `TensionDistributor`.
         rule: How the robot is integrated in compiled steps; None: a plant moves it, by the
             simulator's integrator.
@@ -188,6 +190,7 @@ class TensionControlSettings:
     cables: CableSet | None = None
     believed_cables: CableSet | None = None
     dynamics: PlatformDynamics | None = None
+    balance: str = WRENCH
     distributor: Callable[..., TensionDistributor] = TensionDistributor
     rule: StepRule | None = None
     remote: str | None = None
@@ -278,15 +281,16 @@ def _deciders(
 ) -> tuple[PoseTracking, TensionDistributor]:
     """Controller and distributor, or what stands in the place of one of them."""
     trajectory, gains, place = settings.trajectory, settings.gains, settings.remote
+    balance = settings.balance
     distribution = (settings.method, settings.limits, settings.rate, settings.reference, believed)
     control, distributor = PoseTracking, settings.distributor
     if place == DISTRIBUTOR:
-        remote = RemoteDistributor(in_plant, trajectory, *distribution)
-        return control(in_plant, trajectory, gains, settings.dynamics), remote
-    own = distributor(in_plant, *distribution)
+        remote = RemoteDistributor(in_plant, trajectory, *distribution, balance=balance)
+        return control(in_plant, trajectory, gains, settings.dynamics, balance=balance), remote
+    own = distributor(in_plant, *distribution, balance=balance)
     if place is None:
-        return control(in_plant, trajectory, gains, settings.dynamics), own
-    return RemoteTracking(in_plant, trajectory, gains, place), own
+        return control(in_plant, trajectory, gains, settings.dynamics, balance=balance), own
+    return RemoteTracking(in_plant, trajectory, gains, place, balance=balance), own
 
 
 def _split_state(builder: DiagramBuilder, motion: CompiledMotion, prefix: str) -> OutputPort:

@@ -53,13 +53,18 @@ class TensionRows:
 
     def read_log(self, _: object = None) -> dict[str, Array]:
         """The log since it was cleared, as `TensionControl.read_log` gives it."""
+        return self.control.whole_log(self.columns())
+
+    def columns(self) -> dict[str, Array]:
+        """What is stored: "time", shape (n,) [s], and by name, shape (n, size), as `sizes` has it;
+        what `read_log` makes of these for each row takes its time."""
         rows = np.concatenate(self._stored) if self._stored else np.empty((0, self.width()))
         columns, end = {}, 0
         for name, size in self.sizes.items():
             columns[name] = rows[:, end : end + size]
             end += size
         columns["time"] = columns["time"][:, 0]
-        return self.control.whole_log(columns)
+        return columns
 
     def clear(self, _: object = None) -> None:
         """Forgets the rows; what comes is logged as before."""
@@ -74,12 +79,15 @@ class TensionLoop(TensionRows):
     somebody's own are not in it.
     """
 
-    def __init__(self, control: TensionControl, log_rate: float) -> None:
+    def __init__(
+        self, control: TensionControl, log_rate: float, start: RigidTransform | None = None
+    ) -> None:
         """At the beginning of the trajectory, at rest.
 
         Args:
             control: The blocks; not changed but for their work space.
             log_rate: Rows of the log per second [Hz].
+            start: X_WP at time 0 in the place of the trajectory's [m].
 
         Raises:
             CdprError: The robot is moved by a plant, or the distributor is somebody's own.
@@ -96,9 +104,12 @@ class TensionLoop(TensionRows):
         self._law, self._distribution = blocks.controller.packed(), blocks.distributor.packed()
         self._robot = robot_addresses(motion.arrays())
         self._periods = np.array([1.0 / blocks.distributor.rate, 1.0 / log_rate])
-        start = motion.state(motion.GetMyContextFromRoot(control.make_context()))
-        self._memory = start_tracking(start, self._distribution.bounds[0])
-        super().__init__(control, len(start))
+        context = control.make_context()
+        if start is not None:
+            control.set_pose(context, start)
+        resting = motion.state(motion.GetMyContextFromRoot(context))
+        self._memory = start_tracking(resting, self._distribution.bounds[0])
+        super().__init__(control, len(resting))
         self.advance_to(0.0)
 
     @property

@@ -11,6 +11,7 @@ from pydrake.common.value import AbstractValue
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.control.force_balance import WRENCH
 from cdpr_drake.control.task_space import TaskGains, floating_wrench, planar_wrench
 from cdpr_drake.errors import ClientEndedError
 from cdpr_drake.geometry.poses import pose_from_row, pose_row
@@ -78,12 +79,18 @@ class RemoteTracking(PoseTracking):
     """
 
     def __init__(
-        self, in_plant: RobotInPlant, trajectory: PoseTrajectory, gains: TaskGains, place: str
+        self,
+        in_plant: RobotInPlant,
+        trajectory: PoseTrajectory,
+        gains: TaskGains,
+        place: str,
+        *,
+        balance: str = WRENCH,
     ) -> None:
         """Arguments as of `PoseTracking`; place is CONTROLLER or TRAJECTORY."""
-        super().__init__(in_plant, trajectory, gains)
+        super().__init__(in_plant, trajectory, gains, balance=balance)
         robot = in_plant.robot
-        self._dynamics, self._gains = platform_dynamics(robot).packed(), gains.packed()
+        self._dynamics, self._gains = platform_dynamics(robot, balance).packed(), gains.packed()
         self._height, self.view = robot.plane_height, _View(robot, trajectory)
         inputs, outputs = tension_ports(place, robot)
         resting = {
@@ -165,13 +172,19 @@ class RemoteDistributor(TensionDistributor):
     each update; `feasible` is 1, and there are no failures: nobody here knows what it wants.
     """
 
-    def __init__(self, in_plant: RobotInPlant, trajectory: PoseTrajectory, *settings: Any) -> None:
+    def __init__(
+        self,
+        in_plant: RobotInPlant,
+        trajectory: PoseTrajectory,
+        *settings: Any,
+        balance: str = WRENCH,
+    ) -> None:
         """With the desired motion that the process can see, and what a `TensionDistributor` takes.
 
         Raises:
             TensionProblemError: As `TensionDistributor`.
         """
-        super().__init__(in_plant, *settings)
+        super().__init__(in_plant, *settings, balance=balance)
         robot = in_plant.robot
         self.view = _View(robot, trajectory)
         inputs, outputs = tension_ports(DISTRIBUTOR, robot)

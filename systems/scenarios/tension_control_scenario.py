@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from cdpr_drake.control.force_balance import BALANCES, WRENCH
 from cdpr_drake.control.task_space import TaskGains
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.geometry.cable_set import CableSet
@@ -80,6 +81,12 @@ class TorqueSettings:
     rate: float = number("Control steps per second.", "Hz", 1000.0, above=0.0, at_most=FASTEST)
     stiffness: float = number("Gain Kp.", "1/s^2", at_least=0.0)
     damping: float = number("Gain Kd.", "1/s", at_least=0.0)
+    balance: str = text(
+        "What tensions balance: the wrench; or its force alone, as on a point mass, so that "
+        "moments are not held and the platform turns as it will.",
+        WRENCH,
+        choices=BALANCES,
+    )
 
     def gains(self) -> TaskGains:
         """The gains."""

@@ -28,6 +28,17 @@ from cdpr_drake.analyses.studies.tension_methods.figures import (
     tension_figure,
 )
 from cdpr_drake.analyses.studies.tension_methods.gain_figures import gains_figure, gains_name
+from cdpr_drake.analyses.studies.tension_methods.start_experiments import (
+    START_EXPERIMENTS,
+    start_trials,
+)
+from cdpr_drake.analyses.studies.tension_methods.start_figures import (
+    one_step_figure,
+    start_figure,
+    start_tables,
+)
+from cdpr_drake.analyses.studies.tension_methods.start_statements import START_CHECKS
+from cdpr_drake.analyses.studies.tension_methods.start_trial import run_start_trial
 from cdpr_drake.analyses.studies.tension_methods.statements import CHECKS
 from cdpr_drake.analyses.studies.tension_methods.tables import coverage_tables, run_tables
 from cdpr_drake.analyses.studies.tension_methods.trial import STEP, label_of, run_trial
@@ -43,6 +54,8 @@ def cases(form: Form) -> Iterator[Case]:
     for spec in trials(form.quick):
         keys = spec.keys()
         yield Case(name=f"{spec.experiment} {label_of(keys)}", keys=keys, data=spec)
+    for start in start_trials(form.quick):
+        yield Case(name=start.name(), keys=start.keys(), data=start)
     for name in (THESIS_ROBOT, OTHER_ROBOT):
         robot = load_robot(name)
         for method in applicable_methods(tension_problem(robot, robot.home.transform())):
@@ -55,7 +68,9 @@ def cases(form: Form) -> Iterator[Case]:
 
 
 def measure(case: Case, seed: int) -> Row:
-    """A row of `run_trial` or of `cover`."""
+    """A row of `run_trial`, `run_start_trial` or `cover`."""
+    if case.keys["experiment"] in START_EXPERIMENTS:
+        return run_start_trial(case.data)
     if case.keys["experiment"] != COVERAGE:
         return run_trial(case.data)
     (found,) = cover(case.keys["robot"], case.data, [case.keys["method"]])
@@ -66,7 +81,7 @@ def parameters(form: Form) -> Mapping[str, Any]:
     """What all runs have in common; nothing is random."""
     robot, path = load_robot(THESIS_ROBOT), thesis_path()
     return {
-        "experiments": EXPERIMENTS,
+        "experiments": EXPERIMENTS | START_EXPERIMENTS,
         "integrator": "runge_kutta3",
         "integration_step_s": STEP,
         "mass_kg": robot.platform.mass,
@@ -102,12 +117,14 @@ STUDY = Study(
         "model follows the trajectory from its start; why the thesis' differ is known in part.",
     ),
     stated="What the Gazebo thesis states",
-    checks=CHECKS,
-    tables=[run_tables, lambda runs: coverage_tables(_coverage(runs))],
+    checks=(*CHECKS, *START_CHECKS),
+    tables=[run_tables, lambda runs: coverage_tables(_coverage(runs)), start_tables],
     figures={
         **{f"{name}_errors": partial(error_figure, name) for name in EXPERIMENTS},
         **{f"{name}_tensions": partial(tension_figure, name) for name in EXPERIMENTS},
         **{gains_name(method): partial(gains_figure, method) for method in THESIS_GAINS},
+        "start_errors": start_figure,
+        "one_step": one_step_figure,
         "coverage": lambda runs: coverage_figure(_coverage(runs)),
     },
 )

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from pydrake.multibody.plant import MultibodyPlant
 
+from cdpr_drake.control.force_balance import FORCE, force_problem
 from cdpr_drake.errors import TensionProblemError
 from cdpr_drake.models.robot_in_plant import add_robot
 from cdpr_drake.models.robot_loader import load_robot
@@ -76,6 +77,34 @@ def test_step_is_the_method(name, method):
     assert found["feasible"] == (expected.status == "feasible")
     if expected.status == "feasible":
         np.testing.assert_allclose(found["tensions"], expected.tensions, rtol=ROUNDING, atol=1e-9)
+
+
+@pytest.mark.parametrize(("name", "turns"), [("acrobot_large", 3), ("planar", 1)])
+@pytest.mark.parametrize("method", list(METHODS))
+def test_forces_alone_are_balanced_by_every_method_that_takes_the_redundancy(name, turns, method):
+    """Others are refused in one line; the moments that are asked for count for nothing."""
+    handles = in_plant(name)
+    _, wrench = weight_held(handles)
+    reference = np.full(len(handles.robot.cables), 6.0)
+    whole = tension_problem(handles.robot, handles.robot.home.transform(), reference=reference)
+    problem = force_problem(whole, turns)
+    if not METHODS[method].takes(problem.redundancy):
+        accepted = f"{method}: found redundancy m - n = {problem.redundancy}; accepted: "
+        with pytest.raises(TensionProblemError, match=accepted) as refused:
+            TensionDistributor(handles, method, balance=FORCE)
+        assert "\n" not in str(refused.value)
+        return
+    block = TensionDistributor(handles, method, reference=reference, balance=FORCE)
+    context = block.CreateDefaultContext()
+    block.GetInputPort("platform_state").FixValue(context, home_state(handles))
+    wrench[:3] = 1e3
+    found = step(block, context, wrench)
+    expected = distribute(problem, method)
+    assert found["feasible"] == (expected.status == "feasible")
+    if expected.status == "feasible":
+        np.testing.assert_allclose(found["tensions"], expected.tensions, rtol=ROUNDING, atol=1e-9)
+        left = whole.residual(found["tensions"]), problem.residual(found["tensions"])
+        assert left[1] < ROUNDING
 
 
 def test_what_cannot_be_met_holds_the_last_tensions_and_is_counted():

@@ -94,6 +94,18 @@ def test_a_log_is_read_in_pieces_and_one_call_is_many():
     assert pieces.errors() == pytest.approx(whole.errors(), abs=1e-9)
 
 
+def test_a_loop_starts_where_it_is_told():
+    built = control("acrobot_computed_torque")
+    start = built.trajectory.pose(0.0)
+    start.set_translation(start.translation() + np.array([0.01, -0.02, 0.0]))
+    loop = TensionLoop(built, 100.0, start)
+    assert loop.errors()[0] == pytest.approx(np.hypot(0.01, 0.02))
+    loop.advance_to(0.05)
+    columns, log = loop.columns(), loop.read_log()
+    np.testing.assert_array_equal(columns["tensions"], log["tensions"])
+    np.testing.assert_allclose(log["X_WP"][0, 4:], start.translation(), atol=SAME)
+
+
 def test_what_is_no_loop_of_kernels_is_refused():
     class Own(TensionDistributor):
         pass

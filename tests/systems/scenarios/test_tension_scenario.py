@@ -39,6 +39,7 @@ def test_trajectory_passes_its_poses():
         ("trajectory.stretches=[]", "at least one"),
         ("trajectory.stretches=[{pose: {position: [0, 0, 0.2]}, duration: 0}]", "found 0"),
         ("controller.stiffness=-1", "found -1"),
+        ("controller.balance=moment", "controller.balance: found moment; accepted: wrench, force"),
         ("kind=visual_servo", "kind: found visual_servo"),
         ("camera.kind=rendered", "no key camera"),
         ("robot=foo", "foo"),
@@ -50,6 +51,38 @@ def test_refusals_are_one_line(override, words):
     message = str(caught.value)
     assert words in message
     assert "\n" not in message
+
+
+@pytest.mark.parametrize(
+    ("overrides", "words"),
+    [
+        (["distribution.method=barycenter"], "barycenter: found redundancy m - n = 5; accepted: 2"),
+        (["predictive={steps: 5}"], "controller.balance: found force beside predictive; accepted"),
+    ],
+)
+def test_what_cannot_balance_forces_alone_is_refused_in_one_line(overrides, words):
+    overrides = ["controller.balance=force", *overrides]
+    with pytest.raises(ScenarioError) as caught:
+        load_scenario("acrobot_computed_torque", overrides)
+    assert words in str(caught.value)
+    assert "acrobot_computed_torque" in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("name", scenario_names("tension_control"))
+def test_every_scenario_can_balance_forces_alone(name):
+    scenario = load_scenario(name, ["controller.balance=force"])
+    assert scenario.controller.balance == "force"
+
+
+def test_forces_alone_hold_poses_that_no_wrench_holds():
+    """A pose whose moments cannot be balanced."""
+    robot = load_robot("acrobot_large")
+    turned = ["trajectory.start={position: [0.0, 0.0, 0.5], angles_deg: [0, 70, 0]}"]
+    with pytest.raises(ScenarioError, match="a pose that can be held"):
+        load_scenario("acrobot_computed_torque", turned)
+    scenario = load_scenario("acrobot_computed_torque", [*turned, "controller.balance=force"])
+    assert scenario.robot == robot.name
 
 
 def test_reference_reaches_the_method():
