@@ -73,7 +73,7 @@ def lipschitz_margins(case: StabilityCase, bounds: PerturbationBounds, poses: Ar
     lost = np.full(len(rows.poses), np.inf)
     if not np.any(good):
         return -lost
-    n = NominalMatrices(*(x[good] for x in known[:6]), known.rows)
+    n = known.picked(good)
     K_rw = _spatial(n, n.K_r)[:, :3]
     turn = np.linalg.norm(K_rw, 2, (1, 2))
     A = n.K_l @ n.M

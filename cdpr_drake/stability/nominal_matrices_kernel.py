@@ -36,6 +36,13 @@ class NominalMatrices(NamedTuple):
     loss: Array
     rows: list[int]
 
+    def picked(self, which: np.ndarray) -> NominalMatrices:
+        """Those of some of the poses."""
+        R, J, M, K_l, K_r, loss = (
+            x[which] for x in (self.R, self.J, self.M, self.K_l, self.K_r, self.loss)
+        )
+        return NominalMatrices(R, J, M, K_l, K_r, loss, self.rows)
+
 
 def nominal_matrices(case: CaseArrays, rows: PoseRows) -> NominalMatrices:
     """Matrices of poses of a case whose object is seen as it is."""

@@ -53,7 +53,7 @@ ALLOWANCE = 3e-5
 """The bound of Lipschitz takes 2e-5 off for rounding."""
 
 SETTLED = 1e-9
-"""So near a bound by intervals is to its closed form: the left inverse is wider than its rounding."""
+"""So near a bound by intervals is to its closed form: the enclosed left inverse has a width."""
 
 
 def planar_robot_at_goal() -> StabilityCase:
