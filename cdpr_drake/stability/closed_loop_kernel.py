@@ -1,4 +1,4 @@
-"""Closed loops of the servo that the criterion is about: kinematics alone, a constantly wrong model.
+"""Closed loops of the servo that the criterion is about: kinematics alone, a model wrong throughout.
 
 From a pose the loop de/dt = -Pi e is followed with unit gain: the servo asks for the camera's twist
 v = -L_hat^+ e, turns it into cable velocities by the model that it believes, which is off by the
@@ -162,10 +162,10 @@ def _loops(
 
 @njit(cache=True, error_model="numpy")
 def _inside(p: Array, lower: Array, upper: Array, planar: bool) -> bool:
+    inside = True
     for i in range(2 if planar else 3):
-        if p[i] < lower[i] or p[i] > upper[i]:
-            return False
-    return True
+        inside = inside and lower[i] <= p[i] <= upper[i]
+    return inside
 
 
 @njit(cache=True, error_model="numpy")
