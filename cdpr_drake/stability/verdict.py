@@ -142,7 +142,7 @@ def _judged(
 ) -> dict[str, StabilityChunk]:
     certify = "certified" in verdicts
     if certify:
-        _refuse_unproven(case, bounds)
+        refuse_unproven(case, bounds)
     arrays, rows = packed_case(case, bounds, poses)
     count, size = len(rows.poses), vector_size(case.m)
     margins = {verdict: np.empty(count) for verdict in VERDICTS}
@@ -171,7 +171,8 @@ def _judged(
     }
 
 
-def _refuse_unproven(case: StabilityCase, bounds: PerturbationBounds) -> None:
+def refuse_unproven(case: StabilityCase, bounds: PerturbationBounds) -> None:
+    """Raises StabilityError for perturbations that no proof covers, see `judge_stability`."""
     if case.perturbed != "estimate":
         raise StabilityError(
             f"perturbed: found {case.perturbed} for a certificate; accepted: estimate"
