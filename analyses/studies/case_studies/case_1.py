@@ -15,12 +15,11 @@ from cdpr_drake.analyses.studies.case_studies.case_1_ends import (
 )
 from cdpr_drake.analyses.studies.case_studies.case_1_figures import CASE_1_LAYOUTS
 from cdpr_drake.analyses.studies.case_studies.case_4 import (
-    CABLES,
     CAROCA_SERVO,
     LIFT,
     PRINTED_BELIEF,
 )
-from cdpr_drake.analyses.studies.framework.caroca_cables import CAROCA_RUN
+from cdpr_drake.analyses.studies.framework.caroca_cables import CAROCA_ASSUMPTION, CAROCA_RUN
 from cdpr_drake.analyses.studies.framework.case_definition import PULLEYS, Configuration, Plan
 from cdpr_drake.analyses.studies.framework.case_run import converged, outcomes
 from cdpr_drake.analyses.studies.framework.case_study import configuration_study
@@ -367,7 +366,7 @@ STUDY = configuration_study(
     assumptions=(
         "The simulated robots have pulleys and elastic cables; which of them an estimator knows is "
         "its own matter. The controller's model has neither.",
-        CABLES,
+        CAROCA_ASSUMPTION,
         "Meas. 1: the tracker's errors per distance and per angle are fitted to the 12 mm and 5 mm "
         "printed for these runs (section 2.3.2), so its error at the start and at the end is no "
         "comparison. What they make of the paths was not fitted.",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from cdpr_drake.analyses.studies.case_studies.path_figures import three_layouts
-from cdpr_drake.analyses.studies.framework.caroca_cables import CAROCA_RUN, SWING_HZ, SWING_SHARE
+from cdpr_drake.analyses.studies.framework.caroca_cables import CAROCA_ASSUMPTION, CAROCA_RUN
 from cdpr_drake.analyses.studies.framework.case_definition import Configuration, Plan
 from cdpr_drake.analyses.studies.framework.case_run import outcomes
 from cdpr_drake.analyses.studies.framework.case_statements import same_accuracy
@@ -41,19 +41,12 @@ CAROCA_SERVO = (
 )
 """Poses of case studies IV, V and VIII."""
 
-CABLES = (
-    "CAROCA's cables are catenaries of the printed modulus and diameter and of the weight of solid "
-    "steel, as A.1.2 asks for, and the platform's swing is damped by 168 N s/m and 3.1 N m s/rad, "
-    f"{100.0 * SWING_SHARE:g} % of critical at {SWING_HZ:g} Hz; nothing of it was fitted to runs. "
-    "All cases on CAROCA have this model."
-)
-
 ASSUMPTIONS = (
     "Both printed pairs of poses put the tag 0.133 m below the ground; all heights are raised by "
     "as much.",
     "Only the size of the perturbations is printed. Their directions are those of section 2.3.5: "
     "from the printed initial pose to the printed assumed one, scaled.",
-    CABLES,
+    CAROCA_ASSUMPTION,
     "The simulated robot has the pulleys and the elastic cables of the prototype; the controller's "
     "model has neither.",
 )

@@ -6,8 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cdpr_drake.analyses.studies.case_studies.case_4 import CABLES
-from cdpr_drake.analyses.studies.framework.caroca_cables import CAROCA_CABLES
+from cdpr_drake.analyses.studies.framework.caroca_cables import CAROCA_ASSUMPTION, CAROCA_CABLES
 from cdpr_drake.analyses.studies.framework.case_definition import Configuration, Plan
 from cdpr_drake.analyses.studies.framework.case_study import configuration_study
 from cdpr_drake.analyses.studies.tension_cases.case_10_estimates import ESTIMATES
@@ -138,7 +137,7 @@ STUDY = configuration_study(
         "threshold; C1 and C2, C7 alone, C7 and C8 are run beside them.",
         "The platform hangs at rest with the slack when the servo starts: it is printed that it "
         "turns a little when slack is added, and that the first image shows that.",
-        CABLES,
+        CAROCA_ASSUMPTION,
         "Stiffness of the cables as mounted is not printed: two smaller ones are run beside it, "
         "and massless cables that were fitted once, with three runs each of E3, E4, E7, E8, E9 and "
         "E10 in sight.",
