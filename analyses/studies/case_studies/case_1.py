@@ -17,10 +17,10 @@ from cdpr_drake.analyses.studies.case_studies.case_1_ends import (
 from cdpr_drake.analyses.studies.case_studies.case_1_figures import CASE_1_LAYOUTS
 from cdpr_drake.analyses.studies.case_studies.case_4 import (
     CAROCA_SERVO,
-    DAMPING,
     LIFT,
     PRINTED_BELIEF,
 )
+from cdpr_drake.analyses.studies.framework.caroca_cables import CAROCA_ASSUMPTION, CAROCA_RUN
 from cdpr_drake.analyses.studies.framework.case_definition import PULLEYS, Configuration, Plan
 from cdpr_drake.analyses.studies.framework.case_run import converged, outcomes
 from cdpr_drake.analyses.studies.framework.case_study import configuration_study
@@ -54,7 +54,9 @@ ACROBOT_BELIEF = as_transform(((0.056, -0.077, 0.308), (-6.0, -12.0, -5.0)))
 """Printed assumed pose of section 2.3.3, 0.072 m and 7 deg wrong."""
 
 PERTURBED = pose_item("perturbations.initial_pose", ACROBOT_BELIEF)
-CAROCA_WRONG = (*CAROCA_SERVO, DAMPING, pose_item("perturbations.initial_pose", PRINTED_BELIEF))
+CAROCA_WRONG = (
+    *CAROCA_SERVO, *CAROCA_RUN, pose_item("perturbations.initial_pose", PRINTED_BELIEF),
+)  # fmt: skip
 
 RADII = (0.16, 0.12)
 """Half axes of the moving object's path on the ground along x and y of W [m]."""
@@ -335,7 +337,7 @@ STUDY = configuration_study(
                 CAROCA,
                 "c",
                 (*_SEVEN, "f"),
-                (DAMPING,),
+                CAROCA_RUN,
                 {
                     "1": {"estimate_max_m": "70"},
                     "2": {"image_max_px": "35", "estimate_max_m": "> 100"},
@@ -371,9 +373,7 @@ STUDY = configuration_study(
     assumptions=(
         "The simulated robots have pulleys and elastic cables; which of them an estimator knows is "
         "its own matter. The controller's model has neither.",
-        "CAROCA: the platform's motion is damped by 40 N s/m and 0.8 N m s/rad. Even so, where the "
-        "controller knows nothing of the pulleys, three cables are slack, the platform goes on "
-        "swinging by millimetres, and runs may end by timeout.",
+        CAROCA_ASSUMPTION,
         "Meas. 1: the tracker's errors per distance and per angle are fitted to the 12 mm and 5 mm "
         "printed for these runs (section 2.3.2), so its error at the start and at the end is no "
         "comparison. What they make of the paths was not fitted.",

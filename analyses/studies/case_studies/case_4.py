@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from cdpr_drake.analyses.studies.case_studies.path_figures import three_layouts
-from cdpr_drake.analyses.studies.framework.case_definition import PULLEYS, Configuration, Plan
+from cdpr_drake.analyses.studies.framework.caroca_cables import CAROCA_ASSUMPTION, CAROCA_RUN
+from cdpr_drake.analyses.studies.framework.case_definition import Configuration, Plan
 from cdpr_drake.analyses.studies.framework.case_run import outcomes
 from cdpr_drake.analyses.studies.framework.case_statements import same_accuracy
 from cdpr_drake.analyses.studies.framework.case_study import configuration_study
@@ -40,17 +41,12 @@ CAROCA_SERVO = (
 )
 """Poses of case studies IV, V and VIII."""
 
-DAMPING = "damping={translation: 40, rotation: 0.8}"
-"""A fiftieth of critical damping at 1 Hz, by the platform's mass and inertia [N s/m, N m s/rad]."""
-
 ASSUMPTIONS = (
     "Both printed pairs of poses put the tag 0.133 m below the ground; all heights are raised by "
     "as much.",
     "Only the size of the perturbations is printed. Their directions are those of section 2.3.5: "
     "from the printed initial pose to the printed assumed one, scaled.",
-    "The platform's motion is damped by 40 N s/m and 0.8 N m s/rad. With wrong models three cables "
-    "are slack, and without damping the platform swings by some millimetres and does not come to "
-    "rest.",
+    CAROCA_ASSUMPTION,
     "The simulated robot has the pulleys and the elastic cables of the prototype; the controller's "
     "model has neither.",
 )
@@ -81,7 +77,7 @@ STUDY = configuration_study(
         name="case-4",
         title="PBVS on CAROCA",
         scenario="caroca_pbvs",
-        changes=(*CAROCA_SERVO, PULLEYS, DAMPING),
+        changes=(*CAROCA_SERVO, *CAROCA_RUN),
         configurations=(
             Configuration("none", "no perturbation", (), published={"outcome": "converged"}),
             Configuration(

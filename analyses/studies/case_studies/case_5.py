@@ -5,11 +5,11 @@ from __future__ import annotations
 from cdpr_drake.analyses.studies.case_studies.case_4 import (
     ASSUMPTIONS,
     CAROCA_SERVO,
-    DAMPING,
     believed,
 )
 from cdpr_drake.analyses.studies.case_studies.path_figures import HYBRID_LAYOUTS
-from cdpr_drake.analyses.studies.framework.case_definition import PULLEYS, Configuration, Plan
+from cdpr_drake.analyses.studies.framework.caroca_cables import CAROCA_RUN
+from cdpr_drake.analyses.studies.framework.case_definition import Configuration, Plan
 from cdpr_drake.analyses.studies.framework.case_run import converged, outcomes
 from cdpr_drake.analyses.studies.framework.case_statements import same_accuracy
 from cdpr_drake.analyses.studies.framework.case_study import configuration_study
@@ -73,7 +73,7 @@ STUDY = configuration_study(
         name="case-5",
         title="2 1/2 D visual servoing on CAROCA",
         scenario="caroca_pbvs",
-        changes=(*CAROCA_SERVO, PULLEYS, DAMPING),
+        changes=(*CAROCA_SERVO, *CAROCA_RUN),
         configurations=(
             Configuration(
                 "none",

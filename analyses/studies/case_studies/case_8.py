@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from cdpr_drake.analyses.studies.case_studies.case_4 import ASSUMPTIONS, CAROCA_SERVO, DAMPING
+from cdpr_drake.analyses.studies.case_studies.case_4 import ASSUMPTIONS, CAROCA_SERVO
 from cdpr_drake.analyses.studies.case_studies.case_5 import HYBRID
 from cdpr_drake.analyses.studies.case_studies.path_figures import CAROCA_LAYOUTS
-from cdpr_drake.analyses.studies.framework.case_definition import PULLEYS, Configuration, Plan
+from cdpr_drake.analyses.studies.framework.caroca_cables import CAROCA_RUN
+from cdpr_drake.analyses.studies.framework.case_definition import Configuration, Plan
 from cdpr_drake.analyses.studies.framework.case_run import converged
 from cdpr_drake.analyses.studies.framework.case_study import configuration_study
 from cdpr_drake.analyses.studies.framework.runs import Run, Runs
@@ -140,7 +141,7 @@ STUDY = configuration_study(
         name="case-8",
         title="Trajectory planning and tracking on CAROCA",
         scenario="caroca_pbvs",
-        changes=(*CAROCA_SERVO, *HYBRID, PULLEYS, DAMPING),
+        changes=(*CAROCA_SERVO, *HYBRID, *CAROCA_RUN),
         configurations=(
             Configuration(
                 "servo", "2 1/2 D", published={"image_max_px": "25", "camera_max_m": "70"}

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from cdpr_drake.analyses.studies.framework.caroca_cables import CAROCA_ASSUMPTION, CAROCA_CABLES
 from cdpr_drake.analyses.studies.framework.case_definition import Configuration, Plan
 from cdpr_drake.analyses.studies.framework.case_study import configuration_study
 from cdpr_drake.analyses.studies.tension_cases.case_10_estimates import ESTIMATES
@@ -36,7 +37,17 @@ OTHER_CABLES = {"cables_1_2": (1, 2), "cables_7": (7,), "cables_7_8": (7, 8)}
 """Cables that could have been paid out as well, by the names of configurations."""
 
 SOFTNESS = ("0.02", "0.1")
-"""Stiffness of the cables as mounted, of that by the modulus of steel, beside the scenario's."""
+"""Stiffness of the cables as mounted, of that by the modulus of steel, beside all of it."""
+
+MASSLESS = (
+    "cables={stiffness_ratio: 0.05, retardation_time: 0.006}",
+    "damping={translation: 0, rotation: 0}",
+)
+"""Cables that were once fitted to E3 to E10: straight, without weight or pulleys, a twentieth of
+steel's stiffness, a tenth of critical damping."""
+
+RETARDATION = 3.0e-4
+"""Retardation time in the robot's file [s]."""
 
 ACCURACIES = ("25", "75")
 """Constant errors of the sensors that the readings of slack cables do not hold [N]."""
@@ -75,11 +86,12 @@ def _other_cables() -> list[Configuration]:
 def _softer() -> list[Configuration]:
     found: list[Configuration] = []
     for ratio in SOFTNESS:
-        damping = 0.00134 / np.sqrt(float(ratio))  # the same share of critical damping
-        cables = f"cables={{stiffness_ratio: {ratio}, retardation_time: {damping:.6f}}}"
-        change = (slack_change(6, SLACK_CABLES), cables)
+        damping = RETARDATION / np.sqrt(float(ratio))  # the same share of critical damping
+        cables = (f"cables.stiffness_ratio={ratio}", f"cables.retardation_time={damping:.6f}")
+        change = (slack_change(6, SLACK_CABLES), *cables)
         found += _pair(f"stiffness_{ratio}", f"stiffness x {ratio}", change, "stiffness")
-    return found
+    massless = (slack_change(6, SLACK_CABLES), *MASSLESS)
+    return [*found, *_pair("massless", "massless, stiffness x 0.05", massless, "stiffness")]
 
 
 def _worse_sensors() -> list[Configuration]:
@@ -100,6 +112,7 @@ STUDY = configuration_study(
         title="Slack cables on CAROCA, with and without tension correction",
         scenario="caroca_slack_start",
         changes=(
+            *CAROCA_CABLES,
             "perturbations.initial_pose_shift={distance: 0.02, angle_deg: 1.5}",
             "perturbations.exit_points=0.005",
             "perturbations.anchor_points=0.002",
@@ -124,10 +137,10 @@ STUDY = configuration_study(
         "threshold; C1 and C2, C7 alone, C7 and C8 are run beside them.",
         "The platform hangs at rest with the slack when the servo starts: it is printed that it "
         "turns a little when slack is added, and that the first image shows that.",
-        "Stiffness and damping of the cables as mounted are not printed: a twentieth of steel's "
-        "modulus and about a tenth of critical damping are fitted, with three runs each of E3, "
-        "E4, E7, E8, E9 and E10 in sight: which survive, and for how long C7 is slack; two other "
-        "stiffnesses are run beside it.",
+        CAROCA_ASSUMPTION,
+        "Stiffness of the cables as mounted is not printed: two smaller ones are run beside it, "
+        "and massless cables that were fitted once, with three runs each of E3, E4, E7, E8, E9 and "
+        "E10 in sight.",
         "The readings of slack cables hold the constant errors of the sensors, as they were taken "
         "on this robot; what they do not hold, at other poses, is 0 here, and 25 and 75 N beside.",
         "The printed poses of the tag in the camera at start and goal put it 0.12 m and 0.10 m "
@@ -148,8 +161,8 @@ STUDY = configuration_study(
         ),
         chosen(
             "chosen_stiffness",
-            ("E7/E8", *(f"stiffness_{ratio}" for ratio in SOFTNESS)),
-            "How much the cables give is fitted.",
+            ("E7/E8", *(f"stiffness_{ratio}" for ratio in SOFTNESS), "massless"),
+            "How the cables are modelled is chosen.",
             "nothing",
         ),
         chosen(
