@@ -5,16 +5,21 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rich.table import Table
 
 from cdpr_drake.analyses.front.session import Session, asked_workers
+from cdpr_drake.analyses.reporting.deferred_figures import write_pictures
 from cdpr_drake.analyses.reporting.log_files import write_json
 from cdpr_drake.analyses.reporting.output_folder import continued_folder, results_folder
 from cdpr_drake.analyses.reporting.progress import StudySession, WorkProgress
 from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
+from cdpr_drake.analyses.reproduction.digest_pdf import DIGEST, write_digest
+from cdpr_drake.analyses.reproduction.digest_story import digest_story
+from cdpr_drake.analyses.reproduction.older import SUMMARY, read_older
 from cdpr_drake.analyses.reproduction.page import write_report
 from cdpr_drake.analyses.reproduction.rows import ReportRow, report_rows
 from cdpr_drake.analyses.reproduction.runner import RunSettings, run_studies
@@ -36,9 +41,6 @@ from cdpr_drake.summaries import Summarized
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-SUMMARY = "summary.json"
-"""All rows and counts of the report."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -133,6 +135,8 @@ class Reproduction(Summarized):
         states: How far each study is, by name.
         page: The report as a page.
         left: Studies that were not begun, or stopped.
+        digest: Its digest of about ten pages; None where it could not be written.
+        failed: Of each file of the report that could not be written, and is not the page, why.
     """
 
     quick: bool
@@ -140,6 +144,8 @@ class Reproduction(Summarized):
     states: Mapping[str, StudyState]
     page: Path
     left: tuple[str, ...] = ()
+    digest: Path | None = None
+    failed: Mapping[str, str] = field(default_factory=dict)
 
     def as_dict(self) -> dict[str, Any]:
         """All rows and counts for JSON."""
@@ -168,6 +174,7 @@ class Reproduction(Summarized):
             ("facts", counts or "none"),
             ("failed", ", ".join(failed) or "none"),
             ("report", str(self.page)),
+            ("digest", str(self.digest or f"not written: {'; '.join(self.failed.values())}")),
         ]
 
 
@@ -275,11 +282,14 @@ def reproduce(
     workers: int | None = None,
     overwrite: bool = False,
     formats: Sequence[str] = DEFAULT_FORMATS,
+    beside: Path | str | None = None,
     session: Session | None = None,
 ) -> Reproduction:
     """Runs every study, and writes one report on all that was published beside what is found.
 
-    A study that is finished by the same code is not run again; what was stopped continues.
+    A study that is finished by the same code is not run again; what was stopped continues. A
+    digest as PDF is written after the page, by reportlab (extra `report`); where that is not
+    installed, or fails, the rest is there all the same.
 
     Args:
         folder: Where studies and report are written.
@@ -288,13 +298,18 @@ def reproduce(
         workers: Processes; None: one for each processor.
         overwrite: Whether other results in the folder may be replaced.
         formats: Endings of the files of figures; png, which the report shows, is always there.
+        beside: Folder of an older reproduction, or its summary.json, whose counts the report shows
+            beside its own; None: none.
         session: Who follows it, told of a `StudyOfMany`, and may stop it; None: nobody.
 
     Raises:
         CdprError: A study is unknown.
-        OutputFolderError: The folder holds other things, or cannot be written.
+        OutputFolderError: The folder holds other things, or cannot be written; or there is no
+            older report where one is named.
     """
     chosen, told = chosen_studies(only), session or Session()
+    # Before anything is written: it may be the report that stands in the same folder.
+    older = None if beside is None else read_older(Path(beside))
 
     def tell(name: str, number: int, progress: WorkProgress | None) -> None:
         told.progress(StudyOfMany(name, number, len(chosen), progress))
@@ -311,7 +326,10 @@ def reproduce(
             rows = report_rows(registers, results.path, chosen, states)
             found = Reproduction(quick, rows, states, results.path)
             write_json(results.path / SUMMARY, found.as_dict())  # before the page, which is larger
-            page = write_report(results.path, registers, rows, states, quick)
+            page = write_report(results.path, registers, rows, states, quick, older)
+            story = digest_story(results.path, registers, rows, states, quick, older)
+            failed = write_pictures(results.path, {DIGEST: partial(write_digest, story=story)})
             left = tuple(n for n in chosen if n not in states or states[n].unfinished)
             results.unfinished = bool(left)
-    return replace(found, page=page, left=left)
+    digest = None if failed else results.path / DIGEST
+    return replace(found, page=page, left=left, digest=digest, failed=failed)

@@ -64,6 +64,7 @@ class PublishedNumber:
         format: Of the number in those.
         printed: What is printed, in its words.
         why: Why ours may differ; may be empty.
+        cause: Of what kind that is, see `framework.statement`; empty: nobody knows.
     """
 
     group: str
@@ -75,6 +76,7 @@ class PublishedNumber:
     format: str
     printed: str
     why: str = ""
+    cause: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -295,7 +295,11 @@ def test_rows_have_every_item_beside_what_was_found(folder):
     ]  # fmt: skip
     assert found["statement", "It is high."].found == "yes & no"
     assert found["Figure 1.1", "Seen"].figures == ("studies/good/view.png",)
-    assert found["Table 1.1", "Both"].found == "high: confirmed; low: not confirmed"
+    assert found["Table 1.1", "Both"].printed == "high: yes; low: yes"
+    assert (
+        found["Table 1.1", "Both"].found
+        == "high: confirmed, yes & no; low: not confirmed, yes & no"
+    )
     assert found["Table 1.1", "Both"].why == "low: why; its figure was not drawn"
     assert found["Figure 1.1", "Seen"].differs == "wider < taller"
     assert found["Table 1.4", "Other"].why == "without a verdict here: deep."
