@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -327,9 +326,13 @@ def reproduce(
             found = Reproduction(quick, rows, states, results.path)
             write_json(results.path / SUMMARY, found.as_dict())  # before the page, which is larger
             page = write_report(results.path, registers, rows, states, quick, older)
-            story = digest_story(results.path, registers, rows, states, quick, older)
-            failed = write_pictures(results.path, {DIGEST: partial(write_digest, story=story)})
+
+            def digest(path: Path) -> None:
+                story = digest_story(results.path, registers, rows, states, quick, older)
+                write_digest(path, story)
+
+            failed = write_pictures(results.path, {DIGEST: digest})
             left = tuple(n for n in chosen if n not in states or states[n].unfinished)
             results.unfinished = bool(left)
-    digest = None if failed else results.path / DIGEST
-    return replace(found, page=page, left=left, digest=digest, failed=failed)
+    where = None if failed else results.path / DIGEST
+    return replace(found, page=page, left=left, digest=where, failed=failed)

@@ -36,6 +36,12 @@ NO_REPORTLAB = "reportlab is not installed: pip install 'cdpr_drake[report]'"
 MARGIN, GUTTER = 17.0, 14.0
 """Of a page, at the sides, and above and below [mm]."""
 
+ROOM, ROOM_PART = 40.0, 22.0
+"""Below a heading of a section, or of a part: with less a page begins [mm]."""
+
+FRAME = 6.0
+"""Of reportlab, between text and margin [pt]."""
+
 FONTS = {
     "DejaVuSans": "DejaVuSans.ttf",
     "DejaVuSans-Bold": "DejaVuSans-Bold.ttf",
@@ -44,8 +50,8 @@ FONTS = {
 }
 """Those that come with matplotlib: the standard ones of PDF lack Greek letters and signs."""
 
-SIZE, SMALL, LEADING = 8.5, 6.6, 1.28
-"""Letters of paragraphs and of tables [pt], and lines over letters."""
+SIZE, SMALL, HEAD, LEADING = 8.5, 6.6, 5.8, 1.28
+"""Letters of paragraphs, of tables, of their heads [pt], and lines over letters."""
 
 INK, GREY, LINE, SOFT = "#1b1d21", "#5b616b", "#c9ccd1", "#f4f5f7"
 
@@ -100,10 +106,11 @@ def write_digest(path: Path, story: Sequence[Block]) -> None:
         canvas.setFont("DejaVuSans", SMALL)
         canvas.setFillColor(GREY)
         height = (GUTTER - 2) * mm
-        canvas.drawString(MARGIN * mm, height, title)
-        canvas.drawRightString(A4[0] - MARGIN * mm, height, str(canvas.getPageNumber()))
+        canvas.drawString(MARGIN * mm + FRAME, height, title)
+        number = str(canvas.getPageNumber())
+        canvas.drawRightString(A4[0] - MARGIN * mm - FRAME, height, number)
 
-    typesetter = _Typesetter(document.width, mm)
+    typesetter = _Typesetter(document.width - 2 * FRAME, mm)
     flowables = [each for block in story for each in typesetter.flowables(block)]
     document.build(flowables, onFirstPage=foot, onLaterPages=foot)
 
@@ -136,12 +143,14 @@ class _Typesetter:
         self._width, self._mm = width, mm
         self._styles = {
             "title": style("title", 19, spaceAfter=6),
-            "section": style("section", 13, spaceBefore=11, spaceAfter=4, keepWithNext=1),
-            "part": style("part", 10, spaceBefore=8, spaceAfter=2, keepWithNext=1),
+            "section": style("section", 13, spaceBefore=11, spaceAfter=4),
+            "part": style("part", 10, spaceBefore=8, spaceAfter=2),
             "words": style("words", SIZE, spaceAfter=3),
             "small": style("small", SMALL, spaceAfter=4),
             "cell": style("cell", SMALL),
             "number": style("number", SMALL, alignment=2),
+            "head": style("head", HEAD),
+            "number head": style("number head", HEAD, alignment=2),
             "caption": style("caption", SMALL + 0.6, spaceBefore=2, spaceAfter=8),
         }
         for name in ("small", "caption"):
@@ -156,7 +165,8 @@ class _Typesetter:
         elif isinstance(block, Heading):
             if block.new_page:
                 yield PageBreak()
-            yield CondPageBreak(22 * self._mm)
+            # Not kept with all that follows it, which may be a table of several pages.
+            yield CondPageBreak((ROOM_PART if block.part else ROOM) * self._mm)
             kind = "part" if block.part else "section"
             heading = self._words(f"<b>{escape(block.words)}</b>", kind)
             heading.outline_level = int(block.part)
@@ -188,11 +198,13 @@ class _Typesetter:
     def _table(self, grid: Grid) -> Any:
         from reportlab.platypus import LongTable, TableStyle
 
-        def cell(column: int, words: str, strong: bool) -> Any:
+        def cell(column: int, words: str, strong: bool, head: bool = False) -> Any:
             shown = f"<b>{escape(words)}</b>" if strong else escape(words)
-            return self._words(shown, "number" if column >= grid.numbers else "cell")
+            if column >= grid.numbers:
+                return self._words(shown, "number head" if head else "number")
+            return self._words(shown, "head" if head else "cell")
 
-        data = [[cell(k, words, True) for k, words in enumerate(grid.heads)]]
+        data = [[cell(k, words, True, True) for k, words in enumerate(grid.heads)]]
         for number, line in enumerate(grid.lines):
             data.append([cell(k, words, number in grid.strong) for k, words in enumerate(line)])
         style = [

@@ -20,11 +20,13 @@ from cdpr_drake.analyses.reproduction.older import OlderReport, change_words, ch
 from cdpr_drake.analyses.reproduction.overview import (
     CAUSE_WORDS,
     MET,
+    OPEN,
     STANDS,
     ChapterOverview,
     PlacedFact,
     best_rows,
     chapter_overviews,
+    ended,
     marks,
     shortened,
 )
@@ -39,10 +41,10 @@ from cdpr_drake.analyses.reproduction.scorecard import (
 from cdpr_drake.analyses.reproduction.states import FAILED, FINISHED, StudyState
 from cdpr_drake.analyses.studies.published.register import Register
 
-NAMED = 8
-"""So many facts of a kind are named for each chapter."""
+NAMED, NAMED_OPEN = 7, 3
+"""So many facts of a kind are named for each chapter; and of those without a verdict."""
 
-LONGEST = {"says": 120, "printed": 70, "found": 110, "why": 190, "rule": 150}
+LONGEST = {"says": 110, "printed": 60, "found": 90, "why": 150, "rule": 150}
 """Letters of a cell, by what it holds; the page has all of it."""
 
 TELLING = (
@@ -215,18 +217,21 @@ def _scorecard(
                 for one in changed
             )
             blocks.append(Grid(("what it says", "before", "now"), lines, (0.64, 0.18, 0.18)))
-    if any(card.facts.values()):
-        drawn = _with_runs(card)
+    drawn = _of_sources(card)
+    if drawn.facts:
         blocks.append(Drawing(
             lambda: scorecard_figure(drawn, registers, quick), "Facts by chapter, and verdicts."
         ))  # fmt: skip
     return blocks
 
 
-def _with_runs(card: Scorecard) -> Scorecard:
-    """Counts without chapters of which nothing was asked for."""
-    facts = {place: some for place, some in card.facts.items() if set(+some) != {NOT_ASKED}}
-    return Scorecard(card.chapters, facts or card.facts, card.independent)
+def _of_sources(card: Scorecard) -> Scorecard:
+    """Counts without what is ours, and chapters of which nothing was asked for."""
+    facts = {
+        place: some for place, some in card.facts.items()
+        if place[0] != OWN and set(+some) != {NOT_ASKED}
+    }  # fmt: skip
+    return Scorecard(card.chapters, facts, card.independent)
 
 
 def _counts(registers: Sequence[Register], card: Scorecard, older: OlderReport | None) -> Grid:
@@ -251,7 +256,7 @@ def _counts(registers: Sequence[Register], card: Scorecard, older: OlderReport |
         places = [place for place in card.facts if place[0] == register.name]
         if not places:
             continue
-        for place in places:
+        for place in () if register.name == OWN else places:
             if set(+card.facts[place]) != {NOT_ASKED}:
                 was = None if before is None else before.get(place)
                 lines.append(line(chapter_words(register, place[1]), card.facts[place], was))
@@ -263,9 +268,9 @@ def _counts(registers: Sequence[Register], card: Scorecard, older: OlderReport |
     strong.append(len(lines))
     sums = None if older is None or before is None else older.card.total_facts()
     lines.append(line("All of the sources", card.total_facts(), sums))
-    share = 0.7 / (len(verdicts) + 1)
+    share = 0.8 / (len(verdicts) + 1)
     return Grid(
-        ("", "facts", *verdicts), tuple(lines), (0.3, *[share] * (len(verdicts) + 1)), numbers=1,
+        ("", "facts", *verdicts), tuple(lines), (0.2, *[share] * (len(verdicts) + 1)), numbers=1,
         strong=tuple(strong),
     )  # fmt: skip
 
@@ -281,14 +286,14 @@ def _chapter(overview: ChapterOverview) -> list[Block]:
     """What stands, is corrected, fails and why."""
     blocks: list[Block] = []
     for group in overview.groups:
-        words = f"{group.named(NAMED)}."
-        if group.why:
-            words = f"{group.why}: {words}"
-        blocks.append(Words(words, lead=f"{group.title}, {len(group.facts)}: "))
+        words = group.named(NAMED_OPEN if group.title == OPEN else NAMED)
+        why = f", {group.why}" if group.why else ""
+        lead = f"{group.title}, {len(group.facts)}"
+        blocks.append(Words(f"{why}: {ended(words)}", lead))
     if overview.corrected:
         met = sum(group.title in (STANDS, MET) for group in overview.groups)
         words = "; ".join(overview.corrected)
-        blocks.insert(met, Words(f"{words}.", lead=f"Corrected, {len(overview.corrected)}: "))
+        blocks.insert(met, Words(f": {ended(words)}", f"Corrected, {len(overview.corrected)}"))
     return blocks
 
 
@@ -304,13 +309,11 @@ def _not_confirmed(rows: Sequence[ReportRow]) -> list[Block]:
     blocks: list[Block] = []
     for title, verdict in (("Not confirmed", NOT_CONFIRMED), ("Confirmed in part", IN_PART)):
         some = [one for one in facts if one.fact.verdict == verdict]
-        blocks.append(Heading(f"{title}: {len(some)}", new_page=not blocks))
-        if not some:
-            blocks.append(Words("None."))
-            continue
+        blocks.append(Heading(f"{title}: {len(some)}"))
         heads = ("section", "what it says", "printed", "ours", "cause", "why")
-        widths = (0.08, 0.24, 0.13, 0.2, 0.08, 0.27)
-        blocks.append(Grid(heads, tuple(map(_line, some)), widths))
+        widths = (0.07, 0.25, 0.12, 0.19, 0.08, 0.29)
+        lines = tuple(map(_line, some))
+        blocks.append(Grid(heads, lines, widths) if lines else Words("None."))
     return blocks
 
 
@@ -329,15 +332,17 @@ def _line(placed: PlacedFact) -> tuple[str, ...]:
 
 def _corrections(registers: Sequence[Register], rows: Sequence[ReportRow]) -> list[Block]:
     """What does not hold as printed, of the sources of which something was asked for."""
+    note = "What does not hold as printed. What is used instead stands in the "
+    note += "documentation, under What was corrected in the sources."
     asked = {row.source for row in rows if row.verdict != NOT_ASKED}
-    lines = [
-        Words(one, lead=f"{register.name.replace('_', ' ')}, {chapter_words(register, chapter)}: ")
+    lines = tuple(
+        (register.name.replace("_", " "), chapter_words(register, chapter), "; ".join(some))
         for register in registers
         if register.name in asked
         for chapter, some in register.corrected.items()
-        for one in some
-    ]
-    return [Heading("Corrections"), *(lines or [Words("None.")])]
+    )
+    table = Grid(("source", "chapter", "what does not hold"), lines, (0.2, 0.15, 0.65))
+    return [Heading("Corrections"), Words(note), table] if lines else []
 
 
 def _telling(folder: Path, rows: Sequence[ReportRow]) -> list[Block]:
@@ -353,13 +358,11 @@ def _telling(folder: Path, rows: Sequence[ReportRow]) -> list[Block]:
 
 
 def _tolerances(rows: Sequence[ReportRow]) -> list[Block]:
-    """Rules, each once, with the number of facts that it holds for."""
+    """Rules of the sources' facts, each once, with the number of facts that it holds for."""
     rules: dict[str, list[str]] = {}
-    seen: set[str] = set()
-    for row in rows:
-        for fact in row.facts:
-            if fact.rule and fact.key not in seen:
-                seen.add(fact.key)
+    for (source, _), some in facts_by_place(rows).items():
+        for fact in some:
+            if source != OWN and fact.rule:
                 rules.setdefault(fact.rule, []).append(fact.key)
     lines = tuple(
         (shortened(rule, LONGEST["rule"]), keys[0], str(len(keys))) for rule, keys in rules.items()

@@ -193,6 +193,11 @@ def marks(row: ReportRow) -> list[str]:
     return [*words, "counted above"] if row.repeats else words
 
 
+def ended(words: str) -> str:
+    """Words with a full stop, where they do not end in dots already."""
+    return words if words.endswith(".") else f"{words}."
+
+
 def shortened(words: str, most: int) -> str:
     """Words, cut between two of them where they are longer than so many letters."""
     return words if len(words) <= most else f"{words[:most].rpartition(' ')[0]} ..."

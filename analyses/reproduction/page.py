@@ -23,6 +23,7 @@ from cdpr_drake.analyses.reproduction.overview import (
     STANDS,
     ChapterOverview,
     chapter_overviews,
+    ended,
     marks,
 )
 from cdpr_drake.analyses.reproduction.page_style import STYLE
@@ -134,7 +135,7 @@ def _counted(
     what: str,
     before: Mapping[tuple[str, str], Counter[str]],
 ) -> str:
-    """A table of counts, sources and what is ours apart, beside those of an older report.
+    """A table of counts, those of ours folded below it, beside those of an older report.
 
     Chapters without any item that was asked for are left out, but for the sums.
     """
@@ -164,13 +165,21 @@ def _counted(
         every += total if register.name != OWN else Counter()
         every_before += was if register.name != OWN else Counter()
     sum_before = every_before if before else None
-    lines = [*lines, _counts("All of the sources", every, verdicts, sum_before, "total"), *own]
+    lines.append(_counts("All of the sources", every, verdicts, sum_before, "total"))
+    lines += own[-1:]
     heads = "".join(f'<th class="n">{escape(verdict)}</th>' for verdict in verdicts)
-    return (
-        '<div class="wide"><table class="scorecard"><thead><tr><th></th>'
-        f'<th class="n">{what}</th>{heads}</tr></thead><tbody>{"".join(lines)}</tbody></table>'
-        "</div>"
-    )
+
+    def table(some: Sequence[str]) -> str:
+        return (
+            '<div class="wide"><table class="scorecard"><thead><tr><th></th>'
+            f'<th class="n">{what}</th>{heads}</tr></thead><tbody>{"".join(some)}</tbody></table>'
+            "</div>"
+        )
+
+    if len(own) < 2:
+        return table(lines)
+    ours = f"<details><summary>Ours by study</summary>{table(own)}</details>"
+    return table(lines) + ours
 
 
 NAMED = 6
@@ -190,7 +199,7 @@ def _overview(overview: ChapterOverview) -> list[str]:
     """Lines on a chapter."""
     lines = [
         f"<b>{group.title}, {len(group.facts)}</b>{group.why and ', '}{escape(group.why)}: "
-        f"{escape(group.named(NAMED))}."
+        f"{escape(ended(group.named(NAMED)))}"
         for group in overview.groups
     ]
     if overview.corrected:

@@ -29,6 +29,7 @@ tr.total td { font-weight: 600; border-top: 2px solid #8b9099; }
   margin: 3px 4px 0 0; font-size: 12px; color: var(--grey); background: var(--soft); }
 tr.repeats td { color: var(--grey); }
 small { color: var(--grey); font-weight: 400; }
+.scorecard td:first-child { min-width: 170px; }
 details { margin: 8px 0; } summary { cursor: pointer; color: #0055a4; }
 .quick { background: #fff6dd; border: 1px solid #d9b44a; padding: 8px 12px; max-width: 900px; }
 figure { margin: 12px 0 18px; break-inside: avoid; } figure img { max-width: 100%;
