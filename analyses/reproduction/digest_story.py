@@ -24,10 +24,9 @@ from cdpr_drake.analyses.reproduction.overview import (
     STANDS,
     ChapterOverview,
     PlacedFact,
-    best_rows,
     chapter_overviews,
     ended,
-    marks,
+    first_rows,
     shortened,
 )
 from cdpr_drake.analyses.reproduction.rows import NOT_ASKED, ReportRow
@@ -39,6 +38,7 @@ from cdpr_drake.analyses.reproduction.scorecard import (
     scorecard_figure,
 )
 from cdpr_drake.analyses.reproduction.states import FAILED, FINISHED, StudyState
+from cdpr_drake.analyses.studies.framework.statement import FITTED
 from cdpr_drake.analyses.studies.published.register import Register
 
 NAMED, NAMED_OPEN = 7, 3
@@ -268,11 +268,10 @@ def _counts(registers: Sequence[Register], card: Scorecard, older: OlderReport |
     strong.append(len(lines))
     sums = None if older is None or before is None else older.card.total_facts()
     lines.append(line("All of the sources", card.total_facts(), sums))
-    share = 0.8 / (len(verdicts) + 1)
-    return Grid(
-        ("", "facts", *verdicts), tuple(lines), (0.2, *[share] * (len(verdicts) + 1)), numbers=1,
-        strong=tuple(strong),
-    )  # fmt: skip
+    heads = ("facts", *verdicts)
+    longest = [max(map(len, head.split())) for head in heads]  # letters that cannot be broken
+    widths = [0.82 * letters / sum(longest) for letters in longest]
+    return Grid(("", *heads), tuple(lines), (0.18, *widths), numbers=1, strong=tuple(strong))
 
 
 def _chapters(registers: Sequence[Register], rows: Sequence[ReportRow]) -> list[Block]:
@@ -299,9 +298,9 @@ def _chapter(overview: ChapterOverview) -> list[Block]:
 
 def _not_confirmed(rows: Sequence[ReportRow]) -> list[Block]:
     """Facts of the sources that are not confirmed, or in part, each with what is known of why."""
-    best = best_rows(rows)
+    first = first_rows(rows)
     facts = [
-        PlacedFact(fact, best[fact.key])
+        PlacedFact(fact, first[fact.key])
         for (source, _), some in facts_by_place(rows).items()
         if source != OWN
         for fact in some
@@ -311,22 +310,21 @@ def _not_confirmed(rows: Sequence[ReportRow]) -> list[Block]:
         some = [one for one in facts if one.fact.verdict == verdict]
         blocks.append(Heading(f"{title}: {len(some)}"))
         heads = ("section", "what it says", "printed", "ours", "cause", "why")
-        widths = (0.07, 0.25, 0.12, 0.19, 0.08, 0.29)
+        widths = (0.1, 0.24, 0.12, 0.18, 0.08, 0.28)
         lines = tuple(map(_line, some))
         blocks.append(Grid(heads, lines, widths) if lines else Words("None."))
     return blocks
 
 
 def _line(placed: PlacedFact) -> tuple[str, ...]:
-    row, mark = placed.row, ", ".join(one for one in marks(placed.row) if one != "counted above")
-    printed, found, why = (row.printed, row.found, row.why) if placed.alone else ("", "", row.why)
+    fact = placed.fact
     return (
-        row.section,
-        shortened(placed.words, LONGEST["says"]) + (f" ({mark})" if mark else ""),
-        shortened(printed, LONGEST["printed"]),
-        shortened(found, LONGEST["found"]),
-        CAUSE_WORDS[placed.fact.cause],
-        shortened(why, LONGEST["why"]),
+        placed.row.section,
+        shortened(placed.words, LONGEST["says"]) + (" (fitted)" if fact.basis == FITTED else ""),
+        shortened(fact.printed, LONGEST["printed"]),
+        shortened(fact.found, LONGEST["found"]),
+        CAUSE_WORDS[fact.cause],
+        shortened(fact.why, LONGEST["why"]),
     )
 
 

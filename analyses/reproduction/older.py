@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from cdpr_drake.analyses.reproduction.overview import PlacedFact, best_rows
+from cdpr_drake.analyses.reproduction.overview import PlacedFact, first_rows
 from cdpr_drake.analyses.reproduction.rows import ReportRow
 from cdpr_drake.analyses.reproduction.scorecard import Scorecard, facts_by_place
 from cdpr_drake.errors import OutputFolderError
@@ -84,9 +84,9 @@ def read_older(path: Path) -> OlderReport:
 
 def changed_facts(rows: Sequence[ReportRow], older: OlderReport) -> list[ChangedFact]:
     """Facts whose verdict is another one than before, in the order of the report."""
-    best = best_rows(rows)
+    first = first_rows(rows)
     return [
-        ChangedFact(PlacedFact(fact, best[fact.key]), older.verdicts[fact.key])
+        ChangedFact(PlacedFact(fact, first[fact.key]), older.verdicts[fact.key])
         for facts in facts_by_place(rows).values()
         for fact in facts
         if older.verdicts.get(fact.key, fact.verdict) != fact.verdict

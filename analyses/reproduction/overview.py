@@ -41,27 +41,22 @@ SHORT = 110
 
 @dataclass(frozen=True)
 class PlacedFact:
-    """A fact, and the row that says it best.
+    """A fact, and where it comes first.
 
     Attributes:
         fact: What was found.
-        row: That of its statement or number; else of the first item that rests on it.
+        row: The first that rests on it.
     """
 
     fact: Fact
     row: ReportRow
 
     @property
-    def alone(self) -> bool:
-        """Whether the row is about this fact and no other."""
-        return len(self.row.facts) == 1
-
-    @property
     def words(self) -> str:
-        """What it says: the words of its row where that rests on it alone."""
-        if self.alone:
-            return self.row.words.rstrip(".")
-        return self.fact.key.partition("/")[2].replace("_", " ")
+        """What it says; where nothing was found, what its row does, or the name of its check."""
+        alone = self.row.words if len(self.row.facts) == 1 else ""
+        words = self.fact.says or alone or self.fact.key.partition("/")[2].replace("_", " ")
+        return words.rstrip(".")
 
     @property
     def in_short(self) -> str:
@@ -120,7 +115,7 @@ def chapter_overviews(
 
     Facts of studies that were not asked for are left out, and chapters that have no others.
     """
-    placed, best = facts_by_place(rows), best_rows(rows)
+    placed, first = facts_by_place(rows), first_rows(rows)
     overviews = []
     for register in registers:
         if register.name == OWN:
@@ -130,23 +125,20 @@ def chapter_overviews(
         for chapter in sorted(there | read | {*register.corrected}):
             facts = placed.get((register.name, chapter), ())
             asked = [fact for fact in facts if fact.verdict != NOT_ASKED]
-            groups = _groups([PlacedFact(fact, best[fact.key]) for fact in asked])
+            groups = _groups([PlacedFact(fact, first[fact.key]) for fact in asked])
             corrected = register.corrected.get(chapter, ())
             if groups or (corrected and not facts):
                 overviews.append(ChapterOverview(register, chapter, groups, corrected))
     return overviews
 
 
-def best_rows(rows: Sequence[ReportRow]) -> dict[str, ReportRow]:
-    """Of each fact, by its key, the row that says it best."""
-    best: dict[str, tuple[int, ReportRow]] = {}
+def first_rows(rows: Sequence[ReportRow]) -> dict[str, ReportRow]:
+    """Of each fact, by its key, the first row that rests on it."""
+    first: dict[str, ReportRow] = {}
     for row in rows:
-        told = row.label in ("statement", "number")
-        rank = 0 if len(row.facts) == 1 and told else 1 if len(row.facts) == 1 else 2
         for fact in row.facts:
-            if fact.key not in best or rank < best[fact.key][0]:
-                best[fact.key] = (rank, row)
-    return {key: row for key, (_, row) in best.items()}
+            first.setdefault(fact.key, row)
+    return first
 
 
 def _groups(facts: Sequence[PlacedFact]) -> tuple[FactGroup, ...]:

@@ -53,6 +53,10 @@ class Fact:
         basis: What it rests on, see `framework.statement`.
         rule: What had to be within which bounds.
         cause: Why it does not hold, see `framework.statement`; empty: it does, or nobody knows.
+        says: What it is about, in words; empty where nothing was found.
+        printed: Its numbers.
+        found: Ours.
+        why: What is known of the difference.
     """
 
     key: str
@@ -60,6 +64,10 @@ class Fact:
     basis: str = TEST
     rule: str = ""
     cause: str = ""
+    says: str = ""
+    printed: str = ""
+    found: str = ""
+    why: str = ""
 
 
 @dataclass(frozen=True)
@@ -121,7 +129,10 @@ class _Answer:
 
     def fact(self, key: str) -> Fact:
         """It as a fact, under the key where it is judged first."""
-        return Fact(self.same_as or key, self.verdict, self.basis, self.rule, self.cause)
+        return Fact(
+            self.same_as or key, self.verdict, self.basis, self.rule, self.cause, self.words,
+            self.printed, self.found, self.why,
+        )  # fmt: skip
 
 
 class _Found:
@@ -365,13 +376,14 @@ def _numbers(
             lack = found.lack(study)
             words, verdict, why = "", lack.verdict, lack.why
         cause = number.cause if verdict in (IN_PART, NOT_CONFIRMED) else ""
+        says = f"{number.label}: {number.heading}"
+        fact = Fact(
+            f"{study}/{number.configuration}/{number.metric}", verdict, cause=cause, says=says,
+            printed=number.printed, found=words, why=why,
+        )  # fmt: skip
         yield ReportRow(
-            register.name, section.chapter, section.number, "number",
-            f"{number.label}: {number.heading}", number.printed, words, verdict, why,
-            studies=(study,),
-            facts=(
-                Fact(f"{study}/{number.configuration}/{number.metric}", verdict, cause=cause),
-            ),
+            register.name, section.chapter, section.number, "number", says, number.printed, words,
+            verdict, why, studies=(study,), facts=(fact,),
         )  # fmt: skip
 
 
