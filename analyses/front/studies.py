@@ -11,10 +11,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from rich.table import Table
 
 from cdpr_drake.analyses.front.session import Session, asked_workers
+from cdpr_drake.analyses.reporting.deferred_figures import write_pictures
 from cdpr_drake.analyses.reporting.log_files import write_json
 from cdpr_drake.analyses.reporting.output_folder import continued_folder
 from cdpr_drake.analyses.reporting.progress import StudySession, WorkProgress
 from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
+from cdpr_drake.analyses.reproduction.digest_pdf import DIGEST, write_digest
+from cdpr_drake.analyses.reproduction.digest_story import digest_story
+from cdpr_drake.analyses.reproduction.older import SUMMARY, read_older
 from cdpr_drake.analyses.reproduction.page import write_report
 from cdpr_drake.analyses.reproduction.rows import ReportRow, report_rows
 from cdpr_drake.analyses.reproduction.runner import RunSettings, earlier_words, run_studies
@@ -41,9 +45,6 @@ from cdpr_drake.summaries import Summarized
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-SUMMARY = "summary.json"
-"""All rows and counts of the report."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -138,6 +139,8 @@ class Reproduction(Summarized):
         states: How far each study is, by name.
         page: The report as a page.
         left: Studies that were not begun, or stopped.
+        digest: Its digest of about ten pages; None where it could not be written.
+        failed: Of each file of the report that could not be written, and is not the page, why.
     """
 
     quick: bool
@@ -145,6 +148,8 @@ class Reproduction(Summarized):
     states: Mapping[str, StudyState]
     page: Path
     left: tuple[str, ...] = ()
+    digest: Path | None = None
+    failed: Mapping[str, str] = field(default_factory=dict)
 
     def as_dict(self) -> dict[str, Any]:
         """All rows and counts for JSON."""
@@ -173,6 +178,7 @@ class Reproduction(Summarized):
             ("facts", counts or "none"),
             ("failed", ", ".join(failed) or "none"),
             ("report", str(self.page)),
+            ("digest", str(self.digest or f"not written: {'; '.join(self.failed.values())}")),
         ]
 
 
@@ -292,11 +298,14 @@ def reproduce(
     overwrite: bool = False,
     formats: Sequence[str] = DEFAULT_FORMATS,
     runs_from: Path | str | None = None,
+    beside: Path | str | None = None,
     session: Session | None = None,
 ) -> Reproduction:
     """Runs every study, and writes one report on all that was published beside what is found.
 
-    A study that is finished by the same code is not run again; what was stopped continues.
+    A study that is finished by the same code is not run again; what was stopped continues. A
+    digest as PDF is written after the page, by reportlab (extra `report`); where that is not
+    installed, or fails, the rest is there all the same.
 
     Args:
         folder: Where studies and report are written.
@@ -308,13 +317,18 @@ def reproduce(
         runs_from: Folder of a reproduction by an earlier version of the code: its runs are taken
             over where a study's cases are asked for alike, which the report says; None: all are
             computed.
+        beside: Folder of an older reproduction, or its summary.json, whose counts the report shows
+            beside its own; None: none.
         session: Who follows it, told of a `StudyOfMany`, and may stop it; None: nobody.
 
     Raises:
         CdprError: A study is unknown.
-        OutputFolderError: The folder holds other things, or cannot be written.
+        OutputFolderError: The folder holds other things, or cannot be written; or there is no
+            older report where one is named.
     """
     chosen, told = chosen_studies(only), session or Session()
+    # Before anything is written: it may be the report that stands in the same folder.
+    older = None if beside is None else read_older(Path(beside))
 
     def tell(name: str, number: int, progress: WorkProgress | None) -> None:
         told.progress(StudyOfMany(name, number, len(chosen), progress))
@@ -334,7 +348,14 @@ def reproduce(
             rows = report_rows(registers, results.path, chosen, states)
             found = Reproduction(quick, rows, states, results.path)
             write_json(results.path / SUMMARY, found.as_dict())  # before the page, which is larger
-            page = write_report(results.path, registers, rows, states, quick)
+            page = write_report(results.path, registers, rows, states, quick, older)
+
+            def digest(path: Path) -> None:
+                story = digest_story(results.path, registers, rows, states, quick, older)
+                write_digest(path, story)
+
+            failed = write_pictures(results.path, {DIGEST: digest})
             left = tuple(n for n in chosen if n not in states or states[n].unfinished)
             results.unfinished = bool(left)
-    return replace(found, page=page, left=left)
+    where = None if failed else results.path / DIGEST
+    return replace(found, page=page, left=left, digest=where, failed=failed)

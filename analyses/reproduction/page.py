@@ -1,43 +1,37 @@
 """The report of a reproduction: one page that holds its figures, opens offline and prints.
 
 `write_report` writes it. Figures are inside the page, as small as they can be without a loss that
-is seen (`embedded`); `STYLE` is how it looks, on a screen and on paper.
+is seen (`embedded`).
 """
 
-import base64
 import json
 import re
 from collections import Counter
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from html import escape
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-import cv2
-import numpy as np
-
 from cdpr_drake.analyses.reporting.log_files import write_whole
 from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
-from cdpr_drake.analyses.reporting.statements import (
-    CONFIRMED,
-    IN_PART,
-    NOT_CONFIRMED,
-    NOT_IN_QUICK,
-    NOT_JUDGED,
-    NOT_TESTABLE,
-)
+from cdpr_drake.analyses.reporting.statements import NOT_IN_QUICK, NOT_JUDGED, NOT_TESTABLE
 from cdpr_drake.analyses.reproduction.numbers import RULE
-from cdpr_drake.analyses.reproduction.rows import CITED, MISSING, NOT_ASKED, SHOWN, Fact, ReportRow
+from cdpr_drake.analyses.reproduction.older import OlderReport, change_words, changed_facts
+from cdpr_drake.analyses.reproduction.overview import (
+    MET,
+    STANDS,
+    ChapterOverview,
+    chapter_overviews,
+    ended,
+    marks,
+)
+from cdpr_drake.analyses.reproduction.page_style import STYLE
+from cdpr_drake.analyses.reproduction.pictures import embedded
+from cdpr_drake.analyses.reproduction.rows import CITED, MISSING, NOT_ASKED, SHOWN, ReportRow
 from cdpr_drake.analyses.reproduction.scorecard import OWN, Scorecard, chapter_words
 from cdpr_drake.analyses.reproduction.states import StudyState, study_folder
-from cdpr_drake.analyses.studies.framework.statement import (
-    CHOICE,
-    HARDWARE,
-    MET_CONSTRUCTION,
-    MET_FITTED,
-    SOURCE,
-)
+from cdpr_drake.analyses.studies.framework.statement import MET_CONSTRUCTION, MET_FITTED
 from cdpr_drake.analyses.studies.published.recipe_choices import CHOICES
 from cdpr_drake.analyses.studies.published.register import Register
 
@@ -58,6 +52,7 @@ def write_report(
     rows: Sequence[ReportRow],
     states: Mapping[str, StudyState],
     quick: bool,
+    older: OlderReport | None = None,
 ) -> Path:
     """Writes the page into a reproduction's folder; it appears whole or not at all.
 
@@ -67,12 +62,15 @@ def write_report(
         rows: Every item beside what was found, see `report_rows`.
         states: How far the studies are.
         quick: Whether they were run in their quick form.
+        older: A report that this one is shown beside; None: none.
 
     Returns:
         Path of the page.
     """
-    parts = [_head(quick), _scorecard(rows, registers), _contents(registers, rows)]
+    parts = [_head(quick), _scorecard(rows, registers, older), _contents(registers, rows, older)]
     parts.append(_chapters(rows, registers))
+    if older is not None:
+        parts.append(_changes(rows, older))
     parts += [_lacks(rows), _studies(folder, states)]
     for register in registers:
         parts.append(_source(folder, register, [r for r in rows if r.source == register.name]))
@@ -97,18 +95,31 @@ def _head(quick: bool) -> str:
     )
 
 
-def _scorecard(rows: Sequence[ReportRow], registers: Sequence[Register]) -> str:
+def _scorecard(
+    rows: Sequence[ReportRow], registers: Sequence[Register], older: OlderReport | None
+) -> str:
     """Facts by chapter, and folded below them the items that rest on them."""
-    card = Scorecard.of(rows)
-    facts = _counted(card.facts, card.shown_facts(), registers, "facts")
-    items = _counted(card.chapters, card.shown(), registers, "items")
+    card, before = Scorecard.of(rows), None if older is None else older.card
+    facts = _counted(
+        card.facts, card.shown_facts(), registers, "facts", before.facts if before else {}
+    )
+    items = _counted(
+        card.chapters, card.shown(), registers, "items", before.chapters if before else {}
+    )
+    beside = ""
+    if older is not None:
+        none = "" if older.card.facts else " It counted items, not yet facts."
+        beside = (
+            f'<p class="lead">Small: what {escape(older.words)}, had where that is another '
+            f"number.{none}</p>"
+        )
     return (
         '<h2 id="scorecard" style="break-before: auto">Scorecard</h2>'
-        f'{facts}<p class="lead">A fact is one check of a study, or one printed number, and is '
-        "counted once, where it comes first; what no source states, but we ask for, is apart. Of "
-        f"the facts of the sources {card.independent} are confirmed by runs that could have said "
-        f"otherwise. {escape(MET_FITTED)}: parameters were chosen with the number in sight; "
-        f"{escape(MET_CONSTRUCTION)}: nothing else could have come out.</p>"
+        f'{facts}{beside}<p class="lead">A fact is one check of a study, or one printed number, '
+        "and is counted once, where it comes first; what no source states, but we ask for, is "
+        f"apart. Of the facts of the sources {card.independent} are confirmed by runs that could "
+        f"have said otherwise. {escape(MET_FITTED)}: parameters were chosen with the number in "
+        f"sight; {escape(MET_CONSTRUCTION)}: nothing else could have come out.</p>"
         "<details><summary>Figures, tables, numbers and sentences, of which several may rest on "
         f"one fact</summary>{items}</details>"
         f'<p class="lead">{escape(RULE)} Statements are judged by their studies, which say how. '
@@ -122,11 +133,16 @@ def _counted(
     verdicts: Sequence[str],
     registers: Sequence[Register],
     what: str,
+    before: Mapping[tuple[str, str], Counter[str]],
 ) -> str:
-    """A table of counts, sources and what is ours apart."""
+    """A table of counts, those of ours folded below it, beside those of an older report.
+
+    Chapters without any item that was asked for are left out, but for the sums.
+    """
     lines: list[str] = []
     own: list[str] = []
     every: Counter[str] = Counter()
+    every_before: Counter[str] = Counter()
     for register in registers:
         mine = {
             chapter: some for (name, chapter), some in chapters.items() if name == register.name
@@ -135,25 +151,36 @@ def _counted(
         if not total:
             continue
         some_lines = lines if register.name != OWN else own
+        was = sum(
+            (some for (name, _), some in before.items() if name == register.name), Counter[str]()
+        )
         for chapter, some in mine.items():
-            some_lines.append(_counts(chapter_words(register, chapter), some, verdicts))
-        some_lines.append(_counts(register.title, total, verdicts, "total"))
+            if set(+some) != {NOT_ASKED}:
+                some_before = before.get((register.name, chapter)) if before else None
+                words = chapter_words(register, chapter)
+                some_lines.append(_counts(words, some, verdicts, some_before))
+        some_lines.append(
+            _counts(register.title, total, verdicts, was if before else None, "total")
+        )
         every += total if register.name != OWN else Counter()
-    lines = [*lines, _counts("All of the sources", every, verdicts, "total"), *own]
+        every_before += was if register.name != OWN else Counter()
+    sum_before = every_before if before else None
+    lines.append(_counts("All of the sources", every, verdicts, sum_before, "total"))
+    lines += own[-1:]
     heads = "".join(f'<th class="n">{escape(verdict)}</th>' for verdict in verdicts)
-    return (
-        f'<table class="scorecard"><thead><tr><th></th><th class="n">{what}</th>{heads}</tr>'
-        f"</thead><tbody>{''.join(lines)}</tbody></table>"
-    )
 
+    def table(some: Sequence[str]) -> str:
+        return (
+            '<div class="wide"><table class="scorecard"><thead><tr><th></th>'
+            f'<th class="n">{what}</th>{heads}</tr></thead><tbody>{"".join(some)}</tbody></table>'
+            "</div>"
+        )
 
-CAUSES = {
-    SOURCE: "because of the source, which contradicts itself or leaves out what is needed",
-    HARDWARE: "because of the prototype, which has what is in no model",
-    CHOICE: "because of a choice of ours",
-    "": "for a reason that is not known, or not sorted yet",
-}
-"""Words for why facts do not hold."""
+    if len(own) < 2:
+        return table(lines)
+    ours = f"<details><summary>Ours by study</summary>{table(own)}</details>"
+    return table(lines) + ours
+
 
 NAMED = 6
 """So many facts of a kind are named in the overview of a chapter; the table has all."""
@@ -162,79 +189,72 @@ NAMED = 6
 def _chapters(rows: Sequence[ReportRow], registers: Sequence[Register]) -> str:
     """Of each chapter what stands, what is corrected, what failed and why."""
     parts = ['<h2 id="chapters">Chapter by chapter</h2>']
-    for register in registers:
-        if register.name == OWN:
-            continue
-        mine = [row for row in rows if row.source == register.name]
-        for chapter in sorted({*(row.chapter for row in mine), *register.corrected}):
-            some = [row for row in mine if row.chapter == chapter]
-            lines = _overview(some, register.corrected.get(chapter, ()))
-            if lines:
-                items = "".join(f"<li>{line}</li>" for line in lines)
-                words = f"{register.title.partition(',')[0]}: {chapter_words(register, chapter)}"
-                parts.append(f'<h3>{escape(words)}</h3><ul class="plain">{items}</ul>')
+    for overview in chapter_overviews(rows, registers):
+        items = "".join(f"<li>{line}</li>" for line in _overview(overview))
+        parts.append(f'<h3>{escape(overview.title)}</h3><ul class="plain">{items}</ul>')
     return "".join(parts)
 
 
-def _overview(rows: Sequence[ReportRow], corrected: Sequence[str]) -> list[str]:
-    """Lines on a chapter: its facts by what came of them, each once."""
-    facts: dict[str, tuple[Fact, ReportRow]] = {}
-    for row in sorted(rows, key=lambda row: row.label not in ("statement", "number")):
-        for fact in row.facts:
-            if len(row.facts) == 1 or fact.key not in facts:
-                facts.setdefault(fact.key, (fact, row))
-    found = list(facts.values())
-
-    def named(verdicts: Collection[str], cause: str | None = None) -> tuple[int, str]:
-        some = [
-            (fact, row) for fact, row in found
-            if fact.verdict in verdicts and cause in (None, fact.cause)
-        ]  # fmt: skip
-        words = "; ".join(_in_short(fact, row) for fact, row in some[:NAMED])
-        more = f"; and {len(some) - NAMED} more" if len(some) > NAMED else ""
-        return len(some), escape(words + more)
-
-    lines = []
-    for title, verdicts in (
-        ("Stands", (CONFIRMED,)), ("Met, but not put to a test", (MET_FITTED, MET_CONSTRUCTION)),
-    ):  # fmt: skip
-        count, words = named(verdicts)
-        if count:
-            lines.append(f"<b>{title}, {count}</b>: {words}.")
-    if corrected:
-        lines.append(f"<b>Corrected, {len(corrected)}</b>: {escape('; '.join(corrected))}.")
-    for cause, why in CAUSES.items():
-        for title, verdict in (("Fails", NOT_CONFIRMED), ("Holds in part", IN_PART)):
-            count, words = named((verdict,), cause)
-            if count:
-                lines.append(f"<b>{title}, {count}</b>, {why}: {words}.")
+def _overview(overview: ChapterOverview) -> list[str]:
+    """Lines on a chapter."""
+    lines = [
+        f"<b>{group.title}, {len(group.facts)}</b>{group.why and ', '}{escape(group.why)}: "
+        f"{escape(ended(group.named(NAMED)))}"
+        for group in overview.groups
+    ]
+    if overview.corrected:
+        words = escape("; ".join(overview.corrected))
+        met = sum(group.title in (STANDS, MET) for group in overview.groups)
+        lines.insert(met, f"<b>Corrected, {len(overview.corrected)}</b>: {words}.")
     return lines
 
 
-def _in_short(fact: Fact, row: ReportRow) -> str:
-    """A fact in a few words: those of its row where that rests on it alone."""
-    if len(row.facts) > 1:
-        return fact.key.partition("/")[2].replace("_", " ")
-    words = row.words.rstrip(".")
-    return words if len(words) <= SHORT else f"{words[:SHORT].rpartition(' ')[0]} ..."
+def _counts(
+    words: str,
+    counts: Counter[str],
+    verdicts: Sequence[str],
+    before: Counter[str] | None,
+    kind: str = "",
+) -> str:
+    """A line of counts, each beside that of an older report where it differs."""
+
+    def cell(now: int, was: int | None) -> str:
+        differs = was is not None and was != now
+        small = f" <small>was {was}</small>" if differs else ""
+        return f'<td class="n">{now or ("0" if differs else "")}{small}</td>'
+
+    cells = "".join(
+        cell(counts[verdict], None if before is None else before[verdict]) for verdict in verdicts
+    )
+    total = cell(counts.total(), None if before is None else before.total())
+    return f'<tr class="{kind}"><td>{escape(words)}</td>{total}{cells}</tr>'
 
 
-SHORT = 110
-"""Longest words of a fact in the overview of a chapter."""
-
-
-def _counts(words: str, counts: Counter[str], verdicts: Sequence[str], kind: str = "") -> str:
-    cells = "".join(f'<td class="n">{counts[verdict] or ""}</td>' for verdict in verdicts)
+def _changes(rows: Sequence[ReportRow], older: OlderReport) -> str:
+    """Facts of which now comes something else than in an older report."""
+    changed = changed_facts(rows, older)
+    lines = "".join(
+        f"<tr><td>{escape(one.placed.fact.key)}</td><td>{escape(one.placed.words)}</td>"
+        f"<td>{escape(one.before)}</td><td>{escape(one.placed.fact.verdict)}</td></tr>"
+        for one in changed
+    )
+    table = (
+        '<div class="wide"><table><thead><tr><th>fact</th><th>what it says</th><th>before</th>'
+        f"<th>now</th></tr></thead><tbody>{lines}</tbody></table></div>"
+    )
     return (
-        f'<tr class="{kind}"><td>{escape(words)}</td>'
-        f'<td class="n">{counts.total()}</td>{cells}</tr>'
+        '<h2 id="changes">Beside an older report</h2><p class="lead">'
+        f"{escape(change_words(rows, older))}</p>{table if changed else ''}"
     )
 
 
-def _contents(registers: Sequence[Register], rows: Sequence[ReportRow]) -> str:
+def _contents(
+    registers: Sequence[Register], rows: Sequence[ReportRow], older: OlderReport | None
+) -> str:
     there = {row.source for row in rows}
     links = [
         ("chapters", "Chapter by chapter"),
+        *([] if older is None else [("changes", "Beside an older report")]),
         ("lacks", "What is missing, or not judged"),
         ("studies", "Studies"),
     ]
@@ -309,15 +329,24 @@ def _source(folder: Path, register: Register, rows: Sequence[ReportRow]) -> str:
     parts = [f'<h2 id="{register.name}">{escape(register.title)}</h2>']
     titles = {section.number: section.title for section in register.sections}
     drawn: set[str] = set()
-    parts.append(_without(register))
     asked = [row for row in rows if row.verdict != NOT_ASKED]
+    if asked:
+        parts.append(_without(register))
     if len(asked) < len(rows):
-        words = f"Left out here: {len(rows) - len(asked)} items of studies that were not asked for."
-        parts.append(f'<p class="lead">{words}</p>')
+        parts.append(_not_asked([row for row in rows if row.verdict == NOT_ASKED]))
     for number in dict.fromkeys(row.section for row in asked):
         mine = [row for row in asked if row.section == number]
         title = f"{number} {titles[number]}" if number in titles else number
-        parts.append(f"<h3>{escape(title)}</h3>{_table(mine)}")
+        later = [row for row in mine if row.verdict == NOT_IN_QUICK]
+        if len(later) <= FOLDED_FROM:
+            parts.append(f"<h3>{escape(title)}</h3>{_table(mine)}")
+        else:
+            now = [row for row in mine if row.verdict != NOT_IN_QUICK]
+            words = f"{len(later)} items that are judged in the full form only"
+            parts.append(
+                f"<h3>{escape(title)}</h3>{_table(now) if now else ''}"
+                f"<details><summary>{words}</summary>{_table(later)}</details>"
+            )
         for row in mine:
             for path in row.figures:
                 if path in drawn:
@@ -325,6 +354,28 @@ def _source(folder: Path, register: Register, rows: Sequence[ReportRow]) -> str:
                 drawn.add(path)
                 parts.append(_figure(folder, path, [o for o in asked if path in o.figures]))
     return "\n".join(parts)
+
+
+FOLDED_FROM = 3
+"""More items of a section that the quick form cannot judge are folded."""
+
+
+def _not_asked(rows: Sequence[ReportRow]) -> str:
+    """Items of studies that were not asked for, folded: how many of each, and their labels."""
+    by_study: dict[str, list[ReportRow]] = {}
+    for row in rows:
+        by_study.setdefault(", ".join(row.studies), []).append(row)
+    lines = ""
+    for studies, some in by_study.items():
+        labels = ", ".join(
+            label if count == 1 else f"{count} {label}s"
+            for label, count in Counter(row.label for row in some).items()
+        )
+        lines += f"<li><b>{escape(studies)}</b>, {len(some)}: {escape(labels)}</li>"
+    return (
+        f"<details><summary>Not asked for: {len(rows)} items of {len(by_study)} studies</summary>"
+        f'<ul class="plain">{lines}</ul></details>'
+    )
 
 
 def _without(register: Register) -> str:
@@ -348,25 +399,41 @@ def _table(rows: Sequence[ReportRow]) -> str:
     lines = []
     for row in rows:
         kind = re.sub("[^a-z]+", "-", row.verdict).strip("-")
+        marked = "".join(f'<span class="mark">{escape(word)}</span>' for word in marks(row))
         links = ", ".join(escape(study) for study in row.studies)
         why = "; ".join(part for part in (row.why, row.lacks and f"missing: {row.lacks}") if part)
         label = escape(row.label)
         if row.figures:
             label = f'<a href="#{escape(_anchor(row.figures[0]))}">{label}</a>'
         label = f"{label}<br><small>{links}</small>" if links else label
-        verdict = escape(row.verdict) + ("<br><small>counted above</small>" if row.repeats else "")
+        cells = (
+            label, escape(row.words), escape(row.printed), escape(row.found),
+            f'<div class="v {kind}">{escape(row.verdict)}</div>{marked}', escape(why),
+        )  # fmt: skip
         lines.append(
-            f"<tr><td>{label}</td><td>{escape(row.words)}</td><td>{escape(row.printed)}</td>"
-            f'<td>{escape(row.found)}</td><td><div class="v {kind}">{verdict}</div>'
-            f"</td><td>{escape(why)}</td></tr>"
+            f'<tr class="repeats">{_cells(cells)}</tr>'
+            if row.repeats
+            else f"<tr>{_cells(cells)}</tr>"
         )
     widths = "".join(
         f'<col class="{name}">' for name in ("label", "words", "printed", "found", "verdict", "why")
     )
     return (
-        f'<table class="items"><colgroup>{widths}</colgroup><thead><tr><th>published</th>'
-        "<th>what it says</th><th>printed</th><th>ours</th><th>verdict</th><th>why</th></tr>"
-        f"</thead><tbody>{''.join(lines)}</tbody></table>"
+        f'<table class="items"><colgroup>{widths}</colgroup><thead><tr>'
+        f"{''.join(f'<th>{head}</th>' for head in HEADS)}</tr></thead>"
+        f"<tbody>{''.join(lines)}</tbody></table>"
+    )
+
+
+HEADS = ("published", "what it says", "printed", "ours", "verdict", "why")
+"""Columns of items."""
+
+
+def _cells(cells: Sequence[str]) -> str:
+    """Cells of an item; on a narrow screen they stand below each other, each under its heading."""
+    return "".join(
+        f'<td data-head="{head}">{cell}</td>' if cell else "<td></td>"
+        for head, cell in zip(HEADS, cells, strict=True)
     )
 
 
@@ -400,23 +467,29 @@ def _anchor(path: str) -> str:
 
 
 def _recipe(states: Mapping[str, StudyState]) -> str:
-    """What was chosen, and every recipe on every table, rows in sight and others apart."""
+    """What was chosen, and every recipe on every table, rows in sight and others apart; folded
+    where the study was not asked for."""
     lines = "".join(
         f"<tr><td>{escape(c.what)}</td><td>{escape(c.text)}</td><td>{escape(c.chosen)}</td>"
         f"<td>{escape(c.rows)}</td></tr>"
         for c in CHOICES
     )
-    return (
-        '<h2 id="recipe">The recipe of the stability tables</h2><p class="lead">What the thesis '
+    chosen = (
+        '<p class="lead">What the thesis '
         "does not say was chosen, with printed rows in sight; such rows cannot confirm it. The "
         "statement on each table has its mean difference over the rows that were in sight and over "
         "the others. No row is left out of a mean.</p><table><thead><tr><th>what</th>"
         "<th>what the text says</th><th>what is chosen</th><th>with which rows in sight</th></tr>"
         f"</thead><tbody>{lines}</tbody></table>"
-        "<h3>Every recipe on every table</h3>"
-        + ("".join(map(_words, _plain_tables(states[RECIPES]))) if RECIPES in states else
-           f'<p class="lead">The study {RECIPES} was not asked for.</p>')
-    )  # fmt: skip
+    )
+    title = '<h2 id="recipe">The recipe of the stability tables</h2>'
+    if RECIPES not in states:
+        return (
+            f"{title}<details><summary>The study {RECIPES} was not asked for; what was chosen"
+            f"</summary>{chosen}</details>"
+        )
+    tables = "".join(map(_words, _plain_tables(states[RECIPES])))
+    return f"{title}{chosen}<h3>Every recipe on every table</h3>{tables}"
 
 
 def _rules(rows: Sequence[ReportRow]) -> str:
@@ -468,79 +541,3 @@ def _words(table: Mapping[str, Any]) -> str:
         f'<div class="wide"><table><caption>{escape(table["title"])}</caption><thead><tr>{heads}'
         f"</tr></thead><tbody>{lines}</tbody></table>{caption}</div>"
     )
-
-
-WIDEST = 1500
-"""Wider pictures are made so wide [px]."""
-
-
-def embedded(path: Path) -> str | None:
-    """A PNG file as the address of a picture that a page holds itself; None if it is none.
-
-    Pictures wider than `WIDEST` are made smaller, which a page does not show anyway.
-    """
-    try:
-        content = path.read_bytes()
-    except OSError:
-        return None
-    picture = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_COLOR)
-    if picture is None:
-        return None
-    height, width = picture.shape[:2]
-    if width > WIDEST:
-        size = (WIDEST, round(height * WIDEST / width))
-        picture = cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
-        smaller = cv2.imencode(".png", picture, [cv2.IMWRITE_PNG_COMPRESSION, 9])[1].tobytes()
-        content = min(content, smaller, key=len)
-    return "data:image/png;base64," + base64.b64encode(content).decode("ascii")
-
-
-STYLE = """
-:root { --line: #c9ccd1; --soft: #f4f5f7; --ink: #1b1d21; --grey: #5b616b; }
-* { box-sizing: border-box; }
-body { font: 15px/1.45 system-ui, "Segoe UI", "Noto Sans", sans-serif; color: var(--ink);
-  margin: 0 auto; max-width: 1240px; padding: 24px 28px 80px; background: #fff; }
-h1 { font-size: 28px; margin: 0 0 4px; } h2 { font-size: 22px; margin: 44px 0 8px;
-  border-bottom: 2px solid var(--ink); padding-bottom: 4px; }
-h3 { font-size: 17px; margin: 28px 0 6px; } h4 { font-size: 15px; margin: 18px 0 4px; }
-p { margin: 6px 0; } .lead { color: var(--grey); max-width: 900px; }
-a { color: #0055a4; }
-table { border-collapse: collapse; width: 100%; margin: 8px 0 14px; font-size: 13px; }
-th, td { text-align: left; vertical-align: top; padding: 5px 8px;
-  border-bottom: 1px solid var(--line); overflow-wrap: anywhere; }
-th { background: var(--soft); font-weight: 600; border-bottom: 1px solid #8b9099; }
-td.n, th.n { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
-tr.total td { font-weight: 600; border-top: 2px solid #8b9099; }
-.items { table-layout: fixed; }
-.items col.label { width: 8%; } .items col.words { width: 20%; } .items col.printed { width: 13%; }
-.items col.found { width: 21%; } .items col.verdict { width: 10%; } .items col.why { width: 28%; }
-.v { font-weight: 600; white-space: normal; padding-left: 10px; border-left: 6px solid #8b9099; }
-.v.confirmed { border-left-color: #009e73; }
-.v.met-fitted, .v.met-by-construction { border-left: 6px double #009e73; }
-.v.in-part { border-left: 6px double #c98500; }
-.v.not-confirmed, .v.study-failed { border-left: 6px dashed #b3312c; }
-.v.missing { border-left: 6px dotted #b3312c; }
-.quick { background: #fff6dd; border: 1px solid #d9b44a; padding: 8px 12px; max-width: 900px; }
-figure { margin: 12px 0 18px; break-inside: avoid; } figure img { max-width: 100%;
-  max-height: 620px; border: 1px solid var(--line); display: block; }
-figcaption { color: var(--grey); font-size: 13px; margin-top: 4px; }
-pre { background: var(--soft); padding: 8px 10px; overflow-x: auto; font-size: 12px;
-  white-space: pre-wrap; }
-.wide { overflow-x: auto; } .wide table { font-size: 12px; width: auto; min-width: 50%; }
-nav ol { columns: 2; font-size: 14px; padding-left: 20px; } ul.plain { padding-left: 18px; }
-caption { caption-side: top; text-align: left; font-weight: 600; padding: 4px 0; }
-@page { size: A4 landscape; margin: 12mm; }
-@media print {
-  body { max-width: none; padding: 0; font-size: 9.5pt; }
-  .lead, .quick { max-width: none; } h1 { font-size: 18pt; } h2 { font-size: 14pt; }
-  th, td { padding: 3px 6px; } table { font-size: 8.5pt; margin: 4px 0 8px; }
-  thead { display: table-header-group; }
-  tr, figure, .quick { break-inside: avoid; } h2 { break-before: page; margin-top: 0; }
-  h2, h3, h4 { break-after: avoid; } nav { display: none; } a { color: inherit;
-  text-decoration: none; } figure img { max-height: 150mm; } .wide { overflow: visible; }
-  .wide table { width: 100%; font-size: 7.5pt; }
-  .scorecard { font-size: 7pt; margin: 2px 0; } .scorecard th, .scorecard td { padding: 0 6px; }
-  .scorecard + .lead { font-size: 7pt; } #scorecard { margin-top: 6px; }
-}
-"""
-"""Verdicts differ by word and by kind of line, not by colour alone."""

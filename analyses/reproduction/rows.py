@@ -19,6 +19,7 @@ from cdpr_drake.analyses.reproduction.states import (
     study_folder,
 )
 from cdpr_drake.analyses.studies.catalogue import StudyEntry
+from cdpr_drake.analyses.studies.framework.case_definition import PublishedNumber
 from cdpr_drake.analyses.studies.framework.statement import (
     MET_CONSTRUCTION,
     MET_FITTED,
@@ -52,6 +53,10 @@ class Fact:
         basis: What it rests on, see `framework.statement`.
         rule: What had to be within which bounds.
         cause: Why it does not hold, see `framework.statement`; empty: it does, or nobody knows.
+        says: What it is about, in words; empty where nothing was found.
+        printed: Its numbers.
+        found: Ours.
+        why: What is known of the difference.
     """
 
     key: str
@@ -59,6 +64,10 @@ class Fact:
     basis: str = TEST
     rule: str = ""
     cause: str = ""
+    says: str = ""
+    printed: str = ""
+    found: str = ""
+    why: str = ""
 
 
 @dataclass(frozen=True)
@@ -120,7 +129,10 @@ class _Answer:
 
     def fact(self, key: str) -> Fact:
         """It as a fact, under the key where it is judged first."""
-        return Fact(self.same_as or key, self.verdict, self.basis, self.rule, self.cause)
+        return Fact(
+            self.same_as or key, self.verdict, self.basis, self.rule, self.cause, self.words,
+            self.printed, self.found, self.why,
+        )  # fmt: skip
 
 
 class _Found:
@@ -238,11 +250,48 @@ def _item(
     why, undrawn = answer.why, _undrawn(item, figures, found)
     if undrawn:
         why = f"{why.rstrip('.')}; {undrawn}" if why else undrawn
+    numbers = _numbers_of_figure(section, item, found)
     return ReportRow(
-        register.name, section.chapter, section.number, item.label, words, answer.printed,
-        answer.found, answer.verdict, why, item.missing, tuple(studies), tuple(figures),
-        item.differs, tuple(one.fact(key) for key, one in answers.items()),
+        register.name, section.chapter, section.number, item.label, words,
+        _joined(answer.printed, numbers[0]), _joined(answer.found, numbers[1]), answer.verdict,
+        why, item.missing, tuple(studies), tuple(figures), item.differs,
+        tuple(one.fact(key) for key, one in answers.items()),
     )  # fmt: skip
+
+
+def _joined(first: str, second: str) -> str:
+    return "; ".join(part.rstrip(".") for part in (first, second) if part)
+
+
+MOST_NUMBERS = 4
+"""So many printed numbers of its runs stand beside a figure; all have rows of their own below."""
+
+
+def _numbers_of_figure(
+    section: PublishedSection, item: PublishedItem, found: _Found
+) -> tuple[str, str]:
+    """What is printed in a section of the runs that a figure of it draws, and ours, in words.
+
+    They are judged in rows of their own, not with the figure.
+    """
+    if not item.label.startswith("Figure"):
+        return "", ""
+    drawn = dict.fromkeys(key.partition("/")[0] for key in item.figures)
+    printed, ours = [], []
+    for key in section.numbers:
+        if key.partition("/")[0] not in drawn:
+            continue
+        for number, rows in _numbers_and_runs(key, found):
+            what = f"{number.label}, {number.heading}"
+            printed.append(f"{what}: {number.printed}")
+            if rows:
+                ours.append(f"{what}: {judge_number(number, rows)[0]}")
+    return _first(printed), _first(ours)
+
+
+def _first(words: Sequence[str]) -> str:
+    left = len(words) - MOST_NUMBERS
+    return "; ".join(words[:MOST_NUMBERS]) + (f"; {left} more below" if left > 0 else "")
 
 
 def _undrawn(item: PublishedItem, figures: Sequence[str], found: _Found) -> str:
@@ -263,7 +312,15 @@ def _together(
         return _Answer(CITED, why=item.cited)
     verdicts = [answer.verdict for answer in answers.values()]
     judged = [verdict for verdict in verdicts if verdict in _JUDGED]
-    words = "; ".join(f"{_spoken(key)}: {answer.verdict}" for key, answer in answers.items())
+    words = "; ".join(
+        f"{_spoken(key)}: {answer.verdict}" + (f", {answer.found}" if answer.found else "")
+        for key, answer in answers.items()
+    )
+    printed = "; ".join(
+        f"{_spoken(key)}: {answer.printed}" if len(answers) > 1 else answer.printed
+        for key, answer in answers.items()
+        if answer.printed
+    )
     if judged:
         # What is left to judge may spoil a confirmation, but makes none of what was not confirmed.
         left = len(judged) < len(verdicts)
@@ -271,9 +328,10 @@ def _together(
         alike = (good or len(set(judged)) == 1) and not (left and good)
         # All of it holds as well as the weakest of its parts does.
         whole = max(judged, key=_JUDGED.index) if alike else IN_PART
-        return _Answer(whole, found=words, why=_reasons(answers))
+        return _Answer(whole, printed=printed, found=words, why=_reasons(answers))
     if verdicts:
-        return _Answer(verdicts[0], found=words, why=next(iter(answers.values())).why)
+        why = next(iter(answers.values())).why
+        return _Answer(verdicts[0], printed=printed, found=words, why=why)
     if figures:
         return _Answer(SHOWN)
     if item.figures:
@@ -303,31 +361,42 @@ def _numbers(
     register: Register, section: PublishedSection, key: str, found: _Found
 ) -> Iterator[ReportRow]:
     """The printed numbers of a case study, or of one of its groups."""
-    study, _, group = key.partition("/")
-    entry = found.studies.get(study)
-    if entry is None:
+    study = key.partition("/")[0]
+    if study not in found.studies:
         lack = found.lack(study)
         yield ReportRow(
             register.name, section.chapter, section.number, "numbers", f"Numbers of {key}", "", "",
             lack.verdict, lack.why, studies=(study,),
         )  # fmt: skip
         return
-    rows = [row for row in found.results(study).get("runs", ()) if row["camera"] == PROJECTED]
-    for number in entry.numbers:
-        if group and number.group != group:
-            continue
-        ours = [row for row in rows if row["configuration"] == number.configuration]
+    for number, ours in _numbers_and_runs(key, found):
         if ours:
             words, verdict, why = judge_number(number, ours)
         else:
             lack = found.lack(study)
             words, verdict, why = "", lack.verdict, lack.why
-        yield ReportRow(
-            register.name, section.chapter, section.number, "number",
-            f"{number.label}: {number.heading}", number.printed, words, verdict, why,
-            studies=(study,),
-            facts=(Fact(f"{study}/{number.configuration}/{number.metric}", verdict),),
+        cause = number.cause if verdict in (IN_PART, NOT_CONFIRMED) else ""
+        says = f"{number.label}: {number.heading}"
+        fact = Fact(
+            f"{study}/{number.configuration}/{number.metric}", verdict, cause=cause, says=says,
+            printed=number.printed, found=words, why=why,
         )  # fmt: skip
+        yield ReportRow(
+            register.name, section.chapter, section.number, "number", says, number.printed, words,
+            verdict, why, studies=(study,), facts=(fact,),
+        )  # fmt: skip
+
+
+def _numbers_and_runs(
+    key: str, found: _Found
+) -> Iterator[tuple[PublishedNumber, list[Mapping[str, Any]]]]:
+    """Printed numbers of a study or of one of its groups, each with the runs that it is about."""
+    study, _, group = key.partition("/")
+    entry = found.studies.get(study)
+    rows = [row for row in found.results(study).get("runs", ()) if row["camera"] == PROJECTED]
+    for number in () if entry is None else entry.numbers:
+        if not group or number.group == group:
+            yield number, [row for row in rows if row["configuration"] == number.configuration]
 
 
 def _own(register: Register, study: str, found: _Found) -> Iterator[ReportRow]:

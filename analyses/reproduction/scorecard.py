@@ -30,6 +30,7 @@ from cdpr_drake.analyses.reproduction.rows import (
     NOT_ASKED,
     NOT_FINISHED,
     SHOWN,
+    Fact,
     ReportRow,
 )
 from cdpr_drake.analyses.studies.framework.statement import (
@@ -91,19 +92,27 @@ class Scorecard:
         """Counts rows, and what they rest on."""
         chapters: dict[tuple[str, str], Counter[str]] = {}
         facts: dict[tuple[str, str], Counter[str]] = {}
-        seen: set[str] = set()
         independent = 0
         for row in rows:
             chapters.setdefault((row.source, row.chapter), Counter())[row.verdict] += 1
-            for fact in row.facts:
-                if fact.key in seen:
-                    continue
-                seen.add(fact.key)
-                own = row.source == OWN or fact.basis == OURS
-                key = (OWN, fact.key.partition("/")[0]) if own else (row.source, row.chapter)
-                facts.setdefault(key, Counter())[fact.verdict] += 1
-                independent += not own and fact.basis == TEST and fact.verdict == CONFIRMED
+        for place, some in facts_by_place(rows).items():
+            facts[place] = Counter(fact.verdict for fact in some)
+            if place[0] != OWN:
+                independent += sum(f.basis == TEST and f.verdict == CONFIRMED for f in some)
         return cls(chapters, facts, independent)
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any]) -> Scorecard:
+        """Of what `as_dict` gave, also of reports that did not count facts yet.
+
+        Raises:
+            KeyError, TypeError, ValueError: It is none.
+        """
+        facts = content.get("facts", {"chapters": (), "independent": 0})
+        return cls(
+            _from_lines(content["chapters"]), _from_lines(facts["chapters"]),
+            int(facts["independent"]),
+        )  # fmt: skip
 
     def total(self, source: str | None = None) -> Counter[str]:
         """Counts of the items of a source, or of all."""
@@ -142,6 +151,29 @@ class Scorecard:
                 for (source, chapter), counts in self.chapters.items()
             ],
         }
+
+
+def facts_by_place(rows: Sequence[ReportRow]) -> dict[tuple[str, str], list[Fact]]:
+    """Every fact once, by source and chapter where it comes first; ours under the study's name."""
+    facts: dict[tuple[str, str], list[Fact]] = {}
+    seen: set[str] = set()
+    for row in rows:
+        for fact in row.facts:
+            if fact.key in seen:
+                continue
+            seen.add(fact.key)
+            own = row.source == OWN or fact.basis == OURS
+            place = (OWN, fact.key.partition("/")[0]) if own else (row.source, row.chapter)
+            facts.setdefault(place, []).append(fact)
+    return facts
+
+
+def _from_lines(lines: Sequence[Mapping[str, Any]]) -> dict[tuple[str, str], Counter[str]]:
+    counts: dict[tuple[str, str], Counter[str]] = {}
+    for line in lines:
+        verdicts = {key: int(n) for key, n in line.items() if key not in ("source", "chapter")}
+        counts[str(line["source"]), str(line["chapter"])] = Counter(verdicts)
+    return counts
 
 
 def _sum(counts: Mapping[tuple[str, str], Counter[str]], source: str | None) -> Counter[str]:

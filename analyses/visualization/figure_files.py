@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -44,6 +45,15 @@ def _put(figure: Figure, path: Path) -> None:
     """Writes a figure in place."""
     with mpl.rc_context({**STYLE, **FILES, **NO_LAYOUT}):
         figure.savefig(path, dpi=DPI, metadata=UNDATED.get(path.suffix[1:].lower()))
+
+
+def figure_png(figure: Figure) -> bytes:
+    """A figure as the content of a PNG file."""
+    buffer = BytesIO()
+    lay_out(figure)
+    with mpl.rc_context({**STYLE, **NO_LAYOUT}):
+        figure.savefig(buffer, format="png", dpi=DPI)
+    return buffer.getvalue()
 
 
 def figure_writers(

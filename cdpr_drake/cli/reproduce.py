@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
@@ -11,13 +11,13 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from cdpr_drake.analyses.front.studies import StudyOfMany, chosen_studies
+from cdpr_drake.analyses.front.studies import Reproduction, StudyOfMany, chosen_studies
 from cdpr_drake.analyses.front.studies import reproduce as reproduce_all
 from cdpr_drake.analyses.reporting.output_folder import shown_path
 from cdpr_drake.analyses.reporting.statements import new_table
-from cdpr_drake.analyses.reproduction.rows import FAILED, ReportRow
+from cdpr_drake.analyses.reproduction.digest_pdf import NO_REPORTLAB
+from cdpr_drake.analyses.reproduction.rows import FAILED
 from cdpr_drake.analyses.reproduction.scorecard import Scorecard
-from cdpr_drake.analyses.reproduction.states import StudyState
 from cdpr_drake.analyses.studies.catalogue import STUDIES
 from cdpr_drake.cli.command_session import CommandSession
 from cdpr_drake.cli.completion import words_among
@@ -64,12 +64,17 @@ def reproduce(
     as_json: ResultsAsJson = False,
     overwrite: Overwrite = False,
     runs_from: RunsFrom = None,
+    beside: Annotated[
+        Path | None,
+        typer.Option(help="Folder of an older report, whose counts are shown beside the new ones."),
+    ] = None,
 ) -> int:
     """Runs every study and writes one report on all that was published beside what is found.
 
     A study that is finished is not run again unless the code has changed; what was stopped or
     killed continues when the same command is given again. One that fails does not end the others.
-    Figures are in PNG, which the report shows, and in the formats that are asked for beside.
+    Figures are in PNG, which the report shows, and in the formats that are asked for beside. A
+    digest of about ten pages is written as PDF, where reportlab is installed.
     """
     formats = parse_formats(figure_format)
     asked = None if only is None else [name.strip() for name in only.split(",") if name.strip()]
@@ -78,22 +83,22 @@ def reproduce(
     with ReproductionSession(STOPPING, folder, "reproduce") as session:
         found = reproduce_all(
             folder, quick, asked, workers=workers, overwrite=overwrite, formats=formats,
-            runs_from=runs_from, session=session,
+            runs_from=runs_from, beside=beside, session=session,
         )  # fmt: skip
     session.say_kept()
-    states = found.states
     if as_json:
         print_json(found.as_dict())
     else:
-        _print(found.rows, states, shown_path(found.page))
+        _print(found)
     again = shlex.join(
         ["cdpr", "reproduce", "--out", str(folder), *(["--quick"] if quick else [])]
         + (["--only", only] if only else [])
         + (["--workers", str(workers)] if workers else [])
         + (["--format", figure_format] if figure_format != "png" else [])
         + (["--runs-from", str(runs_from)] if runs_from else [])
+        + (["--beside", str(beside)] if beside else [])
     )
-    return _ending(session.console, found.left, states, again)
+    return _ending(session.console, found, again)
 
 
 class ReproductionSession(CommandSession):
@@ -114,9 +119,9 @@ class ReproductionSession(CommandSession):
             yield say
 
 
-def _print(rows: Sequence[ReportRow], states: Mapping[str, StudyState], page: Path) -> None:
-    """The scorecard, what failed, and where the report is."""
-    card = Scorecard.of(rows)
+def _print(found: Reproduction) -> None:
+    """The scorecard, and where the report and its digest are."""
+    card = Scorecard.of(found.rows)
     verdicts = card.shown_facts()
     title = "What was published, repeated: facts, each counted once"
     table = new_table(title, ("source", "chapter"), ("facts", *verdicts))
@@ -133,13 +138,13 @@ def _print(rows: Sequence[ReportRow], states: Mapping[str, StudyState], page: Pa
         f"{card.independent} facts of the sources are confirmed by runs that could have said "
         f"otherwise; the report has {card.total().total()} figures, tables, numbers and sentences"
     )
-    printer.print(f"{len(states)} studies, report: {page}")
+    digest = "" if found.digest is None else f", digest: {shown_path(found.digest)}"
+    printer.print(f"{len(found.states)} studies, report: {shown_path(found.page)}{digest}")
 
 
-def _ending(
-    console: Console, left: Sequence[str], states: Mapping[str, StudyState], again: str
-) -> int:
+def _ending(console: Console, found: Reproduction, again: str) -> int:
     """Says what is left to do; returns the exit code."""
+    states, left = found.states, found.left
     failed = [state for state in states.values() if state.status == "failed"]
     for state in failed:
         console.print(f"cdpr: {FAILED}: {state.study}: {state.error}")
@@ -150,9 +155,18 @@ def _ending(
             "command tries again",
             soft_wrap=True, markup=False, highlight=False,
         )  # fmt: skip
+    for name, why in found.failed.items():
+        older = " (the one that is there is of an earlier report)"
+        there = (found.page.parent / name).exists()
+        console.print(
+            f"cdpr: {name} was not written{older if there else ''}: {why}",
+            soft_wrap=True, markup=False, highlight=False,
+        )  # fmt: skip
     if left:
         console.print(f"Interrupted; left: {', '.join(left)}; to continue:\n{again}")
         return INTERRUPTED
     if failed:
         return STUDY_FAILED
-    return INCOMPLETE if pictures else 0
+    # A library that nobody installed is a choice, and trying again changes nothing.
+    incomplete = pictures or any(why != NO_REPORTLAB for why in found.failed.values())
+    return INCOMPLETE if incomplete else 0

@@ -6,6 +6,9 @@ import json
 
 import pytest
 
+from cdpr_drake.analyses.front import studies
+from cdpr_drake.analyses.reporting.log_files import write_json
+from cdpr_drake.analyses.reproduction import digest_pdf
 from cdpr_drake.analyses.studies.catalogue import STUDIES, StudyEntry
 from cdpr_drake.analyses.studies.framework.statement import MET_CONSTRUCTION, MET_FITTED
 from cdpr_drake.cli.app import main
@@ -45,6 +48,12 @@ def test_three_studies_and_again(capsys, tmp_path):
     assert code == 0
     assert err.count("finished before by the same code, taken over") == 3
     assert "3 studies, report:" in out
+    assert "digest:" in out
+    assert (folder / "digest.pdf").read_bytes().startswith(b"%PDF-")
+    assert "<small>was" not in page
+    code, _, _ = reproduce(capsys, *ASKED, "--out", str(folder), "--beside", str(folder))
+    assert code == 0
+    assert "0 facts have another verdict, 0 are new, 0 are" in (folder / "report.html").read_text()
     code, _, err = reproduce(capsys, "--only", "case-8", "--out", str(folder))
     assert code == 2
     assert "holds a reproduction in the quick form, the full form is asked for" in err
@@ -69,3 +78,65 @@ def test_wrong_names_are_refused_before_anything_is_written(capsys, tmp_path, on
     assert code == 2
     assert words in err
     assert list(tmp_path.iterdir()) == []
+
+
+def test_an_older_report_that_is_none_is_refused_before_anything_is_written(capsys, tmp_path):
+    (tmp_path / "old").mkdir()
+    code, _, err = reproduce(
+        capsys, "--out", str(tmp_path / "r"), "--beside", str(tmp_path / "old")
+    )
+    assert code == 2
+    assert "summary.json: cannot be read: No such file" in err
+    assert not (tmp_path / "r").exists()
+
+
+class Nothing:
+    """A study that finds nothing at once."""
+
+    interrupted = False
+
+    def as_dict(self):
+        return {"statements": []}
+
+    def tables(self):
+        return []
+
+    def write(self, folder, formats):
+        write_json(folder / "results.json", self.as_dict())
+
+
+def nothing(quick, session):
+    return Nothing()
+
+
+def test_without_reportlab_the_rest_is_there_and_a_line_says_so(capsys, monkeypatch, tmp_path):
+    monkeypatch.setattr(digest_pdf, "find_spec", lambda name: None)
+    monkeypatch.setitem(STUDIES, "case-8", StudyEntry(nothing))
+    code, _, err = reproduce(capsys, "--only", "case-8", "--out", str(tmp_path / "r"))
+    assert code == 0
+    words = "digest.pdf was not written: reportlab is not installed: pip install 'cdpr_drake"
+    assert err.count(words) == 1
+    assert (tmp_path / "r" / "report.html").is_file()
+    assert not (tmp_path / "r" / "digest.pdf").exists()
+
+
+def test_a_digest_that_fails_is_named_and_the_rest_is_there(capsys, monkeypatch, tmp_path):
+    def full(path, story):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setitem(STUDIES, "case-8", StudyEntry(nothing))
+    asked = ("--only", "case-8", "--out", str(tmp_path / "r"))
+    with monkeypatch.context() as patch:
+        patch.setattr(studies, "write_digest", full)
+        code, _, err = reproduce(capsys, *asked)
+    assert code == 3
+    assert "cdpr: digest.pdf was not written: [Errno 28] No space left on device" in err
+    assert (tmp_path / "r" / "report.html").is_file()
+    assert (tmp_path / "r" / "summary.json").is_file()
+    assert not list((tmp_path / "r").glob("*digest*"))
+    assert reproduce(capsys, *asked)[0] == 0
+    assert (tmp_path / "r" / "digest.pdf").is_file()
+    with monkeypatch.context() as patch:
+        patch.setattr(studies, "write_digest", full)
+        _, _, err = reproduce(capsys, *asked)
+    assert "(the one that is there is of an earlier report)" in err

@@ -25,29 +25,18 @@ from cdpr_drake.analyses.reporting.output_folder import continued_folder
 from cdpr_drake.analyses.reporting.statements import Statement
 from cdpr_drake.analyses.reporting.written_files import MARKER, mark, others_in
 from cdpr_drake.analyses.reproduction import runner
+from cdpr_drake.analyses.reproduction.overview import chapter_overviews
 from cdpr_drake.analyses.reproduction.page import write_report
 from cdpr_drake.analyses.reproduction.rows import report_rows
 from cdpr_drake.analyses.reproduction.runner import RunSettings, run_studies
 from cdpr_drake.analyses.reproduction.scorecard import LOOKS, VERDICTS, Scorecard, scorecard_figure
-from cdpr_drake.analyses.reproduction.states import (
-    StudyState,
-    check_folder,
-    read_state,
-    study_folder,
-    write_state,
-)
+from cdpr_drake.analyses.reproduction.states import check_folder, read_state, write_state
 from cdpr_drake.analyses.studies.catalogue import StudyEntry
 from cdpr_drake.analyses.studies.framework.case_definition import PublishedNumber
-from cdpr_drake.analyses.studies.framework.runs import Runs
-from cdpr_drake.analyses.studies.framework.statement import (
-    FITTED,
-    OURS,
-    Finding,
-    judged,
-    statement,
-)
+from cdpr_drake.analyses.studies.framework.statement import FITTED, OURS
 from cdpr_drake.analyses.studies.published.register import published_registers, read_register
 from cdpr_drake.errors import OutputFolderError
+from tests.analyses.reproduction.judged_rows import judged_rows, said
 
 GREY = (0.299, 0.587, 0.114)
 """What red, green and blue weigh in grey print."""
@@ -292,7 +281,11 @@ def test_rows_have_every_item_beside_what_was_found(folder):
     ]  # fmt: skip
     assert found["statement", "It is high."].found == "yes & no"
     assert found["Figure 1.1", "Seen"].figures == ("studies/good/view.png",)
-    assert found["Table 1.1", "Both"].found == "high: confirmed; low: not confirmed"
+    assert found["Table 1.1", "Both"].printed == "high: yes; low: yes"
+    assert (
+        found["Table 1.1", "Both"].found
+        == "high: confirmed, yes & no; low: not confirmed, yes & no"
+    )
     assert found["Table 1.1", "Both"].why == "low: why; its figure was not drawn"
     assert found["Figure 1.1", "Seen"].differs == "wider < taller"
     assert found["Table 1.4", "Other"].why == "without a verdict here: deep."
@@ -407,30 +400,6 @@ def test_states_compare_without_how_they_were_come_by(folder):
     assert replace(state, taken_over=True) == state
 
 
-def judged_rows(folder, **studies):
-    """Rows of a register with each statement of some studies, and a table that rests on all."""
-    states = {}
-    for name, said in studies.items():
-        study_folder(folder, name).mkdir(parents=True)
-        write_json(study_folder(folder, name) / "results.json", {"statements": said})
-        states[name] = StudyState(name, "finished", quick=False, code="1")
-    answers = [f"{study}/{one['name']}" for study, said in studies.items() for one in said]
-    register = read_register("toy", {"title": "Toy", "sections": [{
-        "section": "1.1", "title": "One", "statements": answers,
-        "items": [{"label": "Table 1.1", "says": "All", "answers": answers}],
-    }]})  # fmt: skip
-    return register, report_rows(
-        [register], folder, dict.fromkeys(states, StudyEntry(Toy())), states
-    )
-
-
-def said(name, held, basis="test", **more):
-    check = statement(f"It is {name}.", name=name, basis=basis, **more)(
-        lambda runs: Finding(found="so", held=held)
-    )
-    return judged([check], Runs([]))[0].as_dict()
-
-
 def test_a_fact_is_counted_once_however_many_items_rest_on_it(folder):
     _, rows = judged_rows(
         folder,
@@ -474,6 +443,87 @@ def test_a_chapter_says_what_stands_and_why_what_fails(folder):
     assert "<b>Fails, 1</b>, because of the prototype, which has what is in no model" in words
     assert "<b>Holds in part, 1</b>, for a reason that is not known" in words
     assert "Chapter 2" in words
+
+
+def test_what_is_fitted_or_counted_above_is_marked_in_words(folder):
+    register, rows = judged_rows(
+        folder, one=[said("near", [False], FITTED), said("met", [True], FITTED)]
+    )
+    page = write_report(folder, [register], rows, {}, quick=False).read_text()
+    lines = page[page.index('<table class="items">') :].split("<tr")[2:5]
+    assert ['<span class="mark">fitted</span>' in line for line in lines] == [True, False, True]
+    assert "met (fitted)" in lines[1]
+    assert ["counted above" in line for line in lines] == [False, False, True]
+
+
+def test_beside_a_figure_stand_the_printed_numbers_of_its_runs_and_ours(folder):
+    register = replace(REGISTER, sections=(replace(REGISTER.sections[0], numbers=("good/one",)),))
+    several = tuple(replace(NUMBER, label=f"C{k}") for k in range(6))
+    for numbers, more in (((NUMBER,), ""), (several, "; 2 more below")):
+        studies = {"good": replace(entries(good=Toy(("high", "low")))["good"], numbers=numbers)}
+        states = run_studies(studies, folder, RunSettings())
+        rows = report_rows([register], folder, studies, states)
+        found = {row.label: row for row in rows}
+        first = numbers[0].label
+        assert found["Figure 1.1"].printed.startswith(f"{first}, length [mm]: 2")
+        assert found["Figure 1.1"].found.startswith(f"{first}, length [mm]: 2.1 (1.9 to 2.3, 2 ru")
+        assert found["Figure 1.1"].printed.endswith(more)
+        assert found["Figure 1.1"].verdict == "shown"  # the numbers have rows of their own
+        assert found["Table 1.1"].printed == "high: yes; low: yes"
+        assert found["Table 1.3"].printed == "low: yes"
+
+
+def test_a_printed_number_that_is_not_confirmed_has_its_cause(folder):
+    causes = {}
+    for printed in ("2", "9"):
+        number = replace(NUMBER, printed=printed, why="it slips", cause="hardware")
+        studies = {"good": replace(entries(good=Toy())["good"], numbers=(number,))}
+        states = run_studies(studies, folder, RunSettings())
+        rows = report_rows([REGISTER], folder, studies, states)
+        (row,) = [row for row in rows if row.label == "number"]
+        causes[row.verdict] = row.facts[0].cause
+    assert causes == {"confirmed": "", "not confirmed": "hardware"}
+
+
+def test_what_was_not_asked_for_is_folded_and_counted(folder):
+    states = run_studies(entries(late=Toy(("high",))), folder, RunSettings())
+    rows = report_rows([REGISTER], folder, entries(late=Toy(("high",))), states)
+    page = write_report(folder, [REGISTER], rows, states, quick=False).read_text()
+    count = sum(row.verdict == "not asked for" for row in rows)
+    assert f"<summary>Not asked for: {count} items of 3 studies</summary>" in page
+    assert "<b>other</b>, 1: statement" in page
+    whole = page[page.index('<table class="items">') :]
+    assert "cdpr reproduce --only" not in whole
+    assert "Stands" in page  # what was asked for is told
+
+
+def test_what_the_quick_form_cannot_judge_is_folded_where_it_is_long(tmp_path):
+    check_folder(tmp_path / "q", quick=True)
+    names = [f"low{k}" for k in range(9)]
+    for count, folded in ((3, 0), (4, 1)):
+        answers = [f"good/{name}" for name in names[:count]]
+        register = read_register("toy", {"title": "Toy", "sections": [
+            {"section": "1.1", "title": "One", "statements": ["good/high", *answers]}
+        ]})  # fmt: skip
+        studies = entries(good=Toy(("high",)))
+        states = run_studies(studies, tmp_path / "q", RunSettings(quick=True))
+        rows = report_rows([register], tmp_path / "q", studies, states)
+        page = write_report(tmp_path / "q", [register], rows, states, quick=True).read_text()
+        assert page.count("items that are judged in the full form only</summary>") == folded
+
+
+def test_chapters_count_each_fact_where_the_scorecard_does(folder):
+    _, rows = judged_rows(
+        folder,
+        one=[said("high", [True]), said("wide", [True], OURS), said("low", [True, False])],
+        two=[said("again", [True], same_as="one/high"), said("odd", [])],
+    )
+    later = [replace(row, chapter="2") for row in rows]
+    register = replace(REGISTER, corrected={})
+    overviews = chapter_overviews([*rows, *later], [register])
+    counted = {o.chapter: sum(len(group.facts) for group in o.groups) for o in overviews}
+    facts = Scorecard.of([*rows, *later]).facts
+    assert counted == {"1": facts["toy", "1"].total()} == {"1": 3}
 
 
 def test_the_picture_of_the_scorecard_counts_every_fact_in_a_look_of_its_own():
