@@ -44,6 +44,11 @@ class Statement:
         return asdict(self)
 
 
+def verdict(every: bool, some: bool = False) -> str:
+    """CONFIRMED where `every` part of a statement holds, IN_PART where `some` does."""
+    return CONFIRMED if every else IN_PART if some else NOT_CONFIRMED
+
+
 def new_table(title: str, left: Sequence[str], right: Sequence[str]) -> Table:
     """An empty table with columns of words, then columns of numbers."""
     table = Table(

@@ -386,7 +386,7 @@ class StudyResult:
             "units": runs.units(),
             "arrays": runs.arrays(),
             "runs": runs.table(),
-            "numbers": {} if study.numbers is None else self._numbers(),
+            "numbers": {} if isinstance(self._numbers, MissingRuns) else self._numbers,
             "statements": [one.as_dict() for one in self.statements],
             "scorecard": scorecard(self.statements),
             "left_out": self._left_out(),
@@ -402,12 +402,15 @@ class StudyResult:
         }  # fmt: skip
         return {key: value for key, value in told.items() if value not in ("", [], {})}
 
-    def _numbers(self) -> dict[str, Any]:
-        assert self.study.numbers is not None
+    @cached_property
+    def _numbers(self) -> dict[str, Any] | MissingRuns:
+        """More numbers, or what they lack."""
+        if self.study.numbers is None:
+            return {}
         try:
             return dict(plain(self.study.numbers(self.runs)))
-        except MissingRuns:
-            return {}
+        except MissingRuns as missing:
+            return missing
 
     @property
     def _nothing_lacks(self) -> bool:
@@ -467,9 +470,11 @@ class StudyResult:
         return {}
 
     def _left_out(self) -> dict[str, dict[str, str]]:
-        """Of figures and tables that were not made what they lack."""
+        """Of figures, tables and numbers that were not made what they lack."""
         tables = {name: _lacking(made) for name, made in self._made if isinstance(made, Exception)}
-        return {"figures": dict(self._undrawn), "tables": tables}
+        numbers = self._numbers
+        lacks = {"numbers": _lacking(numbers)} if isinstance(numbers, MissingRuns) else {}
+        return {"figures": dict(self._undrawn), "tables": tables, "numbers": lacks}
 
     def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> dict[str, str]:
         """Writes `runs.csv`, `results.json`, then the figures, into a folder that exists; then
@@ -479,10 +484,11 @@ class StudyResult:
             Of each figure that could not be written, the file and why, in one line.
         """
         self.runs.write_csv(folder / "runs.csv")
-        write_json(folder / "results.json", self.as_dict())
+        told = self.as_dict()
+        write_json(folder / "results.json", told)
         failed = write_figures(folder, self.drawings(), formats)
         if self._undrawn:
-            write_json(folder / "results.json", self.as_dict())
+            write_json(folder / "results.json", told | {"left_out": self._left_out()})
         return failed
 
 

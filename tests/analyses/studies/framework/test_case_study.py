@@ -11,7 +11,7 @@ from cdpr_drake.analyses.reporting.deferred_figures import NothingToDraw
 from cdpr_drake.analyses.reporting.progress import StudySession
 from cdpr_drake.analyses.studies.framework import case_panels as panels
 from cdpr_drake.analyses.studies.framework.case_definition import Configuration, Plan
-from cdpr_drake.analyses.studies.framework.case_figures import case_figures
+from cdpr_drake.analyses.studies.framework.case_figures import BARS, case_figures
 from cdpr_drake.analyses.studies.framework.case_layouts import paths_layout
 from cdpr_drake.analyses.studies.framework.case_run import METRICS
 from cdpr_drake.analyses.studies.framework.case_study import configuration_study
@@ -156,7 +156,8 @@ def test_what_traces_do_not_have_is_not_drawn(result, name):
 
 
 def test_bars_of_what_no_run_measures_are_no_failure(result):
-    bare = [replace(run, measured={"outcome": run["outcome"]}) for run in result[0].runs]
+    unmeasured = {metric: None for metric, _, _ in BARS["estimates"]}
+    bare = [replace(run, measured={**run.measured, **unmeasured}) for run in result[0].runs]
     with pytest.raises(NothingToDraw):
         case_figures(SHORT.cases)["estimates"](Runs(bare))
 

@@ -330,12 +330,13 @@ def left_out(folder):
 
 
 def test_figures_and_tables_of_runs_that_lack_are_left_out_of_the_quick_form_and_named(tmp_path):
-    quick = run(quick=True, tables=[*STUDY.tables, lacking])
+    quick = run(quick=True, tables=[*STUDY.tables, lacking], numbers=lacking)
     assert quick.write(tmp_path) == {}
     assert {path.name for path in tmp_path.glob("*.png")} == {"all.png"}
     assert left_out(tmp_path) == {
         "figures": {"few": "runs are missing: size few"},
         "tables": {"lacking": "runs are missing: size huge"},
+        "numbers": {"numbers": "runs are missing: size huge"},
     }
     assert [table.title for table in quick.tables()] == ["Peaks", STUDY.stated]
 
@@ -365,7 +366,7 @@ def test_a_stopped_full_form_has_no_failures(tmp_path):
 
 def test_a_whole_study_leaves_nothing_out(tmp_path):
     assert run().write(tmp_path) == {}
-    assert left_out(tmp_path) == {"figures": {}, "tables": {}}
+    assert left_out(tmp_path) == {"figures": {}, "tables": {}, "numbers": {}}
 
 
 def test_a_stopped_study_continues_to_the_same_bytes(tmp_path):
