@@ -136,7 +136,8 @@ MADE_UP = [
      CONFIRMED),
     (said.flattens_to_yz, {"3.13 r_B=0.03": lambda x, y, z: np.abs(y) <= 0.2}, NOT_CONFIRMED),
     (said.tiny, {"3.13 r_A=0.1": lambda x, y, z: x**2 + y**2 + z**2 < 0.02}, CONFIRMED),
-    (said.tiny, {}, IN_PART),
+    (said.tiny, {}, NOT_CONFIRMED),
+    (said.tiny, {"3.13 r_A=0.1": lambda x, y, z: (x > 0.4) & (y > 0.4) & (z < 0.05)}, IN_PART),
     (said.tiny, {"3.13 r_A=0.1": lambda x, y, z: z < -1.0}, NOT_CONFIRMED),
     (said.downward, {key: below(0.3) for key in (" ".join(one) for one in CASES
                      if one[0] == "3.13" and one[1] != BASELINE)}, CONFIRMED),

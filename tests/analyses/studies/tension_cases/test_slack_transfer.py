@@ -65,6 +65,8 @@ def runs(*others):
         (nine.undisturbed, [run_of("E6", unstrained_lengths=np.full((ROWS, 8), 1.1))]),
         (nine.without_slack, [run_of("E1", stability_margin=np.full(ROWS, -0.1))]),
         (nine.three_and_four, [run_of("E3", taut_cables=np.full(ROWS, 6))]),
+        # Four for a moment, else none.
+        (nine.three_and_four, [run_of("E3", taut_cables=np.where(np.arange(ROWS) == 99, 4, 8))]),
         (nine.rotation, [run_of("E9", estimate_end_rad=0.0)]),
         (nine.two_spikes, [run_of("E7", image_deviation=np.linspace(0.0, 1.0, ROWS))]),
         (last_is_worse, [run_of("E10", estimate_end_m=0.03)]),
