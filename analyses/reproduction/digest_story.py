@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
 from cdpr_drake.analyses.reporting.statements import IN_PART, NOT_CONFIRMED
 from cdpr_drake.analyses.reproduction.numbers import RULE
-from cdpr_drake.analyses.reproduction.older import OlderReport, change_words, changed_facts
+from cdpr_drake.analyses.reproduction.older import OlderReport, change_words, changed_facts, either
 from cdpr_drake.analyses.reproduction.overview import (
     CAUSE_WORDS,
     MET,
@@ -237,7 +237,7 @@ def _of_sources(card: Scorecard) -> Scorecard:
 def _counts(registers: Sequence[Register], card: Scorecard, older: OlderReport | None) -> Grid:
     """Facts by chapter; those of an older report in brackets where they differ."""
     before = older.card.facts if older is not None and older.card.facts else None
-    verdicts = card.shown_facts()
+    verdicts = either(card.shown_facts(), () if older is None else older.card.shown_facts())
 
     def line(
         words: str, counts: Mapping[str, int], was: Mapping[str, int] | None
