@@ -58,6 +58,7 @@ _WHOLE: dict[str, Callable[[Path], bool]] = {
     ".json": _whole_json,
     ".npz": _whole_zip,
     ".png": lambda path: path.read_bytes().endswith(b"IEND\xaeB`\x82"),
+    ".pdf": lambda path: path.read_bytes().rstrip().endswith(b"%%EOF"),
     ".html": lambda path: path.read_text(encoding="utf-8").rstrip().endswith("</html>"),
     ".yaml": lambda path: path.read_text(encoding="utf-8").endswith("\n"),
 }

@@ -52,6 +52,7 @@ BROKEN = {
     "a.json": b'{"squares": [0.',
     "a.npz": b"PK\x03\x04 and no more",
     "a.png": b"\x89PNG and no more",
+    "a.pdf": b"%PDF-1.4 and no more",
     "a.html": b"<!doctype html><body>",
     "a.yaml": b"mass: 1",
 }

@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
 from cdpr_drake.analyses.reporting.statements import IN_PART, NOT_CONFIRMED
 from cdpr_drake.analyses.reproduction.numbers import RULE
-from cdpr_drake.analyses.reproduction.older import OlderReport, change_words, changed_facts
+from cdpr_drake.analyses.reproduction.older import OlderReport, change_words, changed_facts, either
 from cdpr_drake.analyses.reproduction.overview import (
     CAUSE_WORDS,
     MET,
@@ -237,7 +237,7 @@ def _of_sources(card: Scorecard) -> Scorecard:
 def _counts(registers: Sequence[Register], card: Scorecard, older: OlderReport | None) -> Grid:
     """Facts by chapter; those of an older report in brackets where they differ."""
     before = older.card.facts if older is not None and older.card.facts else None
-    verdicts = card.shown_facts()
+    verdicts = either(card.shown_facts(), () if older is None else older.card.shown_facts())
 
     def line(
         words: str, counts: Mapping[str, int], was: Mapping[str, int] | None
@@ -269,7 +269,7 @@ def _counts(registers: Sequence[Register], card: Scorecard, older: OlderReport |
     sums = None if older is None or before is None else older.card.total_facts()
     lines.append(line("All of the sources", card.total_facts(), sums))
     heads = ("facts", *verdicts)
-    longest = [max(map(len, head.split())) for head in heads]  # letters that cannot be broken
+    longest = [3 + max(map(len, head.split())) for head in heads]  # what cannot be broken
     widths = [0.82 * letters / sum(longest) for letters in longest]
     return Grid(("", *heads), tuple(lines), (0.18, *widths), numbers=1, strong=tuple(strong))
 
@@ -310,7 +310,7 @@ def _not_confirmed(rows: Sequence[ReportRow]) -> list[Block]:
         some = [one for one in facts if one.fact.verdict == verdict]
         blocks.append(Heading(f"{title}: {len(some)}"))
         heads = ("section", "what it says", "printed", "ours", "cause", "why")
-        widths = (0.1, 0.24, 0.12, 0.18, 0.08, 0.28)
+        widths = (0.11, 0.24, 0.12, 0.18, 0.08, 0.27)
         lines = tuple(map(_line, some))
         blocks.append(Grid(heads, lines, widths) if lines else Words("None."))
     return blocks
@@ -319,7 +319,7 @@ def _not_confirmed(rows: Sequence[ReportRow]) -> list[Block]:
 def _line(placed: PlacedFact) -> tuple[str, ...]:
     fact = placed.fact
     return (
-        placed.row.section,
+        f"{placed.row.source.partition('_')[0]} {placed.row.section}",
         shortened(placed.words, LONGEST["says"]) + (" (fitted)" if fact.basis == FITTED else ""),
         shortened(fact.printed, LONGEST["printed"]),
         shortened(fact.found, LONGEST["found"]),

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from cdpr_drake.analyses.reproduction.overview import PlacedFact, first_rows
 from cdpr_drake.analyses.reproduction.rows import ReportRow
-from cdpr_drake.analyses.reproduction.scorecard import Scorecard, facts_by_place
+from cdpr_drake.analyses.reproduction.scorecard import VERDICTS, Scorecard, facts_by_place
 from cdpr_drake.errors import OutputFolderError
 
 SUMMARY = "summary.json"
@@ -36,6 +36,11 @@ class OlderReport:
     def words(self) -> str:
         """What it is."""
         return f"the report by code {self.code}, {'quick' if self.quick else 'full'} form"
+
+
+def either(now: Sequence[str], before: Sequence[str]) -> tuple[str, ...]:
+    """Verdicts that occur now or did before, in the order of the columns."""
+    return tuple(verdict for verdict in VERDICTS if verdict in {*now, *before})
 
 
 @dataclass(frozen=True)

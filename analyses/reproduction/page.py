@@ -17,7 +17,12 @@ from cdpr_drake.analyses.reporting.log_files import write_whole
 from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
 from cdpr_drake.analyses.reporting.statements import NOT_IN_QUICK, NOT_JUDGED, NOT_TESTABLE
 from cdpr_drake.analyses.reproduction.numbers import RULE
-from cdpr_drake.analyses.reproduction.older import OlderReport, change_words, changed_facts
+from cdpr_drake.analyses.reproduction.older import (
+    OlderReport,
+    change_words,
+    changed_facts,
+    either,
+)
 from cdpr_drake.analyses.reproduction.overview import (
     MET,
     STANDS,
@@ -100,12 +105,10 @@ def _scorecard(
 ) -> str:
     """Facts by chapter, and folded below them the items that rest on them."""
     card, before = Scorecard.of(rows), None if older is None else older.card
-    facts = _counted(
-        card.facts, card.shown_facts(), registers, "facts", before.facts if before else {}
-    )
-    items = _counted(
-        card.chapters, card.shown(), registers, "items", before.chapters if before else {}
-    )
+    verdicts = either(card.shown_facts(), before.shown_facts() if before else ())
+    facts = _counted(card.facts, verdicts, registers, "facts", before.facts if before else {})
+    verdicts = either(card.shown(), before.shown() if before else ())
+    items = _counted(card.chapters, verdicts, registers, "items", before.chapters if before else {})
     beside = ""
     if older is not None:
         none = "" if older.card.facts else " It counted items, not yet facts."

@@ -17,16 +17,17 @@ th { background: var(--soft); font-weight: 600; border-bottom: 1px solid #8b9099
 td.n, th.n { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
 tr.total td { font-weight: 600; border-top: 2px solid #8b9099; }
 .items { table-layout: fixed; }
-.items col.label { width: 8%; } .items col.words { width: 20%; } .items col.printed { width: 13%; }
-.items col.found { width: 21%; } .items col.verdict { width: 10%; } .items col.why { width: 28%; }
+.items col.label { width: 9%; } .items col.words { width: 19%; } .items col.printed { width: 14%; }
+.items col.found { width: 20%; } .items col.verdict { width: 12%; } .items col.why { width: 26%; }
 .v { font-weight: 600; white-space: normal; padding-left: 10px; border-left: 6px solid #8b9099; }
 .v.confirmed { border-left-color: #009e73; }
 .v.met-fitted, .v.met-by-construction { border-left: 6px double #009e73; }
 .v.in-part { border-left: 6px double #c98500; }
 .v.not-confirmed, .v.study-failed { border-left: 6px dashed #b3312c; }
 .v.missing { border-left: 6px dotted #b3312c; }
-.mark { display: inline-block; border: 1px solid #8b9099; border-radius: 3px; padding: 0 5px;
-  margin: 3px 4px 0 0; font-size: 12px; color: var(--grey); background: var(--soft); }
+.mark { display: inline-block; white-space: nowrap; border: 1px solid #8b9099; border-radius: 3px;
+  padding: 0 5px; margin: 3px 4px 0 0; font-size: 12px; color: var(--grey);
+  background: var(--soft); }
 tr.repeats td { color: var(--grey); }
 small { color: var(--grey); font-weight: 400; }
 .scorecard td:first-child { min-width: 170px; }

@@ -16,7 +16,7 @@ from cdpr_drake.analyses.front.studies import reproduce as reproduce_all
 from cdpr_drake.analyses.reporting.output_folder import shown_path
 from cdpr_drake.analyses.reporting.statements import new_table
 from cdpr_drake.analyses.reproduction.digest_pdf import NO_REPORTLAB
-from cdpr_drake.analyses.reproduction.rows import FAILED
+from cdpr_drake.analyses.reproduction.rows import FAILED, NOT_ASKED
 from cdpr_drake.analyses.reproduction.scorecard import Scorecard
 from cdpr_drake.analyses.studies.catalogue import STUDIES
 from cdpr_drake.cli.command_session import CommandSession
@@ -126,6 +126,8 @@ def _print(found: Reproduction) -> None:
     title = "What was published, repeated: facts, each counted once"
     table = new_table(title, ("source", "chapter"), ("facts", *verdicts))
     for (source, chapter), counts in card.facts.items():
+        if set(+counts) == {NOT_ASKED}:
+            continue  # the sum has them
         cells = [str(counts[verdict] or "") for verdict in verdicts]
         table.add_row(source.replace("_", " "), chapter, str(counts.total()), *cells)
     table.add_section()

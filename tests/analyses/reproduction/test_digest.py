@@ -89,8 +89,8 @@ def test_the_digest_counts_facts_once_and_names_the_cause(folder):
     card = cells_of(story, "Scorecard")
     assert card[-1] == ("All of the sources", "5", "1", "1", "1", "2")
     assert cells_of(story, "Not confirmed: 2") == (
-        ("1.1", "It is fitted_low (fitted)", "", "so", "ours", ""),
-        ("1.1", "It is low", "", "so", "hardware", ""),
+        ("toy 1.1", "It is fitted_low (fitted)", "", "so", "ours", ""),
+        ("toy 1.1", "It is low", "", "so", "hardware", ""),
     )
     assert [line[4] for line in cells_of(story, "Confirmed in part: 1")] == ["not known"]
     assert cells_of(story, "Tolerances") == (("within 3 mm <half>", "one/high", "1"),)

@@ -70,6 +70,16 @@ def test_the_page_has_older_counts_where_they_differ(older, now):
     assert 'id="changes"' not in alone
 
 
+def test_a_verdict_that_no_fact_has_any_more_keeps_its_column(older, now):
+    folder, register, rows = now
+    good = [row for row in rows if row.words != "It is n." and row.label == "statement"]
+    page = write_report(folder, [register], good, {}, False, read_older(older)).read_text()
+    assert "0 <small>was 1</small>" in page
+    story = digest_story(folder, [register], good, {}, False, read_older(older))
+    grid = next(block for block in story if isinstance(block, Grid))
+    assert grid.lines[0] == ("Chapter 1", "3", "3 (2)", "0 (1)")
+
+
 def test_the_digest_has_older_counts_in_brackets(older, now):
     folder, register, rows = now
     story = digest_story(folder, [register], rows, {}, False, read_older(older))
