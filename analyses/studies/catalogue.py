@@ -77,6 +77,7 @@ MODULES = {
     "stability-recipes": "control_stability.all_recipes",
     "stability-ranges": "stability_ranges.study",
     "stability-shapes": "stability_shapes.study",
+    "stability-bounds": "stability_bounds.study",
     "workspaces": "workspaces.study",
     "design": "design",
     "engines": "engines.study",

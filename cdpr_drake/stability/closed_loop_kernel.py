@@ -1,4 +1,4 @@
-"""Closed loops of the servo that the criterion is about: kinematics alone, a model wrong throughout.
+"""Closed loops of the servo that the criterion is about: kinematics alone, a model always wrong.
 
 From a pose the loop de/dt = -Pi e is followed with unit gain: the servo asks for the camera's twist
 v = -L_hat^+ e, turns it into cable velocities by the model that it believes, which is off by the

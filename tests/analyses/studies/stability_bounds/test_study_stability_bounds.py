@@ -1,0 +1,208 @@
+"""Stability workspaces in several ways: what is asked, judges of made-up rows, pictures."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cdpr_drake.analyses.reporting.statements import CONFIRMED, IN_PART, NOT_CONFIRMED
+from cdpr_drake.analyses.studies.framework.runs import Run, Runs
+from cdpr_drake.analyses.studies.framework.study import Form
+from cdpr_drake.analyses.studies.stability_bounds import statements as said
+from cdpr_drake.analyses.studies.stability_bounds.figures import (
+    maps_figure,
+    shares_figure,
+    tightness,
+    tightness_figure,
+)
+from cdpr_drake.analyses.studies.stability_bounds.questions import (
+    COSTS,
+    METHODS,
+    QUICK_SCALES,
+    ROBOTS,
+    SHARES,
+    THESIS,
+    bounds_task,
+    cases,
+    reduce,
+    servo_case,
+)
+from cdpr_drake.analyses.studies.stability_bounds.study import STUDY, costs_table, shares_table
+from cdpr_drake.stability.perturbation_bounds import PerturbationBounds
+from cdpr_drake.stability.verdict import judge_stability
+
+QUICK = {case.name: case for case in cases(Form(quick=True))}
+
+EXACT = 1e-9
+"""Of rotations and places that are added and taken away again."""
+
+K = 3
+"""Loops of a made-up pose: two drawn, one worst."""
+
+
+def case_of(robot: str, scale: float) -> Any:
+    return QUICK[f"{robot}, D_b times {scale:g}"]
+
+
+def arrays(robot: str, scale: float, **changed: Any) -> dict[str, np.ndarray]:
+    """Everything stable at D_b / 4; the simple proofs prove nothing at D_b."""
+    count = case_of(robot, scale).items
+    simple = np.full(count, scale < THESIS)
+    found = {name: np.ones(count, bool) for name in METHODS}
+    found |= {"lipschitz": simple, "interval": simple, "unstable": np.zeros(count, bool)}
+    found |= {"arrived": np.ones((count, K), bool), "falls": np.full((count, K), 0.5)}
+    found |= {"contradicts": np.zeros((count, K), bool)}
+    for name, change in changed.items():
+        found[name] = np.array(found[name])
+        found[name][0] = change
+    return found
+
+
+def made_up(robot: str = "caroca", scale: float = THESIS, **changed: Any) -> Runs:
+    """All rows, with something changed at the first pose of a robot under some bounds."""
+    rows = []
+    for one in ROBOTS:
+        for s in QUICK_SCALES:
+            case = case_of(one, s)
+            here = changed if (one, s) == (robot, scale) else {}
+            row = reduce(case, arrays(one, s, **here))
+            rows.append(Run(case.name, None, case.keys, row, {}))
+    for n, one in enumerate(ROBOTS):
+        times = {f"{name}_s": 1e-3 * (k + 1 + n) for k, name in enumerate(METHODS)}
+        times |= {"lipschitz_s": 1e-6, "certified_s": 2e-3, "simulated_s": 4e-3}
+        others = dict.fromkeys(("cut_percent", "uncut_percent", "certified_sample_percent"), 50.0)
+        keys = {"experiment": COSTS, "robot": one, "scale": THESIS}
+        rows.append(Run(f"{one}, costs", None, keys, {**times, **others, "cut_s": 0.07}, {}))
+    return Runs(rows)
+
+
+def verdict(check: Any, runs: Runs) -> str:
+    return str(check.judge(runs).verdict)
+
+
+def test_all_hold_of_rows_without_a_fault() -> None:
+    for check in said.CHECKS:
+        assert verdict(check, made_up()) == CONFIRMED, check.name
+
+
+@pytest.mark.parametrize("proof", ["certified", "lipschitz", "interval"])
+def test_one_false_claim_is_enough(proof: str) -> None:
+    runs = made_up(scale=QUICK_SCALES[0], unstable=True, **{proof: True})
+    others = [name for name in ("certified", "lipschitz", "interval") if name != proof]
+    assert verdict(said._no_false_claims, runs) == NOT_CONFIRMED
+    alone = made_up(scale=QUICK_SCALES[0], unstable=True, **dict.fromkeys(others, False))
+    assert verdict(said._no_false_claims, alone) == IN_PART
+
+
+def test_a_bound_that_proves_more_than_the_certificate_is_told() -> None:
+    runs = made_up("planar", QUICK_SCALES[0], certified=False)
+    assert verdict(said._certificate_proves_most, runs) == IN_PART
+
+
+def test_loops_that_contradict_a_certificate_are_told() -> None:
+    assert verdict(said._falls_where_certified, made_up(falls=-0.1)) == IN_PART
+    assert verdict(said._falls_where_certified, made_up(contradicts=True)) == IN_PART
+    uncertified = made_up(falls=-0.1, certified=False)
+    assert verdict(said._falls_where_certified, uncertified) == CONFIRMED
+
+
+def test_one_loop_that_ends_elsewhere_is_told() -> None:
+    runs = made_up(arrived=[True, False, True])
+    found = said._arrives_from_certified.judge(runs)
+    assert (found.verdict, found.held, found.of) == (IN_PART, 3, 4)
+    poses = case_of("caroca", THESIS).items
+    assert f"caroca: {K * poses - 1} of {K * poses}" in found.found
+
+
+def test_a_dear_certificate_is_told() -> None:
+    runs = made_up()
+    dear = [
+        Run(run.case, None, run.keys, {**run.measured, "certified_s": 5e-3}, {})
+        if run["experiment"] == COSTS
+        else run
+        for run in runs
+    ]
+    assert verdict(said._proofs_are_cheap, Runs(dear)) == IN_PART
+
+
+def test_the_way_ends_in_the_middle_of_the_box() -> None:
+    """There is no error there, and the printed lever and the exact one are the same."""
+    for robot in ROBOTS:
+        case, grid = servo_case(robot), bounds_task(robot, THESIS, True).grid
+        middle = (grid.lower + grid.upper) / 2.0
+        for place in (middle, grid.lower):
+            p_WC = place + case.X_PC.translation()
+            rows = case.target.rows(case.X_PC.rotation().matrix()[None], p_WC[None])
+            assert rows.theta_u == pytest.approx(np.zeros((1, 3)), abs=EXACT)
+            assert rows.p_CO == pytest.approx(rows.error, abs=EXACT)
+            way = case.X_PC.rotation().matrix().T @ (middle - place)
+            assert rows.error[0] == pytest.approx(way, abs=EXACT)
+
+
+def test_the_task_says_what_the_methods_say_whatever_the_chunk() -> None:
+    task = bounds_task("planar", 1 / 4, True)
+    whole, tail = task(38, 44), task(41, 44)
+    assert whole["falls"].shape == (6, task.loops + 1)
+    for name, values in tail.items():
+        np.testing.assert_array_equal(whole[name][3:], values)
+    poses = task.grid.pose_rows(38, 44)
+    certified = judge_stability(task.case, task.bounds, poses, "certified", task.options)
+    np.testing.assert_array_equal(whole["certified"], certified.stable)
+    assert np.all(whole["certified"])  # near the goal, under a quarter of the bounds
+    assert np.all(whole["arrived"])
+    assert not np.any(whole["contradicts"])
+
+
+def test_bounds_are_those_of_the_thesis_times_a_scale() -> None:
+    for robot in ROBOTS:
+        bounds: PerturbationBounds = case_of(robot, 1 / 4).task.bounds
+        assert bounds.r_bp == pytest.approx(0.03 / 4)
+        assert bounds.exits == bounds.anchors == "common"
+    assert len(list(cases(Form()))) == 8 * len(ROBOTS)
+
+
+def test_rows_have_shares_of_cells() -> None:
+    case = case_of("planar", THESIS)
+    row = reduce(case, arrays("planar", THESIS, sampled=False))
+    cells = (len(row["x_m"]) - 1) * (len(row["y_m"]) - 1)
+    assert row["sampled_percent"] == pytest.approx(100.0 * (1.0 - 1.0 / cells))
+    assert row["full_m2"] == pytest.approx(0.96**2)
+    assert row["searched_percent"] == 100.0
+
+
+def test_maps_have_a_panel_for_every_robot_and_method() -> None:
+    figure = maps_figure(made_up())
+    titles = [axes.get_title() for axes in figure.axes if axes.get_title()]
+    assert len(titles) == len(ROBOTS) * len(METHODS)
+    assert titles[0] == "sampled\n100.0 %, 1 ms"
+    assert "Lipschitz\n0.0 %" in titles[4]
+    bar = figure.axes[-1]
+    assert [text.get_text() for text in bar.get_xticklabels()] == ["none", "1/4", "1"]
+
+
+def test_tightness_is_a_quotient_of_bounds() -> None:
+    runs = made_up()
+    assert tightness(runs, "caroca", "certified") == 1.0
+    assert tightness(runs, "caroca", "lipschitz") == 0.25
+    (panel,) = tightness_figure(runs).axes
+    drawn = sorted({float(line.get_ydata()[0]) for line in panel.lines})
+    assert drawn == [0.25, 1.0]
+
+
+def test_shares_are_drawn_against_bounds() -> None:
+    panels = shares_figure(made_up()).axes
+    assert len(panels) == len(ROBOTS)
+    lines = {line.get_label(): line for line in panels[0].lines}
+    assert list(lines["Lipschitz"].get_ydata()) == [100.0, 0.0]
+
+
+def test_tables_have_a_row_for_every_robot_and_bounds() -> None:
+    runs = made_up()
+    assert shares_table(runs).row_count == len(ROBOTS) * len(QUICK_SCALES)
+    assert costs_table(runs).row_count == 2 * len(ROBOTS)
+    assert STUDY.names_of_checks()[0] == "no_false_claims"
+    assert [case.alone for case in cases(Form()) if case.keys["experiment"] == SHARES] == (
+        [False] * 7 * len(ROBOTS)
+    )
