@@ -78,18 +78,18 @@ ones that sag; and massless of steel without the pulleys that the controller doe
 
 MATCHED = "matched"
 
-DAMPINGS = (20.0, 60.0, 120.0, 180.0, 240.0, 320.0)
-GAINS = (0.75, 1.25, 1.75, 2.25)
+DAMPINGS = (40.0, 110.0, 180.0, 250.0, 320.0)
+GAINS = (0.75, 1.5, 2.25)
 """The grid: damping of the platform [N s/m], gain lambda at the goal [1/s]."""
 
-QUICK = ((20.0, 1.75), (320.0, 1.25))
+QUICK = ((40.0, 1.5), (320.0, 0.75))
 """Points of the quick form."""
 
 GYRATION = 0.0184
 """Damping of turns per that of translations: mean moment of inertia about the centre of mass, per
 mass [m^2]."""
 
-DURATION, WINDOW = 120.0, 15.0
+DURATION, WINDOW = 80.0, 15.0
 """How long a run takes, and its end in which it is looked at [s]."""
 
 CYCLE = 1e-3

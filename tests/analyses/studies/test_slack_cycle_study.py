@@ -66,7 +66,7 @@ def test_swing_of_a_drifting_sine():
 
 def test_a_run_with_little_damping_cycles_and_one_with_matching_cables_does_not():
     found = {
-        name: measure(Case(name=name, keys={"cables": name, "damping": 20.0, "gain": 1.75}), 0)
+        name: measure(Case(name=name, keys={"cables": name, "damping": 40.0, "gain": 2.25}), 0)
         for name in ("sagging", MATCHED)
     }
     for name, expected in (("sagging", True), (MATCHED, False)):
