@@ -88,6 +88,7 @@ MODULES = {
     "fusion": "fusion.study",
     "schemes": "schemes.study",
     "tagless": "tagless",
+    "slack-cycle": "slack_cycle",
     "calibration": "calibration.study",
     "identification": "identification",
     "case-1": "case_studies.case_1",
