@@ -30,6 +30,9 @@ from cdpr_drake.analyses.studies.stability_ranges.question import unit_of_limit
 DRAWS = 4
 """Sets of rows that are made of each study."""
 
+MANY = 200
+"""Of a plan with more cases one set is made."""
+
 SPREAD = 2.0
 """Logarithms of numbers by chance have this standard deviation."""
 
@@ -140,7 +143,7 @@ def verdicts(name, checks):
     """By check its verdicts on all made rows, and in what kinds of errors it ended."""
     found = {check.name: set() for check in checks}
     errors = {check.name: set() for check in checks}
-    for draw in range(DRAWS):
+    for draw in range(1 if len(_plan(name)[0]) > MANY else DRAWS):
         sets = [made_runs(name, mutate, draw) for mutate in MUTATIONS.values()]
         for runs in (*sets, made_runs(name, MUTATIONS["as made"], draw, exchanged=True)):
             for check in checks:

@@ -72,6 +72,13 @@ def test_no_effect_of_any_error_meets_no_table_not_even_in_part():
     assert {(one.of, one.cause) for one in tables} == {(1, SOURCE)}
 
 
+def test_that_bounds_were_tested_farther_on_the_larger_robot_is_no_finding():
+    # Nothing empties any workspace, and the larger robot keeps no more than the small one.
+    said = {s.name: s for s in judged(CHECKS, printed_rows(lambda share: 50.0))}
+    assert said["scales"].verdict == NOT_CONFIRMED
+    assert said["scales"].of == 9
+
+
 def test_coarse_grids_are_not_judged_but_named():
     said = judged(CHECKS, printed_rows(grid=COARSE), quick=True)
     assert {s.verdict for s in said} == {NOT_IN_QUICK}
