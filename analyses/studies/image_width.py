@@ -21,6 +21,7 @@ from rich.table import Table
 from cdpr_drake.analyses.reporting.statements import new_table
 from cdpr_drake.analyses.simulation.run_summary import THESIS_WIDTH
 from cdpr_drake.analyses.studies.case_studies import case_1, case_7, case_8
+from cdpr_drake.analyses.studies.case_studies.case_1_ends import LENGTHS
 from cdpr_drake.analyses.studies.framework.case_run import measure_run
 from cdpr_drake.analyses.studies.framework.runs import MissingRuns, Runs
 from cdpr_drake.analyses.studies.framework.statement import CHOICE, OURS, Finding, statement
@@ -125,11 +126,11 @@ ROWS = (
     _row("simulated d2, servo", "4.3.2", HELD_OUT, ABOUT, 20.0, "case-7", "simulated_d2_servo"),
     _row("ACROBOT, Est. 1 to 3", "2.3.2", HELD_OUT, MOST, 10.0, "case-1", "a_1", "a_2", "a_3"),
     _row("ACROBOT, Est. 4 to 7", "2.3.2", HELD_OUT, MOST, 15.0, "case-1",
-         *(f"a_{key}" for key in case_1.LENGTHS)),
+         *(f"a_{key}" for key in LENGTHS)),
     _row("exact, servo", "4.3.2", HELD_OUT, MOST, 10.0, "case-7", "none_servo"),
     _row("simulated, servo", "4.3.2", HELD_OUT, MOST, 5.0, "case-7", "simulated_none_servo"),
     _row("CAROCA, best estimator", "2.3.4", HELD_OUT, LEAST, 15.0, "case-1",
-         *(f"c_{key}" for key in ("1", "2", "3", *case_1.LENGTHS))),
+         *(f"c_{key}" for key in ("1", "2", "3", *LENGTHS))),
     _row("CAROCA, servo", "4.4.2", HELD_OUT, LEAST, 25.0, "case-8", "servo"),
 )  # fmt: skip
 """All deviations in the image that the thesis prints."""
@@ -148,7 +149,9 @@ QUICK = (("case-7", "none_servo"),)
 
 def cases(form: Form) -> Iterator[Case]:
     """Each configuration with the scenarios' camera, some with a camera of each width."""
-    wanted = {(row.study, name): (OWN_WIDTH,) for row in ROWS for name in row.configurations}
+    wanted: dict[tuple[str, str], tuple[int, ...]] = {
+        (row.study, name): (OWN_WIDTH,) for row in ROWS for name in row.configurations
+    }
     wanted |= dict.fromkeys(AT_OWN_WIDTH, WIDTHS)
     for (study, name), widths in wanted.items():
         if form.quick and (study, name) not in QUICK:

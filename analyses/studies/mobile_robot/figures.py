@@ -89,20 +89,20 @@ def views_figure(runs: Runs) -> Figure:
                   marker=look.marker, label=f"estimator {NUMBERS[kind]}, median",
                   **line_style(look))  # fmt: skip
         for x, ends in points:
-            axes.plot(np.full(len(ends), x), ends, linestyle="", marker="x", color=look.color,
-                      markersize=4)  # fmt: skip
+            axes.plot(np.full(len(ends), x), ends, linestyle="", marker=look.marker,
+                      color=look.color, markerfacecolor="none", markersize=4)  # fmt: skip
         axes.axhline(PUBLISHED_LAPS[kind], linewidth=0.8, linestyle=":", color=look.color)
         axes.annotate(
             f"published, estimator {NUMBERS[kind]}",
-            (1.0, PUBLISHED_LAPS[kind]),
+            (0.99, PUBLISHED_LAPS[kind]),
             xycoords=("axes fraction", "data"),
             ha="right",
             va="bottom",
             fontsize=8,
         )
-    axes.set(xlabel="margin of the tag along the image's short side [mm]", yscale="log",
-             ylabel="laps until tracking ends, or the run does (crosses: each run)")  # fmt: skip
-    plain_numbers(axes.yaxis)
+    axes.set(xlabel="margin of the tag along the image's short side [mm]",
+             ylabel="laps until tracking ends, or the run does (hollow: each run)",
+             ylim=(0.0, None))  # fmt: skip
     axes.legend(loc="best")
     return figure
 

@@ -57,8 +57,8 @@ def view_decides(runs: Runs) -> Finding:
     return Finding(
         found=". ".join(words),
         held=[any(agree), first == sorted(first) and first[0] < first[-1]],
-        why=f"Est. 1 ends before those by lengths in {sum(reversed_order)} of "
-        f"{len(reversed_order)} views: the margin changes when runs end, not in which order.",
+        why=f"Est. 1 ends before both by lengths in {sum(reversed_order)} of {len(reversed_order)} "
+        "views, in the medians.",
     )
 
 
