@@ -9,6 +9,7 @@ from rich.table import Table
 
 from cdpr_drake.analyses.reporting.statements import new_table
 from cdpr_drake.analyses.studies.framework.runs import Runs
+from cdpr_drake.analyses.studies.tension_methods.experiments import THESIS_ROBOT
 from cdpr_drake.analyses.studies.tension_methods.start_experiments import (
     GAINS,
     ONE_STEP,
@@ -17,12 +18,16 @@ from cdpr_drake.analyses.studies.tension_methods.start_experiments import (
     START_EXPERIMENTS,
 )
 from cdpr_drake.analyses.visualization.figure_style import line_style, new_figure
+from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.palette import BOUND, DASHED, Look, nth_look
 
 TITLE = (
     "Largest tension over the start error, {0}\n"
-    "lines with symbols: found; dashed with the same symbol: Gazebo thesis; crossed: platform lost"
+    "lines with symbols: found; thin, with the symbol at their end: Gazebo thesis; crossed: lost"
 )
+
+DRAWN = 2e4
+"""Larger tensions, of platforms that are lost, are drawn as this [N]."""
 
 PRINTED_AT = 1.04
 """Where the printed values' symbols stand, as a share of the panel's width."""
@@ -94,8 +99,9 @@ def _panel(axes: Axes, runs: Runs, printed: tuple[float, ...]) -> None:
         some.sort(key=lambda run: run["start_error_m"])
         look = nth_look(number)
         errors = [run["start_error_m"] for run in some]
-        sizes = [run["tension_max_n"] for run in some]
-        axes.plot(errors, sizes, label=f"Kp = Kd = {gain:g}", **line_style(look))
+        sizes = [min(run["tension_max_n"], DRAWN) for run in some]
+        found = line_style(look) | {"marker": look.marker, "markersize": 5.0}
+        axes.plot(errors, sizes, label=f"Kp = Kd = {gain:g}", **found)
         lost = [(e, t) for e, t, run in zip(errors, sizes, some, strict=True) if run["lost"]]
         if lost:
             axes.plot(*zip(*lost, strict=True), "x", color="black", markersize=10.0)
@@ -105,7 +111,8 @@ def _panel(axes: Axes, runs: Runs, printed: tuple[float, ...]) -> None:
             PRINTED_AT, value, transform=axes.get_yaxis_transform(), clip_on=False, linestyle="",
             marker=look.marker, color=look.color, markerfacecolor="white",
         )  # fmt: skip
-    axes.axhline(6500.0, **line_style(BOUND))
+    bound = load_robot(THESIS_ROBOT).tension_limits()[1]
+    axes.axhline(bound, label=f"upper bound {bound:g} N", **line_style(BOUND))
     axes.set_yscale("log")
 
 
@@ -121,9 +128,10 @@ def one_step_figure(all_runs: Runs) -> Figure:
         for number, ((start, between), some) in enumerate(
             runs(method=method).by("start", "between")
         ):
-            pairs = sorted((run["kp_per_s2"], run["tension_max_n"]) for run in some)
-            label = f"start: {start}; between: {between}"
-            axes.plot(*zip(*pairs, strict=True), label=label, **line_style(nth_look(number)))
+            pairs = sorted((run["kp_per_s2"], min(run["tension_max_n"], DRAWN)) for run in some)
+            label, look = f"start: {start}; between: {between}", nth_look(number)
+            found = line_style(look) | {"marker": look.marker, "markersize": 5.0}
+            axes.plot(*zip(*pairs, strict=True), label=label, **found)
         axes.plot(GAINS, printed, "k*", markersize=12.0, label="Gazebo thesis")
         axes.set(yscale="log", xlabel="Kp = Kd")
         axes.set_title(method.replace("_", " "), fontsize=10)

@@ -79,6 +79,7 @@ def lp_jumps(runs: Runs) -> Finding:
     "seen in figures 6.11 to 6.14",
     source="Gazebo thesis 6.4.2",
     rule=f"by more than {JUMP:g} N within 1 ms at each gain",
+    cause=SOURCE,
 )
 def qp_jumps(runs: Runs) -> Finding:
     """Jumps of the quadratic program's tensions."""
@@ -123,7 +124,9 @@ def qp_needs_less(runs: Runs) -> Finding:
             ),
         ],
         why="On the trajectory by little, since its largest tensions come at the end, near the "
-        "exit points, where there is little to choose. The thesis does not say where it started.",
+        "exit points, where there is little to choose. The thesis does not say where it started; "
+        "from a start error of some decimetres both are largest at the first request that can be "
+        "met, where there is nothing to choose (largest_at_launch, largest_by_start_error).",
     )
 
 
@@ -148,7 +151,8 @@ def tension_grows(runs: Runs) -> Finding:
         ],
         some=step[2] > GROWS * step[0],
         why="With the exact model there is no error for the gain to act on, except where the "
-        "platform starts beside its goal. The thesis does not say where it started.",
+        "platform starts beside its goal. The thesis does not say where it started; from a start "
+        "error of some decimetres they grow as the gain does (largest_by_start_error).",
     )
 
 
@@ -196,6 +200,7 @@ def no_better(runs: Runs) -> Finding:
     source="Gazebo thesis 6.4.1, 6.4.2",
     rule="each falls, fails, or has a larger error than at gain 100; in part: what starts 50 mm "
     "beside it or is controlled at 100 Hz does",
+    cause=SOURCE,
 )
 def unstable(runs: Runs) -> Finding:
     """Gains that come near instability."""
@@ -227,6 +232,7 @@ def _fails(run: Run) -> bool:
     "figures 6.15 to 6.17",
     source="Gazebo thesis 6.4.3",
     rule="from the start that was moved inside and from the printed one; in part: the latter",
+    cause=SOURCE,
 )
 def pseudo_inverse_negative(runs: Runs) -> Finding:
     """Negative tensions by the pseudo-inverse."""
@@ -261,7 +267,9 @@ def pseudo_inverse_117(runs: Runs) -> Finding:
             all(_near(one, PSEUDO_LARGEST) for one in largest),
         ],
         why="The same at all gains, but an order of magnitude less: weight and acceleration ask "
-        "for no more. Where its 117 N come from is not known.",
+        "for no more. A start error makes it grow with the gain; forces that act for a tenth of "
+        "the time give its order, though not the same at all gains (one_step_117). The number may "
+        "be copied.",
     )
 
 
@@ -270,6 +278,7 @@ def pseudo_inverse_117(runs: Runs) -> Finding:
     "267, 385, 517 N",
     source="Gazebo thesis 6.4.4",
     rule=f"negative at each gain; from gain to gain by a factor of {GROWS:g}",
+    cause=SOURCE,
 )
 def closed_form_negative(runs: Runs) -> Finding:
     """Negative and largest tensions by the closed form."""
@@ -283,7 +292,8 @@ def closed_form_negative(runs: Runs) -> Finding:
         held=[negative, all(more > GROWS * less for less, more in pairwise(largest))],
         some=negative,
         why="Negative and of the printed size, since the middle of 1 and 6500 N is far from what "
-        "1 kg needs; but the same at all gains.",
+        "1 kg needs; but the same at all gains. From a start error, which the thesis does not "
+        "tell, they grow (largest_by_start_error).",
     )
 
 
@@ -292,6 +302,7 @@ def closed_form_negative(runs: Runs) -> Finding:
     "figure 6.18",
     source="Gazebo thesis 6.4.4",
     rule=f"the mean of the last tenth above {1e3 * STEADY:g} mm where cables may push",
+    cause=SOURCE,
 )
 def closed_form_steady(runs: Runs) -> Finding:
     """What error the closed form leaves."""
@@ -305,8 +316,9 @@ def closed_form_steady(runs: Runs) -> Finding:
         + (f"falls after {cut['end_time_s']:.2f} s" if cut["lost"] else "stays up"),
         held=[last > STEADY],
         why="Its tensions balance the wrench exactly, so nothing is left with the exact model. A "
-        "published version of the thesis' simulator balances forces but not moments, which large "
-        "opposed tensions may turn into an error; not tried here.",
+        "published version of the thesis' simulator balances forces but not moments; then the "
+        "closed form's large opposed tensions turn the platform over, and it is lost (experiments "
+        "start_error at 100 Hz, one_step).",
     )
 
 

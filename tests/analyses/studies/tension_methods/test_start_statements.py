@@ -5,7 +5,7 @@ import pytest
 
 from cdpr_drake.analyses.reporting.statements import CONFIRMED, IN_PART, NOT_CONFIRMED
 from cdpr_drake.analyses.studies.framework.runs import Run, Runs
-from cdpr_drake.analyses.studies.framework.statement import MET_FITTED
+from cdpr_drake.analyses.studies.framework.statement import FITTED, MET_FITTED
 from cdpr_drake.analyses.studies.tension_methods.gain_figures import LARGEST
 from cdpr_drake.analyses.studies.tension_methods.start_experiments import (
     GAINS,
@@ -48,7 +48,7 @@ SIZES = [name for name in JUDGES if name.startswith("largest")]
 
 @pytest.mark.parametrize("name", SIZES)
 def test_sizes_are_judged_by_a_factor(name):
-    good = MET_FITTED if name == "largest_by_start_error" else CONFIRMED
+    good = MET_FITTED if JUDGES[name].basis == FITTED else CONFIRMED
     for factor in (1.0, 0.99 * FACTOR, 1.01 / FACTOR):
         assert verdict(name, factor) == good
     for factor in (1.01 * FACTOR, 0.99 / FACTOR, 0.1):
@@ -65,6 +65,15 @@ def test_the_best_start_error_is_found_and_told():
     assert found.verdict == MET_FITTED
     assert found.found.startswith("0.4 m, 100 Hz, force")
     assert found.found.endswith(": 0, 0, 0, 0, 0, 0, 0, 12, 0, 0, 0, 0, 0, 0, 0, 0")
+
+
+def test_the_best_of_forces_that_act_a_tenth_of_the_time_is_found_and_told():
+    found = JUDGES["largest_one_step_best"].judge(
+        made_up(lambda spec: 1.0 if (spec.start, spec.between) == ("path", "nothing") else 9.0)
+    )
+    assert found.verdict == MET_FITTED
+    assert found.found.startswith("start: path, between: nothing")
+    assert found.found.endswith(": 0, 0, 0, 12")
 
 
 @pytest.mark.parametrize(
