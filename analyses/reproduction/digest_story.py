@@ -197,12 +197,13 @@ def _scorecard(
 ) -> list[Block]:
     card = Scorecard.of(rows)
     total = card.total_facts()
+    left = f", {total[NOT_ASKED]} of which were not asked for," if total[NOT_ASKED] else ""
     blocks: list[Block] = [
         Heading("Scorecard"),
         Words(
-            f"Of {total.total()} facts of the sources {card.independent} are confirmed by runs "
-            "that could have said otherwise. A fact is one check of a study or one printed number, "
-            "counted once; what no source states, but we ask for, is apart. Met (fitted): "
+            f"Of {total.total()} facts of the sources{left} {card.independent} are confirmed by "
+            "runs that could have said otherwise. A fact is one check of a study or one printed "
+            "number, counted once; what no source states, but we ask for, is apart. Met (fitted): "
             "parameters were chosen with the number in sight; met (by construction): nothing else "
             "could have come out."
         ),
