@@ -46,6 +46,9 @@ STEP = 0.05
 REACHED = 1e-3
 """A loop has converged when the error is this share of what it was."""
 
+AT_GOAL = 1e-9
+"""Errors below this are rounding, and a loop that starts so is where it shall be [rad, m]."""
+
 LONGEST_TIME = 60.0
 """Without convergence a loop ends after this time, times the gain [-]."""
 
@@ -145,8 +148,8 @@ def _loops(
                     square += e[i] * e[i]
                 if size < 0.0:
                     size = square
-                    falls[n, k] = -rate / square if square > 0.0 else 1.0
-                if square <= REACHED * REACHED * size:
+                    falls[n, k] = -rate / square if square > AT_GOAL * AT_GOAL else 1.0
+                if square <= max(REACHED * REACHED * size, AT_GOAL * AT_GOAL):
                     ends[n, k] = CONVERGED
                     break
                 if not np.isfinite(rate):

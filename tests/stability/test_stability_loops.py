@@ -11,7 +11,7 @@ from pydrake.math import RigidTransform, RollPitchYaw
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import StabilityError
-from cdpr_drake.geometry.poses import exponential, rotation_from_vector, rotation_vector
+from cdpr_drake.geometry.poses import exponential, pose_row, rotation_from_vector, rotation_vector
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.stability.closed_loop_kernel import (
     CONVERGED,
@@ -132,6 +132,18 @@ def test_no_loop_rises_at_the_start_where_the_servo_is_certified() -> None:
     _, worst = worst_perturbations(case, BASELINE, poses, options)
     found = closed_loops(case, BASELINE, poses, worst[:, None], EVERYWHERE)
     assert np.all(found.falls[certified.stable, 0] >= certified.margin[certified.stable])
+
+
+def test_a_loop_that_starts_at_its_goal_is_there() -> None:
+    """A thousandth of an error that is rounding is never reached."""
+    case, rounding = spatial_loop_case(), 1e-16
+    assert isinstance(case.target, FixedObject)
+    X_WP = case.target.X_WO @ case.target.X_CdO.inverse() @ case.X_PC.inverse()
+    pose = pose_row(X_WP) + rounding
+    d = draw_perturbations(pose, BASELINE, case.m, 3, 5)
+    found = closed_loops(case, BASELINE, pose[None], d[None], EVERYWHERE)
+    assert np.all(found.ends == CONVERGED)
+    assert np.all(found.falls == 1.0)
 
 
 def test_where_it_rises_is_told() -> None:

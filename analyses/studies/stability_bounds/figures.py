@@ -15,7 +15,6 @@ from cdpr_drake.analyses.studies.framework.runs import MissingRuns, Run, Runs
 from cdpr_drake.analyses.studies.stability_bounds.questions import (
     COSTS,
     METHODS,
-    ROBOTS,
     SHARES,
     THESIS,
 )
@@ -34,10 +33,13 @@ ROBOT_LABELS = {
 }  # fmt: skip
 
 LOOKS: dict[str, Look] = {
-    **VERDICTS, **{name: nth_look(3 + k) for k, name in enumerate(METHODS) if name not in VERDICTS}
+    **VERDICTS, "simulated": nth_look(3), "lipschitz": nth_look(6), "interval": nth_look(5)
 }  # fmt: skip
 
-ROBOT_MARKERS = dict(zip(ROBOTS, ("s", "o", "D", "^"), strict=True))
+LETTERS = {"planar": "P", "acrobot_small": "S", "acrobot_fully_constrained": "F", "caroca": "C"}
+
+EDGE = "#c00000"
+"""Of what is stable under the thesis' bounds."""
 
 
 def withstood(runs: Runs, robot: str, method: str) -> Array:
@@ -78,7 +80,8 @@ def maps_figure(runs: Runs) -> Figure:
             _outline(panel, x, y, levels > scales.index(THESIS))
             panel.set_aspect("equal")
             panel.set_title(_panel_words(runs, robot, method), fontsize=8)
-            panel.tick_params(labelsize=7)
+            panel.tick_params(labelsize=7, labelleft=panel is row[0])
+            panel.grid(visible=False)
             for axis in (panel.xaxis, panel.yaxis):
                 few_ticks(axis, 4)
         where = "in its plane" if len(z) == 1 else f"z = {z[plane]:g} m"
@@ -90,7 +93,12 @@ def maps_figure(runs: Runs) -> Figure:
         ticks=np.arange(len(scales) + 1),
     )  # fmt: skip
     bar.ax.set_xticklabels(["none", *map(_words, scales)])
-    bar.set_label("bounds that are withstood, times D_b of the servoing thesis [-]")
+    bar.set_label("bounds that are withstood, times D_b of the servoing thesis [-]", fontsize=9)
+    edge = Line2D([], [], color=EDGE, linewidth=1.6, label="edge of what withstands D_b")
+    figure.legend(
+        handles=[edge], loc="outside lower center", fontsize=9, title_fontsize=9,
+        title="over panels: share of the whole box that withstands D_b, processor time for a pose",
+    )  # fmt: skip
     return figure
 
 
@@ -106,15 +114,14 @@ def _panel_words(runs: Runs, robot: str, method: str) -> str:
 
 
 def _outline(panel: Axes, x: Array, y: Array, inside: np.ndarray) -> None:
-    """Draws the edge of a set of points of a grid, halfway to their neighbours."""
-    padded = np.pad(inside, 1)
+    """Draws where a set of points of a grid ends inside the grid, halfway between neighbours."""
     xs, ys = (_edges(axis) for axis in (x, y))
     lines = []
-    for i, j in np.argwhere(padded[1:, 1:-1] != padded[:-1, 1:-1]):
-        lines.append([(xs[i], ys[j]), (xs[i], ys[j + 1])])
-    for i, j in np.argwhere(padded[1:-1, 1:] != padded[1:-1, :-1]):
-        lines.append([(xs[i], ys[j]), (xs[i + 1], ys[j])])
-    panel.add_collection(LineCollection(lines, colors="#c00000", linewidths=1.6))
+    for i, j in np.argwhere(inside[1:] != inside[:-1]):
+        lines.append([(xs[i + 1], ys[j]), (xs[i + 1], ys[j + 1])])
+    for i, j in np.argwhere(inside[:, 1:] != inside[:, :-1]):
+        lines.append([(xs[i], ys[j + 1]), (xs[i + 1], ys[j + 1])])
+    panel.add_collection(LineCollection(lines, colors=EDGE, linewidths=1.6))
 
 
 def _edges(axis: Array) -> Array:
@@ -163,45 +170,46 @@ def tightness(runs: Runs, robot: str, method: str) -> float:
     return float(np.median(scales[withstood(runs, robot, method)][asked] / searched[asked]))
 
 
-NOTHING = 1 / 64
+NOTHING = 1 / 32
 """Where the axis of tightness has its zero, below every quotient of two of the scales."""
 
 
 def tightness_figure(runs: Runs) -> Figure:
     """How large errors are withstood, beside the search, against processor time."""
     figure, panel = new_figure(
-        1, 1, (6.6, 4.6), "Tightness against cost, at the bounds of the servoing thesis"
+        1, 1, (7.2, 4.8), "Tightness against processor time, under the bounds of the thesis"
     )
     robots = [robot for robot, _ in runs(experiment=COSTS).by("robot")]
-    for robot in robots:
+    for number, robot in enumerate(robots):
         run = runs(experiment=COSTS, robot=robot).one()
         for method in METHODS:
-            share = tightness(runs, robot, method)
+            look, share = LOOKS[method], tightness(runs, robot, method)
+            place = 1e3 * run[f"{method}_s"], share or NOTHING
             panel.plot(
-                1e3 * run[f"{method}_s"], share or NOTHING, ROBOT_MARKERS[robot],
-                color=LOOKS[method].color, markersize=9, alpha=0.9,
-                markerfacecolor=LOOKS[method].color if share else "white",
+                *place, look.marker, color=look.color, markersize=8, alpha=0.85,
+                markerfacecolor=look.color if share else "none",
             )  # fmt: skip
-    for method in METHODS:
-        times = [1e3 * runs(experiment=COSTS, robot=one).one()[f"{method}_s"] for one in robots]
-        most = max(tightness(runs, one, method) or NOTHING for one in robots)
-        panel.annotate(
-            LABELS[method], (float(np.exp(np.mean(np.log(times)))), most), (0, 9),
-            textcoords="offset points", ha="center", fontsize=9, color=LOOKS[method].color,
-        )  # fmt: skip
+            panel.annotate(
+                LETTERS[robot], place, (0, 7 if number % 2 == 0 else -14), ha="center",
+                textcoords="offset points", fontsize=8,
+            )  # fmt: skip
     panel.set_xscale("log")
     panel.set_yscale("log", base=2)
-    ticks = 2.0 ** np.arange(-5, 3)
+    ticks = 2.0 ** np.arange(-4, 2)
     panel.set_yticks([NOTHING, *ticks], ["none", *map(_words, ticks)])
-    panel.set_ylim(NOTHING / 1.4, 6.0)
-    panel.set_xlabel("processor time for a pose [ms]")
-    panel.set_ylabel("bounds withstood, as a share of the search's\n(median over poses) [-]")
+    panel.set_ylim(NOTHING / 1.8, 3.2)
+    panel.set_xlabel("processor time for a pose [ms]", fontsize=10)
+    panel.set_ylabel(
+        "bounds withstood, as a share of\nthe search's, median over poses [-]", fontsize=10
+    )
     handles = [
-        Line2D([], [], color="#404040", linestyle="", marker=ROBOT_MARKERS[robot],
-               label=ROBOT_LABELS[robot])
-        for robot in robots
+        Line2D([], [], color=LOOKS[method].color, linestyle="", marker=LOOKS[method].marker,
+               label=LABELS[method])
+        for method in METHODS
     ]  # fmt: skip
-    figure.legend(handles=handles, loc="outside lower center", ncols=2)
+    letters = ", ".join(f"{LETTERS[robot]} {ROBOT_LABELS[robot]}" for robot in robots)
+    figure.legend(handles=handles, loc="outside lower center", ncols=6, title=letters,
+                  fontsize=9, title_fontsize=9)  # fmt: skip
     return figure
 
 

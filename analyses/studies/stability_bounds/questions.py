@@ -74,7 +74,7 @@ COST_POSES, QUICK_COST_POSES = 120, 20
 COST_REPEATS = 3
 """Times are the least of so many: what else a machine does only adds to them."""
 
-CUT_SCALE, CUT_PARTS, CUT_POSES = 1 / 4, 2, 60
+CUT_SCALE, CUT_PARTS, CUT_POSES = 1 / 4, 2, 30
 """Where intervals are also cut, each of up to nine axes into so many parts, and on how many poses:
 512 boxes for a pose of a spatial robot are more than the certificate's pieces."""
 
