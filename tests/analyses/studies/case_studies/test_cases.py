@@ -27,7 +27,7 @@ ENDS = {
         "stiffness_0.1_corrected": "timeout",
     },
     "case-9-torque": {"torque_8cm_less_30": "timeout"},
-    "case-10": {"E7": "timeout", "E8": "timeout"},
+    "case-10": {"E5": "timeout", "E8": "timeout"},
     "case-a6": {"camera_E2": "converged"},
     "tension-tracking": {"d2_none": "converged", "d2_middle": "converged"},
 }
