@@ -5,7 +5,9 @@ Kinds of cases, values of the key column `scan`:
 - TARGETS: for each target of `camera_targets` the rows of d_theta_pc of tables A.9 and A.10, and
   for each arrangement of points the rows of A.11 that are missed, on a grid with every second
   column;
-- KEPT: all rows of A.9 and A.10 by the target in use and by the one that TARGETS chooses;
+- SEEN: the same rows of A.9 and A.10 where an error of the camera's mounting also turns what is
+  seen, for several rotation errors;
+- KEPT: all rows of A.9 and A.10 by the target in use and by those that TARGETS and SEEN choose;
 - PAIRS: the poses at which some target, which may be another one at every pose, is unstable in the
   row d_theta_pc = 50 deg, where A.9 and A.10 print 0, and stable in another row. If less is left
   than that row prints, the two rows do not belong to the same targets.
@@ -30,9 +32,11 @@ from cdpr_drake.analyses.studies.control_stability.camera_targets import (
     HEIGHTS,
     IN_USE_TARGET,
     NO_TURN,
+    SEEN_TARGET,
     CameraTarget,
     goals,
     same_errors,
+    seen_turned,
     with_target,
 )
 from cdpr_drake.analyses.studies.framework.study import Case, Form
@@ -57,7 +61,7 @@ from cdpr_drake.stability.verdict import VerdictOptions, judge_stability
 from cdpr_drake.workspaces.pose_grid import WorkspaceGrid, grid_by_count
 from cdpr_drake.workspaces.volume import VolumeRule, workspace_volume
 
-TARGETS, KEPT, PAIRS = "targets", "kept rows", "pairs of rows"
+TARGETS, SEEN, KEPT, PAIRS = "targets", "seen turned", "kept rows", "pairs of rows"
 """Kinds of cases."""
 
 CHOOSING_BOUND = "d_theta_pc_deg"
@@ -266,7 +270,7 @@ def rows_asked(scan: str, table: PublishedTable) -> list[tuple[str, float]]:
         return list(PAIRED_ROWS)
     if table.robot == FULLY_CONSTRAINED:
         return list(ELEVENTH_ROWS)
-    names = (CHOOSING_BOUND,) if scan == TARGETS else tuple(table.rows)
+    names = tuple(table.rows) if scan == KEPT else (CHOOSING_BOUND,)
     return [(bound, value) for bound in names for value in table.rows[bound]]
 
 
@@ -274,8 +278,10 @@ def scan_cases(form: Form) -> Iterator[Case]:
     """All cases of the scan."""
     scanned, whole = (QUICK, QUICK) if form.quick else (HALF, WHOLE)
     for name in CHOOSING_TABLES:
-        for target in (IN_USE_TARGET, CHOSEN_TARGET):
+        for target in (IN_USE_TARGET, CHOSEN_TARGET, SEEN_TARGET):
             yield _rows_case(KEPT, name, target, whole)
+        for target in seen_turned():
+            yield _rows_case(SEEN, name, target, scanned)
         yield _pairs_case(name, scanned, form.quick)
     for name in CHOOSING_TABLES:
         for target in scan_targets(form.quick):
@@ -313,7 +319,7 @@ def _rows_case(
     table = table_named(name)
     poses = scan_grid(table.robot, grid)
     # How points are wrong is that of the recipe in use for all arrangements.
-    rows = tuple(recipe_bounds(table, *row) for row in rows_asked(scan, table))
+    rows = tuple(target.bounds(recipe_bounds(table, *row)) for row in rows_asked(scan, table))
     case = targeted_case(table, target, recipe)
     return Case(
         name=f"{scan} {name} {recipe.name}, {target.name}",

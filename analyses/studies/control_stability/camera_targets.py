@@ -33,6 +33,7 @@ from cdpr_drake.stability.desired_view import (
     OppositeCorner,
     ServoTarget,
 )
+from cdpr_drake.stability.perturbation_bounds import PerturbationBounds
 from cdpr_drake.stability.stability_case import StabilityCase
 
 SAME_ERROR, GOAL, FARTHEST = "same e_t", "goal", "farthest corner"
@@ -53,10 +54,20 @@ AZIMUTHS = {
 turn about z takes ACROBOT's points to each other within 10 mm."""
 
 HALF_TURN, NO_TURN, DIAGONAL_TURN = "half turn about z", "none", "half turn about (1, 1, 1)"
-TURNS = {
+SEEN_TURNS_DEG = (130.0, 135.0, 140.0, 145.0, 150.0)
+"""Rotation errors about z that are tried where what is seen is turned, too [deg]."""
+
+
+def about_z(angle_deg: float) -> str:
+    """Name of a rotation error about the optical axis."""
+    return f"{angle_deg:g} deg about z"
+
+
+TURNS: Mapping[str, tuple[float, float, float]] = {
     HALF_TURN: (0.0, 0.0, math.pi),
     NO_TURN: (0.0, 0.0, 0.0),
     DIAGONAL_TURN: HALF_TURN_DIAGONAL,
+    **{about_z(angle): (0.0, 0.0, math.radians(angle)) for angle in SEEN_TURNS_DEG},
 }
 """Rotation errors theta u by name [rad]; the first is that of the recipe in use."""
 
@@ -80,6 +91,7 @@ class CameraTarget:
             upper one.
         height: Of the camera above the platform's origin [m].
         turn: Name of the rotation error, of `TURNS`.
+        seen_turned: Whether the orientation of what is seen is wrong as the camera's mounting is.
     """
 
     kind: str
@@ -89,6 +101,7 @@ class CameraTarget:
     share: tuple[float, float, float] = (0.0, 0.0, 0.0)
     height: float = HEIGHT
     turn: str = HALF_TURN
+    seen_turned: bool = False
 
     @property
     def name(self) -> str:
@@ -99,7 +112,8 @@ class CameraTarget:
             GOAL: "goal at ({:g}, {:g}, {:g}) of the box".format(*self.share),
             FARTHEST: FARTHEST,
         }[self.kind]
-        return f"{words}, camera {self.height:g} m, turn {self.turn}"
+        seen = ", seen turned" if self.seen_turned else ""
+        return f"{words}, camera {self.height:g} m, turn {self.turn}{seen}"
 
     def error(self) -> np.ndarray:
         """e_t in the camera frame, for SAME_ERROR, shape (3,) [m]."""
@@ -135,8 +149,12 @@ class CameraTarget:
         return {
             "target": self.kind, "length_m": self.length, "polar_deg": self.polar_deg,
             "azimuth_deg": self.azimuth_deg, "goal": goal, "camera_m": self.height,
-            "turn": self.turn,
+            "turn": self.turn, "seen_turned": self.seen_turned,
         }  # fmt: skip
+
+    def bounds(self, bounds: PerturbationBounds) -> PerturbationBounds:
+        """Bounds of a row with what is seen as wrong as the target says."""
+        return bounds.varied(d_theta_s=bounds.d_theta_pc) if self.seen_turned else bounds
 
 
 IN_USE_TARGET = CameraTarget(GOAL)
@@ -148,6 +166,9 @@ CENTRE_TARGET = CameraTarget(GOAL, share=(0.5, 0.5, 0.5))
 
 CHOSEN_TARGET = CameraTarget(SAME_ERROR, 1.75, 45.0, 90.0)
 """What the rows of d_theta_pc of A.9 and A.10 choose."""
+
+SEEN_TARGET = replace(IN_USE_TARGET, turn=about_z(140.0), seen_turned=True)
+"""What the same rows choose where what is seen is turned by an error of the mounting, too."""
 
 
 def same_errors(
@@ -174,6 +195,13 @@ def goals(height: float = HEIGHT, turn: str = HALF_TURN) -> list[CameraTarget]:
     ]
     found = [CameraTarget(GOAL, share=share, height=height, turn=turn) for share in shares]
     return [*found, CameraTarget(FARTHEST, height=height, turn=turn)]
+
+
+def seen_turned() -> list[CameraTarget]:
+    """The goal in use with what is seen turned, too, by the rotation error."""
+    return [
+        replace(IN_USE_TARGET, turn=about_z(angle), seen_turned=True) for angle in SEEN_TURNS_DEG
+    ]
 
 
 def with_target(case: StabilityCase, robot: str, target: CameraTarget) -> StabilityCase:

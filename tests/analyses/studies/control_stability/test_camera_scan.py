@@ -24,6 +24,7 @@ from cdpr_drake.analyses.studies.control_stability.camera_scan import (
     KEPT,
     PAIRED_ROWS,
     PAIRS,
+    SEEN,
     TARGETS,
     PairTask,
     ScanTask,
@@ -46,13 +47,17 @@ from cdpr_drake.analyses.studies.control_stability.camera_targets import (
     IN_USE_TARGET,
     NO_TURN,
     SAME_ERROR,
+    SEEN_TARGET,
     CameraTarget,
+    about_z,
     goals,
     same_errors,
+    seen_turned,
 )
 from cdpr_drake.analyses.studies.framework.runs import Run, Runs
 from cdpr_drake.analyses.studies.framework.statement import MET_FITTED, judged
 from cdpr_drake.analyses.studies.framework.study import Form, Study
+from cdpr_drake.analyses.studies.published.recipe_variants import RECIPES
 from cdpr_drake.analyses.studies.published.stability_recipe import (
     recipe_bounds,
     recipe_case,
@@ -170,7 +175,7 @@ def test_targets_are_what_they_are_called():
         assert np.linalg.norm(target.error()) == pytest.approx(target.length)
     kinds = [target.kind for target in goals()]
     assert (kinds.count(GOAL), kinds.count(FARTHEST)) == (8 + 6 + 1, 1)
-    for target in (*goals(), *same_errors()):
+    for target in (*goals(), *same_errors(), *seen_turned()):
         assert target_of(Run("", None, target.keys(), {})) == target
 
 
@@ -182,6 +187,39 @@ def test_a_goal_in_the_world_is_the_same_for_a_camera_at_any_height():
         for target in (IN_USE_TARGET, replace(IN_USE_TARGET, height=0.46))
     ]
     np.testing.assert_array_equal(margins[0]["stable"], margins[1]["stable"])
+
+
+def test_what_is_seen_turns_over_where_theta_u_and_its_error_pass_half_a_turn():
+    """At every pose: the estimate's axis is the opposite one there, and with it two signs."""
+    options = replace(recipe_options(A10.robot), draws=400, threads=1)
+    target = replace(SEEN_TARGET, turn=about_z(140.0))
+    shares = {}
+    for angle in (35.0, 50.0):  # 140 deg leave 40
+        bounds = target.bounds(PerturbationBounds(d_theta_pc=math.radians(angle)))
+        assert bounds.d_theta_s == bounds.d_theta_pc
+        task = ScanTask(targeted_case(A10, target), (bounds,), FEW, options)
+        shares[angle] = float(np.mean(task(0, FEW.size)["stable"]))
+    assert shares == {35.0: 1.0, 50.0: 0.0}
+    same = PerturbationBounds(d_theta_pc=1.0)
+    assert IN_USE_TARGET.bounds(same) == same
+
+
+def test_the_recipe_with_what_is_seen_turned_is_the_target_that_is_kept():
+    recipe = RECIPES["seen-turned"]
+    for name in CHOOSING_TABLES:
+        table = table_named(name)
+        own = recipe_case(table.robot, table.scheme, recipe)
+        scanned = targeted_case(table, SEEN_TARGET)
+        np.testing.assert_array_equal(own.target.theta_u, scanned.target.theta_u)
+        np.testing.assert_array_equal(own.target.place, scanned.target.place)
+        assert own.X_PC.IsExactlyEqualTo(scanned.X_PC)
+        for row in rows_asked(KEPT, table):
+            assert recipe_bounds(table, *row, recipe) == SEEN_TARGET.bounds(
+                recipe_bounds(table, *row)
+            )
+    for name in ("A.11", "A.14", "A.16"):
+        table = table_named(name)
+        assert recipe_bounds(table, "r_bp", 0.1, recipe) == recipe_bounds(table, "r_bp", 0.1)
 
 
 def _study(form_cases):
@@ -197,7 +235,7 @@ def made_runs(change=lambda share: share):
         table = table_named(case.keys["of_table"])
         printed = [table.rows[b][v] for b, v in rows_asked(case.keys["scan"], table)]
         met = case.keys["scan"] == PAIRS or target_of(Run("", None, case.keys, {})) in (
-            CHOSEN_TARGET, CENTRE_TARGET,
+            CHOSEN_TARGET, CENTRE_TARGET, SEEN_TARGET,
         )  # fmt: skip
         shares = [change(share) - (0.0 if met else 20.0) for share in printed]
         rows.append(Run(case.name, None, case.keys, {"share_percent": shares}))
@@ -215,10 +253,11 @@ def test_printed_rows_confirm_the_scan_and_are_drawn(printed_runs):
     assert len(said) == len(SCAN_CHECKS)
     fitted = {name for name, one in said.items() if one.verdict == MET_FITTED}
     assert fitted == {
-        "camera_target_chosen", "camera_target_range", "rows_of_one_target", "eleventh_rows",
-        "eleventh_target",
+        "camera_target_chosen", "camera_target_range", "rows_of_one_target", "seen_turned_chosen",
+        "eleventh_rows", "eleventh_target",
     }  # fmt: skip
     assert said["camera_target_kept"].verdict == CONFIRMED
+    assert said["seen_turned_kept"].verdict == CONFIRMED
     assert said["camera_target_range"].of == 2 * 7
     assert said["rows_of_one_target"].of == 2 * len(PAIRED_ROWS)
     figure = camera_targets_figure(printed_runs)
@@ -231,9 +270,12 @@ def test_printed_rows_confirm_the_scan_and_are_drawn(printed_runs):
 def test_other_rows_are_not_confirmed():
     """30 points more: the chosen one is off by 30, the one in use by 10."""
     said = {one.name: one for one in judged(SCAN_CHECKS, made_runs(lambda share: share + 30.0))}
-    for name in ("camera_target_chosen", "camera_target_kept", "camera_target_range"):
+    for name in (
+        "camera_target_chosen", "camera_target_kept", "camera_target_range", "seen_turned_chosen",
+        "seen_turned_kept",
+    ):  # fmt: skip
         assert said[name].verdict == NOT_CONFIRMED
-        assert said[name].cause in ("", "source")
+        assert said[name].cause in ("", "ours" if name.startswith("seen") else "source")
     assert said["eleventh_rows"].verdict == NOT_CONFIRMED
     assert said["eleventh_target"].cause == "ours"
     less = {one.name: one for one in judged(SCAN_CHECKS, made_runs(lambda share: 0.8 * share))}
@@ -245,7 +287,7 @@ def test_other_rows_are_not_confirmed():
 def test_cases_stand_apart_from_the_rows_of_recipes(printed_runs):
     quick = list(scan_cases(Form(quick=True)))
     assert all(is_scan(case) and "table" not in case.keys for case in quick)
-    assert {case.keys["scan"] for case in quick} == {TARGETS, KEPT, PAIRS}
+    assert {case.keys["scan"] for case in quick} == {TARGETS, SEEN, KEPT, PAIRS}
     assert len({case.name for case in quick}) == len(quick)
     for name in CHOOSING_TABLES:
         some = printed_runs(scan=TARGETS, grid=HALF, of_table=name)
