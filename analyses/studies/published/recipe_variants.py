@@ -92,6 +92,8 @@ class Recipe:
         goal: LOWER_CORNER, OPPOSITE_CORNER or CENTRE.
         goals: The same for single robots by name, before `goal`.
         turn: Rotation error theta u of spatial robots under PBVS [rad].
+        seen: Rotation errors theta u of robots by name, before `turn`, with whom an error of the
+            camera's mounting also turns what is seen under PBVS [rad].
         view: What is seen under 2 1/2 D.
         camera: PLATFORM, AS_BUILT or FACING_DOWN.
         sight: Rows that it was chosen with, beside those of `present`; empty: none.
@@ -104,6 +106,7 @@ class Recipe:
     goal: str = LOWER_CORNER
     goals: Mapping[str, str] = field(default_factory=dict)
     turn: tuple[float, float, float] = (0.0, 0.0, math.pi)
+    seen: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
     view: View = field(default_factory=View)
     camera: str = PLATFORM
     sight: str = ""
@@ -171,6 +174,10 @@ def exchanged_anchors(cables: CableSet, one: int, other: int) -> CableSet:
     order[[one, other]] = other, one
     return replace(cables, p_PB=cables.p_PB[:, order])
 
+
+SEEN_TURNED = dict.fromkeys(("acrobot_small", "acrobot_large"), (0.0, 0.0, math.radians(140.0)))
+"""Rotation errors about z of the suspended robots where what is seen is turned, too [rad]. With an
+error of the mounting of 40 deg and more theta u and its error pass half a turn together."""
 
 CAMERA_ROWS = "A.14, A.15"
 """With these rows in sight the height of the camera and the view straight ahead were chosen."""
@@ -290,6 +297,18 @@ RECIPES = {
             view=STRAIGHT_AHEAD,
             camera=FACING_DOWN,
             sight=f"{CAMERA_ROWS}, A.11; r_A and r_B of A.12",
+        ),
+        Recipe(
+            "seen-turned",
+            "one-exchange, but for the suspended ACROBOT under PBVS an error of the camera's "
+            "mounting also turns what is seen, and theta u is 140 deg about z",
+            anchors=EXCHANGED,
+            points={**VARIED_POINTS, FULLY_CONSTRAINED: "independent"},
+            goals={FULLY_CONSTRAINED: CENTRE},
+            seen=SEEN_TURNED,
+            view=STRAIGHT_AHEAD,
+            camera=FACING_DOWN,
+            sight=f"{CAMERA_ROWS}, A.11; d_theta_pc of A.9 and A.10",
         ),
     )
 }

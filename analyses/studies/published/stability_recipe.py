@@ -83,7 +83,7 @@ def recipe_case(robot_name: str, scheme: str, recipe: Recipe = IN_USE) -> Stabil
     robot = load_robot(robot_name)
     known = workspace_defaults(robot, robot_name)
     planar = robot.motion_type().is_horizontal_body
-    turn = np.array(recipe.turn)
+    turn = np.array(recipe.seen.get(robot_name, recipe.turn))
     target: ServoTarget = FixedPlace(known.lower, turn)
     if planar:
         corner = np.full(3, PLANAR_HALF_SIZE)
@@ -122,12 +122,15 @@ def recipe_bounds(
         table: The table.
         name: Name of the bound, angles with _deg.
         value: Its value [m, deg].
-        recipe: How points are wrong.
+        recipe: How points are wrong, and whether what is seen is.
 
     Raises:
         StabilityError: There is no such bound.
     """
-    return single_bounds(_baseline(table.robot), name, value, table, recipe)
+    bounds = single_bounds(_baseline(table.robot), name, value, table, recipe)
+    if table.scheme == "pbvs" and table.robot in recipe.seen:
+        return bounds.varied(d_theta_s=bounds.d_theta_pc)
+    return bounds
 
 
 @cache
