@@ -100,5 +100,6 @@ def test_statements_tell_right_predictions_from_wrong_ones():
 
 def test_figure_has_a_map_of_each_kind_of_cables(tmp_path):
     found = replace(STUDY, measure=made_up)(False, StudySession(workers=1))
+    assert len(found.tables()) > 0
     found.write(tmp_path)
     assert (tmp_path / "slack_cycle.png").is_file()
