@@ -70,7 +70,7 @@ def start_trials(quick: bool) -> list[StartTrial]:
         (start, rate, balance) for start in STARTS for rate in RATES for balance in (WRENCH, FORCE)
     ]
     pulses = [(start, between) for start in (ON_PATH, LAUNCH) for between in (NOTHING, STATIC)]
-    gains = GAINS
+    gains: tuple[float, ...] = GAINS
     if quick:
         combinations = [(error_name(QUICK_ERROR), RATES[-1], one) for one in (WRENCH, FORCE)]
         pulses, gains = [(ON_PATH, NOTHING)], GAINS[:1]

@@ -34,6 +34,9 @@ GRAVITY = 9.81
 ROUNDING = 1e-9
 """Of forces of some ten newtons [N]."""
 
+MEAN = 0.03
+"""What the mean of a period of 10 ms leaves out, and a start that has not quite died out."""
+
 HOME = np.array(load_robot("caroca_gazebo").home.position)
 
 
@@ -89,20 +92,23 @@ def test_by_forces_alone_the_platform_turns():
 
 
 def test_forces_that_act_a_tenth_of_the_time_are_ten_times_as_large():
-    """In the balance of a mean: Kp e carries the other nine tenths of the weight."""
+    """In the balance of a mean: error and speed carry the other nine tenths of the weight.
+
+    From pulse to pulse the speed goes from -v to v and back, v = 9 g 1 ms / 2; it is read at -v.
+    """
     pulsed = spec(
         rate=100.0, between=NOTHING, gain=400.0, method="pseudo_inverse", applied=Applied.PUSHED,
-        position=HOME, duration=3.0,
+        position=HOME, duration=6.0,
     )  # fmt: skip
     run = run_start_trial(pulsed)
-    sag = 9.0 * GRAVITY / 400.0
-    assert run["position_error_last_tenth_m"] == pytest.approx(sag, rel=0.1)
+    sag = (9.0 * GRAVITY - 400.0 * 4.5e-3 * GRAVITY) / 400.0
+    assert run["position_error_last_tenth_m"] == pytest.approx(sag, rel=MEAN)
     robot = load_robot("caroca_gazebo")
     X_WP = pose_from_angles(HOME - [0.0, 0.0, sag], np.zeros(3))
     W = wrench_matrix(X_WP, robot.exit_points(), robot.anchor_points())
     ten = np.linalg.pinv(W) @ [0.0, 0.0, 0.0, 0.0, 0.0, 10.0 * GRAVITY]
-    assert run["tension_last_max_n"] == pytest.approx(np.max(ten), rel=0.1)
-    assert run["control_steps"] == 300
+    assert run["tension_last_max_n"] == pytest.approx(np.max(ten), rel=MEAN)
+    assert run["control_steps"] == 600
 
 
 def test_tensions_of_rest_leave_nothing_to_do_at_home():
