@@ -169,7 +169,8 @@ def test_recipes_differ_in_what_they_name():
 
 
 def some_of(study, *asked, chunk=20):
-    """A study of the cases whose keys have one of some sets of values, each asked by itself."""
+    """A study of the cases whose keys have one of some sets of values, without those whose task
+    another case has."""
 
     def cases(form):
         found = [
@@ -178,8 +179,7 @@ def some_of(study, *asked, chunk=20):
             if any(where.items() <= case.keys.items() for where in asked)
         ]
         there = {case.name for case in found}
-        assert all(case.same_task in ("", *there) for case in found)
-        return found
+        return [case for case in found if case.same_task in ("", *there)]
 
     return replace(study, cases=cases, chunk=chunk)
 
@@ -348,8 +348,9 @@ def test_the_full_form_has_every_row_by_every_recipe():
     assert rows == dict.fromkeys(RECIPES, 468)
     limits = [case for case in cases if case.keys["question"] == ANY_TARGET]
     assert "A.8" not in {case.keys["table"] for case in limits}
-    # What any target leaves is the same for every scheme.
-    assert {case.keys["table"] for case in limits if case.task} == {"A.9", "A.10", "A.11", "A.12"}
+    # What any target leaves is the same for every scheme; these have values that PBVS has not.
+    first = {case.keys["table"] for case in limits if case.task}
+    assert {"A.9", "A.10", "A.11", "A.12"} <= first < {case.keys["table"] for case in limits}
 
 
 def test_what_recipes_are_held_against_is_computed_and_told(tmp_path):
