@@ -40,7 +40,8 @@ UPPER_SHARES = (1.0, 0.5, 2.0)
 
 STEPS = {"acrobot_small": 0.025, "acrobot_large": 0.025, "caroca": 0.05}
 """Distance of neighbours in the figures, full form, about [m]: half of it changes what is left at a
-higher lower limit by less than 0.1 %, see `docs/theory/reproduction.md`."""
+higher lower limit by less than 0.1 % on CAROCA, by about 1 % on ACROBOT, whose answer is 10 % away
+from the limit, see `docs/theory/reproduction.md`."""
 
 QUICK_STEPS = 4.0
 """The quick form's distances are so much larger."""
