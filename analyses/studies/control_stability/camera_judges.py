@@ -319,7 +319,8 @@ def eleventh_rows(runs: Runs) -> Finding:
         least = f"{np.min(shares[kept, 1]):.1f} at least" if np.any(kept) else "no target"
         words.append(
             f"{arrangement} {shares[best, 0]:.1f} and {shares[best, 1]:.1f} by "
-            f"{target_of(some.rows[best]).name}, mean {np.mean(apart_by[best]):.1f}; with the baseline met {least}"
+            f"{target_of(some.rows[best]).name}, mean {np.mean(apart_by[best]):.1f}; with the "
+            f"baseline met {least}"
         )
     return Finding(found=". ".join(words), held=[min(worst) <= MET])
 
