@@ -60,6 +60,10 @@ MET = 5.0
 SAME = 0.5
 """Means that differ by less are the same [points]."""
 
+COARSER = 2.0
+"""What a grid with every second column takes off a share, 1.2 at most in the rows in use
+[points]."""
+
 LARGEST_RISE = 1.0
 """By how much a longer error may leave more before it counts as more: draws are random [points]."""
 
@@ -268,7 +272,7 @@ def camera_target_range(runs: Runs) -> Finding:
     source="tables A.9, A.10",
     rule="not more is printed than the share of the poses at which some target of the scan, which "
     f"may be another one at every pose, is stable in the row and unstable at {AGAINST[1]:g} deg, "
-    f"within {SAME:g} points",
+    f"within {COARSER:g} points, for the coarser grid",
     basis=FITTED,
     cause=SOURCE,
 )
@@ -279,36 +283,44 @@ def rows_of_one_target(runs: Runs) -> Finding:
         run = runs.one(scan=PAIRS, grid=HALF, of_table=name)
         for (bound, value), share in zip(PAIRED_ROWS, run["share_percent"], strict=True):
             printed = table_named(name).rows[bound][value]
-            held.append(printed <= share + SAME)
+            held.append(printed <= share + COARSER)
             words.append(f"{name} {bound} {value:g} {printed:.1f}, at most {share:.1f}")
-    return Finding(found="; ".join(words), held=held)
+    return Finding(
+        found="; ".join(words),
+        held=held,
+        why="As long as the object is seen without error: what empties the workspace is then a "
+        "long e_t, which leaves less in the other rows.",
+    )
 
 
 @statement(
     "Some e_t or goal and some arrangement of the points gives the baseline of A.11 and its row "
-    "d_theta_bp = 20 deg.",
+    "d_theta_bp = 20 deg, and keeps the other rows that are missed.",
     "97.0 and 45.4 %",
     source="table A.11",
-    rule=f"both within {MET:g} points by one target and arrangement",
+    rule=f"both within {MET:g} points and the mean absolute difference over "
+    f"{len(ELEVENTH_ROWS)} rows at most that, by one target and arrangement",
     basis=FITTED,
     cause=SOURCE,
 )
 def eleventh_rows(runs: Runs) -> Finding:
-    """The target and arrangement that comes closest in the worse one of the two rows."""
+    """The target of each arrangement that comes closest, and what the row of 20 deg keeps."""
     table = table_named(ELEVENTH)
     printed = np.array([table.rows[bound][value] for bound, value in ELEVENTH_ROWS])
     words, worst = [], []
     for arrangement in ARRANGEMENTS:
         some = runs(scan=TARGETS, grid=HALF, of_table=ELEVENTH, points=arrangement)
         shares = np.array(some.list("share_percent"))
-        off = np.max(np.abs(shares[:, :2] - printed[:2]), axis=1)
+        apart_by = np.abs(shares - printed)
+        off = np.maximum(np.max(apart_by[:, :2], axis=1), np.mean(apart_by, axis=1))
         best = int(np.argmin(off))
         worst.append(float(off[best]))
         kept = shares[:, 0] >= printed[0] - MET
         least = f"{np.min(shares[kept, 1]):.1f} at least" if np.any(kept) else "no target"
         words.append(
             f"{arrangement} {shares[best, 0]:.1f} and {shares[best, 1]:.1f} by "
-            f"{target_of(some.rows[best]).name}; with the baseline met {least}"
+            f"{target_of(some.rows[best]).name}, mean {np.mean(apart_by[best]):.1f}; with the "
+            f"baseline met {least}"
         )
     return Finding(found=". ".join(words), held=[min(worst) <= MET])
 
@@ -349,7 +361,7 @@ def length_decides(runs: Runs) -> Finding:
     """Shares over the length."""
     words, held = [], []
     for name in CHOOSING_TABLES:
-        lengths, _, means, _ = shares_over_length(runs, name)
+        lengths, _, means, _ = shares_over_length(runs(scan=TARGETS, grid=HALF), name)
         rises = np.max(np.diff(means, axis=0), axis=0)
         held += (rises <= LARGEST_RISE).tolist()
         words.append(

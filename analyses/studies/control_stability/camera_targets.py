@@ -188,10 +188,11 @@ def same_errors(
 
 def goals(height: float = HEIGHT, turn: str = HALF_TURN) -> list[CameraTarget]:
     """Grid II: corners, centres of faces and the centre of the box, and the farthest corner."""
+    steps = (0.0, 0.5, 1.0)
     shares = [
-        share
-        for share in product((0.0, 0.5, 1.0), repeat=3)
-        if share.count(0.5) in (0, 2, 3)  # not the middles of edges
+        (x, y, z)
+        for x, y, z in product(steps, steps, steps)
+        if (x, y, z).count(0.5) in (0, 2, 3)  # not the middles of edges
     ]
     found = [CameraTarget(GOAL, share=share, height=height, turn=turn) for share in shares]
     return [*found, CameraTarget(FARTHEST, height=height, turn=turn)]

@@ -278,7 +278,7 @@ def test_other_rows_are_not_confirmed():
         assert said[name].cause in ("", "ours" if name.startswith("seen") else "source")
     assert said["eleventh_rows"].verdict == NOT_CONFIRMED
     assert said["eleventh_target"].cause == "ours"
-    less = {one.name: one for one in judged(SCAN_CHECKS, made_runs(lambda share: 0.8 * share))}
+    less = {one.name: one for one in judged(SCAN_CHECKS, made_runs(lambda share: 0.5 * share))}
     assert less["rows_of_one_target"].verdict == NOT_CONFIRMED
     some = {one.name: one for one in judged(SCAN_CHECKS, made_runs(lambda s: max(s, 50.0)))}
     assert some["camera_target_range"].verdict == IN_PART  # 0 % at 50 deg, and 20 points less
