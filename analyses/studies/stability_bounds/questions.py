@@ -14,6 +14,7 @@ from cdpr_drake.analyses.reporting.timing import processor_seconds
 from cdpr_drake.analyses.studies.framework.runs import Row
 from cdpr_drake.analyses.studies.framework.study import Case, Form
 from cdpr_drake.analyses.studies.published.stability_recipe import (
+    DRAWS,
     recipe_case,
     recipe_grid,
     recipe_options,
@@ -50,9 +51,10 @@ THESIS = 1.0
 """The scale of the thesis' own bounds."""
 
 COUNTS, QUICK_COUNTS = (11, 11, 5), (5, 5, 3)
-"""Points of the grid of spatial robots along x, y, z; the planar one has the thesis' 33 x 33."""
+"""Points of the grid of spatial robots along x, y, z."""
 
-PLANAR_COUNTS, QUICK_PLANAR_COUNTS = (33, 33, 1), (9, 9, 1)
+PLANAR_COUNTS, QUICK_PLANAR_COUNTS = (17, 17, 1), (9, 9, 1)
+"""Of the planar robot: every other one of the thesis' 33 x 33."""
 
 LOOPS, QUICK_LOOPS = 4, 2
 """Loops with drawn errors from each pose, besides that with the worst one."""
@@ -139,7 +141,7 @@ class BoundsTask(GridTask):
         """
         poses = self.grid.pose_rows(start, stop)
         verdicts = judge_all_verdicts(self.case, self.bounds, poses, self.options)
-        again = replace(self.options, seed=LOOP_SEED, margins=True)
+        again = replace(self.options, seed=LOOP_SEED, margins=True, draws=DRAWS)
         margin, worst = worst_perturbations(self.case, self.bounds, poses, again)
         found = followed(self, poses, worst[:, None])
         stable = {verdict: verdicts[verdict].stable for verdict in VERDICTS}
