@@ -75,6 +75,7 @@ MODULES = {
     "stability-closed-loop-ibvs": "closed_loops.study",
     "control-stability": "control_stability.study",
     "stability-recipes": "control_stability.all_recipes",
+    "stability-targets": "control_stability.all_targets",
     "stability-ranges": "stability_ranges.study",
     "stability-shapes": "stability_shapes.study",
     "stability-bounds": "stability_bounds.study",

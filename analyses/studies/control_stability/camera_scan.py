@@ -291,11 +291,6 @@ def scan_cases(form: Form) -> Iterator[Case]:
             yield _rows_case(TARGETS, ELEVENTH, target, scanned, RECIPES[arrangement])
 
 
-def is_scan(case: Case) -> bool:
-    """Whether `scan_row` gives the row of a case."""
-    return "scan" in case.keys
-
-
 def scan_row(case: Case, arrays: Mapping[str, np.ndarray]) -> dict[str, Any]:
     """The row of a case.
 

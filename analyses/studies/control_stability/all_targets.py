@@ -27,6 +27,8 @@ from cdpr_drake.analyses.studies.control_stability.camera_scan import (
     TARGETS,
     WHOLE,
     rows_asked,
+    scan_cases,
+    scan_row,
     table_named,
 )
 from cdpr_drake.analyses.studies.control_stability.camera_targets import (
@@ -49,6 +51,7 @@ from cdpr_drake.analyses.studies.framework.statement import (
     Finding,
     statement,
 )
+from cdpr_drake.analyses.studies.framework.study import Study
 from cdpr_drake.analyses.studies.published.recipe_variants import IN_USE
 from cdpr_drake.analyses.studies.published.stability_tables import BASELINE_VALUES
 from cdpr_drake.analyses.visualization.figure_style import few_ticks, line_style, new_figure
@@ -450,5 +453,19 @@ SCAN_CHECKS: tuple[Check, ...] = (
 )  # fmt: skip
 """Statements that the scan judges."""
 
-SCAN_FIGURES = {"camera_targets": camera_targets_figure}
-"""What draws it."""
+CHUNK = 500
+"""Poses per chunk."""
+
+STUDY = Study(
+    name="stability-targets",
+    title="Tables A.9 to A.11 by the camera's target: what one can give, and what none can",
+    source="servoing thesis 3.3, tables A.9 to A.11",
+    cases=scan_cases,
+    reduce=scan_row,
+    chunk=CHUNK,
+    unit="poses",
+    before="listing targets",
+    stated="What follows for the printed tables",
+    checks=SCAN_CHECKS,
+    figures={"camera_targets": camera_targets_figure},
+)
