@@ -8,7 +8,7 @@ from pydrake.math import RigidTransform
 from cdpr_drake.analyses.studies.case_studies.path_figures import three_layouts
 from cdpr_drake.analyses.studies.framework.caroca_cables import CAROCA_ASSUMPTION, CAROCA_RUN
 from cdpr_drake.analyses.studies.framework.case_definition import Configuration, Plan
-from cdpr_drake.analyses.studies.framework.case_run import outcomes
+from cdpr_drake.analyses.studies.framework.case_run import converged, outcomes
 from cdpr_drake.analyses.studies.framework.case_statements import same_accuracy
 from cdpr_drake.analyses.studies.framework.case_study import configuration_study
 from cdpr_drake.analyses.studies.framework.experiments import (
@@ -18,7 +18,7 @@ from cdpr_drake.analyses.studies.framework.experiments import (
     turned,
 )
 from cdpr_drake.analyses.studies.framework.runs import Runs
-from cdpr_drake.analyses.studies.framework.statement import SOURCE, Finding, statement
+from cdpr_drake.analyses.studies.framework.statement import CHOICE, Finding, statement
 
 LIFT = 0.133
 """How far all heights are raised so that the tag lies on the ground [m]."""
@@ -73,16 +73,19 @@ _accuracy = same_accuracy(("none", "within", "beyond"), "section 3.4.3")
 @statement(
     "Within the bounds it takes 2 s longer, beyond them half as long again.",
     "46 s beyond the bounds, 50 % more than the others",
-    rule="Confirmed: a quarter longer; in part: longer",
-    cause=SOURCE,
+    rule="Confirmed: a quarter longer beyond them; in part: longer; a run that loses its target "
+    "takes no time to its goal",
+    cause=CHOICE,
 )
-def _slower(runs: Runs) -> Finding:
+def slower(runs: Runs) -> Finding:
+    """Section 3.4.3: how long perturbed runs take to converge."""
     times = [runs.mean("time_s", configuration=name) for name in ("none", "within", "beyond")]
     as_printed = runs.mean("time_s", configuration="beyond_as_printed")
+    arrives = converged(runs, "none") and converged(runs, "beyond")
     return Finding(
         found=", ".join(f"{time:.1f}" for time in times) + " s",
-        held=[times[2] > 1.25 * times[0]],
-        some=times[2] > times[0],
+        held=[arrives and times[2] > 1.25 * times[0]],
+        some=arrives and times[2] > times[0],
         why=f"Within: {times[1] - times[0]:+.1f} s; beyond: {times[2] / times[0]:.2f} times, "
         f"{outcomes(runs, 'beyond')}; with the printed heights {as_printed:.1f} s, "
         f"{outcomes(runs, 'beyond_as_printed')}. The directions of the errors are not printed.",
@@ -123,5 +126,5 @@ STUDY = configuration_study(
     ),
     source="servoing thesis 3.4.3, figures 3.36 to 3.38",
     assumptions=ASSUMPTIONS,
-    checks=(_accuracy, _slower),
+    checks=(_accuracy, slower),
 )

@@ -13,6 +13,7 @@ from cdpr_drake.analyses.studies.case_studies.case_1_ends import (
     servo_pays,
     turns_repeat,
 )
+from cdpr_drake.analyses.studies.case_studies.case_4 import slower
 from cdpr_drake.analyses.studies.framework.case_statements import same_accuracy
 from cdpr_drake.analyses.studies.framework.runs import MissingRuns
 from cdpr_drake.analyses.studies.tension_cases.case_9_statements import least
@@ -39,6 +40,22 @@ def test_an_accuracy_below_the_threshold_at_which_runs_end_confirms_nothing(erro
 def test_one_configuration_that_converges_has_nothing_to_compare():
     runs = [run("none", position_error_m=0.001), run("beyond", "target_lost")]
     assert same_accuracy(("none", "beyond"), "").judge(made_runs(runs)).verdict == "not testable"
+
+
+@pytest.mark.parametrize(
+    ("outcome", "time", "expected"),
+    [
+        ("converged", 46.0, "confirmed"),
+        ("converged", 35.0, "in part"),
+        ("target_lost", 46.0, "not confirmed"),
+    ],
+)
+def test_a_run_that_loses_its_target_does_not_converge_later(outcome, time, expected):
+    runs = [
+        run("none", time_s=31.0), run("within", time_s=33.0), run("beyond", outcome, time_s=time),
+        run("beyond_as_printed", time_s=40.0),
+    ]  # fmt: skip
+    assert slower.judge(made_runs(runs)).verdict == expected
 
 
 MOVING_CASES = [
