@@ -44,7 +44,7 @@ from cdpr_drake.analyses.studies.published.register import Register
 NAMED, NAMED_OPEN = 7, 3
 """So many facts of a kind are named for each chapter; and of those without a verdict."""
 
-LONGEST = {"says": 110, "printed": 60, "found": 90, "why": 150, "rule": 150}
+LONGEST = {"says": 100, "printed": 48, "found": 75, "why": 115, "rule": 150}
 """Letters of a cell, by what it holds; the page has all of it."""
 
 TELLING = (
