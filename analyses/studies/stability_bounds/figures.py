@@ -170,7 +170,7 @@ def tightness(runs: Runs, robot: str, method: str) -> float:
     return float(np.median(scales[withstood(runs, robot, method)][asked] / searched[asked]))
 
 
-NOTHING = 1 / 32
+NOTHING = 1 / 128
 """Where the axis of tightness has its zero, below every quotient of two of the scales."""
 
 
@@ -195,7 +195,7 @@ def tightness_figure(runs: Runs) -> Figure:
             )  # fmt: skip
     panel.set_xscale("log")
     panel.set_yscale("log", base=2)
-    ticks = 2.0 ** np.arange(-4, 2)
+    ticks = 2.0 ** np.arange(-6, 2)
     panel.set_yticks([NOTHING, *ticks], ["none", *map(_words, ticks)])
     panel.set_ylim(NOTHING / 1.8, 3.2)
     panel.set_xlabel("processor time for a pose [ms]", fontsize=10)

@@ -12,6 +12,7 @@ from cdpr_drake.analyses.studies.framework.runs import Run, Runs
 from cdpr_drake.analyses.studies.framework.study import Form
 from cdpr_drake.analyses.studies.stability_bounds import statements as said
 from cdpr_drake.analyses.studies.stability_bounds.figures import (
+    NOTHING,
     maps_figure,
     shares_figure,
     tightness,
@@ -22,6 +23,7 @@ from cdpr_drake.analyses.studies.stability_bounds.questions import (
     METHODS,
     QUICK_SCALES,
     ROBOTS,
+    SCALES,
     SHARES,
     THESIS,
     bounds_task,
@@ -189,6 +191,10 @@ def test_tightness_is_a_quotient_of_bounds() -> None:
     (panel,) = tightness_figure(runs).axes
     drawn = sorted({float(line.get_ydata()[0]) for line in panel.lines})
     assert drawn == [0.25, 1.0]
+
+
+def test_no_quotient_of_two_scales_is_drawn_as_none() -> None:
+    assert min(SCALES) / max(SCALES) > NOTHING
 
 
 def test_shares_are_drawn_against_bounds() -> None:
