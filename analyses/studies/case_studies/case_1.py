@@ -199,6 +199,7 @@ def returns(runs: Runs) -> Finding:
 @statement(
     "On ACROBOT, all estimators keep the object within 15 px of the straight line.",
     "at most 15 px; Est. 1, 2, 3 at most 10 px",
+    cause=HARDWARE,
 )
 def _all_straight(runs: Runs) -> Finding:
     image = {key: runs.mean("image_max_px", configuration=f"a_{key}") for key in "1234567"}
@@ -254,6 +255,7 @@ def _images_fail(runs: Runs) -> Finding:
     "With a wrong initial pose on CAROCA, the estimates from images are the worst: their "
     "error grows.",
     "figure 2.10c",
+    cause=HARDWARE,
 )
 def _images_worst_perturbed(runs: Runs) -> Finding:
     error = {key: 1e3 * runs.mean("estimate_max_m", configuration=f"cp_{key}") for key in "1234567"}
@@ -269,6 +271,7 @@ def _images_worst_perturbed(runs: Runs) -> Finding:
     "does not.",
     "figures 2.12, 2.17",
     rule="Largest change of the estimate's error between two rows of the log, 0.02 s apart",
+    cause=HARDWARE,
 )
 def _jumps(runs: Runs) -> Finding:
     pairs = {

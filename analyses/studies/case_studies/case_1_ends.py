@@ -258,6 +258,7 @@ def accuracy_figure(runs: Runs) -> Figure:
     "section 2.3.3, figure 2.7b",
     rule=f"Very close: within {100.0 * (CLOSE - 1.0):g} %; almost ideally: within {IDEAL[0]:g} mm "
     f"and {IDEAL[1]:g} deg; Est. 4 within a factor {FACTOR:g}",
+    cause=HARDWARE,
 )
 def repeats_by_estimator(runs: Runs) -> Finding:
     """Section 2.3.3, figure 2.7b."""

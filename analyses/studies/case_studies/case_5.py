@@ -14,7 +14,7 @@ from cdpr_drake.analyses.studies.framework.case_run import converged, outcomes
 from cdpr_drake.analyses.studies.framework.case_statements import same_accuracy
 from cdpr_drake.analyses.studies.framework.case_study import configuration_study
 from cdpr_drake.analyses.studies.framework.runs import Runs
-from cdpr_drake.analyses.studies.framework.statement import HARDWARE, Finding, statement
+from cdpr_drake.analyses.studies.framework.statement import HARDWARE, SOURCE, Finding, statement
 
 HYBRID = ("controller.scheme=2.5d",)
 
@@ -43,7 +43,9 @@ def _straighter(runs: Runs) -> Finding:
 
 
 @statement(
-    "Without perturbation, the camera's path is nearly straight.", "at most 70 mm over 2.3 m"
+    "Without perturbation, the camera's path is nearly straight.",
+    "at most 70 mm over 2.3 m",
+    cause=SOURCE,
 )
 def _camera(runs: Runs) -> Finding:
     found = 1e3 * runs.largest("camera_max_m", configuration="none")
@@ -54,6 +56,7 @@ def _camera(runs: Runs) -> Finding:
 @statement(
     "Twice the perturbation doubles the camera's deviation, and the object leaves the image.",
     "figure 3.39d",
+    cause=SOURCE,
 )
 def _doubled(runs: Runs) -> Finding:
     camera = [1e3 * runs.mean("camera_max_m", configuration=name) for name in ("within", "beyond")]

@@ -12,7 +12,7 @@ from cdpr_drake.analyses.studies.framework.case_definition import Configuration,
 from cdpr_drake.analyses.studies.framework.case_run import converged
 from cdpr_drake.analyses.studies.framework.case_study import configuration_study
 from cdpr_drake.analyses.studies.framework.runs import Run, Runs
-from cdpr_drake.analyses.studies.framework.statement import HARDWARE, Finding, statement
+from cdpr_drake.analyses.studies.framework.statement import HARDWARE, SOURCE, Finding, statement
 
 PRINTED_FACTOR = 2.0
 """Distances within this factor of the printed ones agree with them."""
@@ -47,6 +47,7 @@ def _image(runs: Runs) -> Finding:
 @statement(
     "With tracking, the camera stays within 1.5 cm of its line of 2.3 m, 4 times better.",
     "figure 4.7d",
+    cause=HARDWARE,
 )
 def _camera(runs: Runs) -> Finding:
     servo, tracking = (
@@ -64,6 +65,7 @@ def _camera(runs: Runs) -> Finding:
     "With tracking the camera is 7.1 mm from its line in the mean, with a standard deviation "
     "of 3.4 mm.",
     "7.1 and 3.4 mm",
+    cause=HARDWARE,
 )
 def mean_distance(runs: Runs) -> Finding:
     """Section 4.5."""
@@ -114,6 +116,7 @@ def roughness(run: Run) -> float:
     "A smoothing filter on the error makes the control output of CAROCA smoother.",
     "section 4.4.2, proposed, not done",
     rule=f"Smoother: by {100.0 * (1.0 - SMOOTHER):.0f} % at least, and the task ends",
+    cause=SOURCE,
 )
 def filter_smooths(runs: Runs) -> Finding:
     """What section 4.4.2 proposes, and does not do."""

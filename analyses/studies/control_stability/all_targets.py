@@ -132,6 +132,7 @@ def target_of(run: Run) -> CameraTarget:
     source="tables A.9, A.10",
     rule=f"mean absolute difference of at most {MET:g} points; the target was chosen by these rows",
     basis=FITTED,
+    cause=SOURCE,
 )
 def camera_target_chosen(runs: Runs) -> Finding:
     """The target with the smallest mean."""

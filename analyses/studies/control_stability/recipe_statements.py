@@ -325,6 +325,7 @@ def anchor_points(runs: Runs) -> Finding:
     rule=f"{exchange_name(*EXCHANGE)} is the best or as good, within {SAME:g} points, and the "
     f"other rows are off by at most {MET:g} points",
     basis=FITTED,
+    cause=SOURCE,
 )
 def exchanged_cables(runs: Runs) -> Finding:
     """The exchange in table 3.1 that the rows of one bound choose, and the other rows."""

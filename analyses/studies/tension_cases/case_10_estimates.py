@@ -8,7 +8,13 @@ from itertools import pairwise
 import numpy as np
 
 from cdpr_drake.analyses.studies.framework.runs import MissingRuns, Runs
-from cdpr_drake.analyses.studies.framework.statement import CHOICE, Check, Finding, statement
+from cdpr_drake.analyses.studies.framework.statement import (
+    CHOICE,
+    SOURCE,
+    Check,
+    Finding,
+    statement,
+)
 from cdpr_drake.analyses.studies.tension_cases.case_10_statements import SAME_PX, THRESHOLDS
 from cdpr_drake.analyses.studies.tension_cases.slack_experiments import (
     CORRECTED,
@@ -28,7 +34,11 @@ JUST_BELOW = 75.0
 [N]."""
 
 
-@statement("Without slack the estimate ends the same with and without correction.", "figure 5.26")
+@statement(
+    "Without slack the estimate ends the same with and without correction.",
+    "figure 5.26",
+    cause=SOURCE,
+)
 def same_without_slack(runs: Runs) -> Finding:
     """Whether the correction leaves the estimate alone."""
     places = [runs.mean("estimate_end_m", configuration=name) for name in ("E1", "E2")]
@@ -50,6 +60,7 @@ def same_without_slack(runs: Runs) -> Finding:
     rule=f"About the same: within {1e3 * SAME_M:g} mm, in the mean. While slack is wound up the "
     "platform turns, the longer the more slack there is, and control integration keeps what "
     "it did not see.",
+    cause=SOURCE,
 )
 def last_is_worse(runs: Runs) -> Finding:
     """How the estimate depends on slack with correction."""
@@ -66,6 +77,7 @@ def last_is_worse(runs: Runs) -> Finding:
     "Without correction the estimate's position is better in E3 than in all others, and gets "
     "worse with slack, 6 cm in E7.",
     "figure 5.26",
+    cause=SOURCE,
 )
 def position(runs: Runs) -> Finding:
     """How the position's estimate depends on slack without correction."""

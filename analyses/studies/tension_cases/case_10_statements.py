@@ -99,6 +99,7 @@ def failures(runs: Runs, name: str) -> int:
     "Without slack the paths with and without correction are almost the same.",
     "figure 5.24",
     rule=f"The same within {SAME_PX:g} px and {SAME_MM:g} mm.",
+    cause=SOURCE,
 )
 def no_slack(runs: Runs) -> Finding:
     """Whether the correction leaves runs without slack alone."""
@@ -117,6 +118,7 @@ def no_slack(runs: Runs) -> Finding:
     "Without correction the paths in the image and of the camera deviate the more the more "
     "slack there is.",
     "figure 5.24",
+    cause=SOURCE,
 )
 def growing(runs: Runs) -> Finding:
     """Whether more slack means a longer way without correction."""
@@ -213,6 +215,7 @@ def c7(runs: Runs) -> Finding:
     "section 5.3.2, figure 5.25",
     rule=f"About 4 s: within a factor {FACTOR:g}; on the threshold: below it for less than half "
     "of the shortest time without",
+    cause=SOURCE,
 )
 def c3(runs: Runs) -> Finding:
     """What C3 does after some seconds."""
@@ -230,7 +233,9 @@ def c3(runs: Runs) -> Finding:
     )
 
 
-@statement("The reading of C1 never reaches its threshold.", "section 5.3.2, figure 5.25")
+@statement(
+    "The reading of C1 never reaches its threshold.", "section 5.3.2, figure 5.25", cause=SOURCE
+)
 def c1(runs: Runs) -> Finding:
     """Whether C1 is ever corrected."""
     least = means(runs, [*PLAIN, *CORRECTED], "c1_reading_n")
@@ -243,6 +248,7 @@ def c1(runs: Runs) -> Finding:
     "is, over 20 deg at the failure of E9, where the position is off by 50 mm; with "
     "correction it is better.",
     "figure 5.26",
+    cause=SOURCE,
 )
 def estimate(runs: Runs) -> Finding:
     """How wrong the pose estimate ends."""
@@ -279,7 +285,7 @@ def estimate(runs: Runs) -> Finding:
     )
 
 
-@statement("Correction is needed during most of the trajectory.", "section 5.3.2")
+@statement("Correction is needed during most of the trajectory.", "section 5.3.2", cause=SOURCE)
 def needed(runs: Runs) -> Finding:
     """How much of a run is corrected."""
     shares = means(runs, CORRECTED[1:], "correcting")

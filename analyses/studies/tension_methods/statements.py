@@ -62,6 +62,7 @@ def _near(value: float, printed: float) -> bool:
     "seen in figures 6.8 to 6.10",
     source="Gazebo thesis 6.4.1",
     rule=f"by more than {JUMP:g} N within 1 ms at each gain",
+    cause=SOURCE,
 )
 def lp_jumps(runs: Runs) -> Finding:
     """Jumps of the linear program's tensions."""
@@ -162,6 +163,7 @@ def tension_grows(runs: Runs) -> Finding:
     source="Gazebo thesis 6.4.1, 6.4.2",
     rule=f"the largest errors by a factor of {FALLS:g}: of the linear program from gain 100 to "
     "800, of the quadratic one from gain to gain",
+    cause=SOURCE,
 )
 def error_falls(runs: Runs) -> Finding:
     """Position errors against the gain."""
@@ -180,6 +182,7 @@ def error_falls(runs: Runs) -> Finding:
     "figure 6.14",
     source="Gazebo thesis 6.4.2",
     rule="the largest error falls by less than 5 %; in part: by less than 1 um",
+    cause=SOURCE,
 )
 def no_better(runs: Runs) -> Finding:
     """Gain 1500 against 1200."""

@@ -21,10 +21,7 @@ from cdpr_drake.analyses.studies.framework.statement import (
 from cdpr_drake.analyses.studies.framework.study import Form
 
 UNNAMED = {
-    "tension-methods": {
-        "lp_jumps", "qp_jumps", "error_falls", "no_better", "unstable", "pseudo_inverse_negative",
-        "closed_form_negative", "closed_form_steady",
-    },
+    "tension-methods": {"qp_jumps", "unstable"},
     "worked-examples": {
         "two_programs", "homing_tensions", "border_tensions", "equally_tensed", "two_cables_more",
         "polygon_shrinks", "keeps_limits", "pushes",
@@ -41,17 +38,7 @@ UNNAMED = {
         "both_as_good_as_the_better", "survives_either_failure", "wrong_calibration_is_found",
         "imu_improves_rotation", "depth_improves_position", "rate_by_seen_slack",
     },
-    "case-1": {
-        "all_straight", "images_fail", "images_worst_perturbed", "jumps", "moving",
-        "repeats_by_estimator",
-    },
-    "case-5": {"camera", "doubled"},
-    "case-8": {"camera", "mean_distance", "filter_smooths"},
     "case-9": {"sensor_accuracy"},
-    "case-10": {
-        "no_slack", "growing", "fails", "c3", "c1", "estimate", "needed", "same_without_slack",
-        "last_is_worse", "position",
-    },
 }  # fmt: skip
 """Checks of sources that name no cause, by study: where one does not hold, why is not known, or its
 finding says so. It may get shorter; a check that is new names a cause."""
