@@ -78,6 +78,14 @@ ones that sag; and massless of steel without the pulleys that the controller doe
 
 MATCHED = "matched"
 
+TITLES = {
+    "stiff": "stiff: massless steel",
+    "soft": "soft: massless, a twentieth of steel's stiffness",
+    "sagging": "sagging: steel with its weight",
+    "matched": "matched: massless steel, no pulleys",
+}
+"""The same in words."""
+
 DAMPINGS = (40.0, 110.0, 180.0, 250.0, 320.0)
 GAINS = (0.75, 1.5, 2.25)
 """The grid: damping of the platform [N s/m], gain lambda at the goal [1/s]."""
@@ -415,7 +423,8 @@ def figure(runs: Runs) -> Figure:
         2,
         2,
         (11.0, 9.0),
-        "Where a visual servo of CAROCA cycles (cross), and where it comes to rest",
+        "Where a visual servo of CAROCA cycles (cross, amplitude in mm), and where it comes to rest "
+        "(circle)",
     )
     for axis, name in zip(axes.flat, CABLES, strict=True):
         _draw_map(axis, name, runs(cables=name))
@@ -445,7 +454,7 @@ def _draw_map(axis: Axes, name: str, runs: Runs) -> None:
     )  # fmt: skip
     axis.set(
         xlabel="gain at the goal [1/s]", ylabel="damping of the platform [N s/m]",
-        title=f"{name}: {CABLES[name].removeprefix('cables=')}", xlim=(0.5, 2.5), ylim=(0.0, 430.0),
+        title=TITLES[name], xlim=(0.5, 2.5), ylim=(0.0, 430.0),
     )  # fmt: skip
     axis.legend(loc="upper left")
 
