@@ -423,8 +423,7 @@ def figure(runs: Runs) -> Figure:
         2,
         2,
         (11.0, 9.0),
-        "Where a visual servo of CAROCA cycles (cross, amplitude in mm), and where it comes to rest "
-        "(circle)",
+        "Visual servo of CAROCA: cycles (cross, amplitude in mm), comes to rest (circle)",
     )
     for axis, name in zip(axes.flat, CABLES, strict=True):
         _draw_map(axis, name, runs(cables=name))
