@@ -107,7 +107,7 @@ def _panel_words(runs: Runs, robot: str, method: str) -> str:
     share = runs(experiment=SHARES, robot=robot, scale=THESIS).one()[f"{method}_percent"]
     words = f"{LABELS[method]}\n{share:.1f} %"
     try:
-        seconds = runs(experiment=COSTS, robot=robot).one()[f"{method}_s"]
+        seconds = runs(experiment=COSTS, robot=robot).one()["seconds"][method]
     except MissingRuns:
         return words
     return f"{words}, {1e3 * seconds:.2g} ms"
@@ -184,7 +184,7 @@ def tightness_figure(runs: Runs) -> Figure:
         run = runs(experiment=COSTS, robot=robot).one()
         for method in METHODS:
             look, share = LOOKS[method], tightness(runs, robot, method)
-            place = 1e3 * run[f"{method}_s"], share or NOTHING
+            place = 1e3 * run["seconds"][method], share or NOTHING
             panel.plot(
                 *place, look.marker, color=look.color, markersize=8, alpha=0.85,
                 markerfacecolor=look.color if share else "none",

@@ -104,22 +104,22 @@ def _arrives_from_certified(runs: Runs) -> Finding:
 )
 def _proofs_are_cheap(runs: Runs) -> Finding:
     some = runs(experiment=COSTS)
+    pairs = (("certified", "simulated"), ("lipschitz", "sampled"))
+    held = {
+        names: {run["robot"]: run["seconds"][names[0]] <= run["seconds"][names[1]] for run in some}
+        for names in pairs
+    }
+    words = (
+        f"{first} not above {second}: "
+        + (", ".join(robot for robot, good in held[first, second].items() if good) or "no robot")
+        for first, second in pairs
+    )
     return Finding(
-        found=_by_robot(
-            some,
-            lambda one: (
-                f"{1e3 * one.one()['certified_s']:.2f} and {1e3 * one.one()['simulated_s']:.2f}, "
-                f"{1e3 * one.one()['lipschitz_s']:.3f} and {1e3 * one.one()['sampled_s']:.3f} ms"
-            ),
-        ),
-        held=[
-            held
-            for run in some
-            for held in (
-                run["certified_s"] <= run["simulated_s"], run["lipschitz_s"] <= run["sampled_s"],
-            )
-        ],
-    )  # fmt: skip
+        found="; ".join(words),  # times are in the table: they are no results
+        held=[good for robots in held.values() for good in robots.values()],
+        why="The search before a certificate looks at as many samples as the sampled verdict, 1000 "
+        "for the planar robot, 50 else; samples are compiled, the constants are not.",
+    )
 
 
 CHECKS = (

@@ -57,7 +57,7 @@ def costs_table(runs: Runs) -> Table:
     )
     for run in runs(experiment=COSTS):
         robot = run["robot"]
-        table.add_row(robot, "ms", *(f"{1e3 * run[f'{name}_s']:.3g}" for name in METHODS))
+        table.add_row(robot, "ms", *(f"{1e3 * run['seconds'][name]:.3g}" for name in METHODS))
         table.add_row(robot, "share", *(f"{tightness(runs, robot, name):g}" for name in METHODS))
     return table
 
@@ -72,7 +72,7 @@ def cut_table(runs: Runs) -> Table:
     for run in runs(experiment=COSTS):
         names = ("uncut_percent", "cut_percent", "certified_sample_percent")
         shares = (f"{run[name]:.1f}" for name in names)
-        table.add_row(run["robot"], *shares, f"{1e3 * run['cut_s']:.3g}")
+        table.add_row(run["robot"], *shares, f"{1e3 * run['seconds']['cut']:.3g}")
     return table
 
 

@@ -72,11 +72,11 @@ def made_up(robot: str = "caroca", scale: float = THESIS, **changed: Any) -> Run
             row = reduce(case, arrays(one, s, **here))
             rows.append(Run(case.name, None, case.keys, row, {}))
     for n, one in enumerate(ROBOTS):
-        times = {f"{name}_s": 1e-3 * (k + 1 + n) for k, name in enumerate(METHODS)}
-        times |= {"lipschitz_s": 1e-6, "certified_s": 2e-3, "simulated_s": 4e-3}
+        times = {name: 1e-3 * (k + 1 + n) for k, name in enumerate(METHODS)}
+        times |= {"lipschitz": 1e-6, "certified": 2e-3, "simulated": 4e-3, "cut": 0.07}
         others = dict.fromkeys(("cut_percent", "uncut_percent", "certified_sample_percent"), 50.0)
         keys = {"experiment": COSTS, "robot": one, "scale": THESIS}
-        rows.append(Run(f"{one}, costs", None, keys, {**times, **others, "cut_s": 0.07}, {}))
+        rows.append(Run(f"{one}, costs", None, keys, {"seconds": times, **others}, {}))
     return Runs(rows)
 
 
@@ -121,7 +121,7 @@ def test_one_loop_that_ends_elsewhere_is_told() -> None:
 def test_a_dear_certificate_is_told() -> None:
     runs = made_up()
     dear = [
-        Run(run.case, None, run.keys, {**run.measured, "certified_s": 5e-3}, {})
+        Run(run.case, None, run.keys, {"seconds": {**run["seconds"], "certified": 5e-3}}, {})
         if run["experiment"] == COSTS
         else run
         for run in runs
