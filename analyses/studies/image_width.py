@@ -20,13 +20,11 @@ from rich.table import Table
 
 from cdpr_drake.analyses.reporting.statements import new_table
 from cdpr_drake.analyses.simulation.run_summary import THESIS_WIDTH
-from cdpr_drake.analyses.studies.case_studies import case_1, case_7, case_8
-from cdpr_drake.analyses.studies.case_studies.case_1_ends import LENGTHS
+from cdpr_drake.analyses.studies.catalogue import STUDIES
 from cdpr_drake.analyses.studies.framework.case_run import measure_run
 from cdpr_drake.analyses.studies.framework.runs import MissingRuns, Runs
 from cdpr_drake.analyses.studies.framework.statement import CHOICE, OURS, Finding, statement
 from cdpr_drake.analyses.studies.framework.study import Case, Form, Study
-from cdpr_drake.analyses.studies.tension_cases import case_10
 from cdpr_drake.analyses.visualization.figure_style import line_style, new_figure, plain_numbers
 from cdpr_drake.palette import BOUND, nth_look
 from cdpr_drake.systems.cameras.camera_settings import PROJECTED
@@ -58,8 +56,8 @@ SCALES = 0.05
 """How far a deviation at a width may be from that in proportion [-]: a fifth of the least step
 between two widths, 25 %, so that it cannot pass for another width."""
 
-CASES = {one.STUDY.name: one.STUDY for one in (case_1, case_7, case_8, case_10)}
-"""The studies whose configurations are run, by name."""
+LENGTHS = ("4", "5", "6", "7")
+"""Estimators of case study I by cable lengths."""
 
 
 @dataclass(frozen=True)
@@ -173,9 +171,11 @@ def cases(form: Form) -> Iterator[Case]:
 @cache
 def _planned(study: str) -> Mapping[str, Case]:
     """Cases of a case study with projected images, by configuration."""
+    run = STUDIES[study].run
+    assert isinstance(run, Study)
     return {
         case.keys["configuration"]: case
-        for case in CASES[study].plan(Form())
+        for case in run.plan(Form())
         if case.keys["camera"] == PROJECTED
     }
 

@@ -79,6 +79,7 @@ def take_over(
     tasks: Mapping[str, tuple[SweepTask, int]],
     chunk_size: int,
     arguments: Mapping[str, Any],
+    *,
     case_of: Mapping[str, str],
     alone: Collection[str] = (),
 ) -> EarlierRuns:

@@ -141,6 +141,7 @@ def run_study_sweep(
     items: str,
     arguments: dict[str, Any],
     session: StudySession,
+    *,
     alone: Collection[str] = (),
     case_of: Mapping[str, str] | None = None,
 ) -> SweepResult:
@@ -163,7 +164,7 @@ def run_study_sweep(
     earlier = EarlierRuns()
     if kept is not None and session.earlier is not None:
         earlier = take_over(
-            kept, session.earlier, tasks, chunk_size, arguments, case_of or {}, alone
+            kept, session.earlier, tasks, chunk_size, arguments, case_of=case_of or {}, alone=alone
         )
     elif kept is not None:
         earlier = read_taken(kept.folder, len(tasks))

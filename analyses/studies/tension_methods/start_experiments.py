@@ -75,11 +75,13 @@ def start_trials(quick: bool) -> list[StartTrial]:
         combinations = [(error_name(QUICK_ERROR), RATES[-1], one) for one in (WRENCH, FORCE)]
         pulses, gains = [(ON_PATH, NOTHING)], GAINS[:1]
     return [
-        _trial(START_ERROR, method, gain, *combination, "", quick)
+        _trial(START_ERROR, method, gain, *combination, between="", quick=quick)
         for combination in combinations
         for method, gain in product(PRINTED, gains)
     ] + [
-        _trial(ONE_STEP, method, gain, start, RATES[-1], FORCE, between, quick)
+        _trial(
+            ONE_STEP, method, gain, start, RATES[-1], balance=FORCE, between=between, quick=quick
+        )
         for start, between in pulses
         for method, gain in product(PRINTED, gains)
     ]
@@ -95,7 +97,7 @@ def path_of(method: str) -> tuple[Array, Array]:
 
 def _trial(
     experiment: str, method: str, gain: float, start: str, rate: float, balance: str,
-    between: str, quick: bool,
+    *, between: str, quick: bool,
 ) -> StartTrial:  # fmt: skip
     path = path_of(method)
     return StartTrial(
