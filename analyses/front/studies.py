@@ -286,7 +286,7 @@ def chosen_studies(names: Sequence[str] | None) -> dict[str, StudyEntry]:
             raise CdprError(f"study {name!r} is unknown; {closest(name, STUDIES)}")
     if not names:
         raise CdprError("studies: found none; accepted: names of studies")
-    return {name: entry for name, entry in STUDIES.items() if name in names}
+    return {name: STUDIES[name] for name in STUDIES if name in names}
 
 
 def reproduce(

@@ -20,7 +20,7 @@ from rich.table import Table
 
 from cdpr_drake.analyses.reporting.statements import new_table
 from cdpr_drake.analyses.simulation.run_summary import THESIS_WIDTH
-from cdpr_drake.analyses.studies.catalogue import STUDIES
+from cdpr_drake.analyses.studies.catalogue import STUDIES as CATALOGUE
 from cdpr_drake.analyses.studies.framework.case_run import measure_run
 from cdpr_drake.analyses.studies.framework.runs import MissingRuns, Runs
 from cdpr_drake.analyses.studies.framework.statement import CHOICE, OURS, Finding, statement
@@ -171,7 +171,7 @@ def cases(form: Form) -> Iterator[Case]:
 @cache
 def _planned(study: str) -> Mapping[str, Case]:
     """Cases of a case study with projected images, by configuration."""
-    run = STUDIES[study].run
+    run = CATALOGUE[study].run
     assert isinstance(run, Study)
     return {
         case.keys["configuration"]: case
