@@ -180,6 +180,7 @@ def write_study(result: StudyResult, folder: Path, formats: Sequence[str]) -> di
         do not stand for them.
     """
     earlier = _written(folder)
+    folder.mkdir(parents=True, exist_ok=True)  # by what kept no runs there, it is not
     try:
         return dict(result.write(folder, formats) or {})
     except Exception as problem:

@@ -42,7 +42,7 @@ from matplotlib.figure import Figure
 from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
-from cdpr_drake.analyses.studies.framework.runs import Runs
+from cdpr_drake.analyses.studies.framework.runs import MissingRuns, Runs
 from cdpr_drake.analyses.studies.framework.statement import OURS, Finding, statement
 from cdpr_drake.analyses.studies.framework.study import Case, Form, Study
 from cdpr_drake.analyses.studies.framework.summary import Cell, Summary
@@ -324,7 +324,13 @@ def swing(path: Array, step: float) -> tuple[float, float]:
 
 
 def _counts(runs: Runs, column: str) -> tuple[str, float]:
-    """Confusion counts of a prediction in words, and the share of points that agree."""
+    """Confusion counts of a prediction in words, and the share of points that agree.
+
+    Raises:
+        MissingRuns: There are no points.
+    """
+    if not len(runs):
+        raise MissingRuns("all")
     cycles, said = runs["cycles"], runs[column]
     both, neither = int(np.sum(cycles & said)), int(np.sum(~cycles & ~said))
     false, missed = int(np.sum(~cycles & said)), int(np.sum(cycles & ~said))

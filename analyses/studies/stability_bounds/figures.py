@@ -68,7 +68,7 @@ def maps_figure(runs: Runs) -> Figure:
         len(robots), len(METHODS), (2.05 * len(METHODS) + 0.6, 2.35 * len(robots) + 1.6),
         "Largest bounds on the model's errors under which the servo is stable, by method",
     )  # fmt: skip
-    colors = ListedColormap(colormaps["YlGnBu"](np.linspace(0.02, 1.0, len(scales) + 1)))
+    colors = ListedColormap(colormaps.get_cmap("YlGnBu")(np.linspace(0.02, 1.0, len(scales) + 1)))
     norm = BoundaryNorm(np.arange(-0.5, len(scales) + 1.5), colors.N)
     for row, robot in zip(np.atleast_2d(panels), robots, strict=True):
         first = _by_scale(runs, robot)[0]

@@ -33,9 +33,11 @@ RUNS = ("runs", "rows", "some", "mine")
 
 PUT_TOGETHER = {
     "holds_static", "holds_wrench-closure", "certified_poses", "searched_poses", "searched_m3",
-    "camera_x_m", "error_m", "r_s_m", "r_pc_m", "theta_u_deg",
+    "camera_x_m", "error_m", "r_s_m", "r_pc_m", "theta_u_deg", "camera_turn_deg",
+    "certified_percent", "interval_percent", "lipschitz_percent", "m_1",
 }  # fmt: skip
-"""Columns whose names are made of a kind, a verdict or an error, and a unit."""
+"""Columns whose names are made of a kind, a verdict, a method or an error, and a unit, and a
+configuration whose name is made of its group and estimator."""
 
 
 def asked(tree):

@@ -7,8 +7,8 @@ from matplotlib.collections import QuadMesh
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from cdpr_drake.analyses.studies.control_stability.figures import table_figure
-from cdpr_drake.analyses.studies.control_stability.tables import COARSE, FULL
 from cdpr_drake.analyses.studies.framework.runs import Run, Runs
+from cdpr_drake.analyses.studies.framework.summary import COARSE, FULL
 from cdpr_drake.analyses.studies.published.stability_tables import TABLES
 from cdpr_drake.analyses.workspaces.stability_figures import (
     COLORS,
