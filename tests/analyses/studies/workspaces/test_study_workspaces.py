@@ -170,7 +170,7 @@ def test_where_the_grid_decides_whether_a_workspace_remains_large_it_is_said(
     study, robot, fine, half, expected
 ):
     (check,) = [one for one in CHECKS if one.name == robot]
-    good = {CONFIRMED: GOOD[check.basis]}  # the rule for CAROCA was changed with its number in sight
+    good = {CONFIRMED: GOOD[check.basis]}  # CAROCA's rule was changed with its number in sight
     found = check.judge(figures_of(study, fine, half)).verdict
     assert found == good.get(expected, expected)
 
