@@ -55,8 +55,8 @@ SIZE, SMALL, HEAD, LEADING = 8.5, 6.6, 5.8, 1.28
 
 INK, GREY, LINE, SOFT = "#1b1d21", "#5b616b", "#c9ccd1", "#f4f5f7"
 
-HIGHEST = 84.0
-"""Of a picture [mm], so that three are on a page."""
+HIGHEST = 62.0
+"""Of a picture [mm], so that four are on a page."""
 
 
 def can_typeset() -> bool:

@@ -44,7 +44,7 @@ from cdpr_drake.analyses.studies.published.register import Register
 NAMED, NAMED_OPEN = 7, 3
 """So many facts of a kind are named for each chapter; and of those without a verdict."""
 
-LONGEST = {"says": 100, "printed": 48, "found": 75, "why": 115, "rule": 150}
+LONGEST = {"says": 100, "printed": 48, "found": 75, "why": 115}
 """Letters of a cell, by what it holds; the page has all of it."""
 
 TELLING = (
@@ -307,14 +307,25 @@ def _not_confirmed(rows: Sequence[ReportRow]) -> list[Block]:
         for fact in some
     ]
     blocks: list[Block] = []
-    for title, verdict in (("Not confirmed", NOT_CONFIRMED), ("Confirmed in part", IN_PART)):
-        some = [one for one in facts if one.fact.verdict == verdict]
-        blocks.append(Heading(f"{title}: {len(some)}"))
-        heads = ("section", "what it says", "printed", "ours", "cause", "why")
-        widths = (0.11, 0.24, 0.12, 0.18, 0.08, 0.27)
-        lines = tuple(map(_line, some))
-        blocks.append(Grid(heads, lines, widths) if lines else Words("None."))
+    none = [one for one in facts if one.fact.verdict == NOT_CONFIRMED]
+    part = [one for one in facts if one.fact.verdict == IN_PART]
+    heads = ("section", "what it says", "printed", "ours", "cause", "why")
+    widths = (0.11, 0.24, 0.12, 0.18, 0.08, 0.27)
+    for title, some, grid in (
+        ("Not confirmed", none, Grid(heads, tuple(map(_line, none)), widths)),
+        ("Confirmed in part", part, Grid(PART_HEADS, tuple(map(_part_line, part)), PART_WIDTHS)),
+    ):
+        blocks += [Heading(f"{title}: {len(some)}"), grid if some else Words("None.")]
     return blocks
+
+
+PART_HEADS, PART_WIDTHS = ("section", "what it says", "cause"), (0.11, 0.77, 0.12)
+"""Of what holds in part, a line each: its numbers and reasons are on the page."""
+
+
+def _part_line(placed: PlacedFact) -> tuple[str, ...]:
+    section, words, _, _, cause, _ = _line(placed)
+    return section, words, cause
 
 
 def _line(placed: PlacedFact) -> tuple[str, ...]:
@@ -353,19 +364,18 @@ def _telling(folder: Path, rows: Sequence[ReportRow]) -> list[Block]:
         path = next((one for one in there if one.endswith(f"/{study}/{name}.png")), None)
         if path is not None:
             blocks.append(Picture(folder / path, f"{there[path].label}, ours: {words}."))
-    return [Heading("Figures that tell most", new_page=True), *blocks] if blocks else []
+    return [Heading("Figures that tell most"), *blocks] if blocks else []
 
 
 def _tolerances(rows: Sequence[ReportRow]) -> list[Block]:
-    """Rules of the sources' facts, each once, with the number of facts that it holds for."""
-    rules: dict[str, list[str]] = {}
-    for (source, _), some in facts_by_place(rows).items():
-        for fact in some:
-            if source != OWN and fact.rule:
-                rules.setdefault(fact.rule, []).append(fact.key)
-    lines = tuple(
-        (shortened(rule, LONGEST["rule"]), keys[0], str(len(keys))) for rule, keys in rules.items()
+    """The rule for printed numbers, and how many rules of statements the page has."""
+    rules = {
+        fact.rule
+        for (source, _), some in facts_by_place(rows).items()
+        for fact in some
+        if source != OWN and fact.rule
+    }
+    told = (
+        f"{RULE} The {len(rules)} rules by which statements are judged are one table of the page."
     )
-    blocks: list[Block] = [Heading("Tolerances"), Words(RULE)]
-    heads, widths = ("rule", "study and check, the first", "facts"), (0.6, 0.33, 0.07)
-    return [*blocks, Grid(heads, lines, widths, numbers=2)] if lines else blocks
+    return [Heading("Tolerances"), Words(told)]
