@@ -375,7 +375,5 @@ def _tolerances(rows: Sequence[ReportRow]) -> list[Block]:
         for fact in some
         if source != OWN and fact.rule
     }
-    told = (
-        f"{RULE} The {len(rules)} rules by which statements are judged are one table of the page."
-    )
+    told = f"{RULE} Rules of statements, {len(rules)}, are one table of the page."
     return [Heading("Tolerances"), Words(told)]
