@@ -18,7 +18,7 @@ from cdpr_drake.analyses.studies.framework.experiments import (
     turned,
 )
 from cdpr_drake.analyses.studies.framework.runs import Runs
-from cdpr_drake.analyses.studies.framework.statement import CHOICE, Finding, statement
+from cdpr_drake.analyses.studies.framework.statement import CHOICE, SOURCE, Finding, statement
 
 LIFT = 0.133
 """How far all heights are raised so that the tag lies on the ground [m]."""
@@ -95,6 +95,8 @@ def slower(runs: Runs) -> Finding:
 STUDY = configuration_study(
     Plan(
         name="case-4",
+        why="the directions of the errors are not printed, nor how high the ground is",
+        cause=SOURCE,
         title="PBVS on CAROCA",
         scenario="caroca_pbvs",
         changes=(*CAROCA_SERVO, *CAROCA_RUN),

@@ -74,6 +74,8 @@ _accuracy = same_accuracy(("none", "within", "beyond"), "section 3.4.4")
 STUDY = configuration_study(
     Plan(
         name="case-5",
+        why="the directions of the errors are not printed, nor how high the ground is",
+        cause=SOURCE,
         title="2 1/2 D visual servoing on CAROCA",
         scenario="caroca_pbvs",
         changes=(*CAROCA_SERVO, *CAROCA_RUN),

@@ -144,6 +144,8 @@ def filter_smooths(runs: Runs) -> Finding:
 STUDY = configuration_study(
     Plan(
         name="case-8",
+        why="how the prototype's swing is damped is not known, see docs/theory/reproduction.md",
+        cause=HARDWARE,
         title="Trajectory planning and tracking on CAROCA",
         scenario="caroca_pbvs",
         changes=(*CAROCA_SERVO, *HYBRID, *CAROCA_RUN),

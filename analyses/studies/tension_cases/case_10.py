@@ -9,6 +9,7 @@ import numpy as np
 from cdpr_drake.analyses.studies.framework.caroca_cables import CAROCA_ASSUMPTION, CAROCA_CABLES
 from cdpr_drake.analyses.studies.framework.case_definition import Configuration, Plan
 from cdpr_drake.analyses.studies.framework.case_study import configuration_study
+from cdpr_drake.analyses.studies.framework.statement import SOURCE
 from cdpr_drake.analyses.studies.tension_cases.case_10_estimates import ESTIMATES
 from cdpr_drake.analyses.studies.tension_cases.case_10_statements import (
     METRICS,
@@ -109,6 +110,8 @@ def _worse_sensors() -> list[Configuration]:
 STUDY = configuration_study(
     Plan(
         name="case-10",
+        why="which cables were slack and what the controller believed wrongly is not printed",
+        cause=SOURCE,
         title="Slack cables on CAROCA, with and without tension correction",
         scenario="caroca_slack_start",
         changes=(

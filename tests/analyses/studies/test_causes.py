@@ -43,9 +43,6 @@ UNNAMED = {
 """Checks of sources that name no cause, by study: where one does not hold, why is not known, or its
 finding says so. It may get shorter; a check that is new names a cause."""
 
-UNNAMED_NUMBERS = ("case-1", "case-4", "case-5", "case-8", "case-10")
-"""Studies some of whose printed numbers name no cause; it may get shorter."""
-
 
 @pytest.mark.parametrize("name", STUDIES)
 def test_a_check_of_a_source_names_why_it_may_fail(name):
@@ -57,7 +54,7 @@ def test_a_check_of_a_source_names_why_it_may_fail(name):
     assert unnamed <= UNNAMED.get(name, set())
 
 
-@pytest.mark.parametrize("name", [n for n in STUDIES if n not in UNNAMED_NUMBERS])
+@pytest.mark.parametrize("name", STUDIES)
 def test_printed_numbers_name_why_they_may_differ(name):
     for number in STUDIES[name].numbers:
         assert number.cause in (SOURCE, HARDWARE, CHOICE), number
