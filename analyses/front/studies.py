@@ -139,7 +139,7 @@ class Reproduction(Summarized):
         states: How far each study is, by name.
         page: The report as a page.
         left: Studies that were not begun, or stopped.
-        digest: Its digest of about ten pages; None where it could not be written.
+        digest: Its digest of about twelve pages; None where it could not be written.
         failed: Of each file of the report that could not be written, and is not the page, why.
     """
 

@@ -74,7 +74,7 @@ def reproduce(
     A study that is finished is not run again unless the code has changed; what was stopped or
     killed continues when the same command is given again. One that fails does not end the others.
     Figures are in PNG, which the report shows, and in the formats that are asked for beside. A
-    digest of about ten pages is written as PDF, where reportlab is installed.
+    digest of about twelve pages is written as PDF, where reportlab is installed.
     """
     formats = parse_formats(figure_format)
     asked = None if only is None else [name.strip() for name in only.split(",") if name.strip()]
