@@ -13,6 +13,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from cdpr_drake.analyses.reporting.log_files import write_json
 from cdpr_drake.analyses.reporting.written_files import MARKER
 from cdpr_drake.analyses.sweeps.folder import (
@@ -108,23 +110,27 @@ def take_over(
     source, codes = KeptChunks(earlier), dict(read_taken(kept.folder, len(tasks)).codes)
     before = read_taken(earlier, len(tasks)).codes
     alike = _alike(there["cases"], _plain(arguments["cases"]))
+    wanted: dict[str, dict[tuple[int, int], dict[str, np.ndarray]]] = {}
     for name, (_, count) in tasks.items():
-        if case_of[name] not in alike or name in alone or name in codes:
+        if case_of[name] not in alike or name in alone:
             continue
         chunks = {
             (start, stop): source.load(name, start, stop)
             for start in range(0, count, chunk_size)
             if (stop := min(start + chunk_size, count))
         }
-        if any(arrays is None for arrays in chunks.values()):
-            continue
-        if all(kept.load(name, *place) is not None for place in chunks):
+        if name not in codes and all(kept.load(name, *place) is not None for place in chunks):
             continue  # computed here before
-        for (start, stop), arrays in chunks.items():
-            assert arrays is not None
-            kept.store(name, start, stop, arrays)
-        codes[name] = before.get(name, str(there.get(CODE)))
+        found = {place: arrays for place, arrays in chunks.items() if arrays is not None}
+        if len(found) == len(chunks):
+            wanted[name] = found
+            codes[name] = before.get(name, str(there.get(CODE)))
+    # Before the runs: killed meanwhile, they are not taken for those of this code.
     write_json(kept.folder / EARLIER, codes)
+    for name, chunks_of in wanted.items():
+        for place, arrays in chunks_of.items():
+            if kept.load(name, *place) is None:
+                kept.store(name, *place, arrays)
     lacking = "" if codes else "its cases are other ones, or are not finished"
     return EarlierRuns(codes, len(tasks), lacking)
 
@@ -146,7 +152,8 @@ def check_earlier(earlier: Path, wanted: Mapping[str, Any]) -> dict[str, Any]:
         found = read_arguments(path)
     except OSError as problem:
         raise OutputFolderError(f"{path}: cannot be read: {problem.strerror}") from problem
-    if not isinstance(found, dict) or not isinstance(found.get("cases"), dict):
+    cases = found.get("cases") if isinstance(found, dict) else None
+    if not isinstance(cases, dict) or not all(isinstance(one, dict) for one in cases.values()):
         raise OutputFolderError(f"{path}: found no cases; accepted: a study of cases")
     for key, value in wanted.items():
         if found.get(key) != value:

@@ -13,6 +13,7 @@ from cdpr_drake.analyses.studies.catalogue import StudyEntry
 from cdpr_drake.analyses.studies.framework import study as frame
 from cdpr_drake.analyses.studies.framework.study import Case, Study
 from cdpr_drake.analyses.sweeps.earlier_runs import EARLIER
+from cdpr_drake.analyses.sweeps.folder import SweepFolder
 from cdpr_drake.errors import CdprError, OutputFolderError
 
 OLD, NEW = "0.0.1 old", "0.0.2 new"
@@ -117,6 +118,24 @@ def test_a_continued_study_still_tells_and_a_second_step_names_the_first_code(
     assert third.earlier.counts() == {OLD: 4}
 
 
+def test_killed_while_runs_are_taken_over_they_stay_those_of_earlier_code(
+    earlier, tmp_path, monkeypatch
+):
+    stored = SweepFolder.store
+
+    def killed(self, task, start, stop, arrays):
+        if task != "a, seed 0":
+            raise KeyboardInterrupt
+        stored(self, task, start, stop, arrays)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(SweepFolder, "store", killed)
+        with pytest.raises(KeyboardInterrupt):
+            run(STUDY, tmp_path / "now", earlier=earlier)
+    result = run(replace(STUDY, measure=only_b), tmp_path / "now", earlier=earlier)
+    assert result.earlier.counts() == {OLD: 4}
+
+
 def test_nothing_is_taken_over_unless_it_is_asked_for(earlier):
     with pytest.raises(OutputFolderError, match=r"cdpr_drake is \"0.0.1 old\" there"):
         run(STUDY, earlier)
@@ -128,6 +147,13 @@ def test_other_folders_are_refused(earlier, tmp_path):
         run(STUDY, tmp_path / "now", earlier=tmp_path)
     with pytest.raises(OutputFolderError, match='found study "tiny"; accepted: "other"'):
         run(replace(STUDY, name="other"), tmp_path / "other", earlier=earlier)
+
+
+@pytest.mark.parametrize("text", ["no JSON", "[1]", '{"cases": 3}', '{"cases": {"a": 5}}'])
+def test_a_file_of_nonsense_is_one_line(earlier, tmp_path, text):
+    (earlier / "arguments.json").write_text(text)
+    with pytest.raises(OutputFolderError, match=r"arguments.json: found no (JSON|cases)"):
+        run(STUDY, tmp_path / "now", earlier=earlier)
 
 
 def test_the_front_door_refuses_before_anything_is_written(earlier, tmp_path):
