@@ -248,10 +248,12 @@ class Cluster:
             "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0",
             "--no-dashboard", "--scheduler-file", str(file),
         )  # fmt: skip
-        while not file.is_file():
+        self.address = ""
+        while not self.address:  # the file may be there before its text is
             assert self.scheduler.poll() is None
+            with suppress(FileNotFoundError, json.JSONDecodeError):
+                self.address = json.loads(file.read_text())["address"]
             time.sleep(0.05)
-        self.address = json.loads(file.read_text())["address"]
 
     def end(self):
         for process in (self.scheduler, *self.workers):
