@@ -2,6 +2,11 @@ from .camera_catalogue import Camera as Camera
 from .camera_catalogue import CameraFault as CameraFault
 from .camera_catalogue import camera_names as camera_names
 from .camera_catalogue import load_camera as load_camera
+from .plant_cables import PlantCables as PlantCables
+from .plant_rest import Rest as Rest
+from .plant_rest import hang as hang
+from .plant_rest import settle as settle
+from .plant_tree import PlantTree as PlantTree
 from .rendered_camera import color_camera as color_camera
 from .rendered_camera import make_depth_camera as make_depth_camera
 from .rendered_camera import make_rgbd_sensor as make_rgbd_sensor

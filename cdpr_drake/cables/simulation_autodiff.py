@@ -8,8 +8,10 @@ import numpy as np
 from pydrake.autodiffutils import AutoDiffXd
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables import simulation_kernel
+from cdpr_drake.cables import route_kernel, simulation_kernel
+from cdpr_drake.cables.dispatch_kernel import HANGING, STRAIGHT
 from cdpr_drake.cables.hanging_kernel import equations, solve_catenary
+from cdpr_drake.cables.route_kernel import make_route_room, make_tree_room
 from cdpr_drake.cables.simulation_kernel import OUTPUTS, make_room
 from cdpr_drake.geometry.two_pulleys_kernel import begin_swivels
 from cdpr_drake.numerics.kernel_calls import any_scalar
@@ -111,4 +113,92 @@ def model_force_and_drums_array(
     out = np.zeros(nv + len(l0), dtype=object)
     room = make_room(len(l0), law, height, start, dtype=object)
     bad = _force_and_drums(state, l0, l0_dot, cables, room, nv, out)
+    return out, bad
+
+
+_routes = {
+    law: (any_scalar(force, _SOLVED), any_scalar(outputs, _SOLVED))
+    for law, (force, outputs) in {
+        STRAIGHT: (route_kernel.straight_tree_force, route_kernel.straight_tree_outputs),
+        HANGING: (route_kernel.any_tree_force, route_kernel.any_tree_outputs),
+    }.items()
+}
+"""Force and outputs of cables on the bodies of a plant, by law."""
+
+
+def tree_force_array(
+    tree: Array, state: Any, l0: Any, l0_dot: Any, routes: tuple[Array, Any, Any], law: int, nv: int
+) -> tuple[Any, Any, int]:
+    """`route_kernel.any_tree_force` for arrays of any scalar.
+
+    Args:
+        tree: Table of the plant's joints, shape (n, 32).
+        state: Positions and velocities of the plant, shape (nq + nv,).
+        l0: Unstrained lengths, shape (m,) [m].
+        l0_dot: Their rates, shape (m,) [m/s].
+        routes: From `CableRoutes.packed`.
+        law: Number of the cables' law, see `CableModel`.
+        nv: Number of the plant's velocities.
+
+    Returns:
+        Generalized force, shape (nv,), tensions at the exit points, shape (m,), dtype object, and
+        the first cable that cannot run or -1.
+    """
+    out, drums = np.zeros(nv, dtype=object), np.zeros(len(l0), dtype=object)
+    room = make_route_room(routes[0], len(l0), law, dtype=object)
+    bodies = make_tree_room(tree, dtype=object)
+    bad = _routes[law][0](tree, state, l0, l0_dot, *routes, room, bodies, out, drums)
+    return out, drums, bad
+
+
+def tree_outputs_array(
+    tree: Array, state: Any, l0: Any, l0_dot: Any, routes: tuple[Array, Any, Any], law: int
+) -> tuple[Any, int]:
+    """`route_kernel.any_tree_outputs` for arrays of any scalar: shape (6, m), dtype object."""
+    out = np.zeros((OUTPUTS, len(l0)), dtype=object)
+    room = make_route_room(routes[0], len(l0), law, dtype=object)
+    bodies = make_tree_room(tree, dtype=object)
+    bad = _routes[law][1](tree, state, l0, l0_dot, *routes, room, bodies, out)
+    return out, bad
+
+
+_on_bodies = {
+    law: (any_scalar(wrenches, _SOLVED), any_scalar(outputs, _SOLVED))
+    for law, (wrenches, outputs) in {
+        STRAIGHT: (route_kernel.add_straight_wrenches, route_kernel.straight_route_outputs),
+        HANGING: (route_kernel.add_any_wrenches, route_kernel.any_route_outputs),
+    }.items()
+}
+"""Wrenches and outputs of cables on bodies whose motions are given, by law."""
+
+
+def route_wrenches_array(
+    motion: Any, l0: Any, l0_dot: Any, routes: tuple[Array, Any, Any], law: int
+) -> tuple[Any, int]:
+    """`route_kernel.add_any_wrenches` for arrays of any scalar.
+
+    Args:
+        motion: Motions of the bodies, shape (n, 18).
+        l0: Unstrained lengths, shape (m,) [m].
+        l0_dot: Their rates, shape (m,) [m/s].
+        routes: From `CableRoutes.packed`.
+        law: Number of the cables' law, see `CableModel`.
+
+    Returns:
+        Moments about Bo and forces in W, shape (n, 6), dtype object, and the first cable that
+        cannot run or -1.
+    """
+    out = np.zeros((len(motion), 6), dtype=object)
+    room = make_route_room(routes[0], len(l0), law, dtype=object)
+    bad = _on_bodies[law][0](motion, l0, l0_dot, *routes, room, out, np.zeros(0, dtype=object))
+    return out, bad
+
+
+def route_outputs_array(
+    motion: Any, l0: Any, l0_dot: Any, routes: tuple[Array, Any, Any], law: int
+) -> tuple[Any, int]:
+    """`route_kernel.any_route_outputs` for arrays of any scalar: shape (6, m), dtype object."""
+    out = np.zeros((OUTPUTS, len(l0)), dtype=object)
+    room = make_route_room(routes[0], len(l0), law, dtype=object)
+    bad = _on_bodies[law][1](motion, l0, l0_dot, *routes, room, out)
     return out, bad

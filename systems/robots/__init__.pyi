@@ -5,6 +5,12 @@ from .compiled_cable_robot import CompiledCableRobot as CompiledCableRobot
 from .compiled_motion import CompiledMotion as CompiledMotion
 from .motor_winch import MotorWinch as MotorWinch
 from .platform_pose import PlatformPose as PlatformPose
+from .route_assembly import CablePorts as CablePorts
+from .route_assembly import add_cables as add_cables
+from .route_forces import RouteForces as RouteForces
+from .route_forces import RouteForces_ as RouteForces_
+from .route_forces import RouteSpatialForces as RouteSpatialForces
+from .route_forces import RouteSpatialForces_ as RouteSpatialForces_
 from .settings import CableRobotSettings as CableRobotSettings
 from .settings import CableSettings as CableSettings
 from .ups_robot import UpsRobot as UpsRobot

@@ -238,7 +238,7 @@ def CableForces_(T: Any) -> type[LeafSystem]:
             )
             if bad >= 0:
                 raise self._problem(context, np.array([x.value() for x in state]))
-            output.SetFromVector(_with_derivatives(force))
+            output.SetFromVector(with_derivatives(force))
 
         def _calc_both(self, context: Context, output: BasicVector) -> None:
             state, place = self._state(context), self._place
@@ -255,7 +255,7 @@ def CableForces_(T: Any) -> type[LeafSystem]:
             )
             if bad >= 0:
                 raise self._problem(context, np.array([x.value() for x in state]))
-            output.SetFromVector(_with_derivatives(both))
+            output.SetFromVector(with_derivatives(both))
 
         def _row_writer(self, row: int, needs: int) -> Callable[[Context, BasicVector], None]:
             """Writes a row of `model_outputs` from as many inputs as it needs."""
@@ -267,7 +267,7 @@ def CableForces_(T: Any) -> type[LeafSystem]:
                 inputs = state, l0, l0_dot, self._cables
                 if T is not float:
                     table, bad = model_outputs_array(*inputs, self._law, self._place.joint.height)
-                    output.SetFromVector(_with_derivatives(table[row]))
+                    output.SetFromVector(with_derivatives(table[row]))
                     return
                 bad = self._outputs(*inputs, self._room, self._work)
                 if bad >= 0:
@@ -297,7 +297,7 @@ def CableForces_(T: Any) -> type[LeafSystem]:
     return Impl
 
 
-def _with_derivatives(values: Any) -> Any:
+def with_derivatives(values: Any) -> Any:
     """An array of AutoDiffXd only; exact zeros come as floats."""
     return np.array([x if isinstance(x, AutoDiffXd) else AutoDiffXd(x) for x in values])
 

@@ -48,7 +48,10 @@ class CableSettings:
 
     def cable_set(self, robot: Robot) -> CableSet:
         """The cables of a robot, over its pulleys or from fixed exit points."""
-        cables = robot.cable_set()
+        return self.applied(robot.cable_set())
+
+    def applied(self, cables: CableSet) -> CableSet:
+        """Cables as these settings want them."""
         if self.stiffness_ratio != 1.0:
             cables = replace(cables, stiffness=self.stiffness_ratio * cables.stiffness)
         if self.retardation_time is not None:

@@ -1,0 +1,205 @@
+"""Puts cables between any bodies of somebody's plant into a builder, with winches."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from pydrake.multibody.plant import ExternallyAppliedSpatialForceMultiplexer, MultibodyPlant
+from pydrake.systems.framework import Context, DiagramBuilder, InputPort, OutputPort
+
+from cdpr_drake.errors import CableModelError
+from cdpr_drake.geometry.cable_routes import CableRoutes
+from cdpr_drake.models.plant_cables import PlantCables
+from cdpr_drake.models.plant_rest import Rest, hang
+from cdpr_drake.models.plant_tree import unknown_joint
+from cdpr_drake.systems.robots.assembly import apply_force
+from cdpr_drake.systems.robots.cable_forces import PORTS
+from cdpr_drake.systems.robots.route_forces import RouteForces, RouteSpatialForces
+from cdpr_drake.systems.robots.settings import CableSettings
+from cdpr_drake.systems.robots.winches import VelocityWinch
+
+AUTOMATIC, JOINTS, BODIES = "automatic", "joints", "bodies"
+METHODS = (AUTOMATIC, JOINTS, BODIES)
+"""How forces reach the plant: as a generalized force from compiled joints, as spatial forces on
+bodies, or by the first where it knows all joints and else by the second."""
+
+
+@dataclass(frozen=True, eq=False)
+class CablePorts:
+    """Cables and winches in a builder; ports by the names that `CableRobot` has.
+
+    Attributes:
+        plant: The plant.
+        forces: `RouteForces` or `RouteSpatialForces`.
+        winches: The winches.
+        method: How forces reach the plant, `JOINTS` or `BODIES`.
+        why: Why not by `JOINTS`; empty where it is, or where `BODIES` was asked for.
+        inputs: Input ports by name.
+        outputs: Output ports by name.
+    """
+
+    plant: MultibodyPlant
+    forces: Any
+    winches: Any
+    method: str
+    why: str
+    inputs: dict[str, InputPort]
+    outputs: dict[str, OutputPort]
+
+    def HasInputPort(self, port_name: str) -> bool:
+        """Whether there is such an input."""
+        return port_name in self.inputs
+
+    def HasOutputPort(self, port_name: str) -> bool:
+        """Whether there is such an output."""
+        return port_name in self.outputs
+
+    def GetInputPort(self, port_name: str) -> InputPort:
+        """The input of that name."""
+        return self.inputs[port_name]
+
+    def GetOutputPort(self, port_name: str) -> OutputPort:
+        """The output of that name."""
+        return self.outputs[port_name]
+
+    def cables(self) -> PlantCables:
+        """The cables as they are simulated, for statics."""
+        return PlantCables(self.plant, self.forces.routes(), self.forces.model())
+
+    def hang(self, context: Context, **wishes: Any) -> Rest:
+        """Puts the plant at rest on its cables: positions, no velocities, and lengths.
+
+        Args:
+            context: Root context of the built diagram; changed. Its positions are asked for.
+            wishes: As for `models.hang`.
+
+        Returns:
+            The rest; whatever `held` says, the motors of joints must do.
+
+        Raises:
+            CdprError: As `models.hang`.
+        """
+        plant_context = self.plant.GetMyMutableContextFromRoot(context)
+        rest = hang(self.cables(), plant_context, **wishes)
+        self.put(context, rest)
+        return rest
+
+    def put(self, context: Context, rest: Rest) -> None:
+        """Puts plant and winches at a rest, in the root context of the built diagram."""
+        plant_context = self.plant.GetMyMutableContextFromRoot(context)
+        winch_context = self.winches.GetMyMutableContextFromRoot(context)
+        self.plant.SetPositions(plant_context, rest.positions)
+        self.plant.SetVelocities(plant_context, np.zeros(self.plant.num_velocities()))
+        self.winches.hold(winch_context, rest.unstrained_lengths, rest.tensions)
+
+
+def add_cables(
+    builder: DiagramBuilder,
+    plant: MultibodyPlant,
+    routes: CableRoutes,
+    settings: CableSettings | None = None,
+    *,
+    winches: Any = None,
+    rated_speed: float = np.inf,
+    method: str = AUTOMATIC,
+    name: str = "",
+) -> CablePorts:
+    """Adds cables between bodies of a finalized plant of the builder, and winches.
+
+    Forces add up with those of other cables, robots, and of what else is connected to the plant.
+
+    Args:
+        builder: The builder.
+        plant: The plant, continuous or discrete; its state port and its inputs are connected.
+        routes: The cables, made for that plant.
+        settings: Model, pulleys, stiffness and damping; the defaults where None, which are without
+            pulleys.
+        winches: A block with the ports of `VelocityWinch` or `MotorWinch`; None: ideal winches.
+        rated_speed: Largest cable speed of ideal winches [m/s].
+        method: One of `METHODS`.
+        name: Put before the names of the blocks.
+
+    Returns:
+        Handles and ports; `why` says it where `automatic` did not take compiled joints.
+
+    Raises:
+        CableModelError: The model cannot describe the cables, the method is not known, or `joints`
+            is asked for and a joint is not known to it.
+        CableGeometryError: At the plant's default positions a cable cannot run.
+    """
+    if method not in METHODS:
+        raise CableModelError(f"method: found {method!r}; accepted: one of {', '.join(METHODS)}")
+    settings, prefix = settings or CableSettings(), f"{name}_" if name else ""
+    routes = routes.with_cables(settings.applied(routes.ends))
+    why = unknown_joint(plant, routes.touched_bodies())
+    if why and method == JOINTS:
+        raise CableModelError(why)
+    chosen = BODIES if why or method == BODIES else JOINTS
+    kind = RouteForces if chosen == JOINTS else RouteSpatialForces
+    forces = builder.AddNamedSystem(prefix + "cables", kind(plant, routes, settings.model))
+    if winches is None:
+        cables = PlantCables(plant, routes, settings.model)
+        home, _ = cables.lengths_and_jacobian(plant.CreateDefaultContext())
+        winches = VelocityWinch(home, rated_speed)
+    winch = builder.AddNamedSystem(prefix + "winches", winches)
+    _connect_plant(builder, plant, forces, chosen, name)
+    inputs = {}
+    for port in map(winch.get_input_port, range(winch.num_input_ports())):
+        if port.get_name() == "tensions":
+            builder.Connect(forces.GetOutputPort("drum_tensions"), port)
+        else:
+            inputs[port.get_name()] = port
+    for port_name in ("unstrained_lengths", "unstrained_length_rates"):
+        builder.Connect(winch.GetOutputPort(port_name), forces.GetInputPort(port_name))
+    outputs = {port: forces.GetOutputPort(port) for port in PORTS}
+    for port in map(winch.get_output_port, range(winch.num_output_ports())):
+        outputs[port.get_name()] = port
+    outputs["plant_state"] = plant.get_state_output_port()
+    outputs["body_poses"] = plant.get_body_poses_output_port()
+    outputs["body_velocities"] = plant.get_body_spatial_velocities_output_port()
+    outputs["body_accelerations"] = plant.get_body_spatial_accelerations_output_port()
+    why = why if method == AUTOMATIC else ""
+    return CablePorts(plant, forces, winch, chosen, why, inputs, outputs)
+
+
+def _connect_plant(
+    builder: DiagramBuilder, plant: MultibodyPlant, forces: Any, chosen: str, name: str
+) -> None:
+    if chosen == JOINTS:
+        builder.Connect(plant.get_state_output_port(), forces.GetInputPort("plant_state"))
+        apply_force(builder, plant, forces.GetOutputPort("generalized_force"), name=name)
+        return
+    builder.Connect(plant.get_body_poses_output_port(), forces.GetInputPort("body_poses"))
+    builder.Connect(
+        plant.get_body_spatial_velocities_output_port(),
+        forces.GetInputPort("body_spatial_velocities"),
+    )
+    apply_spatial_forces(builder, plant, forces.GetOutputPort("spatial_forces"), name=name)
+
+
+def apply_spatial_forces(
+    builder: DiagramBuilder, plant: MultibodyPlant, forces: OutputPort, *, name: str = ""
+) -> None:
+    """Applies a list of spatial forces, beside one that is applied already, if there is.
+
+    Args:
+        builder: The builder that has the plant.
+        plant: The plant.
+        forces: Port of a list of ExternallyAppliedSpatialForce.
+        name: Put before the name of the block that joins it with what there was.
+    """
+    port = plant.get_applied_spatial_force_input_port()
+    for (system, index), (source, number) in builder.connection_map().items():
+        if system is plant and index == port.get_index():
+            before = source.get_output_port(number)
+            builder.Disconnect(before, port)
+            both = builder.AddNamedSystem(
+                (f"{name}_" if name else "") + "all_spatial_forces",
+                ExternallyAppliedSpatialForceMultiplexer(2),
+            )
+            builder.Connect(before, both.get_input_port(0))
+            builder.Connect(forces, both.get_input_port(1))
+            forces = both.get_output_port()
+    builder.Connect(forces, port)
