@@ -54,7 +54,7 @@ class LinkServo(LeafSystem):
     def __init__(
         self,
         cables: PlantCables,
-        camera: Frame,
+        camera: tuple[Frame, RigidTransform],
         task: ServoTask,
         gain: AdaptiveGain,
         rate: float,
@@ -66,7 +66,8 @@ class LinkServo(LeafSystem):
 
         Args:
             cables: The cables, as the servo believes them to be.
-            camera: The camera frame C, z ahead, x to the right of the image: a frame of the plant.
+            camera: Where it is mounted: a frame F of the plant, and X_FC [m], C with z ahead and
+                x to the right of the image.
             task: Features and what they shall be, from `servoing.make_task`.
             gain: lambda.
             rate: Images per second [Hz].
@@ -89,7 +90,7 @@ class LinkServo(LeafSystem):
         self._columns = np.flatnonzero(moved)
         if not np.any(camera_jacobian(plant, self._own, camera)[:, self._columns]):
             raise VisualFeatureError(
-                f"camera on {camera.body().name()}: found no joint among those that the servo "
+                f"camera on {camera[0].body().name()}: found no joint among those that the servo "
                 "moves which moves it; accepted: a link that they carry"
             )
         size = marks[0] * marks[1]
@@ -138,15 +139,19 @@ class LinkServo(LeafSystem):
         return self._cables.length_jacobian(own) @ v
 
 
-def camera_jacobian(plant: MultibodyPlant, context: Context, camera: Frame) -> Array:
-    """J_C with V_C = J_C v, the twist (w, v) of a frame against W, in its own axes, shape (6, nv).
+def camera_jacobian(
+    plant: MultibodyPlant, context: Context, camera: tuple[Frame, RigidTransform]
+) -> Array:
+    """J_C with V_C = J_C v, the camera's twist (w, v) against W, in C, shape (6, nv).
 
     Args:
         plant: The plant.
         context: Of the plant.
-        camera: The frame.
+        camera: The frame that carries it and its pose there, see `LinkServo`.
     """
+    frame, X_FC = camera
     J = plant.CalcJacobianSpatialVelocity(
-        context, JacobianWrtVariable.kV, camera, np.zeros(3), plant.world_frame(), camera
+        context, JacobianWrtVariable.kV, frame, X_FC.translation(), plant.world_frame(), frame
     )
-    return np.asarray(J)
+    R_CF = X_FC.rotation().matrix().T
+    return np.vstack([R_CF @ J[:3], R_CF @ J[3:]])
