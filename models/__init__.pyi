@@ -3,6 +3,8 @@ from .camera_catalogue import CameraFault as CameraFault
 from .camera_catalogue import camera_names as camera_names
 from .camera_catalogue import load_camera as load_camera
 from .plant_cables import PlantCables as PlantCables
+from .plant_mjcf import PlantMjcf as PlantMjcf
+from .plant_mjcf import export_plant_mjcf as export_plant_mjcf
 from .plant_rest import Rest as Rest
 from .plant_rest import hang as hang
 from .plant_rest import settle as settle

@@ -128,12 +128,15 @@ def _parents_first(joints: dict[int, Joint], bodies: Iterable[int]) -> list[int]
     return order
 
 
-def unknown_joint(plant: MultibodyPlant, bodies: Iterable[int]) -> str:
+def unknown_joint(
+    plant: MultibodyPlant, bodies: Iterable[int], by: str = "the compiled joints"
+) -> str:
     """Why kernels cannot follow these bodies, in one sentence; empty: they can.
 
     Args:
         plant: The plant, finalized.
         bodies: Indices of the bodies.
+        by: What else it is that knows the same joints, for the sentence.
     """
     joints = joint_of_bodies(plant)
     for body in bodies:
@@ -144,15 +147,13 @@ def unknown_joint(plant: MultibodyPlant, bodies: Iterable[int]) -> str:
                 name = plant.get_body(BodyIndex(body)).scoped_name().get_full()
                 return (
                     f"body {name}: found no joint that carries it, since a joint has it for its "
-                    "parent and the world, or what hangs on it, for its child; accepted by the "
-                    "compiled joints: parents nearer to the world"
+                    f"parent and the world, or what hangs on it, for its child; accepted by {by}: "
+                    "parents nearer to the world"
                 )
             if type(joint) not in JOINTS:
                 known = ", ".join(sorted(kind.__name__ for kind in JOINTS))
-                return (
-                    f"joint {joint.name()}: found a {type(joint).__name__}; accepted by the "
-                    f"compiled joints: {known}"
-                )
+                found = type(joint).__name__
+                return f"joint {joint.name()}: found a {found}; accepted by {by}: {known}"
             seen.add(body)
             body = int(joint.parent_body().index())
     return ""

@@ -1,0 +1,1 @@
+"""Machines whose cables run between any frames of a plant."""
