@@ -24,6 +24,7 @@ from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.elastic_law import unstrained_lengths
 from cdpr_drake.cables.straight_kernel import floating_force
+from cdpr_drake.geometry.cable_routes import CableRoutes
 from cdpr_drake.geometry.straight_cables import cable_lengths
 from cdpr_drake.models.robot_in_plant import RobotInPlant, add_robot
 from cdpr_drake.models.robot_loader import load_robot
@@ -34,6 +35,8 @@ from cdpr_drake.systems.robots.cable_forces import CableForces
 from cdpr_drake.systems.robots.cable_robot import SEMI_IMPLICIT, automatic_step, holding_tensions
 from cdpr_drake.systems.robots.compiled_cable_robot import CompiledCableRobot
 from cdpr_drake.systems.robots.compiled_step import StepRule
+from cdpr_drake.systems.robots.route_assembly import connect_cables
+from cdpr_drake.systems.robots.route_forces import RouteForces, RouteSpatialForces
 from cdpr_drake.systems.robots.settings import COMPILED
 from cdpr_drake.systems.robots.winches import VelocityWinch
 from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
@@ -64,7 +67,7 @@ def simulation_rows(quick: bool) -> list[TimingRow]:
     """All rows of this file; `quick` times less and does without the rendered camera."""
     repeats = 3 if quick else 9
     piece = 0.2 if quick else 1.0
-    rows = [kernel_row(repeats), plant_row(repeats, piece)]
+    rows = [kernel_row(repeats), plant_row(repeats, piece), *route_rows(repeats, piece)]
     rows += [compiled_row(method, repeats, piece) for method in ("runge_kutta3", SEMI_IMPLICIT)]
     rows += dynamic_rows(quick)
     rows += bridge_rows(quick)
@@ -173,14 +176,15 @@ def plant_simulator(
     lengths = cable_lengths(X_WP, straight.p_WA, straight.p_PB)
     l0 = unstrained_lengths(lengths, holding_tensions(robot, X_WP), robot.stiffness())
     winches = builder.AddSystem(VelocityWinch(l0, robot.winch.rated_cable_speed()))
-    builder.Connect(
-        plant.get_state_output_port(in_plant.model_instance), cables.GetInputPort("platform_state")
-    )
+    state = plant.get_state_output_port(in_plant.model_instance)
+    if cables.HasInputPort("platform_state"):
+        builder.Connect(state, cables.GetInputPort("platform_state"))
+        applied = cables.GetOutputPort("generalized_force")
+        builder.Connect(applied, plant.get_applied_generalized_force_input_port())
+    else:
+        connect_cables(builder, plant, cables)
     for name in ("unstrained_lengths", "unstrained_length_rates"):
         builder.Connect(winches.GetOutputPort(name), cables.GetInputPort(name))
-    builder.Connect(
-        cables.GetOutputPort("generalized_force"), plant.get_applied_generalized_force_input_port()
-    )
     builder.ExportInput(winches.GetInputPort("cable_velocities"), "cable_velocities")
     diagram = builder.Build()
     context = diagram.CreateDefaultContext()
@@ -232,6 +236,38 @@ def compiled_row(method: str, repeats: int, duration: float) -> TimingRow:
         plant / compiled,
         ratio_means="times faster than the plant",
     )
+
+
+def route_rows(repeats: int, duration: float) -> list[TimingRow]:
+    """Cables between any bodies against those of one platform, the robot being the same."""
+
+    def routes(in_plant: RobotInPlant) -> CableRoutes:
+        cables = in_plant.robot.cable_set().without_pulleys()
+        return CableRoutes.of_cable_set(cables, int(in_plant.body_index))
+
+    makers = (
+        CableForces,
+        lambda in_plant: RouteForces(in_plant.plant, routes(in_plant)),
+        lambda in_plant: RouteSpatialForces(in_plant.plant, routes(in_plant)),
+    )
+    simulators = [plant_simulator(make, STEP) for make in makers]
+    platform, *others = interleaved(
+        [lambda s=s: _seconds_per_second(s, duration) for s in simulators],  # type: ignore[misc]
+        repeats,
+    )
+    names = ("compiled joints", "spatial forces on bodies")
+    return [
+        TimingRow(
+            f"cables between any bodies, {name}",
+            1e3 * other,
+            "ms/simulated s",
+            "cables of one platform, same step of 1 ms",
+            1e3 * platform,
+            other / platform,
+            ratio_means="times the time of one platform's",
+        )
+        for name, other in zip(names, others, strict=True)
+    ]
 
 
 def plant_row(repeats: int, duration: float) -> TimingRow:

@@ -144,7 +144,7 @@ def add_cables(
         home, _ = cables.lengths_and_jacobian(plant.CreateDefaultContext())
         winches = VelocityWinch(home, rated_speed)
     winch = builder.AddNamedSystem(prefix + "winches", winches)
-    _connect_plant(builder, plant, forces, chosen, name)
+    connect_cables(builder, plant, forces, name=name)
     inputs = {}
     for port in map(winch.get_input_port, range(winch.num_input_ports())):
         if port.get_name() == "tensions":
@@ -164,10 +164,18 @@ def add_cables(
     return CablePorts(plant, forces, winch, chosen, why, inputs, outputs)
 
 
-def _connect_plant(
-    builder: DiagramBuilder, plant: MultibodyPlant, forces: Any, chosen: str, name: str
+def connect_cables(
+    builder: DiagramBuilder, plant: MultibodyPlant, forces: Any, *, name: str = ""
 ) -> None:
-    if chosen == JOINTS:
+    """Connects `RouteForces` or `RouteSpatialForces` with their plant, beside other forces.
+
+    Args:
+        builder: The builder that has both.
+        plant: The plant.
+        forces: The cables.
+        name: Put before the name of a block that adds forces.
+    """
+    if isinstance(forces, RouteForces):
         builder.Connect(plant.get_state_output_port(), forces.GetInputPort("plant_state"))
         apply_force(builder, plant, forces.GetOutputPort("generalized_force"), name=name)
         return
