@@ -233,7 +233,8 @@ def hang(
         lower: Smallest tensions, shape (m,) or one for all [N]; None: `LEAST_SHARE` of the weight
             a cable, or 0, with a note, where nothing hangs so. At 0 a cable is at the edge of
             slack, and a plant linearized there is wrong on one side.
-        upper: Largest tensions, shape (m,) or one for all [N].
+        upper: Largest tensions, shape (m,) or one for all [N]; a cable's breaking load, where that
+            is less.
 
     Raises:
         InfeasibleTensionError: No tensions within the bounds hold it; names the joint.
@@ -258,7 +259,7 @@ def hang(
     else:
         moving = question.kept & (question.reach == 0.0)
     wanted = _per_cable(0.0 if prestress is None else prestress, m, "prestress")
-    high = _per_cable(upper, m, "upper")
+    high = np.minimum(_per_cable(upper, m, "upper"), cables.routes.ends.breaking_load)
     mass = plant.CalcTotalMass(question.context)
     gravity = float(np.linalg.norm(plant.gravity_field().gravity_vector()))
     least = LEAST_SHARE * mass * gravity / m
