@@ -14,8 +14,8 @@ LENGTH = 1e-12
 """Of a cable of metres, over several segments [m]; found 4e-15."""
 
 ACCELERATION, SHARE = 1e-8, 1e-12
-"""Of accelerations [m/s^2, rad/s^2] absolute, and as a share of those above 1e4. Found: 2e-10 at
-4e4, the rounding of two ways to solve for them."""
+"""Of accelerations [m/s^2, rad/s^2] absolute, and as a share of those above 1e4. Found: 4e-10 at
+2e4, the rounding of two ways to solve for them."""
 
 
 def in_mujoco(name, l0):
