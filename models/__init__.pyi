@@ -15,6 +15,7 @@ from .plant_mjcf import export_plant_mjcf as export_plant_mjcf
 from .plant_rest import Rest as Rest
 from .plant_rest import hang as hang
 from .plant_rest import settle as settle
+from .plant_statics import plant_tension_problem as plant_tension_problem
 from .plant_tree import PlantTree as PlantTree
 from .rendered_camera import color_camera as color_camera
 from .rendered_camera import make_depth_camera as make_depth_camera

@@ -1,4 +1,7 @@
 from .feature_servo import FeatureServo as FeatureServo
+from .link_servo import LinkServo as LinkServo
+from .plant_tracking import PlantTensionDistributor as PlantTensionDistributor
+from .plant_tracking import PlantTracking as PlantTracking
 from .schemes import SCHEMES as SCHEMES
 from .servo_settings import ControllerSettings as ControllerSettings
 from .tension_corrector import TensionCorrector as TensionCorrector

@@ -2,6 +2,7 @@ from .assembly import add_cable_robot as add_cable_robot
 from .cable_forces import CableForces as CableForces
 from .cable_robot import CableRobot as CableRobot
 from .compiled_cable_robot import CompiledCableRobot as CompiledCableRobot
+from .compiled_mechanism import CompiledMechanism as CompiledMechanism
 from .compiled_motion import CompiledMotion as CompiledMotion
 from .motor_winch import MotorWinch as MotorWinch
 from .platform_pose import PlatformPose as PlatformPose
@@ -13,4 +14,5 @@ from .route_forces import RouteSpatialForces as RouteSpatialForces
 from .route_forces import RouteSpatialForces_ as RouteSpatialForces_
 from .settings import CableRobotSettings as CableRobotSettings
 from .settings import CableSettings as CableSettings
+from .tension_driven_routes import TensionDrivenRoutes as TensionDrivenRoutes
 from .ups_robot import UpsRobot as UpsRobot
