@@ -23,11 +23,15 @@ from pydrake.systems.framework import Context
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables import route_kernel as kernels
 from cdpr_drake.cables.dispatch_kernel import STRAIGHT
-from cdpr_drake.cables.models import CABLE_MODELS, KELVIN_VOIGT
+from cdpr_drake.cables.models import CABLE_MODELS, KELVIN_VOIGT, check_routes
 from cdpr_drake.cables.simulation_kernel import OUTPUTS
-from cdpr_drake.errors import CableGeometryError
+from cdpr_drake.errors import CableGeometryError, CableModelError
 from cdpr_drake.geometry.cable_routes import WORLD_BODY, CableRoutes, Integers
 from cdpr_drake.geometry.tree_kernel import MOTION
+
+
+TILT = 1e-12
+"""Angle between gravity and -z up to which cables that sag hang in vertical planes [rad]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,11 +42,26 @@ class PlantCables:
         plant: The plant.
         routes: The cables.
         model: A name of `cables.CABLE_MODELS`, by which unstrained lengths mean tensions.
+
+    Raises:
+        CableModelError: The model is not known or cannot describe the cables, or cables sag where
+            gravity does not point along -z.
     """
 
     plant: MultibodyPlant
     routes: CableRoutes
     model: str = KELVIN_VOIGT
+
+    def __post_init__(self) -> None:
+        check_routes(self.model, self.routes)
+        gravity = self.plant.gravity_field().gravity_vector()
+        if not CABLE_MODELS[self.model].sags or not np.any(self.routes.ends.linear_weight > 0.0):
+            return
+        if np.linalg.norm(gravity[:2]) > TILT * np.linalg.norm(gravity) or gravity[2] > 0.0:
+            raise CableModelError(
+                f"cable model: found {self.model} in a plant with gravity {gravity} m/s^2; "
+                "accepted: gravity along -z, or straight cables"
+            )
 
     @cached_property
     def bodies(self) -> tuple[int, ...]:
