@@ -29,7 +29,6 @@ from cdpr_drake.errors import CableGeometryError, CableModelError
 from cdpr_drake.geometry.cable_routes import WORLD_BODY, CableRoutes, Integers
 from cdpr_drake.geometry.tree_kernel import MOTION
 
-
 TILT = 1e-12
 """Angle between gravity and -z up to which cables that sag hang in vertical planes [rad]."""
 
