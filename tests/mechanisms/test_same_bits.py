@@ -74,5 +74,5 @@ def test_it_moves_as_one_platform_does(name, model):
     ours, before = (final_state(name, MODELS[model], as_routes) for as_routes in (True, False))
     assert np.all(np.isfinite(before))
     tensions = before[-len(load_robot(name).cables) :]
-    assert np.max(tensions) > 1.0
+    assert np.max(tensions) > 0.01  # N: cables do pull at the end
     np.testing.assert_array_equal(ours, before)
