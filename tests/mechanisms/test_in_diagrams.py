@@ -1,4 +1,4 @@
-"""Cables between bodies beside other blocks: discrete plants, contact, robots that share a plant."""
+"""Cables between bodies beside other blocks: discrete plants, contact, robots in one plant."""
 
 import numpy as np
 import pytest

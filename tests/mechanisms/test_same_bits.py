@@ -58,7 +58,7 @@ def final_state(name, settings, as_routes):
     lengths = block.GetOutputPort("lengths").Eval(
         diagram.GetSubsystemContext(block.forces, context)
     )
-    block.winches.hold(winches, 0.999 * lengths, np.zeros(m))
+    block.winches.hold(winches, 0.99 * lengths, np.zeros(m))
     simulator = Simulator(diagram, context)
     ResetIntegratorFromFlags(simulator, "runge_kutta3", STEP).set_fixed_step_mode(True)
     simulator.AdvanceTo(DURATION)
