@@ -21,7 +21,7 @@ ROBOTS = (
 )  # fmt: skip
 """In space and in planes, of bodies and points, with three to eight cables."""
 
-DURATION, STEP = 0.3, 1e-3
+DURATION, STEP, LOOKS = 0.3, 1e-3, 6
 
 STIFFNESS = 1e4
 """E S of cables [N]: at this step the integrator does not hold those of the robots' files."""
@@ -33,8 +33,8 @@ MODELS = {
 }
 
 
-def final_state(name, settings, as_routes):
-    """State of plant and winches at the end, from a moving start, by either kind of block."""
+def states_of(name, settings, as_routes):
+    """States of plant and winches, and tensions, from a moving start, by either kind of block."""
     robot, builder = load_robot(name), DiagramBuilder()
     settings = replace(settings, stiffness_ratio=STIFFNESS / np.max(robot.stiffness()))
     plant = builder.AddNamedSystem("plant", MultibodyPlant(0.0))
@@ -58,21 +58,23 @@ def final_state(name, settings, as_routes):
     lengths = block.GetOutputPort("lengths").Eval(
         diagram.GetSubsystemContext(block.forces, context)
     )
-    block.winches.hold(winches, 0.99 * lengths, np.zeros(m))
+    block.winches.hold(winches, lengths, np.zeros(m))
     simulator = Simulator(diagram, context)
     ResetIntegratorFromFlags(simulator, "runge_kutta3", STEP).set_fixed_step_mode(True)
-    simulator.AdvanceTo(DURATION)
-    tensions = block.GetOutputPort("tensions").Eval(
-        diagram.GetSubsystemContext(block.forces, context)
-    )
-    return np.concatenate([context.get_continuous_state_vector().CopyToVector(), tensions])
+    states, tensions = [], []
+    for look in range(1, LOOKS + 1):
+        simulator.AdvanceTo(look * DURATION / LOOKS)
+        states.append(context.get_continuous_state_vector().CopyToVector())
+        forces = diagram.GetSubsystemContext(block.forces, context)
+        tensions.append(np.array(block.GetOutputPort("tensions").Eval(forces)))
+    return np.array(states), np.array(tensions)
 
 
 @pytest.mark.parametrize("model", MODELS)
 @pytest.mark.parametrize("name", ROBOTS)
 def test_it_moves_as_one_platform_does(name, model):
-    ours, before = (final_state(name, MODELS[model], as_routes) for as_routes in (True, False))
-    assert np.all(np.isfinite(before))
-    tensions = before[-len(load_robot(name).cables) :]
-    assert np.max(tensions) > 0.01  # N: cables do pull at the end
-    np.testing.assert_array_equal(ours, before)
+    ours, before = (states_of(name, MODELS[model], as_routes) for as_routes in (True, False))
+    for mine, theirs in zip(ours, before, strict=True):
+        assert np.all(np.isfinite(theirs))
+        np.testing.assert_array_equal(mine, theirs)
+    assert np.max(before[1]) > 0.1  # N: some cable pulls at one of the looks
