@@ -77,6 +77,11 @@ class PlantCables:
         """Number of the cables' law."""
         return CABLE_MODELS[self.model].law
 
+    @cached_property
+    def _straight_room(self) -> Array:
+        """Where lines of straight cables are worked out; nothing in it is kept between calls."""
+        return self._room()
+
     def _room(self) -> Array:
         return kernels.make_route_room(self._packed[0], self.routes.count, self.law)
 
@@ -114,7 +119,7 @@ class PlantCables:
         """
         motion, m = self.motions(context), self.routes.count
         lengths, wrenches = np.zeros(m), np.zeros((m, len(motion), 6))
-        bad = kernels.route_lengths(motion, *self._packed, self._room(), lengths, wrenches)
+        bad = kernels.route_lengths(motion, *self._packed, self._straight_room, lengths, wrenches)
         self._check(bad)
         return lengths, -np.einsum("mki,kiv->mv", wrenches, self._jacobians(context))
 
@@ -181,11 +186,14 @@ class PlantCables:
 
         Velocities in the context are not looked at.
         """
+        return self.forces_at_rest(at_rest(self.plant, context))
+
+    def forces_at_rest(self, context: Context) -> Array:
+        """As `other_forces`, at a context without velocities, which saves a copy of it."""
         plant = self.plant
-        still = at_rest(plant, context)
         forces = MultibodyForces(plant)
-        plant.CalcForceElementsContribution(still, forces)
-        needed = plant.CalcInverseDynamics(still, np.zeros(plant.num_velocities()), forces)
+        plant.CalcForceElementsContribution(context, forces)
+        needed = plant.CalcInverseDynamics(context, np.zeros(plant.num_velocities()), forces)
         return -np.asarray(needed)
 
     def _check(self, bad: int) -> None:
