@@ -18,7 +18,7 @@ ROUNDING = 1e-14
 add up. Found 4e-16."""
 
 SAME = 1e-9
-"""How far two ways to one rest end apart [m, rad]; found 7e-14."""
+"""How far two ways to one rest end apart [m, rad], and as a share of E S; found 2e-15."""
 
 FIBRE = 348717.0
 """E S of the 2 mm rope of ACROBOT [N], with which cables slacken by micrometres."""
