@@ -23,11 +23,14 @@ from pydrake.systems.framework import Context
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables import route_kernel as kernels
 from cdpr_drake.cables.dispatch_kernel import STRAIGHT
-from cdpr_drake.cables.models import CABLE_MODELS, KELVIN_VOIGT
+from cdpr_drake.cables.models import CABLE_MODELS, KELVIN_VOIGT, check_routes
 from cdpr_drake.cables.simulation_kernel import OUTPUTS
-from cdpr_drake.errors import CableGeometryError
+from cdpr_drake.errors import CableGeometryError, CableModelError
 from cdpr_drake.geometry.cable_routes import WORLD_BODY, CableRoutes, Integers
 from cdpr_drake.geometry.tree_kernel import MOTION
+
+TILT = 1e-12
+"""Angle between gravity and -z up to which cables that sag hang in vertical planes [rad]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,11 +41,26 @@ class PlantCables:
         plant: The plant.
         routes: The cables.
         model: A name of `cables.CABLE_MODELS`, by which unstrained lengths mean tensions.
+
+    Raises:
+        CableModelError: The model is not known or cannot describe the cables, or cables sag where
+            gravity does not point along -z.
     """
 
     plant: MultibodyPlant
     routes: CableRoutes
     model: str = KELVIN_VOIGT
+
+    def __post_init__(self) -> None:
+        check_routes(self.model, self.routes)
+        gravity = self.plant.gravity_field().gravity_vector()
+        if not CABLE_MODELS[self.model].sags or not np.any(self.routes.ends.linear_weight > 0.0):
+            return
+        if np.linalg.norm(gravity[:2]) > TILT * np.linalg.norm(gravity) or gravity[2] > 0.0:
+            raise CableModelError(
+                f"cable model: found {self.model} in a plant with gravity {gravity} m/s^2; "
+                "accepted: gravity along -z, or straight cables"
+            )
 
     @cached_property
     def bodies(self) -> tuple[int, ...]:
@@ -58,6 +76,11 @@ class PlantCables:
     def law(self) -> int:
         """Number of the cables' law."""
         return CABLE_MODELS[self.model].law
+
+    @cached_property
+    def _straight_room(self) -> Array:
+        """Where lines of straight cables are worked out; nothing in it is kept between calls."""
+        return self._room()
 
     def _room(self) -> Array:
         return kernels.make_route_room(self._packed[0], self.routes.count, self.law)
@@ -96,7 +119,7 @@ class PlantCables:
         """
         motion, m = self.motions(context), self.routes.count
         lengths, wrenches = np.zeros(m), np.zeros((m, len(motion), 6))
-        bad = kernels.route_lengths(motion, *self._packed, self._room(), lengths, wrenches)
+        bad = kernels.route_lengths(motion, *self._packed, self._straight_room, lengths, wrenches)
         self._check(bad)
         return lengths, -np.einsum("mki,kiv->mv", wrenches, self._jacobians(context))
 
@@ -163,11 +186,14 @@ class PlantCables:
 
         Velocities in the context are not looked at.
         """
+        return self.forces_at_rest(at_rest(self.plant, context))
+
+    def forces_at_rest(self, context: Context) -> Array:
+        """As `other_forces`, at a context without velocities, which saves a copy of it."""
         plant = self.plant
-        still = at_rest(plant, context)
         forces = MultibodyForces(plant)
-        plant.CalcForceElementsContribution(still, forces)
-        needed = plant.CalcInverseDynamics(still, np.zeros(plant.num_velocities()), forces)
+        plant.CalcForceElementsContribution(context, forces)
+        needed = plant.CalcInverseDynamics(context, np.zeros(plant.num_velocities()), forces)
         return -np.asarray(needed)
 
     def _check(self, bad: int) -> None:

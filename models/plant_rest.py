@@ -56,6 +56,9 @@ DESCENT_STEPS = 300
 LARGEST_STEP = 1.0
 """Of descent, in any coordinate [rad, m]."""
 
+LARGEST_KICK = 1e-3
+"""Of the step that leaves an unstable rest, in any coordinate [rad, m]."""
+
 NEWTON_STEPS = 20
 """Of Newton's method from what a program or least squares found: three or four are usual."""
 
@@ -156,6 +159,57 @@ def _moved(plant: MultibodyPlant, scratch: Context, q: Array, step: Array) -> Ar
     return np.asarray(new)
 
 
+@dataclass(frozen=True, eq=False)
+class _Model:
+    """Energy near a configuration, by a step d in the velocities without a motor:
+
+        -f' d + d' H d / 2 + sum_i k_i max(0, s_i + J_i d)^2 / 2,
+
+    quadratic but for cables that become taut or slack, which it follows. Differences of forces
+    would average the two sides of such a kink.
+
+    Attributes:
+        others: f, of all but the straight cables, shape (r,) [N, N m].
+        smooth: H: stiffness of these, and of cables that keep their tensions, shape (r, r).
+        J: Length Jacobian of straight cables, shape (m, r).
+        springs: k, 0 of others, shape (m,) [N/m].
+        stretch: s, shape (m,) [m].
+    """
+
+    others: Array
+    smooth: Array
+    J: Array
+    springs: Array
+    stretch: Array
+
+    def force(self) -> Array:
+        """Of all, shape (r,)."""
+        return self.others - self.J.T @ (self.springs * np.maximum(self.stretch, 0.0))
+
+    def stiffness(self, taut: Booleans | None = None) -> Array:
+        """With these cables taut; None: those that are."""
+        J = self.J[self.stretch > 0.0 if taut is None else taut]
+        k = self.springs[self.stretch > 0.0 if taut is None else taut]
+        return self.smooth + J.T @ (k[:, None] * J)
+
+    def step(self, damping: Array) -> tuple[Array, bool]:
+        """d where the energy plus d' (damping) d / 2 has no slope, and whether it is least there.
+
+        Cables that d makes taut or slack are so, if these sets do not go round in a circle.
+        """
+        taut = self.stretch > 0.0
+        d = np.zeros(len(self.others))
+        for _ in range(2 * len(taut) + 1):
+            J, k = self.J[taut], self.springs[taut]
+            K = self.stiffness(taut) + damping
+            d = scipy.linalg.lstsq(K, self.others - J.T @ (k * self.stretch[taut]))[0]
+            then = self.stretch + self.J @ d > 0.0
+            if np.array_equal(then, taut):
+                break
+            taut = then
+        return d, bool(scipy.linalg.eigvalsh(K)[0] > 0.0)
+
+
 class _Question:
     """A mechanism on cables: its forces at positions, and their derivatives."""
 
@@ -165,7 +219,7 @@ class _Question:
         self.held, self.kept = held, ~held
         self.q = np.array(self.plant.GetPositions(self.context))
         _, J = cables.lengths_and_jacobian(self.context)
-        self.load = float(np.max(np.abs(cables.other_forces(self.context)), initial=0.0))
+        self.load = float(np.max(np.abs(cables.forces_at_rest(self.context)), initial=0.0))
         self.reach = np.max(np.abs(J), axis=0, initial=0.0)
 
     def at(self, q: Array) -> Context:
@@ -177,11 +231,26 @@ class _Question:
 
     def with_tensions(self, q: Array, t: Array) -> Array:
         context = self.at(q)
-        return self.cables.other_forces(context) - self.cables.length_jacobian(context).T @ t
+        return self.cables.forces_at_rest(context) - self.cables.length_jacobian(context).T @ t
 
     def with_lengths(self, q: Array, l0: Array) -> Array:
         context = self.at(q)
-        return self.cables.other_forces(context) + self.cables.generalized_force(context, l0)
+        return self.cables.forces_at_rest(context) + self.cables.generalized_force(context, l0)
+
+    def model(self, q: Array, l0: Array) -> _Model:
+        """What happens near q, on the rows without a motor."""
+        rows = np.flatnonzero(self.kept)
+        if CABLE_MODELS[self.cables.model].sags:
+            m = self.cables.routes.count
+            K = -self.by_position(lambda x: self.with_lengths(x, l0), q, rows)[rows]
+            force = self.with_lengths(q, l0)[rows]
+            return _Model(force, (K + K.T) / 2.0, np.zeros((m, len(rows))), np.zeros(m), -l0)
+        lengths, J = self.cables.lengths_and_jacobian(self.at(q))
+        stretch, springs = lengths - l0, self.cables.routes.ends.stiffness / l0
+        t = springs * np.maximum(stretch, 0.0)
+        H = -self.by_position(lambda x: self.with_tensions(x, t), q, rows)[rows]
+        others = self.cables.forces_at_rest(self.at(q))[rows]
+        return _Model(others, (H + H.T) / 2.0, J[:, rows], springs, stretch)
 
     def by_position(self, force: Any, q: Array, columns: Integers) -> Array:
         """Derivative of a force (q) by velocities of these columns, shape (nv, k)."""
@@ -196,9 +265,9 @@ class _Question:
     def rest(self, q: Array, tensions: Array, l0: Array, notes: tuple[str, ...]) -> Rest:
         force = self.with_lengths(q, l0)
         rows = np.flatnonzero(self.kept)
-        K = -self.by_position(lambda x: self.with_lengths(x, l0), q, rows)[rows]
+        K = self.model(q, l0).stiffness() if len(rows) else np.zeros((0, 0))
         M = self.plant.CalcMassMatrix(self.at(q))[np.ix_(rows, rows)]
-        squared = scipy.linalg.eigh((K + K.T) / 2.0, M, eigvals_only=True) if len(rows) else []
+        squared = scipy.linalg.eigh(K, M, eigvals_only=True) if len(rows) else []
         held = np.where(self.held, -force, 0.0)
         residual = float(np.max(np.abs(force[rows]), initial=0.0))
         return Rest(q, tensions, l0, held, residual, np.asarray(squared), notes)
@@ -385,6 +454,8 @@ def settle(
 ) -> Rest:
     """Where a mechanism comes to rest on cables of given unstrained lengths, from where it is.
 
+    A rest from which it would fall away at a touch is left.
+
     Args:
         cables: Its cables, by any model that is extensible.
         context: Of the plant; not changed. Its positions are the start.
@@ -393,9 +464,16 @@ def settle(
 
     Raises:
         EquilibriumError: No rest is found from there.
+        CableModelError: The cables do not stretch.
         CableGeometryError: A cable cannot run.
     """
     plant = cables.plant
+    if not CABLE_MODELS[cables.model].extensible:
+        accepted = [name for name, kind in CABLE_MODELS.items() if kind.extensible]
+        raise CableModelError(
+            f"settle: found cables by the model {cables.model}; accepted: one of "
+            f"{', '.join(accepted)}"
+        )
     l0 = np.array(unstrained_lengths, dtype=float)
     if l0.shape != (cables.routes.count,) or not np.all(np.isfinite(l0) & (l0 > 0.0)):
         raise EquilibriumError(
@@ -405,7 +483,9 @@ def settle(
     question = _Question(cables, context, _held_rows(plant, held))
     rows = np.flatnonzero(question.kept)
     scale = max(question.load, 1e-3)
-    q = _newton(question, _descend(question, question.q, l0, rows), l0, rows)
+    q = question.q
+    if len(rows):
+        q = _newton(question, _descend(question, q, l0, rows), l0, rows)
     force = question.with_lengths(q, l0)[rows]
     if not np.max(np.abs(force), initial=0.0) <= 1e3 * ROUNDING * scale:
         worst = rows[int(np.argmax(np.abs(force)))]
@@ -422,34 +502,42 @@ def _descend(question: _Question, q: Array, l0: Array, rows: Integers) -> Array:
     """Steps of Levenberg and Marquardt that lower the energy, until forces are small.
 
     Descent ends in a minimum, where a mechanism stays; Newton's method alone would as well end in
-    a saddle. (K + mu D) step = force, with D the diagonal of the inertia, mu as small as can be.
+    a saddle. A step goes where the model of the energy plus mu d' D d / 2 is least, with D the
+    diagonal of the inertia, mu as small as can be.
     """
     plant = question.plant
 
     def energy(x: Array) -> float:
         return question.cables.energy(question.at(x), l0)
 
-    def force(x: Array) -> Array:
-        return question.with_lengths(x, l0)
+    def moved_by(d: Array) -> Array:
+        whole = np.zeros(plant.num_velocities())
+        whole[rows] = d
+        return question.moved(q, whole)
 
     mu, height = 0.0, energy(q)
     for _ in range(DESCENT_STEPS):
-        r = force(q)[rows]
-        if np.max(np.abs(r), initial=0.0) <= SETTLED * max(question.load, 1e-3):
-            break
-        K = -question.by_position(force, q, rows)[rows]
+        model = question.model(q, l0)
         D = np.diag(np.diag(plant.CalcMassMatrix(question.at(q))[np.ix_(rows, rows)]))
-        values = scipy.linalg.eigh((K + K.T) / 2.0, D, eigvals_only=True)
+        values, modes = scipy.linalg.eigh(model.stiffness(), D)
         softest, largest = float(values[0]), float(np.max(np.abs(values)))
-        least = max(0.0, 1e-9 * largest - softest) * 1.5
-        mu = max(mu, least)
-        while True:
-            whole = np.zeros(plant.num_velocities())
-            whole[rows] = scipy.linalg.solve((K + K.T) / 2.0 + mu * D, r, assume_a="sym")
-            new = question.moved(q, whole)
-            lower = energy(new) if np.max(np.abs(whole)) < LARGEST_STEP else np.inf
-            if lower < height:
+        if np.max(np.abs(model.force())) <= SETTLED * max(question.load, 1e-3):
+            if softest > -NEUTRAL * largest:
                 break
+            kick = LARGEST_KICK * modes[:, 0] / np.max(np.abs(modes[:, 0]))
+            new = min(moved_by(kick), moved_by(-kick), key=energy)
+            lower = energy(new)
+            if not lower < height:
+                break
+            q, height, mu = new, lower, 0.0
+            continue
+        while True:
+            d, least = model.step(mu * D)
+            if least and np.max(np.abs(d)) < LARGEST_STEP:
+                new = moved_by(d)
+                lower = energy(new)
+                if lower < height:
+                    break
             mu = max(4.0 * mu, 1e-6 * largest)
             if mu > 1e9 * largest:
                 return q
@@ -459,18 +547,14 @@ def _descend(question: _Question, q: Array, l0: Array, rows: Integers) -> Array:
 
 def _newton(question: _Question, q: Array, l0: Array, rows: Integers) -> Array:
     """Newton's steps while they make the largest force smaller."""
-
-    def force(x: Array) -> Array:
-        return question.with_lengths(x, l0)
-
-    r = force(q)[rows]
+    size = float(np.max(np.abs(question.with_lengths(q, l0)[rows]), initial=0.0))
+    none = np.zeros((len(rows), len(rows)))
     for _ in range(NEWTON_STEPS):
-        D = question.by_position(force, q, rows)[rows]
         step = np.zeros(question.plant.num_velocities())
-        step[rows] = -np.linalg.lstsq(D, r, rcond=None)[0]
+        step[rows] = question.model(q, l0).step(none)[0]
         new = question.moved(q, step)
-        new_r = force(new)[rows]
-        if not np.max(np.abs(new_r), initial=0.0) < np.max(np.abs(r), initial=0.0):
+        smaller = float(np.max(np.abs(question.with_lengths(new, l0)[rows]), initial=0.0))
+        if not smaller < size:
             break
-        q, r = new, new_r
+        q, size = new, smaller
     return q

@@ -12,6 +12,7 @@ from cdpr_drake.cables.dispatch_kernel import HANGING, SLACK_WEIGHTS, STRAIGHT, 
 from cdpr_drake.cables.response_kernel import DERIVATIVES, damping_tension
 from cdpr_drake.errors import CableGeometryError, CableModelError
 from cdpr_drake.geometry.cable_paths import cable_paths, impossible_cable, motion_of
+from cdpr_drake.geometry.cable_routes import WORLD_BODY, CableRoutes
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.geometry.two_pulleys_kernel import add_platform_turning
 
@@ -147,6 +148,34 @@ def check_model(model: str, cables: CableSet) -> None:
             raise CableModelError(
                 f"swivel_axis of cable {i + 1}: found {cables.swivel_axis[:, i]}; accepted for "
                 "the catenary: (0, 0, 1) or (0, 0, -1), so that groove and cable share a plane"
+            )
+
+
+def check_routes(model: str, routes: CableRoutes) -> None:
+    """Checks that a model is known and can describe cables between bodies.
+
+    Raises:
+        CableModelError: As `check_model`; or a cable that sags runs over eyelets, or leaves a
+            moving body over a pulley.
+    """
+    check_model(model, routes.ends)
+    if not CABLE_MODELS[model].sags:
+        return
+    for i, name in enumerate(routes.names):
+        if not routes.ends.linear_weight[i] > 0.0:
+            continue
+        points = routes.first[i + 1] - routes.first[i]
+        if points > 2:
+            raise CableModelError(
+                f"{name}: found {points - 2} eyelets on a cable with weight; accepted for the "
+                "catenary: none, or a cable with linear_weight 0"
+            )
+        if routes.bodies[routes.first[i]] != WORLD_BODY and routes.ends.pulley_radius[i] > 0.0:
+            raise CableModelError(
+                f"pulley_radius of {name}: found {routes.ends.pulley_radius[i]:g} at an exit point "
+                "on a moving body; accepted for the catenary: 0 [m], or an exit point in the "
+                "world, since the plane of a cable that sags is vertical and a swivel axis that "
+                "tilts is not"
             )
 
 

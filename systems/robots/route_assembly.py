@@ -133,6 +133,7 @@ def add_cables(
         raise CableModelError(f"method: found {method!r}; accepted: one of {', '.join(METHODS)}")
     settings, prefix = settings or CableSettings(), f"{name}_" if name else ""
     routes = routes.with_cables(settings.applied(routes.ends))
+    cables = PlantCables(plant, routes, settings.model)
     why = unknown_joint(plant, routes.touched_bodies())
     if why and method == JOINTS:
         raise CableModelError(why)
@@ -140,7 +141,6 @@ def add_cables(
     kind = RouteForces if chosen == JOINTS else RouteSpatialForces
     forces = builder.AddNamedSystem(prefix + "cables", kind(plant, routes, settings.model))
     if winches is None:
-        cables = PlantCables(plant, routes, settings.model)
         home, _ = cables.lengths_and_jacobian(plant.CreateDefaultContext())
         winches = VelocityWinch(home, rated_speed)
     winch = builder.AddNamedSystem(prefix + "winches", winches)

@@ -27,7 +27,7 @@ from pydrake.systems.scalar_conversion import TemplateSystem
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables import route_kernel as kernels
 from cdpr_drake.cables.dispatch_kernel import STRAIGHT
-from cdpr_drake.cables.models import CABLE_MODELS, KELVIN_VOIGT
+from cdpr_drake.cables.models import CABLE_MODELS, KELVIN_VOIGT, check_routes
 from cdpr_drake.cables.simulation_autodiff import (
     route_outputs_array,
     route_wrenches_array,
@@ -35,7 +35,7 @@ from cdpr_drake.cables.simulation_autodiff import (
     tree_outputs_array,
 )
 from cdpr_drake.cables.simulation_kernel import OUTPUTS
-from cdpr_drake.errors import CableGeometryError, CableModelError
+from cdpr_drake.errors import CableGeometryError
 from cdpr_drake.geometry.cable_routes import WORLD_BODY, CableRoutes
 from cdpr_drake.geometry.tree_kernel import MOTION
 from cdpr_drake.models.plant_tree import PlantTree
@@ -56,24 +56,7 @@ def simulated_routes(routes: CableRoutes, model: str) -> CableRoutes:
             sags may run over a pulley at an exit point in the world only, and over no eyelets.
     """
     routes = replace(routes, ends=simulated_cables(routes.ends, model))
-    if not CABLE_MODELS[model].sags:
-        return routes
-    for i, name in enumerate(routes.names):
-        if not routes.ends.linear_weight[i] > 0.0:
-            continue
-        points = routes.first[i + 1] - routes.first[i]
-        if points > 2:
-            raise CableModelError(
-                f"{name}: found {points - 2} eyelets on a cable with weight; accepted for the "
-                "catenary: none, or a cable with linear_weight 0"
-            )
-        if routes.bodies[routes.first[i]] != WORLD_BODY and routes.ends.pulley_radius[i] > 0.0:
-            raise CableModelError(
-                f"pulley_radius of {name}: found {routes.ends.pulley_radius[i]:g} at an exit point "
-                "on a moving body; accepted for the catenary: 0 [m], or an exit point in the "
-                "world, since the plane of a cable that sags is vertical and a swivel axis that "
-                "tilts is not"
-            )
+    check_routes(model, routes)
     return routes
 
 

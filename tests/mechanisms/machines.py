@@ -141,6 +141,7 @@ def _robot_points(robot: Any, body: Any, plant: MultibodyPlant) -> Points:
 def acrobot_arm(plant: MultibodyPlant) -> Points:
     """ACROBOT, fully constrained, with a driven arm of two joints below its platform."""
     in_plant = add_robot(plant, load_robot("acrobot_fully_constrained"))
+    plant.AddModelInstance("arm")
     upper = add_body(plant, "upper", 0.35, (0.03, 0.03, 0.16), (0.0, 0.004, -0.08))
     lower = add_body(plant, "lower", 0.25, (0.025, 0.03, 0.14), (0.003, 0.0, -0.07))
     add_hinge(plant, "shoulder", in_plant.body, (0.03, -0.02, -0.035), upper, Y, 0.6, (0, 0, 0.2))
@@ -155,6 +156,7 @@ def hanging_arm(plant: MultibodyPlant) -> Points:
     this one falls.
     """
     in_plant = add_robot(plant, load_robot("acrobot_large"))
+    plant.AddModelInstance("arm")
     upper = add_body(plant, "upper", 0.35, (0.03, 0.03, 0.16), (0.0, 0.0, -0.08))
     lower = add_body(plant, "lower", 0.25, (0.025, 0.03, 0.14), (0.0, 0.0, -0.07))
     F = frame_of(plant, in_plant.body, "shoulder_frame", (0.02, 0.0, -0.035), (0, 0, 0.3))
