@@ -16,3 +16,4 @@ from .settings import CableRobotSettings as CableRobotSettings
 from .settings import CableSettings as CableSettings
 from .tension_driven_routes import TensionDrivenRoutes as TensionDrivenRoutes
 from .ups_robot import UpsRobot as UpsRobot
+from .route_assembly import apply_spatial_forces as apply_spatial_forces
