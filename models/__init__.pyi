@@ -32,6 +32,7 @@ from .robot_holding import hold_robot as hold_robot
 from .robot_holding import rest_as_long as rest_as_long
 from .robot_in_plant import RobotInPlant as RobotInPlant
 from .robot_in_plant import add_robot as add_robot
+from .robot_in_plant import find_robot as find_robot
 from .robot_in_plant import platform_inertia as platform_inertia
 from .robot_loader import gravity_turn as gravity_turn
 from .robot_loader import load_robot as load_robot

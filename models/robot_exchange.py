@@ -13,6 +13,7 @@ from cdpr_drake.models.formats.assumptions import CompletedDraft, complete_draft
 from cdpr_drake.models.formats.caspr_writer import write_caspr
 from cdpr_drake.models.formats.detection import read_foreign
 from cdpr_drake.models.formats.draft import DraftCable, RobotDraft
+from cdpr_drake.models.formats.drake_package import write_drake_package
 from cdpr_drake.models.formats.gazebo_yaml import write_gazebo_yaml
 from cdpr_drake.models.formats.joint_chains import write_sdformat, write_urdf
 from cdpr_drake.models.formats.mjcf import write_mjcf
@@ -208,6 +209,9 @@ def _written(robot: Robot, format: str) -> dict[str, str]:
         return {f"{name}.yaml": write_gazebo_yaml(draft)}
     if format == "urdf":
         return {f"{name}.urdf": write_urdf(draft)}
+    if format == "drake":
+        home = robot.home.transform()
+        return write_drake_package(name, draft.title, write_urdf(draft), home)
     return {f"{name}.sdf": write_sdformat(draft, for_drake=format == "sdf-drake")}
 
 

@@ -28,6 +28,7 @@ EXPORTS = {
     "sdf": "SDFormat with chains of joints for cables, closed by ball joints, for Gazebo",
     "sdf-drake": "the same, closed by Drake's ball constraints, for Drake's parser",
     "urdf": "URDF of the platform with named frames for the points",
+    "drake": "a package of that URDF with model directives, for Drake's ProcessModelDirectives",
     "mjcf": "MJCF with spatial tendons, for MuJoCo",
     "wcrfx": "WireX and WireCenter",
     "caspr": "CASPR, two XML files",
@@ -53,6 +54,7 @@ HELD: dict[str, set[str]] = {
     "sdf": _SDF,
     "sdf-drake": _SDF,
     "urdf": _COMMON | _CENTER | _BOX | _HOME | _FRAME,
+    "drake": _COMMON | _CENTER | _BOX | _HOME | _FRAME,
     "mjcf": _COMMON | _CENTER | _BOX | _HOME | _DIAMETERS | _LIMITS
     | {"plane_height", "gravity", "gravity_direction",
        "cable.youngs_modulus", "cables[].material.youngs_modulus"},

@@ -27,6 +27,7 @@ from pydrake.multibody.tree import (
 from pydrake.systems.framework import Context
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.errors import RobotFileError
 from cdpr_drake.geometry.platform_joint import PlatformJoint
 from cdpr_drake.models.mechanism_files import single_platform
 from cdpr_drake.models.mechanism_schema import Mechanism
@@ -36,6 +37,9 @@ _PLATFORM_COLOR = np.array([0.25, 0.45, 0.75, 1.0])
 
 _PLANE, _LINE = "plane", "line"
 """Names of the joints."""
+
+SAME_MASS = 1e-6
+"""How far masses of one platform may be apart, relative: what files in decimals round away."""
 
 
 @dataclass(frozen=True)
@@ -197,6 +201,46 @@ def add_robot(plant: MultibodyPlant, robot: Robot, name: str | None = None) -> R
     if plant.geometry_source_is_registered():
         X_PShape, shape = platform_shape(robot)
         plant.RegisterVisualGeometry(body, X_PShape, shape, "platform", _PLATFORM_COLOR)
+    return RobotInPlant(robot, plant, instance, body.index())
+
+
+def find_robot(plant: MultibodyPlant, robot: Robot, name: str | None = None) -> RobotInPlant:
+    """The platform of a robot that something else put into a plant, as model directives do.
+
+    Args:
+        plant: The plant, finalized.
+        robot: The robot, a body in space (3R3T).
+        name: Name of its model instance; the robot's where None.
+
+    Returns:
+        Handles to the platform, as `add_robot` gives them. Gravity is that of the plant.
+
+    Raises:
+        RobotFileError: There is no such model instance, no free body `platform` in it, its
+            mass is another one, or further bodies of the instance move, too.
+    """
+    name = name or robot.name
+    if not plant.HasModelInstanceNamed(name):
+        raise RobotFileError(f"robot {robot.name}: found no model instance {name} in the plant")
+    instance = plant.GetModelInstanceByName(name)
+    if not robot.joint().is_floating or not robot.motion_type().is_free:
+        raise RobotFileError(
+            f"robot {robot.name}: motion: found {robot.motion}; accepted by find_robot: 3R3T"
+        )
+    if not plant.HasBodyNamed("platform", instance):
+        raise RobotFileError(f"model instance {name}: found no body platform; accepted: one")
+    body = plant.GetBodyByName("platform", instance)
+    if not body.is_floating_base_body() or plant.num_velocities(instance) != 6:
+        raise RobotFileError(
+            f"model instance {name}: found {plant.num_velocities(instance)} velocities; accepted: "
+            "6, a free platform and all else welded to the world, as by the exported directives"
+        )
+    mass = body.default_mass()
+    if abs(mass - robot.platform.mass) > SAME_MASS * robot.platform.mass:
+        raise RobotFileError(
+            f"model instance {name}: found a platform of {mass:g} kg; accepted: "
+            f"{robot.platform.mass:g} kg, as robot {robot.name} has"
+        )
     return RobotInPlant(robot, plant, instance, body.index())
 
 

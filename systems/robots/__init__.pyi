@@ -8,6 +8,7 @@ from .motor_winch import MotorWinch as MotorWinch
 from .platform_pose import PlatformPose as PlatformPose
 from .route_assembly import CablePorts as CablePorts
 from .route_assembly import add_cables as add_cables
+from .route_assembly import apply_spatial_forces as apply_spatial_forces
 from .route_forces import RouteForces as RouteForces
 from .route_forces import RouteForces_ as RouteForces_
 from .route_forces import RouteSpatialForces as RouteSpatialForces
@@ -16,4 +17,3 @@ from .settings import CableRobotSettings as CableRobotSettings
 from .settings import CableSettings as CableSettings
 from .tension_driven_routes import TensionDrivenRoutes as TensionDrivenRoutes
 from .ups_robot import UpsRobot as UpsRobot
-from .route_assembly import apply_spatial_forces as apply_spatial_forces
