@@ -47,8 +47,7 @@ def through(robot, format, folder):
         return None
     for name, content in files.items():
         (folder / name).write_text(content, encoding="utf-8")
-        path = folder / name
-    return models.load_robot(str(path))
+    return models.load_robot(str(folder / next(iter(files))))
 
 
 def formats():

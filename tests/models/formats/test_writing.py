@@ -65,9 +65,9 @@ def test_what_was_written_is_read_again(name, format, tmp_path):
         X_WP = robot.home.transform() @ RigidTransform(shift)
         found = again.home.transform().GetAsMatrix4()
         np.testing.assert_allclose(found, X_WP.GetAsMatrix4(), atol=EXACT)
-    if format not in ("sdf", "sdf-drake", "urdf"):
+    if format not in ("sdf", "sdf-drake", "urdf", "drake"):
         assert again.tension_limits() == robot.tension_limits()
-    elif format != "urdf":
+    elif format not in ("urdf", "drake"):
         assert again.tension_limits()[1] == robot.tension_limits()[1]
     if format != "gazebo-yaml":
         np.testing.assert_allclose(
