@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
@@ -38,6 +38,9 @@ from cdpr_drake.summaries import Summarized, numbers
 from cdpr_drake.tensions.methods import distribute
 from cdpr_drake.tensions.null_space_kernel import RANK_TOLERANCE
 from cdpr_drake.tensions.problem import TensionProblem, TensionSolution, TensionStatus
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 UNDERACTUATED = "quadratic_program"
 """The only method where cables do not control all that no motor holds."""
@@ -98,6 +101,14 @@ class PlacedMechanism:
                 axis = f" {along} {suffix[1:]} of" if suffix[1:] else " at"
                 words[row] = f"{kind}{axis} {name}"
         return tuple(words), turns
+
+    def tension_figure(self, tensions: Mapping[str, Array], title: str) -> Figure:
+        """Tensions by method, shape (m,) each [N], with the file's bounds."""
+        from cdpr_drake.analyses.statics.static_figures import tension_figure
+
+        names, (low, high) = self.cables.routes.names, self.mechanism.tension_limits()
+        bounds = np.full(len(names), low), np.full(len(names), high)
+        return tension_figure(names, tensions, bounds, title)
 
     def held_rows(self, held: Iterable[str] | None) -> Booleans:
         """Which velocities motors hold, shape (nv,); None: those with actuators.
@@ -193,6 +204,11 @@ class MechanismAtRest(Summarized):
             "frequencies_hz": [None if np.isnan(f) else float(f) for f in self.frequencies],
             "notes": list(rest.notes),
         }
+
+    def plot(self) -> Figure:
+        """Tensions with the file's bounds."""
+        title = f"{self.placed.mechanism.name} at rest: {self.rest.stability}"
+        return self.placed.tension_figure({"at rest": self.rest.tensions}, title)
 
     def summary(self) -> tuple[str, list[tuple[str, str]]]:
         """What it shows of itself."""
@@ -323,6 +339,12 @@ class MechanismTensions(Summarized):
                 {"combination": words, "unbalanced": off} for words, off in self.uncontrolled()
             ],
         }
+
+    def plot(self) -> Figure:
+        """Tensions by each method, with the file's bounds."""
+        found = {one.method: one.tensions for one in self.solutions}
+        title = f"Tensions of {self.placed.mechanism.name}: {self.status}"
+        return self.placed.tension_figure(found or {UNDERACTUATED: self.tensions}, title)
 
     def summary(self) -> tuple[str, list[tuple[str, str]]]:
         """What it shows of itself."""
