@@ -172,11 +172,11 @@ def add_mechanism(plant: MultibodyPlant, mechanism: Mechanism, name: str = "") -
         else:
             parser.AddModels(str(file))
         plant.mutable_gravity_field().set_gravity_vector(mechanism.gravity_vector())
-    frames = {WORLD: int(plant.world_frame().index())}
-    for index in range(before[0], plant.num_frames()):
-        frame = plant.get_frame(FrameIndex(index))
-        if not frame.name().startswith("__"):
-            frames[_plain(frame.scoped_name().get_full(), name)] = index
+        frames = {WORLD: int(plant.world_frame().index())}
+        for index in range(before[0], plant.num_frames()):
+            frame = plant.get_frame(FrameIndex(index))
+            if not frame.name().startswith("__"):
+                frames[_plain(frame.scoped_name().get_full(), name)] = index
     _set_joints(plant, mechanism, name, before[1])
     _set_bodies(plant, mechanism, name, before[2])
     return MechanismInPlant(plant, mechanism, name, frames)
