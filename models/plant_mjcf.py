@@ -55,11 +55,11 @@ _PARTS = {
     kind.WELD: (),
     kind.REVOLUTE: (("", "hinge", None),),
     kind.PRISMATIC: (("", "slide", None),),
-    kind.PLANAR: (("_x", "slide", "x"), ("_y", "slide", "y"), ("_turn", "hinge", "z")),
-    kind.UNIVERSAL: (("_x", "hinge", "x"), ("_y", "hinge", "y")),
+    kind.PLANAR: ((".x", "slide", "x"), (".y", "slide", "y"), (".turn", "hinge", "z")),
+    kind.UNIVERSAL: ((".x", "hinge", "x"), (".y", "hinge", "y")),
     kind.BALL: (("", "ball", None),),
     kind.FLOATING: (
-        ("_x", "slide", "x"), ("_y", "slide", "y"), ("_z", "slide", "z"), ("_turn", "ball", None),
+        (".x", "slide", "x"), (".y", "slide", "y"), (".z", "slide", "z"), (".turn", "ball", None),
     ),
 }  # fmt: skip
 """Joints of MuJoCo that are one of a plant: end of the name, type, and axis in M where it is not
@@ -313,7 +313,7 @@ class _Writer:
         ET.SubElement(world, "light", pos="0 0 10", dir="0 0 -1")
         self._fill(world, WORLD_BODY)
         tendons = ET.SubElement(root, "tendon")
-        for i, name in enumerate(routes.names):
+        for i, name in enumerate(map(xml_words, routes.names)):
             spatial = ET.SubElement(
                 tendons, "spatial", name=name, stiffness=_words(routes.ends.stiffness[i] / l0[i]),
                 springlength=_words([0.0, l0[i]]),
@@ -343,7 +343,7 @@ class _Writer:
         return replace(made, text=ET.tostring(root, encoding="unicode") + "\n")
 
     def _site(self, cable: int, point: int) -> str:
-        return f"{self.routes.names[cable]}_{point - self.routes.first[cable]}"
+        return f"{xml_words(self.routes.names[cable])}_{point - self.routes.first[cable]}"
 
     def _fill(self, element: ET.Element, index: int) -> None:
         """Writes the sites on a body and the bodies that it carries, root first."""

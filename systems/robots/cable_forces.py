@@ -72,6 +72,17 @@ def simulated_cables(cables: CableSet, model: str) -> CableSet:
     return cables
 
 
+def _check_alone(in_plant: RobotInPlant) -> None:
+    plant, instance = in_plant.plant, in_plant.model_instance
+    found, wanted = plant.num_multibody_states(instance), in_plant.robot.joint().num_states
+    if found != wanted:
+        raise CableModelError(
+            f"model instance {plant.GetModelInstanceName(instance)}: found {found} states; "
+            f"accepted: {wanted}, those of the platform, with other bodies that move in a model "
+            "instance of their own"
+        )
+
+
 # With its scope, since Drake would search the whole call stack for it.
 @TemplateSystem.define("CableForces_", T_list=(float, AutoDiffXd), scope=sys.modules[__name__])
 def CableForces_(T: Any) -> type[LeafSystem]:
@@ -126,9 +137,11 @@ def CableForces_(T: Any) -> type[LeafSystem]:
                 converter: Of the template.
 
             Raises:
-                CableModelError: The model cannot be simulated, or cannot describe the cables.
+                CableModelError: The model cannot be simulated, or cannot describe the cables; or
+                    other bodies move in the robot's model instance, whose state is read.
             """
             robot, plant = in_plant.robot, in_plant.plant
+            _check_alone(in_plant)
             place = _Place(
                 robot.joint(),
                 in_plant.first_velocity(),

@@ -4,8 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from pydrake.math import RigidTransform, RollPitchYaw
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import SpatialInertia
 
 from cdpr_drake.errors import CableModelError
+from cdpr_drake.geometry.cable_routes import CableRoute, CableRoutes
 from cdpr_drake.models.plant_cables import PlantCables
 from cdpr_drake.models.plant_rest import hang, moved, rows_of_motors, settle
 from tests.mechanisms.cabled import alone, cables_of, random_states, rest_of
@@ -85,6 +89,22 @@ def test_a_cable_at_the_edge_of_slack_does_not_hide_the_rest():
     found = settle(cables, context, l0)
     assert found.stability == "stable"
     assert found.residual < ROUNDING * FIBRE
+
+
+def test_what_nothing_resists_stays_where_it_is():
+    """A body on one cable swings to below its exit point, however it is turned about the cable."""
+    plant = MultibodyPlant(0.0)
+    body = plant.AddRigidBody("body", SpatialInertia.SolidBoxWithMass(2.0, 0.3, 0.2, 0.1))
+    plant.Finalize()
+    points = [(plant.world_body(), (0.0, 0.0, 1.0)), (body, (0.0, 0.0, 0.05))]
+    routes = CableRoutes.of(plant, [CableRoute(points=points, stiffness=STIFFNESS)])
+    context = plant.CreateDefaultContext()
+    turned = RollPitchYaw(0.3, -0.2, 0.9)
+    plant.SetFreeBodyPose(context, body, RigidTransform(turned, [0.2, 0.1, -0.1]))
+    rest = settle(PlantCables(plant, routes), context, [1.0])
+    assert rest.stability == "neutral"
+    assert rest.residual < ROUNDING * STIFFNESS
+    assert np.max(np.abs(rest.positions[4:6])) < 1e-6  # below the exit point
 
 
 def test_cables_that_sag_settle_too():

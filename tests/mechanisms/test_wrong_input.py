@@ -14,6 +14,9 @@ from cdpr_drake.geometry.cable_routes import CableRoute, CableRoutes
 from cdpr_drake.models.plant_cables import PlantCables
 from cdpr_drake.models.plant_mjcf import export_plant_mjcf
 from cdpr_drake.models.plant_rest import hang, settle
+from cdpr_drake.models.robot_in_plant import add_robot
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.systems.robots.cable_forces import CableForces
 from cdpr_drake.systems.robots.route_assembly import add_cables
 from cdpr_drake.systems.robots.route_forces import RouteForces
 from cdpr_drake.systems.robots.settings import CableSettings
@@ -82,6 +85,15 @@ def sideways():
     plant.mutable_gravity_field().set_gravity_vector([1.0, 0.0, -9.0])
     heavy = replace(routes.ends, linear_weight=np.array([0.1]))
     return PlantCables(plant, routes.with_cables(heavy), "catenary")
+
+
+def robot_with_a_load():
+    """Whose state would be taken for the platform's."""
+    plant = MultibodyPlant(0.0)
+    in_plant = add_robot(plant, load_robot("planar"))
+    plant.AddRigidBody("load", in_plant.model_instance, inertia())
+    plant.Finalize()
+    return CableForces(in_plant)
 
 
 WRONG = {
@@ -154,6 +166,10 @@ WRONG = {
     "rod in MJCF": (
         lambda: mjcf(spatial=SpatialInertia.ThinRodWithMass(1.0, 0.3, [0, 0, 1])),
         "body body: found mass 1 kg and moments 0,",
+    ),
+    "a body in a robot's model instance": (
+        robot_with_a_load,
+        "model instance planar: found 19 states; accepted: 6",
     ),
     "lengths in MJCF": (lambda: mjcf(l0=0.0), "accepted: 1 numbers > 0 [m]"),
 }
