@@ -2,6 +2,13 @@ from .camera_catalogue import Camera as Camera
 from .camera_catalogue import CameraFault as CameraFault
 from .camera_catalogue import camera_names as camera_names
 from .camera_catalogue import load_camera as load_camera
+from .mechanism_files import mechanism_names as mechanism_names
+from .mechanism_in_plant import MechanismInPlant as MechanismInPlant
+from .mechanism_in_plant import add_mechanism as add_mechanism
+from .mechanism_loader import load_mechanism as load_mechanism
+from .mechanism_loader import load_robot_or_mechanism as load_robot_or_mechanism
+from .mechanism_loader import parse_mechanism as parse_mechanism
+from .mechanism_schema import Mechanism as Mechanism
 from .plant_cables import PlantCables as PlantCables
 from .plant_rest import Rest as Rest
 from .plant_rest import hang as hang

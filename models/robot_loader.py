@@ -28,6 +28,14 @@ from cdpr_drake.models.exit_points import MARK, check_rail, split_name
 from cdpr_drake.models.formats.assumptions import complete_draft
 from cdpr_drake.models.formats.detection import SUFFIXES, is_foreign, read_foreign
 from cdpr_drake.models.materials import check_materials
+from cdpr_drake.models.mechanism_files import (
+    MECHANISM_FILE,
+    is_mechanism,
+    is_mechanism_text,
+    shipped_mechanism,
+    single_platform,
+)
+from cdpr_drake.models.mechanism_schema import Mechanism
 from cdpr_drake.models.robot_schema import SHAPE_INERTIA, Pose, Robot
 from cdpr_drake.models.shapes import MESH, check_shapes, mesh_files
 from cdpr_drake.schema.typed_yaml import closest, load_typed, parse_typed
@@ -59,7 +67,7 @@ def robot_file(name: str) -> Path:
 
     Coordinates of exit points on rails may follow, as in `name@C1=0.3`; they do not change it. A
     folder has a `robot.yaml`, or is a CASPR model; files of other tools are told by their
-    endings, `ROBOT_SUFFIXES`.
+    endings, `ROBOT_SUFFIXES`. It may be that of a mechanism, which `load_mechanism` reads.
 
     Raises:
         RobotFileError: There is no such robot; says which exist.
@@ -67,9 +75,9 @@ def robot_file(name: str) -> Path:
     name, _ = split_name(name)
     path, is_ours = Path(name), name in robot_names()
     if not is_ours and path.is_dir():
-        own = path / "robot.yaml"
-        if own.is_file():
-            return own
+        for own in (path / "robot.yaml", path / MECHANISM_FILE):
+            if own.is_file():
+                return own
         if any("bod" in child.name.lower() for child in path.glob("*.[xX][mM][lL]")):
             return path
     if name.lower().endswith(SUFFIXES):
@@ -77,17 +85,24 @@ def robot_file(name: str) -> Path:
             raise RobotFileError(f"{path}: there is no such robot file")
         return path
     if not is_ours:
+        mechanism = shipped_mechanism(name)
+        if mechanism is not None:
+            return mechanism
         file = path.suffix or "/" in name
         hint = f"; the path of a robot file has to end in {', '.join(SUFFIXES)}" if file else ""
         raise RobotFileError(f"robot {name!r} is unknown; {closest(name, robot_names())}{hint}")
     return _FOLDER / name / "robot.yaml"
 
 
-def robot_text(name: str) -> str:
+def robot_text(name: str, asks: str = "robot_text") -> str:
     """The robot file of a robot as YAML, also where its file is one of another tool.
 
+    Args:
+        name: As for `load_robot`.
+        asks: What asks, for the refusal of mechanisms.
+
     Raises:
-        RobotFileError: Unknown robot, or its file cannot be read.
+        RobotFileError: Unknown robot, its file cannot be read, or is that of a mechanism.
     """
     path, (_, rails) = robot_file(name), split_name(name)
     if is_foreign(path):
@@ -97,6 +112,8 @@ def robot_text(name: str) -> str:
             content = path.read_text(encoding="utf-8")
         except (OSError, UnicodeDecodeError) as problem:
             raise RobotFileError(f"{path}: cannot be read: {problem}") from problem
+        if is_mechanism_text(content):
+            raise single_platform(path, asks)
     if not rails:
         return content
     robot = parse_robot(content, path)
@@ -104,7 +121,7 @@ def robot_text(name: str) -> str:
     return yaml_dump_typed(robot)
 
 
-def load_robot(name: str | Path) -> Robot:
+def load_robot(name: str | Path, asks: str = "load_robot") -> Robot:
     """Reads a robot by name or by path, also from a file of another tool.
 
     What a foreign file lacks is assumed, and stands in the robot's `assumptions`. Exit points on
@@ -112,15 +129,18 @@ def load_robot(name: str | Path) -> Robot:
 
     Args:
         name: A name of `robot_names()`, or the path of a file or folder.
+        asks: What asks, for the refusal of mechanisms.
 
     Raises:
-        RobotFileError: Unknown robot, or the file does not describe a possible one.
+        RobotFileError: Unknown robot, or the file does not describe a possible one, or a mechanism.
     """
     name = str(name)
     path, (_, rails) = robot_file(name), split_name(name)
     if is_foreign(path):
         robot = parse_robot(complete_draft(read_foreign(path)).yaml(), path)
     else:
+        if is_mechanism(path):
+            raise single_platform(path, asks)
         robot = load_typed(Robot, path, error=RobotFileError)
         if not rails:
             _check(robot, path)
@@ -129,8 +149,12 @@ def load_robot(name: str | Path) -> Robot:
     return robot
 
 
-def as_robot(robot: Robot | str | Path) -> Robot:
+def as_robot(robot: Robot | str | Path, asks: str = "load_robot") -> Robot:
     """A robot that is given as itself, or by name or path as `load_robot` takes it.
+
+    Args:
+        robot: The robot.
+        asks: What asks, for the refusal of mechanisms.
 
     Raises:
         RobotFileError: As `load_robot`, or it is something else.
@@ -138,7 +162,9 @@ def as_robot(robot: Robot | str | Path) -> Robot:
     if isinstance(robot, Robot):
         return robot
     if isinstance(robot, str | Path):
-        return load_robot(robot)
+        return load_robot(robot, asks)
+    if isinstance(robot, Mechanism):
+        raise single_platform(robot.name, asks)
     raise RobotFileError(
         f"robot: found a {type(robot).__name__}; accepted: a name, a path or a Robot"
     )
@@ -182,6 +208,8 @@ def parse_robot(content: str, path: Path) -> Robot:
     Raises:
         RobotFileError: The text does not describe a possible robot.
     """
+    if is_mechanism_text(content):
+        raise single_platform(path, "a robot file")
     robot = parse_typed(Robot, content, path, error=RobotFileError)
     _check(robot, path)
     return robot

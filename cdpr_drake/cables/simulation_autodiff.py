@@ -127,7 +127,14 @@ _routes = {
 
 
 def tree_force_array(
-    tree: Array, state: Any, l0: Any, l0_dot: Any, routes: tuple[Array, Any, Any], law: int, nv: int
+    tree: Array,
+    state: Any,
+    l0: Any,
+    l0_dot: Any,
+    routes: tuple[Array, Any, Any],
+    *,
+    law: int,
+    nv: int,
 ) -> tuple[Any, Any, int]:
     """`route_kernel.any_tree_force` for arrays of any scalar.
 

@@ -13,6 +13,10 @@ SMALLEST, LARGEST = 1e-100, 1e30
 """Sizes of numbers but zero in any unit; squares and cubes of others are no floats any more."""
 
 
+NAMED = {"named_numbers": "numbers", "named_texts": "texts", "named_sections": "mappings"}
+"""Kinds of fields whose keys are names that a user chose, with what stands behind each."""
+
+
 @dataclass(frozen=True)
 class FieldRule:
     """What a schema field accepts; stored as `metadata["rule"]` of the dataclass field.
@@ -52,6 +56,8 @@ class FieldRule:
             words = "a mapping"
         elif self.kind == "sections":
             words = "a list of mappings"
+        elif self.kind in NAMED:
+            words = f"a mapping from names to {NAMED[self.kind]}"
         else:
             words = {"number": "a number", "whole": "a whole number"}.get(self.kind, "")
             if self.kind == "array":
@@ -183,3 +189,18 @@ def optional_section(doc: str) -> Any:
 def sections(doc: str, required: bool = True) -> Any:
     """A list of nested mappings."""
     return _make({"doc": doc, "kind": "sections"}, REQUIRED if required else [], [])
+
+
+def named_numbers(doc: str, unit: str) -> Any:
+    """A mapping from names to numbers, one or a list for each, arrays of shape (n,)."""
+    return _make({"doc": doc, "kind": "named_numbers", "unit": unit}, dict, dict)
+
+
+def named_texts(doc: str) -> Any:
+    """A mapping from names to texts."""
+    return _make({"doc": doc, "kind": "named_texts"}, dict, dict)
+
+
+def named_sections(doc: str) -> Any:
+    """A mapping from names to nested mappings."""
+    return _make({"doc": doc, "kind": "named_sections"}, dict, dict)

@@ -54,6 +54,14 @@ def _property(rule: FieldRule, bare: Any) -> dict[str, Any]:
         made = _object(bare)
     elif rule.kind == "sections":
         made = {"type": "array", "items": _object(bare)}
+    elif rule.kind == "named_sections":
+        made = {"type": "object", "additionalProperties": _object(bare)}
+    elif rule.kind == "named_texts":
+        made = {"type": "object", "additionalProperties": {"type": "string"}}
+    elif rule.kind == "named_numbers":
+        one = _number(rule)
+        several = {"type": "array", "items": one, "minItems": 1}
+        made = {"type": "object", "additionalProperties": {"anyOf": [one, several]}}
     elif rule.kind == "texts":
         made = {"type": "array", "items": _text(rule)}
     elif rule.kind == "text":

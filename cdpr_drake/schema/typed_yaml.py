@@ -19,7 +19,7 @@ from typing import Any, TypeVar
 import yaml
 
 from cdpr_drake.errors import DataFileError, Problems
-from cdpr_drake.schema.fields import FieldRule
+from cdpr_drake.schema.fields import NAMED, FieldRule
 from cdpr_drake.schema.yaml_files import cached_yaml, other_kind, too_many_bytes, too_many_nodes
 
 
@@ -168,11 +168,13 @@ def rules_of(schema: type) -> dict[str, tuple[FieldRule, Any]]:
 
 
 def _bare_type(hint: Any) -> Any:
-    """The type inside Optional[...] or list[...]; other hints as they are."""
+    """The type inside Optional[...], list[...] or dict[str, ...]; other hints as they are."""
     if typing.get_origin(hint) in (typing.Union, types.UnionType):
         hint = next(a for a in typing.get_args(hint) if a is not type(None))
     if typing.get_origin(hint) is list:
         hint = typing.get_args(hint)[0]
+    if typing.get_origin(hint) is dict:
+        hint = typing.get_args(hint)[1]
     return hint
 
 
@@ -316,10 +318,39 @@ class _Checker:
                     self.section(bare, child, f"{key}[{index}]")
                 else:
                     self.scalar(dataclasses.replace(rule, kind="text"), child, f"{key}[{index}]")
+        elif rule.kind in NAMED:
+            self.named(rule, bare, node, key)
         elif rule.kind == "array":
             self.numbers(rule, node, key, rule.shape)
         else:
             self.scalar(rule, node, key)
+
+    def named(self, rule: FieldRule, bare: Any, node: yaml.Node, key: str) -> None:
+        if not isinstance(node, yaml.MappingNode) or node.tag != _TAG + "map":
+            self.fail(node, key, f"found {show(node)}; accepted: {rule.accepts()}")
+            return
+        seen: set[str] = set()
+        for k, (name_node, child) in enumerate(node.value):
+            full = f"{key}.{show(name_node)}"
+            if not isinstance(name_node, yaml.ScalarNode):
+                self.fail(name_node, full, "found no name; accepted: a name")
+                continue
+            name_node.tag = _TAG + "str"
+            if name_node.value in seen:
+                self.fail(name_node, full, "found twice; accepted: once")
+            seen.add(name_node.value)
+            if rule.kind == "named_sections":
+                self.section(bare, child, full)
+            elif rule.kind == "named_texts":
+                self.scalar(dataclasses.replace(rule, kind="text"), child, full)
+            else:
+                if isinstance(child, yaml.ScalarNode):  # one number is a list of one
+                    child = yaml.SequenceNode(
+                        _TAG + "seq", [child], child.start_mark, child.end_mark, flow_style=True
+                    )
+                    node.value[k] = (name_node, child)
+                one = dataclasses.replace(rule, kind="array", shape=(None,))
+                self.numbers(one, child, full, one.shape)
 
     def numbers(
         self, rule: FieldRule, node: yaml.Node, key: str, shape: tuple[int | None, ...]

@@ -203,7 +203,7 @@ def RouteForces_(T: Any) -> type[LeafSystem]:
         def _of_any(self, context: Context) -> tuple[Any, Any]:
             force, drums, bad = tree_force_array(
                 self._tree.table, self._state(context), self._l0(context), self._rates(context),
-                self._data.packed, self._data.law, self._tree.num_velocities,
+                self._data.packed, law=self._data.law, nv=self._tree.num_velocities,
             )  # fmt: skip
             if bad >= 0:
                 raise self._data.problem(bad, context)
