@@ -3,7 +3,9 @@
 MJCF lets several joints carry one body, the outermost first, as the joints of CASPR are chains of
 moves and turns. So each coordinate of CASPR is the one of a joint here, at the same value, and
 rates are the same, too; Drake puts massless bodies between the joints, which the other formats
-that it reads would have to name.
+that it reads would have to name. A body with several joints lies in the origin of the body that
+carries it, if need be in one that is fixed there: Drake 1.51 puts all but the last of its joints
+into that origin, wherever `pos` says.
 
 Source: mujoco.readthedocs.io, XML reference; github.com/darwinlau/CASPR, src/Model/Bodies.
 """
@@ -14,17 +16,20 @@ import re
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable
 
-from cdpr_drake.models.formats.caspr_trees import GRAVITY, CasprTree, Step
+import numpy as np
+
+from cdpr_drake.models.formats.caspr_trees import GRAVITY, CasprJoint, CasprLink, CasprTree, Step
 from cdpr_drake.models.formats.reading import robot_name
 
+_BASE = "_base"
 _LETTERS = {(1.0, 0.0, 0.0): "x", (0.0, 1.0, 0.0): "y", (0.0, 0.0, 1.0): "z"}
 
 
 def link_names(tree: CasprTree) -> tuple[str, ...]:
     """Names of the links as bodies have them: letters, digits and underscores, each once.
 
-    Names stay different from those of the massless bodies, which Drake calls by the link's name
-    and a number.
+    Names stay different from those of the massless bodies, which bear the link's name and a number,
+    as Drake gives it, or `_base`.
     """
     names: list[str] = []
     for number, link in enumerate(tree.links, 1):
@@ -32,10 +37,17 @@ def link_names(tree: CasprTree) -> tuple[str, ...]:
         while name in names or name.lower() == "world":
             name = f"{name}_{number}"
         names.append(name)
-    for k, link in enumerate(tree.links):
-        while any(f"{names[k]}{i}" in names for i in range(len(link.joint.steps))):
+    while clashing := [
+        k for k, link in enumerate(tree.links) if not _own_names(names[k], link).isdisjoint(names)
+    ]:
+        for k in clashing:
             names[k] += "_"
     return tuple(names)
+
+
+def _own_names(name: str, link: CasprLink) -> set[str]:
+    """Names of the massless bodies of a link, beside its own."""
+    return {f"{name}{_BASE}", *(f"{name}{i}" for i in range(len(link.joint.steps)))}
 
 
 def joint_names(tree: CasprTree) -> tuple[tuple[str, ...], ...]:
@@ -83,9 +95,12 @@ def write_mechanism(tree: CasprTree) -> str:
         number = next(k for k in waiting if tree.links[k - 1].parent in made)
         waiting.remove(number)
         link = tree.links[number - 1]
-        body = ET.SubElement(
-            made[link.parent], "body", name=names[number - 1], pos=_words(link.location)
-        )
+        carrier, place = made[link.parent], link.location
+        if len(link.joint.steps) > 1 and np.any(place):
+            name = names[number - 1] + _BASE
+            carrier = ET.SubElement(carrier, "body", name=name, pos=_words(place))
+            place = np.zeros(3)
+        body = ET.SubElement(carrier, "body", name=names[number - 1], pos=_words(place))
         made[number] = body
         if link.mass > 0.0:
             ET.SubElement(
@@ -98,8 +113,9 @@ def write_mechanism(tree: CasprTree) -> str:
                 body, "joint", name=joints[number - 1][k], type="hinge" if step.turns else "slide",
                 axis=_words(step.axis),
             )  # fmt: skip
-            if link.joint.lower is not None and link.joint.upper is not None:
-                joint.set("range", _words((link.joint.lower[k], link.joint.upper[k])))
+            limits = held_limits(link.joint, k)
+            if limits is not None:
+                joint.set("range", _words(limits))
             if link.joint.actuated:
                 motors.append(joints[number - 1][k])
     if motors:
@@ -108,6 +124,29 @@ def write_mechanism(tree: CasprTree) -> str:
             ET.SubElement(actuator, "motor", name=name, joint=name)
     ET.indent(root, "  ")
     return ET.tostring(root, encoding="unicode") + "\n"
+
+
+def held_limits(joint: CasprJoint, coordinate: int) -> tuple[float, float] | None:
+    """Limits of a coordinate; None: none are given, or it starts beyond them."""
+    if joint.lower is None or joint.upper is None:
+        return None
+    low, high = float(joint.lower[coordinate]), float(joint.upper[coordinate])
+    return (low, high) if low <= joint.initial[coordinate] <= high else None
+
+
+def limit_remarks(tree: CasprTree) -> list[str]:
+    """Which joints start beyond their limits, a sentence for all of them, if any."""
+    found = [
+        name
+        for names, link in zip(joint_names(tree), tree.links, strict=True)
+        for k, name in enumerate(names)
+        if link.joint.lower is not None
+        and link.joint.upper is not None
+        and held_limits(link.joint, k) is None
+    ]
+    if not found:
+        return []
+    return [f"Limits of joints that start beyond them were left out: {', '.join(found)}."]
 
 
 def _words(values: Iterable[float]) -> str:

@@ -24,8 +24,7 @@ src/Model/Cables/CableAttachments.
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
-from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -33,6 +32,12 @@ from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RollPitchYaw, RotationMatrix
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.models.formats.caspr_pulleys import (
+    PULLEYS,
+    read_pulley,
+    short_name,
+    triple,
+)
 from cdpr_drake.models.formats.reading import child_text, fail, number, numbers, read_xml
 
 GRAVITY = 9.81
@@ -41,6 +46,9 @@ GRAVITY = 9.81
 SMALLEST_SHARE = 1e-12
 """Moments of inertia that break the rules of bodies by less, as a share of the largest, are rounded
 numbers: files of CASPR have four digits or more."""
+
+THINNEST = 1e-6
+"""Repaired bodies extend in every direction by this share, squared, of their largest extent."""
 
 _AXES = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
 
@@ -86,7 +94,8 @@ KINDS: dict[str, tuple[Step, ...]] = {
 AXIS_KINDS = {"R_AXIS": True, "P_AXIS": False}
 """Joints with an axis of their own, and whether they turn."""
 
-_QUATERNIONS = {"S_QUATERNION": "S_EULER_XYZ", "SPATIAL_QUATERNION": "SPATIAL_EULER_XYZ"}
+QUATERNIONS = {"S_QUATERNION": "S_EULER_XYZ", "SPATIAL_QUATERNION": "SPATIAL_EULER_XYZ"}
+"""Joints by quaternions, and those that move alike."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -147,6 +156,7 @@ class CasprCable:
         lower: Smallest force [N]; None: not given.
         upper: Largest force [N]; None: not given.
         stiffness: Stiffness times length, E S [N]; None: it does not stretch.
+        diameter: Diameter [m]; None: not given.
         pulley_radius: Radius of a pulley at the first point [m]; 0: none.
         entry: Direction in which the cable comes to that pulley, in W, of length 1, shape (3,).
     """
@@ -157,6 +167,7 @@ class CasprCable:
     lower: float | None = None
     upper: float | None = None
     stiffness: float | None = None
+    diameter: float | None = None
     pulley_radius: float = 0.0
     entry: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
 
@@ -187,7 +198,13 @@ class CasprTree:
         return sum(len(link.joint.steps) for link in self.links)
 
 
-def read_tree(bodies: Path, cables: Path, name: str, cable_set: str | None = None) -> CasprTree:
+def read_tree(
+    bodies: Path,
+    cables: Path,
+    name: str,
+    cable_set: str | None = None,
+    repair_inertia: bool = False,
+) -> CasprTree:
     """Reads the links of a model and one set of its cables.
 
     Args:
@@ -195,13 +212,15 @@ def read_tree(bodies: Path, cables: Path, name: str, cable_set: str | None = Non
         cables: File of its cables.
         name: Name of the model.
         cable_set: The set of cables; None: the default one of the file.
+        repair_inertia: Whether moments of inertia that no body can have, and those of rods without
+            thickness, become the nearest that a body with a thickness can have; a remark each.
 
     Raises:
         RobotFileError: A file is not accepted; names element, value and what is accepted.
     """
     remarks: list[str] = []
     root = read_xml(bodies)
-    links = _links(bodies, root, remarks)
+    links = _links(bodies, root, repair_inertia, remarks)
     system = root if root.tag == "links" else root.find("links")
     words = "" if system is None else system.get("display_range") or ""
     display = numbers(bodies, "display_range", words, 6) if words.strip() else None
@@ -212,14 +231,14 @@ def read_tree(bodies: Path, cables: Path, name: str, cable_set: str | None = Non
     )  # fmt: skip
 
 
-def _links(path: Path, root: ET.Element, remarks: list[str]) -> tuple[CasprLink, ...]:
+def _links(path: Path, root: ET.Element, repair: bool, remarks: list[str]) -> tuple[CasprLink, ...]:
     by_number: dict[int, CasprLink] = {}
     for item in root.iter("link_rigid"):
         where = f"link {item.get('num', '?')}"
         num = _whole(path, f"{where}, num", item.get("num"), 1, "a whole number from 1 on")
         if num in by_number:
             raise fail(path, f"{where}, num", num, "numbers that are given once")
-        by_number[num] = _link(path, item, where, remarks)
+        by_number[num] = _link(path, item, where, repair, remarks)
     if not by_number:
         raise fail(path, "link_rigid", "none", "at least one link")
     count = len(by_number)
@@ -239,7 +258,7 @@ def _links(path: Path, root: ET.Element, remarks: list[str]) -> tuple[CasprLink,
     return tuple(by_number[num] for num in range(1, count + 1))
 
 
-def _link(path: Path, item: ET.Element, where: str, remarks: list[str]) -> CasprLink:
+def _link(path: Path, item: ET.Element, where: str, repair: bool, remarks: list[str]) -> CasprLink:
     name = item.get("name") or where
     physical, parent = item.find("physical"), item.find("parent")
     if physical is None or parent is None:
@@ -248,25 +267,39 @@ def _link(path: Path, item: ET.Element, where: str, remarks: list[str]) -> Caspr
     mass = number(path, f"{where}, mass", child_text(path, physical, "mass", f"{where}, mass"))
     if mass < 0.0:
         raise fail(path, f"{where}, mass", f"{mass:g}", "at least 0 [kg]")
-    com = _triple(path, physical, "com_location", where)
-    end = _triple(path, physical, "end_location", where) if (
+    com = triple(path, physical, "com_location", where)
+    end = triple(path, physical, "end_location", where) if (
         (physical.findtext("end_location") or "").strip()
     ) else np.zeros(3)  # fmt: skip
     num = child_text(path, parent, "num", f"{where}, parent.num")
+    inertia = _inertia(path, physical, where, mass, com)
+    if repair:
+        inertia, words = possible_inertia(inertia), _shown(inertia)
+        if _shown(inertia) != words:
+            remarks.append(
+                f"{where}: principal moments {words} were changed to {_shown(inertia)} kg m^2, the "
+                "nearest that a body with a thickness can have."
+            )
+    elif excess(inertia) > SMALLEST_SHARE:
+        raise fail(
+            path, f"{where}, inertia", _shown(inertia),
+            "principal moments about the centre of mass that a body can have, none above the sum "
+            "of the two others; or to have them repaired",
+        )  # fmt: skip
     return CasprLink(
         name=name,
         parent=_whole(path, f"{where}, parent.num", num, 0, "a whole number from 0 on"),
-        location=_triple(path, parent, "location", where),
+        location=triple(path, parent, "location", where),
         joint=_joint(path, item, where, remarks),
         mass=mass,
         com=com,
         end=end,
-        inertia=_inertia(path, physical, where, mass, com),
+        inertia=inertia,
     )
 
 
 def _inertia(path: Path, physical: ET.Element, where: str, mass: float, com: Array) -> Array:
-    """Moments and products about the centre of mass, as a body can have them."""
+    """Moments and products about the centre of mass, as the file has them."""
     item = physical.find("inertia")
     if item is None:
         raise fail(path, where, "no inertia", "an element <inertia>")
@@ -282,16 +315,48 @@ def _inertia(path: Path, physical: ET.Element, where: str, mass: float, com: Arr
         raise fail(path, f"{where}, inertia.ref", reference, "com or joint")
     if reference == "joint":
         given = given - mass * _of_point(com)
-    moments = np.linalg.eigvalsh(matrix_of(given))
-    excess = max(moments[2] - moments[1] - moments[0], -moments[0])
-    if excess > SMALLEST_SHARE * max(float(np.max(np.abs(moments))), 0.0):
-        words = ", ".join(f"{value:.4g}" for value in moments)
-        raise fail(
-            path, f"{where}, inertia", words,
-            "principal moments about the centre of mass that a body can have, at least 0 and none "
-            "above the sum of the two others",
-        )  # fmt: skip
     return given
+
+
+def excess(inertia: Array) -> float:
+    """By how much a body's extent is below zero in some direction, as a share of its largest.
+
+    Args:
+        inertia: Moments and products about the centre of mass, shape (6,).
+
+    Returns:
+        At most 0 for bodies that can be; 0 for those without thickness.
+    """
+    extents = np.linalg.eigvalsh(_second_moments(inertia))
+    largest = float(np.max(np.abs(extents)))
+    return float(-extents[0]) / largest if largest > 0.0 else 0.0
+
+
+def possible_inertia(inertia: Array) -> Array:
+    """The nearest moments and products of a body that extends in every direction, shape (6,).
+
+    The integral of r r' over the mass, I_3 tr(I) / 2 - I, is positive definite for such a body. Of
+    it the eigenvalues below `THINNEST` of the largest are raised to that.
+
+    Args:
+        inertia: Moments and products about the centre of mass, shape (6,); zero stays zero.
+    """
+    values, V = np.linalg.eigh(_second_moments(inertia))
+    least = THINNEST * float(values[-1])
+    if least <= 0.0 or values[0] >= least:
+        return inertia
+    S = V @ np.diag(np.maximum(values, least)) @ V.T
+    R = np.trace(S) * np.eye(3) - S
+    return np.array([R[0, 0], R[1, 1], R[2, 2], R[0, 1], R[0, 2], R[1, 2]])
+
+
+def _second_moments(inertia: Array) -> Array:
+    J = matrix_of(inertia)
+    return np.asarray(np.trace(J) / 2.0 * np.eye(3) - J)
+
+
+def _shown(inertia: Array) -> str:
+    return ", ".join(f"{value:.5g}" for value in np.linalg.eigvalsh(matrix_of(inertia)) + 0.0)
 
 
 def _of_point(p: Array) -> Array:
@@ -312,15 +377,15 @@ def _joint(path: Path, item: ET.Element, where: str, remarks: list[str]) -> Casp
         raise fail(path, where, "no joint", "an element <joint type=...>")
     kind = found.get("type", "").strip().upper()
     given = found.get("q_initial")
-    if kind in _QUATERNIONS:
+    if kind in QUATERNIONS:
         q = _euler_of(
             numbers(path, f"{where}, joint.q_initial", given or "", 4 + 3 * (kind[1] == "P"))
         )
         remarks.append(
-            f"{where}: the joint {kind} was read as {_QUATERNIONS[kind]}, which moves alike; its "
+            f"{where}: the joint {kind} was read as {QUATERNIONS[kind]}, which moves alike; its "
             "limits were left out."
         )
-        kind = _QUATERNIONS[kind]
+        kind = QUATERNIONS[kind]
         return CasprJoint(kind=kind, steps=KINDS[kind], initial=q, actuated=_actuated(found))
     steps = KINDS.get(kind, ())
     words = found.get("axis")
@@ -331,7 +396,7 @@ def _joint(path: Path, item: ET.Element, where: str, remarks: list[str]) -> Casp
         x, y, z = axis / np.linalg.norm(axis)
         steps = (Step(AXIS_KINDS[kind], (float(x), float(y), float(z)), 0),)
     elif not steps:
-        known = ", ".join((*KINDS, *AXIS_KINDS, *_QUATERNIONS))
+        known = ", ".join((*KINDS, *AXIS_KINDS, *QUATERNIONS))
         raise fail(path, f"{where}, joint.type", kind, known)
     elif words:
         raise fail(path, f"{where}, joint.axis", words, "an axis of R_AXIS and P_AXIS only")
@@ -393,23 +458,40 @@ def _cables(
             continue
         if item.tag not in ("cable_ideal", "cable_linear_spring"):
             varying.add(item.tag)
-        cables.append(_cable(path, item, len(cables) + 1, links))
+        cables.append(_cable(path, item, len(cables) + 1, links, remarks))
     if varying:
         remarks.append(
             f"Cables are of the kind {', '.join(sorted(varying))}, whose stiffness depends on "
             "their force; it was not kept."
         )
-    twice = [word for word, times in Counter(c.name for c in cables).items() if times > 1]
-    if twice:
-        raise fail(path, f"cable_set {name}, name", twice[0], "names that are given once")
-    return name, tuple(cables)
+    return name, _told_apart(cables, remarks)
+
+
+def _told_apart(cables: list[CasprCable], remarks: list[str]) -> tuple[CasprCable, ...]:
+    """Names of cables here, each once; CASPR tells them by their place."""
+    known: set[str] = set()
+    found = []
+    for place, cable in enumerate(cables, 1):
+        name = short_name(cable.name)
+        if name in known:
+            name = f"{name} {place}"
+            remarks.append(f"Cable {place} is the second {cable.name!r}; it is called {name!r}.")
+        known.add(name)
+        found.append(replace(cable, name=name))
+    return tuple(found)
 
 
 def _is_cable(item: ET.Element) -> bool:
     return item.tag.startswith("cable_") and "passive" not in item.tag
 
 
-def _cable(path: Path, item: ET.Element, place: int, links: tuple[CasprLink, ...]) -> CasprCable:
+def _cable(
+    path: Path,
+    item: ET.Element,
+    place: int,
+    links: tuple[CasprLink, ...],
+    remarks: list[str],
+) -> CasprCable:
     name = item.get("name") or f"cable {place}"
     reference = item.get("attachment_reference", "")
     if reference not in ("com", "joint"):
@@ -419,17 +501,19 @@ def _cable(path: Path, item: ET.Element, place: int, links: tuple[CasprLink, ...
     holder = item.find("attachments")
     for index, attachment in enumerate(() if holder is None else holder):
         where = f"{name}, attachment {index + 1}"
-        if attachment.tag == "base_rotating_pulley" and index == 0:
-            radius, entry = _pulley(path, attachment, where)
+        if attachment.tag in PULLEYS and index == 0:
+            pulley = read_pulley(path, attachment, where, remarks)
+            radius, entry = pulley.radius, pulley.entry
             numbers_of.append(0)
-            points.append(_triple(path, attachment, "fixed_location", where))
+            points.append(pulley.point)
             continue
         if attachment.tag != "attachment":
+            first = " or ".join(f"<{tag}>" for tag in PULLEYS)
             raise fail(path, where, f"<{attachment.tag}>",
-                       "<attachment>, or as the first one <base_rotating_pulley>")  # fmt: skip
+                       f"<attachment>, or as the first one {first}")  # fmt: skip
         link = _whole(path, f"{where}, link", child_text(path, attachment, "link", where), 0,
                       f"0, the world, or a link, 1 to {len(links)}", len(links))  # fmt: skip
-        point = _triple(path, attachment, "location", where)
+        point = triple(path, attachment, "location", where)
         if link and reference == "com":
             point = links[link - 1].com + point
         numbers_of.append(link)
@@ -437,7 +521,7 @@ def _cable(path: Path, item: ET.Element, place: int, links: tuple[CasprLink, ...
     if len(points) < 2:
         raise fail(path, f"{name}, attachments", len(points), "at least two")
     given: dict[str, float | None] = {}
-    for key in ("force_min", "force_max", "K"):
+    for key in ("force_min", "force_max", "K", "diameter"):
         text = (item.findtext(f"properties/{key}") or "").strip()
         given[key] = number(path, f"{name}, {key}", text) if text else None
     spring = item.tag == "cable_linear_spring"
@@ -448,26 +532,9 @@ def _cable(path: Path, item: ET.Element, place: int, links: tuple[CasprLink, ...
         raise fail(path, f"{name}, force_min", f"{low:g}", f"at most force_max, {high:g} [N]")
     return CasprCable(
         name=name, links=tuple(numbers_of), points=np.array(points).T, lower=low, upper=high,
-        stiffness=given["K"] if spring else None, pulley_radius=radius, entry=entry,
+        stiffness=given["K"] if spring else None,
+        diameter=given["diameter"] or None, pulley_radius=radius, entry=entry,
     )  # fmt: skip
-
-
-def _pulley(path: Path, item: ET.Element, where: str) -> tuple[float, Array]:
-    """Radius, and the direction in which the cable comes."""
-    words = child_text(path, item, "pulley_radius", where)
-    radius = number(path, f"{where}, pulley_radius", words)
-    entry = _triple(path, item, "cable_entry_vector", where)
-    if radius < 0.0:
-        raise fail(path, f"{where}, pulley_radius", f"{radius:g}", "at least 0 [m]")
-    if not np.any(entry):
-        raise fail(
-            path, f"{where}, cable_entry_vector", entry.tolist(), "a vector that is not zero"
-        )
-    return radius, entry / np.linalg.norm(entry)
-
-
-def _triple(path: Path, parent: ET.Element, name: str, where: str) -> Array:
-    return numbers(path, f"{where}, {name}", child_text(path, parent, name, f"{where}, {name}"), 3)
 
 
 def _whole(
