@@ -2,6 +2,8 @@ from .analyses.front.calibration import calibrate as calibrate
 from .analyses.front.calibration import identify as identify
 from .analyses.front.design import optimize_design as optimize_design
 from .analyses.front.exchange import import_robot as import_robot
+from .analyses.front.mechanisms import hang_mechanism as hang_mechanism
+from .analyses.front.mechanisms import solve_mechanism_tensions as solve_mechanism_tensions
 from .analyses.front.planning import plan_free_motion as plan_free_motion
 from .analyses.front.planning import plan_path as plan_path
 from .analyses.front.session import Session as Session
@@ -24,6 +26,11 @@ from .analyses.front.workspaces import compute_workspace as compute_workspace
 from .errors import CdprError as CdprError
 from .errors import StoppedError as StoppedError
 from .geometry.cable_set import CableSet as CableSet
+from .models.mechanism_files import mechanism_names as mechanism_names
+from .models.mechanism_in_plant import add_mechanism as add_mechanism
+from .models.mechanism_loader import load_mechanism as load_mechanism
+from .models.mechanism_loader import load_robot_or_mechanism as load_robot_or_mechanism
+from .models.mechanism_schema import Mechanism as Mechanism
 from .models.robot_exchange import export_robot as export_robot
 from .models.robot_in_plant import add_robot as add_robot
 from .models.robot_loader import load_robot as load_robot

@@ -169,7 +169,7 @@ def export_robot(robot: Robot | str | Path, format: str) -> dict[str, str]:
         RobotFileError: There is no such format, or it cannot hold this robot. What it cannot hold
             of one that it takes, `export_omissions` says.
     """
-    robot = as_robot(robot)
+    robot = as_robot(robot, "export_robot")
     check_format(format)
     turn, words = gravity_turn(robot), world_turn(robot, format)
     if turn is None or not words:

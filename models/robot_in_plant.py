@@ -28,6 +28,8 @@ from pydrake.systems.framework import Context
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.platform_joint import PlatformJoint
+from cdpr_drake.models.mechanism_files import single_platform
+from cdpr_drake.models.mechanism_schema import Mechanism
 from cdpr_drake.models.robot_schema import SHAPE_INERTIA, Robot
 
 _PLATFORM_COLOR = np.array([0.25, 0.45, 0.75, 1.0])
@@ -178,7 +180,12 @@ def add_robot(plant: MultibodyPlant, robot: Robot, name: str | None = None) -> R
 
     Returns:
         Handles to the platform in the plant.
+
+    Raises:
+        RobotFileError: It is a Mechanism, which `add_mechanism` takes.
     """
+    if isinstance(robot, Mechanism):
+        raise single_platform(robot.name, "add_robot")
     instance = plant.AddModelInstance(name or robot.name)
     body = plant.AddRigidBody("platform", instance, platform_inertia(robot))
     plant.mutable_gravity_field().set_gravity_vector(robot.gravity_vector())

@@ -171,11 +171,16 @@ def as_robot(robot: Robot | str | Path, asks: str = "load_robot") -> Robot:
 
 
 @contextmanager
-def robot_reference(robot: Robot | str | Path) -> Iterator[str]:
+def robot_reference(robot: Robot | str | Path, asks: str = "load_robot") -> Iterator[str]:
     """A name or path by which `load_robot` finds a robot inside the block.
 
     That of a Robot is a file of its own, which goes with the block.
+
+    Raises:
+        RobotFileError: It is a Mechanism; `asks` is what asks.
     """
+    if isinstance(robot, Mechanism):
+        raise single_platform(robot.name, asks)
     if not isinstance(robot, Robot):
         yield str(robot)
         return

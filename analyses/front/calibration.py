@@ -124,7 +124,7 @@ def calibrate(
         DataFileError: A file cannot be read.
         OutputFolderError: The folder holds other things, or cannot be written.
     """
-    loaded = as_robot(robot)
+    loaded = as_robot(robot, "calibrate")
     _check_names(options, (*ASKED, *KEPT), CalibrationError)
     read, places = _inputs(loaded, log, tags, tag_size, tracker_late)
     asked = {name: options[name] for name in ASKED if name in options}
@@ -226,7 +226,7 @@ def identify(
         DataFileError: A file cannot be read.
         OutputFolderError: The folder holds other things, or cannot be written.
     """
-    loaded = as_robot(robot)
+    loaded = as_robot(robot, "identify")
     known = [field.name for field in fields(IdentificationTask)]
     _check_names(options, [k for k in known if k not in ("robot", "unknown")], IdentificationError)
     read = _read(loaded, log, tracker_late)

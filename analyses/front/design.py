@@ -89,9 +89,9 @@ def optimize_design(
         OutputFolderError: The folder belongs to other arguments, or cannot be written.
     """
     told, (count, scheduler) = session or Session(), asked_workers(workers)
-    with robot_reference(robot) as name, _kept(folder, told) as there:
+    with robot_reference(robot, "optimize_design") as name, _kept(folder, told) as there:
         where = Path(there)
-        loaded = load_robot(name)
+        loaded = load_robot(name, "optimize_design")
         asked, words = _settings(loaded, settings, source)
         if generations is not None:
             asked = replace(asked, generations=generations)

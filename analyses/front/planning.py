@@ -136,7 +136,7 @@ def plan_path(
             and the cable.
         CdprError: The path makes no sense.
     """
-    loaded, given = as_robot(robot), _limits(limits)
+    loaded, given = as_robot(robot, "plan_path"), _limits(limits)
     task = _task(loaded, given, pulleys)
     found = path_poses(loaded, path)
     way = make_path(loaded, found.poses, corners, tolerance)
@@ -187,7 +187,7 @@ def plan_free_motion(
     for name in asked:
         if name not in ASKED:
             raise PlanningError(f"{name!r} is unknown; {closest(name, ASKED)}")
-    loaded, given = as_robot(robot), _limits(limits)
+    loaded, given = as_robot(robot, "plan_free_motion"), _limits(limits)
     if isinstance(asked.get("obstacles"), str | Path):
         asked["obstacles"] = load_obstacles(Path(asked["obstacles"]))
     settings = FreeSettings(start=as_pose(loaded, start), goal=as_pose(loaded, goal), **asked)

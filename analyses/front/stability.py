@@ -108,7 +108,7 @@ def stability_question(
         robot, scheme=scheme, verdict=verdict,
         bounds=load_bounds(Path(bounds)) if isinstance(bounds, str | Path) else bounds,
         vary=vary, grid=pose_grid(robot, grid), options=_options(options),
-        statics=static_case(as_robot(robot), **held),
+        statics=static_case(as_robot(robot, "assess_stability"), **held),
         task=None if scenario is None else scenario_task(robot, scenario),
     )  # fmt: skip
 
@@ -163,7 +163,9 @@ def assess_stability(
             run = stability_workspaces(question, where, count, scheduler, told.progress, told.stop)
         if run.workspaces is None:
             raise stopped(run.progress)
-        found = as_kind(DrawnStability, run.workspaces, robot=as_robot(robot), folder=where)
+        found = as_kind(
+            DrawnStability, run.workspaces, robot=as_robot(robot, "assess_stability"), folder=where
+        )
         if where is None:
             return found
         with told.doing("Writing results"):

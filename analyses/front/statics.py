@@ -146,7 +146,7 @@ def solve_static(
     if pose is not None and lengths is not None:
         raise EquilibriumError("pose, lengths: found both; accepted: one of them")
     _check_model(model, CABLE_MODELS)
-    loaded = as_robot(robot)
+    loaded = as_robot(robot, "solve_static")
     if lengths is None:
         found = static_at_pose(loaded, as_pose(loaded, pose), model, pulleys)
     else:
@@ -194,7 +194,7 @@ def find_equilibria(
         raise EquilibriumError(f"seed: found {seed}; accepted: at least 0")
     if position is not None and model == "elastic":
         raise EquilibriumError("position: found with elastic cables; accepted: inextensible ones")
-    loaded = as_robot(robot)
+    loaded = as_robot(robot, "find_equilibria")
     if position is not None:
         place = np.asarray(position, float)
         if place.shape != (3,) or not np.all(np.isfinite(place)):
@@ -232,7 +232,7 @@ def solve_forward_kinematics(
 
     Source: servoing thesis, section 2.2.3.
     """
-    loaded = as_robot(robot)
+    loaded = as_robot(robot, "solve_forward_kinematics")
     cables = loaded.cable_set() if pulleys else loaded.cable_set().without_pulleys()
     start: RigidTransform = as_pose(loaded, guess)
     solver = ForwardKinematics(cables, loaded.motion_type())

@@ -280,7 +280,7 @@ def compare_tensions(
 
 
 def _at(robot: Robot | str | Path, pose: object) -> tuple[Robot, RigidTransform]:
-    loaded = as_robot(robot)
+    loaded = as_robot(robot, "solve_tensions")
     return loaded, as_pose(loaded, pose)
 
 

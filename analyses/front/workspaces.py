@@ -230,7 +230,7 @@ def default_box(
     Returns:
         Lower corner, upper corner and step, shape (3,) each [m].
     """
-    defaults = workspace_defaults(as_robot(robot), _name(robot))
+    defaults = workspace_defaults(as_robot(robot, "compute_workspace"), _name(robot))
     lower, upper, step = defaults.lower, defaults.upper, defaults.step
     if box is None:
         return lower, upper, step
@@ -283,7 +283,7 @@ def workspace_question(
     for name in asked:
         if name not in ASKED:
             raise WorkspaceError(f"{name!r} is unknown; {closest(name, (*ASKED, *SHAPES))}")
-    loaded = as_robot(robot)
+    loaded = as_robot(robot, "compute_workspace")
     own = {"pulleys": True} | {k: v for k, v in asked.items() if k not in (*AROUND, *WRENCHES)}
     force, moment = (asked.get(name) for name in WRENCHES)
     required = own.get("required")
@@ -355,7 +355,7 @@ def compute_workspace(
     question = workspace_question(
         robot, kinds, grid, measures=measures, orientations=orientations, box=box, **asked
     )
-    loaded = as_robot(robot)
+    loaded = as_robot(robot, "compute_workspace")
     search = None
     if shapes.certify:
         search = box_search(question, loaded, (shapes.exit_error, shapes.anchor_error), box)

@@ -186,7 +186,7 @@ def make_question(
     if verdict not in VERDICTS:
         raise StabilityError(f"verdict {verdict!r} is unknown; {closest(verdict, VERDICTS)}")
     name = robot.name if isinstance(robot, Robot) else str(robot)
-    robot = as_robot(robot)
+    robot = as_robot(robot, "stability")
     defaults = workspace_defaults(robot, name)
     if grid is None:
         grid = grid_by_step(defaults.lower, defaults.upper, defaults.step)
@@ -252,7 +252,7 @@ def scenario_task(robot: Robot | str | Path, scenario: str) -> CameraTask:
             about neither.
         ScenarioError: There is no such scenario, or the robot does not fit into it.
     """
-    with robot_reference(robot) as name:
+    with robot_reference(robot, "stability") as name:
         loaded = load_scenario(scenario, [f"robot={name}"])
     where = f"scenario {scenario}"
     if loaded.target.carrier != "world":
@@ -264,6 +264,6 @@ def scenario_task(robot: Robot | str | Path, scenario: str) -> CameraTask:
         raise StabilityError(f"{where}: found target.motion; accepted: an object that rests")
     return CameraTask(
         FixedObject(loaded.target.pose.transform(), loaded.desired.transform()),
-        as_robot(robot).camera_mount(loaded.camera.mount).pose.transform(),
+        as_robot(robot, "stability").camera_mount(loaded.camera.mount).pose.transform(),
         "object",
     )

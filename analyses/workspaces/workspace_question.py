@@ -233,7 +233,7 @@ def make_workspace_question(
         raise WorkspaceError(f"kinds: found none; accepted: {', '.join(KINDS)}")
     if not (np.isfinite(asked.clearance) and asked.clearance >= 0.0):
         raise WorkspaceError(f"clearance: found {asked.clearance:g}; accepted: >= 0 [m]")
-    given, robot = robot, as_robot(robot)
+    given, robot = robot, as_robot(robot, "a workspace")
     check_grid(robot, grid)
     about = pose_conditions(robot, asked)
     if "stable" in kinds:
@@ -331,7 +331,7 @@ def camera_view(robot: Robot, scenario: str) -> CameraView:
         WorkspaceError: The camera is not on the platform, or the target does not rest.
         ScenarioError: There is no such scenario, or the robot does not fit into it.
     """
-    with robot_reference(robot) as name:
+    with robot_reference(robot, "a workspace") as name:
         loaded = load_scenario(scenario, [f"robot={name}"])
     if loaded.target.carrier != "world" or loaded.target.motion is not None:
         raise WorkspaceError(

@@ -153,7 +153,7 @@ def calibrate(
     if poses_from is not None:
         raise CdprError("--poses-from: found without --campaign; accepted: with it")
     name, file = robot_and_log("calibrate", robot, log)
-    loaded = load_robot(name)
+    loaded = load_robot(name, "cdpr calibrate")
     folder = results_below_runs(out, f"calibrate-{loaded.name}")
     session = CommandSession(STOPPING, folder)
     with named_options(OPTIONS):

@@ -8,10 +8,12 @@ from typing import Annotated, Any
 import typer
 import yaml
 
+from cdpr_drake.analyses.front.mechanisms import hang_mechanism
 from cdpr_drake.cli.options import AsJson
 from cdpr_drake.cli.terminal import print_json
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models.formats.detection import is_foreign
+from cdpr_drake.models.mechanism_loader import load_mechanism, names_mechanism
 from cdpr_drake.models.robot_exchange import import_robot
 from cdpr_drake.models.robot_holding import hold_robot
 from cdpr_drake.models.robot_loader import load_robot
@@ -40,6 +42,8 @@ def _read(path: Path) -> tuple[str, list[str]]:
     if _is_scenario(path):
         load_scenario(str(path))
         return "scenario", []
+    if names_mechanism(path):
+        return "mechanism", _mechanism_notes(path)
     robot = load_robot(str(path))
     cables = robot.cable_set()
     try:
@@ -47,6 +51,17 @@ def _read(path: Path) -> tuple[str, list[str]]:
     except CdprError as problem:
         return "robot", [f"the home pose: {problem}"]
     return "robot", []
+
+
+def _mechanism_notes(path: Path) -> list[str]:
+    """What a user may want to know of a mechanism; raises what is wrong with its file."""
+    mechanism = load_mechanism(path)
+    try:
+        found = hang_mechanism(mechanism)
+    except CdprError as problem:
+        return [f"the home positions: {problem}"]
+    falls = found.rest.stability != "stable"
+    return [*found.rest.notes, *([f"at home it is {found.rest.stability}"] if falls else [])]
 
 
 def _is_scenario(path: Path) -> bool:
@@ -63,7 +78,7 @@ def check(
     ],
     as_json: AsJson = False,
 ) -> None:
-    """Checks robot and scenario files and says all that is wrong with them; exit code 2 then."""
+    """Checks files of robots, mechanisms, scenarios; says all that is wrong; exit code 2 then."""
     found = [checked(path) for path in files]
     if as_json:
         print_json(found)

@@ -118,7 +118,7 @@ def design(
     names = [one.name for one in settings.goals]
     if len(set(names)) < len(names):
         raise CdprError(f"--goal: found {', '.join(names)}; accepted: each once")
-    loaded = load_robot(robot)
+    loaded = load_robot(robot, "cdpr design")
     if parameters is None and loaded.is_planar():
         settings.exit_points.reach = np.array([REACH, REACH, 0.0])
     options = {"goals": "--goal"} if goal else {}

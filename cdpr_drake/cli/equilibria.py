@@ -56,7 +56,7 @@ def equilibria(
     if (position is None) == (lengths is None):
         found = "neither" if position is None else "both"
         raise CdprError(f"--lengths, --position: found {found}; accepted: one of them")
-    loaded = load_robot(robot)
+    loaded = load_robot(robot, "cdpr equilibria")
     place, given = None, None
     if position is not None:
         place = parse_numbers("--position", position, (3,), "x,y,z [m]")

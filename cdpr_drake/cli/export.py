@@ -40,7 +40,7 @@ def export(
     as_json: AsJson = False,
 ) -> None:
     """Exports a robot to the format of another tool."""
-    loaded = load_robot(robot)
+    loaded = load_robot(robot, "cdpr export")
     paths = write_files(out, export_robot(loaded, format), overwrite)
     lost = export_omissions(loaded, format)
     if as_json:

@@ -121,7 +121,7 @@ def identify(
             )  # fmt: skip
         return tell_fit(simulated, session, as_json)
     name, file = robot_and_log("identify", robot, log)
-    loaded = load_robot(name)
+    loaded = load_robot(name, "cdpr identify")
     folder = results_below_runs(out, f"identify-{loaded.name}")
     session = CommandSession(STOPPING, folder)
     with named_options(OPTIONS):

@@ -65,7 +65,7 @@ def new(
 
 
 def _robot(source: str) -> tuple[type, dict[str, Any]]:
-    load_robot(source)  # for its message, where there is none
+    load_robot(source, "cdpr new")  # for its message, where there is none
     return Robot, yaml.safe_load(robot_text(source))
 
 

@@ -249,7 +249,7 @@ def plan(
     cable.
     """
     formats = parse_formats(figure_format)
-    loaded = load_robot(robot)
+    loaded = load_robot(robot, "cdpr plan")
     given = LimitSettings(
         tensions=parse_limits(limits), cable_speed=cable_speed,
         cable_acceleration=cable_acceleration, speed=speed, reserve=reserve,

@@ -9,22 +9,25 @@ import typer
 
 from cdpr_drake.cli.completion import words_among
 from cdpr_drake.errors import CdprError
+from cdpr_drake.models.mechanism_schema import Mechanism
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.schema.json_schemas import json_schema
 from cdpr_drake.systems.diagrams.load import SCENARIO_SCHEMAS
 
-ROBOT, SCENARIO = "robot", "scenario"
-FILES = (ROBOT, SCENARIO)
+ROBOT, MECHANISM, SCENARIO = "robot", "mechanism", "scenario"
+FILES = (ROBOT, MECHANISM, SCENARIO)
 
 
 def file_schema(kind: str) -> dict[str, Any]:
-    """The JSON schema of robot or scenario files; of scenarios, that of the file's `kind`.
+    """The JSON schema of files of a kind; of scenarios, that of the file's `kind`.
 
     Raises:
         CdprError: There is no such kind of file.
     """
     if kind == ROBOT:
         return json_schema(Robot, "robot of cdpr_drake")
+    if kind == MECHANISM:
+        return json_schema(Mechanism, "mechanism of cdpr_drake")
     if kind != SCENARIO:
         raise CdprError(f"kind of file: found {kind}; accepted: {', '.join(FILES)}")
     kinds = {
@@ -43,8 +46,8 @@ def file_schema(kind: str) -> dict[str, Any]:
 
 def schema(
     kind: Annotated[
-        str, typer.Argument(help="robot or scenario.", autocompletion=words_among(FILES))
+        str, typer.Argument(help="robot, mechanism or scenario.", autocompletion=words_among(FILES))
     ],
 ) -> None:
-    """Prints the JSON schema of robot or scenario files, for editors."""
+    """Prints the JSON schema of robot, mechanism or scenario files, for editors."""
     print(json.dumps(file_schema(kind), indent=2))

@@ -1,4 +1,4 @@
-"""`cdpr static`: a robot at rest, at a pose or with given cable lengths."""
+"""`cdpr static`: a robot or a mechanism at rest, at a pose or with given cable lengths."""
 
 from __future__ import annotations
 
@@ -10,15 +10,36 @@ import typer
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
+from cdpr_drake.analyses.front.mechanisms import hang_mechanism
 from cdpr_drake.analyses.front.statics import solve_static
 from cdpr_drake.analyses.statics.static_query import StaticReport
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.models import CABLE_MODELS
 from cdpr_drake.cli.completion import words_among
-from cdpr_drake.cli.options import POSE, AsJson, RobotName, parse_numbers, parse_pose, save_plot
+from cdpr_drake.cli.mechanism_options import (
+    Held,
+    Joint,
+    parse_joints,
+    parse_names,
+    print_rest,
+    refuse_for_mechanisms,
+    refuse_for_robots,
+)
+from cdpr_drake.cli.options import (
+    POSE,
+    AsJson,
+    RobotName,
+    parse_limits,
+    parse_numbers,
+    parse_pose,
+    save_plot,
+)
 from cdpr_drake.cli.terminal import message_console, print_json, wide_console, working
 from cdpr_drake.errors import CdprError
 from cdpr_drake.geometry.poses import angles_from_rotation
+from cdpr_drake.models.mechanism_loader import load_mechanism, names_mechanism
+from cdpr_drake.models.plant_rest import POSE as YIELDING_POSE
+from cdpr_drake.models.plant_rest import PRESTRESS
 from cdpr_drake.models.robot_loader import load_robot
 
 
@@ -36,10 +57,64 @@ def static(
         ),
     ] = "elastic",
     pulleys: Annotated[bool, typer.Option(help="Cables run over the robot's pulleys.")] = True,
+    joint: Joint = None,
+    yields: Annotated[
+        str | None,
+        typer.Option(
+            help="Of a mechanism: prestress, positions stay; pose, tensions get to the prestress.",
+            autocompletion=words_among((PRESTRESS, YIELDING_POSE)),
+        ),
+    ] = None,
+    prestress: Annotated[
+        str | None,
+        typer.Option(help="Of a mechanism: wanted tensions, one for all or t1,...,tm [N]."),
+    ] = None,
+    free: Annotated[
+        str | None,
+        typer.Option(
+            help="Of a mechanism: joints that settle, a,b or none; without, those that neither "
+            "cables nor motors act on."
+        ),
+    ] = None,
+    held: Held = None,
+    limits: Annotated[
+        str | None,
+        typer.Option(help="Of a mechanism: tension limits lo,hi [N] in the place of its own."),
+    ] = None,
     as_json: AsJson = False,
     plot: Annotated[Path | None, typer.Option(help="Draw cables, tensions, frequencies.")] = None,
 ) -> None:
-    """Lengths, tensions, stiffness, vibrations and sag of a robot at rest."""
+    """Lengths, tensions, stiffness, vibrations and sag of a robot at rest.
+
+    A mechanism is held at its home by tensions, or with --lengths comes to rest from there.
+    """
+    own = {
+        "joint": joint, "yields": yields, "prestress": prestress, "free": free, "held": held,
+        "limits": limits,
+    }  # fmt: skip
+    if names_mechanism(robot):
+        refuse_for_mechanisms({"pose": pose, "plot": plot})
+        mechanism = load_mechanism(robot)
+        m = len(mechanism.cables)
+        with working(message_console(), f"{mechanism.name} at rest"):
+            at_rest = hang_mechanism(
+                mechanism,
+                parse_numbers("--lengths", lengths, (m,), f"{m} lengths [m]") if lengths else None,
+                joints=parse_joints(joint),
+                model=cable_model,
+                pulleys=pulleys,
+                yields=yields or PRESTRESS,
+                free=parse_names(free),
+                held=parse_names(held),
+                prestress=_prestress(prestress, m),
+                limits=parse_limits(limits),
+            )
+        if as_json:
+            print_json(at_rest.as_dict())
+        else:
+            print_rest(at_rest)
+        return
+    refuse_for_robots(own)
     if (pose is None) == (lengths is None):
         found = "neither" if pose is None else "both"
         raise CdprError(f"--pose, --lengths: found {found}; accepted: one of them")
@@ -59,6 +134,14 @@ def static(
         print_json(report.as_dict())
     else:
         _print(report)
+
+
+def _prestress(words: str | None, m: int) -> Array | None:
+    """Wanted tensions, shape (m,) [N]; raises as `parse_numbers`."""
+    if words is None:
+        return None
+    values = parse_numbers("--prestress", words, (1, m), f"one number, or {m} of them [N]")
+    return np.broadcast_to(np.array(values), (m,))
 
 
 def _print(report: StaticReport) -> None:

@@ -11,6 +11,7 @@ import typer
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
+from cdpr_drake.analyses.front.mechanisms import solve_mechanism_tensions
 from cdpr_drake.analyses.front.tensions import (
     UNDERACTUATED,
     TensionsAtPose,
@@ -19,6 +20,15 @@ from cdpr_drake.analyses.front.tensions import (
     solve_tensions,
 )
 from cdpr_drake.cli.completion import words_among
+from cdpr_drake.cli.mechanism_options import (
+    Held,
+    Joint,
+    parse_joints,
+    parse_names,
+    print_tensions,
+    refuse_for_mechanisms,
+    refuse_for_robots,
+)
 from cdpr_drake.cli.options import (
     POSE,
     AsJson,
@@ -33,6 +43,7 @@ from cdpr_drake.cli.options import (
 )
 from cdpr_drake.cli.terminal import message_console, print_json, wide_console, working
 from cdpr_drake.errors import CdprError
+from cdpr_drake.models.mechanism_loader import load_mechanism, names_mechanism
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.tensions.methods import METHODS
 from cdpr_drake.tensions.problem import TensionSolution
@@ -40,7 +51,7 @@ from cdpr_drake.tensions.problem import TensionSolution
 
 def tension(
     robot: RobotName,
-    pose: Annotated[str, POSE],
+    pose: Annotated[str | None, POSE] = None,
     method: Annotated[
         str,
         typer.Option(help="Method by name, or all.", autocompletion=words_among([*METHODS, "all"])),
@@ -55,6 +66,8 @@ def tension(
         float | None,
         typer.Option(help="By which slack_relaxed and log_barrier divide moments [m]."),
     ] = None,
+    joint: Joint = None,
+    held: Held = None,
     as_json: AsJson = False,
     plot: Annotated[
         Path | None, typer.Option(help="Draw the feasible polygon with the methods' points.")
@@ -66,12 +79,33 @@ def tension(
 ) -> None:
     """Finds cable tensions that hold the platform at a pose, or proves that there are none.
 
+    A mechanism is held at its home, on all that no motor holds.
+
     With fewer cables than degrees of freedom: which combinations of the wrench's components the
     cables cannot change, and tensions where nothing is left unbalanced.
 
     The exit code is 0 for every answer, `infeasible` and `missed` included: read `status` in the
     table or with --json. It is 2 where the question is not accepted.
     """
+    if names_mechanism(robot):
+        refuse_for_mechanisms({
+            "pose": pose, "wrench": wrench, "mass": mass, "plot": plot,
+            "wrench-set-plot": wrench_set_plot,
+        })  # fmt: skip
+        mechanism = load_mechanism(robot)
+        with working(message_console(), f"Distributing tensions of {mechanism.name}"):
+            tensions = solve_mechanism_tensions(
+                mechanism, method, joints=parse_joints(joint), held=parse_names(held),
+                limits=parse_limits(limits), reference=reference, length_scale=length_scale,
+            )  # fmt: skip
+        if as_json:
+            print_json(tensions.as_dict())
+        else:
+            print_tensions(tensions)
+        return
+    refuse_for_robots({"joint": joint, "held": held})
+    if pose is None:
+        raise CdprError("Missing option '--pose'; see cdpr tension --help")
     loaded = load_robot(robot)
     X_WP, external, bounds = parse_pose(pose), parse_wrench(wrench), parse_limits(limits)
     cables = [cable.name for cable in loaded.cables]

@@ -35,7 +35,7 @@ def view(
     """
     if html is not None and (host is not None or port is not None):
         raise CdprError("--host, --port: accepted without --html only, which needs no server")
-    loaded = load_robot(robot)
+    loaded = load_robot(robot, "cdpr view")
     if html is not None and html.suffix.lower() not in PAGES:  # whose file it would replace
         raise OutputFolderError(f"--html: found {html}; accepted: a file that ends in .html")
     if html is not None and not html.absolute().parent.is_dir():

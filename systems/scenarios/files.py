@@ -173,7 +173,7 @@ def load_with_robot(schema: type[S], name: str, overrides: Sequence[str]) -> tup
     if scenario.world is not None:
         scenario.world.find_files(path.parent)
     try:
-        robot = load_robot(scenario.robot)
+        robot = load_robot(scenario.robot, "a scenario")
     except RobotFileError as problem:
         raise RobotFileError(*problem.within(f"{path}: robot")) from problem
     trajectory = getattr(scenario, "trajectory", None)
@@ -190,7 +190,7 @@ def _check_belief(scenario: Any, robot: Robot, path: Path) -> None:
     perturbations, where = scenario.perturbations, f"{path}: perturbations.believed_robot"
     perturbations.believed_robot = resolve_robot_path(path, perturbations.believed_robot)
     try:
-        believed = load_robot(perturbations.believed_robot)
+        believed = load_robot(perturbations.believed_robot, "a scenario")
     except RobotFileError as problem:
         raise RobotFileError(*problem.within(where)) from problem
     true, found = len(robot.cables), len(believed.cables)

@@ -79,7 +79,9 @@ class Workbench:
         self.calculator = calculator or Calculator()
         where = robot_file(robot).resolve()
         self.files = RobotFiles(folder, where.parent)
-        self.robot: Document[Robot] = Document(robot_text(robot), where, self.files.read)
+        self.robot: Document[Robot] = Document(
+            robot_text(robot, "the studio"), where, self.files.read
+        )
         self._saved: dict[Path, str] = {}
         is_own = where.is_relative_to(folder.root) and where.is_file() and not is_foreign(where)
         if is_own:  # with rails that the name moves, the text is not that of the file
