@@ -160,7 +160,7 @@ def _thin(tree: CasprTree) -> str:
     ]
     if not found:
         return ""
-    return f"; links without thickness, which repair_inertia gives them: {', '.join(found)}"
+    return f"; links without thickness, which --repair-inertia gives them: {', '.join(found)}"
 
 
 def export_mechanism(

@@ -124,13 +124,13 @@ def links_of_plant(plant: MultibodyPlant, context: Context, touched: set[int]) -
             made.X_LB[child] = X_LF @ joint.X_FM() @ X_MB
             waiting = leaving.get(child, []) + waiting
             continue
-        chain = list(_motions(joint, X_LF.rotation(), context, int(joint.index()) in driven))
+        chain = list(_motions(plant, joint, X_LF.rotation(), context, int(joint.index()) in driven))
         X_LB = RigidTransform(X_LF.rotation(), np.zeros(3)) @ X_MB
         inner = child
         while (following := _only_massless(plant, leaving, inner, X_LB, touched)) is not None:
             X_LF_inner = X_LB @ following.frame_on_parent().GetFixedPoseInBodyFrame()
             chain += _motions(
-                following, X_LF_inner.rotation(), context, int(following.index()) in driven
+                plant, following, X_LF_inner.rotation(), context, int(following.index()) in driven
             )
             X_LB = RigidTransform(X_LF_inner.rotation(), np.zeros(3)) @ (
                 following.frame_on_child().GetFixedPoseInBodyFrame().inverse()
@@ -167,11 +167,14 @@ def _only_massless(
 
 
 def _motions(
-    joint: Any, R_LF: RotationMatrix, context: Context, actuated: bool
+    plant: MultibodyPlant, joint: Any, R_LF: RotationMatrix, context: Context, actuated: bool
 ) -> Iterator[_Motion]:
     """A joint as moves and turns, the outermost first, along axes of its link's frame."""
     A = R_LF.matrix()
-    q = [float(value) for value in joint.GetPositions(context)]
+    start = joint.position_start()
+    q = [
+        float(value) for value in plant.GetPositions(context)[start : start + joint.num_positions()]
+    ]
     limits = [
         (float(low), float(high))
         for low, high in zip(

@@ -284,7 +284,7 @@ def _link(path: Path, item: ET.Element, where: str, repair: bool, remarks: list[
         raise fail(
             path, f"{where}, inertia", _shown(inertia),
             "principal moments about the centre of mass that a body can have, none above the sum "
-            "of the two others; or to have them repaired",
+            "of the two others; --repair-inertia takes the nearest such ones",
         )  # fmt: skip
     return CasprLink(
         name=name,
