@@ -121,7 +121,7 @@ class RobotPicture:
         self._known = True
         self.title = "" if scenario is None else scenario.title
         if look:
-            _look(self.meshcat, robot)
+            look_at(self.meshcat, robot.frame.lower, robot.frame.upper)
 
     def draw(
         self,
@@ -211,9 +211,9 @@ def _visualized(
     return block, builder.Build(), visualizer
 
 
-def _look(meshcat: Meshcat, robot: Robot) -> None:
-    """Looks from the front and above, past the pillars, with the robot filling the window."""
-    lower, upper = robot.frame.lower, robot.frame.upper
+def look_at(meshcat: Meshcat, lower: Array, upper: Array) -> None:
+    """Looks from the front and above, past pillars, with a box from lower to upper in W [m]
+    filling the window."""
     middle, size = (lower + upper) / 2.0, float(np.linalg.norm(upper - lower))
     eye = middle + size * np.array([-0.18, -0.8, 0.3])
     meshcat.SetCameraPose(eye, middle)

@@ -556,7 +556,9 @@ class RouteMemory:
         """For a tree, what `CableRoutes.packed` gives, the number of cables and their law."""
         room, bodies = make_route_room(packed[0], cables, law), make_tree_room(tree)
         self.arrays = (tree, *packed, room, bodies)
-        self._kept = [np.ascontiguousarray(array) for array in self.arrays]
+        # Whole numbers are read along one axis.
+        in_one_axis = [a if a.dtype == np.float64 else a.ravel() for a in self.arrays]
+        self._kept = [np.ascontiguousarray(array) for array in in_one_axis]
         self.table = array_addresses(self._kept)
 
 

@@ -28,6 +28,13 @@ def robot_words(incomplete: str) -> list[str]:
     return _beginning(incomplete, [path.parent.name for path in found])
 
 
+def robot_or_mechanism_words(incomplete: str) -> list[str]:
+    """Robots and mechanisms that come with the package."""
+    found = (_PACKAGE / "models" / "robots").glob("*/mechanism.yaml")
+    mechanisms = _beginning(incomplete, [path.parent.name for path in found])
+    return sorted(robot_words(incomplete) + mechanisms)
+
+
 def scenario_words(incomplete: str) -> list[str]:
     """Scenarios that come with the package."""
     found = (_PACKAGE / "systems" / "scenarios").glob("*.yaml")
@@ -51,13 +58,13 @@ def _beginning(incomplete: str, names: Collection[str]) -> list[str]:
 FIRST_ARGUMENT: dict[str, Complete] = {
     "simulate": scenario_words,
     "serve": scenario_words,
-    "tension": robot_words,
-    "static": robot_words,
+    "tension": robot_or_mechanism_words,
+    "static": robot_or_mechanism_words,
     "equilibria": robot_words,
     "design": robot_words,
     "stability": robot_words,
     "plan": robot_words,
-    "view": robot_words,
+    "view": robot_or_mechanism_words,
     "studio": studio_words,
     "export": robot_words,
     "calibrate": robot_words,

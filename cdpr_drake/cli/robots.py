@@ -16,6 +16,9 @@ from cdpr_drake.cli.options import AsJson
 from cdpr_drake.cli.robot_folder import write_files
 from cdpr_drake.cli.terminal import print_json, wide_console
 from cdpr_drake.errors import CdprError, OutputFolderError
+from cdpr_drake.models.mechanism_files import mechanism_names
+from cdpr_drake.models.mechanism_loader import load_mechanism
+from cdpr_drake.models.mechanism_schema import Mechanism
 from cdpr_drake.models.robot_loader import load_robot, robot_names
 from cdpr_drake.models.robot_schema import Robot
 
@@ -51,6 +54,18 @@ def robot_facts(robot: Robot) -> dict[str, Any]:
     }
 
 
+def mechanism_facts(mechanism: Mechanism) -> dict[str, Any]:
+    """What a list of mechanisms shows; SI units as the keys end."""
+    return {
+        "name": mechanism.name,
+        "title": mechanism.title,
+        "cables": len(mechanism.cables),
+        "eyelets": sum(len(cable.via) for cable in mechanism.cables),
+        "tension_bounds_n": list(mechanism.tension_limits()),
+        "assumptions": mechanism.assumptions,
+    }
+
+
 def robots(
     motion: Annotated[
         str | None, typer.Option(help="Only those of this motion type, such as 3R3T.")
@@ -81,9 +96,23 @@ def robots(
         Path | None,
         typer.Option(help="Write a page of pictures, .html, that opens without a server."),
     ] = None,
+    mechanisms: Annotated[
+        bool,
+        typer.Option("--mechanisms", help="List mechanisms, whose cables join any bodies."),
+    ] = False,
     as_json: AsJson = False,
 ) -> None:
     """Lists the robots that come with the package, all or those that options choose."""
+    if mechanisms:
+        choices = (motion, cables, suspended, underactuated, camera, search, gallery)
+        if any(choice is not None for choice in choices):
+            raise CdprError("--mechanisms: found with other choices; accepted: alone, or --json")
+        found = [mechanism_facts(load_mechanism(name)) for name in mechanism_names()]
+        if as_json:
+            print_json(found)
+        else:
+            _print_mechanisms(found)
+        return
     if gallery is not None:
         _check_page(gallery)
     everything = [load_robot(name) for name in robot_names()]
@@ -169,6 +198,17 @@ def _write_gallery(page: Path, loaded: list[Robot]) -> None:
     from cdpr_drake.analyses.visualization.robot_gallery import gallery_page
 
     write_files(page.parent, {page.name: gallery_page(loaded)}, overwrite=True)
+
+
+def _print_mechanisms(facts: list[dict[str, Any]]) -> None:
+    table = Table(title="Mechanisms", box=SIMPLE_HEAD, padding=(0, 1), pad_edge=False)
+    for heading in ("name", "m", "tensions"):
+        table.add_column(heading, no_wrap=True)
+    table.add_column("title")
+    for f in facts:
+        low, high = f["tension_bounds_n"]
+        table.add_row(f["name"], str(f["cables"]), f"{low:g}..{high:g} N", f["title"])
+    wide_console().print(table)
 
 
 def _print_table(facts: list[dict[str, Any]]) -> None:

@@ -99,7 +99,9 @@ def static(
         with working(message_console(), f"{mechanism.name} at rest"):
             at_rest = hang_mechanism(
                 mechanism,
-                parse_numbers("--lengths", lengths, (m,), f"{m} lengths [m]") if lengths else None,
+                parse_numbers("--lengths", lengths, (m,), f"{m} lengths [m]")
+                if lengths is not None
+                else None,
                 joints=parse_joints(joint),
                 model=cable_model,
                 pulleys=pulleys,

@@ -1,4 +1,4 @@
-"""`cdpr view`: shows a robot in a browser."""
+"""`cdpr view`: shows a robot or a mechanism in a browser."""
 
 from __future__ import annotations
 
@@ -9,13 +9,18 @@ from typing import Annotated
 
 import typer
 
+from cdpr_drake.analyses.visualization.mechanism_picture import (
+    MechanismPicture,
+    mechanism_picture,
+)
 from cdpr_drake.analyses.visualization.meshcat_window import LOCAL, open_meshcat, page_address
-from cdpr_drake.analyses.visualization.replay import robot_picture
+from cdpr_drake.analyses.visualization.replay import RobotPicture, robot_picture
 from cdpr_drake.cli.options import LISTENING, Host, Port, RobotName, named_options
 from cdpr_drake.cli.robot_folder import write_files
 from cdpr_drake.cli.terminal import message_console, working
 from cdpr_drake.errors import CdprError, OutputFolderError
-from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.mechanism_loader import load_robot_or_mechanism
+from cdpr_drake.models.mechanism_schema import Mechanism
 
 PAGES = (".html", ".htm")
 
@@ -29,13 +34,13 @@ def view(
     host: Host = None,
     port: Port = None,
 ) -> None:
-    """Shows a robot at its home pose, held by its cables, in Meshcat.
+    """Shows a robot or a mechanism at its home, held by its cables, in Meshcat.
 
     A robot that cannot be held there is shown with grey cables, and stderr says why.
     """
     if html is not None and (host is not None or port is not None):
         raise CdprError("--host, --port: accepted without --html only, which needs no server")
-    loaded = load_robot(robot, "cdpr view")
+    loaded = load_robot_or_mechanism(robot)
     if html is not None and html.suffix.lower() not in PAGES:  # whose file it would replace
         raise OutputFolderError(f"--html: found {html}; accepted: a file that ends in .html")
     if html is not None and not html.absolute().parent.is_dir():
@@ -43,7 +48,10 @@ def view(
     with named_options(LISTENING):
         meshcat = open_meshcat(host or LOCAL, port)
     with working(message_console(), f"Drawing {loaded.name}"):
-        picture = robot_picture(loaded, meshcat)
+        if isinstance(loaded, Mechanism):
+            picture: RobotPicture | MechanismPicture = mechanism_picture(loaded, meshcat)
+        else:
+            picture = robot_picture(loaded, meshcat)
     if picture.problem:
         print(f"warning: the cables are grey: {picture.problem}", file=sys.stderr)
     if html is not None:
