@@ -309,7 +309,10 @@ def _add_masses(made: LinksOfPlant, plant: MultibodyPlant) -> None:
         M_BBo_B = item.CalcSpatialInertiaInBodyFrame(context)
         X = made.X_LB[body]
         M = M_BBo_B.ReExpress(X.rotation()).Shift(-X.translation())
-        sums[number] = M if number not in sums else sums[number] + M
+        if number in sums:
+            sums[number] += M
+        else:
+            sums[number] = M
     for number, M in sums.items():
         com = M.get_com()
         inertia = M.Shift(com).CalcRotationalInertia()
