@@ -29,9 +29,6 @@ from cdpr_drake.systems.monitoring.meshcat_cables import (
 THIN = 1.6e-3
 """Radius of a drawn cable at least, of the size of what is shown."""
 
-AROUND = 0.15
-"""What is shown round the cables on each side, of their size."""
-
 
 @dataclass(frozen=True, eq=False)
 class MechanismPicture:
@@ -96,7 +93,7 @@ def mechanism_picture(mechanism: Mechanism, meshcat: Meshcat) -> MechanismPictur
             meshcat.SetObject(f"cables/{name}/{k}", Cylinder(radius, length), color)
             middle = RigidTransform(R, own[:, k] + way / 2.0)
             meshcat.SetTransform(f"cables/{name}/{k}", middle)
-    look_at(meshcat, lower - AROUND * size, upper + AROUND * size)
+    look_at(meshcat, lower, upper)
     return MechanismPicture(meshcat, problem)
 
 
