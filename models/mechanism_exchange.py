@@ -13,10 +13,10 @@ from pydrake.multibody.plant import MultibodyPlant
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import RobotFileError
 from cdpr_drake.geometry.cable_routes import CableRoutes
+from cdpr_drake.models.caspr_of_plant import LinksOfPlant, links_of_plant
 from cdpr_drake.models.formats.assumptions import CompletedDraft
 from cdpr_drake.models.formats.caspr import TOOL, is_caspr_tree, model_files
 from cdpr_drake.models.formats.caspr_mechanism import write_mechanism
-from cdpr_drake.models.formats.caspr_of_plant import LinksOfPlant, links_of_plant
 from cdpr_drake.models.formats.caspr_pulleys import short_name
 from cdpr_drake.models.formats.caspr_tree_writer import CABLE_SET, write_tree
 from cdpr_drake.models.formats.caspr_trees import (
