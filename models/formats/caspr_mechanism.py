@@ -5,7 +5,7 @@ moves and turns. So each coordinate of CASPR is the one of a joint here, at the 
 rates are the same, too; Drake puts massless bodies between the joints, which the other formats
 that it reads would have to name. A body with several joints lies in the origin of the body that
 carries it, if need be in one that is fixed there: Drake 1.51 puts all but the last of its joints
-into that origin, wherever `pos` says.
+into that origin, wherever `pos` says. MuJoCo wants links with a thickness.
 
 Source: mujoco.readthedocs.io, XML reference; github.com/darwinlau/CASPR, src/Model/Bodies.
 """

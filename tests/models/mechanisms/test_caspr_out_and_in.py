@@ -139,6 +139,33 @@ def whole(plant, context):
     return M.CopyToFullMatrix6()
 
 
+def test_mujoco_reads_links_and_joints_alike(tmp_path):
+    """The same file at the same coordinates: poses of all links."""
+    mujoco = pytest.importorskip("mujoco")
+    tree = import_mechanism(all_joints().write(tmp_path)).tree
+    text = write_mechanism(tree)
+    plant = MultibodyPlant(0.0)
+    Parser(plant).AddModelsFromString(text, "xml")
+    plant.Finalize()
+    context = plant.CreateDefaultContext()
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    q = np.zeros(plant.num_positions())
+    for name, value in initial_joints(tree).items():
+        q[plant.GetJointByName(name).position_start()] = value
+        data.joint(name).qpos[:] = value
+    plant.SetPositions(context, q)
+    mujoco.mj_kinematics(model, data)
+    for name in link_names(tree):
+        X_WB = plant.EvalBodyPoseInWorld(context, plant.GetBodyByName(name))
+        there = data.body(name)
+        np.testing.assert_allclose(there.xpos, X_WB.translation(), rtol=0, atol=CHAINED)
+        np.testing.assert_allclose(
+            there.xmat.reshape(3, 3), X_WB.rotation().matrix(), rtol=0, atol=CHAINED
+        )
+    assert model.nu == plant.num_actuators() == 2
+
+
 @pytest.mark.parametrize("name", mechanism_names())
 def test_mechanisms_that_ship_hang_the_same_in_caspr(name, tmp_path):
     mechanism = models.load_mechanism(name)
