@@ -16,7 +16,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import BodyIndex, FrameIndex, JointIndex
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import RobotFileError
+from cdpr_drake.errors import Problems, RobotFileError
 from cdpr_drake.geometry.cable_routes import CableRoute, CableRoutes
 from cdpr_drake.models.mechanism_schema import WORLD, EndPulley, Mechanism, MechanismCable
 
@@ -86,10 +86,10 @@ class MechanismInPlant:
         """The cables, on the frames of the plant.
 
         Raises:
-            RobotFileError: A frame is not there; names the cable's key.
+            RobotFileError: Frames are not there; a line for each, with the cable's key.
             CableModelError: A number is not accepted.
         """
-        mechanism, routes = self.mechanism, []
+        mechanism, routes, problems = self.mechanism, [], Problems(RobotFileError)
         materials, stiffness = mechanism.materials(), mechanism.stiffness()
         for i, cable in enumerate(mechanism.cables):
             points = []
@@ -97,7 +97,7 @@ class MechanismInPlant:
                 try:
                     points.append((self.frame(where), np.asarray(point, float)))
                 except RobotFileError as problem:
-                    raise RobotFileError(f"cables[{i}].{key}: {problem}") from problem
+                    problems.add(f"cables[{i}].{key}: {problem}")
             material, load = materials[i], materials[i].breaking_load
             radius, axis = _pulley(mechanism.pulley, cable, "")
             anchor_radius, anchor_axis = _pulley(mechanism.anchor_pulley, cable, "anchor_")
@@ -115,6 +115,7 @@ class MechanismInPlant:
                     anchor_swivel_axis=anchor_axis,
                 )
             )
+        problems.raise_any()
         made = CableRoutes.of(self.plant, routes)
         return made.with_cables(replace(made.ends, down=mechanism.down()))
 
@@ -171,11 +172,11 @@ def add_mechanism(plant: MultibodyPlant, mechanism: Mechanism, name: str = "") -
         else:
             parser.AddModels(str(file))
         plant.mutable_gravity_field().set_gravity_vector(mechanism.gravity_vector())
-    frames = {WORLD: int(plant.world_frame().index())}
-    for index in range(before[0], plant.num_frames()):
-        frame = plant.get_frame(FrameIndex(index))
-        if not frame.name().startswith("__"):
-            frames[_plain(frame.scoped_name().get_full(), name)] = index
+        frames = {WORLD: int(plant.world_frame().index())}
+        for index in range(before[0], plant.num_frames()):
+            frame = plant.get_frame(FrameIndex(index))
+            if not frame.name().startswith("__"):
+                frames[_plain(frame.scoped_name().get_full(), name)] = index
     _set_joints(plant, mechanism, name, before[1])
     _set_bodies(plant, mechanism, name, before[2])
     return MechanismInPlant(plant, mechanism, name, frames)
@@ -236,6 +237,8 @@ def _set_joints(plant: MultibodyPlant, mechanism: Mechanism, prefix: str, before
             raise RobotFileError(
                 f"home.joints.{name}: found {len(values)} numbers; accepted: {n} [rad, m]"
             )
+        if not np.all(np.isfinite(values)):
+            raise RobotFileError(f"home.joints.{name}: found {words}; accepted: finite numbers")
         low, high = joint.position_lower_limits(), joint.position_upper_limits()
         if np.any(values < low) or np.any(values > high):
             limits = " and ".join(f"{a:g}..{b:g}" for a, b in zip(low, high, strict=True))

@@ -25,6 +25,9 @@ MANIFEST = "package.xml"
 LEAST_INERTIA = 1e-12
 """An eigenvalue of the mass matrix below this share of the largest: a joint that moves nothing."""
 
+LARGEST_INERTIA = 1e15
+"""Of the mass matrix [kg, kg m^2]: 1e7 kg at 10 km, as the largest of robots with one platform."""
+
 
 def load_mechanism(name: str | Path) -> Mechanism:
     """Reads a mechanism by name or by path.
@@ -223,7 +226,14 @@ def _check_in_plant(mechanism: Mechanism, path: Path) -> None:
             f"{path}: mechanism: found {Path(mechanism.mechanism).name}, in which nothing moves; "
             "accepted: bodies with joints, or free ones"
         )
-    values = np.linalg.eigvalsh(plant.CalcMassMatrix(context))
+    M = plant.CalcMassMatrix(context)
+    if not np.all(np.isfinite(M)) or np.max(np.abs(M)) > LARGEST_INERTIA:
+        raise RobotFileError(
+            f"{path}: mechanism: found an inertia beyond {LARGEST_INERTIA:g} kg or kg m^2 in "
+            f"{Path(mechanism.mechanism).name}; accepted: bodies of masses and sizes that make "
+            "sense"
+        )
+    values = np.linalg.eigvalsh(M)
     if not values[0] > LEAST_INERTIA * values[-1]:
         raise RobotFileError(
             f"{path}: mechanism: found a joint of {Path(mechanism.mechanism).name} that moves no "

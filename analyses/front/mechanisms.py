@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
@@ -38,6 +38,9 @@ from cdpr_drake.summaries import Summarized, numbers
 from cdpr_drake.tensions.methods import distribute
 from cdpr_drake.tensions.null_space_kernel import RANK_TOLERANCE
 from cdpr_drake.tensions.problem import TensionProblem, TensionSolution, TensionStatus
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 UNDERACTUATED = "quadratic_program"
 """The only method where cables do not control all that no motor holds."""
@@ -99,13 +102,29 @@ class PlacedMechanism:
                 words[row] = f"{kind}{axis} {name}"
         return tuple(words), turns
 
-    def held_rows(self, held: Iterable[str] | None) -> Booleans:
+    def tension_figure(self, tensions: Mapping[str, Array], title: str) -> Figure:
+        """Tensions by method, shape (m,) each [N], with the file's bounds."""
+        from cdpr_drake.analyses.statics.static_figures import tension_figure
+
+        names, (low, high) = self.cables.routes.names, self.mechanism.tension_limits()
+        bounds = np.full(len(names), low), np.full(len(names), high)
+        return tension_figure(names, tensions, bounds, title)
+
+    def held_rows(self, held: str | Iterable[str] | None) -> Booleans:
         """Which velocities motors hold, shape (nv,); None: those with actuators.
 
         Raises:
             EquilibriumError: There is no such joint.
         """
-        return rows_of_motors(self.plant) if held is None else rows_of_joints(self.plant, held)
+        named = joint_names(held)
+        return rows_of_motors(self.plant) if named is None else rows_of_joints(self.plant, named)
+
+
+def joint_names(given: str | Iterable[str] | None) -> tuple[str, ...] | None:
+    """Names of joints, of which one may be given as itself; None: None."""
+    if given is None:
+        return None
+    return (given,) if isinstance(given, str) else tuple(given)
 
 
 def place_mechanism(
@@ -125,13 +144,18 @@ def place_mechanism(
 
     Raises:
         RobotFileError: The file is not accepted, or there is no such joint.
-        EquilibriumError: The model is unknown.
+        EquilibriumError: The model is unknown, or a position is no number.
     """
     if model not in CABLE_MODELS:
         raise EquilibriumError(f"model: {model!r} is unknown; {closest(model, CABLE_MODELS)}")
     loaded = deepcopy(as_mechanism(mechanism))
     for name, value in (joints or {}).items():
-        loaded.home.joints[name] = np.atleast_1d(np.asarray(value, float))
+        try:
+            loaded.home.joints[name] = np.atleast_1d(np.asarray(value, float))
+        except (TypeError, ValueError) as problem:
+            raise EquilibriumError(
+                f"joints: found {value!r} for {name}; accepted: numbers [rad, m]"
+            ) from problem
     plant = MultibodyPlant(0.0)
     added: MechanismInPlant = add_mechanism(plant, loaded)
     added.finalize()
@@ -194,6 +218,11 @@ class MechanismAtRest(Summarized):
             "notes": list(rest.notes),
         }
 
+    def plot(self) -> Figure:
+        """Tensions with the file's bounds."""
+        title = f"{self.placed.mechanism.name} at rest: {self.rest.stability}"
+        return self.placed.tension_figure({"at rest": self.rest.tensions}, title)
+
     def summary(self) -> tuple[str, list[tuple[str, str]]]:
         """What it shows of itself."""
         rest, frequencies = self.rest, self.frequencies
@@ -216,8 +245,8 @@ def hang_mechanism(
     model: str = "elastic",
     pulleys: bool = True,
     yields: str = PRESTRESS,
-    free: Iterable[str] | None = None,
-    held: Iterable[str] | None = None,
+    free: str | Iterable[str] | None = None,
+    held: str | Iterable[str] | None = None,
     prestress: Array | float | None = None,
     limits: tuple[float, float] | None = None,
 ) -> MechanismAtRest:
@@ -254,11 +283,11 @@ def hang_mechanism(
     if lengths is None:
         low, high = placed.mechanism.tension_limits(limits)
         rest = hang(
-            cables, context, yields=yields, free=free, held=held, prestress=prestress,
-            lower=low if low > 0.0 else None, upper=high,
+            cables, context, yields=yields, free=joint_names(free), held=joint_names(held),
+            prestress=prestress, lower=low if low > 0.0 else None, upper=high,
         )  # fmt: skip
     else:
-        rest = settle(cables, context, np.asarray(lengths, float), held=held)
+        rest = settle(cables, context, np.asarray(lengths, float), held=joint_names(held))
     cables.plant.SetPositions(context, rest.positions)
     return MechanismAtRest(placed, rest, cables.outputs(context, rest.unstrained_lengths)[2])
 
@@ -324,6 +353,12 @@ class MechanismTensions(Summarized):
             ],
         }
 
+    def plot(self) -> Figure:
+        """Tensions by each method, with the file's bounds."""
+        found = {one.method: one.tensions for one in self.solutions}
+        title = f"Tensions of {self.placed.mechanism.name}: {self.status}"
+        return self.placed.tension_figure(found or {UNDERACTUATED: self.tensions}, title)
+
     def summary(self) -> tuple[str, list[tuple[str, str]]]:
         """What it shows of itself."""
         name = self.placed.mechanism.name
@@ -343,7 +378,7 @@ def solve_mechanism_tensions(
     method: str = UNDERACTUATED,
     *,
     joints: Mapping[str, float | Sequence[float]] | None = None,
-    held: Iterable[str] | None = None,
+    held: str | Iterable[str] | None = None,
     limits: tuple[float, float] | None = None,
     reference: Array | float | None = None,
     length_scale: float | None = None,

@@ -93,7 +93,7 @@ def static(
         "limits": limits,
     }  # fmt: skip
     if names_mechanism(robot):
-        refuse_for_mechanisms({"pose": pose, "plot": plot})
+        refuse_for_mechanisms({"pose": pose})
         mechanism = load_mechanism(robot)
         m = len(mechanism.cables)
         with working(message_console(), f"{mechanism.name} at rest"):
@@ -111,6 +111,8 @@ def static(
                 prestress=_prestress(prestress, m),
                 limits=parse_limits(limits),
             )
+        if plot is not None:
+            save_plot(at_rest.plot(), plot)
         if as_json:
             print_json(at_rest.as_dict())
         else:

@@ -89,7 +89,7 @@ def tension(
     """
     if names_mechanism(robot):
         refuse_for_mechanisms({
-            "pose": pose, "wrench": wrench, "mass": mass, "plot": plot,
+            "pose": pose, "wrench": wrench, "mass": mass,
             "wrench-set-plot": wrench_set_plot,
         })  # fmt: skip
         mechanism = load_mechanism(robot)
@@ -98,6 +98,8 @@ def tension(
                 mechanism, method, joints=parse_joints(joint), held=parse_names(held),
                 limits=parse_limits(limits), reference=reference, length_scale=length_scale,
             )  # fmt: skip
+        if plot is not None:
+            save_plot(tensions.plot(), plot)
         if as_json:
             print_json(tensions.as_dict())
         else:

@@ -105,6 +105,16 @@ def test_robots_lists_them_apart(capsys: pytest.CaptureFixture[str]) -> None:
     assert "two_platforms" in run(capsys, "robots", "--mechanisms")
 
 
+def test_plots(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    for k, words in enumerate((
+        ["static", "cable_arm"], ["tension", "cable_arm", "--method", "all"],
+        ["tension", "arm_on_platform", "--held", "none"],
+    )):  # fmt: skip
+        page = tmp_path / f"{k}.png"
+        run(capsys, *words, "--plot", str(page))
+        assert page.stat().st_size > 1000
+
+
 def test_schema_of_mechanisms(capsys: pytest.CaptureFixture[str]) -> None:
     schema = json.loads(run(capsys, "schema", "mechanism"))
     joints = schema["properties"]["home"]["properties"]["joints"]

@@ -149,6 +149,8 @@ def test_a_name_that_two_frames_bear(tmp_path: Path) -> None:
         ({"directives": "directives: [\n"}, "which Drake refuses"),
         ({"directives": DIRECTIVES.replace("arm.urdf", "package://none/a.urdf")}, "none"),
         ({"arm": ARM.replace('child link="lower"', 'child link="platform"')}, "arm.dmd.yaml"),
+        ({"arm": ARM.replace('mass value="1.0"', 'mass value="1e20"')}, "found an inertia beyond"),
+        ({"arm": ARM.replace('"lower"', '"::"')}, "which Drake refuses"),
         ({"arm": ARM.replace(link("lower"), '<link name="lower"/>')}, "moves no mass"),
     ],
 )

@@ -12,7 +12,12 @@ from cdpr_drake.analyses.front.mechanisms import (
     place_mechanism,
     solve_mechanism_tensions,
 )
-from cdpr_drake.errors import EquilibriumError, InfeasibleTensionError, TensionProblemError
+from cdpr_drake.errors import (
+    EquilibriumError,
+    InfeasibleTensionError,
+    RobotFileError,
+    TensionProblemError,
+)
 from cdpr_drake.models.mechanism_files import mechanism_names
 from cdpr_drake.models.mechanism_in_plant import add_mechanism
 from cdpr_drake.models.mechanism_loader import load_mechanism
@@ -159,7 +164,17 @@ def test_wrong_questions() -> None:
     with pytest.raises(TensionProblemError, match="all joints held"):
         solve_mechanism_tensions("cable_arm", held=["shoulder", "elbow"])
     with pytest.raises(EquilibriumError, match="accepted: one of cable_arm::elbow"):
-        solve_mechanism_tensions("cable_arm", held=["knee"])
+        solve_mechanism_tensions("cable_arm", held="knee")
+    for wrong in ("a", [1.0, [2.0]]):
+        with pytest.raises(EquilibriumError, match="joints: found"):
+            hang_mechanism("cable_arm", joints={"elbow": wrong})
+    for wrong in (np.nan, 3.0, [0.1, 0.2]):
+        with pytest.raises(RobotFileError, match=r"home\.joints\.elbow: found"):
+            hang_mechanism("cable_arm", joints={"elbow": wrong})
+    with pytest.raises(InfeasibleTensionError, match="prestress"):
+        hang_mechanism("cable_arm", prestress=[1.0, 2.0])
+    with pytest.raises(InfeasibleTensionError, match="lower <= upper"):
+        hang_mechanism("cable_arm", limits=(5.0, 1.0))
     with pytest.raises(EquilibriumError, match="model: 'rubber' is unknown"):
         hang_mechanism("cable_arm", model="rubber")
     with pytest.raises(TensionProblemError, match="length_scale"):
