@@ -265,7 +265,6 @@ def _not_held(mechanism: Mechanism) -> dict[str, str]:
     """Keys of the mechanism's file that CASPR has no place for."""
     words = "caspr has no place for it"
     lost = dict.fromkeys(("cable.linear_density", "cable.retardation_time"), words)
-    lost["cable.youngs_modulus"] = "is held as E S of each cable, at the diameter that is held"
     if mechanism.title:
         lost["title"] = words
     if mechanism.gravity != GRAVITY:

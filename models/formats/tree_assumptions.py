@@ -37,17 +37,19 @@ def complete_tree(tree: CasprTree, name: str) -> CompletedDraft:
     remarks = [*tree.remarks, *limit_remarks(tree), *_renamed(tree)]
     lower, upper = _tensions(tree, assumed, remarks)
     diameter = float(np.sqrt(4.0 * upper / (np.pi * WORKING_STRESS)))
-    given = {
-        cable.diameter for cable in tree.cables if cable.diameter is not None
-    }  # one for all is that of the section
-    if len(given) == 1 and all(cable.diameter is not None for cable in tree.cables):
+    given = {cable.diameter for cable in tree.cables}
+    if len(given) == 1 and None not in given:  # one for all is that of the section
         diameter = float(next(iter(given)) or diameter)
     else:
         assumed["cable.diameter"] = (
             f"{diameter:.6g}, {WORKING_STRESS / 1e6:g} MPa at the largest tension"
         )
     density = float(STEEL_DENSITY * np.pi * diameter**2 / 4.0)
-    if any(cable.stiffness is None for cable in tree.cables):
+    moduli = [_modulus(cable, diameter) for cable in tree.cables]
+    modulus = moduli[0]
+    if modulus is None or any(other != modulus for other in moduli):
+        modulus = STEEL_ROPE_MODULUS
+    if None in moduli:
         assumed["cable.youngs_modulus"] = f"{STEEL_ROPE_MODULUS:.6g}, steel wire rope"
     assumed["cable.linear_density"] = f"{density:.6g}, solid steel of that diameter"
     assumed["cable.retardation_time"] = f"{RETARDATION:g}, a few per cent of critical damping"
@@ -58,13 +60,13 @@ def complete_tree(tree: CasprTree, name: str) -> CompletedDraft:
         "mechanism": f"{name}.xml",
         "home": {"joints": initial_joints(tree)},
         "cable": {
-            "youngs_modulus": STEEL_ROPE_MODULUS,
+            "youngs_modulus": modulus,
             "diameter": diameter,
             "linear_density": density,
             "retardation_time": RETARDATION,
         },
         "tension_bounds": {"lower": lower, "upper": upper},
-        "cables": [_cable(cable, tree, diameter) for cable in tree.cables],
+        "cables": [_cable(cable, tree, diameter, modulus) for cable in tree.cables],
         "assumptions": f"From {TOOL}. "
         + " ".join(word if word.endswith(".") else word + "." for word in words),
     }
@@ -79,7 +81,7 @@ def _given(tree: CasprTree) -> tuple[str, ...]:
         "cables[].via": any(len(cable.links) > 2 for cable in tree.cables),
         "cables[].pulley_radius": any(cable.pulley_radius for cable in tree.cables),
         "cables[].swivel_axis": any(cable.pulley_radius for cable in tree.cables),
-        "cables[].material.youngs_modulus": any(c.stiffness for c in tree.cables),
+        "cable.youngs_modulus": any(cable.stiffness for cable in tree.cables),
         "cable.diameter": any(cable.diameter for cable in tree.cables),
         "tension_bounds.lower": any(cable.lower is not None for cable in tree.cables),
         "tension_bounds.upper": any(cable.upper is not None for cable in tree.cables),
@@ -120,7 +122,14 @@ def _tensions(tree: CasprTree, assumed: dict[str, str], remarks: list[str]) -> t
     return lower, upper
 
 
-def _cable(cable: CasprCable, tree: CasprTree, common: float) -> dict[str, Any]:
+def _modulus(cable: CasprCable, common: float) -> float | None:
+    """Young's modulus with which a cable is as stiff as the model says; None: it says nothing."""
+    if cable.stiffness is None:
+        return None
+    return float(cable.stiffness / (np.pi * (cable.diameter or common) ** 2 / 4.0))
+
+
+def _cable(cable: CasprCable, tree: CasprTree, diameter: float, modulus: float) -> dict[str, Any]:
     frames = (WORLD, *link_names(tree))
     ends = [
         (frames[number], [float(value) for value in point])
@@ -136,11 +145,11 @@ def _cable(cable: CasprCable, tree: CasprTree, common: float) -> dict[str, Any]:
         item["pulley_radius"] = float(cable.pulley_radius)
         item["swivel_axis"] = [float(value) for value in cable.entry]
     own = {}
-    if cable.diameter is not None and cable.diameter != common:
+    if cable.diameter is not None and cable.diameter != diameter:
         own["diameter"] = float(cable.diameter)
-    if cable.stiffness is not None:
-        area = np.pi * (cable.diameter or common) ** 2 / 4.0
-        own["youngs_modulus"] = float(cable.stiffness / area)
+    stiff = _modulus(cable, diameter)
+    if stiff is not None and stiff != modulus:
+        own["youngs_modulus"] = stiff
     if own:
         item["material"] = own
     return item

@@ -181,6 +181,7 @@ def test_mechanisms_that_ship_hang_the_same_in_caspr(name, tmp_path):
     np.testing.assert_allclose(
         found.routes.ends.stiffness, cables.routes.ends.stiffness, rtol=1e-15
     )
+    assert all(cable.material is None for cable in back.cables)  # one material, as before
     assert one.num_velocities() == two.num_velocities()
     assert one.num_actuators() == two.num_actuators()
     # The forces that cables can balance are the same: coordinates differ, their span does not.
