@@ -170,15 +170,19 @@ def _find_packages(
             fail(f"packages.{name}", folder, "a folder")
         given[name] = str(where)
     near = [here, *here.parents, *(child for child in sorted(here.iterdir()) if child.is_dir())]
-    found = PackageMap.MakeEmpty()
-    found.PopulateFromRosPackagePath()
+    found, elsewhere = PackageMap.MakeEmpty(), PackageMap.MakeEmpty()
+    elsewhere.PopulateFromRosPackagePath()
     for manifest in (folder / MANIFEST for folder in near):
         if manifest.is_file():
             try:
                 found.AddPackageXml(str(manifest))
             except RuntimeError:  # no manifest, or a second package of that name
                 continue
-    mechanism.packages = {name: found.GetPath(name) for name in found.GetPackageNames()} | given
+    for name in found.GetPackageNames():
+        given.setdefault(name, found.GetPath(name))
+    for name in elsewhere.GetPackageNames():
+        given.setdefault(name, elsewhere.GetPath(name))
+    mechanism.packages = given
 
 
 def _find_model(mechanism: Mechanism, path: Path, fail: Callable[[str, object, str], None]) -> None:

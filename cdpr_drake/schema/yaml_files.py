@@ -19,6 +19,7 @@ from pydrake.common.yaml import yaml_load_typed
 
 FILE_KINDS: dict[str, tuple[frozenset[str], str]] = {
     "a robot": (frozenset({"platform", "winch", "tension_bounds"}), "cdpr_drake.models.load_robot"),
+    "a mechanism": (frozenset({"mechanism"}), "cdpr_drake.models.load_mechanism"),
     "a scenario": (frozenset({"robot", "duration"}), "cdpr_drake.systems.load_scenario"),
     "a camera": (
         frozenset({"view_angle_horizontal_deg", "view_angle_vertical_deg"}),

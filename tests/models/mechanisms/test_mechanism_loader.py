@@ -77,6 +77,19 @@ def test_urdf_sdf_and_mjcf_are_read(tmp_path: Path) -> None:
         assert put.routes().count == 1
 
 
+def test_packages_near_the_file_go_before_those_of_ros(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for folder, name in (("here/parts", "parts"), ("ros/parts", "parts"), ("ros/more", "more")):
+        where = tmp_path / folder
+        where.mkdir(parents=True)
+        (where / "package.xml").write_text(f"<package><name>{name}</name></package>")
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path / "ros"))
+    found = load_mechanism(write_small(tmp_path / "here")).packages
+    paths = {name: Path(path) for name, path in found.items()}
+    assert paths == {"parts": tmp_path / "here/parts", "more": tmp_path / "ros/more"}
+
+
 def test_packages_near_the_file_and_given_ones(tmp_path: Path) -> None:
     package, elsewhere = tmp_path / "parts", tmp_path / "elsewhere"
     for folder in (package / "urdf", elsewhere):

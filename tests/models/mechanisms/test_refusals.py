@@ -10,9 +10,12 @@ from pydrake.multibody.plant import MultibodyPlant
 
 import cdpr_drake as cdpr
 from cdpr_drake.cli.app import main
-from cdpr_drake.errors import RobotFileError
+from cdpr_drake.errors import RobotFileError, ScenarioError
 from cdpr_drake.models.mechanism_files import TAKEN_BY
 from cdpr_drake.models.robot_loader import load_robot, parse_robot, robot_file, robot_text
+from cdpr_drake.studio.workbench.robot_files import RobotFiles
+from cdpr_drake.studio.workbench.session import Workbench
+from cdpr_drake.studio.workbench.working_folder import WorkingFolder
 from cdpr_drake.systems.robots.cable_robot import CableRobot
 
 NAME = "cable_arm"
@@ -81,6 +84,24 @@ def test_loaders_refuse_it() -> None:
             load(NAME)
     with pytest.raises(RobotFileError, match=SENTENCE):
         parse_robot(path.read_text(encoding="utf-8"), path)
+
+
+def test_the_studio_refuses_it(tmp_path: Path) -> None:
+    mine = tmp_path / "mine.yaml"
+    mine.write_text(robot_file(NAME).read_text(encoding="utf-8"), encoding="utf-8")
+    files = RobotFiles(WorkingFolder(tmp_path))
+    for open_it in (
+        lambda: Workbench(WorkingFolder(tmp_path), NAME),
+        lambda: Workbench(WorkingFolder(tmp_path), str(mine)),
+        lambda: files.open("mine.yaml"),
+    ):
+        with pytest.raises(RobotFileError, match=SENTENCE):
+            open_it()
+
+
+def test_a_file_in_the_place_of_another_is_told(tmp_path: Path) -> None:
+    with pytest.raises(ScenarioError, match=r"found a mechanism; use .*load_mechanism"):
+        cdpr.load_scenario(str(robot_file(NAME)))
 
 
 @pytest.mark.parametrize("key", ["robot", "perturbations.believed_robot"])
