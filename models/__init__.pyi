@@ -2,6 +2,9 @@ from .camera_catalogue import Camera as Camera
 from .camera_catalogue import CameraFault as CameraFault
 from .camera_catalogue import camera_names as camera_names
 from .camera_catalogue import load_camera as load_camera
+from .mechanism_exchange import ImportedMechanism as ImportedMechanism
+from .mechanism_exchange import export_mechanism as export_mechanism
+from .mechanism_exchange import import_mechanism as import_mechanism
 from .mechanism_files import mechanism_names as mechanism_names
 from .mechanism_in_plant import MechanismInPlant as MechanismInPlant
 from .mechanism_in_plant import add_mechanism as add_mechanism

@@ -15,7 +15,9 @@ MECHANISM_FILE = "mechanism.yaml"
 MECHANISM_KEY = "mechanism"
 """Key at the top of a file that robots of one platform do not have."""
 
-TAKEN_BY = "cdpr check, static, tension, view; hang_mechanism, solve_mechanism_tensions"
+TAKEN_BY = (
+    "cdpr check, static, tension, view, export to caspr; hang_mechanism, solve_mechanism_tensions"
+)
 """What takes mechanisms, for messages."""
 
 _FOLDER = Path(__file__).parent / "robots"

@@ -15,6 +15,7 @@ from cdpr_drake.models.formats.detection import read_foreign
 from cdpr_drake.models.formats.draft import DraftCable, RobotDraft
 from cdpr_drake.models.formats.drake_package import write_drake_package
 from cdpr_drake.models.formats.gazebo_yaml import write_gazebo_yaml
+from cdpr_drake.models.formats.import_words import import_readme
 from cdpr_drake.models.formats.joint_chains import write_sdformat, write_urdf
 from cdpr_drake.models.formats.mjcf import write_mjcf
 from cdpr_drake.models.formats.wirex import write_wirex
@@ -55,17 +56,7 @@ class ImportedRobot(Summarized):
 
     def readme(self) -> str:
         """What came from the file, what it lacked and what was assumed, as Markdown."""
-        given = [f"- `{key}`" for key in self.completed.given]
-        assumed = [f"| `{key}` | {words} |" for key, words in self.completed.assumed.items()]
-        remarks = [f"- {words}" for words in self.completed.remarks] or ["- nothing"]
-        return "\n".join(
-            [
-                f"# {self.robot.name}", "", f"Imported from `{self.source.name}` ({self.tool}).",
-                "", "## From the file", "", *given, "", "## Assumed, for the file lacks it", "",
-                "| key | value |", "| --- | --- |", *assumed, "", "## Read otherwise or not kept",
-                "", *remarks, "",
-            ]
-        )  # fmt: skip
+        return import_readme(self.robot.name, self.source.name, self.tool, self.completed)
 
     def as_dict(self) -> dict[str, Any]:
         """What came from where, for JSON."""

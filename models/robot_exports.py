@@ -16,7 +16,7 @@ import numpy as np
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import RobotFileError
 from cdpr_drake.models.formats.assumptions import complete_draft
-from cdpr_drake.models.formats.caspr import short_name
+from cdpr_drake.models.formats.caspr_pulleys import short_name
 from cdpr_drake.models.formats.draft import DraftCable, RobotDraft
 from cdpr_drake.models.formats.named_frames import is_frame_name
 from cdpr_drake.models.formats.reading import robot_name

@@ -11,6 +11,8 @@ from cdpr_drake.cli.completion import words_among
 from cdpr_drake.cli.options import AsJson, RobotName
 from cdpr_drake.cli.robot_folder import write_files
 from cdpr_drake.cli.terminal import print_json
+from cdpr_drake.models.mechanism_exchange import export_mechanism
+from cdpr_drake.models.mechanism_loader import load_mechanism, names_mechanism
 from cdpr_drake.models.robot_exchange import export_robot
 from cdpr_drake.models.robot_exports import EXPORTS, export_omissions, omission_words
 from cdpr_drake.models.robot_loader import load_robot
@@ -23,7 +25,7 @@ def help_words() -> str:
         "Exports a robot to the format of another tool.\n\n"
         f"{formats}\n\n"
         "What a format cannot hold is left out and named on stderr, field by field; with --json "
-        "under not_written, by the fields' keys."
+        "under not_written, by the fields' keys. Mechanisms go to caspr."
     )
 
 
@@ -40,14 +42,22 @@ def export(
     as_json: AsJson = False,
 ) -> None:
     """Exports a robot to the format of another tool."""
-    loaded = load_robot(robot, "cdpr export")
-    paths = write_files(out, export_robot(loaded, format), overwrite)
-    lost = export_omissions(loaded, format)
+    kind, name, files, lost = _exported(robot, format)
+    paths = write_files(out, files, overwrite)
     if as_json:
-        files = [str(path) for path in paths]
-        print_json({"robot": loaded.name, "format": format, "files": files, "not_written": lost})
+        told = {kind: name, "format": format, "files": [str(path) for path in paths]}
+        print_json({**told, "not_written": lost})
         return
     for words in omission_words(lost):
         typer.echo(words, err=True)
     for path in paths:
         print(path)
+
+
+def _exported(name: str, format: str) -> tuple[str, str, dict[str, str], dict[str, str]]:
+    """Kind and name of what is exported, text of its files by name, and what they do not hold."""
+    if names_mechanism(name):
+        mechanism = load_mechanism(name)
+        return "mechanism", mechanism.name, *export_mechanism(mechanism, format)
+    robot = load_robot(name, "cdpr export")
+    return "robot", robot.name, export_robot(robot, format), export_omissions(robot, format)

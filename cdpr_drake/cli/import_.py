@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -11,6 +11,10 @@ from cdpr_drake.analyses.front.exchange import import_robot
 from cdpr_drake.cli.options import AsJson
 from cdpr_drake.cli.robot_folder import write_files
 from cdpr_drake.cli.terminal import print_json
+from cdpr_drake.errors import RobotFileError
+from cdpr_drake.models.formats.assumptions import CompletedDraft
+from cdpr_drake.models.formats.caspr import TOOL
+from cdpr_drake.models.mechanism_exchange import import_mechanism, is_foreign_mechanism
 
 
 def import_(
@@ -21,9 +25,7 @@ def import_(
             "simulator's YAML; GRAB's JSON; SDFormat; URDF; MJCF."
         ),
     ],
-    out: Annotated[
-        Path | None, typer.Option(help="Folder for robot.yaml and README.md; the robot's name.")
-    ] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder of the files; the robot's name.")] = None,
     name: Annotated[str | None, typer.Option(help="Name of the robot; the file's.")] = None,
     model: Annotated[
         str | None, typer.Option(help="Name of a model in a CASPR list, models_list.csv.")
@@ -31,26 +33,60 @@ def import_(
     cable_set: Annotated[
         str | None, typer.Option(help="Set of cables of a CASPR model; its default one.")
     ] = None,
-    overwrite: Annotated[bool, typer.Option(help="Replace robot.yaml and README.md.")] = False,
+    repair_inertia: Annotated[
+        bool,
+        typer.Option(
+            help="Of links of CASPR: moments of inertia that no body can have, and those of rods "
+            "without thickness, become the nearest that a body can have; each is named."
+        ),
+    ] = False,
+    overwrite: Annotated[bool, typer.Option(help="Replace files of these names.")] = False,
     as_json: AsJson = False,
 ) -> None:
     """Imports a robot from a file of another tool into a folder.
 
     The folder gets robot.yaml, which every command takes, and a README that says what came from
     the file, what it lacked and what was assumed. Commands also take the foreign file itself.
+    CASPR's models of several links give mechanism.yaml, and MJCF for links and joints.
     """
+    if is_foreign_mechanism(file, model):
+        mechanism = import_mechanism(
+            file, name=name, model=model, cable_set=cable_set, repair_inertia=repair_inertia
+        )
+        paths = write_files(out or Path(mechanism.name), mechanism.files(), overwrite)
+        if as_json:
+            _print_json(mechanism.as_dict(), "mechanism", paths)
+            return
+        tree = mechanism.tree
+        print(
+            f"{mechanism.name}: {len(tree.links)} links, {tree.coordinates} coordinates, "
+            f"{len(tree.cables)} cables, from {TOOL}"
+        )
+        _print_told(mechanism.completed, paths)
+        return
+    if repair_inertia:
+        raise RobotFileError(
+            f"--repair-inertia: found for {file}; accepted for CASPR's models of several links, or "
+            "of joints that no platform on cables has"
+        )
     imported = import_robot(file, name=name, model=model, cable_set=cable_set)
     folder = out or Path(imported.robot.name)
     files = {"robot.yaml": imported.yaml(), "README.md": imported.readme()}
     paths = write_files(folder, files, overwrite)
-    completed = imported.completed
     if as_json:
-        told = imported.as_dict()
-        head = {key: told.pop(key) for key in ("robot", "format", "source")}
-        print_json({**head, "files": [str(path) for path in paths], **told})
+        _print_json(imported.as_dict(), "robot", paths)
         return
     robot = imported.robot
     print(f"{robot.name}: {robot.motion}, {len(robot.cables)} cables, from {imported.tool}")
+    _print_told(imported.completed, paths)
+
+
+def _print_json(told: dict[str, Any], kind: str, paths: list[Path]) -> None:
+    head = {key: told.pop(key) for key in (kind, "format", "source")}
+    print_json({**head, "files": [str(path) for path in paths], **told})
+
+
+def _print_told(completed: CompletedDraft, paths: list[Path]) -> None:
     for key, words in completed.assumed.items():
         print(f"  assumed {key}: {words}")
     for words in completed.remarks:

@@ -21,6 +21,8 @@ from pydrake.math import RotationMatrix
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import RobotFileError
+from cdpr_drake.models.formats.caspr_pulleys import PULLEYS, read_pulley, short_name, triple
+from cdpr_drake.models.formats.caspr_trees import AXIS_KINDS, KINDS, QUATERNIONS
 from cdpr_drake.models.formats.draft import DraftCable, RobotDraft
 from cdpr_drake.models.formats.reading import (
     child_text,
@@ -76,6 +78,20 @@ def caspr_models(path: Path) -> dict[str, tuple[Path, Path]]:
     return found
 
 
+def is_caspr_tree(bodies: Path) -> bool:
+    """Whether a bodies file has several links, or a joint that no platform on cables has.
+
+    Raises:
+        RobotFileError: It cannot be read.
+    """
+    links = list(read_xml(bodies).iter("link_rigid"))
+    if len(links) != 1:
+        return len(links) > 1
+    joint = links[0].find("joint")
+    kind = "" if joint is None else joint.get("type", "").upper()
+    return kind not in MOTIONS and (kind in KINDS or kind in AXIS_KINDS or kind in QUATERNIONS)
+
+
 def read_caspr(path: Path, model: str | None = None, cable_set: str | None = None) -> RobotDraft:
     """Reads a CASPR model.
 
@@ -87,7 +103,7 @@ def read_caspr(path: Path, model: str | None = None, cable_set: str | None = Non
     Raises:
         RobotFileError: The files do not describe a cable robot; says where.
     """
-    bodies, cables, name = _files(path, model)
+    bodies, cables, name = model_files(path, model)
     root = read_xml(bodies)
     link, joint = _only_link(bodies, root)
     kind = joint[0]
@@ -95,7 +111,7 @@ def read_caspr(path: Path, model: str | None = None, cable_set: str | None = Non
         raise fail(
             bodies, "joint", kind,
             "a body that cables move freely, " + ", ".join(MOTIONS) + "; this is a model in joint "
-            "space, no cable robot",
+            "space, no cable robot; cdpr import makes a mechanism of it",
         )  # fmt: skip
     draft = RobotDraft(name=robot_name(name), tool=TOOL, title=link.get("name", name))
     draft.motion, draft.gravity = MOTIONS[kind], 9.81
@@ -107,8 +123,16 @@ def read_caspr(path: Path, model: str | None = None, cable_set: str | None = Non
     return draft
 
 
-def _files(path: Path, model: str | None) -> tuple[Path, Path, str]:
-    """Files of bodies and cables, and the model's name."""
+def model_files(path: Path, model: str | None = None) -> tuple[Path, Path, str]:
+    """Files of bodies and cables of a model, and its name.
+
+    Args:
+        path: Its bodies or cables file, its folder, or a list of models.
+        model: Of a list: the name of the model.
+
+    Raises:
+        RobotFileError: There are no such files, or no such model in the list.
+    """
     if path.suffix.lower() == ".csv":
         models = caspr_models(path)
         names = {name.lower(): name for name in models}
@@ -161,7 +185,8 @@ def _only_link(path: Path, root: ET.Element) -> tuple[ET.Element, tuple[str, ET.
     if len(links) != 1:
         raise fail(
             path, "link_rigid", f"{len(links)} bodies",
-            "one body that cables move; more are a model in joint space, no cable robot",
+            "one body that cables move; more are a model in joint space, no cable robot; cdpr "
+            "import makes a mechanism of it",
         )  # fmt: skip
     joint = links[0].find("joint")
     if joint is not None:
@@ -313,23 +338,18 @@ def _cable(path: Path, item: ET.Element, draft: RobotDraft) -> DraftCable:
     holder = item.find("attachments")
     for index, attachment in enumerate(item if holder is None else holder):
         where = f"{name}, attachment {index + 1}"
-        if attachment.tag == "base_rotating_pulley":
-            ends[0].append(_triple(path, attachment, "fixed_location", where))
+        if attachment.tag in PULLEYS:
+            pulley = read_pulley(path, attachment, where, draft.remarks)
+            ends[0].append(pulley.point)
             order.append(0)
-            words = child_text(path, attachment, "pulley_radius", where)
-            radius = number(path, f"{where}, pulley_radius", words)
-            axis = _triple(path, attachment, "cable_entry_vector", where)
-            if radius < 0.0 or not np.any(axis):
-                raise fail(path, where, f"radius {radius:g}, entry vector {axis.tolist()}",
-                           "a radius of at least 0 [m], a vector that is not zero")  # fmt: skip
-            axis = axis / np.linalg.norm(axis)
+            radius, axis = pulley.radius, pulley.entry
             continue
         if attachment.tag != "attachment":
             continue
         link = int(number(path, where, child_text(path, attachment, "link", where)))
         if link not in ends:
             raise fail(path, f"{where}, link", link, "0, the world, or 1, the platform")
-        point = _triple(path, attachment, "location", where)
+        point = triple(path, attachment, "location", where)
         if link == 1 and item.get("attachment_reference", "joint") == "com":
             assert draft.center_of_mass is not None
             point = draft.center_of_mass + point
@@ -354,13 +374,3 @@ def _cable(path: Path, item: ET.Element, draft: RobotDraft) -> DraftCable:
         name=short_name(name), exit_point=exit_point, anchor_point=ends[1][0], lower=limits[0],
         upper=limits[1], pulley_radius=radius, swivel_axis=axis,
     )  # fmt: skip
-
-
-def short_name(name: str) -> str:
-    """What a cable is called here that CASPR's users numbered, `C7` for `cable 7` or `7`."""
-    short = re.sub(r"^cable[ _]*(?=\d+$)", "C", name, flags=re.IGNORECASE)
-    return f"C{short}" if short.isdigit() else short
-
-
-def _triple(path: Path, parent: ET.Element, name: str, where: str) -> Array:
-    return numbers(path, f"{where}, {name}", child_text(path, parent, name, where), 3)

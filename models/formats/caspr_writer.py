@@ -11,7 +11,14 @@ import numpy as np
 from pydrake.math import RollPitchYaw, RotationMatrix
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.models.formats.draft import DraftCable, RobotDraft
+from cdpr_drake.models.formats.caspr_xml import (
+    add_attachment,
+    add_inertia,
+    add_pulley,
+    document,
+    xml_numbers,
+)
+from cdpr_drake.models.formats.draft import RobotDraft
 
 
 def write_caspr(draft: RobotDraft) -> dict[str, str]:
@@ -48,21 +55,24 @@ def write_caspr(draft: RobotDraft) -> dict[str, str]:
     high = [*(draft.frame_upper - offset)[moved], *turns]
     corners = np.column_stack([draft.frame_lower, draft.frame_upper]).ravel()
     system = ET.Element("bodies_system")
-    links = ET.SubElement(system, "links", display_range=_words(corners), view_angle="-37 32")
+    links = ET.SubElement(system, "links", display_range=xml_numbers(corners), view_angle="-37 32")
     link = ET.SubElement(links, "link_rigid", num="1", name=draft.title or draft.name)
     ET.SubElement(
-        link, "joint", type=joint, q_initial=_words(q), q_min=_words(low), q_max=_words(high)
+        link,
+        "joint",
+        type=joint,
+        q_initial=xml_numbers(q),
+        q_min=xml_numbers(low),
+        q_max=xml_numbers(high),
     )
     physical = ET.SubElement(link, "physical")
     ET.SubElement(physical, "mass").text = repr(float(draft.mass or 0.0))
-    ET.SubElement(physical, "com_location").text = _words(draft.center_of_mass)
+    ET.SubElement(physical, "com_location").text = xml_numbers(draft.center_of_mass)
     ET.SubElement(physical, "end_location").text = "0.0 0.0 0.0"
-    inertia = ET.SubElement(physical, "inertia", ref="com")
-    for key, value in zip(("Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz"), draft.inertia, strict=True):
-        ET.SubElement(inertia, key).text = repr(float(value))
+    add_inertia(physical, draft.inertia)
     parent = ET.SubElement(link, "parent")
     ET.SubElement(parent, "num").text = "0"
-    ET.SubElement(parent, "location").text = _words(offset)
+    ET.SubElement(parent, "location").text = xml_numbers(offset)
     root = ET.Element("cables", default_cable_set="original")
     cables = ET.SubElement(root, "cable_set", id="original")
     for cable in draft.cables:
@@ -72,41 +82,16 @@ def write_caspr(draft: RobotDraft) -> dict[str, str]:
         ET.SubElement(properties, "force_max").text = repr(float(cable.upper or 0.0))
         attachments = ET.SubElement(item, "attachments")
         if cable.pulley_radius:  # CASPR divides by the radius
-            _pulley(attachments, cable)
+            assert cable.swivel_axis is not None
+            add_pulley(attachments, cable.exit_point, cable.pulley_radius, cable.swivel_axis)
         else:
-            _attachment(attachments, 0, cable.exit_point)
-        _attachment(attachments, 1, cable.anchor_point)
-    return {"bodies": _document(system, "bodies_system", "bodies"),
-            "cables": _document(root, "cables", "cables")}  # fmt: skip
-
-
-def _attachment(attachments: ET.Element, link: int, point: Array) -> None:
-    attachment = ET.SubElement(attachments, "attachment")
-    ET.SubElement(attachment, "link").text = str(link)
-    ET.SubElement(attachment, "location").text = _words(point)
-
-
-def _pulley(attachments: ET.Element, cable: DraftCable) -> None:
-    """A pulley that swivels about the direction in which the cable comes to it."""
-    assert cable.swivel_axis is not None
-    pulley = ET.SubElement(attachments, "base_rotating_pulley")
-    ET.SubElement(pulley, "fixed_location").text = _words(cable.exit_point)
-    ET.SubElement(pulley, "pulley_radius").text = repr(float(cable.pulley_radius or 0.0))
-    ET.SubElement(pulley, "cable_entry_vector").text = _words(cable.swivel_axis)
+            add_attachment(attachments, 0, cable.exit_point)
+        add_attachment(attachments, 1, cable.anchor_point)
+    return {"bodies": document(system, "bodies_system", "bodies"),
+            "cables": document(root, "cables", "cables")}  # fmt: skip
 
 
 def _angles_xyz(R: Array) -> Array:
     """Angles of R = Rx Ry Rz [rad]."""
     phi, theta, psi = RollPitchYaw(RotationMatrix(R.T)).vector()
     return -np.array([phi, theta, psi])
-
-
-def _words(values: object) -> str:
-    return " ".join(repr(float(value)) for value in np.asarray(values, float))
-
-
-def _document(root: ET.Element, kind: str, template: str) -> str:
-    ET.indent(root, "  ")
-    head = f'<!DOCTYPE {kind} SYSTEM "../../../../templates/{template}.dtd">'
-    body = ET.tostring(root, encoding="unicode")
-    return f'<?xml version="1.0" encoding="utf-8"?>\n{head}\n{body}\n'

@@ -24,8 +24,9 @@ PACKAGE = """<?xml version="1.0"?>
 </package>
 """
 
-DIRECTIVES = """# The frame is welded to the world; the platform is free, at its home pose. Cables are no
-# model: models.find_robot finds the platform, systems.robots.add_cable_robot adds them.
+DIRECTIVES = """\
+# The frame is welded to the world; the platform is free, at its home pose. Cables are no model:
+# models.find_robot finds the platform, systems.robots.add_cable_robot adds them.
 directives:
 - add_model:
     name: {name}

@@ -119,7 +119,6 @@ COMMANDS = [
     ["design", NAME, "--goal", "wrench-feasible"],
     ["calibrate", NAME, "log.csv"],
     ["identify", NAME, "log.csv"],
-    ["export", NAME, "--format", "caspr"],
     ["new", "robot", "mine", "--from", NAME],
     ["studio", NAME, "--no-browser"],
     ["simulate", "acrobot_pbvs", "--set", f"robot={NAME}"],

@@ -1,0 +1,463 @@
+"""CASPR's models of several links: what the format's definition says, by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import JointIndex
+
+from cdpr_drake import models
+from cdpr_drake.errors import RobotFileError
+from cdpr_drake.models.formats.caspr_mechanism import (
+    initial_joints,
+    joint_names,
+    link_names,
+    write_mechanism,
+)
+from cdpr_drake.models.formats.caspr_trees import (
+    AXIS_KINDS,
+    KINDS,
+    excess,
+    matrix_of,
+    possible_inertia,
+    read_tree,
+)
+from cdpr_drake.models.mechanism_exchange import import_mechanism
+from cdpr_drake.models.mechanism_in_plant import add_mechanism
+from tests.models.formats.tree_files import BOX, Cable, Link, Model, two_link
+
+ROUNDING = 2e-15
+"""Of lengths below 2 m and rotations: some units in the last place."""
+
+DIFFERENCES = 1e-9
+"""Of central differences with steps of 1e-6 in lengths of 1 m."""
+
+REPAIRED = 1e-12
+"""Of moments after an eigendecomposition, as a share of the largest."""
+
+
+def loaded(folder, model, **options):
+    """A model as a mechanism in a finalized plant, and its cables."""
+    imported = import_mechanism(model.write(folder), **options)
+    target = folder / "made"
+    target.mkdir()
+    for name, text in imported.files().items():
+        (target / name).write_text(text, encoding="utf-8")
+    mechanism = models.load_mechanism(target)
+    plant = MultibodyPlant(0.0)
+    added = add_mechanism(plant, mechanism)
+    added.finalize()
+    return imported, plant, models.PlantCables(plant, added.routes())
+
+
+def turn(axis, angle):
+    """Rotation about an axis of a frame, as textbooks write it."""
+    c, s = np.cos(angle), np.sin(angle)
+    return {
+        "X": np.array([[1, 0, 0], [0, c, -s], [0, s, c]]),
+        "Y": np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]),
+        "Z": np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]),
+    }[axis]
+
+
+def about(axis, angle):
+    """Rotation about any axis, by Rodrigues' formula."""
+    x, y, z = np.array(axis) / np.linalg.norm(axis)
+    A = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + np.sin(angle) * A + (1 - np.cos(angle)) * A @ A
+
+
+AXIS = (0.3, -0.4, 1.2)
+X, Y, Z = np.eye(3)
+
+# Of each joint, rotation and translation from CASPR's RelRotationMatrix and RelTranslationVector,
+# src/Model/Bodies/Joints of github.com/darwinlau/CASPR.
+DEFINED = {
+    "R_X": lambda q: (turn("X", q[0]), 0 * X),
+    "R_Y": lambda q: (turn("Y", q[0]), 0 * X),
+    "R_Z": lambda q: (turn("Z", q[0]), 0 * X),
+    "R_AXIS": lambda q: (about(AXIS, q[0]), 0 * X),
+    "U_XY": lambda q: (turn("X", q[0]) @ turn("Y", q[1]), 0 * X),
+    "U_YZ": lambda q: (turn("Y", q[0]) @ turn("Z", q[1]), 0 * X),
+    "U_XZ": lambda q: (turn("X", q[0]) @ turn("Z", q[1]), 0 * X),
+    "P_X": lambda q: (np.eye(3), q[0] * X),
+    "P_Y": lambda q: (np.eye(3), q[0] * Y),
+    "P_Z": lambda q: (np.eye(3), q[0] * Z),
+    "P_XY": lambda q: (np.eye(3), q[0] * X + q[1] * Y),
+    "P_YZ": lambda q: (np.eye(3), q[0] * Y + q[1] * Z),
+    "P_XZ": lambda q: (np.eye(3), q[0] * X + q[1] * Z),
+    "P_AXIS": lambda q: (np.eye(3), q[0] * np.array(AXIS) / np.linalg.norm(AXIS)),
+    "PLANAR_XY": lambda q: (turn("Z", q[2]), q[0] * X + q[1] * Y),
+    "PLANAR_YZ": lambda q: (turn("X", q[2]), q[0] * Y + q[1] * Z),
+    "PLANAR_XZ": lambda q: (turn("Y", q[2]), q[0] * X + q[1] * Z),
+    "T_XYZ": lambda q: (np.eye(3), q[:3]),
+    "S_EULER_XYZ": lambda q: (turn("X", q[0]) @ turn("Y", q[1]) @ turn("Z", q[2]), 0 * X),
+    "S_FIXED_XYZ": lambda q: (turn("Z", q[2]) @ turn("Y", q[1]) @ turn("X", q[0]), 0 * X),
+    "SPATIAL_EULER_XYZ": lambda q: (turn("X", q[3]) @ turn("Y", q[4]) @ turn("Z", q[5]), q[:3]),
+}
+
+
+def test_all_kinds_have_a_definition_here():
+    assert set(DEFINED) == {*KINDS, *AXIS_KINDS}
+
+
+@pytest.mark.parametrize("kind", DEFINED)
+def test_a_joint_moves_as_it_is_defined(kind, tmp_path):
+    """The second of two such joints, on a link that is turned and moved itself."""
+    rng = np.random.default_rng(len(kind))
+    count = 1 if kind in AXIS_KINDS else len(KINDS[kind])
+    q1, q2 = rng.uniform(-1.0, 1.0, (2, count))
+    more = f'axis="{AXIS[0]} {AXIS[1]} {AXIS[2]}"' if kind in AXIS_KINDS else ""
+    p1, p2 = np.array([0.3, -0.2, 0.5]), np.array([-0.1, 0.4, 0.2])
+    words = [" ".join(repr(float(x)) for x in values) for values in (q1, q2, p1, p2)]
+    model = Model(
+        [
+            Link(kind, words[0], name="one", location=words[2], more=more),
+            Link(kind, words[1], parent=1, name="two", location=words[3], more=more),
+        ],
+        [Cable([(0, "3 3 3"), (2, "0.1 0.2 0.3")])],
+    )
+    tree = read_tree(*_pair(model, tmp_path), "toy")
+    plant = MultibodyPlant(0.0)
+    Parser(plant).AddModelsFromString(write_mechanism(tree), "xml")
+    plant.Finalize()
+    context = plant.CreateDefaultContext()
+    for name, value in initial_joints(tree).items():
+        joint = plant.GetJointByName(name)
+        start = joint.position_start()
+        q = plant.GetPositions(context)
+        q[start] = value
+        plant.SetPositions(context, q)
+    R1, r1 = DEFINED[kind](q1)
+    R2, r2 = DEFINED[kind](q2)
+    for name, R, p in (
+        ("one", R1, p1 + r1),
+        ("two", R1 @ R2, p1 + r1 + R1 @ (p2 + r2)),
+    ):
+        X_WB = plant.EvalBodyPoseInWorld(context, plant.GetBodyByName(name))
+        np.testing.assert_allclose(X_WB.rotation().matrix(), R, rtol=0, atol=ROUNDING)
+        np.testing.assert_allclose(X_WB.translation(), p, rtol=0, atol=ROUNDING)
+    # Rates are those of the coordinates, and each is one joint's.
+    assert plant.num_positions() == plant.num_velocities() == 2 * count == tree.coordinates
+    v = rng.uniform(-1.0, 1.0, 2 * count)
+    np.testing.assert_array_equal(plant.MapVelocityToQDot(context, v), v)
+    found = {plant.get_joint(JointIndex(i)).name() for i in plant.GetJointIndices()}
+    assert {name for names in joint_names(tree) for name in names} <= found
+
+
+def _pair(model, folder):
+    bodies = model.write(folder)
+    return bodies, folder / f"{model.name}_cables.xml"
+
+
+def test_two_links_in_a_plane_have_lengths_by_hand(tmp_path):
+    _, plant, cables = loaded(tmp_path, two_link())
+    context = plant.CreateDefaultContext()
+    a, b = 0.3, 0.3 - 0.7  # of the links from z to x
+
+    def at(angle, x, z):
+        """A point of a link that is turned so, in W, and its derivative by that."""
+        c, s = np.cos(angle), np.sin(angle)
+        return np.array([c * x + s * z, c * z - s * x]), np.array([-s * x + c * z, -c * x - s * z])
+
+    elbow, elbow_a = at(a, 0.0, 0.4)
+    A1, B1 = np.array([0.5, 0.1]), np.array([-0.5, 0.1])
+    V, V_a = at(a, 0.05, 0.22)  # both from the centres of mass, 0.2 and 0.1 along z
+    P, P_b = at(b, 0.04, 0.16)
+    Q, Q_b = at(b, -0.04, 0.2)
+    P, Q = P + elbow, Q + elbow
+    first, second = np.linalg.norm(V - A1), np.linalg.norm(P - V)
+    third = np.linalg.norm(Q - B1)
+    u1, u2, u3 = (V - A1) / first, (P - V) / second, (Q - B1) / third
+    # q1 turns both links, q2 the second one: d/dq1 = d/da + d/db, d/dq2 = d/db.
+    J = np.array(
+        [
+            [u1 @ V_a + u2 @ (elbow_a + P_b - V_a), u2 @ P_b],
+            [u3 @ (elbow_a + Q_b), u3 @ Q_b],
+        ]
+    )
+    lengths, found = cables.lengths_and_jacobian(context)
+    np.testing.assert_allclose(lengths, [first + second, third], rtol=0, atol=ROUNDING)
+    np.testing.assert_allclose(found, J, rtol=0, atol=ROUNDING)
+
+
+def test_the_jacobian_is_that_of_differences_for_chains_of_joints(tmp_path):
+    model = Model(
+        [
+            Link("SPATIAL_EULER_XYZ", "0.1 0.2 0.9 0.3 -0.2 0.4", name="base"),
+            Link("S_FIXED_XYZ", "0.2 0.5 -0.3", 1, "0.1 0 0.2", "ball"),
+            Link("U_XZ", "0.4 -0.6", 2, "0 0.2 0.1", "cross"),
+            Link("PLANAR_XZ", "0.1 0.2 0.3", 1, "0 0 -0.2", "side"),
+        ],
+        [
+            Cable([(0, "1 1 1"), (1, "0.1 0 0"), (2, "0 0.1 0"), (3, "0 0 0.1")]),
+            Cable([(4, "0.2 0.1 0"), (3, "0.1 0.1 0.1")], name="cable 2"),
+        ],
+    )
+    _, plant, cables = loaded(tmp_path, model)
+    context = plant.CreateDefaultContext()
+    _, J = cables.lengths_and_jacobian(context)
+    q, step = plant.GetPositions(context), 1e-6
+    for k, axis in enumerate(np.eye(len(q))):
+        ends = []
+        for sign in (1.0, -1.0):
+            plant.SetPositions(context, q + sign * step * axis)
+            ends.append(cables.lengths_and_jacobian(context)[0])
+        np.testing.assert_allclose((ends[0] - ends[1]) / (2 * step), J[:, k], atol=DIFFERENCES)
+
+
+@pytest.mark.parametrize(
+    ("kind", "moves"), [("S_QUATERNION", ""), ("SPATIAL_QUATERNION", "1 2 3 ")]
+)
+def test_quaternions_become_euler_angles(kind, moves, tmp_path):
+    model = Model(
+        [Link(kind, moves + "1.6 0.4 -0.6 0.2", name="one")] * 1,
+        [Cable([(0, "3 3 3"), (1, "0 0 1")])],
+    )
+    model.links.append(Link("R_X", "0", 1, name="two"))
+    tree = read_tree(*_pair(model, tmp_path), "toy")
+    e0, e1, e2, e3 = np.array([1.6, 0.4, -0.6, 0.2]) / np.linalg.norm([1.6, 0.4, -0.6, 0.2])
+    R = np.array(
+        [
+            [1 - 2 * (e2**2 + e3**2), 2 * (e1 * e2 - e0 * e3), 2 * (e1 * e3 + e0 * e2)],
+            [2 * (e1 * e2 + e0 * e3), 1 - 2 * (e1**2 + e3**2), 2 * (e2 * e3 - e0 * e1)],
+            [2 * (e1 * e3 - e0 * e2), 2 * (e2 * e3 + e0 * e1), 1 - 2 * (e1**2 + e2**2)],
+        ]
+    )
+    joint = tree.links[0].joint
+    found, r = DEFINED[joint.kind](joint.initial)
+    np.testing.assert_allclose(found, R, rtol=0, atol=ROUNDING)
+    np.testing.assert_array_equal(r, [1, 2, 3] if moves else [0, 0, 0])
+    assert any(f"{kind} was read as {joint.kind}" in words for words in tree.remarks)
+
+
+def test_inertia_about_the_joint_is_turned_to_the_centre_of_mass(tmp_path):
+    model = two_link()
+    m, x, y, z = 1.5, 0.1, -0.2, 0.3
+    about_joint = np.array([0.02, 0.03, 0.04, 0.001, -0.002, 0.003]) + m * np.array(
+        [y * y + z * z, x * x + z * z, x * x + y * y, -x * y, -x * z, -y * z]
+    )
+    model.links[0] = Link(
+        "R_Y",
+        "0.3",
+        name="upper",
+        ref="joint",
+        inertia=" ".join(map(repr, map(float, about_joint))),
+    )
+    tree = read_tree(*_pair(model, tmp_path), "toy")
+    given = [float(value) for value in BOX.split()]
+    np.testing.assert_allclose(tree.links[0].inertia, given, rtol=0, atol=1e-16)
+
+
+def test_inertia_of_no_body_is_refused_or_repaired_by_name(tmp_path):
+    model = two_link()
+    model.links[1].inertia = "0.01 0.01 0.1 0 0 0"
+    files = _pair(model, tmp_path)
+    with pytest.raises(
+        RobotFileError, match=r"link 2, inertia: found 0\.01, 0\.01, 0\.1"
+    ) as caught:
+        read_tree(*files, "toy")
+    assert "\n" not in str(caught.value)
+    tree = read_tree(*files, "toy", None, True)
+    np.testing.assert_allclose(tree.links[1].inertia, [0.05, 0.05, 0.1, 0, 0, 0], rtol=2e-6)
+    np.testing.assert_array_equal(
+        tree.links[0].inertia, [float(value) for value in BOX.split()]
+    )  # what a body can have stays
+    told = [words for words in tree.remarks if "principal moments" in words]
+    assert len(told) == 1
+    assert told[0].startswith("link 2: principal moments 0.01, 0.01, 0.1 were changed to 0.05")
+
+
+def test_repaired_inertia_is_that_of_the_nearest_body():
+    """Nearest in the integral of r r' over the mass: no other positive one is nearer."""
+    rng = np.random.default_rng(4)
+    for _ in range(20):
+        given = np.array([*rng.uniform(0.01, 0.1, 3), *rng.uniform(-0.03, 0.03, 3)])
+        made = possible_inertia(given)
+        assert excess(made) < 0.0
+        if excess(given) < -1e-3:
+            np.testing.assert_array_equal(made, given)
+        S, S_made = (np.trace(J) / 2 * np.eye(3) - J for J in map(matrix_of, (given, made)))
+        away = np.linalg.norm(S_made - S)
+        for _ in range(20):
+            L = rng.normal(size=(3, 3)) * 0.05
+            other = S_made + 0.1 * (L @ L.T)  # another body
+            assert np.linalg.norm(other - S) >= away - REPAIRED
+    np.testing.assert_array_equal(possible_inertia(np.zeros(6)), 0.0)  # a point stays one
+
+
+def test_a_tree_that_moves_no_mass_says_what_might_help(tmp_path):
+    """A rod that a spherical joint can spin about itself has no inertia there."""
+    rod = "0.02 0.02 0 0 0 0"
+    model = Model(
+        [
+            Link("S_EULER_XYZ", "0 0 0", name="upper", com="0 0 0.2", inertia=rod),
+            Link("R_Y", "0", 1, "0 0 0.4", "lower", com="0 0 0.1", inertia=rod),
+        ],
+        [Cable([(0, "1 1 1"), (2, "0.1 0 0.1")])],
+    )
+    path = model.write(tmp_path)
+    with pytest.raises(RobotFileError) as caught:
+        import_mechanism(path)
+    words = str(caught.value)
+    assert words.startswith(f"{path}: mechanism: found a joint of toy.xml that moves no mass")
+    assert words.endswith("--repair-inertia gives them: upper, lower")
+    imported = import_mechanism(path, repair_inertia=True)
+    assert sum("principal moments" in words for words in imported.completed.remarks) == 2
+
+
+def test_a_pulley_at_the_base_is_one_here(tmp_path):
+    model = two_link()
+    model.cables[1].points[0] = (
+        "<base_rotating_pulley><fixed_location>-0.5 0 0.1</fixed_location><pulley_radius>0.03"
+        "</pulley_radius><cable_entry_vector>0 0 2</cable_entry_vector></base_rotating_pulley>"
+    )
+    _, plant, cables = loaded(tmp_path, model)
+    context = plant.CreateDefaultContext()
+    lengths, _ = cables.lengths_and_jacobian(context)
+    X_WB = plant.EvalBodyPoseInWorld(context, plant.GetBodyByName("lower"))
+    B = X_WB.multiply(np.array([-0.04, 0.0, 0.2]))
+    # The cable comes up at F = (-0.5, 0, 0.1), runs over the pulley's top to the side of B, and
+    # leaves it along the tangent to B.
+    C, r = np.array([-0.47, 0.0, 0.1]), 0.03
+    d = float(np.linalg.norm(B - C))
+    free = np.sqrt(d * d - r * r)
+    bearing = np.arctan2(B[2] - C[2], B[0] - C[0])
+    arc = r * (np.pi - (bearing + np.arccos(r / d)))
+    np.testing.assert_allclose(lengths[1], free + arc, rtol=0, atol=ROUNDING)
+
+
+def test_a_pulley_that_travels_is_put_where_the_file_has_a_point(tmp_path):
+    model = two_link()
+    screw = (
+        "<screw_base_rotating_pulley><constant_winch_point>-0.5 0 0.1</constant_winch_point>"
+        "<winch_vector>0 1 0</winch_vector><cable_pulley_entry_vector>0 0 1"
+        "</cable_pulley_entry_vector><pulley_radius>0.03</pulley_radius><winch_radius>0.06"
+        "</winch_radius><winch_groove_width>0.002</winch_groove_width></screw_base_rotating_pulley>"
+    )
+    for cable in model.cables:
+        cable.points[0] = screw
+    tree = read_tree(*_pair(model, tmp_path), "toy")
+    for cable in tree.cables:
+        np.testing.assert_array_equal(cable.points[:, 0], [-0.5, 0.0, 0.1])
+        assert cable.pulley_radius == 0.03
+    assert sum("travel along their winches" in words for words in tree.remarks) == 1
+
+
+def test_springs_have_their_stiffness_and_passive_ones_are_left_out(tmp_path):
+    model = two_link()
+    model.cables[0].kind = "cable_linear_spring"
+    model.cables[0].properties += "<K>5000</K><diameter>0.002</diameter>"
+    model.cables.append(
+        Cable([(0, "0 1 1"), (1, "0 0 0.1")], "rubber", kind="cable_passive_linear_spring",
+              properties="<K>10</K><l0>0.1</l0>")
+    )  # fmt: skip
+    model.cables.append(
+        Cable([(0, "0 1 1"), (1, "0 0 0.1")], "cable 3", kind="cable_vsd_torsion_spring")
+    )
+    imported, _, cables = loaded(tmp_path, model)
+    assert cables.routes.names == ("C1", "C2", "C3")
+    np.testing.assert_allclose(cables.routes.ends.stiffness[0], 5000.0, rtol=1e-12)
+    remarks = imported.completed.remarks
+    assert "rubber, a passive spring, was left out." in remarks
+    assert any("cable_vsd_torsion_spring" in words for words in remarks)
+
+
+def test_sets_of_cables_and_their_names(tmp_path):
+    model = two_link()
+    model.sets = {"other": [Cable([(0, "1 1 1"), (1, "0 0 0.1")], name="7")], "empty": []}
+    model.cables.append(Cable([(0, "1 0 1"), (1, "0 0 0.1")], name="Cable 2"))
+    files = _pair(model, tmp_path)
+    tree = read_tree(*files, "toy")
+    assert [cable.name for cable in tree.cables] == ["C1", "C2", "C2 3"]
+    assert "Cables of the set basic; the file also has other." in tree.remarks
+    assert any("is called 'C2 3'" in words for words in tree.remarks)
+    assert [cable.name for cable in read_tree(*files, "toy", "other").cables] == ["C7"]
+    with pytest.raises(RobotFileError, match=r"cable_set empty: found no cable; .* basic, other"):
+        read_tree(*files, "toy", "empty")
+    with pytest.raises(RobotFileError, match="cable set: found none; accepted: one of basic"):
+        read_tree(*files, "toy", "none")
+
+
+def test_names_of_links_stay_apart_from_massless_bodies(tmp_path):
+    links = [Link("U_XZ", "0.1 0.2", k, "0 0 0.1", f"link {k + 1}") for k in range(11)]
+    links.append(Link("R_X", "0", 11, "0 0 0.1", "world"))
+    links.append(Link("R_X", "0", 11, "0 0 0.1", "link/2"))
+    model = Model(links, [Cable([(0, "1 1 1"), (11, "0 0 0.1")])])
+    imported, plant, _ = loaded(tmp_path, model)
+    names = link_names(imported.tree)
+    assert names[:3] == ("link_1_", "link_2", "link_3")
+    assert names[-2:] == ("world_12", "link_2_13")
+    assert all(plant.HasBodyNamed(name) for name in names)
+    assert any("'link 1' is link_1_" in words for words in imported.completed.remarks)
+
+
+def test_limits_that_a_joint_starts_beyond_are_left_out_by_name(tmp_path):
+    model = two_link()
+    model.links[1].q = "-2.6"
+    imported, plant, _ = loaded(tmp_path, model)
+    assert plant.GetJointByName("upper_ry").position_upper_limits() == [2.0]
+    assert plant.GetJointByName("lower_ry").position_upper_limits() == [np.inf]
+    assert (
+        "Limits of joints that start beyond them were left out: lower_ry."
+        in imported.completed.remarks
+    )
+    assert plant.num_actuators() == 1
+
+
+@pytest.mark.parametrize(
+    ("part", "old", "new", "message"),
+    [
+        ("bodies", 'type="R_Y" q_initial="0.3"', 'type="HELIX" q_initial="0.3"',
+         "link 1, joint.type: found HELIX; accepted: R_X"),
+        ("bodies", 'q_initial="0.3"', 'q_initial="0.3 1"',
+         "link 1, joint.q_initial: found 0.3 1; accepted: 1 finite"),
+        ("bodies", 'q_min="-2.0"', 'q_min="3"', "link 1, joint.q_min: found 3; accepted: at most"),
+        ("bodies", '<num>1</num>', "<num>7</num>",
+         "link 2, parent.num: found 7; accepted: 0, the world, or a link, 1 to 2"),
+        ("bodies", "<num>0</num>", "<num>2</num>", "link 1, parent.num: found 2; accepted: a link"),
+        ("bodies", 'num="2"', 'num="1"', "link 1, num: found 1; accepted: numbers that are given"),
+        ("bodies", 'num="2"', 'num="3"', r"link_rigid, num: found \[1, 3\]; accepted: all of 1"),
+        ("bodies", 'num="2"', 'num="1.5"', "link 1.5, num: found 1.5; accepted: a whole number"),
+        ("bodies", "<mass>1.5</mass>", "<mass>-1</mass>", "link 1, mass: found -1; accepted"),
+        ("bodies", "<mass>1.5</mass>", "", "link 1, mass: found nothing; accepted"),
+        ("bodies", 'ref="com"', 'ref="end"', "link 1, inertia.ref: found end; accepted: com or"),
+        ("bodies", "<Ixx>0.02</Ixx>", "<Ixx>x</Ixx>", "link 1, Ixx: found x; accepted: a finite"),
+        ("bodies", 'q_initial="0.3"', 'q_initial="0.3" axis="1 0 0"',
+         "link 1, joint.axis: found 1 0 0; accepted: an axis of R_AXIS and P_AXIS only"),
+        ("bodies", 'type="R_Y" q_initial="0.3"', 'type="R_AXIS" axis="0 0 0" q_initial="0.3"',
+         "link 1, joint.axis: found 0 0 0; accepted: a vector that is not zero"),
+        ("cables", "<link>2</link>", "<link>3</link>",
+         "cable 1, attachment 3, link: found 3; accepted: 0, the world, or a link, 1 to 2"),
+        ("cables", "<location>0.05 0 0.02</location>", "<location>1 2</location>",
+         "cable 1, attachment 2, location: found 1 2; accepted: 3 finite"),
+        ("cables", 'reference="com"', 'reference="end"',
+         "cable 1, attachment_reference: found end; accepted: com or joint"),
+        ("cables", "<force_min>1.0</force_min>", "<force_min>99</force_min>",
+         "cable 1, force_min: found 99; accepted: at most force_max, 60"),
+        ("cables", "<attachment><link>0</link>", "<winch><link>0</link>", "is not well-formed"),
+        ("cables", "<attachments><attachment><link>0</link><location>0.5 0 0.1</location>"
+         "</attachment>", "<attachments><winch/>",
+         "cable 1, attachment 1: found <winch>; accepted: <attachment>, or as the first one"),
+        ("cables", "cable_ideal", "cable_linear_spring", "cable 1, K: found nothing; accepted"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_said_in_one_line(part, old, new, message, tmp_path):
+    files = dict(zip(("bodies", "cables"), _pair(two_link(), tmp_path), strict=True))
+    text = files[part].read_text(encoding="utf-8")
+    assert old in text
+    count = -1 if old == "cable_ideal" else 1
+    files[part].write_text(text.replace(old, new, count), encoding="utf-8")
+    with pytest.raises(RobotFileError, match=message) as caught:
+        import_mechanism(files["bodies"])
+    assert "\n" not in str(caught.value)
+    assert str(caught.value).startswith(str(files[part]))
+
+
+def test_a_mechanism_is_no_robot_with_one_platform(tmp_path):
+    path = two_link().write(tmp_path)
+    for read in (models.load_robot, models.import_robot):
+        with pytest.raises(RobotFileError, match="cdpr import makes a mechanism of it"):
+            read(path)
