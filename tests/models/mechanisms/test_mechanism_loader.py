@@ -179,7 +179,7 @@ def test_what_drake_refuses_is_one_line(tmp_path: Path, files: dict[str, str], w
 
 def test_mechanisms_and_robots_are_told_apart(tmp_path: Path) -> None:
     assert set(mechanism_names()) == {
-        "arm_on_platform", "cable_arm", "mobile_bases", "two_platforms",
+        "arm_on_platform", "bm_arm", "cable_arm", "mobile_bases", "two_platforms",
     }  # fmt: skip
     assert set(mechanism_names()).isdisjoint(robot_names())
     assert not any(is_mechanism(robot_file(name)) for name in robot_names())
