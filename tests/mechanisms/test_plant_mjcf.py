@@ -28,8 +28,7 @@ from tests.mechanisms.cabled import alone, taut_lengths
 from tests.mechanisms.machines import add_body, frame_of
 
 ACCELERATION = 1e-10
-"""As a share of the largest [-]; found 2e-13, of a plate about a far
-point; else 6e-15."""
+"""As a share of the largest [-]; found 6e-15."""
 
 Y = np.array([0.0, 1.0, 0.0])
 
@@ -164,9 +163,9 @@ def test_a_plate_whose_moments_are_at_the_edge():
     """Its largest moment is the sum of the others, and MuJoCo wants no bit more."""
     for turn in np.linspace(0.1, 2.0, 12):
         plant = MultibodyPlant(0.0)
-        plate = SpatialInertia.SolidBoxWithMass(1.0, 0.37, 0.21, 1e-7)
+        plate = SpatialInertia.SolidBoxWithMass(1.0, 0.37, 0.21, 1e-12)
         R = RollPitchYaw(turn, 2.0 * turn, 0.3).ToRotationMatrix()
-        body = plant.AddRigidBody("plate", plate.ReExpress(R).Shift([0.3, -0.2, turn]))
+        body = plant.AddRigidBody("plate", plate.ReExpress(R))
         plant.Finalize()
         ours, theirs, _ = compared(plant, body)
         assert differ(ours, theirs) < ACCELERATION

@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+from pydrake.multibody.tree import JacobianWrtVariable
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
+from cdpr_drake.geometry.cable_routes import CableRoute, CableRoutes
 from cdpr_drake.models.plant_cables import PlantCables
 from cdpr_drake.models.plant_rest import moved
 from tests.mechanisms.cabled import Cabled, alone, random_states, taut_lengths
@@ -52,6 +54,60 @@ def test_power_on_bodies_is_what_cables_lose(name, ends):
         exchanged = float(np.sum(np.abs(t * l_dot)))
         assert exchanged > 1.0
         assert abs(float(v @ tau + t @ l_dot)) < POWER * exchanged
+
+
+@pytest.mark.parametrize("ends", [{}, PULLEYS], ids=["points", "pulleys"])
+@pytest.mark.parametrize("name", MACHINES)
+def test_damping_goes_by_the_rate_of_the_length(name, ends):
+    """t = E S (e + T de/dt), with rates by differences, from bodies that move and turn."""
+    plant, T = alone(name).plant, 5e-3
+    cables = PlantCables(plant, alone(name).with_ends(retardation=T, **ends))
+    context, l0 = alone(name).home(), 0.8 * taut_lengths(name)
+    l0_dot = 0.1 * np.cos(np.arange(len(l0)))
+    for q, v in random_states(name, STATES, seed=33):
+
+        def lengths(time, q=q, v=v):
+            plant.SetPositions(context, moved(plant, q, time * v))
+            return cables.lengths_and_jacobian(context)[0]
+
+        length, rate = lengths(0.0), slope(lengths)
+        plant.SetPositions(context, q)
+        plant.SetVelocities(context, v)
+        strain_rate = (rate - length * l0_dot / l0) / l0
+        wanted = cables.routes.ends.stiffness * (length / l0 - 1.0 + T * strain_rate)
+        found = cables.outputs(context, l0, l0_dot)[0]
+        assert np.mean(wanted > 0.0) > 0.5
+        assert np.max(np.abs(found - np.maximum(wanted, 0.0))) < POWER * np.max(wanted)
+
+
+def test_a_cable_that_sags_is_damped_as_its_exit_point_moves():
+    """As from a point of the world that is there, with velocities as seen from the exit point."""
+    made = alone("two_platforms")
+    plant, W = made.plant, made.plant.world_frame()
+    left, right = (plant.GetBodyByName(name) for name in ("left", "right"))
+    context = made.home()
+    p_LA, p_RB = np.array([0.09, 0.085, -0.035]), np.array([-0.09, 0.085, 0.035])
+    (q, v), *_ = random_states("two_platforms", 1, seed=35)
+    plant.SetPositions(context, q)
+    plant.SetVelocities(context, v)
+    p_WA = plant.CalcPointsPositions(context, left.body_frame(), p_LA, W).ravel()
+    J = plant.CalcJacobianTranslationalVelocity(
+        context, JacobianWrtVariable.kV, left.body_frame(), p_LA, W, W
+    )
+    found = []
+    for exit_point in ((left, p_LA), (plant.world_body(), p_WA)):
+        route = CableRoute(
+            points=[exit_point, (right, p_RB)], stiffness=1e4, linear_weight=0.4, retardation=0.01
+        )
+        cables = PlantCables(plant, CableRoutes.of(plant, [route]), "catenary")
+        if exit_point[0] is not left:
+            seen = v.copy()
+            start = right.floating_velocities_start_in_v()
+            seen[start + 3 : start + 6] -= J @ v
+            plant.SetVelocities(context, seen)
+        length, _ = cables.lengths_and_jacobian(context)
+        found.append(cables.outputs(context, 0.95 * length)[0, 0])
+    assert abs(found[0] - found[1]) < 1e-12 * found[0]
 
 
 SAGGING = {

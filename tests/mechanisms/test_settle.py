@@ -7,11 +7,12 @@ import pytest
 from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import SpatialInertia
+from scipy.optimize import minimize
 
 from cdpr_drake.errors import CableModelError
 from cdpr_drake.geometry.cable_routes import CableRoute, CableRoutes
 from cdpr_drake.models.plant_cables import PlantCables
-from cdpr_drake.models.plant_rest import hang, moved, rows_of_motors, settle
+from cdpr_drake.models.plant_rest import _Model, hang, moved, rows_of_motors, settle
 from tests.mechanisms.cabled import alone, cables_of, random_states, rest_of
 from tests.mechanisms.machines import STANDING, STIFFNESS
 
@@ -105,6 +106,30 @@ def test_what_nothing_resists_stays_where_it_is():
     assert rest.stability == "neutral"
     assert rest.residual < ROUNDING * STIFFNESS
     assert np.max(np.abs(rest.positions[4:6])) < 1e-6  # below the exit point
+
+
+def test_a_step_of_the_model_follows_cables_that_catch_and_let_go():
+    """Least energy of springs that only pull, against a program that knows nothing of kinks."""
+    random = np.random.default_rng(56)
+    changed = 0
+    for _ in range(20):
+        B = random.normal(size=(4, 4))
+        model = _Model(
+            random.normal(scale=3.0, size=4), B @ B.T, random.normal(size=(7, 4)),
+            random.uniform(5.0, 50.0, 7), random.uniform(-0.3, 0.3, 7),
+        )  # fmt: skip
+
+        def energy(d, model=model):
+            pulled = np.maximum(model.stretch + model.J @ d, 0.0)
+            stored = d @ model.smooth @ d + pulled @ (model.springs * pulled)
+            return float(stored / 2.0 - model.others @ d)
+
+        d, least = model.step(np.zeros((4, 4)))
+        assert least
+        found = minimize(energy, np.zeros(4), method="BFGS", options={"gtol": 1e-9})
+        assert energy(d) < found.fun + 1e-9
+        changed += not np.array_equal(model.stretch > 0.0, model.stretch + model.J @ d > 0.0)
+    assert changed > 10
 
 
 def test_cables_that_sag_settle_too():
