@@ -16,6 +16,7 @@ from pydrake.multibody.tree import (
     BodyIndex,
     FixedOffsetFrame,
     Frame,
+    JointIndex,
     ModelInstanceIndex,
     PlanarJoint,
     PrismaticJoint,
@@ -94,6 +95,19 @@ class RobotInPlant:
     def pose(self, plant_context: Context) -> RigidTransform:
         """X_WP of the platform [m]."""
         return self.plant.EvalBodyPoseInWorld(plant_context, self.body)
+
+
+def carried_bodies(in_plant: RobotInPlant) -> tuple[str, ...]:
+    """Names of the bodies with mass that joints hang on a platform, of a finalized plant."""
+    plant, platform = in_plant.plant, in_plant.body
+    joints = [plant.get_joint(JointIndex(i)) for i in plant.GetJointIndices()]
+    own = [j.index() for j in joints if j.child_body().index() == platform.index()]
+    bodies = (plant.get_body(i) for i in plant.GetBodiesKinematicallyAffectedBy(own))
+    return tuple(
+        body.scoped_name().get_full()
+        for body in bodies
+        if body.index() != platform.index() and body.default_mass() > 0.0
+    )
 
 
 def pose_from_state(robot: Robot, state: Any) -> Any:

@@ -13,10 +13,11 @@ from pydrake.systems.framework import Context, DiagramBuilder, InputPort, Output
 from pydrake.systems.primitives import Adder, Demultiplexer
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.errors import CableModelError
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.models.robot_holding import check_bundles, hold_robot, rest_as_long, rest_with_slack
-from cdpr_drake.models.robot_in_plant import RobotInPlant, add_robot
+from cdpr_drake.models.robot_in_plant import RobotInPlant, add_robot, carried_bodies
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.scene import add_frame, add_ground
 from cdpr_drake.statics.static_tensions import StaticTensions
@@ -243,7 +244,18 @@ def set_robot_at_equilibrium(
     X_WP: RigidTransform,
     holding: StaticTensions,
 ) -> Array:
-    """Puts a platform at a pose, at rest, with lengths and drum tensions; returns its tensions."""
+    """Puts a platform at a pose, at rest, with lengths and drum tensions; returns its tensions.
+
+    Raises:
+        CableModelError: Bodies with mass hang on the platform, which these tensions do not hold.
+    """
+    carried = carried_bodies(block.in_plant)
+    if carried:
+        raise CableModelError(
+            f"set_at_equilibrium: found {carried[0]} on the platform of {block.robot.name}, whose "
+            "weight would not be held; accepted: a platform that carries nothing; models.hang with "
+            "CableRoutes.of_cable_set finds tensions that hold both"
+        )
     block.in_plant.set_pose(plant_context, X_WP)
     block.winches.hold(winch_context, holding.unstrained_lengths, holding.drum_tensions)
     return holding.tensions
