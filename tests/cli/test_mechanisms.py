@@ -10,6 +10,7 @@ from cdpr_drake.analyses.front.mechanisms import hang_mechanism, solve_mechanism
 from cdpr_drake.cli.app import main
 from cdpr_drake.models.mechanism_files import mechanism_names
 from cdpr_drake.models.robot_loader import robot_file
+from tests.messages import printed
 from tests.models.mechanisms.small_mechanisms import MECHANISM, write_small
 
 
@@ -17,7 +18,7 @@ def run(capsys: pytest.CaptureFixture[str], *words: str, code: int = 0) -> str:
     """What a command prints, on stderr where it is refused."""
     with pytest.raises(SystemExit) as ended:
         main(list(words))
-    said = capsys.readouterr()
+    said = printed(capsys)
     assert ended.value.code == code, said.err
     return said.out if code == 0 else said.err
 

@@ -20,9 +20,9 @@ def defines(path, name):
     return found is not None and getattr(found, "__module__", home) == home
 
 
-def test_there_are_twenty_questions():
-    assert len(ROWS) == 20
-    assert PAGE.read_text().count("\n| ") == 20 + 1  # and the head of the table
+def test_every_row_is_a_question():
+    assert len(ROWS) >= 20
+    assert PAGE.read_text().count("\n| ") == len(ROWS) + 1  # and the head of the table
 
 
 @pytest.mark.parametrize(("question", "room", "path", "name"), ROWS, ids=[row[3] for row in ROWS])

@@ -12,6 +12,7 @@ from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from cdpr_drake.geometry.poses import pose_error
 from cdpr_drake.geometry.straight_cables import gravity_wrench, wrench_matrix
 from cdpr_drake.models.camera_catalogue import camera_names, load_camera
+from cdpr_drake.models.mechanism_files import mechanism_names
 from cdpr_drake.models.robot_in_plant import platform_inertia
 from cdpr_drake.models.robot_loader import load_robot, robot_names
 from cdpr_drake.systems.robots.cable_robot import CableRobot, automatic_step
@@ -127,10 +128,11 @@ def test_every_robot_loads_and_hangs_still_at_home(name):
 
 def test_every_folder_has_a_readme_and_a_robot_of_its_name():
     folders = [entry for entry in ROBOTS.iterdir() if entry.is_dir()]
-    assert {folder.name for folder in folders} == set(robot_names())
+    assert {folder.name for folder in folders} == {*robot_names(), *mechanism_names()}
     for folder in folders:
         assert folder.joinpath("README.md").read_text(encoding="utf-8").startswith("# ")
-        content = yaml.safe_load(folder.joinpath("robot.yaml").read_text(encoding="utf-8"))
+        file = "mechanism.yaml" if folder.name in mechanism_names() else "robot.yaml"
+        content = yaml.safe_load(folder.joinpath(file).read_text(encoding="utf-8"))
         assert content["name"] == folder.name
 
 

@@ -137,7 +137,7 @@ def test_commands_refuse_it(
     before = sorted(tmp_path.iterdir())
     with pytest.raises(SystemExit) as ended:
         main(words)
-    lines = capsys.readouterr().err.splitlines()
+    lines = printed(capsys).err.splitlines()
     refused = [line for line in lines if line.startswith("cdpr: ")]
     assert ended.value.code == 2
     assert len(refused) == 1
