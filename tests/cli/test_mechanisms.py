@@ -102,7 +102,7 @@ def test_what_is_not_accepted(
 def test_robots_lists_them_apart(capsys: pytest.CaptureFixture[str]) -> None:
     listed = json.loads(run(capsys, "robots", "--mechanisms", "--json"))
     assert tuple(one["name"] for one in listed) == mechanism_names()
-    assert [one["eyelets"] for one in listed] == [0, 2, 0, 0]
+    assert [one["eyelets"] for one in listed] == [0, 0, 2, 0, 0]
     assert "two_platforms" in run(capsys, "robots", "--mechanisms")
 
 

@@ -17,6 +17,7 @@ from cdpr_drake.studio.workbench.robot_files import RobotFiles
 from cdpr_drake.studio.workbench.session import Workbench
 from cdpr_drake.studio.workbench.working_folder import WorkingFolder
 from cdpr_drake.systems.robots.cable_robot import CableRobot
+from tests.messages import printed
 
 NAME = "cable_arm"
 SENTENCE = f"a robot with one platform; mechanisms are taken by {TAKEN_BY}"
