@@ -11,6 +11,8 @@ import yaml
 from cdpr_drake.errors import RobotFileError, ScenarioError
 from cdpr_drake.models.exit_points import MARK as RAILS_MARK
 from cdpr_drake.models.formats.detection import SUFFIXES as ROBOT_SUFFIXES
+from cdpr_drake.models.mechanism_loader import load_mechanism
+from cdpr_drake.models.mechanism_schema import Mechanism
 from cdpr_drake.models.robot_loader import load_robot, robot_file
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.schema.typed_yaml import closest, load_typed
@@ -22,7 +24,8 @@ _FOLDER = Path(__file__).parent
 VISUAL_SERVO = "visual_servo"
 TENSION_CONTROL = "tension_control"
 PICK_AND_PLACE = "pick_and_place"
-KINDS = (VISUAL_SERVO, TENSION_CONTROL, PICK_AND_PLACE)
+MECHANISM = "mechanism"
+KINDS = (VISUAL_SERVO, TENSION_CONTROL, PICK_AND_PLACE, MECHANISM)
 """Kinds of runs; a file without the key `kind` describes a visual servo."""
 
 
@@ -149,7 +152,12 @@ class _OfRobot(Protocol):
     world: WorldSettings | None
 
 
+class _OfMechanism(Protocol):
+    mechanism: str
+
+
 S = TypeVar("S", bound=_OfRobot)
+M = TypeVar("M", bound=_OfMechanism)
 
 
 def load_with_robot(schema: type[S], name: str, overrides: Sequence[str]) -> tuple[S, Robot, Path]:
@@ -183,6 +191,30 @@ def load_with_robot(schema: type[S], name: str, overrides: Sequence[str]) -> tup
     if getattr(perturbations, "believed_robot", None) is not None:
         _check_belief(scenario, robot, path)
     return scenario, robot, path
+
+
+def load_with_mechanism(
+    schema: type[M], name: str, overrides: Sequence[str]
+) -> tuple[M, Mechanism, Path]:
+    """A scenario of a mechanism by name or by path, the mechanism, and the scenario's file.
+
+    Args:
+        schema: Dataclass of its kind; its `mechanism` becomes a name or an absolute path.
+        name: Name or path.
+        overrides: Items "key.subkey=value" that replace what the file says.
+
+    Raises:
+        ScenarioError: Unknown or malformed scenario.
+        RobotFileError: Its mechanism's file is not accepted.
+    """
+    path = scenario_file(name)
+    scenario = load_typed(schema, path, error=ScenarioError, overrides=overrides)
+    scenario.mechanism = resolve_robot_path(path, scenario.mechanism)
+    try:
+        mechanism = load_mechanism(scenario.mechanism)
+    except RobotFileError as problem:
+        raise RobotFileError(*problem.within(f"{path}: mechanism")) from problem
+    return scenario, mechanism, path
 
 
 def _check_belief(scenario: Any, robot: Robot, path: Path) -> None:
