@@ -16,7 +16,7 @@ from cdpr_drake.cli.process import StopRequest
 from cdpr_drake.cli.run_endings import CLIENT_ENDED
 from cdpr_drake.cli.simulate import STOPPING, SimulationSession, tell_run
 from cdpr_drake.cli.terminal import message_console
-from cdpr_drake.errors import ClientEndedError, ScenarioError
+from cdpr_drake.errors import ClientEndedError
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.remote.messages import PROTOCOL, check_available
@@ -26,7 +26,7 @@ from cdpr_drake.systems.remote.remote_place import SERVO_PLACES, TENSION_PLACES,
 from cdpr_drake.systems.remote.server_socket import ServerSocket as Socket
 from cdpr_drake.systems.remote.server_socket import is_loopback
 from cdpr_drake.systems.remote.service import tension_service
-from cdpr_drake.systems.scenarios.files import MECHANISM, scenario_kind
+from cdpr_drake.systems.scenarios.files import check_moves_robot, scenario_kind
 from cdpr_drake.systems.scenarios.tension_control_scenario import TensionScenario
 
 
@@ -87,11 +87,7 @@ def serve(
     """
     check_available()
     kind = SCENARIO_KINDS[scenario_kind(scenario)]
-    if scenario_kind(scenario) == MECHANISM:
-        raise ScenarioError(
-            f"scenario {scenario}: kind: found {MECHANISM}; accepted by cdpr serve: kinds that "
-            "move a robot with one platform"
-        )
+    check_moves_robot(scenario, "cdpr serve")
     overrides, formats = list(settings or []), parse_formats(figure_format)
     for key, value in (
         ("remote.place", place), ("duration", duration), ("remote.pace", pace),

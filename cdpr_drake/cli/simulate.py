@@ -170,7 +170,7 @@ def simulate(
         (
             kind.live is None and (meshcat or steered_by is not None),
             f"scenario {scenario}: --meshcat: found with the kind {scenario_kind(scenario)}; "
-            "accepted: other kinds; replay.html shows the run afterwards",
+            "accepted: with kinds that move a robot; replay.html shows the run afterwards",
         ),
         (
             not meshcat and (host is not None or port is not None),

@@ -12,7 +12,15 @@ from pydrake.systems.framework import Context, Diagram, DiagramBuilder, OutputPo
 from pydrake.systems.primitives import ZeroOrderHold
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import CdprError, Problems, ScenarioError, TensionProblemError
+from cdpr_drake.errors import (
+    CableModelError,
+    CdprError,
+    EquilibriumError,
+    InfeasibleTensionError,
+    Problems,
+    ScenarioError,
+    TensionProblemError,
+)
 from cdpr_drake.geometry.cable_routes import Integers
 from cdpr_drake.models.mechanism_in_plant import MechanismInPlant, add_mechanism
 from cdpr_drake.models.mechanism_loader import load_mechanism
@@ -132,22 +140,25 @@ class MechanismFollower:
 
     def velocity_names(self) -> list[str]:
         """A name for each velocity: the joint's, or free body's, and which of its rates."""
-        found = []
-        for joint in moving_joints(self.plant):
+        found = [""] * self.plant.num_velocities()
+        for joint in moving_joints(self.plant):  # a free body's comes last, its velocities first
             name, n = part_name(self.plant, joint), joint.num_velocities()
-            found += [name if n == 1 else f"{name}.{joint.velocity_suffix(k)}" for k in range(n)]
+            for k in range(n):
+                words = name if n == 1 else f"{name}.{joint.velocity_suffix(k)}"
+                found[joint.velocity_start() + k] = words
         return found
 
     def position_names(self) -> list[str]:
         """A name for each position, with its unit, if it has one."""
-        found = []
+        found = [""] * self.plant.num_positions()
         for joint in moving_joints(self.plant):
             name, n = part_name(self.plant, joint), joint.num_positions()
+            free = isinstance(joint, QuaternionFloatingJoint)
             for k in range(n):
                 suffix = joint.position_suffix(k)
-                free = isinstance(joint, QuaternionFloatingJoint)
                 unit = "" if free and k < 4 else "_rad" if suffix.startswith("q") else "_m"
-                found.append((name if n == 1 else f"{name}.{suffix}") + unit)
+                words = name if n == 1 else f"{name}.{suffix}"
+                found[joint.position_start() + k] = words + unit
         return found
 
     def part_errors(self, off: Array) -> dict[str, tuple[Array, Array]]:
@@ -278,10 +289,18 @@ def _by_winches(scenario: MechanismScenario, mechanism: Mechanism) -> MechanismF
     routes = given.with_cables(settings.applied(given.ends))
     cables = PlantCables(plant, routes, settings.model)
     low, high = scenario.limits(mechanism)
-    rest = hang(
-        cables, plant.CreateDefaultContext(), prestress=control.prestress,
-        lower=low if low > 0.0 else None, upper=high,
-    )  # fmt: skip
+    try:
+        rest = hang(
+            cables,
+            plant.CreateDefaultContext(),
+            prestress=control.prestress,
+            lower=low if low > 0.0 else None,
+            upper=high,
+        )
+    except CableModelError as problem:
+        raise ScenarioError(f"cables.model: {problem}") from problem
+    except (InfeasibleTensionError, EquilibriumError) as problem:
+        raise ScenarioError(f"control: at the start, {problem}") from problem
     motion = plant_motion(plant, rest.positions, scenario.motion.waypoints)
     period, engine, ports = 1.0 / control.rate, None, None
     if compiled:

@@ -11,6 +11,7 @@ import yaml
 from cdpr_drake.errors import RobotFileError, ScenarioError
 from cdpr_drake.models.exit_points import MARK as RAILS_MARK
 from cdpr_drake.models.formats.detection import SUFFIXES as ROBOT_SUFFIXES
+from cdpr_drake.models.mechanism_files import mechanism_names
 from cdpr_drake.models.mechanism_loader import load_mechanism
 from cdpr_drake.models.mechanism_schema import Mechanism
 from cdpr_drake.models.robot_loader import load_robot, robot_file
@@ -44,6 +45,28 @@ def scenario_names(kind: str | None = None) -> tuple[str, ...]:
     if kind not in KINDS:
         raise ScenarioError(f"kind: found {kind!r}; accepted: {', '.join(KINDS)}")
     return tuple(name for name in names if scenario_kind(name) == kind)
+
+
+def robot_scenario_names() -> tuple[str, ...]:
+    """Names of the scenarios that come with the package and move a robot with one platform."""
+    return tuple(name for name in scenario_names() if scenario_kind(name) != MECHANISM)
+
+
+def check_moves_robot(name: str, asks: str) -> None:
+    """Refuses scenarios of mechanisms.
+
+    Args:
+        name: Name or path of the scenario.
+        asks: What takes robots with one platform only, as in "cdpr serve".
+
+    Raises:
+        ScenarioError: It is one of a mechanism, or there is none.
+    """
+    if scenario_kind(name) == MECHANISM:
+        raise ScenarioError(
+            f"scenario {name}: kind: found {MECHANISM}; accepted by {asks}: kinds that move a "
+            "robot with one platform"
+        )
 
 
 def scenario_file(name: str) -> Path:
@@ -209,7 +232,11 @@ def load_with_mechanism(
     """
     path = scenario_file(name)
     scenario = load_typed(schema, path, error=ScenarioError, overrides=overrides)
-    scenario.mechanism = resolve_robot_path(path, scenario.mechanism)
+    scenario.mechanism = given = resolve_robot_path(path, scenario.mechanism)
+    if "/" not in given and given not in mechanism_names():
+        raise ScenarioError(
+            f"{path}: mechanism: found {given!r}; {closest(given, mechanism_names())}, or a path"
+        )
     try:
         mechanism = load_mechanism(scenario.mechanism)
     except RobotFileError as problem:
