@@ -8,6 +8,7 @@ import pytest
 
 from cdpr_drake.cli.app import SUBCOMMANDS, main
 from cdpr_drake.cli.completion import asked_words, robot_words, scenario_words
+from cdpr_drake.models.mechanism_files import mechanism_names
 from cdpr_drake.models.robot_loader import robot_names
 from cdpr_drake.systems.scenarios.files import scenario_names
 from tests.messages import printed
@@ -57,7 +58,7 @@ def test_subcommands():
     [
         ("cdpr simulate acrobot_c", ["acrobot_circles", "acrobot_circling_ring",
                                      "acrobot_computed_torque"]),
-        ("cdpr tension ", list(robot_names())),
+        ("cdpr tension ", sorted([*robot_names(), *mechanism_names()])),
         ("cdpr view caroca_", ["caroca_gazebo"]),
     ],
 )  # fmt: skip
