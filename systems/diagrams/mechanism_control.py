@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -116,9 +117,13 @@ class MechanismFollower:
         for start, _ in self.motion.quaternions:
             part = slice(start, start + 4)
             goal[part] *= 1.0 if goal[part] @ q[part] >= 0.0 else -1.0
-        own = self.plant.CreateDefaultContext()
-        self.plant.SetPositions(own, q)
-        return np.asarray(self.plant.MapQDotToVelocity(own, goal - q))
+        self.plant.SetPositions(self._own, q)
+        return np.asarray(self.plant.MapQDotToVelocity(self._own, goal - q))
+
+    @cached_property
+    def _own(self) -> Context:
+        """A context of the plant for questions."""
+        return self.plant.CreateDefaultContext()
 
     def turns(self) -> np.ndarray:
         """Which velocities are rates of angles, shape (nv,), true or false."""

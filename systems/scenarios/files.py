@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
@@ -47,6 +48,7 @@ def scenario_names(kind: str | None = None) -> tuple[str, ...]:
     return tuple(name for name in names if scenario_kind(name) == kind)
 
 
+@cache
 def robot_scenario_names() -> tuple[str, ...]:
     """Names of the scenarios that come with the package and move a robot with one platform."""
     return tuple(name for name in scenario_names() if scenario_kind(name) != MECHANISM)

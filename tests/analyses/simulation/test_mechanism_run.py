@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from cdpr_drake.analyses.simulation.mechanism_run import (
     run_mechanism_scenario,
     summarize_mechanism_run,
 )
+from cdpr_drake.analyses.simulation.run_loop import advance
 from cdpr_drake.analyses.simulation.scenario_kinds import SCENARIO_KINDS
 from cdpr_drake.analyses.simulation.session import RunSession
 from cdpr_drake.systems.diagrams.load import load_scenario
@@ -23,6 +25,7 @@ from cdpr_drake.systems.monitoring.run_monitor import Outcome
 from cdpr_drake.systems.scenarios.files import scenario_names
 from tests.cli.test_cli import refuse, run
 
+RUN = "cdpr_drake.analyses.simulation.mechanism_run"
 ARM, BASES = "cable_arm_computed_torque", "mobile_bases_winches"
 
 BETWEEN_STEPS = 1e-3
@@ -164,6 +167,33 @@ def test_a_run_that_was_killed_goes_on_to_the_same_bytes(tmp_path, monkeypatch, 
     assert again.sim_time == whole.sim_time
     for quantity, values in whole.log.items():
         assert again.log[quantity].tobytes() == values.tobytes(), quantity
+
+
+def test_the_command_goes_on_in_its_folder(capsys, tmp_path, monkeypatch):
+    """Which names mechanism and bodies elsewhere than the scenario that was asked for did."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(log_keeper, "CHECKPOINT_WAIT", 0.0)
+    monkeypatch.setattr("cdpr_drake.analyses.front.simulation.write_pictures", lambda *_: {})
+    asked = ("simulate", BASES, "--duration", "0.4")
+    assert run(capsys, *asked, "--out", "whole")[0] == 0
+    with monkeypatch.context() as patch:
+        patch.setattr(f"{RUN}.advance", lambda simulator, duration, *others: advance(
+            simulator, duration, *others[:2],
+            replace(others[2], should_stop=lambda: simulator.get_context().get_time() > 0.15),
+            *others[3:],
+        ))  # fmt: skip
+        assert run(capsys, *asked, "--out", "out")[0] == 130
+    assert json.loads((tmp_path / "out" / "summary.json").read_text())["sim_time_s"] < 0.3
+    bases = tmp_path / "out" / "mechanism.yaml"
+    words = bases.read_text()
+    bases.write_text(words.replace("lower: 2.0", "lower: 3.0"))
+    said = refuse(capsys, "simulate", "--continue", "out")
+    assert "tension_bounds.lower is 2.0 there, 3.0 here" in said
+    bases.write_text(words)
+    assert run(capsys, "simulate", "--continue", "out")[0] == 0
+    for name in ("log.npz", "log.csv", "scenario.yaml", "mechanism.yaml"):
+        whole = (tmp_path / "whole" / name).read_bytes()
+        assert (tmp_path / "out" / name).read_bytes() == whole, name
 
 
 def test_a_step_that_is_too_long_is_told_and_the_run_diverges():
