@@ -36,7 +36,8 @@ def _title(run: MechanismRun, words: str) -> str:
     how = "on winches"
     if control.kind == COMPUTED_TORQUE:
         how = f"computed torque, tensions by the {control.method.replace('_', ' ')}"
-    return f"{words}\n{scenario.title}\n({scenario.name}, {how})"
+    lines = words, scenario.title, f"({scenario.name}, {how})"
+    return "\n".join(line for line in lines if line)
 
 
 WANTED = Look("#b8b8b8")
