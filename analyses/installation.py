@@ -143,6 +143,7 @@ def compilation_steps() -> list[tuple[str, Callable[[], None]]]:
     method distributes tensions once. What is compiled already, or by an earlier step, is not again.
     """
     from cdpr_drake.systems.scenarios.files import (
+        MECHANISM,
         PICK_AND_PLACE,
         TENSION_CONTROL,
         VISUAL_SERVO,
@@ -157,7 +158,8 @@ def compilation_steps() -> list[tuple[str, Callable[[], None]]]:
         if name == "acrobot_pbvs":
             more = (projected, compiled)
             steps.append((f"{name}, compiled engine", partial(_simulate, name, more)))
-    steps += [(name, partial(_simulate, name, ())) for name in scenario_names(TENSION_CONTROL)]
+    for kind in (TENSION_CONTROL, MECHANISM):
+        steps += [(name, partial(_simulate, name, ())) for name in scenario_names(kind)]
     steps += [
         (name, partial(_simulate, name, (projected,))) for name in scenario_names(PICK_AND_PLACE)
     ]

@@ -15,8 +15,12 @@ MECHANISM_FILE = "mechanism.yaml"
 MECHANISM_KEY = "mechanism"
 """Key at the top of a file that robots of one platform do not have."""
 
+SCENARIO_KEY = "kind"
+"""Key at the top of a scenario that moves a mechanism; mechanisms do not have it."""
+
 TAKEN_BY = (
-    "cdpr check, static, tension, view, export to caspr; hang_mechanism, solve_mechanism_tensions"
+    "cdpr check, static, tension, view, export to caspr, and scenarios of kind mechanism; "
+    "hang_mechanism, solve_mechanism_tensions"
 )
 """What takes mechanisms, for messages."""
 
@@ -41,9 +45,8 @@ def is_mechanism_text(content: str) -> bool:
         root = yaml.compose(content, Loader=yaml.SafeLoader)
     except (ValueError, RecursionError, yaml.YAMLError):
         return False
-    return isinstance(root, yaml.MappingNode) and any(
-        key.value == MECHANISM_KEY for key, _ in root.value
-    )
+    keys = {key.value for key, _ in root.value} if isinstance(root, yaml.MappingNode) else set()
+    return MECHANISM_KEY in keys and SCENARIO_KEY not in keys
 
 
 def is_mechanism(path: Path) -> bool:

@@ -80,7 +80,7 @@ class MechanismInPlant:
         Raises:
             RobotFileError: There is none, or there are several; lists those that there are.
         """
-        return self.plant.get_frame(FrameIndex(self.frames[_one_of(self.frames, name)]))
+        return self.plant.get_frame(FrameIndex(self.frames[one_of(self.frames, name)]))
 
     def routes(self) -> CableRoutes:
         """The cables, on the frames of the plant.
@@ -205,8 +205,12 @@ def _plain(scoped: str, prefix: str) -> str:
     return scoped.removeprefix(f"{prefix}::") if prefix else scoped
 
 
-def _one_of(known: dict[str, Any], name: str) -> str:
-    """The scoped name that a name stands for."""
+def one_of(known: dict[str, Any], name: str) -> str:
+    """The scoped name that a name stands for: itself, or the only one that ends in it.
+
+    Raises:
+        RobotFileError: There is none, or there are several; lists those that there are.
+    """
     if name in known:
         return name
     found = [scoped for scoped in known if scoped.rpartition("::")[2] == name]
@@ -229,7 +233,7 @@ def _set_joints(plant: MultibodyPlant, mechanism: Mechanism, prefix: str, before
             joints[_plain(f"{instance}::{joint.name()}", prefix)] = joint
     for name, values in mechanism.home.joints.items():
         try:
-            joint = joints[_one_of(joints, name)]
+            joint = joints[one_of(joints, name)]
         except RobotFileError as problem:
             raise RobotFileError(f"home.joints.{name}: {problem}") from problem
         n, words = joint.num_positions(), ", ".join(f"{value:g}" for value in values)
@@ -259,7 +263,7 @@ def _set_bodies(plant: MultibodyPlant, mechanism: Mechanism, prefix: str, before
             bodies[_plain(body.scoped_name().get_full(), prefix)] = body
     for name, pose in mechanism.home.bodies.items():
         try:
-            body = bodies[_one_of(bodies, name)]
+            body = bodies[one_of(bodies, name)]
         except RobotFileError as problem:
             raise RobotFileError(
                 f"home.bodies.{name}: {problem}, which no joint carries"

@@ -650,7 +650,7 @@ def test_robots_go_out_and_come_back(tmp_path):
 
 
 def test_scenario_names():
-    kinds = ("visual_servo", "tension_control", "pick_and_place")
+    kinds = ("visual_servo", "tension_control", "pick_and_place", "mechanism")
     by_kind = [name for kind in kinds for name in cdpr.scenario_names(kind)]
     assert sorted(by_kind) == list(cdpr.scenario_names())
     one_line(lambda: cdpr.scenario_names("dance"), "dance")

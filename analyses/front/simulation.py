@@ -19,7 +19,6 @@ from cdpr_drake.analyses.reporting.output_folder import (
     shown_path,
     unfinished_folder,
 )
-from cdpr_drake.analyses.reporting.provenance import write_run_inputs
 from cdpr_drake.analyses.simulation.monte_carlo import ManyRuns, run_many, with_seeds
 from cdpr_drake.analyses.simulation.monte_carlo_report import (
     repetition_figure,
@@ -38,7 +37,7 @@ from cdpr_drake.summaries import Summarized
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.loops.loop_choice import set_loop
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
-from cdpr_drake.systems.scenarios.run_settings import ScenarioHeader
+from cdpr_drake.systems.scenarios.run_settings import RunHeader
 from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
 
 if TYPE_CHECKING:
@@ -88,7 +87,8 @@ class Run(Summarized):
     def summary(self) -> tuple[str, list[tuple[str, str]]]:
         """What it shows of itself."""
         told = self.numbers
-        rows = [("simulated", f"{told['sim_time_s']:.2f} s of {told['robot']}")]
+        moved = told["robot"] if "robot" in told else told["mechanism"]
+        rows = [("simulated", f"{told['sim_time_s']:.2f} s of {moved}")]
         if "engine" in told:
             rows.append(("engine, loop", f"{told['engine']}, {told['loop']}"))
         rows += self.facts()[:6]
@@ -147,7 +147,7 @@ class RepeatedRuns(Summarized):
 
 
 def simulate(
-    scenario: ScenarioHeader | str | Path,
+    scenario: RunHeader | str | Path,
     overrides: Sequence[str] = (),
     folder: Path | str | None = None,
     seeds: Sequence[int] | None = None,
@@ -210,7 +210,7 @@ def simulate(
     with results_folder(where, overwrite) as results:
         told.opened(results)
         _check(kind, loaded, note, told)
-        write_run_inputs(results.path, loaded, load_robot(loaded.robot))
+        kind.inputs(results.path, loaded)
         return _run_into(results, kind, loaded, wanted, told)
 
 
@@ -379,10 +379,10 @@ def _repeat(
     return RepeatedRuns(scenario, runs, told, folder, failed)
 
 
-def _loaded(scenario: ScenarioHeader | str | Path, overrides: Sequence[str]) -> Any:
+def _loaded(scenario: RunHeader | str | Path, overrides: Sequence[str]) -> Any:
     if isinstance(scenario, str | Path):
         return load_scenario(str(scenario), overrides)
-    if not isinstance(scenario, ScenarioHeader):
+    if not isinstance(scenario, RunHeader):
         raise ScenarioError(
             f"scenario: found a {type(scenario).__name__}; accepted: a name, a path or a scenario"
         )

@@ -17,10 +17,13 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+import yaml
 from pydrake.common.yaml import yaml_dump_typed
 
 from cdpr_drake.analyses.reporting.log_files import write_scenario, write_whole
 from cdpr_drake.analyses.reporting.written_files import whole_file
+from cdpr_drake.models.mechanism_in_plant import MODEL_SUFFIXES
+from cdpr_drake.models.mechanism_loader import load_mechanism
 from cdpr_drake.models.robot_loader import load_robot, portable_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.version import __version__
@@ -80,6 +83,9 @@ ROBOT_FILE = "robot.yaml"
 MOTION_FILE = "motion.csv"
 """The motion that it tracked, if that came from a file."""
 
+MECHANISM_FILE = "mechanism.yaml"
+"""The mechanism of a run, in its folder."""
+
 BELIEVED_FILE = "believed_robot.yaml"
 """The robot that its controller believes in, if it is another one."""
 
@@ -108,6 +114,25 @@ def write_run_inputs(folder: Path, scenario: Any, robot: Robot) -> None:
         _copy(Path(trajectory.file), folder / MOTION_FILE)
         written.trajectory = replace(trajectory, file=MOTION_FILE)
     write_scenario(folder / "scenario.yaml", written)
+
+
+def write_mechanism(folder: Path, name: str) -> str:
+    """Writes a mechanism into an existing folder; gives its file's name there.
+
+    It names the files of its bodies and packages where they are: on another machine they are not.
+    """
+    write_whole(folder / MECHANISM_FILE, yaml_dump_typed(load_mechanism(name)))
+    return MECHANISM_FILE
+
+
+def mechanism_arguments(name: str) -> dict[str, Any]:
+    """All that a mechanism is, for JSON: its file, and hashes of the models in the folder of its
+    bodies."""
+    mechanism = load_mechanism(name)
+    folder = Path(mechanism.mechanism).parent
+    files = [each for each in sorted(folder.iterdir()) if each.name.endswith(MODEL_SUFFIXES)]
+    hashes = {each.name: hashlib.sha256(each.read_bytes()).hexdigest() for each in files}
+    return {"mechanism": yaml.safe_load(yaml_dump_typed(mechanism)), "bodies": hashes}
 
 
 def _write(path: Path, robot: Robot) -> str:

@@ -16,7 +16,7 @@ import yaml
 from pydrake.common.yaml import yaml_dump_typed
 
 from cdpr_drake.analyses.reporting.log_on_disk import CHECKPOINT, UNWRITTEN_CHECKPOINT
-from cdpr_drake.analyses.reporting.provenance import code_version
+from cdpr_drake.analyses.reporting.provenance import code_version, mechanism_arguments
 from cdpr_drake.analyses.reporting.written_files import claim
 from cdpr_drake.analyses.sweeps.folder import differences
 from cdpr_drake.arrays import Array
@@ -48,6 +48,9 @@ class Checkpoint:
 def run_arguments(scenario: Any) -> dict[str, Any]:
     """All that a run of a scenario of any kind depends on, for JSON: code, scenario, robot."""
     wanted = yaml.safe_load(yaml_dump_typed(scenario))
+    if "mechanism" in wanted:  # by its contents, wherever its file is
+        moved = mechanism_arguments(wanted.pop("mechanism"))
+        return {"cdpr_drake": code_version(), "scenario": wanted, **moved}
     del wanted["robot"]  # by its contents, wherever its file is
     file = getattr(getattr(scenario, "trajectory", None), "file", None)
     if file is not None:

@@ -13,6 +13,21 @@ from pydrake.geometry import Meshcat
 
 from cdpr_drake.analyses.reporting.deferred_figures import Pictures
 from cdpr_drake.analyses.reporting.log_on_disk import Log
+from cdpr_drake.analyses.reporting.provenance import write_run_inputs
+from cdpr_drake.analyses.simulation.mechanism_figures import (
+    mechanism_error_figure,
+    mechanism_pictures,
+)
+from cdpr_drake.analyses.simulation.mechanism_run import (
+    check_mechanism_run,
+    mechanism_end_error,
+    mechanism_facts,
+    run_mechanism_scenario,
+    summarize_mechanism_run,
+    unfinished_mechanism_run,
+    write_mechanism_data,
+    write_mechanism_inputs,
+)
 from cdpr_drake.analyses.simulation.pick_and_place_figures import (
     live_view,
     phase_figure,
@@ -53,6 +68,7 @@ from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario, unfini
 from cdpr_drake.analyses.simulation.worlds import world_facts
 from cdpr_drake.analyses.visualization.live_view import Prepare, live_servo, live_tension_control
 from cdpr_drake.models.rendered_camera import probe_rendering
+from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.cameras.camera_settings import RENDERED
 from cdpr_drake.systems.diagrams.calibration_findings import calibration_facts
 from cdpr_drake.systems.diagrams.servo_models import LoopServo
@@ -61,7 +77,12 @@ from cdpr_drake.systems.diagrams.visual_servo import VisualServo, build_visual_s
 from cdpr_drake.systems.loops.loop_choice import check_loop, uses_compiled_loop
 from cdpr_drake.systems.loops.servo_loop import ServoLoop
 from cdpr_drake.systems.pick_and_place.pick_and_place import build_pick_and_place
-from cdpr_drake.systems.scenarios.files import PICK_AND_PLACE, TENSION_CONTROL, VISUAL_SERVO
+from cdpr_drake.systems.scenarios.files import (
+    MECHANISM,
+    PICK_AND_PLACE,
+    TENSION_CONTROL,
+    VISUAL_SERVO,
+)
 from cdpr_drake.systems.scenarios.pick_and_place_scenario import PickAndPlaceScenario
 from cdpr_drake.systems.scenarios.tension_control_scenario import TensionScenario
 from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
@@ -86,7 +107,8 @@ class ScenarioKind:
         run: Simulates it, with a folder to be made where the log grows; what comes last gets
             simulator and diagram before they start.
         unfinished: The result of a run whose program ended before, from scenario and log.
-        live: Makes what lets Meshcat follow a run, for `run`.
+        live: Makes what lets Meshcat follow a run, for `run`; None: nothing does.
+        inputs: Writes robot or mechanism, and scenario, as they are run, into an existing folder.
         numbers: The summary of a result, for JSON.
         data: Writes the data of a result into a folder; returns the summary.
         pictures: What draws it, with a film if asked, its figures in the formats given.
@@ -101,7 +123,8 @@ class ScenarioKind:
     check: Callable[[Any], list[str]]
     run: Run
     unfinished: Callable[[Any, Log], Any]
-    live: Callable[[Any, Meshcat], Prepare]
+    live: Callable[[Any, Meshcat], Prepare] | None
+    inputs: Callable[[Path, Any], None]
     numbers: Callable[[Any], dict[str, Any]]
     data: Callable[[Path, Any], dict[str, Any]]
     pictures: Callable[[Any, bool, Sequence[str]], Pictures]
@@ -140,6 +163,10 @@ def _check_pick_and_place(scenario: PickAndPlaceScenario) -> list[str]:
     built.make_context()
     check_length(scenario.name, scenario.duration, built.max_step)
     return []
+
+
+def _robot_inputs(folder: Path, scenario: Any) -> None:
+    write_run_inputs(folder, scenario, load_robot(scenario.robot))
 
 
 def _servo_facts(summary: dict[str, Any]) -> list[tuple[str, str]]:
@@ -204,6 +231,7 @@ SCENARIO_KINDS: dict[str, ScenarioKind] = {
         run=run_scenario,
         unfinished=unfinished_run,
         live=live_servo,
+        inputs=_robot_inputs,
         numbers=summarize,
         data=write_run_data,
         pictures=run_pictures,
@@ -218,6 +246,7 @@ SCENARIO_KINDS: dict[str, ScenarioKind] = {
         run=run_tension_scenario,
         unfinished=unfinished_tension_run,
         live=live_tension_control,
+        inputs=_robot_inputs,
         numbers=summarize_tension_run,
         data=write_tension_data,
         pictures=lambda run, video, formats: tension_pictures(run, formats),
@@ -232,12 +261,28 @@ SCENARIO_KINDS: dict[str, ScenarioKind] = {
         run=run_pick_and_place,
         unfinished=unfinished_pick_and_place,
         live=live_view,
+        inputs=_robot_inputs,
         numbers=summarize_pick_and_place,
         data=write_pick_and_place_data,
         pictures=lambda run, video, formats: pick_and_place_pictures(run, formats),
         figure=phase_figure,
         facts=pick_and_place_facts,
         end_error=placed_error,
+    ),
+    MECHANISM: ScenarioKind(
+        has_camera=False,
+        is_servo=False,
+        check=check_mechanism_run,
+        run=run_mechanism_scenario,
+        unfinished=unfinished_mechanism_run,
+        live=None,
+        inputs=write_mechanism_inputs,
+        numbers=summarize_mechanism_run,
+        data=write_mechanism_data,
+        pictures=lambda run, video, formats: mechanism_pictures(run, formats),
+        figure=mechanism_error_figure,
+        facts=mechanism_facts,
+        end_error=mechanism_end_error,
     ),
 }
 """By the name that a scenario file gives as `kind`."""

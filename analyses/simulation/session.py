@@ -27,12 +27,13 @@ def check_connected(scenario: Any, connect: Connect | None) -> None:
     Raises:
         ScenarioError: See above.
     """
-    if scenario.remote is not None and connect is None:
+    remote = getattr(scenario, "remote", None)  # mechanisms have no such section
+    if remote is not None and connect is None:
         raise ScenarioError(
             f"{scenario.name}: remote: found a section, so a process outside closes the loop; "
             "accepted: cdpr serve, or remote: null"
         )
-    if scenario.remote is None and connect is not None:
+    if remote is None and connect is not None:
         raise ScenarioError(
             f"{scenario.name}: remote: found null; accepted: a section with a place"
         )

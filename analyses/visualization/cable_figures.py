@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import Any, Protocol
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -17,7 +17,6 @@ from cdpr_drake.analyses.visualization.curves import (
 )
 from cdpr_drake.analyses.visualization.figure_style import bare_figure, line_style, styled
 from cdpr_drake.arrays import Array
-from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.palette import BOUND, nth_look
 
 NEAR = 1.5
@@ -25,9 +24,17 @@ NEAR = 1.5
 would press the curves flat, and is put into words."""
 
 
+class HasCables(Protocol):
+    """A robot or a mechanism: its cables have names."""
+
+    @property
+    def cables(self) -> Sequence[Any]:
+        """The cables, in the order of all vectors of m."""
+
+
 def cable_figure(
     title: str,
-    robot: Robot,
+    robot: HasCables,
     log: Mapping[str, Array],
     quantity: str,
     label: str,
@@ -39,7 +46,7 @@ def cable_figure(
 
     Args:
         title: Title.
-        robot: The robot.
+        robot: The robot or mechanism.
         log: "time", shape (n,) [s], "slack" and the quantity, shape (n, m).
         quantity: Its name in the log.
         label: Words and unit of its axis.
@@ -73,7 +80,9 @@ def cable_figure(
     return figure
 
 
-def draw_cables(axes: Any, robot: Robot, times: Array, values: Array, scale: float = 1.0) -> None:
+def draw_cables(
+    axes: Any, robot: HasCables, times: Array, values: Array, scale: float = 1.0
+) -> None:
     """Draws a curve for each cable in its own look; values of shape (n, m)."""
     count = len(robot.cables)
     for k, cable in enumerate(robot.cables):

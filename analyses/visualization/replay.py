@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -292,23 +293,49 @@ def write_replay(
         title: Of the page; empty: the scenario's.
     """
     world, things = (None, ()) if around is None else (around.world, around.things)
-    most, curves = MOST_FRAMES, tension_curves(log, limits or robot.tension_limits())
+    curves = tension_curves(log, limits or robot.tension_limits())
     images = film_images(view)
-    while True:
+
+    def page(most: int) -> Recorded:
         picture = _scene(robot, log, scenario, cables, camera, world=world)
         picture.title = title or picture.title
         picture.show_things(things)
         most = min(most, _affordable_frames(picture, log, len(things)))
         shown, frames = _record(picture, log, camera, most, things)
         seen = None if view is None else camera_signals(view, log, shown, images)
-        page = picture.recording_html(frames, curves, seen)
-        if len(page) <= LARGEST_PAGE or most <= FEWEST_FRAMES:
-            break
-        still = len(_scene(robot, log, scenario, cables, camera, world=world).html())
-        room = max(LARGEST_PAGE - still, 0) / (len(page) - still)
-        most = max(FEWEST_FRAMES, int(0.9 * min(most, len(shown)) * room))
-        del picture, page
-    path.write_text(page, encoding="utf-8")
+        return Recorded(picture.recording_html(frames, curves, seen), len(shown), most)
+
+    def still() -> str:
+        return _scene(robot, log, scenario, cables, camera, world=world).html()
+
+    path.write_text(fitting_page(page, still), encoding="utf-8")
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """A page with a recording: its frames, and how many were allowed."""
+
+    html: str
+    frames: int
+    most: int
+
+
+def fitting_page(page: Callable[[int], Recorded], still: Callable[[], str]) -> str:
+    """A page of at most `LARGEST_PAGE`, with as many frames as that allows.
+
+    Args:
+        page: Makes it with at most so many frames.
+        still: The same without a recording.
+    """
+    most = MOST_FRAMES
+    while True:
+        made = page(most)
+        if len(made.html) <= LARGEST_PAGE or made.most <= FEWEST_FRAMES:
+            return made.html
+        bare = len(still())
+        room = max(LARGEST_PAGE - bare, 0) / (len(made.html) - bare)
+        most = max(FEWEST_FRAMES, int(0.9 * min(made.most, made.frames) * room))
+        del made
 
 
 def _scene(

@@ -83,8 +83,10 @@
   }
   function placeNames() {
     const width = pane.clientWidth, height = pane.clientHeight, taken = [];
+    const moved = replay ? replay.places() : null;  // exit points of a mechanism may move
     names.forEach((name, k) => {
-      let v = times(viewer.scene.matrixWorld.elements, [...data.places[k], 1]);
+      const place = moved ? moved.subarray(3 * k, 3 * k + 3) : data.places[k];
+      let v = times(viewer.scene.matrixWorld.elements, [...place, 1]);
       v = times(viewer.camera.matrixWorldInverse.elements, v);
       v = times(viewer.camera.projectionMatrix.elements, v);
       const shown = choice.checked && v[3] > 0;
@@ -224,7 +226,8 @@
     for (const draw of [plot.redraw, values.redraw, () => { changed = true; }]) {
       themed.push(draw);
     }
-    return function (now) {
+    const places = data.frames.places ? unpacked(data.frames.places, Float32Array) : null;
+    function turn(now) {
       if (!ready) { ready = takeOver(); }
       if (playing) {
         if (before !== null) { show(t + (now - before) / 1000 * Number(speed.value)); }
@@ -241,7 +244,9 @@
       plot.cursor(t);
       values.show();
       if (drawImage) { drawImage(); }
-    };
+    }
+    turn.places = () => places && places.subarray(3 * count * frame, 3 * count * (frame + 1));
+    return turn;
 
     function onCanvas(canvas) {  // sized to the pixels of the screen, in units of the page
       const ratio = devicePixelRatio || 1;

@@ -13,6 +13,7 @@ from cdpr_drake.cli.options import AsJson
 from cdpr_drake.cli.terminal import print_json
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models.formats.detection import is_foreign
+from cdpr_drake.models.mechanism_files import MECHANISM_KEY, SCENARIO_KEY
 from cdpr_drake.models.mechanism_loader import load_mechanism, names_mechanism
 from cdpr_drake.models.robot_exchange import import_robot
 from cdpr_drake.models.robot_holding import hold_robot
@@ -69,7 +70,9 @@ def _is_scenario(path: Path) -> bool:
         content = yaml.safe_load(path.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError, yaml.YAMLError):
         return False  # the reader of robots says what is wrong
-    return isinstance(content, dict) and "robot" in content
+    if not isinstance(content, dict):
+        return False
+    return "robot" in content or (MECHANISM_KEY in content and SCENARIO_KEY in content)
 
 
 def check(

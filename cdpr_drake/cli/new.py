@@ -73,7 +73,8 @@ def _scenario(source: str) -> tuple[type, dict[str, Any]]:
     load_scenario(source)
     path = scenario_file(source)
     content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    content["robot"] = resolve_robot_path(path, str(content["robot"]))
+    moved = "robot" if "robot" in content else "mechanism"
+    content[moved] = resolve_robot_path(path, str(content[moved]))
     for obstacle in (content.get("world") or {}).get("obstacles") or ():
         if obstacle.get("file") is not None:
             obstacle["file"] = found_file(str(obstacle["file"]), path.parent)

@@ -12,18 +12,18 @@ from cdpr_drake.cli.options import AsJson
 from cdpr_drake.cli.terminal import print_json, wide_console
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.scenarios.files import scenario_names
-from cdpr_drake.systems.scenarios.run_settings import ScenarioHeader
 from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
 
 
-def scenario_facts(scenario: ScenarioHeader) -> dict[str, Any]:
-    """What a list of scenarios shows; SI units as the keys end, null where a kind has none."""
+def scenario_facts(scenario: Any) -> dict[str, Any]:
+    """What a list of scenarios of any kind shows; SI units, null where a kind has none."""
     servo = scenario if isinstance(scenario, Scenario) else None
     return {
         "name": scenario.name,
         "title": scenario.title,
         "kind": scenario.kind,
-        "robot": scenario.robot,
+        "robot": getattr(scenario, "robot", None),
+        "mechanism": getattr(scenario, "mechanism", None),
         "scheme": servo.controller.scheme if servo else None,
         "target": servo.target.kind if servo else None,
         "camera": scenario.camera.kind if hasattr(scenario, "camera") else None,
@@ -49,5 +49,7 @@ def scenarios(as_json: AsJson = False) -> None:
         table.add_column(heading, no_wrap=True)
     table.add_column("what it shows")
     for f in facts:
-        table.add_row(f["name"], f["robot"], f"{f['duration_s']:g} s", _end(f), f["title"])
+        table.add_row(
+            f["name"], f["robot"] or f["mechanism"], f"{f['duration_s']:g} s", _end(f), f["title"]
+        )
     wide_console().print(table)

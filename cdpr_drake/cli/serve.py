@@ -26,7 +26,7 @@ from cdpr_drake.systems.remote.remote_place import SERVO_PLACES, TENSION_PLACES,
 from cdpr_drake.systems.remote.server_socket import ServerSocket as Socket
 from cdpr_drake.systems.remote.server_socket import is_loopback
 from cdpr_drake.systems.remote.service import tension_service
-from cdpr_drake.systems.scenarios.files import scenario_kind
+from cdpr_drake.systems.scenarios.files import check_moves_robot, scenario_kind
 from cdpr_drake.systems.scenarios.tension_control_scenario import TensionScenario
 
 
@@ -87,6 +87,7 @@ def serve(
     """
     check_available()
     kind = SCENARIO_KINDS[scenario_kind(scenario)]
+    check_moves_robot(scenario, "cdpr serve")
     overrides, formats = list(settings or []), parse_formats(figure_format)
     for key, value in (
         ("remote.place", place), ("duration", duration), ("remote.pace", pace),

@@ -168,6 +168,11 @@ def simulate(
             "--steered-by: accepted without --seeds and --meshcat",
         ),
         (
+            kind.live is None and (meshcat or steered_by is not None),
+            f"scenario {scenario}: --meshcat: found with the kind {scenario_kind(scenario)}; "
+            "accepted: with kinds that move a robot; replay.html shows the run afterwards",
+        ),
+        (
             not meshcat and (host is not None or port is not None),
             "--host, --port: accepted with --meshcat only",
         ),
@@ -270,7 +275,7 @@ class SimulationSession(CommandSession):
         with named_options(LISTENING):
             meshcat = open_meshcat(host, port)
         self.say(f"{scenario.name} at {page_address(meshcat, host)}")
-        return kind.live(scenario, meshcat)
+        return None if kind.live is None else kind.live(scenario, meshcat)
 
 
 def tell_run(found: Run, session: SimulationSession, as_json: bool) -> int:

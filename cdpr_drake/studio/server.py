@@ -29,7 +29,7 @@ from cdpr_drake.studio.workbench.session import USUAL_ROBOT, Workbench
 from cdpr_drake.studio.workbench.working_folder import WorkingFolder
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.remote.server_socket import is_loopback
-from cdpr_drake.systems.scenarios.files import scenario_names
+from cdpr_drake.systems.scenarios.files import check_moves_robot, scenario_names
 
 LOOPBACK = "127.0.0.1"
 USUAL_PORT = 8642
@@ -160,6 +160,7 @@ def _opened(name: str | None) -> tuple[str, str]:
     if name is None:
         return USUAL_ROBOT, ""
     if name not in robot_names() and (name in scenario_names() or _is_scenario(Path(name))):
+        check_moves_robot(name, "cdpr studio")
         return str(load_scenario(name).robot), name
     return name, ""
 

@@ -22,22 +22,27 @@ from cdpr_drake.errors import (
 from cdpr_drake.models.robot_holding import check_pulleys
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import check_pose, tension_problem
+from cdpr_drake.systems.diagrams.mechanism_control import check_mechanism_scenario
 from cdpr_drake.systems.diagrams.scenario_checks import check_scenario
 from cdpr_drake.systems.remote.remote_place import TENSION_PLACES
 from cdpr_drake.systems.remote.settings import check_place
 from cdpr_drake.systems.robots.settings import COMPILED
 from cdpr_drake.systems.scenarios.files import (
+    MECHANISM,
     PICK_AND_PLACE,
     TENSION_CONTROL,
     VISUAL_SERVO,
+    load_with_mechanism,
     load_with_robot,
     scenario_file,
     scenario_kind,
 )
+from cdpr_drake.systems.scenarios.mechanism_scenario import MechanismScenario
 from cdpr_drake.systems.scenarios.pick_and_place_scenario import (
     PickAndPlaceScenario,
     check_pick_and_place,
 )
+from cdpr_drake.systems.scenarios.run_settings import ScenarioHeader
 from cdpr_drake.systems.scenarios.tension_control_scenario import TensionScenario
 from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
 from cdpr_drake.systems.worlds.checks import check_world
@@ -160,18 +165,21 @@ def _check_motion(robot: Robot, path: Path) -> None:
         )
 
 
-SCENARIO_SCHEMAS: dict[str, tuple[type[Any], Callable[[Any, Robot, Path], None]]] = {
+SCENARIO_SCHEMAS: dict[str, tuple[type[Any], Callable[[Any, Any, Path], None]]] = {
     VISUAL_SERVO: (Scenario, check_scenario),
     TENSION_CONTROL: (TensionScenario, _check_tension_scenario),
     PICK_AND_PLACE: (PickAndPlaceScenario, check_pick_and_place),
+    MECHANISM: (MechanismScenario, check_mechanism_scenario),
 }
-"""Schema and check of each kind of scenario, by what its file gives as `kind`."""
+"""Schema of each kind of scenario, and its check against robot or mechanism, by what its file gives
+as `kind`."""
 
 
 def load_scenario(
     name: str, overrides: Sequence[str] = (), *, schema: type[Any] | None = None
 ) -> Any:
-    """Reads a scenario by name or by path to a YAML file, and checks it against its robot.
+    """Reads a scenario by name or by path to a YAML file, and checks it against its robot
+    or mechanism.
 
     Args:
         name: Name or path.
@@ -180,7 +188,8 @@ def load_scenario(
             sections.
 
     Returns:
-        A `Scenario` or `TensionScenario`, as the file's key `kind` says.
+        A `Scenario`, `TensionScenario`, `PickAndPlaceScenario` or `MechanismScenario`, as the
+        file's key `kind` says.
 
     Raises:
         ScenarioError: Unknown or malformed scenario, or its robot cannot do what it asks.
@@ -193,6 +202,10 @@ def load_scenario(
             f"{scenario_file(name)}: kind: found {kind}, not described by {schema.__name__}; "
             f"accepted: {of_kind.__name__}, or a subclass of it with more sections"
         )
+    if not issubclass(of_kind, ScenarioHeader):
+        scenario, mechanism, path = load_with_mechanism(schema or of_kind, name, overrides)
+        check(scenario, mechanism, path)
+        return scenario
     scenario, robot, path = load_with_robot(schema or of_kind, name, overrides)
     _check_motion(robot, path)
     check(scenario, robot, path)

@@ -26,79 +26,61 @@ UNKNOWN_COLOR = Rgba(*rgb(UNKNOWN.color))
 TENSION_COLORS = tuple(Rgba(*rgb(color)) for color in TENSIONS)
 """From the lowest to the highest tension."""
 
+THIN = 1.6e-3
+"""Radius of a drawn cable at least, of the size of what is shown."""
+
 UNSEEN = 0.25
 """What the end of a rod may be off, of its radius."""
 
 
-class CablePictures:
-    """Draws the cables of a robot in Meshcat, also into a recording.
+class CableChains:
+    """Chains of rods in Meshcat that follow the curves of cables, also into a recording.
 
     A recording keeps transforms and properties, not geometry. So a cable is a chain of cylinders
     of unit length, posed and scaled: one straight, more where it sags, hangs slack or runs over a
-    pulley. Every cable has one chain for each number of cylinders and colour that was needed so
-    far, of which one is visible.
+    pulley or through eyelets. Every cable has one chain for each number of cylinders and colour
+    that was needed so far, of which one is visible.
     """
 
     def __init__(
         self,
         meshcat: Meshcat,
-        robot: Robot,
+        paths: Sequence[str],
+        radius: float,
         full_scale: float,
-        path: str = "cables",
-        settings: CableSettings | None = None,
-        *,
         colors: Sequence[str] | None = None,
     ):
-        """Places the cables in Meshcat.
+        """For cables at paths in Meshcat.
 
         Args:
             meshcat: Where to.
-            robot: The robot.
+            paths: Of each cable.
+            radius: Of all rods [m].
             full_scale: Tension of the last colour [N].
-            path: In Meshcat.
-            settings: Model of the cables, and whether they run over pulleys; None: straight,
-                from fixed exit points.
             colors: Of each cable that is not slack, #rrggbb; None: by its tension.
         """
-        self._meshcat = meshcat
+        self._meshcat, self._paths, self._radius = meshcat, list(paths), radius
         self._colors = None if colors is None else [Rgba(*rgb(color)) for color in colors]
-        settings = CableSettings() if settings is None else settings
-        self._set, self._model = settings.cable_set(robot), settings.model
         self._full_scale = max(full_scale, 1e-9)
-        self._paths = [f"{path}/{cable.name}" for cable in robot.cables]
         self._shown: list[str | None] = [None] * len(self._paths)
         self._chains: set[str] = set()
         self._placed: dict[str, tuple[Array, Array]] = {}
         self._waiting: dict[str, tuple[tuple[Array, Array], float | None]] = {}
         self._began: float | None = None
-        size = float(np.linalg.norm(robot.frame.upper - robot.frame.lower))
-        # Thinner than this would vanish on the screen.
-        self._radius = max(float(np.max(robot.diameters())) / 2.0, 1.6e-3 * size)
 
-    def draw(
-        self,
-        X_WP: RigidTransform,
-        tensions: Array,
-        time: float | None = None,
-        unstrained_lengths: Array | None = None,
+    def follow(
+        self, curves: Sequence[Array], tensions: Array, slack: np.ndarray, time: float | None
     ) -> None:
-        """Draws the cables to a platform at X_WP [m].
+        """Draws the cables along curves.
 
         Args:
-            X_WP: The pose.
-            tensions: Shape (m,) [N]; a slack cable is red, see `slack_tensions`, one with
-                NaN grey.
+            curves: Points of each cable in W, shape (3, k) [m].
+            tensions: Shape (m,) [N]; a cable with NaN is grey.
+            slack: Which cables are red, shape (m,), bool.
             time: While Meshcat records, where this goes in the recording [s].
-            unstrained_lengths: From the exit points to the platform, which decide how cables sag
-                and hang, shape (m,) [m]; None: all are straight.
         """
         if self._began is None:
             self._began = time
-        model, l0 = self._model, unstrained_lengths
-        if l0 is None:
-            model, l0 = ELASTIC, np.zeros(len(self._paths))
-        curves = cable_curves(self._set, model, X_WP, l0, least_sag=0.5 * self._radius)
-        slack = self.slack(tensions, unstrained_lengths)
         for i, curve in enumerate(curves):
             rods = curve.shape[1] - 1
             chain = f"{self._paths[i]}/{rods}/{0 if slack[i] else self._level(float(tensions[i]))}"
@@ -110,19 +92,6 @@ class CablePictures:
                     self._meshcat.SetProperty(before, "visible", False, time)
                 self._meshcat.SetProperty(chain, "visible", True, time)
                 self._shown[i] = chain
-
-    def slack(self, tensions: Array, unstrained_lengths: Array | None = None) -> np.ndarray:
-        """Which cables are slack, shape (m,), bool; arguments as those of `draw`."""
-        l0 = np.zeros(len(self._paths)) if unstrained_lengths is None else unstrained_lengths
-        model = ELASTIC if unstrained_lengths is None else self._model
-        return np.asarray(tensions <= slack_tensions(self._set, model, l0))
-
-    def rods(self, X_WP: RigidTransform, unstrained_lengths: Array) -> int:
-        """How many cylinders all cables take at a pose; arguments as those of `draw`."""
-        curves = cable_curves(
-            self._set, self._model, X_WP, unstrained_lengths, least_sag=0.5 * self._radius
-        )
-        return sum(curve.shape[1] - 1 for curve in curves)
 
     def _make(self, chain: str, rods: int, time: float | None, cable: int) -> None:
         """Makes a cable's chain if it is not there yet, invisible in what was recorded before."""
@@ -172,6 +141,75 @@ class CablePictures:
             return 1
         last = len(TENSION_COLORS)
         return min(1 + int(last * tension / self._full_scale), last)
+
+
+class CablePictures:
+    """Draws the cables of a robot in Meshcat, also into a recording, by `CableChains`."""
+
+    def __init__(
+        self,
+        meshcat: Meshcat,
+        robot: Robot,
+        full_scale: float,
+        path: str = "cables",
+        settings: CableSettings | None = None,
+        *,
+        colors: Sequence[str] | None = None,
+    ):
+        """Places the cables in Meshcat.
+
+        Args:
+            meshcat: Where to.
+            robot: The robot.
+            full_scale: Tension of the last colour [N].
+            path: In Meshcat.
+            settings: Model of the cables, and whether they run over pulleys; None: straight,
+                from fixed exit points.
+            colors: Of each cable that is not slack, #rrggbb; None: by its tension.
+        """
+        settings = CableSettings() if settings is None else settings
+        self._set, self._model = settings.cable_set(robot), settings.model
+        paths = [f"{path}/{cable.name}" for cable in robot.cables]
+        size = float(np.linalg.norm(robot.frame.upper - robot.frame.lower))
+        # Thinner than this would vanish on the screen.
+        self._radius = max(float(np.max(robot.diameters())) / 2.0, THIN * size)
+        self._chains = CableChains(meshcat, paths, self._radius, full_scale, colors)
+
+    def draw(
+        self,
+        X_WP: RigidTransform,
+        tensions: Array,
+        time: float | None = None,
+        unstrained_lengths: Array | None = None,
+    ) -> None:
+        """Draws the cables to a platform at X_WP [m].
+
+        Args:
+            X_WP: The pose.
+            tensions: Shape (m,) [N]; a slack cable is red, see `slack_tensions`, one with
+                NaN grey.
+            time: While Meshcat records, where this goes in the recording [s].
+            unstrained_lengths: From the exit points to the platform, which decide how cables sag
+                and hang, shape (m,) [m]; None: all are straight.
+        """
+        model, l0 = self._model, unstrained_lengths
+        if l0 is None:
+            model, l0 = ELASTIC, np.zeros(self._set.count)
+        curves = cable_curves(self._set, model, X_WP, l0, least_sag=0.5 * self._radius)
+        self._chains.follow(curves, tensions, self.slack(tensions, unstrained_lengths), time)
+
+    def slack(self, tensions: Array, unstrained_lengths: Array | None = None) -> np.ndarray:
+        """Which cables are slack, shape (m,), bool; arguments as those of `draw`."""
+        l0 = np.zeros(self._set.count) if unstrained_lengths is None else unstrained_lengths
+        model = ELASTIC if unstrained_lengths is None else self._model
+        return np.asarray(tensions <= slack_tensions(self._set, model, l0))
+
+    def rods(self, X_WP: RigidTransform, unstrained_lengths: Array) -> int:
+        """How many cylinders all cables take at a pose; arguments as those of `draw`."""
+        curves = cable_curves(
+            self._set, self._model, X_WP, unstrained_lengths, least_sag=0.5 * self._radius
+        )
+        return sum(curve.shape[1] - 1 for curve in curves)
 
 
 class MeshcatCables(LeafSystem):

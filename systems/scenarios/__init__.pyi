@@ -1,5 +1,8 @@
 from .files import scenario_file as scenario_file
 from .files import scenario_names as scenario_names
+from .mechanism_scenario import MechanismScenario as MechanismScenario
+from .mechanism_scenario import Waypoint as Waypoint
+from .run_settings import RunHeader as RunHeader
 from .run_settings import ScenarioHeader as ScenarioHeader
 from .tension_control_scenario import Stretch as Stretch
 from .visual_servo_scenario import Scenario as Scenario

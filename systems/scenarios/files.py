@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
@@ -11,6 +12,9 @@ import yaml
 from cdpr_drake.errors import RobotFileError, ScenarioError
 from cdpr_drake.models.exit_points import MARK as RAILS_MARK
 from cdpr_drake.models.formats.detection import SUFFIXES as ROBOT_SUFFIXES
+from cdpr_drake.models.mechanism_files import mechanism_names
+from cdpr_drake.models.mechanism_loader import load_mechanism
+from cdpr_drake.models.mechanism_schema import Mechanism
 from cdpr_drake.models.robot_loader import load_robot, robot_file
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.schema.typed_yaml import closest, load_typed
@@ -22,7 +26,8 @@ _FOLDER = Path(__file__).parent
 VISUAL_SERVO = "visual_servo"
 TENSION_CONTROL = "tension_control"
 PICK_AND_PLACE = "pick_and_place"
-KINDS = (VISUAL_SERVO, TENSION_CONTROL, PICK_AND_PLACE)
+MECHANISM = "mechanism"
+KINDS = (VISUAL_SERVO, TENSION_CONTROL, PICK_AND_PLACE, MECHANISM)
 """Kinds of runs; a file without the key `kind` describes a visual servo."""
 
 
@@ -41,6 +46,29 @@ def scenario_names(kind: str | None = None) -> tuple[str, ...]:
     if kind not in KINDS:
         raise ScenarioError(f"kind: found {kind!r}; accepted: {', '.join(KINDS)}")
     return tuple(name for name in names if scenario_kind(name) == kind)
+
+
+@cache
+def robot_scenario_names() -> tuple[str, ...]:
+    """Names of the scenarios that come with the package and move a robot with one platform."""
+    return tuple(name for name in scenario_names() if scenario_kind(name) != MECHANISM)
+
+
+def check_moves_robot(name: str, asks: str) -> None:
+    """Refuses scenarios of mechanisms.
+
+    Args:
+        name: Name or path of the scenario.
+        asks: What takes robots with one platform only, as in "cdpr serve".
+
+    Raises:
+        ScenarioError: It is one of a mechanism, or there is none.
+    """
+    if scenario_kind(name) == MECHANISM:
+        raise ScenarioError(
+            f"scenario {name}: kind: found {MECHANISM}; accepted by {asks}: kinds that move a "
+            "robot with one platform"
+        )
 
 
 def scenario_file(name: str) -> Path:
@@ -149,7 +177,12 @@ class _OfRobot(Protocol):
     world: WorldSettings | None
 
 
+class _OfMechanism(Protocol):
+    mechanism: str
+
+
 S = TypeVar("S", bound=_OfRobot)
+M = TypeVar("M", bound=_OfMechanism)
 
 
 def load_with_robot(schema: type[S], name: str, overrides: Sequence[str]) -> tuple[S, Robot, Path]:
@@ -183,6 +216,34 @@ def load_with_robot(schema: type[S], name: str, overrides: Sequence[str]) -> tup
     if getattr(perturbations, "believed_robot", None) is not None:
         _check_belief(scenario, robot, path)
     return scenario, robot, path
+
+
+def load_with_mechanism(
+    schema: type[M], name: str, overrides: Sequence[str]
+) -> tuple[M, Mechanism, Path]:
+    """A scenario of a mechanism by name or by path, the mechanism, and the scenario's file.
+
+    Args:
+        schema: Dataclass of its kind; its `mechanism` becomes a name or an absolute path.
+        name: Name or path.
+        overrides: Items "key.subkey=value" that replace what the file says.
+
+    Raises:
+        ScenarioError: Unknown or malformed scenario.
+        RobotFileError: Its mechanism's file is not accepted.
+    """
+    path = scenario_file(name)
+    scenario = load_typed(schema, path, error=ScenarioError, overrides=overrides)
+    scenario.mechanism = given = resolve_robot_path(path, scenario.mechanism)
+    if "/" not in given and given not in mechanism_names():
+        raise ScenarioError(
+            f"{path}: mechanism: found {given!r}; {closest(given, mechanism_names())}, or a path"
+        )
+    try:
+        mechanism = load_mechanism(scenario.mechanism)
+    except RobotFileError as problem:
+        raise RobotFileError(*problem.within(f"{path}: mechanism")) from problem
+    return scenario, mechanism, path
 
 
 def _check_belief(scenario: Any, robot: Robot, path: Path) -> None:

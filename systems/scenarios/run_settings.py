@@ -45,13 +45,19 @@ class ExpectedEnd:
 
 
 @dataclass(kw_only=True)
-class ScenarioHeader:
-    """What a scenario is called, which robot it moves, and how long it runs."""
+class RunHeader:
+    """What a scenario is called, whatever it moves; all of them also have duration and expected."""
 
     kind: str = text("Kind of run.")
     name: str = file_name("Name, the same as that of its file.")
     title: str = text("What it shows, in one line.", "")
     source: str = text("Where its values stand.", "")
+
+
+@dataclass(kw_only=True)
+class ScenarioHeader(RunHeader):
+    """What a scenario is called, which robot it moves, and how long it runs."""
+
     robot: str = text(
         "Robot by name, or path of a robot file, from this file or the working folder."
     )

@@ -27,7 +27,7 @@ from cdpr_drake.studio.workbench.run_job import RunJob
 from cdpr_drake.studio.workbench.scenario_draft import ROBOT
 from cdpr_drake.studio.workbench.scene import RobotScene, RunScene
 from cdpr_drake.studio.workbench.session import Workbench
-from cdpr_drake.systems.scenarios.files import scenario_names
+from cdpr_drake.systems.scenarios.files import robot_scenario_names
 from cdpr_drake.systems.scenarios.visual_servo_scenario import DEFAULT_SCENARIO
 
 TICK = 1.0 / 30.0
@@ -180,7 +180,7 @@ class RunPanel:
 
     def _scenarios(self) -> list[str]:
         files = self._bench.folder.files((".yaml", ".yml"))
-        return [*scenario_names(), *files]
+        return [*robot_scenario_names(), *files]
 
     def _shown_name(self) -> str:
         """The draft's scenario as the list has it."""
@@ -205,7 +205,7 @@ class RunPanel:
         self._body.clear()
         self._form = None
         with self._body, show_errors():
-            known = name in scenario_names()
+            known = name in robot_scenario_names()
             draft = self._board.choose(name if known else str(self._bench.folder.path(name)))
             self._form = ScenarioForm(draft)
             self._take_robot()

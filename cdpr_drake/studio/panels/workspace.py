@@ -30,7 +30,7 @@ from cdpr_drake.studio.workbench.workspace_regions import (
     read_regions,
     show_regions,
 )
-from cdpr_drake.systems.scenarios.files import scenario_names
+from cdpr_drake.systems.scenarios.files import robot_scenario_names
 
 TICK = 0.5
 """Time between looks at jobs and folders [s]."""
@@ -173,7 +173,7 @@ class _WorkspacePanel:
     def _place_form(self, command: str) -> None:
         self._view.command = command
         self._form.clear()
-        scenarios = Choices(scenario_names())
+        scenarios = Choices(robot_scenario_names())
         choices = {
             "workspace": {
                 "kind": Choices(list(KINDS), several=True),

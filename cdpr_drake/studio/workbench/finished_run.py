@@ -18,6 +18,7 @@ from cdpr_drake.geometry.poses import pose_from_row, pose_rows_distance
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.diagrams.servo_models import ServoModel, servo_model
+from cdpr_drake.systems.scenarios.files import check_moves_robot
 from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
 
 MOST_ROWS = 3000
@@ -55,6 +56,7 @@ class FinishedRun:
             raise OutputFolderError(
                 f"{folder.name}: holds no results of a run; accepted: a folder of cdpr simulate"
             )
+        check_moves_robot(str(folder / SCENARIO), "the studio")
         self.scenario = load_scenario(str(folder / SCENARIO))
         robot = load_robot(self.scenario.robot)
         self.cables = [cable.name for cable in robot.cables]

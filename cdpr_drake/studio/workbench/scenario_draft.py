@@ -19,6 +19,7 @@ from cdpr_drake.errors import DataFileError, ScenarioError
 from cdpr_drake.schema.fields import FieldRule
 from cdpr_drake.schema.typed_yaml import rules_of
 from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.scenarios.files import check_moves_robot
 
 COMMON = (
     "duration", "seed", "camera.kind", "controller.scheme", "controller.lambda_0",
@@ -94,6 +95,7 @@ class ScenarioDraft:
             CdprError: It is not accepted, or names files outside of the folder.
         """
         self.name, self._folder = name, folder.resolve()
+        check_moves_robot(name, "the studio")
         scenario = load_scenario(name)
         check_files(scenario, self._folder)
         self.form = _section(type(scenario), yaml.safe_load(yaml_dump_typed(scenario)), "", "")

@@ -1,0 +1,274 @@
+"""Runs of mechanisms: what they reach, both engines, stopping and going on, files, the page."""
+
+import json
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cdpr_drake.analyses.reporting.log_on_disk import PARTS
+from cdpr_drake.analyses.simulation import log_keeper
+from cdpr_drake.analyses.simulation.mechanism_figures import mechanism_pictures
+from cdpr_drake.analyses.simulation.mechanism_run import (
+    check_mechanism_run,
+    mechanism_end_error,
+    mechanism_facts,
+    run_mechanism_scenario,
+    summarize_mechanism_run,
+)
+from cdpr_drake.analyses.simulation.run_loop import advance
+from cdpr_drake.analyses.simulation.scenario_kinds import SCENARIO_KINDS
+from cdpr_drake.analyses.simulation.session import RunSession
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.monitoring.run_monitor import Outcome
+from cdpr_drake.systems.scenarios.files import scenario_names
+from tests.cli.test_cli import refuse, run
+
+RUN = "cdpr_drake.analyses.simulation.mechanism_run"
+ARM, BASES = "cable_arm_computed_torque", "mobile_bases_winches"
+
+BETWEEN_STEPS = 1e-3
+"""What tensions that are held for a millisecond leave of a motion of 2 rad/s and 15 rad/s^2 [rad];
+found 3.8e-4."""
+
+GIVING = 3e-3
+"""What bases and platform give under tensions that are not those of the start, up to 50 N on 45 kg
+at kp 400 1/s^2: 50 / (45 * 400) = 2.8e-3 [m]; found 1.6e-3."""
+
+ENGINES_APART = 1e-5
+"""Of positions by both engines, whose motors and winches are sampled alike [m, rad]: the method is
+the same, and steps are cut at other places; found 2e-7."""
+
+
+@pytest.fixture(scope="module")
+def bases():
+    return run_mechanism_scenario(load_scenario(BASES))
+
+
+def test_an_arm_follows_by_computed_torque():
+    done = run_mechanism_scenario(load_scenario(ARM))
+    summary = summarize_mechanism_run(done)
+    assert done.outcome == Outcome.COMPLETED
+    assert summary["rotation_error_rad"]["max"] < BETWEEN_STEPS
+    assert summary["infeasible_steps"] == 0
+    low, high = summary["tension_limits_n"]
+    assert low - 1e-9 <= summary["tension_n"]["min"] < summary["tension_n"]["max"] <= high
+    assert summary["beyond_limits_n"] < 1e-9
+    distance, angle = mechanism_end_error(done)
+    assert distance == 0.0
+    assert np.degrees(angle) < done.scenario.expected.rotation_deg
+    np.testing.assert_allclose(done.log["positions"][-1], [0.3, -0.2], atol=BETWEEN_STEPS)
+    # What cables carry at the end is what the tension distribution says at rest there.
+    follower, context = done.follower, done.follower.plant.CreateDefaultContext()
+    follower.plant.SetPositions(context, [0.3, -0.2])
+    J = follower.cables.length_jacobian(context)
+    carried = J.T @ done.log["tensions"][-1]
+    np.testing.assert_allclose(carried, follower.cables.other_forces(context), atol=1e-5)
+
+
+def test_bases_drive_and_a_platform_follows_on_winches(bases):
+    summary = summarize_mechanism_run(bases)
+    assert bases.outcome == Outcome.COMPLETED
+    assert summary["position_error_m"]["max"] < GIVING
+    assert summary["slack_cable_seconds"] == 0.0
+    assert summary["infeasible_steps"] is None
+    low, high = summary["tension_limits_n"]
+    assert low <= summary["tension_n"]["min"] < summary["tension_n"]["max"] <= high
+    assert set(summary["parts"]) == {
+        "platform::platform", *(f"base_{k}::{axis}" for k in (1, 2, 3, 4) for axis in "xy")
+    }  # fmt: skip
+    expected, (distance, angle) = bases.scenario.expected, mechanism_end_error(bases)
+    assert distance < expected.position
+    assert np.degrees(angle) < expected.rotation_deg
+    # Winches are where they should be at every step: the lengths at the strains of the start.
+    log, follower = bases.log, bases.follower
+    context = follower.plant.CreateDefaultContext()
+    lengths = []
+    for q in log["wanted_positions"]:
+        follower.plant.SetPositions(context, q)
+        lengths.append(follower.cables.lengths_and_jacobian(context)[0])
+    strains = 1.0 + follower.rest.tensions / follower.cables.routes.ends.stiffness
+    np.testing.assert_allclose(log["unstrained_lengths"], lengths / strains, atol=1e-9)
+    # At the start nothing moves: motors hold what the rest says.
+    held = follower.rest.held[follower.motors()]
+    np.testing.assert_allclose(log["motor_forces"][0], held, atol=1e-9)
+    assert np.max(np.abs(log["velocities"][0])) == 0.0
+
+
+def test_a_mechanism_that_shall_stay_stays():
+    """At rest on winches with motors that hold: nothing drifts."""
+    stays = ["motion.waypoints=[{time: 0.1}]", "duration=0.3"]
+    done = run_mechanism_scenario(load_scenario(BASES, stays))
+    assert summarize_mechanism_run(done)["position_error_m"]["max"] < 1e-10
+    with_nobody = run_mechanism_scenario(
+        load_scenario(ARM, [*stays, "control.kind=winches", "control.prestress=40"])
+    )
+    assert "motor_forces" not in with_nobody.log
+    assert summarize_mechanism_run(with_nobody)["rotation_error_rad"]["max"] < 1e-10
+
+
+def test_both_engines_come_to_the_same(bases):
+    short = ["duration=0.5"]
+    plant = run_mechanism_scenario(load_scenario(BASES, [*short, "integration.engine=plant"]))
+    rows = len(plant.log["time"])
+    np.testing.assert_allclose(plant.log["time"], bases.log["time"][:rows])
+    for name in ("positions", "unstrained_lengths"):
+        there = bases.log[name][:rows]
+        np.testing.assert_allclose(plant.log[name], there, atol=ENGINES_APART)
+
+
+def test_free_bodies_come_first_in_velocities_but_last_among_joints():
+    """Names of columns follow the plant's own order, with an arm on a free platform."""
+    follower = run_mechanism_scenario(
+        load_scenario(BASES, ["mechanism=arm_on_platform", "duration=0.01", "control.prestress=10",
+                              "motion.waypoints=[{time: 1.0, joints: {elbow: -0.5}}]"])
+    ).follower  # fmt: skip
+    plant, names = follower.plant, follower.velocity_names()
+    shoulder = plant.GetJointByName("shoulder")
+    assert names[shoulder.velocity_start()] == "arm_on_platform::shoulder"
+    assert names[0] == "arm_on_platform::platform.wx"
+    assert follower.turns().tolist()[:6] == [True] * 3 + [False] * 3
+    positions = follower.position_names()
+    assert positions[shoulder.position_start()] == "arm_on_platform::shoulder_rad"
+    assert positions[:5:4] == ["arm_on_platform::platform.qw", "arm_on_platform::platform.x_m"]
+    assert [names[row] for row in follower.motors()] == [
+        "arm_on_platform::shoulder", "arm_on_platform::elbow"
+    ]  # fmt: skip
+
+
+def test_a_run_that_is_stopped_keeps_what_it_has():
+    seen = []
+    done = run_mechanism_scenario(
+        load_scenario(BASES), RunSession(seen.append, lambda: len(seen) >= 3)
+    )
+    assert done.outcome == Outcome.INTERRUPTED
+    assert done.sim_time == pytest.approx(0.3)
+    assert summarize_mechanism_run(done)["outcome"] == "interrupted"
+
+
+class EndedError(Exception):
+    """The program ends."""
+
+
+@pytest.mark.parametrize("name", [ARM, BASES])
+def test_a_run_that_was_killed_goes_on_to_the_same_bytes(tmp_path, monkeypatch, name):
+    monkeypatch.setattr(log_keeper, "CHECKPOINT_WAIT", 0.0)
+    kind, wanted = SCENARIO_KINDS["mechanism"], load_scenario(name, ["duration=0.5"])
+
+    def end(progress):
+        if progress.sim_time > 0.25:
+            raise EndedError
+
+    whole = kind.run(wanted)
+    with pytest.raises(EndedError):
+        kind.run(wanted, RunSession(end, log_folder=tmp_path / PARTS))
+    again = kind.run(wanted, RunSession(log_folder=tmp_path / PARTS, resume=True))
+    assert again.sim_time == whole.sim_time
+    for quantity, values in whole.log.items():
+        assert again.log[quantity].tobytes() == values.tobytes(), quantity
+
+
+def test_the_command_goes_on_in_its_folder(capsys, tmp_path, monkeypatch):
+    """Which names mechanism and bodies elsewhere than the scenario that was asked for did."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(log_keeper, "CHECKPOINT_WAIT", 0.0)
+    monkeypatch.setattr("cdpr_drake.analyses.front.simulation.write_pictures", lambda *_: {})
+    asked = ("simulate", BASES, "--duration", "0.4")
+    assert run(capsys, *asked, "--out", "whole")[0] == 0
+    with monkeypatch.context() as patch:
+        patch.setattr(f"{RUN}.advance", lambda simulator, duration, *others: advance(
+            simulator, duration, *others[:2],
+            replace(others[2], should_stop=lambda: simulator.get_context().get_time() > 0.15),
+            *others[3:],
+        ))  # fmt: skip
+        assert run(capsys, *asked, "--out", "out")[0] == 130
+    assert json.loads((tmp_path / "out" / "summary.json").read_text())["sim_time_s"] < 0.3
+    bases = tmp_path / "out" / "mechanism.yaml"
+    words = bases.read_text()
+    bases.write_text(words.replace("lower: 2.0", "lower: 3.0"))
+    said = refuse(capsys, "simulate", "--continue", "out")
+    assert "tension_bounds.lower is 2.0 there, 3.0 here" in said
+    bases.write_text(words)
+    assert run(capsys, "simulate", "--continue", "out")[0] == 0
+    for name in ("log.npz", "log.csv", "scenario.yaml", "mechanism.yaml"):
+        whole = (tmp_path / "whole" / name).read_bytes()
+        assert (tmp_path / "out" / name).read_bytes() == whole, name
+
+
+def test_a_step_that_is_too_long_is_told_and_the_run_diverges():
+    coarse = load_scenario(BASES, ["integration.max_step=0.05", "control.rate=20", "duration=1"])
+    (warning,) = [one for one in check_mechanism_run(coarse) if "max_step" in one]
+    assert "accepted: at most 0.0036 s" in warning
+    done = run_mechanism_scenario(coarse)
+    assert done.outcome == Outcome.DIVERGED
+    summary = summarize_mechanism_run(done)
+    json.dumps(summary, allow_nan=False)
+    assert mechanism_facts(summary)
+
+
+def test_a_motion_that_is_cut_is_told():
+    assert check_mechanism_run(load_scenario(BASES)) == []
+    (warning,) = check_mechanism_run(load_scenario(ARM, ["duration=1.5"]))
+    assert "the last of motion.waypoints is at 2 s" in warning
+
+
+def test_command_writes_a_folder_that_runs_again(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    code, out, _ = run(capsys, "simulate", BASES, "--duration", "0.4", "--out", "out", "--json")
+    assert code == 0
+    summary = json.loads(out)
+    assert (summary["kind"], summary["mechanism"]) == ("mechanism", "mobile_bases")
+    folder = tmp_path / "out"
+    names = {path.name for path in folder.iterdir()}
+    figures = {f"{name}.png" for name in
+               ("error", "positions", "tensions", "cable_lengths", "motor_forces")}  # fmt: skip
+    assert figures | {"log.csv", "log.npz", "mechanism.yaml", "scenario.yaml", "summary.json",
+                      "replay.html"} <= names  # fmt: skip
+    head = (folder / "log.csv").read_text().splitlines()[0].split(",")
+    assert {"positions.base_1::x_m", "way_off.platform::platform.wx_rad", "tensions.C1_n",
+            "velocities.base_2::y_m_s", "motor_forces.base_4::y_n"} <= set(head)  # fmt: skip
+    again = load_scenario(str(folder / "scenario.yaml"))
+    assert again.mechanism == str(folder / "mechanism.yaml")
+    page = (folder / "replay.html").read_text()
+    data = json.loads(re.search(r'id="cdpr-data">(.*?)</script>', page).group(1))
+    assert data["names"] == [f"C{k}" for k in range(1, 9)]
+    assert {"time", "tensions", "slack", "places"} == set(data["frames"])
+
+
+def test_pictures_of_what_computed_torque_could_not_do(tmp_path):
+    """Limits that the motion does not keep, while the places where it rests do."""
+    done = run_mechanism_scenario(
+        load_scenario(ARM, ["motion.waypoints=[{time: 0.15, joints: {elbow: -0.4}}]",
+                            "duration=0.3", "control.limits=[2, 40]"])
+    )  # fmt: skip
+    summary = summarize_mechanism_run(done)
+    assert summary["infeasible_steps"] > 0
+    pictures = mechanism_pictures(done)
+    assert "motor_forces.png" not in pictures
+    pictures["error.png"](tmp_path / "error.png")
+    assert (tmp_path / "error.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("simulate", ARM, "--meshcat"), "--meshcat: found with the kind mechanism"),
+        (("simulate", ARM, "--seeds", "0:2"), "accepted for visual servos"),
+        (("simulate", ARM, "--video"), "has no camera"),
+        (("serve", ARM), "kind: found mechanism; accepted by cdpr serve"),
+    ],
+)
+def test_what_mechanisms_have_not_is_refused(capsys, tmp_path, monkeypatch, arguments, words):
+    monkeypatch.chdir(tmp_path)
+    assert words in refuse(capsys, *arguments)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_check_and_new_know_the_kind(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert set(scenario_names("mechanism")) == {ARM, BASES}
+    assert run(capsys, "new", "scenario", "mine", "--from", BASES)[0] == 0
+    code, out, _ = run(capsys, "check", "mine.yaml")
+    assert (code, out.strip()) == (0, "mine.yaml: scenario: nothing wrong")
+    assert "# " in (tmp_path / "mine.yaml").read_text()
