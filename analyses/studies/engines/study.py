@@ -22,7 +22,12 @@ from cdpr_drake.analyses.studies.framework.runs import Row
 from cdpr_drake.analyses.studies.framework.study import Case, Form, Study
 from cdpr_drake.analyses.studies.framework.summary import Cell, Summary
 from cdpr_drake.systems.diagrams.load import load_scenario
-from cdpr_drake.systems.scenarios.files import TENSION_CONTROL, scenario_kind, scenario_names
+from cdpr_drake.systems.scenarios.files import (
+    MECHANISM,
+    TENSION_CONTROL,
+    scenario_kind,
+    scenario_names,
+)
 from cdpr_drake.systems.scenarios.run_settings import has_contact
 
 RUNS, QUICK_RUNS = 200, 2
@@ -45,6 +50,8 @@ QUICK_ENERGY = 0.5
 def cases(form: Form) -> Iterator[Case]:
     """Scenarios, taut motions and impacts over seeds, orders by what cables do, steps."""
     for name in QUICK_SCENARIOS if form.quick else scenario_names():
+        if scenario_kind(name) == MECHANISM:
+            continue  # its engines are not those of robots
         scenario = load_scenario(name)
         if has_contact(scenario):
             continue  # one engine only has contact: there is nothing to compare

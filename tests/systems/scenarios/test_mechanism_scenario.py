@@ -53,7 +53,7 @@ def waypoint(words):
         (ARM, ["cables.model=elastic"], "cables.model: found elastic; accepted: with winches"),
         (ARM, ["cables.stiffness_ratio=0.5"], "cables.stiffness_ratio: found 0.5"),
         (ARM, ["mechanism=cable_leg"], "mechanism: found 'cable_leg'; did you mean cable_arm"),
-        (ARM, ["mechanism=planar"], "mechanism: found 'planar'; known: arm_on_platform, cable_arm"),
+        (ARM, ["mechanism=planar"], "mechanism: found 'planar'; known: arm_on_platform, bm_arm"),
         (ARM, ["robot=planar"], "no key robot"),
         (BASES, ["control.method=kernel"], "control.method: found kernel; accepted: with comp"),
         (BASES, ["cables.model=catenary"], "cables.model: hang: found cables by the model cat"),

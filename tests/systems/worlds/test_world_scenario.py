@@ -304,7 +304,13 @@ def test_a_platform_is_set_down_on_ground_that_is_level_with_the_frame():
 
 def test_schemas_know_the_world():
     schema = file_schema("scenario")
-    for part in (schema["then"], schema["else"]["then"], schema["else"]["else"]):
+    parts = []
+    while "then" in schema:
+        parts.append(schema["then"])
+        schema = schema["else"]
+    robots = [part for part in (*parts, schema) if "robot" in part["properties"]]
+    assert len(robots) == 3
+    for part in robots:
         assert "obstacles" in part["properties"]["world"]["anyOf"][0]["properties"]
 
 
