@@ -23,10 +23,9 @@ from cdpr_drake.analyses.studies.framework.study import Case, Form, Study
 from cdpr_drake.analyses.studies.framework.summary import Cell, Summary
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.scenarios.files import (
-    MECHANISM,
     TENSION_CONTROL,
+    robot_scenario_names,
     scenario_kind,
-    scenario_names,
 )
 from cdpr_drake.systems.scenarios.run_settings import has_contact
 
@@ -49,9 +48,7 @@ QUICK_ENERGY = 0.5
 
 def cases(form: Form) -> Iterator[Case]:
     """Scenarios, taut motions and impacts over seeds, orders by what cables do, steps."""
-    for name in QUICK_SCENARIOS if form.quick else scenario_names():
-        if scenario_kind(name) == MECHANISM:
-            continue  # its engines are not those of robots
+    for name in QUICK_SCENARIOS if form.quick else robot_scenario_names():
         scenario = load_scenario(name)
         if has_contact(scenario):
             continue  # one engine only has contact: there is nothing to compare
