@@ -48,7 +48,9 @@ class LinkServo(LeafSystem):
     error            vector(e)       -, m, rad   out, s - s*; NaN while nothing is seen
     ================ =============== =========== ==============================================
 
-    Samples its inputs at a rate of its own.
+    Samples its inputs at a rate of its own. Velocities in `plant_state` of joints that it does not
+    move are best the commanded ones: measured ones close a loop through elastic cables, which can
+    be unstable.
     """
 
     def __init__(
