@@ -21,6 +21,8 @@ from cdpr_drake.geometry.poses import pose_from_angles
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from cdpr_drake.models.robot_schema import Robot
+
 RobotName = Annotated[
     str,
     typer.Argument(help="Robot by name, or path of a robot file.", autocompletion=robot_words),
@@ -64,7 +66,9 @@ RunsFrom = Annotated[
 ]
 LISTENING = {"host": "--host", "port": "--port"}
 """Options by the arguments of what listens."""
-POSE = typer.Option(help="Platform, x,y,z [m] or x,y,z,phi,theta,psi [m, deg].")
+POSE = typer.Option(
+    help="Platform, x,y,z [m] or x,y,z,phi,theta,psi [m, deg]; without, the home pose."
+)
 
 
 @contextmanager
@@ -103,6 +107,11 @@ def parse_numbers(option: str, words: str, sizes: tuple[int, ...], meaning: str)
     if len(values) not in sizes or not all(math.isfinite(value) for value in values):
         raise CdprError(f"{option}: found {words!r}; accepted: {meaning}")
     return values
+
+
+def pose_or_home(words: str | None, robot: Robot) -> RigidTransform:
+    """X_WP of --pose, or the robot's home pose without; raises as `parse_numbers`."""
+    return robot.home.transform() if words is None else parse_pose(words)
 
 
 def parse_pose(words: str) -> RigidTransform:

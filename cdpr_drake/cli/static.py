@@ -31,7 +31,7 @@ from cdpr_drake.cli.options import (
     RobotName,
     parse_limits,
     parse_numbers,
-    parse_pose,
+    pose_or_home,
     save_plot,
 )
 from cdpr_drake.cli.terminal import message_console, print_json, wide_console, working
@@ -119,15 +119,13 @@ def static(
             print_rest(at_rest)
         return
     refuse_for_robots(own)
-    if (pose is None) == (lengths is None):
-        found = "neither" if pose is None else "both"
-        raise CdprError(f"--pose, --lengths: found {found}; accepted: one of them")
+    if pose is not None and lengths is not None:
+        raise CdprError("--pose, --lengths: found both; accepted: one of them, or the home pose")
     loaded = load_robot(robot)
     given, X_WP = None, None
-    if pose is not None:
-        X_WP = parse_pose(pose)
+    if lengths is None:
+        X_WP = pose_or_home(pose, loaded)
     else:
-        assert lengths is not None
         m = len(loaded.cables)
         given = parse_numbers("--lengths", lengths, (m,), f"{m} lengths [m]")
     with working(message_console(), f"{loaded.name} at rest"):

@@ -37,8 +37,8 @@ from cdpr_drake.cli.options import (
     RobotName,
     Wrench,
     parse_limits,
-    parse_pose,
     parse_wrench,
+    pose_or_home,
     save_plot,
 )
 from cdpr_drake.cli.terminal import message_console, print_json, wide_console, working
@@ -106,11 +106,10 @@ def tension(
             print_tensions(tensions)
         return
     refuse_for_robots({"joint": joint, "held": held})
-    if pose is None:
-        raise CdprError("Missing option '--pose'; see cdpr tension --help")
     loaded = load_robot(robot)
-    X_WP, external, bounds = parse_pose(pose), parse_wrench(wrench), parse_limits(limits)
+    X_WP, external, bounds = pose_or_home(pose, loaded), parse_wrench(wrench), parse_limits(limits)
     cables = [cable.name for cable in loaded.cables]
+    place = "home" if pose is None else f"({pose})"
     every = method == "all"
     if loaded.is_underactuated():
         for option, given in (("plot", plot), ("wrench-set-plot", wrench_set_plot)):
@@ -133,9 +132,9 @@ def tension(
                 length_scale=length_scale,
             )  # fmt: skip
     if plot is not None and isinstance(found, TensionsAtPose):
-        save_plot(found.plot_polygon(f"{loaded.name} at ({pose})"), plot)
+        save_plot(found.plot_polygon(f"{loaded.name} at {place}"), plot)
     if wrench_set_plot is not None and isinstance(found, TensionsAtPose):
-        save_plot(found.plot_wrenches(f"{loaded.name} at ({pose})"), wrench_set_plot)
+        save_plot(found.plot_wrenches(f"{loaded.name} at {place}"), wrench_set_plot)
     if as_json:
         print_json(found.as_dict())
     elif isinstance(found, TensionsAtPose):

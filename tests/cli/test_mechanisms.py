@@ -83,7 +83,7 @@ REFUSED = [
     (["static", "cable_arm", "--held", "knee"], "joint: found knee"),
     (["tension", "cable_arm", "--wrench", "0,0,0,0,0,1"], "--wrench: found with a mechanism"),
     (["tension", "planar", "--joint", "a=1", "--pose", "0,0,0"], "--joint: found with a robot"),
-    (["tension", "planar"], "Missing option '--pose'"),
+    (["tension", "nowhere.yaml"], "nowhere.yaml"),
     (["tension", "cable_arm", "--method", "none"], "method: found none"),
     (["robots", "--mechanisms", "--cables", "8"], "--mechanisms: found with other choices"),
 ]

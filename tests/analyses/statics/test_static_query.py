@@ -95,10 +95,25 @@ def test_command_prints_a_table_and_draws(capsys, tmp_path):
     assert (tmp_path / "rest.png").stat().st_size > 10_000
 
 
+def test_without_a_pose_it_is_the_home_pose(capsys):
+    home = load_robot("acrobot_large").home.transform()
+    code, out, _ = call("acrobot_large --json", capsys)
+    assert code == 0
+    assert json.loads(out)["pose"]["position_m"] == pytest.approx(home.translation())
+
+
+def test_a_file_of_nonsense_is_named_first(capsys, tmp_path):
+    path = tmp_path / "nonsense.yaml"
+    path.write_text("nonsense\n")
+    code, _, err = call(str(path), capsys)
+    assert code == 2
+    assert "nonsense.yaml" in err
+    assert "--pose" not in err
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ("acrobot_large", "--pose, --lengths: found neither"),
         ("acrobot_large --pose 0,0,0.4 --lengths 1,1,1,1,1,1,1,1", "found both"),
         ("acrobot_large --pose 0,0", "--pose: found '0,0'"),
         ("acrobot_large --lengths 1,1,1", "accepted: 8 lengths [m]"),
