@@ -28,6 +28,7 @@ from cdpr_drake.cables.dispatch_kernel import (
 )
 from cdpr_drake.cables.hanging_kernel import SENSITIVITIES
 from cdpr_drake.cables.response_kernel import DERIVATIVES, straight_motion
+from cdpr_drake.cables.simulation_kernel import write_outputs
 from cdpr_drake.cables.straight_kernel import cable_pull
 from cdpr_drake.geometry.motion_kernel import Motion
 from cdpr_drake.geometry.pulley_kernel import LINEAR_WEIGHT, pulley_line
@@ -320,19 +321,6 @@ def add_plain_wrenches(
     return -1
 
 
-@njit(cache=True, inline="always")
-def _write_outputs(
-    out: Array, i: int,
-    t: float, t_A: float, length: float, surplus: float, sag: float, slack: float,
-) -> None:  # fmt: skip
-    out[0, i] = t
-    out[1, i] = t_A
-    out[2, i] = length
-    out[3, i] = 1.0 if t <= slack else 0.0
-    out[4, i] = surplus
-    out[5, i] = sag
-
-
 @njit(cache=True)
 def straight_route_outputs(
     motion: Array, l0: Array, l0_dot: Array, segments: Array, ends: Array, first: Array,
@@ -362,7 +350,7 @@ def straight_route_outputs(
             good = length == length
         if not good and bad < 0:
             bad = i
-        _write_outputs(out, i, t, t_A, length, surplus, sag, 0.0 * t)
+        write_outputs(out, i, t, t_A, length, surplus, sag, 0.0 * t)
     return bad
 
 
@@ -390,7 +378,7 @@ def any_route_outputs(
         if not good and bad < 0:
             bad = i
         slack = slack_tension(HANGING, segments[k, LINEAR_WEIGHT], l0[i])
-        _write_outputs(out, i, t, t_A, length, surplus, sag, slack)
+        write_outputs(out, i, t, t_A, length, surplus, sag, slack)
     return bad
 
 

@@ -133,10 +133,11 @@ def model_force_and_drums(
 
 
 @njit(cache=True, inline="always")
-def _write_outputs(
+def write_outputs(
     out: Array, i: int,
     t: float, t_A: float, length: float, surplus: float, sag: float, slack: float,
 ) -> None:  # fmt: skip
+    """Writes what cable i does, rows as in `OUTPUTS`; it is slack up to the tension `slack` [N]."""
     out[0, i] = t
     out[1, i] = t_A
     out[2, i] = length
@@ -158,7 +159,7 @@ def _outputs(
         if not good and bad < 0:
             bad = i
         slack = slack_tension(law, cables[i, 9], l0[i])
-        _write_outputs(out, i, t, t_A, length, surplus, sag, slack)
+        write_outputs(out, i, t, t_A, length, surplus, sag, slack)
     return bad
 
 
@@ -194,7 +195,7 @@ def straight_outputs(
         if not good and bad < 0:
             bad = i
         slack = slack_tension(STRAIGHT, cables[i, 9], l0[i])
-        _write_outputs(out, i, t, t_A, length, surplus, sag, slack)
+        write_outputs(out, i, t, t_A, length, surplus, sag, slack)
     return bad
 
 

@@ -80,27 +80,15 @@ class RobotBlock(Protocol):
         """The output of that name, as `CableRobot` names it."""
 
 
-@dataclass(frozen=True)
-class CableRobotPorts:
-    """The blocks of a robot in a builder; ports by the names that `CableRobot` has.
+@dataclass(frozen=True, eq=False)
+class NamedPorts:
+    """Ports of blocks in a builder, by the names that `CableRobot` has.
 
     Attributes:
-        robot: The robot.
-        in_plant: Its platform in the plant.
-        plant: The plant.
-        scene_graph: The scene graph, where there is one, for cameras.
-        forces: The cables, `CableForces`.
-        winches: The winches, `VelocityWinch` or `MotorWinch`.
         inputs: Input ports by name.
         outputs: Output ports by name.
     """
 
-    robot: Robot
-    in_plant: RobotInPlant
-    plant: MultibodyPlant
-    scene_graph: SceneGraph | None
-    forces: CableForces
-    winches: Any
     inputs: dict[str, InputPort]
     outputs: dict[str, OutputPort]
 
@@ -119,6 +107,27 @@ class CableRobotPorts:
     def GetOutputPort(self, port_name: str) -> OutputPort:
         """The output of that name."""
         return self.outputs[port_name]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class CableRobotPorts(NamedPorts):
+    """The blocks of a robot in a builder.
+
+    Attributes:
+        robot: The robot.
+        in_plant: Its platform in the plant.
+        plant: The plant.
+        scene_graph: The scene graph, where there is one, for cameras.
+        forces: The cables, `CableForces`.
+        winches: The winches, `VelocityWinch` or `MotorWinch`.
+    """
+
+    robot: Robot
+    in_plant: RobotInPlant
+    plant: MultibodyPlant
+    scene_graph: SceneGraph | None
+    forces: CableForces
+    winches: Any
 
     def set_at_equilibrium(
         self,
@@ -234,7 +243,10 @@ def add_cable_robot(
     outputs["body_accelerations"] = plant.get_body_spatial_accelerations_output_port()
     if scene_graph is not None:
         outputs["query_object"] = scene_graph.get_query_output_port()
-    return CableRobotPorts(robot, in_plant, plant, scene_graph, forces, winch, inputs, outputs)
+    return CableRobotPorts(
+        inputs, outputs, robot=robot, in_plant=in_plant, plant=plant, scene_graph=scene_graph,
+        forces=forces, winches=winch,
+    )  # fmt: skip
 
 
 def set_robot_at_equilibrium(

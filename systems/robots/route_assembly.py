@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 from pydrake.multibody.plant import ExternallyAppliedSpatialForceMultiplexer, MultibodyPlant
-from pydrake.systems.framework import Context, DiagramBuilder, InputPort, OutputPort
+from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
 
 from cdpr_drake.errors import CableModelError
 from cdpr_drake.geometry.cable_routes import CableRoutes
 from cdpr_drake.models.plant_cables import PlantCables
 from cdpr_drake.models.plant_rest import Rest, hang
 from cdpr_drake.models.plant_tree import unknown_joint
-from cdpr_drake.systems.robots.assembly import apply_force
+from cdpr_drake.systems.robots.assembly import NamedPorts, apply_force
 from cdpr_drake.systems.robots.cable_forces import PORTS
 from cdpr_drake.systems.robots.route_forces import RouteForces, RouteSpatialForces
 from cdpr_drake.systems.robots.settings import CableSettings
@@ -26,9 +26,9 @@ METHODS = (AUTOMATIC, JOINTS, BODIES)
 bodies, or by the first where it knows all joints and else by the second."""
 
 
-@dataclass(frozen=True, eq=False)
-class CablePorts:
-    """Cables and winches in a builder; ports by the names that `CableRobot` has.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class CablePorts(NamedPorts):
+    """Cables and winches in a builder.
 
     Attributes:
         plant: The plant.
@@ -36,8 +36,6 @@ class CablePorts:
         winches: The winches.
         method: How forces reach the plant, `JOINTS` or `BODIES`.
         why: Why not by `JOINTS`; empty where it is, or where `BODIES` was asked for.
-        inputs: Input ports by name.
-        outputs: Output ports by name.
     """
 
     plant: MultibodyPlant
@@ -45,24 +43,6 @@ class CablePorts:
     winches: Any
     method: str
     why: str
-    inputs: dict[str, InputPort]
-    outputs: dict[str, OutputPort]
-
-    def HasInputPort(self, port_name: str) -> bool:
-        """Whether there is such an input."""
-        return port_name in self.inputs
-
-    def HasOutputPort(self, port_name: str) -> bool:
-        """Whether there is such an output."""
-        return port_name in self.outputs
-
-    def GetInputPort(self, port_name: str) -> InputPort:
-        """The input of that name."""
-        return self.inputs[port_name]
-
-    def GetOutputPort(self, port_name: str) -> OutputPort:
-        """The output of that name."""
-        return self.outputs[port_name]
 
     def cables(self) -> PlantCables:
         """The cables as they are simulated, for statics."""
@@ -161,7 +141,9 @@ def add_cables(
     outputs["body_velocities"] = plant.get_body_spatial_velocities_output_port()
     outputs["body_accelerations"] = plant.get_body_spatial_accelerations_output_port()
     why = why if method == AUTOMATIC else ""
-    return CablePorts(plant, forces, winch, chosen, why, inputs, outputs)
+    return CablePorts(
+        inputs, outputs, plant=plant, forces=forces, winches=winch, method=chosen, why=why
+    )
 
 
 def connect_cables(
