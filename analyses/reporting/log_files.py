@@ -27,6 +27,7 @@ _PARTS = {
     "servo_mode": ("image_flag", "switches", "l_pose", "l_image", "pose_bound", "image_bound"),
     "quality": ("deviation_px", "correlation", "share", "points", "followed"),
     "desired_wrench": ("mx_nm", "my_nm", "mz_nm", "fx_n", "fy_n", "fz_n"),
+    "applied_wrench": ("mx_nm", "my_nm", "mz_nm", "fx_n", "fy_n", "fz_n"),
     "feasible": ("flag",),
     "failures": ("count",),
     "specific_force": ("x_m_s2", "y_m_s2", "z_m_s2"),

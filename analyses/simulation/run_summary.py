@@ -20,6 +20,7 @@ from cdpr_drake.geometry.rotation_kernel import rotations_of_quaternions
 from cdpr_drake.systems.controllers.torque_settings import TorqueControl
 from cdpr_drake.systems.diagrams.calibration_findings import found_calibrations
 from cdpr_drake.systems.diagrams.visual_servo import VisualServo
+from cdpr_drake.systems.robots.platform_wrench import APPLIED_WRENCH
 from cdpr_drake.systems.scenarios.run_settings import engine_of
 
 ROWS_AT_ONCE = 20_000
@@ -162,10 +163,24 @@ def summarize(result: RunResult) -> dict[str, Any]:
         "step_error": _step_errors(result),
         "versions": package_versions(),
     }
+    if APPLIED_WRENCH in log:
+        summary["disturbances"] = disturbance_summary(log)
     if isinstance(servo, VisualServo) and servo.remote is not None:
         summary["remote"] = servo.remote.report()
     cleaned: dict[str, Any] = finite(summary)
     return cleaned
+
+
+def disturbance_summary(log: Log) -> dict[str, float]:
+    """What pushed the platform most, of the log's rows, and when."""
+    wrenches = log[APPLIED_WRENCH]
+    found = {}
+    for name, part in (("force_n", wrenches[:, 3:]), ("moment_nm", wrenches[:, :3])):
+        sizes = np.linalg.norm(part, axis=1)
+        k = int(np.argmax(sizes))
+        found[f"largest_{name}"] = float(sizes[k])
+        found[f"largest_{name.split('_')[0]}_at_s"] = float(log["time"][k])
+    return found
 
 
 def _calibration(log: Log) -> dict[str, Any] | None:

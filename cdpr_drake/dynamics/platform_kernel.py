@@ -5,7 +5,8 @@ With c = p_PoCo, m the mass and I the inertia about Po, a wrench (moment about P
     I dw/dt + m c x dv/dt = moment - w x I w + c x m g,
     m dv/dt + m dw/dt x c = force - m w x (w x c) + m g,
 
-which is solved in P, where the mass matrix is constant. The state is MultibodyPlant's: quaternion
+which is solved in P, where the mass matrix is constant; a wrench that acts beside the cables is
+added, see `robot_arrays.apply_wrench`. The state is MultibodyPlant's: quaternion
 wxyz, position of Po, w and v in W; or (x, y, turn) and their rates; or (x, rate). Of the latter, W
 and P here are the joint's frames F and M, see `geometry.PlatformJoint`. The quaternion may have any
 length; dq/dt is linear in it, so that its length does not matter to the rotation.
@@ -19,7 +20,7 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.dynamics.robot_arrays import COM, DAMPING, GRAVITY, INERTIA, INVERSE
+from cdpr_drake.dynamics.robot_arrays import APPLIED, COM, DAMPING, GRAVITY, INERTIA, INVERSE
 from cdpr_drake.geometry.motion_kernel import floating_motion
 
 
@@ -49,6 +50,9 @@ def floating_rates(state: Array, force: Array, body: Array, out: Array) -> None:
     fx = force[3] - brake_v * X[15] + px
     fy = force[4] - brake_v * X[16] + py
     fz = force[5] - brake_v * X[17] + pz
+    if body[APPLIED] != 0.0:
+        mx, my, mz = mx + body[APPLIED + 1], my + body[APPLIED + 2], mz + body[APPLIED + 3]
+        fx, fy, fz = fx + body[APPLIED + 4], fy + body[APPLIED + 5], fz + body[APPLIED + 6]
     # Into P, where the weight's arm and the inertia are constants.
     ax, ay, az = (
         X[0] * wx + X[3] * wy + X[6] * wz,
@@ -94,9 +98,12 @@ def planar_rates(state: Array, force: Array, body: Array, out: Array) -> None:
     brake_v, brake_w = body[DAMPING], body[DAMPING + 1]
     px, py = m * body[GRAVITY], m * body[GRAVITY + 1]
     fx, fy = force[0] - brake_v * vx + px, force[1] - brake_v * vy + py
+    mz = force[2] - brake_w * w
+    if body[APPLIED] != 0.0:
+        fx, fy, mz = fx + body[APPLIED + 1], fy + body[APPLIED + 2], mz + body[APPLIED + 3]
     b0 = c * fx + s * fy + m * w * w * body[COM]
     b1 = -s * fx + c * fy + m * w * w * body[COM + 1]
-    b2 = force[2] - brake_w * w
+    b2 = mz
     b2 += (c * body[COM] - s * body[COM + 1]) * py - (s * body[COM] + c * body[COM + 1]) * px
     k = INVERSE
     a0 = body[k] * b0 + body[k + 1] * b1 + body[k + 2] * b2
@@ -110,7 +117,10 @@ def planar_rates(state: Array, force: Array, body: Array, out: Array) -> None:
 def line_rates(state: Array, force: Array, body: Array, out: Array) -> None:
     """As `floating_rates` for a platform on a line: state (2,), force (f_x,), `out[:2]`."""
     out[0] = state[1]
-    out[1] = (force[0] - body[DAMPING] * state[1]) / body[0] + body[GRAVITY]
+    pull = force[0] - body[DAMPING] * state[1]
+    if body[APPLIED] != 0.0:
+        pull += body[APPLIED + 1]
+    out[1] = pull / body[0] + body[GRAVITY]
 
 
 @njit(cache=True)

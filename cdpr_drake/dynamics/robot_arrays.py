@@ -26,11 +26,12 @@ DRIVE, MODE, LAW, PUSH, PLATFORM, SPEEDS, WINCH = range(7)
 """Entries of `RobotArrays.kinds`: drive, mode of the motors, law of the cables, whether a negative
 tension pushes, states of the platform, its velocities, states of the winches."""
 
-COM, GRAVITY, DAMPING, INERTIA, INVERSE = 1, 4, 7, 9, 18
+COM, GRAVITY, DAMPING, INERTIA, INVERSE, APPLIED = 1, 4, 7, 9, 18, 54
 """Where in `RobotArrays.body` begin: centre of mass (3), gravity (3), damping (2), rotational
-inertia (9), inverse of the mass matrix in P (36, or 9 of a planar platform)."""
+inertia (9), inverse of the mass matrix in P (36, or 9 of a planar platform), and what else acts on
+the platform: 1 where something does, and its generalized force (6, or less), see `apply_wrench`."""
 
-BODY_SIZE = 54
+BODY_SIZE = 61
 
 STAGES = 8
 """Rows of `RobotArrays.work`, each as long as the state."""
@@ -168,6 +169,21 @@ def pack_robot(
         matrices=np.zeros((4, k, k)),
         vectors=np.zeros((10, max(k, m))),
     )
+
+
+def apply_wrench(arrays: RobotArrays, joint: PlatformJoint, wrench: Array | None) -> None:
+    """Has a wrench act on a packed platform from now on, beside cables and weight.
+
+    Args:
+        arrays: The robot; its `body` is changed.
+        joint: What it was packed for.
+        wrench: Moment about Po and force, in W, shape (6,) [N m, N]; None: none acts.
+    """
+    body = arrays.body
+    body[APPLIED] = 0.0 if wrench is None else 1.0
+    if wrench is not None:
+        force = joint.wrench_map() @ wrench
+        body[APPLIED + 1 : APPLIED + 1 + len(force)] = force
 
 
 def _mass_matrix(m: float, com: Array, inertia: Array, speeds: int) -> Array:

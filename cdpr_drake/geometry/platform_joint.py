@@ -96,6 +96,19 @@ class PlatformJoint:
         """Whether it slides along a line."""
         return self._sizes == LINE
 
+    def wrench_map(self) -> Array:
+        """Generalized forces per wrench on the platform, shape (k, 6), k velocities.
+
+        The wrench is (moment about Po, force) in W; generalized forces are that wrench, (f_x, f_y,
+        m_z) in F of a plane, or f_x in F on a line.
+        """
+        if self.is_floating:
+            return np.eye(6)
+        R_FW = self.X_WF.rotation().inverse().matrix()
+        both = np.zeros((6, 6))
+        both[:3, 3:], both[3:, :3] = R_FW, R_FW
+        return both[[0, 1, 5] if self.num_velocities == 3 else [0]]
+
     def turned(self, cables: CableSet) -> CableSet:
         """The cables with exit points and swivel axes in F and anchor points in M."""
         if self.is_as_world():

@@ -35,6 +35,7 @@ from cdpr_drake.systems.estimators.estimator_kinds import ESTIMATORS
 from cdpr_drake.systems.remote.settings import check_servo_place
 from cdpr_drake.systems.robots.cable_forces import simulated_cables
 from cdpr_drake.systems.robots.cable_robot import SEMI_IMPLICIT
+from cdpr_drake.systems.robots.disturbances import check_disturbances
 from cdpr_drake.systems.robots.settings import COMPILED
 from cdpr_drake.systems.sensors.sensor_kinds import SENSORS
 from cdpr_drake.systems.worlds.checks import check_world
@@ -301,6 +302,10 @@ def _check_cables(scenario: Scenario, robot: Robot, path: Path) -> None:
         raise ScenarioError(f"{path}: cables: {problem}") from problem
 
 
+def _check_disturbances(scenario: Scenario, robot: Robot, path: Path) -> None:
+    check_disturbances(scenario.disturbances, path)
+
+
 def _check_winches(scenario: Scenario, robot: Robot, path: Path) -> None:
     winches, step = scenario.winches, scenario.integration.max_step
     if not winches.has_motors():
@@ -387,6 +392,7 @@ CHECKS: list[Callable[[Scenario, Robot, Path], None]] = [
     check_sensor_fusion,
     check_tension_management,
     _check_cables,
+    _check_disturbances,
     _check_winches,
     check_winch_groups,
     check_torque_control,

@@ -23,6 +23,7 @@ from cdpr_drake.models.scene import add_frame, add_ground
 from cdpr_drake.statics.static_tensions import StaticTensions
 from cdpr_drake.systems.robots.cable_forces import PORTS, CableForces
 from cdpr_drake.systems.robots.platform_pose import PlatformPose
+from cdpr_drake.systems.robots.platform_wrench import APPLIED_WRENCH, PlatformWrench
 from cdpr_drake.systems.robots.settings import CableRobotSettings
 from cdpr_drake.systems.robots.winches import make_winches
 
@@ -225,6 +226,8 @@ def add_cable_robot(
         brake = builder.AddNamedSystem(prefix + "damping", settings.damping.block(in_plant))
         builder.Connect(state, brake.get_input_port())
         applied = _sum(builder, prefix + "applied_force", applied, brake.get_output_port())
+    wrench = builder.AddNamedSystem(prefix + "platform_wrench", PlatformWrench(in_plant))
+    applied = _sum(builder, prefix + "force_and_wrench", applied, wrench.get_output_port())
     apply_force(builder, plant, applied, name=name)
     inputs = {}
     for port in map(winch.get_input_port, range(winch.num_input_ports())):
@@ -232,12 +235,21 @@ def add_cable_robot(
             builder.Connect(drums, port)
         else:
             inputs[port.get_name()] = port
+    inputs[APPLIED_WRENCH] = wrench.get_input_port()
+    disturbances = settings.disturbance_block(robot)
+    if disturbances is not None:
+        builder.AddNamedSystem(prefix + "disturbances", disturbances)
+        builder.Connect(disturbances.GetOutputPort("wrench"), wrench.get_input_port())
+        builder.Connect(pose.GetOutputPort("X_WP"), disturbances.GetInputPort("X_WP"))
+        inputs[APPLIED_WRENCH] = disturbances.GetInputPort(APPLIED_WRENCH)
     outputs = {"platform_state": state, "X_WP": pose.GetOutputPort("X_WP")}
     outputs |= {port: forces.GetOutputPort(port) for port in PORTS}
     for port_name in ("unstrained_lengths", "unstrained_length_rates"):
         builder.Connect(winch.GetOutputPort(port_name), forces.GetInputPort(port_name))
     for port in map(winch.get_output_port, range(winch.num_output_ports())):
         outputs[port.get_name()] = port
+    if disturbances is not None:
+        outputs[APPLIED_WRENCH] = disturbances.GetOutputPort("wrench")
     outputs["body_poses"] = plant.get_body_poses_output_port()
     outputs["body_velocities"] = plant.get_body_spatial_velocities_output_port()
     outputs["body_accelerations"] = plant.get_body_spatial_accelerations_output_port()

@@ -47,6 +47,8 @@ class CableRobot(Diagram):
     port                    type                      unit    meaning
     ======================= ========================= ======= =================================
     cable_velocities        vector(m)                 m/s     in, commanded, positive pays out
+    applied_wrench          vector(6)                 N m, N  in, may stay open: moment about Po
+                                                              and force on the platform, in W
     platform_state          vector                    m       out, as `CableForces` takes it
     X_WP                    RigidTransform            m       out, pose of the platform
     tensions                vector(m)                 N       out, at the platform
@@ -63,12 +65,14 @@ class CableRobot(Diagram):
     body_accelerations      list[SpatialAcceleration] rad/s^2 out, from the plant, of bodies in W
                                                       m/s^2
     query_object            QueryObject               -       out, from the scene graph, for cameras
+    applied_wrench          vector(6)                 N m, N  out, only with `disturbances`: these
+                                                              and the input
     ======================= ========================= ======= =================================
 
-    Subsystems: plant, scene_graph, cables, winches, platform_pose. With motors on the winches, the
-    block has the inputs and further outputs of `MotorWinch`, tensions connected. A default context
-    has the platform at the robot's home pose with cables that are just not taut; see
-    `set_at_equilibrium`.
+    Subsystems: plant, scene_graph, cables, winches, platform_pose, platform_wrench. With motors on
+    the winches, the block has the inputs and further outputs of `MotorWinch`, tensions connected. A
+    default context has the platform at the robot's home pose with cables that are just not taut;
+    see `set_at_equilibrium`.
     """
 
     def __init__(

@@ -18,6 +18,7 @@ from cdpr_drake.systems.robots.assembly import SceneAdder, equilibrium_start, fi
 from cdpr_drake.systems.robots.cable_forces import simulated_cables
 from cdpr_drake.systems.robots.compiled_motion import MEMORY, CompiledMotion
 from cdpr_drake.systems.robots.compiled_step import CompiledBodies, StepRule
+from cdpr_drake.systems.robots.platform_wrench import APPLIED_WRENCH
 from cdpr_drake.systems.robots.settings import CableRobotSettings, WinchSettings
 
 
@@ -89,12 +90,26 @@ class CompiledCableRobot(Diagram):
             "bodies",
             CompiledBodies(motion.arrays(), CABLE_MODELS[settings.cables.model].law, robot.joint()),
         )
-        for index in range(bodies.num_input_ports()):
-            port = bodies.get_input_port(index)
-            builder.Connect(motion.GetOutputPort(port.get_name()), port)
+        disturbances = settings.disturbance_block(robot)
+        pushed = [system.GetInputPort(APPLIED_WRENCH) for system in (motion, bodies)]
         for index in range(motion.num_input_ports()):
             port = motion.get_input_port(index)
-            builder.ExportInput(port, port.get_name())
+            if port.get_name() != APPLIED_WRENCH:
+                builder.ExportInput(port, port.get_name())
+        for index in range(bodies.num_input_ports()):
+            port = bodies.get_input_port(index)
+            if port.get_name() != APPLIED_WRENCH:
+                builder.Connect(motion.GetOutputPort(port.get_name()), port)
+        if disturbances is None:
+            builder.ExportInput(pushed[0], APPLIED_WRENCH)
+            builder.ConnectInput(APPLIED_WRENCH, pushed[1])
+        else:
+            builder.AddNamedSystem("disturbances", disturbances)
+            builder.Connect(motion.GetOutputPort("X_WP"), disturbances.GetInputPort("X_WP"))
+            builder.ExportInput(disturbances.GetInputPort(APPLIED_WRENCH), APPLIED_WRENCH)
+            builder.ExportOutput(disturbances.GetOutputPort("wrench"), APPLIED_WRENCH)
+            for port in pushed:
+                builder.Connect(disturbances.GetOutputPort("wrench"), port)
         for index in range(motion.num_output_ports()):
             output = motion.get_output_port(index)
             if output.get_name() not in ("geometry_pose", MEMORY):

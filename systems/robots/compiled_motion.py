@@ -23,7 +23,14 @@ from cdpr_drake.cables.models import CABLE_MODELS
 from cdpr_drake.cables.simulation_kernel import OUTPUTS, make_room, outputs_kernel
 from cdpr_drake.dynamics.advance_events_kernel import BACKWARD, fresh_memory, robot_addresses
 from cdpr_drake.dynamics.advance_kernel import REPORTED, robot_energy
-from cdpr_drake.dynamics.robot_arrays import MOTORS, TENSIONS, Drive, RobotArrays, pack_robot
+from cdpr_drake.dynamics.robot_arrays import (
+    MOTORS,
+    TENSIONS,
+    Drive,
+    RobotArrays,
+    apply_wrench,
+    pack_robot,
+)
 from cdpr_drake.dynamics.robot_kernel import INTEGRATION_OK, ideal_rates
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.cable_set import CableSet
@@ -39,6 +46,7 @@ from cdpr_drake.systems.robots.compiled_step import (
     resting_state,
 )
 from cdpr_drake.systems.robots.motor_winch import COMMAND_PORTS
+from cdpr_drake.systems.robots.platform_wrench import APPLIED_WRENCH
 from cdpr_drake.winches.motor import MODES
 from cdpr_drake.winches.motor_kernel import pack_winch, winch_torques
 
@@ -50,7 +58,7 @@ class CompiledMotion(LeafSystem):
     """Platform, cables and winches of a robot as one block.
 
     Ports are those of `CableRobot` without scene graph, or of `TensionDrivenCables` where tensions
-    are commanded, and these:
+    are commanded, and these; the wrench that is applied is taken as constant like commands:
 
     ====================== =============== ======== =============================================
     port                   type            unit     meaning
@@ -165,6 +173,7 @@ class CompiledMotion(LeafSystem):
             if drive.mode == "position":
                 self._rates = self.DeclareVectorInputPort("commanded_length_rates", k)
         self._plain = self._rates is None and self._brakes is None and k == m
+        self._wrench = self.DeclareVectorInputPort(APPLIED_WRENCH, 6)
 
     def _declare_platform(self, here: set[DependencyTicket]) -> None:
         n, joint = self._n, self._joint
@@ -296,6 +305,8 @@ class CompiledMotion(LeafSystem):
                 command = self._command.Eval(context)
             else:
                 command, others = self._inputs(context)
+            pushed = self._wrench.HasValue(context)
+            apply_wrench(self._arrays, self._joint, self._wrench.Eval(context) if pushed else None)
         packed = self._packed
         bad = packed.reach(self._where, packed.numbers, begin, command, others, time, memory)
         if bad == BACKWARD:

@@ -16,7 +16,15 @@ from cdpr_drake.cables.simulation_kernel import make_room, model_force_and_drums
 from cdpr_drake.dynamics.advance_events_kernel import integrate_explicit, integrate_semi_implicit
 from cdpr_drake.dynamics.explicit_kernel import METHODS
 from cdpr_drake.dynamics.platform_kernel import floating_rates, line_rates, planar_rates
-from cdpr_drake.dynamics.robot_arrays import IDEAL, MOTORS, PLATFORM, SPEEDS, Drive, RobotArrays
+from cdpr_drake.dynamics.robot_arrays import (
+    IDEAL,
+    MOTORS,
+    PLATFORM,
+    SPEEDS,
+    Drive,
+    RobotArrays,
+    apply_wrench,
+)
 from cdpr_drake.dynamics.robot_kernel import INTEGRATION_DIVERGED
 from cdpr_drake.errors import CableGeometryError, CdprError, DivergedError
 from cdpr_drake.geometry.cable_paths import cable_paths, impossible_cable
@@ -25,6 +33,7 @@ from cdpr_drake.geometry.platform_joint import PlatformJoint
 from cdpr_drake.geometry.poses import pose_row
 from cdpr_drake.models.robot_in_plant import pose_from_state
 from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.systems.robots.platform_wrench import APPLIED_WRENCH
 from cdpr_drake.winches.motor import MODES, resting_motors
 
 
@@ -145,6 +154,7 @@ class CompiledBodies(LeafSystem):
     platform_state          vector(13, 6 or 2)        m       in
     unstrained_lengths      vector(m)                 m       in
     unstrained_length_rates vector(m)                 m/s     in
+    applied_wrench          vector(6)                 N m, N  in, may stay open
     body_velocities         list[SpatialVelocity]     rad/s   out, of the world and the platform, in
                                                       m/s     W, of the body's origin
     body_accelerations      list[SpatialAcceleration] rad/s^2 out, the same of accelerations
@@ -155,11 +165,12 @@ class CompiledBodies(LeafSystem):
     """
 
     def __init__(self, arrays: RobotArrays, law: int, joint: PlatformJoint) -> None:
-        """With a robot as the kernels take it, by that joint; its work space is not used."""
+        """With a robot as the kernels take it, by that joint; it is copied."""
         super().__init__()
         m, self._n = len(arrays.cables), int(arrays.kinds[PLATFORM])
         self._nv = int(arrays.kinds[SPEEDS])
-        self._cables, self._body = arrays.cables, arrays.body
+        self._arrays = arrays._replace(body=arrays.body.copy())
+        self._cables, self._joint = arrays.cables, joint
         self._room = make_room(m, law, joint.height)
         self._R_WF = joint.X_WF.rotation().matrix()
         self._as_world = joint.is_as_world()
@@ -171,6 +182,7 @@ class CompiledBodies(LeafSystem):
                 ("unstrained_length_rates", m),
             )
         ]
+        self._wrench = self.DeclareVectorInputPort(APPLIED_WRENCH, 6)
         self.DeclareAbstractOutputPort(
             "body_velocities", lambda: Value[list[SpatialVelocity]](), self._calc_velocities
         )
@@ -186,7 +198,9 @@ class CompiledBodies(LeafSystem):
         state, lengths, rates = (port.Eval(context) for port in self._inputs)
         force, out = np.zeros(self._nv + len(self._cables)), np.zeros(self._n)
         model_force_and_drums(state, lengths, rates, self._cables, self._room, self._nv, force)
-        _RATES[self._n](state, force, self._body, out)
+        pushed = self._wrench.HasValue(context)
+        apply_wrench(self._arrays, self._joint, self._wrench.Eval(context) if pushed else None)
+        _RATES[self._n](state, force, self._arrays.body, out)
         alpha, a = self._parts(out[-self._nv :])
         output.set_value([SpatialAcceleration.Zero(), SpatialAcceleration(alpha=alpha, a=a)])
 

@@ -12,7 +12,8 @@ from cdpr_drake.cables.models import CABLE_MODELS, KELVIN_VOIGT
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.models.robot_in_plant import RobotInPlant
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.schema.fields import number, section, switch, text
+from cdpr_drake.schema.fields import number, optional_section, section, switch, text
+from cdpr_drake.systems.robots.disturbances import Disturbances, DisturbanceSettings
 from cdpr_drake.systems.robots.motor_winch import COMMAND_PORTS
 
 
@@ -124,3 +125,18 @@ class CableRobotSettings:
     damping: DampingSettings = section(
         "What brakes the platform beside its cables.", DampingSettings, required=False
     )
+    disturbances: DisturbanceSettings | None = optional_section(
+        "What pushes the platform beside its cables; null: nothing."
+    )
+
+    def disturbance_block(self, robot: Robot) -> Disturbances | None:
+        """The block of `disturbances`, by the seed of the scenario that these settings are, or 0;
+        None without.
+
+        Raises:
+            ScenarioError: They are not accepted; names it.
+        """
+        if self.disturbances is None:
+            return None
+        seed = int(getattr(self, "seed", 0))
+        return Disturbances(self.disturbances, robot.gravity_vector(), seed=seed)

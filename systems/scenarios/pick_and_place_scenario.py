@@ -15,6 +15,7 @@ from cdpr_drake.models.robot_schema import Pose, Robot
 from cdpr_drake.numerics.explicit_integration import explicit_integrators
 from cdpr_drake.schema.fields import FASTEST, number, optional_section, section, text
 from cdpr_drake.schema.typed_yaml import closest
+from cdpr_drake.systems.robots.disturbances import check_disturbances
 from cdpr_drake.systems.robots.settings import PLANT, CableRobotSettings
 from cdpr_drake.systems.scenarios.files import PICK_AND_PLACE
 from cdpr_drake.systems.scenarios.pick_and_place_settings import (
@@ -130,6 +131,7 @@ def check_pick_and_place(scenario: PickAndPlaceScenario, robot: Robot, path: Pat
     problems = Problems(ScenarioError)
     problems.add(*(f"{path}: {words}" for words in _problems(scenario, robot)))
     problems.raise_any()
+    check_disturbances(scenario.disturbances, path)
     check_world(
         scenario.world, robot, scenario.initial_pose.transform(), path, compiled=False, stop=False
     )

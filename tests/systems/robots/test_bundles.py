@@ -77,7 +77,7 @@ def moved(kind, how, command, duration, step):
         name = port.get_name()
         if name == "brakes":
             port.FixValue(context, np.zeros(3))
-        elif name != "commanded_length_rates":
+        elif name not in ("commanded_length_rates", "applied_wrench"):
             port.FixValue(context, command(l0) if callable(command) else command)
     if kind is CableRobot:
         ResetIntegratorFromFlags(simulator, "runge_kutta3", step).set_fixed_step_mode(True)

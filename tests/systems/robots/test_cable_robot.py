@@ -25,7 +25,7 @@ def port_names(system):
 
 def test_ports_are_public():
     inputs, outputs = port_names(CableRobot(load_robot("acrobot_small")))
-    assert inputs == ["cable_velocities"]
+    assert inputs == ["cable_velocities", "applied_wrench"]
     assert sorted(outputs) == [
         "X_WP", "body_accelerations", "body_poses", "body_velocities", "drum_tensions", "lengths",
         "platform_state", "query_object", "sags", "slack", "surplus_lengths", "tensions",

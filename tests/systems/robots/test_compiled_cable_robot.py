@@ -53,7 +53,7 @@ def simulated(kind, robot, how, command, *, duration, step, X_WP=None, slack=Non
             port.FixValue(context, np.zeros(port.size()))
         elif port.get_name() == "commanded_lengths":
             port.FixValue(context, lengths + command)
-        elif port.get_name() != "commanded_length_rates":
+        elif port.get_name() not in ("commanded_length_rates", "applied_wrench"):
             port.FixValue(context, command)
     steps = int(np.ceil(duration / step / MANY)) * MANY
     step = duration / steps

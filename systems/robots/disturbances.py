@@ -1,0 +1,265 @@
+"""What pushes the platform beside its cables: section `disturbances` of a scenario, and its block.
+
+Every push begins at a time and may end at one. A force f acts at a point Q of the platform, so that
+the wrench about Po is (m + p_PoQ x f, f).
+
+* step: f and m, constant;
+* push: a half sine, f sin(pi (t - start) / (end - start)) and m likewise: an impulse of
+  2 (end - start) f / pi;
+* sine: f sin(2 pi nu (t - start)) and m likewise;
+* wind: rho c_d A |v| v / 2 with v = V + u, V the mean wind and u its turbulence along each axis, of
+  Dryden's longitudinal spectrum, S(omega) = 2 sigma^2 L / (pi |V|) / (1 + (L omega / |V|)^2), sigma
+  the intensity times |V|: a random signal of first order with the time constant L / |V|, exact at
+  any period. How fast the platform moves itself is left out;
+* payload: the weight of a mass at Q, below zero of one that is lost. What it adds to the inertia is
+  left out.
+
+Source of the spectrum: MIL-F-8785C, Flying qualities of piloted airplanes, 1980, 3.7.1.2.
+
+Drake's YAML loader reads the annotations themselves, so they are not postponed here.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from pydrake.common.value import Value
+from pydrake.math import RigidTransform
+from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.errors import ScenarioError
+from cdpr_drake.estimation.sensor_noise import sample_noise
+from cdpr_drake.schema.fields import array, number, sections, text
+from cdpr_drake.systems.robots.platform_wrench import APPLIED_WRENCH
+
+STEP, PUSH, SINE, WIND, PAYLOAD = "step", "push", "sine", "wind", "payload"
+
+NEEDED = {
+    STEP: (),
+    PUSH: ("end",),
+    SINE: ("frequency",),
+    WIND: ("wind", "drag_area"),
+    PAYLOAD: ("mass",),
+}
+"""Fields that a kind needs, beside a force or moment of the first three."""
+
+OWN = {
+    "frequency": SINE, "wind": WIND, "drag_area": WIND, "intensity": WIND, "length_scale": WIND,
+    "mass": PAYLOAD,
+}  # fmt: skip
+"""Fields that one kind has alone."""
+
+WORLD, PLATFORM = "world", "platform"
+
+AIR = 1.225
+"""Density of air at 15 degrees Celsius and sea level [kg/m^3]."""
+
+STREAM = 4200
+"""Stream of the wind's random numbers, apart from those of sensors; one more for each wind."""
+
+
+@dataclass(kw_only=True)
+class Push:
+    """One thing that pushes the platform."""
+
+    kind: str = text("What it is like over time.", choices=tuple(NEEDED))
+    start: float = number("When it begins.", "s", 0.0, at_least=0.0)
+    end: float | None = number("When it ends; null: with the run.", "s", None, above=0.0)
+    force: np.ndarray | None = array("Force.", "N", (3,), None)
+    moment: np.ndarray | None = array("Moment about Po.", "N m", (3,), None)
+    frame: str = text(
+        "Axes of force and moment: those of W, or of P, which turn with the platform.",
+        WORLD,
+        choices=(WORLD, PLATFORM),
+    )
+    point: np.ndarray = array("Where the force acts, in P.", "m", (3,), (0.0, 0.0, 0.0))
+    frequency: float | None = number("Of a sine.", "Hz", None, above=0.0)
+    wind: np.ndarray | None = array("Mean wind in W.", "m/s", (3,), None)
+    drag_area: float | None = number(
+        "Drag coefficient times area that the wind meets.", "m^2", None, above=0.0
+    )
+    intensity: float | None = number(
+        "Of the wind's turbulence: standard deviation over mean speed; null: none.",
+        "-",
+        None,
+        above=0.0,
+        at_most=1.0,
+    )
+    length_scale: float | None = number("Of the turbulence; null: 10 m.", "m", None, above=0.0)
+    mass: float | None = number("Of a payload; below zero: it is lost.", "kg", None)
+
+    def check(self, where: str) -> None:
+        """Checks what belongs together.
+
+        Raises:
+            ScenarioError: Something is missing, or belongs to another kind; names it.
+        """
+        for name in NEEDED[self.kind]:
+            if getattr(self, name) is None:
+                raise ScenarioError(f"{where}.{name}: found none; accepted with {self.kind}: one")
+        for name, kind in OWN.items():
+            if kind != self.kind and getattr(self, name) is not None:
+                raise ScenarioError(
+                    f"{where}.{name}: found one with {self.kind}; accepted with {kind} alone"
+                )
+        given = self.force is not None or self.moment is not None
+        if given != (self.kind in (STEP, PUSH, SINE)):
+            accepted = "none" if given else "a force, a moment, or both"
+            raise ScenarioError(
+                f"{where}.force: found {'one' if given else 'no force and no moment'}; accepted "
+                f"with {self.kind}: {accepted}"
+            )
+        if self.end is not None and self.end <= self.start:
+            raise ScenarioError(
+                f"{where}.end: found {self.end:g} s; accepted: above the start, {self.start:g} s"
+            )
+        if self.kind == WIND and not np.any(self.wind):
+            raise ScenarioError(f"{where}.wind: found none; accepted: a mean speed above 0 [m/s]")
+        if self.kind == PAYLOAD and self.mass == 0.0:
+            raise ScenarioError(f"{where}.mass: found 0; accepted: above or below 0 [kg]")
+
+    def share(self, time: float) -> float:
+        """What of force and moment acts at a time [s]."""
+        if time < self.start or (self.end is not None and time >= self.end):
+            return 0.0
+        since = time - self.start
+        if self.kind == PUSH:
+            assert self.end is not None
+            return float(np.sin(np.pi * since / (self.end - self.start)))
+        if self.kind == SINE:
+            assert self.frequency is not None
+            return float(np.sin(2.0 * np.pi * self.frequency * since))
+        return 1.0
+
+    def wrench(self, time: float, R_WP: Array, gravity: Array, gust: Array) -> Array:
+        """Moment about Po and force in W at a time, shape (6,) [N m, N].
+
+        Args:
+            time: The time [s].
+            R_WP: Rotation of the platform, shape (3, 3).
+            gravity: Acceleration of a falling body in W, shape (3,) [m/s^2].
+            gust: Turbulence of the wind, shape (3,) [m/s].
+        """
+        share = self.share(time)
+        if share == 0.0:
+            return np.zeros(6)
+        force, moment = np.zeros(3), np.zeros(3)
+        if self.kind == PAYLOAD:
+            assert self.mass is not None
+            force = self.mass * gravity
+        elif self.kind == WIND:
+            assert self.wind is not None
+            assert self.drag_area is not None
+            v = self.wind + gust
+            force = 0.5 * AIR * self.drag_area * float(np.linalg.norm(v)) * v
+        else:
+            turn = R_WP if self.frame == PLATFORM else np.eye(3)
+            force = force if self.force is None else share * (turn @ self.force)
+            moment = moment if self.moment is None else share * (turn @ self.moment)
+        return np.concatenate([moment + np.cross(R_WP @ self.point, force), force])
+
+    def turbulence(self, period: float) -> tuple[float, float]:
+        """Share of a gust that is left after a period [s], and its standard deviation [m/s]."""
+        if self.wind is None or self.intensity is None:
+            return 0.0, 0.0
+        speed = float(np.linalg.norm(self.wind))
+        length = 10.0 if self.length_scale is None else self.length_scale
+        return float(np.exp(-period * speed / length)), self.intensity * speed
+
+
+@dataclass(kw_only=True)
+class DisturbanceSettings:
+    """What pushes the platform, and how often that changes."""
+
+    pushes: list[Push] = sections("What pushes the platform; all of it adds up.")
+    rate: float = number(
+        "How often the wrench changes; between, it is that of the middle of the period.",
+        "Hz",
+        1000.0,
+        above=0.0,
+        at_most=1e5,
+    )
+
+    def check(self) -> None:
+        """Checks every push.
+
+        Raises:
+            ScenarioError: There is none, or one is not accepted; names it.
+        """
+        if not self.pushes:
+            raise ScenarioError("disturbances.pushes: found none; accepted: at least one")
+        for number_, push in enumerate(self.pushes):
+            push.check(f"disturbances.pushes[{number_}]")
+
+
+def check_disturbances(settings: DisturbanceSettings | None, path: Path) -> None:
+    """Checks the section of a scenario's file.
+
+    Raises:
+        ScenarioError: Something is not accepted; names the file and it.
+    """
+    try:
+        if settings is not None:
+            settings.check()
+    except ScenarioError as problem:
+        raise ScenarioError(f"{path}: {problem}") from problem
+
+
+class Disturbances(LeafSystem):
+    """What pushes a platform, as a wrench that is constant from period to period.
+
+    ============== ============== ====== ======================================================
+    port           type           unit   meaning
+    ============== ============== ====== ======================================================
+    X_WP           RigidTransform m      in, pose of the platform, read at the period's begin
+    applied_wrench vector(6)      N m, N in, may stay open: what else pushes it
+    wrench         vector(6)      N m, N out, moment about Po and force, in W, of all of it
+    ============== ============== ====== ======================================================
+
+    State: wrench, gusts, and their number. Random numbers depend on the seed and the number of the
+    period alone.
+    """
+
+    def __init__(self, settings: DisturbanceSettings, gravity: Array, *, seed: int = 0) -> None:
+        """With settings that are checked, gravity in W, shape (3,) [m/s^2], and a seed."""
+        super().__init__()
+        settings.check()
+        self._settings, self._gravity, self._seed = settings, np.asarray(gravity, float), seed
+        self._period = 1.0 / settings.rate
+        self._turbulence = [push.turbulence(self._period) for push in settings.pushes]
+        self._pose = self.DeclareAbstractInputPort("X_WP", Value(RigidTransform()))
+        self._more = self.DeclareVectorInputPort(APPLIED_WRENCH, 6)
+        n = 6 + 3 * len(settings.pushes)
+        state = self.DeclareDiscreteState(n)
+        needs = {self.discrete_state_ticket(state), self._more.ticket()}
+        self.DeclareVectorOutputPort("wrench", 6, self._calc, needs)
+        self.DeclareInitializationDiscreteUpdateEvent(self._begin)
+        self.DeclarePeriodicDiscreteUpdateEvent(self._period, 0.0, self._update)
+
+    def _calc(self, context: Context, output: BasicVector) -> None:
+        own = context.get_discrete_state_vector().value()[:6]
+        more = self._more.Eval(context) if self._more.HasValue(context) else 0.0
+        output.SetFromVector(own + more)
+
+    def _begin(self, context: Context, state: DiscreteValues) -> None:
+        if context.get_time() == 0.0:
+            state.set_value(self._next(context, np.zeros(state.get_vector().size())))
+
+    def _update(self, context: Context, state: DiscreteValues) -> None:
+        state.set_value(self._next(context, context.get_discrete_state_vector().value()))
+
+    def _next(self, context: Context, now: Array) -> Array:
+        number_ = round(context.get_time() / self._period)
+        R_WP = self._pose.Eval(context).rotation().matrix()
+        middle = (number_ + 0.5) * self._period
+        out = np.zeros_like(now)
+        for k, push in enumerate(self._settings.pushes):
+            kept, sigma = self._turbulence[k]
+            gust = slice(6 + 3 * k, 9 + 3 * k)
+            if sigma > 0.0:
+                fresh = sample_noise(self._seed, STREAM + k, number_, 3)
+                before, new = (0.0, 1.0) if number_ == 0 else (kept, np.sqrt(1.0 - kept**2))
+                out[gust] = before * now[gust] + new * sigma * fresh
+            out[:6] += push.wrench(middle, R_WP, self._gravity, out[gust])
+        return out
