@@ -130,7 +130,8 @@ def test_ports_are_these():
 def test_ports_of_the_whole_robot_are_these():
     block = CableRobot(load_robot("acrobot_small"))
     assert [block.get_input_port(i).get_name() for i in range(block.num_input_ports())] == [
-        "cable_velocities"
+        "cable_velocities",
+        "applied_wrench",
     ]
     assert {block.get_output_port(i).get_name() for i in range(block.num_output_ports())} == {
         "platform_state",

@@ -69,7 +69,7 @@ def test_winches_with_motors_bring_their_ports(mode):
     inputs, outputs = port_names(
         CableRobot(load_robot("planar"), CableRobotSettings(winches=motors(mode)))
     )
-    assert inputs == [command.get(mode, "commanded_lengths")]
+    assert inputs == [command.get(mode, "commanded_lengths"), "applied_wrench"]
     added = {"motor_angles", "motor_speeds", "applied_torques", "friction_torques"}
     assert added <= set(outputs)
 
