@@ -61,7 +61,8 @@ def convex_distance(P: Array, Q: Array, p: Array, q: Array, n: Array, work: Arra
 
     p - q = distance n, and no plane normal to another n keeps them so far apart. Rounding is some
     1e-15 of the coordinates; that of n is this over the distance, down to `CONTACT`. Of hulls that
-    overlap in more than `MOST_CORNERS` corners of their difference the depth may be found too large, never too small.
+    overlap in more than `MOST_CORNERS` corners of their difference the depth may be found too
+    large, never too small.
 
     Args:
         P: Points, shape (k, 3) [m], k > 0.
