@@ -84,8 +84,8 @@ class ShapeRequest:
         rays: Rays of the hull, at most.
         tolerance: How near to the border of the workspace they end [m].
         mesh: File for the hull's triangles, of an ending in `MESH_ENDINGS`; None: none.
-        certify: Whether boxes of `box`, or of the robot's frame, are proven inside or outside; of
-            one kind.
+        certify: Whether boxes of `box`, or of the robot's frame, are proven inside or outside: of
+            all the kinds that are asked for.
         boxes: Boxes that are judged, at most.
         exit_error: Proven for exit points off by up to so much [m].
         anchor_error: The same of anchor points [m].
@@ -339,9 +339,9 @@ def compute_workspace(
         asked: What kinds shall be asked for: `limits` (2,) [N], `mass` [kg], `wrench` (6,)
             [N m, N], `force` [N] and `moment` [N m] to resist along and about each axis, or
             `required`, a SpatialSet or a file; `accelerations`, `velocities`, `clearance` [m],
-            `obstacles`, rows of boxes or a file; `exit_free`, `anchor_free` [m], `scenario`,
-            `pulleys`, `method`, see `WorkspaceRequest` and `interference_bodies`. And what else is
-            found: `hull` (3,) [m], `certify` and more fields of `ShapeRequest`.
+            `obstacles`, rows of boxes, `Obstacles` or a file; `exit_free`, `anchor_free` [m],
+            `scenario`, `pulleys`, `method`, see `WorkspaceRequest` and `interference_bodies`. And
+            what else is found: `hull` (3,) [m], `certify` and more fields of `ShapeRequest`.
 
     Raises:
         StoppedError: The session stopped it before the grid was finished.

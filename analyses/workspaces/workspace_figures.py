@@ -8,6 +8,7 @@ from textwrap import wrap
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
@@ -22,11 +23,21 @@ from cdpr_drake.analyses.workspaces.workspace_question import RULES
 from cdpr_drake.analyses.workspaces.workspace_results import ALL, RobotWorkspace
 from cdpr_drake.arrays import Array
 from cdpr_drake.palette import nth_look
+from cdpr_drake.workspaces import box_expansion_kernel
 from cdpr_drake.workspaces.available_wrenches import AvailableWrenches
 from cdpr_drake.workspaces.certified_boxes import CertifiedBoxes
 
 OUTSIDE, SOME, INSIDE = "#e8e8e8", "#f0c27b", "#3f8f5f"
 """Of cells where no kind holds, where some do, and where all do."""
+
+PROVEN = {
+    box_expansion_kernel.INSIDE: ("proven inside", INSIDE, None),
+    box_expansion_kernel.OUTSIDE: ("proven outside", OUTSIDE, None),
+    box_expansion_kernel.OPEN: ("open", SOME, "////"),
+}
+"""Label, colour and hatching of boxes by what is proven."""
+
+SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 
 MOST_PLANES = 12
 COLUMNS = 4
@@ -48,9 +59,9 @@ def workspace_pictures(
     for name in workspace.values:
         drawn[name] = partial(planes_figure, workspace, name)
     if boxes is not None:
-        drawn["open_share"] = partial(
-            boxes_figure, boxes, workspace.arguments["robot"], workspace.arguments["cables"]
-        )
+        about = workspace.arguments
+        drawn["open_share"] = partial(boxes_figure, boxes, about["robot"], about["cables"])
+        drawn["boxes"] = partial(box_planes_figure, boxes, about["robot"], list(about["kinds"]))
     return dict(figure_writers(drawn, formats))
 
 
@@ -148,6 +159,54 @@ def boxes_figure(found: CertifiedBoxes, robot: str, cables: str = "") -> Figure:
         )  # fmt: skip
     axes.set(xscale="log", yscale="log", xlabel="boxes judged", ylabel="share of the box [%]")
     figure.legend(loc="outside lower center", ncols=3)
+    return figure
+
+
+def box_planes_figure(found: CertifiedBoxes, robot: str, kinds: Sequence[str]) -> Figure:
+    """What is proven in three planes through the middle of the region that was cut.
+
+    Angles that vary are in the middle of their ranges.
+
+    Args:
+        found: The boxes.
+        robot: Name of the robot.
+        kinds: What was proven.
+    """
+    low = np.min(found.poses - found.halves, axis=0)
+    high = np.max(found.poses + found.halves, axis=0)
+    middle = 0.5 * (low + high)
+    wide = [k for k in range(3) if low[k] < high[k]]
+    planes = [k for k in range(3) if len(set(wide) - {k}) == 2] or [2]
+    words = wrap(f"{robot}: poses proven {', '.join(kinds)}", LINE)
+    figure, grid = new_figure(1, len(planes), (1.0 + 3.6 * len(planes), 4.8), "\n".join(words))
+    # A pose of a border is in several boxes: a little off the middle, where no cut is.
+    at = middle + 1e-6 * (high - low)
+    for axes, normal in zip(np.ravel(grid), planes, strict=True):
+        u, v = (k for k in range(3) if k != normal)
+        others = [k for k in range(found.poses.shape[1]) if k not in (u, v)]
+        hit = np.all(np.abs(found.poses - at)[:, others] <= found.halves[:, others] + 1e-12, axis=1)
+        for verdict, (_, color, hatch) in PROVEN.items():
+            some = np.flatnonzero(hit & (found.verdicts == verdict))
+            corners = (found.poses - found.halves)[some][:, (u, v)]
+            sizes = 2.0 * found.halves[some][:, (u, v)]
+            cells = corners[:, np.newaxis] + sizes[:, np.newaxis] * SQUARE
+            axes.add_collection(
+                PolyCollection(
+                    list(cells), facecolor=color, edgecolor="#555555", linewidth=0.1, hatch=hatch
+                )
+            )
+        axes.set(xlim=(low[u], high[u]), ylim=(low[v], high[v]), aspect="equal")
+        axes.set(xlabel=f"{'xyz'[u]} [m]", ylabel=f"{'xyz'[v]} [m]")
+        axes.grid(False)
+        axes.set_title(f"{'xyz'[normal]} = {middle[normal]:.3g} m", fontsize=11)
+    figure.legend(
+        handles=[
+            Patch(facecolor=color, edgecolor="#555555", hatch=hatch, label=label)
+            for label, color, hatch in PROVEN.values()
+        ],
+        loc="outside lower center",
+        ncols=3,
+    )
     return figure
 
 

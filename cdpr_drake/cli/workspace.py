@@ -263,7 +263,10 @@ def workspace(
         float, typer.Option(help="How far cables and platform stay from others, at least [m].")
     ] = 0.0,
     obstacles: Annotated[
-        Path | None, typer.Option(help="YAML file of boxes that stand in the frame.")
+        Path | None,
+        typer.Option(
+            help="YAML file of what stands in the frame: boxes, spheres, capsules, meshes."
+        ),
     ] = None,
     anchor_free: Annotated[
         float | None,
@@ -312,7 +315,7 @@ def workspace(
         typer.Option(help=f"File for the hull's triangles: {', '.join(MESH_ENDINGS)}."),
     ] = None,
     certify: Annotated[
-        bool, typer.Option(help="Also boxes of the frame proven inside or outside; one kind.")
+        bool, typer.Option(help="Also boxes of the frame proven inside or outside all kinds.")
     ] = False,
     boxes: Annotated[int, typer.Option(help="Boxes that are judged, at most.")] = 200_000,
     boxes_mesh: Annotated[
