@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, fields, replace
-from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -42,7 +41,7 @@ from cdpr_drake.workspaces.proven_sets import COVER
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-ACCELERATION = 1.0
+ACCELERATION = 0.25
 """Half width of the box of accelerations that is proven, where nobody says and nothing turns
 [m/s^2]."""
 
@@ -175,7 +174,6 @@ def plan_proven_motion(
     run = DrawnProvenPlan(
         robot=loaded, limits=task.limits, arguments=arguments, planning_time=took, found=found,
         sets_time=between - begin, judged=judged(sets, found.plan, JUDGED),
-        obstacles=tuple(_corners(row) for row in sets.about["obstacles"]),
     )  # fmt: skip
     own, log = tracked_by(loaded, given, found.plan, say, track)
     return replace(run, limits=own, tracked=log)
@@ -208,14 +206,6 @@ def _check_ends(sets: ProvenSets, ends: list[Array]) -> None:
                 f"{where}: lies in none of {len(sets)} sets{': ' * bool(why)}{why}; accepted: a "
                 "pose in one of them"
             )
-
-
-def _corners(row: list[float]) -> Array:
-    """Corners of a box in W, shape (3, 8) [m]."""
-    numbers = np.array(row, float)
-    signs = np.array(list(product((-1.0, 1.0), repeat=3))).T
-    R, middle, halves = numbers[:9].reshape(3, 3), numbers[9:12], numbers[12:]
-    return np.asarray(middle[:, np.newaxis] + R @ (signs * halves[:, np.newaxis]), float)
 
 
 def _degrees(numbers: Array) -> list[float]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from cdpr_drake.analyses.planning.plan_results import MotionRun
-from cdpr_drake.arrays import Array
 from cdpr_drake.planning.path_task import MotionSamples, PathTask
 from cdpr_drake.planning.proven_path import ProvenMotion
 from cdpr_drake.trajectories.timed_path import TimedPath
@@ -33,13 +32,11 @@ class ProvenRun(MotionRun):
         sets_time: Time that the sets took [s].
         judged: Samples of the motion, and of each kind at how many it fails by the exact checks of
             poses.
-        obstacles: What stands in the way, as outlines to draw: corners, shape (3, c) each [m].
     """
 
     found: ProvenMotion
     sets_time: float
     judged: tuple[int, Mapping[str, int]]
-    obstacles: tuple[Array, ...] = field(default=())
 
     @property
     def sets(self) -> PoseSets:

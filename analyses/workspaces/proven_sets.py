@@ -22,7 +22,7 @@ from cdpr_drake.geometry.poses import rotation_from_angles
 from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import rigid_platform
-from cdpr_drake.workspaces.cable_interference import PART_NAMES, clearances
+from cdpr_drake.workspaces.cable_interference import PART_NAMES, Obstacles, clearances
 from cdpr_drake.workspaces.certified_boxes import CertifiedKind, CertifyTask, PoseBox
 from cdpr_drake.workspaces.demanded_wrenches import SpatialSet, resisting, spatial_inertias
 from cdpr_drake.workspaces.pose_grid import WorkspaceGrid
@@ -81,7 +81,7 @@ class ProvenSets(PoseSets):
         robot: Robot | str,
         kinds: Sequence[str] | None = None,
         angles: Array | None = None,
-        obstacles: Array | None = None,
+        obstacles: Array | Obstacles | None = None,
         accelerations: Array | float | None = None,
         *,
         cover: float = COVER,
@@ -96,7 +96,8 @@ class ProvenSets(PoseSets):
             kinds: Names of `CertifiedKind`; None: all that a motion needs, see `motion_kinds`.
             angles: Orientations (phi, theta, psi) from whose least to whose largest angles the sets
                 go, shape (n, 3) [rad]; None: zero.
-            obstacles: Boxes that cables and platform stay off, shape (o, 15); None: none.
+            obstacles: What cables and platform stay off, boxes, shape (o, 15), or these and convex
+                shapes; None: nothing.
             accelerations: Half widths of a box of accelerations of Po in W, one or three, any of
                 which the cables can give at every pose, for the kind wrench-feasible; only where no
                 angle varies [m/s^2].
@@ -288,14 +289,20 @@ def _prove(
 
 
 def _about(
-    robot: Robot, kinds: tuple[str, ...], angles: Array, obstacles: Array | None,
+    robot: Robot, kinds: tuple[str, ...], angles: Array, obstacles: Array | Obstacles | None,
     box: Array | None, settings: ProofSettings,
 ) -> Mapping[str, Any]:  # fmt: skip
+    there = obstacles if isinstance(obstacles, Obstacles) else Obstacles()
+    if obstacles is not None and not isinstance(obstacles, Obstacles):
+        there = Obstacles(np.asarray(obstacles, float))
     return {
         "robot": robot.name,
         "kinds": list(kinds),
         "angles_rad": [angles.min(axis=0).tolist(), angles.max(axis=0).tolist()],
-        "obstacles": [] if obstacles is None else np.asarray(obstacles, float).tolist(),
+        "obstacles": [
+            {"name": one.name, "points_m": one.points.tolist(), "radius_m": one.radius}
+            for one in there.shapes()
+        ],
         "accelerations_m_s2": None if box is None else box.tolist(),
         "tension_limits_n": [float(v) for v in robot.tension_limits(settings.limits)],
         "clearance_m": settings.clearance,

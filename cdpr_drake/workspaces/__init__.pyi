@@ -4,5 +4,6 @@ from .cable_interference import clearances as clearances
 from .certified_boxes import certify as certify
 from .demanded_wrenches import SpatialSet as SpatialSet
 from .pose_grid import grid_by_count as grid_by_count
+from .proven_sets import PoseSets as PoseSets
 from .static_feasibility import StaticCase as StaticCase
 from .volume import triangles as triangles
