@@ -152,6 +152,8 @@ class ProvenSets(PoseSets):
     def judge(self, positions: Array, rotations: Array) -> dict[str, np.ndarray]:
         """Whether each kind holds at poses, by the exact checks of poses and not by the sets.
 
+        The platform's clearance is among them also where the sets do not prove it.
+
         Args:
             positions: p_WP, shape (n, 3) [m].
             rotations: R_WP, shape (n, 3, 3).
@@ -162,7 +164,8 @@ class ProvenSets(PoseSets):
         if self.conditions is None:
             raise WorkspaceError("proven sets: found sets of a file; accepted: sets that were found")
         at = Poses(0, len(positions), positions, rotations)
-        return {name: KINDS[name].holds(self.conditions, at) for name in self.kinds}
+        names = dict.fromkeys([*self.kinds, "collision-free"])
+        return {name: KINDS[name].holds(self.conditions, at) for name in names}
 
 
 def motion_kinds(accelerated: bool) -> list[str]:

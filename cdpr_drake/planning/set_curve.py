@@ -172,17 +172,18 @@ class _CurveProgram:
         for place, end in ((self.P[0, 0], points[0]), (self.P[-1, -1], points[-1])):
             value = self._scaled(end)
             self.program.AddBoundingBoxConstraint(value, value, place)
+        one = np.eye(d)
         for k in range(n - 1):
             a, b = shares[k], shares[k + 1]
             A, B = self.P[k], self.P[k + 1]
-            for axis in range(d):
-                self.program.AddLinearEqualityConstraint(A[5, axis] == B[0, axis])
+            for left, right in (
+                ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0)),
+                ((0.0, -b, b), (-a, a, 0.0)),
+                ((b**2, -2.0 * b**2, b**2), (a**2, -2.0 * a**2, a**2)),
+            ):
+                rows = np.hstack([*(x * one for x in left), *(-x * one for x in right)])
                 self.program.AddLinearEqualityConstraint(
-                    b * (A[5, axis] - A[4, axis]) == a * (B[1, axis] - B[0, axis])
-                )
-                self.program.AddLinearEqualityConstraint(
-                    b**2 * (A[5, axis] - 2.0 * A[4, axis] + A[3, axis])
-                    == a**2 * (B[2, axis] - 2.0 * B[1, axis] + B[0, axis])
+                    rows, np.zeros(d), np.concatenate([*A[3:], *B[:3]])
                 )
 
     def _scaled(self, point: Array) -> Array:
@@ -190,13 +191,19 @@ class _CurveProgram:
 
     def limit_polygon(self, longest: float) -> None:
         """The control polygon is no longer than that."""
-        steps = self.program.NewContinuousVariables(len(self.sets), DEGREE)
-        for k in range(len(self.sets)):
-            for j in range(DEGREE):
-                self.program.AddLorentzConeConstraint(
-                    np.concatenate([[steps[k, j]], self.P[k, j + 1] - self.P[k, j]])
-                )
-        self.program.AddLinearConstraint(np.sum(steps) <= longest / self.unit)
+        d = self.P.shape[2]
+        steps = self.program.NewContinuousVariables(len(self.sets) * DEGREE)
+        rows = np.zeros((d + 1, 2 * d + 1))
+        rows[0, 0] = 1.0
+        rows[1:, 1 : d + 1], rows[1:, d + 1 :] = np.eye(d), -np.eye(d)
+        for number, step in enumerate(steps):
+            k, j = divmod(number, DEGREE)
+            self.program.AddLorentzConeConstraint(
+                rows, np.zeros(d + 1), np.concatenate([[step], self.P[k, j + 1], self.P[k, j]])
+            )
+        self.program.AddLinearConstraint(
+            np.ones((1, len(steps))), np.array([-np.inf]), np.array([longest / self.unit]), steps
+        )
 
     def add_bending(self) -> None:
         """Costs of second derivatives, in units in which numbers are about 1."""
@@ -216,23 +223,28 @@ class _CurveProgram:
         time2 = self.program.NewContinuousVariables(1)[0]
         self.program.AddLinearCost(time2)
         d = self.P.shape[2]
+        held, m = np.flatnonzero(np.isfinite(acceleration)), min(d, 3)
+        one, moved = np.eye(d)[held], np.eye(d)[:m]
+        bent = DEGREE * (DEGREE - 1) * np.hstack([one, -2.0 * one, one])
         for k, share in enumerate(self.shares):
             P = self.P[k]
+            most = acceleration[held, np.newaxis] / self.unit * share**2
+            rows = np.vstack([np.hstack([bent, -most]), np.hstack([-bent, -most])])
             for j in range(DEGREE - 1):
-                for axis in range(d):
-                    if not np.isfinite(acceleration[axis]):
-                        continue
-                    bend = 20.0 * (P[j, axis] - 2.0 * P[j + 1, axis] + P[j + 2, axis])
-                    most = acceleration[axis] / self.unit * share**2 * time2
-                    self.program.AddLinearConstraint(bend <= most)
-                    self.program.AddLinearConstraint(-bend <= most)
-            if np.isfinite(speed):
-                m = min(d, 3)
-                for j in range(DEGREE):
-                    step = DEGREE * (P[j + 1, :m] - P[j, :m]) / (share * speed / self.unit)
-                    self.program.AddRotatedLorentzConeConstraint(
-                        np.concatenate([[time2, 1.0], step])
-                    )
+                self.program.AddLinearConstraint(
+                    rows, np.full(len(rows), -np.inf), np.zeros(len(rows)),
+                    np.concatenate([*P[j : j + 3], [time2]]),
+                )  # fmt: skip
+            if not np.isfinite(speed):
+                continue
+            step = DEGREE * self.unit / (share * speed) * moved
+            cone, ones = np.zeros((m + 2, 2 * d + 1)), np.zeros(m + 2)
+            cone[0, 0], ones[1] = 1.0, 1.0
+            cone[2:, 1 : d + 1], cone[2:, d + 1 :] = step, -step
+            for j in range(DEGREE):
+                self.program.AddRotatedLorentzConeConstraint(
+                    cone, ones, np.concatenate([[time2], P[j + 1], P[j]])
+                )
 
     def solve(self, whole: float) -> SetCurve:
         """The curve.
