@@ -1,6 +1,6 @@
 """Proven paths against RRT* with shortcuts and free motions, on problems drawn by a seed.
 
-`python -m cdpr_drake.analyses.benchmarks.proven_paths --out FOLDER` writes `table.csv` and prints it.
+`python -m cdpr_drake.analyses.benchmarks.proven_paths --out FOLDER` writes `table.csv`.
 OMPL is asked if it can be imported, else its columns are empty. Walls, pillars and shelves stand in
 the frames of three robots; starts and goals are drawn among the poses that the exact checks accept
 and whose straight line they do not. Paths are judged by the exact checks of poses, not by the sets.
@@ -33,8 +33,8 @@ from cdpr_drake.planning.proven_path import ProvenMotion, proven_motion
 from cdpr_drake.workspaces.cable_interference import box_row
 
 ROBOTS = {"caroca": 0.1, "swinburne": 0.1, "macarm": 1.0}
-"""Robots, and the half width of the box of accelerations that is proven [m/s^2]. Suspended ones give
-little; MACARM has cables from below, too."""
+"""Robots, and the half width of the box of accelerations that is proven [m/s^2]. Suspended ones
+give little; MACARM has cables from below, too."""
 
 PROBLEMS = {
     "caroca": (3, 3, 2), "swinburne": (2, 2, 2), "macarm": (2, 2, 2),
@@ -208,9 +208,7 @@ def rrt_star(problem: Problem) -> tuple[float, float, int] | None:
 def free_motion(problem: Problem) -> tuple[float, str]:
     """Processor time of a free motion among the same obstacles, and its duration or its refusal."""
     ends = [pose_from_angles(pose[:3], pose[3:]) for pose in problem.ends]
-    asked = FreeSettings(
-        start=ends[0], goal=ends[1], clearance=0.0, obstacles=problem.obstacles
-    )
+    asked = FreeSettings(start=ends[0], goal=ends[1], clearance=0.0, obstacles=problem.obstacles)
     begin = time.process_time()
     try:
         words = f"{solve_free_motion(problem.robot, problem.task, asked).duration:.3f} s"

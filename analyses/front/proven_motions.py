@@ -168,7 +168,9 @@ def plan_proven_motion(
         "from": _degrees(ends[0]),
         "to": _degrees(ends[1]),
         **{
-            name: _plain(value) for name, value in asked.items() if name not in ("sets", "obstacles")
+            name: _plain(value)
+            for name, value in asked.items()
+            if name not in ("sets", "obstacles")
         },
     }
     run = DrawnProvenPlan(
@@ -219,4 +221,3 @@ def _plain(value: object) -> object:
 
 def _silent(words: str) -> None:
     """Tells nobody."""
-

@@ -1,7 +1,7 @@
 from .box_certificates import box_search as box_search
 from .box_certificates import certified_boxes as certified_boxes
-from .conditions import Kind as Kind
 from .conditions import MEASURES as MEASURES
+from .conditions import Kind as Kind
 from .conditions import Measure as Measure
 from .conditions import Poses as Poses
 from .pose_grid import plain as plain

@@ -162,7 +162,9 @@ class ProvenSets(PoseSets):
             WorkspaceError: The sets come from a file.
         """
         if self.conditions is None:
-            raise WorkspaceError("proven sets: found sets of a file; accepted: sets that were found")
+            raise WorkspaceError(
+                "proven sets: found sets of a file; accepted: sets that were found"
+            )
         at = Poses(0, len(positions), positions, rotations)
         names = dict.fromkeys([*self.kinds, "collision-free"])
         return {name: KINDS[name].holds(self.conditions, at) for name in names}
@@ -226,9 +228,7 @@ def explain_pose(sets: ProvenSets, pose: Array) -> str:
             continue
         gaps = clearances(about.around, p, R)[0]
         parts = range(4) if name == "interference-free" else range(4, 5)
-        near = [
-            f"{PART_NAMES[k]} {gaps[k]:.4g} m" for k in parts if not gaps[k] > about.clearance
-        ]
+        near = [f"{PART_NAMES[k]} {gaps[k]:.4g} m" for k in parts if not gaps[k] > about.clearance]
         words.append(f"{name} fails: {', '.join(near)}, needed above {about.clearance:g} m")
     return "; ".join(words)
 

@@ -95,10 +95,12 @@ Free = Annotated[
     bool, typer.Option("--free", help="The path is free: from one pose to another, no path given.")
 ]
 From = Annotated[
-    str | None, typer.Option("--from", help="With --free or --proven: pose at the start, as of --waypoints.")
+    str | None,
+    typer.Option("--from", help="With --free or --proven: pose at the start, as of --waypoints."),
 ]
 To = Annotated[
-    str | None, typer.Option("--to", help="With --free or --proven: pose at the end, as of --waypoints.")
+    str | None,
+    typer.Option("--to", help="With --free or --proven: pose at the end, as of --waypoints."),
 ]
 Least = Annotated[
     str | None,

@@ -25,8 +25,8 @@ LeastTime = Annotated[
 Acceleration = Annotated[
     str | None,
     typer.Option(
-        help="With --proven: the motion stays within accelerations a or ax,ay,az of Po, any of which "
-        "the cables are proven to give; 0: poses only; without, 0.25, or 0 with a turn [m/s^2]."
+        help="With --proven: the motion stays within accelerations a or ax,ay,az of Po, any of "
+        "which the cables are proven to give; 0: poses only; without, 0.25, or 0 with a turn [m/s^2]."
     ),
 ]
 Boxes = Annotated[
@@ -71,9 +71,7 @@ class ProvenWords:
             meaning = "a or ax,ay,az, each above 0, or 0 [m/s^2]"
             numbers = parse_numbers("--acceleration", self.acceleration, (1, 3), meaning)
             if min(numbers) <= 0.0 and numbers != [0.0]:
-                raise CdprError(
-                    f"--acceleration: found {self.acceleration!r}; accepted: {meaning}"
-                )
+                raise CdprError(f"--acceleration: found {self.acceleration!r}; accepted: {meaning}")
             found["accelerations"] = numbers[0] if len(numbers) == 1 else numbers
         ends = (("start", "--from", self.start), ("goal", "--to", self.goal))
         return found | {name: one_pose(option, words or "") for name, option, words in ends}

@@ -93,8 +93,8 @@ def time_within_box(
     looks = path.points(np.linspace(0.0, path.length, 50))
     if np.max(np.abs(looks[:, [7, 8, 9, 13, 14, 15]])) > STILL:
         raise PlanningError(
-            "accelerations: found a path that turns; accepted: one without turns, as other inertial "
-            "terms are not within the box"
+            "accelerations: found a path that turns; accepted: one without turns, as other "
+            "inertial terms are not within the box"
         )
     lim = task.limits
     limits = MotionLimits(lower=0.0, upper=2.0, speed=min(lim.speed, lim.cable_speed))

@@ -1,8 +1,8 @@
 """Paths of which every pose is proven: from one pose to another within convex sets of poses.
 
 Sets come from proofs over boxes of poses, so that what is in them holds for all time and not for
-samples. A path is found by short sequences of sets, each a convex program, and is then a curve whose
-control points lie in the sets. `method="gcs"` asks Drake's graph of convex sets instead.
+samples. A path is found by short sequences of sets, each a convex program, and is then a curve
+whose control points lie in the sets. `method="gcs"` asks Drake's graph of convex sets instead.
 
 Source: Marcucci, Umenberger, Parrilo and Tedrake, Shortest paths in graphs of convex sets, 2024;
 Yen, Finding the k shortest loopless paths in a network, 1971.
@@ -56,8 +56,8 @@ ROUNDED_PATHS = 10
 """Paths that the graph of convex sets rounds its relaxation to."""
 
 TURN_PIECE = 0.05
-"""Pieces of a path turn by no more than this, so that polynomials of quaternions leave the angles of
-the curve by less than 1e-12 [rad]."""
+"""Pieces of a path turn by no more than this, so that polynomials of quaternions leave the angles
+of the curve by less than 1e-12 [rad]."""
 
 NOMINAL = 1.0
 """Acceleration for the shape of fast curves where no box says one [m/s^2]."""
@@ -239,8 +239,13 @@ def proven_motion(
                 shares = _time_shares(plan, curves[-1])
             curves.append(
                 fast_curve(
-                    graph.lower, graph.upper, sequence.sets, sequence.points, shares,
-                    limits[sets.axes], speed,
+                    graph.lower,
+                    graph.upper,
+                    sequence.sets,
+                    sequence.points,
+                    shares,
+                    limits[sets.axes],
+                    speed,
                 )  # fmt: skip
             )
     assert best is not None

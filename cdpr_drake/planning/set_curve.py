@@ -116,7 +116,10 @@ def smooth_curve(
     Raises:
         PlanningError: The program was not solved.
     """
-    shares, whole = shares_of(points), float(np.sum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
+    shares, whole = (
+        shares_of(points),
+        float(np.sum(np.linalg.norm(np.diff(points, axis=0), axis=1))),
+    )
     program = _CurveProgram(lower, upper, sets, points, shares)
     program.limit_polygon((1.0 + LONGER) * whole if longest is None else longest)
     program.add_bending()
@@ -167,7 +170,10 @@ class _CurveProgram:
             for j in range(DEGREE + 1):
                 if (k, j) in ((0, 0), (n - 1, DEGREE)):
                     continue
-                low, high = self._scaled(lower[number] + MARGIN), self._scaled(upper[number] - MARGIN)
+                low, high = (
+                    self._scaled(lower[number] + MARGIN),
+                    self._scaled(upper[number] - MARGIN),
+                )
                 self.program.AddBoundingBoxConstraint(low, high, self.P[k, j])
         for place, end in ((self.P[0, 0], points[0]), (self.P[-1, -1], points[-1])):
             value = self._scaled(end)

@@ -312,7 +312,7 @@ def least_ways(low: Array, high: Array, start: Array, goal: Array) -> tuple[Arra
         Points, shape (p, d), and bounds, shape (p,).
     """
     point = np.clip(0.5 * (start + goal), low, high)
-    tiny = 1e-12 * (1.0 + np.linalg.norm(goal - start))
+    tiny = 1e-12 * (1.0 + float(np.linalg.norm(goal - start)))
     for _ in range(BEND_STEPS):
         a, b = 1.0 / _sizes(point - start, tiny), 1.0 / _sizes(point - goal, tiny)
         point = np.clip((a * start + b * goal) / (a + b), low, high)
@@ -330,11 +330,13 @@ def _sizes(steps: Array, least: float) -> Array:
 def _nearest(corners: Array, points: Array) -> Array:
     """Points of a polyline nearest to points, shape (p, d)."""
     best, found = np.full(len(points), np.inf), points.copy()
-    for a, b in zip(corners[:-1], corners[1:], strict=True):
+    for a, b in pairwise(corners):
         step = b - a
         square = float(step @ step)
         share = np.clip((points - a) @ step / square, 0.0, 1.0) if square > 0.0 else 0.0
-        place = a + np.multiply.outer(share, step) if square > 0.0 else np.broadcast_to(a, points.shape)
+        place = (
+            a + np.multiply.outer(share, step) if square > 0.0 else np.broadcast_to(a, points.shape)
+        )
         far = np.linalg.norm(points - place, axis=1)
         closer = far < best
         best[closer], found[closer] = far[closer], place[closer]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from scipy import ndimage
@@ -153,7 +154,7 @@ class _Cover:
                 return
             smallest = min(lone, key=lambda k: (np.count_nonzero(groups == k), k))
             way = self._way(boxes, groups == smallest, parts)
-            for first, second in zip(way[:-1], way[1:], strict=True):
+            for first, second in pairwise(way):
                 held = np.array(self.taken)
                 pair = np.stack([np.minimum(first, second), np.maximum(first, second) + 1])
                 both = np.all((held[:, 0] <= pair[0]) & (held[:, 1] >= pair[1]), axis=1)

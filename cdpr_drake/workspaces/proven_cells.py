@@ -1,4 +1,4 @@
-"""Cells of a raster of poses: wholly proven inside some kinds of workspaces, proven outside, or open.
+"""Cells of a raster of poses: wholly proven inside kinds of workspaces, proven outside, or open.
 
 Boxes of all kinds come from one box of poses that is cut in halves, so they fit a raster of powers
 of two exactly. A cell is inside a kind where boxes proven inside fill it, also many small ones, and
@@ -20,7 +20,7 @@ from cdpr_drake.workspaces.certified_boxes import CertifiedBoxes, CertifyTask, P
 from cdpr_drake.workspaces.cuboid_cover_kernel import add_shares
 
 LATTICE = 30
-"""A box of poses is 2^LATTICE units of the lattice wide along each number: deeper than it is cut."""
+"""A box of poses is 2^LATTICE units of the lattice wide along each number: finer than its boxes."""
 
 CELLS = 2**18
 """Usual number of cells of a raster."""

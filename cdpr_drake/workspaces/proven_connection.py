@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 
 import numpy as np
 from scipy import ndimage
@@ -76,7 +77,7 @@ def connect_poses(
             near = near[~cells.excluded[tuple(near.T)]]
             if len(near):
                 prove(near)
-    for first, second in zip(poses[:-1], poses[1:], strict=True):
+    for first, second in pairwise(poses):
         ends = [inside_cell(cells, pose) for pose in (first, second)]
         if ends[0] is None or ends[1] is None:
             continue

@@ -92,9 +92,7 @@ class PoseSets:
         """The sets over the numbers that vary, for Drake's `GcsTrajectoryOptimization`."""
         return [
             HPolyhedron.MakeBox(low, high)
-            for low, high in zip(
-                self.lower[:, self.axes], self.upper[:, self.axes], strict=True
-            )
+            for low, high in zip(self.lower[:, self.axes], self.upper[:, self.axes], strict=True)
         ]
 
     def save(self, path: Path) -> Path:
