@@ -84,8 +84,8 @@ class ShapeRequest:
         rays: Rays of the hull, at most.
         tolerance: How near to the border of the workspace they end [m].
         mesh: File for the hull's triangles, of an ending in `MESH_ENDINGS`; None: none.
-        certify: Whether boxes of `box`, or of the robot's frame, are proven inside or outside; of
-            one kind.
+        certify: Whether boxes of `box`, or of the robot's frame, are proven inside or outside: of
+            all the kinds that are asked for.
         boxes: Boxes that are judged, at most.
         exit_error: Proven for exit points off by up to so much [m].
         anchor_error: The same of anchor points [m].

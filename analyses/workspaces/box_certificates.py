@@ -20,14 +20,8 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.errors import DataFileError, OutputFolderError, WorkspaceError
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.workspaces.box_grid_agreement import BoxAgreement, grid_agreement, hull_agreement
-from cdpr_drake.workspaces.certified_boxes import (
-    BoxJournal,
-    CertifiedBoxes,
-    CertifiedKind,
-    CertifyTask,
-    PoseBox,
-    certify,
-)
+from cdpr_drake.workspaces.box_judges import MEETING, CertifiedKind, CertifyTask
+from cdpr_drake.workspaces.certified_boxes import BoxJournal, CertifiedBoxes, PoseBox, certify
 from cdpr_drake.workspaces.demanded_wrenches import SpatialSet
 from cdpr_drake.workspaces.hull import WorkspaceHull
 from cdpr_drake.workspaces.mesh_files import write_cells
@@ -47,18 +41,23 @@ class BoxSearch:
     """What is to be proven, and where.
 
     Attributes:
-        task: What is to be proven.
+        tasks: What is to be proven, of one kind each.
         box: The poses.
     """
 
-    task: CertifyTask
+    tasks: tuple[CertifyTask, ...]
     box: PoseBox
+
+    @property
+    def task(self) -> CertifyTask:
+        """What is to be proven; of several the first."""
+        return self.tasks[0]
 
     def words(self) -> dict[str, Any]:
         """Of which cables and which poses verdicts are, for JSON."""
         task = self.task
         cables = task.case.cables
-        if task.kind == CertifiedKind.INTERFERENCE_FREE and task.around is not None:
+        if task.kind in MEETING and task.around is not None:
             cables = task.around.cables
         return {
             "cables": "over pulleys" if cables.has_pulleys() else "from fixed exit points",
@@ -68,8 +67,9 @@ class BoxSearch:
 
     def arguments(self) -> dict[str, Any]:
         """All that verdicts depend on, for JSON."""
+        asked = self.task if len(self.tasks) == 1 else self.tasks
         found: dict[str, Any] = plain(
-            {"cdpr_drake": code_version(), "task": self.task, "box": self.box}
+            {"cdpr_drake": code_version(), "task": asked, "box": self.box}
         )
         return found
 
@@ -83,21 +83,21 @@ def box_search(
     """A region of positions, to be cut into boxes inside or outside the workspace of a question.
 
     Args:
-        question: The question, of one kind; the orientations of its grid are a range, from the
-            least to the largest of each angle, all of which are proven.
+        question: The question; the orientations of its grid are a range, from the least to the
+            largest of each angle, all of which are proven.
         robot: The robot, for its frame and motion.
         errors: How far exit points and anchor points may be off [m].
         region: Corners of the region, shape (3,) each [m]; None: the robot's frame. As far as the
             motion type lets Po go.
 
     Raises:
-        WorkspaceError: There are several kinds, one that cannot be proven, or a method of tensions,
-            of which a proof says nothing.
+        WorkspaceError: A kind cannot be proven, or there is a method of tensions, of which a proof
+            says nothing.
     """
     known = [kind.value for kind in CertifiedKind]
-    if len(question.kinds) != 1 or question.kinds[0] not in known:
+    if not set(question.kinds) <= set(known):
         raise WorkspaceError(
-            f"certify: found kinds {','.join(question.kinds)}; accepted: one of {', '.join(known)}"
+            f"certify: found kinds {','.join(question.kinds)}; accepted: {', '.join(known)}"
         )
     if question.rule != "all":
         raise WorkspaceError(f"certify: found orientations {question.rule}; accepted: all")
@@ -107,14 +107,13 @@ def box_search(
             f"certify: found method {about.method}; accepted: no method, for it is proven that "
             "there are tensions, not that a method finds them"
         )
-    task = CertifyTask(
-        CertifiedKind(question.kinds[0]),
-        about.case,
-        about.required or SpatialSet(),
-        about.around,
-        about.clearance,
-        *errors,
-    )
+    tasks = tuple(
+        CertifyTask(
+            CertifiedKind(kind), about.case, about.required or SpatialSet(), about.around,
+            about.clearance, *errors,
+        )
+        for kind in question.kinds
+    )  # fmt: skip
     lower, upper = robot.reach()
     if region is not None:
         free = lower < upper
@@ -123,7 +122,7 @@ def box_search(
     box = PoseBox(
         np.concatenate([lower, angles.min(axis=0)]), np.concatenate([upper, angles.max(axis=0)])
     )
-    return BoxSearch(task, box)
+    return BoxSearch(tasks, box)
 
 
 def certified_boxes(
@@ -153,8 +152,10 @@ def certified_boxes(
     def save(journal: BoxJournal) -> None:
         if folder is None:
             return
-        verdicts, axes = journal.arrays()
+        verdicts, axes, proven = journal.arrays()
         arrays = {"about": np.array(words), "verdicts": verdicts, "axes": axes}
+        if len(search.tasks) > 1:
+            arrays["proven"] = proven
         try:
             store_arrays(folder / JOURNAL, arrays)
         except OSError as problem:
@@ -172,9 +173,9 @@ def certified_boxes(
     if folder is not None:
         stored = load_arrays(folder / JOURNAL)
         if stored is not None and str(stored["about"]) == words:
-            known = BoxJournal(stored["verdicts"], stored["axes"])
+            known = BoxJournal(stored["verdicts"], stored["axes"], stored.get("proven"))
     found = certify(
-        search.task, search.box, most_boxes, on_progress=on_progress, should_stop=should_stop,
+        search.tasks, search.box, most_boxes, on_progress=on_progress, should_stop=should_stop,
         known=known, on_journal=keep,
     )  # fmt: skip
     if last:

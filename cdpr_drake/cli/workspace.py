@@ -315,7 +315,7 @@ def workspace(
         typer.Option(help=f"File for the hull's triangles: {', '.join(MESH_ENDINGS)}."),
     ] = None,
     certify: Annotated[
-        bool, typer.Option(help="Also boxes of the frame proven inside or outside; one kind.")
+        bool, typer.Option(help="Also boxes of the frame proven inside or outside all kinds.")
     ] = False,
     boxes: Annotated[int, typer.Option(help="Boxes that are judged, at most.")] = 200_000,
     boxes_mesh: Annotated[

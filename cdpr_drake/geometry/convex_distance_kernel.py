@@ -31,6 +31,10 @@ CONTACT = 1e-10
 FLAT = 1e-13
 """Share of the size below which the difference has no thickness, and a corner is not a new one."""
 
+NO_VOLUME = 1e-14
+"""Four corners lie in a plane where their volume is less than this share of three of their edges'
+product: what rounding leaves of nothing."""
+
 SAME_PLANE = 1e-12
 """Less than 1 by so much is the product of the normals of two facets in one plane."""
 
@@ -56,8 +60,8 @@ def convex_distance(P: Array, Q: Array, p: Array, q: Array, n: Array, work: Arra
     """Signed distance of the hulls of P and Q [m], 0 where they touch, below 0 where they overlap.
 
     p - q = distance n, and no plane normal to another n keeps them so far apart. Rounding is some
-    1e-15 of the coordinates. Of hulls that overlap in more than `MOST_CORNERS` corners of their
-    difference the depth may be found too large, never too small.
+    1e-15 of the coordinates; that of n is this over the distance, down to `CONTACT`. Of hulls that
+    overlap in more than `MOST_CORNERS` corners of their difference the depth may be found too large, never too small.
 
     Args:
         P: Points, shape (k, 3) [m], k > 0.
@@ -67,19 +71,23 @@ def convex_distance(P: Array, Q: Array, p: Array, q: Array, n: Array, work: Arra
         n: Gets the unit normal from Q to P, shape (3,).
         work: Of `convex_work`.
     """
-    size, count = 0.0, 1
-    for a in range(3):
-        low, high = P[0, a] - Q[0, a], P[0, a] - Q[0, a]
-        least, most = Q[0, a], Q[0, a]
-        for j in range(Q.shape[0]):
-            least, most = min(least, Q[j, a]), max(most, Q[j, a])
-        for i in range(P.shape[0]):
-            low, high = min(low, P[i, a] - most), max(high, P[i, a] - least)
-        size += max(abs(low), abs(high))
+    gap = convex_gap(P, Q, p, q, n, work)
+    if gap > 0.0:
+        return gap
+    size = _size(P, Q)
     if size == 0.0:
-        p[:], q[:], n[:] = P[0], Q[0], 0.0
-        n[2] = 1.0
+        n[0], n[1], n[2] = 0.0, 0.0, 1.0
         return 0.0
+    return _depth(P, Q, size, p, q, n, work)
+
+
+@njit(cache=True, error_model="numpy")
+def convex_gap(P: Array, Q: Array, p: Array, q: Array, n: Array, work: Array) -> float:
+    """Distance of the hulls of P and Q [m], 0 where they are nearer than `CONTACT` of their size.
+
+    Arguments as of `convex_distance`; where it is 0, p and q are that near, and n is of no use.
+    """
+    contact, count = (CONTACT * _size(P, Q)) ** 2, 1
     for a in range(3):
         n[a] = -(P[0, a] - Q[0, a])
     _extreme(P, Q, n, work, 0)
@@ -88,7 +96,7 @@ def convex_distance(P: Array, Q: Array, p: Array, q: Array, n: Array, work: Arra
     for a in range(3):
         p[a] = work[0, a]
     for _ in range(ROUNDS):
-        if square <= (CONTACT * size) ** 2:
+        if square <= contact:
             break
         for a in range(3):
             n[a] = -p[a]
@@ -96,9 +104,8 @@ def convex_distance(P: Array, Q: Array, p: Array, q: Array, n: Array, work: Arra
         nearer = square
         known = False
         for i in range(count):
-            known = known or (
-                work[i, _P] == work[count, _P] and work[i, _Q] == work[count, _Q]
-            )  # fmt: skip
+            same = work[i, _P] == work[count, _P] and work[i, _Q] == work[count, _Q]
+            known = known or same
         for a in range(3):
             nearer -= p[a] * work[count, a]
         if known or nearer <= SETTLED * square:
@@ -107,7 +114,7 @@ def convex_distance(P: Array, Q: Array, p: Array, q: Array, n: Array, work: Arra
             for a in range(COLUMNS):
                 work[4 + i, a] = work[i, a]
         count = _nearest(work, count + 1, q)
-        now = q[0] * q[0] + q[1] * q[1] + q[2] * q[2]
+        now = _square(q)
         if not now < square:  # no more digits: that before was as near
             for i in range(4):
                 for a in range(COLUMNS):
@@ -117,13 +124,26 @@ def convex_distance(P: Array, Q: Array, p: Array, q: Array, n: Array, work: Arra
         square = now
         for a in range(3):
             p[a] = q[a]
-    if square > (CONTACT * size) ** 2:
-        distance = np.sqrt(square)
-        for a in range(3):
-            n[a] = p[a] / distance
-        _witnesses(P, Q, work, count, p, q)
-        return distance
-    return _depth(P, Q, size, p, q, n, work)
+    distance = np.sqrt(square) if square > contact else 0.0
+    for a in range(3):
+        n[a] = p[a] / distance if distance > 0.0 else 0.0
+    _witnesses(P, Q, work, count, p, q)
+    return distance
+
+
+@njit(cache=True, error_model="numpy")
+def _size(P: Array, Q: Array) -> float:
+    """Bound on the differences of points of P and Q, coordinate by coordinate, in all."""
+    size = 0.0
+    for a in range(3):
+        low = high = P[0, a]
+        least = most = Q[0, a]
+        for i in range(P.shape[0]):
+            low, high = min(low, P[i, a]), max(high, P[i, a])
+        for j in range(Q.shape[0]):
+            least, most = min(least, Q[j, a]), max(most, Q[j, a])
+        size += max(abs(low - most), abs(high - least))
+    return size
 
 
 @njit(cache=True, error_model="numpy")
@@ -217,6 +237,12 @@ def _side(work: Array, i: int, j: int, k: int, other: int) -> float:
         + m1 * (work[other, 1] - work[i, 1])
         + m2 * (work[other, 2] - work[i, 2])
     )
+    b, c = b0 * b0 + b1 * b1 + b2 * b2, c0 * c0 + c1 * c1 + c2 * c2
+    d = 0.0
+    for a in range(3):
+        d += (work[other, a] - work[i, a]) ** 2
+    if abs(inner) <= NO_VOLUME * np.sqrt(b * c * d):
+        return 0.0
     return origin * np.sign(inner)
 
 
@@ -249,7 +275,11 @@ def _nearest(work: Array, count: int, v: Array) -> int:
             if square < best:
                 best, one, two, three, s, t = square, a, b, a, x, 0.0
     if whole:
-        v[:] = 0.0
+        _shares_of_origin(work)
+        for a in range(3):
+            v[a] = 0.0
+            for i in range(4):
+                v[a] += work[i, _WEIGHT] * work[i, a]
         return 4
     shares = (1.0 - s - t, s, t)
     left = 0
@@ -268,6 +298,23 @@ def _nearest(work: Array, count: int, v: Array) -> int:
             for a in range(3):
                 v[a] += work[i, _WEIGHT] * work[i, a]
     return left
+
+
+@njit(cache=True, error_model="numpy")
+def _shares_of_origin(work: Array) -> None:
+    """Writes shares of four corners in the origin, which is within them: by volumes."""
+    total = 0.0
+    for skipped in range(4):
+        i, j, k = (skipped + 1) % 4, (skipped + 2) % 4, (skipped + 3) % 4
+        volume = abs(
+            work[i, 0] * (work[j, 1] * work[k, 2] - work[j, 2] * work[k, 1])
+            + work[i, 1] * (work[j, 2] * work[k, 0] - work[j, 0] * work[k, 2])
+            + work[i, 2] * (work[j, 0] * work[k, 1] - work[j, 1] * work[k, 0])
+        )
+        work[skipped, _WEIGHT] = volume
+        total += volume
+    for i in range(4):
+        work[i, _WEIGHT] /= total
 
 
 @njit(cache=True, error_model="numpy")
@@ -362,7 +409,6 @@ def _depth(P: Array, Q: Array, size: float, p: Array, q: Array, n: Array, work: 
     first, facets, edges = 4, 4 + most, 4 + 3 * most
     corners = _first_corners(P, Q, size, n, work, first)
     if corners < 4:  # no thickness along n: nothing to move it out of
-        _witnesses(P, Q, work, _used(work), p, q)
         return 0.0
     inner = p
     for a in range(3):

@@ -17,13 +17,14 @@ closure. `wrench_capacity` says by how much.
 of the load (`tension_factor`). The platform is held by the tensions of least 2-norm where a number
 depends on them.
 
-**What cables and platform meet**: distances between straight cables and boxes, exact
-(`cable_interference`). The platform, the beams of the frame and obstacles are boxes; a cable is a
-segment with a radius. Next to its ends a cable touches what carries it, so a length there is left
-out by name.
+**What cables and platform meet**: distances between straight cables, boxes and convex shapes, exact
+(`cable_interference`). The platform and the beams of the frame are boxes, obstacles these or convex
+shapes; a cable is a segment with a radius. Next to its ends a cable touches what carries it, so a
+length there is left out by name.
 
-**Proofs for whole boxes of poses**: `certify` of `certified_boxes`; the proof itself stands in
-`box_verdicts_kernel`.
+**Proofs for whole boxes of poses**: `certify` of `certified_boxes`, of one kind or several at once,
+and `refine` of `box_refinement` where more is needed; the proofs stand in `box_verdicts_kernel` and
+`box_collision_kernel`.
 
 Source: Gazebo thesis 2.5 and 2.6; servoing thesis 1.2.2, (1.25), 1.2.4 and 1.3.3; Bosscher, Riechel
 and Ebert-Uphoff, Wrench-feasible workspace generation for cable-driven robots, 2006; Pham et al.,

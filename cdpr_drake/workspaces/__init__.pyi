@@ -1,6 +1,11 @@
+from .box_judges import CertifiedKind as CertifiedKind
+from .box_judges import CertifyTask as CertifyTask
+from .box_refinement import PathTube as PathTube
+from .box_refinement import refine as refine
 from .cable_interference import Obstacles as Obstacles
 from .cable_interference import beams as beams
 from .cable_interference import clearances as clearances
+from .certified_boxes import PoseBox as PoseBox
 from .certified_boxes import certify as certify
 from .demanded_wrenches import SpatialSet as SpatialSet
 from .pose_grid import grid_by_count as grid_by_count

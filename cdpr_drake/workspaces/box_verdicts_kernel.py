@@ -70,7 +70,7 @@ rho_bar) =: |P| y. So t_i = l_i tau_i differs from l_i tau_0i by at most
 and where that leaves all tensions within their bounds, every pose of the box is feasible, and W is
 regular there. For a polytope of wrenches the proof is made for each vertex: what is demanded may be
 any of their means, and the mean of tensions within bounds is within bounds. For wrench closure
-positive tensions are shown to balance nothing; those from `certified_boxes.CLOSURE_SHARE` to 1
+positive tensions are shown to balance nothing; those from `box_judges.CLOSURE_SHARE` to 1
 serve to find some.
 
 How tau_0, tau_k and P are found has no part in the proof. t_0 is the analytic centre of the

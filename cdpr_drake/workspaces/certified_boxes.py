@@ -2,38 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
-from enum import StrEnum
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import WorkspaceError
-from cdpr_drake.numerics.kernel_calls import over_rows
 from cdpr_drake.workspaces.box_expansion_kernel import INSIDE, NUMBERS, OPEN, OUTSIDE
-from cdpr_drake.workspaces.box_verdicts_kernel import judge_boxes, judge_clearances
-from cdpr_drake.workspaces.cable_distance_kernel import BOX_COLUMNS
-from cdpr_drake.workspaces.cable_interference import Surroundings
-from cdpr_drake.workspaces.demanded_wrenches import SpatialSet
-from cdpr_drake.workspaces.static_feasibility import StaticCase
-from cdpr_drake.workspaces.wrench_facets_kernel import wedge_terms
-
-CLOSURE_SHARE = 1e-4
-"""Wrench closure is proven by tensions that balance nothing, the least at least this share of the
-largest."""
+from cdpr_drake.workspaces.box_judges import CertifyTask, judge_all, several
 
 CHUNK = 2048
 """Boxes between two looks at a request to stop."""
-
-
-class CertifiedKind(StrEnum):
-    """Kinds of workspaces of which boxes can be proven."""
-
-    STATIC = "static"
-    WRENCH_FEASIBLE = "wrench-feasible"
-    WRENCH_CLOSURE = "wrench-closure"
-    INTERFERENCE_FREE = "interference-free"
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,51 +45,10 @@ class PoseBox:
         object.__setattr__(self, "lower", low)
         object.__setattr__(self, "upper", high)
 
-
-@dataclass(frozen=True, eq=False)
-class CertifyTask:
-    """What is to be proven.
-
-    Attributes:
-        kind: The kind of workspace.
-        case: Platform, load and tension bounds.
-        required: Wrenches to resist beside the load, a polytope, for `WRENCH_FEASIBLE`.
-        around: What cables may meet, for `INTERFERENCE_FREE`.
-        clearance: How far they must stay from it [m].
-        exit_error: How far exit points may be from where they are believed to be [m].
-        anchor_error: The same of anchor points [m].
-
-    Raises:
-        WorkspaceError: Something is missing or not accepted.
-    """
-
-    kind: CertifiedKind
-    case: StaticCase
-    required: SpatialSet = field(default_factory=SpatialSet)
-    around: Surroundings | None = None
-    clearance: float = 0.0
-    exit_error: float = 0.0
-    anchor_error: float = 0.0
-
-    def __post_init__(self) -> None:
-        """Checks what the kind needs."""
-        for name in ("clearance", "exit_error", "anchor_error"):
-            value = getattr(self, name)
-            if not (np.isfinite(value) and value >= 0.0):
-                raise WorkspaceError(f"{name}: found {value:g}; accepted: >= 0 [m]")
-        self.case.check_bounds()
-        if np.any(self.case.lower >= self.case.upper):
-            raise WorkspaceError("lower: found a tension that cannot change; accepted: < upper [N]")
-        if self.kind == CertifiedKind.INTERFERENCE_FREE and self.around is None:
-            raise WorkspaceError("around: found nothing; accepted: what cables may meet")
-        self.corners()  # refused before anything is computed
-
-    def corners(self) -> Array:
-        """External wrenches, all of which must be resisted, shape (c, rows) [N m, N]."""
-        given = self.case.wrench[list(self.case.rows)]
-        if self.kind == CertifiedKind.WRENCH_FEASIBLE:
-            return self.required.corners(self.case.rows) + given
-        return np.asarray(given[np.newaxis], float)
+    def meets(self, poses: Array, halves: Array) -> np.ndarray:
+        """Which boxes, middles and half widths of shape (k, 6), have a pose in common with it."""
+        below = poses - halves <= self.upper
+        return np.asarray(np.all(below & (poses + halves >= self.lower), axis=1))
 
 
 class BoxJournal:
@@ -118,24 +57,32 @@ class BoxJournal:
     Which boxes these are follows from the first one and from what was found of those before.
     """
 
-    def __init__(self, verdicts: np.ndarray | None = None, axes: np.ndarray | None = None) -> None:
-        """Takes what was found before, both of shape (k,); None: nothing."""
-        self._parts = [] if verdicts is None or axes is None else [(verdicts, axes)]
-        self.count = sum(len(part[0]) for part in self._parts)
+    def __init__(
+        self,
+        verdicts: np.ndarray | None = None,
+        axes: np.ndarray | None = None,
+        proven: np.ndarray | None = None,
+    ) -> None:
+        """Takes what was found before, all of shape (k,); None: nothing; proven: of no kind."""
+        self._parts: list[tuple[np.ndarray, ...]] = []
+        self.count = 0
+        if verdicts is not None and axes is not None:
+            self.add(verdicts, axes, np.zeros(len(axes)) if proven is None else proven)
 
-    def arrays(self) -> tuple[np.ndarray, np.ndarray]:
-        """Verdicts, and the number of a pose across which each would be cut, shape (k,) int8."""
+    def arrays(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Verdicts, the number of a pose across which each would be cut, and what kinds are proven
+        of it, as bits, shape (k,) int8 each."""
         if len(self._parts) != 1:
-            empty = np.zeros(0, np.int8), np.zeros(0, np.int8)
+            empty = (np.zeros(0, np.int8),) * 3
             joined = zip(*(self._parts or [empty]), strict=True)
-            verdicts, axes = (np.concatenate(part).astype(np.int8) for part in joined)
-            self._parts = [(verdicts, axes)]
-        return self._parts[0]
+            self._parts = [tuple(np.concatenate(part) for part in joined)]
+        verdicts, axes, proven = self._parts[0]
+        return verdicts, axes, proven
 
-    def add(self, verdicts: np.ndarray, axes: np.ndarray) -> None:
-        """Adds boxes."""
-        self._parts.append((verdicts.astype(np.int8), axes.astype(np.int8)))
-        self.count += len(verdicts)
+    def add(self, *found: np.ndarray) -> None:
+        """Adds verdicts, axes and proven kinds of boxes."""
+        self._parts.append(tuple(one.astype(np.int8) for one in found))
+        self.count += len(found[0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,6 +96,8 @@ class CertifiedBoxes:
         curve: Boxes judged so far, and the shares proven inside, proven outside and open then,
             shape (g, 4), one row a generation.
         finished: Whether the boxes were exhausted, rather than somebody asked to stop.
+        proven: Which of several kinds are proven of each, bit k of the k-th, shape (k,); of a
+            single kind, nothing.
     """
 
     poses: Array
@@ -156,6 +105,7 @@ class CertifiedBoxes:
     verdicts: np.ndarray
     curve: Array
     finished: bool
+    proven: np.ndarray | None = None
 
     @property
     def inside(self) -> float:
@@ -187,7 +137,7 @@ class CertifiedBoxes:
 
 
 def certify(
-    task: CertifyTask,
+    task: CertifyTask | Sequence[CertifyTask],
     box: PoseBox,
     most_boxes: int = 500_000,
     *,
@@ -199,8 +149,11 @@ def certify(
 ) -> CertifiedBoxes:
     """Cuts a box of poses until little of it is open; the largest boxes first.
 
+    Of several kinds a box is inside where all are proven, and outside where one is proven not to
+    hold. What is proven of a box holds for what is cut of it, and is not asked again.
+
     Args:
-        task: What is to be proven.
+        task: What is to be proven: of one kind, or of up to `MOST_KINDS`.
         box: The poses.
         most_boxes: How many boxes are judged, at most.
         open_share: Share of the box that may stay open.
@@ -211,14 +164,16 @@ def certify(
         on_journal: Called as often with what is known by then, for the next search.
 
     Raises:
-        WorkspaceError: most_boxes < 1.
+        WorkspaceError: most_boxes < 1, or there is no kind, or too many.
     """
     if most_boxes < 1:
         raise WorkspaceError(f"most_boxes: found {most_boxes}; accepted: at least 1")
+    tasks = several(task)
     poses = 0.5 * (box.lower + box.upper)[np.newaxis]
     halves = 0.5 * (box.upper - box.lower)[np.newaxis]
+    proven = np.zeros(1, np.int8)
     volume = 1.0  # of a box of this generation, as a share
-    done: list[tuple[Array, Array, np.ndarray]] = []
+    done: list[tuple[Array, Array, np.ndarray, np.ndarray]] = []
     shares, judged, stopped = {INSIDE: 0.0, OUTSIDE: 0.0}, 0, False
     journal, before = BoxJournal(), (known or BoxJournal()).arrays()
     curve = []
@@ -233,17 +188,18 @@ def certify(
             part = slice(first, min(first + CHUNK, count))
             past = judged + part.stop - part.start
             if past <= len(before[0]):
-                verdicts[part], axes[part] = (found[judged:past] for found in before)
+                verdicts[part], axes[part], proven[part] = (one[judged:past] for one in before)
             else:
-                verdicts[part], stretch = _judge(task, poses[part], halves[part])
-                axes[part] = np.argmax(np.where(halves[part] > 0.0, stretch, -1.0), axis=1)
-            journal.add(verdicts[part], axes[part])
+                verdicts[part], axes[part], proven[part] = judge_all(
+                    tasks, poses[part], halves[part], proven[part]
+                )
+            journal.add(verdicts[part], axes[part], proven[part])
             if past > len(before[0]) and on_journal is not None:
                 on_journal(journal)
             judged = past
             if on_progress is not None:
-                proven = np.count_nonzero(verdicts) * volume + sum(shares.values())
-                on_progress(judged, 1.0 - proven)
+                closed_share = np.count_nonzero(verdicts) * volume + sum(shares.values())
+                on_progress(judged, 1.0 - closed_share)
         for verdict in shares:
             shares[verdict] += volume * int(np.count_nonzero(verdicts == verdict))
         unproven = max(1.0 - sum(shares.values()), 0.0)
@@ -251,18 +207,22 @@ def certify(
         ending = stopped or judged >= most_boxes or unproven <= open_share
         closed = verdicts != OPEN
         keep = np.ones(len(poses), bool) if ending else closed
-        done.append((poses[keep], halves[keep], verdicts[keep]))
+        done.append((poses[keep], halves[keep], verdicts[keep], proven[keep]))
         if ending:
             break
-        poses, halves = _cut(poses[~closed], halves[~closed], axes[~closed])
+        poses, halves = cut_boxes(poses[~closed], halves[~closed], axes[~closed])
+        proven = np.tile(proven[~closed], 2)
         volume *= 0.5
-    all_poses, all_halves, all_verdicts = (
+    all_poses, all_halves, all_verdicts, all_proven = (
         np.concatenate(parts) for parts in zip(*done, strict=True)
     )
-    return CertifiedBoxes(all_poses, all_halves, all_verdicts, np.array(curve), not stopped)
+    return CertifiedBoxes(
+        all_poses, all_halves, all_verdicts, np.array(curve), not stopped,
+        all_proven if len(tasks) > 1 else None,
+    )  # fmt: skip
 
 
-def _cut(poses: Array, halves: Array, axes: np.ndarray) -> tuple[Array, Array]:
+def cut_boxes(poses: Array, halves: Array, axes: np.ndarray) -> tuple[Array, Array]:
     """Each box in two, across one of its half widths."""
     index = np.arange(len(poses))
     halves = halves.copy()
@@ -271,47 +231,3 @@ def _cut(poses: Array, halves: Array, axes: np.ndarray) -> tuple[Array, Array]:
     low[index, axes] -= halves[index, axes]
     high[index, axes] += halves[index, axes]
     return np.concatenate([low, high]), np.concatenate([halves, halves])
-
-
-def _judge(task: CertifyTask, poses: Array, halves: Array) -> tuple[np.ndarray, Array]:
-    case = task.case
-    if task.kind == CertifiedKind.INTERFERENCE_FREE:
-        return _judge_clearances(task, poses, halves)
-    closure = task.kind == CertifiedKind.WRENCH_CLOSURE
-    m, n = case.cables.count, len(case.rows)
-    scale = case.row_scale()
-    load, corners, (lower, upper) = (
-        case.load(),
-        np.ascontiguousarray(task.corners() / scale),
-        case.bounds(),
-    )
-    if closure:
-        load, corners = np.zeros(6), np.zeros((1, n))
-        lower, upper = np.full(m, CLOSURE_SHARE), np.ones(m)
-    verdicts, stretch = np.empty(len(poses), np.int64), np.empty((len(poses), NUMBERS))
-    over_rows(
-        judge_boxes, len(poses), None, closure, np.ascontiguousarray(poses),
-        np.ascontiguousarray(halves), case.cables.packed(), np.array(case.rows), scale, load,
-        corners, lower, upper, np.array([task.exit_error, task.anchor_error]), *wedge_terms(n),
-        verdicts, stretch,
-    )  # fmt: skip
-    return verdicts, stretch
-
-
-def _judge_clearances(task: CertifyTask, poses: Array, halves: Array) -> tuple[np.ndarray, Array]:
-    around = task.around
-    assert around is not None
-    limits = (
-        task.clearance, around.exit_free, around.anchor_free, task.exit_error, task.anchor_error
-    )  # fmt: skip
-    boxes = [
-        np.ascontiguousarray(each, float).reshape(-1, BOX_COLUMNS)
-        for each in (around.bodies, around.fixtures, around.obstacles)
-    ]
-    verdicts, stretch = np.empty(len(poses), np.int64), np.empty((len(poses), NUMBERS))
-    over_rows(
-        judge_clearances, len(poses), None, np.ascontiguousarray(poses),
-        np.ascontiguousarray(halves), around.cables.packed(), np.array(around.radius, float),
-        around.pairs(), *boxes, np.array(limits), verdicts, stretch,
-    )  # fmt: skip
-    return verdicts, stretch

@@ -149,7 +149,10 @@ def test_files_of_wrenches_and_obstacles(tmp_path, capsys):
         (["--measure", "payload"], ["payload", "planar"]),
         (["--hull", "0,0,0.3"], ["--hull", "planar"]),
         (["--mesh", "a.stl"], ["--mesh", "--hull"]),
-        (["--certify", "--kind", "static,wrench-closure"], ["--certify", "static,wrench-closure"]),
+        (
+            ["--certify", "--kind", "static,dynamic"],
+            ["--certify", "static,dynamic", "collision-free"],
+        ),
         (["--certify", "--boxes", "0"], ["--boxes", "0"]),
         (["--certify", "--method", "closed_form"], ["--certify", "--method closed_form"]),
         (["--box", "0:1,0:1"], ["--box", "lower:upper"]),
@@ -234,7 +237,7 @@ STATIC = [*PLANAR, "--kind", "static", "--certify", "--json"]
 
 def test_more_boxes_continue_a_search_for_fewer(tmp_path, capsys, monkeypatch):
     """The result is the same, and what was judged is not judged again."""
-    from cdpr_drake.workspaces import certified_boxes as module
+    from cdpr_drake.workspaces import box_judges as module
 
     assert ended([*STATIC, "--boxes", "900", "--out", str(tmp_path / "whole")]) == 0
     whole = json.loads(printed(capsys).out)["certified"]
@@ -289,7 +292,7 @@ def killed_search(folder):
 
 def test_a_broken_proof_is_reported_loudly(tmp_path, capsys, monkeypatch):
     """A proof that calls every box inside contradicts the grid at each pose outside."""
-    from cdpr_drake.workspaces import certified_boxes as module
+    from cdpr_drake.workspaces import box_judges as module
 
     def wrong(task, poses, halves):
         return np.full(len(poses), INSIDE), halves

@@ -9,8 +9,9 @@ from cdpr_drake.errors import WorkspaceError
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.geometry.poses import rotation_from_angles
 from cdpr_drake.workspaces.box_expansion_kernel import INSIDE, OPEN, OUTSIDE
+from cdpr_drake.workspaces.box_judges import CertifiedKind, CertifyTask
 from cdpr_drake.workspaces.cable_interference import Surroundings, box_row, clearances
-from cdpr_drake.workspaces.certified_boxes import CertifiedKind, CertifyTask, PoseBox, certify
+from cdpr_drake.workspaces.certified_boxes import PoseBox, certify
 from cdpr_drake.workspaces.demanded_wrenches import SpatialSet, resisting
 from cdpr_drake.workspaces.static_feasibility import statically_feasible
 from cdpr_drake.workspaces.wrench_capacity import capacity_margins, closure_margins

@@ -15,7 +15,7 @@ from cdpr_drake.workspaces import (
 from cdpr_drake.workspaces import (
     box_outside_kernel as outside_kernel,
 )
-from cdpr_drake.workspaces.certified_boxes import CLOSURE_SHARE
+from cdpr_drake.workspaces.box_judges import CLOSURE_SHARE
 from cdpr_drake.workspaces.static_feasibility import StaticCase
 from cdpr_drake.workspaces.wrench_capacity import capacity_margins, closure_margins
 from tests.workspaces.mutants import as_python

@@ -10,9 +10,10 @@ from cdpr_drake.geometry.poses import rotation_from_angles
 from cdpr_drake.geometry.pulley_kernel import pulley_geometry
 from cdpr_drake.workspaces import box_pulleys_kernel as pulleys_kernel
 from cdpr_drake.workspaces.box_expansion_kernel import ANCHOR, BEND, EXIT, GAIN, INSIDE, OUTSIDE
+from cdpr_drake.workspaces.box_judges import CertifiedKind, CertifyTask
 from cdpr_drake.workspaces.box_pulleys_kernel import straight_points
 from cdpr_drake.workspaces.cable_interference import Surroundings, box_row, clearances
-from cdpr_drake.workspaces.certified_boxes import CertifiedKind, CertifyTask, PoseBox, certify
+from cdpr_drake.workspaces.certified_boxes import PoseBox, certify
 from cdpr_drake.workspaces.static_feasibility import statically_feasible
 from cdpr_drake.workspaces.wrench_capacity import closure_margins
 from tests.workspaces.mutants import as_python

@@ -1,0 +1,156 @@
+"""Certified boxes made smaller where somebody needs it: in a box of poses, or about a path."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Protocol
+
+import numpy as np
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.errors import WorkspaceError
+from cdpr_drake.workspaces.box_expansion_kernel import INSIDE, NUMBERS, OPEN, OUTSIDE
+from cdpr_drake.workspaces.box_judges import CertifyTask, judge_all, several
+from cdpr_drake.workspaces.certified_boxes import CHUNK, CertifiedBoxes, PoseBox, cut_boxes
+
+SAME_SIZE = 1e-9
+"""Boxes are cut together whose shares of the whole differ by less than this share of them."""
+
+
+class Region(Protocol):
+    """Poses that matter."""
+
+    def meets(self, poses: Array, halves: Array) -> np.ndarray:
+        """Which boxes have a pose in common with it, shape (k,)."""
+
+
+@dataclass(frozen=True, eq=False)
+class PathTube:
+    """All poses within a reach, number by number, of the straight lines between poses in turn.
+
+    Attributes:
+        poses: Position [m] and angles [rad], shape (n, 6), n > 0.
+        reach: How far each number may be off, shape (6,), at least 0 [m, rad].
+
+    Raises:
+        WorkspaceError: A shape or a number is not accepted.
+    """
+
+    poses: Array
+    reach: Array
+
+    def __post_init__(self) -> None:
+        """Copies the arrays and checks them."""
+        poses, reach = np.array(self.poses, float), np.array(self.reach, float)
+        if poses.ndim != 2 or poses.shape[1:] != (NUMBERS,) or not len(poses):
+            raise WorkspaceError(f"poses: found shape {poses.shape}; accepted: (n, 6), n > 0")
+        if reach.shape != (NUMBERS,) or not np.all(np.isfinite(reach) & (reach >= 0.0)):
+            raise WorkspaceError("reach: accepted: six numbers >= 0 [m, rad]")
+        if not np.all(np.isfinite(poses)):
+            raise WorkspaceError("poses: accepted: finite numbers [m, rad]")
+        object.__setattr__(self, "poses", poses)
+        object.__setattr__(self, "reach", reach)
+
+    def meets(self, poses: Array, halves: Array) -> np.ndarray:
+        """Which boxes have a pose in common with it, shape (k,)."""
+        wide, found = halves + self.reach, np.zeros(len(poses), bool)
+        ends = self.poses if len(self.poses) > 1 else np.repeat(self.poses, 2, axis=0)
+        for start, end in pairwise(ends):
+            # Where the line is within the box along each number: a span of its shares, 0 to 1.
+            along, apart = end - start, poses - start
+            with np.errstate(divide="ignore", invalid="ignore"):
+                low, high = (apart - wide) / along, (apart + wide) / along
+            still = along == 0.0
+            low[:, still] = np.where(np.abs(apart[:, still]) <= wide[:, still], -np.inf, np.inf)
+            high[:, still] = -low[:, still]
+            first = np.max(np.minimum(low, high), axis=1)
+            last = np.min(np.maximum(low, high), axis=1)
+            found |= np.maximum(first, 0.0) <= np.minimum(last, 1.0)
+        return found
+
+
+def refine(
+    found: CertifiedBoxes,
+    task: CertifyTask | Sequence[CertifyTask],
+    region: Region | PoseBox,
+    most_boxes: int = 100_000,
+    *,
+    smallest: Array | None = None,
+    on_progress: Callable[[int, float], None] | None = None,
+    should_stop: Callable[[], bool] | None = None,
+) -> CertifiedBoxes:
+    """Goes on cutting boxes that are open and meet a region; the largest first.
+
+    Args:
+        found: What was found of the whole.
+        task: What `found` was asked for.
+        region: Where it matters.
+        most_boxes: How many more boxes are judged, at most.
+        smallest: Half widths below which a box is not cut, shape (6,) [m, rad]; None: no limit.
+        on_progress: Called now and then with the number of boxes judged and the open share.
+        should_stop: Asked as often; True ends it.
+
+    Returns:
+        Boxes of the whole: those that were not cut as they were, in their order, then the others.
+
+    Raises:
+        WorkspaceError: most_boxes < 1, or `found` is of several kinds and the task of one, or the
+            other way round.
+    """
+    if most_boxes < 1:
+        raise WorkspaceError(f"most_boxes: found {most_boxes}; accepted: at least 1")
+    tasks = several(task)
+    if (found.proven is not None) != (len(tasks) > 1):
+        raise WorkspaceError(
+            f"task: found {len(tasks)} kinds; accepted: those that the boxes were asked for"
+        )
+    poses, halves, verdicts = found.poses, found.halves, found.verdicts
+    proven = np.zeros(len(poses), np.int8) if found.proven is None else found.proven
+    least = np.zeros(NUMBERS) if smallest is None else np.asarray(smallest, float)
+    volumes = np.prod(np.where(halves > 0.0, 2.0 * halves, 1.0), axis=1)
+    shares = volumes / np.sum(volumes)
+    judged, stopped, curve = 0, False, [tuple(found.curve[-1])]
+    while not stopped and judged < most_boxes:
+        wanted = np.flatnonzero((verdicts == OPEN) & np.any(halves > least, axis=1))
+        wanted = wanted[region.meets(poses[wanted], halves[wanted])]
+        if not len(wanted):
+            break
+        largest = np.max(shares[wanted])
+        wanted = wanted[shares[wanted] >= largest * (1.0 - SAME_SIZE)]
+        # Two boxes are judged of each that is cut; where, its own judge says once more.
+        wanted = wanted[: max((most_boxes - judged) // 2, 1)]
+        parts = []
+        for first in range(0, len(wanted), CHUNK // 2):
+            if should_stop is not None and should_stop():
+                stopped = True
+                wanted = wanted[:first]
+                break
+            some = wanted[first : first + CHUNK // 2]
+            _, axes, _ = judge_all(tasks, poses[some], halves[some], proven[some])
+            new_poses, new_halves = cut_boxes(poses[some], halves[some], axes)
+            kept = np.tile(proven[some], 2)
+            new_verdicts, _, new_proven = judge_all(tasks, new_poses, new_halves, kept)
+            parts.append(
+                (new_poses, new_halves, new_verdicts, new_proven, np.tile(0.5 * shares[some], 2))
+            )
+        if not parts:
+            break
+        rest = np.ones(len(poses), bool)
+        rest[wanted] = False
+        more = [np.concatenate(part) for part in zip(*parts, strict=True)]
+        poses, halves, verdicts, proven = (
+            np.concatenate([old[rest], new])
+            for old, new in zip((poses, halves, verdicts, proven), more[:4], strict=True)
+        )
+        shares = np.concatenate([shares[rest], more[4]])
+        judged += len(more[0])
+        told = [float(np.sum(shares[verdicts == verdict])) for verdict in (INSIDE, OUTSIDE, OPEN)]
+        curve.append((found.curve[-1, 0] + judged, *told))
+        if on_progress is not None:
+            on_progress(judged, told[2])
+    return CertifiedBoxes(
+        poses, halves, verdicts, np.concatenate([found.curve, np.array(curve[1:]).reshape(-1, 4)]),
+        not stopped, None if found.proven is None else proven,
+    )  # fmt: skip
