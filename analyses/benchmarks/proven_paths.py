@@ -58,7 +58,8 @@ RRT_SECONDS = 8.0
 RRT_CHECKS = 0.005
 """Way between checked states of RRT*, as a share of the extent of the space."""
 
-BOXES = 60_000
+BOXES = 150_000
+"""Boxes that are judged for the sets of a scene, of all kinds."""
 
 COLUMNS = (
     "robot", "scene", "problem", "straight_m", "sets", "sets_s", "found", "length_m", "curve_m",

@@ -61,7 +61,7 @@ class ProvenSettings:
             orientation changes [m/s^2].
         clearance: Least clearance of cables and platform [m].
         method: sequences or gcs.
-        boxes: Boxes that are judged for each kind.
+        boxes: Boxes that are judged.
         cells: Cells of the raster on which they are merged.
         cover: Share of the proven cells that sets cover.
         sequences: Sequences of sets that are looked at.

@@ -22,8 +22,9 @@ from cdpr_drake.geometry.poses import rotation_from_angles
 from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import rigid_platform
+from cdpr_drake.workspaces.box_judges import CertifiedKind, CertifyTask
 from cdpr_drake.workspaces.cable_interference import PART_NAMES, Obstacles, clearances
-from cdpr_drake.workspaces.certified_boxes import CertifiedKind, CertifyTask, PoseBox
+from cdpr_drake.workspaces.certified_boxes import PoseBox
 from cdpr_drake.workspaces.demanded_wrenches import SpatialSet, resisting, spatial_inertias
 from cdpr_drake.workspaces.pose_grid import WorkspaceGrid
 from cdpr_drake.workspaces.proven_cells import CELLS, prove_cells
@@ -32,7 +33,7 @@ from cdpr_drake.workspaces.proven_sets import COVER, PoseSets, sets_of_cells
 from cdpr_drake.workspaces.wrench_capacity import capacity_margins
 
 BOXES = 100_000
-"""Boxes that are judged for each kind, where nobody says."""
+"""Boxes that are judged, where nobody says."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -40,7 +41,7 @@ class ProofSettings:
     """How sets are proven.
 
     Attributes:
-        boxes: Boxes that are judged for each kind, at most.
+        boxes: Boxes that are judged, at most.
         cells: Cells of the raster on which boxes are merged, at most.
         clearance: Least clearance of cables and platform [m].
         limits: Smallest and largest tension; None: the robot's [N].
@@ -136,18 +137,18 @@ class ProvenSets(PoseSets):
         low, high = loaded.reach()
         axes = tuple(np.unique([a, b]) for a, b in zip(low, high, strict=True))
         grid = WorkspaceGrid((axes[0], axes[1], axes[2]), np.unique(turned, axis=0))
-        questions = [make_workspace_question(loaded, [kind], grid, asked=asked) for kind in chosen]
-        searches = [box_search(question, loaded) for question in questions]
-        tasks, conditions = tuple(one.task for one in searches), questions[0].about
-        return _prove(
-            loaded, searches[0].box, tasks,
-            ProvenSets(
-                np.zeros((1, 6)), np.zeros((1, 6)), np.zeros(1, int), kinds=chosen,
-                conditions=conditions, tasks=tasks,
-                about=_about(loaded, chosen, turned, obstacles, box, settings),
-            ),
-            (cover, list(must), settings), say,
-        )  # fmt: skip
+        question = make_workspace_question(loaded, chosen, grid, asked=asked)
+        search = box_search(question, loaded)
+        draft = ProvenSets(
+            np.zeros((1, 6)),
+            np.zeros((1, 6)),
+            np.zeros(1, int),
+            kinds=chosen,
+            conditions=question.about,
+            tasks=search.tasks,
+            about=_about(loaded, chosen, turned, obstacles, box, settings),
+        )
+        return _prove(loaded, search.box, draft, (cover, list(must), settings), say)
 
     def judge(self, positions: Array, rotations: Array) -> dict[str, np.ndarray]:
         """Whether each kind holds at poses, by the exact checks of poses and not by the sets.
@@ -240,14 +241,17 @@ def pose_words(pose: Array) -> str:
 
 
 def _prove(
-    robot: Robot, box: PoseBox, tasks: tuple[CertifyTask, ...], draft: ProvenSets,
-    how: tuple[float, list[Array], ProofSettings], say: Callable[[str], None],
-) -> ProvenSets:  # fmt: skip
+    robot: Robot,
+    box: PoseBox,
+    draft: ProvenSets,
+    how: tuple[float, list[Array], ProofSettings],
+    say: Callable[[str], None],
+) -> ProvenSets:
     cover, must, settings = how
-    names = draft.kinds
+    names, tasks = draft.kinds, draft.tasks
 
-    def tell(number: int, judged: int, share: float) -> None:
-        say(f"Proving {names[number]} for {robot.name}: {judged} boxes, {share:.1%} open")
+    def tell(judged: int, share: float) -> None:
+        say(f"Proving poses of {robot.name}: {judged} boxes, {share:.1%} open")
 
     for pose in must:
         if failing := explain_pose(draft, pose):

@@ -25,12 +25,12 @@ LeastTime = Annotated[
 Acceleration = Annotated[
     str | None,
     typer.Option(
-        help="With --proven: the motion stays within accelerations a or ax,ay,az of Po, any of "
-        "which the cables are proven to give; 0: poses only; without, 0.25, or 0 with a turn [m/s^2]."
+        help="With --proven: the motion stays within accelerations a or ax,ay,az of Po, any "
+        "of which the cables are proven to give; 0: poses only; without, 0.25, or 0 with a turn [m/s^2]."
     ),
 ]
 Boxes = Annotated[
-    int | None, typer.Option(help="With --proven: boxes of poses judged for each kind.")
+    int | None, typer.Option(help="With --proven: boxes of poses that are judged, at most.")
 ]
 
 

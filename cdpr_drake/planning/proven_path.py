@@ -237,17 +237,8 @@ def proven_motion(
                 best = sequence, curves[-1], plan, within
             if len(curves) > 1:
                 shares = _time_shares(plan, curves[-1])
-            curves.append(
-                fast_curve(
-                    graph.lower,
-                    graph.upper,
-                    sequence.sets,
-                    sequence.points,
-                    shares,
-                    limits[sets.axes],
-                    speed,
-                )  # fmt: skip
-            )
+            boxes = graph.lower, graph.upper, sequence.sets, sequence.points
+            curves.append(fast_curve(*boxes, shares, limits[sets.axes], speed))
     assert best is not None
     took = time.perf_counter() - begin
     path = _result(sets, graph, best[:2], found, scale, method, took)

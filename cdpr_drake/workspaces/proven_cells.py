@@ -1,9 +1,8 @@
 """Cells of a raster of poses: wholly proven inside kinds of workspaces, proven outside, or open.
 
-Boxes of all kinds come from one box of poses that is cut in halves, so they fit a raster of powers
-of two exactly. A cell is inside a kind where boxes proven inside fill it, also many small ones, and
-inside all kinds where it is inside each: a conjunction of proofs. It is excluded where one box
-that is proven outside some kind has it whole, or several do.
+Boxes come from one box of poses that is cut in halves, so they fit a raster of powers of two
+exactly. A cell is inside where boxes in which all kinds are proven fill it, also many small ones.
+It is excluded where boxes fill it that are proven outside some kind.
 """
 
 from __future__ import annotations
@@ -16,7 +15,8 @@ import numpy as np
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import WorkspaceError
 from cdpr_drake.workspaces.box_expansion_kernel import INSIDE, NUMBERS, OUTSIDE
-from cdpr_drake.workspaces.certified_boxes import CertifiedBoxes, CertifyTask, PoseBox, certify
+from cdpr_drake.workspaces.box_judges import CertifyTask
+from cdpr_drake.workspaces.certified_boxes import CertifiedBoxes, PoseBox, certify
 from cdpr_drake.workspaces.cuboid_cover_kernel import add_shares
 
 LATTICE = 30
@@ -97,17 +97,17 @@ def prove_cells(
     most_boxes: int,
     arm: float,
     cells: int = CELLS,
-    on_progress: Callable[[int, int, float], None] | None = None,
+    on_progress: Callable[[int, float], None] | None = None,
 ) -> ProvenCells:
-    """Proves boxes of every task, and puts them on one raster.
+    """Proves boxes of all tasks in one search, and puts them on a raster.
 
     Args:
         tasks: What is to be proven; all must hold.
         box: The poses.
-        most_boxes: Boxes that are judged for each task, at most.
+        most_boxes: Boxes that are judged, at most.
         arm: Length by which a turn counts as a way, for the shape of cells [m].
         cells: Cells of the raster, at most; a power of two is used.
-        on_progress: Called with the number of the task, boxes judged and the share still open.
+        on_progress: Called with the boxes judged and the share still open.
 
     Raises:
         WorkspaceError: There is no task, or a number is not accepted.
@@ -117,18 +117,10 @@ def prove_cells(
     if not FEWEST_CELLS <= cells <= MOST_CELLS:
         raise WorkspaceError(f"cells: found {cells}; accepted: {FEWEST_CELLS} to {MOST_CELLS}")
     axes, shape = raster_shape(box, arm, cells)
-    inside, excluded = np.ones(shape, bool), np.zeros(shape, bool)
-    for number, task in enumerate(tasks):
-        tell = None
-        if on_progress is not None:
-
-            def tell(judged: int, share: float, number: int = number) -> None:
-                assert on_progress is not None
-                on_progress(number, judged, share)
-
-        found = certify(task, box, most_boxes, on_progress=tell)
-        inside &= whole_cells(found, INSIDE, box, axes, shape)
-        excluded |= whole_cells(found, OUTSIDE, box, axes, shape)
+    found = certify(tasks, box, most_boxes, on_progress=on_progress)
+    inside, excluded = (
+        whole_cells(found, verdict, box, axes, shape) for verdict in (INSIDE, OUTSIDE)
+    )
     return ProvenCells(box, axes, inside, excluded)
 
 
@@ -141,7 +133,7 @@ def prove_more(
         cells: What is proven by now.
         tasks: What is to be proven.
         where: The cells, shape (n, d).
-        most_boxes: Boxes that are judged in a cell for each task, at most.
+        most_boxes: Boxes that are judged in a cell, at most.
 
     Returns:
         The same raster; cells that stay open are not told apart from those never looked at.
@@ -150,15 +142,9 @@ def prove_more(
     for cell in where:
         lower, upper = cells.box.lower.copy(), cells.box.upper.copy()
         lower[cells.axes], upper[cells.axes] = cells.edges(cell), cells.edges(cell + 1)
-        verdicts = set()
-        for task in tasks:
-            found = certify(task, PoseBox(lower, upper), most_boxes)
-            whole = found.inside == 1.0, found.outside == 1.0
-            verdicts.add(INSIDE if whole[0] else OUTSIDE if whole[1] else 0)
-            if not whole[0]:
-                break
-        inside[tuple(cell)] = verdicts == {INSIDE}
-        excluded[tuple(cell)] = OUTSIDE in verdicts
+        found = certify(tasks, PoseBox(lower, upper), most_boxes)
+        inside[tuple(cell)] = found.inside == 1.0
+        excluded[tuple(cell)] = found.outside == 1.0
     return ProvenCells(cells.box, cells.axes, inside, excluded)
 
 

@@ -11,14 +11,14 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.workspaces.certified_boxes import CertifyTask
+from cdpr_drake.workspaces.box_judges import CertifyTask
 from cdpr_drake.workspaces.proven_cells import ProvenCells, prove_more
 
 ROUNDS = 12
 """Ways between two poses whose open cells are cut, one after the other, at most."""
 
 BOXES_A_CELL = 2000
-"""Boxes that an open cell is cut into, for each kind, at most."""
+"""Boxes that an open cell is cut into, at most."""
 
 PROVEN_STEP = 1e-3
 """What a step through a proven cell costs, where one through an open cell costs 1."""
@@ -55,7 +55,7 @@ def connect_poses(
         cells: What is proven by now.
         tasks: What is to be proven.
         poses: Position and angles, shape (6,) each [m, rad].
-        boxes_a_cell: Boxes that a cell is cut into, for each task, at most.
+        boxes_a_cell: Boxes that a cell is cut into, at most.
         on_cut: Called with the number of cells that were cut by then.
 
     Returns:
