@@ -26,7 +26,8 @@ Acceleration = Annotated[
     str | None,
     typer.Option(
         help="With --proven: the motion stays within accelerations a or ax,ay,az of Po, any "
-        "of which the cables are proven to give; 0: poses only; without, 0.25, or 0 with a turn [m/s^2]."
+        "of which the cables are proven to give; 0: poses only; without, 0.25, or 0 where the "
+        "platform turns [m/s^2]."
     ),
 ]
 Boxes = Annotated[
