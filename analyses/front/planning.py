@@ -15,7 +15,7 @@ from cdpr_drake.analyses.planning.free_motion import FreeSettings, solve_free_mo
 from cdpr_drake.analyses.planning.free_plan_results import FreeRun
 from cdpr_drake.analyses.planning.path_files import read_path
 from cdpr_drake.analyses.planning.plan_results import PlanRun
-from cdpr_drake.analyses.planning.plan_tracking import track_plan
+from cdpr_drake.analyses.planning.plan_tracking import TrackedPlan, track_plan
 from cdpr_drake.analyses.planning.robot_path_task import (
     TOLERANCE,
     LimitSettings,
@@ -30,6 +30,7 @@ from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import as_pose
 from cdpr_drake.planning.free_path_solution import FreePathSolution
+from cdpr_drake.planning.limits import MotionLimits
 from cdpr_drake.planning.path_task import PathTask
 from cdpr_drake.planning.path_timing import STATIONS, PathPlan, plan_along_path
 from cdpr_drake.schema.typed_yaml import closest
@@ -136,11 +137,11 @@ def plan_path(
             and the cable.
         CdprError: The path makes no sense.
     """
-    loaded, given = as_robot(robot, "plan_path"), _limits(limits)
-    task = _task(loaded, given, pulleys)
+    loaded, given = as_robot(robot, "plan_path"), chosen_limits(limits)
+    task = planned_for(loaded, given, pulleys)
     found = path_poses(loaded, path)
     way = make_path(loaded, found.poses, corners, tolerance)
-    arguments = _limits_told(given, pulleys) | {
+    arguments = limits_told(given, pulleys) | {
         "path": str(path) if _is_file(path) else None,
         "waypoints": None if _is_file(path) else [_row(X) for X in found.poses],
         "corners": corners,
@@ -187,15 +188,15 @@ def plan_free_motion(
     for name in asked:
         if name not in ASKED:
             raise PlanningError(f"{name!r} is unknown; {closest(name, ASKED)}")
-    loaded, given = as_robot(robot, "plan_free_motion"), _limits(limits)
+    loaded, given = as_robot(robot, "plan_free_motion"), chosen_limits(limits)
     if isinstance(asked.get("obstacles"), str | Path):
         asked["obstacles"] = load_obstacle_boxes(Path(asked["obstacles"]))
     settings = FreeSettings(start=as_pose(loaded, start), goal=as_pose(loaded, goal), **asked)
-    task = _task(loaded, given, pulleys)
+    task = planned_for(loaded, given, pulleys)
     begin = time.perf_counter()
     found = solve_free_motion(loaded, task, settings, say or _silent)
     took = time.perf_counter() - begin
-    arguments = _limits_told(given, pulleys) | {
+    arguments = limits_told(given, pulleys) | {
         "from": _row(settings.start),
         "to": _row(settings.goal),
         **{
@@ -214,6 +215,15 @@ def _told(
     track: bool,
 ) -> dict[str, Any]:  # fmt: skip
     """What every `MotionRun` has; tracks the motion where that is wanted."""
+    own, tracked = tracked_by(robot, given, found, say, track)
+    return {"robot": robot, "limits": own, "tracked": tracked}
+
+
+def tracked_by(
+    robot: Robot, given: LimitSettings, found: PathPlan | FreePathSolution, say: Say | None,
+    track: bool,
+) -> tuple[MotionLimits, TrackedPlan | None]:  # fmt: skip
+    """The robot's limits without reserve, and what it does with a motion, if that is wanted."""
     own, tracked = robot_limits(robot, given), None
     if track:
         tell, end = say or _silent, found.duration
@@ -223,10 +233,11 @@ def _told(
             tell(f"Tracking the plan of {robot.name}: {now:.0f} of {end:.0f} s")
 
         tracked = track_plan(robot, found, own, show)
-    return {"robot": robot, "limits": own, "tracked": tracked}
+    return own, tracked
 
 
-def _limits(limits: Limits) -> LimitSettings:
+def chosen_limits(limits: Limits) -> LimitSettings:
+    """Settings of limits by name; raises PlanningError for unknown names."""
     if isinstance(limits, LimitSettings):
         return limits
     known = [field.name for field in fields(LimitSettings)]
@@ -236,12 +247,14 @@ def _limits(limits: Limits) -> LimitSettings:
     return LimitSettings(**(limits or {}))
 
 
-def _task(robot: Robot, given: LimitSettings, pulleys: bool) -> PathTask:
+def planned_for(robot: Robot, given: LimitSettings, pulleys: bool) -> PathTask:
+    """The robot as it is planned with."""
     cables = robot.cable_set()
     return path_task(robot, given, cables if pulleys else cables.without_pulleys())
 
 
-def _limits_told(given: LimitSettings, pulleys: bool) -> dict[str, Any]:
+def limits_told(given: LimitSettings, pulleys: bool) -> dict[str, Any]:
+    """What was asked of limits, for JSON."""
     return {
         "limits_n": given.tensions,
         "cable_speed_m_s": given.cable_speed,
@@ -260,6 +273,11 @@ def _row(X_WP: RigidTransform) -> list[float]:
     """x, y, z [m], phi, theta, psi [deg]."""
     angles = np.degrees(angles_from_rotation(X_WP.rotation()))
     return [*X_WP.translation().tolist(), *angles.tolist()]
+
+
+def pose_numbers(X_WP: RigidTransform) -> np.ndarray:
+    """Position [m] and angles (phi, theta, psi) [rad], shape (6,)."""
+    return np.concatenate([X_WP.translation(), angles_from_rotation(X_WP.rotation())])
 
 
 def _silent(words: str) -> None:

@@ -5,6 +5,7 @@ from .conditions import Kind as Kind
 from .conditions import Measure as Measure
 from .conditions import Poses as Poses
 from .pose_grid import plain as plain
+from .proven_sets import ProvenSets as ProvenSets
 from .stability_figures import curves_figure as curves_figure
 from .stability_figures import planes_figure as planes_figure
 from .stability_question import CameraTask as CameraTask

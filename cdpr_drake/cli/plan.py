@@ -1,4 +1,4 @@
-"""`cdpr plan`: the fastest motion of a robot along a path, or a motion whose path is free.
+"""`cdpr plan`: the fastest motion of a robot along a path, a free one, or one that is proven.
 
 The options come first, and what users wrote of a free path (`FreeWords`); then the command, and
 what it does for either kind of motion.
@@ -13,15 +13,16 @@ from typing import Annotated, Any
 
 import numpy as np
 import typer
-from pydrake.math import RigidTransform
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
 from cdpr_drake.analyses.front.planning import PathPoses, path_poses, plan_free_motion, plan_path
+from cdpr_drake.analyses.front.proven_motions import plan_proven_motion
 from cdpr_drake.analyses.planning.free_motion import LEAST
 from cdpr_drake.analyses.planning.free_plan_results import FreeRun
-from cdpr_drake.analyses.planning.plan_results import PlanRun
+from cdpr_drake.analyses.planning.plan_results import MotionRun, PlanRun
+from cdpr_drake.analyses.planning.proven_plan_results import ProvenRun
 from cdpr_drake.analyses.planning.robot_path_task import (
     CORNERS,
     RESERVE,
@@ -41,7 +42,15 @@ from cdpr_drake.cli.options import (
     parse_formats,
     parse_limits,
     parse_numbers,
-    parse_pose,
+)
+from cdpr_drake.cli.proven_options import (
+    Acceleration,
+    Boxes,
+    LeastTime,
+    Proven,
+    ProvenWords,
+    one_pose,
+    print_proven,
 )
 from cdpr_drake.cli.run_endings import report_failures, report_kept_files, report_recovered
 from cdpr_drake.cli.terminal import message_console, print_json, wide_console, working
@@ -86,10 +95,12 @@ Free = Annotated[
     bool, typer.Option("--free", help="The path is free: from one pose to another, no path given.")
 ]
 From = Annotated[
-    str | None, typer.Option("--from", help="With --free: pose at the start, as of --waypoints.")
+    str | None,
+    typer.Option("--from", help="With --free or --proven: pose at the start, as of --waypoints."),
 ]
 To = Annotated[
-    str | None, typer.Option("--to", help="With --free: pose at the end, as of --waypoints.")
+    str | None,
+    typer.Option("--to", help="With --free or --proven: pose at the end, as of --waypoints."),
 ]
 Least = Annotated[
     str | None,
@@ -105,13 +116,15 @@ Duration = Annotated[
 Clearance = Annotated[
     float | None,
     typer.Option(
-        help="With --free: least distance of cables from each other, and of cables and platform "
-        "from --obstacles [m]."
+        help="With --free or --proven: least distance of cables from each other, and of cables and "
+        "platform from --obstacles [m]."
     ),
 ]
 Obstacles = Annotated[
     Path | None,
-    typer.Option(help="With --free: boxes in the way, YAML as of cdpr workspace --obstacles."),
+    typer.Option(
+        help="With --free or --proven: what is in the way, YAML as of cdpr workspace --obstacles."
+    ),
 ]
 KeepInView = Annotated[
     str | None,
@@ -204,12 +217,8 @@ class FreeWords:
         }
 
 
-def one_pose(option: str, words: str) -> RigidTransform:
-    """A pose of an option; raises as `parse_pose`, under its name."""
-    try:
-        return parse_pose(words)
-    except CdprError as problem:
-        raise CdprError(str(problem).replace("--pose", option, 1)) from problem
+SHARED = ("--from", "--to", "--clearance", "--obstacles")
+"""Options that --free and --proven have in common."""
 
 
 def plan(
@@ -236,13 +245,17 @@ def plan(
     camera: Camera = None,
     nearest: Nearest = None,
     knots: Knots = None,
+    proven: Proven = False,
+    time: LeastTime = False,
+    acceleration: Acceleration = None,
+    boxes: Boxes = None,
     track: Track = True,
     out: Out = None,
     overwrite: Overwrite = False,
     figure_format: FigureFormats = "png",
     as_json: ResultsAsJson = False,
 ) -> int:
-    """Plans a motion within limits of tensions and winches: the fastest on a path, or a free one.
+    """Plans a motion within limits of tensions and winches: on a path, a free one, or a proven one.
 
     Writes motion.csv, summary.json and figures; scenarios of dynamic control track the motion by
     trajectory.file. The exit code is 2 where there is no motion: the message says where, and which
@@ -257,13 +270,31 @@ def plan(
     words = FreeWords(
         start, goal, least, duration, clearance, obstacles, keep_in_view, camera, nearest, knots
     )
+    sure = ProvenWords(start, goal, clearance, obstacles, time, acceleration, boxes)
     planner: Planner
-    if free:
+    if not proven and sure.given():
+        raise CdprError(f"{sure.given()[0]}: accepted with --proven; found no --proven")
+    if proven:
+        other = [one for one in words.given() if one not in SHARED]
+        other += ["--free"] * free
+        other += [name for name, value in (("--path", path), ("--waypoints", waypoints)) if value]
+        if other:
+            raise CdprError(f"--proven: found {other[0]} too; accepted: {', '.join(SHARED)}")
+        wanted = sure.asked()
+
+        def planner(say: Callable[[str], None]) -> MotionRun:
+            found = plan_proven_motion(
+                loaded, limits=given, pulleys=pulleys, track=track, say=say, stations=stations,
+                **wanted,
+            )  # fmt: skip
+            return replace(found, arguments=found.arguments | sure.as_dict())
+
+    elif free:
         if path is not None or waypoints is not None:
             raise CdprError("--free: found --path or --waypoints too; accepted: --from and --to")
         asked = words.asked()
 
-        def planner(say: Callable[[str], None]) -> PlanRun | FreeRun:
+        def planner(say: Callable[[str], None]) -> MotionRun:
             found = plan_free_motion(
                 loaded, limits=given, pulleys=pulleys, track=track, say=say, **asked
             )
@@ -277,7 +308,7 @@ def plan(
         for remark in poses.remarks:
             message_console().print(f"note: {path}: {remark}")
 
-        def planner(say: Callable[[str], None]) -> PlanRun | FreeRun:
+        def planner(say: Callable[[str], None]) -> MotionRun:
             found = plan_path(
                 loaded, poses, given, corners=corners, tolerance=tolerance, stations=stations,
                 pulleys=pulleys, track=track, say=say,
@@ -298,7 +329,7 @@ class _Ending:
     as_json: bool
 
 
-Planner = Callable[[Callable[[str], None]], PlanRun | FreeRun]
+Planner = Callable[[Callable[[str], None]], MotionRun]
 
 
 def _run(robot: Robot, planner: Planner, folder: Path, ending: _Ending) -> int:
@@ -320,11 +351,17 @@ def _run(robot: Robot, planner: Planner, folder: Path, ending: _Ending) -> int:
     return report_failures(console, failed, folder, None)
 
 
-def _pictures(run: PlanRun | FreeRun, formats: tuple[str, ...]) -> Pictures:
+def _pictures(run: MotionRun, formats: tuple[str, ...]) -> Pictures:
     from cdpr_drake.analyses.planning.free_plan_figures import free_pictures
     from cdpr_drake.analyses.planning.plan_figures import plan_pictures
+    from cdpr_drake.analyses.planning.proven_plan_figures import proven_pictures
 
-    return free_pictures(run, formats) if isinstance(run, FreeRun) else plan_pictures(run, formats)
+    if isinstance(run, ProvenRun):
+        return proven_pictures(run, formats)
+    if isinstance(run, FreeRun):
+        return free_pictures(run, formats)
+    assert isinstance(run, PlanRun)
+    return plan_pictures(run, formats)
 
 
 def _poses(robot: Robot, path: Path | None, waypoints: str | None) -> PathPoses:
@@ -344,7 +381,9 @@ def _poses(robot: Robot, path: Path | None, waypoints: str | None) -> PathPoses:
 
 
 def _print(console: Console, told: dict[str, Any], folder: Path) -> None:
-    if "knots" in told:
+    if "proven" in told:
+        print_proven(console, told)
+    elif "knots" in told:
         console.print(
             f"{told['robot']}: {told['duration_s']:.4f} s with the least {told['least']}, by "
             f"{told['solver']} at {told['knots']} knots"

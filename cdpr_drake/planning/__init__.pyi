@@ -2,3 +2,5 @@ from .free_path import FreePathProgram as FreePathProgram
 from .input_shaping import make_shaper as make_shaper
 from .path_task import sample_motion as sample_motion
 from .path_timing import plan_along_path as plan_along_path
+from .proven_path import proven_motion as proven_motion
+from .proven_path import proven_path as proven_path

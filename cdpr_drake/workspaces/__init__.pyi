@@ -9,5 +9,6 @@ from .certified_boxes import PoseBox as PoseBox
 from .certified_boxes import certify as certify
 from .demanded_wrenches import SpatialSet as SpatialSet
 from .pose_grid import grid_by_count as grid_by_count
+from .proven_sets import PoseSets as PoseSets
 from .static_feasibility import StaticCase as StaticCase
 from .volume import triangles as triangles

@@ -82,9 +82,9 @@ class SpatialSet:
                 f"vertices: found {len(points)} times {2 ** len(wide)} corners of a box; accepted: "
                 f"at most {MOST_CORNERS}"
             )
-        signs = np.array(np.meshgrid(*[[-1.0, 1.0]] * len(wide))).reshape(len(wide), -1).T
-        moves = np.zeros((max(len(signs), 1), len(rows)))
+        moves = np.zeros((2 ** len(wide), len(rows)))
         if len(wide):
+            signs = np.array(np.meshgrid(*[[-1.0, 1.0]] * len(wide))).reshape(len(wide), -1).T
             moves[:, wide] = signs * half[wide]
         return np.asarray((points[:, np.newaxis] + moves).reshape(-1, len(rows)), float)
 

@@ -1,0 +1,223 @@
+"""A motion of a robot from one pose to another that is proven at every instant."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cdpr_drake.analyses.front.planning import (
+    Limits,
+    Say,
+    chosen_limits,
+    limits_told,
+    planned_for,
+    pose_numbers,
+    tracked_by,
+)
+from cdpr_drake.analyses.planning.proven_plan_results import ProvenRun
+from cdpr_drake.analyses.planning.robot_path_task import length_scale
+from cdpr_drake.analyses.workspaces.proven_sets import (
+    BOXES,
+    ProofSettings,
+    ProvenSets,
+    explain_pose,
+)
+from cdpr_drake.analyses.workspaces.workspace_files import load_obstacles
+from cdpr_drake.arrays import Array
+from cdpr_drake.errors import PlanningError, WorkspaceError
+from cdpr_drake.models.robot_loader import as_robot
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.models.robot_statics import as_pose
+from cdpr_drake.planning.path_timing import STATIONS, PathPlan
+from cdpr_drake.planning.proven_path import SEQUENCES, proven_motion
+from cdpr_drake.schema.typed_yaml import closest
+from cdpr_drake.workspaces.proven_cells import CELLS
+from cdpr_drake.workspaces.proven_sets import COVER
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+ACCELERATION = 0.25
+"""Half width of the box of accelerations that is proven, where nobody says and nothing turns
+[m/s^2]."""
+
+JUDGED = 2000
+"""Samples of a motion that are judged by the exact checks of poses."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ProvenSettings:
+    """What is asked of a proven motion.
+
+    Attributes:
+        least: length or time.
+        obstacles: What cables and platform stay off, as `ProvenSets.find` takes it, or a file.
+        accelerations: Half widths of the box of accelerations that the motion stays in, one or
+            three; 0: none, so that only poses are proven; None: `ACCELERATION`, or none where the
+            orientation changes [m/s^2].
+        clearance: Least clearance of cables and platform [m].
+        method: sequences or gcs.
+        boxes: Boxes that are judged.
+        cells: Cells of the raster on which they are merged.
+        cover: Share of the proven cells that sets cover.
+        sequences: Sequences of sets that are looked at.
+        stations: Points of the path at which limits are asked.
+        sets: Sets that were found before, in place of new ones.
+    """
+
+    least: str = "length"
+    obstacles: Any = None
+    accelerations: Array | float | None = None
+    clearance: float = 0.0
+    method: str = "sequences"
+    boxes: int = BOXES
+    cells: int = CELLS
+    cover: float = COVER
+    sequences: int = SEQUENCES
+    stations: int = STATIONS
+    sets: ProvenSets | None = None
+
+
+ASKED = tuple(field.name for field in fields(ProvenSettings))
+"""What `plan_proven_motion` can be asked for by name."""
+
+
+class DrawnProvenPlan(ProvenRun):
+    """A `ProvenRun` that draws itself."""
+
+    def plot(self) -> Figure:
+        """Sets, obstacles and the path."""
+        from cdpr_drake.analyses.planning.proven_plan_figures import sets_figure
+
+        return sets_figure(self)
+
+
+def plan_proven_motion(
+    robot: Robot | str | Path,
+    start: object,
+    goal: object,
+    limits: Limits = None,
+    *,
+    pulleys: bool = True,
+    track: bool = False,
+    say: Say | None = None,
+    **asked: Any,
+) -> DrawnProvenPlan:
+    """A motion of a robot from one pose to another in sets of poses that are proven.
+
+    At one orientation, and with accelerations, it is proven of every instant that tensions within
+    the limits (less the reserve) give the motion, and that cables and platform meet nothing.
+
+    Args:
+        robot: The robot, or its name or path.
+        start: X_WP at its start, as `as_pose` takes it [m]; None: the home pose.
+        goal: X_WP at its end, likewise.
+        limits: As of `plan_path`.
+        pulleys: Whether the cables run over the robot's pulleys.
+        track: Whether the simulated robot also tracks the motion.
+        say: Told what is done now.
+        asked: Fields of `ProvenSettings`.
+
+    Raises:
+        PlanningError: The sets do not connect the poses, or something is not accepted.
+        WorkspaceError: Something does not hold at an end, or is not proven there: which kind, and
+            numbers.
+    """
+    for name in asked:
+        if name not in ASKED:
+            raise PlanningError(f"{name!r} is unknown; {closest(name, ASKED)}")
+    settings, tell = ProvenSettings(**asked), say or _silent
+    loaded, given = as_robot(robot, "plan_proven_motion"), chosen_limits(limits)
+    task = planned_for(loaded, given, pulleys)
+    ends = [pose_numbers(as_pose(loaded, pose)) for pose in (start, goal)]
+    obstacles = settings.obstacles
+    if isinstance(obstacles, str | Path):
+        obstacles = load_obstacles(Path(obstacles))
+    begin = time.perf_counter()
+    sets = settings.sets
+    if sets is None:
+        proof = ProofSettings(
+            boxes=settings.boxes, cells=settings.cells, clearance=settings.clearance,
+            limits=(task.limits.lower, task.limits.upper), pulleys=pulleys,
+        )  # fmt: skip
+        sets = ProvenSets.find(
+            loaded, None, np.array([end[3:] for end in ends]), obstacles,
+            _accelerations(settings, ends), cover=settings.cover, must=ends, settings=proof,
+            say=tell,
+        )  # fmt: skip
+    else:
+        _check_ends(sets, ends)
+    between = time.perf_counter()
+    try:
+        found = proven_motion(
+            sets, ends[0], ends[1], task, length_scale(loaded), cost=settings.least,
+            method=settings.method, count=settings.sequences, stations=settings.stations, say=tell,
+        )  # fmt: skip
+    except PlanningError as problem:
+        if not sets.cut or "do not connect" not in str(problem):
+            raise
+        raise PlanningError(
+            f"{problem}; {sets.cut} open cells between them were cut further"
+        ) from problem
+    took = time.perf_counter() - between
+    arguments = limits_told(given, pulleys) | {
+        "from": _degrees(ends[0]),
+        "to": _degrees(ends[1]),
+        **{
+            name: _plain(value)
+            for name, value in asked.items()
+            if name not in ("sets", "obstacles")
+        },
+    }
+    run = DrawnProvenPlan(
+        robot=loaded, limits=task.limits, arguments=arguments, planning_time=took, found=found,
+        sets_time=between - begin, judged=judged(sets, found.plan, JUDGED),
+    )  # fmt: skip
+    own, log = tracked_by(loaded, given, found.plan, say, track)
+    return replace(run, limits=own, tracked=log)
+
+
+def judged(sets: ProvenSets, plan: PathPlan, count: int) -> tuple[int, dict[str, int]]:
+    """Samples of a motion, evenly in time, and of each kind at how many it fails exactly."""
+    motion = plan.trajectory
+    times = np.linspace(motion.start_time, motion.end_time, count)
+    poses = [motion.pose(t) for t in times]
+    found = sets.judge(
+        np.array([X.translation() for X in poses]),
+        np.array([X.rotation().matrix() for X in poses]),
+    )
+    return count, {name: int(np.count_nonzero(~holds)) for name, holds in found.items()}
+
+
+def _accelerations(settings: ProvenSettings, ends: list[Array]) -> Array | float | None:
+    given = settings.accelerations
+    if given is None:
+        return ACCELERATION if np.array_equal(ends[0][3:], ends[1][3:]) else None
+    return None if np.ndim(given) == 0 and given == 0.0 else given
+
+
+def _check_ends(sets: ProvenSets, ends: list[Array]) -> None:
+    for where, pose in zip(("from", "to"), ends, strict=True):
+        if not sets.covers(pose):
+            why = explain_pose(sets, pose) if sets.conditions is not None else ""
+            raise WorkspaceError(
+                f"{where}: lies in none of {len(sets)} sets{': ' * bool(why)}{why}; accepted: a "
+                "pose in one of them"
+            )
+
+
+def _degrees(numbers: Array) -> list[float]:
+    """x, y, z [m], phi, theta, psi [deg]."""
+    return [*numbers[:3].tolist(), *np.degrees(numbers[3:]).tolist()]
+
+
+def _plain(value: object) -> object:
+    return value.tolist() if isinstance(value, np.ndarray) else value
+
+
+def _silent(words: str) -> None:
+    """Tells nobody."""

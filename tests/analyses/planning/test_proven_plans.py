@@ -1,0 +1,177 @@
+"""Proven motions from the command line: judged exactly, refused in one line, tracked."""
+
+import json
+
+import numpy as np
+import pytest
+
+from cdpr_drake.analyses.front.proven_motions import plan_proven_motion
+from cdpr_drake.analyses.simulation.tension_control_run import run_tension_scenario
+from cdpr_drake.analyses.workspaces.proven_sets import (
+    ProofSettings,
+    ProvenSets,
+    accelerated_wrenches,
+)
+from cdpr_drake.cli.app import main
+from cdpr_drake.errors import PlanningError, WorkspaceError
+from cdpr_drake.geometry.poses import rotation_from_angles
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_statics import rigid_platform
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.workspaces.cable_interference import box_row
+from cdpr_drake.workspaces.demanded_wrenches import spatial_inertias
+from cdpr_drake.workspaces.proven_sets import PoseSets
+from tests.messages import printed
+
+ENDS = ["--from=-0.15,0,0.25", "--to=0.15,0,0.25"]
+LOW = "boxes: [{pose: {position: [0, 0, 0.12]}, size: [0.04, 0.5, 0.24]}]\n"
+BOXES = 6000
+ROBOT = "acrobot_small"
+
+
+def run(capsys, *words):
+    with pytest.raises(SystemExit) as end:
+        main(["plan", *words])
+    out, err = printed(capsys)
+    return end.value.code, out, err
+
+
+@pytest.fixture(scope="module")
+def planned(tmp_path_factory):
+    """Over a low wall."""
+    folder = tmp_path_factory.mktemp("proven")
+    (folder / "wall.yaml").write_text(LOW)
+    with pytest.raises(SystemExit) as end:
+        main([
+            "plan", ROBOT, "--proven", *ENDS, "--obstacles", str(folder / "wall.yaml"),
+            "--no-pulleys", "--boxes", str(BOXES), "--out", str(folder / "out"), "--json",
+        ])  # fmt: skip
+    assert end.value.code == 0
+    return folder / "out"
+
+
+def test_the_command_writes_a_motion_that_is_proven_and_tracked(planned):
+    told = json.loads((planned / "summary.json").read_text())
+    assert told["proven"]["path"] and told["proven"]["motion"]
+    assert told["judged_samples"] == 2000
+    assert told["judged_infeasible"] == {
+        "wrench-feasible": 0, "interference-free": 0, "collision-free": 0,
+    }  # fmt: skip
+    assert told["straight_m"] < told["lower_bound"] <= told["shortest_polyline_m"]
+    assert told["cost"] == told["path_length_m"]
+    assert max(told["largest_accelerations_m_s2"]) <= 0.25 * (1.0 + 1e-9)
+    assert told["tracked"]["keeps_limits"]
+    assert told["largest_share_of_limits"] <= 1.0
+    table = np.genfromtxt(planned / "motion.csv", delimiter=",", names=True)
+    assert table["x_m"][0] == pytest.approx(-0.15, abs=1e-12)
+    assert table["x_m"][-1] == pytest.approx(0.15, abs=1e-9)
+    assert np.max(table["z_m"]) > 0.27  # over the wall with the platform below Po
+    for figure in ("sets", "accelerations", "tensions", "winches", "path"):
+        assert (planned / f"{figure}.png").stat().st_size > 10_000
+
+
+def test_the_sets_that_are_written_hold_the_motion(planned):
+    told = json.loads((planned / "summary.json").read_text())
+    sets = PoseSets.load(planned / "sets.yaml")
+    assert len(sets) == told["sets"]["count"]
+    assert sets.about["kinds"] == ["wrench-feasible", "interference-free", "collision-free"]
+    table = np.genfromtxt(planned / "motion.csv", delimiter=",", names=True)
+    for row in table[::100]:
+        assert sets.covers(np.array([row["x_m"], row["y_m"], row["z_m"], 0, 0, 0]))
+
+
+def test_a_scenario_tracks_it(planned):
+    scenario = load_scenario(
+        "acrobot_computed_torque",
+        [
+            f"robot={ROBOT}", f"trajectory.file={planned / 'motion.csv'}",
+            "trajectory.pause=0.02", "duration=0.5", "integration.engine=compiled",
+        ],
+    )  # fmt: skip
+    assert run_tension_scenario(scenario).log["failures"][-1, 0] == 0
+
+
+def test_sets_are_the_same_every_time_and_used_again(tmp_path):
+    wall = np.array([box_row([0, 0, 0.12], [0.04, 0.5, 0.24])])
+    ends = [np.array([x, 0.0, 0.25, 0, 0, 0]) for x in (-0.15, 0.15)]
+
+    def found():
+        return ProvenSets.find(
+            ROBOT, None, None, wall, 0.25, must=ends,
+            settings=ProofSettings(boxes=BOXES, pulleys=False, cells=2**15),
+        )  # fmt: skip
+
+    first = found()
+    assert first.save(tmp_path / "a").read_bytes() == found().save(tmp_path / "b").read_bytes()
+    random = np.random.default_rng(0)
+    number = random.integers(0, len(first), 3000)
+    poses = random.uniform(first.lower[number], first.upper[number])[:, :3]
+    held = first.judge(poses, np.repeat(np.eye(3)[np.newaxis], 3000, axis=0))
+    assert all(np.all(one) for one in held.values())  # the exact checks say so, too
+    everywhere = random.uniform(*load_robot(ROBOT).reach(), (3000, 3))
+    some = first.judge(everywhere, np.repeat(np.eye(3)[np.newaxis], 3000, axis=0))
+    assert all(0.0 < np.mean(one) < 1.0 for one in some.values())  # and can say otherwise
+    start, goal = (pose[:3].tolist() for pose in ends)
+    fast = plan_proven_motion(
+        ROBOT, _pose(start), _pose(goal), pulleys=False, sets=first, least="time"
+    )
+    short = plan_proven_motion(ROBOT, _pose(start), _pose(goal), pulleys=False, sets=first)
+    assert fast.motion.end_time <= short.motion.end_time
+    assert fast.as_dict()["lower_bound"] <= fast.motion.end_time
+    assert "proven motion" in short.summary()[0]
+    with pytest.raises(WorkspaceError, match=r"to: lies in none of \d+ sets: wrench-feasible"):
+        plan_proven_motion(ROBOT, _pose(start), _pose([0.5, 0, 0.3]), pulleys=False, sets=first)
+
+
+def _pose(position):
+    X = np.eye(4)
+    X[:3, 3] = position
+    return X
+
+
+def test_accelerations_without_turns_are_wrenches_on_the_platform_at_rest():
+    robot = load_robot("caroca")
+    body, angles, a = rigid_platform(robot), np.array([0.1, -0.2, 0.3]), np.array([0.2, 0.3, 0.5])
+    found = accelerated_wrenches(robot, a, angles).vertices
+    R = rotation_from_angles(angles).matrix()
+    assert len(np.unique(found, axis=0)) == 8
+    np.testing.assert_allclose(np.max(found[:, 3:], axis=0), body.mass * a)
+    c = R @ body.p_PCo
+    np.testing.assert_allclose(found[:, :3], np.cross(c, found[:, 3:]), atol=1e-12)
+    assert spatial_inertias(body.mass, body.p_PCo, body.I_PPo, R).shape == (1, 6, 6)
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--proven", ENDS[0]], "--to: found none with --proven"),
+        (["--proven", *ENDS, "--free"], "--proven: found --free too"),
+        (["--proven", *ENDS, "--knots", "5"], "--proven: found --knots too"),
+        (["--proven", *ENDS, "--waypoints", "0,0,1;0,0,2"], "--proven: found --waypoints too"),
+        (["--time", "--waypoints", "0,0,1;0,0,2"], "--time: accepted with --proven"),
+        (["--proven", *ENDS, "--acceleration", "-1"], "--acceleration: found '-1'"),
+        (["--proven", *ENDS, "--acceleration", "1,2"], "--acceleration: found '1,2'"),
+        (["--proven", *ENDS, "--boxes", "0"], "--boxes: found 0"),
+        (["--proven", *ENDS, "--obstacles", "none.yaml"], "none.yaml: there is no such file"),
+        (["--proven", ENDS[0], "--to=0.5,0,0.2", "--boxes", "500"], "wrench-feasible fails: capac"),
+        (["--proven", ENDS[0], "--to=0.15,0,0.25,0,0,9", "--acceleration", "1"],
+         "accelerations: found with a range of angles"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_asked_is_refused_in_one_line(capsys, tmp_path, words, message):
+    code, _, err = run(capsys, ROBOT, *words, "--out", str(tmp_path / "out"))
+    assert code == 2
+    assert message in err
+    assert len([line for line in err.splitlines() if line.startswith("cdpr")]) == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_poses_that_sets_do_not_connect_are_refused_in_words():
+    lower, upper = np.zeros((2, 6)), np.zeros((2, 6))
+    lower[:, :3], upper[:, :3] = [[-0.2, -0.1, 0.2], [0.1, -0.1, 0.2]], [[-0.1, 0.1, 0.3]] * 2
+    upper[1, 0] = 0.2
+    made = ProvenSets(
+        lower, upper, np.arange(3), {"accelerations_m_s2": None, "obstacles": [], "kinds": []}, cut=7
+    )
+    with pytest.raises(PlanningError, match="do not connect; accepted: .*; 7 open cells between"):
+        plan_proven_motion(ROBOT, _pose([-0.15, 0, 0.25]), _pose([0.15, 0, 0.25]), sets=made)

@@ -1,0 +1,214 @@
+"""Boxes merged to few sets: what they hold is proven, and what was connected stays connected."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pydrake.geometry.optimization import LoadIrisRegionsYamlFile, Point
+from pydrake.planning import GcsTrajectoryOptimization
+from scipy import ndimage
+
+from cdpr_drake.errors import DataFileError, WorkspaceError
+from cdpr_drake.workspaces.box_expansion_kernel import INSIDE, OPEN, OUTSIDE
+from cdpr_drake.workspaces.certified_boxes import CertifiedBoxes, PoseBox
+from cdpr_drake.workspaces.cuboid_cover import SumTable, cover_cells, set_groups
+from cdpr_drake.workspaces.cuboid_cover_kernel import count_cells, overlapping_pairs
+from cdpr_drake.workspaces.proven_cells import ProvenCells, raster_shape, whole_cells
+from cdpr_drake.workspaces.proven_sets import PoseSets, sets_of_cells
+
+FLAT = PoseBox(np.array([-1.0, 0.0, 0.5, 0, 0, 0]), np.array([1.0, 3.0, 0.5, 0, 0, 0]))
+
+
+def random_cells(seed, shape, share=0.6):
+    """Blobs: random numbers, smoothed, above a share."""
+    noise = ndimage.gaussian_filter(np.random.default_rng(seed).normal(size=shape), 1.0)
+    return noise > np.quantile(noise, 1.0 - share)
+
+
+def cut_boxes(seed, box, axes, depth):
+    """A box cut in halves at random, with random verdicts, as `certify` cuts."""
+    random = np.random.default_rng(seed)
+    middle, half = 0.5 * (box.lower + box.upper), 0.5 * (box.upper - box.lower)
+    stack, done = [(middle, half, 0)], []
+    while stack:
+        pose, size, level = stack.pop()
+        if level == depth or random.random() < 0.15:
+            done.append((pose, size, random.choice([INSIDE, OPEN, OUTSIDE], p=[0.85, 0.1, 0.05])))
+            continue
+        axis = random.choice(axes)
+        size = size.copy()
+        size[axis] *= 0.5
+        for side in (-1.0, 1.0):
+            moved = pose.copy()
+            moved[axis] += side * size[axis]
+            stack.append((moved, size, level + 1))
+    poses, halves, verdicts = (np.array(part) for part in zip(*done, strict=True))
+    return CertifiedBoxes(poses, halves, verdicts, np.zeros((1, 4)), True)
+
+
+def test_a_cell_is_whole_where_boxes_fill_it_also_small_ones():
+    axes, shape, count = np.array([0, 1]), (8, 4), 0
+    ticks = [
+        FLAT.lower[a] + (FLAT.upper - FLAT.lower)[a] * (np.arange(64) + 0.5) / 64 for a in axes
+    ]
+    poses = np.repeat(FLAT.lower[np.newaxis], 64 * 64, axis=0)
+    poses[:, :2] = np.stack(np.meshgrid(*ticks, indexing="ij"), axis=-1).reshape(-1, 2)
+    for seed in range(6):
+        boxes = cut_boxes(seed, FLAT, axes, 6)
+        found = whole_cells(boxes, INSIDE, FLAT, axes, shape)
+        inside = boxes.at(poses) == INSIDE
+        np.testing.assert_array_equal(found, inside.reshape(8, 8, 4, 16).all(axis=(1, 3)))
+        count += np.count_nonzero(found)
+    assert 10 < count < 6 * 32 - 10
+
+
+@given(st.integers(0, 2**20), st.sampled_from([(12, 9), (7, 6, 8), (5, 4, 5, 3)]))
+@settings(max_examples=40, deadline=None)
+def test_sets_are_good_cover_and_keep_what_is_connected(seed, shape):
+    good = random_cells(seed, shape)
+    parts, _ = ndimage.label(good)
+    cells = np.argwhere(good)
+    must = cells[np.random.default_rng(seed).integers(0, len(cells), 3)]
+    found = cover_cells(good, 0.9, must)
+    covered = np.zeros(shape, bool)
+    held_by = np.zeros(shape, int)
+    for low, high in found.tolist():
+        place = tuple(slice(a, b) for a, b in zip(low, high, strict=True))
+        assert np.all(good[place])  # what a set holds is proven
+        for axis in range(len(shape)):  # and no layer can be added
+            for edge, inner in ((low[axis] - 1, 0), (high[axis], 1)):
+                if 0 <= edge < shape[axis]:
+                    layer = list(place)
+                    layer[axis] = slice(edge, edge + 1)
+                    assert not np.all(good[tuple(layer)]), inner
+        covered[place] = True
+        held_by[place] += 1
+    assert np.count_nonzero(covered) >= 0.9 * np.count_nonzero(good)
+    assert np.all(covered[tuple(must.T)])
+    groups = set_groups(found)
+    part = parts[tuple(found[:, 0].T)]
+    for one in np.unique(part):  # one part of the cells, one group of the sets
+        assert len(np.unique(groups[part == one])) == 1
+    for one in np.unique(groups):
+        assert len(np.unique(part[groups == one])) == 1
+    assert np.array_equal(found, cover_cells(good, 0.9, must))
+
+
+def test_a_cover_that_is_not_connected_gets_the_cells_between():
+    good = np.zeros((30, 9), bool)
+    good[:10], good[20:] = True, True
+    good[10:20, 4] = True  # a corridor of 10 of 190 cells, which a share of 0.9 need not cover
+    loose = cover_cells(good, 0.9, np.zeros((0, 2)))
+    assert len(np.unique(set_groups(loose))) == 1
+    assert np.any((loose[:, 0, 0] <= 12) & (loose[:, 1, 0] >= 14))
+
+
+def test_counts_of_cells_are_those_of_slices():
+    cells = random_cells(3, (5, 6, 4))
+    table = SumTable.of(cells)
+    low, high = np.array([1, 0, 2]), np.array([4, 5, 4])
+    assert count_cells(table.flat, table.strides, low, high) == cells[1:4, 0:5, 2:4].sum()
+
+
+@pytest.mark.parametrize(
+    ("good", "share", "must", "words"),
+    [
+        (np.zeros((3, 3), bool), 0.9, np.zeros((0, 2)), "no cell that is proven"),
+        (np.ones((3, 3), bool), 0.0, np.zeros((0, 2)), "cover: found 0"),
+        (np.ones((3, 3), bool), 1.5, np.zeros((0, 2)), "cover: found 1.5"),
+        (np.eye(3, dtype=bool), 0.9, np.array([[0, 1]]), "must: found a cell"),
+    ],
+)
+def test_what_cannot_be_covered_is_refused(good, share, must, words):
+    with pytest.raises(WorkspaceError, match=words):
+        cover_cells(good, share, must)
+
+
+def made_sets(seed=5):
+    axes, shape = raster_shape(FLAT, 1.0, 2**7)
+    inside = random_cells(seed, shape, 0.7)
+    cells = ProvenCells(FLAT, axes, inside, ~inside)
+    lower, upper, _ = sets_of_cells(cells, 0.95)
+    return PoseSets(lower, upper, axes, {"robot": "made", "kinds": ["static"]}, cells)
+
+
+def test_shape_of_the_raster_follows_the_box():
+    axes, shape = raster_shape(FLAT, 1.0, 2**7)
+    assert axes.tolist() == [0, 1]
+    assert shape == (8, 16)  # 2 m and 3 m: 0.25 m and 0.1875 m
+
+
+def test_sets_cover_poses_of_their_cells_and_no_other():
+    sets = made_sets()
+    cells = sets.cells
+    random = np.random.default_rng(0)
+    poses = np.repeat(FLAT.lower[np.newaxis], 500, axis=0)
+    poses[:, :2] = random.uniform(FLAT.lower[:2], FLAT.upper[:2], (500, 2))
+    for pose in poses:
+        inside = np.any(cells.inside[tuple(cells.cells_at(pose).T)])
+        assert inside or not sets.covers(pose)
+    other = poses[0].copy()
+    other[5] = 0.1
+    assert not sets.covers(other)
+    assert not len(cells.cells_at(other))
+
+
+def test_a_pose_on_a_border_lies_in_the_cells_on_both_sides():
+    cells = made_sets().cells
+    pose = FLAT.lower.copy()
+    pose[:2] = cells.edges(np.array([2, 3]))
+    assert sorted(map(tuple, cells.cells_at(pose).tolist())) == [(1, 2), (1, 3), (2, 2), (2, 3)]
+    pose[0] = 2.0
+    assert not len(cells.cells_at(pose))
+
+
+def test_what_is_saved_is_read_again_and_has_the_same_bytes(tmp_path):
+    sets = made_sets()
+    first, second = sets.save(tmp_path / "a.yaml"), made_sets().save(tmp_path / "b.yaml")
+    assert first.read_bytes() == second.read_bytes()
+    read = PoseSets.load(first)
+    for name in ("lower", "upper", "axes", "graph"):
+        np.testing.assert_array_equal(getattr(read, name), getattr(sets, name))
+    assert read.about == sets.about
+    regions = LoadIrisRegionsYamlFile(first, "regions")
+    assert len(regions) == len(sets)
+    assert regions["set_00000"].PointInSet(0.5 * (sets.lower + sets.upper)[0, :2])
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [("about:", "abut:"), ("- x", "- q"), ("z: 0.5", "y: 0.5"), ("regions:", "region:")],
+)
+def test_a_damaged_file_is_refused_by_name(tmp_path, old, new):
+    file = made_sets().save(tmp_path / "sets.yaml")
+    text = file.read_text()
+    assert old in text
+    file.write_text(text.replace(old, new, 1))
+    with pytest.raises(DataFileError, match=r"sets\.yaml: found"):
+        PoseSets.load(file)
+    with pytest.raises(DataFileError, match="no such file"):
+        PoseSets.load(tmp_path / "none.yaml")
+
+
+def test_regions_go_into_drakes_graph_of_convex_sets():
+    boxes = np.array([[0, 0, 2, 1], [1, 0, 3, 3], [0, 2, 2, 4]], float)
+    lower, upper = np.zeros((3, 6)), np.zeros((3, 6))
+    lower[:, :2], upper[:, :2] = boxes[:, :2], boxes[:, 2:]
+    sets = PoseSets(lower, upper, np.array([0, 1]))
+    assert sets.graph.tolist() == [[0, 1], [1, 2]]
+    gcs = GcsTrajectoryOptimization(2)
+    middle = gcs.AddRegions(sets.regions(), 1, 0.0, 100.0)
+    start = gcs.AddRegions([Point([0.2, 0.5])], 0)
+    goal = gcs.AddRegions([Point([0.2, 3.5])], 0)
+    gcs.AddEdges(start, middle)
+    gcs.AddEdges(middle, goal)
+    gcs.AddPathLengthCost(1.0)
+    way, result = gcs.SolvePath(start, goal)
+    assert result.is_success()
+    assert way.value(way.end_time()).ravel() == pytest.approx([0.2, 3.5], abs=1e-5)
+
+
+def test_boxes_that_touch_share_no_set():
+    lower, upper = np.array([[0.0, 0.0], [1.0, 0.0]]), np.array([[1.0, 1.0], [2.0, 1.0]])
+    assert not len(overlapping_pairs(lower, upper, 2))
+    assert overlapping_pairs(lower, upper, 1).tolist() == [[0, 1]]
