@@ -1,0 +1,210 @@
+"""Constraints of where the platform and its cables are, for any MathematicalProgram."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+from pydrake.math import RigidTransform
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.errors import PlanningError
+from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.geometry.straight_cables import ALL_ROWS
+from cdpr_drake.planning.clearance_kernel import VIEW_ROWS, cable_gaps, view_gaps
+from cdpr_drake.planning.pose_constraint import PoseConstraint
+from cdpr_drake.planning.pose_coordinates import Coordinates
+from cdpr_drake.planning.pose_coordinates_kernel import SEEDS
+from cdpr_drake.planning.rate_kernel import least_stiffness
+from cdpr_drake.planning.tension_constraints import cable_names, check_cables
+
+SHARED = 1e-9
+"""Cables whose exit or anchor points are nearer share it, and always touch there [m]."""
+
+
+class PlaceWithin(PoseConstraint):
+    """Po within a box of W."""
+
+    description = "place"
+
+    def __init__(self, coordinates: Coordinates, lower: Array, upper: Array) -> None:
+        """With its corners, shape (3,) [m].
+
+        Raises:
+            PlanningError: The box has no inside.
+        """
+        low, high = np.asarray(lower, float), np.asarray(upper, float)
+        if not np.all(low < high):
+            raise PlanningError(
+                f"box: found {low} to {high} m with its margin; accepted: an inside"
+            )
+        super().__init__(coordinates, low, high, ("x", "y", "z"))
+        self._slopes = np.zeros((3, SEEDS))
+        self._slopes[:, 3:6] = np.eye(3)
+
+    def at_points(self, points: Array, extra: Array) -> tuple[Array, Array, Array | None]:
+        """As the base class says."""
+        return points[:, 4:7], np.broadcast_to(self._slopes, (len(points), 3, SEEDS)), None
+
+
+class PlatformSpeed(PoseConstraint):
+    """Speed of Po within a limit: one row, its square over the limit's."""
+
+    description, order = "speed of Po", 1
+
+    def __init__(self, coordinates: Coordinates, limit: float) -> None:
+        """With the largest speed [m/s]."""
+        super().__init__(coordinates, np.zeros(1), np.ones(1), ("Po",))
+        self._limit = limit
+
+    def at_points(self, points: Array, extra: Array) -> tuple[Array, Array, Array | None]:
+        """As the base class says."""
+        v = points[:, 10:13] / self._limit
+        slopes = np.zeros((len(points), 1, SEEDS))
+        slopes[:, 0, 9:12] = 2.0 * v / self._limit
+        return np.sum(v * v, axis=1, keepdims=True), slopes, None
+
+
+class CableClearance(PoseConstraint):
+    """Centre lines of cables that share no point stay a distance apart, a row for each pair [m].
+
+    Over pulleys they are lines from the tangent points. A distance is at least 0, and has no
+    derivative where cables cross.
+    """
+
+    description = "cables apart"
+
+    def __init__(
+        self, cables: CableSet, coordinates: Coordinates, distance: float, names: list[str] | None = None
+    ) -> None:
+        """With the least distance [m].
+
+        Raises:
+            PlanningError: It is negative, or cables run over pulleys of the platform.
+        """
+        check_cables(cables)
+        if not (np.isfinite(distance) and distance >= 0.0):
+            raise PlanningError(f"distance: found {distance:g} m; accepted: at least 0")
+        words = names or cable_names(cables.count)
+        A, B = cables.p_WA.T, cables.p_PB.T
+        pairs = [
+            (i, j)
+            for i, j in combinations(range(cables.count), 2)
+            if np.linalg.norm(A[i] - A[j]) > SHARED and np.linalg.norm(B[i] - B[j]) > SHARED
+        ]
+        rows = [f"{words[i]} and {words[j]}" for i, j in pairs]
+        p = len(pairs)
+        super().__init__(coordinates, np.full(p, distance), np.full(p, np.inf), rows)
+        self._cables, self._pairs = cables.packed(), np.array(pairs, np.int64).reshape(-1, 2)
+
+    def at_points(self, points: Array, extra: Array) -> tuple[Array, Array, Array | None]:
+        """As the base class says."""
+        shape = (len(points), len(self._pairs))
+        values, slopes = np.empty(shape), np.empty((*shape, SEEDS))
+        cable_gaps(points, self._cables, self._pairs, values, slopes)
+        return values, slopes, None
+
+
+class TargetInView(PoseConstraint):
+    """Points of W are in the view of a camera on the platform; five rows each [m].
+
+    Source: servoing thesis, chapter 4, where the target stays in view.
+    """
+
+    description = "view"
+
+    def __init__(
+        self,
+        coordinates: Coordinates,
+        X_PC: RigidTransform,
+        slopes: tuple[float, float],
+        points: Array,
+        nearest: float,
+    ) -> None:
+        """With the camera and what it shall see.
+
+        Args:
+            coordinates: As of the base class.
+            X_PC: Pose of the camera C, z forward [m].
+            slopes: Tangents of half of the view's angles along x and y of C.
+            points: p_WQ, shape (3, q) [m].
+            nearest: Least depth z of the points in C, above 0 [m].
+
+        Raises:
+            PlanningError: The depth or the slopes are not above 0, or there are no points.
+        """
+        marks = np.ascontiguousarray(np.asarray(points, float).T)
+        if marks.ndim != 2 or marks.shape[0] == 0 or marks.shape[1] != 3:
+            raise PlanningError(
+                f"points: found shape {np.shape(points)}; accepted: (3, q), at least one"
+            )
+        if not (nearest > 0.0 and min(slopes) > 0.0):
+            raise PlanningError(
+                f"view: found a nearest depth of {nearest:g} m and slopes {slopes}; accepted: "
+                "above 0"
+            )
+        low = np.tile([0.0, 0.0, 0.0, 0.0, nearest], len(marks))
+        sides = ("right edge", "left edge", "lower edge", "upper edge", "nearness")
+        rows = [f"point {k + 1}, {side}" for k in range(len(marks)) for side in sides]
+        super().__init__(coordinates, low, np.full(len(low), np.inf), rows)
+        self._marks, self._slopes = marks, np.array(slopes, float)
+        R, p = X_PC.rotation().matrix(), X_PC.translation()
+        self._camera = np.concatenate([R.ravel(), p])
+
+    def at_points(self, points: Array, extra: Array) -> tuple[Array, Array, Array | None]:
+        """As the base class says."""
+        shape = (len(points), VIEW_ROWS * len(self._marks))
+        values, slopes = np.empty(shape), np.empty((*shape, SEEDS))
+        view_gaps(points, self._camera, self._slopes, self._marks, values, slopes)
+        return values, slopes, None
+
+
+class StiffnessAbove(PoseConstraint):
+    """The cables hold the platform at least so stiffly against any small displacement.
+
+    One row [N/m]: the least eigenvalue of the elastic stiffness J' diag(E S / l) J, displacements
+    (turn times a length, translation). l is the length from A to B: what tensions stretch, and the
+    stiffness of the tensions themselves, about t / l beside E S / l, is left out. Its gradient is
+    exact; where two eigenvalues are the same it has none, and that of one of them is given.
+
+    Source: Gazebo thesis (2.25) to (2.28), the passive part.
+    """
+
+    description = "stiffness"
+
+    def __init__(
+        self,
+        cables: CableSet,
+        coordinates: Coordinates,
+        least: float,
+        length: float,
+        motions: tuple[int, ...] = ALL_ROWS,
+    ) -> None:
+        """With the least stiffness.
+
+        Args:
+            cables: The cables, with their axial stiffness.
+            coordinates: As of the base class.
+            least: The least eigenvalue [N/m].
+            length: By which turns count as lengths, above 0 [m].
+            motions: Components that the platform can move, see `PlatformDynamics`.
+
+        Raises:
+            PlanningError: A number is not accepted, or cables run over pulleys of the platform.
+        """
+        check_cables(cables)
+        if not (np.isfinite(least) and np.isfinite(length) and length > 0.0):
+            raise PlanningError(
+                f"stiffness: found at least {least:g} N/m with a length of {length:g} m; "
+                "accepted: a number, and a length above 0"
+            )
+        super().__init__(coordinates, np.array([least]), np.array([np.inf]), ("least eigenvalue",))
+        self._packed, self._rows = cables.packed(), np.array(motions, np.int64)
+        self._length = float(length)
+
+    def at_points(self, points: Array, extra: Array) -> tuple[Array, Array, Array | None]:
+        """As the base class says."""
+        N = len(points)
+        values, slopes = np.empty((N, 1)), np.empty((N, 1, SEEDS))
+        least_stiffness(points, self._packed, self._rows, self._length, values, slopes)
+        return values, slopes, None
