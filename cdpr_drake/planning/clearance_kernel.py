@@ -12,6 +12,7 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.geometry.convex_distance_kernel import convex_distance
 from cdpr_drake.geometry.motion_kernel import floating_motion
 from cdpr_drake.geometry.pulley_kernel import pulley_geometry
 from cdpr_drake.planning.cable_derivatives_kernel import cross, dot, exit_derivative
@@ -138,3 +139,64 @@ def view_gaps(
             values[k, base + 4] = seen[2]
             for i in range(18):
                 slopes[k, base + 4, i] = c[2, i] if i < 6 else 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def obstacle_gaps(
+    points: Array, cables: Array, bodies: Array, body_starts: np.ndarray, body_radii: Array,
+    obstacles: Array, starts: np.ndarray, radii: Array, work: Array, values: Array, slopes: Array,
+) -> None:  # fmt: skip
+    """Writes signed distances of cables and of the platform's bodies from obstacles.
+
+    Args:
+        points: Points of a motion, shape (N, 19).
+        cables: `CableSet.packed()`, shape (m, 17).
+        bodies: Points of the platform's bodies in P, `convex_shapes.packed`, shape (k, 3) [m].
+        body_starts: Where each begins, shape (b + 1,).
+        body_radii: Radii, shape (b,) [m].
+        obstacles: Points of the obstacles in W, shape (l, 3) [m].
+        starts: Where each begins, shape (o + 1,).
+        radii: Radii, shape (o,) [m].
+        work: Of `convex_distance_kernel.convex_work` for the largest of all.
+        values: Gets the distances, for each obstacle those of the cables, then of the bodies, shape
+            (N, o (m + b)) [m].
+        slopes: Gets their derivatives by the seeds, shape (N, o (m + b), 18).
+    """
+    m, b = cables.shape[0], body_radii.shape[0]
+    A, B, E = np.empty((m, 3)), np.empty((m, 3)), np.empty((m, 3, 3))
+    moved, segment = np.empty((bodies.shape[0], 3)), np.empty((2, 3))
+    p, q, n = np.empty(3), np.empty(3), np.empty(3)
+    for k in range(points.shape[0]):
+        X = floating_motion(points[k])[:12]
+        cable_ends(X, cables, A, B, E)
+        for i in range(bodies.shape[0]):
+            x, y, z = bodies[i, 0], bodies[i, 1], bodies[i, 2]
+            moved[i, 0] = X[9] + X[0] * x + X[1] * y + X[2] * z
+            moved[i, 1] = X[10] + X[3] * x + X[4] * y + X[5] * z
+            moved[i, 2] = X[11] + X[6] * x + X[7] * y + X[8] * z
+        slopes[k] = 0.0
+        for o in range(radii.shape[0]):
+            corners = obstacles[starts[o] : starts[o + 1]]
+            for i in range(m):
+                row = o * (m + b) + i
+                if not np.isfinite(A[i, 0]):
+                    values[k, row] = np.nan
+                    continue
+                along, length = 0.0, 0.0
+                for j in range(3):
+                    segment[0, j], segment[1, j] = A[i, j], B[i, j]
+                gap = convex_distance(segment, corners, p, q, n, work)
+                for j in range(3):
+                    along += (p[j] - A[i, j]) * (B[i, j] - A[i, j])
+                    length += (B[i, j] - A[i, j]) ** 2
+                values[k, row] = gap - radii[o]
+                normal = (n[0], n[1], n[2])
+                add_cable_slope(X, B[i], E[i], along / length, normal, slopes[k, row])
+            for body in range(b):
+                row = o * (m + b) + m + body
+                own = moved[body_starts[body] : body_starts[body + 1]]
+                gap = convex_distance(own, corners, p, q, n, work)
+                values[k, row] = gap - radii[o] - body_radii[body]
+                turn = cross((p[0] - X[9], p[1] - X[10], p[2] - X[11]), (n[0], n[1], n[2]))
+                for j in range(3):
+                    slopes[k, row, j], slopes[k, row, 3 + j] = turn[j], n[j]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import combinations
 
 import numpy as np
@@ -10,8 +11,10 @@ from pydrake.math import RigidTransform
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import PlanningError
 from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.geometry.convex_distance_kernel import convex_work
+from cdpr_drake.geometry.convex_shapes import ConvexShape, packed
 from cdpr_drake.geometry.straight_cables import ALL_ROWS
-from cdpr_drake.planning.clearance_kernel import VIEW_ROWS, cable_gaps, view_gaps
+from cdpr_drake.planning.clearance_kernel import VIEW_ROWS, cable_gaps, obstacle_gaps, view_gaps
 from cdpr_drake.planning.pose_constraint import PoseConstraint
 from cdpr_drake.planning.pose_coordinates import Coordinates
 from cdpr_drake.planning.pose_coordinates_kernel import SEEDS
@@ -75,7 +78,11 @@ class CableClearance(PoseConstraint):
     description = "cables apart"
 
     def __init__(
-        self, cables: CableSet, coordinates: Coordinates, distance: float, names: list[str] | None = None
+        self,
+        cables: CableSet,
+        coordinates: Coordinates,
+        distance: float,
+        names: Sequence[str] | None = None,
     ) -> None:
         """With the least distance [m].
 
@@ -102,6 +109,65 @@ class CableClearance(PoseConstraint):
         shape = (len(points), len(self._pairs))
         values, slopes = np.empty(shape), np.empty((*shape, SEEDS))
         cable_gaps(points, self._cables, self._pairs, values, slopes)
+        return values, slopes, None
+
+
+class ObstacleClearance(PoseConstraint):
+    """Cables and the platform's bodies stay a distance from obstacles, a row each [m].
+
+    Of centre lines of the cables, from tangent points, and of surfaces of the convex shapes as they
+    are; below 0 where they overlap, by how deep. The distance of two faces or edges that are
+    parallel has a kink, and then the derivative is that of one of their points.
+    """
+
+    description = "obstacles"
+
+    def __init__(
+        self,
+        cables: CableSet,
+        coordinates: Coordinates,
+        obstacles: Sequence[ConvexShape],
+        bodies: Sequence[ConvexShape],
+        cable_distance: float,
+        platform_distance: float,
+        names: Sequence[str] | None = None,
+    ) -> None:
+        """With what stands in the way.
+
+        Args:
+            cables: The cables.
+            coordinates: As of the base class.
+            obstacles: In W, at least one.
+            bodies: Of the platform, in P.
+            cable_distance: Least distance of the cables' centre lines [m].
+            platform_distance: Least distance of the bodies [m].
+            names: Of the cables.
+
+        Raises:
+            PlanningError: There is no obstacle, or cables run over pulleys of the platform.
+        """
+        check_cables(cables)
+        if not obstacles:
+            raise PlanningError("obstacles: found none; accepted: at least one")
+        words = names or cable_names(cables.count)
+        own = [body.name or "the platform" for body in bodies]
+        rows = [
+            f"{who} and {one.name or f'obstacle {number}'}"
+            for number, one in enumerate(obstacles, 1)
+            for who in (*words, *own)
+        ]
+        each = [cable_distance] * cables.count + [platform_distance] * len(bodies)
+        low = np.tile(each, len(obstacles))
+        super().__init__(coordinates, low, np.full(len(low), np.inf), rows)
+        most = max(2, *(len(body.points) for body in bodies)) if bodies else 2
+        work = convex_work(most, max(len(one.points) for one in obstacles))
+        self._arguments = (cables.packed(), *packed(bodies), *packed(obstacles), work)
+
+    def at_points(self, points: Array, extra: Array) -> tuple[Array, Array, Array | None]:
+        """As the base class says."""
+        shape = (len(points), len(self.rows))
+        values, slopes = np.empty(shape), np.empty((*shape, SEEDS))
+        obstacle_gaps(points, *self._arguments, values, slopes)
         return values, slopes, None
 
 
