@@ -23,7 +23,7 @@ from cdpr_drake.analyses.planning.robot_path_task import (
     path_task,
     robot_limits,
 )
-from cdpr_drake.analyses.workspaces.workspace_files import load_obstacles
+from cdpr_drake.analyses.workspaces.workspace_files import load_obstacle_boxes
 from cdpr_drake.errors import PlanningError
 from cdpr_drake.geometry.poses import angles_from_rotation
 from cdpr_drake.models.robot_loader import as_robot
@@ -189,7 +189,7 @@ def plan_free_motion(
             raise PlanningError(f"{name!r} is unknown; {closest(name, ASKED)}")
     loaded, given = as_robot(robot, "plan_free_motion"), _limits(limits)
     if isinstance(asked.get("obstacles"), str | Path):
-        asked["obstacles"] = load_obstacles(Path(asked["obstacles"]))
+        asked["obstacles"] = load_obstacle_boxes(Path(asked["obstacles"]))
     settings = FreeSettings(start=as_pose(loaded, start), goal=as_pose(loaded, goal), **asked)
     task = _task(loaded, given, pulleys)
     begin = time.perf_counter()

@@ -339,9 +339,9 @@ def compute_workspace(
         asked: What kinds shall be asked for: `limits` (2,) [N], `mass` [kg], `wrench` (6,)
             [N m, N], `force` [N] and `moment` [N m] to resist along and about each axis, or
             `required`, a SpatialSet or a file; `accelerations`, `velocities`, `clearance` [m],
-            `obstacles`, rows of boxes or a file; `exit_free`, `anchor_free` [m], `scenario`,
-            `pulleys`, `method`, see `WorkspaceRequest` and `interference_bodies`. And what else is
-            found: `hull` (3,) [m], `certify` and more fields of `ShapeRequest`.
+            `obstacles`, rows of boxes, `Obstacles` or a file; `exit_free`, `anchor_free` [m],
+            `scenario`, `pulleys`, `method`, see `WorkspaceRequest` and `interference_bodies`. And
+            what else is found: `hull` (3,) [m], `certify` and more fields of `ShapeRequest`.
 
     Raises:
         StoppedError: The session stopped it before the grid was finished.

@@ -13,6 +13,7 @@ from cdpr_drake.errors import StabilityError
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.geometry.poses import pose_row
 from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.workspaces.cable_interference import ONLY_GIVEN
 from cdpr_drake.workspaces.pose_grid import WorkspaceGrid
 
 
@@ -42,7 +43,11 @@ def plain(value: Any) -> Any:
             names += ["anchor_pulley_radius", "anchor_swivel_axis"]
         return {"kind": "CableSet", **{name: plain(getattr(value, name)) for name in names}}
     if is_dataclass(value):
-        found = {field.name: plain(getattr(value, field.name)) for field in fields(value)}
+        found = {
+            field.name: plain(getattr(value, field.name))
+            for field in fields(value)
+            if not field.metadata.get(ONLY_GIVEN, False) or getattr(value, field.name)
+        }
         return {"kind": type(value).__name__, **found}
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}

@@ -9,11 +9,13 @@ from pathlib import Path
 import numpy as np
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import DataFileError, WrenchSetError
+from cdpr_drake.errors import CableGeometryError, DataFileError, WrenchSetError
+from cdpr_drake.geometry.convex_shapes import ConvexShape, mesh_vertices
 from cdpr_drake.models.robot_schema import Pose
-from cdpr_drake.schema.fields import array, section, sections
+from cdpr_drake.schema.fields import array, number, section, sections, text
 from cdpr_drake.schema.typed_yaml import load_typed
-from cdpr_drake.workspaces.cable_interference import box_row
+from cdpr_drake.workspaces.cable_distance_kernel import BOX_COLUMNS
+from cdpr_drake.workspaces.cable_interference import Obstacles, box_row
 from cdpr_drake.workspaces.demanded_wrenches import SpatialSet
 
 
@@ -39,10 +41,39 @@ class ObstacleBox:
 
 
 @dataclass(kw_only=True)
-class ObstacleFile:
-    """Boxes that cables and platform may not touch."""
+class ObstacleSphere:
+    """A ball that stands in the robot's frame."""
 
-    boxes: list[ObstacleBox] = sections("The boxes.")
+    position: np.ndarray = array("Its middle in W.", "m", (3,))
+    radius: float = number("Its radius.", "m", above=0.0)
+
+
+@dataclass(kw_only=True)
+class ObstacleCapsule:
+    """What is within a radius of a line in the robot's frame."""
+
+    start: np.ndarray = array("One end of the line in W.", "m", (3,))
+    end: np.ndarray = array("The other.", "m", (3,))
+    radius: float = number("The radius.", "m", above=0.0)
+
+
+@dataclass(kw_only=True)
+class ObstacleMesh:
+    """The convex hull of a mesh that stands in the robot's frame."""
+
+    file: str = text("Mesh in metres, beside this file: .obj; .stl and .ply with trimesh.")
+    pose: Pose = section("Pose of the mesh in W.", Pose)
+    scale: float = number("What its coordinates are multiplied by.", "-", 1.0, above=0.0)
+
+
+@dataclass(kw_only=True)
+class ObstacleFile:
+    """What cables and platform may not touch."""
+
+    boxes: list[ObstacleBox] = sections("Boxes.", required=False)
+    spheres: list[ObstacleSphere] = sections("Balls.", required=False)
+    capsules: list[ObstacleCapsule] = sections("Capsules.", required=False)
+    meshes: list[ObstacleMesh] = sections("Convex hulls of meshes.", required=False)
 
 
 def load_wrench_set(path: Path) -> SpatialSet:
@@ -67,19 +98,48 @@ def load_wrench_set(path: Path) -> SpatialSet:
     return wrenches
 
 
-def load_obstacles(path: Path) -> Array:
-    """Reads boxes, shape (o, 15), rows of `cable_interference.box_row`; keys as `ObstacleFile`.
+def load_obstacles(path: Path) -> Obstacles:
+    """Reads boxes, balls, capsules and convex hulls of meshes; keys as `ObstacleFile`.
 
     Raises:
-        DataFileError: The file cannot be read, or a value is not accepted.
+        DataFileError: The file or a mesh cannot be read, or a value is not accepted.
     """
     if not path.is_file():
         raise DataFileError(f"{path}: there is no such file of obstacles")
-    boxes = load_typed(ObstacleFile, path).boxes
-    X = [box.pose.transform() for box in boxes]
-    return np.array(
-        [
-            box_row(pose.translation(), box.size, pose.rotation().matrix())
-            for pose, box in zip(X, boxes, strict=True)
-        ]
-    )
+    found = load_typed(ObstacleFile, path)
+    if not (found.boxes or found.spheres or found.capsules or found.meshes):
+        raise DataFileError(
+            f"{path}: found no obstacle; accepted: some of boxes, spheres, capsules, meshes"
+        )
+    X = [box.pose.transform() for box in found.boxes]
+    boxes = [
+        box_row(pose.translation(), box.size, pose.rotation().matrix())
+        for pose, box in zip(X, found.boxes, strict=True)
+    ]
+    solids = [
+        ConvexShape.sphere(one.position, one.radius, f"sphere {k}")
+        for k, one in enumerate(found.spheres, 1)
+    ]
+    solids += [
+        ConvexShape.capsule(one.start, one.end, one.radius, f"capsule {k}")
+        for k, one in enumerate(found.capsules, 1)
+    ]
+    for k, one in enumerate(found.meshes):
+        try:
+            vertices = one.scale * mesh_vertices(path.parent / one.file)
+            solids.append(ConvexShape.mesh(vertices, name=one.file).moved(one.pose.transform()))
+        except CableGeometryError as problem:
+            raise DataFileError(f"{path}: meshes[{k}].file: {problem}") from problem
+    return Obstacles(np.array(boxes, float).reshape(-1, BOX_COLUMNS), tuple(solids))
+
+
+def load_obstacle_boxes(path: Path) -> Array:
+    """Reads obstacles for who knows boxes alone, shape (o, 15), rows of `box_row`.
+
+    Raises:
+        DataFileError: As `load_obstacles`, or there are other shapes.
+    """
+    found = load_obstacles(path)
+    if found.solids:
+        raise DataFileError(f"{path}: found {found.solids[0].name}; accepted here: boxes")
+    return found.boxes

@@ -30,7 +30,7 @@ from cdpr_drake.schema.typed_yaml import closest
 from cdpr_drake.systems.cameras.targets import TARGETS
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.tensions.methods import method_for
-from cdpr_drake.workspaces.cable_interference import Surroundings, beams, box_row
+from cdpr_drake.workspaces.cable_interference import Obstacles, Surroundings, beams, box_row
 from cdpr_drake.workspaces.demanded_wrenches import MotionDemand, SpatialSet
 from cdpr_drake.workspaces.pose_grid import WorkspaceGrid
 
@@ -110,7 +110,7 @@ class WorkspaceQuestion:
 
 def interference_bodies(
     robot: Robot,
-    obstacles: Array | None = None,
+    obstacles: Array | Obstacles | None = None,
     exit_free: float | None = None,
     anchor_free: float | None = None,
     pulleys: bool = False,
@@ -119,7 +119,7 @@ def interference_bodies(
 
     Args:
         robot: The robot.
-        obstacles: Boxes, shape (o, 15); None: none.
+        obstacles: Boxes, shape (o, 15), or these and convex shapes; None: none.
         exit_free: Length next to exit points that is not compared with the frame [m]; None: the
             thickness of the beams.
         anchor_free: Length next to anchor points that is not compared with the platform [m]; None:
@@ -135,14 +135,18 @@ def interference_bodies(
         deepest = float(np.max(np.min(inside, axis=0)))
         anchor_free = max(deepest, 0.0) + ANCHOR_DIAMETERS * float(np.max(robot.diameters()))
     cables = robot.cable_set()
+    there = Obstacles() if obstacles is None else obstacles
+    if not isinstance(there, Obstacles):
+        there = Obstacles(there)
     return Surroundings(
         cables if pulleys else cables.without_pulleys(),
         robot.diameters() / 2.0,
         body[np.newaxis],
         _fixtures(robot),
-        np.zeros((0, 15)) if obstacles is None else obstacles,
+        there.boxes,
         robot.frame.beam_width() if exit_free is None else exit_free,
         anchor_free,
+        there.solids,
     )
 
 

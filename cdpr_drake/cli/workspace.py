@@ -263,7 +263,10 @@ def workspace(
         float, typer.Option(help="How far cables and platform stay from others, at least [m].")
     ] = 0.0,
     obstacles: Annotated[
-        Path | None, typer.Option(help="YAML file of boxes that stand in the frame.")
+        Path | None,
+        typer.Option(
+            help="YAML file of what stands in the frame: boxes, spheres, capsules, meshes."
+        ),
     ] = None,
     anchor_free: Annotated[
         float | None,

@@ -2,6 +2,7 @@ from .cable_paths import cable_jacobian as cable_jacobian
 from .cable_routes import CableRoute as CableRoute
 from .cable_routes import CableRoutes as CableRoutes
 from .cable_set import CableSet as CableSet
+from .convex_shapes import ConvexShape as ConvexShape
 from .motion_kernel import Motion as Motion
 from .motion_kernel import joint_motion as joint_motion
 from .motion_type import MOTION_TYPES as MOTION_TYPES

@@ -1,3 +1,4 @@
+from .cable_interference import Obstacles as Obstacles
 from .cable_interference import beams as beams
 from .cable_interference import clearances as clearances
 from .certified_boxes import certify as certify

@@ -10,11 +10,17 @@ import numpy as np
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import WorkspaceError
 from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.geometry.convex_distance_kernel import convex_work
+from cdpr_drake.geometry.convex_shapes import ConvexShape, packed
 from cdpr_drake.numerics.kernel_calls import over_rows
 from cdpr_drake.workspaces.cable_distance_kernel import BOX_COLUMNS, PARTS, many_clearances
+from cdpr_drake.workspaces.convex_clearance_kernel import many_convex_clearances
 
 PART_NAMES = ("cable-cable", "cable-platform", "cable-frame", "cable-obstacle", "platform")
 """Columns of `clearances`; the last is the platform's, from frame and obstacles."""
+
+ONLY_GIVEN = "only given"
+"""In the metadata of a field: what was not given, and is empty, is not said of a question."""
 
 SAME_POINT = 1e-9
 """Cables whose exit or anchor points are nearer [m] share it; they always touch there."""
@@ -64,6 +70,24 @@ def beams(lower: Array, upper: Array, thickness: float) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
+class Obstacles:
+    """What stands in a robot's frame.
+
+    Attributes:
+        boxes: In W, shape (o, 15); rows of `box_row`.
+        solids: Convex shapes in W.
+    """
+
+    boxes: Array = field(default_factory=_no_boxes)
+    solids: tuple[ConvexShape, ...] = ()
+
+    def shapes(self) -> tuple[ConvexShape, ...]:
+        """All of them as convex shapes in W, boxes first."""
+        boxes = [ConvexShape.box(row, f"box {k}") for k, row in enumerate(self.boxes, 1)]
+        return (*boxes, *self.solids)
+
+
+@dataclass(frozen=True, eq=False)
 class Surroundings:
     """What cables and platform may meet. Cables are straight.
 
@@ -76,6 +100,7 @@ class Surroundings:
         exit_free: Length next to an exit point [m] that is not compared with the frame, which
             carries it.
         anchor_free: Length next to an anchor point [m] that is not compared with the platform.
+        solids: Convex shapes in W, obstacles beside the boxes.
     """
 
     cables: CableSet
@@ -85,6 +110,7 @@ class Surroundings:
     obstacles: Array = field(default_factory=_no_boxes)
     exit_free: float = 0.0
     anchor_free: float = 0.0
+    solids: tuple[ConvexShape, ...] = field(default=(), metadata={ONLY_GIVEN: True})
 
     def __post_init__(self) -> None:
         """Checks the lengths.
@@ -96,6 +122,15 @@ class Surroundings:
             value = getattr(self, name)
             if not (np.isfinite(value) and value >= 0.0):
                 raise WorkspaceError(f"{name}: found {value:g}; accepted: >= 0 [m]")
+
+    def platform_shapes(self) -> tuple[ConvexShape, ...]:
+        """The platform as convex shapes in P."""
+        return tuple(ConvexShape.box(row, "platform") for row in self.bodies)
+
+    def still_shapes(self) -> tuple[ConvexShape, ...]:
+        """All that stands in W as convex shapes: frame, boxes, solids."""
+        frame = [ConvexShape.box(row, f"frame {k}") for k, row in enumerate(self.fixtures, 1)]
+        return (*frame, *Obstacles(self.obstacles, self.solids).shapes())
 
     def pairs(self) -> np.ndarray:
         """Cables that are compared with each other: all that share no point, shape (p, 2)."""
@@ -113,8 +148,9 @@ def clearances(around: Surroundings, positions: Array, rotations: Array) -> Arra
     """Clearances at poses, shape (n, 5) [m], columns `PART_NAMES`.
 
     Distances of the surfaces of cables, which have a radius, from each other and from boxes, and of
-    boxes from each other; cables that go through each other have less than 0. Infinite where there
-    is nothing to meet, NaN where a cable cannot run.
+    boxes from each other; cables that go through each other have less than 0, and so has what
+    overlaps a convex shape of `solids`. Infinite where there is nothing to meet, NaN where a cable
+    cannot run.
 
     Args:
         around: What there is.
@@ -137,4 +173,11 @@ def clearances(around: Surroundings, positions: Array, rotations: Array) -> Arra
         np.array(around.radius, float), around.pairs(), *boxes,
         np.array([around.exit_free, around.anchor_free]), out,
     )  # fmt: skip
+    if around.solids:
+        bodies, solids = packed(around.platform_shapes()), packed(around.solids)
+        largest = max(2, *np.diff(bodies[1]), 2), max(np.diff(solids[1]))
+        over_rows(
+            many_convex_clearances, len(p), None, p, R, around.cables.packed(),
+            np.array(around.radius, float), *bodies, *solids, convex_work(*largest), out,
+        )  # fmt: skip
     return out
