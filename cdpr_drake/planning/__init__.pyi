@@ -2,3 +2,17 @@ from .free_path import FreePathProgram as FreePathProgram
 from .input_shaping import make_shaper as make_shaper
 from .path_task import sample_motion as sample_motion
 from .path_timing import plan_along_path as plan_along_path
+from .place_constraints import CableClearance as CableClearance
+from .place_constraints import ObstacleClearance as ObstacleClearance
+from .place_constraints import PlaceWithin as PlaceWithin
+from .place_constraints import SeparatingPlane as SeparatingPlane
+from .place_constraints import StiffnessAbove as StiffnessAbove
+from .place_constraints import TargetInView as TargetInView
+from .pose_coordinates import BodyState as BodyState
+from .pose_coordinates import PlaceAndAngles as PlaceAndAngles
+from .pose_coordinates import RelativePose as RelativePose
+from .servo_constraint import StableServo as StableServo
+from .tension_constraints import LengthAccelerations as LengthAccelerations
+from .tension_constraints import LengthRates as LengthRates
+from .tension_constraints import TensionBalance as TensionBalance
+from .tension_constraints import TensionFeasible as TensionFeasible

@@ -200,3 +200,51 @@ def obstacle_gaps(
                 turn = cross((p[0] - X[9], p[1] - X[10], p[2] - X[11]), (n[0], n[1], n[2]))
                 for j in range(3):
                     slopes[k, row, j], slopes[k, row, 3 + j] = turn[j], n[j]
+
+
+@njit(cache=True, error_model="numpy")
+def plane_gaps(
+    points: Array, body: Array, obstacle: Array, planes: Array,
+    values: Array, slopes: Array, columns: Array,
+) -> None:  # fmt: skip
+    """Writes on which sides of planes the corners of a body and of an obstacle are.
+
+    Args:
+        points: Points of a motion, shape (N, 19).
+        body: Corners of the body in P, shape (k, 3) [m].
+        obstacle: Corners of the obstacle in W, shape (l, 3) [m].
+        planes: Normal n and offset d [m] of a plane each, shape (N, 4).
+        values: Gets n' p - d of the body's corners, d - n' o of the obstacle's, n' n, shape
+            (N, k + l + 1) [m, m, -].
+        slopes: Gets their derivatives by the seeds, shape (N, k + l + 1, 18).
+        columns: Gets those by n and d, shape (N, k + l + 1, 4).
+    """
+    count = body.shape[0]
+    last = count + obstacle.shape[0]
+    for k in range(points.shape[0]):
+        X = floating_motion(points[k])[:12]
+        n, d = (planes[k, 0], planes[k, 1], planes[k, 2]), planes[k, 3]
+        slopes[k] = 0.0
+        for i in range(count):
+            x, y, z = body[i, 0], body[i, 1], body[i, 2]
+            r = (
+                X[0] * x + X[1] * y + X[2] * z, X[3] * x + X[4] * y + X[5] * z,
+                X[6] * x + X[7] * y + X[8] * z,
+            )  # fmt: skip
+            p = (X[9] + r[0], X[10] + r[1], X[11] + r[2])
+            values[k, i] = dot(n, p) - d
+            turn = cross(r, n)
+            for j in range(3):
+                slopes[k, i, j], slopes[k, i, 3 + j] = turn[j], n[j]
+                columns[k, i, j] = p[j]
+            columns[k, i, 3] = -1.0
+        for i in range(obstacle.shape[0]):
+            o = (obstacle[i, 0], obstacle[i, 1], obstacle[i, 2])
+            values[k, count + i] = d - dot(n, o)
+            for j in range(3):
+                columns[k, count + i, j] = -o[j]
+            columns[k, count + i, 3] = 1.0
+        values[k, last] = dot(n, n)
+        for j in range(3):
+            columns[k, last, j] = 2.0 * n[j]
+        columns[k, last, 3] = 0.0

@@ -13,13 +13,23 @@ from cdpr_drake.errors import PlanningError
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.geometry.convex_distance_kernel import convex_work
 from cdpr_drake.geometry.convex_shapes import ConvexShape, packed
+from cdpr_drake.geometry.poses import pose_from_row
 from cdpr_drake.geometry.straight_cables import ALL_ROWS
-from cdpr_drake.planning.clearance_kernel import VIEW_ROWS, cable_gaps, obstacle_gaps, view_gaps
+from cdpr_drake.planning.clearance_kernel import (
+    VIEW_ROWS,
+    cable_gaps,
+    obstacle_gaps,
+    plane_gaps,
+    view_gaps,
+)
 from cdpr_drake.planning.pose_constraint import PoseConstraint
 from cdpr_drake.planning.pose_coordinates import Coordinates
 from cdpr_drake.planning.pose_coordinates_kernel import SEEDS
 from cdpr_drake.planning.rate_kernel import least_stiffness
-from cdpr_drake.planning.tension_constraints import cable_names, check_cables
+from cdpr_drake.planning.tension_constraints import USED, cable_names, check_cables
+
+SHORTEST = 0.5
+"""Least length of the normal of a plane: one of none would separate all that touches."""
 
 SHARED = 1e-9
 """Cables whose exit or anchor points are nearer share it, and always touch there [m]."""
@@ -53,7 +63,8 @@ class PlaceWithin(PoseConstraint):
 class PlatformSpeed(PoseConstraint):
     """Speed of Po within a limit: one row, its square over the limit's."""
 
-    description, order = "speed of Po", 1
+    description, order, highest = "speed of Po", 1, 1
+    kept_within = USED
 
     def __init__(self, coordinates: Coordinates, limit: float) -> None:
         """With the largest speed [m/s]."""
@@ -102,13 +113,19 @@ class CableClearance(PoseConstraint):
         rows = [f"{words[i]} and {words[j]}" for i, j in pairs]
         p = len(pairs)
         super().__init__(coordinates, np.full(p, distance), np.full(p, np.inf), rows)
-        self._cables, self._pairs = cables.packed(), np.array(pairs, np.int64).reshape(-1, 2)
+        self._over_pulleys = cables.has_pulleys()
+        self.radius = float(np.max(np.linalg.norm(B, axis=1)))
+        self._cables, self.pairs = cables.packed(), np.array(pairs, np.int64).reshape(-1, 2)
+
+    def reach(self) -> float | None:
+        """2: of two lines that both move; None over pulleys, where tangent points move, too."""
+        return None if self._over_pulleys else 2.0
 
     def at_points(self, points: Array, extra: Array) -> tuple[Array, Array, Array | None]:
         """As the base class says."""
-        shape = (len(points), len(self._pairs))
+        shape = (len(points), len(self.pairs))
         values, slopes = np.empty(shape), np.empty((*shape, SEEDS))
-        cable_gaps(points, self._cables, self._pairs, values, slopes)
+        cable_gaps(points, self._cables, self.pairs, values, slopes)
         return values, slopes, None
 
 
@@ -159,9 +176,28 @@ class ObstacleClearance(PoseConstraint):
         each = [cable_distance] * cables.count + [platform_distance] * len(bodies)
         low = np.tile(each, len(obstacles))
         super().__init__(coordinates, low, np.full(len(low), np.inf), rows)
+        self._over_pulleys = cables.has_pulleys()
+        every = np.vstack([cables.p_PB.T, *(body.points for body in bodies)])
+        self.radius = float(np.max(np.linalg.norm(every, axis=1)))
         most = max(2, *(len(body.points) for body in bodies)) if bodies else 2
         work = convex_work(most, max(len(one.points) for one in obstacles))
+        self._given = (
+            cables, tuple(obstacles), tuple(bodies), cable_distance, platform_distance, names
+        )  # fmt: skip
         self._arguments = (cables.packed(), *packed(bodies), *packed(obstacles), work)
+
+    def smooth_parts(self) -> tuple[PoseConstraint, ...]:
+        """Of the cables the distances, of the bodies planes between them and the obstacles."""
+        cables, obstacles, bodies, lines, apart, names = self._given
+        here = self.coordinates
+        return (
+            ObstacleClearance(cables, here, obstacles, (), lines, apart, names),
+            *(SeparatingPlane(here, body, one, apart) for one in obstacles for body in bodies),
+        )
+
+    def reach(self) -> float | None:
+        """1; None over pulleys, where tangent points move, too."""
+        return None if self._over_pulleys else 1.0
 
     def at_points(self, points: Array, extra: Array) -> tuple[Array, Array, Array | None]:
         """As the base class says."""
@@ -169,6 +205,50 @@ class ObstacleClearance(PoseConstraint):
         values, slopes = np.empty(shape), np.empty((*shape, SEEDS))
         obstacle_gaps(points, *self._arguments, values, slopes)
         return values, slopes, None
+
+
+class SeparatingPlane(PoseConstraint):
+    """A plane stands between a body of the platform and an obstacle, which are a distance apart.
+
+    The further numbers are the plane's normal n, no longer than 1, and its offset d [m]: n' p >= d
+    and a distance more for all corners p of the body, n' o <= d for those of the obstacle. Unlike
+    their distance it has no kinks; convex shapes that are apart have such a plane.
+    """
+
+    description = "obstacles"
+    extra = 4
+    own_variables = True
+
+    def __init__(
+        self, coordinates: Coordinates, body: ConvexShape, obstacle: ConvexShape, distance: float
+    ) -> None:
+        """With a body in P, an obstacle in W, and their least distance [m]."""
+        k, l = len(body.points), len(obstacle.points)  # noqa: E741
+        low = [*np.full(k, distance + body.radius), *np.full(l, obstacle.radius), SHORTEST**2]
+        high = np.append(np.full(k + l, np.inf), 1.0)
+        name = f"{body.name or 'the platform'} and {obstacle.name or 'the obstacle'}"
+        super().__init__(coordinates, np.array(low), high, [name] * (k + l + 1))
+        self._body, self._obstacle = body, obstacle
+
+    def at_points(self, points: Array, extra: Array) -> tuple[Array, Array, Array | None]:
+        """As the base class says."""
+        shape = (len(points), len(self.rows))
+        values, slopes = np.empty(shape), np.empty((*shape, SEEDS))
+        columns = np.empty((*shape, 4))
+        corners = self._body.points, self._obstacle.points
+        plane_gaps(points, *corners, extra, values, slopes, columns)
+        return values, slopes, columns
+
+    def guess(self, x: Array) -> Array:
+        """The plane halfway between both, or halfway in what overlaps, shape (4,).
+
+        Args:
+            x: Coordinates of a pose.
+        """
+        point = self.coordinates.points(x[np.newaxis])[0][0]
+        found = self._body.moved(pose_from_row(point[:7])).distance(self._obstacle)
+        _, on_body, on_obstacle, n = found
+        return np.append(n, n @ (0.5 * (on_body + on_obstacle)))
 
 
 class TargetInView(PoseConstraint):

@@ -30,11 +30,20 @@ class PoseConstraint(ABC):
         rows: What each row is, in words.
         extra: Numbers that it takes behind those of the platform, such as tensions.
         order: Derivatives of the pose by time that it needs.
+        highest: Derivatives that count where they are given, at least `order`.
+        kept_within: By less than this it may be missed between the samples of a program.
+        own_variables: Whether the further numbers are variables of nobody else, for which `guess`
+            gives numbers.
+        radius: Of the farthest point of the platform from Po whose way its values follow [m].
     """
 
     description = ""
     extra = 0
     order = 0
+    highest = 0
+    kept_within = 1e-5
+    own_variables = False
+    radius = 0.0
 
     def __init__(
         self, coordinates: Coordinates, lower: Array, upper: Array, rows: Sequence[str]
@@ -74,6 +83,21 @@ class PoseConstraint(ABC):
         if columns is not None:
             jacobian = np.concatenate([jacobian, columns], axis=2)
         return values, jacobian
+
+    def smooth_parts(self) -> tuple[PoseConstraint, ...]:
+        """Constraints that together say the same, for solvers that kinks would stop."""
+        return (self,)
+
+    def guess(self, x: Array) -> Array:
+        """Further numbers that suit coordinates of a pose, shape (e,), see `own_variables`."""
+        return np.zeros(self.extra)
+
+    def reach(self) -> float | None:
+        """By how much a value changes at most, per way of any point of the platform in `radius`.
+
+        None: that is not known, or it is no distance.
+        """
+        return None
 
     def missed(self, values: Array) -> Array:
         """By how much values, shape (N, r), are out of bounds, shape (N, r); infinite for NaN."""
@@ -138,11 +162,6 @@ def drake_function(evaluate: Differentiable) -> Callable[[Any], Any]:
     def function(x: Any) -> Any:
         if x.dtype != object:
             return evaluate(x)[0]
-        if not isinstance(x[0], AutoDiffXd):
-            raise PlanningError(
-                "a constraint of the platform: found symbolic expressions; accepted: numbers and "
-                "AutoDiffXd, since it is computed by a kernel"
-            )
         values, jacobian = evaluate(ExtractValue(x).ravel())
         slopes = ExtractGradient(x)
         if slopes.shape[1]:
@@ -166,7 +185,9 @@ def _affine(given: Any) -> tuple[Any, Differentiable | None]:
     """The variables of affine expressions, and the map from these to them; None where they are."""
     if all(isinstance(one, Variable) for one in given):
         return given, None
-    expressions = np.array([Expression(one) for one in given])
+    expressions = np.array([
+        one if isinstance(one, Expression) else Expression(one) for one in given
+    ])  # fmt: skip
     found = Variables()
     for one in expressions:
         found += one.GetVariables()

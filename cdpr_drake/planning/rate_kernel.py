@@ -82,9 +82,7 @@ def length_accelerations(points: Array, cables: Array, values: Array, slopes: Ar
                 dt = cross(w, dr)
                 db = cross(alpha, dr)
                 dy = cross(w, dt)
-                slopes[k, i, j] = (
-                    dot(Db, b) + dot(u, db) + dot(u, dy) + dot(dq, dr) + dot(Dv, dt)
-                )
+                slopes[k, i, j] = dot(Db, b) + dot(u, db) + dot(u, dy) + dot(dq, dr) + dot(Dv, dt)
                 slopes[k, i, 3 + j] = by_place
                 # w x (w x r) changes by dw x (w x r) + w x (dw x r).
                 dw = cross(one, t)

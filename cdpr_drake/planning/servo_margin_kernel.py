@@ -1,4 +1,4 @@
-"""Numba kernel: the margin of a servo's stability at poses, for given perturbations, with slopes."""
+"""Numba kernel: the margin of a servo's stability for given perturbations, with slopes."""
 
 from __future__ import annotations
 

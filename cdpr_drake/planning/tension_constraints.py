@@ -17,6 +17,9 @@ from cdpr_drake.planning.pose_coordinates import Coordinates
 from cdpr_drake.planning.pose_coordinates_kernel import SEEDS
 from cdpr_drake.planning.rate_kernel import length_accelerations, length_rates
 
+USED = 0.01
+"""Share of a limit by which rates may miss it between samples: the reserve of a plan is larger."""
+
 
 def cable_names(count: int) -> list[str]:
     """Words for cables that have no names."""
@@ -43,7 +46,7 @@ class TensionFeasible(PoseConstraint):
     run or the wrench matrix is singular.
     """
 
-    description = "tensions"
+    description, highest = "tensions", 2
 
     def __init__(self, task: PathTask, coordinates: Coordinates, margin: float = 0.0) -> None:
         """With the least margin s [N]."""
@@ -105,7 +108,7 @@ class TensionBalance(PoseConstraint):
     further numbers are the tensions as shares of the largest one.
     """
 
-    description = "dynamics"
+    description, highest = "dynamics", 2
 
     def __init__(self, task: PathTask, coordinates: Coordinates) -> None:
         """With the robot and its limits."""
@@ -116,7 +119,7 @@ class TensionBalance(PoseConstraint):
         self._largest = task.limits.upper
         # Where nothing weighs in the platform's plane, newtons are as good.
         weight = task.dynamics.M_PPo_P.get_mass() * task.dynamics.gravity
-        self._unit = max(weight, 1.0) if len(self._rows) == 6 else 1.0
+        self.unit = max(weight, 1.0) if len(self._rows) == 6 else 1.0
 
     def at_points(self, points: Array, extra: Array) -> tuple[Array, Array, Array | None]:
         """As the base class says."""
@@ -124,14 +127,15 @@ class TensionBalance(PoseConstraint):
         values, slopes, columns = np.empty((N, n)), np.empty((N, n, SEEDS)), np.empty((N, n, m))
         tensions = self._largest * extra
         balances(points, *self._packed, self._rows, tensions, values, slopes, columns)
-        unit = self._unit
+        unit = self.unit
         return values / unit, slopes / unit, columns * (self._largest / unit)
 
 
 class LengthRates(PoseConstraint):
     """Rates of the cables' lengths within a limit: rows dl/dt over it."""
 
-    description, order = "cable speeds", 1
+    description, order, highest = "cable speeds", 1, 1
+    kept_within = USED
 
     def __init__(self, cables: CableSet, coordinates: Coordinates, limit: float) -> None:
         """With the largest rate [m/s].
@@ -156,7 +160,8 @@ class LengthRates(PoseConstraint):
 class LengthAccelerations(PoseConstraint):
     """Accelerations of the cables' lengths within a limit: rows d2l/dt2 over it."""
 
-    description, order = "cable accelerations", 2
+    description, order, highest = "cable accelerations", 2, 2
+    kept_within = USED
 
     def __init__(self, cables: CableSet, coordinates: Coordinates, limit: float) -> None:
         """With the largest acceleration [m/s^2].
@@ -182,7 +187,7 @@ class MotorTorques(PoseConstraint):
     The further numbers are the tensions as shares of the largest one.
     """
 
-    description, order = "torques", 2
+    description, order, highest = "torques", 2, 2
 
     def __init__(self, task: PathTask, coordinates: Coordinates) -> None:
         """With the robot and its limits."""
@@ -196,7 +201,9 @@ class MotorTorques(PoseConstraint):
     def at_points(self, points: Array, extra: Array) -> tuple[Array, Array, Array | None]:
         """As the base class says."""
         values, slopes = accelerations_of(points, self._cables)
-        columns = np.broadcast_to(-self._pull * np.eye(self.extra), (len(points), *2 * (self.extra,)))
+        columns = np.broadcast_to(
+            -self._pull * np.eye(self.extra), (len(points), *2 * (self.extra,))
+        )
         return self._turn * values - self._pull * extra, self._turn * slopes, columns
 
 
