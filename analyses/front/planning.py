@@ -203,6 +203,11 @@ def plan_free_motion(
             for name, value in asked.items()
             if name not in ("obstacles", "guess")
         },
+        **{
+            name: settings.solids().boxes.tolist() if name == "obstacles" else "given"
+            for name in ("obstacles", "guess")
+            if asked.get(name) is not None
+        },
     }
     told = _told(loaded, given, found, say, track)
     return DrawnFreePlan(
