@@ -23,7 +23,7 @@ from cdpr_drake.analyses.planning.robot_path_task import (
     path_task,
     robot_limits,
 )
-from cdpr_drake.analyses.workspaces.workspace_files import load_obstacle_boxes
+from cdpr_drake.analyses.workspaces.workspace_files import load_obstacles
 from cdpr_drake.errors import PlanningError
 from cdpr_drake.geometry.poses import angles_from_rotation
 from cdpr_drake.models.robot_loader import as_robot
@@ -179,8 +179,8 @@ def plan_free_motion(
         track: Whether the simulated robot also tracks the motion.
         say: Told what is done now.
         asked: Fields of `FreeSettings`: `least` (time, tension or energy), `duration` [s],
-            `knots`, `clearance` [m], `obstacles`, rows of boxes or a file, `in_view` (3, p) [m],
-            `camera`, `nearest` [m].
+            `knots`, `clearance` [m], `obstacles` (`Obstacles`, rows of boxes or a file), `in_view`
+            (3, p) [m], `camera`, `guess`, `nearest` [m].
 
     Raises:
         PlanningError: No motion was found, or something is not accepted; names it.
@@ -190,7 +190,7 @@ def plan_free_motion(
             raise PlanningError(f"{name!r} is unknown; {closest(name, ASKED)}")
     loaded, given = as_robot(robot, "plan_free_motion"), chosen_limits(limits)
     if isinstance(asked.get("obstacles"), str | Path):
-        asked["obstacles"] = load_obstacle_boxes(Path(asked["obstacles"]))
+        asked["obstacles"] = load_obstacles(Path(asked["obstacles"]))
     settings = FreeSettings(start=as_pose(loaded, start), goal=as_pose(loaded, goal), **asked)
     task = planned_for(loaded, given, pulleys)
     begin = time.perf_counter()
@@ -202,6 +202,12 @@ def plan_free_motion(
         **{
             name: value.tolist() if isinstance(value, np.ndarray) else value
             for name, value in asked.items()
+            if name not in ("obstacles", "guess")
+        },
+        **{
+            name: settings.solids().boxes.tolist() if name == "obstacles" else "given"
+            for name in ("obstacles", "guess")
+            if asked.get(name) is not None
         },
     }
     told = _told(loaded, given, found, say, track)

@@ -8,20 +8,32 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.math import RigidTransform
 
+from cdpr_drake.analyses.planning.free_detours import detours, is_free
 from cdpr_drake.analyses.planning.robot_path_task import length_scale
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import PlanningError, TensionProblemError
-from cdpr_drake.geometry.poses import pose_error
+from cdpr_drake.geometry.convex_shapes import ConvexShape
+from cdpr_drake.geometry.poses import pose_error, pose_row
 from cdpr_drake.models.camera_catalogue import load_camera
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import check_pose
 from cdpr_drake.planning.failures import check_held
 from cdpr_drake.planning.free_path import KNOTS, FreePathProgram
 from cdpr_drake.planning.free_path_solution import FreePathSolution
-from cdpr_drake.planning.free_path_terms import Capsule
 from cdpr_drake.planning.path_task import PathTask
 from cdpr_drake.planning.path_timing import plan_along_path
-from cdpr_drake.trajectories.pose_path import straight_path
+from cdpr_drake.planning.place_constraints import (
+    CableClearance,
+    ObstacleClearance,
+    PlaceWithin,
+    TargetInView,
+)
+from cdpr_drake.planning.pose_constraint import PoseConstraint
+from cdpr_drake.planning.pose_coordinates import BodyState, Coordinates
+from cdpr_drake.planning.tension_constraints import TensionFeasible
+from cdpr_drake.trajectories.pose_path import PosePath, straight_path
+from cdpr_drake.trajectories.timed_path import TimedPath
+from cdpr_drake.workspaces.cable_interference import Obstacles, box_row
 
 LEAST = ("time", "tension", "energy")
 """What a motion has least of: its time; the mean square of the tensions, in a given time; that
@@ -37,6 +49,9 @@ SHORTEST = 0.05
 
 GUESSED_SPEED = 0.2
 """Of Po, for a first guess of the time where the straight line cannot be followed [m/s]."""
+
+END_MISSED = 1e-6
+"""An end that misses a distance by less keeps it [m]: the solver is no more exact."""
 
 GUESSES = (1.3, 2.5, 5.0)
 """Times from which a solver starts, over the least along the straight line, until it succeeds."""
@@ -54,10 +69,13 @@ class FreeSettings:
         knots: Of the program.
         clearance: Least distance of cables from each other, and of cables and platform from
             obstacles; None: not asked for [m].
-        obstacles: Boxes, rows of `cable_interference.box_row`, shape (o, 15).
+        obstacles: What stands in the way; or boxes, rows of `cable_interference.box_row`, shape
+            (o, 15).
         in_view: Points of W that a camera on the platform sees all along, shape (3, p); None: no.
         camera: Name of the camera's mounting; None: the only one on the platform.
         nearest: Least depth of these points in the camera [m].
+        guess: Where the solver starts, from start to goal; None: the straight line, or detours
+            where something stands in its way.
     """
 
     start: RigidTransform
@@ -66,10 +84,11 @@ class FreeSettings:
     duration: float | None = None
     knots: int = KNOTS
     clearance: float | None = None
-    obstacles: Array | None = None
+    obstacles: Obstacles | Array | None = None
     in_view: Array | None = None
     camera: str | None = None
     nearest: float = NEAREST
+    guess: PosePath | TimedPath | None = None
 
     def __post_init__(self) -> None:
         """Checks what belongs together.
@@ -96,6 +115,12 @@ class FreeSettings:
             raise PlanningError("clearance: found none for the obstacles; accepted: one [m]")
         if not (np.isfinite(self.nearest) and self.nearest > 0.0):
             raise PlanningError(f"nearest: found {self.nearest:g} m; accepted: above 0")
+
+    def solids(self) -> Obstacles:
+        """What stands in the way."""
+        if isinstance(self.obstacles, Obstacles):
+            return self.obstacles
+        return Obstacles() if self.obstacles is None else Obstacles(np.asarray(self.obstacles))
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,8 +169,10 @@ def solve_free_motion(
     """Plans a motion from rest to rest whose path is free.
 
     Po stays in the robot's frame; limits of tensions, winches and the speed of Po are kept at the
-    knots, cable speeds also halfway between. The solver starts from the straight line, in times
-    from `GUESSES` on, until it succeeds; what it finds is the best nearby, not of all.
+    knots, cable speeds also halfway between, distances and the view wherever the motion is looked
+    at. The solver starts from the straight line, in times from `GUESSES` on, until it succeeds;
+    where that is not free, from detours that are, the shortest first. What it finds is the best
+    nearby, not of all.
 
     Args:
         robot: The robot.
@@ -165,19 +192,101 @@ def solve_free_motion(
         check_held(task, X_WP, where)
     if max(pose_error(asked.start, asked.goal)) < 1e-9:
         raise PlanningError("to: found the pose of the start; accepted: another one")
-    least = _straight_time(robot, task, asked)
-    guesses = [least * share for share in GUESSES] if asked.duration is None else [asked.duration]
+    guesses = _guesses(robot, task, asked)
     solution = None
-    for number, guess in enumerate(guesses, 1):
+    for number, (path, time) in enumerate(guesses, 1):
         say(f"Planning for {robot.name}: start {number} of {len(guesses)}")
         bounds = (SHORTEST, LONGEST) if asked.duration is None else (asked.duration,) * 2
         program = _program(robot, task, asked, bounds)
-        solution = program.Solve(float(np.clip(guess, SHORTEST, LONGEST)))
-        if solution.success:
+        found = program.Solve(float(np.clip(time, SHORTEST, LONGEST)), path)
+        if solution is None or found.success:
+            solution = found
+        if found.success:
             break
     assert solution is not None
     solution.motion()  # raises where there is none
     return solution
+
+
+def _guesses(
+    robot: Robot, task: PathTask, asked: FreeSettings
+) -> list[tuple[PosePath | TimedPath | None, float]]:
+    """Where the solver starts, one after the other: a path, None the straight line, and a time.
+
+    Raises:
+        PlanningError: The platform or a cable is in an obstacle at an end.
+    """
+    shares = GUESSES if asked.duration is None else (1.0,)
+    scale = length_scale(robot)
+    straight = straight_path([asked.start, asked.goal], scale)
+
+    def timed(path: PosePath | None, share: float) -> float:
+        if asked.duration is not None:
+            return asked.duration
+        return share * _time_along(task, path or straight)
+
+    if asked.guess is not None:
+        path = asked.guess.path if isinstance(asked.guess, TimedPath) else asked.guess
+        return [(asked.guess, timed(path, share)) for share in shares]
+    lines: list[tuple[PosePath | TimedPath | None, float]]
+    if asked.clearance is None or asked.obstacles is None:
+        least = timed(None, 1.0)
+        return [(None, share * least) for share in shares]
+    places = place_constraints(robot, task, asked, BodyState())
+    for where, X_WP in (("from", asked.start), ("to", asked.goal)):
+        _check_ends(places, X_WP, where)
+    held = [*places, TensionFeasible(task, BodyState())]
+    lines = [(None, timed(None, share)) for share in shares]
+    if is_free(held, straight):
+        return lines
+    moves = [row - 3 for row in task.dynamics.motions if row >= 3]
+    found = detours(held, asked.start, asked.goal, scale, moves)
+    return [*((path, timed(path, shares[0])) for path in found), *lines[:1]]
+
+
+def _check_ends(places: list[PoseConstraint], X_WP: RigidTransform, where: str) -> None:
+    """Refuses an end that is too near to something.
+
+    Raises:
+        PlanningError: It is; names what.
+    """
+    for place in places:
+        values, _ = place.evaluate(pose_row(X_WP)[np.newaxis])
+        gaps = place.missed(values)[0]
+        row = int(np.argmax(gaps))
+        if gaps[row] > END_MISSED:
+            raise PlanningError(
+                f"{where}: found {values[0, row]:.4g} m of {place.rows[row]} "
+                f"({place.description}); "
+                f"accepted: at least {place.lower[row]:.4g} m"
+            )
+
+
+def place_constraints(
+    robot: Robot, task: PathTask, asked: FreeSettings, coordinates: Coordinates
+) -> list[PoseConstraint]:
+    """What is asked of poses alone: the frame, cables apart, obstacles, the view."""
+    cables, names = task.cables, [task.name(i) for i in range(task.cables.count)]
+    found: list[PoseConstraint] = [PlaceWithin(coordinates, robot.frame.lower, robot.frame.upper)]
+    if asked.clearance is not None:
+        radius = 0.5 * float(np.max(robot.diameters()))
+        apart = asked.clearance + 2.0 * radius
+        found.append(CableClearance(cables, coordinates, apart, names))
+        shapes = asked.solids().shapes()
+        if shapes:
+            bodies = [ConvexShape.box(box_row(robot.box_center(), robot.platform.size))]
+            lines = asked.clearance + radius
+            found.append(
+                ObstacleClearance(
+                    cables, coordinates, shapes, bodies, lines, asked.clearance, names
+                )
+            )
+    if asked.in_view is not None:
+        view = camera_view(robot, asked.camera)
+        found.append(
+            TargetInView(coordinates, view.X_PC, view.slopes, asked.in_view, asked.nearest)
+        )
+    return found
 
 
 def _program(
@@ -186,31 +295,20 @@ def _program(
     program = FreePathProgram(task, asked.start, asked.goal, asked.knots, (bounds[0], bounds[1]))
     program.AddCableSpeedLimits()
     program.AddWinchLimits()
-    program.AddPlaceBounds(robot.frame.lower, robot.frame.upper)
     if asked.least == "time":
         program.AddLeastTime()
     elif asked.least == "tension":
         program.AddTensionCost()
     else:
         program.AddEnergyCost()
-    if asked.clearance is not None:
-        radius = 0.5 * float(np.max(robot.diameters()))
-        program.AddCableClearance(asked.clearance + 2.0 * radius)
-        if asked.obstacles is not None:
-            capsules = [Capsule.around(box) for box in asked.obstacles]
-            ball = robot.box_center(), 0.5 * float(np.linalg.norm(robot.platform.size))
-            program.AddObstacles(capsules, asked.clearance + radius, ball)
-    if asked.in_view is not None:
-        view = camera_view(robot, asked.camera)
-        program.AddFieldOfView(view.X_PC, view.slopes, asked.in_view, asked.nearest)
+    for constraint in place_constraints(robot, task, asked, program.pose_coordinates):
+        program.Add(constraint)
     return program
 
 
-def _straight_time(robot: Robot, task: PathTask, asked: FreeSettings) -> float:
-    """Least time along the straight line, or a guess where that cannot be followed [s]."""
-    scale = length_scale(robot)
+def _time_along(task: PathTask, path: PosePath) -> float:
+    """Least time along a path, or a guess where it cannot be followed [s]."""
     try:
-        return plan_along_path(task, straight_path([asked.start, asked.goal], scale)).duration
+        return plan_along_path(task, path).duration
     except PlanningError:
-        distance, angle = pose_error(asked.start, asked.goal)
-        return float(np.hypot(distance, scale * angle)) / GUESSED_SPEED
+        return path.length / GUESSED_SPEED

@@ -123,7 +123,7 @@ Clearance = Annotated[
 Obstacles = Annotated[
     Path | None,
     typer.Option(
-        help="With --free or --proven: what is in the way, YAML as of cdpr workspace --obstacles."
+        help="With --free or --proven: what stands in the way, YAML as of cdpr workspace --obstacles."
     ),
 ]
 KeepInView = Annotated[
@@ -392,6 +392,14 @@ def _print(console: Console, told: dict[str, Any], folder: Path) -> None:
             console.print(f"least distance, {name}: {1e3 * least:.2f} mm")
         for name, least in told["least_share_of_view"].items():
             console.print(f"{name}: {least:.1%} of the view inside its edge")
+        for name, one in told["between_knots"].items():
+            if one["missed"] > 0.0:
+                most = one["missed_at_most"]
+                bound = "" if most is None else f", nowhere by more than {most:.3g}"
+                console.print(
+                    f"between knots: {name} missed by {one['missed']:.3g} ({one['of']}) at "
+                    f"{one['at_time_s']:.3f} s{bound}"
+                )
         if not told["keeps_distances_and_view"]:
             console.print("BETWEEN KNOTS DISTANCES OR VIEW ARE MISSED; more --knots")
     else:

@@ -4,3 +4,17 @@ from .path_task import sample_motion as sample_motion
 from .path_timing import plan_along_path as plan_along_path
 from .proven_path import proven_motion as proven_motion
 from .proven_path import proven_path as proven_path
+from .place_constraints import CableClearance as CableClearance
+from .place_constraints import ObstacleClearance as ObstacleClearance
+from .place_constraints import PlaceWithin as PlaceWithin
+from .place_constraints import SeparatingPlane as SeparatingPlane
+from .place_constraints import StiffnessAbove as StiffnessAbove
+from .place_constraints import TargetInView as TargetInView
+from .pose_coordinates import BodyState as BodyState
+from .pose_coordinates import PlaceAndAngles as PlaceAndAngles
+from .pose_coordinates import RelativePose as RelativePose
+from .servo_constraint import StableServo as StableServo
+from .tension_constraints import LengthAccelerations as LengthAccelerations
+from .tension_constraints import LengthRates as LengthRates
+from .tension_constraints import TensionBalance as TensionBalance
+from .tension_constraints import TensionFeasible as TensionFeasible

@@ -19,6 +19,7 @@ from pydrake.solvers import (
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import PlanningError
+from cdpr_drake.planning.free_path_checks import BetweenKnots
 from cdpr_drake.planning.path_task import MotionSamples, PathTask, sample_motion
 from cdpr_drake.trajectories.timed_path import TimedPath
 
@@ -30,9 +31,6 @@ FEASIBILITY, OPTIMALITY = 1e-7, 1e-5
 
 MOST_STEPS = 1000
 """Major iterations."""
-
-MISSED = 1e-6
-"""What is missed by more is named."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,13 +47,15 @@ class FreePathSolution:
         duration: From start to goal [s].
         violations: By name of what was added: by how much its worst constraint is missed, in its
             own unit; 0 where none is.
+        between: What is asked at the knots, by how much it is missed between them, by name; empty
+            without success. Tensions, in newtons, are those of the best distribution.
         worst: What is missed most, where on the way and by what, in words; empty where nothing is.
         multipliers: By the same names, where the solver gives them: which constraints the cost
             rests on, flat, in the order in which they were added.
         times: Of the knots, shape (k,) [s].
         tensions: At the knots, shape (k, m) [N].
         trajectory: The motion; None without success. It holds at the knots what the program says,
-            and between them about: `samples` says how well.
+            and between them what `between` says; `samples` says more.
     """
 
     task: PathTask
@@ -66,6 +66,7 @@ class FreePathSolution:
     cost: float
     duration: float
     violations: Mapping[str, float]
+    between: Mapping[str, BetweenKnots]
     worst: str
     multipliers: Mapping[str, Array]
     times: Array
@@ -95,8 +96,10 @@ class FreePathSolution:
         return sample_motion(self.task, motion, np.arange(int(motion.end_time * rate) + 1) / rate)
 
 
-def solve(program: MathematicalProgram) -> tuple[MathematicalProgramResult, str, str, float]:
-    """Solves with the first of `SOLVERS` that is there.
+def solve(
+    program: MathematicalProgram, guess: Array | None = None
+) -> tuple[MathematicalProgramResult, str, str, float]:
+    """Solves with the first of `SOLVERS` that is there, from a guess or the program's own.
 
     Returns:
         The result, the solver's name, what it says, and the time that it took [s].
@@ -118,7 +121,7 @@ def solve(program: MathematicalProgram) -> tuple[MathematicalProgramResult, str,
             options.SetOption(solver.id(), "tol", OPTIMALITY)
             options.SetOption(solver.id(), "max_iter", MOST_STEPS)
         begin = time.perf_counter()
-        result = solver.Solve(program, program.initial_guess(), options)
+        result = solver.Solve(program, program.initial_guess() if guess is None else guess, options)
         took = time.perf_counter() - begin
         words = result.get_solution_result().name
         return result, solver.SolverName(), words, took

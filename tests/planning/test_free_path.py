@@ -4,25 +4,26 @@ from functools import cache
 
 import numpy as np
 import pytest
-from pydrake.autodiffutils import ExtractGradient, InitializeAutoDiff
 from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.planning.robot_path_task import LimitSettings, make_path, path_task
-from cdpr_drake.control.task_space import TaskGains, computed_torque
 from cdpr_drake.errors import PlanningError
-from cdpr_drake.geometry.cable_paths import cable_jacobian
-from cdpr_drake.geometry.poses import pose_error, pose_from_angles, pose_from_row
+from cdpr_drake.geometry.convex_shapes import ConvexShape
+from cdpr_drake.geometry.poses import pose_error, pose_from_angles
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.planning.free_path import FreePathProgram
-from cdpr_drake.planning.free_path_terms import Capsule
+from cdpr_drake.planning.free_path_checks import Refinement
+from cdpr_drake.planning.free_path_pieces import between, link, samples
 from cdpr_drake.planning.path_timing import plan_along_path
+from cdpr_drake.trajectories.pose_path import straight_path
 from cdpr_drake.workspaces.cable_interference import Surroundings, box_row, clearances
 
 BETWEEN = 0.02  # of a limit: between knots the motion keeps it about
 START, GOAL = RigidTransform([-0.2, 0.0, 0.35]), RigidTransform([0.2, 0.0, 0.35])
 MARK = np.array([-0.063, 0.0, 0.02])
 SLOPES = (0.65, 0.5)
-BALL = Capsule(np.array([0.0, 0.02, 0.3]), np.array([0.0, 0.02, 0.3]), 0.06)
+MIDDLE, RADIUS = np.array([0.0, 0.02, 0.3]), 0.06
+BALL = ConvexShape.sphere(MIDDLE, RADIUS)
 ROUND = 0.12  # radius of the ball around the platform [m]
 CLEARANCE = 0.02
 NEAREST = 0.3  # depth of the mark in the camera [m]
@@ -42,47 +43,13 @@ def solved(obstacle=False, view=False):
     program = FreePathProgram(task, START, GOAL, 8, (0.9, 0.9))
     program.AddTensionCost()
     if obstacle:
-        program.AddObstacles([BALL], CLEARANCE, (robot.box_center(), ROUND))
+        around = ConvexShape.sphere(robot.box_center(), ROUND)
+        program.AddObstacles([BALL], CLEARANCE, [around])
     if view:
         mount = robot.camera_mount("onboard").pose.transform()
         program.AddFieldOfView(mount, SLOPES, MARK[:, np.newaxis], NEAREST)
         program.AddCableClearance(APART)
     return program.Solve(0.9)
-
-
-@pytest.mark.parametrize("pulleys", [False, True])
-def test_gradients_are_those_of_differences_and_wrenches_those_of_the_robot(pulleys):
-    robot = load_robot("acrobot_large")
-    cables = robot.cable_set() if pulleys else robot.cable_set().without_pulleys()
-    task = path_task(robot, LimitSettings(), cables)
-    start = pose_from_angles(np.array([0.05, 0.0, 0.3]), np.radians([5.0, -4.0, 10.0]))
-    terms = FreePathProgram(task, start, GOAL).terms
-    random = np.random.default_rng(0)
-    x = np.concatenate([random.normal(size=18) * 0.1, random.uniform(2.0, 20.0, 8)])
-
-    def function(z):
-        return terms.unbalanced(terms.point(z[:6], z[6:12], z[12:18]), z[18:])
-
-    found = ExtractGradient(function(InitializeAutoDiff(x).ravel()))
-    step = 1e-6
-    differences = np.array([
-        (function(x + step * e) - function(x - step * e)) / (2.0 * step) for e in np.eye(len(x))
-    ]).T  # fmt: skip
-    np.testing.assert_allclose(found, differences, atol=1e-6 * np.max(np.abs(found)))
-    point = terms.point(x[:6], x[6:12], x[12:18])
-    X = pose_of(point)
-    wanted = computed_torque(
-        X, point[7:13], X, point[7:13], point[13:], dynamics=task.dynamics,
-        gains=TaskGains(stiffness=0.0, damping=0.0),
-    )  # fmt: skip
-    J = cable_jacobian(X, cables)
-    np.testing.assert_allclose(function(x), -J.T @ x[18:] - wanted, atol=1e-9)
-    np.testing.assert_allclose(terms.cable_speeds(point), J @ point[7:13], atol=1e-12)
-    np.testing.assert_allclose(terms.coordinates(X), x[:6], atol=1e-12)
-
-
-def pose_of(point):
-    return pose_from_row(np.asarray(point[:7], float))
 
 
 def test_a_solution_is_a_motion_that_keeps_the_limits():
@@ -106,19 +73,19 @@ def test_obstacles_are_passed_with_the_clearance():
     motion = solution.motion()
     robot, _ = robot_task()
     middles = np.array([motion.pose(t) @ robot.box_center() for t in np.linspace(0.0, 0.9, 91)])
-    gaps = np.linalg.norm(middles - BALL.start, axis=1) - BALL.radius - ROUND
+    gaps = np.linalg.norm(middles - MIDDLE, axis=1) - RADIUS - ROUND
     assert np.min(gaps) > CLEARANCE - 3e-3  # between knots
     assert np.min(gaps) < CLEARANCE + 5e-3
     straight = solved().motion()
     middles = np.array([straight.pose(t) @ robot.box_center() for t in np.linspace(0.0, 0.9, 91)])
-    assert np.min(np.linalg.norm(middles - BALL.start, axis=1)) < BALL.radius + ROUND
+    assert np.min(np.linalg.norm(middles - MIDDLE, axis=1)) < RADIUS + ROUND
     assert np.min(measured(solution)[:, 3]) > CLEARANCE - 3e-3
 
 
 def measured(solution):
     """Clearances by the room of workspaces; the obstacle is the box in the ball."""
     _, task = robot_task()
-    box = box_row(BALL.start, np.full(3, 2.0 * BALL.radius / np.sqrt(3.0)))[np.newaxis]
+    box = box_row(MIDDLE, np.full(3, 2.0 * RADIUS / np.sqrt(3.0)))[np.newaxis]
     around = Surroundings(task.cables, np.zeros(8), obstacles=box)
     poses = [solution.motion().pose(t) for t in np.linspace(0.0, 0.9, 31)]
     return clearances(
@@ -183,8 +150,73 @@ def test_what_cannot_be_done_is_said():
         FreePathProgram(task, START, turned)
 
 
-def test_a_capsule_around_a_box_holds_its_corners():
-    box = box_row(np.array([0.1, 0.2, 0.3]), np.array([0.1, 0.4, 0.2]))
-    capsule = Capsule.around(box)
-    np.testing.assert_allclose(capsule.end - capsule.start, [0.0, 0.4, 0.0])
-    assert capsule.radius == pytest.approx(np.hypot(0.05, 0.1))
+def test_pieces_are_cubic_and_their_jacobians_those_of_differences():
+    random = np.random.default_rng(0)
+    step = 1e-5
+    for function, size in (
+        (lambda x: between(x, 5, 0.3), 13),
+        (lambda x: between(x, 5, 0.3, 0), 13),
+        (lambda x: link(x, 5), 19),
+    ):
+        x = random.uniform(0.5, 1.5, size)
+        found = function(x)[1]
+        rates = [
+            (function(x + step * e)[0] - function(x - step * e)[0]) / (2.0 * step)
+            for e in np.eye(size)
+        ]
+        np.testing.assert_allclose(found, np.array(rates).T, atol=1e-9)
+    q, v, a = random.normal(size=(3, 2, 3))
+    x = np.concatenate([q[0], v[0], a[0], a[1], [0.7]])
+    end = between(x, 1, 1.0)[0]
+    linked = np.concatenate([q[0], v[0], a[0], end[:6], a[1], [0.7]])
+    np.testing.assert_allclose(link(linked, 1)[0], 0.0, atol=1e-15)
+    every = samples(q, v, a, 0.7, 10)[0]
+    np.testing.assert_allclose(every[3], between(x, 1, 0.3)[0], atol=1e-14)
+
+
+def box_program(rounds):
+    """Past a box whose corner a motion cuts between knots, with the platform's own box."""
+    robot, task = robot_task()
+    program = FreePathProgram(task, START, GOAL, 6, (0.9, 0.9))
+    program.AddTensionCost()
+    post = ConvexShape.box_at(np.array([0.0, 0.1, 0.3]), np.array([0.02, 0.1, 0.1]))
+    body = ConvexShape.box_at(robot.box_center(), robot.platform.size)
+    program.AddObstacles([post], CLEARANCE, [body])
+    return program.Solve(0.9, refine=Refinement(rounds=rounds))
+
+
+def test_what_is_missed_between_knots_is_asked_for_there():
+    """By distances of Drake's shapes, not by those of the program."""
+    rough, fine = box_program(0), box_program(4)
+    assert rough.success
+    assert fine.success
+    robot, _ = robot_task()
+    gaps = []
+    for solution in (rough, fine):
+        motion = solution.motion()
+        poses = [motion.pose(t) for t in np.linspace(0.0, 0.9, 301)]
+        body = ConvexShape.box_at(robot.box_center(), robot.platform.size)
+        post = ConvexShape.box_at(np.array([0.0, 0.1, 0.3]), np.array([0.02, 0.1, 0.1]))
+        gaps.append(min(body.moved(X).distance(post)[0] for X in poses))
+    missed = [solution.between["obstacles"] for solution in (rough, fine)]
+    assert missed[0].missed > 1e-4
+    assert missed[0].missed > CLEARANCE - gaps[0] - 1e-6
+    assert missed[1].missed < 1e-5
+    assert gaps[1] > CLEARANCE - missed[1].bound
+    for one in missed:
+        assert one.missed <= one.bound < one.missed + 0.01
+
+
+def test_a_guess_decides_on_which_side_an_obstacle_is_passed():
+    robot, task = robot_task()
+    body = ConvexShape.box_at(robot.box_center(), robot.platform.size)
+    post = ConvexShape.capsule(np.zeros(3), np.array([0.0, 0.0, 0.6]), 0.02)
+    ends = [RigidTransform([-0.3, 0.0, 0.35]), RigidTransform([0.3, 0.0, 0.35])]
+    for side in (-1.0, 1.0):
+        program = FreePathProgram(task, *ends, 8, (2.0, 2.0))
+        program.AddTensionCost()
+        program.AddObstacles([post], CLEARANCE, [body])
+        corner = RigidTransform([0.0, 0.2 * side, 0.35])
+        way = straight_path([ends[0], corner, ends[1]], 0.2)
+        motion = program.Solve(2.0, way).motion()
+        assert side * motion.pose(1.0).translation()[1] > 0.05

@@ -1,18 +1,18 @@
-"""What a free motion asks of cables, on any scalar: the kernels' own source on numbers or AutoDiff.
+"""Constraints of the platform on AutoDiffXd: the kernels' own source in Python, as a reference.
 
-Coordinates of a pose are (g, d), or those of them that the platform can move: the quaternion (1, g)
-turns P in W from its pose at the start, g = u tan(theta / 2), and d is the way of Po in W. They are
-regular below half a turn, and polynomials of them are pieces of a `PosePath`.
+What `planning` does by kernels with hand-written derivatives is done here by Drake's automatic
+ones, slowly and independently: benchmarks and tests hold the one against the other.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from pydrake.autodiffutils import AutoDiffXd
 from pydrake.math import RigidTransform
+from scipy.optimize import linprog
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.control.task_space import floating_wrench
@@ -32,40 +32,10 @@ LARGEST_TURN = 3.0
 TOUCHING = 1e-16
 """Added to squared distances, which have no derivative where segments cross [m^2]."""
 
-AT_LIMIT = 1e-3
-"""Of a limit: cables that are nearer are at it."""
-
-INSTANT = 1e-4
-"""Half the time between speeds of which accelerations are the difference: errors go with its square
-and the third derivative of a length, and stay below 1e-6 of what limits are [s]."""
-
 _point = any_scalar(path_point)
 _motion = any_scalar(floating_motion)
 _wrench = any_scalar(floating_wrench)
 _line = any_scalar(pulley_line)
-
-
-@dataclass(frozen=True)
-class Capsule:
-    """An obstacle in W: what is within a radius of a segment; of no length, a ball.
-
-    Attributes:
-        start: p_W of one end, shape (3,) [m].
-        end: p_W of the other, shape (3,) [m].
-        radius: Radius, at least 0 [m].
-    """
-
-    start: Array
-    end: Array
-    radius: float
-
-    @staticmethod
-    def around(box: Array) -> Capsule:
-        """The one around a box, a row of `cable_interference.box_row`: along its longest edge."""
-        R, middle, half = box[:9].reshape(3, 3), box[9:12], box[12:]
-        k = int(np.argmax(half))
-        radius = float(np.linalg.norm(np.delete(half, k)))
-        return Capsule(middle - half[k] * R[:, k], middle + half[k] * R[:, k], radius)
 
 
 class FreeTerms:
@@ -78,7 +48,7 @@ class FreeTerms:
     def __init__(self, task: PathTask, start: RigidTransform) -> None:
         """With the pose that coordinates count from."""
         self.rows = list(task.dynamics.motions)
-        self._limits = task.limits
+        self._task = task
         self._cables, self._packed = task.cables, task.cables.packed()
         self._dynamics = task.dynamics.packed()
         w, x, y, z = pose_row(start)[:4]
@@ -136,35 +106,6 @@ class FreeTerms:
         X = _motion(point[:13])
         return [_line(X, cable)[1:] for cable in self._packed]
 
-    def at_limit(self, q: Array, v: Array, a: Array, t: Array) -> list[int]:
-        """Cables of which tension, speed or acceleration has come to a limit, the furthest first.
-
-        Args:
-            q: Coordinates, shape (n,).
-            v: Their derivatives by time.
-            a: Their second derivatives.
-            t: Tensions as shares of the largest one, shape (m,).
-        """
-        lim = self._limits
-        left = np.minimum(t - lim.lower / lim.upper, 1.0 - t)
-        left = np.minimum(left, 1.0 - np.abs(self.cable_speeds(self.point(q, v))) / lim.cable_speed)
-        growth = np.asarray(self.cable_accelerations(q, v, a), float)
-        left = np.minimum(left, 1.0 - np.abs(growth) / lim.cable_acceleration)
-        return [int(i) for i in np.argsort(left) if left[i] < AT_LIMIT]
-
-    def halfway(self, x: Any, parts: int) -> tuple[Any, Any, Any]:
-        """Coordinates and derivatives in the middle between two knots.
-
-        Args:
-            x: q, v and a at the first knot, a at the second, and the time of the whole motion [s].
-            parts: Times between knots of the whole motion.
-        """
-        n = (len(x) - 1) // 4
-        q, v, a, b = (x[i * n : (i + 1) * n] for i in range(4))
-        h = x[4 * n] / parts
-        place = q + h * (0.5 * v + h * (5.0 * a + b) / 48.0)
-        return place, v + h * (3.0 * a + b) / 8.0, 0.5 * (a + b)
-
     def unbalanced(self, point: Any, tensions: Any) -> Any:
         """Wrench that the cables give less what the motion needs, shape (n,) [N m, N]."""
         state = np.zeros(13, dtype=point.dtype)
@@ -187,18 +128,6 @@ class FreeTerms:
             for ux, uy, uz, rx, ry, rz in self.lines(point)
         ])  # fmt: skip
 
-    def cable_accelerations(self, q: Any, v: Any, a: Any) -> Any:
-        """d2l/dt2 of the cables, shape (m,) [m/s^2]: of speeds a little before and after.
-
-        Differences in time of what is known exactly: with pulleys, the exit points move too, and
-        these have no second derivatives of their own.
-        """
-        after, before = (
-            self.cable_speeds(self.point(q + e * v + 0.5 * e * e * a, v + e * a))
-            for e in (INSTANT, -INSTANT)
-        )
-        return (after - before) / (2.0 * INSTANT)
-
     def ends(self, point: Any) -> list[Any]:
         """Anchor points p_WB, one of shape (3,) for each cable [m]."""
         return [point[4:7] + np.array(line[3:]) for line in self.lines(point)]
@@ -209,11 +138,63 @@ class FreeTerms:
         d = np.asarray(p_WQ) - point[4:7]
         return np.array([X[k] * d[0] + X[3 + k] * d[1] + X[6 + k] * d[2] for k in range(3)])
 
-    def from_platform(self, point: Any, p_PQ: Array) -> Any:
-        """A point of P in W, p_WQ, shape (3,) [m]."""
-        X, (x, y, z) = _motion(point[:13]), p_PQ
-        turned = [X[k] * x + X[k + 1] * y + X[k + 2] * z for k in (0, 3, 6)]
-        return point[4:7] + np.array(turned)
+    def margin(self, point: Any) -> Any:
+        """Largest s with tensions that keep s off their limits [N], a program of HiGHS.
+
+        Its derivative is that of the balance times its multipliers.
+        """
+        lines = self.lines(point)
+        limits, m = self._task.limits, len(lines)
+        columns = np.array([
+            [value(x) for x in (*np.cross([*map(value, line[3:])], [*map(value, line[:3])]),
+                                *map(value, line[:3]))]
+            for line in lines
+        ]).T[self.rows]  # fmt: skip
+        needed = np.array([value(x) for x in self.unbalanced(point, np.zeros(m))])
+        one = np.ones((m, 1))
+        A = np.vstack([np.hstack([-np.eye(m), one]), np.hstack([np.eye(m), one])])
+        b = np.concatenate([np.full(m, -limits.lower), np.full(m, limits.upper)])
+        balance = np.hstack([columns, np.zeros((len(needed), 1))])
+        found = linprog(
+            [*np.zeros(m), -1.0], A_ub=A, b_ub=b, A_eq=balance, b_eq=needed, bounds=(None, None)
+        )
+        gaps = self.unbalanced(point, found.x[:m])
+        weights = -found.eqlin.marginals
+        return np.array([found.x[m] + weights @ gaps])
+
+    def cable_gaps(self, point: Any, pairs: np.ndarray) -> Any:
+        """Distances of the centre lines of pairs of cables from exit points, shape (p,) [m]."""
+        ends, A = self.ends(point), self.cables.p_WA.T
+        plain = [np.array([value(x) for x in end]) for end in ends]
+        return np.array([
+            segments_gap((A[i], ends[i]), (A[j], ends[j]), [A[i], plain[i], A[j], plain[j]])
+            for i, j in pairs
+        ])  # fmt: skip
+
+    def capsule_gaps(self, point: Any, start: Array, end: Array, radius: float) -> Any:
+        """Distances of cables, and of Po, from a capsule, shape (m + 1,) [m]."""
+        fixed, A = (start, end), self.cables.p_WA.T
+        found = []
+        for begin, B in zip([*A, None], [*self.ends(point), point[4:7]], strict=True):
+            first = B if begin is None else begin
+            numbers = [np.array([value(x) for x in p]) for p in (first, B)]
+            found.append(segments_gap((first, B), fixed, [*numbers, *fixed]) - radius)
+        return np.array(found)
+
+    def view(self, point: Any, camera: RigidTransform, slopes: Array, marks: Array) -> Any:
+        """How far points of W, shape (3, q) [m], are within a view; as `TargetInView`."""
+        R, p = camera.rotation().matrix(), camera.translation()
+        found = []
+        for Q in np.asarray(marks).T:
+            x, y, z = R.T @ (self.in_platform(point, Q) - p)
+            found += [slopes[0] * z - x, slopes[0] * z + x]
+            found += [slopes[1] * z - y, slopes[1] * z + y, z]
+        return np.array(found)
+
+
+def value(x: Any) -> float:
+    """A number that may carry derivatives, without them."""
+    return float(x.value()) if isinstance(x, AutoDiffXd) else float(x)
 
 
 def segments_gap(one: tuple[Any, Any], other: tuple[Any, Any], values: Sequence[Array]) -> Any:
