@@ -23,8 +23,8 @@ from cdpr_drake.analyses.planning.robot_path_task import (
     path_task,
     robot_limits,
 )
-from cdpr_drake.analyses.workspaces.workspace_files import load_obstacles
-from cdpr_drake.errors import PlanningError
+from cdpr_drake.analyses.workspaces.workspace_files import load_obstacles, load_wrench_set
+from cdpr_drake.errors import PlanningError, WrenchSetError
 from cdpr_drake.geometry.poses import angles_from_rotation
 from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
@@ -33,6 +33,7 @@ from cdpr_drake.planning.free_path_solution import FreePathSolution
 from cdpr_drake.planning.path_task import PathTask
 from cdpr_drake.planning.path_timing import STATIONS, PathPlan, plan_along_path
 from cdpr_drake.schema.typed_yaml import closest
+from cdpr_drake.workspaces.demanded_wrenches import SpatialSet
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -114,6 +115,7 @@ def plan_path(
     tolerance: float = TOLERANCE,
     stations: int = STATIONS,
     pulleys: bool = True,
+    resist: SpatialSet | Path | str | None = None,
     track: bool = False,
     say: Say | None = None,
 ) -> DrawnPlan:
@@ -128,6 +130,8 @@ def plan_path(
         tolerance: How far rounded corners may pass from a pose [m].
         stations: Points at which limits are asked.
         pulleys: Whether the cables run over the robot's pulleys.
+        resist: Wrenches on the platform about Po in W [N m, N], a polytope or a box, or their file:
+            at every point of the path tensions must exist for the motion alone, and with each.
         track: Whether the simulated robot also tracks the plan.
         say: Told what is done now.
 
@@ -137,7 +141,7 @@ def plan_path(
         CdprError: The path makes no sense.
     """
     loaded, given = as_robot(robot, "plan_path"), _limits(limits)
-    task = _task(loaded, given, pulleys)
+    task = _task(loaded, given, pulleys, resist)
     found = path_poses(loaded, path)
     way = make_path(loaded, found.poses, corners, tolerance)
     arguments = _limits_told(given, pulleys) | {
@@ -147,6 +151,8 @@ def plan_path(
         "tolerance_m": tolerance,
         "stations": stations,
     }
+    if resist is not None:
+        arguments["resist"] = str(resist) if _is_file(resist) else task.resist.tolist()
     begin = time.perf_counter()
     plan = plan_along_path(task, way, stations)
     took = time.perf_counter() - begin
@@ -236,9 +242,21 @@ def _limits(limits: Limits) -> LimitSettings:
     return LimitSettings(**(limits or {}))
 
 
-def _task(robot: Robot, given: LimitSettings, pulleys: bool) -> PathTask:
+def _task(
+    robot: Robot,
+    given: LimitSettings,
+    pulleys: bool,
+    resist: SpatialSet | Path | str | None = None,
+) -> PathTask:
     cables = robot.cable_set()
-    return path_task(robot, given, cables if pulleys else cables.without_pulleys())
+    cables = cables if pulleys else cables.without_pulleys()
+    if not isinstance(resist, str | Path):
+        return path_task(robot, given, cables, resist)
+    wrenches = load_wrench_set(Path(resist))
+    try:
+        return path_task(robot, given, cables, wrenches)
+    except WrenchSetError as problem:
+        raise WrenchSetError(f"{resist}: {problem}") from problem
 
 
 def _limits_told(given: LimitSettings, pulleys: bool) -> dict[str, Any]:

@@ -16,6 +16,7 @@ from cdpr_drake.planning.limits import MotionLimits
 from cdpr_drake.planning.path_task import PathTask
 from cdpr_drake.systems.controllers.computed_torque import platform_dynamics
 from cdpr_drake.trajectories.pose_path import PosePath, smooth_path, straight_path
+from cdpr_drake.workspaces.demanded_wrenches import SpatialSet
 
 CORNERS = ("smooth", "blend", "rest")
 """What a path does at its poses: a spline through them, straight lines with rounded corners, or
@@ -84,22 +85,35 @@ def robot_limits(robot: Robot, given: LimitSettings) -> MotionLimits:
     )  # fmt: skip
 
 
-def path_task(robot: Robot, given: LimitSettings, cables: CableSet | None = None) -> PathTask:
+def path_task(
+    robot: Robot,
+    given: LimitSettings,
+    cables: CableSet | None = None,
+    resist: SpatialSet | None = None,
+) -> PathTask:
     """A robot for planning, with its limits less the reserve.
 
     Args:
         robot: The robot.
         given: Limits beside its own.
         cables: Its cables; None: over its pulleys.
+        resist: Wrenches on the platform that every point of a path must resist; None: none.
 
     Raises:
         PlanningError: A limit is not accepted, or there are too few cables.
+        WrenchSetError: The wrenches are no polytope, or have too many corners.
     """
     weight = 0.0 if robot.is_planar() else robot.platform.mass * robot.gravity
     limits = robot_limits(robot, given).within(given.reserve, weight)
     cables = robot.cable_set() if cables is None else cables
     names = [cable.name for cable in robot.cables]
-    return PathTask(cables, platform_dynamics(robot), limits, names)
+    dynamics = platform_dynamics(robot)
+    if resist is None:
+        return PathTask(cables, dynamics, limits, names)
+    found = resist.corners(dynamics.motions)  # what a planar platform does not feel is left out
+    corners = np.zeros((len(found), 6))
+    corners[:, list(dynamics.motions)] = found
+    return PathTask(cables, dynamics, limits, names, corners)
 
 
 def length_scale(robot: Robot) -> float:

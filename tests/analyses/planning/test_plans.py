@@ -144,6 +144,55 @@ def test_the_command_plans_and_writes(tmp_path, capsys):
         assert (folder / f"{figure}.png").stat().st_size > 10_000
 
 
+def test_the_command_plans_a_motion_that_resists(tmp_path, capsys):
+    wrenches = write(tmp_path / "push.yaml", "box: [0, 0, 0.2, 10, 6, 0]\n")
+    words = (
+        "planar",
+        "--waypoints",
+        "-0.1,0.1,0.3; 0.2,0.1,0.3",
+        "--stations",
+        "100",
+        "--no-track",
+    )
+    code, out, _ = run(
+        capsys, *words, "--resist", str(wrenches), "--out", str(tmp_path / "out"), "--json"
+    )
+    assert code == 0
+    told = json.loads(out)
+    resisted = told["resist"]
+    assert len(resisted["corners"]) == 8
+    assert resisted["worst"]["least_margin"] == pytest.approx(
+        min(corner["least_margin"] for corner in resisted["corners"])
+    )
+    assert -1e-6 < resisted["worst"]["least_margin"] < 0.3
+    assert "deg" in resisted["worst"]["pose"]
+    assert resisted["largest_share_between_stations"] < 1.002
+    assert told["arguments"]["resist"] == str(wrenches)
+    assert (tmp_path / "out" / "resistance.png").stat().st_size > 10_000
+    code, out, _ = run(capsys, *words, "--resist", str(wrenches), "--out", str(tmp_path / "two"))
+    assert "resists 8 wrenches" in out
+    _, out, _ = run(capsys, *words, "--json", "--out", str(tmp_path / "without"))
+    assert "resist" not in json.loads(out)
+    assert not (tmp_path / "without" / "resistance.png").exists()
+    assert json.loads(out)["duration_s"] < told["duration_s"]
+    round_set = write(tmp_path / "round.yaml", "ellipsoid: [0, 0, 0, 1, 1, 0]\n")
+    code, _, err = run(capsys, *words, "--resist", str(round_set))
+    assert code == 2
+    assert f"{round_set}: ellipsoid: found one" in err.replace("\n", "")
+    code, _, err = run(
+        capsys,
+        "planar",
+        "--free",
+        "--from",
+        "0,0,.3",
+        "--to",
+        "0.1,0,.3",
+        "--resist",
+        str(round_set),
+    )
+    assert (code, "--resist: found with --free" in err) == (2, True)
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
