@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -33,6 +33,7 @@ from cdpr_drake.planning.free_path_solution import FreePathSolution
 from cdpr_drake.planning.path_task import PathTask
 from cdpr_drake.planning.path_timing import STATIONS, PathPlan, plan_along_path
 from cdpr_drake.schema.typed_yaml import closest
+from cdpr_drake.trajectories.curved_path import Move
 from cdpr_drake.workspaces.demanded_wrenches import SpatialSet
 
 if TYPE_CHECKING:
@@ -76,11 +77,13 @@ class PathPoses:
         poses: X_WP, one after the other [m].
         source: What the path is, in words.
         remarks: What was left out of a file, a line each.
+        moves: How it goes from each to the next: lines, arcs, feeds; none: not said.
     """
 
     poses: list[RigidTransform]
     source: str
     remarks: tuple[str, ...] = ()
+    moves: tuple[Move, ...] = ()
 
 
 def path_poses(robot: Robot, path: PathPoses | Path | str | Sequence[object]) -> PathPoses:
@@ -99,7 +102,7 @@ def path_poses(robot: Robot, path: PathPoses | Path | str | Sequence[object]) ->
         return path
     if isinstance(path, str | Path):
         read = read_path(Path(path), robot.plane_height)
-        return PathPoses(read.poses, Path(path).name, read.remarks)
+        return PathPoses(read.poses, Path(path).name, read.remarks, read.moves)
     poses = [as_pose(robot, pose) for pose in path]
     if len(poses) < 2:
         raise PlanningError(f"path: found {len(poses)} poses; accepted: at least 2")
@@ -113,6 +116,7 @@ def plan_path(
     *,
     corners: str = "smooth",
     tolerance: float = TOLERANCE,
+    feeds: bool = True,
     stations: int = STATIONS,
     pulleys: bool = True,
     resist: SpatialSet | Path | str | None = None,
@@ -128,6 +132,7 @@ def plan_path(
             `cable_acceleration` [m/s^2], `speed` [m/s], `reserve` [-], see `LimitSettings`.
         corners: At the poses: smooth (a spline), blend (rounded corners) or rest.
         tolerance: How far rounded corners may pass from a pose [m].
+        feeds: Whether feeds of a file of G-code are kept, as largest speeds of Po.
         stations: Points at which limits are asked.
         pulleys: Whether the cables run over the robot's pulleys.
         resist: Wrenches on the platform about Po in W [N m, N], a polytope or a box, or their file:
@@ -143,7 +148,8 @@ def plan_path(
     loaded, given = as_robot(robot, "plan_path"), _limits(limits)
     task = _task(loaded, given, pulleys, resist)
     found = path_poses(loaded, path)
-    way = make_path(loaded, found.poses, corners, tolerance)
+    moves = found.moves if feeds else tuple(replace(move, speed=np.inf) for move in found.moves)
+    way = make_path(loaded, found.poses, corners, tolerance, moves)
     arguments = _limits_told(given, pulleys) | {
         "path": str(path) if _is_file(path) else None,
         "waypoints": None if _is_file(path) else [_row(X) for X in found.poses],
@@ -151,6 +157,11 @@ def plan_path(
         "tolerance_m": tolerance,
         "stations": stations,
     }
+    if moves:
+        arguments["feeds"] = feeds
+        arguments["arcs"] = sum(move.arc is not None for move in moves)
+        known = [move.speed for move in moves if np.isfinite(move.speed)]
+        arguments["feed_range_m_s"] = [min(known), max(known)] if known else None
     if resist is not None:
         arguments["resist"] = str(resist) if _is_file(resist) else task.resist.tolist()
     begin = time.perf_counter()

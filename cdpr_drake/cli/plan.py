@@ -53,7 +53,9 @@ from cdpr_drake.planning.resistance import wrench_words
 
 PathOption = Annotated[
     Path | None,
-    typer.Option(help="Poses: .csv of x,y,z[,phi,theta,psi] [m, deg], or G-code of G0 and G1."),
+    typer.Option(
+        help="Poses: .csv of x,y,z[,phi,theta,psi] [m, deg], or G-code: lines, arcs, feeds."
+    ),
 ]
 Waypoints = Annotated[
     str | None,
@@ -77,6 +79,9 @@ CableAcceleration = Annotated[
 ]
 Speed = Annotated[float | None, typer.Option(help="Largest speed of Po; without, none [m/s].")]
 Reserve = Annotated[float, typer.Option(help="Share of all limits that is left to feedback.")]
+Feeds = Annotated[
+    bool, typer.Option("--feeds/--no-feeds", help="Feeds of G-code are largest speeds of Po.")
+]
 Stations = Annotated[int, typer.Option(help="Points at which limits are asked.")]
 Pulleys = Annotated[bool, typer.Option(help="Cables run over the robot's pulleys.")]
 Resist = Annotated[
@@ -231,6 +236,7 @@ def plan(
     cable_acceleration: CableAcceleration = None,
     speed: Speed = None,
     reserve: Reserve = RESERVE,
+    feeds: Feeds = True,
     stations: Stations = STATIONS,
     pulleys: Pulleys = True,
     resist: Resist = None,
@@ -290,8 +296,8 @@ def plan(
 
         def planner(say: Callable[[str], None]) -> PlanRun | FreeRun:
             found = plan_path(
-                loaded, poses, given, corners=corners, tolerance=tolerance, stations=stations,
-                pulleys=pulleys, resist=resist, track=track, say=say,
+                loaded, poses, given, corners=corners, tolerance=tolerance, feeds=feeds,
+                stations=stations, pulleys=pulleys, resist=resist, track=track, say=say,
             )  # fmt: skip
             asked = {"path": None if path is None else str(path), "waypoints": waypoints}
             return replace(found, arguments=found.arguments | asked)

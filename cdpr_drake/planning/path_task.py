@@ -15,7 +15,7 @@ from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.geometry.poses import angles_from_rotation, pose_from_row
 from cdpr_drake.geometry.straight_cables import PLANAR_ROWS
 from cdpr_drake.planning.limits import MotionLimits
-from cdpr_drake.planning.margin_kernel import TENSION_USE, uses_of
+from cdpr_drake.planning.margin_kernel import PATH_SPEED_USE, TENSION_USE, uses_of
 from cdpr_drake.planning.resistance import check_resistance, resistance_bounds
 from cdpr_drake.planning.resistance_kernel import resistance_margins
 from cdpr_drake.planning.station_kernel import BASIS, NO_CABLE, SINGULAR, stations_of
@@ -165,7 +165,12 @@ def sample_motion(task: PathTask, motion: TimedPath, times: Array) -> MotionSamp
     u = rows[number, 3]
     speeds = np.maximum(rows[number, 2] + u * since, 0.0)
     s = motion.stations[number] + (rows[number, 2] + 0.5 * u * since) * since
-    return samples_at(task, motion.path.points(s), times, s, u, speeds)
+    found = samples_at(task, motion.path.points(s), times, s, u, speeds)
+    if motion.path.speeds is not None:
+        way = np.linalg.norm(motion.path.points(s)[:, 10:13], axis=1)
+        uses = way * speeds / motion.path.largest_speeds(s)
+        found.uses[:, PATH_SPEED_USE] = np.maximum(found.uses[:, PATH_SPEED_USE], uses)
+    return found
 
 
 def samples_at(

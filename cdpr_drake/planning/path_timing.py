@@ -82,7 +82,7 @@ def plan_along_path(
 
     Args:
         task: The robot and its limits.
-        path: The path; where its direction jumps, the platform rests.
+        path: The path; where its direction jumps, the platform rests. Its speeds are kept, too.
         stations: About how many points of the path the limits are asked at; a path of more pieces
             has more.
         start_time: When it begins [s].
@@ -122,7 +122,8 @@ def _plan_leg(task: PathTask, leg: PosePath, whole: float, density: tuple[float,
     stations, reach = task.stations(points)
     limits, lim = task.limits.packed(), task.limits
     fastest = lim.cable_speed / np.maximum(np.max(np.abs(stations[:, RATE]), axis=1), 1e-300)
-    fastest = np.minimum(fastest, lim.speed / np.maximum(reach, 1e-300)) ** 2
+    most = np.minimum(leg.largest_speeds(places), lim.speed)
+    fastest = np.minimum(fastest, most / np.maximum(reach, 1e-300)) ** 2
     n, r = len(places) - 1, stations.shape[1] - BASIS
     etas, margins = np.zeros((n + 1, r)), np.empty(n + 1)
     rest_margins(stations, limits, etas, margins)

@@ -52,7 +52,8 @@ def test_g_code(tmp_path):
     places = [np.round(X.translation(), 6).tolist() for X in found.poses]
     assert places == [[0, 0, 0.3], [0.1, 0, 0.3], [0.1, 0.1, 0.3], [0, 0.1, 0.3], [0, 0, 0.3]]
     assert found.poses[2].rotation().matrix()[2, 1] == pytest.approx(np.sin(np.radians(2.5)))
-    assert found.remarks == ("F words left out: 1", "M words left out: 1")
+    assert found.remarks == ("M30 (end of program) left out: 1",)
+    assert found.moves[1].speed == pytest.approx(0.02)
 
 
 @pytest.mark.parametrize(
@@ -62,7 +63,7 @@ def test_g_code(tmp_path):
         ("a.csv", "0,0,1\n0,0\n", "line 2: .* accepted: 3 finite"),
         ("a.csv", "0,0,1\n0,nan,1\n", "line 2"),
         ("a.csv", "0,0,1\n", "found 1 poses"),
-        ("a.nc", "G0 X0 Y0 Z0\nG2 X1 Y1 I1\n", "line 2: found G2; accepted: straight"),
+        ("a.nc", "G0 X0 Y0 Z0\nG5 X1 Y1 I1\n", "line 2: found G5; accepted: straight"),
         ("a.nc", "G0 X0 Y0\n", "line 1: Z is not known"),
         ("a.nc", "X0 Y0\n", "line 1: found coordinates before"),
         ("a.nc", "G0 X0 X1\n", "X twice"),
