@@ -6,6 +6,7 @@ from .analyses.front.mechanisms import hang_mechanism as hang_mechanism
 from .analyses.front.mechanisms import solve_mechanism_tensions as solve_mechanism_tensions
 from .analyses.front.planning import plan_free_motion as plan_free_motion
 from .analyses.front.planning import plan_path as plan_path
+from .analyses.front.reconfiguration import reconfigure as reconfigure
 from .analyses.front.session import Session as Session
 from .analyses.front.simulated_fits import calibrate_in_simulation as calibrate_in_simulation
 from .analyses.front.simulated_fits import identify_in_simulation as identify_in_simulation

@@ -2,3 +2,6 @@ from .free_path import FreePathProgram as FreePathProgram
 from .input_shaping import make_shaper as make_shaper
 from .path_task import sample_motion as sample_motion
 from .path_timing import plan_along_path as plan_along_path
+from .reconfiguration import Rails as Rails
+from .reconfiguration import RailTask as RailTask
+from .reconfiguration import ReconfigurationProgram as ReconfigurationProgram
