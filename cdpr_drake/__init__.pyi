@@ -7,6 +7,7 @@ from .analyses.front.mechanisms import solve_mechanism_tensions as solve_mechani
 from .analyses.front.planning import plan_free_motion as plan_free_motion
 from .analyses.front.planning import plan_path as plan_path
 from .analyses.front.proven_motions import plan_proven_motion as plan_proven_motion
+from .analyses.front.reconfiguration import reconfigure as reconfigure
 from .analyses.front.session import Session as Session
 from .analyses.front.simulated_fits import calibrate_in_simulation as calibrate_in_simulation
 from .analyses.front.simulated_fits import identify_in_simulation as identify_in_simulation

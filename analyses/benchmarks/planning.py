@@ -13,15 +13,27 @@ from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.planning.path_task import PathTask
 from cdpr_drake.planning.path_timing import plan_along_path
 from cdpr_drake.trajectories.pose_path import PosePath
+from cdpr_drake.workspaces.demanded_wrenches import SpatialSet
 
 ROBOT, TENSIONS = "acrobot_large", (1.0, 60.0)
 
 STATIONS = 500
 
+POSES = [
+    pose_from_angles(np.array(place), np.radians(angles))
+    for place, angles in (
+        ([0.0, 0.0, 0.2], [0.0, 0.0, 0.0]),
+        ([0.15, -0.1, 0.4], [4.0, -3.0, 6.0]),
+        ([-0.1, 0.1, 0.3], [0.0, 0.0, 0.0]),
+    )
+]
+"""Of the path."""
+
 
 def planning_rows(quick: bool) -> list[TimingRow]:
     """All rows of this file; `quick` repeats less."""
-    return [path_row(3 if quick else 7)]
+    repeats = 3 if quick else 7
+    return [path_row(repeats), resistance_row(repeats)]
 
 
 def path_row(repeats: int) -> TimingRow:
@@ -32,15 +44,7 @@ def path_row(repeats: int) -> TimingRow:
     """
     robot = load_robot(ROBOT)
     task = path_task(robot, LimitSettings(tensions=TENSIONS))
-    poses = [
-        pose_from_angles(np.array(place), np.radians(angles))
-        for place, angles in (
-            ([0.0, 0.0, 0.2], [0.0, 0.0, 0.0]),
-            ([0.15, -0.1, 0.4], [4.0, -3.0, 6.0]),
-            ([-0.1, 0.1, 0.3], [0.0, 0.0, 0.0]),
-        )
-    ]
-    path = make_path(robot, poses, "smooth")
+    path = make_path(robot, POSES, "smooth")
     plan = plan_along_path(task, path, STATIONS)
     programs = station_programs(task, path, plan.trajectory.stations)
 
@@ -56,6 +60,29 @@ def path_row(repeats: int) -> TimingRow:
     name = f"{ROBOT}: plan along a path, {len(programs)} stations"
     baseline = "one LP a station, HiGHS by scipy"
     return TimingRow(name, own, "ms", baseline, other, other / own, ratio_means="times faster")
+
+
+def resistance_row(repeats: int) -> TimingRow:
+    """A plan that resists the 64 corners of a box of wrenches, against one that resists none."""
+    robot = load_robot(ROBOT)
+    box = SpatialSet(box=np.array([0.02, 0.02, 0.02, 2.0, 2.0, 1.0]))
+    alone, resisting = (
+        path_task(robot, LimitSettings(tensions=TENSIONS), resist=some) for some in (None, box)
+    )
+    path = make_path(robot, POSES, "smooth")
+
+    def plan(task: PathTask) -> None:
+        plan_along_path(task, path, STATIONS)
+
+    plan(resisting)
+    works = [
+        lambda: 1e3 * processor_seconds(lambda: plan(resisting)),
+        lambda: 1e3 * processor_seconds(lambda: plan(alone)),
+    ]
+    own, other = interleaved(works, repeats)
+    name = f"{ROBOT}: plan that resists {len(resisting.resist)} wrenches"
+    baseline = "the plan without"
+    return TimingRow(name, own, "ms", baseline, other, own / other, ratio_means="times as long")
 
 
 def station_programs(task: PathTask, path: PosePath, places: Array) -> list[dict[str, object]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,8 +23,8 @@ from cdpr_drake.analyses.planning.robot_path_task import (
     path_task,
     robot_limits,
 )
-from cdpr_drake.analyses.workspaces.workspace_files import load_obstacles
-from cdpr_drake.errors import PlanningError
+from cdpr_drake.analyses.workspaces.workspace_files import load_obstacles, load_wrench_set
+from cdpr_drake.errors import PlanningError, WrenchSetError
 from cdpr_drake.geometry.poses import angles_from_rotation
 from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
@@ -34,6 +34,8 @@ from cdpr_drake.planning.limits import MotionLimits
 from cdpr_drake.planning.path_task import PathTask
 from cdpr_drake.planning.path_timing import STATIONS, PathPlan, plan_along_path
 from cdpr_drake.schema.typed_yaml import closest
+from cdpr_drake.trajectories.curved_path import Move
+from cdpr_drake.workspaces.demanded_wrenches import SpatialSet
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -76,11 +78,13 @@ class PathPoses:
         poses: X_WP, one after the other [m].
         source: What the path is, in words.
         remarks: What was left out of a file, a line each.
+        moves: How it goes from each to the next: lines, arcs, feeds; none: not said.
     """
 
     poses: list[RigidTransform]
     source: str
     remarks: tuple[str, ...] = ()
+    moves: tuple[Move, ...] = ()
 
 
 def path_poses(robot: Robot, path: PathPoses | Path | str | Sequence[object]) -> PathPoses:
@@ -99,7 +103,7 @@ def path_poses(robot: Robot, path: PathPoses | Path | str | Sequence[object]) ->
         return path
     if isinstance(path, str | Path):
         read = read_path(Path(path), robot.plane_height)
-        return PathPoses(read.poses, Path(path).name, read.remarks)
+        return PathPoses(read.poses, Path(path).name, read.remarks, read.moves)
     poses = [as_pose(robot, pose) for pose in path]
     if len(poses) < 2:
         raise PlanningError(f"path: found {len(poses)} poses; accepted: at least 2")
@@ -113,8 +117,10 @@ def plan_path(
     *,
     corners: str = "smooth",
     tolerance: float = TOLERANCE,
+    feeds: bool = True,
     stations: int = STATIONS,
     pulleys: bool = True,
+    resist: SpatialSet | Path | str | None = None,
     track: bool = False,
     say: Say | None = None,
 ) -> DrawnPlan:
@@ -127,8 +133,11 @@ def plan_path(
             `cable_acceleration` [m/s^2], `speed` [m/s], `reserve` [-], see `LimitSettings`.
         corners: At the poses: smooth (a spline), blend (rounded corners) or rest.
         tolerance: How far rounded corners may pass from a pose [m].
+        feeds: Whether feeds of a file of G-code are kept, as largest speeds of Po.
         stations: Points at which limits are asked.
         pulleys: Whether the cables run over the robot's pulleys.
+        resist: Wrenches on the platform about Po in W [N m, N], a polytope or a box, or their file:
+            at every point of the path tensions must exist for the motion alone, and with each.
         track: Whether the simulated robot also tracks the plan.
         say: Told what is done now.
 
@@ -138,9 +147,10 @@ def plan_path(
         CdprError: The path makes no sense.
     """
     loaded, given = as_robot(robot, "plan_path"), chosen_limits(limits)
-    task = planned_for(loaded, given, pulleys)
+    task = planned_for(loaded, given, pulleys, resist)
     found = path_poses(loaded, path)
-    way = make_path(loaded, found.poses, corners, tolerance)
+    moves = found.moves if feeds else tuple(replace(move, speed=np.inf) for move in found.moves)
+    way = make_path(loaded, found.poses, corners, tolerance, moves)
     arguments = limits_told(given, pulleys) | {
         "path": str(path) if _is_file(path) else None,
         "waypoints": None if _is_file(path) else [_row(X) for X in found.poses],
@@ -148,6 +158,13 @@ def plan_path(
         "tolerance_m": tolerance,
         "stations": stations,
     }
+    if moves:
+        arguments["feeds"] = feeds
+        arguments["arcs"] = sum(move.arc is not None for move in moves)
+        known = [move.speed for move in moves if np.isfinite(move.speed)]
+        arguments["feed_range_m_s"] = [min(known), max(known)] if known else None
+    if resist is not None:
+        arguments["resist"] = str(resist) if _is_file(resist) else task.resist.tolist()
     begin = time.perf_counter()
     plan = plan_along_path(task, way, stations)
     took = time.perf_counter() - begin
@@ -253,10 +270,22 @@ def chosen_limits(limits: Limits) -> LimitSettings:
     return LimitSettings(**(limits or {}))
 
 
-def planned_for(robot: Robot, given: LimitSettings, pulleys: bool) -> PathTask:
-    """The robot as it is planned with."""
+def planned_for(
+    robot: Robot,
+    given: LimitSettings,
+    pulleys: bool,
+    resist: SpatialSet | Path | str | None = None,
+) -> PathTask:
+    """The robot as it is planned with; `resist` is a set of wrenches, or its file."""
     cables = robot.cable_set()
-    return path_task(robot, given, cables if pulleys else cables.without_pulleys())
+    cables = cables if pulleys else cables.without_pulleys()
+    if not isinstance(resist, str | Path):
+        return path_task(robot, given, cables, resist)
+    wrenches = load_wrench_set(Path(resist))
+    try:
+        return path_task(robot, given, cables, wrenches)
+    except WrenchSetError as problem:
+        raise WrenchSetError(f"{resist}: {problem}") from problem
 
 
 def limits_told(given: LimitSettings, pulleys: bool) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,9 @@ from cdpr_drake.analyses.visualization.path_figures import Path3D, path_figure
 from cdpr_drake.arrays import Array
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.palette import BOUND, DESIRED, DISTANCE, IDEAL, PLATFORM, Look, nth_look
-from cdpr_drake.planning.path_task import MotionSamples
+from cdpr_drake.planning.margin_kernel import TENSION_USE
+from cdpr_drake.planning.path_task import MotionSamples, sample_motion
+from cdpr_drake.planning.resistance import wrench_words
 
 CROWDED = 24
 """Rows of limits that a figure shows; of more, those that are reached longest."""
@@ -32,6 +35,8 @@ def plan_pictures(run: PlanRun, formats: Sequence[str] = DEFAULT_FORMATS) -> Pic
         "winches": lambda: winch_figure(run),
         "path": lambda: plan_path_figure(run),
     }
+    if run.resisted is not None:
+        drawn["resistance"] = lambda: resistance_figure(run)
     return dict(figure_writers(drawn, formats))
 
 
@@ -124,6 +129,38 @@ def winch_figure(run: MotionRun) -> Figure:
             if number == 0:
                 place.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
         places[-1].set(xlabel="time [s]")
+    return figure
+
+
+def resistance_figure(run: PlanRun) -> Figure:
+    """What the motion leaves of tensions and torques, alone and under the wrenches to resist."""
+    found, samples = run.resisted, run.samples
+    assert found is not None
+    assert samples.resisted is not None
+    alone = sample_motion(replace(run.task, resist=np.empty((0, 6))), run.motion, samples.times)
+    figure = bare_figure((11.0, 4.6), _title(run, "What is left under the wrenches to resist"))
+    worst = wrench_words(found.corners[found.worst])
+    with styled():
+        axes = figure.subplots()
+        s = samples.parameters
+        axes.plot(s, 1.0 - alone.uses[:, TENSION_USE], label="motion alone", **line_style(IDEAL))
+        label = f"with the worst of {len(found.corners)} wrenches at each point"
+        axes.plot(s, 1.0 - samples.resisted, label=label, **line_style(DISTANCE))
+        axes.plot(
+            found.parameters, found.margins, "o", markersize=4.0, color="black",
+            markerfacecolor="none", label="each wrench where it is worst",
+        )  # fmt: skip
+        axes.plot(
+            found.parameters[found.worst], found.margins[found.worst], "D", color="black",
+            label=f"the worst: {worst}",
+        )  # fmt: skip
+        axes.axhline(0.0, label="limit", **line_style(BOUND))
+        axes.set(
+            xlabel="way s along the path [m], turns by the length scale",
+            ylabel="margin, share of half the range [-]",
+        )
+        axes.margins(x=0.01)
+        axes.legend(loc="best")
     return figure
 
 

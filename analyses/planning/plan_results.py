@@ -17,8 +17,9 @@ from cdpr_drake.analyses.reporting.provenance import package_versions
 from cdpr_drake.arrays import Array
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.planning.limits import MotionLimits
-from cdpr_drake.planning.path_task import MotionSamples, PathTask, sample_motion
+from cdpr_drake.planning.path_task import MotionSamples, PathTask, pose_words, sample_motion
 from cdpr_drake.planning.path_timing import PathPlan
+from cdpr_drake.planning.resistance import CornerMargins, resisted_along, wrench_words
 from cdpr_drake.summaries import Summarized, numbers
 from cdpr_drake.trajectories.sampled_motion import MOTION_COLUMNS, TIME_COLUMN
 from cdpr_drake.trajectories.timed_path import TimedPath
@@ -77,6 +78,10 @@ class MotionRun(Summarized):
     def details(self) -> dict[str, Any]:
         """What is its own in `as_dict`."""
 
+    def more_rows(self) -> list[tuple[str, str]]:
+        """What is its own in its summary."""
+        return []
+
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
         told: dict[str, Any] = finite(
@@ -106,6 +111,7 @@ class MotionRun(Summarized):
              f"limit {limits.cable_speed:.4g} m/s"),
             ("largest share", f"{np.max(samples.uses):.4f} of a limit"),
             ("most reached", most if reached[most] else "none"),
+            *self.more_rows(),
         ]  # fmt: skip
         if self.tracked is not None:
             told = self.tracked.as_dict()
@@ -149,10 +155,27 @@ class PlanRun(MotionRun):
         """What it is, in words for titles."""
         return f"{self.robot.name}, time-optimal along {self.source}: {self.plan.duration:.4g} s"
 
+    def more_rows(self) -> list[tuple[str, str]]:
+        """As the base class says."""
+        if (found := self.resisted) is None:
+            return []
+        k = found.worst
+        return [(
+            "resists", f"{len(found.corners)} wrenches, {wrench_words(found.corners[k])} with the "
+            f"least margin, {found.margins[k]:.4f} at s = {found.parameters[k]:.4g} m",
+        )]  # fmt: skip
+
     @cached_property
     def samples(self) -> MotionSamples:
         """The plan, as often as it is controlled."""
         return self.plan.samples(RATE)
+
+    @cached_property
+    def resisted(self) -> CornerMargins | None:
+        """How well it resists each of the wrenches that it must, at its stations; None: none."""
+        if not len(self.task.resist):
+            return None
+        return resisted_along(self.task, self.plan.trajectory)
 
     def reached_share(self) -> float:
         """Share of the instants at which a limit is reached, see `REACHED`."""
@@ -167,7 +190,28 @@ class PlanRun(MotionRun):
             "stations": len(plan.trajectory.stations),
             "rests": len(plan.path.rests),
             "planning_time_s": self.planning_time,
+            **({} if self.resisted is None else {"resist": corners_told(self)}),
         }
+
+
+def corners_told(run: PlanRun) -> dict[str, Any]:
+    """How well a plan resists each of the wrenches that it must, for JSON."""
+    found, samples = run.resisted, run.samples
+    assert found is not None
+    assert samples.resisted is not None
+    between = int(np.argmax(samples.resisted))
+    names = ("wrench_n_m_n", "least_margin", "at_s_m")
+    corners = [
+        dict(zip(names, (corner.tolist(), float(margin), float(s)), strict=True))
+        for corner, margin, s in zip(found.corners, found.margins, found.parameters, strict=True)
+    ]
+    return {
+        "corners": corners,
+        "worst": corners[found.worst] | {"pose": pose_words(run.plan.path.points(
+            found.parameters[[found.worst]])[0])},
+        "largest_share_between_stations": float(samples.resisted[between]),
+        "at_s_m": float(samples.parameters[between]),
+    }  # fmt: skip
 
 
 def limits_told(run: MotionRun) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -15,7 +15,9 @@ from cdpr_drake.models.robot_statics import check_pose
 from cdpr_drake.planning.limits import MotionLimits
 from cdpr_drake.planning.path_task import PathTask
 from cdpr_drake.systems.controllers.computed_torque import platform_dynamics
+from cdpr_drake.trajectories.curved_path import Move, curved_path, points_on_arcs
 from cdpr_drake.trajectories.pose_path import PosePath, smooth_path, straight_path
+from cdpr_drake.workspaces.demanded_wrenches import SpatialSet
 
 CORNERS = ("smooth", "blend", "rest")
 """What a path does at its poses: a spline through them, straight lines with rounded corners, or
@@ -26,6 +28,10 @@ RESERVE = 0.05
 
 TOLERANCE = 5e-3
 """How far rounded corners may pass from a pose, where nobody says [m]."""
+
+
+ARC_STEP = float(np.radians(5.0))
+"""Points of an arc that a spline goes through are so far apart, or less [rad]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,22 +90,35 @@ def robot_limits(robot: Robot, given: LimitSettings) -> MotionLimits:
     )  # fmt: skip
 
 
-def path_task(robot: Robot, given: LimitSettings, cables: CableSet | None = None) -> PathTask:
+def path_task(
+    robot: Robot,
+    given: LimitSettings,
+    cables: CableSet | None = None,
+    resist: SpatialSet | None = None,
+) -> PathTask:
     """A robot for planning, with its limits less the reserve.
 
     Args:
         robot: The robot.
         given: Limits beside its own.
         cables: Its cables; None: over its pulleys.
+        resist: Wrenches on the platform that every point of a path must resist; None: none.
 
     Raises:
         PlanningError: A limit is not accepted, or there are too few cables.
+        WrenchSetError: The wrenches are no polytope, or have too many corners.
     """
     weight = 0.0 if robot.is_planar() else robot.platform.mass * robot.gravity
     limits = robot_limits(robot, given).within(given.reserve, weight)
     cables = robot.cable_set() if cables is None else cables
     names = [cable.name for cable in robot.cables]
-    return PathTask(cables, platform_dynamics(robot), limits, names)
+    dynamics = platform_dynamics(robot)
+    if resist is None:
+        return PathTask(cables, dynamics, limits, names)
+    found = resist.corners(dynamics.motions)  # what a planar platform does not feel is left out
+    corners = np.zeros((len(found), 6))
+    corners[:, list(dynamics.motions)] = found
+    return PathTask(cables, dynamics, limits, names, corners)
 
 
 def length_scale(robot: Robot) -> float:
@@ -109,7 +128,11 @@ def length_scale(robot: Robot) -> float:
 
 
 def make_path(
-    robot: Robot, poses: Sequence[RigidTransform], corners: str, tolerance: float = TOLERANCE
+    robot: Robot,
+    poses: Sequence[RigidTransform],
+    corners: str,
+    tolerance: float = TOLERANCE,
+    moves: Sequence[Move] = (),
 ) -> PosePath:
     """The path of a robot through poses.
 
@@ -118,6 +141,8 @@ def make_path(
         poses: X_WP, at least two [m].
         corners: One of `CORNERS`.
         tolerance: How far `blend` may pass from a corner, above 0 [m].
+        moves: How it goes from each pose to the next, lines and arcs, with largest speeds; none:
+            straight lines without. A `smooth` path goes through points of arcs, `ARC_STEP` apart.
 
     Raises:
         PlanningError: The name or the tolerance is not accepted, or a pose lies outside the robot's
@@ -133,6 +158,18 @@ def make_path(
             check_pose(robot, X)
         except TensionProblemError as problem:
             raise PlanningError(f"path: {number} of {len(poses)} poses: {problem}") from problem
+    scale = length_scale(robot)
+    if moves:
+        points, ways = points_on_arcs(poses, moves, scale, ARC_STEP)
+        for X in points:
+            try:
+                check_pose(robot, X)
+            except TensionProblemError as problem:
+                raise PlanningError(f"path: on an arc: {problem}") from problem
+        if corners == "smooth":
+            path, speeds = smooth_path(points, scale), np.array([way.speed for way in ways])
+            return replace(path, speeds=speeds if np.any(np.isfinite(speeds)) else None)
+        return curved_path(poses, moves, scale, tolerance if corners == "blend" else 0.0)
     if corners == "smooth":
-        return smooth_path(poses, length_scale(robot))
-    return straight_path(poses, length_scale(robot), tolerance if corners == "blend" else 0.0)
+        return smooth_path(poses, scale)
+    return straight_path(poses, scale, tolerance if corners == "blend" else 0.0)

@@ -64,6 +64,7 @@ FIRST_ARGUMENT: dict[str, Complete] = {
     "design": robot_words,
     "stability": robot_words,
     "plan": robot_words,
+    "reconfigure": robot_words,
     "view": robot_or_mechanism_words,
     "studio": studio_words,
     "export": robot_words,

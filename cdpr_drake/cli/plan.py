@@ -58,10 +58,13 @@ from cdpr_drake.errors import CdprError
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.planning.path_timing import STATIONS
+from cdpr_drake.planning.resistance import wrench_words
 
 PathOption = Annotated[
     Path | None,
-    typer.Option(help="Poses: .csv of x,y,z[,phi,theta,psi] [m, deg], or G-code of G0 and G1."),
+    typer.Option(
+        help="Poses: .csv of x,y,z[,phi,theta,psi] [m, deg], or G-code: lines, arcs, feeds."
+    ),
 ]
 Waypoints = Annotated[
     str | None,
@@ -85,8 +88,18 @@ CableAcceleration = Annotated[
 ]
 Speed = Annotated[float | None, typer.Option(help="Largest speed of Po; without, none [m/s].")]
 Reserve = Annotated[float, typer.Option(help="Share of all limits that is left to feedback.")]
+Feeds = Annotated[
+    bool, typer.Option("--feeds/--no-feeds", help="Feeds of G-code are largest speeds of Po.")
+]
 Stations = Annotated[int, typer.Option(help="Points at which limits are asked.")]
 Pulleys = Annotated[bool, typer.Option(help="Cables run over the robot's pulleys.")]
+Resist = Annotated[
+    Path | None,
+    typer.Option(
+        help="Wrenches on the platform that must be resisted all along the path, YAML as of cdpr "
+        "workspace --wrench-set: vertices, a box."
+    ),
+]
 Track = Annotated[bool, typer.Option(help="Also have the simulated robot track the plan at 1 kHz.")]
 Out = Annotated[
     Path | None, typer.Option(help="Results folder; without, plans/ROBOT, or ROBOT-2, ...")
@@ -232,8 +245,10 @@ def plan(
     cable_acceleration: CableAcceleration = None,
     speed: Speed = None,
     reserve: Reserve = RESERVE,
+    feeds: Feeds = True,
     stations: Stations = STATIONS,
     pulleys: Pulleys = True,
+    resist: Resist = None,
     free: Free = False,
     start: From = None,
     goal: To = None,
@@ -292,6 +307,8 @@ def plan(
     elif free:
         if path is not None or waypoints is not None:
             raise CdprError("--free: found --path or --waypoints too; accepted: --from and --to")
+        if resist is not None:
+            raise CdprError("--resist: found with --free; accepted: with --path or --waypoints")
         asked = words.asked()
 
         def planner(say: Callable[[str], None]) -> MotionRun:
@@ -310,8 +327,8 @@ def plan(
 
         def planner(say: Callable[[str], None]) -> MotionRun:
             found = plan_path(
-                loaded, poses, given, corners=corners, tolerance=tolerance, stations=stations,
-                pulleys=pulleys, track=track, say=say,
+                loaded, poses, given, corners=corners, tolerance=tolerance, feeds=feeds,
+                stations=stations, pulleys=pulleys, resist=resist, track=track, say=say,
             )  # fmt: skip
             asked = {"path": None if path is None else str(path), "waypoints": waypoints}
             return replace(found, arguments=found.arguments | asked)
@@ -411,6 +428,13 @@ def _print(console: Console, told: dict[str, Any], folder: Path) -> None:
         f"at a limit in {told['instants_at_a_limit']:.1%} of all instants; largest share of a "
         f"limit {told['largest_share_of_limits']:.4f}"
     )
+    if "resist" in told:
+        worst = told["resist"]["worst"]
+        console.print(
+            f"resists {len(told['resist']['corners'])} wrenches; the least margin, "
+            f"{worst['least_margin']:.4f} of half the range, has "
+            f"{wrench_words(worst['wrench_n_m_n'])} at s = {worst['at_s_m']:.4g} m"
+        )
     table = Table(box=SIMPLE_HEAD, pad_edge=False, title="Limits")
     table.add_column("limit")
     table.add_column("reached [ms]", justify="right")

@@ -18,3 +18,6 @@ from .tension_constraints import LengthAccelerations as LengthAccelerations
 from .tension_constraints import LengthRates as LengthRates
 from .tension_constraints import TensionBalance as TensionBalance
 from .tension_constraints import TensionFeasible as TensionFeasible
+from .reconfiguration import Rails as Rails
+from .reconfiguration import RailTask as RailTask
+from .reconfiguration import ReconfigurationProgram as ReconfigurationProgram

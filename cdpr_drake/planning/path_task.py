@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -15,7 +15,9 @@ from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.geometry.poses import angles_from_rotation, pose_from_row
 from cdpr_drake.geometry.straight_cables import PLANAR_ROWS
 from cdpr_drake.planning.limits import MotionLimits
-from cdpr_drake.planning.margin_kernel import uses_of
+from cdpr_drake.planning.margin_kernel import PATH_SPEED_USE, TENSION_USE, uses_of
+from cdpr_drake.planning.resistance import check_resistance, resistance_bounds
+from cdpr_drake.planning.resistance_kernel import resistance_margins
 from cdpr_drake.planning.station_kernel import BASIS, NO_CABLE, SINGULAR, stations_of
 from cdpr_drake.trajectories.timed_path import TimedPath
 
@@ -33,19 +35,23 @@ class PathTask:
         dynamics: Its platform; `motions` says whether it is planar.
         limits: What the motion may ask.
         names: Of the cables, for messages; empty: by number.
+        resist: Wrenches on the platform about Po in W, (moment, force), shape (k, 6): at every
+            point of a path tensions must also exist under each; none: shape (0, 6) [N m, N].
     """
 
     cables: CableSet
     dynamics: PlatformDynamics
     limits: MotionLimits
     names: Sequence[str] = ()
+    resist: Array = field(default_factory=lambda: np.empty((0, 6)), repr=False)
 
     def __post_init__(self) -> None:
         """Checks that the cables can control the platform.
 
         Raises:
-            PlanningError: There are fewer cables than degrees of freedom, or cables run over
-                pulleys of the platform, whose lengths bend in another way along a path.
+            PlanningError: There are fewer cables than degrees of freedom, cables run over pulleys
+                of the platform, whose lengths bend in another way along a path, or the wrenches to
+                resist are not accepted.
         """
         if self.cables.has_platform_pulleys():
             raise PlanningError(
@@ -57,6 +63,7 @@ class PathTask:
                 f"a path of {n} degrees of freedom: found {m} cables; accepted: at least {n}, "
                 "since fewer cannot follow a given path"
             )
+        check_resistance(self)
 
     def name(self, cable: int) -> str:
         """Of a cable, counted from 0."""
@@ -109,6 +116,8 @@ class MotionSamples:
         torques: Of the motors, friction aside, shape (n, m) [N m]; NaN where neither their inertia
             nor their limit is known.
         limits: The limits.
+        resisted: Share of the limits of tensions and torques that the motion and the worst of the
+            wrenches to resist use together, shape (n,), also in `uses`; None: there are none.
     """
 
     times: Array
@@ -120,6 +129,7 @@ class MotionSamples:
     cable_accelerations: Array
     torques: Array
     limits: MotionLimits
+    resisted: Array | None = None
 
     def active(self) -> dict[str, np.ndarray]:
         """Which limits are reached, by name: for each cable, shape (n, m), or for Po, (n, 1)."""
@@ -134,6 +144,8 @@ class MotionSamples:
         }
         found: dict[str, np.ndarray] = {name: gap <= ACTIVE for name, gap in gaps.items()}
         found["speed of Po"] = self.uses[:, 3:] >= 1.0 - ACTIVE
+        if self.resisted is not None:
+            found["wrench to resist"] = self.resisted[:, np.newaxis] >= 1.0 - ACTIVE
         return found
 
 
@@ -153,7 +165,12 @@ def sample_motion(task: PathTask, motion: TimedPath, times: Array) -> MotionSamp
     u = rows[number, 3]
     speeds = np.maximum(rows[number, 2] + u * since, 0.0)
     s = motion.stations[number] + (rows[number, 2] + 0.5 * u * since) * since
-    return samples_at(task, motion.path.points(s), times, s, u, speeds)
+    found = samples_at(task, motion.path.points(s), times, s, u, speeds)
+    if motion.path.speeds is not None:
+        way = np.linalg.norm(motion.path.points(s)[:, 10:13], axis=1)
+        uses = way * speeds / motion.path.largest_speeds(s)
+        found.uses[:, PATH_SPEED_USE] = np.maximum(found.uses[:, PATH_SPEED_USE], uses)
+    return found
 
 
 def samples_at(
@@ -168,13 +185,20 @@ def samples_at(
     n, m = len(points), task.cables.count
     uses, tensions, rates = np.empty((n, 4)), np.empty((n, m)), np.empty((n, 2, m))
     uses_of(stations, reach, u, speeds**2, task.limits.packed(), uses, tensions, rates)
-    lim = task.limits
+    lim, resisting = task.limits, None
+    if len(task.resist):
+        margins = np.empty(n)
+        bounds = resistance_bounds(task, points, stations)
+        resistance_margins(bounds, u, speeds**2, margins, np.empty(n, np.int64))
+        resisting = 1.0 - margins
+        uses[:, TENSION_USE] = np.maximum(uses[:, TENSION_USE], resisting)
     torques = np.full((n, m), np.nan)
     if lim.inertia > 0.0 or np.isfinite(lim.torque):
         torques = lim.inertia / lim.ratio * rates[:, 1] - lim.ratio * tensions
     return MotionSamples(
         times=times, parameters=s, speeds=speeds, uses=uses, tensions=tensions,
         cable_speeds=rates[:, 0], cable_accelerations=rates[:, 1], torques=torques, limits=lim,
+        resisted=resisting,
     )  # fmt: skip
 
 

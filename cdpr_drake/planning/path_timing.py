@@ -26,6 +26,8 @@ from cdpr_drake.planning.reachability_kernel import (
     forward,
     largest_speeds,
 )
+from cdpr_drake.planning.resistance import resistance_bounds
+from cdpr_drake.planning.resistance_kernel import resistance_margins
 from cdpr_drake.planning.station_kernel import BASIS, RATE
 from cdpr_drake.trajectories.pose_path import PosePath
 from cdpr_drake.trajectories.timed_path import TimedPath
@@ -80,7 +82,7 @@ def plan_along_path(
 
     Args:
         task: The robot and its limits.
-        path: The path; where its direction jumps, the platform rests.
+        path: The path; where its direction jumps, the platform rests. Its speeds are kept, too.
         stations: About how many points of the path the limits are asked at; a path of more pieces
             has more.
         start_time: When it begins [s].
@@ -120,10 +122,16 @@ def _plan_leg(task: PathTask, leg: PosePath, whole: float, density: tuple[float,
     stations, reach = task.stations(points)
     limits, lim = task.limits.packed(), task.limits
     fastest = lim.cable_speed / np.maximum(np.max(np.abs(stations[:, RATE]), axis=1), 1e-300)
-    fastest = np.minimum(fastest, lim.speed / np.maximum(reach, 1e-300)) ** 2
+    most = np.minimum(leg.largest_speeds(places), lim.speed)
+    fastest = np.minimum(fastest, most / np.maximum(reach, 1e-300)) ** 2
     n, r = len(places) - 1, stations.shape[1] - BASIS
     etas, margins = np.zeros((n + 1, r)), np.empty(n + 1)
     rest_margins(stations, limits, etas, margins)
+    bounds = resistance_bounds(task, points, stations)
+    if bounds.shape[1]:
+        still, resisting = np.zeros(n + 1), np.empty(n + 1)
+        resistance_margins(bounds, still, still, resisting, np.empty(n + 1, np.int64))
+        margins = np.minimum(margins, resisting)
     margins[np.abs(margins) <= ROUNDING] = 0.0
     for end in (0, n):
         if not margins[end] >= 0.0:
@@ -131,11 +139,11 @@ def _plan_leg(task: PathTask, leg: PosePath, whole: float, density: tuple[float,
     ways = np.diff(places)
     speeds, ends = np.empty((n + 1, 2)), np.empty((n, 2, 2 + 2 * r))
     x, u = np.zeros(n + 1), np.empty(n)
-    code, where = backward(stations, ways, fastest, etas, margins, limits, speeds, ends)
+    code, where = backward(stations, bounds, ways, fastest, etas, margins, limits, speeds, ends)
     if code == DONE and speeds[0, 0] > 0.0:
         code, where = 1, 0
     if code == DONE:
-        code, where = forward(stations, ways, fastest, speeds, ends, limits, x, u)
+        code, where = forward(stations, bounds, ways, fastest, speeds, ends, limits, x, u)
     if code == UNSOLVED:
         raise PlanningError(
             f"path: at s = {places[where]:.4g} m of {whole:.4g} m a linear program was not solved; "
@@ -156,7 +164,7 @@ def _plan_leg(task: PathTask, leg: PosePath, whole: float, density: tuple[float,
             )
         )
     largest = np.empty(n + 1)
-    largest_speeds(stations, etas, margins, fastest, limits, largest)
+    largest_speeds(stations, bounds, etas, margins, fastest, limits, largest)
     return _Leg(places, x, speeds, largest)
 
 

@@ -25,6 +25,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.numerics.linear_program_kernel import lowest_point
 from cdpr_drake.planning.limits import CABLE_ACCELERATION, INERTIA, LOWER, RATIO, TORQUE, UPPER
 from cdpr_drake.planning.margin_kernel import ROUNDING
+from cdpr_drake.planning.resistance_kernel import BY_U, BY_X, ROOM
 from cdpr_drake.planning.station_kernel import BASIS, BEND, RATE, T_0, T_U, T_X
 
 DONE, UNREACHABLE, UNSOLVED = range(3)
@@ -46,14 +47,17 @@ def _kinds(limits: Array) -> int:
 
 
 @njit(cache=True)
-def row_count(m: int, limits: Array) -> int:
-    """Rows of the programs of two stations: those of either, then x there, then x here."""
-    return 2 * m * _kinds(limits) + 2
+def row_count(m: int, limits: Array, more: int) -> int:
+    """Rows of the programs of two stations: those of either, then x there, then x here.
+
+    Those of either are the limits of m cables, kind by kind, and `more` bounds of (u, x).
+    """
+    return 2 * (m * _kinds(limits) + more) + 2
 
 
 @njit(cache=True)
 def _write_station(
-    S: Array, limits: Array, twice: float, first: int, at: int,
+    S: Array, bounds: Array, limits: Array, twice: float, first: int, at: int,
     rows: Array, low: Array, high: Array,
 ) -> int:  # fmt: skip
     """Writes rows of one station into a program; returns where the next begin.
@@ -83,19 +87,25 @@ def _write_station(
             rows[at, 0], rows[at, 1] = S[RATE, i] + twice * S[BEND, i], S[BEND, i]
             low[at], high[at] = -limits[CABLE_ACCELERATION], limits[CABLE_ACCELERATION]
             at += 1
+    for k in range(bounds.shape[0]):
+        rows[at, 0] = bounds[k, BY_U] + twice * bounds[k, BY_X]
+        rows[at, 1] = bounds[k, BY_X]
+        low[at], high[at] = -np.inf, bounds[k, ROOM]
+        at += 1
     return at
 
 
 @njit(cache=True)
 def write_program(
-    here: Array, there: Array, way: float, limits: Array, fastest: float, goal: Array,
-    rows: Array, low: Array, high: Array,
+    here: Array, there: Array, bounds: Array, way: float, limits: Array, fastest: float,
+    goal: Array, rows: Array, low: Array, high: Array,
 ) -> None:  # fmt: skip
     """Writes the constraints between two stations, low <= rows z <= high.
 
     Args:
         here: Rows of the first station, shape (5 + r, m).
         there: Of the second.
+        bounds: Of (u, x) at both, as `resistance_kernel.resistance_rows`, shape (2, p, 4).
         way: D between them [m].
         limits: `MotionLimits.packed`.
         fastest: Largest x here [m^2/s^2].
@@ -106,8 +116,8 @@ def write_program(
     """
     r = here.shape[0] - BASIS
     rows[:] = 0.0
-    at = _write_station(here, limits, 0.0, 2, 0, rows, low, high)
-    at = _write_station(there, limits, 2.0 * way, 2 + r, at, rows, low, high)
+    at = _write_station(here, bounds[0], limits, 0.0, 2, 0, rows, low, high)
+    at = _write_station(there, bounds[1], limits, 2.0 * way, 2 + r, at, rows, low, high)
     rows[at, 0], rows[at, 1] = 2.0 * way, 1.0
     low[at], high[at] = goal[0], goal[1]
     rows[at + 1, 1] = 1.0
@@ -142,6 +152,8 @@ def feasible_point(
     for i in range(p):
         value = rows[i, 0] * start[0]
         scale = 0.5 * (high[i] - low[i]) if i < p - hard else 0.0
+        if scale == np.inf:  # a bound of one side, of tensions
+            scale = 0.5 * (limits[UPPER] - limits[LOWER])
         for j in range(k):
             wide[i, j] = rows[i, j]
             wide[p + i, j] = rows[i, j]
@@ -163,17 +175,18 @@ def feasible_point(
 
 @njit(cache=True)
 def backward(
-    stations: Array, ways: Array, fastest: Array, etas: Array, margins: Array, limits: Array,
-    speeds: Array, ends: Array,
+    stations: Array, bounds: Array, ways: Array, fastest: Array, etas: Array, margins: Array,
+    limits: Array, speeds: Array, ends: Array,
 ) -> tuple[int, int]:  # fmt: skip
     """Finds from which speeds the end of the path can be reached at rest.
 
     Args:
         stations: Rows of `stations_of`, shape (n + 1, 5 + r, m).
+        bounds: More bounds of (u, x) there, rows of `resistance_kernel`, shape (n + 1, p, 4).
         ways: Between them, shape (n,) [m].
         fastest: Largest x there, shape (n + 1,) [m^2/s^2].
         etas: Of the platform at rest, shape (n + 1, r) [N].
-        margins: Its margins, shape (n + 1,); negative where it cannot rest.
+        margins: Its margins, shape (n + 1,); negative where it cannot rest, or bounds forbid it.
         limits: `MotionLimits.packed`.
         speeds: Gets smallest and largest x, shape (n + 1, 2) [m^2/s^2].
         ends: Gets points of the programs at both, shape (n, 2, 2 + 2 r).
@@ -183,14 +196,14 @@ def backward(
     """
     n, m = ways.shape[0], stations.shape[2]
     r = stations.shape[1] - BASIS
-    p, k = row_count(m, limits), 2 + 2 * r
+    p, k = row_count(m, limits, bounds.shape[1]), 2 + 2 * r
     rows, low, high = np.empty((p, k)), np.empty(p), np.empty(p)
     z, cost = np.empty(k), np.zeros(k)
     speeds[n] = 0.0
     for i in range(n - 1, -1, -1):
         write_program(
-            stations[i], stations[i + 1], ways[i], limits, fastest[i], speeds[i + 1],
-            rows, low, high,
+            stations[i], stations[i + 1], bounds[i : i + 2], ways[i], limits, fastest[i],
+            speeds[i + 1], rows, low, high,
         )  # fmt: skip
         if margins[i] >= 0.0 and margins[i + 1] >= 0.0 and speeds[i + 1, 0] == 0.0:
             z[:] = 0.0
@@ -217,13 +230,14 @@ def backward(
 
 @njit(cache=True)
 def forward(
-    stations: Array, ways: Array, fastest: Array, speeds: Array, ends: Array, limits: Array,
-    x: Array, u: Array,
+    stations: Array, bounds: Array, ways: Array, fastest: Array, speeds: Array, ends: Array,
+    limits: Array, x: Array, u: Array,
 ) -> tuple[int, int]:  # fmt: skip
     """Finds the fastest law of time that stays at speeds from which the end can be reached.
 
     Args:
         stations: As `backward`.
+        bounds: As `backward`.
         ways: As `backward`.
         fastest: As `backward`.
         speeds: What `backward` found.
@@ -237,15 +251,15 @@ def forward(
     """
     n, m = ways.shape[0], stations.shape[2]
     r = stations.shape[1] - BASIS
-    p, k = row_count(m, limits), 2 + 2 * r
+    p, k = row_count(m, limits, bounds.shape[1]), 2 + 2 * r
     rows, low, high = np.empty((p, k)), np.empty(p), np.empty(p)
     fewer, z, cost = np.empty((p, k - 1)), np.empty(k - 1), np.zeros(k - 1)
     cost[0] = -1.0
     least = STANDSTILL * np.max(speeds)
     for i in range(n):
         write_program(
-            stations[i], stations[i + 1], ways[i], limits, fastest[i], speeds[i + 1],
-            rows, low, high,
+            stations[i], stations[i + 1], bounds[i : i + 2], ways[i], limits, fastest[i],
+            speeds[i + 1], rows, low, high,
         )  # fmt: skip
         span = speeds[i, 1] - speeds[i, 0]
         share = min(max((x[i] - speeds[i, 0]) / span, 0.0), 1.0) if span > 0.0 else 0.0
@@ -270,12 +284,14 @@ def forward(
 
 @njit(cache=True)
 def largest_speeds(
-    stations: Array, etas: Array, margins: Array, fastest: Array, limits: Array, out: Array
-) -> None:
+    stations: Array, bounds: Array, etas: Array, margins: Array, fastest: Array, limits: Array,
+    out: Array,
+) -> None:  # fmt: skip
     """Writes the largest x at every station by itself, whatever comes before and after.
 
     Args:
         stations: As `backward`.
+        bounds: As `backward`.
         etas: As `backward`.
         margins: As `backward`; where the platform cannot rest, the answer is NaN.
         fastest: As `backward`.
@@ -283,13 +299,13 @@ def largest_speeds(
         out: Gets it, shape (n + 1,) [m^2/s^2].
     """
     m, r = stations.shape[2], stations.shape[1] - BASIS
-    p, k = m * _kinds(limits) + 1, 2 + r
+    p, k = m * _kinds(limits) + bounds.shape[1] + 1, 2 + r
     rows, low, high = np.empty((p, k)), np.empty(p), np.empty(p)
     z, cost = np.empty(k), np.zeros(k)
     cost[1] = -1.0
     for i in range(stations.shape[0]):
         rows[:] = 0.0
-        at = _write_station(stations[i], limits, 0.0, 2, 0, rows, low, high)
+        at = _write_station(stations[i], bounds[i], limits, 0.0, 2, 0, rows, low, high)
         rows[at, 1], low[at], high[at] = 1.0, 0.0, fastest[i]
         z[:] = 0.0
         for j in range(r):

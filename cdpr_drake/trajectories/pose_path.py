@@ -62,11 +62,13 @@ class PosePath:
         pieces: Their coefficients as `path_point` takes them, shape (k, 42).
         rests: Numbers of the breaks, beside the first and the last, at which the direction jumps,
             so that the platform must rest there.
+        speeds: Largest speed of Po on each piece, shape (k,) [m/s]; None: none is asked for.
     """
 
     breaks: Array
     pieces: Array
     rests: Corners = field(default=())
+    speeds: Array | None = None
 
     def __post_init__(self) -> None:
         """Checks the sizes.
@@ -82,6 +84,11 @@ class PosePath:
             )
         if not np.all(np.diff(self.breaks) > 0.0) or not np.all(np.isfinite(self.pieces)):
             raise TrajectoryError("a path: found breaks that do not grow, or NaN; accepted: others")
+        if self.speeds is not None and (self.speeds.shape != (k,) or not np.all(self.speeds > 0.0)):
+            raise TrajectoryError(
+                f"a path of {k} pieces: found speeds of shape {self.speeds.shape}, or one that is "
+                "not above 0; accepted: one above 0 for each piece [m/s]"
+            )
 
     @property
     def length(self) -> float:
@@ -104,7 +111,24 @@ class PosePath:
     def legs(self) -> list[PosePath]:
         """Its parts from rest to rest, each with the parameters that it has here."""
         ends = [0, *self.rests, len(self.pieces)]
-        return [PosePath(self.breaks[a : b + 1], self.pieces[a:b]) for a, b in pairwise(ends)]
+        most = self.speeds
+        return [
+            PosePath(
+                self.breaks[a : b + 1], self.pieces[a:b], (), None if most is None else most[a:b]
+            )
+            for a, b in pairwise(ends)
+        ]
+
+    def largest_speeds(self, parameters: Array) -> Array:
+        """Largest speed of Po that is asked for at parameters [m], the least at breaks [m/s]."""
+        if self.speeds is None:
+            return np.full(len(parameters), np.inf)
+        last = len(self.speeds) - 1
+        found = [
+            self.speeds[np.clip(np.searchsorted(self.breaks, parameters, side) - 1, 0, last)]
+            for side in ("left", "right")
+        ]
+        return np.minimum(*found)
 
 
 def shifted_pieces(path: PosePath, parameters: Array) -> Array:
@@ -132,7 +156,7 @@ def smooth_path(poses: Sequence[RigidTransform], length_scale: float) -> PosePat
     Raises:
         TrajectoryError: There are fewer than two, or one is twice the same in a row.
     """
-    rows, ways = _rows(poses, length_scale)
+    rows, ways = _distinct_rows(poses, length_scale)
     if len(rows) == 2:
         return straight_path(poses, length_scale)
     breaks = np.concatenate([[0.0], np.cumsum(ways)])
@@ -157,13 +181,13 @@ def straight_path(
     Raises:
         TrajectoryError: There are fewer than two poses, or one is twice the same in a row.
     """
-    rows, ways = _rows(poses, length_scale)
-    lines = [_Line(a, b, way) for a, b, way in zip(rows[:-1], rows[1:], ways, strict=True)]
+    rows, ways = _distinct_rows(poses, length_scale)
+    lines = [Line(a, b, way) for a, b, way in zip(rows[:-1], rows[1:], ways, strict=True)]
     cut, jumps = np.zeros(len(lines) + 1), np.zeros(len(lines) + 1, bool)
     for i in range(1, len(lines)):
         _, first, _ = lines[i - 1].at(ways[i - 1])
         _, second, _ = lines[i].at(0.0)
-        kink = _size(second - first, length_scale)
+        kink = change_size(second - first, length_scale)
         if kink > SHORTEST_STRETCH:
             room = LONGEST_BLEND * min(ways[i - 1], ways[i])
             cut[i] = min(tolerance / (BLEND_SHARE * kink), room)
@@ -270,7 +294,7 @@ def hermite(way: float, start: tuple[Array, ...], end: tuple[Array, ...]) -> Arr
     return c.ravel()
 
 
-class _Line:
+class Line:
     """From pose row to pose row: seven numbers by the length, and their derivatives."""
 
     def __init__(self, start: Array, end: Array, way: float) -> None:
@@ -296,8 +320,12 @@ class _Line:
         )
 
 
-def _rows(poses: Sequence[RigidTransform], length_scale: float) -> tuple[Array, Array]:
-    """Pose rows with quaternions on one side, and the ways between them [m]."""
+def pose_rows(poses: Sequence[RigidTransform], length_scale: float) -> tuple[Array, Array]:
+    """Pose rows with quaternions on one side, and the straight ways between them [m].
+
+    Raises:
+        TrajectoryError: There are fewer than two, or the length scale is not accepted.
+    """
     if len(poses) < 2:
         raise TrajectoryError(f"a path: found {len(poses)} poses; accepted: at least 2")
     if not (np.isfinite(length_scale) and length_scale > 0.0):
@@ -310,6 +338,11 @@ def _rows(poses: Sequence[RigidTransform], length_scale: float) -> tuple[Array, 
     # |q_2 - q_1| = 2 sin(theta / 4), exactly also for small turns.
     angles = 4.0 * np.arcsin(np.clip(0.5 * np.linalg.norm(steps[:, :4], axis=1), 0.0, 1.0))
     ways = np.hypot(np.linalg.norm(steps[:, 4:], axis=1), length_scale * angles)
+    return rows, ways
+
+
+def _distinct_rows(poses: Sequence[RigidTransform], length_scale: float) -> tuple[Array, Array]:
+    rows, ways = pose_rows(poses, length_scale)
     if np.any(ways <= SHORTEST_STRETCH):
         i = int(np.argmin(ways))
         raise TrajectoryError(
@@ -318,6 +351,6 @@ def _rows(poses: Sequence[RigidTransform], length_scale: float) -> tuple[Array, 
     return rows, ways
 
 
-def _size(row: Array, length_scale: float) -> float:
+def change_size(row: Array, length_scale: float) -> float:
     """Of a change of seven numbers as a length; the quaternion's stands for half a turn [m]."""
     return float(np.hypot(np.linalg.norm(row[4:]), 2.0 * length_scale * np.linalg.norm(row[:4])))

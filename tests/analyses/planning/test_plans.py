@@ -52,7 +52,8 @@ def test_g_code(tmp_path):
     places = [np.round(X.translation(), 6).tolist() for X in found.poses]
     assert places == [[0, 0, 0.3], [0.1, 0, 0.3], [0.1, 0.1, 0.3], [0, 0.1, 0.3], [0, 0, 0.3]]
     assert found.poses[2].rotation().matrix()[2, 1] == pytest.approx(np.sin(np.radians(2.5)))
-    assert found.remarks == ("F words left out: 1", "M words left out: 1")
+    assert found.remarks == ("M30 (end of program) left out: 1",)
+    assert found.moves[1].speed == pytest.approx(0.02)
 
 
 @pytest.mark.parametrize(
@@ -62,7 +63,7 @@ def test_g_code(tmp_path):
         ("a.csv", "0,0,1\n0,0\n", "line 2: .* accepted: 3 finite"),
         ("a.csv", "0,0,1\n0,nan,1\n", "line 2"),
         ("a.csv", "0,0,1\n", "found 1 poses"),
-        ("a.nc", "G0 X0 Y0 Z0\nG2 X1 Y1 I1\n", "line 2: found G2; accepted: straight"),
+        ("a.nc", "G0 X0 Y0 Z0\nG5 X1 Y1 I1\n", "line 2: found G5; accepted: straight"),
         ("a.nc", "G0 X0 Y0\n", "line 1: Z is not known"),
         ("a.nc", "X0 Y0\n", "line 1: found coordinates before"),
         ("a.nc", "G0 X0 X1\n", "X twice"),
@@ -142,6 +143,55 @@ def test_the_command_plans_and_writes(tmp_path, capsys):
     assert np.max(table["tension_C1_n"]) <= 60.0
     for figure in ("phase_plane", "tensions", "winches", "path"):
         assert (folder / f"{figure}.png").stat().st_size > 10_000
+
+
+def test_the_command_plans_a_motion_that_resists(tmp_path, capsys):
+    wrenches = write(tmp_path / "push.yaml", "box: [0, 0, 0.2, 10, 6, 0]\n")
+    words = (
+        "planar",
+        "--waypoints",
+        "-0.1,0.1,0.3; 0.2,0.1,0.3",
+        "--stations",
+        "100",
+        "--no-track",
+    )
+    code, out, _ = run(
+        capsys, *words, "--resist", str(wrenches), "--out", str(tmp_path / "out"), "--json"
+    )
+    assert code == 0
+    told = json.loads(out)
+    resisted = told["resist"]
+    assert len(resisted["corners"]) == 8
+    assert resisted["worst"]["least_margin"] == pytest.approx(
+        min(corner["least_margin"] for corner in resisted["corners"])
+    )
+    assert -1e-6 < resisted["worst"]["least_margin"] < 0.3
+    assert "deg" in resisted["worst"]["pose"]
+    assert resisted["largest_share_between_stations"] < 1.002
+    assert told["arguments"]["resist"] == str(wrenches)
+    assert (tmp_path / "out" / "resistance.png").stat().st_size > 10_000
+    code, out, _ = run(capsys, *words, "--resist", str(wrenches), "--out", str(tmp_path / "two"))
+    assert "resists 8 wrenches" in out
+    _, out, _ = run(capsys, *words, "--json", "--out", str(tmp_path / "without"))
+    assert "resist" not in json.loads(out)
+    assert not (tmp_path / "without" / "resistance.png").exists()
+    assert json.loads(out)["duration_s"] < told["duration_s"]
+    round_set = write(tmp_path / "round.yaml", "ellipsoid: [0, 0, 0, 1, 1, 0]\n")
+    code, _, err = run(capsys, *words, "--resist", str(round_set))
+    assert code == 2
+    assert f"{round_set}: ellipsoid: found one" in err.replace("\n", "")
+    code, _, err = run(
+        capsys,
+        "planar",
+        "--free",
+        "--from",
+        "0,0,.3",
+        "--to",
+        "0.1,0,.3",
+        "--resist",
+        str(round_set),
+    )
+    assert (code, "--resist: found with --free" in err) == (2, True)
 
 
 @pytest.mark.parametrize(
