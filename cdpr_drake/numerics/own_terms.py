@@ -332,19 +332,22 @@ class OwnTerms(ABC):
             self._watched = _counts_of(program), found
         return self._watched[1]
 
-    def _solve_whole(self, guess: Array, what: str) -> tuple[Array, str, str]:
+    def _solve_whole(
+        self, guess: Array, what: str, program: MathematicalProgram | None = None
+    ) -> tuple[Array, str, str]:
         """The solution of the whole program, its solver and what that said.
 
         Args:
             guess: Where it starts, shape (num_vars,).
             what: What is sought, in words, for the message.
+            program: One with the same terms, in another form; None: `prog()`.
 
         Raises:
             CdprError: Of the room, where nothing keeps all constraints, or no solver came to an
                 end.
         """
-        program = self.prog()
-        said = []
+        program = self.prog() if program is None else program
+        said, named = [], []
         for solver in _solvers_for(program):
             result = solver.Solve(program, guess, None)
             word = solver.solver_id().name()

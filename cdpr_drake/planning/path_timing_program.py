@@ -14,12 +14,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from pydrake.solvers import MathematicalProgram
+from pydrake.solvers import MathematicalProgram, RotatedLorentzConeConstraint
 from scipy.linalg import null_space
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import PlanningError
-from cdpr_drake.numerics.own_terms import OwnTerms, ProgramValues
+from cdpr_drake.numerics.own_terms import OwnTerms, ProgramValues, is_convex
+from cdpr_drake.numerics.program_functions import ProgramCost
 from cdpr_drake.planning.path_task import PathTask, samples_at
 from cdpr_drake.planning.path_timing import STATIONS, PathPlan, plan_along_path, stations_of_leg
 from cdpr_drake.planning.station_kernel import BASIS, BEND, RATE, T_0, T_U, T_X
@@ -32,6 +33,12 @@ ENDS = (0.0, 1.0)
 SPEEDS, ACCELERATIONS, TENSIONS = "speeds_squared", "accelerations", "tensions"
 KINDS = (SPEEDS, ACCELERATIONS, TENSIONS)
 """Values that own terms may be of."""
+
+LEAST_SQUARE = 1e-12
+"""Where the slope of the time by a squared speed would be infinite, as at rest [m^2/s^2]."""
+
+LEAST_SHARE = 1e-3
+"""Of the largest squared speed, where solvers of nonlinear programs start at stations at rest."""
 
 NO_SPEED = 1e-6
 """Share of the largest (ds/dt)^2 below which two stations in a row are at rest [-]."""
@@ -80,6 +87,24 @@ def task_asks(task: PathTask) -> Asks:
         return PathAsks(E, *by, rows[:, RATE], rows[:, BEND], reach)
 
     return asks
+
+
+class TimeCost(ProgramCost):
+    """The time by squared speeds at stations [s], with its gradient."""
+
+    def __init__(self, ways: Array) -> None:
+        """With the lengths of the stretches, shape (n,) [m]."""
+        self._ways = ways
+
+    def value(self, x: Array) -> tuple[float, Array]:
+        """Time, and its derivatives; squares below a small one count as that."""
+        root = np.sqrt(np.maximum(x, LEAST_SQUARE))
+        both = root[1:] + root[:-1]
+        by_both = -2.0 * self._ways / both**2
+        slope = np.zeros(len(x))
+        slope[1:] += by_both
+        slope[:-1] += by_both
+        return float(np.sum(2.0 * self._ways / both)), slope * 0.5 / root
 
 
 class PathTimingProgram(OwnTerms):
@@ -202,10 +227,7 @@ class PathTimingProgram(OwnTerms):
         plan = plan_along_path(self.task, self.path, self._count, self._start_time)
         if not self.has_own_terms:
             return plan
-        guess = self._guess(plan)
-        for k, value in enumerate(self._sizes(guess)):
-            self._prog.SetVariableScaling(self._prog.decision_variable(k), value)
-        found, solver, said = self._solve_whole(guess, "a law of time along the path")
+        found, solver, said = self._optimum(self._guess(plan))
         x = np.maximum(found[self._prog.FindDecisionVariableIndices(self._x)], 0.0)
         x[self._rests] = 0.0
         if np.any((x[1:] + x[:-1]) <= NO_SPEED * np.max(x)):
@@ -279,13 +301,38 @@ class PathTimingProgram(OwnTerms):
             x[a : b + 1] = 1e-2 * s * (1.0 - s)
         return x
 
-    def _sizes(self, guess: Array) -> Array:
-        """How large variables are, of each kind, for solvers of nonlinear programs."""
-        sizes = np.ones(len(guess))
-        for kind in (self._x, self._root, self._inverse):
-            places = self._prog.FindDecisionVariableIndices(kind)
-            sizes[places] = float(np.median(np.abs(guess[places])))
-        return sizes
+    def _optimum(self, guess: Array) -> tuple[Array, str, str]:
+        """All variables, the solver and what it said, as `_solve_whole`.
+
+        Cones bend too much for solvers of nonlinear programs: these get the time as a function of
+        the squared speeds, unless own terms are of the variables that make it a cone.
+        """
+        what, program = "a law of time along the path", self._prog
+        cone = {v.get_id() for v in (*self._root, *self._inverse)}
+        costs, constraints = self._own()
+        own = [v.get_id() for b in (*costs, *constraints) for v in b.variables()]
+        if is_convex(program) or not cone.isdisjoint(own):
+            return self._solve_whole(guess, what)
+        smooth = MathematicalProgram()
+        smooth.AddDecisionVariables(program.decision_variables())
+        for binding in program.GetAllConstraints():
+            if not isinstance(binding.evaluator(), RotatedLorentzConeConstraint):
+                smooth.AddConstraint(binding)
+        for binding in costs:
+            smooth.AddCost(binding)
+        smooth.AddCost(TimeCost(self._ways), vars=self._x)
+        places = program.FindDecisionVariableIndices(self._x)
+        size = float(np.max(guess[places]))
+        for x in self._x:
+            smooth.SetVariableScaling(x, size)
+        start = guess.copy()
+        start[places] = np.maximum(guess[places], LEAST_SHARE * size)
+        found, solver, said = self._solve_whole(start, what, smooth)
+        root = np.sqrt(np.maximum(found[places], 0.0))
+        found[program.FindDecisionVariableIndices(self._root)] = root
+        inverse = 1.0 / np.maximum(root[1:] + root[:-1], 1e-300)
+        found[program.FindDecisionVariableIndices(self._inverse)] = inverse
+        return found, solver, said
 
     def _guess(self, plan: PathPlan) -> Array:
         """All variables of the fastest motion, with tensions in the middle of what is left."""
