@@ -16,6 +16,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.calibration.elimination import MOST_STEPS, LeastSquares, Minimum, Prior, minimize
 from cdpr_drake.calibration.identifiability import Identifiability, identifiability
 from cdpr_drake.calibration.onboard_terms import TagCorners, Tilts
+from cdpr_drake.calibration.own_steps import minimize_with
 from cdpr_drake.calibration.parameters import (
     CalibrationModel,
     model_difference,
@@ -62,8 +63,8 @@ class CalibrationProgram(OwnTerms):
     terms of one's own to it. They are of `values`: by how much unknown parameters differ from the
     model that is believed, in their units, as `CalibrationResult.values`. A cost counts beside half
     the sum of squared residuals over sigma, so that 0.5 ((v - a) / s)^2 says as much as a
-    measurement of a with the standard deviation s. With own terms SNOPT solves the whole program,
-    from what Gauss-Newton found.
+    measurement of a with the standard deviation s. With own terms of parameters, each step of
+    Gauss-Newton becomes a program with them; with terms of poses, SNOPT solves the whole program.
 
     Attributes:
         model: The robot as it is believed.
@@ -340,25 +341,61 @@ class CalibrationProgram(OwnTerms):
         self, problem: LeastSquares, found: Minimum, outliers: bool, began: float
     ) -> CalibrationResult:
         """The minimum of the whole program, from one without own terms."""
-        program, start = self.prog(), self.at()
-        x = self._steps_to(found.at)
+        steps = found.steps
         for _ in range(MOST_ROUNDS):
-            for k, cost in enumerate(self._costs):
-                cost.drop(problem.dropped, k)
-            x, solver, said = self._solve_whole(x, "a robot that the measurements fit")
-            at = self._point(x, start)
-            gone = outlying_rows(problem, at) if outliers else problem.dropped
+            found, solver, said = self._step_on(problem, found)
+            steps += found.steps
+            gone = outlying_rows(problem, found.at) if outliers else None
             if gone is None or problem.dropped is None or all(
                 np.array_equal(a, b) for a, b in zip(gone, problem.dropped, strict=True)
             ):  # fmt: skip
                 break
             problem = replace(problem, dropped=gone)
+        self._leave_out(problem)
         lost = (BY_LIKELIHOOD, WITHOUT_LOSS) if outliers else (BY_LIKELIHOOD,)
-        report = self._report(x, solver, said, lost)
-        assert program.num_vars() == len(x)
-        end = Minimum(at, report.cost, found.steps, True)
+        report = self._report(self._steps_to(found.at), solver, said, lost)
+        end = replace(found, steps=steps)
         result = make_result(problem, end, self.model, time.perf_counter() - began)
         return replace(result, program=report)
+
+    def _step_on(self, problem: LeastSquares, found: Minimum) -> tuple[Minimum, str, str]:
+        """The minimum with own terms, what solved its programs and what that said last.
+
+        Where all of them are of parameters, poses are eliminated; else the whole program is solved.
+        """
+        program, start, what = self.prog(), self.at(), "a robot that the measurements fit"
+        mine = {v.get_id() for v in self._theta}
+        costs, constraints = self._own()
+        if not all(v.get_id() in mine for b in (*costs, *constraints) for v in b.variables()):
+            self._leave_out(problem)
+            x, solver, said = self._solve_whole(self._steps_to(found.at), what)
+            at = self._point(x, start)
+            return Minimum(at, problem.cost(at), 1, True), solver, said
+        heard = ["", ""]
+
+        def solve(H: Array, g: Array, x: Array) -> Array:
+            step = MathematicalProgram()
+            step.AddDecisionVariables(self._theta)
+            step.AddQuadraticCost(H, -g - H @ x, self._theta, is_convex=True)
+            for binding in costs:
+                step.AddCost(binding)
+            for binding in constraints:
+                step.AddConstraint(binding)
+            y, *heard[:] = self._solve_whole(x, what, step)
+            return y
+
+        def own(x: Array) -> float:
+            whole = np.zeros(program.num_vars())
+            whole[program.FindDecisionVariableIndices(self._theta)] = x
+            return sum(float(program.EvalBinding(b, whole)[0]) for b in costs)
+
+        end, _ = minimize_with(problem, found.at, start, solve, own=own)
+        return end, heard[0], heard[1]
+
+    def _leave_out(self, problem: LeastSquares) -> None:
+        """Drops in the program what is dropped in a problem."""
+        for k, cost in enumerate(self._costs):
+            cost.drop(problem.dropped, k)
 
     def _steps_to(self, at: Point) -> Array:
         """The program's variables at a point."""

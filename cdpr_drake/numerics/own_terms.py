@@ -56,13 +56,32 @@ class ProgramValues:
         variables: Shape (n,).
         matrix: Shape (k, n), in the units of the values.
         offset: Shape (k,), likewise.
-        names: Of the values, k of them.
+        names: Of the values.
+        transform: Makes the values of what is affine; None: that is what they are.
     """
 
     variables: np.ndarray
     matrix: Array
     offset: Array
     names: tuple[str, ...]
+    transform: Function | None = None
+
+    @property
+    def size(self) -> int:
+        """Number of values."""
+        return len(self.names)
+
+    def at(self, x: Array) -> Array:
+        """The values where the variables are x, shape (n,)."""
+        plain = self.offset + self.matrix @ x
+        return plain if self.transform is None else np.asarray(self.transform(plain), float)
+
+    def of_affine(self, function: Function) -> Function:
+        """A function of the values as one of what is affine."""
+        transform = self.transform
+        if transform is None:
+            return function
+        return lambda plain: function(np.asarray(transform(plain), float))
 
     @staticmethod
     def scaled(
@@ -176,7 +195,7 @@ class OwnTerms(ABC):
             CdprError: Of the room; a shape, a name, or a Q that is not positive semidefinite.
         """
         v = self._chosen(of)
-        k = len(v.offset)
+        k = v.size
         goal = self._numbers("wanted", wanted, (k,))
         Q = np.asarray(weight, float)
         if Q.ndim < 2:
@@ -188,6 +207,8 @@ class OwnTerms(ABC):
             raise self.problem_kind(
                 f"weight: found a matrix with the eigenvalue {least:.4g}; accepted: none below 0"
             )
+        if v.transform is not None:
+            return self.AddCost(lambda u: (u - goal) @ Q @ (u - goal), of, name)
         off = v.offset - goal
         A, b, c = v.matrix.T @ Q @ v.matrix, v.matrix.T @ Q @ off, float(off @ Q @ off)
         unit = self.cost_unit
@@ -212,9 +233,9 @@ class OwnTerms(ABC):
         if found.size != 1:
             raise self.problem_kind(
                 f"cost: found an array of shape {found.shape}; accepted: a function that gives one "
-                f"number for {len(v.offset)} values"
+                f"number for {v.size} values"
             )
-        cost = ValueCost(function, v.matrix, v.offset, 1.0 / self.cost_unit)
+        cost = ValueCost(v.of_affine(function), v.matrix, v.offset, 1.0 / self.cost_unit)
         return self._named(self.prog().AddCost(cost, vars=v.variables), "cost", name)
 
     def AddLinearConstraint(
@@ -239,8 +260,10 @@ class OwnTerms(ABC):
         """
         v = self._chosen(of)
         rows = np.atleast_2d(np.asarray(A, float))
-        rows = self._numbers("A", rows, (rows.shape[0], len(v.offset)))
+        rows = self._numbers("A", rows, (rows.shape[0], v.size))
         low, high = self._bounds(lower, upper, len(rows))
+        if v.transform is not None:
+            return self.AddConstraint(lambda u: rows @ u, low, high, of, name)
         whole, fixed = rows @ v.matrix, rows @ v.offset
         # Rows as long as one, so that solvers' tolerances mean the same for all.
         size = np.maximum(np.linalg.norm(whole, axis=1), 1e-300)
@@ -269,7 +292,7 @@ class OwnTerms(ABC):
         bounds = np.vstack([low, high])
         size = np.where(np.isfinite(bounds), np.abs(bounds), 0.0).max(axis=0)
         size = np.where(size > 0.0, size, 1.0)
-        made = ValueFunction(function, v.matrix, v.offset, 1.0 / size)
+        made = ValueFunction(v.of_affine(function), v.matrix, v.offset, 1.0 / size)
         binding = self.prog().AddConstraint(made, low / size, high / size, vars=v.variables)
         return self._named(binding, "constraint", name)
 
@@ -365,7 +388,8 @@ class OwnTerms(ABC):
 
     def _named_misses(self, result: MathematicalProgramResult) -> list[str]:
         x = np.asarray(result.get_x_val(), float)
-        return self._missed(x) if x.size and np.all(np.isfinite(x)) else []
+        whole = x.size == self.prog().num_vars() and np.all(np.isfinite(x))
+        return self._missed(x) if whole else []
 
     def _named(self, binding: Binding, kind: str, name: str) -> Binding:
         if name:
@@ -381,7 +405,7 @@ class OwnTerms(ABC):
         program = self.prog()
         places = program.FindDecisionVariableIndices(v.variables)
         start = np.nan_to_num(np.asarray(program.initial_guess(), float)[places])
-        found = np.asarray(function(v.offset + v.matrix @ start))
+        found = np.asarray(function(v.at(start)))
         try:
             found = found.astype(float)
         except (TypeError, ValueError) as problem:
