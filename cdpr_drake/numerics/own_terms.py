@@ -372,8 +372,15 @@ class OwnTerms(ABC):
         program = self.prog() if program is None else program
         said, named = [], []
         for solver in _solvers_for(program):
-            result = solver.Solve(program, guess, None)
             word = solver.solver_id().name()
+            try:
+                result = solver.Solve(program, guess, None)
+            except RuntimeError as problem:  # what Drake makes of an error in a function
+                words = " ".join(str(problem).split())
+                raise self.problem_kind(
+                    f"{what}: {word}: {words}; accepted: own terms that can be evaluated near the "
+                    "solution"
+                ) from problem
             status = str(result.get_solution_result()).rpartition(".")[2]
             if result.is_success():
                 return np.asarray(result.get_x_val(), float), word, status
