@@ -277,9 +277,7 @@ class IdentificationProgram(OwnTerms):
             theta = self.layout.model.vector()
             rows = self._rows(theta)
             self._prog = self._program(rows, [np.ones(len(r.b)) for r in rows], theta)
-            self._prog.SetInitialGuess(
-                self._prog.decision_variables(), theta / self.layout.typical
-            )
+            self._prog.SetInitialGuess(self._prog.decision_variables(), theta / self.layout.typical)
             self._seal()
         return self._prog
 

@@ -423,9 +423,7 @@ class OwnTerms(ABC):
             )
         return np.atleast_1d(found)
 
-    def _bounds(
-        self, lower: float | Array, upper: float | Array, rows: int
-    ) -> tuple[Array, Array]:
+    def _bounds(self, lower: float | Array, upper: float | Array, rows: int) -> tuple[Array, Array]:
         low, high = (
             self._numbers(word, value, (rows,), finite=False)
             for word, value in (("lower", lower), ("upper", upper))

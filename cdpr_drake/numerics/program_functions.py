@@ -38,9 +38,7 @@ class ProgramFunction(ABC):
         inner = ExtractGradient(x)
         if not inner.size:
             return np.array([AutoDiffXd(value) for value in values])
-        return np.array(
-            [AutoDiffXd(v, row @ inner) for v, row in zip(values, slopes, strict=True)]
-        )
+        return np.array([AutoDiffXd(v, row @ inner) for v, row in zip(values, slopes, strict=True)])
 
 
 class ProgramCost(ABC):

@@ -100,9 +100,9 @@ def test_a_linear_bound_is_what_scipy_finds():
     program = made()
     program.AddLinearConstraint(A, low, high, name="frame")
     found = program.Solve(outliers=False)
-    other, cost = by_scipy(
-        lambda v: 0.0, [LinearConstraint(np.pad(0.01 * A, ((0, 0), (0, 24))), low, high)]
-    )
+    wide = np.pad(0.01 * A, ((0, 0), (0, 24)))  # variables are in typical sizes, then poses
+    rules = [LinearConstraint(wide[k], low[k], high[k]) for k in range(2)]
+    other, cost = by_scipy(lambda v: 0.0, rules)
     assert found.values[2] == pytest.approx(found.values[5], abs=1e-8)
     assert found.values[8] == pytest.approx(least, abs=1e-8)
     assert found.program.cost == pytest.approx(cost, rel=1e-4)
@@ -142,8 +142,8 @@ def test_outliers_are_dropped_with_own_terms_too():
 
 
 def test_poses_have_variables_too():
-    """A pose that is known by other means is kept where it was put."""
-    program = made()
+    """A pose that is known by other means is kept where it was put; SNOPT solves the whole."""
+    program = made(count=3)
     program.prog().AddBoundingBoxConstraint(0.0, 0.0, program.pose(1))
     found = program.Solve(outliers=False)
     np.testing.assert_allclose(found.stations.p[1], program.stations.p[1], atol=1e-9)

@@ -40,9 +40,7 @@ def convex_time(robot: Robot, task: PathTask, path: PosePath, count: int) -> flo
     Raises:
         PlanningError: The program was not solved.
     """
-    made = PathTimingProgram(
-        task, path, at=(0.5,), asks=difference_asks(robot, task), even=count
-    )
+    made = PathTimingProgram(task, path, at=(0.5,), asks=difference_asks(robot, task), even=count)
     result = ClarabelSolver().Solve(made.prog())
     if not result.is_success():
         raise PlanningError(f"convex program: {result.get_solution_result()}; accepted: solved")

@@ -13,7 +13,7 @@ from cdpr_drake.models.robot_loader import load_robot
 
 ROBOT = "acrobot_large"
 NEAR = 1e-5  # relative; of SNOPT, with slopes by differences of 1e-4 of a box
-GRID = 401
+GRID = 31
 """Designs of brute force over one variable; the best lies within a step of the grid."""
 
 
@@ -22,8 +22,8 @@ def wanted(*goals, reach=(0.0, 0.0, 0.0), **weights):
         goals=[GoalSettings(name=name, weight=weights.get(name, 1.0)) for name in goals]
     )
     settings.exit_points.reach = np.array(reach)
-    settings.poses.counts = np.array([2.0, 2.0, 2.0])
-    settings.generations, settings.population = 2, 3
+    settings.poses.counts = np.array([2.0, 2.0, 1.0])
+    settings.generations, settings.population = 2, 4
     return settings
 
 
@@ -79,7 +79,7 @@ def test_with_nothing_added_the_search_answers():
     settings = wanted("tension-factor", reach=(0.0, 0.0, 0.1))
     found = DesignProgram(ROBOT, settings).Solve()
     assert found.program is None
-    assert len(found.values) == 6
+    assert len(found.values) == 8
 
 
 def test_a_quadratic_preference_is_the_closed_form():
@@ -100,20 +100,18 @@ def test_a_quadratic_preference_is_the_closed_form():
 
 
 def test_a_linear_bound_ties_variables():
-    """r <= 0.1 tau, with speed wanted and power paid for: on the bound, or at its best without."""
-    program = DesignProgram(ROBOT, winches("speed", "power"))
+    """r <= 0.1 tau, with speed wanted and torque paid for: best at tau = 0.2 + 0.1 / (2 q r0)."""
+    program = DesignProgram(ROBOT, winches("speed"))
+    r0, q = load_robot(ROBOT).winch.drum_radius, 20.0
     program.AddLinearConstraint([1.0, -0.1], -np.inf, 0.0, of=["drum_radius", "motor_torque"],
                                 name="slim")  # fmt: skip
+    program.AddQuadraticCost(0.2, q, of="motor_torque", name="price")
     found = program.Solve()
     winch = found.candidates.robot(0, found.coordinates[-1]).winch
-    now = load_robot(ROBOT).winch
-    r, tau = np.meshgrid(np.linspace(0.02, 0.08, 241), np.linspace(0.2, 0.8, 241))
-    whole = np.where(r <= 0.1 * tau + 1e-12, r / now.drum_radius - tau / now.motor_torque, -np.inf)
-    k = np.unravel_index(np.argmax(whole), whole.shape)
-    best = winch.drum_radius / now.drum_radius - winch.motor_torque / now.motor_torque
-    assert best == pytest.approx(np.max(whole), abs=1e-3)
-    assert winch.drum_radius <= 0.1 * winch.motor_torque + 1e-9
-    assert winch.drum_radius == pytest.approx(r[k], abs=1e-3)
+    exact = 0.2 + 0.1 / (2.0 * q * r0)
+    assert 0.2 < exact < 0.8
+    assert winch.motor_torque == pytest.approx(exact, rel=NEAR)
+    assert winch.drum_radius == pytest.approx(0.1 * exact, rel=NEAR)
 
 
 def test_a_linear_bound_of_a_point_is_brute_force():
@@ -126,8 +124,8 @@ def test_a_linear_bound_of_a_point_is_brute_force():
     program.AddLinearConstraint([1.0], low, high, name="ceiling")
     solved = program.Solve()
     inside = (z >= low - 1e-9) & (z <= high + 1e-9)
-    assert height_of(solved) == pytest.approx(z[inside][np.argmax(found[inside])], abs=2e-3)
-    assert solved.values[-1, 0] == pytest.approx(np.max(found[inside]), rel=1e-3)
+    assert height_of(solved) == pytest.approx(z[inside][np.argmax(found[inside])], abs=z[1] - z[0])
+    assert solved.values[-1, 0] >= np.max(found[inside]) - 1e-6
 
 
 def test_a_nonlinear_cost_is_brute_force():
@@ -142,7 +140,7 @@ def test_a_nonlinear_cost_is_brute_force():
     program = DesignProgram(ROBOT, heights())
     program.AddCost(price, name="price")
     solved = program.Solve()
-    assert height_of(solved) == pytest.approx(z[np.argmin(whole)], abs=2.0 * (z[1] - z[0]))
+    assert height_of(solved) == pytest.approx(z[np.argmin(whole)], abs=z[1] - z[0])
     both = solved.program.cost + solved.program.own_costs["price"]
     assert both <= np.min(whole) + 1e-6
     assert "by evolution may find" in solved.program.lost[0]
