@@ -70,13 +70,13 @@ def minimize_with(
             tried, there = at, np.inf
         # The first point need not keep the own constraints: no step from it can be worse.
         rounding = SETTLED * (1.0 + 1e-6 * cost)
-        if not kept or there + own(new) <= cost + own(x) + rounding:
-            if np.isfinite(there):
-                at, x, cost, kept = tried, new, there, True
-                damping = max(damping / 10.0, LEAST_DAMPING)
-                if small:
-                    return Minimum(at, cost, number, True), x
-                continue
+        better = not kept or there + own(new) <= cost + own(x) + rounding
+        if better and np.isfinite(there):
+            at, x, cost, kept = tried, new, there, True
+            damping = max(damping / 10.0, LEAST_DAMPING)
+            if small:
+                return Minimum(at, cost, number, True), x
+            continue
         if small and kept:
             return Minimum(at, cost, number, True), x
         damping *= 10.0

@@ -469,7 +469,8 @@ class CalibrationProgram(OwnTerms):
         for one in asked:
             if not np.any(self.layout.select([one]) & self.free):
                 raise CalibrationError(
-                    f"of: found {one!r}, which is not unknown; accepted: {', '.join(names[:6])}, ..."
+                    f"of: found {one!r}, which is not unknown; accepted: {', '.join(names[:6])} "
+                    "and the other unknown ones"
                 )
         return every.only(np.flatnonzero(self.layout.select(asked)[self.free]))
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 
 import numpy as np
+import numpy.typing as npt
 from pydrake.solvers import Binding, MathematicalProgram, Solve
 from scipy.linalg import null_space
 
@@ -239,7 +240,9 @@ class IdentificationProgram(OwnTerms):
     def _with_own_terms(self, fit: _Fit, began: float) -> IdentificationResult:
         """The whole program, again and again until its weights do not change what it finds."""
         theta, typical, program = fit.theta, self.layout.typical, self.prog()
-        for step in range(1, MOST_STEPS + 1):
+        step, far = 0, np.inf
+        while step < MOST_STEPS:
+            step += 1
             rows = self._rows(theta)
             rests = [r.A @ (theta / typical) - r.b for r in rows]
             weights = [huber_weights(*each) for each in zip(rests, fit.limits, strict=True)]
@@ -251,7 +254,8 @@ class IdentificationProgram(OwnTerms):
                 None if convex else smooth_program(self.layout, program),
             )
             way = x - theta / typical
-            far = float(np.sqrt(max(way @ self._information(rows, weights) @ way, 0.0)))
+            said_by = float(way @ self._information(rows, weights) @ way)
+            far = float(np.sqrt(max(said_by, 0.0)))
             theta = x * typical
             # A solver of nonlinear programs comes no nearer than its tolerance.
             if far < (SETTLED if convex else ROUGHLY_SETTLED):
@@ -309,7 +313,7 @@ class IdentificationProgram(OwnTerms):
 
     def AddLinearConstraint(
         self,
-        A: Array,
+        A: npt.ArrayLike,
         lower: float | Array,
         upper: float | Array,
         of: str | Sequence[str] | None = None,

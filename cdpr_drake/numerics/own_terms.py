@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
+import numpy.typing as npt
 from pydrake.solvers import (
     Binding,
     ClarabelSolver,
@@ -240,7 +241,7 @@ class OwnTerms(ABC):
 
     def AddLinearConstraint(
         self,
-        A: Array,
+        A: npt.ArrayLike,
         lower: float | Array,
         upper: float | Array,
         of: str | Sequence[str] | None = None,

@@ -83,8 +83,8 @@ def task_asks(task: PathTask) -> Asks:
         E = np.array(
             [null_space(one[BASIS:]).T if one.shape[0] > BASIS else np.eye(m) for one in rows]
         )
-        by = [np.einsum("knm,km->kn", E, rows[:, row]) for row in (T_U, T_X, T_0)]
-        return PathAsks(E, *by, rows[:, RATE], rows[:, BEND], reach)
+        by_u, by_x, rest = (np.einsum("knm,km->kn", E, rows[:, row]) for row in (T_U, T_X, T_0))
+        return PathAsks(E, by_u, by_x, rest, rows[:, RATE], rows[:, BEND], reach)
 
     return asks
 

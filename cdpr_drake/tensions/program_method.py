@@ -189,7 +189,8 @@ class ProgramKernel:
 
 def _read(address: int, size: int) -> Array:
     """The numbers at an address, shape (size,)."""
-    return np.frombuffer((c_double * size).from_address(address), float)
+    buffer: Any = (c_double * size).from_address(address)
+    return np.frombuffer(buffer, float)
 
 
 def _key(lower: Array, upper: Array, row_scale: Array) -> bytes:

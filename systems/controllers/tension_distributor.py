@@ -79,7 +79,7 @@ class TensionDistributor(LeafSystem):
         self.rate = rate
         chosen = method_for(method, m - n, reference is not None)
         chosen.prepare(home, 1.0 / rate)
-        self._method = chosen
+        self._method, self._chosen = method, chosen
         wanted = reference if chosen.needs_reference else None
         bounds = np.vstack([home.lower, home.upper, np.zeros(m) if wanted is None else wanted])
         cables = robot.cable_set().without_pulleys() if cables is None else cables
@@ -114,7 +114,7 @@ class TensionDistributor(LeafSystem):
         None: of kernels. One record for all blocks with this method, of which the last that was
         made says the period.
         """
-        return self._method.step_times
+        return self._chosen.step_times
 
     def packed(self) -> TensionStep:
         """Its constants, for loops that are compiled as a whole."""

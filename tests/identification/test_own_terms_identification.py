@@ -48,7 +48,10 @@ def by_scipy(found, extra, constraints=()):
         return 0.5 * float(np.sum((A @ x - b) ** 2)) + extra(values(x))
 
     start = plain().model.vector()[:10] / typical[:10]
-    rules = [NonlinearConstraint(lambda x: rule(values(x)), 0.0, np.inf) for rule in constraints]
+    rules = [
+        NonlinearConstraint(lambda x, rule=rule: rule(values(x)), 0.0, np.inf)
+        for rule in constraints
+    ]
     solved = minimize(cost, start, method="SLSQP", constraints=rules,
                       options={"ftol": 1e-15, "maxiter": 500})  # fmt: skip
     assert solved.success or solved.status == 8, solved.message  # 8: as near as rounding lets it
@@ -178,7 +181,7 @@ def test_own_terms_that_no_robot_keeps_are_said():
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (lambda p: p.AddQuadraticCost(1.0, of="stiffness"), "of: found 'stiffness'; accepted: mass"),
+        (lambda p: p.AddQuadraticCost(1.0, of="stiffness"), "found 'stiffness'; accepted: mass"),
         (lambda p: p.AddLinearConstraint([1.0], -np.inf, np.inf, of="center_of_mass.x"),
          "found no finite bound"),
         (lambda p: p.AddLinearConstraint([1.0, 1.0], 0.0, 1.0, of="mass"), r"shape \(1, 2\)"),

@@ -52,7 +52,7 @@ def least_by_scipy(program, extra, start):
         return time_of(x, ways) + extra(x)
 
     found = minimize(whole, np.log(start[1:-1]), method="L-BFGS-B",
-                     options={"ftol": 1e-15, "gtol": 1e-10, "maxiter": 5000, "maxfun": 10**6})  # fmt: skip
+                     options={"ftol": 1e-15, "gtol": 1e-10, "maxfun": 10**6})  # fmt: skip
     return np.concatenate([[0.0], np.exp(found.x), [0.0]])
 
 

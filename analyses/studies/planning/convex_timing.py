@@ -10,6 +10,8 @@ robots: a convex optimization approach, 2009.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from pydrake.math import RigidTransform
 from pydrake.solvers import ClarabelSolver
@@ -63,7 +65,7 @@ def difference_asks(robot: Robot, task: PathTask) -> Asks:
     """What a path asks, by differences of its poses."""
     rows, platform = list(robot_rows(robot)), rigid_platform(robot)
 
-    def at(path: PosePath, s: float) -> tuple[Array, ...]:
+    def at(path: PosePath, s: float) -> tuple[Any, ...]:
         h = STEP * path.length
         X: RigidTransform = path.pose(s)
         twist = _twist(path, s, h)

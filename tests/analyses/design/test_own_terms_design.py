@@ -1,5 +1,6 @@
 """Own costs and constraints of a design, against closed forms and brute force."""
 
+import itertools
 from functools import cache
 
 import numpy as np
@@ -39,7 +40,7 @@ def heights():
     settings = wanted("capacity-margin", reach=(0.0, 0.0, 0.3))
     names = [f"C{i}" for i in range(1, 9)]
     settings.mirrors = [
-        MirrorSettings(axis="x", pairs=[f"{a}-{b}" for a, b in zip(names, names[1:], strict=False)])
+        MirrorSettings(axis="x", pairs=[f"{a}-{b}" for a, b in itertools.pairwise(names)])
     ]
     return settings
 
