@@ -24,9 +24,9 @@ from cdpr_drake.models.robot_statics import tension_problem
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.tensions.batch import distribute_batch
 from cdpr_drake.tensions.closed_form_kernel import closed_form
-from cdpr_drake.tensions.methods import METHODS, Distributor, distribute
+from cdpr_drake.tensions.methods import METHODS, Distributor, TensionMethod, distribute
 from cdpr_drake.tensions.problem import TensionProblem
-from cdpr_drake.tensions.program import program_tensions
+from cdpr_drake.tensions.program import TensionProgram, program_tensions
 from cdpr_drake.tensions.quadratic_program_kernel import nearest_tensions, workspace_shape
 
 ROBOT = "acrobot_large"
@@ -46,6 +46,7 @@ def tension_rows(quick: bool) -> list[TimingRow]:
     rows.append(batch_row(problems, repeats))
     rows.append(dynamic_row(1.0 if quick else 8.0))
     rows += method_rows(problems[:20], 2 if quick else 5)
+    rows += program_rows(300 if quick else 3000)
     return rows
 
 
@@ -167,3 +168,68 @@ def method_rows(problems: list[TensionProblem], repeats: int) -> list[TimingRow]
         )
         for label, value in zip(labels, figures, strict=True)
     ]
+
+
+def _near(problem: TensionProblem) -> TensionProgram:
+    """Near 8 N, first pair of cables within 1 N: a quadratic program."""
+    program = TensionProgram(problem)
+    program.AddQuadraticCost(8.0, 2.0)
+    program.AddLinearConstraint([1.0, -1.0], -1.0, 1.0, of=["cable 1", "cable 2"])
+    return program
+
+
+def _never_slack(problem: TensionProblem) -> TensionProgram:
+    """A barrier in Python: a nonlinear program."""
+    program = TensionProgram(problem)
+    program.AddCost(lambda t: 20.0 * float(np.sum(1.0 / t)))
+    return program
+
+
+def program_rows(count: int) -> list[TimingRow]:
+    """A step of methods made of programs along a path, against one of the kernel's, with the wrench
+    matrix and wrench of each step and the tensions of the step before."""
+    robot, rows = load_robot(ROBOT), []
+    angles = np.linspace(0.0, 2.0 * np.pi, count)
+    places = np.column_stack([0.2 * np.cos(angles), 0.2 * np.sin(angles), np.full(count, 0.35)])
+    steps = [
+        tension_problem(robot, pose_from_angles(place, np.zeros(3)), limits=(1.0, 60.0))
+        for place in places
+    ]
+    kernel = Distributor(steps[0])
+    for label, build in (("own quadratic program", _near), ("own nonlinear program", _never_slack)):
+        name = label.replace(" ", "_")
+        method = TensionMethod.from_program(name, build)
+        try:
+            own = Distributor(steps[0], name)
+
+            def follow(own: Distributor = own) -> None:
+                last = None
+                for step in steps:
+                    last = own(step.W, step.wrench, last).tensions
+
+            follow()
+            times = method.step_times
+            assert times is not None
+            times.restart()
+            took, base = interleaved(
+                [
+                    lambda follow=follow: 1e6 * seconds_per_call(follow, 1) / count,  # type: ignore[misc]
+                    lambda: _over(steps, lambda p: kernel(p.W, p.wrench)),
+                ],
+                3,
+            )
+            rows.append(
+                TimingRow(
+                    f"{label}, a step (worst {1e6 * times.worst:.0f} us, {times.late} of "
+                    f"{times.steps} above 1 ms)",
+                    took,
+                    "us",
+                    "Distributor, quadratic_program",
+                    base,
+                    took / base,
+                    ratio_means="times as long",
+                )
+            )
+        finally:
+            del METHODS[name]
+    return rows

@@ -25,6 +25,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CdprError, DesignError
 from cdpr_drake.models.robot_loader import as_robot, parse_robot
 from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.numerics.own_terms import ProgramReport
 from cdpr_drake.workspaces.demanded_wrenches import SpatialSet
 from cdpr_drake.workspaces.pose_grid import grid_by_count
 
@@ -66,6 +67,7 @@ class DesignSearch:
         values: Their goals, larger is better, shape (n, goals).
         scores: Weighted sums, as `scores_of`, shape (n,).
         progress: Where the search stood at the end.
+        program: Of a `DesignProgram` with own terms, how it was solved; None: by a search.
     """
 
     candidates: Candidates
@@ -77,6 +79,7 @@ class DesignSearch:
     values: Array
     scores: Array
     progress: WorkProgress
+    program: ProgramReport | None = None
 
     @property
     def names(self) -> tuple[str, ...]:

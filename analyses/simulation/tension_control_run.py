@@ -144,6 +144,7 @@ def run_tension_scenario(
     with suppress(CableGeometryError, RuntimeError), resting(control.remote):
         warm = make_simulator(control, scenario)
         warm.AdvanceTo(min(2.0 / scenario.controller.rate, scenario.duration, LONGEST_WARM_UP))
+    _count_anew(control)
     simulator = make_simulator(control, scenario)
     session.begin(simulator, control.diagram, control.remote)
     context = simulator.get_mutable_context()
@@ -173,6 +174,7 @@ def _run_loop(
     make = TensionLoop if control.remote is None else RemoteTensionLoop
     with suppress(CableGeometryError, DivergedError), resting(control.remote):  # as above
         make(control, scenario.log_rate).advance_to(1.0 / scenario.controller.rate)
+    _count_anew(control)
     session.join(control.remote)
     loop = make(control, scenario.log_rate)
     keeper = session.keeper(loop, None, loop.read_log, scenario, remote=control.remote)
@@ -188,6 +190,13 @@ def _run_loop(
         control=control,
         loop=COMPILED_LOOP if control.remote is None else REMOTE_LOOP,
     )
+
+
+def _count_anew(control: TensionControl) -> None:
+    """Steps of the run alone count, not those that load compiled kernels."""
+    times = control.blocks.distributor.step_times
+    if times is not None:
+        times.restart(times.period)
 
 
 def _outcome(
@@ -247,6 +256,9 @@ def summarize_tension_run(run: TensionRun) -> dict[str, Any]:
         "world": world_summary(scenario, run.log),
         "versions": package_versions(),
     }
+    times = run.control.blocks.distributor.step_times
+    if times is not None:
+        summary["program_steps"] = times.as_dict()
     if run.control.remote is not None:
         summary["remote"] = run.control.remote.report()
     cleaned: dict[str, Any] = finite(summary)

@@ -16,11 +16,16 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.calibration.elimination import MOST_STEPS, LeastSquares, Minimum, Prior, minimize
 from cdpr_drake.calibration.identifiability import Identifiability, identifiability
 from cdpr_drake.calibration.onboard_terms import TagCorners, Tilts
-from cdpr_drake.calibration.parameters import CalibrationModel, parameter_layout
+from cdpr_drake.calibration.own_steps import minimize_with
+from cdpr_drake.calibration.parameters import (
+    CalibrationModel,
+    model_difference,
+    parameter_layout,
+)
 from cdpr_drake.calibration.pose_search import HUBER
 from cdpr_drake.calibration.program_costs import PriorCost, StationCost
 from cdpr_drake.calibration.result import CalibrationResult, make_result, outlying_rows, robust_cost
-from cdpr_drake.calibration.stations import POSE, Point, Stations
+from cdpr_drake.calibration.stations import POSE, Point, Stations, turn_vectors
 from cdpr_drake.calibration.terms import (
     EquilibriumTerm,
     Lengths,
@@ -30,6 +35,7 @@ from cdpr_drake.calibration.terms import (
     TrackedPoses,
 )
 from cdpr_drake.errors import CalibrationError
+from cdpr_drake.numerics.own_terms import OwnTerms, ProgramValues
 from cdpr_drake.vision.pinhole import Pinhole
 
 NO_WORSE = 1e-6
@@ -38,15 +44,27 @@ NO_WORSE = 1e-6
 MOST_ROUNDS = 10
 """Times that outliers are dropped and the rest is solved again."""
 
+BY_LIKELIHOOD = (
+    "standard deviations, covariance and chi-square are those of measurements and priors alone; "
+    "own terms are not in them"
+)
+WITHOUT_LOSS = "the loss for outliers is not in the program: those beyond four sigmas are dropped"
 
-class CalibrationProgram:
+
+class CalibrationProgram(OwnTerms):
     """Finds unknown constants of a robot from what was measured at some poses.
 
     The poses themselves are unknown, too. `Add...` methods add measurements and priors; `Solve`
     finds the most likely parameters by Gauss-Newton with the poses eliminated, since general
-    solvers of `prog()` do not know that poses meet in the parameters alone. `prog()` is the same
-    problem as a MathematicalProgram, with variables by name, for constraints of one's own and for
-    other solvers.
+    solvers of `prog()` do not know that poses meet in the parameters alone.
+
+    `prog()` is the same problem as a MathematicalProgram, with variables by name, once everything
+    measured was added. `AddQuadraticCost`, `AddCost`, `AddLinearConstraint` and `AddConstraint` add
+    terms of one's own to it. They are of `values`: by how much unknown parameters differ from the
+    model that is believed, in their units, as `CalibrationResult.values`. A cost counts beside half
+    the sum of squared residuals over sigma, so that 0.5 ((v - a) / s)^2 says as much as a
+    measurement of a with the standard deviation s. With own terms of parameters, each step of
+    Gauss-Newton becomes a program with them; with terms of poses, SNOPT solves the whole program.
 
     Attributes:
         model: The robot as it is believed.
@@ -54,6 +72,8 @@ class CalibrationProgram:
         free: Which of them are unknown, shape (n,).
         stations: The poses from which the search starts.
     """
+
+    problem_kind = CalibrationError
 
     def __init__(
         self,
@@ -81,6 +101,10 @@ class CalibrationProgram:
         self.terms: list[Term] = []
         self._planar = planar
         self._std = np.full(self.layout.size, np.inf)
+        self._prog: MathematicalProgram | None = None
+        self._theta = np.empty(0, object)
+        self._own_poses: list[npt.NDArray[np.object_]] = []
+        self._costs: list[StationCost] = []
 
     def AddLengths(
         self,
@@ -100,6 +124,7 @@ class CalibrationProgram:
         Raises:
             CalibrationError: A shape or sigma is not accepted.
         """
+        self._still_grows("AddLengths")
         readings = self._table("lengths", readings)
         if start is None:
             start = first_readings(readings)
@@ -115,6 +140,7 @@ class CalibrationProgram:
 
         They are X_KM, of a marker in the tracker's frame; X_WP where the model has neither.
         """
+        self._still_grows("AddTrackedPoses")
         self._count("tracked poses", len(poses))
         R = np.array(
             [np.full((3, 3), np.nan) if X is None else X.rotation().matrix() for X in poses]
@@ -139,6 +165,7 @@ class CalibrationProgram:
         Raises:
             CalibrationError: A tag is not in the model, or a shape or sigma is not accepted.
         """
+        self._still_grows("AddTagCorners")
         unknown = [tag for tag in points if tag not in self.model.tags]
         if unknown:
             raise CalibrationError(f"tags: found {unknown}; accepted: {list(self.model.tags)}")
@@ -153,6 +180,7 @@ class CalibrationProgram:
 
     def AddSwivels(self, readings: Array, sigma: float) -> Swivels:
         """Angles of pulleys about their swivel axes, shape (k, m) [rad]; NaN: none."""
+        self._still_grows("AddSwivels")
         _positive("swivel angles", sigma)
         term = Swivels(self._table("swivel angles", readings), sigma)
         self.terms.append(term)
@@ -163,6 +191,7 @@ class CalibrationProgram:
 
         The rotation of P in W is Rz(yaw) Ry(pitch) Rx(roll); sigmas of roll and pitch, and of yaw.
         """
+        self._still_grows("AddTilts")
         _positive("inclination", sigma_tilt, sigma_yaw)
         if np.shape(angles) != (self.stations.count, 3):
             raise CalibrationError(
@@ -192,6 +221,7 @@ class CalibrationProgram:
         Raises:
             CalibrationError: A shape or sigma is not accepted.
         """
+        self._still_grows("AddRest")
         _positive("equilibrium", sigma_moment, sigma_force)
         guess = self._table("tensions", tensions)
         self.stations = replace(self.stations, tensions=guess)
@@ -207,6 +237,7 @@ class CalibrationProgram:
 
     def AddTensions(self, readings: Array, sigma: float | Array) -> Tensions:
         """Tensions that sensors measured, shape (k, m) [N], after `AddRest`; NaN: none."""
+        self._still_grows("AddTensions")
         if self.stations.tensions is None:
             raise CalibrationError("tensions: found no equilibrium that needs them; AddRest first")
         readings = self._table("tensions", readings)
@@ -216,6 +247,7 @@ class CalibrationProgram:
 
     def AddPrior(self, patterns: Sequence[str], std: float) -> None:
         """Parameters are known up to a standard deviation, each in its unit."""
+        self._still_grows("AddPrior")
         _positive("prior", std)
         self._std[self.layout.select(patterns)] = std
 
@@ -277,10 +309,18 @@ class CalibrationProgram:
         """
         began = time.perf_counter()
         self._require_told(self.FindIdentifiability())
+        problem, found = self._by_gauss_newton(outliers, start, straight)
+        if self.has_own_terms:
+            return self._with_own_terms(problem, found, outliers, began)
+        return make_result(problem, found, self.model, time.perf_counter() - began)
+
+    def _by_gauss_newton(
+        self, outliers: bool, start: Point | None, straight: bool
+    ) -> tuple[LeastSquares, Minimum]:
+        """What was solved last, and its minimum, as `Solve` without own terms."""
         plain, at = self.least_squares(), self.at() if start is None else start
         if not outliers:
-            found = minimize(plain, at)
-            return make_result(plain, found, self.model, time.perf_counter() - began)
+            return plain, minimize(plain, at)
         before, steps = robust_cost(plain, at), 0
         if not straight:
             bent = self.Approach(MOST_STEPS, at)
@@ -295,20 +335,149 @@ class CalibrationProgram:
                 f"search: found an end with cost {after:.6g} after a start with {before:.6g}; "
                 "accepted: one that is no worse, so from another first pose or with other sigmas"
             )
-        return make_result(
-            problem, replace(found, steps=steps), self.model, time.perf_counter() - began
-        )
+        return problem, replace(found, steps=steps)
+
+    def _with_own_terms(
+        self, problem: LeastSquares, found: Minimum, outliers: bool, began: float
+    ) -> CalibrationResult:
+        """The minimum of the whole program, from one without own terms."""
+        steps = found.steps
+        for _ in range(MOST_ROUNDS):
+            found, solver, said = self._step_on(problem, found)
+            steps += found.steps
+            gone = outlying_rows(problem, found.at) if outliers else None
+            if gone is None or problem.dropped is None or all(
+                np.array_equal(a, b) for a, b in zip(gone, problem.dropped, strict=True)
+            ):  # fmt: skip
+                break
+            problem = replace(problem, dropped=gone)
+        self._leave_out(problem)
+        lost = (BY_LIKELIHOOD, WITHOUT_LOSS) if outliers else (BY_LIKELIHOOD,)
+        report = self._report(self._steps_to(found.at), solver, said, lost)
+        end = replace(found, steps=steps)
+        result = make_result(problem, end, self.model, time.perf_counter() - began)
+        return replace(result, program=report)
+
+    def _step_on(self, problem: LeastSquares, found: Minimum) -> tuple[Minimum, str, str]:
+        """The minimum with own terms, what solved its programs and what that said last.
+
+        Where all of them are of parameters, poses are eliminated; else the whole program is solved.
+        """
+        program, start, what = self.prog(), self.at(), "a robot that the measurements fit"
+        mine = {v.get_id() for v in self._theta}
+        costs, constraints = self._own()
+        if not all(v.get_id() in mine for b in (*costs, *constraints) for v in b.variables()):
+            self._leave_out(problem)
+            x, solver, said = self._solve_whole(self._steps_to(found.at), what)
+            at = self._point(x, start)
+            return Minimum(at, problem.cost(at), 1, True), solver, said
+        heard = ["", ""]
+
+        def solve(H: Array, g: Array, x: Array) -> Array:
+            step = MathematicalProgram()
+            step.AddDecisionVariables(self._theta)
+            step.AddQuadraticCost(H, -g - H @ x, self._theta, is_convex=True)
+            for binding in costs:
+                step.AddCost(binding)
+            for binding in constraints:
+                step.AddConstraint(binding)
+            y, *heard[:] = self._solve_whole(x, what, step)
+            return y
+
+        def own(x: Array) -> float:
+            whole = np.zeros(program.num_vars())
+            whole[program.FindDecisionVariableIndices(self._theta)] = x
+            return sum(float(program.EvalBinding(b, whole)[0]) for b in costs)
+
+        end, _ = minimize_with(problem, found.at, start, solve, own=own)
+        return end, heard[0], heard[1]
+
+    def _leave_out(self, problem: LeastSquares) -> None:
+        """Drops in the program what is dropped in a problem."""
+        for k, cost in enumerate(self._costs):
+            cost.drop(problem.dropped, k)
+
+    def _steps_to(self, at: Point) -> Array:
+        """The program's variables at a point."""
+        problem, start, program = self.least_squares(), self.at(), self.prog()
+        step = model_difference(at.model, start.model) / start.layout.typical
+        x = np.zeros(program.num_vars())
+        x[program.FindDecisionVariableIndices(self._theta)] = step[self.free]
+        R = at.stations.R @ np.swapaxes(start.stations.R, 1, 2)
+        steps = [turn_vectors(R), at.stations.p - start.stations.p]
+        if at.stations.tensions is not None and start.stations.tensions is not None:
+            steps.append(at.stations.tensions - start.stations.tensions)
+        rows = np.hstack(steps)[:, problem.columns(start)] / problem.station_scale(start)
+        for own, row in zip(self._own_poses, rows, strict=True):
+            x[program.FindDecisionVariableIndices(own)] = row
+        return x
+
+    def _point(self, x: Array, start: Point) -> Point:
+        """The model and poses of the program's variables."""
+        problem, program = self.least_squares(), self.prog()
+        step = np.zeros(start.layout.size)
+        theta = x[program.FindDecisionVariableIndices(self._theta)]
+        step[self.free] = theta * start.layout.typical[self.free]
+        steps = np.zeros((start.stations.count, start.stations.width))
+        rows = [x[program.FindDecisionVariableIndices(own)] for own in self._own_poses]
+        steps[:, problem.columns(start)] = np.array(rows) * problem.station_scale(start)
+        return start.moved(step, steps)
 
     def prog(self) -> MathematicalProgram:
-        """The same problem for Drake's solvers, without loss for outliers.
+        """The same problem for Drake's solvers, without loss for outliers; one object.
 
         Variables are steps from the start: one for each unknown parameter, by its name, in its
         typical size, and for each pose k turn0_k.., place0_k.., in hundredths of a radian and of a
-        metre, and its tensions in newtons. Gradients are analytic.
+        metre, and its tensions in newtons. Gradients are analytic. Measurements and priors come
+        before it; what is added to it counts in `Solve`.
+
+        Raises:
+            CalibrationError: Nothing was measured.
         """
+        if self._prog is None:
+            self._make()
+        assert self._prog is not None
+        return self._prog
+
+    def parameters(self, of: str | Sequence[str] | None = None) -> npt.NDArray[np.object_]:
+        """Variables of unknown parameters over their typical sizes, as `values` chooses them."""
+        return self.values(of).variables
+
+    def pose(self, k: int) -> npt.NDArray[np.object_]:
+        """Variables of pose k, from 0: turn, place and, where they are unknown, tensions."""
+        self.prog()
+        if not 0 <= k < len(self._own_poses):
+            raise CalibrationError(f"pose: found {k}; accepted: 0 to {len(self._own_poses) - 1}")
+        return self._own_poses[k]
+
+    def values(self, of: str | Sequence[str] | None = None) -> ProgramValues:
+        """By how much unknown parameters differ from the believed model, in their units.
+
+        Args:
+            of: Groups and names as `ParameterLayout.select` takes them, in the layout's order;
+                None: all that are unknown.
+
+        Raises:
+            CalibrationError: A parameter is not there, or none of a pattern is unknown.
+        """
+        self.prog()
+        names, typical = self.names(), self.layout.typical[self.free]
+        every = ProgramValues.scaled(self._theta, typical, np.zeros(len(names)), names)
+        if of is None:
+            return every
+        asked = [of] if isinstance(of, str) else list(of)
+        for one in asked:
+            if not np.any(self.layout.select([one]) & self.free):
+                raise CalibrationError(
+                    f"of: found {one!r}, which is not unknown; accepted: {', '.join(names[:6])} "
+                    "and the other unknown ones"
+                )
+        return every.only(np.flatnonzero(self.layout.select(asked)[self.free]))
+
+    def _make(self) -> None:
         problem, start = self.least_squares(), self.at()
         program = MathematicalProgram()
-        theta = _variables(self.names())
+        self._theta = theta = _variables(self.names())
         program.AddDecisionVariables(theta)
         columns = problem.columns(start)
         labels = [f"{w}{i}" for w in ("turn", "place") for i in range(3)]
@@ -319,9 +488,20 @@ class CalibrationProgram:
             one = replace(problem, terms=tuple(t.only(slice(k, k + 1)) for t in self.terms))
             cost = StationCost(one, self.at(self.stations.only(slice(k, k + 1))))
             program.AddCost(cost, vars=np.concatenate([theta, own]))
+            self._costs.append(cost)
+            self._own_poses.append(own)
         if np.isfinite(self._std[self.free]).any():
             program.AddCost(PriorCost(problem, start), vars=theta)
-        return program
+        self._prog = program
+        self._seal()
+
+    def _still_grows(self, what: str) -> None:
+        """Measurements and priors are in the program from its beginning."""
+        if self._prog is not None:
+            raise CalibrationError(
+                f"{what}: found a program that was already made for own terms; accepted: "
+                "measurements and priors first"
+            )
 
     def _require_told(self, found: Identifiability) -> None:
         if found.untold:

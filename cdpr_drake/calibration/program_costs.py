@@ -2,33 +2,16 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
-from pydrake.autodiffutils import AutoDiffXd, ExtractGradient, ExtractValue
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.calibration.elimination import LeastSquares
 from cdpr_drake.calibration.stations import Point, turn_slope
-
-
-class ProgramCost(ABC):
-    """A cost with an analytic gradient, as Drake evaluates it."""
-
-    @abstractmethod
-    def value(self, x: Array) -> tuple[float, Array]:
-        """Cost and gradient."""
-
-    def __call__(self, x: npt.NDArray[np.generic]) -> object:
-        """A number, or one with its gradient."""
-        if x.dtype != object:
-            return self.value(np.asarray(x, float))[0]
-        cost, gradient = self.value(ExtractValue(x).ravel())
-        inner = ExtractGradient(x)
-        if not inner.size:
-            return AutoDiffXd(cost)
-        return AutoDiffXd(cost, gradient @ inner)
+from cdpr_drake.numerics.program_functions import ProgramCost
 
 
 class StationCost(ProgramCost):
@@ -36,6 +19,11 @@ class StationCost(ProgramCost):
 
     def __init__(self, problem: LeastSquares, start: Point) -> None:
         self._problem, self._start = problem, start
+
+    def drop(self, rows: Sequence[npt.NDArray[np.bool_]] | None, k: int) -> None:
+        """Leaves out rows of each term at this pose, number k, given for all poses; None: none."""
+        gone = None if rows is None else [one[k : k + 1] for one in rows]
+        self._problem = replace(self._problem, dropped=gone)
 
     def value(self, x: Array) -> tuple[float, Array]:
         """Cost and gradient."""

@@ -29,6 +29,7 @@ from cdpr_drake.calibration.parameters import (
 )
 from cdpr_drake.calibration.pose_search import OUTLIER, robust_costs
 from cdpr_drake.calibration.stations import POSE, Point, Stations
+from cdpr_drake.numerics.own_terms import ProgramReport
 
 MOST_LARGEST = 10
 """Largest residuals that a result names."""
@@ -110,6 +111,7 @@ class CalibrationResult:
         degrees: Degrees of freedom of it.
         steps: Steps of the solver.
         seconds: Time it took [s].
+        program: With own terms, how the program was solved; None: by Gauss-Newton.
     """
 
     status: str
@@ -137,6 +139,7 @@ class CalibrationResult:
     degrees: int
     steps: int
     seconds: float
+    program: ProgramReport | None = None
 
     @property
     def correlation(self) -> Array:

@@ -254,6 +254,28 @@ class Layout:
                 parts.append(values[:1] if group in self.common else values)
         return np.concatenate(parts) if parts else np.zeros(0)
 
+    def ratios(self) -> list[tuple[dict[int, float], dict[int, float]] | None]:
+        """Each free parameter as one linear form of the vector over another, both with a constant
+        at entry -1; None: what is neither, moments of inertia about the centre of mass."""
+        one = {-1: 1.0}
+        found: list[tuple[dict[int, float], dict[int, float]] | None] = []
+        if MASS_GROUP in self.unknown:
+            found.append(({MASS: 1.0}, one))
+        if CENTER in self.unknown:
+            found += [({1 + j: 1.0}, {MASS: 1.0}) for j in range(3)]
+        if MOMENTS in self.unknown:
+            found += [None] * 6
+        for group, above, below in (
+            (STIFFNESS, (), COMPLIANCE), (DAMPING, (LAG,), COMPLIANCE), (None, (OFFSET,), None),
+            (FRICTION, (COULOMB,), None), (FRICTION, (VISCOUS,), None),
+            (STATIC, (COULOMB, EXCESS), None),
+        ):  # fmt: skip
+            if self.offsets if group is None else group in self.unknown:
+                for i in range(1 if group in self.common else len(self.model.names)):
+                    form = {column(i, what): 1.0 for what in above} or one
+                    found.append((form, one if below is None else {column(i, below): 1.0}))
+        return found
+
     def jacobian(self, theta: Array, Z: Array) -> Array:
         """Of `values` by steps y along the columns of Z, by central differences."""
         J = np.empty((len(self.parameters()), Z.shape[1]))

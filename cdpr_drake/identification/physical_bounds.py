@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from pydrake.solvers import MathematicalProgram
+from pydrake.solvers import LinearMatrixInequalityConstraint, MathematicalProgram
 from pydrake.symbolic import Variable
 
 from cdpr_drake.arrays import Array
@@ -23,6 +23,7 @@ from cdpr_drake.identification.parameters import (
     column,
 )
 from cdpr_drake.identification.regressor import SIZE, pseudo_inertia
+from cdpr_drake.numerics.program_functions import ValueFunction
 
 LEAST_INERTIA = 1e-9
 """Smallest eigenvalue of the pseudo-inertia that counts as inside of what bodies can have, over its
@@ -55,6 +56,31 @@ def make_program(
     for k in _not_negative(layout):
         program.AddBoundingBoxConstraint(0.0, np.inf, x[k])
     return program
+
+
+def smooth_program(layout: Layout, program: MathematicalProgram) -> MathematicalProgram:
+    """The same program for solvers that know no matrix inequality.
+
+    All leading minors of the pseudo-inertia are positive in its place (Sylvester).
+    """
+    smooth = MathematicalProgram()
+    x = program.decision_variables()
+    smooth.AddDecisionVariables(x)
+    for binding in program.GetAllCosts():
+        smooth.AddCost(binding)
+    for binding in program.GetAllConstraints():
+        if not isinstance(binding.evaluator(), LinearMatrixInequalityConstraint):
+            smooth.AddConstraint(binding)
+            continue
+
+        def minors(theta: Array) -> Array:
+            J = _squeezed(layout, pseudo_inertia(theta))
+            return np.array([np.linalg.det(J[:k, :k]) for k in range(1, 5)])
+
+        scale, most = np.diag(layout.typical[:SIZE]), np.full(4, np.inf)
+        made = ValueFunction(minors, scale, np.zeros(SIZE))
+        smooth.AddConstraint(made, np.full(4, LEAST_INERTIA), most, vars=x[:SIZE])
+    return smooth
 
 
 def violated(layout: Layout, theta: Array) -> tuple[str, ...]:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
 
 import numpy as np
-from pydrake.solvers import MathematicalProgram, Solve
+import numpy.typing as npt
+from pydrake.solvers import Binding, MathematicalProgram, Solve
 from scipy.linalg import null_space
 
 from cdpr_drake.arrays import Array
@@ -15,7 +17,7 @@ from cdpr_drake.errors import IdentificationError
 from cdpr_drake.identification.identifiability import unidentifiable_words
 from cdpr_drake.identification.motion_term import MotionTerm
 from cdpr_drake.identification.parameters import GROUPS, DynamicModel, Layout, offsets_needed
-from cdpr_drake.identification.physical_bounds import make_program, violated
+from cdpr_drake.identification.physical_bounds import make_program, smooth_program, violated
 from cdpr_drake.identification.result import (
     AT_THE_RIM,
     MISFIT,
@@ -27,10 +29,20 @@ from cdpr_drake.identification.result import (
 from cdpr_drake.identification.robust_cost import huber_cost, huber_limit, huber_weights
 from cdpr_drake.identification.samples import LoggedMotion, WinchSamples
 from cdpr_drake.identification.terms import CableTerm, Prior, Rows, Term, WinchTerm, prior_rows
+from cdpr_drake.numerics.own_terms import OwnTerms, ProgramReport, ProgramValues, is_convex
+
+BY_LIKELIHOOD = (
+    "standard errors, covariance and chi-square are those of measurements and priors alone; own "
+    "terms are not in them"
+)
+NOT_SETTLED = "weights and own terms did not settle: the last step went {0:.2g} standard errors"
 
 MOST_STEPS = 30
 CLOSE, SETTLED = 1e-9, 1e-5
 """Steps end where the vector changes by less, in typical sizes or in standard errors."""
+
+ROUGHLY_SETTLED = 1e-2
+"""The same where a solver of nonlinear programs takes the steps."""
 
 MOST_HALVINGS = 8
 NOTHING = 1.0
@@ -54,20 +66,30 @@ class _Fit:
     last_step: float
 
 
-class IdentificationProgram:
+class IdentificationProgram(OwnTerms):
     """Finds unknown constants of a robot's dynamics in what was measured while it moved.
 
     `Add...` methods add measurements and priors; `Solve` finds the most likely parameters that
     some body has. All equations are linear in `layout`'s vector, weighted by the noise that they
     are measured with; what weights, corrected poses and a few known constants make of it is solved
-    again until it does not change, by steps that do not raise the cost. `prog()` is one step as a
-    MathematicalProgram: a convex quadratic cost with a linear matrix inequality.
+    again until it does not change, by steps that do not raise the cost.
+
+    `prog()` is one step as a MathematicalProgram: a convex quadratic cost with a linear matrix
+    inequality, once everything measured was added. `AddQuadraticCost`, `AddCost`,
+    `AddLinearConstraint` and `AddConstraint` add terms of one's own to it. They are of `values`,
+    the parameters as users read them, in their units. A cost counts beside half of chi-square, so
+    that 0.5 ((v - a) / s)^2 says as much as a measurement of a with the standard error s. With own
+    terms Drake solves the whole program, again and again until weights settle: by Clarabel where it
+    is convex, as with bounds on single parameters, costs of masses, friction and offsets; else by
+    SNOPT, to the best that is near.
 
     Attributes:
         layout: The unknown vector.
         terms: What was measured.
         gravity: Acceleration of a falling body in W, shape (3,) [m/s^2].
     """
+
+    problem_kind = IdentificationError
 
     def __init__(
         self,
@@ -97,9 +119,11 @@ class IdentificationProgram:
         self.gravity = np.asarray(gravity, float)
         self.terms: list[Term] = []
         self._priors: list[Prior] = []
+        self._prog: MathematicalProgram | None = None
 
     def AddMotion(self, samples: LoggedMotion) -> MotionTerm:
         """The wrench that the cables put on the platform, and the motion that it made."""
+        self._still_grows("AddMotion")
         term = MotionTerm.make(samples, self.gravity)
         self.terms.append(term)
         return term
@@ -119,6 +143,7 @@ class IdentificationProgram:
             sigma: Their standard deviation, with what is wrong of the geometry [m].
             slack_below: Cables with less tension tell nothing [N].
         """
+        self._still_grows("AddCableLengths")
         if np.shape(counted) != (samples.count, len(self.layout.model.names)):
             raise IdentificationError(
                 f"counted lengths: found shape {np.shape(counted)}; accepted: "
@@ -133,6 +158,7 @@ class IdentificationProgram:
 
     def AddWinches(self, samples: WinchSamples) -> WinchTerm:
         """What turning winches lose."""
+        self._still_grows("AddWinches")
         term = WinchTerm.make(samples, self.layout.model.names)
         self.terms.append(term)
         return term
@@ -143,6 +169,7 @@ class IdentificationProgram:
         [kg]; [m]; [kg m^2] about Po; [N]; [s]; of Coulomb and of static less Coulomb friction
         [N m], of viscous friction 1 s/rad of Coulomb's.
         """
+        self._still_grows("AddPrior")
         _positive("prior", std)
         if group not in GROUPS:
             raise IdentificationError(f"priors: found {group!r}; accepted: {', '.join(GROUPS)}")
@@ -193,6 +220,8 @@ class IdentificationProgram:
                 "them, or a log of a motion that excites them"
             )
         fit = self._least_squares(outliers)
+        if self.has_own_terms:
+            return self._with_own_terms(fit, began)
         status, solver, active = OPTIMAL, "least squares", violated(self.layout, fit.theta)
         theta = fit.theta
         if active:
@@ -208,16 +237,160 @@ class IdentificationProgram:
         self._check_end(theta, fit)
         return self._result(fit, theta, (status, solver, active), time.perf_counter() - began)
 
+    def _with_own_terms(self, fit: _Fit, began: float) -> IdentificationResult:
+        """The whole program, again and again until its weights do not change what it finds."""
+        theta, typical, program = fit.theta, self.layout.typical, self.prog()
+        step, far = 0, np.inf
+        while step < MOST_STEPS:
+            step += 1
+            rows = self._rows(theta)
+            rests = [r.A @ (theta / typical) - r.b for r in rows]
+            weights = [huber_weights(*each) for each in zip(rests, fit.limits, strict=True)]
+            self._weigh(rows, weights, theta)
+            convex = is_convex(program)
+            x, solver, said = self._solve_whole(
+                theta / typical,
+                "parameters that some robot has",
+                None if convex else smooth_program(self.layout, program),
+            )
+            way = x - theta / typical
+            said_by = float(way @ self._information(rows, weights) @ way)
+            far = float(np.sqrt(max(said_by, 0.0)))
+            theta = x * typical
+            # A solver of nonlinear programs comes no nearer than its tolerance.
+            if far < (SETTLED if convex else ROUGHLY_SETTLED):
+                break
+        words = [BY_LIKELIHOOD]
+        if far > ROUGHLY_SETTLED:
+            words.append(NOT_SETTLED.format(far))
+        active = violated(self.layout, fit.theta)
+        how = AT_THE_RIM if active else OPTIMAL, solver, active
+        end = replace(fit, theta=theta, rows=rows, weights=weights, steps=step, last_step=far)
+        found = self._result(end, theta, how, time.perf_counter() - began)
+        report: ProgramReport = self._report(x, solver, said, words)
+        return replace(found, program=report)
+
     def prog(self) -> MathematicalProgram:
-        """The same problem for Drake's solvers, weighted as at the believed model.
+        """The same problem for Drake's solvers, weighted as at the believed model; one object.
 
         Variables are the vector over its typical sizes, by name; what is known are linear
         equations, the pseudo-inertia is positive semidefinite, friction and compliance are not
-        negative.
+        negative. Measurements and priors come before it; what is added to it counts in `Solve`.
         """
-        theta = self.layout.model.vector()
-        rows = self._rows(theta)
-        return self._program(rows, [np.ones(len(r.b)) for r in rows], theta)
+        if self._prog is None:
+            theta = self.layout.model.vector()
+            rows = self._rows(theta)
+            self._prog = self._program(rows, [np.ones(len(r.b)) for r in rows], theta)
+            self._prog.SetInitialGuess(self._prog.decision_variables(), theta / self.layout.typical)
+            self._seal()
+        return self._prog
+
+    def values(self, of: str | Sequence[str] | None = None) -> ProgramValues:
+        """Parameters as users read them, in their units, in the order of `names`.
+
+        Args:
+            of: Names, with * and ?, or groups of `GROUPS` that are unknown; None: all.
+
+        Raises:
+            IdentificationError: No unknown parameter has the name.
+        """
+        program, layout = self.prog(), self.layout
+        chosen = self._which(of)
+        names, ratios = self.names(), layout.ratios()
+        x, typical = program.decision_variables(), layout.typical
+        told = tuple(names[k] for k in chosen)
+        forms = [ratios[k] for k in chosen]
+        matrix, offset = np.zeros((len(chosen), len(x))), np.zeros(len(chosen))
+        for r, form in enumerate(forms):
+            if form is None or form[1] != {-1: 1.0}:
+                break
+            matrix[r], offset[r] = self._form(form[0])
+        else:
+            return ProgramValues(x, matrix, offset, told)
+        return ProgramValues(
+            x, np.diag(typical), np.zeros(len(x)), told, lambda theta: layout.values(theta)[chosen]
+        )
+
+    def AddLinearConstraint(
+        self,
+        A: npt.ArrayLike,
+        lower: float | Array,
+        upper: float | Array,
+        of: str | Sequence[str] | None = None,
+        name: str = "",
+    ) -> Binding:
+        """As of `OwnTerms`; bounds on single parameters keep the program convex.
+
+        A centre of mass is a ratio of two linear forms, stiffness and retardation time too: a bound
+        on one, times what is below, is linear.
+        """
+        v, ratios = self._chosen(of), self.layout.ratios()
+        rows = np.atleast_2d(np.asarray(A, float))
+        forms = [ratios[k] for k in self._which(of)]
+        single = rows.shape[1] == v.size and np.all(np.sum(rows != 0.0, axis=1) == 1)
+        places = [int(np.argmax(row != 0.0)) for row in rows] if single else []
+        if v.transform is None or not single or any(forms[k] is None for k in places):
+            return super().AddLinearConstraint(A, lower, upper, of, name)
+        low, high = self._bounds(lower, upper, len(rows))
+        parts, most = [], []
+        for row, k, ends in zip(rows, places, zip(low, high, strict=True), strict=True):
+            form = forms[k]
+            assert form is not None
+            above, below = (self._form(one) for one in form)
+            for sign, end in ((-1.0, ends[0]), (1.0, ends[1])):
+                if np.isfinite(end):  # sign (a above - end below) <= 0, below > 0
+                    line = sign * (row[k] * above[0] - end * below[0])
+                    rest = sign * (row[k] * above[1] - end * below[1])
+                    size = float(np.linalg.norm(line))
+                    parts.append(line / size)
+                    most.append(-rest / size)
+        if not parts:
+            raise IdentificationError("own constraint: found no finite bound; accepted: one")
+        binding = self.prog().AddLinearConstraint(
+            np.array(parts), np.full(len(parts), -np.inf), np.array(most), v.variables
+        )
+        return self._named(binding, "constraint", name)
+
+    def _form(self, form: dict[int, float]) -> tuple[Array, float]:
+        """A linear form of the vector by the program's variables, and its constant."""
+        typical = self.layout.typical
+        line = np.zeros(len(typical))
+        for k, factor in form.items():
+            if k >= 0:
+                line[k] = factor * typical[k]
+        return line, form.get(-1, 0.0)
+
+    def _which(self, of: str | Sequence[str] | None) -> list[int]:
+        """Numbers of the parameters that are meant."""
+        names = self.names()
+        if of is None:
+            return list(range(len(names)))
+        chosen: set[int] = set()
+        for one in [of] if isinstance(of, str) else of:
+            mine = [k for k, name in enumerate(names) if fnmatchcase(name, one)]
+            mine = mine or [k for k, name in enumerate(names) if name.startswith(f"{one}.")]
+            if not mine:
+                raise IdentificationError(f"of: found {one!r}; accepted: {', '.join(names)}")
+            chosen |= set(mine)
+        return sorted(chosen)
+
+    def _still_grows(self, what: str) -> None:
+        """Measurements and priors are in the program from its beginning."""
+        if self._prog is not None:
+            raise IdentificationError(
+                f"{what}: found a program that was already made for own terms; accepted: "
+                "measurements and priors first"
+            )
+
+    def _weigh(self, rows: list[Rows], weights: list[Array], theta: Array) -> None:
+        """Puts the weights and what is known at a vector into the program that is kept."""
+        program = self.prog()
+        g, c = self._gradient(rows, weights)
+        cost = self._built_in_costs[0].evaluator()
+        cost.UpdateCoefficients(self._information(rows, weights), -g, 0.5 * c, is_convex=True)
+        E, e = self._scaled(theta)
+        if len(e):
+            program.linear_equality_constraints()[0].evaluator().UpdateCoefficients(E, e)
 
     def _program(self, rows: list[Rows], weights: list[Array], theta: Array) -> MathematicalProgram:
         g, c = self._gradient(rows, weights)

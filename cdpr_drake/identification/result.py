@@ -8,6 +8,7 @@ import numpy as np
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.identification.parameters import DynamicModel
+from cdpr_drake.numerics.own_terms import ProgramReport
 
 OPTIMAL, AT_THE_RIM, MISFIT = "optimal", "at the rim of what bodies can have", "misfit"
 """Statuses: the most likely parameters; the same on a bound that the data alone would pass;
@@ -80,6 +81,7 @@ class IdentificationResult:
         steps: Times that it was solved.
         last_step: How far the last of them would have gone, in standard errors.
         wall_time: [s].
+        program: With own terms, how the program was solved; None: without.
     """
 
     status: str
@@ -102,6 +104,7 @@ class IdentificationResult:
     steps: int
     last_step: float
     wall_time: float
+    program: ProgramReport | None = None
 
     @property
     def std(self) -> Array:

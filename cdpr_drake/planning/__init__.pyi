@@ -21,3 +21,4 @@ from .tension_constraints import TensionFeasible as TensionFeasible
 from .reconfiguration import Rails as Rails
 from .reconfiguration import RailTask as RailTask
 from .reconfiguration import ReconfigurationProgram as ReconfigurationProgram
+from .path_timing_program import PathTimingProgram as PathTimingProgram

@@ -16,6 +16,7 @@ import numpy as np
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import PlanningError
+from cdpr_drake.numerics.own_terms import ProgramReport
 from cdpr_drake.planning.failures import held_badly, stuck
 from cdpr_drake.planning.margin_kernel import ROUNDING, rest_margins
 from cdpr_drake.planning.path_task import MotionSamples, PathTask, sample_motion
@@ -55,6 +56,8 @@ class PathPlan:
             next corner at which it rests, shape (n + 1, 2) [m^2/s^2].
         largest: Largest (ds/dt)^2 that the limits admit at a station by itself, shape (n + 1,)
             [m^2/s^2]; NaN where the platform could not rest, and the motion carries it through.
+        program: Of a `PathTimingProgram` with own terms, how it was solved; `reachable` and
+            `largest` are then those without these. None: by the passes.
     """
 
     task: PathTask
@@ -62,6 +65,7 @@ class PathPlan:
     trajectory: TimedPath
     reachable: Array
     largest: Array
+    program: ProgramReport | None = None
 
     @property
     def duration(self) -> float:
@@ -91,19 +95,32 @@ def plan_along_path(
         PlanningError: There is no such motion, and says where and which cable; a cable cannot run;
             the number of stations is not accepted.
     """
-    if not FEWEST <= stations <= MOST:
-        raise PlanningError(f"stations: found {stations}; accepted: {FEWEST} to {MOST}")
-    density = (
-        stations * (1.0 - EVEN_SHARE) / path.length,
-        stations * EVEN_SHARE / len(path.pieces),
-    )
-    legs = [_plan_leg(task, leg, path.length, density) for leg in path.legs()]
+    legs = [_plan_leg(task, *leg, path.length) for leg in stations_of_leg(path, stations)]
     places = np.concatenate([legs[0].places[:1], *(leg.places[1:] for leg in legs)])
     x = np.concatenate([legs[0].x[:1], *(leg.x[1:] for leg in legs)])
     reachable = np.concatenate([legs[0].reachable[:1], *(leg.reachable[1:] for leg in legs)])
     largest = np.concatenate([legs[0].largest[:1], *(leg.largest[1:] for leg in legs)])
     motion = TimedPath.make(path, places, x, start_time)
     return PathPlan(task, path, motion, reachable, largest)
+
+
+def stations_of_leg(path: PosePath, stations: int) -> list[tuple[PosePath, Array]]:
+    """The legs of a path from rest to rest, each with s of its stations [m].
+
+    Args:
+        path: The path.
+        stations: As `plan_along_path`.
+
+    Raises:
+        PlanningError: The number is not accepted.
+    """
+    if not FEWEST <= stations <= MOST:
+        raise PlanningError(f"stations: found {stations}; accepted: {FEWEST} to {MOST}")
+    density = (
+        stations * (1.0 - EVEN_SHARE) / path.length,
+        stations * EVEN_SHARE / len(path.pieces),
+    )
+    return [(leg, _places(leg, *density)) for leg in path.legs()]
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,8 +133,7 @@ class _Leg:
     largest: Array
 
 
-def _plan_leg(task: PathTask, leg: PosePath, whole: float, density: tuple[float, float]) -> _Leg:
-    places = _places(leg, *density)
+def _plan_leg(task: PathTask, leg: PosePath, places: Array, whole: float) -> _Leg:
     points = leg.points(places)
     stations, reach = task.stations(points)
     limits, lim = task.limits.packed(), task.limits

@@ -4,5 +4,7 @@ from .methods import METHODS as METHODS
 from .methods import Distributor as Distributor
 from .methods import TensionMethod as TensionMethod
 from .methods import distribute as distribute
+from .problem import TensionProblem as TensionProblem
+from .program import TensionProgram as TensionProgram
 from .program import make_program as make_program
 from .program import program_tensions as program_tensions

@@ -36,6 +36,7 @@ from cdpr_drake.tensions.problem import (
     TensionStatus,
     refuse,
 )
+from cdpr_drake.tensions.program_method import Build, ProgramKernel, StepTimes
 from cdpr_drake.tensions.quadratic_program_kernel import (
     FEASIBLE,
     INFEASIBLE,
@@ -71,6 +72,7 @@ class TensionMethod:
         starts: Whether its kernel starts at the reference, where that is within the bounds; with
             what it gave a step before it is faster, and gives the same.
         program: What it adds to a program of Drake, see `make_program`; None: there is none.
+        asked: Of a method made by `from_program`, what asks the program; None: it is a kernel.
     """
 
     title: str
@@ -81,6 +83,50 @@ class TensionMethod:
     relaxes: bool = False
     starts: bool = False
     program: Addition | None = None
+    asked: ProgramKernel | None = None
+
+    @staticmethod
+    def from_program(name: str, build: Build, title: str = "") -> TensionMethod:
+        """A method made of a program with costs and constraints of one's own, by name.
+
+        It is a row of `METHODS` from then on, in this process: `distribute`, batches,
+        `TensionDistributor`, scenarios and commands called from Python take it by its name. A name
+        that was given before to such a method stands for the new one.
+
+        Args:
+            name: The name.
+            build: From a problem to a `TensionProgram` with all terms; called once for each set of
+                bounds. At every step W and wrench in it change, and the solver starts at the
+                tensions of the step before, in a loop, or at what `Distributor` is given.
+            title: What it does, in a few words.
+
+        Raises:
+            TensionProblemError: The name is that of a kernel, or none.
+        """
+        if not name or (name in METHODS and METHODS[name].asked is None):
+            raise TensionProblemError(
+                f"from_program: found the name {name!r}; accepted: one that no kernel has"
+            )
+        asked = ProgramKernel(name, build)
+        words = title or "a program of one's own"
+        METHODS[name] = TensionMethod(words, asked.kernel, starts=True, asked=asked)
+        return METHODS[name]
+
+    @property
+    def step_times(self) -> StepTimes | None:
+        """How long its steps took since they were counted anew; None: of kernels."""
+        return None if self.asked is None else self.asked.times
+
+    def prepare(self, problem: TensionProblem, period: float | None = None) -> None:
+        """Builds its program, if it has one; counts steps anew where a period is given [s].
+
+        Raises:
+            TensionProblemError: Own terms do not fit the problem.
+        """
+        if self.asked is not None:
+            self.asked.prepare(problem)
+            if period is not None:
+                self.asked.times.restart(period)
 
     def takes(self, redundancy: int) -> bool:
         """Whether it can distribute over n + redundancy cables."""
@@ -89,7 +135,8 @@ class TensionMethod:
     def compiled(self, redundancy: int) -> tuple[int, bool, bool]:
         """Address of the compiled solver, whether the exact program answers, `relaxes`."""
         kernel, exact = self.kernel, self.exact
-        if redundancy == 0 and kernel is not None and not self.relaxes:
+        chooses = self.relaxes or self.asked is not None
+        if redundancy == 0 and kernel is not None and not chooses:
             kernel, exact = pseudo_inverse, True
         return 0 if kernel is None else kernel_address(kernel), exact, self.relaxes
 
@@ -196,6 +243,7 @@ class Distributor:
         """
         n, m = problem.W.shape
         chosen = method_for(method, m - n, problem.reference is not None)
+        chosen.prepare(problem)
         wanted = problem.reference if chosen.needs_reference else None
         self._problem, self._method, self._chosen = problem, method, chosen
         self._wanted = problem.nothing_wanted if wanted is None else wanted

@@ -29,13 +29,15 @@ def nearest_reference(
     """Least distance from the reference."""
     assert problem.reference is not None
     wanted = problem.reference / scale
-    program.AddQuadraticCost(2.0 * np.eye(len(t)), -2.0 * wanted, t, is_convex=True)
+    far = float(wanted @ wanted)
+    program.AddQuadraticCost(2.0 * np.eye(len(t)), -2.0 * wanted, far, t, is_convex=True)
 
 
 def nearest_middle(program: Program, t: np.ndarray, problem: TensionProblem, scale: float) -> None:
     """Least distance from the middle of the bounds."""
     middle = (problem.lower + problem.upper) / (2.0 * scale)
-    program.AddQuadraticCost(2.0 * np.eye(len(t)), -2.0 * middle, t, is_convex=True)
+    far = float(middle @ middle)
+    program.AddQuadraticCost(2.0 * np.eye(len(t)), -2.0 * middle, far, t, is_convex=True)
 
 
 def infinity_norm(program: Program, t: np.ndarray, problem: TensionProblem, scale: float) -> None:

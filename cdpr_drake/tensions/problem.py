@@ -11,6 +11,7 @@ from numba import njit
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import TensionProblemError
+from cdpr_drake.numerics.own_terms import ProgramReport
 from cdpr_drake.summaries import Summarized
 from cdpr_drake.tensions.null_space_kernel import RANK_TOLERANCE
 
@@ -149,6 +150,7 @@ class TensionSolution(Summarized):
         residual: |W t + w| relative to the forces at work; NaN where there are no tensions.
         active: -1 where a tension is on its lower bound, 1 on its upper, else 0, shape (m,).
         slack: Wrench that the tensions leave unbalanced, W t + w, shape (n,) [N m, N].
+        program: Of a `TensionProgram` with own terms, how it was solved; None: by a kernel.
     """
 
     method: str
@@ -157,11 +159,12 @@ class TensionSolution(Summarized):
     residual: float
     active: np.ndarray
     slack: Array
+    program: ProgramReport | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON; tensions that are not there are null."""
         finite = np.all(np.isfinite(self.tensions))
-        return {
+        found: dict[str, Any] = {
             "method": self.method,
             "status": str(self.status),
             "tensions_n": self.tensions.tolist() if finite else None,
@@ -169,6 +172,9 @@ class TensionSolution(Summarized):
             "active_bounds": self.active.tolist(),
             "slack_wrench": self.slack.tolist() if finite else None,
         }
+        if self.program is not None:
+            found["program"] = self.program.as_dict()
+        return found
 
     def summary(self) -> tuple[str, list[tuple[str, str]]]:
         """What it shows of itself; tensions on a bound have a star."""
@@ -176,10 +182,10 @@ class TensionSolution(Summarized):
             f"{t:.2f}{'*' if bound else ''}"
             for t, bound in zip(self.tensions, self.active, strict=True)
         )
-        return f"Tensions by {self.method}: {self.status}", [
-            ("tensions [N]", ", ".join(words)),
-            ("residual", f"{self.residual:.2g}"),
-        ]
+        rows = [("tensions [N]", ", ".join(words)), ("residual", f"{self.residual:.2g}")]
+        if self.program is not None:
+            rows += self.program.rows()
+        return f"Tensions by {self.method}: {self.status}", rows
 
 
 @njit(cache=True)

@@ -12,6 +12,7 @@ from cdpr_drake.models.robot_in_plant import RobotInPlant
 from cdpr_drake.models.robot_statics import tension_problem
 from cdpr_drake.tensions.control_step_kernel import TensionStep, update_tensions_at
 from cdpr_drake.tensions.methods import method_for
+from cdpr_drake.tensions.program_method import StepTimes
 from cdpr_drake.tensions.quadratic_program_kernel import FEASIBLE, workspace_shape
 
 
@@ -36,6 +37,9 @@ class TensionDistributor(LeafSystem):
     it is counted as not met all the same. `log_barrier` starts at the tensions of the last step.
     By forces alone the moments of the wrench count for nothing, and the redundancy is larger by as
     many as there are.
+
+    A method made by `TensionMethod.from_program` is built for this robot here, once, and starts at
+    the tensions of the last step; `step_times` tells what it costs.
     """
 
     def __init__(
@@ -74,7 +78,8 @@ class TensionDistributor(LeafSystem):
         n, m = home.W.shape
         self.rate = rate
         chosen = method_for(method, m - n, reference is not None)
-        self._method = method
+        chosen.prepare(home, 1.0 / rate)
+        self._method, self._chosen = method, chosen
         wanted = reference if chosen.needs_reference else None
         bounds = np.vstack([home.lower, home.upper, np.zeros(m) if wanted is None else wanted])
         cables = robot.cable_set().without_pulleys() if cables is None else cables
@@ -101,6 +106,15 @@ class TensionDistributor(LeafSystem):
         self.DeclareStateOutputPort("tensions", DiscreteStateIndex(self._tensions))
         self.DeclareStateOutputPort("feasible", DiscreteStateIndex(self._feasible))
         self.DeclareStateOutputPort("failures", DiscreteStateIndex(self._failures))
+
+    @property
+    def step_times(self) -> StepTimes | None:
+        """How long the steps of a method made of a program took since the block was made.
+
+        None: of kernels. One record for all blocks with this method, of which the last that was
+        made says the period.
+        """
+        return self._chosen.step_times
 
     def packed(self) -> TensionStep:
         """Its constants, for loops that are compiled as a whole."""

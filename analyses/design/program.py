@@ -1,0 +1,351 @@
+"""The design of a robot as a program, with own terms of its points, its winch and its goals.
+
+Source: see the room; Gill, Murray and Saunders, SNOPT, 2005, for the solver.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from fnmatch import fnmatchcase
+
+import numpy as np
+import yaml
+from pydrake.solvers import Binding, MathematicalProgram
+
+from cdpr_drake.analyses.design.candidates import make_candidates
+from cdpr_drake.analyses.design.goals import GOALS, evaluate_goals
+from cdpr_drake.analyses.design.maximin import SLOPES, Slopes
+from cdpr_drake.analyses.design.search import (
+    DesignSearch,
+    evaluate_original,
+    goal_context,
+    scores_of,
+    search_design,
+)
+from cdpr_drake.analyses.design.settings import DesignSettings
+from cdpr_drake.analyses.reporting.progress import (
+    DEFAULT_STUDY_SESSION,
+    StudySession,
+    WorkProgress,
+)
+from cdpr_drake.analyses.workspaces.conditions import KINDS
+from cdpr_drake.arrays import Array
+from cdpr_drake.errors import DesignError
+from cdpr_drake.models.robot_loader import as_robot
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.numerics.own_terms import OwnTerms, ProgramValues
+from cdpr_drake.numerics.program_functions import ProgramCost, ProgramFunction
+
+STEPPED = (*KINDS, "csw", "cables")
+"""Goals that are counts: they have no slope, and no program finds a better one by it."""
+
+STEP = 1e-4
+"""Of differences of goals, in boxes of width 1."""
+
+MOST_KEPT = 200
+"""Designs whose goals are kept, since costs and constraints ask for the same ones."""
+
+LOCAL = (
+    "a design near the present robot: goals are not convex, and a search by evolution may find a "
+    "better one elsewhere"
+)
+
+Told = Callable[[Array], Array]
+"""Numbers of the program's design variables, shape (size,), to shape (r,)."""
+
+
+class DesignProgram(OwnTerms):
+    """A robot that is better by the goals of a design, near the present one, with own terms.
+
+    Variables of `prog()` are where in its range each design variable is, from 0 to 1. `values` are
+    the numbers of the robot file: coordinates of points as C1.exit_point.x or C1.anchor_point.z
+    [m], of points that are tied together those of the first, and drum_radius [m], gear_ratio [-] or
+    motor_torque [N m]. Costs count beside the goals' weighted sum with the sign changed, in which
+    every goal is relative to the robot as it is.
+
+    A goal that is the least of smooth functions over the poses, of `maximin.SLOPES`, enters as
+    such, with exact slopes; others by differences. With nothing added `Solve` is `search_design`.
+    With own terms SNOPT seeks from the present robot.
+
+    Attributes:
+        robot: The robot, or its name or path.
+        candidates: The designs that there may be.
+        settings: What is wanted.
+        judging: What designs are judged by.
+        number: Which of the sets of cables.
+    """
+
+    problem_kind = DesignError
+
+    def __init__(
+        self, robot: Robot | str, settings: DesignSettings, *, source: str = "design",
+        number: int = 0,
+    ) -> None:  # fmt: skip
+        """For a robot and what may change of it.
+
+        Args:
+            robot: Robot by name, or path of a robot file.
+            settings: What may change, and what is wanted.
+            source: Words for messages.
+            number: Number of the set of cables, from 0.
+
+        Raises:
+            CdprError: As `make_candidates` and `evaluate_original`; nothing may move; a goal is a
+                count; there is no such set.
+        """
+        name = robot.name if isinstance(robot, Robot) else robot
+        self.robot, self.settings, self.number = robot, settings, number
+        self.candidates = make_candidates(name, settings, source)
+        if self.candidates.size == 0:
+            raise DesignError("design: found nothing that may move; accepted: a reach above 0")
+        if not 0 <= number < len(self.candidates.kept):
+            raise DesignError(
+                f"number: found {number}; accepted: 0 to {len(self.candidates.kept) - 1}"
+            )
+        self._goals = tuple(goal.name for goal in settings.goals)
+        self._refuse_counts(self._goals)
+        self.judging = goal_context(robot, settings.poses, settings)
+        self._original = evaluate_original(self.candidates, self.judging, self._goals)
+        self._told: dict[bytes, dict[str, float]] = {}
+        self._values = self._read()
+        self._prog = MathematicalProgram()
+        self._z = self._prog.NewContinuousVariables(self.candidates.size, "design")
+        self._prog.AddBoundingBoxConstraint(0.0, 1.0, self._z)
+        self._prog.SetInitialGuess(self._z, self._present())
+        self._leasts: list[tuple[object, Slopes]] = []
+        for goal, weight in zip(self._goals, self._weights(), strict=True):
+            self._add_goal(goal, weight)
+        self._seal()
+
+    def prog(self) -> MathematicalProgram:
+        """The program; what is added to it counts in `Solve`."""
+        return self._prog
+
+    def design_variables(self) -> np.ndarray:
+        """Where in its range each design variable is, shape (size,)."""
+        return self._z
+
+    def values(self, of: str | Sequence[str] | None = None) -> ProgramValues:
+        """Numbers of the robot file, all or by names with * and ?.
+
+        Raises:
+            DesignError: No design variable has the name.
+        """
+        scale, offset, names = self._values
+        every = ProgramValues.scaled(self._z, scale, offset, names)
+        if of is None:
+            return every
+        chosen: set[int] = set()
+        for one in [of] if isinstance(of, str) else of:
+            mine = [k for k, name in enumerate(names) if fnmatchcase(name, one)]
+            if not mine:
+                raise DesignError(f"of: found {one!r}; accepted: {', '.join(names)}")
+            chosen |= set(mine)
+        return every.only(np.array(sorted(chosen)))
+
+    def AddGoalConstraint(
+        self, goal: str, lower: float = -np.inf, upper: float = np.inf, name: str = ""
+    ) -> Binding:
+        """Adds lower <= value <= upper of a goal, in its unit, wanted or not.
+
+        Raises:
+            DesignError: No such goal, or one that is a count; bounds that cross.
+        """
+        self._refuse_counts([goal])
+        low, high = self._bounds(lower, upper, 1)
+        size = max(abs(self._goal(goal, self._present())), 1e-9)
+        made = _ByDifferences(lambda z: np.array([self._goal(goal, z) / size]))
+        binding = self._prog.AddConstraint(made, low / size, high / size, vars=self._z)
+        return self._named(binding, "constraint", name or goal)
+
+    def AddGoalCost(
+        self, function: Callable[[Array], float], goals: str | Sequence[str], name: str = ""
+    ) -> Binding:
+        """Adds a smooth cost, function(values), of goals' values in their units.
+
+        Raises:
+            DesignError: No such goal, or one that is a count.
+        """
+        asked = [goals] if isinstance(goals, str) else list(goals)
+        self._refuse_counts(asked)
+
+        def cost(z: Array) -> Array:
+            return np.array([float(function(np.array([self._goal(g, z) for g in asked])))])
+
+        binding = self._prog.AddCost(_CostOf(_ByDifferences(cost)), vars=self._z)
+        return self._named(binding, "cost", name or ", ".join(asked))
+
+    def Solve(self, session: StudySession = DEFAULT_STUDY_SESSION) -> DesignSearch:
+        """The design: two are in the result with own terms, the present robot and what was found.
+
+        Args:
+            session: Of a search without own terms.
+
+        Raises:
+            CdprError: As `search_design`; no design keeps the own constraints.
+        """
+        if not self.has_own_terms:
+            return search_design(self.robot, self.candidates, self.settings, session)
+        start = np.zeros(self._prog.num_vars())
+        places = self._prog.FindDecisionVariableIndices(self._z)
+        start[places] = self._present()
+        for least, slopes in self._leasts:
+            margins, _ = slopes(
+                self.candidates, self.number, self._shares(start[places]), self.judging
+            )
+            start[self._prog.FindDecisionVariableIndex(least)] = float(np.min(margins))
+        x, solver, said = self._solve_whole(start, "a design")
+        designs = np.array([self._shares(start[places]), self._shares(np.clip(x[places], 0, 1))])
+        values = np.array([
+            evaluate_goals(self.candidates.robot(self.number, one), self.judging, self._goals)
+            for one in designs
+        ])  # fmt: skip
+        done = WorkProgress(said, 2, 2, 0.0, rate="designs/s", items="designs")
+        return DesignSearch(
+            self.candidates, self.settings, self.judging, self._original,
+            np.full(2, self.number), designs, values,
+            scores_of(values, self._original, self.settings), done,
+            self._report(x, solver, said, (LOCAL,)),
+        )  # fmt: skip
+
+    def _add_goal(self, goal: str, weight: float) -> None:
+        slopes = SLOPES.get(goal)
+        if slopes is None:
+            sign = -1.0 if GOALS[goal].smaller else 1.0
+            made = _ByDifferences(lambda z: np.array([-weight * sign * self._goal(goal, z)]))
+            self._prog.AddCost(_CostOf(made), vars=self._z)
+            return
+        (least,) = self._prog.NewContinuousVariables(1, f"least {goal}")
+        rows = _Margins(lambda z: self._margins(slopes, z))
+        count = self.judging.grid.size
+        self._prog.AddConstraint(
+            rows, np.zeros(count), np.full(count, np.inf), vars=np.append(self._z, least)
+        )
+        self._prog.AddLinearCost(np.array([-weight]), 0.0, np.array([least]))
+        self._leasts.append((least, slopes))
+
+    def _margins(self, slopes: Slopes, z: Array) -> tuple[Array, Array]:
+        found, by = slopes(self.candidates, self.number, self._shares(z), self.judging)
+        return found, by * self._share_slopes(z)
+
+    def _goal(self, goal: str, z: Array) -> float:
+        """The value of a goal, in its unit."""
+        kept = self._told.setdefault(z.tobytes(), {})
+        if goal not in kept:
+            robot = self.candidates.robot(self.number, self._shares(z))
+            kept[goal] = GOALS[goal].value(robot, self.judging)
+        while len(self._told) > MOST_KEPT:
+            del self._told[next(iter(self._told))]
+        return kept[goal]
+
+    def _weights(self) -> Array:
+        """Of the goals, each over its size of the robot as it is, as `scores_of`."""
+        size = np.where(
+            np.isfinite(self._original) & (self._original != 0.0), np.abs(self._original), 1.0
+        )
+        return np.array([goal.weight for goal in self.settings.goals]) / size
+
+    def _refuse_counts(self, goals: Sequence[str]) -> None:
+        smooth = [name for name in GOALS if name not in STEPPED]
+        for goal in goals:
+            if goal not in smooth:
+                raise DesignError(
+                    f"goal: found {goal!r}; accepted in a program: {', '.join(smooth)}"
+                )
+
+    def _read(self) -> tuple[Array, Array, tuple[str, ...]]:
+        """Scale, offset and names of the values."""
+        text = yaml.safe_load(self.candidates.text)
+        points, cables = self.candidates.points, text["cables"]
+        m = len(cables)
+        low, high = (points.displacements(np.full(points.size, end)) for end in (0.0, 1.0))
+        scale, offset, names = [], [], []
+        for k in range(points.size):
+            one = np.full(points.size, 0.5)
+            one[k] = 1.0
+            axis, column = np.argwhere(points.displacements(one).T != 0.0)[0][::-1]
+            key = "exit_point" if column < m else "anchor_point"
+            cable = cables[column % m]
+            scale.append(high[axis, column] - low[axis, column])
+            offset.append(float(cable[key][axis]) + low[axis, column])
+            names.append(f"{cable['name']}.{key}.{'xyz'[axis]}")
+        for name, (least, most) in self.candidates.ranges.items():
+            scale.append(most - least)
+            offset.append(least)
+            names.append(name)
+        return np.array(scale), np.array(offset), tuple(names)
+
+    def _present(self) -> Array:
+        """The design variables of the robot as it is, within the ranges."""
+        z = np.full(self.candidates.size, 0.5)
+        winch = as_robot(self.robot).winch
+        for k, (name, (low, high)) in enumerate(self.candidates.ranges.items()):
+            value = getattr(winch, name)
+            if value is not None:
+                z[self.candidates.points.size + k] = np.clip((value - low) / (high - low), 0, 1)
+        return z
+
+    def _shares(self, z: Array) -> Array:
+        """Coordinates of `Candidates`, whose winches are in ratios."""
+        found, first = np.array(z, float), self.candidates.points.size
+        for k, (low, high) in enumerate(self.candidates.ranges.values()):
+            found[first + k] = np.log(1.0 + (high / low - 1.0) * z[first + k]) / np.log(high / low)
+        return found
+
+    def _share_slopes(self, z: Array) -> Array:
+        """How these grow with the variables, shape (size,)."""
+        found, first = np.ones(len(z)), self.candidates.points.size
+        for k, (low, high) in enumerate(self.candidates.ranges.values()):
+            more = high / low - 1.0
+            found[first + k] = more / (1.0 + more * z[first + k]) / np.log(high / low)
+        return found
+
+
+class _ByDifferences(ProgramFunction):
+    """Numbers of design variables, with derivatives by differences within their ranges."""
+
+    def __init__(self, function: Told) -> None:
+        self._function = function
+
+    def numbers(self, x: Array) -> Array:
+        """The numbers alone."""
+        return self._function(np.clip(x, 0.0, 1.0))
+
+    def rows(self, x: Array) -> tuple[Array, Array]:
+        """Numbers and derivatives."""
+        slopes = []
+        for k in range(len(x)):
+            ends = np.clip(x[k] + np.array([-STEP, STEP]), 0.0, 1.0)
+            less, more = (self.numbers(np.where(np.arange(len(x)) == k, e, x)) for e in ends)
+            slopes.append((more - less) / (ends[1] - ends[0]))
+        return self.numbers(x), np.array(slopes).T
+
+
+class _CostOf(ProgramCost):
+    """One number as a cost."""
+
+    def __init__(self, rows: ProgramFunction) -> None:
+        self._rows = rows
+
+    def value(self, x: Array) -> tuple[float, Array]:
+        """Cost and gradient."""
+        values, slopes = self._rows.rows(x)
+        return float(values[0]), slopes[0]
+
+    def __call__(self, x: np.ndarray) -> object:
+        """A number, or one with its gradient."""
+        if x.dtype != object:
+            return float(self._rows.numbers(np.asarray(x, float))[0])
+        return super().__call__(x)
+
+
+class _Margins(ProgramFunction):
+    """By how much values at all poses are above a variable, the last one."""
+
+    def __init__(self, margins: Callable[[Array], tuple[Array, Array]]) -> None:
+        self._margins = margins
+
+    def rows(self, x: Array) -> tuple[Array, Array]:
+        """Numbers and derivatives."""
+        found, by = self._margins(np.clip(x[:-1], 0.0, 1.0))
+        return found - x[-1], np.hstack([by, np.full((len(found), 1), -1.0)])
