@@ -51,7 +51,7 @@ SUBCOMMANDS = {
     name: f"cdpr_drake.cli.{_function_of(name)}"
     for name in (
         "simulate", "serve", "tension", "static", "equilibria", "stability", "workspace", "plan",
-        "design", "calibrate", "identify", "study", "reproduce", "robots", "import", "export",
+        "design", "calibrate", "identify", "study", "reproduce", "robots", "import", "import-log", "export",
         "scenarios", "new", "check", "schema", "view", "studio", "notebooks", "doctor", "bench",
     )
 }  # fmt: skip
