@@ -177,7 +177,7 @@ def export_robot(robot: Robot | str | Path, format: str) -> dict[str, str]:
 
 
 def _with_comment(text: str, words: str) -> str:
-    """A file, XML, YAML or of a firmware, with a comment at its top, below the line that says what it is."""
+    """A file with a comment at its top, in XML below the line that says what it is."""
     if not text.startswith("<"):
         return f"{';' if text.startswith(';') else '#'} {words}\n{text}"
     head, line, body = text.partition("\n") if text.startswith(("<?", "<!")) else ("", "", text)

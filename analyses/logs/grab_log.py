@@ -1,7 +1,7 @@
 """Raw logs of GRAB's cable robots: lines `type,time,...`, each of one device.
 
-Type 3 is an actuator: number, state, motor counts, their rate, motor torque, cable length [m] and its
-rate, tension, wanted tension [N], counts of the swivel encoder, their rate, swivel angle [rad].
+Type 3 is an actuator: number, state, motor counts, their rate, motor torque, cable length [m] and
+its rate, tension, wanted tension [N], counts of the swivel encoder, their rate, swivel angle [rad].
 Type 5 is the inclinometer: roll, pitch, yaw [deg]. Lengths and swivel angles count from where the
 encoders were switched on. Devices are read out together: one time is one row.
 
@@ -76,7 +76,9 @@ def read_grab_log(path: Path, asked: LogRequest) -> RecordedLog:
         kind = cells[0]
         if kind not in _CELLS:
             if not kind.isdigit():
-                raise LogFileError(f"{path}:{number}: type: found {kind[:20]!r}; accepted: a number")
+                raise LogFileError(
+                    f"{path}:{number}: type: found {kind[:20]!r}; accepted: a number"
+                )
             other[kind] = other.get(kind, 0) + 1
             continue
         values = _numbers(path, number, cells, kind)
@@ -90,7 +92,8 @@ def read_grab_log(path: Path, asked: LogRequest) -> RecordedLog:
         if kind == ACTUATOR:
             if key in row.get(LENGTH, {}):
                 raise LogFileError(
-                    f"{path}:{number}: found actuator {key} twice at {values[1]:g} s; accepted: once"
+                    f"{path}:{number}: found actuator {key} twice at {values[1]:g} s; accepted: "
+                    "once"
                 )
             for what, cell in _FIELDS.items():
                 row.setdefault(what, {})[key] = values[cell]

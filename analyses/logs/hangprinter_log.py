@@ -57,8 +57,7 @@ def read_hangprinter(path: Path, asked: LogRequest) -> RecordedLog:
     else:
         names, motors, points, forces = _from_columns(path, text, asked)
     columns: Columns = {
-        f"{name}_{MOTOR}": np.radians(column)
-        for name, column in zip(names, motors.T, strict=True)
+        f"{name}_{MOTOR}": np.radians(column) for name, column in zip(names, motors.T, strict=True)
     }
     units = {"motor angles": "deg by the format"}
     if points is not None:
@@ -71,7 +70,9 @@ def read_hangprinter(path: Path, asked: LogRequest) -> RecordedLog:
             header = f"raw_force_{name}" if factor is None else f"{name}_{TENSION}"
             columns[header] = column * (1.0 if factor is None else factor)
         if factor is None:
-            remarks.append("the unit of the forces is not stated: kept as raw_force; --unit force=N")
+            remarks.append(
+                "the unit of the forces is not stated: kept as raw_force; --unit force=N"
+            )
         else:
             units["forces"] = f"{asked.units['force']}, as told"
     log = RecordedLog(
@@ -140,7 +141,9 @@ def _array(path: Path, text: str, name: str) -> Array | None:
         if depth == 0:
             break
     else:
-        raise LogFileError(f"{path}: {name}: found brackets that do not close; accepted: [[...], ...]")
+        raise LogFileError(
+            f"{path}: {name}: found brackets that do not close; accepted: [[...], ...]"
+        )
     try:
         rows = ast.literal_eval(text[start : end + 1])
         table = np.array(rows, float)

@@ -144,7 +144,7 @@ def read_mapping(path: Path) -> ColumnMapping:
     skip, mark, rate = (content.get(key) for key in ("skip_rows", "separator", "rate_hz"))
     if skip is not None and (isinstance(skip, bool) or not isinstance(skip, int) or skip < 0):
         raise LogFileError(f"{path}: skip_rows: found {skip!r}; accepted: a whole number from 0")
-    if mark is not None and (not isinstance(mark, str) or len(mark) != 1 or mark in "\"\n\r."):
+    if mark is not None and (not isinstance(mark, str) or len(mark) != 1 or mark in '"\n\r.'):
         raise LogFileError(f"{path}: separator: found {mark!r}; accepted: one sign, as ';'")
     if rate is not None and not _is_rate(rate):
         raise LogFileError(f"{path}: rate_hz: found {rate!r}; accepted: a number above 0")
@@ -161,9 +161,10 @@ def _headers(path: Path, columns: Any) -> tuple[str, ...] | dict[str, str]:
     if isinstance(columns, list) and columns:
         if all(isinstance(header, str) or header is None for header in columns):
             return tuple(header or "" for header in columns)
-    elif isinstance(columns, dict) and columns:
-        if all(isinstance(h, str) or h is None for pair in columns.items() for h in pair):
-            return {str(name): header or "" for name, header in columns.items()}
+    elif isinstance(columns, dict) and all(
+        isinstance(h, str) or h is None for pair in columns.items() for h in pair
+    ):
+        return {str(name): header or "" for name, header in columns.items()}
     raise LogFileError(f"{path}: columns: found {str(columns)[:80]}; accepted: {accepted}")
 
 

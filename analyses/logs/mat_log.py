@@ -93,7 +93,9 @@ def read_mat(path: Path, asked: LogRequest) -> RecordedLog:
     """
     found = read_mat_variables(path)
     if {name.split(".")[1] for name in found if "." in name} >= _ROBOT:
-        raise LogFileError(f"{path}: found a robot of GRAB's tools; accepted: logs; see cdpr import")
+        raise LogFileError(
+            f"{path}: found a robot of GRAB's tools; accepted: logs; see cdpr import"
+        )
     wanted = _mapped(path, found, asked) if asked.mapping else _known(found)
     if not wanted:
         raise LogFileError(
@@ -186,7 +188,7 @@ def _spread(
 def _si(header: str) -> tuple[str, float]:
     """A header with its SI unit, and the factor on its numbers."""
     words, unit = split_unit(header)
-    if not unit or read_header(header, [], 1) is not None and unit in ("s", "m", "rad", "n"):
+    if not unit or (read_header(header, [], 1) is not None and unit in ("s", "m", "rad", "n")):
         return header, 1.0
     dimension, factor = UNITS[unit]
     si = {"length": "m", "angle": "rad", "force": "n", "time": "s", "torque": "nm"}.get(dimension)

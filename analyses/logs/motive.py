@@ -1,7 +1,7 @@
 """OptiTrack Motive's CSV: rigid bodies and markers over time.
 
-Above the rows stand a line of settings in pairs, and lines of types, names, identities and what each
-column is. Quaternions have their real part last. Where the settings name no `Length Units`, as in
+Above the rows stand a line of settings in pairs, and lines of types, names, identities and what
+each column is. Quaternions have their real part last. Where the settings name no `Length Units`, as in
 format version 1.1, the user has to.
 
 Source: OptiTrack, Data Export: CSV, docs.optitrack.com/motive/data-export/data-export-csv.
@@ -17,7 +17,7 @@ import numpy as np
 from cdpr_drake.analyses.logs.frames import axes_in_words, turned_columns
 from cdpr_drake.analyses.logs.log_request import LogRequest
 from cdpr_drake.analyses.logs.recorded_log import POSITION, QUATERNION, TIME, RecordedLog, settled
-from cdpr_drake.analyses.logs.text_tables import cell_table, log_text, parsed
+from cdpr_drake.analyses.logs.text_tables import cell_table, log_text
 from cdpr_drake.analyses.reporting.exported_logs import Columns
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import LogFileError
@@ -52,11 +52,15 @@ def read_motive(path: Path, asked: LogRequest) -> RecordedLog:
     lines = text.split("\n")
     place = next((k for k, line in enumerate(lines[:_MOST_HEAD]) if line.startswith("Frame,")), -1)
     if place < 0:
-        raise LogFileError(f"{path}: found no line that begins with Frame; accepted: one above rows")
+        raise LogFileError(
+            f"{path}: found no line that begins with Frame; accepted: one above rows"
+        )
     settings = _pairs(lines[0])
     width = len(lines[place].split(","))
     head = [_cells(line, width) for line in lines[1:place] if line.strip(", \t")]
-    types = next((row for row in head if any("Rigid Body" in c or c == "Marker" for c in row)), None)
+    types = next(
+        (row for row in head if any("Rigid Body" in c or c == "Marker" for c in row)), None
+    )
     what = next((row for row in head if "Position" in row), None)
     if types is None or what is None:
         raise LogFileError(f"{path}: found no types or no Position above the rows; accepted: both")

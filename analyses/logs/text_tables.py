@@ -125,7 +125,9 @@ def cell_table(path: Path, text: str, separator: str | None = "", skip: int = 0)
         if separator is None:
             rows = [line.split() for line in lines]
         else:
-            rows = [[cell.strip() for cell in row] for row in csv.reader(lines, delimiter=separator)]
+            rows = [
+                [cell.strip() for cell in row] for row in csv.reader(lines, delimiter=separator)
+            ]
     except csv.Error as problem:
         raise LogFileError(f"{path}: cannot be read as a table: {problem}") from problem
     if len(rows) != len(kept):

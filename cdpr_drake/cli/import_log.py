@@ -49,9 +49,7 @@ Mapping = Annotated[
         "header; skip_rows, separator, rate_hz."
     ),
 ]
-Rate = Annotated[
-    float | None, typer.Option(help="Rows per second, for files without times [1/s].")
-]
+Rate = Annotated[float | None, typer.Option(help="Rows per second, for files without times [1/s].")]
 Body = Annotated[str | None, typer.Option(help="Rigid body of a tracker that is the platform.")]
 Axes = Annotated[
     str | None,

@@ -19,6 +19,7 @@ from rich.console import Console
 from rich.table import Table
 
 from cdpr_drake.analyses.front.planning import PathPoses, path_poses, plan_free_motion, plan_path
+from cdpr_drake.analyses.planning.cable_streams import MODELS, cable_stream
 from cdpr_drake.analyses.planning.free_motion import LEAST
 from cdpr_drake.analyses.planning.free_plan_results import FreeRun
 from cdpr_drake.analyses.planning.plan_results import PlanRun
@@ -31,6 +32,7 @@ from cdpr_drake.analyses.planning.robot_path_task import (
 from cdpr_drake.analyses.reporting.deferred_figures import Pictures, write_pictures
 from cdpr_drake.analyses.reporting.folder_lock import free_folder
 from cdpr_drake.analyses.reporting.output_folder import results_folder, shown_path
+from cdpr_drake.cables.models import ELASTIC
 from cdpr_drake.cli.completion import words_among
 from cdpr_drake.cli.options import (
     FigureFormats,
@@ -79,6 +81,22 @@ Reserve = Annotated[float, typer.Option(help="Share of all limits that is left t
 Stations = Annotated[int, typer.Option(help="Points at which limits are asked.")]
 Pulleys = Annotated[bool, typer.Option(help="Cables run over the robot's pulleys.")]
 Track = Annotated[bool, typer.Option(help="Also have the simulated robot track the plan at 1 kHz.")]
+Stream = Annotated[
+    float | None,
+    typer.Option(
+        help="Also write unstrained cable lengths and motor angles at so many points a second: "
+        "lengths.csv, motor_angles.csv, and stream.json, which says whether cables stay taut "
+        "between points."
+    ),
+]
+StreamModel = Annotated[
+    str,
+    typer.Option(
+        help="Cables of the stream: elastic, stretched by their tension, or catenary, which sag, "
+        "too.",
+        autocompletion=words_among(MODELS),
+    ),
+]
 Out = Annotated[
     Path | None, typer.Option(help="Results folder; without, plans/ROBOT, or ROBOT-2, ...")
 ]
@@ -237,6 +255,8 @@ def plan(
     nearest: Nearest = None,
     knots: Knots = None,
     track: Track = True,
+    stream: Stream = None,
+    stream_model: StreamModel = ELASTIC,
     out: Out = None,
     overwrite: Overwrite = False,
     figure_format: FigureFormats = "png",
@@ -286,7 +306,9 @@ def plan(
             return replace(found, arguments=found.arguments | asked)
 
     folder = out if out is not None else free_folder(Path("plans") / loaded.name)
-    return _run(loaded, planner, folder, _Ending(overwrite, formats, as_json))
+    return _run(loaded, planner, folder, _Ending(
+        overwrite, formats, as_json, None if stream is None else (stream, stream_model)
+    ))  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -296,6 +318,7 @@ class _Ending:
     overwrite: bool
     formats: tuple[str, ...]
     as_json: bool
+    stream: tuple[float, str] | None = None
 
 
 Planner = Callable[[Callable[[str], None]], PlanRun | FreeRun]
@@ -310,6 +333,10 @@ def _run(robot: Robot, planner: Planner, folder: Path, ending: _Ending) -> int:
             run = planner(say)
             say("Writing results")
             told = run.write(results.path)
+            streamed = None
+            if ending.stream is not None:
+                streamed = cable_stream(run, *ending.stream)
+                told["stream"] = streamed.write(results.path)
             failed = write_pictures(results.path, _pictures(run, ending.formats), say)
             folder = shown_path(results.publish())
     report_kept_files(console, results.kept)
@@ -317,6 +344,8 @@ def _run(robot: Robot, planner: Planner, folder: Path, ending: _Ending) -> int:
         print_json(told)
     else:
         _print(wide_console(), told, folder)
+        if streamed is not None:
+            print(streamed.words())
     return report_failures(console, failed, folder, None)
 
 

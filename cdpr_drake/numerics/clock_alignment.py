@@ -91,9 +91,7 @@ class ClockAlignment:
     def on_other_clock(self, time: Array) -> Array:
         """Instants of the first clock as the other one tells them [s]."""
         t = np.asarray(time, float)
-        return np.asarray(
-            (t - self.shift + self.drift * self.reference) / (1.0 + self.drift)
-        )
+        return np.asarray((t - self.shift + self.drift * self.reference) / (1.0 + self.drift))
 
 
 def align_clocks(
@@ -254,9 +252,12 @@ class _Fit:
             J, r, _, _ = made
             H = np.einsum("knp,knq->pq", J, J)
             scale = np.sqrt(np.maximum(np.diag(H), 1e-300))
-            step = np.linalg.lstsq(
-                H / np.outer(scale, scale), -np.einsum("knp,kn->p", J, r) / scale, rcond=1e-12
-            )[0] / scale
+            step = (
+                np.linalg.lstsq(
+                    H / np.outer(scale, scale), -np.einsum("knp,kn->p", J, r) / scale, rcond=1e-12
+                )[0]
+                / scale
+            )
             step *= min(1.0, 20.0 * self.most / max(abs(step[0]), 1e-300))
             p = p + step
             if abs(p[1]) > MOST_DRIFT:

@@ -1,8 +1,8 @@
 """Robots of GRAB's tools as MATLAB files: a platform, and pulleys on the frame.
 
 A structure with `EndEffector.Platform` (mass `m`, `PtoG`, `InertialMatrix` about G, `points` A_i in
-P) and `Trasmission.Pulley` (radius `r`, `CableEnterPosition` D_i in W, `FixedFrame` with axes i, j, k
-of the pulley in W), as the files spell it. The cable arrives along k, about which the pulley turns;
+P) and `Trasmission.Pulley` (radius `r`, `CableEnterPosition` D_i in W, `FixedFrame` with axes i, j,
+k of the pulley in W), as the files spell it. The cable arrives along k, about which the pulley turns;
 its swivel angle is atan2(j' DA, i' DA).
 
 Source: github.com/fzoffoli/UACDPR_SelfCalibration, IRMA4U_Mar25.mat and its class
@@ -133,5 +133,7 @@ def _numbers(path: Path, where: str, value: Any, count: int) -> Array:
     except (TypeError, ValueError):
         found = np.empty(0)
     if found.size != count or not np.isfinite(found).all():
-        raise fail(path, where, None if value is None else str(value)[:60], f"{count} finite numbers")
+        raise fail(
+            path, where, None if value is None else str(value)[:60], f"{count} finite numbers"
+        )
     return found

@@ -1,13 +1,13 @@
 """The Maslow 4's maslow.yaml: a router on four belts, on the floor or upright.
 
 `kinematics: MaslowKinematics:` has the anchors [mm] tlX, tlY, tlZ, trX, ... of top left, top right,
-bottom left and bottom right; older firmware has Maslow_tlX, ... at the top. A belt leaves the sled z
-above its anchor. All belts point to the middle of the sled, beltEndExtension + armLength past their
+bottom left and bottom right; older firmware has Maslow_tlX, ... at the top. A belt leaves the sled
+z above its anchor. All belts point to the middle of the sled, beltEndExtension + armLength past their
 end, so that it moves as a point in a plane. `Maslow_vertical` says that the plane is upright:
 x and y of the file are x and z of W then, and out of the board is -y.
 
-Source: github.com/MaslowCNC/Maslow_4, firmware/FluidNC/data/maslow.yaml, and its web page's words on
-the settings.
+Source: github.com/MaslowCNC/Maslow_4, firmware/FluidNC/data/maslow.yaml, and its web page's words
+on the settings.
 """
 
 from __future__ import annotations
@@ -83,9 +83,7 @@ def read_maslow(path: Path) -> RobotDraft:
     R = _R_UPRIGHT if upright else np.eye(3)
     points = np.array([_anchor(path, settings, corner) for corner in CORNERS])
     for corner, point in zip(CORNERS, points, strict=True):
-        draft.cables.append(
-            DraftCable(name=corner, exit_point=R @ point, anchor_point=np.zeros(3))
-        )
+        draft.cables.append(DraftCable(name=corner, exit_point=R @ point, anchor_point=np.zeros(3)))
     middle = np.array([*points[:, :2].mean(axis=0), 0.0])
     draft.home_position = R @ middle
     if not upright:
