@@ -2,6 +2,7 @@ from .analyses.front.calibration import calibrate as calibrate
 from .analyses.front.calibration import identify as identify
 from .analyses.front.design import optimize_design as optimize_design
 from .analyses.front.exchange import import_robot as import_robot
+from .analyses.front.logs import import_log as import_log
 from .analyses.front.mechanisms import hang_mechanism as hang_mechanism
 from .analyses.front.mechanisms import solve_mechanism_tensions as solve_mechanism_tensions
 from .analyses.front.planning import plan_free_motion as plan_free_motion
@@ -25,6 +26,7 @@ from .analyses.front.tensions import TENSION_METHODS as TENSION_METHODS
 from .analyses.front.tensions import compare_tensions as compare_tensions
 from .analyses.front.tensions import solve_tensions as solve_tensions
 from .analyses.front.workspaces import compute_workspace as compute_workspace
+from .analyses.logs.log_request import LogRequest as LogRequest
 from .errors import CdprError as CdprError
 from .errors import StoppedError as StoppedError
 from .geometry.cable_set import CableSet as CableSet

@@ -206,3 +206,11 @@ class IdentificationError(CdprError):
 
 class CalibrationError(CdprError):
     """A calibration is asked for what its data do not hold or cannot tell; names what and why."""
+
+
+class ClockError(CdprError):
+    """Two recordings cannot be told to be of one motion, or at which shift; says why."""
+
+
+class LogFileError(CdprError):
+    """A log of a machine cannot be read: names file, line or column, what was found, accepted."""

@@ -17,7 +17,10 @@ from cdpr_drake.models.formats.drake_package import write_drake_package
 from cdpr_drake.models.formats.gazebo_yaml import write_gazebo_yaml
 from cdpr_drake.models.formats.import_words import import_readme
 from cdpr_drake.models.formats.joint_chains import write_sdformat, write_urdf
+from cdpr_drake.models.formats.klipper import write_klipper
+from cdpr_drake.models.formats.maslow import write_maslow
 from cdpr_drake.models.formats.mjcf import write_mjcf
+from cdpr_drake.models.formats.reprapfirmware import write_reprapfirmware
 from cdpr_drake.models.formats.wirex import write_wirex
 from cdpr_drake.models.materials import given_material
 from cdpr_drake.models.robot_exports import check_format, names_in_file, xml_words
@@ -174,9 +177,9 @@ def export_robot(robot: Robot | str | Path, format: str) -> dict[str, str]:
 
 
 def _with_comment(text: str, words: str) -> str:
-    """A file, XML or YAML, with a comment at its top, below the line that says what it is."""
+    """A file with a comment at its top, in XML below the line that says what it is."""
     if not text.startswith("<"):
-        return f"# {words}\n{text}"
+        return f"{';' if text.startswith(';') else '#'} {words}\n{text}"
     head, line, body = text.partition("\n") if text.startswith(("<?", "<!")) else ("", "", text)
     return f"{head}{line}<!-- {words} -->\n{body}"
 
@@ -198,6 +201,12 @@ def _written(robot: Robot, format: str) -> dict[str, str]:
         return {f"{name}.xml": write_mjcf(draft, robot.stiffness(), lengths_at_home(robot)[0])}
     if format == "gazebo-yaml":
         return {f"{name}.yaml": write_gazebo_yaml(draft)}
+    if format == "klipper":
+        return {f"{name}.cfg": write_klipper(draft)}
+    if format == "reprapfirmware":
+        return {f"{name}.g": write_reprapfirmware(draft)}
+    if format == "maslow":
+        return {f"{name}.yaml": write_maslow(draft)}
     if format == "urdf":
         return {f"{name}.urdf": write_urdf(draft)}
     if format == "drake":
@@ -206,13 +215,24 @@ def _written(robot: Robot, format: str) -> dict[str, str]:
     return {f"{name}.sdf": write_sdformat(draft, for_drake=format == "sdf-drake")}
 
 
+_FIRMWARES = {"klipper": ("3T", 3, 26), "reprapfirmware": ("3T", 3, 9), "maslow": ("2T", 4, 4)}
+"""Motion types of firmwares, and how many cables they have."""
+
+
 def _check_held(robot: Robot, format: str) -> None:
     """Refuses a motion type that a format cannot hold."""
     motion, found = robot.motion_type(), robot.motion
     if robot.axis is not None:
         found += f" with axis {np.round(robot.axis, 6).tolist()}"
-    accepted = ""
-    if format == "caspr" and motion.rows is None:
+    accepted, m = "", len(robot.cables)
+    if format in _FIRMWARES:
+        kind, least, most = _FIRMWARES[format]
+        level = motion.axis in ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0))
+        if robot.motion != kind or not least <= m <= most or (kind == "2T" and not level):
+            found += f", {m} cables"
+            accepted = f"{kind} on {least} to {most} cables"
+            accepted += ", with axis y or z" if kind == "2T" else ""
+    elif format == "caspr" and motion.rows is None:
         accepted = "types whose motions are along axes of W"
     elif format == "wcrfx" and (motion.num_moves < 3 and motion.axis != (0.0, 0.0, 1.0)):
         accepted = "types without an axis, or with it along z"

@@ -15,6 +15,7 @@ import numpy as np
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import RobotFileError
+from cdpr_drake.models.formats import klipper, maslow, reprapfirmware
 from cdpr_drake.models.formats.assumptions import complete_draft
 from cdpr_drake.models.formats.caspr_pulleys import short_name
 from cdpr_drake.models.formats.draft import DraftCable, RobotDraft
@@ -33,6 +34,9 @@ EXPORTS = {
     "wcrfx": "WireX and WireCenter",
     "caspr": "CASPR, two XML files",
     "gazebo-yaml": "the Gazebo cable robot simulator's YAML",
+    "klipper": "sections of Klipper's printer.cfg for kinematics: winch, point masses",
+    "reprapfirmware": "the lines M669 and M666 of RepRapFirmware's config.g, point masses",
+    "maslow": "anchors of a maslow.yaml, four belts in a plane",
 }
 """Formats that robots are written in, with what each is."""
 
@@ -48,6 +52,7 @@ _DIAMETERS = {"cable.diameter", "cables[].material.diameter"}
 _PULLEYS = {
     "pulley.radius", "pulley.swivel_axis", "cables[].pulley_radius", "cables[].swivel_axis"
 }  # fmt: skip
+_ANCHORS = {"name", "motion", "cables[].name", "cables[].exit_point", "cables[].anchor_point"}
 _SDF = _COMMON | _CENTER | _BOX | _HOME | _FRAME | _DIAMETERS | {"tension_bounds.upper"}
 
 HELD: dict[str, set[str]] = {
@@ -65,6 +70,10 @@ HELD: dict[str, set[str]] = {
     "caspr": _COMMON | _CENTER | _HOME | _PULLEYS | _LIMITS
     | {"title", "plane_height", "frame.lower", "frame.upper"},
     "gazebo-yaml": _COMMON | _CENTER | _BOX | _HOME | _FRAME | _LIMITS | {"cable.diameter"},
+    "klipper": _ANCHORS | {"winch.drum_radius", "winch.gear_ratio"},
+    "reprapfirmware": _ANCHORS | _LIMITS | {"platform.mass", "winch.drum_radius",
+                                            "winch.gear_ratio"},
+    "maslow": _ANCHORS | {"axis"},
 }  # fmt: skip
 """Keys of the schema that each format of `EXPORTS` holds, as its reader gets them back."""
 
@@ -205,9 +214,15 @@ def omission_words(lost: dict[str, str]) -> list[str]:
 
 
 def _words(key: str, robot: Robot, format: str) -> str:
-    if key == "winch.motor_speed_rpm" and format in ("sdf", "sdf-drake", "gazebo-yaml"):
+    if key == "winch.motor_speed_rpm" and format in ("sdf", "sdf-drake", "gazebo-yaml", "klipper"):
         speed = robot.winch.rated_cable_speed()
         return f"written as the speed of the cables, {speed:.6g} m/s"
+    if key == "cable.youngs_modulus" and format == "reprapfirmware":
+        cable = robot.cable
+        stiffness = reprapfirmware.cable_stiffness(cable.youngs_modulus, cable.diameter)
+        return f"written as E S, {stiffness:.6g} N"
+    if key.startswith("home.") and format in ("klipper", "reprapfirmware"):
+        return "lengths count from the origin there"
     if key == "cable.retardation_time" and format == "mjcf":
         return "tendons are undamped, since MuJoCo damps slack ones as well"
     for start, words in _WORDS.items():
@@ -225,8 +240,19 @@ def _name_of_robot(robot: Robot, format: str) -> dict[str, str]:
     return {} if again == robot.name else {"name": f"is read back as {again}"}
 
 
+_FIRMWARE_NAMES: dict[str, Sequence[str]] = {
+    "klipper": klipper.LETTERS, "reprapfirmware": reprapfirmware.LETTERS, "maslow": maslow.CORNERS
+}  # fmt: skip
+"""Names of cables of firmwares, by their places."""
+
+
 def names_in_file(names: Sequence[str], format: str) -> list[str]:
-    """Names of cables as a format has them: their own, or C and the place where it cannot."""
+    """Names of cables as a format has them: their own, or C and the place where it cannot.
+
+    Firmwares have names of their own.
+    """
+    if format in _FIRMWARE_NAMES:
+        return list(_FIRMWARE_NAMES[format][: len(names)])
     kept = {name for place, name in enumerate(names, start=1) if _holds_name(format, name, place)}
     found = []
     for place, name in enumerate(names, start=1):
@@ -255,6 +281,9 @@ def _holds_name(format: str, name: str, place: int) -> bool:
         return _is_xml(name) and short_name(name) == name != ""
     if format == "mjcf":
         return _is_xml(name) and name != ""
+    if format in _FIRMWARE_NAMES:
+        names = _FIRMWARE_NAMES[format]
+        return place <= len(names) and name == names[place - 1]
     return (  # frames, links and joints of SDFormat and URDF
         _is_xml(name) and "::" not in name and name not in _NAMES
         and re.search(r"^ | $|  |[\t\n\r]", name) is None  # their parsers join such blanks
@@ -304,6 +333,19 @@ def _axes_without_pulleys(robot: Robot, format: str) -> dict[str, str]:
             key = "pulley.swivel_axis" if cable.swivel_axis is None else "cables[].swivel_axis"
             lost[key] = "CASPR has pulleys with a radius above 0 only"
     return lost
+
+
+def _gear(robot: Robot, format: str) -> dict[str, str]:
+    if format != "reprapfirmware" or reprapfirmware.holds_gear(robot.winch.gear_ratio):
+        return {}
+    return {"winch.gear_ratio": "gears have whole teeth there"}
+
+
+def _inertia(robot: Robot, format: str) -> dict[str, str]:
+    """Where a robot says no inertia, that of its box or shape is lost with the mass and size."""
+    if "platform.inertia" in HELD[format]:
+        return {}
+    return {"platform.inertia_of": f"{format} has no place for it"}
 
 
 def _frame(robot: Robot, format: str) -> dict[str, str]:
@@ -356,6 +398,7 @@ def _numbers(values: Any) -> str:
 
 
 _RULES: tuple[Callable[[Robot, str], dict[str, str]], ...] = (
-    _name_of_robot, _title, _names_of_cables, _middle_of_box, _axes_without_pulleys, _frame, _rest
+    _name_of_robot, _title, _names_of_cables, _middle_of_box, _axes_without_pulleys, _gear,
+    _inertia, _frame, _rest,
 )  # fmt: skip
 """What depends on values: fields that a format holds, but not all that may stand in them."""

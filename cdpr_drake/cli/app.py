@@ -52,8 +52,8 @@ SUBCOMMANDS = {
     for name in (
         "simulate", "serve", "tension", "static", "equilibria", "stability", "workspace", "plan",
         "reconfigure", "design", "calibrate", "identify", "study", "reproduce", "robots", "import",
-        "export", "scenarios", "new", "check", "schema", "view", "studio", "notebooks", "doctor",
-        "bench",
+        "import-log", "export", "scenarios", "new", "check", "schema", "view", "studio",
+        "notebooks", "doctor", "bench",
     )
 }  # fmt: skip
 """Subcommands in the order of the help, each with the module whose function of that name it is.

@@ -8,11 +8,15 @@ from typing import Annotated, Any
 import typer
 import yaml
 
+from cdpr_drake.analyses.front.logs import import_log
 from cdpr_drake.analyses.front.mechanisms import hang_mechanism
-from cdpr_drake.cli.options import AsJson
+from cdpr_drake.analyses.logs.log_formats import detect_log
+from cdpr_drake.cli.import_log import log_lines
+from cdpr_drake.cli.options import AsJson, save_plot
 from cdpr_drake.cli.terminal import print_json
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models.formats.detection import is_foreign
+from cdpr_drake.models.formats.grab_mat import is_grab_mat
 from cdpr_drake.models.mechanism_files import MECHANISM_KEY, SCENARIO_KEY
 from cdpr_drake.models.mechanism_loader import load_mechanism, names_mechanism
 from cdpr_drake.models.robot_exchange import import_robot
@@ -21,6 +25,9 @@ from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.diagrams.load import load_scenario
 
 WRONG = 2
+
+LOG_SUFFIXES = (".csv", ".tsv", ".txt", ".log", ".dat", ".mat", ".py")
+"""Endings of files that may be logs; a reader has to know what is in them, too."""
 
 
 def checked(path: Path) -> dict[str, Any]:
@@ -36,6 +43,9 @@ def _read(path: Path) -> tuple[str, list[str]]:
     """What a file is, and notes; raises what is wrong with it."""
     if not path.exists():
         raise CdprError(f"{path}: there is no such file")
+    if is_log(path):
+        told = log_lines(import_log(path))
+        return "log, " + told[0].removeprefix(f"{path}: "), [line.strip() for line in told[1:]]
     if is_foreign(path):
         imported = import_robot(path)
         assumed = [f"assumed {key}: {words}" for key, words in imported.completed.assumed.items()]
@@ -52,6 +62,13 @@ def _read(path: Path) -> tuple[str, list[str]]:
     except CdprError as problem:
         return "robot", [f"the home pose: {problem}"]
     return "robot", []
+
+
+def is_log(path: Path) -> bool:
+    """Whether a file is a log of a machine, told by its ending and by a reader that knows it."""
+    if path.suffix.lower() not in LOG_SUFFIXES or not path.is_file() or is_grab_mat(path):
+        return False
+    return detect_log(path) is not None
 
 
 def _mechanism_notes(path: Path) -> list[str]:
@@ -77,11 +94,18 @@ def _is_scenario(path: Path) -> bool:
 
 def check(
     files: Annotated[
-        list[Path], typer.Argument(help="Robot or scenario files, also of other tools.")
+        list[Path], typer.Argument(help="Robot or scenario files, also of other tools, or logs.")
     ],
+    plot: Annotated[Path | None, typer.Option(help="File of a figure of the one log.")] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Checks files of robots, mechanisms, scenarios; says all that is wrong; exit code 2 then."""
+    """Checks files of robots, mechanisms, scenarios; says all that is wrong; exit code 2 then.
+
+    Of a log it says which reader knows it, and what is in it: rows, gaps, columns, units; what a
+    log does not say, cdpr import-log takes as options.
+    """
+    if plot is not None and (len(files) != 1 or not is_log(files[0])):
+        raise CdprError(f"--plot: found for {', '.join(map(str, files))}; accepted: for one log")
     found = [checked(path) for path in files]
     if as_json:
         print_json(found)
@@ -93,5 +117,7 @@ def check(
                 print(f"{item['file']}: {item['kind']}: nothing wrong")
             for note in item["notes"]:
                 print(f"  note: {note}")
+    if plot is not None and not found[0]["problems"]:
+        save_plot(import_log(files[0]).plot(), plot)
     if any(item["problems"] for item in found):
         raise typer.Exit(WRONG)

@@ -19,6 +19,7 @@ from rich.table import Table
 
 from cdpr_drake.analyses.front.planning import PathPoses, path_poses, plan_free_motion, plan_path
 from cdpr_drake.analyses.front.proven_motions import plan_proven_motion
+from cdpr_drake.analyses.planning.cable_streams import MODELS, cable_stream
 from cdpr_drake.analyses.planning.free_motion import LEAST
 from cdpr_drake.analyses.planning.free_plan_results import FreeRun
 from cdpr_drake.analyses.planning.plan_results import MotionRun, PlanRun
@@ -32,6 +33,7 @@ from cdpr_drake.analyses.planning.robot_path_task import (
 from cdpr_drake.analyses.reporting.deferred_figures import Pictures, write_pictures
 from cdpr_drake.analyses.reporting.folder_lock import free_folder
 from cdpr_drake.analyses.reporting.output_folder import results_folder, shown_path
+from cdpr_drake.cables.models import ELASTIC
 from cdpr_drake.cli.completion import words_among
 from cdpr_drake.cli.options import (
     FigureFormats,
@@ -101,6 +103,22 @@ Resist = Annotated[
     ),
 ]
 Track = Annotated[bool, typer.Option(help="Also have the simulated robot track the plan at 1 kHz.")]
+Stream = Annotated[
+    float | None,
+    typer.Option(
+        help="Also write unstrained cable lengths and motor angles at so many points a second: "
+        "lengths.csv, motor_angles.csv, and stream.json, which says whether cables stay taut "
+        "between points."
+    ),
+]
+StreamModel = Annotated[
+    str,
+    typer.Option(
+        help="Cables of the stream: elastic, stretched by their tension, or catenary, which sag, "
+        "too.",
+        autocompletion=words_among(MODELS),
+    ),
+]
 Out = Annotated[
     Path | None, typer.Option(help="Results folder; without, plans/ROBOT, or ROBOT-2, ...")
 ]
@@ -265,6 +283,8 @@ def plan(
     acceleration: Acceleration = None,
     boxes: Boxes = None,
     track: Track = True,
+    stream: Stream = None,
+    stream_model: StreamModel = ELASTIC,
     out: Out = None,
     overwrite: Overwrite = False,
     figure_format: FigureFormats = "png",
@@ -334,7 +354,9 @@ def plan(
             return replace(found, arguments=found.arguments | asked)
 
     folder = out if out is not None else free_folder(Path("plans") / loaded.name)
-    return _run(loaded, planner, folder, _Ending(overwrite, formats, as_json))
+    return _run(loaded, planner, folder, _Ending(
+        overwrite, formats, as_json, None if stream is None else (stream, stream_model)
+    ))  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -344,6 +366,7 @@ class _Ending:
     overwrite: bool
     formats: tuple[str, ...]
     as_json: bool
+    stream: tuple[float, str] | None = None
 
 
 Planner = Callable[[Callable[[str], None]], MotionRun]
@@ -358,6 +381,10 @@ def _run(robot: Robot, planner: Planner, folder: Path, ending: _Ending) -> int:
             run = planner(say)
             say("Writing results")
             told = run.write(results.path)
+            streamed = None
+            if ending.stream is not None:
+                streamed = cable_stream(run, *ending.stream)
+                told["stream"] = streamed.write(results.path)
             failed = write_pictures(results.path, _pictures(run, ending.formats), say)
             folder = shown_path(results.publish())
     report_kept_files(console, results.kept)
@@ -365,6 +392,8 @@ def _run(robot: Robot, planner: Planner, folder: Path, ending: _Ending) -> int:
         print_json(told)
     else:
         _print(wide_console(), told, folder)
+        if streamed is not None:
+            print(streamed.words())
     return report_failures(console, failed, folder, None)
 
 

@@ -14,6 +14,9 @@ from cdpr_drake.models.formats.draft import RobotDraft
 from cdpr_drake.models.formats.point_mass import find_beam, to_a_point
 
 GRAVITY = 9.81
+MASS = 1.0
+"""Of a platform, for files of firmwares, which know lengths alone [kg]."""
+
 STEEL_ROPE_MODULUS = 100e9
 STEEL_DENSITY = 7850.0
 WORKING_STRESS = 200e6
@@ -60,6 +63,9 @@ class CompletedDraft:
 def complete_draft(draft: RobotDraft) -> CompletedDraft:
     """Fills in what a draft lacks; what it has stays as it is."""
     assumed: dict[str, str] = {}
+    given = _given(draft)
+    if draft.mass is None:
+        draft.mass = _assume(assumed, "platform.mass", MASS, "where a file gives none")
     remarks = [*draft.remarks, *draft.tell_cables_apart()]
     gravity = draft.gravity
     if gravity is None:
@@ -105,7 +111,7 @@ def complete_draft(draft: RobotDraft) -> CompletedDraft:
     content["assumptions"] = f"From {draft.tool}. " + " ".join(
         word if word.endswith(".") else word + "." for word in words
     )
-    return CompletedDraft(content, _given(draft), assumed, tuple(remarks))
+    return CompletedDraft(content, given, assumed, tuple(remarks))
 
 
 def _assume(assumed: dict[str, str], key: str, value: Any, why: str) -> Any:

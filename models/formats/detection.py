@@ -12,15 +12,20 @@ from cdpr_drake.models.formats.caspr import is_caspr, read_caspr
 from cdpr_drake.models.formats.draft import RobotDraft
 from cdpr_drake.models.formats.gazebo_yaml import is_gazebo_yaml, read_gazebo_yaml
 from cdpr_drake.models.formats.grab import read_grab
+from cdpr_drake.models.formats.grab_mat import read_grab_mat
+from cdpr_drake.models.formats.klipper import read_klipper
+from cdpr_drake.models.formats.maslow import is_maslow, read_maslow
 from cdpr_drake.models.formats.mjcf import is_mjcf, read_mjcf
 from cdpr_drake.models.formats.named_frames import is_sdformat, is_urdf, read_named_frames
-from cdpr_drake.models.formats.reading import fail, read_text, read_xml
+from cdpr_drake.models.formats.reading import fail, read_text, read_xml, read_yaml
+from cdpr_drake.models.formats.reprapfirmware import read_reprapfirmware
 from cdpr_drake.models.formats.wirex import is_wirex, read_wirex
 from cdpr_drake.schema.yaml_files import too_many_bytes
 
 YAML_SUFFIXES = (".yaml", ".yml")
 XML_SUFFIXES = (".xml", ".wcrfx", ".sdf", ".world", ".urdf", ".mjcf", ".model")
-SUFFIXES = (*YAML_SUFFIXES, *XML_SUFFIXES, ".json", ".csv")
+FIRMWARE_SUFFIXES = {".cfg": read_klipper, ".g": read_reprapfirmware, ".gcode": read_reprapfirmware}
+SUFFIXES = (*YAML_SUFFIXES, *XML_SUFFIXES, *FIRMWARE_SUFFIXES, ".json", ".csv", ".mat")
 """Endings of files that robots are read from."""
 
 _XML = {is_caspr: read_caspr, is_wirex: read_wirex, is_mjcf: read_mjcf,
@@ -34,16 +39,17 @@ def is_foreign(path: Path) -> bool:
     if path.suffix.lower() in YAML_SUFFIXES:
         try:
             # One that is too large is refused by the other reader, before it is parsed.
-            return not too_many_bytes(path) and _is_gazebo(read_text(path))
+            return not too_many_bytes(path) and _is_foreign_yaml(read_text(path))
         except (OSError, RobotFileError):
             return False  # whose reader says what is wrong with it
     return True
 
 
 @lru_cache(32)  # the same robots are read again and again
-def _is_gazebo(text: str) -> bool:
+def _is_foreign_yaml(text: str) -> bool:
     try:
-        return is_gazebo_yaml(yaml.safe_load(text))
+        content = yaml.safe_load(text)
+        return is_gazebo_yaml(content) or is_maslow(content)
     except (yaml.YAMLError, ValueError, RecursionError):
         return False
 
@@ -67,9 +73,13 @@ def read_foreign(path: Path, model: str | None = None, cable_set: str | None = N
     if model is not None:
         raise fail(path, "model", model, "a name for lists of models, .csv, only")
     if suffix in YAML_SUFFIXES:
-        return read_gazebo_yaml(path)
+        return _read_yaml(path)
     if suffix == ".json":
         return read_grab(path)
+    if suffix == ".mat":
+        return read_grab_mat(path)
+    if suffix in FIRMWARE_SUFFIXES:
+        return FIRMWARE_SUFFIXES[suffix](path)
     if suffix not in XML_SUFFIXES:
         raise fail(path, "ending", suffix, "one of " + ", ".join(SUFFIXES))
     root = read_xml(path)
@@ -86,3 +96,8 @@ def read_foreign(path: Path, model: str | None = None, cable_set: str | None = N
         path, "root element", f"<{root.tag}>",
         "a robot of CASPR, WireX, SDFormat, URDF or MJCF",
     )  # fmt: skip
+
+
+def _read_yaml(path: Path) -> RobotDraft:
+    """Maslow's machines, else the Gazebo simulator's robots."""
+    return read_maslow(path) if is_maslow(read_yaml(path)) else read_gazebo_yaml(path)

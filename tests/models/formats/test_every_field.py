@@ -76,6 +76,8 @@ def test_in_a_turned_world_all_is_as_that_world_has_it(name, tmp_path):
         if format == "mjcf":  # which has gravity in any direction
             continue
         again = through(robot, format, tmp_path)
+        if again is None:
+            continue
         unsaid = fields_that_differ(seen, again) - set(export_omissions(seen, format))
         assert unsaid <= {key for key in PROSE if getattr(robot, key) == ""}, format
         assert export_omissions(robot, format)["gravity_direction"].startswith(

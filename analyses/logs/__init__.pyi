@@ -1,0 +1,9 @@
+from .clock_pairs import JoinedLogs as JoinedLogs
+from .clock_pairs import join_logs as join_logs
+from .log_figures import log_figure as log_figure
+from .log_formats import LOG_READERS as LOG_READERS
+from .log_formats import detect_log as detect_log
+from .log_formats import read_recorded as read_recorded
+from .log_request import LogRequest as LogRequest
+from .log_request import read_mapping as read_mapping
+from .recorded_log import RecordedLog as RecordedLog

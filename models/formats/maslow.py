@@ -1,0 +1,129 @@
+"""The Maslow 4's maslow.yaml: a router on four belts, on the floor or upright.
+
+`kinematics: MaslowKinematics:` has the anchors [mm] tlX, tlY, tlZ, trX, ... of top left, top right,
+bottom left and bottom right; older firmware has Maslow_tlX, ... at the top. A belt leaves the sled
+z above its anchor. All belts point to the middle of the sled, beltEndExtension + armLength past their
+end, so that it moves as a point in a plane. `Maslow_vertical` says that the plane is upright:
+x and y of the file are x and z of W then, and out of the board is -y.
+
+Source: github.com/MaslowCNC/Maslow_4, firmware/FluidNC/data/maslow.yaml, and its web page's words
+on the settings.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.models.formats.draft import DraftCable, RobotDraft
+from cdpr_drake.models.formats.reading import (
+    YAML_WORDS,
+    fail,
+    kind_of,
+    number,
+    read_yaml,
+    robot_name,
+)
+
+TOOL = "Maslow YAML"
+
+MM = 1e-3
+
+CORNERS = ("tl", "tr", "bl", "br")
+"""Names of the cables."""
+
+_SECTION = "MaslowKinematics"
+
+_EXTRA = ("beltEndExtension", "armLength")
+
+_R_UPRIGHT = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+"""From the file's axes to those of W, where the board is upright."""
+
+
+def is_maslow(content: Any) -> bool:
+    """Whether a YAML document is one of these."""
+    return isinstance(content, dict) and _settings(content) is not None
+
+
+def _settings(content: dict[Any, Any]) -> dict[str, Any] | None:
+    """Anchors and the like by their names without Maslow_, None where there are none."""
+    kinematics = content.get("kinematics")
+    if isinstance(kinematics, dict) and isinstance(kinematics.get(_SECTION), dict):
+        return {str(key): value for key, value in kinematics[_SECTION].items()}
+    start = "maslow_"
+    old = {
+        str(key)[len(start) :]: value
+        for key, value in content.items()
+        if str(key).lower().startswith(start)
+    }
+    return old if any(f"{corner}X" in old for corner in CORNERS) else None
+
+
+def read_maslow(path: Path) -> RobotDraft:
+    """Reads a point in a plane on four belts.
+
+    Raises:
+        RobotFileError: The file does not describe one; says where.
+    """
+    content = read_yaml(path)
+    settings = _settings(content) if isinstance(content, dict) else None
+    if settings is None:
+        found = kind_of(content, YAML_WORDS)
+        raise fail(path, "top", found, f"kinematics with {_SECTION}, or Maslow_tlX and the like")
+    upright = content.get("Maslow_vertical", False)
+    if not isinstance(upright, bool):
+        raise fail(path, "Maslow_vertical", upright, "true or false")
+    draft = RobotDraft(name=robot_name(path.stem), tool=TOOL, title=f"from {path.name}")
+    draft.motion = "2T"
+    draft.axis = np.array([0.0, 1.0, 0.0]) if upright else None
+    R = _R_UPRIGHT if upright else np.eye(3)
+    points = np.array([_anchor(path, settings, corner) for corner in CORNERS])
+    for corner, point in zip(CORNERS, points, strict=True):
+        draft.cables.append(DraftCable(name=corner, exit_point=R @ point, anchor_point=np.zeros(3)))
+    middle = np.array([*points[:, :2].mean(axis=0), 0.0])
+    draft.home_position = R @ middle
+    if not upright:
+        draft.plane_height = 0.0
+    draft.remarks.append("home is the middle of the anchors.")
+    extra = [number(path, name, settings[name]) for name in _EXTRA if name in settings]
+    if any(extra):
+        draft.remarks.append(
+            f"Belts end {sum(extra):g} mm before the middle of the sled, to which lengths go here."
+        )
+    for name in ("Scale_X", "Scale_Y"):
+        scale = content.get(f"Maslow_{name}", 1.0)
+        if number(path, f"Maslow_{name}", scale) != 1.0:
+            draft.remarks.append(f"Maslow_{name}, {scale}, was not kept.")
+    return draft
+
+
+def _anchor(path: Path, settings: dict[str, Any], corner: str) -> Array:
+    """x and y of an anchor, and minus how far its belt leaves the sled above it [m]."""
+    default = 0.0 if corner == "bl" else None  # older firmware has it at the origin
+    x, y, z = (
+        number(path, f"{corner}{axis}", settings.get(f"{corner}{axis}", none))
+        for axis, none in (("X", default), ("Y", default), ("Z", 0.0))
+    )
+    return MM * np.array([x, y, -z])
+
+
+def write_maslow(draft: RobotDraft) -> str:
+    """Anchors and whether the plane is upright; all else is the machine's own.
+
+    It holds exit points, from the corner of the board.
+    """
+    upright = draft.axis is not None and abs(float(draft.axis[1])) == 1.0
+    R = _R_UPRIGHT if upright else np.eye(3)
+    anchors: dict[str, float] = {}
+    for corner, cable in zip(CORNERS, draft.cables, strict=True):
+        point = R.T @ (cable.exit_point - cable.anchor_point) / MM
+        if not upright:
+            point[2] -= (draft.plane_height or 0.0) / MM
+        point[2] *= -1.0
+        anchors |= {f"{corner}{k}": float(x) + 0.0 for k, x in zip("XYZ", point, strict=True)}
+    content = {"Maslow_vertical": upright, "kinematics": {_SECTION: anchors}}
+    return yaml.safe_dump(content, sort_keys=False)

@@ -1,0 +1,289 @@
+"""Logs as recorders write them: what is read is what was recorded, or is refused in one line."""
+
+import numpy as np
+import pytest
+from scipy.io import savemat
+
+from cdpr_drake.analyses.calibration.log_file import read_log
+from cdpr_drake.analyses.front.logs import import_log
+from cdpr_drake.analyses.logs.clock_pairs import join_logs
+from cdpr_drake.analyses.logs.log_formats import LOG_READERS, detect_log, read_recorded
+from cdpr_drake.analyses.logs.log_request import LogRequest, axes_rotation, read_mapping
+from cdpr_drake.errors import CdprError, LogFileError
+from tests.analyses.logs import recorders
+
+DIGITS = 5.1e-5
+"""Controllers write lengths with four digits behind the point [m]."""
+
+PRINTED = 2e-6
+"""Times have six digits behind the point, and the sled moves at 2 m/s at most [m]."""
+
+FILES = {
+    "gtgraffiti": ("log.txt", recorders.gtgraffiti),
+    "motive": ("take.csv", recorders.motive),
+    "grab": ("raw.log", recorders.grab),
+    "hangprinter": ("simulation.py", recorders.hangprinter_script),
+    "csv": ("log.csv", recorders.columns),
+}
+
+TOLD = LogRequest(units={"length": "m"}, rate=100.0)
+
+
+@pytest.fixture
+def write(tmp_path):
+    def written(name, text, **more):
+        path = tmp_path / name
+        path.write_text(text, encoding="utf-8", newline="", **more)
+        return path
+
+    return written
+
+
+@pytest.mark.parametrize("format", FILES)
+def test_a_file_is_told_by_what_is_in_it(format, write):
+    name, make = FILES[format]
+    found = detect_log(write(name, make()))
+    assert found is not None
+    assert found.format == format
+    assert found.why
+
+
+def test_every_reader_has_a_file_here():
+    assert {*FILES, "mat"} == set(LOG_READERS)
+
+
+@pytest.mark.parametrize("format", FILES)
+def test_a_written_log_is_read_by_calibrations(format, write, tmp_path):
+    name, make = FILES[format]
+    log = read_recorded(write(name, make()), asked=TOLD)
+    log.write(tmp_path / "out.csv")
+    again = read_recorded(tmp_path / "out.csv")
+    assert list(again.columns) == list(log.columns)
+    for header, values in log.columns.items():
+        np.testing.assert_allclose(again.columns[header], values, rtol=1e-11)
+    if format in ("grab", "hangprinter"):
+        names = log.cables()
+        if format == "hangprinter":  # which has positions without turns
+            return
+        read = read_log(tmp_path / "out.csv", names)
+        np.testing.assert_allclose(read.lengths[:, 2], log.columns["C3_length_m"], rtol=1e-11)
+        np.testing.assert_allclose(read.tensions[:, 1], log.columns["C2_tension_n"], rtol=1e-11)
+
+
+def test_a_controller_and_a_tracker_are_one_log(write):
+    first = read_recorded(write("log.txt", recorders.gtgraffiti()), asked=TOLD)
+    take = write("take.csv", recorders.motive())
+    asked = LogRequest(units={"length": "m"}, R_WF=axes_rotation("-z,-x,y"))
+    joined = join_logs(first, read_recorded(take, asked=asked))
+    sigma = joined.alignment.sigmas[0]
+    at = joined.alignment.on_first_clock(np.array([5.0]))[0]
+    assert abs(at - (5.0 + recorders.MOTIVE_SHIFT)) < 5.0 * sigma + 1e-6
+    assert sigma < 1e-3
+    log = joined.log
+    seen = np.isfinite(log.columns["x_m"])
+    true = recorders.positions(log.time)
+    for k, header in enumerate(("x_m", "y_m", "z_m")):
+        assert np.max(np.abs(log.columns[header] - true[:, k])[seen]) < 1e-3
+    np.testing.assert_allclose(
+        log.table([f"C{k}_length_m" for k in (1, 2, 3, 4)]), recorders.lengths(true), atol=DIGITS
+    )
+    assert any("sigma" in words for words in log.remarks)
+
+
+def test_a_tracker_in_other_axes_and_units(write):
+    path = write("take.csv", recorders.motive(units="Millimeters"))
+    log = read_recorded(path, asked=LogRequest(R_WF=axes_rotation("-z,-x,y")))
+    seen = np.isfinite(log.columns["x_m"])
+    assert np.count_nonzero(~seen) == 16  # rows in which the body was not seen
+    true = recorders.positions(log.time + recorders.MOTIVE_SHIFT)
+    np.testing.assert_allclose(log.columns["z_m"][seen], true[seen, 2], atol=PRINTED)
+    np.testing.assert_allclose(log.columns["x_m"][seen], true[seen, 0], atol=PRINTED)
+    np.testing.assert_allclose(log.columns["marker_Corner_1_y_m"], 0.1)
+    np.testing.assert_allclose(log.columns["qw"][seen], 1.0)
+
+
+def test_gaps_and_rows_twice_are_told(write):
+    log = read_recorded(write("raw.log", recorders.grab()))
+    report = log.row_report()
+    assert report.gaps == 1
+    assert report.longest_gap == pytest.approx(5.1)
+    assert report.longest_gap_at == pytest.approx(13.0)
+    lines = recorders.columns().split("\n")
+    lines.insert(7, lines[6])
+    twice = read_recorded(write("twice.csv", "\n".join(lines)))
+    assert twice.row_report().repeated == 1
+    assert twice.count == 20
+
+
+def test_series_of_a_hangprinter(write):
+    log = read_recorded(write("simulation.py", recorders.hangprinter_script()))
+    again = read_recorded(write("samples.csv", recorders.hangprinter_columns()))
+    angles = log.table([f"{name}_motor_angle_rad" for name in "ABCD"])
+    np.testing.assert_allclose(angles, np.radians(recorders.MOTOR_ANGLES))
+    np.testing.assert_allclose(again.table([f"{n}_motor_angle_rad" for n in "ABCD"]), angles)
+    np.testing.assert_allclose(log.columns["x_m"][:2], 1e-3 * recorders.POINTS[:, 0])
+    assert np.isnan(log.columns["x_m"][2])
+    assert "raw_force_A" in log.columns
+    told = read_recorded(
+        write("simulation.py", recorders.hangprinter_script()),
+        asked=LogRequest(units={"force": "n"}),
+    )
+    assert told.columns["A_tension_n"][0] == 13.7
+
+
+@pytest.mark.parametrize(
+    ("separator", "decimal", "ending"),
+    [(",", ".", "\n"), (";", ",", "\r\n"), ("\t", ".", "\r"), (";", ".", "\n")],
+)
+def test_columns_in_any_country(separator, decimal, ending, write):
+    log = read_recorded(write("log.csv", recorders.columns(separator, decimal, ending)))
+    np.testing.assert_allclose(log.time, 0.01 * np.arange(20))
+    np.testing.assert_allclose(log.columns["C1_length_m"], 1.0005 + 1e-3 * np.arange(20))
+    np.testing.assert_allclose(log.columns["C1_tension_n"], 40.0 + np.arange(20))
+    np.testing.assert_allclose(log.columns["note_number"], np.arange(20))
+
+
+def test_columns_without_a_header_need_a_mapping(write):
+    path = write("real.csv", "1,2.5,3\n2,3.5,3\n3,4.5,4\n")
+    with pytest.raises(LogFileError, match="no reader of logs knows"):
+        read_recorded(path)
+    with pytest.raises(LogFileError, match="3 columns of numbers without a header"):
+        read_recorded(path, "csv")
+    mapping = read_mapping(
+        write("map.yaml", "columns: [commanded_x_mm, C1_length_cm, '']\nrate_hz: 10\n")
+    )
+    log = read_recorded(path, asked=LogRequest(mapping=mapping))
+    np.testing.assert_allclose(log.columns["commanded_x_m"], [1e-3, 2e-3, 3e-3])
+    np.testing.assert_allclose(log.columns["C1_length_m"], [0.025, 0.035, 0.045])
+    np.testing.assert_allclose(log.time, [0.0, 0.1, 0.2])
+    assert "rows/s, as told" in log.units["time"]
+
+
+def test_a_unit_that_nobody_says_is_told_as_assumed(write):
+    path = write("log.csv", "time,C1_length\n0,1000\n1,1001\n")
+    assert "since neither header nor --unit" in str(read_recorded(path).units)
+    log = read_recorded(path, asked=LogRequest(units={"length": "mm"}))
+    np.testing.assert_allclose(log.columns["C1_length_m"], [1.0, 1.001])
+
+
+def test_parsed_logs_of_grab(tmp_path):
+    t = np.arange(50) * 0.1
+    path = tmp_path / "parsed.mat"
+    st = {"t": t, "epsilon": 0.1 + np.zeros((3, 50)), "cable_length": np.ones((4, 50)),
+          "swivel": np.zeros((4, 50)), "tensions": 90.0 + np.arange(4)[:, None] + 0.0 * t,
+          "other": np.zeros(7)}  # fmt: skip
+    savemat(path, {"st": st})
+    log = read_recorded(path)
+    assert log.format == "mat"
+    np.testing.assert_allclose(log.columns["C4_tension_n"], 93.0)
+    np.testing.assert_allclose(log.columns["roll_rad"], 0.1)
+    assert "st.other" in log.remarks[0]
+    st["swivel"] = np.zeros((4, 49))
+    savemat(path, {"st": st})
+    with pytest.raises(LogFileError, match="swivel: found 49 rows; accepted: 50"):
+        read_recorded(path)
+
+
+REFUSED = [
+    ("take.csv", recorders.motive(), LogRequest(), "Length Units: found none"),
+    ("take.csv", recorders.motive(units="Feet"), LogRequest(), "Length Units: found Feet"),
+    (
+        "take.csv", recorders.motive(bodies=("One", "Two")), TOLD,
+        "found 'One' .1484 rows., 'Two' .1484 rows.; accepted: one of them by --body",
+    ),
+    ("take.csv", recorders.motive().replace("Quaternion", "XYZ"), TOLD, "Rotation Type: found XYZ"),
+    ("log.txt", recorders.gtgraffiti(), LogRequest(), "time: found none; accepted: rows per"),
+    ("log.txt", recorders.gtgraffiti().replace("2: 1.9", "2: oh", 1), TOLD, ":.*: found '2: oh"),
+    ("raw.log", recorders.grab().replace("3,11.000,2", "3,11.000,1"), TOLD, "actuator 1 twice"),
+    ("raw.log", recorders.grab().replace("5,12.000,", "5,12.000,nan,"), TOLD, "found 6 cells"),
+    ("raw.log", recorders.grab().replace(",55,", ",inf,", 1), TOLD, "knows|'inf'"),
+    ("log.csv", recorders.columns().replace("1003.500", "x"), TOLD, ":5: column 2: found 'x'"),
+    ("log.csv", recorders.columns().replace("1003.500", "NaN"), TOLD, "column 2: found 'NaN'"),
+    ("log.csv", recorders.columns().replace("50.000", "20.000"), TOLD, ":7: time: found 0.02 s"),
+    ("log.csv", recorders.columns().replace("C2_length", "C1_length"), TOLD, "C1_length_m twice"),
+    ("log.csv", recorders.columns().replace(",42.000", ",42.000,1"), TOLD, ":4: found 6 cells"),
+    ("s.py", recorders.hangprinter_script().replace("7431.3", "--1"), TOLD, "no rows of numbers"),
+    ("s.py", recorders.hangprinter_script() * 2, TOLD, "found 2 times"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "text", "asked", "words"), REFUSED)
+def test_what_is_wrong_is_said_in_one_line(name, text, asked, words, write):
+    with pytest.raises(LogFileError, match=words) as refused:
+        read_recorded(write(name, text), asked=asked)
+    assert "\n" not in str(refused.value)
+    assert name in str(refused.value)
+
+
+def damaged(raw, rng):
+    """A file after an accident."""
+    kind = int(rng.integers(8))
+    at = int(rng.integers(len(raw)))
+    if kind == 0:
+        return raw[:at]
+    if kind == 1:
+        return raw[:at] + bytes(rng.integers(0, 256, 40, dtype=np.uint8)) + raw[at:]
+    if kind == 2:
+        return raw.replace(b",", b";", int(rng.integers(1, 50)))
+    if kind == 3:
+        lines = raw.split(b"\n")
+        rng.shuffle(lines)
+        return b"\n".join(lines)
+    if kind == 4:
+        return raw.replace(b"\n", b"\r\n", int(rng.integers(1, 500)))
+    if kind == 5:
+        return raw[:at] + b"," + raw[at:]
+    if kind == 6:
+        return raw.replace(b"1", b"nan", int(rng.integers(1, 5)))
+    return raw[at:]
+
+
+@pytest.mark.parametrize("format", [*FILES, "mat"])
+def test_damaged_files_are_read_or_refused(format, tmp_path):
+    """Whatever happened to a file, a reader gives finite times that grow, or says what is wrong."""
+    if format == "mat":
+        path = tmp_path / "log.mat"
+        savemat(path, {"st": {"t": np.arange(30.0), "tensions": np.ones((4, 30))}})
+        raw = path.read_bytes()
+    else:
+        name, make = FILES[format]
+        path = tmp_path / name
+        raw = make(**({"count": 40} if format in ("gtgraffiti", "motive", "grab") else {})).encode()
+    for seed in range(60):
+        path.write_bytes(damaged(raw, np.random.default_rng(seed)))
+        for how in ("auto", format):
+            words, log = "", None
+            try:
+                log = read_recorded(path, how, TOLD)
+            except CdprError as problem:
+                words = str(problem)
+            if log is None:
+                assert "\n" not in words
+                assert str(path) in words
+            else:
+                assert log.count > 0
+                assert log.time is None or np.all(np.diff(log.time) > 0.0)
+                assert not any(np.isinf(values).any() for values in log.columns.values())
+
+
+@pytest.mark.parametrize("raw", [b"", b"\n\n", b"\x89PNG\r\n\x1a\n\0\0", b"#\n#\n", b"\xff" * 100])
+def test_nonsense_is_refused_by_every_reader(raw, tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_bytes(raw)
+    for how in ("auto", *LOG_READERS):
+        with pytest.raises(LogFileError, match=r"log\.csv.*found|log\.csv: cannot be read"):
+            read_recorded(path, how)
+
+
+def test_a_part_of_a_log(write):
+    path = write("raw.log", recorders.grab())
+    found = import_log(path, start=11.0, end=12.0, every=2)
+    np.testing.assert_allclose(found.log.time, 11.0 + 0.2 * np.arange(6))
+    with pytest.raises(LogFileError, match="no rows from 100"):
+        import_log(path, start=100.0)
+
+
+@pytest.mark.parametrize("words", ["x,y", "x,x,z", "y,x,z", "a,b,c", "x,y,-z"])
+def test_axes_are_right_handed(words):
+    with pytest.raises(LogFileError, match="right-handed"):
+        axes_rotation(words)
