@@ -60,7 +60,7 @@ def calibration_dict(
         ],
         "unknown": list(task.unknown),
         "priors": dict(task.priors),
-        "sigmas": vars(task.sigmas),
+        "sigmas": {key: value for key, value in vars(task.sigmas).items() if value is not None},
         "poses": calibration.log.count,
         "chi_square": finite(result.chi_square),
         "degrees_of_freedom": result.degrees,

@@ -18,6 +18,7 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.calibration.calibration_request import Prepared
 from cdpr_drake.analyses.calibration.fit_programs import program_from, start_points
+from cdpr_drake.analyses.calibration.motion_start import on_motion
 from cdpr_drake.arrays import Array
 from cdpr_drake.calibration.pose_search import (
     HUBER,
@@ -230,7 +231,7 @@ def _elsewhere(
     Returns:
         Row of each search, shape (s,), where they ended, and the costs of what was found, (k,).
     """
-    result, planar = one.result, prepared.task.robot.is_planar()
+    result, freedom = one.result, prepared.freedom
     at = Point(result.model, result.stations, one.program.layout)
     here, count = result.stations, result.stations.count
     costs = _row_costs(prepared, one, at)
@@ -245,7 +246,7 @@ def _elsewhere(
         turns = np.concatenate([here.R[others], home.R, *(s.R[k : k + 1] for s in pool)])
         places = np.concatenate([here.p[others], home.p, *(s.p[k : k + 1] for s in pool)])
         if every or k in badly:
-            mine = turned_starts(here.R[k], planar=planar)
+            mine = turned_starts(here.R[k], freedom=freedom)
             turns = np.concatenate([turns, mine])
             places = np.concatenate([places, np.tile(here.p[k], (len(mine), 1))])
         kept = [(here.R[k], here.p[k])]
@@ -264,7 +265,7 @@ def _elsewhere(
     ends = robust_poses(
         [term.only(rows) for term in one.program.terms],
         Point(result.model, begins, one.program.layout),
-        planar=planar, outliers=prepared.task.outliers, without=np.array(batch.without),
+        freedom=freedom, outliers=prepared.task.outliers, without=np.array(batch.without),
     )  # fmt: skip
     return rows, ends, costs
 
@@ -337,6 +338,8 @@ def _apart(result: CalibrationResult, k: int, X: RigidTransform, Y: RigidTransfo
 
 def blind(prepared: Prepared) -> bool:
     """Whether nothing but the robot itself tells where the platform is."""
+    if prepared.points is not None and prepared.freedom.motion.is_point:
+        return False
     return prepared.log.poses is None and not prepared.targets
 
 
@@ -356,7 +359,7 @@ def _other_starts(prepared: Prepared) -> list[RigidTransform]:
         place = np.clip(X.translation() + step, frame.lower, frame.upper)
         if robot.is_planar():
             place[2] = X.translation()[2]
-        Y = RigidTransform(R, place)
+        Y = on_motion(robot, RigidTransform(R, place))
         if pose_error(X, Y)[0] > 0.0:
             starts.append(Y)
     return starts

@@ -11,6 +11,7 @@ from pydrake.math import RigidTransform
 from cdpr_drake.analyses.calibration.calibration_request import Prepared, unknown_frames
 from cdpr_drake.analyses.calibration.log_file import CalibrationLog
 from cdpr_drake.analyses.calibration.log_fit import refuse_late_tracker
+from cdpr_drake.arrays import Array
 from cdpr_drake.calibration.guesses import guessed_tracker
 from cdpr_drake.calibration.stations import Point, Stations
 from cdpr_drake.errors import CalibrationError
@@ -44,6 +45,8 @@ def check_clock(prepared: Prepared) -> None:
     log, poses = prepared.log, prepared.tracked
     if poses is None or log.time is None or prepared.lengths is None:
         return
+    if "clock" in prepared.unknown:
+        return  # it is found with all else
     tracked = np.full(prepared.lengths.shape, np.nan)
     seen = [k for k, X in enumerate(poses) if X is not None]
     at = Point(prepared.model, Stations.at([X for X in poses if X is not None]))
@@ -59,6 +62,8 @@ def shifted_log(log: CalibrationLog, late: float) -> CalibrationLog:
     Raises:
         CalibrationError: It has no times or no poses.
     """
+    if log.time is not None and log.points is not None:
+        return replace(log, points=_shifted_points(log.time, log.points, late))
     if log.time is None or log.poses is None:
         raise CalibrationError(
             f"{log.path}: found no {'time' if log.time is None else 'poses'} to shift a tracker by"
@@ -80,3 +85,13 @@ def shifted_log(log: CalibrationLog, late: float) -> CalibrationLog:
         p = X.translation() + share * (Y.translation() - X.translation())
         moved.append(RigidTransform(type(X.rotation()).ProjectToRotationMatrix(R), p))
     return replace(log, poses=moved)
+
+
+def _shifted_points(time: Array, points: Array, late: float) -> Array:
+    """Positions of a tracker that was late, shape (k, 3) [m]; NaN at the ends."""
+    seen = np.isfinite(points).all(axis=1)
+    moved = np.full(points.shape, np.nan)
+    inside = (time + late >= time[seen][0]) & (time + late <= time[seen][-1])
+    for axis in range(3):
+        moved[inside, axis] = np.interp(time[inside] + late, time[seen], points[seen, axis])
+    return moved

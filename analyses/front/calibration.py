@@ -41,7 +41,7 @@ GEOMETRY = ("exit_points", "anchor_points")
 MOST_PARAMETERS = 7
 """So many are shown where an identification shows itself."""
 
-ASKED = ("priors", "mount", "image_size", "start", "rest", "outliers")
+ASKED = ("priors", "mount", "image_size", "start", "rest", "outliers", "zero", "bounds")
 KEPT = ("propose", "overwrite", "formats")
 """What `calibrate` takes by name besides: fields of its task, and what is done with results."""
 

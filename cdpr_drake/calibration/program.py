@@ -13,14 +13,17 @@ from pydrake.solvers import MathematicalProgram
 from pydrake.symbolic import Variable
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.calibration.bounded_search import solve_within
 from cdpr_drake.calibration.elimination import MOST_STEPS, LeastSquares, Minimum, Prior, minimize
 from cdpr_drake.calibration.identifiability import Identifiability, identifiability
 from cdpr_drake.calibration.onboard_terms import TagCorners, Tilts
 from cdpr_drake.calibration.parameters import CalibrationModel, parameter_layout
+from cdpr_drake.calibration.point_terms import Course, TrackedPoints
+from cdpr_drake.calibration.pose_freedom import PoseFreedom
 from cdpr_drake.calibration.pose_search import HUBER
 from cdpr_drake.calibration.program_costs import PriorCost, StationCost
 from cdpr_drake.calibration.result import CalibrationResult, make_result, outlying_rows, robust_cost
-from cdpr_drake.calibration.stations import POSE, Point, Stations
+from cdpr_drake.calibration.stations import Point, Stations
 from cdpr_drake.calibration.terms import (
     EquilibriumTerm,
     Lengths,
@@ -29,8 +32,11 @@ from cdpr_drake.calibration.terms import (
     Term,
     TrackedPoses,
 )
+from cdpr_drake.calibration.zeroed_terms import ZeroedCables
 from cdpr_drake.errors import CalibrationError
+from cdpr_drake.geometry.motion_type import FREE, LEVEL, MotionType
 from cdpr_drake.vision.pinhole import Pinhole
+from cdpr_drake.winches.drum import Drum
 
 NO_WORSE = 1e-6
 """Share of a cost by which rounding may make an end worse than its start."""
@@ -61,6 +67,7 @@ class CalibrationProgram:
         poses: Sequence[RigidTransform],
         unknown: Sequence[str],
         planar: bool = False,
+        motion: MotionType | None = None,
     ) -> None:
         """With guesses of the poses X_WP.
 
@@ -68,7 +75,9 @@ class CalibrationProgram:
             model: The robot as it is believed.
             poses: Where the platform is believed to have been [m].
             unknown: Groups and names of parameters, as `ParameterLayout.select` takes them.
-            planar: Whether the platform slides in a plane.
+            planar: Whether the platform slides in a horizontal plane.
+            motion: In the place of it: the platform's motion type; None: a body in space, or as
+                `planar` says.
 
         Raises:
             CalibrationError: No poses, or no such parameter.
@@ -79,8 +88,9 @@ class CalibrationProgram:
         self.free = self.layout.select(unknown)
         self.stations = Stations.at(poses)
         self.terms: list[Term] = []
-        self._planar = planar
+        self._freedom = PoseFreedom(motion or (LEVEL if planar else FREE))
         self._std = np.full(self.layout.size, np.inf)
+        self._bounds = np.full(self.layout.size, np.inf)
 
     def AddLengths(
         self,
@@ -105,6 +115,72 @@ class CalibrationProgram:
             start = first_readings(readings)
         strain = np.zeros(readings.shape) if strain is None else np.asarray(strain, float)
         term = Lengths(readings, _sigmas("lengths", sigma, readings), start, strain)
+        self.terms.append(term)
+        return term
+
+    def AddZeroedCables(
+        self,
+        readings: Array,
+        sigma: float | Array,
+        zero: RigidTransform | None,
+        drum: Drum | None = None,
+        **more: Array | None,
+    ) -> ZeroedCables:
+        """Lengths, or motor angles, of winches that stood at zero at a known pose or somewhere.
+
+        Args:
+            readings: Shape (k, m), lengths [m] or, with a drum, angles [rad]; NaN: none.
+            sigma: Standard deviation of the lengths, or one for each [m].
+            zero: The pose X_WP at zero [m]; None: `length_offsets` are whole lengths at zero.
+            drum: The drums as they are believed; None: readings are lengths.
+            more: `strain`, by how much cables are longer than counted, shape (k, m) [-];
+                `advantage`, parts of line side by side, shape (m,) [-]; None or missing: 0, 1.
+
+        Raises:
+            CalibrationError: A shape or sigma is not accepted.
+        """
+        readings = self._table("lengths", readings)
+        strain, advantage = more.get("strain"), more.get("advantage")
+        blank = np.zeros(readings.shape)
+        term = ZeroedCables(
+            readings, _sigmas("lengths", sigma, readings), zero, drum,
+            blank if strain is None else strain, blank, 1.0 if advantage is None else advantage,
+        )  # fmt: skip
+        self.terms.append(term)
+        return term
+
+    def AddTrackedPoints(
+        self,
+        points: Array,
+        sigma: float,
+        *,
+        normal: Array | None = None,
+        sigma_along: float | None = None,
+        times: Array | None = None,
+    ) -> TrackedPoints:
+        """Positions that a tracker measured without rotations, shape (k, 3) [m]; NaN: none.
+
+        Args:
+            points: Of a marker, in the tracker's frame.
+            sigma: Standard deviation of a coordinate [m].
+            normal: Direction in W in which it is another, shape (3,); None: in none.
+            sigma_along: That one [m].
+            times: Of the poses, growing, shape (k,) [s]: the tracker's clock may be another.
+
+        Raises:
+            CalibrationError: A shape or sigma is not accepted.
+        """
+        points = np.asarray(points, float)
+        if points.shape != (self.stations.count, 3):
+            raise CalibrationError(
+                f"tracked positions: found shape {points.shape}; accepted: "
+                f"({self.stations.count}, 3)"
+            )
+        along = sigma if sigma_along is None else sigma_along
+        _positive("tracked positions", sigma, along)
+        course = None if times is None else Course.of(np.asarray(times, float), points)
+        axis = np.zeros(3) if normal is None else np.asarray(normal, float)
+        term = TrackedPoints(points, sigma, axis, along, course)
         self.terms.append(term)
         return term
 
@@ -219,6 +295,11 @@ class CalibrationProgram:
         _positive("prior", std)
         self._std[self.layout.select(patterns)] = std
 
+    def AddBound(self, patterns: Sequence[str], most: float) -> None:
+        """Parameters change by no more than this, each in its unit; `prog()` has bounds, too."""
+        _positive("bound", most)
+        self._bounds[self.layout.select(patterns)] = most
+
     def names(self) -> tuple[str, ...]:
         """Names of the unknown parameters."""
         return tuple(np.array(self.layout.names)[self.free])
@@ -236,13 +317,11 @@ class CalibrationProgram:
         if not any(term.measured().any() for term in self.terms):
             raise CalibrationError("measurements: found none; accepted: at least one")
         prior = Prior(self.model, self._std)
-        return LeastSquares(tuple(self.terms), self.free, prior, self._planar, huber)
+        return LeastSquares(tuple(self.terms), self.free, prior, self._freedom, huber)
 
     def FindIdentifiability(self) -> Identifiability:
         """What these measurements and priors can tell, at the start."""
-        problem, at = self.least_squares(), self.at()
-        S = problem.normal_equations(at, 0.0).S
-        return identifiability(S, at, self.free, problem.used(at))
+        return _told(self.least_squares(), self.at())
 
     def Approach(self, steps: int, start: Point | None = None) -> Minimum:
         """Where some steps with linear loss for outliers lead: to tell starts apart cheaply.
@@ -275,15 +354,28 @@ class CalibrationProgram:
             CalibrationError: A parameter cannot be told and has no prior: names which from which;
                 a pose is not determined; the start is impossible; or the end is worse.
         """
+        at = self.at() if start is None else start
+        if np.isinf(self._bounds[self.free]).all():
+            return self._solve(self.free, at, outliers, straight)[0]
+        found, held = solve_within(
+            lambda free, begin: self._solve(free, begin, outliers, straight),
+            self.free, self._bounds, at, self.model,
+        )  # fmt: skip
+        return replace(found, at_bounds={self.layout.names[k]: v for k, v in held.items()})
+
+    def _solve(
+        self, free: npt.NDArray[np.bool_], at: Point, outliers: bool, straight: bool
+    ) -> tuple[CalibrationResult, LeastSquares]:
+        """As `Solve`, for some of the parameters and without bounds; and the last problem."""
         began = time.perf_counter()
-        self._require_told(self.FindIdentifiability())
-        plain, at = self.least_squares(), self.at() if start is None else start
+        plain = replace(self.least_squares(), free=free)
+        self._require_told(_told(plain, self.at()))
         if not outliers:
             found = minimize(plain, at)
-            return make_result(plain, found, self.model, time.perf_counter() - began)
+            return make_result(plain, found, self.model, time.perf_counter() - began), plain
         before, steps = robust_cost(plain, at), 0
         if not straight:
-            bent = self.Approach(MOST_STEPS, at)
+            bent = minimize(replace(plain, huber=HUBER), at)
             problem, found = _dropping(plain, bent.at)
             steps = bent.steps + found.steps
         if straight or robust_cost(plain, found.at) > before * (1.0 + NO_WORSE):
@@ -295,9 +387,8 @@ class CalibrationProgram:
                 f"search: found an end with cost {after:.6g} after a start with {before:.6g}; "
                 "accepted: one that is no worse, so from another first pose or with other sigmas"
             )
-        return make_result(
-            problem, replace(found, steps=steps), self.model, time.perf_counter() - began
-        )
+        seconds = time.perf_counter() - began
+        return make_result(problem, replace(found, steps=steps), self.model, seconds), problem
 
     def prog(self) -> MathematicalProgram:
         """The same problem for Drake's solvers, without loss for outliers.
@@ -305,16 +396,22 @@ class CalibrationProgram:
         Variables are steps from the start: one for each unknown parameter, by its name, in its
         typical size, and for each pose k turn0_k.., place0_k.., in hundredths of a radian and of a
         metre, and its tensions in newtons. Gradients are analytic.
+
+        Raises:
+            CalibrationError: The platform is a beam, whose turns do not add up to one that it has.
         """
+        if self._freedom.motion.num_turns == 2:
+            raise CalibrationError("motion: found 2R3T; accepted by prog(): another, or Solve")
         problem, start = self.least_squares(), self.at()
         program = MathematicalProgram()
         theta = _variables(self.names())
         program.AddDecisionVariables(theta)
-        columns = problem.columns(start)
-        labels = [f"{w}{i}" for w in ("turn", "place") for i in range(3)]
-        labels += [f"tension{i}" for i in range(start.stations.width - POSE)]
+        most = self._bounds[self.free] / self.layout.typical[self.free]
+        if np.isfinite(most).any():
+            program.AddBoundingBoxConstraint(-most, most, theta)
+        labels = problem.freedom.labels(start.stations.width)
         for k in range(start.stations.count):
-            own = _variables([f"{labels[c]}_{k}" for c in columns])
+            own = _variables([f"{label}_{k}" for label in labels])
             program.AddDecisionVariables(own)
             one = replace(problem, terms=tuple(t.only(slice(k, k + 1)) for t in self.terms))
             cost = StationCost(one, self.at(self.stations.only(slice(k, k + 1))))
@@ -341,6 +438,11 @@ class CalibrationProgram:
     def _count(self, what: str, found: int) -> None:
         if found != self.stations.count:
             raise CalibrationError(f"{what}: found {found}; accepted: {self.stations.count}")
+
+
+def _told(problem: LeastSquares, at: Point) -> Identifiability:
+    S = problem.normal_equations(at, 0.0).S
+    return identifiability(S, at, problem.free, problem.used(at))
 
 
 def _variables(names: Sequence[str]) -> npt.NDArray[np.object_]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -28,7 +29,7 @@ from cdpr_drake.calibration.parameters import (
     parameter_layout,
 )
 from cdpr_drake.calibration.pose_search import OUTLIER, robust_costs
-from cdpr_drake.calibration.stations import POSE, Point, Stations
+from cdpr_drake.calibration.stations import Point, Stations
 
 MOST_LARGEST = 10
 """Largest residuals that a result names."""
@@ -110,6 +111,8 @@ class CalibrationResult:
         degrees: Degrees of freedom of it.
         steps: Steps of the solver.
         seconds: Time it took [s].
+        at_bounds: Parameters that are held at a bound, by name, and by how much they changed; they
+            are not among the unknown ones.
     """
 
     status: str
@@ -137,6 +140,7 @@ class CalibrationResult:
     degrees: int
     steps: int
     seconds: float
+    at_bounds: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def correlation(self) -> Array:
@@ -221,7 +225,7 @@ def make_result(
     prior, _ = problem.prior.evaluate(at, free)
     known = int(np.sum(np.isfinite(problem.prior.std[free])))
     told = count - open_now.gauge_basis.shape[1] - open_now.untold_basis.shape[1]
-    unknown = told + at.stations.count * len(problem.columns(at))
+    unknown = told + at.stations.count * problem.freedom.count(at.stations.width)
     return CalibrationResult(
         status=CONVERGED if found.settled else NOT_CONVERGED,
         model=at.model, stations=at.stations,
@@ -247,11 +251,11 @@ def _pose_std(problem: LeastSquares, at: Point, equations: NormalEquations, scal
     the blocks of the inverse of the whole normal equations.
     """
     scale = problem.station_scale(at)
-    back, columns = equations.back, problem.columns(at)
+    back, motion = equations.back, problem.freedom.motion
     whole = np.linalg.inv(equations.H) + back @ scaled @ np.swapaxes(back, 1, 2)
     variances = np.diagonal(whole, axis1=1, axis2=2) * scale**2
-    turns = np.sum(variances[:, columns < 3], axis=1)
-    places = np.sum(variances[:, (columns >= 3) & (columns < POSE)], axis=1)
+    turns = np.sum(variances[:, : motion.num_turns], axis=1)
+    places = np.sum(variances[:, motion.num_turns : motion.freedom], axis=1)
     return np.sqrt(np.column_stack([turns, places]))
 
 
