@@ -133,7 +133,9 @@ class Cable:
         "Parts of line side by side between exit and anchor point, a block and tackle: line that "
         "its drum winds over length of the cable. The material is that of all parts together; "
         "rated speeds are of cables with 1.",
-        "-", 1.0, at_least=1.0,
+        "-",
+        1.0,
+        at_least=1.0,
     )
 
     def base_of(self, p_WA: Array) -> Array:

@@ -101,8 +101,33 @@ def calibration_dict(
         "steps": result.steps,
         "seconds": result.seconds,
         "versions": package_versions(),
+        **_new_keys(calibration),
         **(more or {}),
     }
+
+
+def _new_keys(calibration: Calibration) -> dict[str, Any]:
+    """What belongs to some calibrations only, for JSON."""
+    result, task, names = calibration.result, calibration.task, calibration.result.names
+    model, added = result.model, dict[str, Any]()
+    if any("drum_radius" in name for name in names):
+        added["drum_radii_m"] = [
+            (task.robot.winch.drum_radius if cable.drum_radius is None else cable.drum_radius)
+            + model.common_drum_radius + float(change)
+            for cable, change in zip(task.robot.cables, model.drum_radius, strict=True)
+        ]  # fmt: skip
+    if any(name.startswith("tilt_zero") for name in names):
+        added["tilt_zeros_rad"] = model.tilt_zero.tolist()
+    if "clock" in names:
+        added["tracker_late_s"] = model.clock
+    if task.zero is not None:
+        added["zero_X_WP"] = pose_row(task.zero).tolist()
+    if task.bounds:
+        added["bounds"] = dict(task.bounds)
+        added["at_bounds"] = dict(result.at_bounds)
+    if calibration.held is not None:
+        added["held_out"] = calibration.held.as_dict()
+    return added
 
 
 def residual_row(one: Outlier) -> dict[str, Any]:
@@ -139,6 +164,8 @@ def _tables(calibration: Calibration, remarks: Sequence[str]) -> list[Table]:
     said = [("frames are not told", words) for words in result.gauge]
     said += [("frames are hardly told", words) for words in result.loose]
     said += [("from the prior alone", words) for words in result.prior_only]
+    if calibration.held is not None:
+        said.append(("held out", calibration.held.words()))
     said += [("remark", words) for words in remarks]
     if said:
         notes = new_table("To know", ("what", "which"), ())

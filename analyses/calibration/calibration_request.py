@@ -81,6 +81,15 @@ class Sigmas:
     off_plane: float | None = None
 
 
+HOMING = Sigmas(
+    lengths=0.01, tensions=10.0, swivels=np.pi / 180.0, tilt=np.pi / 90.0, yaw=np.pi / 90.0
+)
+"""What sensors of a robot with fewer cables than degrees of freedom are taken to miss while it looks
+for where they count from, where nothing else is said: 10 mm, 10 N, 1 deg and 2 deg.
+
+Source: Zoffoli, UACDPR_SelfCalibration, UACDPR_AutoSelfCalibration.m, 2025, `sensor_disturb`."""
+
+
 @dataclass(frozen=True, eq=False)
 class CalibrationTask:
     """What is asked of a log.
@@ -100,6 +109,7 @@ class CalibrationTask:
         outliers: Whether outliers are sought.
         zero: Pose at which lengths or motor angles were zero [m]; None: they count from anywhere.
         bounds: By how much parameters may change at most, by group or name, in their units.
+        hold_out: Rows that are not fitted but predicted, see `held_groups`; None: none.
     """
 
     robot: Robot
@@ -114,6 +124,7 @@ class CalibrationTask:
     outliers: bool = True
     zero: RigidTransform | None = None
     bounds: dict[str, float] = field(default_factory=dict)
+    hold_out: str | int | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -254,6 +265,12 @@ def turns_unknown(prepared: Prepared) -> bool:
     return bool((free & ~known)[begin : begin + 3].all())
 
 
+def is_homing(robot: Robot, log: CalibrationLog) -> bool:
+    """Whether a robot with fewer cables than degrees of freedom has nothing but its own sensors."""
+    seen = log.poses is not None or log.points is not None or bool(log.corners)
+    return robot.is_underactuated() and not seen
+
+
 def default_unknown(robot: Robot, log: CalibrationLog) -> tuple[str, ...]:
     """What is looked for where nothing is said.
 
@@ -262,7 +279,7 @@ def default_unknown(robot: Robot, log: CalibrationLog) -> tuple[str, ...]:
     tell anchor points from exit points; other robots look for both.
     """
     motion = robot.motion_type()
-    if robot.is_underactuated() and log.poses is None and log.points is None and not log.corners:
+    if is_homing(robot, log):
         yaw = log.tilts is not None and bool(np.isfinite(log.tilts[:, 2]).any())
         lengths = log.lengths is not None or log.angles is not None
         zeros = [("length_offsets", lengths), ("swivel_offsets", log.swivels is not None)]

@@ -19,6 +19,7 @@ from pydrake.math import RigidTransform
 from cdpr_drake.analyses.calibration.calibration_request import Prepared
 from cdpr_drake.analyses.calibration.fit_programs import program_from, start_points
 from cdpr_drake.analyses.calibration.motion_start import on_motion
+from cdpr_drake.analyses.calibration.turned_sensors import upside_down
 from cdpr_drake.arrays import Array
 from cdpr_drake.calibration.pose_search import (
     HUBER,
@@ -88,12 +89,15 @@ class MultiStartFit:
         ties: Poses of other minima that fit as well, by rows.
         starts: How many starts were tried.
         minima: How many minima they ended in.
+        flipped_costs_less: By how much the best minimum with the platform upside down costs less
+            than this one [-]; 0 where there is none that does.
     """
 
     result: CalibrationResult
     ties: tuple[Tie, ...]
     starts: int
     minima: int
+    flipped_costs_less: float = 0.0
 
 
 class _Minimum(NamedTuple):
@@ -130,7 +134,7 @@ def best_of_starts(prepared: Prepared, say: Callable[[str], None]) -> MultiStart
         assert problem is not None
         raise problem
     say("Comparing starts")
-    best = min(known, key=lambda one: one.cost)
+    best = min(_upright(prepared, known), key=lambda one: one.cost)
     if len(programs) > 1:
         pool += [one.result.stations for one in known if one is not best]
         best = _improved(prepared, best, pool)
@@ -140,7 +144,15 @@ def best_of_starts(prepared: Prepared, say: Callable[[str], None]) -> MultiStart
             for k, Y in enumerate(one.result.stations.poses()):
                 _add_tie(ties, best.result, (k, Y), one.cost - best.cost)
     ties.sort(key=lambda tie: (tie.pose, tie.more))
-    return MultiStartFit(best.result, tuple(ties), len(programs), len(known))
+    less = max(0.0, best.cost - min(one.cost for one in known))
+    return MultiStartFit(best.result, tuple(ties), len(programs), len(known), less)
+
+
+def _upright(prepared: Prepared, known: Sequence[_Minimum]) -> Sequence[_Minimum]:
+    """Minima in which the platform is not upside down against the first pose; all, if each is."""
+    up = prepared.first.rotation().matrix()[:, 2]
+    upright = [one for one in known if not upside_down(one.result, up).any()]
+    return upright or known
 
 
 def _solved(

@@ -11,8 +11,10 @@ import csv
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
 from cdpr_drake.analyses.calibration.columns import (
@@ -86,6 +88,16 @@ class CalibrationLog:
     tilts: Array | None = None
     headers: dict[str, tuple[str, ...]] = field(default_factory=dict)
     points: Array | None = None
+
+    def only(self, rows: npt.NDArray[np.intp]) -> CalibrationLog:
+        """Some of the rows, numbers from 0 that grow."""
+        arrays = ("time", "lengths", "angles", "swivels", "tensions", "torques", "tilts", "points")
+        parts: dict[str, Any] = {
+            name: value[rows] for name in arrays if (value := getattr(self, name)) is not None
+        }
+        poses = None if self.poses is None else [self.poses[k] for k in rows]
+        corners = {tag: uv[rows] for tag, uv in self.corners.items()}
+        return replace(self, count=len(rows), poses=poses, corners=corners, **parts)
 
 
 def read_log(path: Path, cables: Sequence[str]) -> CalibrationLog:

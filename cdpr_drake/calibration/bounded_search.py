@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.calibration.elimination import LeastSquares
-from cdpr_drake.calibration.parameters import CalibrationModel, model_difference, moved_model
+from cdpr_drake.calibration.parameters import CalibrationModel, model_difference
 from cdpr_drake.calibration.result import CalibrationResult
 from cdpr_drake.calibration.stations import Point
 from cdpr_drake.errors import CalibrationError

@@ -298,9 +298,9 @@ def model_difference(model: CalibrationModel, other: CalibrationModel) -> Array:
         pose_step(model.X_WK, other.X_WK),
         pose_step(model.X_PM, other.X_PM),
         model.drum_radius - other.drum_radius,
-        [model.common_drum_radius - other.common_drum_radius],
+        np.array([model.common_drum_radius - other.common_drum_radius]),
         model.tilt_zero - other.tilt_zero,
-        [model.clock - other.clock],
+        np.array([model.clock - other.clock]),
     ]
     return np.concatenate(parts)
 

@@ -33,7 +33,7 @@ class Course:
         return Course(times, CubicSpline(times[seen], points[seen], extrapolate=True))
 
     def at(self, clock: float) -> tuple[Array, Array]:
-        """Positions [m] and velocities [m/s] in K, shape (k, 3), of a tracker that is so late [s]."""
+        """Positions [m] and velocities [m/s] in K, (k, 3), of a tracker that is so late [s]."""
         return self.spline(self.times + clock), self.spline(self.times + clock, 1)
 
     def only(self, which: npt.NDArray[np.generic] | slice) -> Course:
@@ -94,7 +94,8 @@ class TrackedPoints(Term):
 
     def measured(self) -> npt.NDArray[np.bool_]:
         """As the base class says."""
-        return np.repeat(np.isfinite(self.points).all(axis=1)[:, None], 3, axis=1)
+        whole = np.asarray(np.isfinite(self.points).all(axis=1))
+        return np.repeat(whole[:, None], 3, axis=1)
 
     def sigmas(self) -> Array:
         """As the base class says."""

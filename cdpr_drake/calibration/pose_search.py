@@ -187,7 +187,12 @@ def robust_poses(
 def turned_starts(R: Array, *, freedom: PoseFreedom) -> Array:
     """A rotation turned to both sides about each axis in which the platform turns, (s, 3, 3)."""
     axes = freedom.turn_axes()
-    return turns_of_vectors(np.array([angle * axis for axis in axes for angle in TURNS]).reshape(-1, 3)) @ R
+    return (
+        turns_of_vectors(
+            np.array([angle * axis for axis in axes for angle in TURNS]).reshape(-1, 3)
+        )
+        @ R
+    )
 
 
 def guessed_from(
@@ -299,6 +304,6 @@ def guessed_stations(
 ) -> Stations:
     """As `guessed_from`, from one first pose; tensions of shape (k, m) [N]."""
     t = None if tensions is None else tensions[None]
-    return guessed_from([model], terms, [first], count=count, tensions=t, freedom=freedom, sure=sure)[
-        0
-    ]
+    return guessed_from(
+        [model], terms, [first], count=count, tensions=t, freedom=freedom, sure=sure
+    )[0]

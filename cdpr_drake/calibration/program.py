@@ -14,7 +14,7 @@ from pydrake.symbolic import Variable
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.calibration.bounded_search import solve_within
-from cdpr_drake.calibration.elimination import MOST_STEPS, LeastSquares, Minimum, Prior, minimize
+from cdpr_drake.calibration.elimination import LeastSquares, Minimum, Prior, minimize
 from cdpr_drake.calibration.identifiability import Identifiability, identifiability
 from cdpr_drake.calibration.onboard_terms import TagCorners, Tilts
 from cdpr_drake.calibration.parameters import CalibrationModel, parameter_layout
