@@ -14,6 +14,7 @@ from cdpr_drake.analyses.calibration.calibrated_robots import calibrated_robot
 from cdpr_drake.analyses.calibration.calibration_task import Calibration
 from cdpr_drake.analyses.calibration.fit_verdict import MISFIT_FACTOR
 from cdpr_drake.analyses.calibration.log_fit import LogFit
+from cdpr_drake.analyses.calibration.row_figure import row_figure
 from cdpr_drake.analyses.reporting.log_files import finite
 from cdpr_drake.analyses.reporting.provenance import package_versions
 from cdpr_drake.analyses.reporting.statements import new_table
@@ -194,7 +195,8 @@ def _tables(calibration: Calibration, remarks: Sequence[str]) -> list[Table]:
 
 def _misfit_table(calibration: Calibration) -> Table:
     """Why it is no fit, and the largest residuals."""
-    title = "Does not fit: " + "; ".join(calibration.misfit[:-1])
+    why = [words for words in calibration.misfit if not words.startswith("largest: ")]
+    title = "Does not fit: " + "; ".join(why)
     table = new_table(title, ("row", "measurement"), ("off by", "sigmas"))
     for one in calibration.result.largest:
         table.add_row(
@@ -222,10 +224,14 @@ def grouped(calibration: Calibration) -> list[tuple[str, str, np.ndarray, np.nda
 
 def calibration_drawings(calibration: Calibration) -> dict[str, Callable[[], Figure]]:
     """What draws the figures, by name: how measurements fit and what was found; correlations."""
-    return {
+    drawings: dict[str, Callable[[], Figure]] = {
         "calibration": partial(_fit_figure, calibration),
         "correlation": partial(_correlation_figure, calibration),
     }
+    motion = calibration.task.robot.motion_type()
+    if calibration.held is not None or not (motion.is_free or motion.is_horizontal_body):
+        drawings["rows"] = partial(row_figure, calibration)
+    return drawings
 
 
 def _fit_figure(calibration: Calibration) -> Figure:

@@ -84,8 +84,8 @@ class Sigmas:
 HOMING = Sigmas(
     lengths=0.01, tensions=10.0, swivels=np.pi / 180.0, tilt=np.pi / 90.0, yaw=np.pi / 90.0
 )
-"""What sensors of a robot with fewer cables than degrees of freedom are taken to miss while it looks
-for where they count from, where nothing else is said: 10 mm, 10 N, 1 deg and 2 deg.
+"""What sensors of a robot with fewer cables than degrees of freedom are taken to miss, while it
+looks for where they count from and nothing else is said: 10 mm, 10 N, 1 deg and 2 deg.
 
 Source: Zoffoli, UACDPR_SelfCalibration, UACDPR_AutoSelfCalibration.m, 2025, `sensor_disturb`."""
 
@@ -276,7 +276,8 @@ def default_unknown(robot: Robot, log: CalibrationLog) -> tuple[str, ...]:
 
     A robot with fewer cables than degrees of freedom, whose own sensors are all there is, first has
     to know where these count from: nothing else follows from so few numbers. A point mass cannot
-    tell anchor points from exit points; other robots look for both.
+    tell anchor points from exit points; other robots look for both. In a plane across an axis of W,
+    but for a body's horizontal one, coordinates across it are left out.
     """
     motion = robot.motion_type()
     if is_homing(robot, log):
@@ -284,7 +285,13 @@ def default_unknown(robot: Robot, log: CalibrationLog) -> tuple[str, ...]:
         lengths = log.lengths is not None or log.angles is not None
         zeros = [("length_offsets", lengths), ("swivel_offsets", log.swivels is not None)]
         return tuple(name for name, there in [*zeros, ("tilt_zero.yaw", yaw)] if there)
-    return ("exit_points",) if motion.is_point else ("exit_points", "anchor_points")
+    normal = off_plane(robot)
+    if normal is None or motion.is_horizontal_body or motion.rows is None:
+        return ("exit_points",) if motion.is_point else ("exit_points", "anchor_points")
+    # To first order nothing tells how far points are out of a plane.
+    inside = "".join(axis for axis, part in zip("xyz", normal, strict=True) if part == 0.0)
+    points = ("exit_point",) if motion.is_point else ("exit_point", "anchor_point")
+    return tuple(f"*.{point}.[{inside}]" for point in points)
 
 
 def _points_of(task: CalibrationTask, log: CalibrationLog) -> Array | None:

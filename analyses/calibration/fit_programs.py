@@ -42,7 +42,7 @@ def start_points(prepared: Prepared, firsts: Sequence[RigidTransform]) -> list[S
     Raises:
         CalibrationError: A start is impossible.
     """
-    log, robot, tracked = prepared.log, prepared.task.robot, prepared.tracked
+    log, tracked = prepared.log, prepared.tracked
     seen = next((X for X in tracked or () if X is not None), None)
     seeds = list(firsts) if seen is None else [seen] * len(firsts)
     counting = [_counting(prepared, seed) for seed in seeds]
@@ -122,7 +122,8 @@ def add_winches(prepared: Prepared, program: CalibrationProgram, tensions: Array
 def _add_zeroed(prepared: Prepared, program: CalibrationProgram, strain: Array | None) -> None:
     """Adds cables that were counted from zero, by lengths or by motor angles."""
     robot, log, sigma = prepared.task.robot, prepared.log, prepared.sigma
-    assert prepared.lengths is not None and sigma is not None
+    assert prepared.lengths is not None
+    assert sigma is not None
     if log.lengths is not None or log.angles is None:
         program.AddZeroedCables(prepared.lengths, sigma, prepared.task.zero, strain=strain)
         return

@@ -118,7 +118,8 @@ def calibrate(
         say: Told what is done now.
         session: In the place of it: who follows the calibration.
         options: Fields of `CalibrationTask`: `priors`, `mount`, `image_size`, `start`, `rest`,
-            `outliers`, `zero`, `bounds`, `hold_out`. `propose`: also proposes so many poses that would tell most next.
+            `outliers`, `zero`, `bounds`, `hold_out`. `propose`: also proposes so many poses that
+            would tell most next.
             `overwrite`: whether results in the folder may be replaced. `formats`: endings of the
             files of figures.
 

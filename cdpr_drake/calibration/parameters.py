@@ -65,9 +65,9 @@ GROUPS = {
 
 `length_scales` are drum radii over those of the robot's file: cable that is counted times the scale
 is cable that is paid out. `drum_radii` are by how much each drum is larger, beside
-`common_drum_radius` of all; with layers on a drum these turn motor angles into lengths otherwise than
-a scale. `clock` is by how much a tracker is late. Turns (rx, ry, rz) of the camera and of a tracker's marker are about the
-axes of P, of tags and of the tracker's frame about those of W."""
+`common_drum_radius` of all; with layers on a drum these turn motor angles into lengths otherwise
+than a scale. `clock` is by how much a tracker is late. Turns (rx, ry, rz) of the camera and of a
+tracker's marker are about the axes of P, of tags and of the tracker's frame about those of W."""
 
 POSE_GROUPS = tuple(key for key, group in GROUPS.items() if group.parts == _POSE[0])
 """Groups whose members are poses: turns, which do not add up, then translations."""

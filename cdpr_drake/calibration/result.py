@@ -113,6 +113,8 @@ class CalibrationResult:
         seconds: Time it took [s].
         at_bounds: Parameters that are held at a bound, by name, and by how much they changed; they
             are not among the unknown ones.
+        by_row: Root mean square of residuals over sigma at each pose that counted, shape (k,), by
+            kind; NaN where none did.
     """
 
     status: str
@@ -141,6 +143,7 @@ class CalibrationResult:
     steps: int
     seconds: float
     at_bounds: Mapping[str, float] = field(default_factory=dict)
+    by_row: Mapping[str, Array] = field(default_factory=dict)
 
     @property
     def correlation(self) -> Array:
@@ -214,14 +217,18 @@ def make_result(
     std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     std[_untold_share(open_now) > 1e-6] = np.inf
     fits, rows, squares = {}, 0, 0.0
+    by_row: dict[str, Array] = {}
     readings: dict[str, int] = {}
     for k, term in enumerate(problem.terms):
         counts = used_rows(problem, k)
-        r = term.evaluate(at)[0][counts]
+        whole = np.where(counts, term.evaluate(at)[0], np.nan)
+        number = np.sum(counts, axis=1)
+        by_row[term.kind] = np.sqrt(np.nansum(whole**2, axis=1) / np.where(number, number, np.nan))
+        r = whole[counts]
         fits[term.kind] = _fit(r, int(np.sum(term.measured() & ~counts)))
         rows, squares = rows + len(r), squares + float(r @ r)
-        for row, number in enumerate(np.sum(term.measured(), axis=0)):
-            readings[term.row_name(row, at.model.names)] = int(number)
+        for row, read in enumerate(np.sum(term.measured(), axis=0)):
+            readings[term.row_name(row, at.model.names)] = int(read)
     prior, _ = problem.prior.evaluate(at, free)
     known = int(np.sum(np.isfinite(problem.prior.std[free])))
     told = count - open_now.gauge_basis.shape[1] - open_now.untold_basis.shape[1]
@@ -240,7 +247,7 @@ def make_result(
         largest=tuple(find_outliers(problem, at, 0.0)[:MOST_LARGEST]),
         robust_cost=robust_cost(problem, at),
         chi_square=squares + float(prior @ prior), degrees=rows + known - unknown,
-        steps=found.steps, seconds=seconds,
+        steps=found.steps, seconds=seconds, by_row=by_row,
     )  # fmt: skip
 
 

@@ -56,7 +56,8 @@ def help_words() -> str:
     return (
         "Finds a robot's constants in a log of what was measured at poses of its platform.\n\n"
         "A row of LOG is a pose. Columns: time_s; C1_length_m ... or C1_motor_angle_rad; x_m, y_m, "
-        "z_m alone, or with qw, qx, qy, qz, or phi_deg, theta_deg, psi_deg, or rx_rad, ry_rad, rz_rad, or "
+        "z_m alone, or with qw, qx, qy, qz, or phi_deg, theta_deg, psi_deg, or rx_rad, ry_rad, "
+        "rz_rad, or "
         "roll_deg, pitch_deg, yaw_deg, of a tracker; tag0_u1_px, tag0_v1_px to tag0_u4_px, "
         "tag0_v4_px, corners in the image of the camera on the platform; C1_tension_n; "
         "C1_swivel_rad; roll_deg, pitch_deg, yaw_deg without a position, of an inclinometer or IMU "
