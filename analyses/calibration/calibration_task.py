@@ -34,8 +34,16 @@ from cdpr_drake.analyses.calibration.tracker import (
     with_tracker,
     with_turned_tracker,
 )
-from cdpr_drake.analyses.calibration.turned_sensors import turned_sensors, upside_down
+from cdpr_drake.analyses.calibration.turned_sensors import (
+    turned_sensors,
+    turned_where_lost,
+    upside_down,
+)
 from cdpr_drake.calibration.result import CalibrationResult
+from cdpr_drake.errors import CalibrationError
+
+LOST = ("pose ", "search: ", "start: ")
+"""How errors begin that a sensor's sign may be the reason of."""
 
 REMARKED = 2.0
 """A fit that is worse than this many sigmas is remarked."""
@@ -83,7 +91,15 @@ def calibrate(
     """
     if task.hold_out is not None:
         return _held_out(task, log, say)
-    prepared, found = _fitted(task, log, say)
+    try:
+        prepared, found = _fitted(task, log, say)
+    except CalibrationError as problem:
+        if str(problem).startswith(LOST):
+            say("Looking for signs that are turned")
+            turned = turned_where_lost(task, log, lambda t, g: _fitted(t, g, _quiet)[1].result)
+            if turned:
+                raise CalibrationError(f"{problem}; {turned[0]}") from problem
+        raise
     result = found.result
     misfit = misfits(result)
     up = prepared.first.rotation().matrix()[:, 2]
@@ -95,11 +111,8 @@ def calibrate(
         )  # fmt: skip
     if misfit:
         say("Looking for signs that are turned")
-        quiet: Callable[[str], None] = lambda words: None  # noqa: E731
-        misfit = (
-            *turned_sensors(task, log, result, lambda t, g: _fitted(t, g, quiet)[1].result),
-            *misfit,
-        )
+        turned = turned_sensors(task, log, result, lambda t, g: _fitted(t, g, _quiet)[1].result)
+        misfit = (*turned, *misfit)
     if misfit:
         result = replace(result, status=MISFIT)
     remarks = [*log.remarks, *unused_columns(prepared)]
@@ -122,6 +135,10 @@ def calibrate(
     if found.ties:
         remarks.append(_tied(found.ties))
     return Calibration(task, log, result, prepared.mount, tuple(remarks), misfit, found.ties)
+
+
+def _quiet(words: str) -> None:
+    """Says nothing."""
 
 
 def _fitted(

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cdpr_drake.analyses.calibration.calibration_request import CalibrationTask
-from cdpr_drake.analyses.calibration.fit_verdict import is_thrown_out
+from cdpr_drake.analyses.calibration.fit_verdict import is_thrown_out, misfits
 from cdpr_drake.analyses.calibration.log_file import CalibrationLog
 from cdpr_drake.arrays import Array
 from cdpr_drake.calibration.result import CalibrationResult
@@ -66,6 +66,28 @@ def turned_sensors(
                 words.append(f"{again.count} of {whole} {kind} fit {how}")
                 break
     return tuple(words)
+
+
+def turned_where_lost(task: CalibrationTask, log: CalibrationLog, refit: Refit) -> tuple[str, ...]:
+    """As `turned_sensors`, where no start leads anywhere.
+
+    Args:
+        task: What was asked.
+        log: What was measured.
+        refit: Calibrates anew.
+    """
+    for kind, field in TRIED.items():
+        values = getattr(log, field)
+        if values is None:
+            continue
+        try:
+            found = refit(task, replace(log, **{field: -values}))
+        except CalibrationError:
+            continue
+        fit = found.residuals.get(kind)
+        if fit is not None and not misfits(found):
+            return (f"{fit.count} of {fit.count + fit.dropped} {kind} fit with the sign turned",)
+    return ()
 
 
 def upside_down(result: CalibrationResult, up: Array) -> npt.NDArray[np.bool_]:

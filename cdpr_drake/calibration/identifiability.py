@@ -106,8 +106,11 @@ def identifiability(
     moves = moves[:, np.linalg.norm(G[free] @ moves, axis=0) > 1e-9]
     basis = G[free] @ moves
     if basis.shape[1]:
-        U, s, _ = np.linalg.svd(basis, full_matrices=False)
-        basis = U[:, s > 1e-9 * s[0]]
+        U, s, Vt = np.linalg.svd(basis, full_matrices=False)
+        keep = s > 1e-9 * s[0]
+        basis = U[:, keep]
+        if not keep.all():  # motions that change nothing, as of the frame of a point mass
+            moves = moves @ Vt[keep].T
     gauge = tuple(
         _joined([FRAMES[j] for j in np.flatnonzero(np.abs(c) > SHARE * np.max(np.abs(c)))])
         for c in sparse_basis(moves).T

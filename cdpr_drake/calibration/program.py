@@ -22,6 +22,7 @@ from cdpr_drake.calibration.point_terms import Course, TrackedPoints
 from cdpr_drake.calibration.pose_freedom import PoseFreedom
 from cdpr_drake.calibration.pose_search import HUBER
 from cdpr_drake.calibration.program_costs import PriorCost, StationCost
+from cdpr_drake.calibration.rest_terms import RestrictedEquilibrium
 from cdpr_drake.calibration.result import CalibrationResult, make_result, outlying_rows, robust_cost
 from cdpr_drake.calibration.stations import Point, Stations
 from cdpr_drake.calibration.terms import (
@@ -271,13 +272,13 @@ class CalibrationProgram:
         _positive("equilibrium", sigma_moment, sigma_force)
         guess = self._table("tensions", tensions)
         self.stations = replace(self.stations, tensions=guess)
-        term = EquilibriumTerm(
-            self.stations.count,
-            np.asarray(weight, float),
-            np.asarray(p_PPcm, float),
-            sigma_moment,
-            sigma_force,
-        )
+        known = (
+            self.stations.count, np.asarray(weight, float), np.asarray(p_PPcm, float),
+            sigma_moment, sigma_force,
+        )  # fmt: skip
+        motion = self._freedom.motion
+        whole = motion.is_free or motion.is_horizontal_body
+        term = EquilibriumTerm(*known) if whole else RestrictedEquilibrium(*known, motion)
         self.terms.append(term)
         return term
 

@@ -57,7 +57,7 @@ def test_an_upright_plane_that_nothing_tracks_leaves_its_three_motions_free():
 
 def test_coordinates_across_a_plane_are_refused_by_name():
     motion = MOTIONS["body in an upright plane"]
-    program, _ = program_of(motion, np.random.default_rng(0))
+    program, _ = program_of(motion, np.random.default_rng(0), tracked=False)
     program.free = program.layout.select(["exit_points"])
     with pytest.raises(CalibrationError, match=r"exit point along y cannot be told at all"):
         program.Solve()
@@ -105,3 +105,21 @@ def test_a_bound_holds_a_parameter_and_lets_it_go_where_it_is_wide():
     assert name not in held.names
     with pytest.raises(CalibrationError, match="bound: sigma: found -1"):
         program.AddBound([name], -1.0)
+
+
+def test_a_point_mass_at_rest_balances_along_its_plane_alone():
+    motion = MOTIONS["point in an oblique plane"]
+    program, _ = program_of(motion, np.random.default_rng(0))
+    weight = np.array([1.0, 2.0, -15.0])
+    tensions = np.random.default_rng(1).uniform(5.0, 20.0, (14, 4))
+    term = program.AddRest(weight, np.zeros(3), 0.1, 0.5, tensions)
+    at = program.at()
+    r, _, B = term.evaluate(at)
+    u = at.vector(0)
+    force = weight - np.einsum("kma,km->ka", u, tensions)
+    inside = motion.basis(np.eye(3))[3:]
+    np.testing.assert_allclose(r * term.sigmas(), force @ inside, atol=1e-9)
+    assert B.shape == (14, 2, 10)
+    assert term.row_unit(0) == "N"
+    assert term.row_name(0, ("a",)).startswith("force along (")
+    assert term.only(np.array([3])).measured().shape[1] == 2

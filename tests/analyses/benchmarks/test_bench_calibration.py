@@ -7,7 +7,7 @@ SAME = 1e-6
 """SciPy ends where its own differences let it, far below the deviations of 0.2 mm and more [m]."""
 
 POINT_SAME = 2e-5
-"""SciPy stops where its relative step is 1e-8 of cost, within hundredths of a deviation of 1 mm [m]."""
+"""SciPy stops at a relative gain of 1e-8, within hundredths of deviations of 1 mm and more [m]."""
 
 
 def test_both_ways_end_in_the_same_points():

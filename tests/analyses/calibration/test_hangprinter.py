@@ -134,8 +134,13 @@ def test_positions_without_rotations_are_read():
 def test_motors_whose_sign_is_turned_are_no_fit_and_named():
     log = read_log(LOG, ["A", "B", "C", "D"])
     turned = replace(log, angles=-log.angles)
+    with pytest.raises(CalibrationError, match="176 of 176 motor angles fit with the sign turned"):
+        cdpr.calibrate(
+            load_robot("hangprinter_4"), turned, UNKNOWN, sigmas=EXACT, zero=RigidTransform()
+        )
     found = cdpr.calibrate(
-        load_robot("hangprinter_4"), turned, UNKNOWN, sigmas=EXACT, zero=RigidTransform()
-    )
+        load_robot("hangprinter_4"), turned, UNKNOWN, sigmas=EXACT, zero=RigidTransform(),
+        outliers=False,
+    )  # fmt: skip
     assert found.result.status == "misfit"
     assert "176 of 176 motor angles fit with the sign turned" in found.misfit[0]
