@@ -126,6 +126,17 @@ class Cable:
     material: OwnMaterial | None = optional_section(
         "What it is made of where that differs from `cable`; null: nothing differs."
     )
+    drum_radius: float | None = number(
+        "Radius of its drum; null: that of `winch`.", "m", None, above=0.0
+    )
+    mechanical_advantage: float = number(
+        "Parts of line side by side between exit and anchor point, a block and tackle: line that "
+        "its drum winds over length of the cable. The material is that of all parts together; "
+        "rated speeds are of cables with 1.",
+        "-",
+        1.0,
+        at_least=1.0,
+    )
 
     def base_of(self, p_WA: Array) -> Array:
         """The `exit_point` with which the cable leaves the frame at p_WA, shape (3,) [m]."""
@@ -304,8 +315,8 @@ class Robot(Summarized):
         return np.asarray(self.platform.box_center, float)
 
     def drum(self) -> Drum:
-        """Drums and gears of the winches."""
-        return self.winch.drum(self._drum_diameter())
+        """Drums and gears of the winches, blocks and tackles included."""
+        return self.winch.drum(self._drum_diameter(), *self._own_drums())
 
     def winch_law(self) -> WinchLaw:
         """The winches with their motors.
@@ -314,7 +325,8 @@ class Robot(Summarized):
             RobotFileError: The file does not give the inertia of the motors.
         """
         groups = self.winch_groups()
-        law = self.winch.law(self._drum_diameter(), groups if groups.are_shared() else None)
+        shared = groups if groups.are_shared() else None
+        law = self.winch.law(self._drum_diameter(), shared, *self._own_drums())
         if law is None:
             raise RobotFileError(
                 f"robot {self.name}: winch.inertia: found null; accepted: a number > 0 [kg m^2], "
@@ -331,6 +343,18 @@ class Robot(Summarized):
         diameters = self.diameters()
         alike = bool(np.all(diameters == diameters[0]))
         return float(diameters[0]) if alike else diameters
+
+    def _own_drums(self) -> tuple[Array | None, Array | None]:
+        """Radii of the drums [m] and mechanical advantages, shape (m,); None where all are the
+        winch's, and 1."""
+        radii = [cable.drum_radius for cable in self.cables]
+        advantages = np.array([cable.mechanical_advantage for cable in self.cables])
+        common = self.winch.drum_radius
+        own = np.array([common if radius is None else radius for radius in radii])
+        return (
+            None if all(radius is None for radius in radii) else own,
+            None if np.all(advantages == 1.0) else advantages,
+        )
 
     def motion_type(self) -> MotionType:
         """Which motions the platform has."""

@@ -51,7 +51,7 @@ class DrumLayers:
         None,
         at_least=0.0,
     )
-    wound: float = number("Cable on the drum at the home pose.", "m", at_least=0.0)
+    wound: float = number("Line on the drum at the home pose.", "m", at_least=0.0)
 
 
 @dataclass(kw_only=True)
@@ -99,28 +99,41 @@ class Winch:
         """Cable speed at the motor's rated speed [m/s]. Source: servoing thesis (1.21)."""
         return self.rated_motor_speed() / self.gear_ratio * self.drum_radius
 
-    def drum(self, cable_diameter: float | Array) -> Drum:
+    def drum(
+        self,
+        cable_diameter: float | Array,
+        radii: Array | None = None,
+        advantages: Array | None = None,
+    ) -> Drum:
         """The drum with its gear; the cable's centre line is half a diameter [m] outside.
 
         The diameter is one number, or one for each cable, shape (m,); then so are radius and
-        height of layers.
+        height of layers. So are radii of drums that differ [m] and mechanical advantages: n parts
+        of line side by side are one on a drum of an n-th of the radius, of layers of an n-th of
+        the height, with an n-th of the length wound.
 
         Source: servoing thesis (1.1).
         """
-        radius = self.drum_radius + cable_diameter / 2.0
+        radius = (self.drum_radius if radii is None else radii) + cable_diameter / 2.0
+        n = 1.0 if advantages is None else advantages
         if self.layers is None:
-            return Drum(radius, self.gear_ratio)
+            return Drum(radius / n, self.gear_ratio)
         height = cable_diameter if self.layers.height is None else self.layers.height
-        return Drum(radius, self.gear_ratio, self.layers.turns, height, self.layers.wound)
+        turns, wound = self.layers.turns, self.layers.wound
+        return Drum(radius / n, self.gear_ratio, turns, height / n, wound / n)
 
     def law(
-        self, cable_diameter: float | Array, groups: WinchGroups | None = None
+        self,
+        cable_diameter: float | Array,
+        groups: WinchGroups | None = None,
+        radii: Array | None = None,
+        advantages: Array | None = None,
     ) -> WinchLaw | None:
         """The winch with its motor; None where the inertia is not known."""
         if self.inertia is None:
             return None
         return WinchLaw(
-            drum=self.drum(cable_diameter),
+            drum=self.drum(cable_diameter, radii, advantages),
             inertia=self.inertia,
             rated_speed=self.rated_motor_speed(),
             rated_torque=np.inf if self.motor_torque is None else self.motor_torque,

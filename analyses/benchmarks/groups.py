@@ -8,6 +8,7 @@ from cdpr_drake.analyses.benchmarks.constraints import constraint_rows
 from cdpr_drake.analyses.benchmarks.design import design_rows
 from cdpr_drake.analyses.benchmarks.identification import calibration_rows, identification_rows
 from cdpr_drake.analyses.benchmarks.planning import planning_rows
+from cdpr_drake.analyses.benchmarks.point_calibration import point_calibration_rows
 from cdpr_drake.analyses.benchmarks.servo import servo_rows
 from cdpr_drake.analyses.benchmarks.simulation import effect_rows, simulation_rows
 from cdpr_drake.analyses.benchmarks.stability import stability_rows
@@ -17,7 +18,7 @@ from cdpr_drake.analyses.benchmarks.workspaces import workspace_rows
 from cdpr_drake.analyses.reporting.timing import TimingRow
 
 BENCH_GROUPS: dict[str, Callable[[bool], list[TimingRow]]] = {
-    "calibration": calibration_rows,
+    "calibration": lambda quick: [*calibration_rows(quick), *point_calibration_rows(quick)],
     "constraints": constraint_rows,
     "design": design_rows,
     "identification": identification_rows,

@@ -19,9 +19,7 @@ def calibration_model(robot: Robot, mount: str | None = None) -> CalibrationMode
 
     Raises:
         CalibrationError: There is no such mounting on the platform.
-        RobotFileError: The platform moves otherwise than in space or in a horizontal plane.
     """
-    robot.servo_rows("a calibration")
     model = CalibrationModel(tuple(cable.name for cable in robot.cables), robot.cable_set())
     if mount is None:
         return model
@@ -58,12 +56,18 @@ def calibrated_robot(
     for k, cable in enumerate(robot.cables):
         radius = float(model.cables.pulley_radius[k])
         own = f"{cable.name}.pulley_radius" in moved
+        drum = cable.drum_radius
+        if f"{cable.name}.drum_radius" in moved:
+            drum = (robot.winch.drum_radius if drum is None else drum) + float(model.drum_radius[k])
+        if drum is not None:
+            drum += model.common_drum_radius
         cables.append(
             replace(
                 cable,
                 exit_point=cable.base_of(model.cables.p_WA[:, k]),
                 anchor_point=np.array(model.cables.p_PB[:, k]),
                 pulley_radius=radius if own else cable.pulley_radius,
+                drum_radius=drum,
             )
         )
     cameras = [
@@ -87,11 +91,15 @@ def calibrated_robot(
             f"drum radii: the file has one for all, their mean; each over it: "
             f"{', '.join(f'{s / mean:.5f}' for s in scales)}"
         )
+    if model.common_drum_radius:
+        winch = replace(winch, drum_radius=winch.drum_radius + model.common_drum_radius)
     for group in ("length_offset", "swivel_offset"):
         if any(name.endswith(group) for name in moved):
             left.append(f"{group.replace('_', ' ')}s belong to the log; they are in results.json")
     frames = [key for key in ("tracker", "marker") if any(n.startswith(f"{key}.") for n in moved)]
     if frames:
         left.append(f"the {' and the '.join(frames)} belong to the log; they are in results.json")
+    if any(name == "clock" or name.startswith("tilt_zero.") for name in moved):
+        left.append("zeros of tilts and the tracker's clock belong to the log, as well")
     changes = {"cables": cables, "cameras": cameras, "winch": winch}
     return fitted_robot(robot, "Calibrated", result, **changes), tuple(left)

@@ -14,6 +14,7 @@ from cdpr_drake.analyses.calibration.calibrated_robots import calibrated_robot
 from cdpr_drake.analyses.calibration.calibration_task import Calibration
 from cdpr_drake.analyses.calibration.fit_verdict import MISFIT_FACTOR
 from cdpr_drake.analyses.calibration.log_fit import LogFit
+from cdpr_drake.analyses.calibration.row_figure import row_figure
 from cdpr_drake.analyses.reporting.log_files import finite
 from cdpr_drake.analyses.reporting.provenance import package_versions
 from cdpr_drake.analyses.reporting.statements import new_table
@@ -60,7 +61,7 @@ def calibration_dict(
         ],
         "unknown": list(task.unknown),
         "priors": dict(task.priors),
-        "sigmas": vars(task.sigmas),
+        "sigmas": {key: value for key, value in vars(task.sigmas).items() if value is not None},
         "poses": calibration.log.count,
         "chi_square": finite(result.chi_square),
         "degrees_of_freedom": result.degrees,
@@ -101,8 +102,33 @@ def calibration_dict(
         "steps": result.steps,
         "seconds": result.seconds,
         "versions": package_versions(),
+        **_new_keys(calibration),
         **(more or {}),
     }
+
+
+def _new_keys(calibration: Calibration) -> dict[str, Any]:
+    """What belongs to some calibrations only, for JSON."""
+    result, task, names = calibration.result, calibration.task, calibration.result.names
+    model, added = result.model, dict[str, Any]()
+    if any("drum_radius" in name for name in names):
+        added["drum_radii_m"] = [
+            (task.robot.winch.drum_radius if cable.drum_radius is None else cable.drum_radius)
+            + model.common_drum_radius + float(change)
+            for cable, change in zip(task.robot.cables, model.drum_radius, strict=True)
+        ]  # fmt: skip
+    if any(name.startswith("tilt_zero") for name in names):
+        added["tilt_zeros_rad"] = model.tilt_zero.tolist()
+    if "clock" in names:
+        added["tracker_late_s"] = model.clock
+    if task.zero is not None:
+        added["zero_X_WP"] = pose_row(task.zero).tolist()
+    if task.bounds:
+        added["bounds"] = dict(task.bounds)
+        added["at_bounds"] = dict(result.at_bounds)
+    if calibration.held is not None:
+        added["held_out"] = calibration.held.as_dict()
+    return added
 
 
 def residual_row(one: Outlier) -> dict[str, Any]:
@@ -139,6 +165,8 @@ def _tables(calibration: Calibration, remarks: Sequence[str]) -> list[Table]:
     said = [("frames are not told", words) for words in result.gauge]
     said += [("frames are hardly told", words) for words in result.loose]
     said += [("from the prior alone", words) for words in result.prior_only]
+    if calibration.held is not None:
+        said.append(("held out", calibration.held.words()))
     said += [("remark", words) for words in remarks]
     if said:
         notes = new_table("To know", ("what", "which"), ())
@@ -167,7 +195,8 @@ def _tables(calibration: Calibration, remarks: Sequence[str]) -> list[Table]:
 
 def _misfit_table(calibration: Calibration) -> Table:
     """Why it is no fit, and the largest residuals."""
-    title = "Does not fit: " + "; ".join(calibration.misfit[:-1])
+    why = [words for words in calibration.misfit if not words.startswith("largest: ")]
+    title = "Does not fit: " + "; ".join(why)
     table = new_table(title, ("row", "measurement"), ("off by", "sigmas"))
     for one in calibration.result.largest:
         table.add_row(
@@ -195,10 +224,14 @@ def grouped(calibration: Calibration) -> list[tuple[str, str, np.ndarray, np.nda
 
 def calibration_drawings(calibration: Calibration) -> dict[str, Callable[[], Figure]]:
     """What draws the figures, by name: how measurements fit and what was found; correlations."""
-    return {
+    drawings: dict[str, Callable[[], Figure]] = {
         "calibration": partial(_fit_figure, calibration),
         "correlation": partial(_correlation_figure, calibration),
     }
+    motion = calibration.task.robot.motion_type()
+    if calibration.held is not None or not (motion.is_free or motion.is_horizontal_body):
+        drawings["rows"] = partial(row_figure, calibration)
+    return drawings
 
 
 def _fit_figure(calibration: Calibration) -> Figure:

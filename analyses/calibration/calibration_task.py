@@ -5,9 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from cdpr_drake.analyses.calibration.calibration_request import CalibrationTask, prepare
+import numpy as np
+
+from cdpr_drake.analyses.calibration.calibration_request import (
+    CalibrationTask,
+    Prepared,
+    prepare,
+)
 from cdpr_drake.analyses.calibration.fit_programs import start_points
-from cdpr_drake.analyses.calibration.fit_starts import Tie, best_of_starts
+from cdpr_drake.analyses.calibration.fit_starts import MultiStartFit, Tie, best_of_starts
 from cdpr_drake.analyses.calibration.fit_verdict import (
     MISFIT,
     bad_sensors,
@@ -15,9 +21,29 @@ from cdpr_drake.analyses.calibration.fit_verdict import (
     misfits,
     unused_columns,
 )
+from cdpr_drake.analyses.calibration.held_out import (
+    EACH,
+    HeldOut,
+    HeldRow,
+    held_groups,
+    predicted,
+)
 from cdpr_drake.analyses.calibration.log_file import CalibrationLog
-from cdpr_drake.analyses.calibration.tracker import check_clock, with_tracker
+from cdpr_drake.analyses.calibration.tracker import (
+    check_clock,
+    with_tracker,
+    with_turned_tracker,
+)
+from cdpr_drake.analyses.calibration.turned_sensors import (
+    turned_sensors,
+    turned_where_lost,
+    upside_down,
+)
 from cdpr_drake.calibration.result import CalibrationResult
+from cdpr_drake.errors import CalibrationError
+
+LOST = ("pose ", "search: ", "start: ")
+"""How errors begin that a sensor's sign may be the reason of."""
 
 REMARKED = 2.0
 """A fit that is worse than this many sigmas is remarked."""
@@ -35,6 +61,7 @@ class Calibration:
         remarks: What should be known of it, in words.
         misfit: Why it is no fit, in words; empty where it is one.
         ties: Poses that fit as well elsewhere.
+        held: Rows that were not fitted but predicted; None: all were fitted.
     """
 
     task: CalibrationTask
@@ -44,6 +71,7 @@ class Calibration:
     remarks: tuple[str, ...]
     misfit: tuple[str, ...] = ()
     ties: tuple[Tie, ...] = ()
+    held: HeldOut | None = None
 
 
 def calibrate(
@@ -61,14 +89,30 @@ def calibrate(
     Raises:
         CalibrationError: The log does not hold, or does not tell, what is asked; names it.
     """
-    say("Looking for where the poses were")
-    prepared = prepare(task, log)
-    if log.poses is not None and prepared.tracked is None:
-        prepared = with_tracker(prepared, start_points(prepared, [prepared.first])[0].poses)
-    check_clock(prepared)
-    found = best_of_starts(prepared, say)
+    if task.hold_out is not None:
+        return _held_out(task, log, say)
+    try:
+        prepared, found = _fitted(task, log, say)
+    except CalibrationError as problem:
+        if str(problem).startswith(LOST):
+            say("Looking for signs that are turned")
+            turned = turned_where_lost(task, log, lambda t, g: _fitted(t, g, _quiet)[1].result)
+            if turned:
+                raise CalibrationError(f"{problem}; {turned[0]}") from problem
+        raise
     result = found.result
     misfit = misfits(result)
+    up = prepared.first.rotation().matrix()[:, 2]
+    flipped = upside_down(result, up)
+    if flipped.any():
+        misfit = (
+            f"the platform is upside down against its home, or its start, in {np.sum(flipped)} of "
+            f"{len(flipped)} rows: sign or zero of a sensor?", *misfit,
+        )  # fmt: skip
+    if misfit:
+        say("Looking for signs that are turned")
+        turned = turned_sensors(task, log, result, lambda t, g: _fitted(t, g, _quiet)[1].result)
+        misfit = (*turned, *misfit)
     if misfit:
         result = replace(result, status=MISFIT)
     remarks = [*log.remarks, *unused_columns(prepared)]
@@ -78,9 +122,56 @@ def calibrate(
             "as much too small, or something that was not asked for is off"
         )
     remarks += [*bad_sensors(result), *doubts(result, found.minima)]
+    remarks += [
+        f"{name} is held at its bound, {value:.6g}; standard deviations are those of the others "
+        "while it stays there"
+        for name, value in result.at_bounds.items()
+    ]
+    if found.flipped_costs_less > 0.0:
+        remarks.append(
+            f"a platform upside down would cost {found.flipped_costs_less:.3g} less, which was not "
+            "taken: its start is upright"
+        )
     if found.ties:
         remarks.append(_tied(found.ties))
     return Calibration(task, log, result, prepared.mount, tuple(remarks), misfit, found.ties)
+
+
+def _quiet(words: str) -> None:
+    """Says nothing."""
+
+
+def _fitted(
+    task: CalibrationTask, log: CalibrationLog, say: Callable[[str], None]
+) -> tuple[Prepared, MultiStartFit]:
+    """The log and task, checked, and the best of all starts."""
+    say("Looking for where the poses were")
+    prepared = prepare(task, log)
+    if log.poses is not None and prepared.tracked is None:
+        prepared = with_tracker(prepared, start_points(prepared, [prepared.first])[0].poses)
+    elif log.points is not None and prepared.freedom.motion.is_point and prepared.tracked is None:
+        prepared = with_turned_tracker(prepared, start_points(prepared, [prepared.first])[0].poses)
+    check_clock(prepared)
+    return prepared, best_of_starts(prepared, say)
+
+
+def _held_out(
+    task: CalibrationTask, log: CalibrationLog, say: Callable[[str], None]
+) -> Calibration:
+    """A calibration on some rows, the others predicted; or on all, each held out once."""
+    assert task.hold_out is not None
+    words, plain = task.hold_out, replace(task, hold_out=None)
+    whole = prepare(plain, log)
+    rows: list[HeldRow] = []
+    groups = held_groups(words, log, whole.is_zeroed() and task.zero is not None)
+    for number, group in enumerate(groups):
+        say(f"Calibrating without rows, {number + 1} of {len(groups)}")
+        kept = np.setdiff1d(np.arange(log.count), group)
+        found = calibrate(plain, log.only(kept))
+        rows += predicted(whole, found.result, kept.tolist(), group)
+    if len(groups) == 1 and str(words) != EACH:
+        return replace(found, held=HeldOut(tuple(rows), tuple(kept.tolist())))
+    return replace(calibrate(plain, log, say), held=HeldOut(tuple(rows), ()))
 
 
 def _tied(ties: tuple[Tie, ...]) -> str:

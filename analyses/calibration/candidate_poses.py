@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from pydrake.math import RigidTransform
 
+from cdpr_drake.analyses.calibration.motion_start import on_motion
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CalibrationError, CdprError
 from cdpr_drake.geometry.poses import place_error, pose_from_angles
@@ -63,7 +64,7 @@ def rest_poses(
         if robot.is_planar():
             place[2], turn[:2] = robot.plane_height or 0.0, 0.0
         R = R_WH @ pose_from_angles(np.zeros(3), LARGEST_TURN * turn).rotation()
-        X_WP = RigidTransform(R, place)
+        X_WP = on_motion(robot, RigidTransform(R, place))
         try:
             problem = tension_problem(robot, X_WP, limits=(least, high), cables=cables)
             found = distribute(problem, "quadratic_program")

@@ -9,6 +9,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.calibration.calibration_request import Prepared
+from cdpr_drake.analyses.calibration.motion_start import off_plane
 from cdpr_drake.arrays import Array
 from cdpr_drake.calibration.guesses import guessed_tags, poses_by_tags, with_tags
 from cdpr_drake.calibration.parameters import CalibrationModel
@@ -41,7 +42,7 @@ def start_points(prepared: Prepared, firsts: Sequence[RigidTransform]) -> list[S
     Raises:
         CalibrationError: A start is impossible.
     """
-    log, robot, tracked = prepared.log, prepared.task.robot, prepared.tracked
+    log, tracked = prepared.log, prepared.tracked
     seen = next((X for X in tracked or () if X is not None), None)
     seeds = list(firsts) if seen is None else [seen] * len(firsts)
     counting = [_counting(prepared, seed) for seed in seeds]
@@ -49,18 +50,18 @@ def start_points(prepared: Prepared, firsts: Sequence[RigidTransform]) -> list[S
     if tracked is not None and all(X is not None for X in tracked):
         known = [X for X in tracked if X is not None]
         return [StartPoint(model, known) for model in models]
-    count, planar, m = log.count, robot.is_planar(), prepared.model.cables.count
+    count, freedom, m = log.count, prepared.freedom, prepared.model.cables.count
     # Balance is hard to follow from afar; it is asked where lengths and the like are too few.
     told = m * ((prepared.lengths is not None) + (log.swivels is not None))
-    rest = prepared.rest and told < (3 if planar else 6)
+    rest = prepared.rest and told < freedom.motion.freedom
     tensions = None
     if rest:
         tensions = np.array([guessed_tensions(prepared, [seed] * count) for seed in seeds])
     first = None if tensions is None else tensions[0]
-    trial = CalibrationProgram(models[0], [seeds[0]] * count, (), planar)
+    trial = CalibrationProgram(models[0], [seeds[0]] * count, (), motion=freedom.motion)
     add_winches(prepared, trial, first)
     found = guessed_from(
-        models, trial.terms, seeds, count=count, tensions=tensions, planar=planar,
+        models, trial.terms, seeds, count=count, tensions=tensions, freedom=freedom,
         sure=not counting[0][1],
     )  # fmt: skip
     return [
@@ -71,10 +72,11 @@ def start_points(prepared: Prepared, firsts: Sequence[RigidTransform]) -> list[S
 def _counting(prepared: Prepared, seed: RigidTransform) -> tuple[CalibrationModel, bool]:
     """The model with guesses of what readings count from, and whether lengths are unsure by it."""
     task, log, model = prepared.task, prepared.log, prepared.model
-    asked = CalibrationProgram(model, [seed], (), task.robot.is_planar())
+    asked = CalibrationProgram(model, [seed], (), motion=prepared.freedom.motion)
     free = asked.layout.select(prepared.unknown_of_robot())
     offsets = free[asked.layout.slices["length_offsets"]]
     unsure = bool(offsets.any()) and "length_offsets" not in task.priors
+    unsure = unsure and task.zero is None
     at = Point(model, Stations.at([seed])).numbers[0]
     if prepared.lengths is not None and unsure:
         # Where winches began to count is not known: as if that had been at the first pose.
@@ -99,8 +101,11 @@ def add_winches(prepared: Prepared, program: CalibrationProgram, tensions: Array
         strain = None
         if log.tensions is not None:
             strain = np.nan_to_num(log.tensions) / robot.stiffness()
-        start = first_readings(prepared.lengths)
-        program.AddLengths(prepared.lengths, prepared.sigma, start, strain)
+        if prepared.is_zeroed():
+            _add_zeroed(prepared, program, strain)
+        else:
+            start = first_readings(prepared.lengths)
+            program.AddLengths(prepared.lengths, prepared.sigma, start, strain)
     if log.swivels is not None:
         program.AddSwivels(log.swivels, sigmas.swivels)
     if log.tilts is not None:
@@ -112,6 +117,20 @@ def add_winches(prepared: Prepared, program: CalibrationProgram, tensions: Array
         if log.tensions is not None:
             share = sigmas.tensions_share * np.nan_to_num(np.abs(log.tensions))
             program.AddTensions(log.tensions, np.hypot(sigmas.tensions, share))
+
+
+def _add_zeroed(prepared: Prepared, program: CalibrationProgram, strain: Array | None) -> None:
+    """Adds cables that were counted from zero, by lengths or by motor angles."""
+    robot, log, sigma = prepared.task.robot, prepared.log, prepared.sigma
+    assert prepared.lengths is not None
+    assert sigma is not None
+    if log.lengths is not None or log.angles is None:
+        program.AddZeroedCables(prepared.lengths, sigma, prepared.task.zero, strain=strain)
+        return
+    advantage = np.array([cable.mechanical_advantage for cable in robot.cables])
+    program.AddZeroedCables(
+        log.angles, sigma, prepared.task.zero, robot.drum(), strain=strain, advantage=advantage
+    )
 
 
 def guessed_tensions(prepared: Prepared, poses: Sequence[RigidTransform]) -> Array:
@@ -144,7 +163,7 @@ def _held(prepared: Prepared, X_WP: RigidTransform) -> Array | None:
 def program_from(prepared: Prepared, begun: StartPoint) -> CalibrationProgram:
     """The program, with poses and tags guessed from where a search begins."""
     task, log, poses = prepared.task, prepared.log, prepared.tracked
-    sigmas, planar = task.sigmas, task.robot.is_planar()
+    sigmas, motion = task.sigmas, prepared.freedom.motion
     model, at_rows = begun.model, begun.poses
     if poses is not None:
         at_rows = [g if X is None else X for g, X in zip(at_rows, poses, strict=True)]
@@ -158,10 +177,16 @@ def program_from(prepared: Prepared, begun: StartPoint) -> CalibrationProgram:
             targets = {tag: prepared.targets[tag] for tag in log.corners}
             uv = np.stack([log.corners[tag] for tag in targets], axis=1)
             at_rows = poses_by_tags(model, at_rows, targets, uv, prepared.pinhole)
-    program = CalibrationProgram(model, at_rows, prepared.unknown, planar)
+    program = CalibrationProgram(model, at_rows, prepared.unknown, motion=motion)
     add_winches(prepared, program, guessed_tensions(prepared, at_rows) if prepared.rest else None)
     if log.poses is not None:
         program.AddTrackedPoses(log.poses, sigmas.turn, sigmas.place)
+    if prepared.points is not None:
+        times = log.time if program.free[program.layout.slices["clock"]].any() else None
+        program.AddTrackedPoints(
+            prepared.points, sigmas.place, normal=off_plane(task.robot),
+            sigma_along=sigmas.off_plane, times=times,
+        )  # fmt: skip
     if prepared.targets:
         assert prepared.pinhole is not None
         order = [tag for tag in model.tags if tag in prepared.targets]
@@ -170,4 +195,6 @@ def program_from(prepared: Prepared, begun: StartPoint) -> CalibrationProgram:
         program.AddTagCorners(points, uv, sigmas.corners, prepared.pinhole)
     for name, std in prepared.priors.items():
         program.AddPrior([name], std)
+    for name, most in task.bounds.items():
+        program.AddBound([name], most)
     return program

@@ -18,6 +18,8 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.calibration.calibration_request import Prepared
 from cdpr_drake.analyses.calibration.fit_programs import program_from, start_points
+from cdpr_drake.analyses.calibration.motion_start import on_motion
+from cdpr_drake.analyses.calibration.turned_sensors import upside_down
 from cdpr_drake.arrays import Array
 from cdpr_drake.calibration.pose_search import (
     HUBER,
@@ -87,12 +89,15 @@ class MultiStartFit:
         ties: Poses of other minima that fit as well, by rows.
         starts: How many starts were tried.
         minima: How many minima they ended in.
+        flipped_costs_less: By how much the best minimum with the platform upside down costs less
+            than this one [-]; 0 where there is none that does.
     """
 
     result: CalibrationResult
     ties: tuple[Tie, ...]
     starts: int
     minima: int
+    flipped_costs_less: float = 0.0
 
 
 class _Minimum(NamedTuple):
@@ -129,7 +134,7 @@ def best_of_starts(prepared: Prepared, say: Callable[[str], None]) -> MultiStart
         assert problem is not None
         raise problem
     say("Comparing starts")
-    best = min(known, key=lambda one: one.cost)
+    best = min(_upright(prepared, known), key=lambda one: one.cost)
     if len(programs) > 1:
         pool += [one.result.stations for one in known if one is not best]
         best = _improved(prepared, best, pool)
@@ -139,7 +144,15 @@ def best_of_starts(prepared: Prepared, say: Callable[[str], None]) -> MultiStart
             for k, Y in enumerate(one.result.stations.poses()):
                 _add_tie(ties, best.result, (k, Y), one.cost - best.cost)
     ties.sort(key=lambda tie: (tie.pose, tie.more))
-    return MultiStartFit(best.result, tuple(ties), len(programs), len(known))
+    less = max(0.0, best.cost - min(one.cost for one in known))
+    return MultiStartFit(best.result, tuple(ties), len(programs), len(known), less)
+
+
+def _upright(prepared: Prepared, known: Sequence[_Minimum]) -> Sequence[_Minimum]:
+    """Minima in which the platform is not upside down against the first pose; all, if each is."""
+    up = prepared.first.rotation().matrix()[:, 2]
+    upright = [one for one in known if not upside_down(one.result, up).any()]
+    return upright or known
 
 
 def _solved(
@@ -230,7 +243,7 @@ def _elsewhere(
     Returns:
         Row of each search, shape (s,), where they ended, and the costs of what was found, (k,).
     """
-    result, planar = one.result, prepared.task.robot.is_planar()
+    result, freedom = one.result, prepared.freedom
     at = Point(result.model, result.stations, one.program.layout)
     here, count = result.stations, result.stations.count
     costs = _row_costs(prepared, one, at)
@@ -245,7 +258,7 @@ def _elsewhere(
         turns = np.concatenate([here.R[others], home.R, *(s.R[k : k + 1] for s in pool)])
         places = np.concatenate([here.p[others], home.p, *(s.p[k : k + 1] for s in pool)])
         if every or k in badly:
-            mine = turned_starts(here.R[k], planar=planar)
+            mine = turned_starts(here.R[k], freedom=freedom)
             turns = np.concatenate([turns, mine])
             places = np.concatenate([places, np.tile(here.p[k], (len(mine), 1))])
         kept = [(here.R[k], here.p[k])]
@@ -264,7 +277,7 @@ def _elsewhere(
     ends = robust_poses(
         [term.only(rows) for term in one.program.terms],
         Point(result.model, begins, one.program.layout),
-        planar=planar, outliers=prepared.task.outliers, without=np.array(batch.without),
+        freedom=freedom, outliers=prepared.task.outliers, without=np.array(batch.without),
     )  # fmt: skip
     return rows, ends, costs
 
@@ -337,6 +350,8 @@ def _apart(result: CalibrationResult, k: int, X: RigidTransform, Y: RigidTransfo
 
 def blind(prepared: Prepared) -> bool:
     """Whether nothing but the robot itself tells where the platform is."""
+    if prepared.points is not None and prepared.freedom.motion.is_point:
+        return False
     return prepared.log.poses is None and not prepared.targets
 
 
@@ -356,7 +371,7 @@ def _other_starts(prepared: Prepared) -> list[RigidTransform]:
         place = np.clip(X.translation() + step, frame.lower, frame.upper)
         if robot.is_planar():
             place[2] = X.translation()[2]
-        Y = RigidTransform(R, place)
+        Y = on_motion(robot, RigidTransform(R, place))
         if pose_error(X, Y)[0] > 0.0:
             starts.append(Y)
     return starts

@@ -15,7 +15,7 @@ from cdpr_drake.analyses.calibration.columns import (
     TORQUES,
     TURN,
 )
-from cdpr_drake.calibration.result import CalibrationResult
+from cdpr_drake.calibration.result import CalibrationResult, Fit
 
 MISFIT = "misfit"
 """Status of a result that does not fit what was measured."""
@@ -41,6 +41,8 @@ HINTS = {
     "tensions": "sign or unit?",
     "inclination": "sign, unit or axes?",
     "tracked poses": "frame, unit or clock?",
+    "tracked positions": "frame, unit or clock?",
+    "motor angles": "sign, gear or drum?",
     "tag corners": "order of corners, or the tag's size?",
     "equilibrium": "did the platform rest, and is its mass right?",
 }
@@ -57,7 +59,7 @@ def misfits(result: CalibrationResult) -> tuple[str, ...]:
         )
     for kind, fit in result.residuals.items():
         whole = fit.count + fit.dropped
-        if fit.dropped >= FEWEST_DROPPED and fit.dropped > MOST_DROPPED * whole:
+        if is_thrown_out(fit):
             why.append(f"{fit.dropped} of {whole} {kind} do not fit: {HINTS.get(kind, '')}")
     if why:
         worst = result.largest[0]
@@ -66,6 +68,12 @@ def misfits(result: CalibrationResult) -> tuple[str, ...]:
             f"{worst.unit}, {abs(worst.sigmas):.3g} sigmas"
         )
     return tuple(why)
+
+
+def is_thrown_out(fit: Fit) -> bool:
+    """Whether so much of a kind of measurement was dropped that it is not what it is taken for."""
+    whole = fit.count + fit.dropped
+    return fit.dropped >= FEWEST_DROPPED and fit.dropped > MOST_DROPPED * whole
 
 
 def bad_sensors(result: CalibrationResult) -> tuple[str, ...]:
@@ -100,7 +108,7 @@ def unused_columns(prepared: Prepared) -> tuple[str, ...]:
         why[kind] = f"{headers[first[0]][0]} and the like tell the rotation"
     if log.lengths is not None:
         why[ANGLES] = "there are cable lengths"
-    if log.poses is None or prepared.lengths is None:
+    if (log.poses is None and prepared.points is None) or prepared.lengths is None:
         why[TIME] = "without a tracker and lengths no clock is checked"
     if not prepared.rest:
         why[TENSIONS] = "the platform is not said to rest; strain of cables alone"

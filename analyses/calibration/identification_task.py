@@ -207,8 +207,10 @@ def _time(log: CalibrationLog) -> Array:
 
 def _pose_rows(log: CalibrationLog) -> Array:
     if log.poses is None:
+        lacking = "none" if log.points is None else "x, y, z without a rotation"
         raise IdentificationError(
-            f"{log.path}: poses: found none; accepted: x_m, y_m, z_m with qw, qx, qy, qz, or angles"
+            f"{log.path}: poses: found {lacking}; accepted: x_m, y_m, z_m with qw, qx, qy, qz, "
+            "or angles"
         )
     nothing = np.full(7, np.nan)
     return np.array([nothing if X is None else pose_row(X) for X in log.poses])

@@ -11,8 +11,10 @@ import csv
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
 from cdpr_drake.analyses.calibration.columns import (
@@ -36,6 +38,9 @@ from cdpr_drake.analyses.calibration.columns import (
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CalibrationError
 from cdpr_drake.geometry.poses import rotation_from_angles, rotation_from_vector
+
+ROTATIONS = (QUATERNION, TAIT, TURN, RPY)
+"""Columns that a rotation may stand in."""
 
 ParsedColumns = dict[str, dict[int | tuple[int, int, int], Array]]
 """Columns in SI units, by what they hold and by cable, part or corner."""
@@ -63,6 +68,8 @@ class CalibrationLog:
             shape (k, 3) [rad], NaN where not measured; None.
         headers: Columns by what is in them, as the file names them: `LENGTHS` and the like.
         poses: X_WP of a tracker, None in rows without; None.
+        points: Positions of a tracker that tells no rotation, shape (k, 3) [m], NaN in rows
+            without, and in coordinates that the file does not have; None.
         corners: By tag, images of its corners, shape (k, 4, 2) [px].
         remarks: What was left out, in words.
     """
@@ -80,6 +87,17 @@ class CalibrationLog:
     torques: Array | None = None
     tilts: Array | None = None
     headers: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    points: Array | None = None
+
+    def only(self, rows: npt.NDArray[np.intp]) -> CalibrationLog:
+        """Some of the rows, numbers from 0 that grow."""
+        arrays = ("time", "lengths", "angles", "swivels", "tensions", "torques", "tilts", "points")
+        parts: dict[str, Any] = {
+            name: value[rows] for name in arrays if (value := getattr(self, name)) is not None
+        }
+        poses = None if self.poses is None else [self.poses[k] for k in rows]
+        corners = {tag: uv[rows] for tag, uv in self.corners.items()}
+        return replace(self, count=len(rows), poses=poses, corners=corners, **parts)
 
 
 def read_log(path: Path, cables: Sequence[str]) -> CalibrationLog:
@@ -263,11 +281,24 @@ def _assembled(
             f"{path}: time: found {time[k + 1]:g} s after {time[k]:g} s in row {k + 2}; accepted: "
             "times that grow"
         )
+    turned = any(kind in found for kind in ROTATIONS)
     return CalibrationLog(
         path, count, time, tables[LENGTHS], tables[ANGLES], tables[SWIVELS], tables[TENSIONS],
-        parse_poses(path, found, count), dict(sorted(corners.items())), remarks, tables[TORQUES],
-        parse_tilts(path, found, count),
+        parse_poses(path, found, count) if turned else None, dict(sorted(corners.items())),
+        remarks, tables[TORQUES], parse_tilts(path, found, count),
+        points=None if turned else parse_points(found, count),
     )  # fmt: skip
+
+
+def parse_points(found: ParsedColumns, count: int) -> Array | None:
+    """Positions from columns, shape (k, 3) [m], NaN where there are none; None: no such columns."""
+    if POSITION not in found:
+        return None
+    points = np.full((count, 3), np.nan)
+    for axis, values in found[POSITION].items():
+        assert isinstance(axis, int)
+        points[:, axis] = values
+    return points
 
 
 def parse_poses(path: Path, found: ParsedColumns, count: int) -> list[RigidTransform | None] | None:
@@ -275,7 +306,7 @@ def parse_poses(path: Path, found: ParsedColumns, count: int) -> list[RigidTrans
     if POSITION not in found:
         return None
     p = _whole(path, found, POSITION, 3, count)
-    kind = next((one for one in (QUATERNION, TAIT, TURN, RPY) if one in found), None)
+    kind = next((one for one in ROTATIONS if one in found), None)
     if kind is None:
         raise CalibrationError(
             f"{path}: pose: found x, y, z without a rotation; accepted: qw, qx, qy, qz, or "

@@ -15,6 +15,7 @@ from cdpr_drake.analyses.calibration.calibrated_robots import calibrated_robot
 from cdpr_drake.analyses.calibration.calibration_request import Prepared, prepare
 from cdpr_drake.analyses.calibration.calibration_task import Calibration
 from cdpr_drake.analyses.calibration.candidate_poses import in_short_hops, rest_poses
+from cdpr_drake.analyses.calibration.motion_start import off_plane
 from cdpr_drake.analyses.reporting.log_files import finite, write_whole
 from cdpr_drake.analyses.reporting.statements import new_table
 from cdpr_drake.arrays import Array
@@ -127,8 +128,11 @@ def _expected(
     """A program of what would be measured at poses, without noise."""
     task, log, model = prepared.task, prepared.log, calibration.result.model
     sigmas, random = task.sigmas, np.random.default_rng(0)
-    program = CalibrationProgram(model, poses, calibration.result.names, task.robot.is_planar())
-    if prepared.lengths is not None:
+    motion = prepared.freedom.motion
+    program = CalibrationProgram(model, poses, calibration.result.names, motion=motion)
+    if prepared.is_zeroed():
+        _expect_zeroed(prepared, program)
+    elif prepared.lengths is not None:
         lengths = Point(model, Stations.at(poses)).numbers[:, :, 0]
         sigma = np.hypot(sigmas.lengths, sigmas.lengths_share * lengths)
         program.AddLengths(lengths, sigma, first_readings(prepared.lengths))
@@ -146,6 +150,11 @@ def _expected(
     if log.poses is not None:
         told = simulated_poses(poses, 0.0, 0.0, random, model)
         program.AddTrackedPoses(told, sigmas.turn, sigmas.place)
+    if prepared.points is not None:
+        seen = [X.translation() for X in simulated_poses(poses, 0.0, 0.0, random, model)]
+        program.AddTrackedPoints(
+            np.array(seen), sigmas.place, normal=off_plane(task.robot), sigma_along=sigmas.off_plane
+        )
     if prepared.targets:
         assert prepared.pinhole is not None
         targets = {tag: prepared.targets[tag] for tag in model.tags if tag in prepared.targets}
@@ -153,6 +162,23 @@ def _expected(
         points = {tag: target.points for tag, target in targets.items()}
         program.AddTagCorners(points, uv, sigmas.corners, prepared.pinhole)
     return program
+
+
+def _expect_zeroed(prepared: Prepared, program: CalibrationProgram) -> None:
+    """Adds cables that would be counted from zero, without noise."""
+    task, robot, at = prepared.task, prepared.task.robot, program.at()
+    lengths = at.numbers[:, :, 0]
+    sigma = np.hypot(task.sigmas.lengths, task.sigmas.lengths_share * lengths)
+    home = np.zeros(lengths.shape[1])
+    if task.zero is not None:
+        home = Point(program.model, Stations.at([task.zero])).numbers[0, :, 0]
+    paid = (lengths - home - program.model.length_offset) / program.model.length_scale
+    if prepared.log.lengths is not None or prepared.log.angles is None:
+        program.AddZeroedCables(paid, sigma, task.zero)
+        return
+    advantage = np.array([cable.mechanical_advantage for cable in robot.cables])
+    drum = robot.drum()
+    program.AddZeroedCables(drum.motor_angles(paid), sigma, task.zero, drum, advantage=advantage)
 
 
 def _kind(name: str) -> str:

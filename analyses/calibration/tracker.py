@@ -6,11 +6,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from pydrake.math import RigidTransform
+from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.analyses.calibration.calibration_request import Prepared, unknown_frames
 from cdpr_drake.analyses.calibration.log_file import CalibrationLog
 from cdpr_drake.analyses.calibration.log_fit import refuse_late_tracker
+from cdpr_drake.analyses.calibration.motion_start import on_motion
+from cdpr_drake.arrays import Array
 from cdpr_drake.calibration.guesses import guessed_tracker
 from cdpr_drake.calibration.stations import Point, Stations
 from cdpr_drake.errors import CalibrationError
@@ -35,6 +37,35 @@ def with_tracker(prepared: Prepared, poses: Sequence[RigidTransform]) -> Prepare
     return replace(prepared, model=model, tracked=told)
 
 
+def with_turned_tracker(prepared: Prepared, poses: Sequence[RigidTransform]) -> Prepared:
+    """As `with_tracker`, for a tracker of positions of a point mass whose frame is turned.
+
+    Raises:
+        CalibrationError: Fewer than three positions were told.
+
+    Source: Kabsch, A solution for the best rotation to relate two sets of vectors, 1976.
+    """
+    points = prepared.points
+    assert points is not None
+    seen = np.asarray(np.isfinite(points).all(axis=1))
+    if np.sum(seen) < 3:
+        raise CalibrationError(
+            f"{prepared.log.path}: tracked positions: found {np.sum(seen)}; accepted: at least 3, "
+            "where nothing is known of how the tracker's frame is turned"
+        )
+    there = np.array([X.translation() for X in poses])[seen]
+    here = points[seen]
+    U, _, Vt = np.linalg.svd((there - there.mean(axis=0)).T @ (here - here.mean(axis=0)))
+    R = U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt
+    place = there.mean(axis=0) - R @ here.mean(axis=0)
+    X_WK = RigidTransform(RotationMatrix.ProjectToRotationMatrix(R), place)
+    told = [
+        on_motion(prepared.task.robot, RigidTransform(X.rotation(), X_WK @ p)) if known else None
+        for X, p, known in zip(poses, points, seen, strict=True)
+    ]
+    return replace(prepared, model=replace(prepared.model, X_WK=X_WK), tracked=told)
+
+
 def check_clock(prepared: Prepared) -> None:
     """Refuses a tracker that is out of sync with the winches.
 
@@ -44,6 +75,8 @@ def check_clock(prepared: Prepared) -> None:
     log, poses = prepared.log, prepared.tracked
     if poses is None or log.time is None or prepared.lengths is None:
         return
+    if "clock" in prepared.unknown:
+        return  # it is found with all else
     tracked = np.full(prepared.lengths.shape, np.nan)
     seen = [k for k, X in enumerate(poses) if X is not None]
     at = Point(prepared.model, Stations.at([X for X in poses if X is not None]))
@@ -59,6 +92,8 @@ def shifted_log(log: CalibrationLog, late: float) -> CalibrationLog:
     Raises:
         CalibrationError: It has no times or no poses.
     """
+    if log.time is not None and log.points is not None:
+        return replace(log, points=_shifted_points(log.time, log.points, late))
     if log.time is None or log.poses is None:
         raise CalibrationError(
             f"{log.path}: found no {'time' if log.time is None else 'poses'} to shift a tracker by"
@@ -80,3 +115,13 @@ def shifted_log(log: CalibrationLog, late: float) -> CalibrationLog:
         p = X.translation() + share * (Y.translation() - X.translation())
         moved.append(RigidTransform(type(X.rotation()).ProjectToRotationMatrix(R), p))
     return replace(log, poses=moved)
+
+
+def _shifted_points(time: Array, points: Array, late: float) -> Array:
+    """Positions of a tracker that was late, shape (k, 3) [m]; NaN at the ends."""
+    seen = np.isfinite(points).all(axis=1)
+    moved = np.full(points.shape, np.nan)
+    inside = (time + late >= time[seen][0]) & (time + late <= time[seen][-1])
+    for axis in range(3):
+        moved[inside, axis] = np.interp(time[inside] + late, time[seen], points[seen, axis])
+    return moved

@@ -11,7 +11,14 @@ import numpy as np
 from rich.table import Table
 
 from cdpr_drake.analyses.calibration.calibration_report import calibration_fit
-from cdpr_drake.analyses.calibration.calibration_request import CalibrationTask, Sigmas, TagPlace
+from cdpr_drake.analyses.calibration.calibration_request import (
+    HOMING,
+    CalibrationTask,
+    Sigmas,
+    TagPlace,
+    default_unknown,
+    is_homing,
+)
 from cdpr_drake.analyses.calibration.calibration_task import Calibration
 from cdpr_drake.analyses.calibration.calibration_task import calibrate as calibrate_log
 from cdpr_drake.analyses.calibration.identification_report import identification_fit
@@ -35,13 +42,10 @@ from cdpr_drake.models.robot_statics import as_pose
 from cdpr_drake.schema.typed_yaml import closest
 from cdpr_drake.summaries import as_kind
 
-GEOMETRY = ("exit_points", "anchor_points")
-"""What `calibrate` looks for where nothing else is said."""
-
 MOST_PARAMETERS = 7
 """So many are shown where an identification shows itself."""
 
-ASKED = ("priors", "mount", "image_size", "start", "rest", "outliers")
+ASKED = ("priors", "mount", "image_size", "start", "rest", "outliers", "zero", "bounds", "hold_out")
 KEPT = ("propose", "overwrite", "formats")
 """What `calibrate` takes by name besides: fields of its task, and what is done with results."""
 
@@ -87,7 +91,7 @@ class RobotIdentification(FittedRobot, Identification):
 def calibrate(
     robot: Robot | str | Path,
     log: CalibrationLog | Path | str,
-    unknown: str | Sequence[str] = GEOMETRY,
+    unknown: str | Sequence[str] | None = None,
     *,
     sigmas: Sigmas | Mapping[str, float] | None = None,
     tags: Mapping[int, TagPlace] | Path | str | None = None,
@@ -103,7 +107,9 @@ def calibrate(
     Args:
         robot: The robot as it is believed, or its name or path.
         log: The log, or its file; columns as `cdpr calibrate --help` says.
-        unknown: Groups of `calibration.parameters.GROUPS`, and names of parameters.
+        unknown: Groups of `calibration.parameters.GROUPS`, and names of parameters; None: exit and
+            anchor points, of a point mass exit points; of a robot with fewer cables than degrees of
+            freedom without a tracker, from where its sensors count.
         sigmas: Standard deviations of what was measured: `Sigmas`, or some of its fields by name.
         tags: What is known of tags by number, or a file of it.
         tag_size: In the place of it: edge of all tags [m].
@@ -112,7 +118,8 @@ def calibrate(
         say: Told what is done now.
         session: In the place of it: who follows the calibration.
         options: Fields of `CalibrationTask`: `priors`, `mount`, `image_size`, `start`, `rest`,
-            `outliers`. `propose`: also proposes so many poses that would tell most next.
+            `outliers`, `zero`, `bounds`, `hold_out`. `propose`: also proposes so many poses that
+            would tell most next.
             `overwrite`: whether results in the folder may be replaced. `formats`: endings of the
             files of figures.
 
@@ -128,10 +135,15 @@ def calibrate(
     _check_names(options, (*ASKED, *KEPT), CalibrationError)
     read, places = _inputs(loaded, log, tags, tag_size, tracker_late)
     asked = {name: options[name] for name in ASKED if name in options}
-    if asked.get("start") is not None:
-        asked["start"] = as_pose(loaded, asked["start"])
+    for pose in ("start", "zero"):
+        if asked.get(pose) is not None:
+            asked[pose] = as_pose(loaded, asked[pose])
+    usual = Sigmas()
+    if unknown is None:
+        unknown = default_unknown(loaded, read)
+        usual = HOMING if is_homing(loaded, read) else usual
     task = CalibrationTask(
-        robot=loaded, unknown=_words(unknown), sigmas=_sigmas(sigmas), tags=places, **asked
+        robot=loaded, unknown=_words(unknown), sigmas=_sigmas(sigmas, usual), tags=places, **asked
     )
 
     def work(folder: Path | None, say: Say) -> RobotCalibration:
@@ -255,11 +267,11 @@ def _words(names: str | Sequence[str]) -> tuple[str, ...]:
     return (names,) if isinstance(names, str) else tuple(names)
 
 
-def _sigmas(given: Sigmas | Mapping[str, float] | None) -> Sigmas:
+def _sigmas(given: Sigmas | Mapping[str, float] | None, usual: Sigmas) -> Sigmas:
     if isinstance(given, Sigmas):
         return given
     _check_names(given or {}, [field.name for field in fields(Sigmas)], CalibrationError)
-    return replace(Sigmas(), **(given or {}))
+    return replace(usual, **(given or {}))
 
 
 def _check_names(

@@ -20,10 +20,10 @@ from scipy.linalg import LinAlgError, eigh
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.calibration.parameters import CalibrationModel, model_difference
-from cdpr_drake.calibration.stations import POSE, Point, inverse_turn_slope
+from cdpr_drake.calibration.pose_freedom import BODY, PoseFreedom
+from cdpr_drake.calibration.stations import Point, inverse_turn_slope
 from cdpr_drake.calibration.terms import Term
 from cdpr_drake.errors import CableModelError, CalibrationError
-from cdpr_drake.geometry.straight_cables import ALL_ROWS, PLANAR_ROWS
 
 UNTOLD = 1e-3
 """A direction of parameters whose standard deviation is above a thousand times what is typical
@@ -35,10 +35,6 @@ standard deviations."""
 
 MOST_STEPS = 100
 SMALLEST_DAMPING, LARGEST_DAMPING = 1e-12, 1e12
-
-STATION_TYPICAL = 0.01
-"""What makes turns [rad] and places [m] of a pose, and tensions in hundreds of newtons,
-comparable."""
 
 SINGULAR = 1e-13
 """Smallest over largest eigenvalue of a pose's own normal equations; below, nothing determines
@@ -103,7 +99,7 @@ class LeastSquares:
         terms: What was measured.
         free: Which parameters are unknown, shape (n,).
         prior: What is known of them.
-        planar: Whether the platform slides in a plane.
+        freedom: Which coordinates of poses are unknown.
         huber: From how many sigmas on a residual counts linearly; infinite: squares.
         dropped: Rows of terms that do not count, each shape (k, rows); or None.
     """
@@ -111,14 +107,9 @@ class LeastSquares:
     terms: Sequence[Term]
     free: npt.NDArray[np.bool_]
     prior: Prior
-    planar: bool = False
+    freedom: PoseFreedom = BODY
     huber: float = np.inf
     dropped: Sequence[npt.NDArray[np.bool_]] | None = None
-
-    def columns(self, at: Point) -> npt.NDArray[np.intp]:
-        """Which unknowns of a pose move."""
-        pose = PLANAR_ROWS if self.planar else ALL_ROWS
-        return np.array([*pose, *range(POSE, at.stations.width)])
 
     def used(self, at: Point) -> npt.NDArray[np.bool_]:
         """Which parameters, unknown or not, measurements depend on, shape (n,)."""
@@ -127,9 +118,7 @@ class LeastSquares:
 
     def station_scale(self, at: Point) -> Array:
         """Typical sizes of the unknowns of a pose that move."""
-        scale = np.full(at.stations.width, STATION_TYPICAL)
-        scale[POSE:] *= 1e2
-        return scale[self.columns(at)]
+        return self.freedom.scale(at.stations.width)
 
     def evaluate(self, at: Point) -> tuple[Array, Array, Array]:
         """All residuals, shape (k, rows), and derivatives in typical sizes."""
@@ -140,7 +129,7 @@ class LeastSquares:
             part[2] = np.where(gone[:, :, None], 0.0, part[2])
         r = np.concatenate([part[0] for part in parts], axis=1)
         A = np.concatenate([part[1][:, :, self.free] for part in parts], axis=1)
-        B = np.concatenate([part[2] for part in parts], axis=1)[:, :, self.columns(at)]
+        B = self.freedom.narrow(np.concatenate([part[2] for part in parts], axis=1), at.stations.R)
         return r, A * at.layout.typical[self.free], B * self.station_scale(at)
 
     def cost(self, at: Point) -> float:
@@ -230,9 +219,8 @@ def minimize(problem: LeastSquares, at: Point, most: int = MOST_STEPS) -> Minimu
             continue
         theta = np.zeros(at.layout.size)
         theta[problem.free] = told * typical[problem.free]
-        steps = np.zeros((at.stations.count, at.stations.width))
-        moved = -(equations.alone + equations.back @ told)
-        steps[:, problem.columns(at)] = moved * problem.station_scale(at)
+        moved = -(equations.alone + equations.back @ told) * problem.station_scale(at)
+        steps = problem.freedom.widen(moved, at.stations.R, at.stations.width)
         try:
             candidate = at.moved(theta, steps)
             new = problem.cost(candidate)

@@ -44,11 +44,12 @@ class Identifiability:
     untold_basis: Array
 
 
-def frame_motions(at: Point) -> Array:
+def frame_motions(at: Point, free: npt.NDArray[np.bool_] | None = None) -> Array:
     """How parameters change as the world or the platform frame moves, in typical sizes, (n, 12).
 
     The world moves exit points, tags and the tracker's frame, the platform anchor points, camera
-    and marker; each turns about its axes, then moves along them.
+    and marker; each turns about its axes, then moves along them. The zero of a yaw turns with the
+    world about z, where it is free; else it holds the world by what it measures.
     """
     model, where = at.model, at.layout.slices
     G = np.zeros((at.layout.size, 12))
@@ -70,6 +71,9 @@ def frame_motions(at: Point) -> Array:
         pose(where["tags"].start + 6 * k, X_WT.translation(), 0)
     pose(where["tracker"].start, model.X_WK.translation(), 0)
     pose(where["marker"].start, model.X_PM.translation(), 6)
+    yaw = where["tilt_zeros"].start + 2
+    if free is not None and free[yaw]:
+        G[yaw, 2] = 1.0
     return G / at.layout.typical[:, None]
 
 
@@ -91,7 +95,7 @@ def identifiability(
     N = V[:, values <= UNTOLD**2]
     if not N.shape[1]:
         return Identifiability((), (), np.zeros((count, 0)), N)
-    G = frame_motions(at)
+    G = frame_motions(at, free)
     size = np.linalg.norm(G, axis=0)
     size[size == 0.0] = 1.0
     G = G / size
@@ -102,8 +106,11 @@ def identifiability(
     moves = moves[:, np.linalg.norm(G[free] @ moves, axis=0) > 1e-9]
     basis = G[free] @ moves
     if basis.shape[1]:
-        U, s, _ = np.linalg.svd(basis, full_matrices=False)
-        basis = U[:, s > 1e-9 * s[0]]
+        U, s, Vt = np.linalg.svd(basis, full_matrices=False)
+        keep = s > 1e-9 * s[0]
+        basis = U[:, keep]
+        if not keep.all():  # motions that change nothing, as of the frame of a point mass
+            moves = moves @ Vt[keep].T
     gauge = tuple(
         _joined([FRAMES[j] for j in np.flatnonzero(np.abs(c) > SHARE * np.max(np.abs(c)))])
         for c in sparse_basis(moves).T
@@ -156,7 +163,7 @@ def _loose(
     held: npt.NDArray[np.bool_],
     with_gauge: bool = False,
 ) -> tuple[list[tuple[Array, float]], Array, Array]:
-    G = frame_motions(at)
+    G = frame_motions(at, free)
     size = np.linalg.norm(G, axis=0)
     size[size == 0.0] = 1.0
     G = G / size

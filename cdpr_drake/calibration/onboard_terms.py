@@ -105,7 +105,7 @@ class Tilts(Term):
     """Roll, pitch and yaw of the platform that an inclinometer or an IMU on it measured.
 
     The rotation of the platform in W is Rz(yaw) Ry(pitch) Rx(roll): roll and pitch are against the
-    vertical, yaw is about it from the x axis of W.
+    vertical, yaw is about it from the x axis of W, each from the zero that the model has for it.
 
     Attributes:
         angles: Roll, pitch and yaw, shape (k, 3) [rad]; NaN where one was not measured.
@@ -129,7 +129,7 @@ class Tilts(Term):
         roll = np.arctan2(R[:, 2, 1], R[:, 2, 2])
         pitch = np.arctan2(-R[:, 2, 0], level)
         yaw = np.arctan2(R[:, 1, 0], R[:, 0, 0])
-        residual = np.column_stack([roll, pitch, yaw]) - self.angles
+        residual = np.column_stack([roll, pitch, yaw]) - at.model.tilt_zero - self.angles
         residual = (residual + np.pi) % (2.0 * np.pi) - np.pi
         A, B = at.blank(3)
         upright = level > STEEP
@@ -139,6 +139,8 @@ class Tilts(Term):
         B[:, 1, 0], B[:, 1, 1] = -s, c
         slope = -R[:, 2, 0] / safe
         B[:, 2, 0], B[:, 2, 1], B[:, 2, 2] = slope * c, slope * s, 1.0
+        three = np.arange(3)
+        A[:, three, at.layout.slices["tilt_zeros"].start + three] = -1.0
         residual = np.where(upright[:, None], residual, np.inf)
         return weighted(residual, A, B, self.sigmas(), self.measured())
 

@@ -57,9 +57,8 @@ def minimize_with(
         H = J.T @ equations.S @ J + damping * np.eye(len(x))
         new = solve(0.5 * (H + H.T), J.T @ equations.rhs, x)
         told = J @ (new - x)
-        moves = np.zeros((at.stations.count, at.stations.width))
-        alone = -(equations.alone + equations.back @ told)
-        moves[:, problem.columns(at)] = alone * problem.station_scale(at)
+        alone = -(equations.alone + equations.back @ told) * problem.station_scale(at)
+        moves = problem.freedom.widen(alone, at.stations.R, at.stations.width)
         step[free] = new * typical[free]
         small = 0.5 * float(told @ equations.S @ told) <= SETTLED * (1.0 + 1e-6 * cost)
         try:

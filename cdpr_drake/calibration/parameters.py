@@ -52,12 +52,22 @@ GROUPS = {
     "tags": ParameterGroup("pose", "pose", *_POSE, "tag"),
     "tracker": ParameterGroup("tracker", "tracker's frame", *_POSE, "robot"),
     "marker": ParameterGroup("marker", "tracker's marker", *_POSE, "robot"),
+    "drum_radii": ParameterGroup("drum_radius", "drum's radius", (), ("m",), (0.001,)),
+    "common_drum_radius": ParameterGroup(
+        "common_drum_radius", "radius of all drums", (), ("m",), (0.001,), "robot"
+    ),
+    "tilt_zeros": ParameterGroup(
+        "tilt_zero", "tilt's zero", ("roll", "pitch", "yaw"), ("rad",) * 3, (0.05,) * 3, "robot"
+    ),
+    "clock": ParameterGroup("clock", "tracker's clock", (), ("s",), (0.01,), "robot"),
 }
 """Kinds of parameters in the order of the vector.
 
 `length_scales` are drum radii over those of the robot's file: cable that is counted times the scale
-is cable that is paid out. Turns (rx, ry, rz) of the camera and of a tracker's marker are about the
-axes of P, of tags and of the tracker's frame about those of W."""
+is cable that is paid out. `drum_radii` are by how much each drum is larger, beside
+`common_drum_radius` of all; with layers on a drum these turn motor angles into lengths otherwise
+than a scale. `clock` is by how much a tracker is late. Turns (rx, ry, rz) of the camera and of a
+tracker's marker are about the axes of P, of tags and of the tracker's frame about those of W."""
 
 POSE_GROUPS = tuple(key for key, group in GROUPS.items() if group.parts == _POSE[0])
 """Groups whose members are poses: turns, which do not add up, then translations."""
@@ -77,6 +87,10 @@ class CalibrationModel:
         swivel_offset: Angle about the swivel axis where a reading is zero, shape (m,) [rad].
         X_WK: Frame K in which a tracker tells poses [m].
         X_PM: Marker body M on the platform, whose pose a tracker tells [m].
+        drum_radius: By how much each drum is larger than in the robot's file, shape (m,) [m].
+        common_drum_radius: By how much all of them are larger, besides [m].
+        tilt_zero: Roll, pitch and yaw at which a tilt sensor reads zero, shape (3,) [rad].
+        clock: By how much a tracker is late [s].
     """
 
     names: tuple[str, ...]
@@ -88,6 +102,10 @@ class CalibrationModel:
     swivel_offset: Array = field(default_factory=lambda: np.zeros(0))
     X_WK: RigidTransform = field(default_factory=RigidTransform)
     X_PM: RigidTransform = field(default_factory=RigidTransform)
+    drum_radius: Array = field(default_factory=lambda: np.zeros(0))
+    common_drum_radius: float = 0.0
+    tilt_zero: Array = field(default_factory=lambda: np.zeros(3))
+    clock: float = 0.0
 
     def __post_init__(self) -> None:
         """Fills in what was left out.
@@ -97,7 +115,10 @@ class CalibrationModel:
                 a pulley at the platform.
         """
         m = self.cables.count
-        for name, value in (("length_offset", 0.0), ("length_scale", 1.0), ("swivel_offset", 0.0)):
+        for name, value in (
+            ("length_offset", 0.0), ("length_scale", 1.0), ("swivel_offset", 0.0),
+            ("drum_radius", 0.0),
+        ):  # fmt: skip
             if np.size(getattr(self, name)) == 0:
                 object.__setattr__(self, name, np.full(m, value))
             found = np.shape(getattr(self, name))
@@ -201,7 +222,9 @@ def parameter_layout(model: CalibrationModel) -> ParameterLayout:
 def _in_words(who: str, part: str) -> str:
     if part in _TURNS:
         return f"{who} about {part[1]}"
-    return f"{who} along {part}" if part else who
+    if part not in _XYZ:
+        return f"{who} in {part}" if part else who
+    return f"{who} along {part}"
 
 
 def moved_model(
@@ -233,6 +256,10 @@ def moved_model(
         swivel_offset=model.swivel_offset + step[at["swivel_offsets"]],
         X_WK=turned(model.X_WK, step[at["tracker"]]),
         X_PM=turned(model.X_PM, step[at["marker"]]),
+        drum_radius=model.drum_radius + step[at["drum_radii"]],
+        common_drum_radius=model.common_drum_radius + float(step[at["common_drum_radius"]][0]),
+        tilt_zero=model.tilt_zero + step[at["tilt_zeros"]],
+        clock=model.clock + float(step[at["clock"]][0]),
     )
 
 
@@ -270,6 +297,10 @@ def model_difference(model: CalibrationModel, other: CalibrationModel) -> Array:
         *(pose_step(X, other.tags[tag]) for tag, X in model.tags.items()),
         pose_step(model.X_WK, other.X_WK),
         pose_step(model.X_PM, other.X_PM),
+        model.drum_radius - other.drum_radius,
+        np.array([model.common_drum_radius - other.common_drum_radius]),
+        model.tilt_zero - other.tilt_zero,
+        np.array([model.clock - other.clock]),
     ]
     return np.concatenate(parts)
 

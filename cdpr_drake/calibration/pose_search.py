@@ -16,12 +16,12 @@ import numpy.typing as npt
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.calibration.elimination import IMPOSSIBLE, STATION_TYPICAL
+from cdpr_drake.calibration.elimination import IMPOSSIBLE
 from cdpr_drake.calibration.parameters import CalibrationModel, parameter_layout
-from cdpr_drake.calibration.stations import POSE, Point, Stations, turns_of_vectors
+from cdpr_drake.calibration.pose_freedom import BODY, PoseFreedom
+from cdpr_drake.calibration.stations import Point, Stations, turns_of_vectors
 from cdpr_drake.calibration.terms import Term
 from cdpr_drake.errors import CalibrationError
-from cdpr_drake.geometry.straight_cables import ALL_ROWS, PLANAR_ROWS
 
 OUTLIER = 4.0
 """A residual of more sigmas is an outlier: one of 16 thousand normal ones is."""
@@ -91,7 +91,7 @@ def settle_poses(
     at: Point,
     weights: Weights,
     *,
-    planar: bool,
+    freedom: PoseFreedom,
     most: int = MOST_STEPS,
     without: npt.NDArray[np.bool_] | None = None,
 ) -> FoundPoses:
@@ -101,14 +101,11 @@ def settle_poses(
         terms: What was measured, a row for each pose.
         at: The model, and where each search begins.
         weights: How residuals count.
-        planar: Whether the platform slides in a plane.
+        freedom: Which coordinates of poses are unknown.
         most: Steps at most.
         without: Residuals that do not count, shape (k, rows); None: all do.
     """
-    columns = np.array([*(PLANAR_ROWS if planar else ALL_ROWS), *range(POSE, at.stations.width)])
-    scale = np.full(at.stations.width, STATION_TYPICAL)
-    scale[POSE:] *= 1e2
-    scale = scale[columns]
+    scale = freedom.scale(at.stations.width)
     stations, layout = at.stations, at.layout
     counts = None if without is None else ~without
     r, B = _evaluated(terms, at, counts)
@@ -121,16 +118,15 @@ def settle_poses(
         if not len(now):
             break
         w = weights(r[now])[1]
-        J = B[now][:, :, columns] * scale
+        J = freedom.narrow(B[now], stations.R[now]) * scale
         Jt = np.swapaxes(J * w[:, :, None], 1, 2)
         H, g = Jt @ J, np.einsum("kqr,kr->kq", Jt, r[now])
         # What nothing tells stays where it is, and rounding makes no matrix singular.
         floor = ROUNDING * np.trace(H, axis1=1, axis2=2)
-        damped = H + (damping[now] + floor)[:, None, None] * np.eye(len(columns))
+        damped = H + (damping[now] + floor)[:, None, None] * np.eye(len(scale))
         told = -np.linalg.solve(damped, g[:, :, None])[:, :, 0]
         expected = -0.5 * np.sum(told * g, axis=1)
-        steps = np.zeros((len(now), stations.width))
-        steps[:, columns] = told * scale
+        steps = freedom.widen(told * scale, stations.R[now], stations.width)
         moved = stations.only(now).moved(steps)
         mine = [term.only(now) for term in terms]
         some = None if counts is None else counts[now]
@@ -163,7 +159,7 @@ def robust_poses(
     terms: Sequence[Term],
     at: Point,
     *,
-    planar: bool,
+    freedom: PoseFreedom,
     outliers: bool = True,
     without: npt.NDArray[np.bool_] | None = None,
 ) -> FoundPoses:
@@ -174,24 +170,29 @@ def robust_poses(
     Args:
         terms: What was measured, a row for each pose.
         at: The model, and where each search begins.
-        planar: Whether the platform slides in a plane.
+        freedom: Which coordinates of poses are unknown.
         outliers: Whether outliers are sought.
         without: Residuals that do not count on the way there, shape (k, rows): a bad one may lead
             into a wrong minimum, though it is an outlier there, too.
     """
     if not outliers:
-        found = settle_poses(terms, at, squares, planar=planar, without=without)
+        found = settle_poses(terms, at, squares, freedom=freedom, without=without)
         return FoundPoses(found.stations, 2.0 * found.costs)
-    begun = settle_poses(terms, at, huber, planar=planar, without=without)
+    begun = settle_poses(terms, at, huber, freedom=freedom, without=without)
     there = Point(at.model, begun.stations, at.layout)
-    found = settle_poses(terms, there, truncated, planar=planar)
+    found = settle_poses(terms, there, truncated, freedom=freedom)
     return FoundPoses(found.stations, 2.0 * found.costs)
 
 
-def turned_starts(R: Array, *, planar: bool) -> Array:
+def turned_starts(R: Array, *, freedom: PoseFreedom) -> Array:
     """A rotation turned to both sides about each axis in which the platform turns, (s, 3, 3)."""
-    axes = np.eye(3)[2:] if planar else np.eye(3)
-    return turns_of_vectors(np.array([angle * axis for axis in axes for angle in TURNS])) @ R
+    axes = freedom.turn_axes()
+    return (
+        turns_of_vectors(
+            np.array([angle * axis for axis in axes for angle in TURNS]).reshape(-1, 3)
+        )
+        @ R
+    )
 
 
 def guessed_from(
@@ -201,7 +202,7 @@ def guessed_from(
     *,
     count: int,
     tensions: Array | None = None,
-    planar: bool = False,
+    freedom: PoseFreedom = BODY,
     sure: bool = True,
 ) -> list[Stations]:
     """Poses that fit what was measured, each found from the one before; from several first ones.
@@ -213,7 +214,7 @@ def guessed_from(
         firsts: Where the search for the first pose begins, X_WP [m], one a start.
         count: Number of poses k.
         tensions: Guesses of the tensions, shape (starts, k, m) [N], if a term needs them.
-        planar: Whether the platform slides in a plane.
+        freedom: Which coordinates of poses are unknown.
         sure: Whether the model is nearly right: poses that fit worse than others are then sought
             from further starts. Else each stays near the one before, as whatever is off shifts all
             of them alike.
@@ -229,7 +230,7 @@ def guessed_from(
         """From these poses, each of a row and a start."""
         mine = [t.only(rows).counted_by([models[s] for s in which], base) for t in terms]
         t = None if tensions is None else tensions[which, rows]
-        found = settle_poses(mine, Point(base, Stations(R, p, t), layout), squares, planar=planar)
+        found = settle_poses(mine, Point(base, Stations(R, p, t), layout), squares, freedom=freedom)
         if not np.isfinite(found.costs).all():
             raise CalibrationError(IMPOSSIBLE)
         return found
@@ -250,7 +251,7 @@ def guessed_from(
         R, p = here.stations.R, here.stations.p
         along.append(here)
     return [
-        _sought_again([one.only(np.array([s])) for one in along], s, searched, first, planar)
+        _sought_again([one.only(np.array([s])) for one in along], s, searched, first, freedom)
         if sure
         else _joined([one.only(np.array([s])) for one in along]).stations
         for s in range(starts)
@@ -262,7 +263,7 @@ Search = Callable[[Rows, Rows, Array, Array], FoundPoses]
 
 
 def _sought_again(
-    found: list[FoundPoses], start: int, searched: Search, first: Stations, planar: bool
+    found: list[FoundPoses], start: int, searched: Search, first: Stations, freedom: PoseFreedom
 ) -> Stations:
     """Poses of a start, those that fit worse than others sought from turned starts: perhaps they
     are in a wrong minimum."""
@@ -270,8 +271,8 @@ def _sought_again(
     for k in np.flatnonzero(whole.costs > UNUSUAL * float(np.median(whole.costs))):
         here = whole.stations
         R = np.concatenate([
-            here.R[k : k + 1], turned_starts(first.R[start], planar=planar),
-            turned_starts(here.R[k], planar=planar),
+            here.R[k : k + 1], turned_starts(first.R[start], freedom=freedom),
+            turned_starts(here.R[k], freedom=freedom),
         ])  # fmt: skip
         count = (len(R) - 1) // 2
         p = np.vstack([here.p[k], *[first.p[start]] * count, *[here.p[k]] * count])
@@ -298,11 +299,11 @@ def guessed_stations(
     first: RigidTransform,
     *,
     tensions: Array | None = None,
-    planar: bool = False,
+    freedom: PoseFreedom = BODY,
     sure: bool = True,
 ) -> Stations:
     """As `guessed_from`, from one first pose; tensions of shape (k, m) [N]."""
     t = None if tensions is None else tensions[None]
-    return guessed_from([model], terms, [first], count=count, tensions=t, planar=planar, sure=sure)[
-        0
-    ]
+    return guessed_from(
+        [model], terms, [first], count=count, tensions=t, freedom=freedom, sure=sure
+    )[0]

@@ -13,7 +13,8 @@ from pydrake.solvers import MathematicalProgram
 from pydrake.symbolic import Variable
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.calibration.elimination import MOST_STEPS, LeastSquares, Minimum, Prior, minimize
+from cdpr_drake.calibration.bounded_search import solve_within
+from cdpr_drake.calibration.elimination import LeastSquares, Minimum, Prior, minimize
 from cdpr_drake.calibration.identifiability import Identifiability, identifiability
 from cdpr_drake.calibration.onboard_terms import TagCorners, Tilts
 from cdpr_drake.calibration.own_steps import minimize_with
@@ -22,10 +23,13 @@ from cdpr_drake.calibration.parameters import (
     model_difference,
     parameter_layout,
 )
+from cdpr_drake.calibration.point_terms import Course, TrackedPoints
+from cdpr_drake.calibration.pose_freedom import PoseFreedom
 from cdpr_drake.calibration.pose_search import HUBER
 from cdpr_drake.calibration.program_costs import PriorCost, StationCost
+from cdpr_drake.calibration.rest_terms import RestrictedEquilibrium
 from cdpr_drake.calibration.result import CalibrationResult, make_result, outlying_rows, robust_cost
-from cdpr_drake.calibration.stations import POSE, Point, Stations, turn_vectors
+from cdpr_drake.calibration.stations import Point, Stations, turn_vectors
 from cdpr_drake.calibration.terms import (
     EquilibriumTerm,
     Lengths,
@@ -34,9 +38,12 @@ from cdpr_drake.calibration.terms import (
     Term,
     TrackedPoses,
 )
+from cdpr_drake.calibration.zeroed_terms import ZeroedCables
 from cdpr_drake.errors import CalibrationError
+from cdpr_drake.geometry.motion_type import FREE, LEVEL, MotionType
 from cdpr_drake.numerics.own_terms import OwnTerms, ProgramValues
 from cdpr_drake.vision.pinhole import Pinhole
+from cdpr_drake.winches.drum import Drum
 
 NO_WORSE = 1e-6
 """Share of a cost by which rounding may make an end worse than its start."""
@@ -81,6 +88,7 @@ class CalibrationProgram(OwnTerms):
         poses: Sequence[RigidTransform],
         unknown: Sequence[str],
         planar: bool = False,
+        motion: MotionType | None = None,
     ) -> None:
         """With guesses of the poses X_WP.
 
@@ -88,7 +96,9 @@ class CalibrationProgram(OwnTerms):
             model: The robot as it is believed.
             poses: Where the platform is believed to have been [m].
             unknown: Groups and names of parameters, as `ParameterLayout.select` takes them.
-            planar: Whether the platform slides in a plane.
+            planar: Whether the platform slides in a horizontal plane.
+            motion: In the place of it: the platform's motion type; None: a body in space, or as
+                `planar` says.
 
         Raises:
             CalibrationError: No poses, or no such parameter.
@@ -99,12 +109,13 @@ class CalibrationProgram(OwnTerms):
         self.free = self.layout.select(unknown)
         self.stations = Stations.at(poses)
         self.terms: list[Term] = []
-        self._planar = planar
+        self._freedom = PoseFreedom(motion or (LEVEL if planar else FREE))
         self._std = np.full(self.layout.size, np.inf)
         self._prog: MathematicalProgram | None = None
         self._theta = np.empty(0, object)
         self._own_poses: list[npt.NDArray[np.object_]] = []
         self._costs: list[StationCost] = []
+        self._bounds = np.full(self.layout.size, np.inf)
 
     def AddLengths(
         self,
@@ -130,6 +141,72 @@ class CalibrationProgram(OwnTerms):
             start = first_readings(readings)
         strain = np.zeros(readings.shape) if strain is None else np.asarray(strain, float)
         term = Lengths(readings, _sigmas("lengths", sigma, readings), start, strain)
+        self.terms.append(term)
+        return term
+
+    def AddZeroedCables(
+        self,
+        readings: Array,
+        sigma: float | Array,
+        zero: RigidTransform | None,
+        drum: Drum | None = None,
+        **more: Array | None,
+    ) -> ZeroedCables:
+        """Lengths, or motor angles, of winches that stood at zero at a known pose or somewhere.
+
+        Args:
+            readings: Shape (k, m), lengths [m] or, with a drum, angles [rad]; NaN: none.
+            sigma: Standard deviation of the lengths, or one for each [m].
+            zero: The pose X_WP at zero [m]; None: `length_offsets` are whole lengths at zero.
+            drum: The drums as they are believed; None: readings are lengths.
+            more: `strain`, by how much cables are longer than counted, shape (k, m) [-];
+                `advantage`, parts of line side by side, shape (m,) [-]; None or missing: 0, 1.
+
+        Raises:
+            CalibrationError: A shape or sigma is not accepted.
+        """
+        readings = self._table("lengths", readings)
+        strain, advantage = more.get("strain"), more.get("advantage")
+        blank = np.zeros(readings.shape)
+        term = ZeroedCables(
+            readings, _sigmas("lengths", sigma, readings), zero, drum,
+            blank if strain is None else strain, blank, 1.0 if advantage is None else advantage,
+        )  # fmt: skip
+        self.terms.append(term)
+        return term
+
+    def AddTrackedPoints(
+        self,
+        points: Array,
+        sigma: float,
+        *,
+        normal: Array | None = None,
+        sigma_along: float | None = None,
+        times: Array | None = None,
+    ) -> TrackedPoints:
+        """Positions that a tracker measured without rotations, shape (k, 3) [m]; NaN: none.
+
+        Args:
+            points: Of a marker, in the tracker's frame.
+            sigma: Standard deviation of a coordinate [m].
+            normal: Direction in W in which it is another, shape (3,); None: in none.
+            sigma_along: That one [m].
+            times: Of the poses, growing, shape (k,) [s]: the tracker's clock may be another.
+
+        Raises:
+            CalibrationError: A shape or sigma is not accepted.
+        """
+        points = np.asarray(points, float)
+        if points.shape != (self.stations.count, 3):
+            raise CalibrationError(
+                f"tracked positions: found shape {points.shape}; accepted: "
+                f"({self.stations.count}, 3)"
+            )
+        along = sigma if sigma_along is None else sigma_along
+        _positive("tracked positions", sigma, along)
+        course = None if times is None else Course.of(np.asarray(times, float), points)
+        axis = np.zeros(3) if normal is None else np.asarray(normal, float)
+        term = TrackedPoints(points, sigma, axis, along, course)
         self.terms.append(term)
         return term
 
@@ -225,13 +302,13 @@ class CalibrationProgram(OwnTerms):
         _positive("equilibrium", sigma_moment, sigma_force)
         guess = self._table("tensions", tensions)
         self.stations = replace(self.stations, tensions=guess)
-        term = EquilibriumTerm(
-            self.stations.count,
-            np.asarray(weight, float),
-            np.asarray(p_PPcm, float),
-            sigma_moment,
-            sigma_force,
-        )
+        known = (
+            self.stations.count, np.asarray(weight, float), np.asarray(p_PPcm, float),
+            sigma_moment, sigma_force,
+        )  # fmt: skip
+        motion = self._freedom.motion
+        whole = motion.is_free or motion.is_horizontal_body
+        term = EquilibriumTerm(*known) if whole else RestrictedEquilibrium(*known, motion)
         self.terms.append(term)
         return term
 
@@ -251,6 +328,11 @@ class CalibrationProgram(OwnTerms):
         _positive("prior", std)
         self._std[self.layout.select(patterns)] = std
 
+    def AddBound(self, patterns: Sequence[str], most: float) -> None:
+        """Parameters change by no more than this, each in its unit; `prog()` has bounds, too."""
+        _positive("bound", most)
+        self._bounds[self.layout.select(patterns)] = most
+
     def names(self) -> tuple[str, ...]:
         """Names of the unknown parameters."""
         return tuple(np.array(self.layout.names)[self.free])
@@ -268,13 +350,11 @@ class CalibrationProgram(OwnTerms):
         if not any(term.measured().any() for term in self.terms):
             raise CalibrationError("measurements: found none; accepted: at least one")
         prior = Prior(self.model, self._std)
-        return LeastSquares(tuple(self.terms), self.free, prior, self._planar, huber)
+        return LeastSquares(tuple(self.terms), self.free, prior, self._freedom, huber)
 
     def FindIdentifiability(self) -> Identifiability:
         """What these measurements and priors can tell, at the start."""
-        problem, at = self.least_squares(), self.at()
-        S = problem.normal_equations(at, 0.0).S
-        return identifiability(S, at, self.free, problem.used(at))
+        return _told(self.least_squares(), self.at())
 
     def Approach(self, steps: int, start: Point | None = None) -> Minimum:
         """Where some steps with linear loss for outliers lead: to tell starts apart cheaply.
@@ -307,23 +387,36 @@ class CalibrationProgram(OwnTerms):
             CalibrationError: A parameter cannot be told and has no prior: names which from which;
                 a pose is not determined; the start is impossible; or the end is worse.
         """
+        at = self.at() if start is None else start
+        if np.isinf(self._bounds[self.free]).all() or self.has_own_terms:
+            return self._solve(self.free, at, outliers, straight)[0]
+        found, held = solve_within(
+            lambda free, begin: self._solve(free, begin, outliers, straight),
+            self.free, self._bounds, at, self.model,
+        )  # fmt: skip
+        return replace(found, at_bounds={self.layout.names[k]: v for k, v in held.items()})
+
+    def _solve(
+        self, free: npt.NDArray[np.bool_], at: Point, outliers: bool, straight: bool
+    ) -> tuple[CalibrationResult, LeastSquares]:
+        """As `Solve`, for some of the parameters and without bounds; and the last problem."""
         began = time.perf_counter()
-        self._require_told(self.FindIdentifiability())
-        problem, found = self._by_gauss_newton(outliers, start, straight)
+        plain = replace(self.least_squares(), free=free)
+        self._require_told(_told(plain, self.at()))
+        problem, found = self._by_gauss_newton(plain, at, outliers, straight)
         if self.has_own_terms:
-            return self._with_own_terms(problem, found, outliers, began)
-        return make_result(problem, found, self.model, time.perf_counter() - began)
+            return self._with_own_terms(problem, found, outliers, began), problem
+        return make_result(problem, found, self.model, time.perf_counter() - began), problem
 
     def _by_gauss_newton(
-        self, outliers: bool, start: Point | None, straight: bool
+        self, plain: LeastSquares, at: Point, outliers: bool, straight: bool
     ) -> tuple[LeastSquares, Minimum]:
-        """What was solved last, and its minimum, as `Solve` without own terms."""
-        plain, at = self.least_squares(), self.at() if start is None else start
+        """What was solved last, and its minimum, as `Solve` without own terms and bounds."""
         if not outliers:
             return plain, minimize(plain, at)
         before, steps = robust_cost(plain, at), 0
         if not straight:
-            bent = self.Approach(MOST_STEPS, at)
+            bent = minimize(replace(plain, huber=HUBER), at)
             problem, found = _dropping(plain, bent.at)
             steps = bent.steps + found.steps
         if straight or robust_cost(plain, found.at) > before * (1.0 + NO_WORSE):
@@ -356,7 +449,13 @@ class CalibrationProgram(OwnTerms):
         report = self._report(self._steps_to(found.at), solver, said, lost)
         end = replace(found, steps=steps)
         result = make_result(problem, end, self.model, time.perf_counter() - began)
-        return replace(result, program=report)
+        return replace(result, program=report, at_bounds=self._bounds_met(found.at))
+
+    def _bounds_met(self, at: Point) -> dict[str, float]:
+        """Parameters at their bounds, by name, and by how much they changed."""
+        step = model_difference(at.model, self.model)
+        met = self.free & (np.abs(step) >= (1.0 - NO_WORSE) * self._bounds)
+        return {self.layout.names[k]: float(step[k]) for k in np.flatnonzero(met)}
 
     def _step_on(self, problem: LeastSquares, found: Minimum) -> tuple[Minimum, str, str]:
         """The minimum with own terms, what solved its programs and what that said last.
@@ -371,12 +470,14 @@ class CalibrationProgram(OwnTerms):
             x, solver, said = self._solve_whole(self._steps_to(found.at), what)
             at = self._point(x, start)
             return Minimum(at, problem.cost(at), 1, True), solver, said
-        heard = ["", ""]
+        heard, most = ["", ""], self._bounds[self.free] / self.layout.typical[self.free]
 
         def solve(H: Array, g: Array, x: Array) -> Array:
             step = MathematicalProgram()
             step.AddDecisionVariables(self._theta)
             step.AddQuadraticCost(H, -g - H @ x, self._theta, is_convex=True)
+            if np.isfinite(most).any():
+                step.AddBoundingBoxConstraint(-most, most, self._theta)
             for binding in costs:
                 step.AddCost(binding)
             for binding in constraints:
@@ -407,7 +508,8 @@ class CalibrationProgram(OwnTerms):
         steps = [turn_vectors(R), at.stations.p - start.stations.p]
         if at.stations.tensions is not None and start.stations.tensions is not None:
             steps.append(at.stations.tensions - start.stations.tensions)
-        rows = np.hstack(steps)[:, problem.columns(start)] / problem.station_scale(start)
+        own_steps = problem.freedom.coordinates(np.hstack(steps), start.stations.R)
+        rows = own_steps / problem.station_scale(start)
         for own, row in zip(self._own_poses, rows, strict=True):
             x[program.FindDecisionVariableIndices(own)] = row
         return x
@@ -418,9 +520,9 @@ class CalibrationProgram(OwnTerms):
         step = np.zeros(start.layout.size)
         theta = x[program.FindDecisionVariableIndices(self._theta)]
         step[self.free] = theta * start.layout.typical[self.free]
-        steps = np.zeros((start.stations.count, start.stations.width))
-        rows = [x[program.FindDecisionVariableIndices(own)] for own in self._own_poses]
-        steps[:, problem.columns(start)] = np.array(rows) * problem.station_scale(start)
+        rows = np.array([x[program.FindDecisionVariableIndices(own)] for own in self._own_poses])
+        rows = rows * problem.station_scale(start)
+        steps = problem.freedom.widen(rows, start.stations.R, start.stations.width)
         return start.moved(step, steps)
 
     def prog(self) -> MathematicalProgram:
@@ -432,7 +534,8 @@ class CalibrationProgram(OwnTerms):
         before it; what is added to it counts in `Solve`.
 
         Raises:
-            CalibrationError: Nothing was measured.
+            CalibrationError: Nothing was measured, or the platform is a beam, whose turns do not
+                add up to one that it has.
         """
         if self._prog is None:
             self._make()
@@ -475,15 +578,18 @@ class CalibrationProgram(OwnTerms):
         return every.only(np.flatnonzero(self.layout.select(asked)[self.free]))
 
     def _make(self) -> None:
+        if self._freedom.motion.num_turns == 2:
+            raise CalibrationError("motion: found 2R3T; accepted by prog(): another, or Solve")
         problem, start = self.least_squares(), self.at()
         program = MathematicalProgram()
         self._theta = theta = _variables(self.names())
         program.AddDecisionVariables(theta)
-        columns = problem.columns(start)
-        labels = [f"{w}{i}" for w in ("turn", "place") for i in range(3)]
-        labels += [f"tension{i}" for i in range(start.stations.width - POSE)]
+        most = self._bounds[self.free] / self.layout.typical[self.free]
+        if np.isfinite(most).any():
+            program.AddBoundingBoxConstraint(-most, most, theta)
+        labels = problem.freedom.labels(start.stations.width)
         for k in range(start.stations.count):
-            own = _variables([f"{labels[c]}_{k}" for c in columns])
+            own = _variables([f"{label}_{k}" for label in labels])
             program.AddDecisionVariables(own)
             one = replace(problem, terms=tuple(t.only(slice(k, k + 1)) for t in self.terms))
             cost = StationCost(one, self.at(self.stations.only(slice(k, k + 1))))
@@ -521,6 +627,11 @@ class CalibrationProgram(OwnTerms):
     def _count(self, what: str, found: int) -> None:
         if found != self.stations.count:
             raise CalibrationError(f"{what}: found {found}; accepted: {self.stations.count}")
+
+
+def _told(problem: LeastSquares, at: Point) -> Identifiability:
+    S = problem.normal_equations(at, 0.0).S
+    return identifiability(S, at, problem.free, problem.used(at))
 
 
 def _variables(names: Sequence[str]) -> npt.NDArray[np.object_]:

@@ -34,7 +34,7 @@ class StationCost(ProgramCost):
         r, A, B = problem.evaluate(at)
         by_step, by_steps = step_slopes(problem, at, step, steps[0])
         gradient = np.concatenate([r[0] @ A[0] @ by_step, r[0] @ B[0] @ by_steps])
-        assert len(gradient) == count + len(problem.columns(at))
+        assert len(gradient) == count + problem.freedom.count(at.stations.width)
         return 0.5 * float(r[0] @ r[0]), gradient
 
 
@@ -61,9 +61,11 @@ def unpack_step(problem: LeastSquares, start: Point, x: Array) -> tuple[Array, A
     count = int(np.sum(free))
     step = np.zeros(start.layout.size)
     step[free] = x[:count] * start.layout.typical[free]
-    steps = np.zeros((start.stations.count, start.stations.width))
+    stations = start.stations
+    steps = np.zeros((stations.count, stations.width))
     if len(x) > count:
-        steps[0, problem.columns(start)] = x[count:] * problem.station_scale(start)
+        own = x[None, count:] * problem.station_scale(start)
+        steps[:1] = problem.freedom.widen(own, stations.R[:1], stations.width)
     return step, steps
 
 
@@ -77,5 +79,8 @@ def step_slopes(problem: LeastSquares, at: Point, step: Array, steps: Array) -> 
     whole = whole * typical / typical[:, None]
     own = np.eye(len(steps))
     own[:3, :3] = turn_slope(steps[:3])
-    columns = problem.columns(at)
-    return whole[np.ix_(problem.free, problem.free)], own[np.ix_(columns, columns)]
+    free, columns = problem.free, problem.freedom.columns(len(steps))
+    if columns is None:
+        # A turn about one axis adds up; that of a beam is refused, see `CalibrationProgram.prog`.
+        return whole[np.ix_(free, free)], np.eye(problem.freedom.count(len(steps)))
+    return whole[np.ix_(free, free)], own[np.ix_(columns, columns)]

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -28,7 +29,7 @@ from cdpr_drake.calibration.parameters import (
     parameter_layout,
 )
 from cdpr_drake.calibration.pose_search import OUTLIER, robust_costs
-from cdpr_drake.calibration.stations import POSE, Point, Stations
+from cdpr_drake.calibration.stations import Point, Stations
 from cdpr_drake.numerics.own_terms import ProgramReport
 
 MOST_LARGEST = 10
@@ -112,6 +113,10 @@ class CalibrationResult:
         steps: Steps of the solver.
         seconds: Time it took [s].
         program: With own terms, how the program was solved; None: by Gauss-Newton.
+        at_bounds: Parameters that are held at a bound, by name, and by how much they changed; they
+            are not among the unknown ones.
+        by_row: Root mean square of residuals over sigma at each pose that counted, shape (k,), by
+            kind; NaN where none did.
     """
 
     status: str
@@ -140,6 +145,8 @@ class CalibrationResult:
     steps: int
     seconds: float
     program: ProgramReport | None = None
+    at_bounds: Mapping[str, float] = field(default_factory=dict)
+    by_row: Mapping[str, Array] = field(default_factory=dict)
 
     @property
     def correlation(self) -> Array:
@@ -213,18 +220,22 @@ def make_result(
     std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     std[_untold_share(open_now) > 1e-6] = np.inf
     fits, rows, squares = {}, 0, 0.0
+    by_row: dict[str, Array] = {}
     readings: dict[str, int] = {}
     for k, term in enumerate(problem.terms):
         counts = used_rows(problem, k)
-        r = term.evaluate(at)[0][counts]
+        whole = np.where(counts, term.evaluate(at)[0], np.nan)
+        number = np.sum(counts, axis=1)
+        by_row[term.kind] = np.sqrt(np.nansum(whole**2, axis=1) / np.where(number, number, np.nan))
+        r = whole[counts]
         fits[term.kind] = _fit(r, int(np.sum(term.measured() & ~counts)))
         rows, squares = rows + len(r), squares + float(r @ r)
-        for row, number in enumerate(np.sum(term.measured(), axis=0)):
-            readings[term.row_name(row, at.model.names)] = int(number)
+        for row, read in enumerate(np.sum(term.measured(), axis=0)):
+            readings[term.row_name(row, at.model.names)] = int(read)
     prior, _ = problem.prior.evaluate(at, free)
     known = int(np.sum(np.isfinite(problem.prior.std[free])))
     told = count - open_now.gauge_basis.shape[1] - open_now.untold_basis.shape[1]
-    unknown = told + at.stations.count * len(problem.columns(at))
+    unknown = told + at.stations.count * problem.freedom.count(at.stations.width)
     return CalibrationResult(
         status=CONVERGED if found.settled else NOT_CONVERGED,
         model=at.model, stations=at.stations,
@@ -239,7 +250,7 @@ def make_result(
         largest=tuple(find_outliers(problem, at, 0.0)[:MOST_LARGEST]),
         robust_cost=robust_cost(problem, at),
         chi_square=squares + float(prior @ prior), degrees=rows + known - unknown,
-        steps=found.steps, seconds=seconds,
+        steps=found.steps, seconds=seconds, by_row=by_row,
     )  # fmt: skip
 
 
@@ -250,11 +261,11 @@ def _pose_std(problem: LeastSquares, at: Point, equations: NormalEquations, scal
     the blocks of the inverse of the whole normal equations.
     """
     scale = problem.station_scale(at)
-    back, columns = equations.back, problem.columns(at)
+    back, motion = equations.back, problem.freedom.motion
     whole = np.linalg.inv(equations.H) + back @ scaled @ np.swapaxes(back, 1, 2)
     variances = np.diagonal(whole, axis1=1, axis2=2) * scale**2
-    turns = np.sum(variances[:, columns < 3], axis=1)
-    places = np.sum(variances[:, (columns >= 3) & (columns < POSE)], axis=1)
+    turns = np.sum(variances[:, : motion.num_turns], axis=1)
+    places = np.sum(variances[:, motion.num_turns : motion.freedom], axis=1)
     return np.sqrt(np.column_stack([turns, places]))
 
 

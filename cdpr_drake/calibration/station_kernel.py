@@ -27,6 +27,7 @@ def cable_terms(
     """Writes what residuals of a calibration need of each cable at each pose.
 
     A cable of radius 0 leaves its exit point straight; the slope over the radius holds there, too.
+    Along the swivel axis it has no swivel angle, and no slope of one.
     With alpha where the cable leaves the groove, the slope of the length is pi - alpha - sin alpha,
     and alpha falls by (1 + cos alpha) / L: the groove grows about A, not about its centre.
 
@@ -54,25 +55,41 @@ def cable_terms(
                 e[a] = d[a] - h * n[a]
                 square += e[a] * e[a]
             rho, r = np.sqrt(square), cables[i, PULLEY_RADIUS]
-            for a in range(3):
-                e[a] /= rho
+            upright = rho == 0.0 and r == 0.0
+            if upright:
+                _any_across(n, e)
+            else:
+                for a in range(3):
+                    e[a] /= rho
             side[0] = n[1] * e[2] - n[2] * e[1]
             side[1] = n[2] * e[0] - n[0] * e[2]
             side[2] = n[0] * e[1] - n[1] * e[0]
             L, sine, cosine = tangent(rho, h, r)
+            if upright and h != 0.0:
+                L, sine, cosine = abs(h), 0.0, -np.sign(h)
             alpha = np.arctan2(sine, cosine)
             numbers[k, i, LENGTH] = L + r * (np.pi - alpha)
             numbers[k, i, RADIUS_SLOPE] = np.pi - alpha - sine
             numbers[k, i, SWIVEL_ANGLE] = swivel_angle(e, n)
             turn = -(1.0 + cosine) / L
+            bent = 1.0 / L if upright else sine / rho
             for a in range(3):
                 normal = cosine * e[a] + sine * n[a]
                 vectors[k, i, U + a] = sine * e[a] - cosine * n[a]
                 vectors[k, i, BEND + a] = normal * turn
-                vectors[k, i, ACROSS + a] = side[a] / rho
+                vectors[k, i, ACROSS + a] = 0.0 if upright else side[a] / rho
                 for b in range(3):
                     other = cosine * e[b] + sine * n[b]
-                    hessians[k, i, a, b] = normal * other / L + sine / rho * side[a] * side[b]
+                    hessians[k, i, a, b] = normal * other / L + bent * side[a] * side[b]
+
+
+@njit(cache=True, error_model="numpy")
+def _any_across(n: Array, e: Array) -> None:
+    """Writes a unit vector e across n, both shape (3,)."""
+    first = 1 if abs(n[0]) > 0.9 else 0
+    size = np.sqrt(1.0 - n[first] * n[first])
+    for a in range(3):
+        e[a] = ((1.0 if a == first else 0.0) - n[first] * n[a]) / size
 
 
 @njit(cache=True, error_model="numpy")

@@ -347,7 +347,8 @@ class EquilibriumTerm(Term):
         B[:, :3, :3] += crosses(f) @ crosses(lever)
         B[:, :, 3:POSE] = np.sum(minus_t * by_point, axis=1)
         B[:, :, POSE:] = -np.moveaxis(J, 1, 2)
-        return weighted(residual, A, B, self.sigmas(), self.measured())
+        sigma = np.tile([self.sigma_moment] * 3 + [self.sigma_force] * 3, (self.count, 1))
+        return weighted(residual, A, B, sigma, np.ones((self.count, 6), dtype=bool))
 
     def measured(self) -> npt.NDArray[np.bool_]:
         """As the base class says."""

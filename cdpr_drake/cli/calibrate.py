@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.calibration.calibration_request import Sigmas
 from cdpr_drake.analyses.front.calibration import calibrate as run_calibration
@@ -36,16 +37,18 @@ from cdpr_drake.cli.options import (
 )
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.systems.diagrams.load import load_scenario
 
 OPTIONS = {
     "unknown": "--unknown", "priors": "--prior", "tags": "--tags", "tag_size": "--tag-size",
     "mount": "--mount", "image_size": "--image-size", "tracker_late": "--tracker-late",
+    "zero": "--zero", "bounds": "--bound", "hold_out": "--hold-out",
 }  # fmt: skip
 """Options by the arguments of `calibrate`."""
 
-UNKNOWN = "exit_points,anchor_points"
-"""What is asked for where nothing else is said."""
+HOME = "home"
+"""Of --zero: the robot's home pose."""
 
 
 def help_words() -> str:
@@ -53,11 +56,13 @@ def help_words() -> str:
     return (
         "Finds a robot's constants in a log of what was measured at poses of its platform.\n\n"
         "A row of LOG is a pose. Columns: time_s; C1_length_m ... or C1_motor_angle_rad; x_m, y_m, "
-        "z_m with qw, qx, qy, qz, or phi_deg, theta_deg, psi_deg, or rx_rad, ry_rad, rz_rad, or "
+        "z_m alone, or with qw, qx, qy, qz, or phi_deg, theta_deg, psi_deg, or rx_rad, ry_rad, "
+        "rz_rad, or "
         "roll_deg, pitch_deg, yaw_deg, of a tracker; tag0_u1_px, tag0_v1_px to tag0_u4_px, "
         "tag0_v4_px, corners in the image of the camera on the platform; C1_tension_n; "
         "C1_swivel_rad; roll_deg, pitch_deg, yaw_deg without a position, of an inclinometer or IMU "
-        "on the platform. Cables go by name or number, units by ending, as mm, deg, ms, kn; empty "
+        "on the platform. Positions alone are of a tracker that tells no rotation. Cables go by "
+        "name or number, units by ending, as mm, deg, ms, kn; empty "
         "cells were not measured; columns that are not used are named.\n\n"
         f"--unknown: {', '.join(GROUPS)}, or names such as C3.exit_point.z, also with \\* and ?. "
         "Tags without a place are unknown in any case. Writes robot.yaml, which scenarios take as "
@@ -71,8 +76,13 @@ def calibrate(
     robot: RobotOrCampaign = None,
     log: LogOrCampaign = None,
     unknown: Annotated[
-        str, typer.Option(help="Groups and names of parameters, with commas.")
-    ] = UNKNOWN,
+        str | None,
+        typer.Option(
+            help="Groups and names of parameters, with commas; else exit_points,anchor_points, of "
+            "a point mass exit_points, of a robot with fewer cables than degrees of freedom and no "
+            "tracker the zeros of its sensors."
+        ),
+    ] = None,
     prior: Annotated[
         str | None,
         typer.Option(help="Standard deviations known beforehand, as exit_points=0.01 [m, rad, -]."),
@@ -81,7 +91,9 @@ def calibrate(
         str | None,
         typer.Option(
             help="Standard deviations of measurements, as lengths=0.001,corners=0.2: "
-            + ", ".join(f"{f.name} ({f.default:g})" for f in fields(Sigmas))
+            + ", ".join(
+                f.name + ("" if f.default is None else f" ({f.default:g})") for f in fields(Sigmas)
+            )
             + " [m, rad, px, N, N m; shares -]."
         ),
     ] = None,
@@ -107,6 +119,24 @@ def calibrate(
         typer.Option("--rest/--no-rest", help="Whether the platform rested in all rows."),
     ] = None,
     tracker_late: TrackerLate = None,
+    zero: Annotated[
+        str | None,
+        typer.Option(
+            help="Pose at which lengths or motor angles were zero: home, or "
+            "x,y,z[,phi,theta,psi] [m, deg]; else they count from anywhere."
+        ),
+    ] = None,
+    bound: Annotated[
+        str | None,
+        typer.Option(help="Most that parameters may change, as tracker.[xyz]=0.001 [m, rad, -]."),
+    ] = None,
+    hold_out: Annotated[
+        str | None,
+        typer.Option(
+            help="Tracked rows that are not fitted but predicted: so many, rows as 100-160,200, or "
+            "each, which repeats the calibration without every one of them."
+        ),
+    ] = None,
     keep_outliers: Annotated[bool, typer.Option(help="Count every measurement as it is.")] = False,
     campaign: Annotated[
         str | None,
@@ -158,14 +188,21 @@ def calibrate(
     session = CommandSession(STOPPING, folder)
     with named_options(OPTIONS):
         found = run_calibration(
-            loaded, file, comma_words(unknown),
+            loaded, file, None if unknown is None else comma_words(unknown),
             sigmas=named_values("--sigma", sigma, [f.name for f in fields(Sigmas)]), tags=tags,
             tag_size=tag_size, tracker_late=tracker_late, folder=folder, session=session,
             priors=named_values("--prior", prior), mount=mount, image_size=_size(image_size),
             start=None if start is None else parse_pose(start), rest=rest,
-            outliers=not keep_outliers, **kept,
+            outliers=not keep_outliers, zero=_zero(loaded, zero), hold_out=hold_out,
+            bounds=named_values("--bound", bound), **kept,
         )  # fmt: skip
     return tell_fit(found, session, as_json)
+
+
+def _zero(robot: Robot, words: str | None) -> RigidTransform | None:
+    if words is None:
+        return None
+    return robot.home.transform() if words == HOME else parse_pose(words)
 
 
 def _size(words: str | None) -> tuple[int, int] | None:

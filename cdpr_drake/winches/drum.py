@@ -33,14 +33,14 @@ class Drum:
         gear_ratio: Motor turns per drum turn.
         layer_turns: N, turns in a layer; infinite: one layer.
         layer_height: By how much the radius grows from layer to layer [m]; or shape (m,).
-        wound: Cable on the drum where the motor's angle is zero [m].
+        wound: Cable on the drum where the motor's angle is zero [m]; or shape (m,).
     """
 
     radius: float | Array
     gear_ratio: float
     layer_turns: float = np.inf
     layer_height: float | Array = 0.0
-    wound: float = 0.0
+    wound: float | Array = 0.0
 
     def has_layers(self) -> bool:
         """Whether the radius changes at all."""
@@ -70,6 +70,17 @@ class Drum:
         """
         phi = self.start_angle() - motor_angles / self.gear_ratio
         return np.asarray(self.wound - wound_length(self, phi))
+
+    def per_radius(self, motor_angles: Array) -> Array:
+        """How `paid_out` grows with the drums' radii, from (..., m) [rad] to (..., m) [-].
+
+        What is wound is the integral of the radius over the angle at which the drum stands, which
+        begins where a drum of that radius holds what is wound at zero.
+        """
+        start = self.start_angle()
+        phi = start - motor_angles / self.gear_ratio
+        at_start = drum_radius(self, np.asarray(start))
+        return np.asarray(start * drum_radius(self, phi) / at_start - phi)
 
     def length_per_angle(self, motor_angles: Array) -> Array:
         """dl/dq, the radius over the gear ratio at these motor angles, shape (m,) [m/rad]."""

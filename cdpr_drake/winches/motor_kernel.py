@@ -28,16 +28,18 @@ def pack_winch(law: WinchLaw) -> Array:
     drum, friction = law.drum, law.friction
     turns = drum.layer_turns if drum.has_layers() else 0.0
     alike = np.array([
-        np.nan, drum.gear_ratio, turns, np.nan, drum.wound,
+        np.nan, drum.gear_ratio, turns, np.nan, np.nan,
         law.inertia, law.rated_speed, law.rated_torque,
         friction.coulomb, friction.static, friction.viscous, friction.stribeck_speed,
         friction.settling_time,
         law.brake_torque,
         *law.gains(), law.position_bandwidth, 0.0,
     ])  # fmt: skip
-    count = max(np.size(drum.radius), np.size(drum.layer_height), len(law.leaders))
+    each = {0: drum.radius, 3: drum.layer_height, 4: drum.wound}
+    count = max(*(np.size(value) for value in each.values()), len(law.leaders))
     rows = np.tile(alike, (count, 1))
-    rows[:, 0], rows[:, 3] = drum.radius, drum.layer_height
+    for column, value in each.items():
+        rows[:, column] = value
     if law.leaders:
         rows[:, LEADER] = law.leaders
     elif count > 1:

@@ -1,0 +1,95 @@
+"""Whether measurements that do not fit would with the sign turned, or from another zero."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from cdpr_drake.analyses.calibration.calibration_request import CalibrationTask
+from cdpr_drake.analyses.calibration.fit_verdict import is_thrown_out, misfits
+from cdpr_drake.analyses.calibration.log_file import CalibrationLog
+from cdpr_drake.arrays import Array
+from cdpr_drake.calibration.result import CalibrationResult
+from cdpr_drake.errors import CalibrationError
+
+TRIED = {
+    "swivel angles": "swivels",
+    "lengths": "lengths",
+    "motor angles": "angles",
+    "tensions": "tensions",
+    "inclination": "tilts",
+}
+"""Fields of a log by the kind of measurement."""
+
+Refit = Callable[[CalibrationTask, CalibrationLog], CalibrationResult]
+
+
+def turned_sensors(
+    task: CalibrationTask, log: CalibrationLog, result: CalibrationResult, refit: Refit
+) -> tuple[str, ...]:
+    """What would fit otherwise, in words: kinds of which most was thrown out, tried anew.
+
+    A sign is the wrong one where, with it turned, the fit throws out no third of the kind and the
+    whole costs less. A tilt is tried from other zeros, too.
+
+    Args:
+        task: What was asked.
+        log: What was measured.
+        result: What was found, which is no fit.
+        refit: Calibrates anew.
+    """
+    words = []
+    poor = result.spread() > 1.0
+    for kind, fit in result.residuals.items():
+        field = TRIED.get(kind)
+        if field is None or not (poor or is_thrown_out(fit)):
+            continue
+        values = getattr(log, field)
+        if values is None:
+            continue
+        trials = [("with the sign turned", task, replace(log, **{field: -values}))]
+        if kind == "inclination" and "tilt_zeros" not in task.unknown:
+            unknown = (*task.unknown, "tilt_zeros")
+            trials.append(("from other zeros, see tilt_zeros", replace(task, unknown=unknown), log))
+        for how, other_task, other_log in trials:
+            try:
+                found = refit(other_task, other_log)
+            except CalibrationError:
+                continue
+            again = found.residuals[kind]
+            better = found.robust_cost < result.robust_cost
+            if better and not is_thrown_out(again):
+                whole = again.count + again.dropped
+                words.append(f"{again.count} of {whole} {kind} fit {how}")
+                break
+    return tuple(words)
+
+
+def turned_where_lost(task: CalibrationTask, log: CalibrationLog, refit: Refit) -> tuple[str, ...]:
+    """As `turned_sensors`, where no start leads anywhere.
+
+    Args:
+        task: What was asked.
+        log: What was measured.
+        refit: Calibrates anew.
+    """
+    for kind, field in TRIED.items():
+        values = getattr(log, field)
+        if values is None:
+            continue
+        try:
+            found = refit(task, replace(log, **{field: -values}))
+        except CalibrationError:
+            continue
+        fit = found.residuals.get(kind)
+        if fit is not None and not misfits(found):
+            return (f"{fit.count} of {fit.count + fit.dropped} {kind} fit with the sign turned",)
+    return ()
+
+
+def upside_down(result: CalibrationResult, up: Array) -> npt.NDArray[np.bool_]:
+    """Which poses have the platform's z axis against that of a pose known upright, shape (k,)."""
+    return np.asarray(result.stations.R[:, :, 2] @ up < 0.0)
