@@ -3,12 +3,14 @@
 Drake's YAML loader reads the annotations themselves, so they are not postponed here.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from cdpr_drake.errors import ScenarioError
-from cdpr_drake.models.camera_catalogue import CameraFault
+from cdpr_drake.errors import RobotFileError, ScenarioError
+from cdpr_drake.models.camera_catalogue import CameraFault, Distortion, fold_problem, load_camera
+from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.schema.fields import FASTEST, number, optional_section, text, whole
+from cdpr_drake.vision.pinhole import Pinhole
 
 RENDERED, PROJECTED = "rendered", "projected"
 WHOLE, REGION = "whole", "target"
@@ -24,6 +26,13 @@ class CameraSettings:
         choices=(RENDERED, PROJECTED),
     )
     mount: str = text("Which of the robot's camera mountings.", "onboard")
+    model: str | None = text(
+        "Camera by name, or path of a camera file, in the place of the mounting's; null: that.",
+        None,
+    )
+    distortion: Distortion | None = optional_section(
+        "What the lens does to images, in the place of what the camera's file says; null: that."
+    )
     width: int = whole("Image width.", 640, "px", at_least=16, at_most=8192)
     height: int = whole("Image height.", 480, "px", at_least=16, at_most=8192)
     region: str = text(
@@ -75,4 +84,43 @@ def check_camera(camera: CameraSettings, path: Path) -> None:
             f"{path}: camera.focus_zoom: found {camera.focus_zoom:g} with camera.kind "
             f"{camera.kind}, whose focal length does not change; accepted: 0, or camera.kind "
             f"{PROJECTED}"
+        )
+
+
+def servo_pinhole(camera: CameraSettings, robot: Robot) -> Pinhole:
+    """Intrinsic parameters and lens of the camera of some settings on a robot.
+
+    Raises:
+        RobotFileError: There is no such camera, or its file describes none.
+    """
+    model = camera.model or robot.camera_mount(camera.mount).model
+    pinhole = load_camera(model).pinhole(camera.width, camera.height)
+    if camera.distortion is None:
+        return pinhole
+    return replace(pinhole, distortion=camera.distortion.lens())
+
+
+def check_lens(camera: CameraSettings, robot: Robot, path: Path) -> None:
+    """Refuses a camera that is none, and a lens that folds its image over or that no region takes.
+
+    Args:
+        camera: The settings, with a mounting that the robot has.
+        robot: The robot.
+        path: Of the scenario's file, for the message.
+
+    Raises:
+        ScenarioError: As said; names the field.
+    """
+    if camera.distortion is not None and camera.distortion.problem():
+        raise ScenarioError(f"{path}: camera.distortion.{camera.distortion.problem()}")
+    try:
+        pinhole = servo_pinhole(camera, robot)
+    except RobotFileError as problem:
+        raise ScenarioError(*problem.within(f"{path}: camera.model")) from problem
+    fold = fold_problem(pinhole)
+    if fold:
+        raise ScenarioError(f"{path}: camera.distortion: {fold}")
+    if camera.region == REGION and pinhole.distortion is not None:
+        raise ScenarioError(
+            f"{path}: camera.region: found {REGION} with a lens that distorts; accepted: {WHOLE}"
         )

@@ -16,6 +16,7 @@ from pydrake.systems.sensors import ImageRgba8U
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.servoing.circle_features import ELLIPSE_SIZE
+from cdpr_drake.vision.mark_reading import found_marks, read_marks
 from cdpr_drake.vision.pinhole import Pinhole
 from cdpr_drake.vision.target import Target
 
@@ -36,7 +37,9 @@ class TargetMeasurement(LeafSystem):
                                    told; only of targets that tell
     ======== ============== ====== ========================================================
 
-    Points of a target of which a part is seen are filled by their images at the pose X_CO.
+    Marks are in pixels of the ideal camera: where the lens distorts, or is believed to be another,
+    they are read by `Pinhole.read`. Points of a target of which a part is seen are filled by their
+    images at the pose X_CO.
 
     The image of time t is on the ports for a controller that acts at t, since it is taken by an
     unrestricted update, which Drake performs before the discrete updates of the same time; with
@@ -91,12 +94,16 @@ class TargetMeasurement(LeafSystem):
         return self._pose(values[: self._frame_size])
 
     def newest_marks(self, context: Context) -> Array | None:
-        """Marks in the newest image so far, without its bias, shape (target.size,) [px]; None: not
-        seen."""
-        frame = context.get_discrete_state(self._frames).value()[: self._frame_size]
-        if frame[0] == 0.0:
+        """Where marks are in the newest image so far, shape (target.size,) [px]; None: not seen."""
+        return self.newest_in_image(context.get_discrete_state(self._frames).value())
+
+    def newest_in_image(self, frames: Array) -> Array | None:
+        """As `newest_marks`, from the frames in the delay line."""
+        if frames[0] == 0.0:
             return None
-        marks = np.array(self.marks_of(frame))
+        marks = np.array(frames[self._marks])
+        if not self.pinhole.is_ideal:
+            marks = found_marks(marks, self.target.mark, self.target.size, self.pinhole)
         return marks if self.bias is None else shifted_marks(self.target, marks, -self.bias)
 
     def _take_image(self, context: Context, state: State) -> None:
@@ -121,11 +128,15 @@ class TargetMeasurement(LeafSystem):
             marks = marks[: self.target.size]
         if marks is not None and self.bias is not None:
             marks = shifted_marks(self.target, marks, self.bias)
-        X_CO = None if marks is None else self.target.solve(marks, self.pinhole)
+        camera = self.pinhole
+        if marks is not None and not camera.is_ideal:
+            marks = read_marks(marks, self.target.mark, self.target.size, camera)
+            camera = camera.ideal
+        X_CO = None if marks is None else self.target.solve(marks, camera)
         if marks is not None and X_CO is not None:
             at = self._pose_at
             values[0] = 1.0
-            values[self._marks] = self.target.complete(marks, X_CO, self.pinhole)
+            values[self._marks] = self.target.complete(marks, X_CO, camera)
             values[at : at + 9] = X_CO.rotation().matrix().ravel()
             values[at + 9 : at + 12] = X_CO.translation()
         return values

@@ -18,9 +18,7 @@ K = np.array([[700.0, 0.0, 331.5], [0.0, 640.0, 225.0], [0.0, 0.0, 1.0]])
 LENSES = {
     "barrel": LensDistortion("brown_conrady", (-0.31, 0.11, 1e-3, -7e-4, -0.02)),
     "pincushion": LensDistortion("brown_conrady", (0.12, 0.02, -5e-4, 1e-3)),
-    "rational": LensDistortion(
-        "brown_conrady", (1.2, 0.4, 2e-4, -3e-4, 0.02, 1.6, 0.6, 0.05)
-    ),
+    "rational": LensDistortion("brown_conrady", (1.2, 0.4, 2e-4, -3e-4, 0.02, 1.6, 0.6, 0.05)),
     "fisheye": LensDistortion("fisheye", (-0.02, 0.006, -0.002, 2e-4)),
     "equidistant": LensDistortion("fisheye", ()),
 }
