@@ -34,12 +34,12 @@ def read_marks(marks: Array, mark: str, size: int, camera: Pinhole) -> Array:
         size: Numbers that are marks.
         camera: The camera.
     """
-    return _through(marks, mark, size, camera.read)
+    return moved_marks(marks, mark, size, camera.read)
 
 
 def found_marks(marks: Array, mark: str, size: int, camera: Pinhole) -> Array:
     """Where in an image marks are found, from where they are read; the inverse of `read_marks`."""
-    return _through(marks, mark, size, camera.found_at)
+    return moved_marks(marks, mark, size, camera.found_at)
 
 
 def read_corners(uv: Array, camera: Pinhole) -> Array:
@@ -49,7 +49,8 @@ def read_corners(uv: Array, camera: Pinhole) -> Array:
     return np.asarray(camera.read(uv.reshape(-1, 2).T).T.reshape(uv.shape))
 
 
-def _through(marks: Array, mark: str, size: int, way: Callable[[Array], Array]) -> Array:
+def moved_marks(marks: Array, mark: str, size: int, way: Callable[[Array], Array]) -> Array:
+    """Marks as `read_marks`, by any map of pixels, shape (2, n) [px]."""
     moved = np.array(marks)
     if mark == "corners":
         moved[:size] = way(moved[:size].reshape(-1, 2).T).T.ravel()

@@ -16,7 +16,8 @@ from pydrake.systems.sensors import ImageRgba8U
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.servoing.circle_features import ELLIPSE_SIZE
-from cdpr_drake.vision.mark_reading import found_marks, read_marks
+from cdpr_drake.vision.lens_picture import StraightPicture
+from cdpr_drake.vision.mark_reading import found_marks, moved_marks, read_marks
 from cdpr_drake.vision.pinhole import Pinhole
 from cdpr_drake.vision.target import Target
 
@@ -126,12 +127,9 @@ class TargetMeasurement(LeafSystem):
         if marks is not None and len(marks) > self.target.size:
             values[self._quality] = marks[self.target.size :]
             marks = marks[: self.target.size]
-        if marks is not None and self.bias is not None:
-            marks = shifted_marks(self.target, marks, self.bias)
-        camera = self.pinhole
-        if marks is not None and not camera.is_ideal:
-            marks = read_marks(marks, self.target.mark, self.target.size, camera)
-            camera = camera.ideal
+        if marks is not None:
+            marks = self.read_marks(marks)
+        camera = self.pinhole.ideal
         X_CO = None if marks is None else self.target.solve(marks, camera)
         if marks is not None and X_CO is not None:
             at = self._pose_at
@@ -140,6 +138,14 @@ class TargetMeasurement(LeafSystem):
             values[at : at + 9] = X_CO.rotation().matrix().ravel()
             values[at + 9 : at + 12] = X_CO.translation()
         return values
+
+    def read_marks(self, marks: Array) -> Array:
+        """Marks in pixels of the ideal camera, of what was found in an image, bias included."""
+        if self.bias is not None:
+            marks = shifted_marks(self.target, marks, self.bias)
+        if self.pinhole.is_ideal:
+            return marks
+        return read_marks(marks, self.target.mark, self.target.size, self.pinhole)
 
     def _frame(self, context: Context) -> Array:
         return self.oldest(context.get_discrete_state(self._frames).value())
@@ -192,7 +198,8 @@ def shifted_marks(target: Target, marks: Array, shift: Array) -> Array:
 class TargetDetector(TargetMeasurement):
     """Finds a target in images by OpenCV, to fractions of a pixel, and its pose.
 
-    A target that is followed is looked for where the newest image had it, and then everywhere.
+    Where the camera is believed to have a lens it looks in `StraightPicture`s of the images. A
+    target that is followed is looked for where the newest image had it, and then everywhere.
 
     =========== ============== ==== ===================================================
     port        type           unit meaning
@@ -215,8 +222,30 @@ class TargetDetector(TargetMeasurement):
     ) -> None:
         """For one target, images at `rate` [Hz], latency in whole frames, bias as the base's."""
         super().__init__(target, pinhole, rate, latency_frames, image_bias)
+        reader = pinhole.believed or pinhole
+        self._straight = None if reader.distortion is None else StraightPicture(reader)
         self._image = self.DeclareAbstractInputPort("color_image", Value(ImageRgba8U()))
 
     def find_marks(self, context: Context) -> Array | None:
         """The target's marks in the image at the input, or None."""
-        return self.target.follow(self._image.Eval(context).data, self.newest_marks(context))
+        return self.find_in(self._image.Eval(context).data, self.newest_marks(context))
+
+    def find_in(self, image: np.ndarray, before: Array | None = None) -> Array | None:
+        """The target's marks in an image, or None.
+
+        Args:
+            image: Shape (height, width, 3 or 4), 8 bits a channel.
+            before: Where they were in the image before; None: it was not seen.
+        """
+        straight, size, mark = self._straight, self.target.size, self.target.mark
+        if straight is None:
+            return self.target.follow(image, before)
+        reader = self.pinhole.believed or self.pinhole
+        if before is not None:
+            before = moved_marks(
+                read_marks(before, mark, size, reader), mark, size, straight.from_ideal
+            )
+        marks = self.target.follow(straight.picture(image), before)
+        if marks is None:
+            return None
+        return found_marks(moved_marks(marks, mark, size, straight.to_ideal), mark, size, reader)
