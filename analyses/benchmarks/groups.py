@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from cdpr_drake.analyses.benchmarks.cameras import camera_rows
 from cdpr_drake.analyses.benchmarks.design import design_rows
 from cdpr_drake.analyses.benchmarks.identification import calibration_rows, identification_rows
 from cdpr_drake.analyses.benchmarks.planning import planning_rows
@@ -17,6 +18,7 @@ from cdpr_drake.analyses.reporting.timing import TimingRow
 
 BENCH_GROUPS: dict[str, Callable[[bool], list[TimingRow]]] = {
     "calibration": calibration_rows,
+    "cameras": camera_rows,
     "design": design_rows,
     "identification": identification_rows,
     "physics": lambda quick: [*physics_rows(quick), *effect_rows(quick)],
