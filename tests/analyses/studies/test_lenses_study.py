@@ -17,7 +17,7 @@ def made_up(case, seed, known=1.02, ignored=300.0):
     lens = case.keys["lens"]
     times = known if lens in KNOWN else ignored if lens in UNKNOWN else 1.0
     return {"final_m": times * IDEAL, "final_deg": 0.001 * times, "outcome": "timeout",
-            "lost": False}  # fmt: skip
+            "lost": False, "noise_cost": 1.03}  # fmt: skip
 
 
 def verdicts(measure):
@@ -26,12 +26,12 @@ def verdicts(measure):
 
 
 def test_statements_hold_of_what_they_should():
-    assert verdicts(made_up) == {"known": "confirmed", "ignored": "confirmed"}
+    assert verdicts(made_up) == {"known": "confirmed", "noise": "confirmed", "ignored": "confirmed"}
 
 
 def test_statements_fail_of_what_they_should():
     told = verdicts(lambda case, seed: made_up(case, seed, known=1.2, ignored=2.0))
-    assert told == {"known": "contradicted", "ignored": "contradicted"}
+    assert told == {"known": "contradicted", "noise": "contradicted", "ignored": "contradicted"}
 
 
 def test_every_variant_is_a_scenario():
