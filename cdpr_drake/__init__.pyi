@@ -1,5 +1,6 @@
 from .analyses.front.calibration import calibrate as calibrate
 from .analyses.front.calibration import identify as identify
+from .analyses.front.camera_calibration import calibrate_camera as calibrate_camera
 from .analyses.front.design import optimize_design as optimize_design
 from .analyses.front.exchange import import_robot as import_robot
 from .analyses.front.logs import import_log as import_log
@@ -60,3 +61,4 @@ from .tensions.methods import distribute as distribute
 from .tensions.problem import TensionProblem as TensionProblem
 from .tensions.problem import TensionSolution as TensionSolution
 from .version import __version__ as __version__
+from .vision.calibration_boards import CalibrationBoard as CalibrationBoard

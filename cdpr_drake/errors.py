@@ -180,6 +180,14 @@ class VisualFeatureError(CdprError):
     """Visual features cannot control the motions that they should; says why."""
 
 
+class LensDistortionError(CdprError):
+    """A lens folds its image over, or has coefficients that none has."""
+
+
+class CameraCalibrationError(CdprError):
+    """Images do not tell the camera that took them; says which, or why."""
+
+
 class DesignError(DataFileError):
     """A search for a design makes no sense; names file, field, found and accepted values."""
 

@@ -1,17 +1,76 @@
-"""The catalogue of cameras: what manufacturers publish, the pinhole model that follows, faults."""
+"""The catalogue of cameras: what manufacturers publish, the pinhole model that follows, faults.
 
-from dataclasses import dataclass
+Files of one's own, as `cdpr calibrate-camera` writes them, are the same, with what was calibrated.
+"""
+
+from dataclasses import dataclass, fields, replace
 from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 
 from cdpr_drake.errors import RobotFileError
-from cdpr_drake.schema.fields import array, number, text, whole
+from cdpr_drake.schema.fields import array, number, optional_section, text, whole
 from cdpr_drake.schema.typed_yaml import closest, load_typed
+from cdpr_drake.vision.lens_distortion import COEFFICIENTS, NO_LENS, LensDistortion
 from cdpr_drake.vision.pinhole import Pinhole
 
 _FOLDER = Path(__file__).parent / "cameras"
+
+CAMERA_SUFFIXES = (".yaml", ".yml")
+"""Of files of cameras; what ends otherwise is a name of the catalogue."""
+
+
+@dataclass(kw_only=True)
+class Distortion:
+    """What a lens does to the image of a pinhole, in the model and with the signs of OpenCV."""
+
+    kind: str = text(
+        "none; brown_conrady, radial with k1 to k6, k4 to k6 in a denominator, and tangential with "
+        "p1 and p2; fisheye, a polynomial of the angle from the axis with k1 to k4.",
+        NO_LENS,
+        choices=(NO_LENS, *COEFFICIENTS),
+    )
+    k1: float = number("First radial coefficient.", "-", 0.0)
+    k2: float = number("Second radial coefficient.", "-", 0.0)
+    p1: float = number("First tangential coefficient.", "-", 0.0)
+    p2: float = number("Second tangential coefficient.", "-", 0.0)
+    k3: float = number("Third radial coefficient.", "-", 0.0)
+    k4: float = number("Fourth radial coefficient.", "-", 0.0)
+    k5: float = number("Fifth radial coefficient.", "-", 0.0)
+    k6: float = number("Sixth radial coefficient.", "-", 0.0)
+
+    def lens(self) -> LensDistortion | None:
+        """The lens; None where it does nothing."""
+        if self.kind == NO_LENS:
+            return None
+        names = COEFFICIENTS[self.kind]
+        return LensDistortion(self.kind, tuple(float(getattr(self, name)) for name in names))
+
+    def problem(self) -> str:
+        """Words for a coefficient that its kind does not have; empty where all fit."""
+        known = COEFFICIENTS.get(self.kind, ())
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if field.name != "kind" and field.name not in known and value != 0.0:
+                has = f"0, or {', '.join(known)}" if known else "0, or another kind"
+                return f"{field.name}: found {value:g} with kind {self.kind}; accepted: {has}"
+        return ""
+
+
+def fold_problem(pinhole: Pinhole) -> str:
+    """Words for a lens whose image folds over within the picture; empty where it does not."""
+    share = pinhole.blind_share()
+    if share == 0.0:
+        return ""
+    assert pinhole.distortion is not None
+    angle = float(np.degrees(np.arctan(pinhole.distortion.valid_radius)))
+    return (
+        f"found a {pinhole.distortion.kind} lens whose image folds over {angle:.1f} deg from the "
+        f"axis, within the image of {pinhole.width} x {pinhole.height} pixels, of whose rim it "
+        f"leaves {100.0 * share:.0f} % without a direction; accepted: coefficients that hold up to "
+        "the corners"
+    )
 
 
 @dataclass(kw_only=True)
@@ -31,18 +90,39 @@ class Camera:
     )
     rate_hz: float = number("Largest frame rate.", "Hz", above=0.0)
     assumptions: str = text("Values that no source gives, and what they were taken from.", "")
+    principal_point: np.ndarray | None = array(
+        "Principal point (u, v) in the full image, from the middle of its upper left pixel; null: "
+        "the middle of the image.",
+        "px",
+        (2,),
+        None,
+    )
+    distortion: Distortion | None = optional_section(
+        "What the lens does to the image of the pinhole that the view angles mean; null: nothing."
+    )
 
     def pinhole(self, width: int, height: int) -> Pinhole:
         """The pinhole camera with these view angles and an image of width x height [px].
 
-        The published angles hold exactly, even where they mean pixels that are not square.
+        The published angles hold exactly, even where they mean pixels that are not square. They are
+        those of the pinhole: what a lens that distorts sees is more, or less.
         """
-        return Pinhole.from_view_angles(
+        pinhole = Pinhole.from_view_angles(
             width,
             height,
             float(np.radians(self.view_angle_horizontal_deg)),
             float(np.radians(self.view_angle_vertical_deg)),
         )
+        if self.principal_point is not None:
+            u, v = self.principal_point
+            # The image's corner is half a pixel off the first pixel's middle, at every scale.
+            pinhole = replace(
+                pinhole,
+                cx=float((u + 0.5) * width / self.width - 0.5),
+                cy=float((v + 0.5) * height / self.height - 0.5),
+            )
+        lens = None if self.distortion is None else self.distortion.lens()
+        return pinhole if lens is None else replace(pinhole, distortion=lens)
 
 
 DEAD, FROZEN, OFF = "dead", "frozen", "off"
@@ -84,13 +164,50 @@ def camera_names() -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in _FOLDER.glob("*.yaml")))
 
 
-@lru_cache
 def load_camera(name: str) -> Camera:
-    """Reads a camera of the catalogue.
+    """A camera of the catalogue by its name, or of a file by its path.
 
     Raises:
-        RobotFileError: There is no such camera; says which exist.
+        RobotFileError: There is no such camera, and says which exist; or the file describes none.
     """
+    if name.lower().endswith(CAMERA_SUFFIXES):
+        return load_camera_file(Path(name))
+    return _of_catalogue(name)
+
+
+def load_camera_file(path: Path) -> Camera:
+    """Reads a camera's file.
+
+    Raises:
+        RobotFileError: It cannot be read, or its lens folds its image over.
+    """
+    camera = load_typed(Camera, path, error=RobotFileError)
+    if camera.principal_point is not None:
+        u, v = camera.principal_point
+        if not (-0.5 < u < camera.width - 0.5 and -0.5 < v < camera.height - 0.5):
+            raise RobotFileError(
+                f"{path}: principal_point: found [{u:g}, {v:g}]; accepted: a point in the image of "
+                f"{camera.width} x {camera.height} pixels"
+            )
+    if camera.distortion is not None and camera.distortion.problem():
+        raise RobotFileError(f"{path}: distortion.{camera.distortion.problem()}")
+    fold = fold_problem(camera.pinhole(camera.width, camera.height))
+    if fold:
+        raise RobotFileError(f"{path}: distortion: {fold}")
+    return camera
+
+
+@lru_cache
+def _of_catalogue(name: str) -> Camera:
     if name not in camera_names():
         raise RobotFileError(f"camera {name!r} is unknown; {closest(name, camera_names())}")
-    return load_typed(Camera, _FOLDER / f"{name}.yaml", error=RobotFileError)
+    return load_camera_file(_FOLDER / f"{name}.yaml")
+
+
+def resolved_camera(name: str, folder: Path) -> str:
+    """A camera's name, or the absolute path of its file: in a folder, if it is there, else as it is
+    found from the working folder."""
+    if not name.lower().endswith(CAMERA_SUFFIXES):
+        return name
+    beside = folder / name
+    return str((beside if beside.exists() else Path(name)).absolute())

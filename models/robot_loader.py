@@ -23,7 +23,12 @@ from cdpr_drake.errors import Problems, RobotFileError
 from cdpr_drake.geometry.motion_type import across
 from cdpr_drake.geometry.poses import angles_from_rotation
 from cdpr_drake.geometry.straight_cables import cable_lengths
-from cdpr_drake.models.camera_catalogue import camera_names
+from cdpr_drake.models.camera_catalogue import (
+    CAMERA_SUFFIXES,
+    camera_names,
+    load_camera,
+    resolved_camera,
+)
 from cdpr_drake.models.exit_points import MARK, check_rail, split_name
 from cdpr_drake.models.formats.assumptions import complete_draft
 from cdpr_drake.models.formats.detection import SUFFIXES, is_foreign, read_foreign
@@ -282,8 +287,15 @@ def _check(robot: Robot, path: Path) -> None:
     for index, mount in enumerate(robot.cameras):
         if mount.name in mounts[:index]:
             fail(f"cameras[{index}].name", f"{mount.name} twice", "each name once")
-        if mount.model not in camera_names():
-            fail(f"cameras[{index}].model", mount.model, "one of " + ", ".join(camera_names()))
+        mount.model = resolved_camera(mount.model, path.parent)
+        if mount.model.lower().endswith(CAMERA_SUFFIXES):
+            with problems.collected():
+                load_camera(mount.model)
+        elif mount.model not in camera_names():
+            fail(
+                f"cameras[{index}].model", mount.model,
+                "one of " + ", ".join(camera_names()) + ", or the path of a camera file",
+            )  # fmt: skip
     platform = robot.platform
     with problems.collected():
         check_shapes(
@@ -452,14 +464,28 @@ _UPRIGHT = 1e-12
 
 
 def portable_robot(robot: Robot) -> tuple[Robot, list[Path]]:
-    """A robot whose file can lie in another folder, and the files of its mesh to lie beside it."""
+    """A robot whose file can lie in another folder, and the files to lie beside it: of its mesh,
+    and of its cameras, but for one of the same name as another."""
     shape = robot.platform.shape
-    if shape is None or shape.kind != MESH:
+    own: dict[str, str] = {}
+    for mount in robot.cameras:
+        if mount.model.lower().endswith(CAMERA_SUFFIXES):
+            own.setdefault(Path(mount.model).name, mount.model)
+    has_mesh = shape is not None and shape.kind == MESH
+    if not has_mesh and not own:
         return robot, []
-    portable, file = deepcopy(robot), Path(str(shape.file))
-    assert portable.platform.shape is not None
-    portable.platform.shape.file = file.name
-    return portable, mesh_files(file)
+    portable = deepcopy(robot)
+    for mount in portable.cameras:
+        name = Path(mount.model).name
+        if own.get(name) == mount.model:
+            mount.model = name
+    files = [Path(file) for file in own.values()]
+    if has_mesh:
+        assert portable.platform.shape is not None
+        file = Path(str(portable.platform.shape.file))
+        portable.platform.shape.file = file.name
+        files = mesh_files(file) + files
+    return portable, files
 
 
 def moved_robot(robot: Robot, shift: Array, name: str | None = None) -> Robot:

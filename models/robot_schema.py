@@ -145,10 +145,10 @@ class Cable:
 
 @dataclass(kw_only=True)
 class CameraMount:
-    """A camera of the catalogue and where it is mounted."""
+    """A camera of the catalogue, or of a file, and where it is mounted."""
 
     name: str = text("Name of the mounting, once in a robot.")
-    model: str = text("Camera of the catalogue.")
+    model: str = text("Camera of the catalogue, or path of a camera file.")
     parent: str = text("What carries it.", "platform", choices=("platform", "world"))
     pose: Pose = section("Pose of the camera frame C in the parent, z forward, y down.", Pose)
 

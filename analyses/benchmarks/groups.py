@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from cdpr_drake.analyses.benchmarks.constraints import constraint_rows
+from cdpr_drake.analyses.benchmarks.cameras import camera_rows
 from cdpr_drake.analyses.benchmarks.design import design_rows
 from cdpr_drake.analyses.benchmarks.identification import calibration_rows, identification_rows
 from cdpr_drake.analyses.benchmarks.planning import planning_rows
@@ -19,6 +20,7 @@ from cdpr_drake.analyses.reporting.timing import TimingRow
 
 BENCH_GROUPS: dict[str, Callable[[bool], list[TimingRow]]] = {
     "calibration": lambda quick: [*calibration_rows(quick), *point_calibration_rows(quick)],
+    "cameras": camera_rows,
     "constraints": constraint_rows,
     "design": design_rows,
     "identification": identification_rows,

@@ -33,12 +33,12 @@ from cdpr_drake.calibration.stations import Point, Stations
 from cdpr_drake.errors import CalibrationError, EquilibriumError
 from cdpr_drake.geometry.pose_accuracy import distances_from_line
 from cdpr_drake.geometry.poses import angles_from_rotation, place_error
-from cdpr_drake.models.camera_catalogue import load_camera
 from cdpr_drake.models.robot_holding import hold_robot
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import Pose, Robot
 from cdpr_drake.models.robot_statics import rigid_platform
 from cdpr_drake.statics.equilibrium import equilibrium_near
+from cdpr_drake.systems.cameras.camera_settings import servo_pinhole
 from cdpr_drake.systems.diagrams.beliefs import believed_robot
 from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
 from cdpr_drake.vision.apriltags import TagTarget
@@ -133,7 +133,7 @@ def run_campaign(
     robot, random = load_robot(scenario.robot), np.random.default_rng([scenario.seed, 17])
     tags, targets = _tags(scenario)
     mount = find_mount(robot, scenario.camera.mount)
-    pinhole = load_camera(mount.model).pinhole(scenario.camera.width, scenario.camera.height)
+    pinhole = servo_pinhole(scenario.camera, robot)
     belief = believed_robot(scenario, robot)
     nominal = _with(robot, belief.cables.p_WA, belief.cables.p_PB, mount.name, belief.X_PC)
     true = with_tags(calibration_model(robot, mount.name), tags)

@@ -22,6 +22,7 @@ from pydrake.common.yaml import yaml_dump_typed
 
 from cdpr_drake.analyses.reporting.log_files import write_scenario, write_whole
 from cdpr_drake.analyses.reporting.written_files import whole_file
+from cdpr_drake.models.camera_catalogue import CAMERA_SUFFIXES
 from cdpr_drake.models.mechanism_in_plant import MODEL_SUFFIXES
 from cdpr_drake.models.mechanism_loader import load_mechanism
 from cdpr_drake.models.robot_loader import load_robot, portable_robot
@@ -109,6 +110,14 @@ def write_run_inputs(folder: Path, scenario: Any, robot: Robot) -> None:
     if perturbations is not None and getattr(perturbations, "believed_robot", None) is not None:
         believed = _write(folder / BELIEVED_FILE, load_robot(perturbations.believed_robot))
         written.perturbations = replace(perturbations, believed_robot=believed)
+    camera = getattr(scenario, "camera", None)
+    for section, key in ((camera, "model"), (perturbations, "camera_model")):
+        file = getattr(section, key, None)
+        if file is not None and file.lower().endswith(CAMERA_SUFFIXES):
+            name = f"{key}.yaml"
+            _copy(Path(file), folder / name)
+            where = "camera" if section is camera else "perturbations"
+            setattr(written, where, replace(getattr(written, where), **{key: name}))
     trajectory = getattr(scenario, "trajectory", None)
     if trajectory is not None and getattr(trajectory, "file", None) is not None:
         _copy(Path(trajectory.file), folder / MOTION_FILE)

@@ -18,6 +18,7 @@ from cdpr_drake.geometry.poses import pose_from_row
 from cdpr_drake.models.rendered_camera import add_renderer
 from cdpr_drake.servoing.circle_features import ELLIPSE_SIZE
 from cdpr_drake.systems.diagrams.camera import add_sensor, pictured_robot
+from cdpr_drake.vision.mark_reading import found_marks
 
 _CORNER_COLOR = (40, 40, 230)
 _LINE_COLOR = (60, 160, 60)
@@ -78,6 +79,8 @@ def write_video(path: Path, result: RunResult) -> None:
     if not film.isOpened():
         raise OutputFolderError(f"{path}: OpenCV cannot write this film")
     times, track, line = image_path(result)
+    # Paths and marks are read: in the image they are where the lens puts them.
+    track, line = (pinhole.found_at(path.T).T for path in (track, line))
     # A log on disk is read where it is looked at.
     log_times, poses, found = log["time"], log["X_WP"], log["found"]
     marks = log[f"{servo.target.mark}_px"]
@@ -90,7 +93,10 @@ def write_video(path: Path, result: RunResult) -> None:
         picture = cv2.cvtColor(rgb[:, :, :3], cv2.COLOR_RGB2BGR)
         _draw_track(picture, track[times <= now], line)
         if found[index, 0] > 0.0:
-            _draw_marks(picture, servo.target.mark, marks[index])
+            own = marks[index]
+            if not pinhole.is_ideal:
+                own = found_marks(own, servo.target.mark, servo.target.size, pinhole)
+            _draw_marks(picture, servo.target.mark, own)
         cv2.putText(
             picture, f"{now:6.2f} s", (10, 28), cv2.FONT_HERSHEY_SIMPLEX, 0.8, (20, 20, 20), 2
         )

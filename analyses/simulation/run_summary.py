@@ -46,7 +46,7 @@ def image_path(result: RunResult) -> tuple[Array, Array, Array]:
         part = found[first : first + ROWS_AT_ONCE]
         path[first : first + len(part)] = target.centers(marks[part], poses[part, 4:], pinhole)
     path = path * [pinhole.fx, pinhole.fy] + [pinhole.cx, pinhole.cy]
-    desired = pinhole.project(servo.X_CdO.translation()[:, np.newaxis])[:, 0]
+    desired = pinhole.ideal.project(servo.X_CdO.translation()[:, np.newaxis])[:, 0]
     start = path[0] if len(path) else desired
     return log["time"][found], path, np.array([start, desired])
 

@@ -73,7 +73,7 @@ def _corner_traces(result: RunResult, scale: float) -> dict[str, Array]:
     if target.size != 2 * CORNERS or not isinstance(target, PointTarget):
         return {}
     seen = log[f"{target.mark}_px"][log["found"][:, 0] > 0.0]
-    goals = result.servo.pinhole.project(result.servo.X_CdO @ target.points).T
+    goals = result.servo.pinhole.ideal.project(result.servo.X_CdO @ target.points).T
     return {
         "corner_paths": (scale * seen).reshape(-1, CORNERS, 2).astype(np.float32),
         "corner_goals": scale * goals,

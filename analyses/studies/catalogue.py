@@ -89,6 +89,7 @@ MODULES = {
     "fusion": "fusion.study",
     "schemes": "schemes.study",
     "tagless": "tagless",
+    "lenses": "lenses",
     "slack-cycle": "slack_cycle",
     "calibration": "calibration.study",
     "identification": "identification",

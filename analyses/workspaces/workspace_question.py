@@ -22,11 +22,11 @@ from cdpr_drake.analyses.workspaces.stability_question import make_question, sce
 from cdpr_drake.analyses.workspaces.static_feasible import static_case
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import WorkspaceError
-from cdpr_drake.models.camera_catalogue import load_camera
 from cdpr_drake.models.robot_loader import as_robot, robot_reference
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import rigid_platform
 from cdpr_drake.schema.typed_yaml import closest
+from cdpr_drake.systems.cameras.camera_settings import servo_pinhole
 from cdpr_drake.systems.cameras.targets import TARGETS
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.tensions.methods import method_for
@@ -343,6 +343,6 @@ def camera_view(robot: Robot, scenario: str) -> CameraView:
             "world, seen by a camera on the platform"
         )
     mount = robot.camera_mount(loaded.camera.mount)
-    pinhole = load_camera(mount.model).pinhole(loaded.camera.width, loaded.camera.height)
+    pinhole = servo_pinhole(loaded.camera, robot)
     target = TARGETS[loaded.target.kind](loaded.target)
     return CameraView(target, loaded.target.pose.transform(), mount.pose.transform(), pinhole)

@@ -12,6 +12,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.calibration.parameters import CalibrationModel
 from cdpr_drake.errors import CalibrationError
 from cdpr_drake.geometry.poses import pose_error
+from cdpr_drake.vision.mark_reading import read_corners
 from cdpr_drake.vision.pinhole import Pinhole
 from cdpr_drake.vision.target import PointTarget
 
@@ -39,7 +40,7 @@ def guessed_tags(
     Raises:
         CalibrationError: A tag is in no image.
     """
-    tags = {}
+    tags, uv, pinhole = {}, read_corners(uv, pinhole), pinhole.ideal
     for t, (tag, target) in enumerate(targets.items()):
         seen = []
         for X_WP, corners in zip(poses, uv[:, t], strict=True):
@@ -65,7 +66,7 @@ def poses_by_tags(
     Lengths of cables have several poses each, and a search from afar may end in a wrong one; tags
     that are in most images tell which. Arguments as for `guessed_tags`, with a model that has tags.
     """
-    agreed = []
+    agreed, uv, pinhole = [], read_corners(uv, pinhole), pinhole.ideal
     for X_WP, corners in zip(poses, uv, strict=True):
         told = []
         for (tag, target), one in zip(targets.items(), corners, strict=True):

@@ -42,6 +42,7 @@ from cdpr_drake.calibration.zeroed_terms import ZeroedCables
 from cdpr_drake.errors import CalibrationError
 from cdpr_drake.geometry.motion_type import FREE, LEVEL, MotionType
 from cdpr_drake.numerics.own_terms import OwnTerms, ProgramValues
+from cdpr_drake.vision.mark_reading import read_corners
 from cdpr_drake.vision.pinhole import Pinhole
 from cdpr_drake.winches.drum import Drum
 
@@ -237,7 +238,7 @@ class CalibrationProgram(OwnTerms):
             points: Corners of each tag in its frame, shape (3, 4) [m], by its number.
             uv: Their images, shape (k, tags, 4, 2) [px]; NaN where a corner was not seen.
             sigma: Standard deviation of a coordinate [px].
-            pinhole: The camera.
+            pinhole: The camera; what its lens distorts is read first.
 
         Raises:
             CalibrationError: A tag is not in the model, or a shape or sigma is not accepted.
@@ -251,7 +252,8 @@ class CalibrationProgram(OwnTerms):
             raise CalibrationError(f"uv: found shape {np.shape(uv)}; accepted: {wanted}")
         _positive("tag corners", sigma)
         corners = np.array(list(points.values()))
-        term = TagCorners(tuple(points), corners, np.asarray(uv, float), sigma, pinhole)
+        read = read_corners(np.asarray(uv, float), pinhole)
+        term = TagCorners(tuple(points), corners, read, sigma, pinhole.ideal)
         self.terms.append(term)
         return term
 

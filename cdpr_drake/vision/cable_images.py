@@ -135,6 +135,9 @@ def slack_from_image(
     focal = float(np.sqrt(pinhole.fx * pinhole.fy))
     for k in range(m):
         seen = pixels[k][:, np.all(np.isfinite(pixels[k]), axis=0)]
+        if not pinhole.is_ideal:
+            seen = pinhole.read(seen)
+            seen = seen[:, np.all(np.isfinite(seen), axis=0)]
         start, rise = paths.p_WT[:, k], ends[:, k] - paths.p_WT[:, k]
         span = float(np.hypot(rise[0], rise[1]))
         if span < LEAST_SPAN or seen.shape[1] < LEAST_POINTS:

@@ -1,6 +1,10 @@
 """The pinhole camera: intrinsic parameters, projection, field of view, and marks without pixels.
 
-`Pinhole` is the camera for Python. The kernels take it as `Pinhole.numbers`, fx, fy, cx, cy first,
+`Pinhole` is the camera for Python, with the distortion of its lens where it has one. What is found
+in its image is read: brought to the pixels of the `ideal` camera, by the lens and the intrinsic
+parameters that are believed. All that comes after, kernels too, knows the ideal camera alone.
+
+The kernels take it as `Pinhole.numbers`, fx, fy, cx, cy first,
 and a pose X_CO as its matrix (3, 4), column by column, shape (12,) [-, m]: `images_of`, `is_faced`
 and `is_pictured` project points; `normalize_points`, `normalize_ellipses` and `crossing_diagonals`
 bring marks of targets to unit focal length.
@@ -10,7 +14,7 @@ Source: servoing thesis (1.41).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -18,11 +22,15 @@ from numba import njit
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.servoing.circle_features import ELLIPSE_SIZE
+from cdpr_drake.vision.lens_distortion import LensDistortion
+
+RIM_POINTS = 65
+"""Of each edge of an image that are looked at."""
 
 
 @dataclass(frozen=True)
 class Pinhole:
-    """Intrinsic parameters of a camera without distortion.
+    """Intrinsic parameters of a camera, and the distortion of its lens.
 
     Pixel coordinates (u, v) count from the middle of the upper left pixel, u to the right and v
     down, as in OpenCV. In the camera frame C, x points right, y down, z forward.
@@ -34,6 +42,8 @@ class Pinhole:
         fy: Focal length along v [px].
         cx: Principal point along u [px].
         cy: Principal point along v [px].
+        distortion: What its lens does to images; None: nothing.
+        believed: The camera as whose its images are read; None: as which they are.
     """
 
     width: int
@@ -42,6 +52,8 @@ class Pinhole:
     fy: float
     cx: float
     cy: float
+    distortion: LensDistortion | None = None
+    believed: Pinhole | None = None
 
     @staticmethod
     def from_view_angles(width: int, height: int, horizontal: float, vertical: float) -> Pinhole:
@@ -67,10 +79,68 @@ class Pinhole:
     def project(self, p_CK: Array) -> Array:
         """Pixels (u, v), shape (2, n) [px], of points K in C, shape (3, n) [m].
 
-        Points at or behind the focal plane (z <= 0) give NaN. Source: servoing thesis (1.41).
+        Points at or behind the focal plane (z <= 0) give NaN, and those beyond what the lens is
+        valid for. Source: servoing thesis (1.41).
         """
         z = np.where(p_CK[2] > 0.0, p_CK[2], np.nan)
+        if self.distortion is not None:
+            return self._placed(self.distortion.distort(p_CK[:2] / z))
         return np.vstack([self.cx + self.fx * p_CK[0] / z, self.cy + self.fy * p_CK[1] / z])
+
+    @cached_property
+    def ideal(self) -> Pinhole:
+        """The camera in whose pixels marks are once they are read: without lens and belief."""
+        return self if self.is_ideal else replace(self, distortion=None, believed=None)
+
+    @property
+    def is_ideal(self) -> bool:
+        """Whether what is found in its image is read as it is."""
+        return self.distortion is None and self.believed is None
+
+    def read(self, uv: Array) -> Array:
+        """Ideal pixels of what is found at pixels uv of the image, both of shape (2, n) [px].
+
+        By the camera that is believed: at unit focal length they are where that one says. NaN where
+        the believed lens has no such image.
+        """
+        if self.is_ideal:
+            return uv
+        camera = self.believed or self
+        xy = camera._normalized(uv)
+        if camera.distortion is not None:
+            xy = camera.distortion.undistort(xy)
+        return self._placed(xy)
+
+    def found_at(self, uv: Array) -> Array:
+        """Where in the image is found what is read at ideal pixels uv; the inverse of `read`."""
+        if self.is_ideal:
+            return uv
+        camera, xy = self.believed or self, self._normalized(uv)
+        return camera._placed(xy if camera.distortion is None else camera.distortion.distort(xy))
+
+    def blind_share(self) -> float:
+        """Share of the image's rim that the valid field of the lens does not reach, 0..1.
+
+        An image must be within: beyond, two directions would share one pixel.
+        """
+        if self.distortion is None:
+            return 0.0
+        u = np.linspace(-0.5, self.width - 0.5, RIM_POINTS)
+        v = np.linspace(-0.5, self.height - 0.5, RIM_POINTS)
+        left, top = np.full(RIM_POINTS, -0.5), np.full(RIM_POINTS, -0.5)
+        rim = np.hstack([
+            [u, top], [u, top + self.height], [left, v], [left + self.width, v],
+        ])  # fmt: skip
+        seen = self.distortion.undistort(self._normalized(rim))
+        return float(np.mean(~np.all(np.isfinite(seen), axis=0)))
+
+    def _normalized(self, uv: Array) -> Array:
+        """Pixels at unit focal length, shape (2, n) [-]."""
+        return np.vstack([(uv[0] - self.cx) / self.fx, (uv[1] - self.cy) / self.fy])
+
+    def _placed(self, xy: Array) -> Array:
+        """The pixels of points at unit focal length, shape (2, n) [px]."""
+        return np.vstack([self.cx + self.fx * xy[0], self.cy + self.fy * xy[1]])
 
     def sees(self, uv: Array, border: float = 0.0) -> bool:
         """Whether all pixels uv, shape (2, n) [px], lie in the image, `border` [px] off its rim."""

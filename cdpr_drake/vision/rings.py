@@ -16,6 +16,7 @@ from cdpr_drake.servoing.circle_features import (
     plane_of,
 )
 from cdpr_drake.vision.blob_detection import find_dark_blobs
+from cdpr_drake.vision.mark_reading import outline_moments
 from cdpr_drake.vision.pinhole import Pinhole, normalize_ellipses
 from cdpr_drake.vision.target import (
     NormalNumbers,
@@ -61,6 +62,9 @@ class CircleTarget(Target):
         """As the base class says; noisy ellipses are fitted to 48 noisy points each."""
         if not self.in_view(X_CO, pinhole):
             return None
+        if noise == 0.0 and pinhole.distortion is not None:
+            images = [pinhole.project(X_CO @ (radius * self._circle)) for radius in self.radii]
+            return np.concatenate([outline_moments(uv) for uv in images])
         if noise == 0.0:
             exact = circle_images(X_CO.rotation().matrix(), X_CO.translation(), self.radii)
             return to_pixels(exact, pinhole).ravel()
@@ -91,6 +95,8 @@ class CircleTarget(Target):
         A circle has two poses; the search starts from both and the smaller residual wins.
         """
         ellipses = self.normalized(marks, pinhole)
+        if not np.all(np.isfinite(ellipses)):  # out of what a lens is valid for
+            return None
         best, best_error = None, np.inf
         for start in starting_poses(ellipses[0], float(self.radii[0])):
             fitted = _refined(start, ellipses, self.radii)

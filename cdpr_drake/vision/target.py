@@ -121,6 +121,11 @@ class Target(ABC):
 
     def in_view(self, X_CO: RigidTransform, pinhole: Pinhole) -> bool:
         """Whether all of it is in the image and its face is turned to the camera."""
+        if pinhole.distortion is not None:
+            # A lens bends edges, so that corners alone do not tell where they are.
+            halfway = 0.5 * (self.outline + np.roll(self.outline, 1, axis=1))
+            around = pinhole.project(X_CO @ np.hstack([self.outline, halfway]))
+            return faces_camera(X_CO) and pinhole.sees(around, VISIBLE_BORDER)
         return bool(is_pictured(self.outline, _columns(X_CO), pinhole.numbers, VISIBLE_BORDER))
 
 
@@ -137,6 +142,13 @@ class PointTarget(Target):
         self, X_CO: RigidTransform, pinhole: Pinhole, noise: float, random: NormalNumbers
     ) -> Array | None:
         """As the base class says."""
+        if pinhole.distortion is not None:
+            if not self.in_view(X_CO, pinhole):
+                return None
+            uv = pinhole.project(X_CO @ self.points)
+            if noise > 0.0:
+                uv = uv + noise * random.standard_normal(uv.shape)
+            return uv.T.ravel()
         X = _columns(X_CO)
         if not is_pictured(self.outline, X, pinhole.numbers, VISIBLE_BORDER):
             return None

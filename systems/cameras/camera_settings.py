@@ -3,15 +3,62 @@
 Drake's YAML loader reads the annotations themselves, so they are not postponed here.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from cdpr_drake.errors import ScenarioError
-from cdpr_drake.models.camera_catalogue import CameraFault
+from cdpr_drake.errors import RobotFileError, ScenarioError
+from cdpr_drake.models.camera_catalogue import CameraFault, Distortion, fold_problem, load_camera
+from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.schema.fields import FASTEST, number, optional_section, text, whole
+from cdpr_drake.vision.image_flaws import ImageFlaws
+from cdpr_drake.vision.pinhole import Pinhole
 
 RENDERED, PROJECTED = "rendered", "projected"
 WHOLE, REGION = "whole", "target"
+
+
+@dataclass(kw_only=True)
+class FlawSettings:
+    """What spoils rendered images beside the lens."""
+
+    noise: float = number(
+        "Standard deviation of every colour of a pixel, of 255.",
+        "-",
+        0.0,
+        at_least=0.0,
+        at_most=255.0,
+    )
+    defocus: float = number(
+        "Standard deviation of the blur of a lens out of focus.",
+        "px",
+        0.0,
+        at_least=0.0,
+        at_most=100.0,
+    )
+    exposure: float = number(
+        "How long a row of pixels is exposed, while what moves blurs.",
+        "s",
+        0.0,
+        at_least=0.0,
+        at_most=1.0,
+    )
+    readout: float = number(
+        "Rolling shutter: by how much the last row is exposed after the first; 0: all at once.",
+        "s",
+        0.0,
+        at_least=0.0,
+        at_most=1.0,
+    )
+    renders: int = whole(
+        "Pictures that are drawn of an image that takes time, at instants of it.",
+        8,
+        at_least=2,
+        at_most=256,
+    )
+
+    def flaws(self) -> ImageFlaws:
+        """The same without a file."""
+        return ImageFlaws(self.noise, self.defocus, self.exposure, self.readout, self.renders)
 
 
 @dataclass(kw_only=True)
@@ -24,6 +71,13 @@ class CameraSettings:
         choices=(RENDERED, PROJECTED),
     )
     mount: str = text("Which of the robot's camera mountings.", "onboard")
+    model: str | None = text(
+        "Camera by name, or path of a camera file, in the place of the mounting's; null: that.",
+        None,
+    )
+    distortion: Distortion | None = optional_section(
+        "What the lens does to images, in the place of what the camera's file says; null: that."
+    )
     width: int = whole("Image width.", 640, "px", at_least=16, at_most=8192)
     height: int = whole("Image height.", 480, "px", at_least=16, at_most=8192)
     region: str = text(
@@ -50,6 +104,9 @@ class CameraSettings:
         at_most=0.5,
     )
     focus_period: float = number("Time of one up and down of the auto-focus.", "s", 2.0, above=0.0)
+    flaws: FlawSettings | None = optional_section(
+        "What spoils images; null: nothing; rendered camera with region whole only."
+    )
     fault: CameraFault | None = optional_section(
         "When it fails; null: never; projected camera only."
     )
@@ -70,9 +127,60 @@ def check_camera(camera: CameraSettings, path: Path) -> None:
             f"{path}: camera.region: found {REGION} with camera.kind {camera.kind}, which draws no "
             f"image; accepted: whole, or camera.kind {RENDERED}"
         )
+    if camera.flaws is not None and (camera.kind != RENDERED or camera.region != WHOLE):
+        raise ScenarioError(
+            f"{path}: camera.flaws: found a section with camera.kind {camera.kind} and "
+            f"camera.region {camera.region}; accepted: null, or {RENDERED} and {WHOLE}"
+        )
+    if camera.flaws is not None:
+        taken = camera.flaws.exposure + camera.flaws.readout
+        if taken > 1.0 / camera.rate:
+            raise ScenarioError(
+                f"{path}: camera.flaws: found exposure and readout of {taken:g} s; accepted: at "
+                f"most {1.0 / camera.rate:g} s, the time of an image at camera.rate"
+            )
     if camera.focus_zoom > 0.0 and camera.kind != PROJECTED:
         raise ScenarioError(
             f"{path}: camera.focus_zoom: found {camera.focus_zoom:g} with camera.kind "
             f"{camera.kind}, whose focal length does not change; accepted: 0, or camera.kind "
             f"{PROJECTED}"
+        )
+
+
+def servo_pinhole(camera: CameraSettings, robot: Robot) -> Pinhole:
+    """Intrinsic parameters and lens of the camera of some settings on a robot.
+
+    Raises:
+        RobotFileError: There is no such camera, or its file describes none.
+    """
+    model = camera.model or robot.camera_mount(camera.mount).model
+    pinhole = load_camera(model).pinhole(camera.width, camera.height)
+    if camera.distortion is None:
+        return pinhole
+    return replace(pinhole, distortion=camera.distortion.lens())
+
+
+def check_lens(camera: CameraSettings, robot: Robot, path: Path) -> None:
+    """Refuses a camera that is none, and a lens that folds its image over or that no region takes.
+
+    Args:
+        camera: The settings, with a mounting that the robot has.
+        robot: The robot.
+        path: Of the scenario's file, for the message.
+
+    Raises:
+        ScenarioError: As said; names the field.
+    """
+    if camera.distortion is not None and camera.distortion.problem():
+        raise ScenarioError(f"{path}: camera.distortion.{camera.distortion.problem()}")
+    try:
+        pinhole = servo_pinhole(camera, robot)
+    except RobotFileError as problem:
+        raise ScenarioError(*problem.within(f"{path}: camera.model")) from problem
+    fold = fold_problem(pinhole)
+    if fold:
+        raise ScenarioError(f"{path}: camera.distortion: {fold}")
+    if camera.region == REGION and pinhole.distortion is not None:
+        raise ScenarioError(
+            f"{path}: camera.region: found {REGION} with a lens that distorts; accepted: {WHOLE}"
         )

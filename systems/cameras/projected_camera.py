@@ -16,13 +16,13 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.poses import pose_from_angles
 from cdpr_drake.models.camera_catalogue import DEAD, FROZEN, CameraFault
 from cdpr_drake.servoing.servo_task import CameraMounting
-from cdpr_drake.systems.cameras.target_measurement import TargetMeasurement, shifted_marks
+from cdpr_drake.systems.cameras.target_measurement import TargetMeasurement
 from cdpr_drake.vision.pinhole import Pinhole
 from cdpr_drake.vision.target import Target
 
 
 class ProjectedCamera(TargetMeasurement):
-    """Projects the target through the pinhole model and adds pixel noise.
+    """Projects the target through pinhole and lens and adds pixel noise.
 
     =========== ============== ==== ========================================================
     port        type           unit meaning
@@ -87,10 +87,7 @@ class ProjectedCamera(TargetMeasurement):
         if fault.kind == DEAD:
             return None
         if fault.kind == FROZEN:
-            if frames[0] == 0.0:
-                return None
-            marks = np.array(frames[self._marks])
-            return marks if self.bias is None else shifted_marks(self.target, marks, -self.bias)
+            return self.newest_in_image(frames)
         return self.project(
             read, time, pose_from_angles(fault.offset, np.radians(fault.angles_deg))
         )

@@ -9,6 +9,7 @@ from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, State
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.errors import LensDistortionError
 from cdpr_drake.systems.cameras.scene_picture import draw_image, draw_window
 from cdpr_drake.systems.cameras.target_measurement import TargetMeasurement, shifted_marks
 from cdpr_drake.vision.image_window import ImageWindow, expected_window, target_box, whole_image
@@ -62,7 +63,15 @@ class RegionCamera(TargetMeasurement):
             X_BC: Pose of the camera frame C in B, z forward, y down [m].
             latency_frames: Latency in whole frames.
             image_bias: As for `TargetMeasurement`.
+
+        Raises:
+            LensDistortionError: The lens distorts, or is believed to be another.
         """
+        if not pinhole.is_ideal:
+            raise LensDistortionError(
+                "camera.region: found target with a lens that distorts, or that is believed to be "
+                "another; accepted: whole, or a camera without distortion"
+            )
         super().__init__(target, pinhole, rate, latency_frames, image_bias)
         self._parent, self._X_BC = parent, X_BC
         self._query = self.DeclareAbstractInputPort(

@@ -7,6 +7,7 @@ background, which is filled in.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import reduce
 from itertools import product
 
@@ -14,11 +15,14 @@ import numpy as np
 from pydrake.common.value import AbstractValue, Value
 from pydrake.geometry import FrameId, QueryObject, Role
 from pydrake.math import RigidTransform
+from pydrake.multibody.math import SpatialVelocity
 from pydrake.systems.framework import Context, LeafSystem
 from pydrake.systems.sensors import ImageRgba8U
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.geometry.poses import exponential
 from cdpr_drake.models.rendered_camera import BACKGROUND, NEAR, color_camera
+from cdpr_drake.vision.image_flaws import ImageFlaws
 from cdpr_drake.vision.image_window import (
     ImageWindow,
     union,
@@ -26,10 +30,14 @@ from cdpr_drake.vision.image_window import (
     window_round,
     with_principal_point,
 )
+from cdpr_drake.vision.lens_picture import lens_picture, without_lens
 from cdpr_drake.vision.pinhole import Pinhole
 
 SMOOTHED = 4
 """Pixels round a bounding box that smoothing of its edges may reach."""
+
+_IMAGE_STREAM = 577
+"""Tells the noise of images from other random numbers of the same seed."""
 
 _SIGNS = np.array(list(product((-1.0, 1.0), repeat=3))).T
 _EDGES = np.array(
@@ -38,27 +46,69 @@ _EDGES = np.array(
 _FILLING = np.round(255.0 * np.append(BACKGROUND, 1.0)).astype(np.uint8)
 
 
+@dataclass(frozen=True, kw_only=True)
+class SpoiledImages:
+    """What spoils the images of a camera, and whose motion while they are exposed.
+
+    Attributes:
+        flaws: What spoils them.
+        rate: Images per second [Hz].
+        seed: Seed of the noise, with the image's number.
+        frame: Geometry frame of the platform, P.
+        body: Its place among the plant's bodies.
+    """
+
+    flaws: ImageFlaws
+    rate: float
+    seed: int
+    frame: FrameId
+    body: int
+
+
 class SceneCamera(LeafSystem):
     """A camera of a scene: the image of Drake's RgbdSensor, drawn where there is something.
 
-    ============ ============== ==== ========================================================
-    port         type           unit meaning
-    ============ ============== ==== ========================================================
-    query_object QueryObject    -    in, of a scene graph with the renderer of `add_renderer`
-    color_image  ImageRgba8U    -    out
-    ============ ============== ==== ========================================================
+    =============== ===================== ===== ==================================================
+    port            type                  unit  meaning
+    =============== ===================== ===== ==================================================
+    query_object    QueryObject           -     in, of a scene graph with the renderer of
+                                                `add_renderer`
+    body_velocities list[SpatialVelocity] rad/s in, of all bodies in W, as MultibodyPlant gives
+                                          m/s   them; only if images take time
+    color_image     ImageRgba8U           -     out
+    =============== ===================== ===== ==================================================
+
+    Through a lens it is drawn wider and looked up, see `vision.lens_picture`. An image that takes
+    time is drawn several times, from where the camera was with the platform's twist of now: that is
+    exact while the twist is constant, for what rests in the world before a camera on the platform,
+    and for what is on the platform before one in the world. The image of time t is complete at t.
     """
 
-    def __init__(self, parent: FrameId, X_BC: RigidTransform, pinhole: Pinhole) -> None:
+    def __init__(
+        self,
+        parent: FrameId,
+        X_BC: RigidTransform,
+        pinhole: Pinhole,
+        spoiled: SpoiledImages | None = None,
+    ) -> None:
         """For a camera on a body B.
 
         Args:
             parent: Geometry frame of B.
             X_BC: Pose of the camera frame C in B, z forward, y down [m].
-            pinhole: Intrinsic parameters [px].
+            pinhole: Intrinsic parameters [px] and lens.
+            spoiled: What spoils its images; None: nothing.
+
+        Raises:
+            LensDistortionError: The lens has no valid field in all of the image.
         """
         super().__init__()
         self._parent, self._X_BC, self._pinhole = parent, X_BC, pinhole
+        self._spoiled, self._drawn = spoiled, without_lens(pinhole)
+        if spoiled is not None and spoiled.flaws.moves:
+            self._velocities = self.DeclareAbstractInputPort(
+                "body_velocities", Value[list[SpatialVelocity]]()
+            )
         query = AbstractValue.Make(QueryObject())
         self._query = self.DeclareAbstractInputPort("query_object", query)
         self.DeclareAbstractOutputPort(
@@ -68,10 +118,37 @@ class SceneCamera(LeafSystem):
         )
 
     def _calc_image(self, context: Context, output: AbstractValue) -> None:
-        camera = self._pinhole
-        output.get_mutable_value().mutable_data[:] = draw_image(
-            self._query.Eval(context), self._parent, self._X_BC, camera
-        )
+        query, spoiled = self._query.Eval(context), self._spoiled
+        if spoiled is None:
+            output.get_mutable_value().mutable_data[:] = self._seen(query, self._X_BC)
+            return
+        flaws, places = spoiled.flaws, [self._X_BC]
+        if flaws.moves:
+            V_WP = self._velocities.Eval(context)[spoiled.body]
+            places = self._places(query, V_WP, flaws.instants)
+        image = flaws.expose(np.array([self._seen(query, place) for place in places]))
+        number = round(context.get_time() * spoiled.rate)
+        random = np.random.default_rng([spoiled.seed, _IMAGE_STREAM, number])
+        output.get_mutable_value().mutable_data[:] = flaws.spoil(image, random)
+
+    def _seen(self, query: QueryObject, X_BC: RigidTransform) -> np.ndarray:
+        """The image from a place on B, through the lens."""
+        drawn = draw_image(query, self._parent, X_BC, self._drawn)
+        return drawn if self._pinhole.distortion is None else lens_picture(drawn, self._pinhole)
+
+    def _places(
+        self, query: QueryObject, V_WP: SpatialVelocity, instants: Array
+    ) -> list[RigidTransform]:
+        """Poses in B from which the scene of now looks as it did before, at instants [s], from
+        where the camera was then."""
+        assert self._spoiled is not None
+        X_WP = query.GetPoseInWorld(self._spoiled.frame)
+        R_PW = X_WP.rotation().inverse()
+        V_P = np.concatenate([R_PW @ V_WP.rotational(), R_PW @ V_WP.translational()])
+        if self._parent == self._spoiled.frame:
+            return [exponential(V_P * t) @ self._X_BC for t in instants]
+        X_PB = X_WP.inverse() @ query.GetPoseInWorld(self._parent)
+        return [X_PB.inverse() @ exponential(-V_P * t) @ X_PB @ self._X_BC for t in instants]
 
 
 def draw_window(

@@ -16,6 +16,8 @@ from pydrake.systems.sensors import ImageRgba8U
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.servoing.circle_features import ELLIPSE_SIZE
+from cdpr_drake.vision.lens_picture import StraightPicture
+from cdpr_drake.vision.mark_reading import found_marks, moved_marks, read_marks
 from cdpr_drake.vision.pinhole import Pinhole
 from cdpr_drake.vision.target import Target
 
@@ -36,7 +38,9 @@ class TargetMeasurement(LeafSystem):
                                    told; only of targets that tell
     ======== ============== ====== ========================================================
 
-    Points of a target of which a part is seen are filled by their images at the pose X_CO.
+    Marks are in pixels of the ideal camera: where the lens distorts, or is believed to be another,
+    they are read by `Pinhole.read`. Points of a target of which a part is seen are filled by their
+    images at the pose X_CO.
 
     The image of time t is on the ports for a controller that acts at t, since it is taken by an
     unrestricted update, which Drake performs before the discrete updates of the same time; with
@@ -91,12 +95,16 @@ class TargetMeasurement(LeafSystem):
         return self._pose(values[: self._frame_size])
 
     def newest_marks(self, context: Context) -> Array | None:
-        """Marks in the newest image so far, without its bias, shape (target.size,) [px]; None: not
-        seen."""
-        frame = context.get_discrete_state(self._frames).value()[: self._frame_size]
-        if frame[0] == 0.0:
+        """Where marks are in the newest image so far, shape (target.size,) [px]; None: not seen."""
+        return self.newest_in_image(context.get_discrete_state(self._frames).value())
+
+    def newest_in_image(self, frames: Array) -> Array | None:
+        """As `newest_marks`, from the frames in the delay line."""
+        if frames[0] == 0.0:
             return None
-        marks = np.array(self.marks_of(frame))
+        marks = np.array(frames[self._marks])
+        if not self.pinhole.is_ideal:
+            marks = found_marks(marks, self.target.mark, self.target.size, self.pinhole)
         return marks if self.bias is None else shifted_marks(self.target, marks, -self.bias)
 
     def _take_image(self, context: Context, state: State) -> None:
@@ -119,16 +127,25 @@ class TargetMeasurement(LeafSystem):
         if marks is not None and len(marks) > self.target.size:
             values[self._quality] = marks[self.target.size :]
             marks = marks[: self.target.size]
-        if marks is not None and self.bias is not None:
-            marks = shifted_marks(self.target, marks, self.bias)
-        X_CO = None if marks is None else self.target.solve(marks, self.pinhole)
+        if marks is not None:
+            marks = self.read_marks(marks)
+        camera = self.pinhole.ideal
+        X_CO = None if marks is None else self.target.solve(marks, camera)
         if marks is not None and X_CO is not None:
             at = self._pose_at
             values[0] = 1.0
-            values[self._marks] = self.target.complete(marks, X_CO, self.pinhole)
+            values[self._marks] = self.target.complete(marks, X_CO, camera)
             values[at : at + 9] = X_CO.rotation().matrix().ravel()
             values[at + 9 : at + 12] = X_CO.translation()
         return values
+
+    def read_marks(self, marks: Array) -> Array:
+        """Marks in pixels of the ideal camera, of what was found in an image, bias included."""
+        if self.bias is not None:
+            marks = shifted_marks(self.target, marks, self.bias)
+        if self.pinhole.is_ideal:
+            return marks
+        return read_marks(marks, self.target.mark, self.target.size, self.pinhole)
 
     def _frame(self, context: Context) -> Array:
         return self.oldest(context.get_discrete_state(self._frames).value())
@@ -181,7 +198,8 @@ def shifted_marks(target: Target, marks: Array, shift: Array) -> Array:
 class TargetDetector(TargetMeasurement):
     """Finds a target in images by OpenCV, to fractions of a pixel, and its pose.
 
-    A target that is followed is looked for where the newest image had it, and then everywhere.
+    Where the camera is believed to have a lens it looks in `StraightPicture`s of the images. A
+    target that is followed is looked for where the newest image had it, and then everywhere.
 
     =========== ============== ==== ===================================================
     port        type           unit meaning
@@ -204,8 +222,30 @@ class TargetDetector(TargetMeasurement):
     ) -> None:
         """For one target, images at `rate` [Hz], latency in whole frames, bias as the base's."""
         super().__init__(target, pinhole, rate, latency_frames, image_bias)
+        reader = pinhole.believed or pinhole
+        self._straight = None if reader.distortion is None else StraightPicture(reader)
         self._image = self.DeclareAbstractInputPort("color_image", Value(ImageRgba8U()))
 
     def find_marks(self, context: Context) -> Array | None:
         """The target's marks in the image at the input, or None."""
-        return self.target.follow(self._image.Eval(context).data, self.newest_marks(context))
+        return self.find_in(self._image.Eval(context).data, self.newest_marks(context))
+
+    def find_in(self, image: np.ndarray, before: Array | None = None) -> Array | None:
+        """The target's marks in an image, or None.
+
+        Args:
+            image: Shape (height, width, 3 or 4), 8 bits a channel.
+            before: Where they were in the image before; None: it was not seen.
+        """
+        straight, size, mark = self._straight, self.target.size, self.target.mark
+        if straight is None:
+            return self.target.follow(image, before)
+        reader = self.pinhole.believed or self.pinhole
+        if before is not None:
+            before = moved_marks(
+                read_marks(before, mark, size, reader), mark, size, straight.from_ideal
+            )
+        marks = self.target.follow(straight.picture(image), before)
+        if marks is None:
+            return None
+        return found_marks(moved_marks(marks, mark, size, straight.to_ideal), mark, size, reader)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cdpr_drake.models.camera_catalogue import Distortion
 from cdpr_drake.models.robot_schema import Pose
 from cdpr_drake.schema.fields import array, number, optional_section, section, switch, text
 
@@ -60,6 +61,15 @@ class Perturbations:
     )
     image_bias: np.ndarray | None = array(
         "Shift (u, v) of everything that is measured in the image.", "px", (2,), None
+    )
+    camera_model: str | None = text(
+        "Camera by name, or path of a camera file, as whose the images of the servo's camera are "
+        "read; null: as which they are.",
+        None,
+    )
+    camera_distortion: Distortion | None = optional_section(
+        "What the lens is believed to do to images, of kind none: nothing; null: what that camera "
+        "says."
     )
     exit_points: float = number(
         "Distance of each assumed exit point from the true one, in a random direction.",

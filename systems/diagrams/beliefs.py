@@ -10,11 +10,14 @@ from pydrake.math import RigidTransform
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.poses import rotation_from_vector
 from cdpr_drake.geometry.straight_cables import PLANAR_ROWS
+from cdpr_drake.models.camera_catalogue import load_camera
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.servoing.servo_task import BelievedRobot
+from cdpr_drake.systems.cameras.camera_settings import servo_pinhole
 from cdpr_drake.systems.controllers.perturbation_settings import PoseShift
 from cdpr_drake.systems.scenarios.visual_servo_scenario import VisualServoSettings
+from cdpr_drake.vision.pinhole import Pinhole
 
 _POINTS, _INITIAL_POSE, _CAMERA, _WINCHES, _EXTERNAL_CAMERA, _TOLD_OBJECT = 1, 2, 3, 4, 5, 6
 """Streams of random numbers of one seed, so that one perturbation does not change another."""
@@ -58,6 +61,23 @@ def believed_robot(settings: VisualServoSettings, robot: Robot) -> BelievedRobot
         motions=motions,
         cable_speed=robot.winch.rated_cable_speed(),
     )
+
+
+def read_camera(settings: VisualServoSettings, robot: Robot) -> Pinhole:
+    """The servo's camera with the belief by which its images are read.
+
+    Raises:
+        RobotFileError: A camera is unknown, or its file describes none.
+    """
+    camera, wrong = servo_pinhole(settings.camera, robot), settings.perturbations
+    if wrong.camera_model is None and wrong.camera_distortion is None:
+        return camera
+    believed = camera
+    if wrong.camera_model is not None:
+        believed = load_camera(wrong.camera_model).pinhole(camera.width, camera.height)
+    if wrong.camera_distortion is not None:
+        believed = replace(believed, distortion=wrong.camera_distortion.lens())
+    return replace(camera, believed=believed)
 
 
 def believed_external_camera(settings: VisualServoSettings, robot: Robot) -> RigidTransform | None:

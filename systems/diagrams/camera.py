@@ -16,7 +16,7 @@ from cdpr_drake.servoing.servo_task import CameraMounting
 from cdpr_drake.systems.cameras.camera_settings import PROJECTED, REGION, CameraSettings
 from cdpr_drake.systems.cameras.projected_camera import ProjectedCamera
 from cdpr_drake.systems.cameras.region_camera import RegionCamera
-from cdpr_drake.systems.cameras.scene_picture import SceneCamera
+from cdpr_drake.systems.cameras.scene_picture import SceneCamera, SpoiledImages
 from cdpr_drake.systems.cameras.scene_target import SceneTarget
 from cdpr_drake.systems.cameras.target_measurement import TargetDetector, TargetMeasurement
 from cdpr_drake.systems.cameras.targets import TargetSettings
@@ -123,7 +123,7 @@ def add_camera(
         mounting: Where it is, and the target, if that is on the platform.
         pinhole: Its intrinsic parameters.
         X_WO: Pose of a target in the world [m]; only a projected camera needs it.
-        seed: Seed of the noise of a projected camera.
+        seed: Seed of the noise of a projected camera, or of spoiled images.
         image_bias: Shift (u, v) of all that is measured, shape (2,) [px]; none if None.
         name: Put before the names of the blocks "camera" and, if whole images are rendered,
             "detector".
@@ -156,7 +156,14 @@ def add_camera(
             image_bias=image_bias,
             name=prefix + "camera",
         )
-    sensor = add_sensor(builder, robot, mounting, pinhole, name=prefix + "camera")
+    spoiled = None if settings.flaws is None else SpoiledImages(
+        flaws=settings.flaws.flaws(),
+        rate=settings.rate,
+        seed=seed,
+        frame=robot.plant.GetBodyFrameIdOrThrow(robot.in_plant.body.index()),
+        body=int(robot.in_plant.body_index),
+    )  # fmt: skip
+    sensor = add_sensor(builder, robot, mounting, pinhole, spoiled, name=prefix + "camera")
     detector = TargetDetector(target, pinhole, settings.rate, settings.latency_frames, image_bias)
     builder.AddNamedSystem(prefix + "detector", detector)
     builder.Connect(sensor.GetOutputPort("color_image"), detector.GetInputPort("color_image"))
@@ -218,12 +225,17 @@ def add_sensor(
     robot: RobotBlock,
     mounting: CameraMounting,
     pinhole: Pinhole,
+    spoiled: SpoiledImages | None = None,
     *,
     name: str = "camera",
 ) -> SceneCamera:
     """Adds the rendering camera to a robot whose scene graph has a renderer."""
     frame = _camera_frame(robot, mounting)
-    sensor = builder.AddNamedSystem(name, SceneCamera(frame, mounting.X_BC, pinhole))
+    sensor = builder.AddNamedSystem(name, SceneCamera(frame, mounting.X_BC, pinhole, spoiled))
+    if sensor.HasInputPort("body_velocities"):
+        builder.Connect(
+            robot.GetOutputPort("body_velocities"), sensor.GetInputPort("body_velocities")
+        )
     builder.Connect(robot.GetOutputPort("query_object"), sensor.GetInputPort("query_object"))
     return sensor
 

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 
 from cdpr_drake.errors import VisualFeatureError
-from cdpr_drake.models.camera_catalogue import load_camera
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.servoing.controller import ServoController
 from cdpr_drake.servoing.feature_plan import FeaturePlan
@@ -22,6 +21,7 @@ from cdpr_drake.servoing.servo_law import (
 from cdpr_drake.servoing.servo_task import BelievedRobot, ServoTask, make_task
 from cdpr_drake.servoing.target_motion import MotionFilter
 from cdpr_drake.servoing.visual_features import Sighting, VisualFeatures
+from cdpr_drake.systems.cameras.camera_settings import servo_pinhole
 from cdpr_drake.systems.controllers.schemes import ideal_sighting, make_features
 from cdpr_drake.systems.controllers.servo_settings import PartitionSettings, SwitchSettings
 from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario, VisualServoSettings
@@ -123,8 +123,7 @@ def check_scheme(settings: Scenario, robot: Robot, target: Target) -> None:
             f"controller.scheme: found partitioned on {robot.name}, a planar robot; accepted "
             "there: pbvs, pbvs-line, ibvs, 2.5d, switching"
         )
-    camera = load_camera(robot.camera_mount(settings.camera.mount).model)
-    pinhole = camera.pinhole(settings.camera.width, settings.camera.height)
+    pinhole = servo_pinhole(settings.camera, robot)
     field = _partition(settings, pinhole).field
     if field is None or not isinstance(target, PointTarget):
         return

@@ -17,12 +17,14 @@ from cdpr_drake.errors import (
     VisualFeatureError,
 )
 from cdpr_drake.geometry.poses import adjoint
+from cdpr_drake.models.camera_catalogue import fold_problem
 from cdpr_drake.models.robot_holding import check_pulleys
 from cdpr_drake.models.robot_schema import Pose, Robot
 from cdpr_drake.numerics.explicit_integration import explicit_integrators
 from cdpr_drake.schema.typed_yaml import closest
 from cdpr_drake.servoing.point_features import interaction_rank
-from cdpr_drake.systems.cameras.camera_settings import check_camera
+from cdpr_drake.systems.cameras.camera_settings import REGION, WHOLE, check_camera, check_lens
+from cdpr_drake.systems.diagrams.beliefs import read_camera
 from cdpr_drake.systems.diagrams.controller import check_scheme, make_tasks
 from cdpr_drake.systems.diagrams.fusion_checks import check_sensor_fusion
 from cdpr_drake.systems.diagrams.tension_management import check_tension_management
@@ -162,6 +164,21 @@ def _check_mount(scenario: Scenario, robot: Robot, path: Path) -> None:
 
 def _check_camera(scenario: Scenario, robot: Robot, path: Path) -> None:
     check_camera(scenario.camera, path)
+    check_lens(scenario.camera, robot, path)
+    wrong, where = scenario.perturbations, f"{path}: perturbations"
+    if wrong.camera_distortion is not None and wrong.camera_distortion.problem():
+        raise ScenarioError(f"{where}.camera_distortion.{wrong.camera_distortion.problem()}")
+    try:
+        camera = read_camera(scenario, robot)
+    except RobotFileError as problem:
+        raise ScenarioError(*problem.within(f"{where}.camera_model")) from problem
+    if camera.believed is not None and fold_problem(camera.believed):
+        raise ScenarioError(f"{where}.camera_distortion: {fold_problem(camera.believed)}")
+    if camera.believed is not None and scenario.camera.region == REGION:
+        raise ScenarioError(
+            f"{path}: camera.region: found {REGION} with a camera that is believed to be another; "
+            f"accepted: {WHOLE}"
+        )
 
 
 def _check_poses(scenario: Scenario, robot: Robot, path: Path) -> None:

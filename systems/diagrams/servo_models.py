@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 from pydrake.math import RigidTransform
 
-from cdpr_drake.models.camera_catalogue import load_camera
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.servoing.controller import ServoController
 from cdpr_drake.servoing.pose_features import seen_pose_error
@@ -17,6 +16,7 @@ from cdpr_drake.systems.controllers.planned_pose_servo import PlannedPoseServo
 from cdpr_drake.systems.diagrams.beliefs import (
     believed_external_camera,
     believed_robot,
+    read_camera,
     told_object,
 )
 from cdpr_drake.systems.diagrams.controller import make_controller
@@ -39,7 +39,7 @@ class ServoModel:
         target: What the camera looks at.
         motion: How the target moves in its carrier.
         mounting: Where camera and target truly are.
-        pinhole: The camera's intrinsic parameters.
+        pinhole: The camera's intrinsic parameters, its lens, and as which it is read.
         X_CdO: Desired pose of the target in the camera, that of the last task [m].
         begins: Time at which the last task takes over [s].
         controller: The law.
@@ -165,7 +165,7 @@ def servo_model(settings: VisualServoSettings, robot: Robot) -> ServoModel:
     last_task = settings.tasks()[-1]
     X_CdO = last_task.desired.transform()
     believed = believed_robot(settings, robot)
-    pinhole = load_camera(mount.model).pinhole(settings.camera.width, settings.camera.height)
+    pinhole = read_camera(settings, robot)
     return ServoModel(
         robot=robot,
         believed=believed,

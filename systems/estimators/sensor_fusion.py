@@ -199,7 +199,7 @@ class SensorFusion(PoseEstimator):
             if np.any(p_C[2] <= NEAREST):
                 shown["fused_found"] = np.zeros(1)
             elif eye is not None:
-                shown["fused_marks"] = eye.pinhole.project(p_C).T.ravel()
+                shown["fused_marks"] = eye.pinhole.ideal.project(p_C).T.ravel()
         return shown
 
     def belief(self, context: Context) -> FusedBelief:

@@ -10,6 +10,7 @@ from typing import Any, Protocol, TypeVar
 import yaml
 
 from cdpr_drake.errors import RobotFileError, ScenarioError
+from cdpr_drake.models.camera_catalogue import resolved_camera
 from cdpr_drake.models.exit_points import MARK as RAILS_MARK
 from cdpr_drake.models.formats.detection import SUFFIXES as ROBOT_SUFFIXES
 from cdpr_drake.models.mechanism_files import mechanism_names
@@ -213,6 +214,10 @@ def load_with_robot(schema: type[S], name: str, overrides: Sequence[str]) -> tup
     if trajectory is not None and getattr(trajectory, "file", None) is not None:
         trajectory.file = resolve_file_path(path, trajectory.file)
     perturbations = getattr(scenario, "perturbations", None)
+    camera = getattr(scenario, "camera", None)
+    for section, key in ((camera, "model"), (perturbations, "camera_model")):
+        if getattr(section, key, None) is not None:
+            setattr(section, key, resolved_camera(getattr(section, key), path.parent))
     if getattr(perturbations, "believed_robot", None) is not None:
         _check_belief(scenario, robot, path)
     return scenario, robot, path

@@ -264,7 +264,7 @@ IMPOSSIBLE = {
     "unknown camera": (
         changed("cameras", 0, "model", to="webcam"),
         "cameras[0].model: found webcam",
-        "one of astra, ids_kowa, mt4018",
+        "one of astra, ids_kowa, mt4018, or the path of a camera file",
     ),
     "a mounting's name twice": (
         _two_mounts_of_one_name(),

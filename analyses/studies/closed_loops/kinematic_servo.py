@@ -10,7 +10,7 @@ from pydrake.math import RigidTransform
 from cdpr_drake.analyses.studies.closed_loops.servo_models import PerturbedServo
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.poses import exponential
-from cdpr_drake.models.camera_catalogue import load_camera
+from cdpr_drake.systems.cameras.camera_settings import servo_pinhole
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
 
 STEP = 0.02
@@ -48,8 +48,7 @@ def kinematic_path(servo: PerturbedServo, X_WP: RigidTransform) -> KinematicPath
     Source: servoing thesis (1.40).
     """
     settings = servo.scenario.camera
-    mount = servo.robot.camera_mount(settings.mount)
-    pinhole = load_camera(mount.model).pinhole(settings.width, settings.height)
+    pinhole = servo_pinhole(settings, servo.robot)
     frame = servo.robot.frame
     local = servo.scenario.controller.scheme == "ibvs"
     poses, errors = [], []

@@ -29,13 +29,13 @@ from cdpr_drake.geometry.poses import (
     pose_row,
     pose_rows_distance,
 )
-from cdpr_drake.models.camera_catalogue import load_camera
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.stability.desired_view import FixedObject
 from cdpr_drake.stability.perturbation_bounds import PerturbationBounds, vector_size
 from cdpr_drake.stability.perturbation_samples_kernel import draw_perturbations
 from cdpr_drake.stability.stability_case import StabilityCase
 from cdpr_drake.stability.verdict import VerdictOptions, judge_stability, worst_perturbations
+from cdpr_drake.systems.cameras.camera_settings import servo_pinhole
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.loops.loop_choice import choose_compiled_loop
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
@@ -262,8 +262,7 @@ def stable_starts(scheme: str, count: int) -> Starts:
         raise StabilityError("closed loop: the desired pose is not stable, or cannot be held")
     random = np.random.default_rng([SEED, 7])
     settings = servo.scenario.camera
-    mount = servo.robot.camera_mount(settings.mount)
-    pinhole = load_camera(mount.model).pinhole(settings.width, settings.height)
+    pinhole = servo_pinhole(settings, servo.robot)
     widest = np.radians([TILT_DEG, TILT_DEG, YAW_DEG])
     rows: list[Array] = []
     drawn = not_held = not_seen = not_stable = 0

@@ -1,0 +1,114 @@
+"""`cdpr calibrate-camera`: from drawn images to a camera that scenarios take."""
+
+import json
+
+import cv2
+import numpy as np
+import pytest
+
+import cdpr_drake as cdpr
+from cdpr_drake.cli import main
+from cdpr_drake.models.camera_catalogue import load_camera
+from cdpr_drake.systems.diagrams.load import load_scenario
+from tests.messages import printed
+from tests.vision.boards import board_image, board_poses, make_board
+
+K = np.array([[520.0, 0.0, 331.2], [0.0, 518.0, 236.4], [0.0, 0.0, 1.0]])
+LENS = np.array([-0.28, 0.09, 0.0012, -0.0008, 0.0])
+FOCAL = 0.005  # share of the focal length; of eight drawn images
+BOARD = ("--board", "charuco", "--squares", "9x7", "--size", "0.035")
+
+
+def ended(*arguments):
+    """Exit code of the command."""
+    with pytest.raises(SystemExit) as end:
+        main(["calibrate-camera", *arguments])
+    return end.value.code
+
+
+@pytest.fixture(scope="module")
+def images(tmp_path_factory):
+    """Files of drawn images, one of them without a board."""
+    folder, board = tmp_path_factory.mktemp("boards"), make_board("charuco")
+    files = []
+    for k, pose in enumerate(board_poses(board, 10, 0.45, spread=0.35)):
+        path = folder / f"board_{k}.png"
+        cv2.imwrite(str(path), board_image(board, K, LENS, (640, 480), pose))
+        files.append(str(path))
+    empty = folder / "empty.png"
+    cv2.imwrite(str(empty), np.full((480, 640), 128, np.uint8))
+    return [*files, str(empty)]
+
+
+def test_images_become_a_camera_that_scenarios_take(images, tmp_path, capsys):
+    out = tmp_path / "camera"
+    assert ended(*images, *BOARD, "--json", "--out", str(out)) == 0
+    numbers = json.loads(capsys.readouterr().out)
+    assert numbers == json.loads((out / "results.json").read_text(encoding="utf-8"))
+    values = {row["name"]: row["value"] for row in numbers["parameters"]}
+    assert values["fx"] == pytest.approx(520.0, rel=FOCAL)
+    assert values["fy"] == pytest.approx(518.0, rel=FOCAL)
+    assert all(row["std"] > 0.0 for row in numbers["parameters"])
+    assert numbers["fitted_rms_px"] < 0.3
+    assert numbers["held_out_rms_px"] < 0.5
+    assert [row["role"] for row in numbers["images"]].count("held out") == 2
+    assert any("empty.png" in words for words in numbers["remarks"])
+    assert (out / "camera.png").stat().st_size > 10_000
+    pinhole = load_camera(str(out / "camera.yaml")).pinhole(640, 480)
+    for name in ("fx", "fy", "cx", "cy"):
+        assert getattr(pinhole, name) == pytest.approx(values[name], abs=1e-9)
+    assert pinhole.distortion.coefficients[:5] == pytest.approx(
+        [values[name] for name in ("k1", "k2", "p1", "p2", "k3")], abs=1e-15
+    )
+    scenario = load_scenario("acrobot_pbvs", [f"camera.model={out / 'camera.yaml'}"])
+    assert scenario.camera.model == str(out / "camera.yaml")
+
+
+def test_the_front_door_gives_what_the_command_writes(images):
+    board = cdpr.CalibrationBoard("charuco", 9, 7, 0.035)
+    found = cdpr.calibrate_camera(images, board, name="mine", rate=25.0)
+    assert found.folder is None
+    assert (found.camera.name, found.camera.rate_hz) == ("mine", 25.0)
+    assert "held out" in repr(found)
+    assert len(found.tables()) == 4
+    pictures = [cv2.imread(name) for name in images]
+    again = cdpr.calibrate_camera(pictures, board)
+    np.testing.assert_allclose(again.fit.values, found.fit.values, rtol=1e-9)
+    with pytest.raises(cdpr.CdprError, match="sharp: unknown"):
+        cdpr.calibrate_camera(images, board, sharp=True)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"--squares": "9"}, "--squares: found '9'"),
+        ({"--size": "-1"}, "--size: found -1"),
+        ({"--model": "plumb"}, "--model: found 'plumb'"),
+        ({"--hold-out": "0.8"}, "--hold-out: found 0.8"),
+        ({"--rate": "0"}, "--rate: found 0"),
+        ({"--board": "dots"}, "--board: found 'dots'"),
+    ],
+)
+def test_wrong_options_are_refused(images, tmp_path, capsys, changes, words):
+    options = dict(zip(BOARD[::2], BOARD[1::2], strict=True)) | changes
+    flat = [word for pair in options.items() for word in pair]
+    out = tmp_path / "no"
+    assert ended(*images[:5], *flat, "--out", str(out)) == 2
+    assert words in printed(capsys.readouterr()).err
+    assert not out.exists()
+
+
+def test_images_that_are_none_or_too_few_are_refused(images, tmp_path, capsys):
+    other = tmp_path / "other.png"
+    cv2.imwrite(str(other), np.full((100, 100), 128, np.uint8))
+    (tmp_path / "text.png").write_text("no picture", encoding="utf-8")
+    for files, words in (
+        (images[:3], "images: found the board in 3; accepted: at least 5"),
+        ([images[0], str(other)], "other.png: found 100 x 100 pixels"),
+        ([str(tmp_path / "text.png")], "text.png: found no image"),
+        ([str(tmp_path / "nothing.png")], "nothing.png: found no image"),
+    ):
+        out = tmp_path / "no"
+        assert ended(*files, *BOARD, "--out", str(out)) == 2
+        assert words in printed(capsys.readouterr()).err
+        assert not out.exists()

@@ -1,0 +1,166 @@
+"""Cameras from images of boards, against cameras that are known: OpenCV's projection and boards."""
+
+import cv2
+import numpy as np
+import pytest
+
+from cdpr_drake.errors import CameraCalibrationError
+from cdpr_drake.vision.calibration_boards import CalibrationBoard
+from cdpr_drake.vision.camera_fit import View, fit_camera
+from tests.vision.boards import board_image, board_poses, make_board
+
+SIGMAS = 3.5
+"""Errors over their standard deviations, the largest of nine: 3 is passed by one in forty such
+sets, 3.5 by one in 240."""
+
+IMAGE_FOCAL = 0.004
+"""Share of a focal length by which detection in drawn images may be off: a tenth of a pixel of 40
+of a square; 0.002 was measured."""
+
+IMAGE_CENTRE = 1.5  # [px] of the principal point from drawn images; 0.4 was measured
+SIZE = (640, 480)
+K = np.array([[520.0, 0.0, 331.2], [0.0, 518.0, 236.4], [0.0, 0.0, 1.0]])
+LENSES = {
+    "none": np.zeros(0),
+    "brown_conrady": np.array([-0.28, 0.09, 0.0012, -0.0008, 0.0]),
+    "fisheye": np.array([-0.03, 0.006, -0.002, 1e-4]),
+}
+
+
+def projected(name, count=20, noise=0.1, poses=None):
+    """Corners of a board as OpenCV projects them, with noise; those in the image."""
+    board = make_board("chessboard")
+    y, x = np.mgrid[: board.rows - 1, : board.columns - 1]
+    points = board.size * np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
+    random, views = np.random.default_rng(7), []
+    for k, (R, p) in enumerate(poses or board_poses(board, count, 0.42)):
+        r = cv2.Rodrigues(R)[0]
+        if name == "fisheye":
+            uv = cv2.fisheye.projectPoints(points.reshape(-1, 1, 3), r, p, K, LENSES[name])[0]
+        else:
+            uv = cv2.projectPoints(points, r, p, K, LENSES[name])[0]
+        uv = uv.reshape(-1, 2) + noise * random.standard_normal((len(points), 2))
+        seen = np.all((uv > 0.0) & (uv < np.array(SIZE) - 1.0), axis=1)
+        if np.count_nonzero(seen) >= 20:
+            views.append(View(f"image {k}", points[seen], uv[seen]))
+    return views
+
+
+def truth(name):
+    return np.array([K[0, 0], K[1, 1], K[0, 2], K[1, 2], *LENSES[name]])
+
+
+@pytest.mark.parametrize("name", LENSES)
+def test_a_known_camera_comes_back_within_its_standard_deviations(name):
+    fit = fit_camera(projected(name), SIZE, name)
+    off = (fit.values - truth(name)) / fit.deviations
+    assert np.max(np.abs(off)) < SIGMAS
+    assert len(fit.names) == len(fit.values)
+    # Noise of 0.1 px along each axis is 0.14 px of distance; poses take a little of it.
+    assert fit.rms("fitted") == pytest.approx(0.1 * np.sqrt(2.0), rel=0.1)
+    assert fit.rms("held out") == pytest.approx(0.1 * np.sqrt(2.0), rel=0.15)
+
+
+def test_standard_deviations_are_those_of_opencv():
+    views = projected("brown_conrady")
+    fit = fit_camera(views, SIZE, hold_out=0.0)
+    deviations = cv2.calibrateCameraExtended(
+        [v.points.astype(np.float32) for v in views], [v.uv.astype(np.float32) for v in views],
+        SIZE, None, None,
+    )[5].ravel()[:9]  # fmt: skip
+    np.testing.assert_allclose(fit.deviations, deviations, rtol=0.02)
+
+
+def test_standard_deviations_of_a_fisheye_are_those_of_many_fits():
+    """OpenCV has none; the spread over noise is what they say."""
+    fits = []
+    for seed in range(12):
+        views = projected("fisheye", noise=0.0)
+        random = np.random.default_rng(seed)
+        noisy = [v._replace(uv=v.uv + 0.1 * random.standard_normal(v.uv.shape)) for v in views]
+        fits.append(fit_camera(noisy, SIZE, "fisheye", hold_out=0.0))
+    spread = np.std([fit.values for fit in fits], axis=0, ddof=1)
+    told = np.mean([fit.deviations for fit in fits], axis=0)
+    assert np.all((spread / told > 0.5) & (spread / told < 1.7))
+
+
+def test_held_out_images_are_evenly_chosen_and_not_fitted():
+    views = projected("brown_conrady")
+    fit = fit_camera(views, SIZE)
+    held = [view.name for view in fit.views if view.role == "held out"]
+    assert len(held) == round(0.2 * len(views))
+    shifted = [v._replace(uv=v.uv + 25.0) if v.name in held else v for v in views]
+    again = fit_camera(shifted, SIZE)
+    # OpenCV adds up in threads, in no order.
+    np.testing.assert_allclose(again.values, fit.values, rtol=1e-9)
+
+
+def test_an_image_that_fits_far_worse_is_named_and_left_out():
+    views = projected("brown_conrady")
+    held = {view.name for view in fit_camera(views, SIZE).views if view.role == "held out"}
+    bad = next(k for k, view in enumerate(views) if view.name not in held)
+    random = np.random.default_rng(2)
+    wrong = views[bad].uv + 4.0 * random.standard_normal(views[bad].uv.shape)
+    views[bad] = views[bad]._replace(uv=wrong)
+    fit = fit_camera(views, SIZE)
+    assert [view.name for view in fit.views if view.role == "outlier"] == [views[bad].name]
+    assert np.max(np.abs((fit.values - truth("brown_conrady")) / fit.deviations)) < SIGMAS
+    kept = fit_camera(views, SIZE, keep_outliers=True)
+    assert not any(view.role == "outlier" for view in kept.views)
+    assert kept.rms("fitted") > 3.0 * fit.rms("fitted")
+
+
+@pytest.mark.parametrize("kind", ["charuco", "tags", "chessboard"])
+def test_drawn_images_give_the_camera_that_drew_them(kind):
+    board, views, lens = make_board(kind), [], LENSES["brown_conrady"]
+    for k, pose in enumerate(board_poses(board, 9, 0.45, spread=0.35)):
+        found = board.find(board_image(board, K, lens, SIZE, pose))
+        if found is not None:
+            views.append(View(str(k), *found))
+    assert len(views) >= 5
+    fit = fit_camera(views, SIZE, hold_out=0.0)
+    np.testing.assert_allclose(fit.values[:2], np.diag(K)[:2], rtol=IMAGE_FOCAL)
+    np.testing.assert_allclose(fit.values[2:4], K[:2, 2], rtol=0.0, atol=IMAGE_CENTRE)
+
+
+@pytest.mark.parametrize(
+    ("views", "options", "words"),
+    [
+        (lambda: projected("none", 3), {}, "found the board in 3; accepted: at least 5"),
+        (lambda: projected("none"), {"model": "plumb"}, "model: found 'plumb'"),
+        (lambda: projected("none"), {"hold_out": 0.9}, "hold_out: found 0.9"),
+        (lambda: projected("none", poses=flat()), {"model": "none"}, "deg of parallel"),
+    ],
+    ids=["few", "model", "share", "parallel"],
+)
+def test_images_that_do_not_tell_the_camera_are_refused(views, options, words):
+    with pytest.raises(CameraCalibrationError, match=words):
+        fit_camera(views(), SIZE, **options)
+
+
+def flat():
+    """Boards that all face the camera."""
+    shifts = [(-0.1, -0.05), (0.05, 0.02), (-0.15, -0.1), (0.0, 0.0), (-0.1, 0.0), (-0.05, -0.08)]
+    return [(np.eye(3), np.array([x - 0.05, y - 0.05, 0.5 + 0.1 * x])) for x, y in shifts]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("circles", 9, 7, 0.03), "board: found 'circles'"),
+        (("charuco", 2, 7, 0.03), "squares: found 2x7"),
+        (("charuco", 9, 7, 0.0), r"size: found 0 \[m\]"),
+        (("charuco", 9, 7, 0.03, 0.04), "marker: found 0.04"),
+        (("chessboard", 9, 7, 0.03, 0.02), "found markers on a chessboard"),
+        (("tags", 4, 3, 0.03, None, "7X7_9"), "markers: found '7X7_9'"),
+    ],
+)
+def test_what_is_no_board_is_refused(arguments, words):
+    with pytest.raises(CameraCalibrationError, match=words):
+        CalibrationBoard(*arguments)
+
+
+def test_no_board_is_found_where_there_is_none():
+    gray = np.full((240, 320), 200, np.uint8)
+    for kind in ("charuco", "tags", "chessboard"):
+        assert make_board(kind).find(gray) is None
