@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from cdpr_drake.analyses.benchmarks.constraints import constraint_rows
 from cdpr_drake.analyses.benchmarks.cameras import camera_rows
+from cdpr_drake.analyses.benchmarks.constraints import constraint_rows
 from cdpr_drake.analyses.benchmarks.design import design_rows
 from cdpr_drake.analyses.benchmarks.identification import calibration_rows, identification_rows
 from cdpr_drake.analyses.benchmarks.planning import planning_rows

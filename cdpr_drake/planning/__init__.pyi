@@ -2,8 +2,7 @@ from .free_path import FreePathProgram as FreePathProgram
 from .input_shaping import make_shaper as make_shaper
 from .path_task import sample_motion as sample_motion
 from .path_timing import plan_along_path as plan_along_path
-from .proven_path import proven_motion as proven_motion
-from .proven_path import proven_path as proven_path
+from .path_timing_program import PathTimingProgram as PathTimingProgram
 from .place_constraints import CableClearance as CableClearance
 from .place_constraints import ObstacleClearance as ObstacleClearance
 from .place_constraints import PlaceWithin as PlaceWithin
@@ -13,12 +12,13 @@ from .place_constraints import TargetInView as TargetInView
 from .pose_coordinates import BodyState as BodyState
 from .pose_coordinates import PlaceAndAngles as PlaceAndAngles
 from .pose_coordinates import RelativePose as RelativePose
+from .proven_path import proven_motion as proven_motion
+from .proven_path import proven_path as proven_path
+from .reconfiguration import Rails as Rails
+from .reconfiguration import RailTask as RailTask
+from .reconfiguration import ReconfigurationProgram as ReconfigurationProgram
 from .servo_constraint import StableServo as StableServo
 from .tension_constraints import LengthAccelerations as LengthAccelerations
 from .tension_constraints import LengthRates as LengthRates
 from .tension_constraints import TensionBalance as TensionBalance
 from .tension_constraints import TensionFeasible as TensionFeasible
-from .reconfiguration import Rails as Rails
-from .reconfiguration import RailTask as RailTask
-from .reconfiguration import ReconfigurationProgram as ReconfigurationProgram
-from .path_timing_program import PathTimingProgram as PathTimingProgram
