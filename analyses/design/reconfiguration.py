@@ -33,7 +33,8 @@ from cdpr_drake.schema.fields import array, number, sections, texts
 from cdpr_drake.schema.typed_yaml import closest, load_typed
 from cdpr_drake.summaries import Summarized, numbers
 from cdpr_drake.workspaces.box_expansion_kernel import INSIDE
-from cdpr_drake.workspaces.certified_boxes import CertifiedKind, CertifyTask, PoseBox, certify
+from cdpr_drake.workspaces.box_judges import CertifiedKind, CertifyTask
+from cdpr_drake.workspaces.certified_boxes import PoseBox, certify
 from cdpr_drake.workspaces.demanded_wrenches import SpatialSet
 from cdpr_drake.workspaces.static_feasibility import wrench_matrices
 

@@ -49,6 +49,9 @@ from cdpr_drake.winches.drum import Drum
 NO_WORSE = 1e-6
 """Share of a cost by which rounding may make an end worse than its start."""
 
+AT_BOUND = 1e-4
+"""Share of a bound within which a parameter is told to be at it: interior point solvers stop there."""
+
 MOST_ROUNDS = 10
 """Times that outliers are dropped and the rest is solved again."""
 
@@ -116,7 +119,7 @@ class CalibrationProgram(OwnTerms):
         self._theta = np.empty(0, object)
         self._own_poses: list[npt.NDArray[np.object_]] = []
         self._costs: list[StationCost] = []
-        self._bounds = np.full(self.layout.size, np.inf)
+        self._largest = np.full(self.layout.size, np.inf)
 
     def AddLengths(
         self,
@@ -166,6 +169,7 @@ class CalibrationProgram(OwnTerms):
         Raises:
             CalibrationError: A shape or sigma is not accepted.
         """
+        self._still_grows("AddZeroedCables")
         readings = self._table("lengths", readings)
         strain, advantage = more.get("strain"), more.get("advantage")
         blank = np.zeros(readings.shape)
@@ -197,6 +201,7 @@ class CalibrationProgram(OwnTerms):
         Raises:
             CalibrationError: A shape or sigma is not accepted.
         """
+        self._still_grows("AddTrackedPoints")
         points = np.asarray(points, float)
         if points.shape != (self.stations.count, 3):
             raise CalibrationError(
@@ -332,8 +337,9 @@ class CalibrationProgram(OwnTerms):
 
     def AddBound(self, patterns: Sequence[str], most: float) -> None:
         """Parameters change by no more than this, each in its unit; `prog()` has bounds, too."""
+        self._still_grows("AddBound")
         _positive("bound", most)
-        self._bounds[self.layout.select(patterns)] = most
+        self._largest[self.layout.select(patterns)] = most
 
     def names(self) -> tuple[str, ...]:
         """Names of the unknown parameters."""
@@ -390,11 +396,11 @@ class CalibrationProgram(OwnTerms):
                 a pose is not determined; the start is impossible; or the end is worse.
         """
         at = self.at() if start is None else start
-        if np.isinf(self._bounds[self.free]).all() or self.has_own_terms:
+        if np.isinf(self._largest[self.free]).all() or self.has_own_terms:
             return self._solve(self.free, at, outliers, straight)[0]
         found, held = solve_within(
             lambda free, begin: self._solve(free, begin, outliers, straight),
-            self.free, self._bounds, at, self.model,
+            self.free, self._largest, at, self.model,
         )  # fmt: skip
         return replace(found, at_bounds={self.layout.names[k]: v for k, v in held.items()})
 
@@ -456,7 +462,7 @@ class CalibrationProgram(OwnTerms):
     def _bounds_met(self, at: Point) -> dict[str, float]:
         """Parameters at their bounds, by name, and by how much they changed."""
         step = model_difference(at.model, self.model)
-        met = self.free & (np.abs(step) >= (1.0 - NO_WORSE) * self._bounds)
+        met = self.free & (np.abs(step) >= (1.0 - AT_BOUND) * self._largest)
         return {self.layout.names[k]: float(step[k]) for k in np.flatnonzero(met)}
 
     def _step_on(self, problem: LeastSquares, found: Minimum) -> tuple[Minimum, str, str]:
@@ -472,7 +478,7 @@ class CalibrationProgram(OwnTerms):
             x, solver, said = self._solve_whole(self._steps_to(found.at), what)
             at = self._point(x, start)
             return Minimum(at, problem.cost(at), 1, True), solver, said
-        heard, most = ["", ""], self._bounds[self.free] / self.layout.typical[self.free]
+        heard, most = ["", ""], self._largest[self.free] / self.layout.typical[self.free]
 
         def solve(H: Array, g: Array, x: Array) -> Array:
             step = MathematicalProgram()
@@ -586,7 +592,7 @@ class CalibrationProgram(OwnTerms):
         program = MathematicalProgram()
         self._theta = theta = _variables(self.names())
         program.AddDecisionVariables(theta)
-        most = self._bounds[self.free] / self.layout.typical[self.free]
+        most = self._largest[self.free] / self.layout.typical[self.free]
         if np.isfinite(most).any():
             program.AddBoundingBoxConstraint(-most, most, theta)
         labels = problem.freedom.labels(start.stations.width)

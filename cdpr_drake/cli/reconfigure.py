@@ -34,7 +34,7 @@ from cdpr_drake.cli.options import (
     parse_formats,
     parse_limits,
 )
-from cdpr_drake.cli.plan import one_pose
+from cdpr_drake.cli.proven_options import one_pose
 from cdpr_drake.cli.run_endings import report_failures, report_kept_files, report_recovered
 from cdpr_drake.cli.terminal import message_console, print_json, wide_console, working
 from cdpr_drake.errors import CdprError

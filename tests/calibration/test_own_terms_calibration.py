@@ -46,7 +46,7 @@ def slope(found, extra=lambda v: 0.0):
     problem = program.least_squares()
     end = program.at(found.stations)
     end = type(end)(found.model, found.stations, end.layout)
-    columns = problem.columns(end)
+    columns = problem.freedom.columns(end.stations.width)
     free = np.flatnonzero(program.free)
 
     def cost(step, steps):
@@ -183,3 +183,24 @@ def test_bad_input_is_one_line(change, words):
     with pytest.raises(CalibrationError, match=words) as refused:
         change(made())
     assert "\n" not in str(refused.value)
+
+
+def test_a_bound_holds_beside_own_terms():
+    """An own cost that is almost none: the bounded search without it is the oracle."""
+    most, found = 4e-4, []
+    for own in (False, True):
+        program = made()
+        program.AddBound(["C3.exit_point.*"], most)
+        if own:
+            program.AddQuadraticCost(0.0, 1e-6, of="C3.exit_point.*", name="almost nothing")
+        found.append(program.Solve(outliers=False))
+    bounded, both = found
+    assert bounded.at_bounds
+    assert set(both.at_bounds) == set(bounded.at_bounds)
+    where = [k for k, name in enumerate(both.names) if name not in bounded.at_bounds]
+    values = dict(zip(bounded.names, bounded.values, strict=True))
+    np.testing.assert_allclose(
+        both.values[where], [values[both.names[k]] for k in where], atol=SHARE * np.min(bounded.std)
+    )
+    for name, value in bounded.at_bounds.items():
+        assert both.at_bounds[name] == pytest.approx(value, rel=1e-4)
