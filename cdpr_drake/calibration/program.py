@@ -50,7 +50,7 @@ NO_WORSE = 1e-6
 """Share of a cost by which rounding may make an end worse than its start."""
 
 AT_BOUND = 1e-4
-"""Share of a bound within which a parameter is told to be at it: interior point solvers stop there."""
+"""Share of a bound within which a parameter is told to be at it, where interior points stop."""
 
 MOST_ROUNDS = 10
 """Times that outliers are dropped and the rest is solved again."""
