@@ -47,7 +47,7 @@ def rails_figure(found: Reconfiguration) -> Figure:
         space.plot(*places, "x", color=DARK, label="Po at the poses")
         space.set(xlabel="x [m]", ylabel="y [m]", zlabel="z [m]")
         space.set_aspect("equal")
-        space.legend(loc="lower center", bbox_to_anchor=(0.5, -0.11), ncols=3, fontsize="small")
+        space.legend(loc="upper left", bbox_to_anchor=(-0.2, 1.05), ncols=1, fontsize="small")
         bars = figure.add_subplot(1, 2, 2)
         number = np.arange(1, len(task.poses) + 1)
         for shift, values, colour, hatch, label in (
