@@ -7,11 +7,13 @@ from scipy.optimize import linprog
 
 from cdpr_drake.analyses.planning.robot_path_task import LimitSettings, make_path, path_task
 from cdpr_drake.analyses.reporting.timing import TimingRow, interleaved, processor_seconds
+from cdpr_drake.analyses.workspaces.static_feasible import static_case
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.poses import pose_from_angles
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.planning.path_task import PathTask
 from cdpr_drake.planning.path_timing import plan_along_path
+from cdpr_drake.planning.reconfiguration import Rails, RailTask, ReconfigurationProgram
 from cdpr_drake.trajectories.pose_path import PosePath
 from cdpr_drake.workspaces.demanded_wrenches import SpatialSet
 
@@ -33,7 +35,7 @@ POSES = [
 def planning_rows(quick: bool) -> list[TimingRow]:
     """All rows of this file; `quick` repeats less."""
     repeats = 3 if quick else 7
-    return [path_row(repeats), resistance_row(repeats)]
+    return [path_row(repeats), resistance_row(repeats), rails_row(repeats)]
 
 
 def path_row(repeats: int) -> TimingRow:
@@ -83,6 +85,39 @@ def resistance_row(repeats: int) -> TimingRow:
     name = f"{ROBOT}: plan that resists {len(resisting.resist)} wrenches"
     baseline = "the plan without"
     return TimingRow(name, own, "ms", baseline, other, own / other, ratio_means="times as long")
+
+
+def rails_row(repeats: int) -> TimingRow:
+    """The best place of two exit points on rails, against all places of a grid of 9 by 9."""
+    robot = load_robot("planar")
+    bases = robot.exit_points()
+    directions = np.zeros((2, *bases.shape))
+    directions[0, 1, 0] = directions[1, 1, 2] = 1.0
+    most = np.full(2, 0.2)
+    rails = Rails(directions, -most, most, np.zeros(2), bases)
+    poses = [
+        pose_from_angles(np.array([x, y, robot.plane_height]), np.zeros(3))
+        for x, y in ((0.15, 0.1), (-0.1, -0.15))
+    ]
+    task = RailTask(static_case(robot, TENSIONS), rails, poses)
+    places = [
+        np.array([a, b]) for a in np.linspace(-0.2, 0.2, 9) for b in np.linspace(-0.2, 0.2, 9)
+    ]
+
+    def ours() -> None:
+        program = ReconfigurationProgram(task)
+        program.AddLargestMargin()
+        program.Solve(2)
+
+    def grid() -> None:
+        for place in places:
+            task.margins(place)
+
+    works = [lambda: 1e3 * processor_seconds(ours), lambda: 1e3 * processor_seconds(grid)]
+    own, other = interleaved(works, repeats)
+    name = "planar: two exit points on rails, two starts"
+    baseline = "81 places, HiGHS by scipy"
+    return TimingRow(name, own, "ms", baseline, other, other / own, ratio_means="times faster")
 
 
 def station_programs(task: PathTask, path: PosePath, places: Array) -> list[dict[str, object]]:

@@ -27,7 +27,7 @@ def rails_figure(found: Reconfiguration) -> Figure:
     after = rails.exit_points(found.solution.coordinates)
     ends = rails.exit_points(rails.lower), rails.exit_points(rails.upper)
     title = f"{found.before.name}: exit points on rails, before and after, and margins"
-    figure = bare_figure((11.0, 5.2), title)
+    figure = bare_figure((11.0, 6.0), title)
     with styled():
         space = figure.add_subplot(1, 2, 1, projection="3d")
         for k in range(before.shape[1]):
@@ -47,7 +47,7 @@ def rails_figure(found: Reconfiguration) -> Figure:
         space.plot(*places, "x", color=DARK, label="Po at the poses")
         space.set(xlabel="x [m]", ylabel="y [m]", zlabel="z [m]")
         space.set_aspect("equal")
-        space.legend(loc="upper left", bbox_to_anchor=(-0.2, 1.0), fontsize="small")
+        space.legend(loc="upper left", bbox_to_anchor=(-0.2, 1.05), ncols=1, fontsize="small")
         bars = figure.add_subplot(1, 2, 2)
         number = np.arange(1, len(task.poses) + 1)
         for shift, values, colour, hatch, label in (
@@ -62,7 +62,9 @@ def rails_figure(found: Reconfiguration) -> Figure:
             markersize=5.0, linestyle="none", label="after, over pulleys",
         )  # fmt: skip
         bars.axhline(0.0, color=DARK, linewidth=0.8)
-        bars.set(xlabel="pose", ylabel="margin under the worst wrench, share of half the range [-]")
+        bars.set(
+            xlabel="pose", ylabel="margin under the worst wrench,\nshare of half the range [-]"
+        )
         bars.set_xticks(number)
         bars.legend(loc="best")
     return figure

@@ -121,7 +121,11 @@ def rails_of(robot: Robot, groups: Sequence[Sequence[str]] = ()) -> tuple[Rails,
     Raises:
         PlanningError: It has none.
     """
-    on_rails = {cable.name: k for k, cable in enumerate(robot.cables) if cable.rail is not None}
+    on_rails = {
+        cable.name: (k, cable.rail)
+        for k, cable in enumerate(robot.cables)
+        if cable.rail is not None
+    }
     if not on_rails:
         raise PlanningError(
             f"robot {robot.name}: found no cables[].rail; accepted: rails in its file, or --rails"
@@ -132,9 +136,8 @@ def rails_of(robot: Robot, groups: Sequence[Sequence[str]] = ()) -> tuple[Rails,
     directions = np.zeros((len(together), 3, len(robot.cables)))
     for direction, group in zip(directions, together, strict=True):
         for name in group:
-            rail = robot.cables[on_rails[name]].rail
-            assert rail is not None
-            direction[:, on_rails[name]] = rail.axis / np.linalg.norm(rail.axis)
+            k, rail = on_rails[name]
+            direction[:, k] = rail.axis / np.linalg.norm(rail.axis)
         rows.append((rail.lower, rail.upper, rail.at))
     lower, upper, at = np.array(rows).T
     bases = np.array([cable.exit_point for cable in robot.cables], float).T
@@ -344,7 +347,7 @@ def reconfigured(
 
 
 def _impossible(task: RailTask, margins: Array) -> str:
-    k, c = np.unravel_index(int(np.argmin(margins)), margins.shape)
+    k, c = divmod(int(np.argmin(margins)), margins.shape[1])
     corners = np.zeros((1, 6))
     if task.required is not None:
         found = task.required.corners(task.case.rows)

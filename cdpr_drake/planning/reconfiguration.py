@@ -35,6 +35,9 @@ STARTS = 5
 MOST_PROGRAMS = 4096
 """Poses times wrenches that one program may have."""
 
+SMALL = 0.05
+"""Loads count at least this share of the largest tension, where the balance is scaled."""
+
 EXACT = {"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10}
 
 
@@ -338,7 +341,8 @@ class ReconfigurationProgram:
         task, r = self.task, len(self.task.rails.lower)
         one = RailTask(task.case, task.rails, [task.poses[pose]])
         load, scale = self._loads[pose, corner], task.case.row_scale()
-        size = scale * max(float(np.max(np.abs(self._loads[pose] / scale))), 1e-9 * self._largest)
+        heaviest = float(np.max(np.abs(self._loads[pose] / scale)))
+        size = scale * max(heaviest, SMALL * self._largest)
         span = task.rails.upper - task.rails.lower
 
         def balance(x: Any) -> Any:

@@ -6,6 +6,7 @@ import re
 import numpy as np
 import pytest
 import yaml
+from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.design.reconfiguration import Around, RailSettings, put_rails
 from cdpr_drake.analyses.front.reconfiguration import reconfigure
@@ -21,7 +22,7 @@ RAILS = [
     RailSettings(cables=["C1", "C2"], axis=np.array([0.0, 1.0, 0.0]), lower=-0.3, upper=0.3),
     RailSettings(cables=["C3"], axis=np.array([0.0, 2.0, 0.0]), lower=-0.3, upper=0.3),
 ]
-POSES = [(0.15, 0.1, 0.3), (-0.1, -0.15, 0.3)]
+POSES = [RigidTransform([0.15, 0.1, 0.3]), RigidTransform([-0.1, -0.15, 0.3])]
 SMALL = Around(0.005, 0.5, 2000)
 
 
