@@ -92,6 +92,7 @@ PROMISED = {
     "assess_stability",
     "plan_path",
     "plan_free_motion",
+    "plan_proven_motion",
     "calibrate",
     "identify",
     "optimize_design",

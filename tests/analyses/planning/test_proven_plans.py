@@ -171,7 +171,11 @@ def test_poses_that_sets_do_not_connect_are_refused_in_words():
     lower[:, :3], upper[:, :3] = [[-0.2, -0.1, 0.2], [0.1, -0.1, 0.2]], [[-0.1, 0.1, 0.3]] * 2
     upper[1, 0] = 0.2
     made = ProvenSets(
-        lower, upper, np.arange(3), {"accelerations_m_s2": None, "obstacles": [], "kinds": []}, cut=7
+        lower,
+        upper,
+        np.arange(3),
+        {"accelerations_m_s2": None, "obstacles": [], "kinds": []},
+        cut=7,
     )
     with pytest.raises(PlanningError, match="do not connect; accepted: .*; 7 open cells between"):
         plan_proven_motion(ROBOT, _pose([-0.15, 0, 0.25]), _pose([0.15, 0, 0.25]), sets=made)
