@@ -93,6 +93,7 @@ PROMISED = {
     "plan_path",
     "plan_free_motion",
     "reconfigure",
+    "plan_proven_motion",
     "calibrate",
     "identify",
     "optimize_design",

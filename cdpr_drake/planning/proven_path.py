@@ -165,7 +165,7 @@ def proven_path(
     best = min(found, key=lambda one: one.length)
     curve = smooth_curve(graph.lower, graph.upper, best.sets, best.points)
     took = time.perf_counter() - begin
-    return _result(sets, graph, (best, curve), found, scale, method, took)
+    return _result(sets, graph, (best, curve), found, scale, method=method, took=took)
 
 
 def proven_motion(
@@ -238,10 +238,10 @@ def proven_motion(
             if len(curves) > 1:
                 shares = _time_shares(plan, curves[-1])
             boxes = graph.lower, graph.upper, sequence.sets, sequence.points
-            curves.append(fast_curve(*boxes, shares, limits[sets.axes], speed))
+            curves.append(fast_curve(*boxes, shares, acceleration=limits[sets.axes], speed=speed))
     assert best is not None
     took = time.perf_counter() - begin
-    path = _result(sets, graph, best[:2], found, scale, method, took)
+    path = _result(sets, graph, best[:2], found, scale, method=method, took=took)
     return ProvenMotion(path, best[2], best[3], cost)
 
 
@@ -318,7 +318,7 @@ def _near(graph: OverlapGraph, point: Array) -> np.ndarray:
 
 def _result(
     sets: PoseSets, graph: OverlapGraph, best: tuple[SetSequence, SetCurve],
-    found: list[SetSequence], scale: Array, method: str, took: float,
+    found: list[SetSequence], scale: Array, *, method: str, took: float,
 ) -> ProvenPath:  # fmt: skip
     looked = sorted((one.length, one.sets) for one in found)
     return ProvenPath(

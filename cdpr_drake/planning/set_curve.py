@@ -128,7 +128,7 @@ def smooth_curve(
 
 def fast_curve(
     lower: Array, upper: Array, sets: tuple[int, ...], points: Array, shares: Array,
-    acceleration: Array, speed: float,
+    *, acceleration: Array, speed: float,
 ) -> SetCurve:  # fmt: skip
     """The curve that is fastest on the fly, if its pieces last given shares of the time.
 

@@ -22,8 +22,8 @@ depends on them.
 shapes; a cable is a segment with a radius. Next to its ends a cable touches what carries it, so a
 length there is left out by name.
 
-**Proven sets**: `proven_cells`, `cuboid_cover` and `proven_sets` merge boxes to few convex sets whose
-overlaps are a graph; `proven_connection` cuts open cells where two poses need them.
+**Proven sets**: `proven_cells`, `cuboid_cover` and `proven_sets` merge boxes to few convex sets
+whose overlaps are a graph; `proven_connection` cuts open cells where two poses need them.
 
 **Proofs for whole boxes of poses**: `certify` of `certified_boxes`, of one kind or several at once,
 and `refine` of `box_refinement` where more is needed; the proofs stand in `box_verdicts_kernel` and

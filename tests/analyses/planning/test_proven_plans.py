@@ -52,7 +52,8 @@ def planned(tmp_path_factory):
 
 def test_the_command_writes_a_motion_that_is_proven_and_tracked(planned):
     told = json.loads((planned / "summary.json").read_text())
-    assert told["proven"]["path"] and told["proven"]["motion"]
+    assert told["proven"]["path"]
+    assert told["proven"]["motion"]
     assert told["judged_samples"] == 2000
     assert told["judged_infeasible"] == {
         "wrench-feasible": 0, "interference-free": 0, "collision-free": 0,
@@ -177,5 +178,5 @@ def test_poses_that_sets_do_not_connect_are_refused_in_words():
         {"accelerations_m_s2": None, "obstacles": [], "kinds": []},
         cut=7,
     )
-    with pytest.raises(PlanningError, match="do not connect; accepted: .*; 7 open cells between"):
+    with pytest.raises(PlanningError, match=r"do not connect; accepted: .*; 7 open cells between"):
         plan_proven_motion(ROBOT, _pose([-0.15, 0, 0.25]), _pose([0.15, 0, 0.25]), sets=made)

@@ -35,6 +35,7 @@ ASKED: dict[str, Callable[[Any], object]] = {
     "optimize_design": lambda robot: cdpr.optimize_design(robot, "wrench-feasible"),
     "plan_path": lambda robot: cdpr.plan_path(robot, [np.eye(4), np.eye(4)]),
     "plan_free_motion": lambda robot: cdpr.plan_free_motion(robot, None, None),
+    "plan_proven_motion": lambda robot: cdpr.plan_proven_motion(robot, None, None),
     "calibrate": lambda robot: cdpr.calibrate(robot, "log.csv"),
     "identify": lambda robot: cdpr.identify(robot, "log.csv"),
     "export_robot": lambda robot: cdpr.export_robot(robot, "mjcf"),
