@@ -184,12 +184,11 @@ def camera_figure(fit: CameraFit) -> Figure:
         xlim=(-most, most), ylim=(-most, most), aspect="equal", xlabel="residual along u [px]",
         ylabel="residual along v [px]", title="residuals",
     )  # fmt: skip
-    places = np.arange(len(fit.views))
     for k, role in enumerate(ROLES):
-        mine = [n for n, view in enumerate(fit.views) if view.role == role]
-        if mine:
-            heights = [fit.views[n].rms for n in mine]
-            axes[2].bar(places[mine], heights, label=role, **bar_style(nth_look(k)))
+        own = [(n, view.rms) for n, view in enumerate(fit.views) if view.role == role]
+        if own:
+            places, heights = zip(*own, strict=True)
+            axes[2].bar(places, heights, label=role, **bar_style(nth_look(k)))
     axes[2].set(xlabel="image, in the order given", ylabel="rms [px]", title="images")
     for axis in axes:
         axis.legend(loc="best", fontsize=8)
