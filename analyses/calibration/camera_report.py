@@ -14,7 +14,7 @@ from cdpr_drake.analyses.reporting.statements import new_table
 from cdpr_drake.analyses.visualization.figure_style import bar_style, new_figure
 from cdpr_drake.models.camera_catalogue import Camera, Distortion, fold_problem
 from cdpr_drake.palette import nth_look
-from cdpr_drake.vision.camera_fit import CELLS, CameraFit
+from cdpr_drake.vision.camera_fit import CELLS, LEAST_OUTLIER, OUTLIER, CameraFit
 from cdpr_drake.vision.lens_distortion import COEFFICIENTS
 
 ROLES = ("fitted", "held out", "outlier")
@@ -68,6 +68,14 @@ def camera_remarks(fit: CameraFit, unseen: list[str]) -> list[str]:
     bad = [f"{view.name} ({view.rms:.2f} px)" for view in fit.views if view.role == "outlier"]
     if bad:
         said.append("left out, since they fit far worse than the others: " + ", ".join(bad))
+    own = fit.rms("fitted")
+    far = [
+        f"{view.name} ({view.rms:.2f} px)"
+        for view in fit.views
+        if view.role == "held out" and view.rms > max(OUTLIER * own, LEAST_OUTLIER)
+    ]
+    if far:
+        said.append("held out, and far worse than fitted images: " + ", ".join(far))
     if fit.coverage < LEAST_COVERAGE:
         said.append(
             f"corners lie in {100.0 * fit.coverage:.0f} % of the image's {CELLS[0]} x {CELLS[1]} "
@@ -78,7 +86,7 @@ def camera_remarks(fit: CameraFit, unseen: list[str]) -> list[str]:
             f"the farthest corner is at {100.0 * fit.reach:.0f} % of the way to a corner of the "
             "image: beyond, the lens is guessed"
         )
-    held, own = fit.rms("held out"), fit.rms("fitted")
+    held = fit.rms("held out")
     if held > MOST_WORSE * own:
         said.append(
             f"images held out have {held / own:.1f} times the residuals of fitted ones: the lens "
@@ -184,12 +192,11 @@ def camera_figure(fit: CameraFit) -> Figure:
         xlim=(-most, most), ylim=(-most, most), aspect="equal", xlabel="residual along u [px]",
         ylabel="residual along v [px]", title="residuals",
     )  # fmt: skip
-    places = np.arange(len(fit.views))
     for k, role in enumerate(ROLES):
-        mine = [n for n, view in enumerate(fit.views) if view.role == role]
-        if mine:
-            heights = [fit.views[n].rms for n in mine]
-            axes[2].bar(places[mine], heights, label=role, **bar_style(nth_look(k)))
+        own = [(n, view.rms) for n, view in enumerate(fit.views) if view.role == role]
+        if own:
+            places, heights = zip(*own, strict=True)
+            axes[2].bar(places, heights, label=role, **bar_style(nth_look(k)))
     axes[2].set(xlabel="image, in the order given", ylabel="rms [px]", title="images")
     for axis in axes:
         axis.legend(loc="best", fontsize=8)

@@ -24,6 +24,7 @@ from cdpr_drake.palette import nth_look
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.diagrams.servo_models import ServoModel
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
+from cdpr_drake.vision.target import PointTarget
 
 SCENARIO = "acrobot_pbvs"
 SCHEMES = ("pbvs", "ibvs", "2.5d")
@@ -110,16 +111,18 @@ def noise_cost(servo: ServoModel) -> float:
 
     A lens that shows a wider field has less of it in a pixel.
     """
+    target = servo.target
+    assert isinstance(target, PointTarget)
     deviations = []
     for camera in (replace(servo.pinhole, believed=None), servo.pinhole.ideal):
-        marks = camera.project(servo.X_CdO @ servo.target.points)
+        marks = camera.project(servo.X_CdO @ target.points)
         total = 0.0
         for k in range(marks.size):
             ends = []
             for step in (PIXEL_STEP, -PIXEL_STEP):
                 moved = marks.copy()
                 moved.flat[k] += step
-                X_CO = servo.target.solve(camera.read(moved).T.ravel(), camera.ideal)
+                X_CO = target.solve(camera.read(moved).T.ravel(), camera.ideal)
                 assert X_CO is not None
                 ends.append(X_CO.inverse().translation())
             total += float(np.sum(((ends[0] - ends[1]) / (2.0 * PIXEL_STEP)) ** 2))
@@ -129,7 +132,7 @@ def noise_cost(servo: ServoModel) -> float:
 
 def _ratios(runs: Runs, variants: tuple[str, ...]) -> dict[str, float]:
     """Root mean squares of final distances over those without a lens, by scheme and variant."""
-    found = {}
+    found: dict[str, float] = {}
     for scheme in SCHEMES:
         if runs.has(scheme=scheme, lens="ideal"):
             ideal = _rms(runs, scheme, "ideal")

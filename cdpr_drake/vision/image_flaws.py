@@ -57,7 +57,8 @@ class ImageFlaws:
         first, shape (n,) [s]; none is later than 0."""
         if not self.moves:
             return np.zeros(1)
-        return (np.arange(self.renders) + 0.5) * self.step - self.exposure - self.readout
+        span = self.exposure + self.readout
+        return np.asarray((np.arange(self.renders) + 0.5) * self.step - span, float)
 
     def shares(self, height: int) -> Array:
         """How much each row of an image has of each picture, shape (n, height) [-]; sums to 1."""

@@ -94,7 +94,7 @@ def test_wrong_options_are_refused(images, tmp_path, capsys, changes, words):
     flat = [word for pair in options.items() for word in pair]
     out = tmp_path / "no"
     assert ended(*images[:5], *flat, "--out", str(out)) == 2
-    assert words in printed(capsys.readouterr()).err
+    assert words in printed(capsys).err
     assert not out.exists()
 
 
@@ -110,5 +110,5 @@ def test_images_that_are_none_or_too_few_are_refused(images, tmp_path, capsys):
     ):
         out = tmp_path / "no"
         assert ended(*files, *BOARD, "--out", str(out)) == 2
-        assert words in printed(capsys.readouterr()).err
+        assert words in printed(capsys).err
         assert not out.exists()

@@ -2,8 +2,6 @@
 
 from dataclasses import replace
 
-import numpy as np
-
 from cdpr_drake.analyses.reporting.progress import StudySession
 from cdpr_drake.analyses.studies.framework.study import Form
 from cdpr_drake.analyses.studies.lenses import KNOWN, STUDY, UNKNOWN, VARIANTS, measure
@@ -31,7 +29,7 @@ def test_statements_hold_of_what_they_should():
 
 def test_statements_fail_of_what_they_should():
     told = verdicts(lambda case, seed: made_up(case, seed, known=1.2, ignored=2.0))
-    assert told == {"known": "contradicted", "noise": "contradicted", "ignored": "contradicted"}
+    assert told == dict.fromkeys(("known", "noise", "ignored"), "not confirmed")
 
 
 def test_every_variant_is_a_scenario():
@@ -41,9 +39,9 @@ def test_every_variant_is_a_scenario():
 
 def test_a_run_comes_to_rest_where_it_should_with_a_known_lens_only():
     cases = {case.keys["lens"]: case for case in STUDY.plan(Form(quick=True))}
-    ideal, known, ignored = (
-        measure(cases[lens], 0)["final_m"] for lens in ("ideal", KNOWN[0], UNKNOWN[0])
-    )
-    assert known < 1.1 * ideal
+    rows = [measure(cases[lens], 0) for lens in ("ideal", KNOWN[0], UNKNOWN[0])]
+    ideal, known, ignored = (row["final_m"] for row in rows)
+    # One run; the same noise goes through another lens.
+    assert known < 1.05 * rows[1]["noise_cost"] * ideal
+    assert 1.0 < rows[1]["noise_cost"] < 1.2
     assert ignored > 5.0 * ideal
-    assert np.isfinite(ignored)
