@@ -26,6 +26,7 @@ from pydrake.solvers import (
     ProgramType,
     ScsSolver,
     SnoptSolver,
+    SolutionResult,
 )
 
 from cdpr_drake.arrays import Array
@@ -387,6 +388,8 @@ class OwnTerms(ABC):
                 return np.asarray(result.get_x_val(), float), word, status
             said.append(f"{status} by {word}")
             named = self._named_misses(result)
+            if result.get_solution_result() == SolutionResult.kInfeasibleConstraints:
+                break  # another solver would say so later
         names = named or [word for word, _, _ in self._own_constraints()]
         more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
         own = f" with {', '.join(names[:MOST_NAMED])}{more}" if names else ""

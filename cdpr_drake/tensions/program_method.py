@@ -159,10 +159,8 @@ class ProgramKernel:
             self._programs[key] = made
         return self._programs[key]
 
-    def _answer(
-        self, n: int, m: int, W: int, w: int, lower: int, upper: int, reference: int,
-        row_scale: int, t: int,
-    ) -> int:  # fmt: skip
+    def _answer(self, n: int, m: int, *addresses: int) -> int:
+        W, w, lower, upper, reference, row_scale, t = addresses
         began = perf_counter()
         try:
             bounds = [_read(at, size) for at, size in ((lower, m), (upper, m), (row_scale, n))]

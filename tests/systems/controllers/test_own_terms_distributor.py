@@ -25,7 +25,7 @@ from cdpr_drake.tensions.program import TensionProgram
 SCENARIO = "acrobot_computed_torque"
 SOLVER = 1e-4  # [N]; of solvers that stop at 1e-8 of the weight, or SNOPT at 1e-6
 LOCAL = 1e-2  # [N]; SNOPT from another start, where the cost is flat
-BOUND = 0.5  # [N]
+BOUND = 0.45  # [N]
 
 
 def preference(problem):
@@ -85,7 +85,7 @@ def test_a_loop_of_1_khz_misses_no_step(terms, own_method):
     if terms == "bound":
         apart = np.abs(t[:, ::2] - t[:, 1::2])
         assert np.max(apart) <= BOUND + SOLVER
-        plain = run_tension_scenario(scenario("quadratic_program", 0.6)).log["tensions"][1:]
+        plain = run_tension_scenario(scenario("quadratic_program", 2.5)).log["tensions"][1:]
         assert np.max(np.abs(plain[:, ::2] - plain[:, 1::2])) > BOUND
     # The wrench that the tensions gave is that of the motion: asked again, by itself.
     robot = run.control.robot
