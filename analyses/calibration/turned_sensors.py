@@ -30,7 +30,7 @@ Refit = Callable[[CalibrationTask, CalibrationLog], CalibrationResult]
 def turned_sensors(
     task: CalibrationTask, log: CalibrationLog, result: CalibrationResult, refit: Refit
 ) -> tuple[str, ...]:
-    """What would fit otherwise, in words: kinds of which most was thrown out, tried anew.
+    """What would fit otherwise, in words: kinds of which much was thrown out, else all, tried anew.
 
     A sign is the wrong one where, with it turned, the fit throws out no third of the kind and the
     whole costs less. A tilt is tried from other zeros, too.
@@ -42,10 +42,10 @@ def turned_sensors(
         refit: Calibrates anew.
     """
     words = []
-    poor = result.spread() > 1.0
-    for kind, fit in result.residuals.items():
+    suspects = [kind for kind, fit in result.residuals.items() if is_thrown_out(fit)]
+    for kind in suspects or result.residuals:
         field = TRIED.get(kind)
-        if field is None or not (poor or is_thrown_out(fit)):
+        if field is None:
             continue
         values = getattr(log, field)
         if values is None:
