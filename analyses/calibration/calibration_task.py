@@ -35,6 +35,7 @@ from cdpr_drake.analyses.calibration.tracker import (
     with_turned_tracker,
 )
 from cdpr_drake.analyses.calibration.turned_sensors import (
+    far_outside,
     turned_sensors,
     turned_where_lost,
     upside_down,
@@ -108,6 +109,12 @@ def calibrate(
         misfit = (
             f"the platform is upside down against its home, or its start, in {np.sum(flipped)} of "
             f"{len(flipped)} rows: sign or zero of a sensor?", *misfit,
+        )  # fmt: skip
+    outside = far_outside(task.robot, result)
+    if outside.any():
+        misfit = (
+            f"the platform is out of the frame by more than its size in {np.sum(outside)} of "
+            f"{len(outside)} rows: sign, unit or zero of a sensor?", *misfit,
         )  # fmt: skip
     if misfit:
         say("Looking for signs that are turned")

@@ -134,7 +134,7 @@ def best_of_starts(prepared: Prepared, say: Callable[[str], None]) -> MultiStart
         assert problem is not None
         raise problem
     say("Comparing starts")
-    best = min(_upright(prepared, known), key=lambda one: one.cost)
+    best = min(upright_minima(prepared, known), key=lambda one: one.cost)
     if len(programs) > 1:
         pool += [one.result.stations for one in known if one is not best]
         best = _improved(prepared, best, pool)
@@ -148,7 +148,7 @@ def best_of_starts(prepared: Prepared, say: Callable[[str], None]) -> MultiStart
     return MultiStartFit(best.result, tuple(ties), len(programs), len(known), less)
 
 
-def _upright(prepared: Prepared, known: Sequence[_Minimum]) -> Sequence[_Minimum]:
+def upright_minima(prepared: Prepared, known: Sequence[_Minimum]) -> Sequence[_Minimum]:
     """Minima in which the platform is not upside down against the first pose; all, if each is."""
     up = prepared.first.rotation().matrix()[:, 2]
     upright = [one for one in known if not upside_down(one.result, up).any()]

@@ -14,6 +14,7 @@ from cdpr_drake.analyses.calibration.log_file import CalibrationLog
 from cdpr_drake.arrays import Array
 from cdpr_drake.calibration.result import CalibrationResult
 from cdpr_drake.errors import CalibrationError
+from cdpr_drake.models.robot_schema import Robot
 
 TRIED = {
     "swivel angles": "swivels",
@@ -30,10 +31,10 @@ Refit = Callable[[CalibrationTask, CalibrationLog], CalibrationResult]
 def turned_sensors(
     task: CalibrationTask, log: CalibrationLog, result: CalibrationResult, refit: Refit
 ) -> tuple[str, ...]:
-    """What would fit otherwise, in words: kinds of which most was thrown out, tried anew.
+    """What would fit otherwise, in words: kinds of which much was thrown out, else all, tried anew.
 
     A sign is the wrong one where, with it turned, the fit throws out no third of the kind and the
-    whole costs less. A tilt is tried from other zeros, too.
+    whole costs less. A tilt is tried from other zeros, too. The first that fits is told.
 
     Args:
         task: What was asked.
@@ -41,14 +42,10 @@ def turned_sensors(
         result: What was found, which is no fit.
         refit: Calibrates anew.
     """
-    words = []
-    poor = result.spread() > 1.0
-    for kind, fit in result.residuals.items():
-        field = TRIED.get(kind)
-        if field is None or not (poor or is_thrown_out(fit)):
-            continue
+    suspects = [kind for kind, fit in result.residuals.items() if is_thrown_out(fit)]
+    for kind, field in TRIED.items():
         values = getattr(log, field)
-        if values is None:
+        if kind not in (suspects or result.residuals) or values is None:
             continue
         trials = [("with the sign turned", task, replace(log, **{field: -values}))]
         if kind == "inclination" and "tilt_zeros" not in task.unknown:
@@ -63,9 +60,8 @@ def turned_sensors(
             better = found.robust_cost < result.robust_cost
             if better and not is_thrown_out(again):
                 whole = again.count + again.dropped
-                words.append(f"{again.count} of {whole} {kind} fit {how}")
-                break
-    return tuple(words)
+                return (f"{again.count} of {whole} {kind} fit {how}",)
+    return ()
 
 
 def turned_where_lost(task: CalibrationTask, log: CalibrationLog, refit: Refit) -> tuple[str, ...]:
@@ -88,6 +84,14 @@ def turned_where_lost(task: CalibrationTask, log: CalibrationLog, refit: Refit) 
         if fit is not None and not misfits(found):
             return (f"{fit.count} of {fit.count + fit.dropped} {kind} fit with the sign turned",)
     return ()
+
+
+def far_outside(robot: Robot, result: CalibrationResult) -> npt.NDArray[np.bool_]:
+    """Which poses are farther out of the robot's frame than that is large, shape (k,)."""
+    lower, upper = np.asarray(robot.frame.lower, float), np.asarray(robot.frame.upper, float)
+    size = float(np.max(upper - lower))
+    p = result.stations.p
+    return np.asarray(np.any((p < lower - size) | (p > upper + size), axis=1))
 
 
 def upside_down(result: CalibrationResult, up: Array) -> npt.NDArray[np.bool_]:

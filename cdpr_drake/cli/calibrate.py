@@ -202,7 +202,7 @@ def calibrate(
 def _zero(robot: Robot, words: str | None) -> RigidTransform | None:
     if words is None:
         return None
-    return robot.home.transform() if words == HOME else parse_pose(words)
+    return robot.home.transform() if words == HOME else parse_pose(words, "--zero")
 
 
 def _size(words: str | None) -> tuple[int, int] | None:

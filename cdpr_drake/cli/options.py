@@ -114,9 +114,9 @@ def pose_or_home(words: str | None, robot: Robot) -> RigidTransform:
     return robot.home.transform() if words is None else parse_pose(words)
 
 
-def parse_pose(words: str) -> RigidTransform:
-    """X_WP of --pose; raises as `parse_numbers`."""
-    numbers = parse_numbers("--pose", words, (3, 6), "x,y,z [m] or x,y,z,phi,theta,psi [m, deg]")
+def parse_pose(words: str, option: str = "--pose") -> RigidTransform:
+    """X_WP of --pose or another option; raises as `parse_numbers`."""
+    numbers = parse_numbers(option, words, (3, 6), "x,y,z [m] or x,y,z,phi,theta,psi [m, deg]")
     return pose_from_angles(np.array(numbers[:3]), np.radians(numbers[3:] or [0.0, 0.0, 0.0]))
 
 

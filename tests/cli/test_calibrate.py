@@ -1,4 +1,5 @@
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -243,3 +244,35 @@ def test_what_a_robot_file_cannot_hold_is_said():
 
     _, left = calibrated_robot(ROBOT, Result())
     assert len(left) == 2
+
+
+SERIES = Path(__file__).parents[1] / "analyses/calibration/hangprinter4/samples.csv"
+
+
+def test_a_hangprinter_is_calibrated_from_its_recorded_series(tmp_path, capsys):
+    out = tmp_path / "out"
+    unknown = "exit_points,common_drum_radius,D.drum_radius,tracker.[xyz]"
+    found = answered(
+        ["calibrate", "hangprinter_4", str(SERIES), "--zero", "home", "--sigma", "place=1e-6",
+         "--unknown", unknown, "--bound", "tracker.[xyz]=0.001", "--hold-out", "8-9",
+         "--keep-outliers", "--out", str(out), "--json"], capsys,
+    )  # fmt: skip
+    assert found["status"] == "converged"
+    assert found["at_bounds"] == {"tracker.x": pytest.approx(1e-3)}
+    assert found["held_out"]["compared_rows"] == [8, 9]
+    assert found["poses"] == 42
+    assert load_robot(str(out / "robot.yaml")).motion == "3T"
+    assert (out / "rows.png").exists()
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--zero", "somewhere"], "--zero: found 'somewhere'"),
+        (["--zero", "home", "--hold-out", "x"], "--hold-out: found 'x'"),
+        (["--bound", "tracker"], "--bound"),
+    ],
+)
+def test_wrong_options_of_a_point_mass_are_named(options, said, capsys, tmp_path):
+    arguments = ["calibrate", "hangprinter_4", str(SERIES), *options, "--out", str(tmp_path / "o")]
+    assert said in refused(arguments, capsys)

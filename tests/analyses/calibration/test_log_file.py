@@ -92,7 +92,7 @@ def test_corners_of_tags(written):
         ("l1,C1_length_m\n1,2\n", "twice"),
         ("a,b\n1,2\n", "columns: found a, b"),
         ("1 2 3\n", "3 columns without a header"),
-        ("x,y,z,l1\n1,2,3,1\n", "without a rotation"),
+        ("x,y,z,qw,l1\n1,2,3,1,1\n", "quaternion: found 1 columns"),
         ("x,y,z,qw,qx,qy,qz\n1,2,3,2,0,0,0\n", "quaternion: found length 2"),
         ("x,y,qw,qx,qy,qz\n1,2,1,0,0,0\n", "position: found 2 columns"),
         ("t,l1\n0,1\n0,2\n", "times that grow"),
