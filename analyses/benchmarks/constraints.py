@@ -65,7 +65,7 @@ def pairs() -> dict[str, tuple[PoseConstraint, Evaluate]]:
     """Constraints by kernels, and the same by automatic derivatives, of an array of AutoDiffXd."""
     robot = load_robot(ROBOT)
     cables = robot.cable_set().without_pulleys()
-    task = path_task(robot, LimitSettings(tensions=TENSIONS), cables)
+    task = path_task(robot, LimitSettings(tensions=TENSIONS, reserve=0.0), cables)
     terms, here = FreeTerms(task, START), RelativePose(START)
     balance, apart = TensionBalance(task, here), CableClearance(cables, here, APART)
     camera = robot.camera_mount("onboard").pose.transform()

@@ -111,7 +111,9 @@ Clearance = Annotated[
 ]
 Obstacles = Annotated[
     Path | None,
-    typer.Option(help="With --free: what stands in the way, YAML as of cdpr workspace --obstacles."),
+    typer.Option(
+        help="With --free: what stands in the way, YAML as of cdpr workspace --obstacles."
+    ),
 ]
 KeepInView = Annotated[
     str | None,
