@@ -154,7 +154,10 @@ Clearance = Annotated[
 Obstacles = Annotated[
     Path | None,
     typer.Option(
-        help="With --free or --proven: what stands in the way, YAML as of cdpr workspace --obstacles."
+        typer.Option(
+            help="With --free or --proven: what stands in the way, YAML as of cdpr workspace "
+            "--obstacles."
+        ),
     ),
 ]
 KeepInView = Annotated[

@@ -6,6 +6,7 @@ from pydrake.multibody.inverse_kinematics import InverseKinematics
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.planning import DirectCollocation, KinematicTrajectoryOptimization
 from pydrake.solvers import MathematicalProgram, SnoptSolver
+from pydrake.symbolic import Expression
 from pydrake.systems.primitives import LinearSystem
 
 from cdpr_drake.geometry.convex_shapes import ConvexShape
@@ -65,16 +66,20 @@ def test_a_pose_is_found_with_a_view_off_an_obstacle_that_tensions_hold():
 def test_inverse_kinematics_of_a_plant_takes_them_on_the_state_of_its_platform():
     robot, _ = robot_task()
     plant = MultibodyPlant(0.0)
-    platform = add_robot(plant, robot).body
+    placed = add_robot(plant, robot)
     plant.Finalize()
     ik = InverseKinematics(plant)
     here = BodyState()
     constraints = asked(here)
-    q = ik.q()[platform.floating_positions_start() :][:7]
+    first = plant.get_body(placed.body_index).floating_positions_start()
+    q = ik.q()[first : first + 7]
+    start = np.array([1.0, 0.0, 0.0, 0.0, 0.06, 0.0, 0.25])
+    assert not keeps(constraints, start[np.newaxis])
     for constraint in constraints:
-        constraint.AddTo(ik.prog(), q)
-    start = np.array([1.0, 0.0, 0.0, 0.0, 0.2, 0.1, 0.5])
-    ik.prog().AddQuadraticErrorCost(np.eye(3), np.array([0.05, 0.0, 0.2]), q[4:])
+        for part in constraint.smooth_parts():
+            own = ik.prog().NewContinuousVariables(part.extra, "n")
+            part.AddTo(ik.prog(), np.concatenate([q, own]))
+            ik.prog().SetInitialGuess(own, part.guess(start))
     ik.prog().SetInitialGuess(q, start)
     result = SnoptSolver().Solve(ik.prog())
     assert result.is_success()
@@ -102,7 +107,10 @@ def test_a_spline_keeps_them_at_its_samples():
         spline.AddVelocityConstraintAtNormalizedTime(rates.as_drake(), s)
     # The same on the control points themselves, with tensions as variables of one sample.
     middle = np.array([spline.basis().EvaluateBasisFunctionI(i, 0.5) for i in range(8)])
-    pose = spline.control_points() @ middle
+    pose = [
+        sum((float(w) * point for w, point in zip(middle, row, strict=True) if w), Expression(0.0))
+        for row in spline.control_points()
+    ]
     tensions, _ = feasible.AddWithTensions(spline.get_mutable_prog(), pose)
     result = SnoptSolver().Solve(spline.prog())
     assert result.is_success()
@@ -143,8 +151,11 @@ def test_a_collocation_keeps_tensions_of_the_whole_motion():
         )
     feasible = TensionFeasible(task, here)
     inside = PlaceWithin(here, np.array([-0.3, -0.1, 0.2]), np.array([0.3, 0.1, 0.5]))
-    motion = np.concatenate([collocation.state(), collocation.input()])
-    collocation.AddConstraintToAllKnotPoints(feasible.as_drake(2), motion)
+    for k in range(11):  # tensions as variables: their margin has kinks where a least time ends
+        motion = np.concatenate([collocation.state(k), collocation.input(k)])
+        feasible.AddWithTensions(prog, motion)
+    rates = LengthRates(task.cables, here, 1.0)
+    collocation.AddConstraintToAllKnotPoints(rates.as_drake(), collocation.state())
     collocation.AddConstraintToAllKnotPoints(inside.as_drake(), collocation.state()[:6])
     collocation.AddFinalCost(collocation.time())
     share = np.linspace(0.0, 1.0, 11)
@@ -156,6 +167,7 @@ def test_a_collocation_keeps_tensions_of_the_whole_motion():
     states, inputs = collocation.GetStateSamples(result).T, collocation.GetInputSamples(result).T
     x = np.hstack([states, inputs])
     assert keeps([feasible], x)
+    assert keeps([rates], states)
     assert np.min(feasible.evaluate(x)[0]) < 0.05  # the time rests on the tensions
     X = pose_from_row(here.points(x[-1:])[0][0, :7])
     np.testing.assert_allclose(X.translation(), goal.translation(), atol=1e-6)

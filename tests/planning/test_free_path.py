@@ -204,19 +204,19 @@ def test_what_is_missed_between_knots_is_asked_for_there():
     assert missed[1].missed < 1e-5
     assert gaps[1] > CLEARANCE - missed[1].bound
     for one in missed:
-        assert one.missed <= one.bound < one.missed + 0.01
+        assert one.missed <= one.bound < one.missed + 0.03  # half the way between instants
 
 
 def test_a_guess_decides_on_which_side_an_obstacle_is_passed():
     robot, task = robot_task()
     body = ConvexShape.box_at(robot.box_center(), robot.platform.size)
-    post = ConvexShape.capsule(np.zeros(3), np.array([0.0, 0.0, 0.6]), 0.02)
+    ball = ConvexShape.sphere(np.array([0.0, 0.0, 0.35]), 0.04)
     ends = [RigidTransform([-0.3, 0.0, 0.35]), RigidTransform([0.3, 0.0, 0.35])]
     for side in (-1.0, 1.0):
-        program = FreePathProgram(task, *ends, 8, (2.0, 2.0))
-        program.AddTensionCost()
-        program.AddObstacles([post], CLEARANCE, [body])
+        program = FreePathProgram(task, *ends, 6, (2.0, 2.0))
+        program.AddPlaceBounds(robot.frame.lower, robot.frame.upper)
+        program.AddObstacles([ball], CLEARANCE, [body])
         corner = RigidTransform([0.0, 0.2 * side, 0.35])
         way = straight_path([ends[0], corner, ends[1]], 0.2)
-        motion = program.Solve(2.0, way).motion()
+        motion = program.Solve(2.0, way, Refinement(rounds=0)).motion()
         assert side * motion.pose(1.0).translation()[1] > 0.05
