@@ -1,8 +1,8 @@
 """OptiTrack Motive's CSV: rigid bodies and markers over time.
 
 Above the rows stand a line of settings in pairs, and lines of types, names, identities and what
-each column is. Quaternions have their real part last. Where the settings name no `Length Units`, as in
-format version 1.1, the user has to.
+each column is. Quaternions have their real part last. Where the settings name no `Length Units`, as
+in format version 1.1, the user has to.
 
 Source: OptiTrack, Data Export: CSV, docs.optitrack.com/motive/data-export/data-export-csv.
 """

@@ -52,7 +52,8 @@ SUBCOMMANDS = {
     for name in (
         "simulate", "serve", "tension", "static", "equilibria", "stability", "workspace", "plan",
         "design", "calibrate", "identify", "study", "reproduce", "robots", "import", "import-log",
-        "export", "scenarios", "new", "check", "schema", "view", "studio", "notebooks", "doctor", "bench",
+        "export", "replay", "scenarios", "new", "check", "schema", "view", "studio", "notebooks",
+        "doctor", "bench",
     )
 }  # fmt: skip
 """Subcommands in the order of the help, each with the module whose function of that name it is.

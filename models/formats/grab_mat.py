@@ -2,8 +2,8 @@
 
 A structure with `EndEffector.Platform` (mass `m`, `PtoG`, `InertialMatrix` about G, `points` A_i in
 P) and `Trasmission.Pulley` (radius `r`, `CableEnterPosition` D_i in W, `FixedFrame` with axes i, j,
-k of the pulley in W), as the files spell it. The cable arrives along k, about which the pulley turns;
-its swivel angle is atan2(j' DA, i' DA).
+k of the pulley in W), as the files spell it. The cable arrives along k, about which the pulley
+turns; its swivel angle is atan2(j' DA, i' DA).
 
 Source: github.com/fzoffoli/UACDPR_SelfCalibration, IRMA4U_Mar25.mat and its class
 Pulley, ComputePulleyAngles.

@@ -2,8 +2,8 @@
 
 `kinematics: MaslowKinematics:` has the anchors [mm] tlX, tlY, tlZ, trX, ... of top left, top right,
 bottom left and bottom right; older firmware has Maslow_tlX, ... at the top. A belt leaves the sled
-z above its anchor. All belts point to the middle of the sled, beltEndExtension + armLength past their
-end, so that it moves as a point in a plane. `Maslow_vertical` says that the plane is upright:
+z above its anchor. All belts point to the middle of the sled, beltEndExtension + armLength past
+their end, so that it moves as a point in a plane. `Maslow_vertical` says that the plane is upright:
 x and y of the file are x and z of W then, and out of the board is -y.
 
 Source: github.com/MaslowCNC/Maslow_4, firmware/FluidNC/data/maslow.yaml, and its web page's words

@@ -2,9 +2,9 @@
 
 M669 has the anchors [mm] as A0:-2000:-100 B... and their number N; older ones have the last anchor
 as its height alone. M666 has Q build-up factor, R spool radii [mm], U mechanical advantages, O
-lines on a spool, L and H teeth of motor and spool gear, J full steps a turn, W mass of the mover [kg],
-S stiffness of a line of unit length, E S of the cables [N], I and X least and largest force [N].
-Cables end in one point; lengths count from where that is at the origin. With advantage U a spool
+lines on a spool, L and H teeth of motor and spool gear, J full steps a turn, W mass of the mover
+[kg], S stiffness of a line of unit length, E S of the cables [N], I and X least and largest force
+[N]. Cables end in one point; lengths count from where that is at the origin. With advantage U a spool
 turns U times as far.
 
 Source: github.com/Duet3D/RepRapFirmware, src/Movement/Kinematics/HangprinterKinematics.cpp
