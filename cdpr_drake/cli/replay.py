@@ -51,7 +51,7 @@ def replay(
     and its distance from what was measured is the error from simulation to machine.
     """
     formats = parse_formats(figure_format)
-    request = log_request(robot, None, unit, mapping, rate, body, axes)
+    request = log_request(robot, None, unit, mapping=mapping, rate=rate, body=body, axes=axes)
     folder = out if out is not None else free_folder(Path("runs") / f"replay-{log.stem}")
     found = replay_log(
         log, robot, request, format=log_format, fit_frame=fit_frame, follow=follow, folder=folder,

@@ -23,7 +23,7 @@ def written(tmp_path, offsets, shift=(0.0, 0.0, 0.0), tensions=False):
     """A slow motion of gt_graffiti; the tracker's origin may be another one."""
     robot = load_robot("gt_graffiti")
     t = np.arange(0.0, 3.0, 0.02)
-    p = np.column_stack([1.5 + 0.2 * np.sin(t) ** 2, 0.0 * t, 1.1 + 0.1 * (1 - np.cos(2 * t))])
+    p = np.column_stack([1.5 + 0.2 * np.sin(t) ** 2, 0.0 * t, 1.1 + 0.1 * np.sin(1.7 * t) ** 2])
     lengths = np.array(
         [cable_paths(pose_from_angles(x, np.zeros(3)), robot.cable_set()).lengths for x in p]
     )
