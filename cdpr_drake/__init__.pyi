@@ -4,6 +4,7 @@ from .analyses.front.camera_calibration import calibrate_camera as calibrate_cam
 from .analyses.front.design import optimize_design as optimize_design
 from .analyses.front.exchange import import_robot as import_robot
 from .analyses.front.logs import import_log as import_log
+from .analyses.front.logs import replay_log as replay_log
 from .analyses.front.mechanisms import hang_mechanism as hang_mechanism
 from .analyses.front.mechanisms import solve_mechanism_tensions as solve_mechanism_tensions
 from .analyses.front.planning import plan_free_motion as plan_free_motion

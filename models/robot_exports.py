@@ -252,7 +252,8 @@ def names_in_file(names: Sequence[str], format: str) -> list[str]:
     Firmwares have names of their own.
     """
     if format in _FIRMWARE_NAMES:
-        return list(_FIRMWARE_NAMES[format][: len(names)])
+        known = _FIRMWARE_NAMES[format]  # robots with more cables are refused by their motion
+        return [*known[: len(names)], *(f"C{k + 1}" for k in range(len(known), len(names)))]
     kept = {name for place, name in enumerate(names, start=1) if _holds_name(format, name, place)}
     found = []
     for place, name in enumerate(names, start=1):

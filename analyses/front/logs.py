@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cdpr_drake.analyses.logs.clock_pairs import JoinedLogs, join_logs
+from cdpr_drake.analyses.logs.followed_log import FollowedLog, follow_log
 from cdpr_drake.analyses.logs.log_formats import AUTO, read_recorded
+from cdpr_drake.analyses.logs.log_replay import SUMMARY, LogReplay
+from cdpr_drake.analyses.logs.log_replay import replay_log as compare_log
 from cdpr_drake.analyses.logs.log_request import LogRequest
 from cdpr_drake.analyses.logs.recorded_log import RecordedLog
+from cdpr_drake.analyses.reporting.deferred_figures import write_pictures
+from cdpr_drake.analyses.reporting.log_files import write_json
+from cdpr_drake.analyses.reporting.output_folder import results_folder
+from cdpr_drake.models.robot_loader import as_robot
+from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.summaries import Summarized
 
 if TYPE_CHECKING:
@@ -94,3 +102,81 @@ def import_log(
     if start is not None or end is not None or every != 1:
         log = log.part(start, end, every)
     return ImportedLog(log, joined)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ReplayedLog(Summarized):
+    """A log beside a model of its robot.
+
+    Attributes:
+        replay: Lengths, poses and tensions of both.
+        followed: What the simulated robot did with the log's lengths; None: it was not asked.
+    """
+
+    replay: LogReplay
+    followed: FollowedLog | None = None
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        told = None if self.followed is None else self.followed.as_dict()
+        return {**self.replay.as_dict(), "followed": told}
+
+    def summary(self) -> tuple[str, list[tuple[str, str]]]:
+        """What it shows of itself."""
+        title, rows = self.replay.summary()
+        if self.followed is not None:
+            error = self.followed.as_dict()["position_error_rms_m"]
+            words = "no measured pose" if error is None else f"{1e3 * error:.4g} mm rms"
+            rows.insert(1, ("simulated", f"follows the log's lengths: {words} from what was"))
+        return title, rows
+
+    def plot(self) -> Figure:
+        """Residuals by cable, and distances of positions."""
+        from cdpr_drake.analyses.logs.replay_figures import residual_figure
+
+        return residual_figure(self.replay, self.followed)
+
+
+def replay_log(
+    path: Path | str,
+    robot: Robot | str | Path,
+    request: LogRequest | None = None,
+    *,
+    format: str = AUTO,
+    fit_frame: bool = False,
+    follow: bool = False,
+    folder: Path | str | None = None,
+    overwrite: bool = False,
+    formats: tuple[str, ...] = ("png",),
+) -> ReplayedLog:
+    """Puts a log of a machine beside a model of it.
+
+    Args:
+        path: The log, see `import_log`.
+        robot: The robot, or its name or path.
+        request: What the file does not say; its cables are the robot's.
+        format: A name of `LOG_READERS`; `auto`: told by the file.
+        fit_frame: Whether the tracker's frame is fitted to the positions by lengths.
+        follow: Whether the simulated robot is driven with the log's lengths.
+        folder: Where summary, table, figures and the replay page are written; None: nowhere.
+        overwrite: Whether results in the folder are replaced.
+        formats: Of the figures.
+
+    Raises:
+        CdprError: The log or the robot is not accepted; one line.
+    """
+    loaded = as_robot(robot, "replay_log")
+    asked = LogRequest() if request is None else request
+    if asked.cables is None:
+        asked = replace(asked, cables=tuple(cable.name for cable in loaded.cables))
+    found = compare_log(loaded, read_recorded(Path(path), format, asked), fit_frame)
+    result = ReplayedLog(found, follow_log(found) if follow else None)
+    if folder is not None:
+        from cdpr_drake.analyses.logs.replay_figures import replay_pictures
+
+        with results_folder(Path(folder), overwrite) as results:
+            found.write(results.path)
+            write_json(results.path / SUMMARY, result.as_dict())
+            write_pictures(results.path, replay_pictures(found, result.followed, formats))
+            results.publish()
+    return result

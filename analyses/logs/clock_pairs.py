@@ -90,6 +90,7 @@ def join_logs(first: RecordedLog, second: RecordedLog) -> JoinedLogs:
     found: Columns = dict(first.columns) | dict(zip(names, table.T, strict=True))
     if all(name in found for name in QUATERNION):
         size = np.linalg.norm([found[name] for name in QUATERNION], axis=0)
+        size = np.where(found[QUATERNION[0]] < 0.0, -size, size)
         found |= {name: found[name] / size for name in QUATERNION}
     missing = int(np.count_nonzero(np.isnan(table).all(axis=1)))
     joined = JoinedLogs(
@@ -120,7 +121,8 @@ def _one_sign(log: RecordedLog, names: tuple[str, ...]) -> Array:
         rows = np.flatnonzero(np.isfinite(q).all(axis=1))
         turned = np.sum(q[rows[1:]] * q[rows[:-1]], axis=1) < 0.0
         sign = np.cumprod(np.where(np.concatenate([[False], turned]), -1.0, 1.0))
-        table[np.ix_(rows, columns)] = q[rows] * sign[:, None]
+        for k, column in enumerate(columns):
+            table[rows, column] = q[rows, k] * sign
     return table
 
 

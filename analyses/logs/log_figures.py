@@ -63,6 +63,7 @@ def log_figure(log: RecordedLog) -> Figure:
             axes.set_ylabel(f"{title} [{unit}]")
             axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
             few_ticks(axes.yaxis)
+            axes.set_xlim(float(t[0]), float(t[-1]) if len(t) > 1 else float(t[0]) + 1.0)
         row_axes[-1].set_xlabel("time [s]" if time is not None else "row")
     return figure
 

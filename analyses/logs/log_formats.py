@@ -79,7 +79,7 @@ def detect_log(path: Path) -> Detected | None:
     except OSError as problem:
         raise LogFileError(f"{path}: cannot be read: {problem.strerror}") from problem
     text = _head_text(raw)
-    found = []
+    found: list[Detected] = []
     for name, reader in LOG_READERS.items():
         why = ""
         if reader.of_bytes is not None:

@@ -1,3 +1,4 @@
+from .cable_streams import cable_stream as cable_stream
 from .plan_figures import phase_figure as phase_figure
 from .plan_results import PlanRun as PlanRun
 from .plan_tracking import track_plan as track_plan

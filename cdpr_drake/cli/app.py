@@ -51,9 +51,9 @@ SUBCOMMANDS = {
     name: f"cdpr_drake.cli.{_function_of(name)}"
     for name in (
         "simulate", "serve", "tension", "static", "equilibria", "stability", "workspace", "plan",
-        "reconfigure", "design", "calibrate", "calibrate-camera", "identify", "study", "reproduce",
-        "robots", "import", "import-log", "export", "scenarios", "new", "check", "schema", "view",
-        "studio", "notebooks", "doctor", "bench",
+        "reconfigure", "design", "calibrate", "calibrate-camera", "identify", "replay", "study",
+        "reproduce", "robots", "import", "import-log", "export", "scenarios", "new", "check",
+        "schema", "view", "studio", "notebooks", "doctor", "bench",
     )
 }  # fmt: skip
 """Subcommands in the order of the help, each with the module whose function of that name it is.

@@ -94,7 +94,7 @@ def import_log(
     """Reads a log of a machine or tracker, and writes one that calibrate and identify take."""
     if out is not None and out.exists() and not overwrite:
         raise OutputFolderError(f"--out: found {out}; accepted: a new file, or --overwrite")
-    request = log_request(robot, cables, unit, mapping, rate, body, axes)
+    request = log_request(robot, cables, unit, mapping=mapping, rate=rate, body=body, axes=axes)
     found = read_logs(
         file, request, format=log_format, beside=beside, beside_format=with_format, start=start,
         end=until, every=every,
@@ -119,6 +119,7 @@ def log_request(
     robot: str | None,
     cables: str | None,
     unit: str | None,
+    *,
     mapping: Path | None,
     rate: float | None,
     body: str | None,

@@ -38,7 +38,7 @@ CANDIDATES = 6
 ALIKE = 1.2
 """Two shifts whose residuals differ by less than this factor cannot be told apart."""
 
-EXPLAINED = 0.5
+EXPLAINED = 0.2
 """Residuals above this share of what moves mean that both did not record one motion."""
 
 ROUNDS = 30

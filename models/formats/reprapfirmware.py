@@ -3,9 +3,9 @@
 M669 has the anchors [mm] as A0:-2000:-100 B... and their number N; older ones have the last anchor
 as its height alone. M666 has Q build-up factor, R spool radii [mm], U mechanical advantages, O
 lines on a spool, L and H teeth of motor and spool gear, J full steps a turn, W mass of the mover
-[kg], S stiffness of a line of unit length, E S of the cables [N], I and X least and largest force [N].
-Cables end in one point; lengths count from where that is at the origin. With advantage U a spool
-turns U times as far.
+[kg], S stiffness of a line of unit length, E S of the cables [N], I and X least and largest force
+[N]. Cables end in one point; lengths count from where that is at the origin. With advantage U a
+spool turns U times as far.
 
 Source: github.com/Duet3D/RepRapFirmware, src/Movement/Kinematics/HangprinterKinematics.cpp
 (3.5-dev): Configure, Recalc, MotorPosToLinePos, SpringK.
@@ -106,9 +106,9 @@ def _spools(path: Path, given: dict[str, list[float]], draft: RobotDraft) -> Non
         return None if values is None else np.broadcast_to(np.array(values, float), m)
 
     radii, teeth, motor, advantage = (each(letter) for letter in "RHLU")
-    for letter, values in (("R", radii), ("H", teeth), ("L", motor), ("U", advantage)):
-        if values is not None and np.any(values <= 0.0):
-            raise fail(path, f"M666 {letter}", values.min(), "above 0")
+    for letter, row in (("R", radii), ("H", teeth), ("L", motor), ("U", advantage)):
+        if row is not None and np.any(row <= 0.0):
+            raise fail(path, f"M666 {letter}", row.min(), "above 0")
     one = [values is None or np.ptp(values) == 0.0 for values in (radii, teeth, motor, advantage)]
     if not all(one):
         draft.remarks.append(

@@ -56,9 +56,10 @@ def test_loads_hangs_steps_and_is_exported(name):
     assert np.all(tensions <= robot.tension_bounds.upper + off)
     written = {format: exported(robot, format) for format in EXPORTS}
     assert isinstance(written["mjcf"], dict)
-    for found in written.values():
+    firmwares = ("klipper", "reprapfirmware", "maslow")  # which know points alone
+    for format, found in written.items():
         if isinstance(found, str):  # a format that cannot hold the motion type says so
-            assert robot.motion != "3R3T"
+            assert robot.motion != "3R3T" or format in firmwares
             assert f"motion: found {robot.motion}" in found
         else:
             assert found
