@@ -23,8 +23,12 @@ from cdpr_drake.analyses.reporting.timing import (
 )
 from cdpr_drake.analyses.workspaces.static_feasible import static_case
 from cdpr_drake.arrays import Array
+from cdpr_drake.geometry.convex_distance_kernel import convex_distance, convex_work
+from cdpr_drake.geometry.convex_shapes import ConvexShape
 from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.workspaces.box_judges import CertifiedKind, CertifyTask, judge_all
 from cdpr_drake.workspaces.cable_interference import Surroundings, box_row, clearances
+from cdpr_drake.workspaces.certified_boxes import PoseBox, certify
 from cdpr_drake.workspaces.demanded_wrenches import weight_wrenches
 from cdpr_drake.workspaces.hull import workspace_hull
 from cdpr_drake.workspaces.pose_grid import grid_by_count
@@ -44,6 +48,8 @@ def workspace_rows(quick: bool) -> list[TimingRow]:
         static_row(50 if quick else 300, repeats),
         margin_row(5 if quick else 30, repeats),
         clearance_row(50 if quick else 300, repeats),
+        convex_row(50 if quick else 300, repeats),
+        collision_row(2000 if quick else 20_000, repeats),
         hull_row(300 if quick else 10_000, 3),
     ]
 
@@ -158,6 +164,71 @@ def _floating(plant: MultibodyPlant, name: str, shape: object) -> object:
     friction = CoulombFriction(0.5, 0.5)
     plant.RegisterCollisionGeometry(body, RigidTransform(), shape, name, friction)
     return body
+
+
+def convex_row(count: int, repeats: int) -> TimingRow:
+    """Signed distance of two turned boxes, as hulls of points, against Drake's query."""
+    random = np.random.default_rng(0)
+    size = np.array([0.4, 0.3, 0.2])
+    builder = DiagramBuilder()
+    plant, _ = AddMultibodyPlantSceneGraph(builder, 0.0)
+    bodies = [_floating(plant, name, Box(*size)) for name in ("one", "other")]
+    plant.Finalize()
+    root = (diagram := builder.Build()).CreateDefaultContext()
+    context = plant.GetMyMutableContextFromRoot(root)
+    turn = RotationMatrix.MakeFromOneVector(random.normal(size=3), 2)
+    X = RigidTransform(turn, [0.5, 0.1, 0.1])
+    plant.SetFreeBodyPose(context, bodies[1], X)
+    query = plant.get_geometry_query_input_port().Eval(context)
+    one = ConvexShape.box_at(np.zeros(3), size)
+    other, work = one.moved(X), convex_work(8, 8)
+    p, q, n = np.empty((3, 3))
+
+    def distances(owner: object = diagram) -> object:
+        """A query lives no longer than its diagram, which is kept here."""
+        return query.ComputeSignedDistancePairwiseClosestPoints()
+
+    ours, theirs = interleaved(
+        [
+            lambda: 1e6 * seconds_each(
+                range(count), lambda k: convex_distance(one.points, other.points, p, q, n, work)
+            ),
+            lambda: 1e6 * seconds_each(range(count), lambda k: distances()),
+        ],
+        repeats,
+    )  # fmt: skip
+    return _row("signed distance of two boxes", ours, "Drake's distance query", theirs)
+
+
+def collision_row(count: int, repeats: int) -> TimingRow:
+    """A box of poses judged for collisions, against the exact check of its 16 corners."""
+    robot = load_robot(ROBOT)
+    case, _, _ = _poses(1)
+    body = box_row(np.array([0.0, 0.0, robot.platform.size[2] / 2.0]), robot.platform.size)
+    solids = (ConvexShape.sphere(np.array([0.2, 0.2, 0.5]), 0.08),)
+    around = Surroundings(
+        case.cables, np.full(case.cables.count, RADIUS), body[np.newaxis], solids=solids,
+        obstacles=box_row(np.array([0.0, 0.0, 0.2]), np.array([0.1, 0.1, 0.4]))[np.newaxis],
+    )  # fmt: skip
+    task = CertifyTask(CertifiedKind.COLLISION_FREE, case, around=around)
+    turn = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.17])
+    lower, upper = robot.reach()
+    box = PoseBox(np.concatenate([lower, -turn[3:]]), np.concatenate([upper, turn[3:]]))
+    found = certify(task, box, count)
+    poses, halves = found.poses[:count], found.halves[:count]
+    random = np.random.default_rng(0)
+    corners = np.repeat(poses, 16, axis=0)
+    corners = corners + random.choice([-1.0, 1.0], corners.shape) * np.repeat(halves, 16, axis=0)
+    turns = np.array([RotationMatrix.MakeZRotation(angle).matrix() for angle in corners[:, 5]])
+    kept = np.zeros(len(poses), np.int8)
+    ours, other = interleaved(
+        [
+            lambda: _each(lambda: judge_all([task], poses, halves, kept), len(poses)),
+            lambda: _each(lambda: clearances(around, corners[:, :3], turns), len(poses)),
+        ],
+        repeats,
+    )
+    return _row("a box of poses, free of collisions", ours, "exact at 16 of its corners", other)
 
 
 def hull_row(rays: int, repeats: int) -> TimingRow:

@@ -26,6 +26,10 @@ CLOSURE_SHARE = 1e-4
 """Wrench closure is proven by tensions that balance nothing, the least at least this share of the
 largest."""
 
+LEVER = 1.0
+"""Half widths of positions and of angles are compared by this length [m/rad]; open shares of robots
+of a metre hardly change from one to seven times it."""
+
 MOST_KINDS = 7
 """So many kinds fit into the bits that say which are proven."""
 
@@ -147,7 +151,15 @@ _COSTS = (
 
 
 def _longest(halves: Array, stretch: Array) -> np.ndarray:
-    return np.asarray(np.argmax(np.where(halves > 0.0, stretch, -1.0), axis=1))
+    """Across which number to cut, shape (k,): the one that is most in the way.
+
+    Where orientations vary, that times its size: what is in the way now can be far from what is
+    after some cuts, and boxes that have become plates are hard to prove.
+    """
+    turned = np.any(halves[:, 3:] > 0.0, axis=1, keepdims=True)
+    sizes = halves * np.repeat([1.0, LEVER], 3)
+    wanted = np.where(turned, stretch * sizes, stretch)
+    return np.asarray(np.argmax(np.where(halves > 0.0, wanted, -1.0), axis=1))
 
 
 def _judge(task: CertifyTask, poses: Array, halves: Array) -> tuple[np.ndarray, Array]:

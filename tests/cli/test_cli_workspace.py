@@ -256,6 +256,29 @@ def test_more_boxes_continue_a_search_for_fewer(tmp_path, capsys, monkeypatch):
         np.testing.assert_array_equal(*both)
 
 
+OBSTACLES = """\
+spheres: [{position: [0.1, 0.1, 0.0], radius: 0.05}]
+capsules: [{start: [-0.2, 0.0, 0.0], end: [-0.2, 0.2, 0.0], radius: 0.02}]
+"""
+
+
+def test_several_kinds_are_proven_at_once_among_convex_obstacles(tmp_path, capsys):
+    (tmp_path / "o.yaml").write_text(OBSTACLES)
+    asked = [*PLANAR, "--kind", "static,interference-free,collision-free", "--certify", "--json"]
+    asked += ["--obstacles", str(tmp_path / "o.yaml"), "--boxes", "3000"]
+    assert ended([*asked, "--out", str(tmp_path / "out")]) == 0
+    told = json.loads(printed(capsys).out)
+    proven = told["certified"]
+    assert proven["boxes_judged"] == 3000
+    assert min(proven["inside_share"], proven["outside_share"]) > 0.01
+    assert told["agreement"]["grid"]["contradictions"] == 0
+    assert (tmp_path / "out" / "boxes.png").is_file()
+    (tmp_path / "o.yaml").write_text("spheres: [{position: [0, 0, 0], radius: 0}]\n")
+    assert ended([*asked, "--out", str(tmp_path / "out2")]) == 2
+    assert "spheres[0].radius" in printed(capsys).err
+    assert not (tmp_path / "out2").exists()
+
+
 def planar_search():
     robot = load_robot("planar")
     point = [0.0, 0.0, robot.plane_height]
