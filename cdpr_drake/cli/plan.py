@@ -154,10 +154,8 @@ Clearance = Annotated[
 Obstacles = Annotated[
     Path | None,
     typer.Option(
-        typer.Option(
-            help="With --free or --proven: what stands in the way, YAML as of cdpr workspace "
-            "--obstacles."
-        ),
+        help="With --free or --proven: what stands in the way, YAML as of cdpr workspace "
+        "--obstacles."
     ),
 ]
 KeepInView = Annotated[
