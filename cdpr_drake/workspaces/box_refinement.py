@@ -62,11 +62,12 @@ class PathTube:
             along, apart = end - start, poses - start
             with np.errstate(divide="ignore", invalid="ignore"):
                 low, high = (apart - wide) / along, (apart + wide) / along
+            first, last = np.minimum(low, high), np.maximum(low, high)
             still = along == 0.0
-            low[:, still] = np.where(np.abs(apart[:, still]) <= wide[:, still], -np.inf, np.inf)
-            high[:, still] = -low[:, still]
-            first = np.max(np.minimum(low, high), axis=1)
-            last = np.min(np.maximum(low, high), axis=1)
+            within = np.abs(apart[:, still]) <= wide[:, still]
+            first[:, still] = np.where(within, -np.inf, np.inf)
+            last[:, still] = -first[:, still]
+            first, last = np.max(first, axis=1), np.min(last, axis=1)
             found |= np.maximum(first, 0.0) <= np.minimum(last, 1.0)
         return found
 
