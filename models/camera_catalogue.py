@@ -124,6 +124,17 @@ class Camera:
         lens = None if self.distortion is None else self.distortion.lens()
         return pinhole if lens is None else replace(pinhole, distortion=lens)
 
+    def view_slopes(self) -> tuple[float, float]:
+        """Tangents of half the angles along x and y of C of a view that is seen in full [-].
+
+        With a lens, or with a principal point off the middle, see `Pinhole.view_slopes`.
+        """
+        if self.principal_point is not None or self.distortion is not None:
+            return self.pinhole(self.width, self.height).view_slopes()
+        angles = self.view_angle_horizontal_deg, self.view_angle_vertical_deg
+        x, y = (float(np.tan(0.5 * np.radians(angle))) for angle in angles)
+        return x, y
+
 
 DEAD, FROZEN, OFF = "dead", "frozen", "off"
 

@@ -154,10 +154,7 @@ def camera_view(robot: Robot, name: str | None) -> View:
             f"camera: found {name!r}; accepted for {robot.name}: {', '.join(names) or 'none'}"
         )
     mount = mounts[0] if name is None else next(one for one in mounts if one.name == name)
-    camera = load_camera(mount.model)
-    angles = camera.view_angle_horizontal_deg, camera.view_angle_vertical_deg
-    slopes = [float(np.tan(0.5 * np.radians(angle))) for angle in angles]
-    return View(mount.pose.transform(), (slopes[0], slopes[1]))
+    return View(mount.pose.transform(), load_camera(mount.model).view_slopes())
 
 
 def solve_free_motion(

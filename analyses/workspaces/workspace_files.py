@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 
-from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CableGeometryError, DataFileError, WrenchSetError
 from cdpr_drake.geometry.convex_shapes import ConvexShape, mesh_vertices
 from cdpr_drake.models.robot_schema import Pose
@@ -131,15 +130,3 @@ def load_obstacles(path: Path) -> Obstacles:
         except CableGeometryError as problem:
             raise DataFileError(f"{path}: meshes[{k}].file: {problem}") from problem
     return Obstacles(np.array(boxes, float).reshape(-1, BOX_COLUMNS), tuple(solids))
-
-
-def load_obstacle_boxes(path: Path) -> Array:
-    """Reads obstacles for who knows boxes alone, shape (o, 15), rows of `box_row`.
-
-    Raises:
-        DataFileError: As `load_obstacles`, or there are other shapes.
-    """
-    found = load_obstacles(path)
-    if found.solids:
-        raise DataFileError(f"{path}: found {found.solids[0].name}; accepted here: boxes")
-    return found.boxes

@@ -125,14 +125,30 @@ class Pinhole:
         """
         if self.distortion is None:
             return 0.0
+        return float(np.mean(~np.all(np.isfinite(self._rim()), axis=0)))
+
+    def view_slopes(self) -> tuple[float, float]:
+        """Largest s_x, s_y such that all (x, y, 1) in C with |x| <= s_x, |y| <= s_y are seen [-].
+
+        Where the image's rim is, a lens bends these sides inwards or outwards; the rectangle is
+        within. Not positive where the middle of C is not in the image.
+        """
+        top, bottom, left, right = np.split(self._rim(), 4, axis=1)
+        x = min(float(np.min(-left[0])), float(np.min(right[0])))
+        return x, min(float(np.min(-top[1])), float(np.min(bottom[1])))
+
+    def _rim(self) -> Array:
+        """Directions (x, y) of points on the image's rim at unit depth: top, bottom, left, right,
+        `RIM_POINTS` of each, shape (2, n) [-]; NaN beyond what the lens is valid for.
+        """
         u = np.linspace(-0.5, self.width - 0.5, RIM_POINTS)
         v = np.linspace(-0.5, self.height - 0.5, RIM_POINTS)
         left, top = np.full(RIM_POINTS, -0.5), np.full(RIM_POINTS, -0.5)
         rim = np.hstack([
             [u, top], [u, top + self.height], [left, v], [left + self.width, v],
         ])  # fmt: skip
-        seen = self.distortion.undistort(self._normalized(rim))
-        return float(np.mean(~np.all(np.isfinite(seen), axis=0)))
+        xy = self._normalized(rim)
+        return xy if self.distortion is None else self.distortion.undistort(xy)
 
     def _normalized(self, uv: Array) -> Array:
         """Pixels at unit focal length, shape (2, n) [-]."""

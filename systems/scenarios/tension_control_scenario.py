@@ -146,10 +146,8 @@ class PredictiveSettings:
             raise ScenarioError(
                 f"predictive.mount: found {self.mount!r}; accepted for {robot.name}: {names}"
             )
-        camera = load_camera(found[0].model)
-        angles = camera.view_angle_horizontal_deg, camera.view_angle_vertical_deg
-        slopes = np.tan(np.radians(angles) / 2.0)
-        return View(found[0].pose.transform(), (float(slopes[0]), float(slopes[1])), self.points.T)
+        slopes = load_camera(found[0].model).view_slopes()
+        return View(found[0].pose.transform(), slopes, self.points.T)
 
 
 @dataclass(kw_only=True)

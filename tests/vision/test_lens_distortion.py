@@ -1,5 +1,7 @@
 """The distortion of lenses, against OpenCV's own projection, and where it folds over."""
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -8,6 +10,7 @@ from hypothesis import strategies as st
 
 from cdpr_drake.errors import LensDistortionError
 from cdpr_drake.vision.lens_distortion import LensDistortion
+from cdpr_drake.vision.pinhole import Pinhole
 
 PIXEL_TOLERANCE = 1e-9  # [px]; the formulas are the same, and images have a thousand pixels
 RETURN_TOLERANCE = 1e-9  # [-]; well inside the field, where the slope is not small
@@ -152,3 +155,24 @@ def test_nothing_comes_of_nothing():
 def test_what_is_no_lens_is_refused(kind, coefficients, words):
     with pytest.raises(LensDistortionError, match=words):
         LensDistortion(kind, coefficients)
+
+
+@pytest.mark.parametrize("coefficients", [(-0.25, 0.08, 0.001, -0.0005), (0.12, 0.0, 0.0, 0.0)])
+def test_a_view_that_a_lens_sees_in_full(coefficients):
+    """All of the rectangle is in the image, and of one that is wider a side reaches out."""
+    lens = LensDistortion("brown_conrady", coefficients)
+    camera = replace(Pinhole.from_view_angles(640, 480, 0.9, 0.7), cx=330.0, distortion=lens)
+    x, y = camera.view_slopes()
+    edge = np.linspace(-1.0, 1.0, 41)
+    inside = 0.999 * np.array([[x * a, y * b] for a in edge for b in edge]).T
+    assert camera.sees(camera.project(np.vstack([inside, np.ones(inside.shape[1])])))
+    for sides in (
+        [(sign * 1.01 * x, a * y) for sign in (1, -1) for a in edge],
+        [(a * x, sign * 1.01 * y) for sign in (1, -1) for a in edge],
+    ):
+        assert not camera.sees(camera.project(np.vstack([np.array(sides).T, np.ones(82)])))
+
+
+def test_without_a_lens_the_view_is_that_of_the_angles():
+    camera = Pinhole.from_view_angles(640, 480, 0.9, 0.7)
+    assert camera.view_slopes() == pytest.approx((np.tan(0.45), np.tan(0.35)))

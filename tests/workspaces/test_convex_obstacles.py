@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cdpr_drake.analyses.workspaces.pose_grid import plain
-from cdpr_drake.analyses.workspaces.workspace_files import load_obstacle_boxes, load_obstacles
+from cdpr_drake.analyses.workspaces.workspace_files import load_obstacles
 from cdpr_drake.analyses.workspaces.workspace_question import interference_bodies
 from cdpr_drake.errors import DataFileError
 from cdpr_drake.geometry.convex_shapes import ConvexShape
@@ -66,8 +66,6 @@ def test_files_of_obstacles_have_all_shapes(tmp_path):
         np.array([[-0.3, 0, 0], [-0.3, 0.1, 0], [-0.4, 0, 0], [-0.3, 0, 0.1]])
     )
     assert len(found.shapes()) == 4
-    with pytest.raises(DataFileError, match="found sphere 1; accepted here: boxes"):
-        load_obstacle_boxes(tmp_path / "obstacles.yaml")
 
 
 @pytest.mark.parametrize(
