@@ -29,7 +29,9 @@ def rails_figure(found: Reconfiguration) -> Figure:
     title = f"{found.before.name}: exit points on rails, before and after, and margins"
     figure = bare_figure((11.0, 6.0), title)
     with styled():
-        space = figure.add_subplot(1, 2, 1, projection="3d")
+        # A column between them: labels of axes in space are outside what a layout counts.
+        grid = figure.add_gridspec(1, 3, width_ratios=(1.2, 0.08, 1.0))
+        space = figure.add_subplot(grid[0], projection="3d")
         for k in range(before.shape[1]):
             label = "rail" if k == 0 else None
             one = np.array([ends[0][:, k], ends[1][:, k]]).T
@@ -48,7 +50,7 @@ def rails_figure(found: Reconfiguration) -> Figure:
         space.set(xlabel="x [m]", ylabel="y [m]", zlabel="z [m]")
         space.set_aspect("equal")
         space.legend(loc="upper left", bbox_to_anchor=(-0.2, 1.05), ncols=1, fontsize="small")
-        bars = figure.add_subplot(1, 2, 2)
+        bars = figure.add_subplot(grid[2])
         number = np.arange(1, len(task.poses) + 1)
         for shift, values, colour, hatch, label in (
             (-0.2, found.margins[0], "white", "//", "before"),
