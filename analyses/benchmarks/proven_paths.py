@@ -28,8 +28,8 @@ from cdpr_drake.errors import CdprError, PlanningError
 from cdpr_drake.geometry.poses import pose_from_angles
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.planning.path_in_sets import ProvenMotion, proven_motion
 from cdpr_drake.planning.path_task import PathTask
-from cdpr_drake.planning.proven_path import ProvenMotion, proven_motion
 from cdpr_drake.workspaces.cable_interference import box_row
 
 ROBOTS = {"caroca": 0.1, "swinburne": 0.1, "macarm": 1.0}

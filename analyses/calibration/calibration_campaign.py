@@ -25,10 +25,11 @@ from cdpr_drake.analyses.simulation.run_summary import camera_path
 from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
 from cdpr_drake.arrays import Array
 from cdpr_drake.calibration.guesses import with_tags
+from cdpr_drake.calibration.measured_program import first_readings
 from cdpr_drake.calibration.measurements import simulated_corners
 from cdpr_drake.calibration.pose_design import choose_poses, informing_rows
 from cdpr_drake.calibration.pose_search import guessed_stations
-from cdpr_drake.calibration.program import CalibrationProgram, first_readings
+from cdpr_drake.calibration.program import CalibrationProgram
 from cdpr_drake.calibration.stations import Point, Stations
 from cdpr_drake.errors import CalibrationError, EquilibriumError
 from cdpr_drake.geometry.pose_accuracy import distances_from_line

@@ -117,7 +117,6 @@ def plan_path(
     *,
     corners: str = "smooth",
     tolerance: float = TOLERANCE,
-    feeds: bool = True,
     stations: int = STATIONS,
     pulleys: bool = True,
     resist: SpatialSet | Path | str | None = None,
@@ -130,10 +129,10 @@ def plan_path(
         robot: The robot, or its name or path.
         path: A file or poses, as `path_poses` takes them [m].
         limits: Beside the robot's: `tensions` (2,) [N], `cable_speed` [m/s],
-            `cable_acceleration` [m/s^2], `speed` [m/s], `reserve` [-], see `LimitSettings`.
+            `cable_acceleration` [m/s^2], `speed` [m/s], `reserve` [-], `feeds`, see
+            `LimitSettings`.
         corners: At the poses: smooth (a spline), blend (rounded corners) or rest.
         tolerance: How far rounded corners may pass from a pose [m].
-        feeds: Whether feeds of a file of G-code are kept, as largest speeds of Po.
         stations: Points at which limits are asked.
         pulleys: Whether the cables run over the robot's pulleys.
         resist: Wrenches on the platform about Po in W [N m, N], a polytope or a box, or their file:
@@ -149,7 +148,9 @@ def plan_path(
     loaded, given = as_robot(robot, "plan_path"), chosen_limits(limits)
     task = planned_for(loaded, given, pulleys, resist)
     found = path_poses(loaded, path)
-    moves = found.moves if feeds else tuple(replace(move, speed=np.inf) for move in found.moves)
+    moves = found.moves
+    if not given.feeds:
+        moves = tuple(replace(move, speed=np.inf) for move in moves)
     way = make_path(loaded, found.poses, corners, tolerance, moves)
     arguments = limits_told(given, pulleys) | {
         "path": str(path) if _is_file(path) else None,
@@ -159,7 +160,7 @@ def plan_path(
         "stations": stations,
     }
     if moves:
-        arguments["feeds"] = feeds
+        arguments["feeds"] = given.feeds
         arguments["arcs"] = sum(move.arc is not None for move in moves)
         known = [move.speed for move in moves if np.isfinite(move.speed)]
         arguments["feed_range_m_s"] = [min(known), max(known)] if known else None

@@ -32,8 +32,8 @@ from cdpr_drake.errors import PlanningError, WorkspaceError
 from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import as_pose
+from cdpr_drake.planning.path_in_sets import SEQUENCES, proven_motion
 from cdpr_drake.planning.path_timing import STATIONS, PathPlan
-from cdpr_drake.planning.proven_path import SEQUENCES, proven_motion
 from cdpr_drake.schema.typed_yaml import closest
 from cdpr_drake.workspaces.proven_cells import CELLS
 from cdpr_drake.workspaces.proven_sets import COVER

@@ -275,7 +275,7 @@ def place_constraints(
             lines = asked.clearance + radius
             found.append(
                 ObstacleClearance(
-                    cables, coordinates, shapes, bodies, lines, asked.clearance, names
+                    cables, coordinates, shapes, bodies, lines, asked.clearance, names=names
                 )
             )
     if asked.in_view is not None:

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from cdpr_drake.analyses.planning.plan_results import MotionRun
+from cdpr_drake.planning.path_in_sets import ProvenMotion
 from cdpr_drake.planning.path_task import MotionSamples, PathTask
-from cdpr_drake.planning.proven_path import ProvenMotion
 from cdpr_drake.trajectories.timed_path import TimedPath
 from cdpr_drake.workspaces.proven_sets import PoseSets
 

@@ -44,6 +44,7 @@ class LimitSettings:
         cable_acceleration: Largest acceleration of a cable [m/s^2].
         speed: Largest speed of Po [m/s].
         reserve: Share of all limits that the plan leaves to feedback, see `MotionLimits.within`.
+        feeds: Whether feeds of a file of G-code are kept, as largest speeds of Po.
     """
 
     tensions: tuple[float, float] | None = None
@@ -51,6 +52,7 @@ class LimitSettings:
     cable_acceleration: float | None = None
     speed: float | None = None
     reserve: float = RESERVE
+    feeds: bool = True
 
 
 def robot_limits(robot: Robot, given: LimitSettings) -> MotionLimits:

@@ -348,7 +348,7 @@ def plan(
 
         def planner(say: Callable[[str], None]) -> MotionRun:
             found = plan_path(
-                loaded, poses, given, corners=corners, tolerance=tolerance, feeds=feeds,
+                loaded, poses, replace(given, feeds=feeds), corners=corners, tolerance=tolerance,
                 stations=stations, pulleys=pulleys, resist=resist, track=track, say=say,
             )  # fmt: skip
             asked = {"path": None if path is None else str(path), "waypoints": waypoints}

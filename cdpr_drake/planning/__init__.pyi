@@ -1,5 +1,7 @@
 from .free_path import FreePathProgram as FreePathProgram
 from .input_shaping import make_shaper as make_shaper
+from .path_in_sets import proven_motion as proven_motion
+from .path_in_sets import proven_path as proven_path
 from .path_task import sample_motion as sample_motion
 from .path_timing import plan_along_path as plan_along_path
 from .path_timing_program import PathTimingProgram as PathTimingProgram
@@ -12,8 +14,6 @@ from .place_constraints import TargetInView as TargetInView
 from .pose_coordinates import BodyState as BodyState
 from .pose_coordinates import PlaceAndAngles as PlaceAndAngles
 from .pose_coordinates import RelativePose as RelativePose
-from .proven_path import proven_motion as proven_motion
-from .proven_path import proven_path as proven_path
 from .reconfiguration import Rails as Rails
 from .reconfiguration import RailTask as RailTask
 from .reconfiguration import ReconfigurationProgram as ReconfigurationProgram

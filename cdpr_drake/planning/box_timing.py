@@ -98,7 +98,7 @@ def time_within_box(
         )
     lim = task.limits
     limits = MotionLimits(lower=0.0, upper=2.0, speed=min(lim.speed, lim.cable_speed))
-    within = BoxTask(task.cables, task.dynamics, limits, task.names, box)
+    within = BoxTask(task.cables, task.dynamics, limits, task.names, box=box)
     found = plan_along_path(within, path, stations)
     times = _with_bounds(found.trajectory)
     over = max(float(np.max(times[0] / box)), (times[1] / limits.speed) ** 2, 1.0)

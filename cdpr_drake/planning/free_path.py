@@ -201,7 +201,7 @@ class FreePathProgram:
         self.Add(
             ObstacleClearance(
                 self.task.cables, self.pose_coordinates, obstacles, bodies, lines, clearance,
-                self._cable_words(),
+                names=self._cable_words(),
             )
         )  # fmt: skip
 

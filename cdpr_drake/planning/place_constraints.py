@@ -147,6 +147,7 @@ class ObstacleClearance(PoseConstraint):
         bodies: Sequence[ConvexShape],
         cable_distance: float,
         platform_distance: float,
+        *,
         names: Sequence[str] | None = None,
     ) -> None:
         """With what stands in the way.
@@ -191,7 +192,7 @@ class ObstacleClearance(PoseConstraint):
         cables, obstacles, bodies, lines, apart, names = self._given
         here = self.coordinates
         return (
-            ObstacleClearance(cables, here, obstacles, (), lines, apart, names),
+            ObstacleClearance(cables, here, obstacles, (), lines, apart, names=names),
             *(SeparatingPlane(here, body, one, apart) for one in obstacles for body in bodies),
         )
 

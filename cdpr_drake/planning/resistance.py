@@ -10,24 +10,52 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from math import comb
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.control.task_space import PlatformDynamics
 from cdpr_drake.errors import PlanningError
+from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.geometry.poses import pose_from_row
+from cdpr_drake.planning.limits import MotionLimits
 from cdpr_drake.planning.resistance_kernel import corner_margins, resistance_rows
 from cdpr_drake.workspaces.static_feasibility import wrench_matrices
 from cdpr_drake.workspaces.wrench_facets_kernel import wedge_terms
 
 if TYPE_CHECKING:
-    from cdpr_drake.planning.path_task import PathTask
     from cdpr_drake.trajectories.timed_path import TimedPath
 
 MOST_ROWS = 10_000
 """Bounds of (u, x) that a point of a path may have: 8 cables have 112, and 896 with torques; so
 many take some seconds for a path."""
+
+
+class ResistingTask(Protocol):
+    """What is asked of a `PathTask` here; that file asks this one."""
+
+    @property
+    def cables(self) -> CableSet:
+        """The cables."""
+
+    @property
+    def dynamics(self) -> PlatformDynamics:
+        """The platform."""
+
+    @property
+    def limits(self) -> MotionLimits:
+        """What the motion may ask."""
+
+    @property
+    def resist(self) -> Array:
+        """Wrenches on the platform, shape (k, 6) [N m, N]."""
+
+    def name(self, cable: int) -> str:
+        """Of a cable, counted from 0."""
+
+    def stations(self, points: Array) -> tuple[Array, Array]:
+        """What points of a path ask."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +79,7 @@ class CornerMargins:
         return int(np.argmin(self.margins))
 
 
-def check_resistance(task: PathTask) -> None:
+def check_resistance(task: ResistingTask) -> None:
     """Makes sure that a set of wrenches can be asked along a path.
 
     Raises:
@@ -71,7 +99,7 @@ def check_resistance(task: PathTask) -> None:
         )
 
 
-def row_count(task: PathTask) -> int:
+def row_count(task: ResistingTask) -> int:
     """Bounds that a set of wrenches makes at a point of a path."""
     if not len(task.resist):
         return 0
@@ -80,7 +108,7 @@ def row_count(task: PathTask) -> int:
     return 2 * comb(m, f - 1) * ways
 
 
-def resistance_bounds(task: PathTask, points: Array, stations: Array) -> Array:
+def resistance_bounds(task: ResistingTask, points: Array, stations: Array) -> Array:
     """What the wrenches to resist leave (u, x), shape (n, p, 4), as `resistance_rows`; p may be 0.
 
     Args:
@@ -98,13 +126,13 @@ def resistance_bounds(task: PathTask, points: Array, stations: Array) -> Array:
     return out
 
 
-def responses(task: PathTask, points: Array) -> Array:
+def responses(task: ResistingTask, points: Array) -> Array:
     """Tensions of least norm that balance each wrench to resist, shape (n, k, m) [N]."""
     W, rows = _matrices(task, points), list(task.dynamics.motions)
     return np.ascontiguousarray(-task.resist[:, rows] @ np.linalg.pinv(W).transpose(0, 2, 1))
 
 
-def resisted(task: PathTask, points: Array, s: Array, u: Array, x: Array) -> CornerMargins:
+def resisted(task: ResistingTask, points: Array, s: Array, u: Array, x: Array) -> CornerMargins:
     """How well points of a path, shape (n, 19), resist each corner with d2s/dt2 and (ds/dt)^2.
 
     Args:
@@ -124,7 +152,7 @@ def resisted(task: PathTask, points: Array, s: Array, u: Array, x: Array) -> Cor
     return CornerMargins(task.resist, margins, s[where])
 
 
-def bound_words(task: PathTask, row: int) -> str:
+def bound_words(task: ResistingTask, row: int) -> str:
     """Which cables a row of `resistance_bounds` is about."""
     f, m = len(task.dynamics.motions), task.cables.count
     ways = 2 ** (m - f + 1) if np.isfinite(task.limits.torque) else 1
@@ -138,7 +166,7 @@ def _others(f: int, m: int) -> np.ndarray:
     return np.array([[j for j in range(m) if j not in chosen] for chosen in some])
 
 
-def resisted_along(task: PathTask, motion: TimedPath) -> CornerMargins:
+def resisted_along(task: ResistingTask, motion: TimedPath) -> CornerMargins:
     """How well a motion resists each corner, at its stations: what it asks before and after each.
 
     Raises:
@@ -163,7 +191,7 @@ def wrench_words(wrench: Sequence[float] | Array) -> str:
     return f"({', '.join(words[:3])}) N m, ({', '.join(words[3:])}) N"
 
 
-def _matrices(task: PathTask, points: Array) -> Array:
+def _matrices(task: ResistingTask, points: Array) -> Array:
     """Wrench matrices of the rows that the platform moves, shape (n, f, m)."""
     R = np.array([pose_from_row(point[:7]).rotation().matrix() for point in points])
     W = wrench_matrices(points[:, 4:7], R, task.cables)

@@ -218,7 +218,11 @@ def test_feeds_are_speeds_of_their_pieces(tmp_path, corners):
     assert np.max(samples.uses[:, 3]) == pytest.approx(np.max(way / most))
     assert np.mean(samples.active()["speed of Po"]) > 0.5
     free = plan_path(
-        "acrobot_large", file, {"tensions": (1.0, 60.0)}, corners=corners, stations=300, feeds=False
+        "acrobot_large",
+        file,
+        {"tensions": (1.0, 60.0), "feeds": False},
+        corners=corners,
+        stations=300,
     )
     assert free.plan.duration < 0.8 * run.plan.duration
     assert free.plan.path.speeds is None

@@ -8,7 +8,7 @@ from cdpr_drake.errors import PlanningError
 from cdpr_drake.geometry.poses import angles_from_rotation, pose_from_angles
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.planning.box_timing import time_within_box
-from cdpr_drake.planning.proven_path import proven_motion, proven_path
+from cdpr_drake.planning.path_in_sets import proven_motion, proven_path
 from cdpr_drake.planning.set_curve import control_points
 from cdpr_drake.planning.set_sequences import OverlapGraph, least_ways
 from cdpr_drake.trajectories.pose_path import smooth_path
