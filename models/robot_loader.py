@@ -95,7 +95,8 @@ def robot_file(name: str) -> Path:
             return mechanism
         file = path.suffix or "/" in name
         hint = f"; the path of a robot file has to end in {', '.join(SUFFIXES)}" if file else ""
-        raise RobotFileError(f"robot {name!r} is unknown; {closest(name, robot_names())}{hint}")
+        known = "cdpr robots lists the names" if file else closest(name, robot_names())
+        raise RobotFileError(f"robot {name!r} is unknown; {known}{hint}")
     return _FOLDER / name / "robot.yaml"
 
 

@@ -23,11 +23,16 @@ get_ipython().reset()
 import os, sys
 if "matplotlib.pyplot" in sys.modules:
     sys.modules["matplotlib.pyplot"].close("all")
+methods = sys.modules.get("cdpr_drake.tensions.methods")
+if methods is not None:
+    for name in [name for name, one in methods.METHODS.items() if one.asked is not None]:
+        del methods.METHODS[name]
 os.chdir({folder!r})
-del os, sys
+del os, sys, methods
 get_ipython().execution_count = 0
 """
-"""Forgets what the notebook before has made: its names, numbers of cells, open figures, folder."""
+"""Forgets what the notebook before has made: its names, numbers of cells, open figures, folder,
+its own methods of tensions."""
 
 
 @pytest.fixture(scope="module")

@@ -106,7 +106,7 @@ def put_rails(robot: Robot, rails: Sequence[RailSettings], source: str = "rails"
                 raise PlanningError(f"{where}.cables: found {name} again; accepted: once")
             taken.add(name)
             cable = found.cables[names.index(name)]
-            cable.exit_point = robot.exit_points()[:, names.index(name)]
+            cable.exit_point = robot.cable_set().p_WA[:, names.index(name)]
             cable.rail = Rail(axis=np.array(rail.axis), lower=rail.lower, upper=rail.upper)
     return found
 

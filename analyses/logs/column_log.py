@@ -67,7 +67,7 @@ def knows_columns(head: str) -> str:
     mark = "," if separator not in (",", None) else "."
     below = [cell.strip() for cell in lines[1].split(separator)]
     numbers = [parsed(cell, mark if "," in cell else ".") is not None for cell in below]
-    names = [f"C{k + 1}" for k in range(MOST_CABLES)]
+    names = ["C" + str(k + 1) for k in range(MOST_CABLES)]
     known = [cell for cell in cells if read_header(_plain(cell)[1], names, 1) is not None]
     if not known or len(below) != len(cells) or sum(numbers) < 0.5 * len(numbers):
         return ""
@@ -143,7 +143,7 @@ def _plain(header: str) -> tuple[str, str]:
 def _converted(
     path: Path, headers: list[str], table: CellTable, first: int, asked: LogRequest
 ) -> tuple[Columns, dict[str, str], tuple[str, ...]]:
-    names = list(asked.cables or [f"C{k + 1}" for k in range(MOST_CABLES)])
+    names = list(asked.cables or ["C" + str(k + 1) for k in range(MOST_CABLES)])
     start = first_number([_plain(header)[1] for header in headers], len(asked.cables or ()) or -1)
     columns: Columns = {}
     units: dict[str, str] = {}

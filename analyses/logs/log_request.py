@@ -72,7 +72,7 @@ class LogRequest:
             LogFileError: Another number of names was given.
         """
         if self.cables is None:
-            return list(default) if default else [f"C{k + 1}" for k in range(count)]
+            return list(default) if default else ["C" + str(k + 1) for k in range(count)]
         if len(self.cables) != count:
             raise LogFileError(
                 f"{path}: cables: found {count} in the log and {len(self.cables)} names "

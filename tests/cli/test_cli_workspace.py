@@ -150,8 +150,8 @@ def test_files_of_wrenches_and_obstacles(tmp_path, capsys):
         (["--hull", "0,0,0.3"], ["--hull", "planar"]),
         (["--mesh", "a.stl"], ["--mesh", "--hull"]),
         (
-            ["--certify", "--kind", "static,dynamic"],
-            ["--certify", "static,dynamic", "collision-free"],
+            ["--certify", "--kind", "static,singularity-free"],
+            ["--certify", "static,singularity-free", "collision-free"],
         ),
         (["--certify", "--boxes", "0"], ["--boxes", "0"]),
         (["--certify", "--method", "closed_form"], ["--certify", "--method closed_form"]),

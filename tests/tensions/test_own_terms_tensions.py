@@ -329,4 +329,4 @@ def test_a_function_that_raises_in_a_loop_ends_it(own_method, capsys):
     own_method("faulty", build)
     with pytest.raises(TensionProblemError, match="faulty: its program raised an error"):
         distribute(acrobot(RigidTransform(PLACES[0]), 1.0), "faulty")
-    assert "own function" in capsys.readouterr().err
+    assert "own function" in printed(capsys).err

@@ -116,7 +116,6 @@ def test_command_tells_infeasible_from_wrong_input(capsys):
         (["acrobot_large", "--pose", "0,0,0.3", "--method", "reference_program"], "no reference"),
         (["planar", "--pose", "0,0,0.3", "--plot", "x.png"], "redundancy 1; accepted: 2"),
         (["acrobot_large", "--pose", "0,0,0.3", "--plot", "no/such/x.png"], "cannot be written"),
-        (["acrobot_large"], "--pose"),
     ],
 )
 def test_command_refuses(capsys, tmp_path, monkeypatch, arguments, words):

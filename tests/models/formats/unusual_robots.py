@@ -67,6 +67,7 @@ def robot_with_everything(**changes: object) -> Robot:
            "breaking_load": 3456.0}  # fmt: skip
     made["cables"][0] |= {"pulley_radius": 0.017, "swivel_axis": [0.0, 1.0, 0.3], "material": own}
     made["cables"][1] |= {"material": {"diameter": 0.0031}}
+    made["cables"][1] |= {"mechanical_advantage": 2.0, "drum_radius": 0.031}
     made["cables"][2] |= {"anchor_pulley_radius": 0.006, "anchor_swivel_axis": [1.0, 0.0, 0.5]}
     made["cables"][3] |= {"rail": {"axis": [0, 0, 1], "lower": -0.1, "upper": 0.1, "at": 0.05}}
     made["cables"][4] |= {"winch": "pair"}

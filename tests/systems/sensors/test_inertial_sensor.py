@@ -90,7 +90,7 @@ def accelerations_of(kind, robot, settings, commands, X_WP, twist):
     block.set_at_equilibrium(context, X_WP)
     for port in range(block.num_input_ports()):
         name = block.get_input_port(port).get_name()
-        if name != "commanded_length_rates":
+        if name not in ("commanded_length_rates", "applied_wrench"):
             block.get_input_port(port).FixValue(context, commands)
     if kind is CableRobot:
         plant = block.GetMutableSubsystemContext(block.plant, context)
