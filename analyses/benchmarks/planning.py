@@ -90,7 +90,7 @@ def resistance_row(repeats: int) -> TimingRow:
 def rails_row(repeats: int) -> TimingRow:
     """The best place of two exit points on rails, against all places of a grid of 9 by 9."""
     robot = load_robot("planar")
-    bases = robot.exit_points()
+    bases = robot.cable_set().p_WA
     directions = np.zeros((2, *bases.shape))
     directions[0, 1, 0] = directions[1, 1, 2] = 1.0
     most = np.full(2, 0.2)

@@ -46,6 +46,8 @@ MISSED = 1e-5
 """A constraint that is missed by more, in the program's scaled units, is not kept: ten times what
 solvers of nonlinear programs stop at."""
 
+SNOPT_CANNOT_IMPROVE = 41
+
 MOST_NAMED = 3
 """Constraints that a message names."""
 
@@ -386,6 +388,8 @@ class OwnTerms(ABC):
             status = str(result.get_solution_result()).rpartition(".")[2]
             if result.is_success():
                 return np.asarray(result.get_x_val(), float), word, status
+            if _cannot_improve(result) and not result.GetInfeasibleConstraints(program):
+                return np.asarray(result.get_x_val(), float), word, "cannot be improved, info 41"
             said.append(f"{status} by {word}")
             named = self._named_misses(result)
             if result.get_solution_result() == SolutionResult.kInfeasibleConstraints:
@@ -477,6 +481,16 @@ def chosen_names(
 def is_convex(program: MathematicalProgram) -> bool:
     """Whether a solver finds the best solution of a program from anywhere."""
     return GetProgramType(program) in CONVEX
+
+
+def _cannot_improve(result: MathematicalProgramResult) -> bool:
+    """Whether SNOPT ended where rounding of costs hides any further descent, its info 41.
+
+    So it ends where it starts near a minimum, with slopes by differences.
+    """
+    if result.get_solver_id() != SnoptSolver.id():
+        return False
+    return int(result.get_solver_details().info) == SNOPT_CANNOT_IMPROVE
 
 
 def _solvers_for(program: MathematicalProgram) -> list[Any]:

@@ -36,7 +36,7 @@ ASKED: dict[str, Callable[[Any], object]] = {
     "plan_path": lambda robot: cdpr.plan_path(robot, [np.eye(4), np.eye(4)]),
     "plan_free_motion": lambda robot: cdpr.plan_free_motion(robot, None, None),
     "plan_proven_motion": lambda robot: cdpr.plan_proven_motion(robot, None, None),
-    "reconfigure": lambda robot: cdpr.reconfigure(robot, [None]),
+    "reconfigure": lambda robot: cdpr.reconfigure(robot, None, [None]),
     "replay_log": lambda robot: cdpr.replay_log("log.csv", robot),
     "calibrate": lambda robot: cdpr.calibrate(robot, "log.csv"),
     "identify": lambda robot: cdpr.identify(robot, "log.csv"),
