@@ -20,6 +20,9 @@ from cdpr_drake.calibration.result import CalibrationResult, Fit
 MISFIT = "misfit"
 """Status of a result that does not fit what was measured."""
 
+MOST_LEFT_OUT = 0.5
+"""Outliers over the degrees of freedom that remain; of more, the search chose what it fits."""
+
 MISFIT_FACTOR = 3.0
 """Residuals of so many sigmas, root mean square, are no fit."""
 
@@ -61,6 +64,12 @@ def misfits(result: CalibrationResult) -> tuple[str, ...]:
         whole = fit.count + fit.dropped
         if is_thrown_out(fit):
             why.append(f"{fit.dropped} of {whole} {kind} do not fit: {HINTS.get(kind, '')}")
+    left_out = len(result.outliers)
+    if result.degrees > 0 and left_out > MOST_LEFT_OUT * result.degrees:
+        why.append(
+            f"{left_out} readings were left out beside {result.degrees} degrees of freedom; "
+            f"accepted: at most {MOST_LEFT_OUT:g} of these"
+        )
     if why:
         worst = result.largest[0]
         why.append(

@@ -144,3 +144,17 @@ def test_motors_whose_sign_is_turned_are_no_fit_and_named():
     )  # fmt: skip
     assert found.result.status == "misfit"
     assert "176 of 176 motor angles fit with the sign turned" in found.misfit[0]
+
+
+def test_half_the_readings_of_one_motor_off_are_no_calibration(tmp_path):
+    """A third too much in every other row: most of what is dropped is what the search chose."""
+    lines = LOG.read_text(encoding="utf-8").splitlines()
+    first = next(k for k, line in enumerate(lines) if line.startswith("A_motor"))
+    for k in range(first + 2, len(lines), 2):
+        angle, *rest = lines[k].split(",")
+        lines[k] = ",".join([str(1.3 * float(angle)), *rest])
+    (tmp_path / "half.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    found = cdpr.calibrate(
+        believed(), tmp_path / "half.csv", UNKNOWN, sigmas=EXACT, zero=RigidTransform()
+    )
+    assert found.result.status == "misfit"
