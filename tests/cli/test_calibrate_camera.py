@@ -64,6 +64,11 @@ def test_images_become_a_camera_that_scenarios_take(images, tmp_path, capsys):
     assert scenario.camera.model == str(out / "camera.yaml")
 
 
+SAME = 1e-3
+"""Of standard deviations. OpenCV adds up in parallel, so that its results change in the seventh
+digit from call to call; another set of images would change them by whole deviations."""
+
+
 def test_the_front_door_gives_what_the_command_writes(images):
     board = cdpr.CalibrationBoard("charuco", 9, 7, 0.035)
     found = cdpr.calibrate_camera(images, board, name="mine", rate=25.0)
@@ -73,7 +78,8 @@ def test_the_front_door_gives_what_the_command_writes(images):
     assert len(found.tables()) == 4
     pictures = [cv2.imread(name) for name in images]
     again = cdpr.calibrate_camera(pictures, board)
-    np.testing.assert_allclose(again.fit.values, found.fit.values, rtol=1e-9)
+    apart = np.abs(again.fit.values - found.fit.values) / found.fit.deviations
+    assert np.max(apart) < SAME
     with pytest.raises(cdpr.CdprError, match="sharp: unknown"):
         cdpr.calibrate_camera(images, board, sharp=True)
 
