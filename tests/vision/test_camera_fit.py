@@ -91,8 +91,8 @@ def test_held_out_images_are_evenly_chosen_and_not_fitted():
     assert len(held) == round(0.2 * len(views))
     shifted = [v._replace(uv=v.uv + 25.0) if v.name in held else v for v in views]
     again = fit_camera(shifted, SIZE)
-    # OpenCV adds up in threads, in no order.
-    np.testing.assert_allclose(again.values, fit.values, rtol=1e-9)
+    # OpenCV adds up in parallel: its results change in the seventh digit from call to call.
+    assert np.max(np.abs(again.values - fit.values) / fit.deviations) < 1e-3
 
 
 def test_an_image_that_fits_far_worse_is_named_and_left_out():
