@@ -19,6 +19,12 @@ from cdpr_drake.analyses.workspaces.workspace_question import (
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.workspaces.pose_grid import WorkspaceGrid, grid_by_count
 
+NEEDS_SPARE = ("wrench-closure", "single-failure")
+"""Kinds without a pose where no cable is more than the degrees of freedom need."""
+
+RESISTING = ("wrench-feasible", "single-failure")
+"""Kinds that the wrenches to resist belong to."""
+
 BOXES = 200_000
 """Boxes that are judged for each robot."""
 
@@ -109,14 +115,14 @@ def confirm(
     volumes, opens, finished = [], [], True
     for name in (original, design):
         robot = load_robot(name)
-        if kind == "wrench-closure" and not can_close(robot):  # such a set of cables was chosen
+        if kind in NEEDS_SPARE and not can_close(robot):  # such a set of cables was chosen
             volumes.append(0.0)
             opens.append(0.0)
             continue
         if say is not None:
             say(f"proving {kind} of {robot.name}")
         asked = WorkspaceRequest(
-            required=judging.required if kind == "wrench-feasible" else None,
+            required=judging.required if kind in RESISTING else None,
             around=interference_bodies(robot),
         )
         question = make_workspace_question(name, [kind], judging.grid, asked=asked)

@@ -165,6 +165,15 @@ GOALS: dict[str, Goal] = {
         name: Goal(f"least {MEASURES[name].title}", MEASURES[name].unit, _least(name))
         for name in ("capacity-margin", "stiffness", "frequency", "dexterity", "clearance")
     },
+    "survives": Goal(
+        f"share of poses: {KINDS['single-failure'].title}",
+        "-",
+        _share("single-failure"),
+        proven_as="single-failure",
+    ),
+    "breaks-survived": Goal(
+        "mean number of single breaks after which the weight is held", "-", _mean("breaks-survived")
+    ),
     "tension-factor": Goal("mean tension factor", "-", _mean("tension-factor")),
     "payload": Goal("least payload", "kg", _least("payload")),
     "accuracy": Goal(
@@ -177,6 +186,10 @@ GOALS: dict[str, Goal] = {
     ),
 }
 """Goals by name."""
+
+
+NEEDS_SPARE = ("wrench-closure", "survives", "breaks-survived")
+"""Goals that make sense only with more cables than degrees of freedom."""
 
 
 def can_close(robot: Robot) -> bool:
@@ -201,9 +214,10 @@ def check_goals(robot: Robot, judging: GoalContext, names: Sequence[str]) -> Non
             "0"
         )
     freedom = robot.motion_type().freedom
-    if "wrench-closure" in names and not can_close(robot):
+    spare = [name for name in names if name in NEEDS_SPARE]
+    if spare and not can_close(robot):
         raise DesignError(
-            f"goals wrench-closure: found {len(robot.cables)} cables of {robot.name} for {freedom} "
+            f"goals {spare[0]}: found {len(robot.cables)} cables of {robot.name} for {freedom} "
             f"degrees of freedom; accepted: robots with more than {freedom}"
         )
     case = pose_conditions(robot).case

@@ -36,7 +36,7 @@ from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.numerics.own_terms import OwnTerms, ProgramValues
 from cdpr_drake.numerics.program_functions import ProgramCost, ProgramFunction
 
-STEPPED = (*KINDS, "csw", "cables")
+STEPPED = (*KINDS, "csw", "cables", "survives", "breaks-survived")
 """Goals that are counts: they have no slope, and no program finds a better one by it."""
 
 STEP = 1e-4

@@ -21,6 +21,11 @@ from cdpr_drake.workspaces.demanded_wrenches import (
 )
 from cdpr_drake.workspaces.method_feasibility import held_by_method
 from cdpr_drake.workspaces.pose_grid import WorkspaceGrid
+from cdpr_drake.workspaces.single_failure import (
+    break_margins,
+    breaks_survived,
+    survives_breaks,
+)
 from cdpr_drake.workspaces.static_feasibility import StaticCase, statically_feasible
 from cdpr_drake.workspaces.stiffness import first_frequencies, stiffness_at
 from cdpr_drake.workspaces.tension_factor import REGULAR, dexterities, tension_factors
@@ -123,6 +128,10 @@ def _wrench_feasible(about: PoseConditions, at: Poses) -> np.ndarray:
     return capacity_margins(about.case, at.positions, at.rotations, demand).feasible
 
 
+def _single_failure(about: PoseConditions, at: Poses) -> np.ndarray:
+    return survives_breaks(about.case, at.positions, at.rotations, about.required)
+
+
 def _dynamic(about: PoseConditions, at: Poses) -> np.ndarray:
     assert about.motion is not None
     demand = accelerating(about.case, about.motion, at.rotations)
@@ -156,6 +165,9 @@ KINDS: dict[str, Kind] = {
     "wrench-closure": Kind(
         "tensions without upper limit balance every wrench",
         lambda about, at: closure_margins(about.case, at.positions, at.rotations) > 0.0,
+    ),
+    "single-failure": Kind(
+        "weight and required wrenches can be held with any one cable broken", _single_failure
     ),
     "statically-stable": Kind(
         "held with a regular Jacobian and a positive definite stiffness",
@@ -195,6 +207,16 @@ def _clearance(about: PoseConditions, at: Poses) -> Array:
 
 MEASURES: dict[str, Measure] = {
     "capacity-margin": Measure("capacity margin", "N", _capacity),
+    "breaks-survived": Measure(
+        "single breaks after which all is held",
+        "-",
+        lambda a, at: breaks_survived(a.case, at.positions, at.rotations, a.required).astype(float),
+    ),
+    "failure-margin": Measure(
+        "least capacity margin with any one cable broken",
+        "N",
+        lambda a, at: break_margins(a.case, at.positions, at.rotations, a.required),
+    ),
     "tension-factor": Measure(
         "tension factor", "-", lambda a, at: tension_factors(a.case, at.positions, at.rotations)
     ),

@@ -196,6 +196,9 @@ class WorkspaceRequest:
 
 DEFAULT_REQUEST = WorkspaceRequest()
 
+REDUNDANT = ("wrench-closure", "single-failure", "failure-margin", "breaks-survived")
+"""Kinds and measures that make sense only with more cables than degrees of freedom."""
+
 HINTS = {
     "required": "required, force or moment",
     "motion": "accelerations",
@@ -253,9 +256,11 @@ def make_workspace_question(
             f"method {asked.method}: found kinds {','.join(kinds)}; accepted: static among them"
         )
     n, m = len(about.case.rows), about.case.cables.count
-    if "wrench-closure" in kinds and m <= n:
+    redundant = [f"kinds {name}" for name in kinds if name in REDUNDANT]
+    redundant += [f"measures {name}" for name in measures if name in REDUNDANT]
+    if redundant and m <= n:
         raise WorkspaceError(
-            f"kinds wrench-closure: found {m} cables of {robot.name} for {n} degrees of freedom; "
+            f"{redundant[0]}: found {m} cables of {robot.name} for {n} degrees of freedom; "
             f"accepted: robots with more than {n}"
         )
     moved = [row - 3 for row in about.case.rows if row >= 3]

@@ -139,6 +139,22 @@ class CableSet:
         """Number of cables m."""
         return int(self.p_WA.shape[1])
 
+    def chosen(self, cables: npt.NDArray[np.generic]) -> Self:
+        """Some of the cables, in the order asked for.
+
+        Args:
+            cables: Which, shape (m,) of bool, or their numbers from 0.
+
+        Raises:
+            CableModelError: None is left.
+        """
+        parts = {
+            each.name: getattr(self, each.name)[..., cables]
+            for each in fields(self)
+            if each.name != "down"
+        }
+        return replace(self, **parts)
+
     def over_platform_pulleys(self, radius: Array | float, swivel_axis: Array) -> Self:
         """The same cables over pulleys at the platform.
 

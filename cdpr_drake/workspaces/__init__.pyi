@@ -10,5 +10,7 @@ from .certified_boxes import certify as certify
 from .demanded_wrenches import SpatialSet as SpatialSet
 from .pose_grid import grid_by_count as grid_by_count
 from .proven_sets import PoseSets as PoseSets
+from .single_failure import breaks_survived as breaks_survived
+from .single_failure import survives_breaks as survives_breaks
 from .static_feasibility import StaticCase as StaticCase
 from .volume import triangles as triangles

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 import numpy as np
@@ -19,6 +19,7 @@ from cdpr_drake.workspaces.box_verdicts_kernel import judge_boxes, judge_clearan
 from cdpr_drake.workspaces.cable_distance_kernel import BOX_COLUMNS
 from cdpr_drake.workspaces.cable_interference import Surroundings
 from cdpr_drake.workspaces.demanded_wrenches import SpatialSet
+from cdpr_drake.workspaces.single_failure import cases_after_breaks
 from cdpr_drake.workspaces.static_feasibility import StaticCase
 from cdpr_drake.workspaces.wrench_facets_kernel import wedge_terms
 
@@ -40,6 +41,7 @@ class CertifiedKind(StrEnum):
     STATIC = "static"
     WRENCH_FEASIBLE = "wrench-feasible"
     WRENCH_CLOSURE = "wrench-closure"
+    SINGLE_FAILURE = "single-failure"
     INTERFERENCE_FREE = "interference-free"
     COLLISION_FREE = "collision-free"
 
@@ -55,7 +57,8 @@ class CertifyTask:
     Attributes:
         kind: The kind of workspace.
         case: Platform, load and tension bounds.
-        required: Wrenches to resist beside the load, a polytope, for `WRENCH_FEASIBLE`.
+        required: Wrenches to resist beside the load, a polytope, for `WRENCH_FEASIBLE` and
+            `SINGLE_FAILURE`.
         around: What cables and platform may meet, for `INTERFERENCE_FREE` and `COLLISION_FREE`.
         clearance: How far they must stay from it [m].
         exit_error: How far exit points may be from where they are believed to be [m].
@@ -84,12 +87,14 @@ class CertifyTask:
             raise WorkspaceError("lower: found a tension that cannot change; accepted: < upper [N]")
         if self.kind in MEETING and self.around is None:
             raise WorkspaceError("around: found nothing; accepted: what cables may meet")
+        if self.kind == CertifiedKind.SINGLE_FAILURE:
+            cases_after_breaks(self.case)
         self.corners()  # refused before anything is computed
 
     def corners(self) -> Array:
         """External wrenches, all of which must be resisted, shape (c, rows) [N m, N]."""
         given = self.case.wrench[list(self.case.rows)]
-        if self.kind == CertifiedKind.WRENCH_FEASIBLE:
+        if self.kind in (CertifiedKind.WRENCH_FEASIBLE, CertifiedKind.SINGLE_FAILURE):
             return self.required.corners(self.case.rows) + given
         return np.asarray(given[np.newaxis], float)
 
@@ -134,10 +139,7 @@ def judge_all(
         outside[asked] = found == OUTSIDE
         proven[asked[found == INSIDE]] |= 1 << k
         # Of kinds that are open each has a say of the same weight in where to cut.
-        stretch = np.where(halves[asked] > 0.0, stretch, 0.0)
-        largest = np.max(stretch, axis=1, keepdims=True)
-        share = np.divide(stretch, largest, out=np.zeros_like(stretch), where=largest > 0.0)
-        blame[asked[found == OPEN]] += share[found == OPEN]
+        blame[asked[found == OPEN]] += _shares(halves[asked], stretch)[found == OPEN]
     every = (1 << len(tasks)) - 1
     verdicts = np.where(outside, OUTSIDE, np.where(proven == every, INSIDE, OPEN))
     return verdicts, _longest(halves, blame), proven
@@ -145,7 +147,7 @@ def judge_all(
 
 _COSTS = (
     CertifiedKind.COLLISION_FREE, CertifiedKind.INTERFERENCE_FREE, CertifiedKind.STATIC,
-    CertifiedKind.WRENCH_CLOSURE, CertifiedKind.WRENCH_FEASIBLE,
+    CertifiedKind.WRENCH_CLOSURE, CertifiedKind.WRENCH_FEASIBLE, CertifiedKind.SINGLE_FAILURE,
 )  # fmt: skip
 """Kinds, those first that take least time: a box that one proves outside is asked for no other."""
 
@@ -168,6 +170,8 @@ def _judge(task: CertifyTask, poses: Array, halves: Array) -> tuple[np.ndarray, 
         return _judge_clearances(task, poses, halves)
     if task.kind == CertifiedKind.COLLISION_FREE:
         return _judge_collisions(task, poses, halves)
+    if task.kind == CertifiedKind.SINGLE_FAILURE:
+        return _judge_breaks(task, poses, halves)
     closure = task.kind == CertifiedKind.WRENCH_CLOSURE
     m, n = case.cables.count, len(case.rows)
     scale = case.row_scale()
@@ -187,6 +191,27 @@ def _judge(task: CertifyTask, poses: Array, halves: Array) -> tuple[np.ndarray, 
         verdicts, stretch,
     )  # fmt: skip
     return verdicts, stretch
+
+
+def _judge_breaks(task: CertifyTask, poses: Array, halves: Array) -> tuple[np.ndarray, Array]:
+    """All m + 1 cases must be proven inside; one that is outside is enough."""
+    verdicts, stretch = np.full(len(poses), INSIDE), np.zeros((len(poses), NUMBERS))
+    for case in cases_after_breaks(task.case):
+        one = replace(task, kind=CertifiedKind.WRENCH_FEASIBLE, case=case)
+        asked = np.flatnonzero(verdicts != OUTSIDE)
+        found, wide = _judge(one, poses[asked], halves[asked])
+        opened = asked[found == OPEN]
+        stretch[opened] += _shares(halves[opened], wide[found == OPEN])
+        verdicts[opened] = OPEN
+        verdicts[asked[found == OUTSIDE]] = OUTSIDE
+    return verdicts, stretch
+
+
+def _shares(halves: Array, stretch: Array) -> Array:
+    """Stretch as shares of its largest, so that each of several proofs has a say of one weight."""
+    stretch = np.where(halves > 0.0, stretch, 0.0)
+    largest = np.max(stretch, axis=1, keepdims=True)
+    return np.divide(stretch, largest, out=np.zeros_like(stretch), where=largest > 0.0)
 
 
 def _judge_clearances(task: CertifyTask, poses: Array, halves: Array) -> tuple[np.ndarray, Array]:
