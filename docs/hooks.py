@@ -69,6 +69,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         text = (ROOT / source).read_text(encoding="utf-8")
         add(page, text.replace("](docs/", "]("))
     add("reference/commands.md", commands_page())
+    add("howto/examples.md", examples_page())
     for room in rooms():
         add(room_page(room), room_text(room))
     for path in notebooks():
@@ -166,6 +167,7 @@ def room_page(room: str) -> str:
 def commands_page() -> str:
     """Every subcommand with its arguments and options, as `--help` has them."""
     from cdpr_drake.cli.app import SUBCOMMANDS, make_app
+    from cdpr_drake.cli.command_help import EXAMPLES
 
     out = ["# Commands\n\nAs `cdpr COMMAND --help` prints them.\n"]
     for name in SUBCOMMANDS:
@@ -175,6 +177,23 @@ def commands_page() -> str:
         rows = [row for parameter in command.params for row in _parameter_row(parameter)]
         if rows:
             out.append("\n| argument or option | |\n| --- | --- |\n" + "\n".join(rows) + "\n")
+        lines = "\n".join(EXAMPLES[name])
+        out.append(f"\n```text\n{lines}\n```\n")
+    return "".join(out)
+
+
+def examples_page() -> str:
+    """The example programs, as `cdpr examples` copies them."""
+    out = [
+        "# Examples\n\nShort programs to start from. `cdpr examples` lists them, `cdpr examples "
+    ]
+    out.append("NAME` copies one into the folder where you are, `cdpr examples all` all of them.\n")
+    for path in sorted((NOTEBOOKS / "examples").glob("*.py")):
+        source = path.read_text(encoding="utf-8")
+        words = (ast.get_docstring(ast.parse(source)) or "").splitlines()[0]
+        title, _, rest = words.partition(":")
+        out.append(f"\n## {title}\n\n`{path.stem}`: {rest.strip() or words}\n")
+        out.append(f"\n```python\n{source}```\n")
     return "".join(out)
 
 

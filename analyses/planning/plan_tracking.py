@@ -15,6 +15,7 @@ from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.planning.free_path_solution import FreePathSolution
 from cdpr_drake.planning.limits import MotionLimits
 from cdpr_drake.planning.path_timing import PathPlan
+from cdpr_drake.summaries import Summarized
 from cdpr_drake.systems.diagrams.tension_control import (
     TensionControlSettings,
     build_tension_control,
@@ -38,8 +39,8 @@ ROUNDING = 1e-9
 """A limit that is missed by less, relative to it, is kept."""
 
 
-@dataclass(frozen=True, eq=False)
-class TrackedPlan:
+@dataclass(frozen=True, eq=False, repr=False)
+class TrackedPlan(Summarized):
     """What the simulated robot did.
 
     Attributes:
@@ -55,6 +56,17 @@ class TrackedPlan:
     cable_speeds: Array
     cable_accelerations: Array
     torques: Array
+
+    def summary(self) -> tuple[str, list[tuple[str, str]]]:
+        """As `Summarized` has it."""
+        distance, angle = self.errors()
+        kept = "all kept" if self.keeps_limits() else "MISSED; plan with more reserve"
+        shares = ", ".join(f"{name} {share:.4f}" for name, share in self.uses().items())
+        return "The simulated robot tracks the plan", [
+            ("limits", f"{kept}; steps without tensions: {self.missed_steps()}"),
+            ("largest shares", shares),
+            ("error", f"up to {1e3 * distance:.3f} mm, {np.degrees(angle):.4f} deg"),
+        ]
 
     def missed_steps(self) -> int:
         """Control steps at which no tensions within the limits gave the wrench."""

@@ -20,6 +20,7 @@ from typing import Annotated, Any, NoReturn
 import typer
 from typer.core import TyperGroup
 
+from cdpr_drake.cli.command_help import GROUPS, examples_of, first_steps
 from cdpr_drake.cli.completion import PROGRAM, asked_words, stand_in
 from cdpr_drake.cli.option_names import SHARED_OPTIONS, with_options
 from cdpr_drake.cli.process import INTERRUPTED, SIGNALS, compile_ahead, exit_with_parent
@@ -48,14 +49,8 @@ def _function_of(name: str) -> str:
 
 
 SUBCOMMANDS = {
-    name: f"cdpr_drake.cli.{_function_of(name)}"
-    for name in (
-        "simulate", "serve", "tension", "static", "equilibria", "stability", "workspace", "plan",
-        "reconfigure", "design", "calibrate", "calibrate-camera", "identify", "replay", "study",
-        "reproduce", "robots", "import", "import-log", "export", "scenarios", "new", "check",
-        "schema", "view", "studio", "notebooks", "doctor", "bench",
-    )
-}  # fmt: skip
+    name: f"cdpr_drake.cli.{_function_of(name)}" for names in GROUPS.values() for name in names
+}
 """Subcommands in the order of the help, each with the module whose function of that name it is.
 
 What a subcommand prints as help is the function's docstring, or what the module's `help_words`
@@ -70,9 +65,10 @@ class _Subcommands(TyperGroup):
     """Lets a Ctrl-C through; its help has the whole first line of each subcommand."""
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
-        helps = {name: self.commands[name].help or "" for name in self.list_commands(ctx)}
-        with formatter.section("Commands"):
-            formatter.write_dl([(name, help.partition("\n\n")[0]) for name, help in helps.items()])
+        for title, names in GROUPS.items():
+            helps = [(name, self.commands[name].help or "") for name in names]
+            with formatter.section(title):
+                formatter.write_dl([(name, help.partition("\n\n")[0]) for name, help in helps])
 
     def invoke(self, ctx: Any) -> Any:
         try:
@@ -117,7 +113,8 @@ def make_app(arguments: Sequence[str] = ()) -> typer.Typer:
             continue
         module = import_module(where)
         help_words = getattr(module, "help_words", lambda: None)()
-        app.command(name, help=help_words)(getattr(module, _function_of(name)))
+        function = getattr(module, _function_of(name))
+        app.command(name, help=help_words, epilog=examples_of(name))(function)
     return app
 
 
@@ -154,8 +151,8 @@ def _options(
 ) -> None:
     """Cable-driven parallel robots in Drake."""
     if context.invoked_subcommand is None:
-        print(context.get_help())
-        raise typer.Exit(BAD_INPUT)
+        print(first_steps())
+        raise typer.Exit
 
 
 def _usage_words(problem: Exception) -> str:

@@ -1,0 +1,21 @@
+"""A process outside closes the loop: this file is server and client; yours may be in any language.
+
+`cdpr serve acrobot_computed_torque --place trajectory` in another shell is the same server.
+"""
+
+import subprocess
+import sys
+
+from cdpr_drake.systems.remote import RemoteClient
+
+SERVER = [
+    sys.executable, "-m", "cdpr_drake", "serve", "acrobot_computed_torque", "--place", "controller",
+    "--port", "5791", "--duration", "0.2", "--out", "served",
+]  # fmt: skip
+WEIGHT = [0.0, 0.0, 0.0, 0.0, 0.0, 34.3]  # moment [N m] and force [N] that carry the platform
+
+with subprocess.Popen(SERVER) as server:
+    with RemoteClient("tcp://127.0.0.1:5791") as client:
+        end = client.run(lambda now: {"desired_wrench": WEIGHT})
+    print(end)
+    server.wait()
