@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import fields
 from html import escape
 from typing import Any, TypeVar
@@ -42,6 +42,28 @@ class Summarized(ABC):
             for label, words in rows
         )
         return f"<table><caption>{escape(title)}</caption>{cells}</table>"
+
+
+class Tabulated(Summarized):
+    """A result that is also a table."""
+
+    @abstractmethod
+    def columns(self) -> Mapping[str, Any]:
+        """Columns by name, in SI units and radians unless a name says otherwise, all as long."""
+
+    def to_dataframe(self) -> Any:
+        """The columns as a pandas DataFrame.
+
+        Raises:
+            ImportError: pandas is not installed; `columns` has the same.
+        """
+        try:
+            import pandas as pd  # type: ignore[import-untyped, import-not-found, unused-ignore]
+        except ImportError as problem:
+            raise ImportError(
+                "to_dataframe: pandas is not installed; columns() has the same as arrays"
+            ) from problem
+        return pd.DataFrame(dict(self.columns()))
 
 
 def as_kind(kind: type[T], result: Any, **more: Any) -> T:

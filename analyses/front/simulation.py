@@ -33,7 +33,7 @@ from cdpr_drake.analyses.sweeps.workers import check_scheduler
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.summaries import Summarized
+from cdpr_drake.summaries import Summarized, Tabulated
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.loops.loop_choice import set_loop
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
@@ -42,6 +42,9 @@ from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+REPLAY = "replay.html"
+"""Among the pictures of every run."""
 
 SCENARIO_FILE = "scenario.yaml"
 """Of every folder of a run, see `write_run_inputs`."""
@@ -80,6 +83,12 @@ class Run(Summarized):
         """Errors over time; of a pick-and-place its phases."""
         return self._kind.figure(self.result)
 
+    def replay(self, path: Path | str = "replay.html") -> Path:
+        """Writes the run in 3D as one page that opens without a network, and returns its path."""
+        page = Path(path)
+        self._kind.pictures(self.result, False, ())[REPLAY](page)
+        return page
+
     def facts(self) -> list[tuple[str, str]]:
         """What its kind tells of the summary: labels and words."""
         return self._kind.facts(self.numbers)
@@ -101,7 +110,7 @@ class Run(Summarized):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class RepeatedRuns(Summarized):
+class RepeatedRuns(Tabulated):
     """What runs of a scenario over seeds did.
 
     Attributes:
@@ -121,6 +130,10 @@ class RepeatedRuns(Summarized):
     def as_dict(self) -> dict[str, Any]:
         """The summary for JSON; keys end in units."""
         return self.numbers
+
+    def columns(self) -> dict[str, Any]:
+        """A row a run: its seed and summary."""
+        return dict(self.runs.table())
 
     def plot(self) -> Figure:
         """Errors of all runs over time, and where they end."""

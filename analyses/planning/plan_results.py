@@ -20,7 +20,7 @@ from cdpr_drake.planning.limits import MotionLimits
 from cdpr_drake.planning.path_task import MotionSamples, PathTask, pose_words, sample_motion
 from cdpr_drake.planning.path_timing import PathPlan
 from cdpr_drake.planning.resistance import CornerMargins, resisted_along, wrench_words
-from cdpr_drake.summaries import Summarized, numbers
+from cdpr_drake.summaries import Tabulated, numbers
 from cdpr_drake.trajectories.sampled_motion import MOTION_COLUMNS, TIME_COLUMN
 from cdpr_drake.trajectories.timed_path import TimedPath
 
@@ -37,7 +37,7 @@ MOMENT = 1e-9
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class MotionRun(Summarized):
+class MotionRun(Tabulated):
     """A planned motion of a robot, of any kind, as figures and tables ask it.
 
     Attributes:
@@ -120,10 +120,14 @@ class MotionRun(Summarized):
             rows.append(("tracked", f"{words}, error up to {error:.3g} mm"))
         return self.about, rows
 
+    def columns(self) -> dict[str, Array]:
+        """A row a step of control: pose, velocity, acceleration, and what cables do."""
+        return motion_columns(self)
+
     def write(self, folder: Path) -> dict[str, Any]:
         """Writes summary and motion into an existing folder; returns the summary."""
         told = self.as_dict()
-        write_columns(folder / MOTION, motion_columns(self))
+        write_columns(folder / MOTION, self.columns())
         write_json(folder / SUMMARY, told)
         return told
 

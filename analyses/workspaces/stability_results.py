@@ -16,7 +16,7 @@ from cdpr_drake.analyses.workspaces.grid_runs import SweepOptions, run_poses
 from cdpr_drake.analyses.workspaces.stability_question import StabilityQuestion
 from cdpr_drake.analyses.workspaces.static_feasible import StaticTask
 from cdpr_drake.stability.perturbation_bounds import PerturbationBounds
-from cdpr_drake.summaries import Summarized
+from cdpr_drake.summaries import Tabulated
 from cdpr_drake.workspaces.pose_grid import WorkspaceGrid
 from cdpr_drake.workspaces.volume import VolumeRule, WorkspaceVolume, workspace_volume
 
@@ -45,7 +45,7 @@ LEVERS_IN_WORDS = {
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class StabilityWorkspaces(Summarized):
+class StabilityWorkspaces(Tabulated):
     """Workspaces of one robot and scheme under one or several perturbation bounds.
 
     Attributes:
@@ -127,6 +127,14 @@ class StabilityWorkspaces(Summarized):
         if len(self.names) > SHOWN:
             rows.append(("...", f"{len(self.names) - SHOWN} more bounds"))
         return f"Stability of {about['robot']} under {about['scheme']}", rows
+
+    def columns(self) -> dict[str, np.ndarray]:
+        """A row a pose: where it is, whether it can be held, and under each bounds Z and margin."""
+        found = {**self.grid.columns(), "S": self.feasible.reshape(-1)}
+        for k, name in enumerate(self.names):
+            found[f"Z {name}"] = self.stable[k].reshape(-1)
+            found[f"margin {name}"] = self.margin[k].reshape(-1)
+        return found
 
     def save(self, folder: Path) -> Path:
         """Writes `workspace.npz` into a folder that exists, and returns its path."""

@@ -16,7 +16,7 @@ from cdpr_drake.analyses.workspaces.conditions import KINDS, MEASURES
 from cdpr_drake.analyses.workspaces.grid_results import load_grid, region_numbers, save_grid
 from cdpr_drake.analyses.workspaces.grid_runs import SweepOptions, run_poses
 from cdpr_drake.analyses.workspaces.workspace_question import WorkspaceQuestion
-from cdpr_drake.summaries import Summarized
+from cdpr_drake.summaries import Tabulated
 from cdpr_drake.workspaces.pose_grid import WorkspaceGrid
 from cdpr_drake.workspaces.volume import VolumeRule, WorkspaceVolume, workspace_volume
 
@@ -39,7 +39,7 @@ SLOW = {"stable", "target-visible"}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class RobotWorkspace(Summarized):
+class RobotWorkspace(Tabulated):
     """Where kinds hold on a grid, and measures there.
 
     Attributes:
@@ -142,6 +142,11 @@ class RobotWorkspace(Summarized):
             words = "none" if least is None else f"{least:.4g} to {most:.4g} {one['unit']}"
             rows.append((name, words))
         return f"Workspaces of {told['robot']}, cables {told['cables']}", rows
+
+    def columns(self) -> dict[str, np.ndarray]:
+        """A row a pose: where it is, which kinds hold, and the measures in their units."""
+        parts = {**self.holds, **self.values}
+        return {**self.grid.columns(), **{name: one.reshape(-1) for name, one in parts.items()}}
 
     def save(self, folder: Path) -> Path:
         """Writes `workspace.npz` into a folder that exists, and returns its path."""

@@ -111,6 +111,13 @@ class WorkspaceGrid:
         which = np.unravel_index(self._range(start, stop), self.shape)[0]
         return np.concatenate([turns[which], self.positions(start, stop)], axis=1)
 
+    def columns(self) -> dict[str, Array]:
+        """Positions and angles of all poses by name, shape (n,) each [m, rad]."""
+        which = np.unravel_index(self._range(0, None), self.shape)[0]
+        named = zip(("x_m", "y_m", "z_m"), self.positions().T, strict=True)
+        turned = zip(("phi_rad", "theta_rad", "psi_rad"), self.angles[which].T, strict=True)
+        return {**dict(named), **dict(turned)}
+
     def _range(self, start: int, stop: int | None) -> np.ndarray:
         return np.arange(*slice(start, stop).indices(self.size))
 

@@ -1,0 +1,56 @@
+"""Results as tables: columns of one length, the numbers that the result itself has."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import cdpr_drake as cdpr
+
+QUICK = ["camera.kind=projected", "duration=0.1"]
+
+
+@pytest.fixture(scope="module")
+def workspace():
+    return cdpr.compute_workspace("planar", grid=(4, 3, 1), measures="capacity-margin")
+
+
+def test_a_workspace_has_a_row_a_pose(workspace):
+    frame = workspace.to_dataframe()
+    assert isinstance(frame, pd.DataFrame)
+    assert len(frame) == workspace.grid.size
+    np.testing.assert_array_equal(frame[["x_m", "y_m", "z_m"]], workspace.grid.positions())
+    inside = frame[frame.static]
+    assert len(inside) == workspace.inside("static").sum() > 0
+    assert np.all(inside["capacity-margin"] >= 0.0)
+
+
+def test_stability_has_a_row_a_pose():
+    found = cdpr.assess_stability("planar", "pbvs", "sampled", grid=(2, 2, 1), options={"draws": 5})
+    frame = found.to_dataframe()
+    assert len(frame) == 4
+    assert list(frame[f"Z {found.names[0]}"]) == list(found.stable[0].ravel())
+
+
+def test_a_plan_and_repeated_runs():
+    robot = cdpr.load_robot("planar")
+    aside = cdpr.Pose(position=[0.1, 0.0, robot.plane_height])
+    plan = cdpr.plan_path(robot, [None, aside], stations=50)
+    frame = plan.to_dataframe()
+    assert frame.time_s.is_monotonic_increasing
+    assert frame.time_s.iloc[-1] == pytest.approx(plan.motion.end_time)
+    runs = cdpr.simulate("acrobot_pbvs", QUICK, seeds=range(2), workers=1)
+    assert list(runs.to_dataframe()["seed"]) == [0, 1]
+
+
+def test_without_pandas_the_message_names_what_has_the_same(workspace, monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, "pandas", None)
+    with pytest.raises(ImportError, match=r"columns\(\) has the same"):
+        workspace.to_dataframe()
+    assert {len(column) for column in workspace.columns().values()} == {workspace.grid.size}
+
+
+def test_a_run_writes_its_replay(tmp_path):
+    run = cdpr.simulate("acrobot_pbvs", QUICK)
+    page = run.replay(tmp_path / "mine.html")
+    assert page == tmp_path / "mine.html"
+    assert "<html" in page.read_text(encoding="utf-8")[:500]
