@@ -52,6 +52,7 @@ _PER_CABLE = {
     "tension_thresholds": "n",
     "applied_torques": "nm",
     "friction_torques": "nm",
+    "broken": "flag",
 }
 
 ROWS_AT_ONCE = 2000

@@ -21,6 +21,7 @@ from cdpr_drake.systems.monitoring.stability_watch import (
     StabilityWatch,
 )
 from cdpr_drake.systems.monitoring.tension_watch import BreakingLoadWatch, TensionRange
+from cdpr_drake.systems.robots.failures import FAULTS
 from cdpr_drake.systems.robots.platform_wrench import APPLIED_WRENCH
 from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
 from cdpr_drake.systems.sensors.perception_sensors import PerceptionSensors
@@ -224,6 +225,8 @@ def add_servo_log(
         ports[name] = block.GetOutputPort(name)
     if scenario.disturbances is not None:
         ports[APPLIED_WRENCH] = block.GetOutputPort(APPLIED_WRENCH)
+    if scenario.failures is not None:
+        ports |= {name: block.GetOutputPort(name) for name in FAULTS if block.HasOutputPort(name)}
     if blocks.plan is not None:
         ports["X_WP_planned"] = servo.GetOutputPort("X_WP_planned")
     if scenario.pose_plan is not None:

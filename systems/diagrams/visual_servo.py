@@ -175,6 +175,9 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
         builder, block, scenario.sensors, seed=scenario.seed, motion=blocks.motion
     )
     log = add_servo_log(builder, scenario, blocks, stability, looking, watches.meters)
+    for event in () if scenario.failures is None else scenario.failures.frozen():
+        assert event.sensor is not None
+        blocks.readings.freeze(event.sensor, event.begins, event.cable)
     max_step = integration_step(scenario, blocks)
     if scenario.integration.max_step is None:
         max_step = min(max_step, blocks.readings.shortest_period(), scenario.sensors.own_period())
