@@ -17,6 +17,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.pose_accuracy import distances_from_line
 from cdpr_drake.geometry.poses import pose_from_row, pose_row, pose_rows_distance
 from cdpr_drake.geometry.rotation_kernel import rotations_of_quaternions
+from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.systems.controllers.torque_settings import TorqueControl
 from cdpr_drake.systems.diagrams.calibration_findings import found_calibrations
 from cdpr_drake.systems.diagrams.visual_servo import VisualServo

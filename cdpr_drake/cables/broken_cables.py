@@ -29,4 +29,5 @@ def break_cables(whole: Array, broken: Array, out: Array) -> None:
     out[:] = whole
     rows = np.flatnonzero(broken)
     if rows.size:
-        out[np.ix_(rows, _OF_A_CABLE)] = 0.0
+        for column in _OF_A_CABLE:
+            out[rows, column] = 0.0

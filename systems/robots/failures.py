@@ -71,13 +71,16 @@ class Equipment:
         """Whether there is what a field of a failure says."""
         if name == "sensor":
             return found in self.sensors
-        return name == "delay" or float(found) < getattr(self, f"{name}s")
+        return name == "delay" or float(found) < self._count(name)
 
     def accepted(self, name: str) -> str:
         """What there is, in words."""
         if name == "sensor":
             return ", ".join(self.sensors) or "one of sensors.log that samples, of which is none"
-        return f"0 to {getattr(self, f'{name}s') - 1}"
+        return f"0 to {self._count(name) - 1}"
+
+    def _count(self, name: str) -> int:
+        return self.cables if name == "cable" else self.winches
 
 
 @dataclass(kw_only=True)
