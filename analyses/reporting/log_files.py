@@ -53,6 +53,9 @@ _PER_CABLE = {
     "applied_torques": "nm",
     "friction_torques": "nm",
     "broken": "flag",
+    "found_broken": "flag",
+    "left_out": "flag",
+    "break_residuals": "m",
 }
 
 ROWS_AT_ONCE = 2000

@@ -208,6 +208,9 @@ def failure_summary(settings: FailureSettings, robot: Robot, log: Log) -> dict[s
     since = log["time"] >= min(event["time_s"] for event in events)
     X_WP, tensions = log["X_WP"][since], log["tensions"][since]
     distance, angle = pose_rows_distance(X_WP, np.broadcast_to(X_WP[0], X_WP.shape))
+    if "left_out" in log:
+        acts = np.any(log["left_out"] > 0.0, axis=1)
+        found["reacts_at_s"] = float(log["time"][np.argmax(acts)]) if np.any(acts) else None
     found |= {
         "largest_excursion_m": float(np.max(distance)),
         "largest_turn_rad": float(np.max(angle)),

@@ -26,6 +26,7 @@ from cdpr_drake.servoing.point_features import interaction_rank
 from cdpr_drake.systems.cameras.camera_settings import REGION, WHOLE, check_camera, check_lens
 from cdpr_drake.systems.diagrams.beliefs import read_camera
 from cdpr_drake.systems.diagrams.controller import check_scheme, make_tasks
+from cdpr_drake.systems.diagrams.emergency import check_emergency
 from cdpr_drake.systems.diagrams.fusion_checks import check_sensor_fusion
 from cdpr_drake.systems.diagrams.tension_management import check_tension_management
 from cdpr_drake.systems.diagrams.torque_control import (
@@ -419,6 +420,7 @@ CHECKS: list[Callable[[Scenario, Robot, Path], None]] = [
     _check_cables,
     _check_disturbances,
     _check_failures,
+    check_emergency,
     _check_winches,
     check_winch_groups,
     check_torque_control,

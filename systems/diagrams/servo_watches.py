@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.systems.cameras.camera_settings import RENDERED
@@ -206,6 +207,7 @@ def add_servo_log(
     stability: StabilityWatch | None,
     looking: PerceptionSensors,
     meters: WorldMeters | None,
+    reacting: Mapping[str, OutputPort],
 ) -> RunLog:
     """Logs what the summary, the figures and the replay need."""
     block, measurement, servo = blocks.block, blocks.measurement, blocks.servo
@@ -251,4 +253,4 @@ def add_servo_log(
         if block.HasOutputPort(name):  # motors on the winches
             ports[name] = block.GetOutputPort(name)
     ports |= fusion_ports((blocks.estimator, *blocks.compared))
-    return add_log(builder, ports | looking.logged, scenario.log_rate)
+    return add_log(builder, ports | looking.logged | dict(reacting), scenario.log_rate)
