@@ -165,7 +165,8 @@ def mark_instants(axes: Any, instants: Sequence[tuple[float, str]]) -> None:
             axes.axvline(time, color="#303030", linestyle=":", linewidth=1.2, zorder=1)
             axes.annotate(
                 words, (time, 1.0), (2, -3), xycoords=("data", "axes fraction"),
-                textcoords="offset points", rotation=90, va="top", fontsize=8, color="#303030", zorder=5,
+                textcoords="offset points", rotation=90, va="top", fontsize=8, color="#303030",
+                zorder=5,
                 bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.0, "alpha": 0.85},
             )  # fmt: skip
 

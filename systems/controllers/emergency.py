@@ -2,7 +2,8 @@
 
 * stop: the brakes of all winches close, `delay` after it is known;
 * redistribute: the controller of motor torques asks the cables that are left for the wrench, at
-  once, and the winch of the broken one stands still; by `winches.mode` torque alone.
+  once, and the winch of the broken one stands still; by `winches.mode` torque alone. The platform
+  is to stay where it is, or to go on where the servo wants it.
 
 It is known by being told, as by a switch on the drum, or found by a `BreakDetector`.
 
@@ -18,6 +19,7 @@ from cdpr_drake.estimation.failure_detection import AlarmRule, threshold
 from cdpr_drake.schema.fields import FASTEST, number, text, whole
 
 STOP, REDISTRIBUTE = REACTIONS = ("stop", "redistribute")
+HOLD, CONTINUE = "hold", "continue"
 TOLD, FOUND = "told", "found"
 
 ACCEPTED = 1e-3
@@ -31,6 +33,11 @@ class EmergencySettings:
     """What is done when a cable has broken, and how that is known."""
 
     reaction: str = text("What is done.", choices=REACTIONS)
+    motion: str = text(
+        "What redistribution is to do with the platform: hold it where it is, or continue.",
+        HOLD,
+        choices=(HOLD, CONTINUE),
+    )
     known: str = text(
         "How it is known: told when it happens, or found from lengths and tensions.",
         TOLD,
@@ -48,6 +55,12 @@ class EmergencySettings:
         at_least=0.0,
     )
     pose_bias: float = number("Bound of the slow errors of these lengths.", "m", 5e-3, at_least=0.0)
+    slack_below: float = number(
+        "Measured tension below which a cable may be broken: what its sensor may read without one.",
+        "N",
+        0.5,
+        above=0.0,
+    )
     in_a_row: int = whole("Samples in a row that make an alarm.", 3, at_least=1)
 
     def rule(self, cables: int) -> AlarmRule:
@@ -68,9 +81,10 @@ class EmergencyReaction(LeafSystem):
     found_broken vector(m) -    in, not 0 for each cable that is known to be broken
     jammed       vector(m) -    out, 1 for each winch that is to stand still
     left_out     vector(m) -    out, 1 for each cable that is not to be asked any more
+    halted       vector(1) -    out, 1 while the platform is to stay where it is
     ============ ========= ==== ===========================================================
 
-    Looks at its input at a rate. State: when each cable was known to be broken, and both outputs.
+    Looks at its input at a rate. State: when each cable was known to be broken, and the outputs.
     """
 
     def __init__(self, settings: EmergencySettings, cables: int) -> None:
@@ -79,15 +93,17 @@ class EmergencyReaction(LeafSystem):
         self._settings, m = settings, cables
         self._m = m
         self._found = self.DeclareVectorInputPort("found_broken", m)
-        state = self.DeclareDiscreteState(np.concatenate([np.full(m, np.inf), np.zeros(2 * m)]))
+        state = self.DeclareDiscreteState(np.concatenate([np.full(m, np.inf), np.zeros(2 * m + 1)]))
         needs = {self.discrete_state_ticket(state)}
-        for row, name in ((1, "jammed"), (2, "left_out")):
-            part = slice(row * m, (row + 1) * m)
+        for name, start, end in (
+            ("jammed", m, 2 * m), ("left_out", 2 * m, 3 * m), ("halted", 3 * m, 3 * m + 1)
+        ):  # fmt: skip
+            part = slice(start, end)
 
             def write(context: Context, output: BasicVector, part: slice = part) -> None:
                 output.SetFromVector(context.get_discrete_state_vector().value()[part])
 
-            self.DeclareVectorOutputPort(name, m, write, needs)
+            self.DeclareVectorOutputPort(name, end - start, write, needs)
         self.DeclarePeriodicDiscreteUpdateEvent(1.0 / settings.rate, 0.0, self._update)
 
     def _update(self, context: Context, state: DiscreteValues) -> None:
@@ -96,4 +112,5 @@ class EmergencyReaction(LeafSystem):
         known = np.where(self._found.Eval(context) != 0.0, np.minimum(known, time), known)
         acts = (known + self._settings.delay <= time * (1.0 + 1e-12)).astype(float)
         stops = np.full(m, np.max(acts)) if self._settings.reaction == STOP else acts
-        state.set_value(np.concatenate([known, stops, acts]))
+        halts = np.max(acts) * float(self._settings.motion == HOLD)
+        state.set_value(np.concatenate([known, stops, acts, [halts]]))

@@ -23,6 +23,8 @@ class TorqueController(LeafSystem):
     length_rates      vector(m)      m/s      in, of the unstrained lengths, as the drives know them
     left_out          vector(m)      -        in, may stay open: not 0 for each cable that is
                                               broken, of which nothing is asked
+    halted            vector(1)      -        in, may stay open: not 0 while the platform is to
+                                              stay where it is, whatever the servo wants
     motor_torques     vector(m)      N m      out, to the winches, positive pays out
     wanted_tensions   vector(m)      N        out, what the torques are for
     desired_wrench    vector(6)      N m, N   out, F_P_W about Po for the servo's acceleration
@@ -49,6 +51,7 @@ class TorqueController(LeafSystem):
         self._tensions = self.DeclareVectorInputPort("tensions", m).Eval
         self._rates = self.DeclareVectorInputPort("length_rates", m).Eval
         self._left_out = self.DeclareVectorInputPort("left_out", m)
+        self._halted = self.DeclareVectorInputPort("halted", 1)
         self._outputs = {
             name: self.DeclareDiscreteState(size)
             for name, size in (
@@ -89,9 +92,12 @@ class TorqueController(LeafSystem):
 
     def _update(self, context: Context, state: DiscreteValues) -> None:
         readings = np.array([self._tensions(context), self._rates(context)])
+        twist = self._twist(context)
+        if self._halted.HasValue(context) and self._halted.Eval(context)[0] != 0.0:
+            twist = np.zeros(6)
         command, memory = self._law_now(context).step(
             context.get_discrete_state(self._memory).value(),
-            self._twist(context),
+            twist,
             self._X_WP(context),
             readings,
             context.get_time(),

@@ -9,7 +9,13 @@ from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.systems.controllers.emergency import FOUND, REDISTRIBUTE, EmergencyReaction
+from cdpr_drake.systems.controllers.emergency import (
+    CONTINUE,
+    FOUND,
+    HOLD,
+    REDISTRIBUTE,
+    EmergencyReaction,
+)
 from cdpr_drake.systems.diagrams.servo_blocks import VisualServoBlocks
 from cdpr_drake.systems.diagrams.torque_control import TORQUE
 from cdpr_drake.systems.monitoring.break_detector import BreakDetector
@@ -39,6 +45,10 @@ def check_emergency(scenario: Scenario, robot: Robot, path: Path) -> None:
             f"{where}: found a section with {robot.name}, which has several cables on one winch; "
             "accepted: null"
         )
+    if settings.reaction != REDISTRIBUTE and settings.motion == CONTINUE:
+        raise ScenarioError(
+            f"{where}.motion: found {CONTINUE} with reaction {settings.reaction}; accepted: {HOLD}"
+        )
     if settings.reaction == REDISTRIBUTE and scenario.winches.mode != TORQUE:
         raise ScenarioError(
             f"{where}.reaction: found {REDISTRIBUTE} with winches.mode {scenario.winches.mode}; "
@@ -64,7 +74,8 @@ def add_emergency(
         if not scenario.controller.pulleys:
             believed = believed.without_pulleys()
         detector = builder.AddNamedSystem(
-            "break_detector", BreakDetector(believed, settings.rule(count), settings.rate)
+            "break_detector",
+            BreakDetector(believed, settings.rule(count), settings.rate, settings.slack_below),
         )
         for name, source in (
             ("X_WP", blocks.estimator.GetOutputPort("X_WP")),
@@ -81,4 +92,5 @@ def add_emergency(
     if settings.reaction == REDISTRIBUTE:
         assert blocks.torque is not None
         builder.Connect(left_out, blocks.torque.GetInputPort("left_out"))
+        builder.Connect(reaction.GetOutputPort("halted"), blocks.torque.GetInputPort("halted"))
     return logged | {"left_out": left_out}
