@@ -205,7 +205,7 @@ def failure_summary(settings: FailureSettings, robot: Robot, log: Log) -> dict[s
     if not events:
         return found
     # A row holds what stood there before its instant: that of the first failure is the last whole.
-    since = log["time"] >= min(event["time_s"] for event in events)
+    since = log["time"] >= min(event.begins for event in settings.events)
     X_WP, tensions = log["X_WP"][since], log["tensions"][since]
     distance, angle = pose_rows_distance(X_WP, np.broadcast_to(X_WP[0], X_WP.shape))
     if "left_out" in log:

@@ -8,6 +8,7 @@ drum turns by the cable's pull, friction and its inertia.
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -44,16 +45,21 @@ def fail_winches(whole: Array, brakes: Array, jammed: Array, powerless: Array, o
     out[:] = whole
     out[powerless != 0.0, _RATED_TORQUE] = 0.0
     out[jammed != 0.0, _BRAKE_TORQUE] = HOLD
+    return held_brakes(brakes, jammed)
+
+
+def held_brakes(brakes: Array, jammed: Array) -> Array:
+    """Brakes of which those of what is jammed hold, shape (m,)."""
     return np.where(jammed != 0.0, 1.0, brakes)
 
 
 def failed_law(law: WinchLaw, jammed: Array, powerless: Array) -> WinchLaw:
     """The same for `motor.winch_motion`: a law with numbers for each cable.
 
-    The brakes of what is jammed must hold, too.
+    The brakes of what is jammed must hold, too: `held_brakes`.
     """
-    return replace(
-        law,
-        rated_torque=np.where(powerless != 0.0, 0.0, law.rated_torque),
-        brake_torque=np.where(jammed != 0.0, HOLD, law.brake_torque),
-    )
+    each: Any = {  # numbers for each cable, where the law has one for all
+        "rated_torque": np.where(powerless != 0.0, 0.0, law.rated_torque),
+        "brake_torque": np.where(jammed != 0.0, HOLD, law.brake_torque),
+    }
+    return replace(law, **each)

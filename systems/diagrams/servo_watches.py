@@ -207,6 +207,7 @@ def add_servo_log(
     stability: StabilityWatch | None,
     looking: PerceptionSensors,
     meters: WorldMeters | None,
+    *,
     reacting: Mapping[str, OutputPort],
 ) -> RunLog:
     """Logs what the summary, the figures and the replay need."""

@@ -176,7 +176,9 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
         builder, block, scenario.sensors, seed=scenario.seed, motion=blocks.motion
     )
     reacting = add_emergency(builder, scenario, blocks)
-    log = add_servo_log(builder, scenario, blocks, stability, looking, watches.meters, reacting)
+    log = add_servo_log(
+        builder, scenario, blocks, stability, looking, watches.meters, reacting=reacting
+    )
     for event in () if scenario.failures is None else scenario.failures.frozen():
         assert event.sensor is not None
         blocks.readings.freeze(event.sensor, event.begins, event.cable)

@@ -8,6 +8,7 @@ from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.systems.robots.cable_forces import CableForces
 from cdpr_drake.systems.robots.cable_robot import CableRobot
 from cdpr_drake.systems.robots.compiled_cable_robot import CompiledCableRobot
 from cdpr_drake.systems.robots.compiled_step import StepRule
@@ -239,3 +240,30 @@ def test_an_input_breaks_it_too(kind):
         found.append(states(block, context))
     assert np.array_equal(*found)
     assert found[0][-2] == 0.0
+
+
+def test_forces_with_derivatives_break_too():
+    """`CableForces` for AutoDiffXd gives the numbers of that for float."""
+    robot = load_robot("planar")
+    in_plant = CableRobot(robot).in_plant
+    block = CableForces(in_plant, breakable=True)
+    flags = np.arange(len(robot.cables)) == 1
+    found = []
+    for system in (block, block.ToAutoDiffXd()):
+        context = system.CreateDefaultContext()
+        m = len(robot.cables)
+        for name, values in (
+            ("platform_state", [0.01, 0.02, 0.03, 0.1, -0.2, 0.3]),
+            ("unstrained_lengths", np.full(m, 0.5)),
+            ("unstrained_length_rates", np.zeros(m)),
+            ("broken", flags.astype(float)),
+        ):
+            port = system.GetInputPort(name)
+            port.FixValue(context, np.array(values)[: port.size()])
+        force = system.GetOutputPort("generalized_force").Eval(context)
+        tensions = system.GetOutputPort("tensions").Eval(context)
+        numbers = [getattr(x, "value", lambda x=x: x)() for x in (*force, *tensions)]
+        found.append(np.array(numbers, float))
+    np.testing.assert_allclose(found[1], found[0], rtol=1e-12)
+    assert found[0][-m + 1] == 0.0
+    assert np.all(np.delete(found[0][-m:], 1) > 0.0)
