@@ -52,6 +52,10 @@ _PER_CABLE = {
     "tension_thresholds": "n",
     "applied_torques": "nm",
     "friction_torques": "nm",
+    "broken": "flag",
+    "found_broken": "flag",
+    "left_out": "flag",
+    "break_residuals": "m",
 }
 
 ROWS_AT_ONCE = 2000

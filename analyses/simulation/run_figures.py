@@ -23,6 +23,7 @@ from cdpr_drake.analyses.visualization.cable_figures import cable_figure
 from cdpr_drake.analyses.visualization.curves import (
     by_pieces,
     draw_curve,
+    mark_instants,
     path_rows,
     phase_of,
     shade,
@@ -188,7 +189,15 @@ def error_figure(result: RunResult) -> Figure:
         axes.remove()
     for axes in figure.axes:
         axes.set(xlabel="time [s]")
+        mark_instants(axes, _instants(result))
     return figure
+
+
+def _instants(result: RunResult) -> list[tuple[float, str]]:
+    """When something failed [s], and what."""
+    failures = result.servo.scenario.failures
+    events = [] if failures is None else failures.events
+    return [(event.begins, event.words(result.servo.robot)) for event in events]
 
 
 CABLE_CURVES = {
@@ -203,10 +212,12 @@ def cable_curves_figure(result: RunResult, quantity: str) -> Figure:
     """One of `CABLE_CURVES` over time; velocities are those commanded, tensions have bounds."""
     words, label, factor = CABLE_CURVES[quantity]
     robot = result.servo.robot
-    return cable_figure(
+    figure = cable_figure(
         _title(result, words), robot, result.log, quantity, label,
         scale=factor, bounds=robot.tension_limits() if quantity == "tensions" else None,
     )  # fmt: skip
+    mark_instants(figure.axes[0], _instants(result))
+    return figure
 
 
 def platform_path_figure(result: RunResult) -> Figure:

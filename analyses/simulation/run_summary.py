@@ -17,9 +17,11 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.pose_accuracy import distances_from_line
 from cdpr_drake.geometry.poses import pose_from_row, pose_row, pose_rows_distance
 from cdpr_drake.geometry.rotation_kernel import rotations_of_quaternions
+from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.systems.controllers.torque_settings import TorqueControl
 from cdpr_drake.systems.diagrams.calibration_findings import found_calibrations
 from cdpr_drake.systems.diagrams.visual_servo import VisualServo
+from cdpr_drake.systems.robots.failures import FailureSettings
 from cdpr_drake.systems.robots.platform_wrench import APPLIED_WRENCH
 from cdpr_drake.systems.scenarios.run_settings import engine_of
 
@@ -165,6 +167,8 @@ def summarize(result: RunResult) -> dict[str, Any]:
     }
     if APPLIED_WRENCH in log:
         summary["disturbances"] = disturbance_summary(log)
+    if scenario.failures is not None:
+        summary["failures"] = failure_summary(scenario.failures, servo.robot, log)
     if isinstance(servo, VisualServo) and servo.remote is not None:
         summary["remote"] = servo.remote.report()
     cleaned: dict[str, Any] = finite(summary)
@@ -180,6 +184,38 @@ def disturbance_summary(log: Log) -> dict[str, float]:
         k = int(np.argmax(sizes))
         found[f"largest_{name}"] = float(sizes[k])
         found[f"largest_{name.split('_')[0]}_at_s"] = float(log["time"][k])
+    return found
+
+
+def failure_summary(settings: FailureSettings, robot: Robot, log: Log) -> dict[str, Any]:
+    """What failed, and how far the platform went and the tensions since the first of it.
+
+    Args:
+        settings: What fails.
+        robot: The robot.
+        log: The run's log.
+    """
+    end = float(log["time"][-1])
+    events = [
+        {"kind": event.kind, "what": event.words(robot), "time_s": event.begins}
+        for event in settings.events
+        if event.begins <= end
+    ]
+    found: dict[str, Any] = {"events": events}
+    if not events:
+        return found
+    # A row holds what stood there before its instant: that of the first failure is the last whole.
+    since = log["time"] >= min(event.begins for event in settings.events)
+    X_WP, tensions = log["X_WP"][since], log["tensions"][since]
+    distance, angle = pose_rows_distance(X_WP, np.broadcast_to(X_WP[0], X_WP.shape))
+    if "left_out" in log:
+        acts = np.any(log["left_out"] > 0.0, axis=1)
+        found["reacts_at_s"] = float(log["time"][np.argmax(acts)]) if np.any(acts) else None
+    found |= {
+        "largest_excursion_m": float(np.max(distance)),
+        "largest_turn_rad": float(np.max(angle)),
+        "largest_tension_n": float(np.max(tensions)),
+    }
     return found
 
 

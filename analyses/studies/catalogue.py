@@ -91,6 +91,7 @@ MODULES = {
     "tagless": "tagless",
     "lenses": "lenses",
     "slack-cycle": "slack_cycle",
+    "failure": "failure",
     "calibration": "calibration.study",
     "identification": "identification",
     "case-1": "case_studies.case_1",

@@ -157,6 +157,20 @@ def shade(
         )  # fmt: skip
 
 
+def mark_instants(axes: Any, instants: Sequence[tuple[float, str]]) -> None:
+    """Marks instants [s] by lines across, with their words on them, where they are shown."""
+    low, high = axes.get_xlim()
+    for time, words in instants:
+        if low <= time <= high:
+            axes.axvline(time, color="#303030", linestyle=":", linewidth=1.2, zorder=1)
+            axes.annotate(
+                words, (time, 1.0), (2, -3), xycoords=("data", "axes fraction"),
+                textcoords="offset points", rotation=90, va="top", fontsize=8, color="#303030",
+                zorder=5,
+                bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.0, "alpha": 0.85},
+            )  # fmt: skip
+
+
 def draw_bars(axes: Any, times: Array, rows: Sequence[tuple[str, Look, Array]]) -> None:
     """A band of bars: who, and when something holds for it.
 

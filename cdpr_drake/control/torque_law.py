@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,6 +33,10 @@ from cdpr_drake.winches.friction import FrictionLaw
 
 FALLBACK = "slack_relaxed"
 """The method that answers where no tensions within the limits give a wrench."""
+
+
+EMERGENCY = "quadratic_program"
+"""The method for cables that are left: any number of them may be, and bounds may meet."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -207,7 +212,7 @@ class TorqueServoLaw:
         )
         step = np.array([period, wrench.period, wrench.mu, wrench.kappa, height])
         assert len(step) == STEP_SIZE
-        self.cable_count, self._period = m, period
+        self.cable_count, self._period, self._redundancy = m, period, m - n
         self.memory_size = CABLES + 3 * m
         loops = np.tile(loop.packed(), (m, 1))
         if drums is not None:
@@ -218,6 +223,25 @@ class TorqueServoLaw:
             step, loops, dynamics.packed(), np.zeros(4), cables.packed(), limits,
             np.ascontiguousarray(row_scale, float), np.empty(workspace_shape(n, m)),
         )  # fmt: skip
+
+    def without(self, broken: Array) -> TorqueServoLaw:
+        """The same law that asks nothing of some cables, and least 2-norm of the others.
+
+        Its memory is the same. The others may go slack: a smallest tension is a luxury, and with it
+        they would hold fewer poses. Where they cannot give a wrench, what comes nearest is asked.
+
+        Args:
+            broken: Not 0 for each cable to be left out, shape (m,).
+        """
+        other = copy.copy(self)
+        chosen = method_for(EMERGENCY, self._redundancy, False).compiled(self._redundancy)
+        other._methods = (chosen, self._methods[1])
+        step, loops, dynamics, pose, cables, limits, scale, work = self._given
+        limits = limits.copy()
+        limits[0] = 0.0
+        limits[:, np.asarray(broken) != 0.0] = 0.0
+        other._given = (step, loops, dynamics, pose, cables, limits, scale, np.empty_like(work))
+        return other
 
     def fresh_memory(self) -> Array:
         """Memory before the first step, shape (memory_size,)."""

@@ -21,6 +21,10 @@ class TorqueController(LeafSystem):
     X_WP              RigidTransform m        in, believed pose of the platform
     tensions          vector(m)      N        in, measured
     length_rates      vector(m)      m/s      in, of the unstrained lengths, as the drives know them
+    left_out          vector(m)      -        in, may stay open: not 0 for each cable that is
+                                              broken, of which nothing is asked
+    halted            vector(1)      -        in, may stay open: not 0 while the platform is to
+                                              stay where it is, whatever the servo wants
     motor_torques     vector(m)      N m      out, to the winches, positive pays out
     wanted_tensions   vector(m)      N        out, what the torques are for
     desired_wrench    vector(6)      N m, N   out, F_P_W about Po for the servo's acceleration
@@ -41,10 +45,13 @@ class TorqueController(LeafSystem):
         """With a law that is made for steps at a rate [Hz]."""
         super().__init__()
         self.law, m = law, law.cable_count
+        self._others: dict[bytes, TorqueServoLaw] = {}
         self._twist = self.DeclareVectorInputPort("platform_velocity", 6).Eval
         self._X_WP = self.DeclareAbstractInputPort("X_WP", Value(RigidTransform())).Eval
         self._tensions = self.DeclareVectorInputPort("tensions", m).Eval
         self._rates = self.DeclareVectorInputPort("length_rates", m).Eval
+        self._left_out = self.DeclareVectorInputPort("left_out", m)
+        self._halted = self.DeclareVectorInputPort("halted", 1)
         self._outputs = {
             name: self.DeclareDiscreteState(size)
             for name, size in (
@@ -72,11 +79,25 @@ class TorqueController(LeafSystem):
     def _calc_relaxed(self, context: Context, output: BasicVector) -> None:
         output.set_value([float(self.steps(context)[1])])
 
+    def _law_now(self, context: Context) -> TorqueServoLaw:
+        if not self._left_out.HasValue(context):
+            return self.law
+        flags = self._left_out.Eval(context) != 0.0
+        if not np.any(flags):
+            return self.law
+        key = flags.tobytes()
+        if key not in self._others:
+            self._others[key] = self.law.without(flags)
+        return self._others[key]
+
     def _update(self, context: Context, state: DiscreteValues) -> None:
         readings = np.array([self._tensions(context), self._rates(context)])
-        command, memory = self.law.step(
+        twist = self._twist(context)
+        if self._halted.HasValue(context) and self._halted.Eval(context)[0] != 0.0:
+            twist = np.zeros(6)
+        command, memory = self._law_now(context).step(
             context.get_discrete_state(self._memory).value(),
-            self._twist(context),
+            twist,
             self._X_WP(context),
             readings,
             context.get_time(),

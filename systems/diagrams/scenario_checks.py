@@ -26,6 +26,7 @@ from cdpr_drake.servoing.point_features import interaction_rank
 from cdpr_drake.systems.cameras.camera_settings import REGION, WHOLE, check_camera, check_lens
 from cdpr_drake.systems.diagrams.beliefs import read_camera
 from cdpr_drake.systems.diagrams.controller import check_scheme, make_tasks
+from cdpr_drake.systems.diagrams.emergency import check_emergency
 from cdpr_drake.systems.diagrams.fusion_checks import check_sensor_fusion
 from cdpr_drake.systems.diagrams.tension_management import check_tension_management
 from cdpr_drake.systems.diagrams.torque_control import (
@@ -38,6 +39,7 @@ from cdpr_drake.systems.remote.settings import check_servo_place
 from cdpr_drake.systems.robots.cable_forces import simulated_cables
 from cdpr_drake.systems.robots.cable_robot import SEMI_IMPLICIT
 from cdpr_drake.systems.robots.disturbances import check_disturbances
+from cdpr_drake.systems.robots.failures import check_failures
 from cdpr_drake.systems.robots.settings import COMPILED
 from cdpr_drake.systems.sensors.sensor_kinds import SENSORS
 from cdpr_drake.systems.worlds.checks import check_world
@@ -323,6 +325,12 @@ def _check_disturbances(scenario: Scenario, robot: Robot, path: Path) -> None:
     check_disturbances(scenario.disturbances, path)
 
 
+def _check_failures(scenario: Scenario, robot: Robot, path: Path) -> None:
+    check_failures(
+        scenario.failures, robot, scenario.winches.has_motors(), scenario.sensors.sampled(), path
+    )
+
+
 def _check_winches(scenario: Scenario, robot: Robot, path: Path) -> None:
     winches, step = scenario.winches, scenario.integration.max_step
     if not winches.has_motors():
@@ -338,7 +346,8 @@ def _check_winches(scenario: Scenario, robot: Robot, path: Path) -> None:
         raise ScenarioError(f"{path}: winches.kind: found motor; {problem}") from problem
     largest = 2.0 * law.friction.settling_time
     explicit = scenario.integration.integrator != SEMI_IMPLICIT
-    if explicit and law.friction.static > 0.0 and step is not None and step > largest:
+    dry = law.friction.static > 0.0 or scenario.failures is not None
+    if explicit and dry and step is not None and step > largest:
         raise ScenarioError(
             f"{path}: integration.max_step: found {step:g}; accepted: at most {largest:g} [s], "
             f"twice the winch.friction.settling_time of {robot.name}"
@@ -410,6 +419,8 @@ CHECKS: list[Callable[[Scenario, Robot, Path], None]] = [
     check_tension_management,
     _check_cables,
     _check_disturbances,
+    _check_failures,
+    check_emergency,
     _check_winches,
     check_winch_groups,
     check_torque_control,

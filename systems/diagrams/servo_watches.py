@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.systems.cameras.camera_settings import RENDERED
@@ -21,6 +22,7 @@ from cdpr_drake.systems.monitoring.stability_watch import (
     StabilityWatch,
 )
 from cdpr_drake.systems.monitoring.tension_watch import BreakingLoadWatch, TensionRange
+from cdpr_drake.systems.robots.failures import FAULTS
 from cdpr_drake.systems.robots.platform_wrench import APPLIED_WRENCH
 from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
 from cdpr_drake.systems.sensors.perception_sensors import PerceptionSensors
@@ -205,6 +207,8 @@ def add_servo_log(
     stability: StabilityWatch | None,
     looking: PerceptionSensors,
     meters: WorldMeters | None,
+    *,
+    reacting: Mapping[str, OutputPort],
 ) -> RunLog:
     """Logs what the summary, the figures and the replay need."""
     block, measurement, servo = blocks.block, blocks.measurement, blocks.servo
@@ -224,6 +228,8 @@ def add_servo_log(
         ports[name] = block.GetOutputPort(name)
     if scenario.disturbances is not None:
         ports[APPLIED_WRENCH] = block.GetOutputPort(APPLIED_WRENCH)
+    if scenario.failures is not None:
+        ports |= {name: block.GetOutputPort(name) for name in FAULTS if block.HasOutputPort(name)}
     if blocks.plan is not None:
         ports["X_WP_planned"] = servo.GetOutputPort("X_WP_planned")
     if scenario.pose_plan is not None:
@@ -248,4 +254,4 @@ def add_servo_log(
         if block.HasOutputPort(name):  # motors on the winches
             ports[name] = block.GetOutputPort(name)
     ports |= fusion_ports((blocks.estimator, *blocks.compared))
-    return add_log(builder, ports | looking.logged, scenario.log_rate)
+    return add_log(builder, ports | looking.logged | dict(reacting), scenario.log_rate)

@@ -16,6 +16,7 @@ from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.systems.cameras.region_camera import RegionCamera
 from cdpr_drake.systems.controllers.torque_settings import TorqueControl
 from cdpr_drake.systems.diagrams.camera import scene_adder
+from cdpr_drake.systems.diagrams.emergency import add_emergency
 from cdpr_drake.systems.diagrams.servo_blocks import VisualServoBlocks, add_visual_servo
 from cdpr_drake.systems.diagrams.servo_models import ServoModel
 from cdpr_drake.systems.diagrams.servo_watches import (
@@ -174,7 +175,13 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
     looking = add_perception_sensors(
         builder, block, scenario.sensors, seed=scenario.seed, motion=blocks.motion
     )
-    log = add_servo_log(builder, scenario, blocks, stability, looking, watches.meters)
+    reacting = add_emergency(builder, scenario, blocks)
+    log = add_servo_log(
+        builder, scenario, blocks, stability, looking, watches.meters, reacting=reacting
+    )
+    for event in () if scenario.failures is None else scenario.failures.frozen():
+        assert event.sensor is not None
+        blocks.readings.freeze(event.sensor, event.begins, event.cable)
     max_step = integration_step(scenario, blocks)
     if scenario.integration.max_step is None:
         max_step = min(max_step, blocks.readings.shortest_period(), scenario.sensors.own_period())

@@ -22,6 +22,7 @@ from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.scene import add_frame, add_ground
 from cdpr_drake.statics.static_tensions import StaticTensions
 from cdpr_drake.systems.robots.cable_forces import PORTS, CableForces
+from cdpr_drake.systems.robots.failures import BROKEN, FAULTS
 from cdpr_drake.systems.robots.platform_pose import PlatformPose
 from cdpr_drake.systems.robots.platform_wrench import APPLIED_WRENCH, PlatformWrench
 from cdpr_drake.systems.robots.settings import CableRobotSettings
@@ -207,11 +208,15 @@ def add_cable_robot(
     settings = settings or CableRobotSettings()
     robot, plant, prefix = in_plant.robot, in_plant.plant, f"{name}_" if name else ""
     cables = settings.cables.cable_set(robot)
+    failures = settings.failure_block(robot)
+    may_fail = failures is not None
     forces = builder.AddNamedSystem(
-        prefix + "cables", CableForces(in_plant, cables, settings.cables.model)
+        prefix + "cables", CableForces(in_plant, cables, settings.cables.model, may_fail)
     )
     home = cable_paths(robot.home.transform(), cables).lengths
-    winch = builder.AddNamedSystem(prefix + "winches", make_winches(robot, settings.winches, home))
+    winch = builder.AddNamedSystem(
+        prefix + "winches", make_winches(robot, settings.winches, home, may_fail)
+    )
     pose = builder.AddNamedSystem(prefix + "platform_pose", PlatformPose(in_plant))
     state = plant.get_state_output_port(in_plant.model_instance)
     builder.Connect(state, forces.GetInputPort("platform_state"))
@@ -250,6 +255,13 @@ def add_cable_robot(
         outputs[port.get_name()] = port
     if disturbances is not None:
         outputs[APPLIED_WRENCH] = disturbances.GetOutputPort("wrench")
+    if failures is not None:
+        builder.AddNamedSystem(prefix + "failures", failures)
+        inputs[BROKEN] = forces.GetInputPort(BROKEN)
+        for port_name in set(FAULTS) & set(inputs):
+            outputs[port_name] = failures.GetOutputPort(port_name)
+            builder.Connect(outputs[port_name], inputs[port_name])
+            inputs[port_name] = failures.GetInputPort(port_name)
     outputs["body_poses"] = plant.get_body_poses_output_port()
     outputs["body_velocities"] = plant.get_body_spatial_velocities_output_port()
     outputs["body_accelerations"] = plant.get_body_spatial_accelerations_output_port()

@@ -14,6 +14,7 @@ from pydrake.systems.framework import BasicVector, Context, InputPortIndex, Leaf
 from pydrake.systems.scalar_conversion import TemplateSystem
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.cables.broken_cables import break_cables
 from cdpr_drake.cables.dispatch_kernel import STRAIGHT
 from cdpr_drake.cables.models import CABLE_MODELS, KELVIN_VOIGT, check_model
 from cdpr_drake.cables.simulation_autodiff import (
@@ -34,6 +35,7 @@ from cdpr_drake.geometry.cable_paths import impossible_cable
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.geometry.platform_joint import PlatformJoint
 from cdpr_drake.models.robot_in_plant import RobotInPlant, pose_on_joint
+from cdpr_drake.systems.robots.failures import BROKEN
 from cdpr_drake.systems.robots.templates import class_for_floats
 
 PULLS = ("tensions", "drum_tensions", "slack")
@@ -99,6 +101,8 @@ def CableForces_(T: Any) -> type[LeafSystem]:
                                                  on a line (2,), see `PlatformJoint`
         unstrained_lengths      vector(m)  m     in, from the exit points to the platform
         unstrained_length_rates vector(m)  m/s   in
+        broken                  vector(m)  -     in, only if `breakable`, may stay open: not 0 for
+                                                 each cable that is broken and pulls nothing
         generalized_force       vector(nv) N, Nm out, for the plant's applied_generalized_force
         force_and_drums         vector     N, Nm out, generalized_force and then drum_tensions,
                                                  which is quicker than both
@@ -126,6 +130,7 @@ def CableForces_(T: Any) -> type[LeafSystem]:
             in_plant: RobotInPlant,
             cables: CableSet | None = None,
             model: str = KELVIN_VOIGT,
+            breakable: bool = False,
             converter: Any = None,
         ) -> None:
             """For a robot whose plant is finalized; see `cdpr_drake.models.add_robot`.
@@ -134,6 +139,7 @@ def CableForces_(T: Any) -> type[LeafSystem]:
                 in_plant: The robot in its plant.
                 cables: The cables as they really are; None: the robot's, from fixed exit points.
                 model: A name of `cables.CABLE_MODELS` but inextensible.
+                breakable: Whether cables may break, by an input.
                 converter: Of the template.
 
             Raises:
@@ -149,17 +155,21 @@ def CableForces_(T: Any) -> type[LeafSystem]:
                 plant.num_multibody_states(in_plant.model_instance),
             )
             cables = robot.cable_set().without_pulleys() if cables is None else cables
-            self._declare(place, simulated_cables(cables, model), model, converter)
+            self._declare(place, simulated_cables(cables, model), model, breakable, converter)
 
         def _construct_copy(self, other: Any, converter: Any = None) -> None:
-            Impl._declare(self, other._place, other._set, other._model, converter)
+            breakable = other._broken is not None
+            Impl._declare(self, other._place, other._set, other._model, breakable, converter)
 
-        def _declare(self, place: _Place, cables: CableSet, model: str, converter: Any) -> None:
+        def _declare(
+            self, place: _Place, cables: CableSet, model: str, breakable: bool, converter: Any
+        ) -> None:
             LeafSystem_[T].__init__(self, converter=converter)
             self._place, self._set, self._model = place, cables, model
             joint = place.joint
             check_model(model, joint.turned(cables))
-            self._cables = joint.turned(cables).packed()
+            self._whole = joint.turned(cables).packed()
+            self._rows = self._whole.copy()
             m = cables.count
             kind = CABLE_MODELS[model]
             self._law = kind.law
@@ -179,6 +189,12 @@ def CableForces_(T: Any) -> type[LeafSystem]:
             state, lengths, rates = (self.input_port_ticket(InputPortIndex(i)) for i in range(3))
             self._damped = bool(np.any(cables.retardation > 0.0))
             pull = {state, lengths, rates} if self._damped else {state, lengths}
+            self._broken = None
+            extra = set()
+            if breakable:  # which pulleys a cable runs over changes, too
+                self._broken = self.DeclareVectorInputPort(BROKEN, m)
+                extra = {self._broken.ticket()}
+                pull |= extra
             self._zeros, self._ones = np.zeros(m), np.ones(m)
             self.DeclareVectorOutputPort("generalized_force", place.num_velocities, calc, pull)
             self.DeclareVectorOutputPort(
@@ -188,7 +204,17 @@ def CableForces_(T: Any) -> type[LeafSystem]:
                 needs = pull if name in PULLS else {state, lengths}
                 if name == "lengths" and not kind.sags:
                     needs = {state}
-                self.DeclareVectorOutputPort(name, m, self._row_writer(row, len(needs)), needs)
+                writer = self._row_writer(row, len(needs - extra))
+                self.DeclareVectorOutputPort(name, m, writer, needs | extra)
+
+        def _cables_now(self, context: Context) -> Array:
+            if self._broken is not None and self._broken.HasValue(context):
+                broken = self._broken.Eval(context)
+                if T is not float:
+                    broken = np.array([x.value() for x in broken])
+                break_cables(self._whole, broken, self._rows)
+                return self._rows
+            return self._whole
 
         def _rates(self, context: Context) -> Array:
             return self._l0_dot(context) if self._damped else self._zeros
@@ -198,7 +224,7 @@ def CableForces_(T: Any) -> type[LeafSystem]:
                 self._state(context),
                 self._l0(context),
                 self._rates(context),
-                self._cables,
+                self._cables_now(context),
                 self._place.start,
                 output.get_mutable_value(),
             )
@@ -208,7 +234,7 @@ def CableForces_(T: Any) -> type[LeafSystem]:
                 self._state(context),
                 self._l0(context),
                 self._rates(context),
-                self._cables,
+                self._cables_now(context),
                 self._place.start,
                 output.get_mutable_value(),
                 self._place.joint.height,
@@ -219,7 +245,7 @@ def CableForces_(T: Any) -> type[LeafSystem]:
                 self._state(context),
                 self._l0(context),
                 self._rates(context),
-                self._cables,
+                self._cables_now(context),
                 self._place.start,
                 output.get_mutable_value(),
             )
@@ -230,7 +256,7 @@ def CableForces_(T: Any) -> type[LeafSystem]:
                 state,
                 self._l0(context),
                 self._rates(context),
-                self._cables,
+                self._cables_now(context),
                 self._room,
                 output.get_mutable_value(),
             )
@@ -243,7 +269,7 @@ def CableForces_(T: Any) -> type[LeafSystem]:
                 state,
                 self._l0(context),
                 self._rates(context),
-                self._cables,
+                self._cables_now(context),
                 self._law,
                 self._place.joint.height,
                 start=self._place.start,
@@ -255,7 +281,7 @@ def CableForces_(T: Any) -> type[LeafSystem]:
 
         def _calc_both(self, context: Context, output: BasicVector) -> None:
             state, place = self._state(context), self._place
-            inputs = state, self._l0(context), self._rates(context), self._cables
+            inputs = state, self._l0(context), self._rates(context), self._cables_now(context)
             if T is float:
                 bad = model_force_and_drums(
                     *inputs, self._room, place.num_velocities, output.get_mutable_value()
@@ -277,7 +303,7 @@ def CableForces_(T: Any) -> type[LeafSystem]:
                 state = self._state(context)
                 l0 = self._l0(context) if needs > 1 else self._ones
                 l0_dot = self._l0_dot(context) if needs > 2 else self._zeros
-                inputs = state, l0, l0_dot, self._cables
+                inputs = state, l0, l0_dot, self._cables_now(context)
                 if T is not float:
                     table, bad = model_outputs_array(*inputs, self._law, self._place.joint.height)
                     output.SetFromVector(with_derivatives(table[row]))
@@ -297,7 +323,7 @@ def CableForces_(T: Any) -> type[LeafSystem]:
 
         def cables(self) -> Array:
             """`CableSet.packed` of the cables in the frames of `PlatformJoint`, shape (m, 17)."""
-            return self._cables
+            return self._whole
 
         def cable_set(self) -> CableSet:
             """The cables as they are simulated."""
@@ -321,7 +347,11 @@ if TYPE_CHECKING:  # what an editor cannot see in a template
         """`CableForces_` for float."""
 
         def __init__(
-            self, in_plant: RobotInPlant, cables: CableSet | None = None, model: str = KELVIN_VOIGT
+            self,
+            in_plant: RobotInPlant,
+            cables: CableSet | None = None,
+            model: str = KELVIN_VOIGT,
+            breakable: bool = False,
         ) -> None: ...
         def cables(self) -> Array: ...  # noqa: D102
         def cable_set(self) -> CableSet: ...  # noqa: D102

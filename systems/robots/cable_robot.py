@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -30,6 +31,7 @@ from cdpr_drake.systems.robots.assembly import (
 from cdpr_drake.systems.robots.cable_forces import CableForces
 from cdpr_drake.systems.robots.settings import CableRobotSettings
 from cdpr_drake.tensions.methods import exact_tensions
+from cdpr_drake.winches.failed_winches import HOLD
 from cdpr_drake.winches.motor import MODES
 
 STEP_SHARE = 0.8
@@ -49,6 +51,13 @@ class CableRobot(Diagram):
     cable_velocities        vector(m)                 m/s     in, commanded, positive pays out
     applied_wrench          vector(6)                 N m, N  in, may stay open: moment about Po
                                                               and force on the platform, in W
+    broken                  vector(m)                 -       in, only with `failures`, may stay
+                                                              open: not 0 for each cable that is
+                                                              broken
+    jammed                  vector(k)                 -       in, as broken, for each winch that
+                                                              stands still
+    powerless               vector(k)                 -       in, as broken, for each motor
+                                                              without power; only with motors
     platform_state          vector                    m       out, as `CableForces` takes it
     X_WP                    RigidTransform            m       out, pose of the platform
     tensions                vector(m)                 N       out, at the platform
@@ -67,6 +76,8 @@ class CableRobot(Diagram):
     query_object            QueryObject               -       out, from the scene graph, for cameras
     applied_wrench          vector(6)                 N m, N  out, only with `disturbances`: these
                                                               and the input
+    broken, jammed, powerless                         -       out, only with `failures`: these
+                                                              and the inputs
     ======================= ========================= ======= =================================
 
     Subsystems: plant, scene_graph, cables, winches, platform_pose, platform_wrench. With motors on
@@ -209,6 +220,8 @@ def automatic_step(
     poles = np.zeros(0)
     if winches.has_motors():
         law, m = robot.winch_law(), len(robot.cables)
+        if settings.failures is not None:  # what stands still settles as dry friction does
+            law = replace(law, brake_torque=max(law.brake_torque, HOLD))
         poles = law.poles(MODES[winches.mode])
         groups, per_angle = robot.winch_groups(), law.drum.length_per_angle(np.zeros(m))
         J = np.hstack([J, -groups.to_cables()])

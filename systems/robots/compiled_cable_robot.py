@@ -18,6 +18,7 @@ from cdpr_drake.systems.robots.assembly import SceneAdder, equilibrium_start, fi
 from cdpr_drake.systems.robots.cable_forces import simulated_cables
 from cdpr_drake.systems.robots.compiled_motion import MEMORY, CompiledMotion
 from cdpr_drake.systems.robots.compiled_step import CompiledBodies, StepRule
+from cdpr_drake.systems.robots.failures import BROKEN, FAULTS
 from cdpr_drake.systems.robots.platform_wrench import APPLIED_WRENCH
 from cdpr_drake.systems.robots.settings import CableRobotSettings, WinchSettings
 
@@ -74,12 +75,13 @@ class CompiledCableRobot(Diagram):
                 f"with its {own}; other bodies need the engine plant"
             )
         cables = simulated_cables(settings.cables.cable_set(robot), settings.cables.model)
-        damping = settings.damping
+        damping, failures = settings.damping, settings.failure_block(robot)
         motion = CompiledMotion(
             robot, cables, settings.cables.model, winch_drive(robot, settings.winches),
             damping=(damping.translation, damping.rotation),
             frame=plant.GetBodyFrameIdOrThrow(in_plant.body_index),
             command_period=command_period,
+            may_fail=failures is not None,
         )  # fmt: skip
         motion.rule = rule or motion.rule
         builder.AddNamedSystem("motion", motion)
@@ -94,12 +96,20 @@ class CompiledCableRobot(Diagram):
         pushed = [system.GetInputPort(APPLIED_WRENCH) for system in (motion, bodies)]
         for index in range(motion.num_input_ports()):
             port = motion.get_input_port(index)
-            if port.get_name() != APPLIED_WRENCH:
+            if port.get_name() not in (APPLIED_WRENCH, *FAULTS):
                 builder.ExportInput(port, port.get_name())
         for index in range(bodies.num_input_ports()):
             port = bodies.get_input_port(index)
-            if port.get_name() != APPLIED_WRENCH:
+            if port.get_name() not in (APPLIED_WRENCH, BROKEN):
                 builder.Connect(motion.GetOutputPort(port.get_name()), port)
+        if failures is not None:
+            builder.AddNamedSystem("failures", failures)
+            builder.Connect(failures.GetOutputPort(BROKEN), bodies.GetInputPort(BROKEN))
+            for name in filter(motion.HasInputPort, FAULTS):
+                flags = failures.GetOutputPort(name)
+                builder.Connect(flags, motion.GetInputPort(name))
+                builder.ExportInput(failures.GetInputPort(name), name)
+                builder.ExportOutput(flags, name)
         if disturbances is None:
             builder.ExportInput(pushed[0], APPLIED_WRENCH)
             builder.ConnectInput(APPLIED_WRENCH, pushed[1])

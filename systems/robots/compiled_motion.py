@@ -18,6 +18,7 @@ from pydrake.systems.framework import (
 )
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.cables.broken_cables import break_cables
 from cdpr_drake.cables.commanded_tension_kernel import cable_motions
 from cdpr_drake.cables.models import CABLE_MODELS
 from cdpr_drake.cables.simulation_kernel import OUTPUTS, make_room, outputs_kernel
@@ -45,10 +46,12 @@ from cdpr_drake.systems.robots.compiled_step import (
     packed_rule,
     resting_state,
 )
+from cdpr_drake.systems.robots.failures import BROKEN, JAMMED, POWERLESS
 from cdpr_drake.systems.robots.motor_winch import COMMAND_PORTS
 from cdpr_drake.systems.robots.platform_wrench import APPLIED_WRENCH
+from cdpr_drake.winches.failed_winches import fail_winches, pack_failing_winches
 from cdpr_drake.winches.motor import MODES
-from cdpr_drake.winches.motor_kernel import pack_winch, winch_torques
+from cdpr_drake.winches.motor_kernel import winch_torques
 
 MEMORY = "motion_memory"
 """Name of the port from which blocks without Python can read, see `CompiledMotion.parts`."""
@@ -65,6 +68,11 @@ class CompiledMotion(LeafSystem):
     ====================== =============== ======== =============================================
     commanded_length_rates vector(m)       m/s      in, may stay open; mode position only: by
                                                     which the commanded lengths change
+    broken                 vector(m)       -        in, only if it may fail, as are the next two,
+                                                    may stay open: not 0 for each cable that is
+                                                    broken
+    jammed                 vector(k)       -        in, for each winch that stands still
+    powerless              vector(k)       -        in, with motors: for each that has no power
     geometry_pose          FramePoseVector m        out, of the platform's frame; not without one
     step_errors            vector(2)       m, rad   out, largest estimated error of one step so
                                                     far, in position and rotation
@@ -93,6 +101,7 @@ class CompiledMotion(LeafSystem):
         damping: tuple[float, float] = (0.0, 0.0),
         frame: FrameId | None = None,
         command_period: float | None = None,
+        may_fail: bool = False,
     ) -> None:
         """Declares ports and state.
 
@@ -104,6 +113,8 @@ class CompiledMotion(LeafSystem):
             damping: Of the platform, [N s/m] and [N m s/rad].
             frame: The platform's frame in a scene graph.
             command_period: Longest time between two looks at the commands; None: at events only.
+            may_fail: Whether it has inputs for what fails; they count like commands. Not for
+                tensions that are commanded.
         """
         super().__init__()
         self._robot, self._set, self._model, self._drive = robot, cables, model, drive
@@ -115,6 +126,11 @@ class CompiledMotion(LeafSystem):
             rigid_platform(robot), cables, model, drive,
             home=self._home, joint=joint, damping=damping,
         )  # fmt: skip
+        self._may_fail = may_fail and drive.kind != TENSIONS
+        if self._may_fail and drive.law is not None:
+            rows = pack_failing_winches(drive.law, m)
+            self._arrays = self._arrays._replace(winch=rows)
+        self._whole, self._whole_winch = self._arrays.cables.copy(), self._arrays.winch.copy()
         self._n = joint.num_states
         self._size = size = self._n + m * drive.states_per_cable()
         self._where = robot_addresses(self._arrays)
@@ -174,6 +190,12 @@ class CompiledMotion(LeafSystem):
                 self._rates = self.DeclareVectorInputPort("commanded_length_rates", k)
         self._plain = self._rates is None and self._brakes is None and k == m
         self._wrench = self.DeclareVectorInputPort(APPLIED_WRENCH, 6)
+        self._faults = {}
+        if self._may_fail:
+            self._plain = False
+            self._faults = {BROKEN: self.DeclareVectorInputPort(BROKEN, m)}
+            names = (JAMMED, POWERLESS) if drive.kind == MOTORS else (JAMMED,)
+            self._faults |= {name: self.DeclareVectorInputPort(name, k) for name in names}
 
     def _declare_platform(self, here: set[DependencyTicket]) -> None:
         n, joint = self._n, self._joint
@@ -228,6 +250,7 @@ class CompiledMotion(LeafSystem):
             self._vector("unstrained_length_rates", m, lambda c: self.state(c)[after:][:m], here)
         else:
             command = {self.input_port_ticket(self._command.get_index())}
+            command |= {port.ticket() for port in self._faults.values()}
             self._vector("unstrained_length_rates", m, self._ideal_rates, command)
 
     def _declare_driven(self, here: set[DependencyTicket]) -> None:
@@ -248,7 +271,7 @@ class CompiledMotion(LeafSystem):
     def _declare_motors(self, here: set[DependencyTicket]) -> None:
         law, n, m = self._drive.law, self._n, self._m
         assert law is not None
-        constants, mode = pack_winch(law), MODES[self._drive.mode]
+        mode = MODES[self._drive.mode]
 
         def paid_out(context: Context) -> Array:
             return np.asarray(self.state(context)[n : n + m] - self._home)
@@ -259,7 +282,7 @@ class CompiledMotion(LeafSystem):
             command, (_, brakes) = self._inputs(context)
             winch_torques(
                 np.ascontiguousarray(self.state(context)[n:]), drums, command, brakes, self._home,
-                mode, constants, out,
+                mode, self._arrays.winch, out,
             )  # fmt: skip
             return out[row]
 
@@ -288,7 +311,25 @@ class CompiledMotion(LeafSystem):
         for row, port in enumerate((self._rates, self._brakes)):
             if port is not None and (row == 1 or port.HasValue(context)):
                 others[row] = port.Eval(context)[self._of_cable]
-        return self._command.Eval(context)[self._of_cable], others
+        command = self._command.Eval(context)[self._of_cable]
+        if self._may_fail:
+            command = self._fail(context, command, others)
+        return command, others
+
+    def _fail(self, context: Context, command: Array, others: Array) -> Array:
+        """Has what failed act: on cables, winches and their brakes; returns their command."""
+        flags = {BROKEN: self._still, JAMMED: self._still, POWERLESS: self._still}
+        for name, port in self._faults.items():
+            if port.HasValue(context):
+                found = port.Eval(context)
+                flags[name] = found if name == BROKEN else found[self._of_cable]
+        break_cables(self._whole, flags[BROKEN], self._arrays.cables)
+        if self._drive.kind == MOTORS:
+            others[1] = fail_winches(
+                self._whole_winch, others[1], flags[JAMMED], flags[POWERLESS], self._arrays.winch
+            )
+            return command
+        return np.where(flags[JAMMED] != 0.0, 0.0, command)
 
     def _calc_reached(self, context: Context, output: BasicVector) -> None:
         """Moves on from the last event, unless that was done already.
@@ -322,6 +363,8 @@ class CompiledMotion(LeafSystem):
 
     def _calc_cables(self, context: Context, value: AbstractValue) -> None:
         table: Array = value.get_mutable_value()
+        if self._may_fail:
+            self._inputs(context)
         state, n, m = self.state(context), self._n, self._m
         motors = self._drive.kind == MOTORS
         rates = state[n + m : n + 2 * m] if motors else self._ideal_rates(context)
@@ -333,7 +376,7 @@ class CompiledMotion(LeafSystem):
 
     def _ideal_rates(self, context: Context) -> Array:
         out = np.empty(self._m)
-        command = self._command.Eval(context)[self._of_cable]
+        command, _ = self._inputs(context)
         ideal_rates(self._arrays.winch[0, 0], command, out)
         return out
 
@@ -374,6 +417,8 @@ class CompiledMotion(LeafSystem):
 
     def energy(self, context: Context) -> float:
         """Kinetic and potential energy of platform and cables [J], see `robot_energy`."""
+        if self._may_fail:
+            self._inputs(context)
         return self.energy_of(self.state(context))
 
     def energy_of(self, state: Array) -> float:

@@ -12,6 +12,7 @@ from pydrake.multibody.math import SpatialAcceleration, SpatialVelocity
 from pydrake.systems.framework import Context, LeafSystem
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.cables.broken_cables import break_cables
 from cdpr_drake.cables.simulation_kernel import make_room, model_force_and_drums
 from cdpr_drake.dynamics.advance_events_kernel import integrate_explicit, integrate_semi_implicit
 from cdpr_drake.dynamics.explicit_kernel import METHODS
@@ -33,6 +34,7 @@ from cdpr_drake.geometry.platform_joint import PlatformJoint
 from cdpr_drake.geometry.poses import pose_row
 from cdpr_drake.models.robot_in_plant import pose_from_state
 from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.systems.robots.failures import BROKEN
 from cdpr_drake.systems.robots.platform_wrench import APPLIED_WRENCH
 from cdpr_drake.winches.motor import MODES, resting_motors
 
@@ -155,6 +157,7 @@ class CompiledBodies(LeafSystem):
     unstrained_lengths      vector(m)                 m       in
     unstrained_length_rates vector(m)                 m/s     in
     applied_wrench          vector(6)                 N m, N  in, may stay open
+    broken                  vector(m)                 -       in, may stay open
     body_velocities         list[SpatialVelocity]     rad/s   out, of the world and the platform, in
                                                       m/s     W, of the body's origin
     body_accelerations      list[SpatialAcceleration] rad/s^2 out, the same of accelerations
@@ -170,7 +173,8 @@ class CompiledBodies(LeafSystem):
         m, self._n = len(arrays.cables), int(arrays.kinds[PLATFORM])
         self._nv = int(arrays.kinds[SPEEDS])
         self._arrays = arrays._replace(body=arrays.body.copy())
-        self._cables, self._joint = arrays.cables, joint
+        self._whole, self._joint = arrays.cables.copy(), joint
+        self._cables = self._whole.copy()
         self._room = make_room(m, law, joint.height)
         self._R_WF = joint.X_WF.rotation().matrix()
         self._as_world = joint.is_as_world()
@@ -183,6 +187,7 @@ class CompiledBodies(LeafSystem):
             )
         ]
         self._wrench = self.DeclareVectorInputPort(APPLIED_WRENCH, 6)
+        self._broken = self.DeclareVectorInputPort(BROKEN, m)
         self.DeclareAbstractOutputPort(
             "body_velocities", lambda: Value[list[SpatialVelocity]](), self._calc_velocities
         )
@@ -197,6 +202,8 @@ class CompiledBodies(LeafSystem):
     def _calc(self, context: Context, output: AbstractValue) -> None:
         state, lengths, rates = (port.Eval(context) for port in self._inputs)
         force, out = np.zeros(self._nv + len(self._cables)), np.zeros(self._n)
+        if self._broken.HasValue(context):
+            break_cables(self._whole, self._broken.Eval(context), self._cables)
         model_force_and_drums(state, lengths, rates, self._cables, self._room, self._nv, force)
         pushed = self._wrench.HasValue(context)
         apply_wrench(self._arrays, self._joint, self._wrench.Eval(context) if pushed else None)

@@ -21,7 +21,9 @@ from pydrake.systems.primitives import Demultiplexer
 from pydrake.systems.scalar_conversion import TemplateSystem
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.systems.robots.failures import JAMMED, POWERLESS
 from cdpr_drake.systems.robots.templates import class_for_floats
+from cdpr_drake.winches.failed_winches import fail_winches, failed_law, pack_failing_winches
 from cdpr_drake.winches.groups import WinchGroups
 from cdpr_drake.winches.motor import (
     MODES,
@@ -52,6 +54,9 @@ class MotorWinch(Diagram):
     commanded_lengths       vector(k) m     in, mode position: wanted unstrained lengths
     tensions                vector(m) N     in, of the cables at the drums
     brakes                  vector(k) -     in, 1 holds, 0 releases; only if there are brakes
+    jammed                  vector(k) -     in, only if they may fail, may stay open: not 0 for
+                                            each drum that stands still
+    powerless               vector(k) -     in, as jammed, for each motor without power
     unstrained_lengths      vector(m) m     out
     unstrained_length_rates vector(m) m/s   out
     motor_angles            vector(m) rad   out, zero where the cables have their home lengths
@@ -69,12 +74,21 @@ class MotorWinch(Diagram):
     `winches.motor` has the equations.
     """
 
-    def __init__(self, law: WinchLaw, mode: str, home: Array) -> None:
-        """With a kind of winch, a mode of `MODES` and unstrained lengths at angle zero [m]."""
+    def __init__(self, law: WinchLaw, mode: str, home: Array, may_fail: bool = False) -> None:
+        """Builds the winches.
+
+        Args:
+            law: Their kind.
+            mode: A name of `MODES`.
+            home: Unstrained lengths at angle zero, shape (m,) [m].
+            may_fail: Whether they have inputs for what fails.
+        """
         super().__init__()
         m = len(home)
         builder = DiagramBuilder()
-        motors = self._motors = builder.AddNamedSystem("motors", WinchMotors(law, mode, home))
+        motors = self._motors = builder.AddNamedSystem(
+            "motors", WinchMotors(law, mode, home, may_fail)
+        )
         parts = builder.AddNamedSystem("parts", Demultiplexer([m] * motors.num_groups()))
         builder.Connect(motors.GetOutputPort("state"), parts.get_input_port())
         for index in range(motors.num_input_ports()):
@@ -120,7 +134,14 @@ def WinchMotors_(T: Any) -> type[LeafSystem]:
         ===== ========== ==== =================================================================
         """
 
-        def _construct(self, law: WinchLaw, mode: str, home: Array, converter: Any = None) -> None:
+        def _construct(
+            self,
+            law: WinchLaw,
+            mode: str,
+            home: Array,
+            may_fail: bool = False,
+            converter: Any = None,
+        ) -> None:
             LeafSystem_[T].__init__(self, converter=converter)
             self._law, self._mode_name, self._mode = law, mode, MODES[mode]
             self._home = np.ascontiguousarray(home, dtype=float)
@@ -128,7 +149,8 @@ def WinchMotors_(T: Any) -> type[LeafSystem]:
             groups = law.groups or WinchGroups(tuple(range(m)))
             k, self._of_cable = groups.count, list(groups.of_cable)
             self._leaders = list(groups.leaders())
-            self._constants = pack_winch(law)
+            self._whole = pack_failing_winches(law, m) if may_fail else pack_winch(law)
+            self._constants = self._whole.copy()
             self._released = np.zeros(m)
             num_z = 0 if self._mode == TORQUE else m
             self._work = np.zeros(2 * m + num_z)
@@ -140,6 +162,9 @@ def WinchMotors_(T: Any) -> type[LeafSystem]:
             self._brakes = None
             if law.brake_torque > 0.0:
                 self._brakes = self.DeclareVectorInputPort("brakes", k).Eval
+            self._faults = [
+                self.DeclareVectorInputPort(name, k) for name in (JAMMED, POWERLESS) if may_fail
+            ]
             # Written by Drake itself, which is quicker than a port of this class.
             self.DeclareStateOutputPort("state", ContinuousStateIndex(index))
             angles = {self.q_ticket()}
@@ -153,7 +178,10 @@ def WinchMotors_(T: Any) -> type[LeafSystem]:
                 self.DeclareVectorOutputPort(name, m, calc, ticket)
 
         def _construct_copy(self, other: Any, converter: Any = None) -> None:
-            Impl._construct(self, other._law, other._mode_name, other._home, converter=converter)
+            may_fail = bool(other._faults)
+            Impl._construct(
+                self, other._law, other._mode_name, other._home, may_fail, converter=converter
+            )
 
         def num_groups(self) -> int:
             """How many vectors of m the state has."""
@@ -169,16 +197,27 @@ def WinchMotors_(T: Any) -> type[LeafSystem]:
             brakes, command = self._released, self._command(context)
             if self._brakes is not None:
                 brakes = self._brakes(context)[self._of_cable]
+            if self._faults:
+                jammed, powerless = self._failed(context)
+                brakes = fail_winches(self._whole, brakes, jammed, powerless, self._constants)
             return state, self._tensions(context), command[self._of_cable], brakes
+
+        def _failed(self, context: Context) -> list[Array]:
+            """Flags of what stands still and of what has no power, shape (m,) each."""
+            flags = []
+            for port in self._faults:
+                found = port.Eval(context) if port.HasValue(context) else np.zeros(port.size())
+                numbers = [float(x.value() if isinstance(x, AutoDiffXd) else x) for x in found]
+                flags.append(np.array(numbers)[self._of_cable])
+            return flags
 
         def _motion(self, context: Context) -> WinchMotion:
             state, tensions, command, brakes = self._inputs(context)
+            law = failed_law(self._law, *self._failed(context)) if self._faults else self._law
             m = self._m
             z = 0.0 * state[:m] if self._mode == TORQUE else state[2 * m :]
             parts = (state[:m], state[m : 2 * m], z)
-            return winch_motion(
-                self._law, self._mode, parts, tensions, command, brakes, home=self._home
-            )
+            return winch_motion(law, self._mode, parts, tensions, command, brakes, home=self._home)
 
         def DoCalcTimeDerivatives(self, context: Context, derivatives: ContinuousState) -> None:
             """Length rates, length accelerations and rates of the integrals."""
@@ -233,7 +272,9 @@ if TYPE_CHECKING:  # what an editor cannot see in a template
     class WinchMotors(LeafSystem):
         """`WinchMotors_` for float."""
 
-        def __init__(self, law: WinchLaw, mode: str, home: Array) -> None: ...
+        def __init__(
+            self, law: WinchLaw, mode: str, home: Array, may_fail: bool = False
+        ) -> None: ...
         def num_groups(self) -> int: ...  # noqa: D102
         def holding_state(self, lengths: Array, tensions: Array) -> Array: ...  # noqa: D102
 else:

@@ -14,6 +14,7 @@ from cdpr_drake.models.robot_in_plant import RobotInPlant
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.schema.fields import number, optional_section, section, switch, text
 from cdpr_drake.systems.robots.disturbances import Disturbances, DisturbanceSettings
+from cdpr_drake.systems.robots.failures import Failures, FailureSettings
 from cdpr_drake.systems.robots.motor_winch import COMMAND_PORTS
 
 
@@ -128,6 +129,9 @@ class CableRobotSettings:
     disturbances: DisturbanceSettings | None = optional_section(
         "What pushes the platform beside its cables; null: nothing."
     )
+    failures: FailureSettings | None = optional_section(
+        "What fails: cables that break, winches; null: nothing."
+    )
 
     def disturbance_block(self, robot: Robot) -> Disturbances | None:
         """The block of `disturbances`, by the seed of the scenario that these settings are, or 0;
@@ -140,3 +144,9 @@ class CableRobotSettings:
             return None
         seed = int(getattr(self, "seed", 0))
         return Disturbances(self.disturbances, robot.gravity_vector(), seed=seed)
+
+    def failure_block(self, robot: Robot) -> Failures | None:
+        """The block of `failures`; None without, and nothing can fail."""
+        if self.failures is None:
+            return None
+        return Failures(self.failures, len(robot.cables), robot.winch_groups().count)

@@ -17,7 +17,7 @@ from cdpr_drake.schema.fields import FASTEST, number, optional_section, section,
 from cdpr_drake.schema.typed_yaml import closest
 from cdpr_drake.systems.robots.disturbances import check_disturbances
 from cdpr_drake.systems.robots.settings import PLANT, CableRobotSettings
-from cdpr_drake.systems.scenarios.files import PICK_AND_PLACE
+from cdpr_drake.systems.scenarios.files import PICK_AND_PLACE, VISUAL_SERVO
 from cdpr_drake.systems.scenarios.pick_and_place_settings import (
     BoxCameraSettings,
     CoverSettings,
@@ -132,6 +132,11 @@ def check_pick_and_place(scenario: PickAndPlaceScenario, robot: Robot, path: Pat
     problems.add(*(f"{path}: {words}" for words in _problems(scenario, robot)))
     problems.raise_any()
     check_disturbances(scenario.disturbances, path)
+    if scenario.failures is not None:
+        raise ScenarioError(
+            f"{path}: failures: found some with kind {PICK_AND_PLACE}; accepted: null, or kind "
+            f"{VISUAL_SERVO}"
+        )
     check_world(
         scenario.world, robot, scenario.initial_pose.transform(), path, compiled=False, stop=False
     )

@@ -20,6 +20,7 @@ from cdpr_drake.schema.fields import (
 )
 from cdpr_drake.systems.cameras.camera_settings import CameraSettings
 from cdpr_drake.systems.cameras.targets import TargetSettings
+from cdpr_drake.systems.controllers.emergency import EmergencySettings
 from cdpr_drake.systems.controllers.open_loop_servo import OpenLoopSettings
 from cdpr_drake.systems.controllers.perturbation_settings import Perturbations
 from cdpr_drake.systems.controllers.planned_pose_servo import PosePlanSettings
@@ -100,5 +101,8 @@ class Scenario(VisualServoSettings, CableRobotSettings, ScenarioHeader):
     integration: IntegrationSettings = section("Integration.", IntegrationSettings, required=False)
     stability: StabilitySettings | None = optional_section(
         "The stability criterion along the run, in its log; null: not logged."
+    )
+    emergency: EmergencySettings | None = optional_section(
+        "What is done when a cable has broken, beside section failures; null: nothing."
     )
     log_rate: float = number("Rows of the log per second.", "Hz", 50.0, above=0.0, at_most=FASTEST)

@@ -72,6 +72,9 @@ class MotorEncoders(SampledSensor):
         lengths = self._reference + self._believed.paid_out(angles)
         return np.concatenate([angles, lengths])
 
+    def _per_turn(self) -> int:
+        return self._m
+
     def reading(self, sample: Array) -> Array:
         """The lengths of a sample, shape (m,) [m]."""
         return sample[self._m :]

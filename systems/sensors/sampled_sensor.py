@@ -39,6 +39,7 @@ class SampledSensor(LeafSystem):
         self._rate = rate
         self.period = 1.0 / rate
         self._size = size
+        self._frozen: list[tuple[float, Array]] = []
         self._sample = self.DeclareDiscreteState(size)
         self.DeclareInitializationUnrestrictedUpdateEvent(self._take_sample)
         self.DeclarePeriodicUnrestrictedUpdateEvent(1.0 / rate, 0.0, self._take_sample)
@@ -67,10 +68,31 @@ class SampledSensor(LeafSystem):
         """The latest sample; zeros before the first."""
         return context.get_discrete_state(self._sample).value()
 
+    def freeze(self, begins: float, entries: Array) -> None:
+        """From a time [s] on, gives numbers of its sample as they were, True in `entries`."""
+        self._frozen.append((begins, np.asarray(entries, bool)))
+
+    def channels(self, cable: int | None) -> Array:
+        """Which numbers of a sample belong to a cable, shape (size,); None: all.
+
+        For sensors with one number, or several in turn, of each cable.
+        """
+        if cable is None:
+            return np.ones(self._size, bool)
+        return np.arange(self._size) % self._per_turn() == cable
+
+    def _per_turn(self) -> int:
+        return self._size
+
     def _take_sample(self, context: Context, state: State) -> None:
         truth = self.truth(context)
         values = state.get_mutable_discrete_state().get_mutable_vector(self._sample)
-        values.SetFromVector(self.measure(truth, self.number_at(context.get_time())))
+        time = context.get_time()
+        sample = self.measure(truth, self.number_at(time))
+        for begins, entries in self._frozen:
+            if time >= begins:
+                sample = np.where(entries, self.sample(context), sample)
+        values.SetFromVector(sample)
 
     def _declare_slice(self, name: str, start: int, size: int) -> None:
         """Adds a vector output port with a part of the sample."""

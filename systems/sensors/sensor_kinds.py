@@ -156,6 +156,10 @@ class SensorSettings:
         given = getattr(self, f"{sensor}_rate", None)
         return None if largest is None else float(given or largest)
 
+    def sampled(self) -> list[str]:
+        """Those of `log` that sample."""
+        return [sensor for sensor in self.log if self.rate(sensor) is not None]
+
     def largest_rate(self, sensor: str) -> float | None:
         """The most readings per second that the type of one of `SENSORS` makes [Hz], or None."""
         kind = self.kind(sensor)

@@ -9,6 +9,7 @@ from pydrake.systems.framework import DiagramBuilder, OutputPort, System
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.systems.robots.assembly import RobotBlock
+from cdpr_drake.systems.sensors.sampled_sensor import SampledSensor
 from cdpr_drake.systems.sensors.sensor_kinds import SENSORS, SensorSettings
 
 
@@ -66,6 +67,7 @@ class SensorReadings:
         self._robot = robot
         self._prefix = f"{name}_" if name else ""
         self._ports: dict[str, OutputPort] = {}
+        self._systems: dict[str, SampledSensor] = {}
 
     def port(self, reading: str) -> OutputPort:
         """The port with the reading of that name."""
@@ -87,6 +89,17 @@ class SensorReadings:
         for sensor, rate in self._added():
             check_rate(sensor, rate, max_step)
 
+    def freeze(self, sensor: str, begins: float, cable: int | None) -> None:
+        """Has one of `SENSORS` give what it read last from a time on.
+
+        Args:
+            sensor: Its name; it is there and samples.
+            begins: The time [s].
+            cable: Of which cable; None: of all, or of a pose.
+        """
+        system = self._systems[sensor]
+        system.freeze(begins, system.channels(cable))
+
     def _added(self) -> Iterator[tuple[str, float]]:
         """Sensors that were added and sample, with their rates [Hz]."""
         for sensor, kind in SENSORS.items():
@@ -100,7 +113,8 @@ class SensorReadings:
         if rate is None:
             return truth
         system = make_sensor(sensor, self._settings, self._robot.robot, self._seed)
-        assert system is not None
+        assert isinstance(system, SampledSensor)
+        self._systems[sensor] = system
         self._builder.AddNamedSystem(self._prefix + kind.block, system)
         self._builder.Connect(truth, system.get_input_port())
         return system.GetOutputPort(kind.output)

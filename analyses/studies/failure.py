@@ -1,0 +1,296 @@
+"""Study: what a cable robot does when a cable breaks, and what reactions are worth.
+
+ACROBOT with its large platform moves under a visual servo by motor torques; at a time one cable
+breaks. Every single cable, at several poses and speeds, and every reaction:
+
+* none: nobody knows, and the controller goes on to ask the broken cable for its part, and to its
+  goal, so that its way counts as excursion, too;
+* stop: brakes of all winches close, told at once, `BRAKE` later;
+* redistribute: the cables that are left are asked to hold the platform where it is, told at once;
+* found: as redistribute, when lengths and tensions have told;
+* continue: as redistribute, but on to the goal.
+
+The robot hangs: all exit points are above. At most poses seven of its cables hold it only if some
+of them may go slack, or not at all; column `holds` says whether tensions from zero to the upper
+limit balance the weight at the pose where it broke.
+
+Other reactions, and the statements of Boumann and Bruckmann, Robotics 9(2):41, are left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from itertools import product
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
+from cdpr_drake.analyses.studies.framework.runs import MissingRuns, Runs
+from cdpr_drake.analyses.studies.framework.statement import OURS, Finding, statement
+from cdpr_drake.analyses.studies.framework.study import Case, Form, Study
+from cdpr_drake.analyses.studies.framework.summary import Cell, Summary
+from cdpr_drake.analyses.visualization.figure_style import new_figure
+from cdpr_drake.arrays import Array
+from cdpr_drake.geometry.poses import pose_from_row, pose_rows_distance
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.models.robot_statics import wrench_balance
+from cdpr_drake.palette import nth_look
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.monitoring.run_monitor import Outcome
+from cdpr_drake.tensions.methods import distribute
+from cdpr_drake.tensions.problem import TensionProblem, TensionStatus
+
+SCENARIO = "acrobot_broken_redistributed"
+
+BRAKE = 0.03
+"""Time that brakes take to close [s]."""
+
+NONE, STOP, REDISTRIBUTE, FOUND = "none", "stop", "redistribute", "found"
+CONTINUE = "continue"
+
+REACTIONS = {
+    NONE: "null",
+    STOP: f"{{reaction: stop, delay: {BRAKE:g}}}",
+    REDISTRIBUTE: "{reaction: redistribute}",
+    FOUND: "{reaction: redistribute, known: found}",
+    CONTINUE: "{reaction: redistribute, motion: continue}",
+}
+"""Section `emergency` of each reaction."""
+
+SHIFTS = ((0.0, 0.0, 0.0), (0.03, 0.03, 0.02), (-0.03, 0.03, 0.04), (0.03, -0.03, -0.02))
+"""By how much the start is moved from that of the scenario [m]."""
+
+TIMES = (0.4, 1.0, 3.0)
+"""When the cable breaks [s]: near the start, at full speed, and where the servo has arrived."""
+
+AFTER = 2.0
+"""For how long a run goes on after that [s]."""
+
+QUICK = (0, 5)
+"""Cables of the quick form, with the first shift and the second time."""
+
+RATE = 500.0
+"""Rows of the log per second [Hz]."""
+
+RESTS = (0.005, 0.05)
+"""Speeds below which the platform is at rest [m/s, rad/s]."""
+
+SAME = 1e-3
+"""Excursions that differ by less are the same [m]."""
+
+
+def cases(form: Form) -> Iterator[Case]:
+    """All cables, states and reactions."""
+    count = len(load_robot(load_scenario(SCENARIO).robot).cables)
+    states = [(0, 1)] if form.quick else product(range(len(SHIFTS)), range(len(TIMES)))
+    for shift, time in states:
+        for cable in QUICK if form.quick else range(count):
+            for reaction in REACTIONS:
+                keys = {"start": shift, "time_s": TIMES[time], "cable": cable, "reaction": reaction}
+                name = f"start {shift} at {TIMES[time]:g} cable {cable} {reaction}"
+                yield Case(name=name, keys=keys)
+
+
+def overrides(keys: Mapping[str, Any]) -> list[str]:
+    """What differs from the scenario in a run."""
+    time = keys["time_s"]
+    position = load_scenario(SCENARIO).initial_pose.position + SHIFTS[keys["start"]]
+    return [
+        "initial_pose.position=[" + ", ".join(f"{x:g}" for x in position) + "]",
+        f"failures.events=[{{kind: cable_breaks, time: {time:g}, cable: {keys['cable']}}}]",
+        f"emergency={REACTIONS[keys['reaction']]}",
+        f"duration={time + AFTER:g}", f"log_rate={RATE:g}", "integration.engine=compiled",
+    ]  # fmt: skip
+
+
+def measure(case: Case, _seed: int) -> dict[str, Any]:
+    """A run.
+
+    Returns:
+        outcome; speed_m_s, that of the platform when the cable broke; excursion_m and turn_rad, the
+        largest from its pose then; largest_speed_m_s; leaves, whether an anchor point left the
+        frame or went into the ground, and impact_m_s, the speed then, 0 without; tension_n, the
+        largest; slack_s, seconds that cables which are left were slack; rest_s, time until at rest,
+        or `AFTER`; holds, whether tensions that only pull hold the pose without the cable.
+    """
+    scenario = load_scenario(SCENARIO, overrides(case.keys))
+    run = run_scenario(scenario)
+    robot, log = load_robot(scenario.robot), run.log
+    cable, time = case.keys["cable"], case.keys["time_s"]
+    # A row holds what stood there before its instant.
+    since = log["time"] >= time - 0.5 / RATE
+    X_WP, times = log["X_WP"][since], log["time"][since]
+    distance, angle = pose_rows_distance(X_WP, np.broadcast_to(X_WP[0], X_WP.shape))
+    speed, turning = speeds(X_WP, times)
+    out = np.flatnonzero(leaves(robot, X_WP))
+    left = np.arange(len(robot.cables)) != cable
+    slack = log["slack"][since][:, left]
+    return {
+        "outcome": Outcome(run.outcome).name.lower(),
+        "speed_m_s": float(speed[0]),
+        "excursion_m": float(np.max(distance)),
+        "turn_rad": float(np.max(angle)),
+        "largest_speed_m_s": float(np.max(speed)),
+        "leaves": bool(len(out)),
+        "impact_m_s": float(speed[out[0]]) if len(out) else 0.0,
+        "tension_n": float(np.max(log["tensions"][since])),
+        "slack_s": float(np.sum(slack[:-1] * np.diff(times)[:, np.newaxis])),
+        "rest_s": rest_time(times - times[0], speed, turning),
+        "holds": holds_without(robot, X_WP[0], cable),
+    }
+
+
+def speeds(X_WP: Array, times: Array) -> tuple[Array, Array]:
+    """Speeds of Po [m/s] and of turning [rad/s] over rows of poses, shape (n, 7), at times [s]."""
+    speed = np.linalg.norm(np.gradient(X_WP[:, 4:], times, axis=0), axis=1)
+    _, angles = pose_rows_distance(X_WP[1:], X_WP[:-1])
+    turning = angles / np.diff(times)
+    return speed, np.append(turning, turning[-1])
+
+
+def leaves(robot: Robot, X_WP: Array) -> np.ndarray:
+    """Whether an anchor point is outside the frame or in the ground, of rows of poses."""
+    p_PB = robot.cable_set().p_PB
+    low, high = robot.frame.lower, robot.frame.upper
+    found = []
+    for row in X_WP:
+        p_WB = pose_from_row(row) @ p_PB
+        found.append(bool(np.any(p_WB < low[:, np.newaxis]) or np.any(p_WB > high[:, np.newaxis])))
+    return np.array(found)
+
+
+def rest_time(times: Array, speed: Array, turning: Array) -> float:
+    """When the platform comes to rest for good [s]; the last time where it does not."""
+    moves = np.flatnonzero((speed > RESTS[0]) | (turning > RESTS[1]))
+    last = int(moves[-1]) + 1 if len(moves) else 0
+    return float(times[min(last, len(times) - 1)])
+
+
+def holds_without(robot: Robot, row: Array, cable: int) -> bool:
+    """Whether tensions from zero to the upper limit hold a pose without a cable."""
+    balance = wrench_balance(robot, pose_from_row(row))
+    lower, upper = np.zeros_like(balance.upper), balance.upper.copy()
+    upper[cable] = 0.0
+    problem = TensionProblem(balance.W, balance.wrench, lower, upper, None, balance.row_scale)
+    return distribute(problem).status == TensionStatus.FEASIBLE
+
+
+def beside(runs: Runs, one: str, other: str) -> tuple[list[bool], float, str]:
+    """Of each cable and state, whether a reaction goes less far than another, median ratio, words.
+
+    Raises:
+        MissingRuns: There are none of both.
+    """
+    better, ratios, same = [], [], 0
+    for _, some in runs.by("start", "time_s", "cable"):
+        pair = [some(reaction=reaction) for reaction in (one, other)]
+        if not all(len(each) for each in pair):
+            continue
+        a, b = (float(each["excursion_m"][0]) for each in pair)
+        same += abs(a - b) < SAME
+        better.append(a < b)
+        ratios.append(a / b)
+    if not better:
+        raise MissingRuns(f"{one} and {other}")
+    words = (
+        f"less far in {sum(better)} of {len(better)} cases, {same} of them within "
+        f"{1e3 * SAME:g} mm of each other; median ratio of excursions {np.median(ratios):.2f}"
+    )
+    return better, float(np.median(ratios)), words
+
+
+@statement("Stopping all winches keeps the platform nearer than going on.", basis=OURS)
+def stopping(runs: Runs) -> Finding:
+    """Stop beside nothing."""
+    better, _, words = beside(runs, STOP, NONE)
+    return Finding(found=words, held=better)
+
+
+@statement("Redistribution goes less far than stopping.", basis=OURS)
+def redistribution(runs: Runs) -> Finding:
+    """Redistribute beside stop, and where seven cables hold the pose."""
+    better, _, words = beside(runs, REDISTRIBUTE, STOP)
+    held = runs(holds=True)
+    apart = "; seven cables hold none of the poses"
+    if len(held):
+        apart = f"; where seven cables hold the pose: {beside(held, REDISTRIBUTE, STOP)[2]}"
+    return Finding(
+        found=words + apart,
+        held=better,
+        why="A robot that hangs has few poses that seven cables hold. Where they do not, the "
+        "controller asks for a pose that cannot be held, and the platform goes where the nearest "
+        "wrench takes it; drums that stand still hold it on cables of constant length.",
+    )
+
+
+@statement("No reaction goes farther than none.", basis=OURS)
+def worse(runs: Runs) -> Finding:
+    """Every reaction beside nothing, with those named that are worse."""
+    held, words = [], []
+    for reaction in (STOP, REDISTRIBUTE, FOUND):
+        better, ratio, _ = beside(runs, reaction, NONE)
+        held += better
+        words.append(f"{reaction}: farther in {better.count(False)} of {len(better)} ({ratio:.2f})")
+    return Finding(found="; ".join(words), held=held)
+
+
+def figure(runs: Runs) -> Figure:
+    """Largest excursion and speed by cable, a symbol for each reaction."""
+    drawn, axes = new_figure(1, 2, (12.0, 5.0), "A cable breaks: what becomes of each reaction")
+    for place, reaction in enumerate(REACTIONS):
+        some, look = runs(reaction=reaction), nth_look(place)
+        if not len(some):
+            continue
+        across = some["cable"] + 1.0 + 0.16 * (place - 2.0)
+        for axis, column, factor in zip(
+            axes, ("excursion_m", "largest_speed_m_s"), (1e3, 1.0), strict=True
+        ):
+            axis.plot(
+                across, factor * some[column], look.marker or "o", color=look.color,
+                markerfacecolor="none", label=reaction,
+            )  # fmt: skip
+    axes[0].set(ylabel="largest excursion [mm]")
+    axes[1].set(ylabel="largest speed [m/s]")
+    for axis in axes:
+        axis.set(xlabel="cable that breaks", yscale="log")
+        axis.legend(loc="best")
+    return drawn
+
+
+def parameters(_form: Form) -> Mapping[str, Any]:
+    """What all runs have in common."""
+    return {
+        "scenario": SCENARIO, "reactions": REACTIONS, "shifts_m": SHIFTS, "times_s": TIMES,
+        "after_s": AFTER, "brake_s": BRAKE, "rests": RESTS, "same_m": SAME,
+    }  # fmt: skip
+
+
+STUDY = Study(
+    name="failure",
+    title="A cable breaks: what stopping and redistribution are worth, cable by cable",
+    cases=cases,
+    measure=measure,
+    parameters=parameters,
+    checks=(stopping, redistribution, worse),
+    tables=[
+        Summary(
+            "Runs by reaction",
+            ("reaction",),
+            {
+                "runs": Cell("runs"),
+                "pose held by seven": Cell("total", "holds"),
+                "median excursion [mm]": Cell("median", "excursion_m", ".1f"),
+                "largest excursion [mm]": Cell("largest", "excursion_m", ".1f"),
+                "largest speed [m/s]": Cell("largest", "largest_speed_m_s", ".2f"),
+                "leave the frame": Cell("total", "leaves"),
+                "largest impact [m/s]": Cell("largest", "impact_m_s", ".2f"),
+                "largest tension [N]": Cell("largest", "tension_n", ".1f"),
+                "median time to rest [s]": Cell("median", "rest_s", ".2f"),
+            },
+        )
+    ],
+    figures={"failure": figure},
+)
