@@ -28,6 +28,8 @@ _PARTS = {
     "quality": ("deviation_px", "correlation", "share", "points", "followed"),
     "desired_wrench": ("mx_nm", "my_nm", "mz_nm", "fx_n", "fy_n", "fz_n"),
     "applied_wrench": ("mx_nm", "my_nm", "mz_nm", "fx_n", "fy_n", "fz_n"),
+    "wrench_estimated": ("mx_nm", "my_nm", "mz_nm", "fx_n", "fy_n", "fz_n"),
+    "wrench_sigma": ("mx_nm", "my_nm", "mz_nm", "fx_n", "fy_n", "fz_n"),
     "feasible": ("flag",),
     "failures": ("count",),
     "specific_force": ("x_m_s2", "y_m_s2", "z_m_s2"),

@@ -6,8 +6,8 @@ cables gain per length wound in, and the positive part of each number,
 
     y(j + 1) = y(j) - T M G max(y(j - d), 0),      G = diag(g),  d = tau / T.
 
-Held fast by others, a platform lets cables know nothing of each other: M = diag(k). On its cables it
-gives way: M = K_c - K_c J K^-1 J' K_c with K_c = diag(k) and the platform's stiffness K; where
+Held fast by others, a platform lets cables know nothing of each other: M = diag(k). On its cables
+it gives way: M = K_c - K_c J K^-1 J' K_c with K_c = diag(k) and the platform's stiffness K. Where
 that is the cables' own, K = J' K_c J, M is between 0 and K_c (a projection, scaled by K_c), of as
 many dimensions as there are cables to spare. So what holds for diag(k) holds for all together.
 
