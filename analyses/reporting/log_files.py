@@ -29,6 +29,7 @@ _PARTS = {
     "desired_wrench": ("mx_nm", "my_nm", "mz_nm", "fx_n", "fy_n", "fz_n"),
     "applied_wrench": ("mx_nm", "my_nm", "mz_nm", "fx_n", "fy_n", "fz_n"),
     "wrench_estimated": ("mx_nm", "my_nm", "mz_nm", "fx_n", "fy_n", "fz_n"),
+    "displacement": ("rx_rad", "ry_rad", "rz_rad", "x_m", "y_m", "z_m"),
     "wrench_sigma": ("mx_nm", "my_nm", "mz_nm", "fx_n", "fy_n", "fz_n"),
     "feasible": ("flag",),
     "failures": ("count",),
