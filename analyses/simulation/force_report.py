@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from cdpr_drake.analyses.reporting.log_on_disk import Log
@@ -63,6 +64,14 @@ def force_summary(settings: ForceControl | None, log: Log) -> dict[str, Any]:
     return found
 
 
+def widen(panel: Axes, least: float) -> None:
+    """Shows at least so much of an axis, so that what is nothing looks like that."""
+    low, high = panel.get_ylim()
+    if high - low < least:
+        middle = 0.5 * (low + high)
+        panel.set_ylim(middle - 0.5 * least, middle + 0.5 * least)
+
+
 def force_figure(title: str, settings: ForceControl | None, log: Log) -> Figure:
     """Force on the platform over time, true and estimated, and where it goes."""
     time, true = log["time"], true_force(log)
@@ -81,10 +90,12 @@ def force_figure(title: str, settings: ForceControl | None, log: Log) -> Figure:
         if pressed[k] != 0.0:
             force.axhline(-pressed[k], **line_style(DESIRED), label="asked for")
         force.set(ylabel=f"force along {axis} [N]")
+        widen(force, 0.1)
         where, wanted = (np.asarray(log[name])[:, 4 + k] for name in ("X_WP", "X_WP_desired"))
         place.plot(time, 1e3 * wanted, **line_style(DESIRED), label="trajectory")
         place.plot(time, 1e3 * where, **line_style(ESTIMATED), label="platform")
         place.set(xlabel="time [s]", ylabel=f"{axis} [mm]")
-    for row in (0, 1):
-        panels[row, 2].legend(loc="best")
+        widen(place, 1.0)
+    panels[0, int(np.argmax(np.abs(pressed))) if np.any(pressed) else 2].legend(loc="best")
+    panels[1, 2].legend(loc="best")
     return figure

@@ -172,8 +172,8 @@ class WrenchError:
             compliance: By how much a cable is longer per tension, shape (m,), where its length is
                 that of the drum stretched by the reading [m/N].
         """
-        each = self.noise**2 * response.tension_noise + self.offset**2
-        each = each + (self.friction * np.asarray(tensions)) ** 2 / 3.0
+        constant = self.noise**2 * response.tension_noise + self.offset**2
+        each = constant + (self.friction * np.asarray(tensions)) ** 2 / 3.0
         found = (J.T * each) @ J
         if response.pose_noise > 0.0:
             lengths = self.length**2 + (self.noise * np.broadcast_to(compliance, len(J))) ** 2

@@ -261,6 +261,11 @@ class ForceTracking(PoseTracking):
             trajectory.velocity(time),
             trajectory.acceleration(time),
         )
+        if kind == HYBRID:  # along axes that press it is where it shall be
+            S = in_world(self._R_WT, self._pressed)
+            away = X_WD.translation() - X_WP.translation()
+            X_WD = RigidTransform(X_WD.rotation(), X_WD.translation() - S[3:, 3:] @ away)
+            V_D, A_D = V_D - S @ (V_D - V), A_D - S @ A_D
         none, free = TaskGains(0.0, 0.0), np.zeros(6)
 
         def torque(X: RigidTransform, V_X: Array, A_X: Array, gains: TaskGains) -> Array:

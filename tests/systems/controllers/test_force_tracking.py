@@ -62,17 +62,18 @@ def test_an_impedance_gives_way_by_force_over_stiffness():
 
 @pytest.mark.parametrize("wrong", [0.7, 1.0, 1.3])
 def test_a_force_of_5_n_is_held_on_a_table_of_another_stiffness(wrong):
-    """Contact on four corners is m g / penetration, 34 kN/m; from when it is touched on."""
-    true = MASS * 9.81 / 0.001
+    """Contact on two corners is half of m g / penetration, 17 kN/m."""
+    true = 0.5 * MASS * 9.81 / 0.001
     result = run(
         HELD, f"force_control.contact_stiffness={wrong * true}", "trajectory.pause=1",
-        "trajectory.stretches=[{pose: {position: [0.02, 0.0, 0.1055]}, duration: 2}]", "duration=3",
-        "integration.max_step=0.001",
+        "trajectory.stretches=[{pose: {position: [0.0955, 0.0, 0.2]}, duration: 2}]", "duration=3",
     )  # fmt: skip
     forces = summarize_tension_run(result)["forces"]
     assert forces["held_from_s"] < 1.0
     assert forces["held_rms_n"] < 0.3
-    assert np.all(result.log["contact_force"][-100:, 2] > 4.0)
+    assert np.all(result.log["contact_force"][-100:, 0] > 4.0)
+    assert result.log["X_WP"][-1, 5] == pytest.approx(0.0, abs=2e-3)  # along the edge it follows
+    assert np.max(np.abs(result.log["X_WP"][:, 1:4])) < 0.01  # and turns by less than a degree
     assert "forces.png" in tension_pictures(result, ("png",))
 
 
