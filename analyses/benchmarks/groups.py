@@ -7,6 +7,7 @@ from collections.abc import Callable
 from cdpr_drake.analyses.benchmarks.cameras import camera_rows
 from cdpr_drake.analyses.benchmarks.constraints import constraint_rows
 from cdpr_drake.analyses.benchmarks.design import design_rows
+from cdpr_drake.analyses.benchmarks.forces import force_rows
 from cdpr_drake.analyses.benchmarks.identification import calibration_rows, identification_rows
 from cdpr_drake.analyses.benchmarks.planning import planning_rows
 from cdpr_drake.analyses.benchmarks.point_calibration import point_calibration_rows
@@ -23,6 +24,7 @@ BENCH_GROUPS: dict[str, Callable[[bool], list[TimingRow]]] = {
     "cameras": camera_rows,
     "constraints": constraint_rows,
     "design": design_rows,
+    "forces": force_rows,
     "identification": identification_rows,
     "physics": lambda quick: [*physics_rows(quick), *effect_rows(quick)],
     "planning": planning_rows,

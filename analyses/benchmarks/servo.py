@@ -45,9 +45,9 @@ SCENARIOS = {
 }
 
 CORRECTIONS = {
-    "constant": "{kind: constant}",
+    "constant": "{kind: constant, gain: 0.04}",
     "adaptive": "{kind: adaptive}",
-    "by_length": "{kind: by_length, highest: [3], shortest: 0.6, longest: 1.4}",
+    "by_length": "{kind: by_length, gain: 0.04, highest: [3], shortest: 0.6, longest: 1.4}",
     "distribution": "{kind: distribution, integral: 0.01}",
     "length": "{kind: length}",
 }

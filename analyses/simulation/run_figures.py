@@ -19,6 +19,7 @@ from cdpr_drake.analyses.simulation.run_summary import camera_line, image_path
 from cdpr_drake.analyses.simulation.stability_files import stability_figure
 from cdpr_drake.analyses.simulation.visual_servo_run import RunResult
 from cdpr_drake.analyses.simulation.worlds import world_figure, world_words
+from cdpr_drake.analyses.simulation.wrench_report import wrench_figure
 from cdpr_drake.analyses.visualization.cable_figures import cable_figure
 from cdpr_drake.analyses.visualization.curves import (
     by_pieces,
@@ -46,6 +47,7 @@ from cdpr_drake.palette import (
     nth_look,
 )
 from cdpr_drake.systems.diagrams.torque_control import tension_limits
+from cdpr_drake.systems.estimators.wrench_estimator import WRENCH_ESTIMATED
 
 
 def run_figures(result: RunResult, formats: Sequence[str] = DEFAULT_FORMATS) -> Pictures:
@@ -77,6 +79,9 @@ def run_figures(result: RunResult, formats: Sequence[str] = DEFAULT_FORMATS) -> 
             lambda words: _title(result, words), sensors, log, result.servo.motion,
             result.depth_image,
         )  # fmt: skip
+    if WRENCH_ESTIMATED in log:
+        pushed = _title(result, "What pushes the platform beside its cables, true and estimated")
+        drawn["wrench"] = lambda: wrench_figure(pushed, log)
     world = result.servo.scenario.world
     if world is not None:
         around = _title(result, world_words(world))

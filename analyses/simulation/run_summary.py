@@ -13,6 +13,7 @@ from cdpr_drake.analyses.reporting.provenance import package_versions
 from cdpr_drake.analyses.simulation.run_stability import stability_of_run
 from cdpr_drake.analyses.simulation.visual_servo_run import RunResult
 from cdpr_drake.analyses.simulation.worlds import world_summary
+from cdpr_drake.analyses.simulation.wrench_report import wrench_summary
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.pose_accuracy import distances_from_line
 from cdpr_drake.geometry.poses import pose_from_row, pose_row, pose_rows_distance
@@ -169,6 +170,9 @@ def summarize(result: RunResult) -> dict[str, Any]:
         summary["disturbances"] = disturbance_summary(log)
     if scenario.failures is not None:
         summary["failures"] = failure_summary(scenario.failures, servo.robot, log)
+    estimation = scenario.wrench_estimation
+    if isinstance(servo, VisualServo) and servo.wrench is not None and estimation is not None:
+        summary["wrench_estimation"] = wrench_summary(log, estimation.kind, servo.wrench.delay)
     if isinstance(servo, VisualServo) and servo.remote is not None:
         summary["remote"] = servo.remote.report()
     cleaned: dict[str, Any] = finite(summary)

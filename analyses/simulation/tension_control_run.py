@@ -17,6 +17,11 @@ from cdpr_drake.analyses.reporting.deferred_figures import Pictures
 from cdpr_drake.analyses.reporting.log_files import finite, spread, write_json, write_log
 from cdpr_drake.analyses.reporting.log_on_disk import Log
 from cdpr_drake.analyses.reporting.provenance import package_versions, write_run_inputs
+from cdpr_drake.analyses.simulation.force_report import (
+    feels_forces,
+    force_figure,
+    force_summary,
+)
 from cdpr_drake.analyses.simulation.run_loop import (
     LONGEST_WARM_UP,
     EndedRun,
@@ -119,6 +124,9 @@ def make_control(scenario: TensionScenario) -> TensionControl:
             distributor=distributor,
             world=scenario.world,
             stop_at_contact=scenario.stop.contact,
+            force=scenario.force_control,
+            disturbances=scenario.disturbances,
+            seed=scenario.seed,
         ),
         log_rate=scenario.log_rate,
     )
@@ -256,6 +264,8 @@ def summarize_tension_run(run: TensionRun) -> dict[str, Any]:
         "world": world_summary(scenario, run.log),
         "versions": package_versions(),
     }
+    if feels_forces(log):
+        summary["forces"] = force_summary(scenario.force_control, log)
     times = run.control.blocks.distributor.step_times
     if times is not None:
         summary["program_steps"] = times.as_dict()
@@ -319,6 +329,9 @@ def tension_pictures(run: TensionRun, formats: Sequence[str] = DEFAULT_FORMATS) 
         ),
         "platform_path": lambda: platform_path_figure(run),
     }
+    if feels_forces(log):
+        forces = _title(run, "Forces on the platform, and where it goes")
+        drawn["forces"] = lambda: force_figure(forces, run.scenario.force_control, log)
     world = run.scenario.world
     if world is not None:
         words = _title(run, world_words(world))

@@ -7,6 +7,8 @@ Errors of a pose are twists in the body frame, X_true = X exp(e), ordered (rotat
 are where they are told to be. `pose_filter` fuses one camera with lengths, and finds errors of the
 robot's points.
 
+`wrench_observers` tell what pushes the platform beside its cables, from tensions and poses.
+
 Source: servoing thesis 2.1 and 2.3; for the invariant filter, Barrau and Bonnabel, 2017.
 """
 

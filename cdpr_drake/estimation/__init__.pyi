@@ -5,3 +5,7 @@ from .camera_miscalibration import mixture as mixture
 from .sensor_filter import correct as correct
 from .sensor_filter import move as move
 from .sensor_models import Look as Look
+from .wrench_observers import OBSERVERS as OBSERVERS
+from .wrench_observers import WrenchError as WrenchError
+from .wrench_observers import WrenchObserver as WrenchObserver
+from .wrench_observers import observer_response as observer_response

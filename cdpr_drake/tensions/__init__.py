@@ -13,7 +13,8 @@ They are pure functions of readings; `systems.controllers` has their block, `Ten
 * `tension_correction`, (5.1): a cable below its threshold is wound up. The threshold is constant,
   grows with how short the cable is (`length_thresholds`), or comes from a tension distribution at
   the believed pose, which `TensionFollower` follows from both sides. The gain is constant or, by
-  `adaptive_gains`, (5.3), proportional to what the cable is too long by.
+  `adaptive_gains`, (5.3), proportional to what the cable is too long by. `tension_gain` is how
+  large it may be, by stiffness, rate and delay.
 * `length_correction`, (5.5): the cables of least tension are wound up to the length that the
   believed pose asks for.
 * `polygon_correction`: tensions that leave the feasible polygon of the believed pose, or come near

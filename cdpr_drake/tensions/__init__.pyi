@@ -1,5 +1,7 @@
 from .batch import distribute_batch as distribute_batch
 from .closed_form_kernel import closed_form as closed_form
+from .correction_gain import SampledCorrection as SampledCorrection
+from .correction_gain import tension_gain as tension_gain
 from .methods import METHODS as METHODS
 from .methods import Distributor as Distributor
 from .methods import TensionMethod as TensionMethod

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 from pydrake.common.value import AbstractValue, Value
 from pydrake.math import RigidTransform
-from pydrake.systems.framework import BasicVector, Context, LeafSystem
+from pydrake.systems.framework import BasicVector, Context, DependencyTicket, LeafSystem
 
 from cdpr_drake.control.force_balance import FORCE, WRENCH
 from cdpr_drake.control.task_space import (
@@ -98,15 +98,22 @@ class PoseTracking(LeafSystem):
         )
         self._table = self._step.table
         size = in_plant.plant.num_multibody_states(in_plant.model_instance)
+        remembered = self._declare_memory()
         state = self.DeclareVectorInputPort("platform_state", size)
         self._state = state.Eval  # looked up once: called at every step of control
         now, here = {self.time_ticket()}, {self.input_port_ticket(state.get_index())}
-        self.DeclareVectorOutputPort("desired_wrench", 6, self._calc_wrench, now | here)
+        self.DeclareVectorOutputPort(
+            "desired_wrench", 6, self._calc_wrench, now | here | remembered
+        )
         for name, calc, sources in (
             ("X_WP", self._calc_pose, here),
             ("X_WP_desired", self._calc_desired_pose, now),
         ):
             self.DeclareAbstractOutputPort(name, lambda: Value(RigidTransform()), calc, sources)
+
+    def _declare_memory(self) -> set[DependencyTicket]:
+        """Declares what the wrench depends on beside time and the platform's state."""
+        return set()
 
     def packed(self) -> TrackingStep:
         """Its constants, for loops that are compiled as a whole."""

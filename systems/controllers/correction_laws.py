@@ -64,6 +64,21 @@ class CorrectionReadings:
         return pose
 
 
+@dataclass(frozen=True, eq=False)
+class LengthGain:
+    """A gain that is in proportion to a cable's length, as how far it gives is.
+
+    Attributes:
+        share: Gain per length, shape (m,) [1/(N s)].
+    """
+
+    share: Array
+
+    def each(self, lengths: Array) -> Array:
+        """For lengths that are counted, shape (m,) [m]; shape (m,) [m/(N s)]."""
+        return np.asarray(self.share * np.maximum(lengths, 0.0))
+
+
 class CorrectionLaw(Protocol):
     """Cable velocities from readings; `memory` is what it keeps between steps, shape (k,)."""
 
@@ -76,6 +91,11 @@ class CorrectionLaw(Protocol):
 
         What is kept in `memory` is changed in place; it begins as zeros.
         """
+
+
+def each_gain(gain: Array | LengthGain, readings: CorrectionReadings) -> Array:
+    """The gain of each cable now, shape (m,) [m/(N s)]."""
+    return gain.each(readings.lengths) if isinstance(gain, LengthGain) else gain
 
 
 def expected_lengths(cables: CableSet, readings: CorrectionReadings) -> Array | None:
@@ -91,13 +111,13 @@ class ConstantThreshold:
     """(5.1): the same threshold, shape (m,) [N], and gain, shape (m,) [m/(N s)], at all times."""
 
     threshold: Array
-    gain: Array
+    gain: Array | LengthGain
     memory: int = 0
 
     def step(self, readings: CorrectionReadings, memory: Array) -> tuple[Array, Array, bool]:
         """As `CorrectionLaw`."""
-        found = tension_correction(readings.tensions, self.threshold, self.gain)
-        return found, self.threshold, True
+        gains = each_gain(self.gain, readings)
+        return tension_correction(readings.tensions, self.threshold, gains), self.threshold, True
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +147,7 @@ class LengthThreshold:
     shortest: float
     longest: float
     shape: str
-    gain: Array
+    gain: Array | LengthGain
     memory: int = 0
 
     def step(self, readings: CorrectionReadings, memory: Array) -> tuple[Array, Array, bool]:
@@ -136,7 +156,8 @@ class LengthThreshold:
             readings.lengths, self.shortest, self.longest,
             lowest=self.threshold, highest=self.highest, shape=self.shape,
         )  # fmt: skip
-        return tension_correction(readings.tensions, thresholds, self.gain), thresholds, True
+        gains = each_gain(self.gain, readings)
+        return tension_correction(readings.tensions, thresholds, gains), thresholds, True
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,7 +218,8 @@ class InsidePolygon:
         upper: Largest [N].
         margin: Distance to keep from both [N].
         method: A name of `tensions.METHODS`, for the tensions that are approached.
-        gain: Velocity per missing tension [m/(N s)].
+        gain: Velocity per missing tension [m/(N s)]; of a `LengthGain` the least share counts, for
+            the mean length.
         fastest: Largest velocity of a correction; more is scaled down together [m/s].
     """
 
@@ -207,7 +229,7 @@ class InsidePolygon:
     upper: float
     margin: float
     method: str
-    gain: float
+    gain: float | LengthGain
     fastest: float
     memory: int = 0
 
@@ -224,10 +246,16 @@ class InsidePolygon:
         )  # fmt: skip
         found = polygon_correction(
             readings.tensions, missing, least, problem.W, readings.lengths,
-            np.full(m, self.gain),
+            np.full(m, self._gain(readings.lengths)),
         )  # fmt: skip
         largest = float(np.max(np.abs(found)))
         return found * min(1.0, self.fastest / largest) if largest else found, least, True
+
+    def _gain(self, lengths: Array) -> float:
+        """Of a cable of mean length [m/(N s)]."""
+        if isinstance(self.gain, LengthGain):
+            return float(np.min(self.gain.share) * np.mean(lengths))
+        return self.gain
 
 
 def _hold(
@@ -272,7 +300,7 @@ class ImageSlackRate:
 
     Attributes:
         threshold: Tension below which a cable counts as slack, shape (m,) [N].
-        gain: Velocity per missing tension, shape (m,) [m/(N s)].
+        gain: Velocity per missing tension, shape (m,) [m/(N s)], or one by length.
         cables: The believed cables.
         camera: The camera in W [m], its intrinsic parameters, its noise [px].
         allowance: Surplus that is left to the tension [m].
@@ -281,7 +309,7 @@ class ImageSlackRate:
     """
 
     threshold: Array
-    gain: Array
+    gain: Array | LengthGain
     cables: CableSet
     camera: tuple[RigidTransform, Pinhole, float]
     allowance: float
@@ -291,7 +319,8 @@ class ImageSlackRate:
 
     def step(self, readings: CorrectionReadings, memory: Array) -> tuple[Array, Array, bool]:
         """As `CorrectionLaw`; where no cable can run at the believed pose, by tension alone."""
-        alone = tension_correction(readings.tensions, self.threshold, self.gain)
+        gains = each_gain(self.gain, readings)
+        alone = tension_correction(readings.tensions, self.threshold, gains)
         pixels = readings.cable_points.reshape(self.cables.count, 2, -1)
         try:
             seen = slack_from_image(pixels, self.cables, readings.X_WP, *self.camera).surplus

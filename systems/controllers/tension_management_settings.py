@@ -41,11 +41,20 @@ class TensionManagement:
         (None,),
         (1.0,),
     )
-    gain: float = number(
-        "Velocity per missing tension, k_c; kinds constant, by_length and polygon.",
+    gain: float | None = number(
+        "Velocity per missing tension, k_c; kinds constant, by_length, polygon and image; null: "
+        "from the cables' stiffness, the rate and the delay, so that the loop is stable.",
         "m/(N s)",
-        0.04,
+        None,
         above=0.0,
+    )
+    delay: float | None = number(
+        "From a tension to the velocity that it asks for, beside the period of the corrections, "
+        "with which a gain of null reckons; null: the period of the tension sensors.",
+        "s",
+        None,
+        at_least=0.0,
+        at_most=10.0,
     )
     gain_per_length: float = number(
         "That gain per metre that a cable is too long, k_c,a; kind adaptive.",
@@ -122,3 +131,7 @@ class TensionManagement:
     closing_time: float = number(
         "Time in which what is seen to hang through is wound in; kind image.", "s", 0.2, above=0.0
     )
+
+    def needs_gain(self) -> bool:
+        """Whether a gain must be found, since the kind has one and none is stated."""
+        return self.gain is None and self.kind in (CONSTANT, BY_LENGTH, POLYGON, IMAGE)

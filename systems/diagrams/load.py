@@ -22,10 +22,12 @@ from cdpr_drake.errors import (
 from cdpr_drake.models.robot_holding import check_pulleys
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import check_pose, tension_problem
+from cdpr_drake.systems.controllers.force_tracking import check_force_control
 from cdpr_drake.systems.diagrams.mechanism_control import check_mechanism_scenario
 from cdpr_drake.systems.diagrams.scenario_checks import check_scenario
 from cdpr_drake.systems.remote.remote_place import TENSION_PLACES
 from cdpr_drake.systems.remote.settings import check_place
+from cdpr_drake.systems.robots.disturbances import check_disturbances
 from cdpr_drake.systems.robots.settings import COMPILED
 from cdpr_drake.systems.scenarios.files import (
     MECHANISM,
@@ -71,6 +73,8 @@ def _check_tension_scenario(scenario: TensionScenario, robot: Robot, path: Path)
                     f"{path}: perturbations.believed_robot: found beside {key}; accepted: one of "
                     "both"
                 )
+    check_disturbances(scenario.disturbances, path)
+    _check_forces(scenario, robot, path)
     if scenario.predictive is not None and scenario.controller.balance != WRENCH:
         raise ScenarioError(
             f"{path}: controller.balance: found {scenario.controller.balance} beside predictive; "
@@ -83,6 +87,29 @@ def _check_tension_scenario(scenario: TensionScenario, robot: Robot, path: Path)
             said.add(words)
             problems.add(f"{path}: {key}: {words}")
     problems.raise_any()
+
+
+def _check_forces(scenario: TensionScenario, robot: Robot, path: Path) -> None:
+    """Refuses laws that answer forces, and pushes, beside what does not go with them."""
+    for key in ("force_control", "disturbances"):
+        if getattr(scenario, key) is not None and scenario.integration.engine == COMPILED:
+            raise ScenarioError(
+                f"{path}: integration.engine: found {COMPILED} beside {key}; accepted: plant"
+            )
+    if scenario.force_control is None:
+        return
+    try:
+        check_force_control(scenario.force_control, robot)
+    except ScenarioError as problem:
+        raise ScenarioError(f"{path}: {problem}") from problem
+    for key in ("remote", "predictive"):
+        if getattr(scenario, key) is not None:
+            raise ScenarioError(f"{path}: force_control: found beside {key}; accepted: one of both")
+    if scenario.controller.balance != WRENCH:
+        raise ScenarioError(
+            f"{path}: controller.balance: found {scenario.controller.balance} beside "
+            f"force_control; accepted: {WRENCH}"
+        )
 
 
 def _poses_of(scenario: TensionScenario, robot: Robot, path: Path) -> dict[str, RigidTransform]:

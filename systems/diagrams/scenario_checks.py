@@ -34,6 +34,7 @@ from cdpr_drake.systems.diagrams.torque_control import (
     check_torque_control,
     check_winch_groups,
 )
+from cdpr_drake.systems.diagrams.wrench_estimation import check_wrench_estimation
 from cdpr_drake.systems.estimators.estimator_kinds import ESTIMATORS
 from cdpr_drake.systems.remote.settings import check_servo_place
 from cdpr_drake.systems.robots.cable_forces import simulated_cables
@@ -421,6 +422,7 @@ CHECKS: list[Callable[[Scenario, Robot, Path], None]] = [
     _check_disturbances,
     _check_failures,
     check_emergency,
+    check_wrench_estimation,
     _check_winches,
     check_winch_groups,
     check_torque_control,

@@ -22,7 +22,9 @@ from cdpr_drake.systems.diagrams.torque_control import (
     add_torque_controller,
     connect_torque_controller,
 )
+from cdpr_drake.systems.diagrams.wrench_estimation import add_wrench_estimator
 from cdpr_drake.systems.estimators.estimator_kinds import EstimatorSettings, EstimatorTask
+from cdpr_drake.systems.estimators.wrench_estimator import WrenchEstimator
 from cdpr_drake.systems.remote.remote_servo import RemoteServo
 from cdpr_drake.systems.robots.assembly import RobotBlock
 from cdpr_drake.systems.scenarios.visual_servo_scenario import VisualServoSettings
@@ -44,6 +46,7 @@ class VisualServoBlocks(ServoModel):
             None for others.
         corrector: Takes up slack; None unless asked for.
         torque: Makes torques of the servo's twist; None unless winches are commanded by torque.
+        wrench: Estimates what pushes the platform; None unless asked for.
     """
 
     block: RobotBlock
@@ -55,6 +58,7 @@ class VisualServoBlocks(ServoModel):
     wanted_lengths: Integrator | None
     corrector: TensionCorrector | None = None
     torque: TorqueController | None = None
+    wrench: WrenchEstimator | None = None
 
     def take_lengths(self, context: Context, lengths: Array) -> None:
         """Starts what integrates wanted lengths at lengths, shape (m,) [m], in the root context."""
@@ -158,6 +162,14 @@ def add_visual_servo(
         wanted_lengths=_command_winches(builder, velocities, robot, prefix),
         corrector=corrector,
         torque=torque,
+        wrench=add_wrench_estimator(
+            builder,
+            settings,
+            robot,
+            believed=model.believed,
+            readings=readings,
+            name=prefix + "wrench_estimator",
+        ),
     )
 
 

@@ -14,6 +14,7 @@ from cdpr_drake.systems.diagrams.fusion_readings import fusion_ports
 from cdpr_drake.systems.diagrams.servo_blocks import VisualServoBlocks, seen_ports
 from cdpr_drake.systems.diagrams.servo_models import ServoModel
 from cdpr_drake.systems.diagrams.torque_control import tension_limits
+from cdpr_drake.systems.estimators.wrench_estimator import WRENCH_ESTIMATED, WRENCH_SIGMA
 from cdpr_drake.systems.monitoring.log_row import RunLog, add_log
 from cdpr_drake.systems.monitoring.run_monitor import RunMonitor, StopRules
 from cdpr_drake.systems.monitoring.stability_watch import (
@@ -230,6 +231,9 @@ def add_servo_log(
         ports[APPLIED_WRENCH] = block.GetOutputPort(APPLIED_WRENCH)
     if scenario.failures is not None:
         ports |= {name: block.GetOutputPort(name) for name in FAULTS if block.HasOutputPort(name)}
+    if blocks.wrench is not None:
+        for name in (WRENCH_ESTIMATED, WRENCH_SIGMA):
+            ports[name] = blocks.wrench.GetOutputPort(name)
     if blocks.plan is not None:
         ports["X_WP_planned"] = servo.GetOutputPort("X_WP_planned")
     if scenario.pose_plan is not None:

@@ -20,6 +20,7 @@ from cdpr_drake.geometry.poses import pose_error, pose_from_row, pose_row
 from cdpr_drake.models.robot_in_plant import RobotInPlant, add_robot, pose_on_joint
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.systems.controllers.computed_torque import PoseTracking
+from cdpr_drake.systems.controllers.force_tracking import ForceControl, ForceTracking
 from cdpr_drake.systems.controllers.tension_distributor import TensionDistributor
 from cdpr_drake.systems.monitoring.log_row import RunLog, add_log
 from cdpr_drake.systems.remote.remote_place import DISTRIBUTOR, TRAJECTORY, Remote
@@ -28,6 +29,8 @@ from cdpr_drake.systems.robots.assembly import apply_force
 from cdpr_drake.systems.robots.compiled_cable_robot import motion_by_tensions
 from cdpr_drake.systems.robots.compiled_motion import MEMORY, CompiledMotion
 from cdpr_drake.systems.robots.compiled_step import StepRule
+from cdpr_drake.systems.robots.disturbances import Disturbances, DisturbanceSettings
+from cdpr_drake.systems.robots.platform_wrench import APPLIED_WRENCH, PlatformWrench
 from cdpr_drake.systems.robots.tension_driven_cables import TensionDrivenCables
 from cdpr_drake.systems.worlds.adding import (
     CLEARANCES,
@@ -178,6 +181,9 @@ class TensionControlSettings:
         remote: In which of `remote_place.TENSION_PLACES` a process outside stands; None: nowhere.
         world: What is round the robot; None: nothing. Contact needs the plant.
         stop_at_contact: Whether the first touch ends the simulation.
+        force: How the platform answers forces; None: as computed torque does. Needs the plant.
+        disturbances: What pushes the platform; None: nothing. Needs the plant.
+        seed: Of their random numbers.
     """
 
     trajectory: PoseTrajectory
@@ -196,6 +202,9 @@ class TensionControlSettings:
     remote: str | None = None
     world: WorldSettings | None = None
     stop_at_contact: bool = False
+    force: ForceControl | None = None
+    disturbances: DisturbanceSettings | None = None
+    seed: int = 0
 
 
 @dataclass(frozen=True)
@@ -209,6 +218,7 @@ class TensionControlBlocks:
             compiled steps.
         cables: Those cables.
         state: State of the platform, which controller and distributor read.
+        pushes: What pushes the platform beside its cables; None: nothing.
     """
 
     controller: PoseTracking
@@ -216,6 +226,7 @@ class TensionControlBlocks:
     driven: TensionDrivenCables | CompiledMotion
     cables: CableSet
     state: OutputPort
+    pushes: Disturbances | None = None
 
 
 def add_tension_control(
@@ -266,14 +277,15 @@ def add_tension_control(
         (distribution, driven, "tensions"),
     ):
         builder.Connect(before.GetOutputPort(port), after.GetInputPort(port))
-    if isinstance(control, RemoteTracking):
+    if isinstance(control, RemoteTracking | ForceTracking):
         builder.Connect(distribution.GetOutputPort("tensions"), control.GetInputPort("tensions"))
     for block in (control, distribution):
         if isinstance(block, RemoteTracking | RemoteDistributor):
             builder.Connect(driven.GetOutputPort("lengths"), block.GetInputPort("lengths"))
     if isinstance(driven, TensionDrivenCables):
         apply_force(builder, in_plant.plant, driven.GetOutputPort("generalized_force"), name=name)
-    return TensionControlBlocks(control, distribution, driven, real, state)
+    pushes = _add_pushes(builder, in_plant, settings, control, name)
+    return TensionControlBlocks(control, distribution, driven, real, state, pushes)
 
 
 def _deciders(
@@ -288,9 +300,33 @@ def _deciders(
         remote = RemoteDistributor(in_plant, trajectory, *distribution, balance=balance)
         return control(in_plant, trajectory, gains, settings.dynamics, balance=balance), remote
     own = distributor(in_plant, *distribution, balance=balance)
+    if settings.force is not None:
+        return ForceTracking(
+            in_plant, trajectory, gains, settings.force, believed, settings.rate, settings.dynamics
+        ), own
     if place is None:
         return control(in_plant, trajectory, gains, settings.dynamics, balance=balance), own
     return RemoteTracking(in_plant, trajectory, gains, place, balance=balance), own
+
+
+def _add_pushes(
+    builder: DiagramBuilder,
+    in_plant: RobotInPlant,
+    settings: TensionControlSettings,
+    control: PoseTracking,
+    name: str,
+) -> Disturbances | None:
+    """Adds what pushes the platform, in a plant."""
+    if settings.disturbances is None:
+        return None
+    prefix, gravity = f"{name}_" if name else "", in_plant.robot.gravity_vector()
+    pushes = Disturbances(settings.disturbances, gravity, seed=settings.seed)
+    builder.AddNamedSystem(prefix + "disturbances", pushes)
+    wrench = builder.AddNamedSystem(prefix + "platform_wrench", PlatformWrench(in_plant))
+    builder.Connect(control.GetOutputPort("X_WP"), pushes.GetInputPort("X_WP"))
+    builder.Connect(pushes.GetOutputPort("wrench"), wrench.get_input_port())
+    apply_force(builder, in_plant.plant, wrench.get_output_port(), name=prefix + "pushed")
+    return pushes
 
 
 def _split_state(builder: DiagramBuilder, motion: CompiledMotion, prefix: str) -> OutputPort:
@@ -342,6 +378,11 @@ def build_tension_control(
         }
         for name in ("tensions", "feasible", "failures"):
             logged[name] = blocks.distributor.GetOutputPort(name)
+        if blocks.pushes is not None:
+            logged[APPLIED_WRENCH] = blocks.pushes.GetOutputPort("wrench")
+        if isinstance(blocks.controller, ForceTracking):
+            for name in ("wrench_estimated", "displacement"):
+                logged[name] = blocks.controller.GetOutputPort(name)
         if settings.remote == TRAJECTORY:
             logged["desired_motion"] = blocks.controller.GetOutputPort("desired_motion")
         if meters is not None and meters.contact is not None:

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from pydrake.math import RigidTransform
 from pydrake.systems.framework import DiagramBuilder, OutputPort, System
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import ScenarioError, TensionProblemError
+from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.models.camera_catalogue import load_camera
 from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.models.robot_statics import rigid_platform
 from cdpr_drake.servoing.servo_task import BelievedRobot
 from cdpr_drake.systems.cameras.cable_camera import CableCamera
 from cdpr_drake.systems.controllers.correction_laws import (
@@ -24,6 +28,7 @@ from cdpr_drake.systems.controllers.correction_laws import (
     FollowedDistribution,
     ImageSlackRate,
     InsidePolygon,
+    LengthGain,
     LengthThreshold,
 )
 from cdpr_drake.systems.controllers.tension_corrector import TensionCorrector
@@ -39,6 +44,7 @@ from cdpr_drake.systems.controllers.tension_management_settings import (
 from cdpr_drake.systems.robots.assembly import RobotBlock
 from cdpr_drake.systems.scenarios.visual_servo_scenario import VisualServoSettings
 from cdpr_drake.systems.sensors.sensor_readings import SensorReadings
+from cdpr_drake.tensions.correction_gain import SHARES, SampledCorrection, tension_gain
 from cdpr_drake.tensions.methods import method_for
 from cdpr_drake.tensions.slack_correction import TensionFollower
 from cdpr_drake.vision.pinhole import Pinhole
@@ -137,8 +143,57 @@ def _check_by_length(settings: TensionManagement, refuse: object) -> None:
         raise refuse("threshold", f"{np.min(low):g}", "above 0 [N] by shape exponential")
 
 
+def automatic_gain(
+    robot: Robot, cables: CableSet, X_WP: RigidTransform, rate: float, delay: float
+) -> LengthGain:
+    """A gain by `tension_gain`, less where modes of the platform on its cables ask for that.
+
+    Args:
+        robot: The robot, for its platform.
+        cables: The cables, as stiff and as damped as they are known to be.
+        X_WP: Pose at which modes are judged.
+        rate: Corrections per second [Hz].
+        delay: From a tension to the velocity that it asks for, beside the period [s].
+
+    Raises:
+        ScenarioError: No gain down to 1/64 of that is stable.
+    """
+    loop, lengths = correction_loop(robot, cables, X_WP)
+    gains = tension_gain(loop.cable_stiffness, rate, delay)
+    share = loop.stable_share(gains, rate, delay)
+    if share is None:
+        least = float(np.min(gains)) * SHARES[0]
+        raise ScenarioError(
+            f"tension_management.gain: found null; accepted for {robot.name} at {rate:g} Hz with a "
+            f"delay of {delay:g} s: a number, as no gain down to {least:.2g} m/(N s) is stable; a "
+            "higher rate, or cables that damp more, may help"
+        )
+    return LengthGain(share * gains / lengths)
+
+
+def correction_loop(
+    robot: Robot, cables: CableSet, X_WP: RigidTransform
+) -> tuple[SampledCorrection, Array]:
+    """The loop of a correction about a pose, and lengths of the cables there, shape (m,) [m].
+
+    All cables pull; what weight and tensions add to their stiffness, and what brakes the platform
+    beside them, is left out.
+    """
+    paths = cable_paths(X_WP, cables)
+    S = robot.motion_type().basis(X_WP.rotation().matrix())
+    k, J = cables.stiffness / paths.lengths, paths.J @ S
+    mass = S.T @ rigid_platform(robot).mass_matrix(X_WP) @ S
+    stiffness = J.T @ (k[:, np.newaxis] * J)
+    loop = SampledCorrection(mass, stiffness, J, k, cables.retardation, np.zeros_like(mass))
+    return loop, paths.lengths
+
+
 def correction_law(
-    settings: TensionManagement, robot: Robot, cables: CableSet, fastest: float
+    settings: TensionManagement,
+    robot: Robot,
+    cables: CableSet,
+    fastest: float,
+    by_length: LengthGain | None = None,
 ) -> CorrectionLaw:
     """The law that settings ask for, with what is believed of the cables.
 
@@ -147,12 +202,19 @@ def correction_law(
         robot: The robot, for its weight and tension bounds.
         cables: The believed cables.
         fastest: Rated cable speed of the winches [m/s].
+        by_length: The gain where the section states none; needed by kinds that have one.
     """
 
     def each(values: Array) -> Array:
         return np.asarray(np.broadcast_to(values, cables.count), float).copy()
 
-    threshold, gain = each(settings.threshold), np.full(cables.count, settings.gain)
+    threshold = each(settings.threshold)
+    gain: Array | LengthGain = np.zeros(0)
+    if settings.needs_gain():
+        assert by_length is not None
+        gain = by_length
+    elif settings.gain is not None:
+        gain = np.full(cables.count, settings.gain)
     if settings.kind == CONSTANT:
         return ConstantThreshold(threshold, gain)
     if settings.kind == ADAPTIVE:
@@ -177,7 +239,7 @@ def correction_law(
     if settings.kind == POLYGON:
         return InsidePolygon(
             robot, cables, float(threshold[0]), robot.tension_bounds.upper, settings.margin,
-            settings.set_point, settings.gain, settings.fastest or fastest,
+            settings.set_point, settings.gain or by_length or 0.0, settings.fastest or fastest,
         )  # fmt: skip
     if settings.kind == IMAGE:
         mount = robot.camera_mount(settings.sight_mount)
@@ -196,15 +258,35 @@ def _sight(robot: Robot, settings: TensionManagement) -> Pinhole:
 
 
 def make_corrector(
-    settings: VisualServoSettings, wanted: TensionManagement, robot: Robot, believed: BelievedRobot
+    settings: VisualServoSettings,
+    wanted: TensionManagement,
+    robot: Robot,
+    believed: BelievedRobot,
+    real: CableSet,
 ) -> TensionCorrector:
-    """What takes up slack beside a servo, with what is believed of the robot."""
+    """What takes up slack beside a servo, with what is believed of the robot.
+
+    Where no gain is stated, stiffness and damping of the cables are known as they are, `real`, or
+    are those of the robot that is believed in, if that is another one.
+
+    Raises:
+        ScenarioError: No gain is stated, and none is stable.
+    """
     cables = believed.cables
     if not settings.controller.pulleys:
         cables = cables.without_pulleys()
-    law = correction_law(wanted, robot, cables, robot.winch.rated_cable_speed())
+    by_length, rate = None, wanted.rate or settings.controller.rate
+    if wanted.needs_gain():
+        known = cables
+        if settings.perturbations.believed_robot is None:
+            known = replace(cables, stiffness=real.stiffness, retardation=real.retardation)
+        readings, delay = settings.sensors.rate("tension"), wanted.delay
+        if delay is None:
+            delay = 0.0 if readings is None else 1.0 / readings
+        by_length = automatic_gain(robot, known, believed.X_WP0, rate, delay)
+    law = correction_law(wanted, robot, cables, robot.winch.rated_cable_speed(), by_length)
     points = SEEN_POINTS if wanted.kind == IMAGE else 0
-    return TensionCorrector(law, cables.count, wanted.rate or settings.controller.rate, points)
+    return TensionCorrector(law, cables.count, rate, points)
 
 
 def add_tension_corrector(
@@ -227,7 +309,7 @@ def add_tension_corrector(
     wanted = settings.tension_management
     if wanted is None:
         return None, commanded
-    corrector = make_corrector(settings, wanted, robot.robot, believed)
+    corrector = make_corrector(settings, wanted, robot.robot, believed, robot.forces.cable_set())
     builder.AddNamedSystem(name, corrector)
     for port, source in (
         ("commanded_velocities", commanded),

@@ -97,8 +97,9 @@ class ServoLoop:
         self._corrector = None
         if scenario.tension_management is not None:
             self._corrector = make_corrector(
-                scenario, scenario.tension_management, robot, self.model.believed
-            )
+                scenario, scenario.tension_management, robot, self.model.believed,
+                scenario.cables.cable_set(robot),
+            )  # fmt: skip
             self._law_memory = self._corrector.no_memory()
             self._correction = Clock(self._corrector.period)
         self._connect(robot)

@@ -169,6 +169,8 @@ def set_engine(scenario: AnyScenario, repeated: bool = False) -> tuple[AnyScenar
     if asked.integration.engine == AUTOMATIC and has_contact(scenario):
         why = "its world has contact, which the compiled engine has not"
         return scenario, f"{asked.name}: by the engine plant, as {why}"
+    if getattr(asked, "plant_alone", False):
+        return scenario, ""
     why = many_steps_reason(asked, repeated)
     if asked.integration.engine != AUTOMATIC or not why:
         return scenario, ""

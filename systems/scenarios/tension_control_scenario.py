@@ -30,8 +30,10 @@ from cdpr_drake.schema.fields import (
     text,
     whole,
 )
+from cdpr_drake.systems.controllers.force_tracking import ForceControl
 from cdpr_drake.systems.remote.settings import RemoteSettings
 from cdpr_drake.systems.robots.compiled_step import StepRule
+from cdpr_drake.systems.robots.disturbances import DisturbanceSettings
 from cdpr_drake.systems.robots.settings import AUTOMATIC, COMPILED, ENGINES
 from cdpr_drake.systems.scenarios.files import TENSION_CONTROL
 from cdpr_drake.systems.scenarios.run_settings import ScenarioHeader
@@ -203,6 +205,12 @@ class TensionScenario(ScenarioHeader):
     predictive: PredictiveSettings | None = optional_section(
         "Tensions by a program over the time ahead, in the place of computed torque; null: none."
     )
+    force_control: ForceControl | None = optional_section(
+        "How the platform answers forces, by the engine plant; null: as computed torque does."
+    )
+    disturbances: DisturbanceSettings | None = optional_section(
+        "What pushes the platform, by the engine plant; null: nothing."
+    )
     integration: StepSettings = section("Integration.", StepSettings, required=False)
     perturbations: TensionBelief = section(
         "What the controller believes wrongly.", TensionBelief, required=False
@@ -212,6 +220,11 @@ class TensionScenario(ScenarioHeader):
     )
     stop: TensionStop = section("When the run ends early.", TensionStop, required=False)
     log_rate: float = number("Rows of the log per second.", "Hz", 100.0, above=0.0, at_most=FASTEST)
+
+    @property
+    def plant_alone(self) -> bool:
+        """Whether the engine plant alone can run it."""
+        return self.force_control is not None or self.disturbances is not None
 
     def step_rule(self) -> StepRule | None:
         """How the robot is integrated in compiled steps; None by the engine plant."""

@@ -32,6 +32,7 @@ from cdpr_drake.systems.controllers.servo_settings import (
 from cdpr_drake.systems.controllers.tension_management_settings import TensionManagement
 from cdpr_drake.systems.controllers.torque_settings import TorqueControl
 from cdpr_drake.systems.estimators.estimator_kinds import EstimatorSettings
+from cdpr_drake.systems.estimators.wrench_estimator import WrenchEstimation
 from cdpr_drake.systems.monitoring.stability_watch import StabilitySettings
 from cdpr_drake.systems.remote.settings import RemoteSettings
 from cdpr_drake.systems.robots.settings import CableRobotSettings
@@ -71,6 +72,9 @@ class VisualServoSettings:
     sensors: SensorSuite = section("Sensors.", SensorSuite, required=False)
     tension_management: TensionManagement | None = optional_section(
         "What takes up slack beside the servo; null: nobody looks after the tensions."
+    )
+    wrench_estimation: WrenchEstimation | None = optional_section(
+        "An estimate of what pushes the platform, which is logged; null: none."
     )
     torque_control: TorqueControl | None = optional_section(
         "How winches are commanded by torque, with winches.mode torque; null: its defaults."

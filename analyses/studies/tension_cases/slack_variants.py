@@ -17,11 +17,12 @@ VARIANTS: dict[str, tuple[str, str]] = {
     "adaptive": ("gain by surplus length", "{kind: adaptive, gain_per_length: 2}"),
     "by_length": (
         "threshold by length, linear, 1 to 3 N",
-        "{kind: by_length, highest: [3], shortest: 0.6, longest: 1.4}",
+        "{kind: by_length, gain: 0.04, highest: [3], shortest: 0.6, longest: 1.4}",
     ),
     "by_length_exponential": (
         "threshold by length, exponential, 1 to 3 N",
-        "{kind: by_length, highest: [3], shortest: 0.6, longest: 1.4, shape: exponential}",
+        "{kind: by_length, gain: 0.04, highest: [3], shortest: 0.6, longest: 1.4, "
+        "shape: exponential}",
     ),
     "distribution_p": ("tension distribution, P", "{kind: distribution, proportional: 0.003}"),
     "distribution_pi": (

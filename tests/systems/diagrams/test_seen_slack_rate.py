@@ -23,7 +23,7 @@ def slack_run(section):
 
 def test_slack_that_is_seen_is_wound_in_sooner():
     gone = {}
-    for kind in ("{kind: constant}", "{kind: image, allowance: 0.002}"):
+    for kind in ("{kind: constant, gain: 0.04}", "{kind: image, gain: 0.04, allowance: 0.002}"):
         log = run_scenario(slack_run(kind)).log
         slack = np.any(log["surplus_lengths"][:, :2] > TAUT, axis=1)
         gone[kind] = float(log["time"][np.flatnonzero(slack)[-1]])

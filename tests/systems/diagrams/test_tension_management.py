@@ -1,5 +1,7 @@
 """Tension management in a servo: slack goes, and what is asked wrongly is refused."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -21,6 +23,7 @@ from cdpr_drake.systems.controllers.correction_laws import (
 )
 from cdpr_drake.systems.controllers.tension_corrector import TensionCorrector
 from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.diagrams.tension_management import automatic_gain
 from cdpr_drake.systems.diagrams.visual_servo import build_visual_servo
 from cdpr_drake.tensions.slack_correction import TensionFollower
 
@@ -111,7 +114,8 @@ def test_a_perfect_belief_has_the_margin_one():
     "kind",
     [
         "{kind: adaptive, gain_per_length: 4}",
-        "{kind: by_length, highest: [3], shortest: 0.5, longest: 1.5, shape: exponential}",
+        "{kind: by_length, gain: 0.04, highest: [3], shortest: 0.5, longest: 1.5, "
+        "shape: exponential}",
         "{kind: distribution, threshold: [0.5], integral: 0.01}",
         "{kind: length}",
         "{kind: polygon, margin: 2, gain: 0.02}",
@@ -124,6 +128,43 @@ def test_every_kind_runs_and_takes_up_slack(kind):
     surplus = log["unstrained_lengths"][:, :2] - log["lengths"][:, :2]
     assert np.all(surplus[-1] < 0.5 * surplus[0])
     assert np.all(np.isfinite(log["tension_corrections"]))
+
+
+@pytest.mark.parametrize(
+    "kind", ["kind: constant, threshold: [9]", "kind: polygon, threshold: [5], margin: 2"]
+)
+def test_without_a_gain_it_takes_one_that_is_stable(kind):
+    """The published gain chatters where many cables are corrected; loop and diagram are one."""
+
+    def log(more, loop):
+        changes = (f"tension_management={{{kind}{more}}}", f"integration.loop={loop}")
+        shared = ("duration=3", "perturbations.slack=null", "integration.engine=compiled")
+        return run_scenario(load(*shared, *changes)).log["tension_corrections"]
+
+    own, there, published = log("", "compiled"), log("", "diagram"), log(", gain: 0.04", "compiled")
+    np.testing.assert_array_equal(own, there)
+    chatter, stated = (np.mean(np.abs(np.diff(c[-50:], 2, axis=0))) for c in (own, published))
+    assert np.max(np.abs(own)) > 0.0
+    assert stated > 10.0 * chatter
+
+
+def test_without_a_gain_it_is_proportional_to_stiffness_and_to_the_period():
+    """On cables a hundred times as stiff, and ten times as often; where modes do not matter."""
+
+    def gain(ratio, rate):
+        cables = load_robot("acrobot_large").cable_set()
+        cables = replace(cables, stiffness=ratio * cables.stiffness, retardation=np.full(8, 2e-2))
+        robot = load_robot("acrobot_large")
+        return automatic_gain(robot, cables, robot.home.transform(), rate, 0.0).share
+
+    np.testing.assert_allclose(gain(1.0, 25.0), 1e-2 * gain(1e-2, 25.0), rtol=1e-9)
+    assert np.all(gain(1.0, 25.0) > 0.0)
+
+
+def test_where_no_gain_is_stable_that_is_said():
+    words = "tension_management.gain: found null; accepted for acrobot_large at 25 Hz with a delay"
+    with pytest.raises(ScenarioError, match=words):
+        build_visual_servo(load("cables.retardation_time=0", "tension_management={delay: 0.1}"))
 
 
 def test_winches_commanded_by_position_get_the_correction():

@@ -1,0 +1,190 @@
+"""Scenario section `wrench_estimation`, and its block: what pushes, by tensions and lengths.
+
+Lengths, stretched by tensions, tell the pose (forward kinematics from the pose before), and that
+and tensions the wrench, by one of `estimation.wrench_observers.OBSERVERS`, which says what each is
+worth.
+
+Drake's YAML loader reads the annotations themselves, so they are not postponed here.
+"""
+
+from contextlib import suppress
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.math import RigidTransform
+from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.errors import CableGeometryError, ForwardKinematicsError
+from cdpr_drake.estimation.wrench_observer_kernel import MEMORY_SIZE
+from cdpr_drake.estimation.wrench_observers import (
+    MOMENTUM,
+    OBSERVERS,
+    WrenchError,
+    WrenchObserver,
+    observer_response,
+    packed_body,
+    tension_at_platform,
+    tension_before_pulley,
+)
+from cdpr_drake.geometry.cable_paths import cable_jacobian
+from cdpr_drake.geometry.poses import pose_from_row, pose_row
+from cdpr_drake.schema.fields import FASTEST, number, text
+from cdpr_drake.statics.forward_kinematics import ForwardKinematics, tautest_cables
+from cdpr_drake.statics.rigid_platform import RigidPlatform
+from cdpr_drake.systems.estimators.length_estimator import EncoderLengths
+
+WRENCH_ESTIMATED, WRENCH_SIGMA = "wrench_estimated", "wrench_sigma"
+"""Outputs: the estimate, and the standard deviation of each of its components."""
+
+MISFIT = 0.02
+"""Lengths that fit a pose this badly [m] tell none: the pose before stays."""
+
+
+@dataclass(kw_only=True)
+class WrenchEstimation:
+    """An estimate of what pushes the platform beside its cables and its weight."""
+
+    kind: str = text(
+        "static: what balances cables and weight, which takes acceleration for a wrench; momentum: "
+        "from the change of momentum; extended: a state of an observer of the motion.",
+        MOMENTUM,
+        choices=tuple(OBSERVERS),
+    )
+    rate: float = number("Samples per second.", "Hz", 200.0, above=0.0, at_most=FASTEST)
+    bandwidth: float = number(
+        "Of the estimate, over 2 pi: it is late by a time constant, by three of kind extended.",
+        "Hz",
+        2.0,
+        above=0.0,
+    )
+    slack_below: float = number(
+        "Cables that pull less tell nothing of the pose, while there are enough others.",
+        "N",
+        0.5,
+        at_least=0.0,
+    )
+    pulley_friction: float = number(
+        "Share of a tension that pulleys take between the sensors and the platform; 0: sensors are "
+        "at the platform.",
+        "-",
+        0.0,
+        at_least=0.0,
+        at_most=0.5,
+    )
+    believed_pulley_friction: float | None = number(
+        "The share that is reckoned with; null: what it is.", "-", None, at_least=0.0, at_most=0.5
+    )
+    fading_speed: float = number(
+        "Cable speed below which that friction fades.", "m/s", 0.001, above=0.0
+    )
+
+    def believed_share(self) -> float:
+        """Share of a tension that pulleys are believed to take."""
+        given = self.believed_pulley_friction
+        return self.pulley_friction if given is None else given
+
+
+class WrenchEstimator(LeafSystem):
+    """What pushes the platform beside its cables and its weight.
+
+    ================= ========= ====== =======================================================
+    port              type      unit   meaning
+    ================= ========= ====== =======================================================
+    measured_tensions vector(m) N      in
+    measured_lengths  vector(m) m      in, unstrained lengths that the encoders count
+    wrench_estimated  vector(6) N m, N out, moment about Po and force, in W
+    wrench_sigma      vector(6) N m, N out, standard deviation of each, of what readings err by
+    ================= ========= ====== =======================================================
+
+    Samples at a rate of its own. Where lengths fit no pose, the pose before stays.
+    """
+
+    def __init__(
+        self,
+        settings: WrenchEstimation,
+        counted: EncoderLengths,
+        platform: RigidPlatform,
+        X_WP0: RigidTransform,
+        error: WrenchError,
+    ) -> None:
+        """For a platform that moves freely.
+
+        Args:
+            settings: The section.
+            counted: The cables as they are believed to be, and whether they stretch.
+            platform: The platform as it is believed to be.
+            X_WP0: Pose believed at the start [m].
+            error: What the readings err by.
+        """
+        super().__init__()
+        m, self.period = counted.cables.count, 1.0 / settings.rate
+        self._settings, self._counted, self._platform = settings, counted, platform
+        self._kinematics = ForwardKinematics(counted.cables, platform.motion)
+        body = packed_body(platform.mass, platform.p_PCo, platform.I_PPo, platform.acceleration())
+        omega = 2.0 * np.pi * settings.bandwidth
+        self._observer = WrenchObserver(settings.kind, body, omega, self.period)
+        self._response = observer_response(settings.kind, omega, self.period)
+        self._error = error
+        self._tensions = self.DeclareVectorInputPort("measured_tensions", m).Eval
+        self._lengths = self.DeclareVectorInputPort("measured_lengths", m).Eval
+        self._found = self.DeclareDiscreteState(6)
+        self._sigma = self.DeclareDiscreteState(6)
+        self._memory = self.DeclareDiscreteState(MEMORY_SIZE)
+        self._pose = self.DeclareDiscreteState(pose_row(X_WP0))
+        self._reference = self.DeclareDiscreteState(np.full(m, np.nan))
+        self._before = self.DeclareDiscreteState(np.full(m, np.nan))
+        self.DeclarePeriodicDiscreteUpdateEvent(self.period, 0.0, self._update)
+        self.DeclareForcedDiscreteUpdateEvent(self._update)
+        self.DeclareStateOutputPort(WRENCH_ESTIMATED, self._found)
+        self.DeclareStateOutputPort(WRENCH_SIGMA, self._sigma)
+
+    @property
+    def delay(self) -> float:
+        """By how much a slow wrench is shown late [s]."""
+        return self._response.delay
+
+    def _update(self, context: Context, state: DiscreteValues) -> None:
+        def kept(index: int) -> Array:
+            return np.array(context.get_discrete_state(index).value())
+
+        X_WP, before = pose_from_row(kept(self._pose)), kept(self._before)
+        readings, counts = self._tensions(context), self._lengths(context)
+        rates = np.zeros(len(counts)) if np.isnan(before[0]) else (counts - before) / self.period
+        tensions = self._at_platform(readings, rates)
+        reference = kept(self._reference)
+        if np.isnan(reference[0]):
+            reference = self._counted.reference(X_WP, counts, tensions)
+        X_WP = self._where(X_WP, self._counted.lengths(counts, reference, tensions), tensions)
+        with suppress(CableGeometryError):
+            J = cable_jacobian(X_WP, self._counted.cables)
+            observer = self._observer
+            observer.memory[:] = kept(self._memory)
+            state.set_value(self._found, observer.update(X_WP, -J.T @ tensions))
+            state.set_value(self._memory, observer.memory)
+            spread = self._error.covariance(
+                J, tensions, self._platform.mass_matrix(X_WP), self._response,
+                (counts + reference) / self._counted.cables.stiffness,
+            )  # fmt: skip
+            state.set_value(self._sigma, np.sqrt(np.diag(spread)))
+        for index, value in (
+            (self._pose, pose_row(X_WP)), (self._reference, reference), (self._before, counts),
+        ):  # fmt: skip
+            state.set_value(index, value)
+
+    def _at_platform(self, readings: Array, rates: Array) -> Array:
+        """Tensions at the platform, behind the pulleys that are simulated, shape (m,) [N]."""
+        settings = self._settings
+        fading = settings.fading_speed
+        read = tension_before_pulley(readings, rates, settings.pulley_friction, fading)
+        found = tension_at_platform(read, rates, settings.believed_share(), fading)
+        return np.maximum(found, 0.0)
+
+    def _where(self, X_WP: RigidTransform, lengths: Array, tensions: Array) -> RigidTransform:
+        """The pose that lengths tell, near the one before."""
+        used = np.flatnonzero(tensions >= self._settings.slack_below)
+        if len(used) < self._kinematics.num_unknowns:
+            used = tautest_cables(tensions, self._kinematics.num_unknowns)
+        with suppress(ForwardKinematicsError):
+            return self._kinematics.pose(lengths, X_WP, used, MISFIT).X_WP
+        return X_WP
