@@ -56,8 +56,9 @@ LOST = 1e3
 OUTLYING = 3.0
 """Residuals beyond so many sigmas count linearly [sigma]."""
 
-CLOSE = 1e-7
-"""The search ends where the cost changes by less than this share."""
+CLOSE = 1e-5
+"""The search ends where the cost changes by less than this share: of some thousand residuals, less
+than a tenth of a standard error."""
 
 
 @dataclass(frozen=True)

@@ -67,7 +67,7 @@ class Stretch:
         time: Shape (n,) [s].
         recorded: Turns and positions of the whole log.
         known: 1 where turns were measured near, else 0, shape (n,).
-        tensions: Means about the instants, shape (n, m) [N], NaN where there are none.
+        tensions: Between rows, not means, which would damp them; shape (n, m) [N], NaN: none.
     """
 
     time: Array
@@ -167,24 +167,14 @@ def cut(
         tensions = np.full((len(t), m), np.nan)
         if log.tensions is not None:
             for i in range(m):
-                tensions[:, i] = _means(time, log.tensions[:, i], t, 0.5 / rate)
+                good = np.isfinite(log.tensions[:, i])
+                if good.any():
+                    tensions[:, i] = np.interp(t, time[good], log.tensions[good, i])
         known = np.asarray(away < MISSED * usual, float)
         if not known.any():
             raise IdentificationError(f"{words}: found no turns in it; accepted: a part with some")
         made.append(Stretch(time=t, recorded=recorded, known=known, tensions=tensions))
     return made
-
-
-def _means(time: Array, values: Array, at: Array, half: float) -> Array:
-    """Means of rows within half a step of instants, by interpolation where there are none."""
-    good = np.isfinite(values)
-    if not good.any():
-        return np.full(len(at), np.nan)
-    t, total = time[good], np.concatenate([[0.0], np.cumsum(values[good])])
-    first, last = np.searchsorted(t, at - half), np.searchsorted(t, at + half)
-    count = last - first
-    mean = (total[last] - total[first]) / np.maximum(count, 1)
-    return np.where(count > 0, mean, np.interp(at, t, values[good]))
 
 
 def _refuse_turning(words: str, robot: Robot, lengths: Array) -> None:

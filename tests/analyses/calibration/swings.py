@@ -21,6 +21,9 @@ DRAG = (1.2, 0.12)
 RATE = 100.0
 """Rows per second."""
 
+BEFORE = 0.5
+"""Time from the push to the log [s], in which what it does along the cables dies out."""
+
 NOISE = {"turn": 0.002, "tension": 0.5}
 """Of each row [rad, N]."""
 
@@ -44,8 +47,8 @@ def true_robot():
 
 
 @cache
-def swing(seed=0, span=4.0, late=LATE):
-    """Times [s], true poses (k, 7), what the sensor tells of turns (k, 3) [rad], tensions (k, 4)."""
+def swing(seed=0, span=3.0, late=LATE):
+    """Times [s], true poses (k, 7), turns by the sensor (k, 3) [rad], tensions (k, 4)."""
     robot, random = true_robot(), np.random.default_rng(seed)
     settings = CableRobotSettings(
         cables=CableSettings(pulleys=True),
@@ -64,7 +67,7 @@ def swing(seed=0, span=4.0, late=LATE):
     time = np.arange(round(span * RATE)) / RATE
     poses, tensions = np.empty((len(time), 7)), np.empty((len(time), 4))
     for k, t in enumerate(time):
-        simulator.AdvanceTo(t)
+        simulator.AdvanceTo(BEFORE + t)
         poses[k] = pose_row(block.GetOutputPort("X_WP").Eval(context))
         tensions[k] = block.GetOutputPort("tensions").Eval(context)
     seen = np.column_stack([np.interp(time - late, time, poses[:, j]) for j in range(7)])

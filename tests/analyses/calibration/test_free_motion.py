@@ -91,7 +91,7 @@ def test_dominant_frequency_is_that_of_a_sine():
 REFUSED = [
     (["--free", "5"], "--free: found '5'; accepted: first:last, as 20:24.5 [s]"),
     (["--free", "2:1"], "--free: found '2:1'; accepted: first:last"),
-    (["--free", "0:90"], "stretch 0:90: accepted: 0.5 s or more within 0 to 3.99 s"),
+    (["--free", "0:90"], "stretch 0:90: accepted: 0.5 s or more within 0 to 2.99 s"),
     (
         ["--free", "halves", "--unknown", "friction"],
         "unknown: found 'friction'; accepted of a free",
@@ -115,11 +115,11 @@ def test_what_cannot_be_is_said_in_one_line(tmp_path, capsys, options, words):
 
 def test_winches_that_turn_and_a_mass_without_tensions_are_refused(tmp_path):
     path = tmp_path / "log.csv"
-    lengths = np.linspace(1.9, 1.95, 400)[:, None]
+    lengths = np.linspace(1.9, 1.95, 300)[:, None]
     swings.write(path, (0,), lengths)
-    with pytest.raises(IdentificationError, match="C1: found its length changing by 0.05 m"):
-        identify_free_motion("irma4u", path, stretches=[(0.0, 3.0)])
+    with pytest.raises(IdentificationError, match=r"C1: found its length changing by 0\.0"):
+        identify_free_motion("irma4u", path, stretches=[(0.0, 2.5)])
     lines = [",".join(row.split(",")[:4]) for row in path.read_text().splitlines()]
     path.write_text("\n".join(lines) + "\n")
     with pytest.raises(IdentificationError, match="without which a free motion does not tell the"):
-        identify_free_motion("irma4u", path, "mass", stretches=[(0.0, 3.0)])
+        identify_free_motion("irma4u", path, "mass", stretches=[(0.0, 2.5)])
