@@ -37,7 +37,8 @@ def turned_sensors(
     """What would fit otherwise, in words: kinds of which much was thrown out, else all, tried anew.
 
     A sign is the wrong one where, with it turned, the fit throws out no third of the kind and the
-    whole costs less; where only one cable's is, the whole must fit then. A tilt is tried from other zeros, too. The first that fits is told.
+    whole costs less; where only one cable's is, the whole must fit then. A tilt is tried from other
+    zeros, too. The first that fits is told.
 
     Args:
         task: What was asked.
