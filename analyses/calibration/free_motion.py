@@ -50,6 +50,9 @@ MOVED = np.array([0.5] * 3 + [0.3] * 3 + [5.0] * 3 + [2.0] * 3)
 SMALL = 1e-5
 """Differences of the search, in sizes of unknowns: off by 1e-5 of a slope, and rounding below."""
 
+INSIDE = 0.03
+"""So far from its bounds an unknown starts, in sizes: at a bound the search takes small steps."""
+
 LOST = 1e3
 """Residuals of a motion that cannot go on [sigma]."""
 
@@ -118,6 +121,7 @@ class FollowedStretch:
         predicted_turns: The same of what the sensor would have told.
         positions: Measured in W, or where the measured turns and the cables' lengths put Po,
             shape (n, 3) [m]; NaN where neither does.
+        places: Predicted for the times at which those were measured, shape (n, 3) [m].
     """
 
     stretch: Stretch
@@ -128,6 +132,7 @@ class FollowedStretch:
     measured_turns: Array
     predicted_turns: Array
     positions: Array
+    places: Array
 
     def after_lead(self) -> np.typing.NDArray[np.bool_]:
         """Instants that are predicted, or all, shape (n,)."""
@@ -143,7 +148,7 @@ class FollowedStretch:
 
     def position_rms(self) -> float | None:
         """Distance of predicted and measured positions, root mean square [m]."""
-        off = np.sum((self.states[:, 4:7] - self.positions) ** 2, axis=1)
+        off = np.sum((self.places - self.positions) ** 2, axis=1)
         rows = off[self.after_lead() & np.isfinite(off) & (self.stretch.known > 0.0)]
         return float(np.sqrt(np.mean(rows))) if len(rows) else None
 
@@ -300,10 +305,40 @@ def _sensor_believed(model: FreeMotionModel, stretches: Sequence[Stretch]) -> Fr
     return replace(model, unknowns=changed)
 
 
-def sensed(model: FreeMotionModel, vector: Array, states: Array) -> tuple[Rotation, Array]:
-    """What the sensor would tell of states: turns, and positions in its frame, shape (n, 3) [m]."""
+def earlier(states: Array, step: float, late: float) -> tuple[Rotation, Array]:
+    """Turns and positions, shape (n, 3) [m], a time before even states, by Hermite's cubics.
+
+    The model is asked earlier, not the log later: between rows of a log noise is less than at rows,
+    and a clock that was sought so would be drawn to the middle between them.
+
+    Args:
+        states: Shape (n, 13).
+        step: Between them [s].
+        late: The time [s].
+    """
+    n = len(states)
+    at = np.arange(n) - late / step
+    k = np.clip(np.floor(at).astype(int), 0, n - 2)
+    u = (at - k)[:, None]
+    q, w = states[:, :4], states[:, 7:10]
+    rates = np.empty((n, 7))
+    rates[:, 0] = -0.5 * np.sum(w * q[:, 1:], axis=1)
+    rates[:, 1:4] = 0.5 * (w * q[:, :1] + np.cross(w, q[:, 1:]))
+    rates[:, 4:] = states[:, 10:13]
+    x, v = states[:, :7], step * rates
+    found = (
+        (1.0 + 2.0 * u) * (1.0 - u) ** 2 * x[k] + u * (1.0 - u) ** 2 * v[k]
+        + u**2 * (3.0 - 2.0 * u) * x[k + 1] + u**2 * (u - 1.0) * v[k + 1]
+    )  # fmt: skip
+    return Rotation.from_quat(found[:, [1, 2, 3, 0]]), found[:, 4:]
+
+
+def sensed(
+    model: FreeMotionModel, vector: Array, states: Array, step: float
+) -> tuple[Rotation, Array]:
+    """What the sensor would tell at even states: turns, and positions in its frame, (n, 3) [m]."""
     n = model.by_name(vector)
-    turns, p = Rotation.from_quat(states[:, [1, 2, 3, 0]]), states[:, 4:7]
+    turns, p = earlier(states, step, n["sensor.late"])
     if "sensor.heading" in n:
         mount = Rotation.from_rotvec([n[f"sensor.mount_{a}"] for a in "xyz"])
         return Rotation.from_rotvec([0.0, 0.0, n["sensor.heading"]]) * turns * mount, p
@@ -404,8 +439,8 @@ class _Search:
         states, tensions = self.model.run(vector, moved, stretch.count, stretch.step)
         if not np.isfinite(states).all():
             return np.full((stretch.count, 6 + m), LOST)
-        at = stretch.time + self.model.by_name(vector)["sensor.late"]
-        turns, p = sensed(self.model, vector, states)
+        at = stretch.time
+        turns, p = sensed(self.model, vector, states, stretch.step)
         out = np.zeros((stretch.count, 6 + m))
         out[:, :3] = (turns.inv() * stretch.recorded.turns_at(at)).as_rotvec() / self.sigmas.turn
         measured = stretch.recorded.positions_at(at)
@@ -458,7 +493,8 @@ class _Search:
         for k, one in enumerate(np.array(self.model.unknowns, object)[f]):
             least[k] = (one.least - one.before) / one.size
             largest[k] = (one.most - one.before) / one.size
-        x = np.clip(x, least, largest)
+        room = INSIDE * np.minimum(1.0, largest - least)
+        x = np.clip(x, least + room, largest - room)
         found = least_squares(
             residuals, x, jac=jacobian, bounds=(least, largest), loss="huber", f_scale=OUTLYING,
             x_scale="jac", max_nfev=most, ftol=CLOSE, xtol=1e-9,
@@ -523,17 +559,17 @@ def _followed(
         raise IdentificationError(
             f"stretch from {stretch.time[0]:g} s: found no motion that goes on to its end"
         )
-    at = stretch.time + model.by_name(vector)["sensor.late"]
-    turns, _ = sensed(model, vector, states)
-    measured = stretch.recorded.turns_at(at)
-    R_WP, p = unsensed(model, vector, measured, stretch.recorded.positions_at(at))
+    turns, _ = sensed(model, vector, states, stretch.step)
+    _, places = earlier(states, stretch.step, model.by_name(vector)["sensor.late"])
+    measured = stretch.recorded.turns_at(stretch.time)
+    R_WP, p = unsensed(model, vector, measured, stretch.recorded.positions_at(stretch.time))
     if p is None:
         pulled = np.where(np.isfinite(stretch.tensions), stretch.tensions, tensions)
-        p = places_by_lengths(model, vector, R_WP, pulled, states[:, 4:7])
+        p = places_by_lengths(model, vector, R_WP, pulled, places)
     middle = measured.mean().inv()
     return FollowedStretch(
         stretch=stretch, lead=np.inf if lead is None else lead, states=states, tensions=tensions,
-        turned=(turns.inv() * measured).as_rotvec(), positions=p,
+        turned=(turns.inv() * measured).as_rotvec(), positions=p, places=places,
         measured_turns=(middle * measured).as_rotvec(),
         predicted_turns=(middle * turns).as_rotvec(),
     )  # fmt: skip

@@ -47,7 +47,7 @@ def true_robot():
 
 
 @cache
-def swing(seed=0, span=3.0, late=LATE):
+def swing(seed=0, span=2.4, late=LATE):
     """Times [s], true poses (k, 7), turns by the sensor (k, 3) [rad], tensions (k, 4)."""
     robot, random = true_robot(), np.random.default_rng(seed)
     settings = CableRobotSettings(

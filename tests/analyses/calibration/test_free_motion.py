@@ -4,7 +4,9 @@ import json
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
+from cdpr_drake.analyses.calibration.free_motion import earlier
 from cdpr_drake.analyses.calibration.free_motion_report import dominant_frequency
 from cdpr_drake.analyses.front.free_motion import identify_free_motion
 from cdpr_drake.cli.app import main
@@ -19,8 +21,11 @@ SIGMAS = 4.0
 PREDICTED_TURN, PREDICTED_PLACE = 0.01, 2e-3
 """Of a held-out stretch [rad, m]: five times the noise of turns, which its first state has."""
 
-FREQUENCY_TOLERANCE = 0.005
-"""Share of a dominant frequency; a stretch of 3 s tells 0.3 Hz apart, its peak some 0.01 Hz."""
+HERMITE_TOLERANCE = 5e-6
+"""h^4 / 384 of a fourth derivative of 9^4, twice."""
+
+FREQUENCY_TOLERANCE = 0.015
+"""Share of a dominant frequency: 1.6 s tell 0.6 Hz apart, noise moves the peak by some 0.02 Hz."""
 
 
 def spans_words(spans):
@@ -59,7 +64,7 @@ def test_a_swing_by_the_plant_tells_the_platform_and_its_cables(found):
     for name, value in true.items():
         one = by_name[name]
         assert abs(one["value"] - value) < SIGMAS * one["std"], (name, one, value)
-    assert by_name["mass"]["std"] < 0.1
+    assert by_name["mass"]["std"] < 0.2
     assert by_name["all.stiffness"]["std"] < 0.05 * true["all.stiffness"]
     identified = load_robot(str(folder / "out/robot.yaml"))
     assert identified.platform.mass == pytest.approx(by_name["mass"]["value"])
@@ -81,6 +86,25 @@ def test_a_held_out_swing_is_predicted(found):
     assert abs(said["modes_before_hz"][0] / said["modes_hz"][0] - 1.0) > 0.02
 
 
+def test_states_a_time_earlier_are_those_of_the_motion():
+    step, late, w = 0.02, 0.013, np.array([0.3, -1.2, 0.8])
+    t = np.arange(60) * step
+
+    def states(time):
+        angle = np.sin(9.0 * time)[:, None]
+        q = Rotation.from_rotvec(angle * w / 2.0).as_quat()[:, [3, 0, 1, 2]]
+        p = np.column_stack([np.cos(9.0 * time), 0.0 * time, time])
+        spin = 9.0 * np.cos(9.0 * time)[:, None] * w / 2.0
+        v = np.column_stack([-9.0 * np.sin(9.0 * time), 0.0 * time, 1.0 + 0.0 * time])
+        return np.hstack([q, p, spin, v])
+
+    turns, places = earlier(states(t), step, late)
+    true = states(t - late)
+    off = turns.inv() * Rotation.from_quat(true[:, [1, 2, 3, 0]])
+    assert np.max(off[1:].magnitude()) < HERMITE_TOLERANCE
+    assert np.max(np.abs(places[1:] - true[1:, 4:7])) < HERMITE_TOLERANCE
+
+
 def test_dominant_frequency_is_that_of_a_sine():
     t = np.arange(300) / 50.0
     for f in (0.83, 1.9, 7.3):
@@ -91,13 +115,13 @@ def test_dominant_frequency_is_that_of_a_sine():
 REFUSED = [
     (["--free", "5"], "--free: found '5'; accepted: first:last, as 20:24.5 [s]"),
     (["--free", "2:1"], "--free: found '2:1'; accepted: first:last"),
-    (["--free", "0:90"], "stretch 0:90: accepted: 0.5 s or more within 0 to 2.99 s"),
+    (["--free", "0:90"], "stretch 0:90: accepted: 0.5 s or more within 0 to 2.39 s"),
     (
         ["--free", "halves", "--unknown", "friction"],
         "unknown: found 'friction'; accepted of a free",
     ),
     (["--free", "halves", "--lead", "-1"], "--lead: found -1; accepted: > 0 [s]"),
-    (["--free", "halves", "--sigma", "turns=1"], "'turns' is unknown; did you mean 'turn'"),
+    (["--free", "halves", "--sigma", "turns=1"], "'turns' is unknown; did you mean turn?"),
 ]
 
 
@@ -115,11 +139,11 @@ def test_what_cannot_be_is_said_in_one_line(tmp_path, capsys, options, words):
 
 def test_winches_that_turn_and_a_mass_without_tensions_are_refused(tmp_path):
     path = tmp_path / "log.csv"
-    lengths = np.linspace(1.9, 1.95, 300)[:, None]
+    lengths = np.linspace(1.9, 1.95, 240)[:, None]
     swings.write(path, (0,), lengths)
     with pytest.raises(IdentificationError, match=r"C1: found its length changing by 0\.0"):
-        identify_free_motion("irma4u", path, stretches=[(0.0, 2.5)])
+        identify_free_motion("irma4u", path, stretches=[(0.0, 2.0)])
     lines = [",".join(row.split(",")[:4]) for row in path.read_text().splitlines()]
     path.write_text("\n".join(lines) + "\n")
     with pytest.raises(IdentificationError, match="without which a free motion does not tell the"):
-        identify_free_motion("irma4u", path, "mass", stretches=[(0.0, 2.5)])
+        identify_free_motion("irma4u", path, "mass", stretches=[(0.0, 2.0)])
