@@ -6,7 +6,36 @@ Drake's YAML loader reads the annotations themselves, so they are not postponed 
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 
-from cdpr_drake.schema.fields import number
+from cdpr_drake.cables.cable_behaviour import CableBehaviour
+from cdpr_drake.schema.fields import number, optional_section
+
+
+@dataclass(kw_only=True)
+class BehaviourSettings:
+    """What cables and their sheaves do beside the elastic law; see `cables.cable_behaviour`."""
+
+    stiffening: float = number(
+        "Growth of the tangent stiffness per tension: E S (1 + g t).", "1/N", 0.0, at_least=0.0,
+        at_most=1.0,
+    )  # fmt: skip
+    expansion: float = number(
+        "Of unstrained lengths with temperature.", "1/K", 0.0, at_least=-1e-3, at_most=1e-3
+    )
+    warmer: float = number(
+        "Temperature above that at which lengths are counted.", "K", 0.0, at_least=-200.0,
+        at_most=200.0,
+    )  # fmt: skip
+    sheave_friction: float = number(
+        "Friction of cables in the grooves of their pulleys, tension times exp(mu angle).", "-",
+        0.0, at_least=0.0, at_most=2.0,
+    )  # fmt: skip
+
+    def behaviour(self) -> CableBehaviour:
+        """These numbers as the laws take them."""
+        return CableBehaviour(
+            stiffening=self.stiffening, expansion=self.expansion, warmer=self.warmer,
+            sheave_friction=self.sheave_friction,
+        )  # fmt: skip
 
 
 @dataclass(kw_only=True)
@@ -24,6 +53,9 @@ class CableMaterial:
     )
     breaking_load: float | None = number(
         "Tension at which a cable breaks; null where unpublished.", "N", None, above=0.0
+    )
+    behaviour: BehaviourSettings | None = optional_section(
+        "Stiffening, heat and friction of sheaves, for robots at rest; null: none."
     )
 
 

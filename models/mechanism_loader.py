@@ -131,6 +131,8 @@ def _check(mechanism: Mechanism, path: Path) -> None:
     if not mechanism.cables:
         fail("cables", "none", "at least one cable")
     check_materials(mechanism.cable, [cable.material for cable in mechanism.cables], fail)
+    if mechanism.cable.behaviour is not None:
+        fail("cable.behaviour", "a section", "null: mechanisms have elastic cables")
     _check_cables(mechanism, fail)
     _find_packages(mechanism, path, fail)
     _find_model(mechanism, path, fail)

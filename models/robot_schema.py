@@ -9,6 +9,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.cables.cable_behaviour import CableBehaviour
 from cdpr_drake.cables.elastic_law import axial_stiffness
 from cdpr_drake.errors import RobotFileError
 from cdpr_drake.geometry.cable_set import CableSet
@@ -235,6 +236,11 @@ class Robot(Summarized):
     def materials(self) -> list[CableMaterial]:
         """What each cable is made of, m of them."""
         return [own_material(self.cable, cable.material) for cable in self.cables]
+
+    def cable_behaviour(self) -> CableBehaviour:
+        """What the cables do beside the elastic law; nothing where the file does not say."""
+        settings = self.cable.behaviour
+        return CableBehaviour() if settings is None else settings.behaviour()
 
     def diameters(self) -> Array:
         """Of the cables, shape (m,) [m]."""

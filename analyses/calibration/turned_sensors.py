@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -25,6 +25,9 @@ TRIED = {
 }
 """Fields of a log by the kind of measurement."""
 
+BY_CABLE = ("swivels", "lengths", "angles", "tensions")
+"""Fields with a column a cable, each of which may be turned by itself."""
+
 Refit = Callable[[CalibrationTask, CalibrationLog], CalibrationResult]
 
 
@@ -34,7 +37,8 @@ def turned_sensors(
     """What would fit otherwise, in words: kinds of which much was thrown out, else all, tried anew.
 
     A sign is the wrong one where, with it turned, the fit throws out no third of the kind and the
-    whole costs less. A tilt is tried from other zeros, too. The first that fits is told.
+    whole costs less; where only one cable's is, the whole must fit then. A tilt is tried from other
+    zeros, too. The first that fits is told.
 
     Args:
         task: What was asked.
@@ -61,7 +65,7 @@ def turned_sensors(
             if better and not is_thrown_out(again):
                 whole = again.count + again.dropped
                 return (f"{again.count} of {whole} {kind} fit {how}",)
-    return ()
+    return _one_cable(task, log, suspects or list(result.residuals), refit)
 
 
 def turned_where_lost(task: CalibrationTask, log: CalibrationLog, refit: Refit) -> tuple[str, ...]:
@@ -83,7 +87,43 @@ def turned_where_lost(task: CalibrationTask, log: CalibrationLog, refit: Refit) 
         fit = found.residuals.get(kind)
         if fit is not None and not misfits(found):
             return (f"{fit.count} of {fit.count + fit.dropped} {kind} fit with the sign turned",)
+    return _one_cable(task, log, list(TRIED), refit)
+
+
+def _one_cable(
+    task: CalibrationTask, log: CalibrationLog, kinds: list[str], refit: Refit
+) -> tuple[str, ...]:
+    """In words the one cable with whose sign turned all fits.
+
+    Args:
+        task: What was asked.
+        log: What was measured.
+        kinds: Kinds of measurement that may be turned.
+        refit: Calibrates anew.
+    """
+    for kind, name, other in _turned_cables(task, log, kinds):
+        try:
+            found = refit(task, other)
+        except CalibrationError:
+            continue
+        if kind in found.residuals and not misfits(found):
+            return (f"all fits with the sign of the {kind} of {name} turned",)
     return ()
+
+
+def _turned_cables(
+    task: CalibrationTask, log: CalibrationLog, kinds: list[str]
+) -> Iterator[tuple[str, str, CalibrationLog]]:
+    """Kind, cable, and the log with its sign turned."""
+    for kind in kinds:
+        field = TRIED.get(kind, "")
+        values = getattr(log, field, None) if field in BY_CABLE else None
+        if values is None:
+            continue
+        for k, cable in enumerate(task.robot.cables):
+            turned = values.copy()
+            turned[:, k] *= -1.0
+            yield kind, cable.name, replace(log, **{field: turned})
 
 
 def far_outside(robot: Robot, result: CalibrationResult) -> npt.NDArray[np.bool_]:

@@ -1,10 +1,12 @@
 """Logs in MATLAB's files: what GRAB's tools parse, or any variables with a mapping.
 
 Variables of GRAB's: t [s], epsilon (roll, pitch, yaw) [rad], cable_length [m], swivel [rad],
-tensions, target_tensions [N], each with a row a cable; also with _r behind (1 kHz). A mapping gives
-variables their headers, with {c} for the names of cables: `st.tensions: "{c}_tension_n"`.
+tensions, target_tensions [N], each with a row a cable; also with _r behind (1 kHz), then with
+epsilon_r in degrees, as the inclinometer sends them. A mapping gives variables their headers, with
+{c} for the names of cables: `st.tensions: "{c}_tension_n"`.
 
-Source: github.com/fzoffoli/UACDPR_SelfCalibration, CdprViconDataHandling/CdprDataHandling.m.
+Source: github.com/fzoffoli/UACDPR_SelfCalibration, CdprViconDataHandling/CdprDataHandling.m and
+CdprViconDataHandling.m, which makes radians of epsilon_r.
 """
 
 from __future__ import annotations
@@ -36,6 +38,7 @@ from cdpr_drake.errors import LogFileError
 GRAB_VARIABLES = {
     "t": (TIME,),
     "epsilon": ANGLES,
+    "epsilon_r": ("roll_deg", "pitch_deg", "yaw_deg"),
     "cable_length": (f"{{c}}_{LENGTH}",),
     "swivel": (f"{{c}}_{SWIVEL}",),
     "tensions": (f"{{c}}_{TENSION}",),
@@ -120,7 +123,10 @@ def read_mat(path: Path, asked: LogRequest) -> RecordedLog:
     if TIME not in columns and asked.rate is not None:
         columns = {TIME: even_times(path, count, asked.rate), **columns}
     columns = {header: columns[header] for header in sorted(columns, key=lambda h: h != TIME)}
-    units = {"variables": "m, rad, N, s by the format" if not asked.mapping else "by the mapping"}
+    said = "m, rad, N, s by the format"
+    if any(headers[0].endswith("_deg") for headers in wanted.values()):
+        said += "; epsilon_r in deg"
+    units = {"variables": said if not asked.mapping else "by the mapping"}
     log = RecordedLog(
         path, "mat", knows_mat(MAGIC), turned_columns(columns, asked.R_WF), units, tuple(remarks)
     )

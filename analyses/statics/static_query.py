@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.cables.cable_behaviour import (
+    CableBehaviour,
+    counted_lengths,
+    drum_tensions,
+    tangent_cables,
+)
 from cdpr_drake.cables.dispatch_kernel import STRAIGHT
 from cdpr_drake.cables.models import (
     CABLE_MODELS,
@@ -17,7 +23,7 @@ from cdpr_drake.cables.models import (
     cable_state,
     check_model,
 )
-from cdpr_drake.errors import EquilibriumError
+from cdpr_drake.errors import CableModelError, EquilibriumError
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.geometry.poses import angles_from_rotation
@@ -39,6 +45,10 @@ from cdpr_drake.summaries import Summarized, numbers
 
 STARTS = 40
 """Poses from which equilibria are searched, beside the home pose."""
+
+MOST_TOUCHES, TOUCHING = 20, 1e-10
+"""Steps of Newton's method for cables that stiffen, which end where tensions change by less, of the
+largest; four or five are usual."""
 
 LARGEST_STRAIN = 0.03
 """Where a robot file gives no breaking load, a cable is taken to break at this strain, which is
@@ -71,6 +81,8 @@ class StaticReport(Summarized):
             of the motions that these leave, None where they leave none.
         modes: Their shapes, columns (turn, translation), shape (6, k); None likewise.
         others: Other poses of rest that were found, by energy.
+        drums: Tensions at the drums while all cables are wound up, and while all are paid out,
+            shape (2, m) [N]; None without friction of sheaves.
     """
 
     robot: str
@@ -92,9 +104,16 @@ class StaticReport(Summarized):
     frequencies: Array | None
     modes: Array | None
     others: list[Equilibrium]
+    drums: Array | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """The report for JSON; what is infinite or does not apply is null."""
+        drums: dict[str, Any] = {}
+        if self.drums is not None:
+            drums = {
+                "drum_tensions_winding_up_n": self.drums[0].tolist(),
+                "drum_tensions_paying_out_n": self.drums[1].tolist(),
+            }
         return {
             "robot": self.robot,
             "cable_model": self.model,
@@ -115,7 +134,7 @@ class StaticReport(Summarized):
                 {"pose": _pose(one.X_WP), "energy_j": one.energy, "stability": str(one.stability)}
                 for one in self.others
             ],
-        }
+        } | drums
 
     def summary(self) -> tuple[str, list[tuple[str, str]]]:
         """What it shows of itself."""
@@ -141,9 +160,16 @@ def static_at_pose(robot: Robot, X_WP: RigidTransform, model: str, pulleys: bool
     Raises:
         CdprError: The pose is outside the frame, or cannot be held; says why.
     """
-    cables = _cables(robot, pulleys)
+    cables, behaviour = _cables(robot, pulleys), _behaviour(robot, model, pulleys)
     held = hold_robot(robot, X_WP, cables, model)
     l0 = held.unstrained_lengths
+    if behaviour.changes_lengths():
+        lengths = cable_paths(X_WP, cables).lengths
+        counted = counted_lengths(lengths, held.tensions, cables.stiffness, behaviour)
+        linear, l0 = tangent_cables(cables, counted, held.tensions, behaviour)
+        state = cable_state(linear, model, X_WP, l0)
+        report = _report(robot, linear, model, X_WP, l0, held.tensions, state=state, others=[])
+        return replace(report, cables=cables, l0=counted)
     state = cable_state(cables, model, X_WP, l0) if CABLE_MODELS[model].extensible else None
     return _report(robot, cables, model, X_WP, l0, held.tensions, state=state, others=[])
 
@@ -165,7 +191,33 @@ def static_at_lengths(
     Raises:
         CdprError: No pose in the frame has these lengths without breaking a cable; by how much.
     """
-    cables, platform = _cables(robot, pulleys), rigid_platform(robot)
+    cables, behaviour = _cables(robot, pulleys), _behaviour(robot, model, pulleys)
+    if behaviour.changes_lengths():
+        return _touching(robot, l0, model, pulleys, seed)
+    return _at_lengths(robot, cables, l0, model, seed)
+
+
+def _touching(robot: Robot, counted: Array, model: str, pulleys: bool, seed: int) -> StaticReport:
+    """As `static_at_lengths` of cables that stiffen or are warm: by elastic ones that touch their
+    law at the tensions, which is Newton's method."""
+    cables, behaviour = _cables(robot, pulleys), robot.cable_behaviour()
+    tensions = np.zeros(cables.count)
+    for _ in range(MOST_TOUCHES):
+        linear, l0 = tangent_cables(cables, counted, tensions, behaviour)
+        report = _at_lengths(robot, linear, l0, model, seed)
+        moved = float(np.max(np.abs(report.tensions - tensions)))
+        tensions = report.tensions
+        if moved <= TOUCHING * float(np.max(tensions)):
+            return replace(report, cables=cables, l0=np.asarray(counted, float))
+    raise EquilibriumError(
+        f"lengths: after {MOST_TOUCHES} steps tensions still change by {moved:.3g} N; accepted: "
+        "cables that stiffen less"
+    )
+
+
+def _at_lengths(robot: Robot, cables: CableSet, l0: Array, model: str, seed: int) -> StaticReport:
+    """As `static_at_lengths`, on these cables."""
+    platform = rigid_platform(robot)
     home, joint = robot.home.transform(), robot.joint()
     lower = np.array(robot.frame.lower, float)
     if robot.plane_height is not None:
@@ -201,6 +253,42 @@ def static_at_lengths(
         others=others,
         rest=chosen,
     )
+
+
+def _behaviour(robot: Robot, model: str, pulleys: bool) -> CableBehaviour:
+    """What the robot's cables do beside the elastic law.
+
+    Raises:
+        CableModelError: The model, or the robot's pulleys, do not go with it.
+    """
+    behaviour = robot.cable_behaviour()
+    known = CABLE_MODELS.get(model)
+    elastic = known is not None and known.extensible and known.law == STRAIGHT
+    if behaviour.changes_lengths() and known is not None and not elastic:
+        raise CableModelError(
+            f"cable model: found {model} for cables that stiffen or are warm, see cable.behaviour "
+            f"of {robot.name}; accepted: elastic, kelvin_voigt"
+        )
+    return behaviour
+
+
+def _drums(robot: Robot, cables: CableSet, X_WP: RigidTransform, tensions: Array) -> Array | None:
+    """Tensions at the drums, wound up and paid out, shape (2, m) [N]; None without friction.
+
+    Raises:
+        CableModelError: Cables run over pulleys at the platform, too.
+    """
+    friction = robot.cable_behaviour().sheave_friction
+    if friction == 0.0 or not cables.has_pulleys():
+        return None
+    if cables.has_platform_pulleys():
+        raise CableModelError(
+            f"cable.behaviour.sheave_friction of {robot.name}: found {friction:g} with pulleys at "
+            "the platform; accepted: 0, or pulleys at the exit points only"
+        )
+    radii = np.where(cables.pulley_radius > 0.0, cables.pulley_radius, np.inf)
+    wraps, ones = cable_paths(X_WP, cables).arcs / radii, np.ones(cables.count)
+    return np.array([drum_tensions(tensions, wraps, friction, s * ones) for s in (1.0, -1.0)])
 
 
 def _cables(robot: Robot, pulleys: bool) -> CableSet:
@@ -307,6 +395,7 @@ def _report(
         frequencies=frequencies,
         modes=shapes,
         others=others,
+        drums=_drums(robot, cables, X_WP, tensions),
     )
 
 

@@ -10,6 +10,7 @@ import typer
 from cdpr_drake.analyses.calibration.identification_campaign import CAMPAIGN_UNKNOWN
 from cdpr_drake.analyses.calibration.identification_task import UNKNOWN
 from cdpr_drake.analyses.front.calibration import identify as run_identification
+from cdpr_drake.analyses.front.free_motion import identify_free_motion
 from cdpr_drake.analyses.front.simulated_fits import identify_in_simulation
 from cdpr_drake.cli.command_session import CommandSession
 from cdpr_drake.cli.log_options import (
@@ -31,15 +32,21 @@ from cdpr_drake.cli.options import (
     named_options,
     named_values,
     parse_formats,
+    parse_pose,
 )
+from cdpr_drake.errors import CdprError
 from cdpr_drake.identification.parameters import GROUPS
 from cdpr_drake.identification.result import MISFIT_FACTOR
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.diagrams.load import load_scenario
 
+HALVES = "halves"
+"""Of --free: the first half of the log is fitted, the second predicted."""
+
 OPTIONS = {
     "unknown": "--unknown", "common": "--common", "priors": "--prior", "bandwidth": "--bandwidth",
     "sigma_lengths": "--sigma-lengths", "tracker_late": "--tracker-late", "scenario": "--campaign",
+    "lead": "--lead", "held_out": "--hold-out", "start": "--start", "sigmas": "--sigma",
 }  # fmt: skip
 """Options by the arguments of `identify`."""
 
@@ -53,6 +60,10 @@ def help_words() -> str:
         "stiffness and damping what winches count, C1_length_m or C1_motor_angle_rad; for friction "
         "also C1_motor_torque_nm. Cables go by name or number, units by ending; of true and "
         "measured values the measured ones are read.\n\n"
+        "--free is for a platform that swings on winches that stand still, such as one with fewer "
+        "cables than degrees of freedom that was pushed: its whole motion is predicted. Columns: "
+        "time_s; poses, or roll, pitch and yaw; C1_tension_n ..., without which the mass is not "
+        "told. --hold-out stretches are predicted, and not fitted.\n\n"
         f"--unknown: {', '.join(GROUPS)}. Writes robot.yaml, which scenarios take as "
         "perturbations.believed_robot, identification.json and figures. The exit code is 2 where "
         f"the log cannot tell what is asked, 6 where residuals are more than {MISFIT_FACTOR:g} "
@@ -100,6 +111,34 @@ def identify(
             "the scenario's own motion again."
         ),
     ] = None,
+    free: Annotated[
+        str | None,
+        typer.Option(
+            help="Stretches of free motion that are fitted, as 44.6:49.2,32:36 [s], or halves."
+        ),
+    ] = None,
+    hold_out: Annotated[
+        str | None,
+        typer.Option(help="Stretches of free motion that are predicted, as 20:24 [s]."),
+    ] = None,
+    start: Annotated[
+        str | None,
+        typer.Option(help="Pose near which the platform swings; else it is looked for."),
+    ] = None,
+    lead: Annotated[
+        float,
+        typer.Option(help="Part of a held-out stretch that tells its first state [s]."),
+    ] = 1.0,
+    sigma: Annotated[
+        str | None,
+        typer.Option(
+            help="Standard deviations in a free motion, as turn=0.0175,position=0.003,tension=5 "
+            "[rad, m, N]."
+        ),
+    ] = None,
+    tracker_frame: Annotated[
+        bool, typer.Option(help="Poses of a free motion are in a frame that is unknown.")
+    ] = False,
     keep_outliers: Annotated[bool, typer.Option(help="Count every equation as it is.")] = False,
     out: ResultsBelowRuns = None,
     as_json: ResultsAsJson = False,
@@ -124,6 +163,16 @@ def identify(
     loaded = load_robot(name, "cdpr identify")
     folder = results_below_runs(out, f"identify-{loaded.name}")
     session = CommandSession(STOPPING, folder)
+    if free is not None:
+        with named_options(OPTIONS):
+            swung = identify_free_motion(
+                loaded, file, asked, stretches=_spans("--free", free),
+                held_out=_spans("--hold-out", hold_out), lead=lead, folder=folder,
+                start=None if start is None else parse_pose(start, "--start"),
+                sigmas=named_values("--sigma", sigma), tracker=tracker_frame, session=session,
+                **kept,
+            )  # fmt: skip
+        return tell_fit(swung, session, as_json)
     with named_options(OPTIONS):
         found = run_identification(
             loaded, file, UNKNOWN if asked is None else asked, validate=validate,
@@ -132,3 +181,24 @@ def identify(
             sigma_lengths=sigma_lengths, pulleys=pulleys, outliers=not keep_outliers, **kept,
         )  # fmt: skip
     return tell_fit(found, session, as_json)
+
+
+def _spans(option: str, words: str | None) -> tuple[tuple[float, float], ...]:
+    """Stretches of a log, from first:last with commas.
+
+    Raises:
+        CdprError: One is not so.
+    """
+    if words is None or (option == "--free" and words == HALVES):
+        return ()
+    found = []
+    for item in comma_words(words):
+        parts = item.split(":")
+        try:
+            first, last = (float(part) for part in parts)
+        except ValueError:
+            first = last = 0.0
+        if not -1e12 < first < last < 1e12:
+            raise CdprError(f"{option}: found {item!r}; accepted: first:last, as 20:24.5 [s]")
+        found.append((first, last))
+    return tuple(found)

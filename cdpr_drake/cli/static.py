@@ -170,6 +170,10 @@ def _print(report: StaticReport) -> None:
             "slack" if report.slack[k] else "",
         )
     console.print(table)
+    if report.drums is not None:
+        for words, row in zip(("wound up", "paid out"), report.drums, strict=True):
+            told = ", ".join(f"{t:.2f}" for t in row)
+            console.print(f"tensions at the drums while cable is {words} [N]: {told}")
     stiffness = ", ".join(f"{k:.3g}" if np.isfinite(k) else "rigid" for k in report.principal)
     console.print(f"principal stiffnesses [N/m], turns times {report.arm:.3g} m: {stiffness}")
     if report.frequencies is not None:

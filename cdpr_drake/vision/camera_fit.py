@@ -12,7 +12,8 @@ Source: Zhang, IEEE TPAMI 22(11), 2000; OpenCV, modules calib3d and fisheye.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -118,6 +119,17 @@ class CameraFit:
         return float(np.sqrt(np.mean(np.sum(np.concatenate(parts) ** 2, axis=1))))
 
 
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """OpenCV in one thread: in several it adds up in any order, and no fit comes back twice."""
+    threads = cv2.getNumThreads()
+    cv2.setNumThreads(1)
+    try:
+        yield
+    finally:
+        cv2.setNumThreads(threads)
+
+
 def fit_camera(
     views: Sequence[View],
     size: tuple[int, int],
@@ -209,6 +221,7 @@ class _Fit(NamedTuple):
         return Pinhole(size[0], size[1], fx, fy, cx, cy, distortion)
 
 
+@_one_thread()
 def _fit(views: Sequence[View], size: tuple[int, int], model: str) -> _Fit:
     fisheye = model == "fisheye"
     try:

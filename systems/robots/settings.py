@@ -8,7 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from pydrake.systems.primitives import MatrixGain
 
+from cdpr_drake.cables.cable_behaviour import CableBehaviour
 from cdpr_drake.cables.models import CABLE_MODELS, KELVIN_VOIGT
+from cdpr_drake.errors import CableModelError
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.models.robot_in_plant import RobotInPlant
 from cdpr_drake.models.robot_schema import Robot
@@ -49,7 +51,16 @@ class CableSettings:
     )
 
     def cable_set(self, robot: Robot) -> CableSet:
-        """The cables of a robot, over its pulleys or from fixed exit points."""
+        """The cables of a robot, over its pulleys or from fixed exit points.
+
+        Raises:
+            CableModelError: Its cables do what no simulated cable does.
+        """
+        if robot.cable_behaviour() != CableBehaviour():
+            raise CableModelError(
+                f"robot {robot.name}: cable.behaviour: found a section that changes its cables; "
+                "accepted in a simulation: null, since simulated cables are elastic and damped"
+            )
         return self.applied(robot.cable_set())
 
     def applied(self, cables: CableSet) -> CableSet:

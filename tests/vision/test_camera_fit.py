@@ -91,8 +91,21 @@ def test_held_out_images_are_evenly_chosen_and_not_fitted():
     assert len(held) == round(0.2 * len(views))
     shifted = [v._replace(uv=v.uv + 25.0) if v.name in held else v for v in views]
     again = fit_camera(shifted, SIZE)
-    # OpenCV adds up in parallel: its results change in the seventh digit from call to call.
-    assert np.max(np.abs(again.values - fit.values) / fit.deviations) < 1e-3
+    np.testing.assert_array_equal(again.values, fit.values)
+
+
+@pytest.mark.parametrize("model", ["brown_conrady", "fisheye"])
+def test_a_fit_comes_back_to_the_bit_and_leaves_threads_as_they_were(model):
+    views, threads = projected(model), cv2.getNumThreads()
+    cv2.setNumThreads(2)
+    try:
+        fits = [fit_camera(views, SIZE, model) for _ in range(3)]
+        assert cv2.getNumThreads() == 2
+    finally:
+        cv2.setNumThreads(threads)
+    for fit in fits[1:]:
+        np.testing.assert_array_equal(fit.values, fits[0].values)
+        np.testing.assert_array_equal(fit.deviations, fits[0].deviations)
 
 
 def test_an_image_that_fits_far_worse_is_named_and_left_out():

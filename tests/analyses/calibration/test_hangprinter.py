@@ -158,3 +158,16 @@ def test_half_the_readings_of_one_motor_off_are_no_calibration(tmp_path):
         believed(), tmp_path / "half.csv", UNKNOWN, sigmas=EXACT, zero=RigidTransform()
     )
     assert found.result.status == "misfit"
+
+
+@pytest.mark.parametrize("cable", ["A", "C"])
+def test_a_motor_that_turns_the_other_way_is_named(cable):
+    log = read_log(LOG, ["A", "B", "C", "D"])
+    angles = log.angles.copy()
+    angles[:, "ABCD".index(cable)] *= -1.0
+    words = f"all fits with the sign of the motor angles of {cable} turned"
+    found = cdpr.calibrate(
+        believed(), replace(log, angles=angles), UNKNOWN, sigmas=EXACT, zero=RigidTransform(),
+        outliers=False, bounds={"tracker.[xyz]": 1e-3},
+    )  # fmt: skip
+    assert found.misfit[0] == words

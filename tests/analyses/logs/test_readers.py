@@ -178,6 +178,12 @@ def test_parsed_logs_of_grab(tmp_path):
     np.testing.assert_allclose(log.columns["C4_tension_n"], 93.0)
     np.testing.assert_allclose(log.columns["roll_rad"], 0.1)
     assert "st.other" in log.remarks[0]
+    # What was taken at 1 kHz has its turns in degrees, as the inclinometer sends them.
+    fast = {f"{name}_r": st[name] for name in ("t", "epsilon", "tensions")}
+    savemat(path, {"st": fast})
+    log = read_recorded(path)
+    np.testing.assert_allclose(log.columns["pitch_rad"], np.radians(0.1))
+    assert "epsilon_r in deg" in log.units["variables"]
     st["swivel"] = np.zeros((4, 49))
     savemat(path, {"st": st})
     with pytest.raises(LogFileError, match="swivel: found 49 rows; accepted: 50"):

@@ -1,0 +1,601 @@
+"""Identification from free motion: a platform swings on cables whose winches stand still.
+
+The whole motion is predicted from its state at the beginning of each stretch, and compared with
+turns, positions and tensions that were measured (output error, Ljung, System identification, 1999,
+3.3). First its beginning is fitted, then longer parts: a wrong frequency only shows as a phase that
+runs away. What was held out is predicted by what was fitted, from a state that its own beginning
+tells.
+"""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from pydrake.math import RigidTransform, RollPitchYaw
+from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
+
+from cdpr_drake.analyses.calibration.free_motion_model import (
+    FREE_GROUPS,
+    START,
+    FreeMotionModel,
+    Unknown,
+)
+from cdpr_drake.analyses.calibration.free_motion_samples import (
+    Stretch,
+    cut,
+    recorded_turns,
+    start_pose,
+)
+from cdpr_drake.analyses.calibration.log_file import CalibrationLog
+from cdpr_drake.arrays import Array
+from cdpr_drake.errors import CableGeometryError, EquilibriumError, IdentificationError
+from cdpr_drake.geometry.cable_paths import cable_paths
+from cdpr_drake.geometry.poses import pose_from_row
+from cdpr_drake.identification.parameters import MASS_GROUP
+from cdpr_drake.identification.result import MISFIT, MISFIT_FACTOR, OPTIMAL
+from cdpr_drake.models.robot_schema import Robot
+
+HORIZONS = ((0.6, 12), (1.5, 12), (1e9, 40))
+"""So much of each stretch is fitted, with so many steps at most: first what belongs to sensors and
+to the beginning, then all."""
+
+MOVED = np.array([0.5] * 3 + [0.3] * 3 + [5.0] * 3 + [2.0] * 3)
+"""How far a state may usually be from rest: turn [rad], translation [m], their rates."""
+
+SMALL = 1e-5
+"""Differences of the search, in sizes of unknowns: off by 1e-5 of a slope, and rounding below."""
+
+INSIDE = 0.03
+"""So far from its bounds an unknown starts, in sizes: at a bound the search takes small steps."""
+
+LOST = 1e3
+"""Residuals of a motion that cannot go on [sigma]."""
+
+OUTLYING = 3.0
+"""Residuals beyond so many sigmas count linearly [sigma]."""
+
+CLOSE = 1e-5
+"""The search ends where the cost changes by less than this share: of some thousand residuals, less
+than a tenth of a standard error."""
+
+
+@dataclass(frozen=True)
+class FreeSigmas:
+    """Standard deviations of what is compared.
+
+    Attributes:
+        turn: Of turns about each axis [rad].
+        position: Of each coordinate [m].
+        tension: Of each cable's [N].
+    """
+
+    turn: float = 0.0175
+    position: float = 0.003
+    tension: float = 5.0
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FreeMotionTask:
+    """What is asked of a log of free motion.
+
+    Attributes:
+        robot: As it is believed.
+        unknown: Groups of `FREE_GROUPS`; None: all that the log can tell.
+        stretches: First and last instants of stretches that are fitted [s]; none: the first half
+            of the log.
+        held_out: Of those that are predicted; none: the second half of the log, where stretches
+            are not given either.
+        sigmas: Standard deviations.
+        start: A pose near which the platform hangs; None: see `start_pose`.
+        tracker: Whether the frame of a tracker of poses is unknown; else it is W.
+        lead: From so much of a held-out stretch its first state is told [s].
+    """
+
+    robot: Robot
+    unknown: tuple[str, ...] | None = None
+    stretches: tuple[tuple[float, float], ...] = ()
+    held_out: tuple[tuple[float, float], ...] = ()
+    sigmas: FreeSigmas = field(default_factory=FreeSigmas)
+    start: RigidTransform | None = None
+    tracker: bool = False
+    lead: float = 1.0
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FollowedStretch:
+    """A stretch beside what was predicted of it.
+
+    Attributes:
+        stretch: What was measured.
+        lead: From so much of it the first state was told [s]; all of it where it was fitted.
+        states: Of the platform, shape (n, 13).
+        tensions: Shape (n, m) [N].
+        turned: Rotation vectors from predicted to measured turns, in the sensor's frame, shape
+            (n, 3) [rad].
+        measured_turns: Rotation vectors from the mean measured turn, shape (n, 3) [rad].
+        predicted_turns: The same of what the sensor would have told.
+        positions: Measured in W, or where the measured turns and the cables' lengths put Po,
+            shape (n, 3) [m]; NaN where neither does.
+        places: Predicted for the times at which those were measured, shape (n, 3) [m].
+    """
+
+    stretch: Stretch
+    lead: float
+    states: Array
+    tensions: Array
+    turned: Array
+    measured_turns: Array
+    predicted_turns: Array
+    positions: Array
+    places: Array
+
+    def after_lead(self) -> np.typing.NDArray[np.bool_]:
+        """Instants that are predicted, or all, shape (n,)."""
+        time = self.stretch.time
+        if self.lead >= time[-1] - time[0]:
+            return np.ones(len(time), bool)
+        return np.asarray(time - time[0] > self.lead)
+
+    def turn_rms(self) -> float:
+        """Angle between predicted and measured turns, root mean square [rad]."""
+        rows = self.turned[self.after_lead() & (self.stretch.known > 0.0)]
+        return float(np.sqrt(np.mean(np.sum(rows**2, axis=1))))
+
+    def position_rms(self) -> float | None:
+        """Distance of predicted and measured positions, root mean square [m]."""
+        off = np.sum((self.places - self.positions) ** 2, axis=1)
+        rows = off[self.after_lead() & np.isfinite(off) & (self.stretch.known > 0.0)]
+        return float(np.sqrt(np.mean(rows))) if len(rows) else None
+
+    def tension_rms(self) -> float | None:
+        """Of all cables [N]."""
+        off = (self.tensions - self.stretch.tensions)[self.after_lead()]
+        off = off[np.isfinite(off)]
+        return float(np.sqrt(np.mean(off**2))) if off.size else None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FreeMotion:
+    """What a log of free motion told of a robot.
+
+    Attributes:
+        task: What was asked.
+        log: The log.
+        status: `OPTIMAL`, or `MISFIT` where residuals are more than `MISFIT_FACTOR` sigmas.
+        model: The robot as a function of the unknowns.
+        unknowns: The unknowns.
+        values: Found, shape (f,).
+        std: Their standard errors, shape (f,), infinite where the log does not tell: residuals are
+            correlated in time, and count as their correlation allows.
+        spread: Residuals over sigma, root mean square.
+        correlation_time: Residuals are correlated over so many instants.
+        fitted: Stretches that were fitted.
+        held_out: Stretches that were predicted.
+        modes: Frequencies about rest, of what was found and as believed, shapes (6,) [Hz].
+        steps: Of the search.
+        wall_time: [s].
+        remarks: What should be known, in words.
+    """
+
+    task: FreeMotionTask
+    log: CalibrationLog
+    status: str
+    model: FreeMotionModel
+    unknowns: tuple[Unknown, ...]
+    values: Array
+    std: Array
+    spread: float
+    correlation_time: float
+    fitted: tuple[FollowedStretch, ...]
+    held_out: tuple[FollowedStretch, ...]
+    modes: tuple[Array, Array]
+    steps: int
+    wall_time: float
+    remarks: tuple[str, ...]
+
+
+def fit_free_motion(
+    task: FreeMotionTask, log: CalibrationLog, say: Callable[[str], object] = lambda _: None
+) -> FreeMotion:
+    """Finds a robot's dynamics in a log of free motion.
+
+    Args:
+        task: What is asked.
+        log: The log.
+        say: Told what is done now.
+
+    Raises:
+        IdentificationError: The log does not hold what is asked, or no motion follows from it.
+    """
+    began, recorded = clock.monotonic(), recorded_turns(log)
+    fitted_spans, held_spans = _spans(task, recorded.time)
+    fitted = cut(task.robot, log, recorded, fitted_spans)
+    held = cut(task.robot, log, recorded, held_spans)
+    tracked = recorded.positions is not None
+    start = start_pose(task.robot, fitted, tracked and not task.tracker, task.start)
+    groups = _groups(task, log, fitted)
+    model = FreeMotionModel.of(task.robot, start, groups, not tracked, tracked and task.tracker)
+    model = _sensor_believed(model, fitted)
+    z, steps = np.zeros(len(model.unknowns)), 0
+    moved = [first_state(model, model.before(), s) for s in fitted]
+    sensor = np.array([one.group in ("", "sensor") for one in model.unknowns])
+    for n, (horizon, most) in enumerate(HORIZONS):
+        say(f"{'first ' + str(horizon) + ' s' if horizon < 1e3 else 'whole'} of each stretch")
+        free = sensor if n == 0 else np.ones(len(z), bool)
+        parts = [s.first(horizon) for s in fitted]
+        search = _Search(model, task.sigmas, parts, free)
+        z, moved, found = search.solve(z, moved, most)
+        steps += int(found.nfev)
+    if not np.isfinite(found.cost) or found.cost > 0.1 * LOST**2 * len(found.fun):
+        raise IdentificationError(
+            f"{log.path}: found no motion of {task.robot.name} that goes on as measured; accepted: "
+            "stretches in which nothing but cables and weight acts, or a start pose"
+        )
+    vector = search.vector(z)
+    spread, together = search.spread(z, moved)
+    std = search.errors(found, spread, together)
+    say("held-out stretches")
+    followed = [_followed(model, vector, s, x, None) for s, x in zip(fitted, moved, strict=True)]
+    predicted = [
+        _followed(model, vector, s, lead_state(model, task, z, s), task.lead) for s in held
+    ]
+    remarks = _remarks(model, std, spread, vector)
+    return FreeMotion(
+        task=task, log=log, status=MISFIT if spread > MISFIT_FACTOR else OPTIMAL, model=model,
+        unknowns=model.unknowns, values=vector, std=std, spread=spread,
+        correlation_time=together, fitted=tuple(followed), held_out=tuple(predicted),
+        modes=(_modes(model, vector), _modes(model, model.before())), steps=steps,
+        wall_time=clock.monotonic() - began, remarks=remarks,
+    )  # fmt: skip
+
+
+def _spans(
+    task: FreeMotionTask, time: Array
+) -> tuple[tuple[tuple[float, float], ...], tuple[tuple[float, float], ...]]:
+    """Stretches that are fitted, and held out; halves of the log where none are given."""
+    start, end = float(time[0]), float(time[-1])
+    if task.stretches:
+        return task.stretches, task.held_out
+    middle = 0.5 * (start + end)
+    return ((start, middle),), task.held_out or ((middle, end),)
+
+
+def _groups(
+    task: FreeMotionTask, log: CalibrationLog, stretches: Sequence[Stretch]
+) -> tuple[str, ...]:
+    """Groups that are unknown: a mass needs tensions."""
+    told = any(np.isfinite(s.tensions).any() for s in stretches)
+    if task.unknown is None:
+        return FREE_GROUPS if told else tuple(g for g in FREE_GROUPS if g != MASS_GROUP)
+    if MASS_GROUP in task.unknown and not told:
+        raise IdentificationError(
+            f"{log.path}: tensions: found none; accepted: columns such as C1_tension_n, without "
+            "which a free motion does not tell the mass"
+        )
+    return task.unknown
+
+
+def _sensor_believed(model: FreeMotionModel, stretches: Sequence[Stretch]) -> FreeMotionModel:
+    """Heading, mount or frame of a sensor such that its mean is the start pose."""
+    mean = Rotation.concatenate([s.recorded.turns_at(s.time) for s in stretches]).mean()
+    R_start = model.start.rotation().matrix()
+    before: dict[str, float] = {}
+    names = model.names
+    if "sensor.heading" in names:
+        heading = mean.as_euler("ZYX")[0] - RollPitchYaw(model.start.rotation()).yaw_angle()
+        upright = Rotation.from_rotvec([0.0, 0.0, heading]) * Rotation.from_matrix(R_start)
+        mount = (upright.inv() * mean).as_rotvec()
+        before["sensor.heading"] = float(np.angle(np.exp(1j * heading)))
+        before |= {f"sensor.mount_{a}": float(x) for a, x in zip("xyz", mount, strict=True)}
+    if "tracker.x" in names:
+        turn = mean * Rotation.from_matrix(R_start).inv()
+        rows = [s.recorded.positions_at(s.time) for s in stretches]
+        p = np.mean(np.concatenate([row for row in rows if row is not None]), axis=0)
+        offset = p - turn.apply(model.start.translation())
+        before |= {
+            f"tracker.turn_{a}": float(x) for a, x in zip("xyz", turn.as_rotvec(), strict=True)
+        }
+        before |= {f"tracker.{a}": float(x) for a, x in zip("xyz", offset, strict=True)}
+    changed = tuple(replace(one, before=before.get(one.name, one.before)) for one in model.unknowns)
+    return replace(model, unknowns=changed)
+
+
+def earlier(states: Array, step: float, late: float) -> tuple[Rotation, Array]:
+    """Turns and positions, shape (n, 3) [m], a time before even states, by Hermite's cubics.
+
+    The model is asked earlier, not the log later: between rows of a log noise is less than at rows,
+    and a clock that was sought so would be drawn to the middle between them.
+
+    Args:
+        states: Shape (n, 13).
+        step: Between them [s].
+        late: The time [s].
+    """
+    n = len(states)
+    at = np.arange(n) - late / step
+    k = np.clip(np.floor(at).astype(int), 0, n - 2)
+    u = (at - k)[:, None]
+    q, w = states[:, :4], states[:, 7:10]
+    rates = np.empty((n, 7))
+    rates[:, 0] = -0.5 * np.sum(w * q[:, 1:], axis=1)
+    rates[:, 1:4] = 0.5 * (w * q[:, :1] + np.cross(w, q[:, 1:]))
+    rates[:, 4:] = states[:, 10:13]
+    x, v = states[:, :7], step * rates
+    found = (
+        (1.0 + 2.0 * u) * (1.0 - u) ** 2 * x[k] + u * (1.0 - u) ** 2 * v[k]
+        + u**2 * (3.0 - 2.0 * u) * x[k + 1] + u**2 * (u - 1.0) * v[k + 1]
+    )  # fmt: skip
+    return Rotation.from_quat(found[:, [1, 2, 3, 0]]), found[:, 4:]
+
+
+def sensed(
+    model: FreeMotionModel, vector: Array, states: Array, step: float
+) -> tuple[Rotation, Array]:
+    """What the sensor would tell at even states: turns, and positions in its frame, (n, 3) [m]."""
+    n = model.by_name(vector)
+    turns, p = earlier(states, step, n["sensor.late"])
+    if "sensor.heading" in n:
+        mount = Rotation.from_rotvec([n[f"sensor.mount_{a}"] for a in "xyz"])
+        return Rotation.from_rotvec([0.0, 0.0, n["sensor.heading"]]) * turns * mount, p
+    if "tracker.x" in n:
+        frame = Rotation.from_rotvec([n[f"tracker.turn_{a}"] for a in "xyz"])
+        return frame * turns, frame.apply(p) + [n[f"tracker.{a}"] for a in "xyz"]
+    return turns, p
+
+
+def unsensed(
+    model: FreeMotionModel, vector: Array, turns: Rotation, positions: Array | None
+) -> tuple[Rotation, Array | None]:
+    """The inverse of `sensed`: turns and positions of P in W."""
+    n = model.by_name(vector)
+    if "sensor.heading" in n:
+        mount = Rotation.from_rotvec([n[f"sensor.mount_{a}"] for a in "xyz"])
+        heading = Rotation.from_rotvec([0.0, 0.0, n["sensor.heading"]])
+        return heading.inv() * turns * mount.inv(), positions
+    if "tracker.x" in n:
+        frame = Rotation.from_rotvec([n[f"tracker.turn_{a}"] for a in "xyz"])
+        if positions is not None:
+            positions = frame.inv().apply(positions - [n[f"tracker.{a}"] for a in "xyz"])
+        return frame.inv() * turns, positions
+    return turns, positions
+
+
+def first_state(model: FreeMotionModel, vector: Array, stretch: Stretch) -> Array:
+    """From rest at the start to the first state, as measured; see `FreeMotionModel.run`."""
+    first = stretch.time[0] + model.by_name(vector)["sensor.late"]
+    apart = 0.04  # long enough for the noise of turns, short beside a swing [s]
+    t = np.array([first, first + apart])
+    turns, p = unsensed(
+        model, vector, stretch.recorded.turns_at(t), stretch.recorded.positions_at(t)
+    )
+    w = (turns[1] * turns[0].inv()).as_rotvec() / apart
+    R_start = Rotation.from_matrix(model.start.rotation().matrix())
+    if p is not None:
+        place, v = p[0], (p[1] - p[0]) / apart
+    else:
+        place = places_by_lengths(
+            model, vector, turns[:1], np.zeros((1, len(model.robot.cables))),
+            np.array([model.start.translation()]),
+        )[0]  # fmt: skip
+        J = _jacobian(model, turns[0], place)
+        v = np.linalg.lstsq(J[:, 3:], -J[:, :3] @ w, rcond=None)[0]
+    turn = (turns[0] * R_start.inv()).as_rotvec()
+    return np.concatenate([turn, place - model.start.translation(), w, v])
+
+
+def _jacobian(model: FreeMotionModel, turn: Rotation, place: Array) -> Array:
+    row = np.concatenate([turn.as_quat()[[3, 0, 1, 2]], place])
+    return cable_paths(pose_from_row(row), model.robot.cable_set()).J
+
+
+def places_by_lengths(
+    model: FreeMotionModel, vector: Array, turns: Rotation, tensions: Array, guesses: Array
+) -> Array:
+    """Where the cables' lengths under tension put Po, with turns known, shape (n, 3) [m].
+
+    Least squares of the lengths, by Gauss and Newton; NaN where cables cannot run, and for fewer
+    than three cables.
+    """
+    cables, l0 = model.robot.cable_set(), model.lengths(vector)
+    n = model.by_name(vector)
+    EA = cables.stiffness * n["all.stiffness"] / float(np.mean(cables.stiffness))
+    places = np.array(guesses, float)
+    if cables.count < 3:
+        return np.full_like(places, np.nan)
+    quaternions = turns.as_quat()[:, [3, 0, 1, 2]]
+    for k, q in enumerate(quaternions):
+        try:
+            for _ in range(6):
+                paths = cable_paths(pose_from_row(np.concatenate([q, places[k]])), cables)
+                lacking = l0 * (1.0 + tensions[k] / EA) - paths.lengths
+                places[k] += np.linalg.lstsq(paths.J[:, 3:], lacking, rcond=None)[0]
+        except CableGeometryError:
+            places[k] = np.nan
+    return places
+
+
+@dataclass(frozen=True, eq=False)
+class _Search:
+    """The unknowns in sizes, and of each stretch what moves its first state, in sizes."""
+
+    model: FreeMotionModel
+    sigmas: FreeSigmas
+    stretches: Sequence[Stretch]
+    free: np.typing.NDArray[np.bool_]
+
+    def vector(self, z: Array) -> Array:
+        """Unknowns from sizes."""
+        sizes = np.array([one.size for one in self.model.unknowns])
+        return self.model.before() + sizes * z
+
+    def measured(self, z: Array, moved: Array, stretch: Stretch) -> Array:
+        """Residuals of what was measured in a stretch [sigma], shape (n, 6 + m)."""
+        vector, m = self.vector(z), len(self.model.robot.cables)
+        states, tensions = self.model.run(vector, moved, stretch.count, stretch.step)
+        if not np.isfinite(states).all():
+            return np.full((stretch.count, 6 + m), LOST)
+        at = stretch.time
+        turns, p = sensed(self.model, vector, states, stretch.step)
+        out = np.zeros((stretch.count, 6 + m))
+        out[:, :3] = (turns.inv() * stretch.recorded.turns_at(at)).as_rotvec() / self.sigmas.turn
+        measured = stretch.recorded.positions_at(at)
+        if measured is not None:
+            out[:, 3:6] = (measured - p) / self.sigmas.position
+        out[:, :6] *= stretch.known[:, None]
+        off = (stretch.tensions - tensions) / self.sigmas.tension
+        out[:, 6:] = np.where(np.isfinite(off), off, 0.0)
+        return np.clip(out, -LOST, LOST)
+
+    def part(self, z: Array, y: Array, stretch: Stretch) -> Array:
+        """All residuals that a stretch's first state y (in sizes) belongs to."""
+        return np.concatenate([self.measured(z, MOVED * y, stretch).ravel(), y])
+
+    def solve(self, z: Array, moved: list[Array], most: int) -> tuple[Array, list[Array], Any]:
+        """Least squares from here; the unknowns, first states, and scipy's result."""
+        f, base = np.flatnonzero(self.free), z.copy()
+
+        def parts(x: Array) -> tuple[Array, list[Array]]:
+            z = base.copy()
+            z[f] = x[: len(f)]
+            return z, [x[len(f) + START * j :][:START] for j in range(len(self.stretches))]
+
+        def residuals(x: Array) -> Array:
+            z, states = parts(x)
+            each = zip(states, self.stretches, strict=True)
+            return np.concatenate([self.part(z, y, s) for y, s in each] + [x[: len(f)]])
+
+        def jacobian(x: Array) -> Array:
+            z, states = parts(x)
+            rows = []
+            for j, (y, s) in enumerate(zip(states, self.stretches, strict=True)):
+                now = self.part(z, y, s)
+                J = np.zeros((len(now), len(x)))
+                for k in range(len(f)):
+                    moved_z = z.copy()
+                    moved_z[f[k]] += SMALL
+                    J[:, k] = (self.part(moved_z, y, s) - now) / SMALL
+                for k in range(START):
+                    moved_y = y.copy()
+                    moved_y[k] += SMALL
+                    column = len(f) + START * j + k
+                    J[:, column] = (self.part(z, moved_y, s) - now) / SMALL
+                rows.append(J)
+            rows.append(np.eye(len(f), len(x)))
+            return np.vstack(rows)
+
+        x = np.concatenate([z[f], *(m / MOVED for m in moved)])
+        least, largest = np.full(len(x), -np.inf), np.full(len(x), np.inf)
+        for k, one in enumerate(np.array(self.model.unknowns, object)[f]):
+            least[k] = (one.least - one.before) / one.size
+            largest[k] = (one.most - one.before) / one.size
+        room = INSIDE * np.minimum(1.0, largest - least)
+        x = np.clip(x, least + room, largest - room)
+        found = least_squares(
+            residuals, x, jac=jacobian, bounds=(least, largest), loss="huber", f_scale=OUTLYING,
+            x_scale="jac", max_nfev=most, ftol=CLOSE, xtol=1e-9,
+        )  # fmt: skip
+        z, states = parts(found.x)
+        return z, [MOVED * y for y in states], found
+
+    def spread(self, z: Array, moved: Sequence[Array]) -> tuple[float, float]:
+        """Root mean square of residuals [sigma], and over how many instants they go together."""
+        tables = [self.measured(z, x, s) for x, s in zip(moved, self.stretches, strict=True)]
+        told = np.concatenate([t.ravel() for t in tables])
+        told = told[told != 0.0]
+        spread = float(np.sqrt(np.mean(told**2))) if len(told) else 0.0
+        top, bottom = 0.0, 0.0
+        for table in tables:
+            for column in table.T:
+                power = float(column @ column)
+                if power > 0.0:
+                    top += power * _together(column)
+                    bottom += power
+        return spread, max(top / bottom, 1.0) if bottom else 1.0
+
+    def errors(self, found: Any, spread: float, together: float) -> Array:
+        """Standard errors of the unknowns; infinite where the log tells no more than the prior."""
+        count = int(np.count_nonzero(self.free))
+        J = found.jac[: -count or None]  # without the priors of the unknowns
+        n = count
+        information = J.T @ J / (max(spread, 1.0) ** 2 * together)
+        information[n:, n:] += np.eye(len(information) - n) * 1e-6
+        whole = information + np.diag(np.r_[np.full(n, 1e-4), np.zeros(len(information) - n)])
+        variance = np.diag(np.linalg.pinv(whole, hermitian=True))[:n]
+        sizes = np.array([one.size for one in self.model.unknowns])
+        std = sizes * np.sqrt(np.maximum(variance, 0.0))
+        # A prior as wide as 100 sizes keeps the matrix regular; what it tells alone is nothing.
+        return np.where(variance > 25.0, np.inf, std)
+
+
+def _together(column: Array) -> float:
+    """Integrated autocorrelation, up to where it first falls to nothing, at least 1."""
+    n = len(column)
+    spectrum = np.abs(np.fft.rfft(column, 2 * n)) ** 2
+    rho = np.fft.irfft(spectrum)[:n]
+    rho = rho / rho[0]
+    below = np.flatnonzero(rho <= 0.0)
+    last = int(below[0]) if len(below) else n
+    return float(max(1.0 + 2.0 * np.sum(rho[1:last]), 1.0))
+
+
+def lead_state(model: FreeMotionModel, task: FreeMotionTask, z: Array, stretch: Stretch) -> Array:
+    """The first state of a stretch by its beginning, with the robot known."""
+    search = _Search(model, task.sigmas, [stretch.first(task.lead)], np.zeros(len(z), bool))
+    first = first_state(model, search.vector(z), stretch)
+    _, moved, _ = search.solve(z, [first], HORIZONS[-1][1])
+    return moved[0]
+
+
+def _followed(
+    model: FreeMotionModel, vector: Array, stretch: Stretch, moved: Array, lead: float | None
+) -> FollowedStretch:
+    states, tensions = model.run(vector, moved, stretch.count, stretch.step)
+    if not np.isfinite(states).all():
+        raise IdentificationError(
+            f"stretch from {stretch.time[0]:g} s: found no motion that goes on to its end"
+        )
+    turns, _ = sensed(model, vector, states, stretch.step)
+    _, places = earlier(states, stretch.step, model.by_name(vector)["sensor.late"])
+    measured = stretch.recorded.turns_at(stretch.time)
+    R_WP, p = unsensed(model, vector, measured, stretch.recorded.positions_at(stretch.time))
+    if p is None:
+        pulled = np.where(np.isfinite(stretch.tensions), stretch.tensions, tensions)
+        p = places_by_lengths(model, vector, R_WP, pulled, places)
+    middle = measured.mean().inv()
+    return FollowedStretch(
+        stretch=stretch, lead=np.inf if lead is None else lead, states=states, tensions=tensions,
+        turned=(turns.inv() * measured).as_rotvec(), positions=p, places=places,
+        measured_turns=(middle * measured).as_rotvec(),
+        predicted_turns=(middle * turns).as_rotvec(),
+    )  # fmt: skip
+
+
+def _modes(model: FreeMotionModel, vector: Array) -> Array:
+    try:
+        return model.frequencies(vector)
+    except EquilibriumError:
+        return np.full(6, np.nan)
+
+
+def _remarks(model: FreeMotionModel, std: Array, spread: float, vector: Array) -> tuple[str, ...]:
+    said = []
+    unsaid = [u.name for u, s in zip(model.unknowns, std, strict=True) if not np.isfinite(s)]
+    if unsaid:
+        said.append(f"not told by these stretches: {', '.join(unsaid)}")
+    edge = [
+        u.name for u, x in zip(model.unknowns, vector, strict=True)
+        if min(x - u.least, u.most - x) < 1e-6 * u.size and np.isfinite(u.least)
+    ]  # fmt: skip
+    if edge:
+        said.append(f"at a bound: {', '.join(edge)}")
+    if spread > 1.0:
+        said.append(
+            f"residuals are {spread:.3g} sigma: standard errors are as much larger, and for "
+            "correlation in time"
+        )
+    return tuple(said)

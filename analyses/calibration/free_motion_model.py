@@ -1,0 +1,253 @@
+"""A robot whose winches stand still, as a function of what is unknown of it.
+
+The unknown vector has constants of the robot, how a sensor of turns is mounted and where it counts
+from, its clock, and unstrained lengths of the cables. The state at the first instant of a stretch
+is apart. The motion is that of the room `dynamics`, with cables of Kelvin and Voigt.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from pydrake.math import RigidTransform
+
+from cdpr_drake.analyses.calibration.identified_robots import dynamic_model, platform_size
+from cdpr_drake.arrays import Array
+from cdpr_drake.cables.models import ELASTIC, KELVIN_VOIGT, cable_derivatives
+from cdpr_drake.dynamics.free_run_kernel import free_run
+from cdpr_drake.dynamics.robot_arrays import Drive, RobotArrays, pack_robot
+from cdpr_drake.dynamics.robot_kernel import INTEGRATION_OK
+from cdpr_drake.errors import IdentificationError
+from cdpr_drake.geometry.cable_paths import cable_paths
+from cdpr_drake.geometry.poses import cross_matrix, pose_row
+from cdpr_drake.geometry.rotation_kernel import turn_pose
+from cdpr_drake.identification.parameters import CENTER, DAMPING, MASS_GROUP, MOMENTS, STIFFNESS
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.models.robot_statics import rigid_platform
+from cdpr_drake.statics.equilibrium import equilibrium_near
+from cdpr_drake.statics.rigid_platform import RigidPlatform
+from cdpr_drake.statics.stiffness import natural_modes
+
+FREE_GROUPS = (MASS_GROUP, CENTER, MOMENTS, STIFFNESS, DAMPING)
+"""Groups that a motion on standing winches can tell."""
+
+STATE, START = 13, 12
+"""Numbers of a platform's state, and of what moves the state at the first instant."""
+
+ANGLE_OF_STEP = 0.7
+"""Largest step times the fastest mode of the cables [rad]: the method is stable up to 1.7, and what
+is slow, and is compared, is exact to 1e-6."""
+
+DECAY_OF_STEP = 1.5
+"""The same of a mode's decay in a step; stable up to 2.5."""
+
+STIFFER = 2.0
+"""The fastest mode may become so many times as fast in the search."""
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """One number of the unknown vector.
+
+    Attributes:
+        name: As results name it.
+        unit: Its unit.
+        group: Its group.
+        before: As it is believed.
+        size: How far it may usually be from that; weighs as a prior of this standard deviation.
+        least: Bounds.
+        most: See there.
+    """
+
+    name: str
+    unit: str
+    group: str
+    before: float
+    size: float
+    least: float = -np.inf
+    most: float = np.inf
+
+
+@dataclass(frozen=True, eq=False)
+class FreeMotionModel:
+    """A robot on standing winches.
+
+    Attributes:
+        robot: As it is believed.
+        start: A pose near which it hangs.
+        unknowns: The unknown vector.
+        step: Largest step of the method [s].
+        fixed: Numbers that are not unknown, by name.
+    """
+
+    robot: Robot
+    start: RigidTransform
+    unknowns: tuple[Unknown, ...]
+    step: float
+    fixed: dict[str, float]
+
+    @staticmethod
+    def of(
+        robot: Robot, start: RigidTransform, groups: Sequence[str], turns: bool, tracker: bool
+    ) -> FreeMotionModel:
+        """With these groups unknown.
+
+        Args:
+            robot: As it is believed.
+            start: A pose near which it hangs.
+            groups: Names of `FREE_GROUPS`.
+            turns: Whether a sensor tells turns alone, from an unknown heading, mounted unknown.
+            tracker: Whether a tracker's frame is unknown.
+
+        Raises:
+            IdentificationError: The robot does not move freely in space, or a group is not known.
+        """
+        for word in groups:
+            if word not in FREE_GROUPS:
+                raise IdentificationError(
+                    f"unknown: found {word!r}; accepted of a free motion: {', '.join(FREE_GROUPS)}"
+                )
+        all_of = _all_unknowns(robot, start, turns, tracker)
+        asked = [one for one in all_of if one.group in (*groups, "", "sensor")]
+        fixed = {one.name: one.before for one in all_of if one not in asked}
+        fastest = STIFFER * _fastest_mode(robot, start)
+        step = ANGLE_OF_STEP / fastest
+        longest = DECAY_OF_STEP / (fastest**2 * step)
+        asked = [
+            replace(one, most=max(longest, 2.0 * one.before))
+            if one.name == "all.retardation_time" else one
+            for one in asked
+        ]  # fmt: skip
+        return FreeMotionModel(robot, start, tuple(asked), step, fixed)
+
+    @property
+    def names(self) -> list[str]:
+        """Of the vector."""
+        return [one.name for one in self.unknowns]
+
+    def before(self) -> Array:
+        """The vector as it is believed."""
+        return np.array([one.before for one in self.unknowns])
+
+    def by_name(self, vector: Array) -> dict[str, float]:
+        """All numbers at a vector."""
+        return self.fixed | dict(zip(self.names, vector.tolist(), strict=True))
+
+    def lengths(self, vector: Array) -> Array:
+        """Unstrained lengths, shape (m,) [m]."""
+        found = self.by_name(vector)
+        return np.array([found[f"{c.name}.unstrained_length"] for c in self.robot.cables])
+
+    def platform(self, vector: Array) -> RigidPlatform:
+        """The platform at a vector."""
+        n = self.by_name(vector)
+        mass, c = n["mass"], np.array([n[f"center_of_mass.{a}"] for a in "xyz"])
+        xx, yy, zz, xy, xz, yz = (n[f"inertia.{a}"] for a in ("xx", "yy", "zz", "xy", "xz", "yz"))
+        I_central = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        S = cross_matrix(c)
+        believed = rigid_platform(self.robot)
+        return replace(believed, mass=mass, p_PCo=c, I_PPo=I_central + mass * S @ S.T)
+
+    def arrays(self, vector: Array) -> RobotArrays:
+        """The robot at a vector, as the kernels take it."""
+        n, cables = self.by_name(vector), self.robot.cable_set()
+        believed = float(np.mean(cables.stiffness))
+        share = n["all.stiffness"] / believed
+        cables = replace(
+            cables, stiffness=cables.stiffness * share,
+            retardation=np.full(cables.count, n["all.retardation_time"]),
+        )  # fmt: skip
+        return pack_robot(
+            self.platform(vector), cables, KELVIN_VOIGT, Drive(), home=self.lengths(vector),
+            damping=(n["drag.force"], n["drag.moment"]),
+        )  # fmt: skip
+
+    def run(self, vector: Array, moved: Array, count: int, step: float) -> tuple[Array, Array]:
+        """States and tensions at even instants, shapes (count, 13) and (count, m); NaN behind an
+        instant at which the motion cannot go on.
+
+        Args:
+            vector: The unknown vector.
+            moved: From `start` at rest to the first state: rotation vector and translation in W,
+                then V_WP, shape (12,).
+            count: Instants.
+            step: Between them [s].
+        """
+        m = len(self.robot.cables)
+        state = np.zeros(STATE + m)
+        state[:7] = pose_row(self.start)
+        turn_pose(state, *moved[:3])
+        state[4:7] += moved[3:6]
+        state[7:STATE], state[STATE:] = moved[6:], self.lengths(vector)
+        states, tensions = np.full((count, STATE + m), np.nan), np.full((count, m), np.nan)
+        bad = free_run(
+            self.arrays(vector), state, np.zeros(m), step, self.step, states, tensions, np.zeros(4)
+        )
+        if bad != INTEGRATION_OK:
+            states[-1] = np.nan
+        return states[:, :STATE], tensions
+
+    def frequencies(self, vector: Array) -> Array:
+        """Of the modes about the pose of rest, slowest first [Hz].
+
+        Raises:
+            EquilibriumError: The platform does not rest anywhere near.
+        """
+        platform, n = self.platform(vector), self.by_name(vector)
+        cables = self.robot.cable_set()
+        share = n["all.stiffness"] / float(np.mean(cables.stiffness))
+        cables = replace(cables, stiffness=cables.stiffness * share)
+        l0 = self.lengths(vector)
+        X_WP = equilibrium_near(cables, ELASTIC, platform, l0, self.start).X_WP
+        K = platform.weight_stiffness(X_WP)
+        K = K - cable_derivatives(cables, ELASTIC, X_WP, l0).wrench_by_pose
+        return np.sort(natural_modes(K, platform, X_WP).frequencies)
+
+
+def _all_unknowns(robot: Robot, start: RigidTransform, turns: bool, tracker: bool) -> list[Unknown]:
+    """Every number that may be unknown."""
+    model, size = dynamic_model(robot), platform_size(robot)
+    cables, platform = robot.cable_set(), rigid_platform(robot)
+    mean = float(np.mean(model.inertia[:3]))
+    lengths = cable_paths(start, cables).lengths
+    share = model.mass * platform.gravity / len(robot.cables)
+    l0 = lengths / (1.0 + share / model.stiffness)
+    EA = float(np.mean(model.stiffness))
+    damped = model.mass / size
+    found = [
+        Unknown(f"{c.name}.unstrained_length", "m", "", float(value), 0.1 * float(value))
+        for c, value in zip(robot.cables, l0, strict=True)
+    ]
+    found.append(Unknown("mass", "kg", MASS_GROUP, model.mass, model.mass, 1e-3 * model.mass))
+    for axis, value in zip("xyz", model.center_of_mass.tolist(), strict=True):
+        found.append(Unknown(f"center_of_mass.{axis}", "m", CENTER, value, size))
+    for k, words in enumerate(("xx", "yy", "zz", "xy", "xz", "yz")):
+        least = 0.02 * mean if k < 3 else -np.inf
+        found.append(
+            Unknown(f"inertia.{words}", "kg m^2", MOMENTS, float(model.inertia[k]), mean, least)
+        )
+    T = float(np.mean(model.retardation))
+    found += [
+        Unknown("all.stiffness", "N", STIFFNESS, EA, EA, 0.02 * EA, STIFFER**2 * EA),
+        Unknown("all.retardation_time", "s", DAMPING, T, 0.01, 0.0),
+        Unknown("drag.force", "N s/m", DAMPING, 0.0, damped, 0.0),
+        Unknown("drag.moment", "N m s/rad", DAMPING, 0.0, damped * size**2, 0.0),
+    ]
+    if turns:
+        found.append(Unknown("sensor.heading", "rad", "sensor", 0.0, 0.5))
+        found += [Unknown(f"sensor.mount_{a}", "rad", "sensor", 0.0, 0.2) for a in "xyz"]
+    if tracker:
+        found += [Unknown(f"tracker.turn_{a}", "rad", "sensor", 0.0, 0.5) for a in "xyz"]
+        found += [Unknown(f"tracker.{a}", "m", "sensor", 0.0, 1.0) for a in "xyz"]
+    found.append(Unknown("sensor.late", "s", "sensor", 0.0, 0.1))
+    return found
+
+
+def _fastest_mode(robot: Robot, X_WP: RigidTransform) -> float:
+    """Of the platform on its cables, where their axial stiffness alone counts [rad/s]."""
+    cables, platform = robot.cable_set(), rigid_platform(robot)
+    paths = cable_paths(X_WP, cables)
+    K = paths.J.T @ np.diag(cables.stiffness / paths.lengths) @ paths.J
+    return float(2.0 * np.pi * np.max(natural_modes(K, platform, X_WP).frequencies))

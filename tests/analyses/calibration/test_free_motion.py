@@ -1,0 +1,149 @@
+"""Identification from free motion: motions by Drake's plant, frequencies, refusals."""
+
+import json
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from cdpr_drake.analyses.calibration.free_motion import earlier
+from cdpr_drake.analyses.calibration.free_motion_report import dominant_frequency
+from cdpr_drake.analyses.front.free_motion import identify_free_motion
+from cdpr_drake.cli.app import main
+from cdpr_drake.errors import IdentificationError
+from cdpr_drake.models.robot_loader import load_robot
+from tests.analyses.calibration import swings
+from tests.messages import printed
+
+SIGMAS = 4.0
+"""Standard errors by which a value may be off: one of 23 by 3 happens now and then."""
+
+PREDICTED_TURN, PREDICTED_PLACE = 0.01, 2e-3
+"""Of a held-out stretch [rad, m]: five times the noise of turns, which its first state has."""
+
+HERMITE_TOLERANCE = 5e-6
+"""h^4 / 384 of a fourth derivative of 9^4, twice."""
+
+FREQUENCY_TOLERANCE = 0.015
+"""Share of a dominant frequency: 1.6 s tell 0.6 Hz apart, noise moves the peak by some 0.02 Hz."""
+
+
+def spans_words(spans):
+    """Stretches as options take them."""
+    return ",".join(f"{a:.6g}:{b:.6g}" for a, b in spans)
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory):
+    """The command on two fitted swings and one that is held out: exit code, JSON and folder."""
+    folder = tmp_path_factory.mktemp("swings")
+    spans = swings.write(folder / "log.csv", (0, 1, 2))
+    args = ["identify", "irma4u", str(folder / "log.csv"), "--free", spans_words(spans[:2])]
+    args += ["--hold-out", spans_words(spans[2:]), "--out", str(folder / "out"), "--lead", "0.8"]
+    args += ["--sigma", "turn=0.002,tension=0.5", "--json"]
+    with pytest.raises(SystemExit) as ended:
+        main(args)
+    return ended.value.code, json.loads((folder / "out/identification.json").read_text()), folder
+
+
+def test_a_swing_by_the_plant_tells_the_platform_and_its_cables(found):
+    code, said, folder = found
+    assert code == 0
+    assert said["status"] == "optimal"
+    assert 0.9 < said["residuals_over_sigma"] < 1.15
+    true = {
+        "mass": 14.1, "all.stiffness": 4e10 * np.pi * 1e-6, "all.retardation_time": 0.004,
+        "drag.force": swings.DRAG[0], "drag.moment": swings.DRAG[1],
+        "sensor.late": swings.LATE, "sensor.heading": swings.HEADING,
+    }  # fmt: skip
+    robot = swings.true_robot()
+    true |= {f"center_of_mass.{a}": x for a, x in zip("xyz", (0.008, -0.004, 0.155), strict=True)}
+    names = ("xx", "yy", "zz", "xy", "xz", "yz")
+    true |= {f"inertia.{a}": float(x) for a, x in zip(names, robot.platform.inertia, strict=True)}
+    by_name = {one["name"]: one for one in said["parameters"]}
+    for name, value in true.items():
+        one = by_name[name]
+        assert abs(one["value"] - value) < SIGMAS * one["std"], (name, one, value)
+    assert by_name["mass"]["std"] < 0.2
+    assert by_name["all.stiffness"]["std"] < 0.05 * true["all.stiffness"]
+    identified = load_robot(str(folder / "out/robot.yaml"))
+    assert identified.platform.mass == pytest.approx(by_name["mass"]["value"])
+    np.testing.assert_allclose(
+        identified.cable_set().stiffness, by_name["all.stiffness"]["value"], rtol=1e-9
+    )
+    assert (folder / "out/held_out.png").exists()
+
+
+def test_a_held_out_swing_is_predicted(found):
+    _, said, _ = found
+    (one,) = said["held_out"]
+    assert one["turn_rms_rad"] < PREDICTED_TURN
+    assert one["position_rms_m"] < PREDICTED_PLACE
+    assert one["frequencies"]
+    for each in one["frequencies"]:
+        assert abs(each["off"]) < FREQUENCY_TOLERANCE
+    # The model as it was believed has other modes; what was found has the true ones.
+    assert abs(said["modes_before_hz"][0] / said["modes_hz"][0] - 1.0) > 0.02
+
+
+def test_states_a_time_earlier_are_those_of_the_motion():
+    step, late, w = 0.02, 0.013, np.array([0.3, -1.2, 0.8])
+    t = np.arange(60) * step
+
+    def states(time):
+        angle = np.sin(9.0 * time)[:, None]
+        q = Rotation.from_rotvec(angle * w / 2.0).as_quat()[:, [3, 0, 1, 2]]
+        p = np.column_stack([np.cos(9.0 * time), 0.0 * time, time])
+        spin = 9.0 * np.cos(9.0 * time)[:, None] * w / 2.0
+        v = np.column_stack([-9.0 * np.sin(9.0 * time), 0.0 * time, 1.0 + 0.0 * time])
+        return np.hstack([q, p, spin, v])
+
+    turns, places = earlier(states(t), step, late)
+    true = states(t - late)
+    off = turns.inv() * Rotation.from_quat(true[:, [1, 2, 3, 0]])
+    assert np.max(off[1:].magnitude()) < HERMITE_TOLERANCE
+    assert np.max(np.abs(places[1:] - true[1:, 4:7])) < HERMITE_TOLERANCE
+
+
+def test_dominant_frequency_is_that_of_a_sine():
+    t = np.arange(300) / 50.0
+    for f in (0.83, 1.9, 7.3):
+        values = 3.0 + np.exp(-0.2 * t) * np.sin(2.0 * np.pi * f * t + 0.3)
+        assert dominant_frequency(t, values) == pytest.approx(f, rel=2e-3)
+
+
+REFUSED = [
+    (["--free", "5"], "--free: found '5'; accepted: first:last, as 20:24.5 [s]"),
+    (["--free", "2:1"], "--free: found '2:1'; accepted: first:last"),
+    (["--free", "0:90"], "stretch 0:90: accepted: 0.5 s or more within 0 to 2.39 s"),
+    (
+        ["--free", "halves", "--unknown", "friction"],
+        "unknown: found 'friction'; accepted of a free",
+    ),
+    (["--free", "halves", "--lead", "-1"], "--lead: found -1; accepted: > 0 [s]"),
+    (["--free", "halves", "--sigma", "turns=1"], "'turns' is unknown; did you mean turn?"),
+]
+
+
+@pytest.mark.parametrize(("options", "words"), REFUSED)
+def test_what_cannot_be_is_said_in_one_line(tmp_path, capsys, options, words):
+    swings.write(tmp_path / "log.csv", (0,))
+    out = tmp_path / "out"
+    with pytest.raises(SystemExit) as ended:
+        main(["identify", "irma4u", str(tmp_path / "log.csv"), *options, "--out", str(out)])
+    said = printed(capsys).err
+    assert ended.value.code == 2
+    assert words in said
+    assert not out.exists()
+
+
+def test_winches_that_turn_and_a_mass_without_tensions_are_refused(tmp_path):
+    path = tmp_path / "log.csv"
+    lengths = np.linspace(1.9, 1.95, 240)[:, None]
+    swings.write(path, (0,), lengths)
+    with pytest.raises(IdentificationError, match=r"C1: found its length changing by 0\.0"):
+        identify_free_motion("irma4u", path, stretches=[(0.0, 2.0)])
+    lines = [",".join(row.split(",")[:4]) for row in path.read_text().splitlines()]
+    path.write_text("\n".join(lines) + "\n")
+    with pytest.raises(IdentificationError, match="without which a free motion does not tell the"):
+        identify_free_motion("irma4u", path, "mass", stretches=[(0.0, 2.0)])
