@@ -34,12 +34,12 @@ from cdpr_drake.planning.path_task import PathTask
 from cdpr_drake.workspaces.cable_interference import box_row
 from cdpr_drake.workspaces.proven_cells import CELLS
 
-ROBOTS = {"caroca": 0.1, "swinburne": 0.1, "macarm": 1.0}
+ROBOTS = {"caroca": 0.1, "macarm": 1.0, "ipanema_1": 0.5}
 """Robots, and the half width of the box of accelerations that is proven [m/s^2]. Suspended ones
-give little; MACARM has cables from below, too."""
+give little; the last two have cables from below, too."""
 
 PROBLEMS = {
-    "caroca": (3, 3, 2), "swinburne": (2, 2, 2), "macarm": (2, 2, 2),
+    "caroca": (3, 3, 2), "macarm": (2, 2, 2), "ipanema_1": (2, 2, 2),
 }  # fmt: skip
 """Problems with the wall, the pillars and the shelf."""
 
