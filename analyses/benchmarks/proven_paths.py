@@ -1,6 +1,7 @@
 """Proven paths against RRT* with shortcuts and free motions, on problems drawn by a seed.
 
-`python -m cdpr_drake.analyses.benchmarks.proven_paths --out FOLDER` writes `table.csv`.
+`python -m cdpr_drake.analyses.benchmarks.proven_paths --out FOLDER` writes `table.csv`, row by row,
+and with `--free N` afterwards `free.csv`; the same command goes on after the last whole row.
 OMPL is asked if it can be imported, else its columns are empty. Walls, pillars and shelves stand in
 the frames of three robots; starts and goals are drawn among the poses that the exact checks accept
 and whose straight line they do not. Paths are judged by the exact checks of poses, not by the sets.
@@ -24,20 +25,21 @@ from cdpr_drake.analyses.planning.free_motion import FreeSettings, solve_free_mo
 from cdpr_drake.analyses.planning.robot_path_task import LimitSettings, length_scale, path_task
 from cdpr_drake.analyses.workspaces.proven_sets import ProofSettings, ProvenSets
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import CdprError, PlanningError
+from cdpr_drake.errors import CdprError, DataFileError, PlanningError
 from cdpr_drake.geometry.poses import pose_from_angles
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.planning.path_in_sets import ProvenMotion, proven_motion
 from cdpr_drake.planning.path_task import PathTask
 from cdpr_drake.workspaces.cable_interference import box_row
+from cdpr_drake.workspaces.proven_cells import CELLS
 
-ROBOTS = {"caroca": 0.1, "swinburne": 0.1, "macarm": 1.0}
+ROBOTS = {"caroca": 0.1, "macarm": 1.0, "ipanema_1": 0.5}
 """Robots, and the half width of the box of accelerations that is proven [m/s^2]. Suspended ones
-give little; MACARM has cables from below, too."""
+give little; the last two have cables from below, too."""
 
 PROBLEMS = {
-    "caroca": (3, 3, 2), "swinburne": (2, 2, 2), "macarm": (2, 2, 2),
+    "caroca": (3, 3, 2), "macarm": (2, 2, 2), "ipanema_1": (2, 2, 2),
 }  # fmt: skip
 """Problems with the wall, the pillars and the shelf."""
 
@@ -61,24 +63,42 @@ RRT_CHECKS = 0.005
 BOXES = 150_000
 """Boxes that are judged for the sets of a scene, of all kinds."""
 
+ROUGH_BOXES, ROUGH_CELLS = 2000, 2**12
+"""Of sets that starts and goals are drawn with, where only the exact checks matter."""
+
+TABLE, FREE_TABLE = "table.csv", "free.csv"
+
+NAMES = ("seed", "robot", "scene", "problem")
+"""First columns of both tables."""
+
 COLUMNS = (
-    "robot", "scene", "problem", "straight_m", "sets", "sets_s", "found", "length_m", "curve_m",
-    "bound_m", "path_s", "duration_s", "infeasible", "samples", "rrt_m", "rrt_s", "rrt_infeasible",
-    "ratio", "free_s", "free",
+    *NAMES, "straight_m", "sets", "sets_s", "found", "length_m", "curve_m", "bound_m", "path_s",
+    "duration_s", "infeasible", "samples", "rrt_m", "rrt_s", "rrt_infeasible", "ratio",
 )  # fmt: skip
+
+FREE_COLUMNS = (*NAMES, "free_s", "free")
 
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """A start and a goal among obstacles."""
+    """A start and a goal among obstacles.
+
+    Attributes:
+        robot: The robot.
+        task: Its limits.
+        scene: One of `SCENES`.
+        number: Of those of the scene, from 1.
+        ends: Start and goal, shape (6,) each [m, rad].
+        judges: Sets that know the exact checks.
+        obstacles: Boxes, shape (o, 15).
+    """
 
     robot: Robot
     task: PathTask
     scene: str
     number: int
     ends: tuple[Array, Array]
-    sets: ProvenSets
-    sets_time: float
+    judges: ProvenSets
     obstacles: Array
 
 
@@ -124,37 +144,50 @@ def drawn_ends(sets: ProvenSets, robot: Robot, count: int, seed: int) -> list[tu
     return found
 
 
-def all_problems(seed: int) -> Iterator[Problem]:
-    """Problems in order; those of a scene share their sets."""
+def proof_settings(task: PathTask, boxes: int, cells: int) -> ProofSettings:
+    """How sets are proven for the tensions of a task."""
+    return ProofSettings(boxes=boxes, cells=cells, limits=(task.limits.lower, task.limits.upper))
+
+
+def scenes_of_problems(seed: int) -> Iterator[list[Problem]]:
+    """The problems of each robot and scene, in order."""
     for name, acceleration in ROBOTS.items():
         robot = load_robot(name)
         task = path_task(robot, LimitSettings())
-        settings = ProofSettings(boxes=BOXES, limits=(task.limits.lower, task.limits.upper))
         for k, scene in enumerate(SCENES):
-            boxes = scene_boxes(robot, scene)
-            rough = ProvenSets.find(
+            boxes, count = scene_boxes(robot, scene), PROBLEMS[name][k]
+            judges = ProvenSets.find(
                 robot, None, None, boxes, acceleration,
-                settings=ProofSettings(boxes=2000, cells=2**12, limits=settings.limits),
+                settings=proof_settings(task, ROUGH_BOXES, ROUGH_CELLS),
             )  # fmt: skip
-            ends = drawn_ends(rough, robot, PROBLEMS[name][k], seed + k)
-            begin = time.process_time()
-            try:
-                sets = ProvenSets.find(
-                    robot, None, None, boxes, acceleration, settings=settings,
-                    must=[pose for pair in ends for pose in pair],
-                )  # fmt: skip
-            except CdprError:  # a pose at the very border: without those that must be in
-                sets = ProvenSets.find(robot, None, None, boxes, acceleration, settings=settings)
-            took = time.process_time() - begin
-            for number, pair in enumerate(ends, 1):
-                yield Problem(robot, task, scene, number, pair, sets, took, boxes)
+            ends = drawn_ends(judges, robot, count, seed + k)
+            if len(ends) < count:
+                print(f"{name}, {scene}: {len(ends)} problems of {count} found", flush=True)
+            yield [
+                Problem(robot, task, scene, number, pair, judges, boxes)
+                for number, pair in enumerate(ends, 1)
+            ]
+
+
+def proven_sets(problems: Sequence[Problem]) -> tuple[ProvenSets, float]:
+    """Sets for all problems of a scene, and the processor time that they took [s]."""
+    one = problems[0]
+    settings = proof_settings(one.task, BOXES, CELLS)
+    asked = (one.robot, None, None, one.obstacles, ROBOTS[one.robot.name])
+    begin = time.process_time()
+    try:
+        must = [pose for problem in problems for pose in problem.ends]
+        sets = ProvenSets.find(*asked, settings=settings, must=must)
+    except CdprError:  # a pose at the very border: without those that must be in
+        sets = ProvenSets.find(*asked, settings=settings)
+    return sets, time.process_time() - begin
 
 
 def judged_motion(problem: Problem, found: ProvenMotion) -> int:
     """Of `CHECKED` samples of a motion, at how many a kind does not hold by the exact checks."""
     path = found.path.path
     s = np.linspace(0.0, path.length, CHECKED)
-    return int(np.count_nonzero(~good_poses(problem.sets, path.points(s)[:, 4:7])))
+    return int(np.count_nonzero(~good_poses(problem.judges, path.points(s)[:, 4:7])))
 
 
 def rrt_star(problem: Problem) -> tuple[float, float, int] | None:
@@ -176,7 +209,7 @@ def rrt_star(problem: Problem) -> tuple[float, float, int] | None:
     setup = geometric.SimpleSetup(space)
 
     def valid(state: Any) -> bool:
-        return bool(good_poses(problem.sets, np.array([[state[0], state[1], state[2]]]))[0])
+        return bool(good_poses(problem.judges, np.array([[state[0], state[1], state[2]]]))[0])
 
     setup.setStateValidityChecker(valid)
     setup.getSpaceInformation().setStateValidityCheckingResolution(RRT_CHECKS)
@@ -203,7 +236,7 @@ def rrt_star(problem: Problem) -> tuple[float, float, int] | None:
     ways = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(corners, axis=0), axis=1)))
     at = np.linspace(0.0, ways[-1], CHECKED)
     samples = np.column_stack([np.interp(at, ways, corners[:, k]) for k in range(3)])
-    return float(ways[-1]), took, int(np.count_nonzero(~good_poses(problem.sets, samples)))
+    return float(ways[-1]), took, int(np.count_nonzero(~good_poses(problem.judges, samples)))
 
 
 def free_motion(problem: Problem) -> tuple[float, str]:
@@ -218,18 +251,15 @@ def free_motion(problem: Problem) -> tuple[float, str]:
     return time.process_time() - begin, words
 
 
-def row_of(problem: Problem, free: bool) -> dict[str, Any]:
+def row_of(problem: Problem, sets: ProvenSets) -> dict[str, Any]:
     """All that is measured of a problem, by `COLUMNS`."""
     row: dict[str, Any] = {
-        "robot": problem.robot.name, "scene": problem.scene, "problem": problem.number,
         "straight_m": float(np.linalg.norm(problem.ends[1] - problem.ends[0])),
-        "sets": len(problem.sets), "sets_s": problem.sets_time, "found": "yes",
+        "sets": len(sets), "found": "yes",
     }  # fmt: skip
     begin = time.process_time()
     try:
-        found = proven_motion(
-            problem.sets, *problem.ends, problem.task, length_scale(problem.robot)
-        )
+        found = proven_motion(sets, *problem.ends, problem.task, length_scale(problem.robot))
         row |= {
             "path_s": time.process_time() - begin, "length_m": found.path.length,
             "curve_m": found.path.curve.polygon, "bound_m": found.path.lower_bound,
@@ -237,7 +267,7 @@ def row_of(problem: Problem, free: bool) -> dict[str, Any]:
             "infeasible": judged_motion(problem, found),
         }  # fmt: skip
     except CdprError as refusal:
-        row["found"] = str(refusal)[:60]
+        row["found"] = str(refusal)
     try:
         other = rrt_star(problem)
     except ImportError:
@@ -246,27 +276,85 @@ def row_of(problem: Problem, free: bool) -> dict[str, Any]:
         row |= {"rrt_m": other[0], "rrt_s": other[1], "rrt_infeasible": other[2]}
         if "length_m" in row:
             row["ratio"] = row["length_m"] / other[0]
-    if free:
-        row["free_s"], row["free"] = free_motion(problem)
     return row
 
 
+@dataclass(frozen=True, eq=False)
+class Table:
+    """A file of rows that grows, and goes on where an earlier run ended.
+
+    Attributes:
+        path: The file.
+        columns: Its columns; the first are `NAMES`.
+        seed: Of its problems.
+    """
+
+    path: Path
+    columns: tuple[str, ...]
+    seed: int
+
+    def done(self) -> set[tuple[str, str, int]]:
+        """Robot, scene and number of its whole rows; a half row at the end is cut off.
+
+        Raises:
+            DataFileError: It is of another seed, or of other columns.
+        """
+        if not self.path.is_file():
+            with self.path.open("w", newline="", encoding="utf-8") as file:
+                csv.writer(file).writerow(self.columns)
+            return set()
+        text = self.path.read_bytes()
+        self.path.write_bytes(text[: text.rfind(b"\n") + 1])
+        with self.path.open(newline="", encoding="utf-8") as file:
+            reader = csv.DictReader(file)
+            if tuple(reader.fieldnames or ()) != self.columns:
+                raise DataFileError(f"{self.path}: found other columns; accepted: this version's")
+            rows = list(reader)
+        if any(row["seed"] != str(self.seed) for row in rows):
+            raise DataFileError(f"{self.path}: found seed {rows[0]['seed']}; accepted: {self.seed}")
+        return {(row["robot"], row["scene"], int(row["problem"])) for row in rows}
+
+    def add(self, problem: Problem, row: dict[str, Any]) -> None:
+        """Writes what was measured of a problem."""
+        names = dict(zip(NAMES, (self.seed, *key_of(problem)), strict=True))
+        with self.path.open("a", newline="", encoding="utf-8") as file:
+            csv.DictWriter(file, self.columns).writerow({**names, **row})
+        print({**names, **row}, flush=True)
+
+
+def key_of(problem: Problem) -> tuple[str, str, int]:
+    """Robot, scene and number."""
+    return problem.robot.name, problem.scene, problem.number
+
+
 def main(words: Sequence[str] | None = None) -> int:
-    """Runs all problems; writes the table as it grows."""
+    """Runs all problems; writes the tables as they grow."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--free", type=int, default=0, help="problems of which free motions run")
+    parser.add_argument(
+        "--free", type=int, default=0, help="problems of each scene of which free motions run"
+    )
     given = parser.parse_args(words)
     given.out.mkdir(parents=True, exist_ok=True)
-    with (given.out / "table.csv").open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, COLUMNS)
-        writer.writeheader()
-        for number, problem in enumerate(all_problems(given.seed)):
-            row = row_of(problem, number < given.free)
-            writer.writerow(row)
-            file.flush()
-            print(row, flush=True)
+    table = Table(given.out / TABLE, COLUMNS, given.seed)
+    done = table.done()
+    for problems in scenes_of_problems(given.seed):
+        missing = [problem for problem in problems if key_of(problem) not in done]
+        if not missing:
+            continue
+        sets, took = proven_sets(problems)
+        for problem in missing:
+            table.add(problem, {"sets_s": took, **row_of(problem, sets)})
+    if given.free > 0:
+        table = Table(given.out / FREE_TABLE, FREE_COLUMNS, given.seed)
+        done = table.done()
+        for problems in scenes_of_problems(given.seed):
+            for problem in problems[: given.free]:
+                if key_of(problem) not in done:
+                    table.add(
+                        problem, dict(zip(FREE_COLUMNS[4:], free_motion(problem), strict=True))
+                    )
     return 0
 
 

@@ -35,6 +35,7 @@ from cdpr_drake.planning.path_task import PathTask
 from cdpr_drake.planning.path_timing import STATIONS, PathPlan, plan_along_path
 from cdpr_drake.schema.typed_yaml import closest
 from cdpr_drake.trajectories.curved_path import Move
+from cdpr_drake.trajectories.sampled_motion import read_motion
 from cdpr_drake.workspaces.demanded_wrenches import SpatialSet
 
 if TYPE_CHECKING:
@@ -198,7 +199,8 @@ def plan_free_motion(
         say: Told what is done now.
         asked: Fields of `FreeSettings`: `least` (time, tension or energy), `duration` [s],
             `knots`, `clearance` [m], `obstacles` (`Obstacles`, rows of boxes or a file), `in_view`
-            (3, p) [m], `camera`, `guess`, `nearest` [m].
+            (3, p) [m], `camera`, `guess` (a path or motion, or motion.csv of another plan),
+            `nearest` [m].
 
     Raises:
         PlanningError: No motion was found, or something is not accepted; names it.
@@ -209,6 +211,8 @@ def plan_free_motion(
     loaded, given = as_robot(robot, "plan_free_motion"), chosen_limits(limits)
     if isinstance(asked.get("obstacles"), str | Path):
         asked["obstacles"] = load_obstacles(Path(asked["obstacles"]))
+    if isinstance(asked.get("guess"), str | Path):
+        asked["guess"] = read_motion(Path(asked["guess"]))
     settings = FreeSettings(start=as_pose(loaded, start), goal=as_pose(loaded, goal), **asked)
     task = planned_for(loaded, given, pulleys)
     begin = time.perf_counter()

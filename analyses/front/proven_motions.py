@@ -146,8 +146,8 @@ def plan_proven_motion(
         )  # fmt: skip
         sets = ProvenSets.find(
             loaded, None, np.array([end[3:] for end in ends]), obstacles,
-            _accelerations(settings, ends), cover=settings.cover, must=ends, settings=proof,
-            say=tell,
+            _accelerations(settings, ends), cover=settings.cover,
+            must=dict(zip(("from", "to"), ends, strict=True)), settings=proof, say=tell,
         )  # fmt: skip
     else:
         _check_ends(sets, ends)

@@ -53,6 +53,10 @@ GUESSED_SPEED = 0.2
 END_MISSED = 1e-6
 """An end that misses a distance by less keeps it [m]: the solver is no more exact."""
 
+GUESS_WITHIN = 1e-3
+"""By which the ends of a guess may be off [m, rad]: files have rounded numbers, and the solver
+keeps the ends by itself."""
+
 GUESSES = (1.3, 2.5, 5.0)
 """Times from which a solver starts, over the least along the straight line, until it succeeds."""
 
@@ -224,6 +228,15 @@ def _guesses(
 
     if asked.guess is not None:
         path = asked.guess.path if isinstance(asked.guess, TimedPath) else asked.guess
+        for word, at, end in (
+            ("begins", path.pose(0.0), asked.start), ("ends", path.pose(path.length), asked.goal)
+        ):  # fmt: skip
+            way, angle = pose_error(at, end)
+            if max(way, angle) > GUESS_WITHIN:
+                raise PlanningError(
+                    f"guess: {word} {way:.4g} m and {np.degrees(angle):.4g} deg from there; "
+                    "accepted: a path or motion from the start to the goal"
+                )
         return [(asked.guess, timed(path, share)) for share in shares]
     lines: list[tuple[PosePath | TimedPath | None, float]]
     if asked.clearance is None or asked.obstacles is None:

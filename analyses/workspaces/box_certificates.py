@@ -200,9 +200,15 @@ def box_numbers(found: CertifiedBoxes, search: BoxSearch | None = None) -> dict[
 
 
 def save_boxes(found: CertifiedBoxes, folder: Path) -> Path:
-    """Writes `boxes.npz` into a folder that exists, and returns its path."""
+    """Writes `boxes.npz` into a folder that exists, and returns its path.
+
+    Of several kinds the bits that say which are proven of each box are there, too, so that boxes
+    that are read again can be refined.
+    """
     path = folder / BOX_ARRAYS
     arrays = {name: getattr(found, name) for name in ("poses", "halves", "verdicts", "curve")}
+    if found.proven is not None:
+        arrays["proven"] = found.proven
     store_arrays(path, arrays)
     return path
 
@@ -221,7 +227,7 @@ def load_boxes(folder: Path, finished: bool) -> CertifiedBoxes:
     if arrays is None or not set(names) <= set(arrays):
         raise DataFileError(f"{folder / BOX_ARRAYS}: found no boxes; accepted: a whole file")
     poses, halves, verdicts, curve = (arrays[name] for name in names)
-    return CertifiedBoxes(poses, halves, verdicts, curve, finished)
+    return CertifiedBoxes(poses, halves, verdicts, curve, finished, arrays.get("proven"))
 
 
 def write_boxes(found: CertifiedBoxes, path: Path) -> Path:

@@ -86,7 +86,7 @@ class ProvenSets(PoseSets):
         accelerations: Array | float | None = None,
         *,
         cover: float = COVER,
-        must: Sequence[Array] = (),
+        must: Sequence[Array] | Mapping[str, Array] = (),
         settings: ProofSettings = DEFAULT_PROOF,
         say: Callable[[str], None] = lambda words: None,
     ) -> ProvenSets:
@@ -103,8 +103,9 @@ class ProvenSets(PoseSets):
                 which the cables can give at every pose, for the kind wrench-feasible; only where no
                 angle varies [m/s^2].
             cover: Share of what is proven that the sets cover.
-            must: Poses in sets, shape (6,) each [m, rad]; where open cells keep them from each
-                other, in their order, these are cut further.
+            must: Poses in sets, shape (6,) each [m, rad], or these by the names that refusals
+                begin with; where open cells keep them from each other, in their order, these are
+                cut further.
             settings: How they are proven.
             say: Told what is done now.
 
@@ -148,7 +149,8 @@ class ProvenSets(PoseSets):
             tasks=search.tasks,
             about=_about(loaded, chosen, turned, obstacles, box, settings),
         )
-        return _prove(loaded, search.box, draft, (cover, list(must), settings), say)
+        named = must if isinstance(must, Mapping) else {f"must[{k}]": p for k, p in enumerate(must)}
+        return _prove(loaded, search.box, draft, (cover, dict(named), settings), say)
 
     def judge(self, positions: Array, rotations: Array) -> dict[str, np.ndarray]:
         """Whether each kind holds at poses, by the exact checks of poses and not by the sets.
@@ -244,7 +246,7 @@ def _prove(
     robot: Robot,
     box: PoseBox,
     draft: ProvenSets,
-    how: tuple[float, list[Array], ProofSettings],
+    how: tuple[float, dict[str, Array], ProofSettings],
     say: Callable[[str], None],
 ) -> ProvenSets:
     cover, must, settings = how
@@ -253,22 +255,27 @@ def _prove(
     def tell(judged: int, share: float) -> None:
         say(f"Proving poses of {robot.name}: {judged} boxes, {share:.1%} open")
 
-    for pose in must:
+    for name, pose in must.items():
+        found = f"{name}: found the pose {pose_words(pose)}"
         if failing := explain_pose(draft, pose):
-            raise WorkspaceError(f"pose {pose_words(pose)}: {failing}; accepted: where all hold")
+            raise WorkspaceError(f"{found}: {failing}; accepted: where all hold")
         if np.any((pose < box.lower - 1e-9) | (pose > box.upper + 1e-9)):
             raise WorkspaceError(
-                f"pose {pose_words(pose)}: lies outside the frame of {robot.name}, or at other "
+                f"{found}: it lies outside the frame of {robot.name}, or at other "
                 "angles; accepted: poses inside"
             )
     cells = prove_cells(tasks, box, settings.boxes, tasks[0].case.arm(), settings.cells, tell)
     cells, cut = connect_poses(
-        cells, tasks, must, on_cut=lambda n: say(f"Cutting open cells for {robot.name}: {n}")
+        cells,
+        tasks,
+        list(must.values()),
+        on_cut=lambda n: say(f"Cutting open cells for {robot.name}: {n}"),
     )
-    for pose in must:
+    for name, pose in must.items():
         if inside_cell(cells, pose) is None:
             raise WorkspaceError(
-                f"pose {pose_words(pose)}: all of {', '.join(names)} hold there, but not proven in "
+                f"{name}: found the pose {pose_words(pose)}: all of {', '.join(names)} hold there, "
+                "but are not proven in "
                 f"a cell round it, {np.array2string(cells.width, precision=3)} wide; accepted: a "
                 "pose farther from the border, or more boxes or cells"
             )
@@ -278,9 +285,9 @@ def _prove(
             "proven; accepted: more boxes, smaller accelerations, another orientation"
         )
     say(f"Merging boxes for {robot.name}")
-    lower, upper, found = sets_of_cells(cells, cover, must)
+    lower, upper, merged = sets_of_cells(cells, cover, list(must.values()))
     covered = np.zeros(cells.inside.shape, bool)
-    for low, high in found.tolist():
+    for low, high in merged.tolist():
         covered[tuple(slice(a, b) for a, b in zip(low, high, strict=True))] = True
     about = {
         **draft.about,

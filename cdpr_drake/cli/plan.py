@@ -49,6 +49,7 @@ from cdpr_drake.cli.proven_options import (
     Acceleration,
     Boxes,
     LeastTime,
+    Method,
     Proven,
     ProvenWords,
     one_pose,
@@ -171,6 +172,13 @@ Camera = Annotated[
 Nearest = Annotated[
     float | None, typer.Option(help="With --keep-in-view: least depth of the points [m].")
 ]
+Guess = Annotated[
+    Path | None,
+    typer.Option(
+        help="With --free: motion.csv of another plan between the same poses, such as one of "
+        "--proven, from which the solver starts."
+    ),
+]
 Knots = Annotated[int | None, typer.Option(help="With --free: instants at which limits are asked.")]
 
 
@@ -188,10 +196,11 @@ class FreeWords:
     camera: str | None
     nearest: float | None
     knots: int | None
+    guess: Path | None
 
     OPTIONS = (
         "--from", "--to", "--least", "--duration", "--clearance", "--obstacles", "--keep-in-view",
-        "--camera", "--nearest", "--knots",
+        "--camera", "--nearest", "--knots", "--guess",
     )  # fmt: skip
 
     def given(self) -> list[str]:
@@ -226,6 +235,7 @@ class FreeWords:
                 "camera",
                 "nearest",
                 "knots",
+                "guess",
             )
             if (value := getattr(self, name)) is not None
         }
@@ -279,10 +289,12 @@ def plan(
     camera: Camera = None,
     nearest: Nearest = None,
     knots: Knots = None,
+    guess: Guess = None,
     proven: Proven = False,
     time: LeastTime = False,
     acceleration: Acceleration = None,
     boxes: Boxes = None,
+    method: Method = None,
     track: Track = True,
     stream: Stream = None,
     stream_model: StreamModel = ELASTIC,
@@ -304,9 +316,10 @@ def plan(
         cable_acceleration=cable_acceleration, speed=speed, reserve=reserve,
     )  # fmt: skip
     words = FreeWords(
-        start, goal, least, duration, clearance, obstacles, keep_in_view, camera, nearest, knots
-    )
-    sure = ProvenWords(start, goal, clearance, obstacles, time, acceleration, boxes)
+        start, goal, least, duration, clearance, obstacles, keep_in_view, camera, nearest, knots,
+        guess,
+    )  # fmt: skip
+    sure = ProvenWords(start, goal, clearance, obstacles, time, acceleration, boxes, method)
     planner: Planner
     if not proven and sure.given():
         raise CdprError(f"{sure.given()[0]}: accepted with --proven; found no --proven")

@@ -9,8 +9,10 @@ from typing import Annotated, Any
 import typer
 from rich.console import Console
 
+from cdpr_drake.cli.completion import words_among
 from cdpr_drake.cli.options import parse_numbers, parse_pose
 from cdpr_drake.errors import CdprError
+from cdpr_drake.planning.path_in_sets import METHODS
 
 Proven = Annotated[
     bool,
@@ -30,6 +32,14 @@ Acceleration = Annotated[
         "platform turns [m/s^2]."
     ),
 ]
+Method = Annotated[
+    str | None,
+    typer.Option(
+        help="With --proven: how sets are chosen: sequences (without this option), short ones from "
+        "set to set, or gcs, by Drake's graph of convex sets, to compare.",
+        autocompletion=words_among(METHODS),
+    ),
+]
 Boxes = Annotated[
     int | None, typer.Option(help="With --proven: boxes of poses that are judged, at most.")
 ]
@@ -46,11 +56,12 @@ class ProvenWords:
     time: bool
     acceleration: str | None
     boxes: int | None
+    method: str | None
 
     def given(self) -> list[str]:
         """Names of the options that were given and belong to --proven alone."""
         found = {"--time": self.time or None, "--acceleration": self.acceleration,
-                 "--boxes": self.boxes}  # fmt: skip
+                 "--boxes": self.boxes, "--method": self.method}  # fmt: skip
         return [name for name, value in found.items() if value is not None]
 
     def asked(self) -> dict[str, Any]:
@@ -63,11 +74,13 @@ class ProvenWords:
         for option, words in (("--from", self.start), ("--to", self.goal)):
             if words is None:
                 raise CdprError(f"{option}: found none with --proven; accepted: a pose")
-        for name in ("clearance", "obstacles", "boxes"):
+        for name in ("clearance", "obstacles", "boxes", "method"):
             if (value := getattr(self, name)) is not None:
                 found[name] = value
         if self.boxes is not None and self.boxes < 1:
             raise CdprError(f"--boxes: found {self.boxes}; accepted: at least 1")
+        if self.method is not None and self.method not in METHODS:
+            raise CdprError(f"--method: found {self.method!r}; accepted: {', '.join(METHODS)}")
         if self.acceleration is not None:
             meaning = "a or ax,ay,az, each above 0, or 0 [m/s^2]"
             numbers = parse_numbers("--acceleration", self.acceleration, (1, 3), meaning)
@@ -83,6 +96,7 @@ class ProvenWords:
             "from": self.start, "to": self.goal, "clearance": self.clearance,
             "obstacles": None if self.obstacles is None else str(self.obstacles),
             "time": self.time, "acceleration": self.acceleration, "boxes": self.boxes,
+            "method": self.method,
         }  # fmt: skip
 
 

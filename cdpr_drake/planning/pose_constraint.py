@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from pydrake.autodiffutils import AutoDiffXd, ExtractGradient, ExtractValue, InitializeAutoDiff
+from pydrake.autodiffutils import AutoDiffXd, ExtractGradient, InitializeAutoDiff
 from pydrake.solvers import Binding, MathematicalProgram, PyFunctionConstraint
 from pydrake.symbolic import DecomposeAffineExpressions, Expression, Variable, Variables
 
@@ -162,10 +162,11 @@ def drake_function(evaluate: Differentiable) -> Callable[[Any], Any]:
     def function(x: Any) -> Any:
         if x.dtype != object:
             return evaluate(x)[0]
-        values, jacobian = evaluate(ExtractValue(x).ravel())
+        # Half of a call is Drake's, which makes these numbers; taking them one by one is faster.
+        values, jacobian = evaluate(np.fromiter(map(AutoDiffXd.value, x), float, len(x)))
         slopes = ExtractGradient(x)
         if slopes.shape[1]:
-            jacobian = jacobian @ slopes
+            jacobian = np.dot(jacobian, slopes)
             return InitializeAutoDiff(values, jacobian).ravel()
         return np.array([AutoDiffXd(value) for value in values])
 

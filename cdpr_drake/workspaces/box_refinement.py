@@ -13,7 +13,12 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.errors import WorkspaceError
 from cdpr_drake.workspaces.box_expansion_kernel import INSIDE, NUMBERS, OPEN, OUTSIDE
 from cdpr_drake.workspaces.box_judges import CertifyTask, judge_all, several
-from cdpr_drake.workspaces.certified_boxes import CHUNK, CertifiedBoxes, PoseBox, cut_boxes
+from cdpr_drake.workspaces.certified_boxes import (
+    CHUNK,
+    BoxJournal,
+    CertifiedBoxes,
+    cut_boxes,
+)
 
 SAME_SIZE = 1e-9
 """Boxes are cut together whose shares of the whole differ by less than this share of them."""
@@ -75,23 +80,28 @@ class PathTube:
 def refine(
     found: CertifiedBoxes,
     task: CertifyTask | Sequence[CertifyTask],
-    region: Region | PoseBox,
+    region: Region,
     most_boxes: int = 100_000,
     *,
     smallest: Array | None = None,
     on_progress: Callable[[int, float], None] | None = None,
     should_stop: Callable[[], bool] | None = None,
+    known: BoxJournal | None = None,
+    on_journal: Callable[[BoxJournal], None] | None = None,
 ) -> CertifiedBoxes:
     """Goes on cutting boxes that are open and meet a region; the largest first.
 
     Args:
         found: What was found of the whole.
         task: What `found` was asked for.
-        region: Where it matters.
+        region: Where it matters, such as a `PoseBox` or a `PathTube`.
         most_boxes: How many more boxes are judged, at most.
         smallest: Half widths below which a box is not cut, shape (6,) [m, rad]; None: no limit.
         on_progress: Called now and then with the number of boxes judged and the open share.
         should_stop: Asked as often; True ends it.
+        known: Of an earlier call for the same, for as many boxes or fewer, which is continued: what
+            comes out is the same as if it had not ended.
+        on_journal: Called as often with what is known by then, for the next call.
 
     Returns:
         Boxes of the whole: those that were not cut as they were, in their order, then the others.
@@ -113,6 +123,7 @@ def refine(
     volumes = np.prod(np.where(halves > 0.0, 2.0 * halves, 1.0), axis=1)
     shares = volumes / np.sum(volumes)
     judged, stopped, curve = 0, False, [tuple(found.curve[-1])]
+    journal, before = BoxJournal(), (known or BoxJournal()).arrays()
     while not stopped and judged < most_boxes:
         wanted = np.flatnonzero((verdicts == OPEN) & np.any(halves > least, axis=1))
         wanted = wanted[region.meets(poses[wanted], halves[wanted])]
@@ -129,13 +140,14 @@ def refine(
                 wanted = wanted[:first]
                 break
             some = wanted[first : first + CHUNK // 2]
-            _, axes, _ = judge_all(tasks, poses[some], halves[some], proven[some])
-            new_poses, new_halves = cut_boxes(poses[some], halves[some], axes)
-            kept = np.tile(proven[some], 2)
-            new_verdicts, _, new_proven = judge_all(tasks, new_poses, new_halves, kept)
-            parts.append(
-                (new_poses, new_halves, new_verdicts, new_proven, np.tile(0.5 * shares[some], 2))
-            )
+            # Of each box that is cut the journal has two rows, of its halves.
+            rows = slice(journal.count, journal.count + 2 * len(some))
+            told_before = tuple(one[rows] for one in before)
+            new = _cut_and_judge(tasks, poses[some], halves[some], proven[some], told_before)
+            journal.add(*new[2:])
+            if on_journal is not None and rows.stop > len(before[0]):
+                on_journal(journal)
+            parts.append((new[0], new[1], new[2], new[4], np.repeat(0.5 * shares[some], 2)))
         if not parts:
             break
         rest = np.ones(len(poses), bool)
@@ -155,3 +167,37 @@ def refine(
         poses, halves, verdicts, np.concatenate([found.curve, np.array(curve[1:]).reshape(-1, 4)]),
         not stopped, None if found.proven is None else proven,
     )  # fmt: skip
+
+
+def _cut_and_judge(
+    tasks: Sequence[CertifyTask], poses: Array, halves: Array, proven: np.ndarray,
+    known: tuple[np.ndarray, np.ndarray, np.ndarray],
+) -> tuple[Array, Array, np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
+    """Both halves of each box, one after the other: poses, half widths, verdicts, and the rest.
+
+    Args:
+        tasks: What is to be proven.
+        poses: Middles, shape (k, 6) [m, rad].
+        halves: Half widths, shape (k, 6) [m, rad].
+        proven: Which tasks are proven of them, bits, shape (k,).
+        known: Verdicts, axes and bits of the halves of the first of them, as they are returned.
+
+    Returns:
+        Poses and half widths, shape (2 k, 6); verdicts, the number that each was cut across, and
+        bits, shape (2 k,).
+    """
+    have = len(known[0]) // 2
+    axes = np.zeros(len(poses), np.int64)
+    axes[:have] = known[1][: 2 * have : 2]
+    if have < len(poses):
+        axes[have:] = judge_all(tasks, poses[have:], halves[have:], proven[have:])[1]
+    low_high = np.arange(2 * len(poses)).reshape(2, -1).T.ravel()
+    new_poses, new_halves = (one[low_high] for one in cut_boxes(poses, halves, axes))
+    verdicts, bits = np.zeros(2 * len(poses), np.int64), np.repeat(proven, 2)
+    verdicts[: 2 * have], bits[: 2 * have] = known[0][: 2 * have], known[2][: 2 * have]
+    if have < len(poses):
+        rest = slice(2 * have, None)
+        verdicts[rest], _, bits[rest] = judge_all(
+            tasks, new_poses[rest], new_halves[rest], bits[rest]
+        )
+    return new_poses, new_halves, verdicts, np.repeat(axes, 2), bits

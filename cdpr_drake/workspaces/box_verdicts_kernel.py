@@ -90,16 +90,18 @@ of the n - 1 cables that it is normal to are sure, and c_k turns it with them. F
 the centre of the cone {c: W'c < 0}, c_k keeps products with it as they are, and f_i < 0 is shown:
 no positive tensions balance anything.
 
-**Interference.** n(delta) = n_0 + sum delta_k n_k, k over the position, separates two things if
-n(delta) times any point of one less any point of the other exceeds (the distance that is asked for,
-and what points are off by, turns too: s |b|) times a bound on |n(delta)|. For two cables the
-difference of points is linear in the place on each, so four corners decide: exit or anchor point of
-one less that of the other, a fixed vector Q plus sign delta, sign 0, 1 or -1. For a cable and a
-box, seen from the box, one end of the cable rests and the other is moved by sign delta: of the
-cable two ends decide, of the box the corner where n(delta) points, or, where a component of n may
-change its sign, both corners. Then n(delta).(Q + sign delta) is
+**Interference.** n(delta) = n_0 + sum delta_k n_k separates two things if n(delta) times any point
+of one less any point of the other exceeds (the distance that is asked for, and what points are off
+by) times a bound on |n(delta)|. Points of cables follow the pose by m_k: of an anchor point the
+axes of W and b^k, which leaves s^2 |b| / 2; of an exit point v = a - p seen from the platform minus
+the axes and -a_k x v, a_k the axes of the angles, which leaves s^2 |v| / 2 + s |h|, h over the
+position. For two cables the difference of points is linear in the place on each, so four corners
+decide: exit or anchor point of one less that of the other, Q + sum delta_k m_k, m_k the difference
+of theirs. For a cable and a box, seen from the box, one end of the cable rests and the other
+moves: of the cable two ends decide, of the box the corner where n(delta) points, or, where a
+component of n may change its sign, both corners. Then n(delta).(Q + sum delta_k m_k) is
 
-  n_0.Q + sum delta_k (n_k.Q + sign n_0k) + sign sum delta_j delta_k n_kj,
+  n_0.Q + sum delta_k (n_k.Q + n_0.m_k) + sum delta_j delta_k n_k.m_j,
 
 bounded term by term. Where a length f next to the resting end is left out, the part begins at that
 end + f u(delta); u, the direction of the cable q of length l, is off its first order by at most
@@ -109,9 +111,10 @@ edges.
 
 A box is outside if some point of a cable and some point of what it meets, at shares of their
 lengths that may follow delta, are too near for all delta: their distance is at most that at the
-middle, plus sum h_k |w_k| with w_k = (x - y) e_k + x_k D - y_k D' the rates at which it changes,
-plus |h| sum h_k |x_k - y_k|, for cables along D and D', nearest at x and y. Of a box the point need
-only stay within, axis by axis.
+middle, plus sum h_k |w_k| with w_k = x B^k - y D^k + x_k (B - A) - y_k (D - C) the rates at which
+it changes, plus |h| sum h_k |x_k - y_k| over the position, plus what the angles move either anchor
+point times sum h_k |x_k|, or |y_k|, for cables A to B and C to D, nearest at x and y. Of a box the
+point need only stay within, axis by axis; what the end is off beside m_k moves it by its share.
 
 **Rounding.** All that enters a proof is computed from coordinates by at most a few dozen additions
 and products, each wrong by 1.1e-16 of its result. `box_expansion_kernel.ROUNDING` times the sum of
@@ -139,6 +142,7 @@ from cdpr_drake.workspaces.box_expansion_kernel import (
     NUMBERS,
     OPEN,
     OUTSIDE,
+    ROUNDING,
     expand,
     expand_demand,
     turn_axes,
@@ -150,7 +154,7 @@ from cdpr_drake.workspaces.box_outside_kernel import (
     proves_open_cone,
     proves_outside,
 )
-from cdpr_drake.workspaces.box_pair_clearance_kernel import judge_pair
+from cdpr_drake.workspaces.box_pair_clearance_kernel import judge_pair, swing
 from cdpr_drake.workspaces.box_pulleys_kernel import see_pulleys, straight_points
 from cdpr_drake.workspaces.wrench_facets_kernel import facet_normals, margin_along
 
@@ -320,9 +324,13 @@ def judge_clearances(
     R, axes, moved = np.empty((3, 3)), np.empty((3, 3)), np.empty((bodies.shape[0], 15))
     B, b, seen = np.empty((m, 3)), np.empty((m, 3)), np.empty((m, 3))
     arm, far, off, gain = np.empty(m), np.empty(m), np.empty(m), np.zeros(m)
-    n, nk, Q, q, blame = (
-        np.empty(3), np.empty((3, 3)), np.empty(3), np.empty(3), np.empty(3)
+    n, nk, Q, q, work, blame = (
+        np.empty(3), np.empty((NUMBERS, 3)), np.empty(3), np.empty(3), np.empty(NUMBERS),
+        np.zeros(NUMBERS),
     )  # fmt: skip
+    moves, spare = np.empty((2, m, NUMBERS, 3)), np.empty((NUMBERS, 3))
+    margin = np.empty(m)
+    around = _limits(fixtures), _limits(obstacles)
     clearance, exit_free, anchor_free = limits[0], limits[1], limits[2]
     for box in range(first, past):
         half = halves[box]
@@ -331,6 +339,7 @@ def judge_clearances(
             runs = see_pulleys(poses[box], half, cables, limits[3:], False, points, bounds, turns)
         size = np.sqrt(half[0] ** 2 + half[1] ** 2 + half[2] ** 2)
         s = half[3] + half[4] + half[5]
+        numbers = NUMBERS if s > 0.0 else 3
         turn_axes(poses[box, 3:], R, axes)
         extent = size
         for i in range(m):
@@ -343,7 +352,9 @@ def judge_clearances(
                 distance += seen[i, k] ** 2
                 coordinates += abs(points[i, k]) + abs(points[i, 3 + k]) + abs(poses[box, k])
             arm[i], far[i] = np.sqrt(square), np.sqrt(distance)
-            off[i] = s * arm[i] + bounds[i, ANCHOR]
+            off[i] = 0.5 * s * s * arm[i]
+            _write_moves(axes, b[i], 1.0, moves[0, i])
+            _write_moves(axes, seen[i], -1.0, moves[1, i])
             if pulleys:  # what a tangent point is off, by what the anchor point moves
                 change = bounds[i, EXIT] + bounds[i, ANCHOR] - limits[3] - limits[4]
                 gain[i] = change / (size + s * arm[i])
@@ -356,6 +367,11 @@ def judge_clearances(
                     coordinates += abs(each[row, k])
                 extent = max(extent, coordinates)
         _turned(R, bodies, moved)
+        for i in range(m):
+            margin[i] = _surely_far(
+                points[i, :3], B[i], size + swing(moves[0, i], half, numbers), off[i],
+                bounds[i, EXIT], bounds[i, ANCHOR], exit_free, clearance + radius[i], extent,
+            )  # fmt: skip
         inward, outward, verdict = -1.0, np.inf, INSIDE if runs else OPEN  # missed by
         for j in range(6):
             stretch[box, j] = half[j]
@@ -366,28 +382,32 @@ def judge_clearances(
             for number in range(count):
                 if kind == 0:
                     i, o = pairs[number, 0], pairs[number, 1]
-                    error = max(bounds[i, EXIT], off[i]) + max(bounds[o, EXIT], off[o])
+                    error = max(bounds[i, EXIT], off[i] + bounds[i, ANCHOR])
+                    error += max(bounds[o, EXIT], off[o] + bounds[o, ANCHOR])
                     apart, reach = clearance + radius[i] + radius[o], arm[i] + arm[o]
                     shifted = max(gain[i], gain[o])
                     found, missing = judge_pair(
-                        points[i, :3], B[i], points[o, :3], B[o], half[:3], apart, error, extent,
-                        n, nk, Q, blame,
+                        points[i, :3], B[i], points[o, :3], B[o], moves[0, i], moves[0, o], half,
+                        numbers, apart, error, extent, n, nk, Q, spare, blame,
                     )  # fmt: skip
                 elif kind == 1:
                     i, o = number % m, number // m
                     reach, shifted = far[i], gain[i]
                     found, missing = judge_box(
-                        b[i], seen[i], -1.0, half[:3], moved[o], anchor_free, clearance + radius[i],
-                        bounds[i, ANCHOR], s * (far[i] + size) + bounds[i, EXIT], extent, n, nk,
-                        Q, q, blame,
+                        b[i], seen[i], moves[1, i], half, numbers, moved[o], anchor_free,
+                        clearance + radius[i], bounds[i, ANCHOR], bounds[i, EXIT],
+                        s * (0.5 * s * far[i] + size), extent, n, nk, Q, q, work, blame,
                     )  # fmt: skip
                 else:
                     i, o = number % m, number // m
+                    if _apart(points[i, :3], B[i], around[kind - 2][o], margin[i]):
+                        continue
                     reach, shifted = arm[i], gain[i]
                     found, missing = judge_box(
-                        points[i, :3], B[i], 1.0, half[:3], (fixtures, obstacles)[kind - 2][o],
-                        exit_free if kind == 2 else 0.0, clearance + radius[i], bounds[i, EXIT],
-                        off[i], extent, n, nk, Q, q, blame,
+                        points[i, :3], B[i], moves[0, i], half, numbers,
+                        (fixtures, obstacles)[kind - 2][o], exit_free if kind == 2 else 0.0,
+                        clearance + radius[i], bounds[i, EXIT], bounds[i, ANCHOR], off[i], extent,
+                        n, nk, Q, q, work, blame,
                     )  # fmt: skip
                 if found == OUTSIDE:
                     verdict = OUTSIDE
@@ -403,10 +423,64 @@ def judge_clearances(
                             inward = missing
                         for k in range(3):
                             stretch[box, k] = blame[k] + shifted * half[k]
-                            stretch[box, 3 + k] = half[3 + k] * reach
+                            rest = half[3 + k] * (0.5 * s + shifted) * reach
+                            stretch[box, 3 + k] = blame[3 + k] + rest
             if verdict == OUTSIDE:
                 break
         verdicts[box] = verdict
+
+
+@njit(cache=True, error_model="numpy")
+def _limits(boxes: Array) -> Array:
+    """Least and largest coordinates of boxes, shape (o, 6)."""
+    found = np.empty((boxes.shape[0], 6))
+    for row in range(boxes.shape[0]):
+        for k in range(3):
+            wide = 0.0
+            for a in range(3):
+                wide += abs(boxes[row, 3 * k + a]) * boxes[row, 12 + a]
+            found[row, k], found[row, 3 + k] = boxes[row, 9 + k] - wide, boxes[row, 9 + k] + wide
+    return found
+
+
+@njit(cache=True, error_model="numpy")
+def _surely_far(
+    A: Array, B: Array, size: float, bend: float, exit_off: float, anchor_off: float, free: float,
+    apart: float, extent: float,
+) -> float:  # fmt: skip
+    """A distance at the middle at which `judge_box` says inside at once; infinite: there is none.
+
+    It is larger than needed by more than roundings, so it changes no verdict.
+    """
+    length = 0.0
+    for k in range(3):
+        length += (B[k] - A[k]) ** 2
+    change = size + exit_off + anchor_off + bend + ROUNDING * extent
+    shortest = np.sqrt(length) - change
+    if not shortest > 0.0:
+        return np.inf
+    need = size + max(exit_off, anchor_off) + bend + apart + free * change / shortest
+    return (1.0 + ROUNDING) * need + 10.0 * ROUNDING * extent
+
+
+@njit(cache=True, error_model="numpy")
+def _apart(A: Array, B: Array, limits: Array, margin: float) -> bool:
+    """Whether a cable at the middle is farther than that from a box along an axis."""
+    for k in range(3):
+        if limits[k] - max(A[k], B[k]) > margin or min(A[k], B[k]) - limits[3 + k] > margin:
+            return True
+    return False
+
+
+@njit(cache=True, error_model="numpy")
+def _write_moves(axes: Array, arm: Array, sign: float, moves: Array) -> None:
+    """Writes how sign (p + R b), b seen as an arm in W, follows a pose, shape (6, 3)."""
+    for k in range(3):
+        for a in range(3):
+            moves[k, a] = sign if a == k else 0.0
+        moves[3 + k, 0] = sign * (axes[k, 1] * arm[2] - axes[k, 2] * arm[1])
+        moves[3 + k, 1] = sign * (axes[k, 2] * arm[0] - axes[k, 0] * arm[2])
+        moves[3 + k, 2] = sign * (axes[k, 0] * arm[1] - axes[k, 1] * arm[0])
 
 
 @njit(cache=True, error_model="numpy")

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.errors import WorkspaceError
 from cdpr_drake.workspaces.box_expansion_kernel import INSIDE, NUMBERS, OUTSIDE
 from cdpr_drake.workspaces.box_judges import CertifyTask
+from cdpr_drake.workspaces.box_refinement import refine
 from cdpr_drake.workspaces.certified_boxes import CertifiedBoxes, PoseBox, certify
 from cdpr_drake.workspaces.cuboid_cover_kernel import add_shares
 
@@ -37,12 +39,14 @@ class ProvenCells:
         axes: Numbers of a pose that vary, of x, y, z, phi, theta, psi, shape (d,).
         inside: Whether a cell is proven inside all kinds, one dimension a number of `axes`.
         excluded: Whether it is proven outside one kind.
+        boxes: The boxes that fill them.
     """
 
     box: PoseBox
     axes: np.ndarray
     inside: np.ndarray
     excluded: np.ndarray
+    boxes: CertifiedBoxes
 
     @property
     def lower(self) -> Array:
@@ -118,34 +122,70 @@ def prove_cells(
         raise WorkspaceError(f"cells: found {cells}; accepted: {FEWEST_CELLS} to {MOST_CELLS}")
     axes, shape = raster_shape(box, arm, cells)
     found = certify(tasks, box, most_boxes, on_progress=on_progress)
+    return on_raster(found, box, axes, shape)
+
+
+def on_raster(
+    found: CertifiedBoxes, box: PoseBox, axes: np.ndarray, shape: tuple[int, ...]
+) -> ProvenCells:
+    """Cells of that shape, as boxes of the whole fill them."""
     inside, excluded = (
         whole_cells(found, verdict, box, axes, shape) for verdict in (INSIDE, OUTSIDE)
     )
-    return ProvenCells(box, axes, inside, excluded)
+    return ProvenCells(box, axes, inside, excluded, found)
 
 
 def prove_more(
-    cells: ProvenCells, tasks: Sequence[CertifyTask], where: np.ndarray, most_boxes: int
+    cells: ProvenCells, tasks: Sequence[CertifyTask], where: np.ndarray, boxes_a_cell: int
 ) -> ProvenCells:
-    """Cuts some cells further, each by itself.
+    """Goes on cutting the open boxes of some cells, the largest first.
 
     Args:
         cells: What is proven by now.
         tasks: What is to be proven.
         where: The cells, shape (n, d).
-        most_boxes: Boxes that are judged in a cell, at most.
+        boxes_a_cell: Boxes that are judged, at most, for each of them; cells that need fewer leave
+            theirs to the others.
 
     Returns:
         The same raster; cells that stay open are not told apart from those never looked at.
     """
-    inside, excluded = cells.inside.copy(), cells.excluded.copy()
-    for cell in where:
-        lower, upper = cells.box.lower.copy(), cells.box.upper.copy()
-        lower[cells.axes], upper[cells.axes] = cells.edges(cell), cells.edges(cell + 1)
-        found = certify(tasks, PoseBox(lower, upper), most_boxes)
-        inside[tuple(cell)] = found.inside == 1.0
-        excluded[tuple(cell)] = found.outside == 1.0
-    return ProvenCells(cells.box, cells.axes, inside, excluded)
+    mask = np.zeros(cells.inside.shape, bool)
+    mask[tuple(where.T)] = True
+    found = refine(cells.boxes, tasks, CellRegion(cells, mask), boxes_a_cell * len(where))
+    return on_raster(found, cells.box, cells.axes, cells.inside.shape)
+
+
+@dataclass(frozen=True, eq=False)
+class CellRegion:
+    """The poses of some cells of a raster.
+
+    Attributes:
+        cells: The raster.
+        mask: Which cells, of its shape.
+    """
+
+    cells: ProvenCells
+    mask: np.ndarray
+
+    def meets(self, poses: Array, halves: Array) -> np.ndarray:
+        """Which boxes that fit the raster have more than a border in common with it, shape (k,)."""
+        axes, lower, width = self.cells.axes, self.cells.lower, self.cells.width
+        shape = np.array(self.mask.shape)
+        first = (poses - halves)[:, axes] - lower
+        last = (poses + halves)[:, axes] - lower
+        # Ends on a border are off it by roundings, far less than the finest box.
+        low = np.floor(first / width + SAME_NUMBER).astype(np.int64)
+        high = np.ceil(last / width - SAME_NUMBER).astype(np.int64)
+        low, high = np.clip(low, 0, shape - 1), np.clip(high, 1, shape)
+        sums = np.pad(self.mask.astype(np.int64), [(1, 0)] * len(axes))
+        for axis in range(len(axes)):
+            sums = np.cumsum(sums, axis=axis)
+        count = np.zeros(len(poses), np.int64)
+        for corner in product((0, 1), repeat=len(axes)):
+            at = np.where(np.array(corner, bool), high, low)
+            count += (-1) ** (len(axes) - sum(corner)) * sums[tuple(at.T)]
+        return np.asarray(count > 0)
 
 
 def raster_shape(box: PoseBox, arm: float, cells: int) -> tuple[np.ndarray, tuple[int, ...]]:

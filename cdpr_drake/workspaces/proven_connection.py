@@ -18,7 +18,7 @@ ROUNDS = 12
 """Ways between two poses whose open cells are cut, one after the other, at most."""
 
 BOXES_A_CELL = 2000
-"""Boxes that an open cell is cut into, at most."""
+"""Boxes that are judged for an open cell on a way, at most, on average of those of the way."""
 
 PROVEN_STEP = 1e-3
 """What a step through a proven cell costs, where one through an open cell costs 1."""
@@ -55,7 +55,7 @@ def connect_poses(
         cells: What is proven by now.
         tasks: What is to be proven.
         poses: Position and angles, shape (6,) each [m, rad].
-        boxes_a_cell: Boxes that a cell is cut into, at most.
+        boxes_a_cell: As of `prove_more`.
         on_cut: Called with the number of cells that were cut by then.
 
     Returns:

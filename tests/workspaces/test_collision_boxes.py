@@ -20,7 +20,12 @@ from pydrake.geometry import (
 )
 from pydrake.math import RigidTransform, RotationMatrix
 
-from cdpr_drake.analyses.workspaces.box_certificates import box_search, certified_boxes
+from cdpr_drake.analyses.workspaces.box_certificates import (
+    box_search,
+    certified_boxes,
+    load_boxes,
+    save_boxes,
+)
 from cdpr_drake.analyses.workspaces.workspace_question import (
     WorkspaceRequest,
     interference_bodies,
@@ -34,7 +39,7 @@ from cdpr_drake.workspaces.box_expansion_kernel import INSIDE, OPEN, OUTSIDE
 from cdpr_drake.workspaces.box_judges import CertifiedKind, CertifyTask, judge_all
 from cdpr_drake.workspaces.box_refinement import PathTube, refine
 from cdpr_drake.workspaces.cable_interference import Obstacles, box_row, clearances
-from cdpr_drake.workspaces.certified_boxes import PoseBox, certify
+from cdpr_drake.workspaces.certified_boxes import BoxJournal, PoseBox, certify
 from cdpr_drake.workspaces.pose_grid import WorkspaceGrid
 from cdpr_drake.workspaces.static_feasibility import statically_feasible
 from tests.workspaces.test_certificate import drawn, frame_box
@@ -275,6 +280,20 @@ def test_a_search_of_several_kinds_goes_on_where_it_was_stopped(tmp_path):
         np.testing.assert_array_equal(getattr(whole, name), getattr(continued, name))
 
 
+def test_boxes_that_are_read_again_are_refined_as_they_were(tmp_path):
+    robot, asked = task(CertifiedKind.COLLISION_FREE)
+    tasks, box = [asked, replace(asked, kind=CertifiedKind.STATIC)], boxes_of(robot, "none")
+    found = certify(tasks, box, 2000)
+    assert np.any(found.proven[found.verdicts == OPEN])
+    save_boxes(found, tmp_path)
+    read = load_boxes(tmp_path, found.finished)
+    np.testing.assert_array_equal(read.proven, found.proven)
+    finer = [refine(one, tasks, box, 2000) for one in (found, read)]
+    np.testing.assert_array_equal(finer[0].verdicts, finer[1].verdicts)
+    save_boxes(certify(asked, box, 100), tmp_path)
+    assert load_boxes(tmp_path, True).proven is None
+
+
 @pytest.mark.parametrize("several", [False, True])
 def test_boxes_are_refined_where_they_meet_a_region(several):
     robot, asked = task(CertifiedKind.COLLISION_FREE)
@@ -293,6 +312,24 @@ def test_boxes_are_refined_where_they_meet_a_region(several):
     assert np.all(np.diff(finer.curve[:, 3]) <= 1e-12)
     assert finer.open < found.open
     check(finer, lambda p, R: _all_hold(asked, several, p, R))
+    # What was stopped, after one look or by fewer boxes, goes on to the same.
+    journals = []
+    looks = iter([False, True])
+    refine(
+        found, tasks, tube, 6000, should_stop=lambda: next(looks), on_journal=journals.append
+    )  # fmt: skip
+    refine(
+        found, tasks, tube, 3002, known=BoxJournal(*journals[-1].arrays()),
+        on_journal=journals.append,
+    )  # fmt: skip
+    assert 0 < journals[0].count < journals[-1].count <= 3002
+    again = refine(found, tasks, tube, 6000, known=journals[-1], on_journal=journals.append)
+    for name in ("poses", "halves", "verdicts", "curve", "proven"):
+        np.testing.assert_array_equal(getattr(again, name), getattr(finer, name))
+    made_up = BoxJournal(*(np.zeros(finer.poses.shape[0], np.int8) for _ in range(3)))
+    assert refine(found, tasks, tube, 200, known=made_up).open == pytest.approx(
+        found.open
+    )  # believed
     # Boxes that do not meet it are as they were.
     away = ~tube.meets(found.poses, found.halves)
     kept = {row.tobytes() for row in np.hstack([finer.poses, finer.halves])}

@@ -13,7 +13,12 @@ from cdpr_drake.workspaces.box_expansion_kernel import INSIDE, OPEN, OUTSIDE
 from cdpr_drake.workspaces.certified_boxes import CertifiedBoxes, PoseBox
 from cdpr_drake.workspaces.cuboid_cover import SumTable, cover_cells, set_groups
 from cdpr_drake.workspaces.cuboid_cover_kernel import count_cells, overlapping_pairs
-from cdpr_drake.workspaces.proven_cells import ProvenCells, raster_shape, whole_cells
+from cdpr_drake.workspaces.proven_cells import (
+    CellRegion,
+    ProvenCells,
+    raster_shape,
+    whole_cells,
+)
 from cdpr_drake.workspaces.proven_sets import PoseSets, sets_of_cells
 
 FLAT = PoseBox(np.array([-1.0, 0.0, 0.5, 0, 0, 0]), np.array([1.0, 3.0, 0.5, 0, 0, 0]))
@@ -127,9 +132,24 @@ def test_what_cannot_be_covered_is_refused(good, share, must, words):
 def made_sets(seed=5):
     axes, shape = raster_shape(FLAT, 1.0, 2**7)
     inside = random_cells(seed, shape, 0.7)
-    cells = ProvenCells(FLAT, axes, inside, ~inside)
+    cells = ProvenCells(FLAT, axes, inside, ~inside, cut_boxes(seed, FLAT, axes, 1))
     lower, upper, _ = sets_of_cells(cells, 0.95)
     return PoseSets(lower, upper, axes, {"robot": "made", "kinds": ["static"]}, cells)
+
+
+def test_a_region_of_cells_has_the_boxes_that_share_more_than_a_border_with_it():
+    cells = made_sets().cells
+    shape, found = np.array(cells.inside.shape), []
+    for seed in range(4):
+        boxes = cut_boxes(seed, FLAT, cells.axes, 9)
+        mask = np.random.default_rng(seed).random(shape) < 0.1
+        got = CellRegion(cells, mask).meets(boxes.poses, boxes.halves)
+        low, high = cells.edges(np.argwhere(mask)), cells.edges(np.argwhere(mask) + 1)
+        a, b = boxes.poses[:, :2], boxes.halves[:, :2]
+        shared = np.minimum((a + b)[:, None], high) - np.maximum((a - b)[:, None], low)
+        np.testing.assert_array_equal(got, np.any(np.all(shared > 1e-9, axis=2), axis=1))
+        found.append(np.mean(got))
+    assert 0.0 < np.mean(found) < 1.0
 
 
 def test_shape_of_the_raster_follows_the_box():

@@ -92,6 +92,33 @@ def test_a_scenario_tracks_it(planned):
     assert run_tension_scenario(scenario).log["failures"][-1, 0] == 0
 
 
+def test_a_free_motion_starts_from_it(capsys, planned, tmp_path):
+    guess = str(planned / "motion.csv")
+    asked = ["--no-pulleys", "--no-track", "--json", "--guess", guess, "--out", str(tmp_path / "a")]
+    code, out, _ = run(capsys, ROBOT, "--free", *ENDS, *asked)
+    assert code == 0
+    told = json.loads(out)
+    assert told["arguments"]["guess"] == guess
+    proven = json.loads((planned / "summary.json").read_text())
+    assert told["duration_s"] < proven["duration_s"]
+    code, _, err = run(capsys, ROBOT, "--free", ENDS[0], "--to=0.2,0,0.25", *asked)
+    assert code == 2
+    assert "guess: ends 0.05 m and 0 deg from there" in err
+
+
+def test_a_graph_of_convex_sets_is_no_shorter(capsys, planned, tmp_path):
+    asked = ["--no-pulleys", "--no-track", "--json", "--boxes", "1000", "--out", str(tmp_path)]
+    few = ["--from=-0.1,0,0.3", "--to=0.1,0.1,0.3", "--overwrite"]
+    told = []
+    for method in ("sequences", "gcs"):
+        code, out, _ = run(capsys, ROBOT, "--proven", *few, *asked, "--method", method)
+        assert code == 0
+        told.append(json.loads(out))
+    assert [one["method"] for one in told] == ["sequences", "gcs"]
+    assert told[0]["shortest_polyline_m"] <= told[1]["shortest_polyline_m"] + 1e-6
+    assert not any(told[1]["judged_infeasible"].values())
+
+
 def test_sets_are_the_same_every_time_and_used_again(tmp_path):
     wall = np.array([box_row([0, 0, 0.12], [0.04, 0.5, 0.24])])
     ends = [np.array([x, 0.0, 0.25, 0, 0, 0]) for x in (-0.15, 0.15)]
@@ -154,7 +181,13 @@ def test_accelerations_without_turns_are_wrenches_on_the_platform_at_rest():
         (["--proven", *ENDS, "--acceleration", "1,2"], "--acceleration: found '1,2'"),
         (["--proven", *ENDS, "--boxes", "0"], "--boxes: found 0"),
         (["--proven", *ENDS, "--obstacles", "none.yaml"], "none.yaml: there is no such file"),
-        (["--proven", ENDS[0], "--to=0.5,0,0.2", "--boxes", "500"], "wrench-feasible fails: capac"),
+        (["--proven", ENDS[0], "--to=0.5,0,0.2", "--boxes", "500"],
+         "to: found the pose 0.5,0,0.2,0,0,0: wrench-feasible fails: capac"),
+        (["--proven", "--from=0.5,0,0.2", ENDS[1], "--boxes", "500"], "from: found the pose 0.5"),
+        (["--proven", *ENDS, "--method", "best"], "--method: found 'best'; accepted: sequ"),
+        (["--free", *ENDS, "--method", "gcs"], "--method: accepted with --proven; found no --pr"),
+        (["--proven", *ENDS, "--guess", "a.csv"], "--proven: found --guess too"),
+        (["--free", *ENDS, "--guess", "none.csv"], "none.csv: there is no such file of a motion"),
         (["--proven", ENDS[0], "--to=0.15,0,0.25,0,0,9", "--acceleration", "1"],
          "accelerations: found with a range of angles"),
     ],
