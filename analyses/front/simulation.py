@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from cdpr_drake.analyses.front.session import Say, Session, asked_workers
 from cdpr_drake.analyses.reporting.deferred_figures import write_pictures
 from cdpr_drake.analyses.reporting.exported_logs import checked_log_formats, log_exports
+from cdpr_drake.analyses.reporting.log_files import log_columns
 from cdpr_drake.analyses.reporting.log_on_disk import CHECKPOINT, PARTS, LogOnDisk
 from cdpr_drake.analyses.reporting.output_folder import (
     ResultsFolder,
@@ -33,7 +34,7 @@ from cdpr_drake.analyses.sweeps.workers import check_scheduler
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.summaries import Summarized, Tabulated
+from cdpr_drake.summaries import Tabulated
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.loops.loop_choice import set_loop
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
@@ -51,7 +52,7 @@ SCENARIO_FILE = "scenario.yaml"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Run(Summarized):
+class Run(Tabulated):
     """What a run did.
 
     Attributes:
@@ -78,6 +79,10 @@ class Run(Summarized):
     def as_dict(self) -> dict[str, Any]:
         """The summary for JSON; keys end in units."""
         return self.numbers
+
+    def columns(self) -> dict[str, Any]:
+        """A row a logged time, a column a number, by the names of `log.csv`."""
+        return log_columns(self.log, self._kind.log_names(self.result))
 
     def plot(self) -> Figure:
         """Errors over time; of a pick-and-place its phases."""

@@ -67,9 +67,12 @@ ROWS_AT_ONCE = 2000
 Parts = Mapping[str, Sequence[str]]
 """Names of the numbers of quantities, by the names of these."""
 
+LogNames = tuple[Sequence[str], Sequence[str], Parts | None]
+"""Of a kind of run: names of cables, of features, and of the numbers of further quantities."""
+
 
 def column_names(
-    log: Log, cables: list[str], features: Sequence[str] = (), parts: Parts | None = None
+    log: Log, cables: Sequence[str], features: Sequence[str] = (), parts: Parts | None = None
 ) -> list[str]:
     """Names of the columns of `log.csv`, each ending in its unit, if it has one.
 
@@ -103,10 +106,17 @@ def column_names(
     return names
 
 
+def log_columns(log: Log, names: LogNames) -> dict[str, Array]:
+    """A log as columns by the names of `log.csv`, shape (n,) each."""
+    rows = len(log["time"])
+    table = np.column_stack([log_block(log, name, 0, rows) for name in log])
+    return dict(zip(column_names(log, *names), table.T, strict=True))
+
+
 def write_log(
     folder: Path,
     log: Log,
-    cables: list[str],
+    cables: Sequence[str],
     features: Sequence[str] = (),
     parts: Parts | None = None,
 ) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 from pydrake.systems.analysis import Simulator
 
 from cdpr_drake.analyses.reporting.log_files import (
+    LogNames,
     finite,
     spread,
     write_json,
@@ -250,7 +251,16 @@ def write_mechanism_inputs(folder: Path, scenario: MechanismScenario) -> None:
 
 def write_mechanism_data(folder: Path, run: MechanismRun) -> dict[str, Any]:
     """Writes log, inputs and summary of a run into an existing folder; returns the summary."""
-    summary, follower = summarize_mechanism_run(run), run.follower
+    summary = summarize_mechanism_run(run)
+    write_log(folder, run.log, *mechanism_log_names(run))
+    write_mechanism_inputs(folder, run.scenario)
+    write_json(folder / "summary.json", summary)
+    return summary
+
+
+def mechanism_log_names(run: MechanismRun) -> LogNames:
+    """Names for the log's columns."""
+    follower = run.follower
     positions, names = follower.position_names(), follower.velocity_names()
     parts = {
         "positions": positions,
@@ -262,10 +272,7 @@ def write_mechanism_data(folder: Path, run: MechanismRun) -> dict[str, Any]:
             f"{names[row]}_{'nm' if follower.turns()[row] else 'n'}" for row in follower.motors()
         ],
     }
-    write_log(folder, run.log, list(follower.cables.routes.names), parts=parts)
-    write_mechanism_inputs(folder, run.scenario)
-    write_json(folder / "summary.json", summary)
-    return summary
+    return list(follower.cables.routes.names), (), parts
 
 
 def _with_units(follower: MechanismFollower) -> list[str]:

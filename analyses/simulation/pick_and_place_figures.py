@@ -12,7 +12,7 @@ from pydrake.geometry import Box, Meshcat
 from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.reporting.deferred_figures import Pictures
-from cdpr_drake.analyses.reporting.log_files import write_json, write_log
+from cdpr_drake.analyses.reporting.log_files import LogNames, write_json, write_log
 from cdpr_drake.analyses.reporting.provenance import write_run_inputs
 from cdpr_drake.analyses.simulation.pick_and_place_run import PickAndPlaceRun
 from cdpr_drake.analyses.simulation.pick_and_place_summary import (
@@ -198,11 +198,15 @@ def way_figure(run: PickAndPlaceRun) -> Figure:
 def write_pick_and_place_data(folder: Path, run: PickAndPlaceRun) -> dict[str, Any]:
     """Writes log, inputs and summary of a run into an existing folder; returns the summary."""
     summary = summarize_pick_and_place(run)
-    cables = [cable.name for cable in run.built.robot.cables]
-    write_log(folder, run.log, cables)
+    write_log(folder, run.log, *placed_log_names(run))
     write_run_inputs(folder, run.scenario, run.built.robot)
     write_json(folder / "summary.json", summary)
     return summary
+
+
+def placed_log_names(run: PickAndPlaceRun) -> LogNames:
+    """Names for the log's columns."""
+    return [cable.name for cable in run.built.robot.cables], (), None
 
 
 def pick_and_place_pictures(

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from cdpr_drake.analyses.reporting.deferred_figures import Pictures
-from cdpr_drake.analyses.reporting.log_files import write_json, write_log
+from cdpr_drake.analyses.reporting.log_files import LogNames, write_json, write_log
 from cdpr_drake.analyses.reporting.provenance import write_run_inputs
 from cdpr_drake.analyses.simulation.camera_video import camera_view, write_video
 from cdpr_drake.analyses.simulation.run_figures import run_figures
@@ -25,12 +25,17 @@ def write_run_data(folder: Path, result: RunResult) -> dict[str, Any]:
     """Writes log, inputs and summary of a run into an existing folder; returns the summary."""
     servo = result.servo
     summary = summarize(result)
-    cables = [cable.name for cable in servo.robot.cables]
-    columns = world_columns(servo.scenario.world)
-    write_log(folder, result.log, cables, servo.feature_names, columns)
+    write_log(folder, result.log, *servo_log_names(result))
     write_run_inputs(folder, servo.scenario, servo.robot)
     write_json(folder / "summary.json", summary)
     return summary
+
+
+def servo_log_names(result: RunResult) -> LogNames:
+    """Names for the log's columns."""
+    servo = result.servo
+    cables = [cable.name for cable in servo.robot.cables]
+    return cables, servo.feature_names, world_columns(servo.scenario.world)
 
 
 def run_pictures(

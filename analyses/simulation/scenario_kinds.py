@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from pydrake.geometry import Meshcat
 
 from cdpr_drake.analyses.reporting.deferred_figures import Pictures
+from cdpr_drake.analyses.reporting.log_files import LogNames
 from cdpr_drake.analyses.reporting.log_on_disk import Log
 from cdpr_drake.analyses.reporting.provenance import write_run_inputs
 from cdpr_drake.analyses.simulation.mechanism_figures import (
@@ -22,6 +23,7 @@ from cdpr_drake.analyses.simulation.mechanism_run import (
     check_mechanism_run,
     mechanism_end_error,
     mechanism_facts,
+    mechanism_log_names,
     run_mechanism_scenario,
     summarize_mechanism_run,
     unfinished_mechanism_run,
@@ -32,6 +34,7 @@ from cdpr_drake.analyses.simulation.pick_and_place_figures import (
     live_view,
     phase_figure,
     pick_and_place_pictures,
+    placed_log_names,
     write_pick_and_place_data,
 )
 from cdpr_drake.analyses.simulation.pick_and_place_run import (
@@ -44,7 +47,7 @@ from cdpr_drake.analyses.simulation.pick_and_place_summary import (
     summarize_pick_and_place,
 )
 from cdpr_drake.analyses.simulation.run_figures import error_figure as servo_error_figure
-from cdpr_drake.analyses.simulation.run_files import run_pictures, write_run_data
+from cdpr_drake.analyses.simulation.run_files import run_pictures, servo_log_names, write_run_data
 from cdpr_drake.analyses.simulation.run_summary import final_errors, summarize
 from cdpr_drake.analyses.simulation.session import DEFAULT_SESSION, RunSession
 from cdpr_drake.analyses.simulation.start_checks import (
@@ -60,6 +63,7 @@ from cdpr_drake.analyses.simulation.tension_control_run import (
     run_tension_scenario,
     summarize_tension_run,
     tension_end_error,
+    tension_log_names,
     tension_pictures,
     unfinished_tension_run,
     write_tension_data,
@@ -110,6 +114,7 @@ class ScenarioKind:
         live: Makes what lets Meshcat follow a run, for `run`; None: nothing does.
         inputs: Writes robot or mechanism, and scenario, as they are run, into an existing folder.
         numbers: The summary of a result, for JSON.
+        log_names: Names for the columns of a result's log.
         data: Writes the data of a result into a folder; returns the summary.
         pictures: What draws it, with a film if asked, its figures in the formats given.
         figure: The figure of a result that says most of it.
@@ -126,6 +131,7 @@ class ScenarioKind:
     live: Callable[[Any, Meshcat], Prepare] | None
     inputs: Callable[[Path, Any], None]
     numbers: Callable[[Any], dict[str, Any]]
+    log_names: Callable[[Any], LogNames]
     data: Callable[[Path, Any], dict[str, Any]]
     pictures: Callable[[Any, bool, Sequence[str]], Pictures]
     figure: Callable[[Any], Figure]
@@ -233,6 +239,7 @@ SCENARIO_KINDS: dict[str, ScenarioKind] = {
         live=live_servo,
         inputs=_robot_inputs,
         numbers=summarize,
+        log_names=servo_log_names,
         data=write_run_data,
         pictures=run_pictures,
         figure=servo_error_figure,
@@ -248,6 +255,7 @@ SCENARIO_KINDS: dict[str, ScenarioKind] = {
         live=live_tension_control,
         inputs=_robot_inputs,
         numbers=summarize_tension_run,
+        log_names=tension_log_names,
         data=write_tension_data,
         pictures=lambda run, video, formats: tension_pictures(run, formats),
         figure=tension_error_figure,
@@ -263,6 +271,7 @@ SCENARIO_KINDS: dict[str, ScenarioKind] = {
         live=live_view,
         inputs=_robot_inputs,
         numbers=summarize_pick_and_place,
+        log_names=placed_log_names,
         data=write_pick_and_place_data,
         pictures=lambda run, video, formats: pick_and_place_pictures(run, formats),
         figure=phase_figure,
@@ -278,6 +287,7 @@ SCENARIO_KINDS: dict[str, ScenarioKind] = {
         live=None,
         inputs=write_mechanism_inputs,
         numbers=summarize_mechanism_run,
+        log_names=mechanism_log_names,
         data=write_mechanism_data,
         pictures=lambda run, video, formats: mechanism_pictures(run, formats),
         figure=mechanism_error_figure,

@@ -14,7 +14,7 @@ from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator, SimulatorStatus
 
 from cdpr_drake.analyses.reporting.deferred_figures import Pictures
-from cdpr_drake.analyses.reporting.log_files import finite, spread, write_json, write_log
+from cdpr_drake.analyses.reporting.log_files import LogNames, finite, spread, write_json, write_log
 from cdpr_drake.analyses.reporting.log_on_disk import Log
 from cdpr_drake.analyses.reporting.provenance import package_versions, write_run_inputs
 from cdpr_drake.analyses.simulation.force_report import (
@@ -310,11 +310,16 @@ def error_figure(run: TensionRun) -> Figure:
 def write_tension_data(folder: Path, run: TensionRun) -> dict[str, Any]:
     """Writes log, inputs and summary of a run into an existing folder; returns the summary."""
     summary = summarize_tension_run(run)
-    cables = [cable.name for cable in run.control.robot.cables]
-    write_log(folder, run.log, cables, parts=world_columns(run.scenario.world))
+    write_log(folder, run.log, *tension_log_names(run))
     write_run_inputs(folder, run.scenario, run.control.robot)
     write_json(folder / "summary.json", summary)
     return summary
+
+
+def tension_log_names(run: TensionRun) -> LogNames:
+    """Names for the log's columns."""
+    cables = [cable.name for cable in run.control.robot.cables]
+    return cables, (), world_columns(run.scenario.world)
 
 
 def tension_pictures(run: TensionRun, formats: Sequence[str] = DEFAULT_FORMATS) -> Pictures:

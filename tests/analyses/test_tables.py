@@ -49,8 +49,11 @@ def test_without_pandas_the_message_names_what_has_the_same(workspace, monkeypat
     assert {len(column) for column in workspace.columns().values()} == {workspace.grid.size}
 
 
-def test_a_run_writes_its_replay(tmp_path):
-    run = cdpr.simulate("acrobot_pbvs", QUICK)
+def test_a_run_writes_its_replay_and_has_the_columns_of_its_log(tmp_path):
+    run = cdpr.simulate("acrobot_pbvs", QUICK, tmp_path / "run", formats=())
+    frame, written = run.to_dataframe(), pd.read_csv(tmp_path / "run" / "log.csv")
+    assert list(frame.columns) == list(written.columns)
+    np.testing.assert_array_equal(frame, written)
     page = run.replay(tmp_path / "mine.html")
     assert page == tmp_path / "mine.html"
     assert "<html" in page.read_text(encoding="utf-8")[:500]
