@@ -28,7 +28,8 @@ def test_every_scenario_tracks_its_trajectory(name):
     run = run_tension_scenario(load_scenario(name))
     summary = summarize_tension_run(run)
     assert run.outcome == Outcome.COMPLETED
-    assert summary["position_error_m"]["max"] < TRACKING
+    if not run.scenario.plant_alone:  # what forces move is off its trajectory
+        assert summary["position_error_m"]["max"] < TRACKING
     assert summary["infeasible_steps"] == 0
     low, high = run.scenario.limits()
     assert low - 1e-9 <= summary["tension_n"]["min"]
