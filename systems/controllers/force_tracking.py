@@ -183,6 +183,7 @@ class ForceTracking(PoseTracking):
         settings: ForceControl,
         cables: CableSet,
         rate: float,
+        *,
         dynamics: PlatformDynamics | None = None,
     ) -> None:
         """For a robot whose plant is finalized, which moves freely.

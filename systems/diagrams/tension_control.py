@@ -302,8 +302,9 @@ def _deciders(
     own = distributor(in_plant, *distribution, balance=balance)
     if settings.force is not None:
         return ForceTracking(
-            in_plant, trajectory, gains, settings.force, believed, settings.rate, settings.dynamics
-        ), own
+            in_plant, trajectory, gains, settings.force, believed, settings.rate,
+            dynamics=settings.dynamics,
+        ), own  # fmt: skip
     if place is None:
         return control(in_plant, trajectory, gains, settings.dynamics, balance=balance), own
     return RemoteTracking(in_plant, trajectory, gains, place, balance=balance), own
