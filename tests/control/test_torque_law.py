@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import MultibodyForces
+from scipy.optimize import minimize
 
 from cdpr_drake.control.planned_goal import GoalPlan, goal_offset, goal_pose
 from cdpr_drake.control.servo_wrench_kernel import to_world, twist_from_winches, wanted_acceleration
@@ -232,6 +233,33 @@ def test_six_cables_have_one_answer(method):
         )
     W = -cable_jacobian(CASE_9_START, six).T
     np.testing.assert_allclose(command.tensions, np.linalg.solve(W, command.wrench), rtol=1e-9)
+
+
+@pytest.mark.parametrize("method", ["barycenter", "quadratic_program"])
+@pytest.mark.parametrize("cable", [2, 4])
+def test_without_a_cable_the_others_give_the_wrench(method, cable):
+    """At a pose that seven cables hold; by scipy's least-norm tensions that only pull."""
+    broken = np.arange(CABLES.count) == cable
+    law, home = make_law(method).without(broken), ROBOT.home.transform()
+    memory = law.fresh_memory()
+    tensions = distribute(tension_problem(ROBOT, home, limits=(0.0, UPPER))).tensions
+    for k in range(200):  # the rate of tensions is limited
+        command, memory = law.step(
+            memory, np.zeros(6), home, [np.where(broken, 0.0, 6.0 + tensions), np.zeros(8)],
+            k * PERIOD,
+        )  # fmt: skip
+    assert not command.relaxed
+    assert command.tensions[cable] == 0.0
+    W = -cable_jacobian(home, CABLES).T
+    left, force = W[:, ~broken], command.wrench
+    best = minimize(
+        lambda t: 0.5 * t @ t, np.full(7, 5.0), jac=lambda t: t, method="SLSQP",
+        bounds=[(0.0, UPPER)] * 7, options={"ftol": 1e-14, "maxiter": 500},
+        constraints={"type": "eq", "fun": lambda t: left @ t - force, "jac": lambda t: left},
+    )  # fmt: skip
+    assert best.success
+    SOLVED = 1e-5  # of scipy's iteration [N]
+    np.testing.assert_allclose(command.tensions[~broken], best.x, atol=SOLVED)
 
 
 def test_methods_that_need_a_reference_are_refused():
