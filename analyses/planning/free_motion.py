@@ -237,6 +237,8 @@ def _guesses(
                     f"guess: {word} {way:.4g} m and {np.degrees(angle):.4g} deg from there; "
                     "accepted: a path or motion from the start to the goal"
                 )
+        if isinstance(asked.guess, TimedPath):  # which the solver starts from in its own time
+            return [(asked.guess, asked.guess.end_time - asked.guess.start_time)]
         return [(asked.guess, timed(path, share)) for share in shares]
     lines: list[tuple[PosePath | TimedPath | None, float]]
     if asked.clearance is None or asked.obstacles is None:

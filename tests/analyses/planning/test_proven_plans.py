@@ -107,7 +107,7 @@ def test_a_free_motion_starts_from_it(capsys, planned, tmp_path):
 
 
 def test_a_graph_of_convex_sets_is_no_shorter(capsys, planned, tmp_path):
-    asked = ["--no-pulleys", "--no-track", "--json", "--boxes", "1000", "--out", str(tmp_path)]
+    asked = ["--no-pulleys", "--no-track", "--json", "--boxes", "4000", "--out", str(tmp_path)]
     few = ["--from=-0.1,0,0.3", "--to=0.1,0.1,0.3", "--overwrite"]
     told = []
     for method in ("sequences", "gcs"):
