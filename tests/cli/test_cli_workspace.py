@@ -261,8 +261,9 @@ def test_more_boxes_continue_a_search_for_fewer(tmp_path, capsys, monkeypatch):
 
 
 def test_open_boxes_are_cut_further_along_a_way(tmp_path, capsys):
-    z = load_robot("planar").plane_height
-    way = ["--boxes", "900", "--refine", f"-0.2,0,{z};0.2,0.1,{z}", "--refine-reach", "0.01"]
+    corners = np.array(load_robot("planar").reach())
+    words = ";".join(",".join(str(x) for x in corner) for corner in corners)
+    way = ["--boxes", "900", "--refine", words, "--refine-reach", "0.01"]
     asked = [*STATIC, *way, "--refine-boxes"]
     assert ended([*asked, "800", "--out", str(tmp_path / "whole")]) == 0
     whole = json.loads(printed(capsys).out)
@@ -286,9 +287,8 @@ def test_open_boxes_are_cut_further_along_a_way(tmp_path, capsys):
     poses, halves, verdicts = (
         np.load(again / "boxes.npz")[name] for name in ("poses", "halves", "verdicts")
     )
-    corners = np.array([[-0.2, 0.0], [0.2, 0.1]])
     line = corners[0] + np.linspace(0.0, 1.0, 500)[:, np.newaxis] * (corners[1] - corners[0])
-    within = np.abs(line[:, np.newaxis] - poses[:, :2]) <= halves[:, :2]
+    within = np.abs(line[:, np.newaxis, :2] - poses[:, :2]) <= halves[:, :2]
     hit = np.any(np.all(within, axis=2), axis=0)
     sizes = np.prod(halves[:, :2], axis=1) * np.where(halves[:, 5] > 0.0, halves[:, 5], 1.0)
     open_share = np.sum(sizes[hit & (verdicts == 0)]) / np.sum(sizes[hit])
