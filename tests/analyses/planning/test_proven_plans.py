@@ -101,7 +101,7 @@ def test_a_free_motion_starts_from_it(capsys, planned, tmp_path):
     assert told["arguments"]["guess"] == guess
     proven = json.loads((planned / "summary.json").read_text())
     assert told["duration_s"] < proven["duration_s"]
-    code, _, err = run(capsys, ROBOT, "--free", ENDS[0], "--to=0.2,0,0.25", *asked)
+    code, _, err = run(capsys, ROBOT, "--free", ENDS[0], "--to=0.2,0,0.25", *asked, "--overwrite")
     assert code == 2
     assert "guess: ends 0.05 m and 0 deg from there" in err
 
