@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
@@ -21,11 +21,13 @@ from cdpr_drake.analyses.reporting.written_files import whole_file
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
 from cdpr_drake.analyses.workspaces.box_certificates import (
     BoxSearch,
+    RefinedBoxes,
     agreement_numbers,
     agreements,
     box_numbers,
     box_search,
     certified_boxes,
+    refined_boxes,
     save_boxes,
     write_boxes,
 )
@@ -90,6 +92,10 @@ class ShapeRequest:
         exit_error: Proven for exit points off by up to so much [m].
         anchor_error: The same of anchor points [m].
         boxes_mesh: File for the boxes as cells of VTK, of an ending in `GRID_ENDINGS`; None: none.
+        refine: Corners of a way of Po, shape (n, 3), about which open boxes are cut further at all
+            orientations [m]; None: nowhere.
+        refine_reach: How far Po may be off the way along each axis [m].
+        refine_boxes: Boxes that are judged for it, at most.
     """
 
     hull: Array | Sequence[float] | None = None
@@ -102,6 +108,9 @@ class ShapeRequest:
     exit_error: float = 0.0
     anchor_error: float = 0.0
     boxes_mesh: Path | str | None = None
+    refine: Array | Sequence[Sequence[float]] | None = None
+    refine_reach: float = 0.05
+    refine_boxes: int = 100_000
 
     def check(self, box: Box | None) -> None:
         """Refuses what does not go together, before anything is computed.
@@ -124,6 +133,21 @@ class ShapeRequest:
             raise WorkspaceError(f"hull: found {self.hull!r}; accepted: x, y, z [m]")
         if self.certify and self.boxes < 1:
             raise WorkspaceError(f"boxes: found {self.boxes}; accepted: at least 1")
+        if self.refine is None:
+            return
+        if not self.certify:
+            raise WorkspaceError("refine: needs certify; accepted: both")
+        way = np.asarray(self.refine, float)
+        if way.ndim != 2 or way.shape[1] != 3 or not len(way) or not np.all(np.isfinite(way)):
+            raise WorkspaceError(
+                f"refine: found shape {way.shape}; accepted: corners x, y, z, at least one [m]"
+            )
+        if not (np.isfinite(self.refine_reach) and self.refine_reach >= 0.0):
+            raise WorkspaceError(
+                f"refine_reach: found {self.refine_reach:g} m; accepted: at least 0"
+            )
+        if self.refine_boxes < 1:
+            raise WorkspaceError(f"refine_boxes: found {self.refine_boxes}; accepted: at least 1")
 
 
 SHAPES = tuple(one.name for one in fields(ShapeRequest))
@@ -140,6 +164,7 @@ class DrawnWorkspace(RobotWorkspace):
         bound: Where the rays of the hull end at the latest.
         boxes: Boxes proven inside or outside; None: they were not asked for.
         search: What was cut into boxes.
+        refined: How boxes were cut further along a way; None: that was not asked for.
         agreement: What the boxes say of the grid, and of the ends of the hull's rays.
         folder: Where it was written; None: nowhere.
         failed: Of each picture that could not be written, the file and why.
@@ -150,6 +175,7 @@ class DrawnWorkspace(RobotWorkspace):
     bound: HullBound | None = None
     boxes: CertifiedBoxes | None = None
     search: BoxSearch | None = None
+    refined: RefinedBoxes | None = None
     agreement: Mapping[str, BoxAgreement] = field(default_factory=dict)
     folder: Path | None = None
     failed: Mapping[str, str] = field(default_factory=dict)
@@ -166,6 +192,8 @@ class DrawnWorkspace(RobotWorkspace):
             told["hull"] = hull_numbers(self.hull, self.bound)
         if self.boxes is not None:
             told["certified"] = box_numbers(self.boxes, self.search)
+        if self.refined is not None:
+            told["refined"] = self.refined.numbers()
             told["agreement"] = agreement_numbers(self.agreement)
         return told
 
@@ -359,7 +387,7 @@ def compute_workspace(
     search = None
     if shapes.certify:
         search = box_search(question, loaded, (shapes.exit_error, shapes.anchor_error), box)
-    hull = bound = boxes = None
+    hull = bound = boxes = finer = None
     if shapes.hull is not None:
         bound = hull_bound(loaded, box, shapes.unbounded)
         with told.doing("Casting rays"):
@@ -375,9 +403,12 @@ def compute_workspace(
         if search is not None:
             with told.computing("certify"):
                 boxes = _certified(search, shapes.boxes, where, told)
+                if shapes.refine is not None and boxes.finished:
+                    finer = _refined(boxes, search, shapes, where, told)
+                    boxes = finer.boxes
         found = as_kind(
             DrawnWorkspace, run.workspace, robot=loaded, hull=hull, bound=bound, boxes=boxes,
-            search=search, folder=where,
+            search=search, folder=where, refined=finer,
             agreement={} if boxes is None else agreements(run.workspace, hull, boxes),
         )  # fmt: skip
         if where is None and shapes.mesh is None and shapes.boxes_mesh is None:
@@ -397,13 +428,31 @@ def _certified(
     search: BoxSearch, most: int, folder: Path | None, session: Session
 ) -> CertifiedBoxes:
     """Certified boxes; where the session stops the search, what is proven by then."""
+    tell = _box_progress(session, most)
+    return certified_boxes(search, most, folder, on_progress=tell, should_stop=session.stop)
+
+
+def _refined(
+    found: CertifiedBoxes, search: BoxSearch, shapes: ShapeRequest, folder: Path | None,
+    session: Session,
+) -> RefinedBoxes:  # fmt: skip
+    """The same cut further along a way; where the session stops it, what is proven by then."""
+    most = shapes.refine_boxes
+    return refined_boxes(
+        found, search, np.asarray(shapes.refine, float), shapes.refine_reach, most, folder,
+        on_progress=_box_progress(session, most), should_stop=session.stop,
+    )  # fmt: skip
+
+
+def _box_progress(session: Session, most: int) -> Callable[[int, float], None]:
+    """What tells a session how many boxes of so many are judged."""
     begin = time.monotonic()
 
     def tell(judged: int, open_share: float) -> None:
         passed, words = time.monotonic() - begin, f"{open_share:.1%} open"
         session.progress(WorkProgress(words, judged, most, passed, rate="boxes/s", items="boxes"))
 
-    return certified_boxes(search, most, folder, on_progress=tell, should_stop=session.stop)
+    return tell
 
 
 def stopped(progress: WorkProgress) -> StoppedError:

@@ -226,18 +226,13 @@ def _guesses(
             return asked.duration
         return share * _time_along(task, path or straight)
 
-    if asked.guess is not None:
-        path = asked.guess.path if isinstance(asked.guess, TimedPath) else asked.guess
-        for word, at, end in (
-            ("begins", path.pose(0.0), asked.start), ("ends", path.pose(path.length), asked.goal)
-        ):  # fmt: skip
-            way, angle = pose_error(at, end)
-            if max(way, angle) > GUESS_WITHIN:
-                raise PlanningError(
-                    f"guess: {word} {way:.4g} m and {np.degrees(angle):.4g} deg from there; "
-                    "accepted: a path or motion from the start to the goal"
-                )
-        return [(asked.guess, timed(path, share)) for share in shares]
+    guess = asked.guess
+    if isinstance(guess, TimedPath):  # which the solver starts from in its own time
+        _check_guess(asked, guess.pose(guess.start_time), guess.pose(guess.end_time))
+        return [(guess, guess.end_time - guess.start_time)]
+    if guess is not None:
+        _check_guess(asked, guess.pose(0.0), guess.pose(guess.length))
+        return [(guess, timed(guess, share)) for share in shares]
     lines: list[tuple[PosePath | TimedPath | None, float]]
     if asked.clearance is None or asked.obstacles is None:
         least = timed(None, 1.0)
@@ -252,6 +247,21 @@ def _guesses(
     moves = [row - 3 for row in task.dynamics.motions if row >= 3]
     found = detours(held, asked.start, asked.goal, scale, moves)
     return [*((path, timed(path, shares[0])) for path in found), *lines[:1]]
+
+
+def _check_guess(asked: FreeSettings, first: RigidTransform, last: RigidTransform) -> None:
+    """Refuses a guess between other poses.
+
+    Raises:
+        PlanningError: It is; says by how much.
+    """
+    for word, at, end in (("begins", first, asked.start), ("ends", last, asked.goal)):
+        way, angle = pose_error(at, end)
+        if max(way, angle) > GUESS_WITHIN:
+            raise PlanningError(
+                f"guess: {word} {way:.4g} m and {np.degrees(angle):.4g} deg from there; "
+                "accepted: a path or motion from the start to the goal"
+            )
 
 
 def _check_ends(places: list[PoseConstraint], X_WP: RigidTransform, where: str) -> None:

@@ -19,15 +19,17 @@ from cdpr_drake.analyses.workspaces.workspace_results import ALL, RobotWorkspace
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import DataFileError, OutputFolderError, WorkspaceError
 from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.workspaces.box_expansion_kernel import OPEN
 from cdpr_drake.workspaces.box_grid_agreement import BoxAgreement, grid_agreement, hull_agreement
 from cdpr_drake.workspaces.box_judges import MEETING, CertifiedKind, CertifyTask
+from cdpr_drake.workspaces.box_refinement import PathTube, refine
 from cdpr_drake.workspaces.certified_boxes import BoxJournal, CertifiedBoxes, PoseBox, certify
 from cdpr_drake.workspaces.demanded_wrenches import SpatialSet
 from cdpr_drake.workspaces.hull import WorkspaceHull
 from cdpr_drake.workspaces.mesh_files import write_cells
 
-BOX_ARRAYS, JOURNAL = "boxes.npz", "boxes_journal.npz"
-"""Files of the boxes, and of what a search that is continued begins with."""
+BOX_ARRAYS, JOURNAL, REFINED_JOURNAL = "boxes.npz", "boxes_journal.npz", "refined_journal.npz"
+"""Files of the boxes, and of what a search, or one along a way, that is continued begins with."""
 
 SAVE_SECONDS = 5.0
 """Between two times that the journal is written."""
@@ -146,41 +148,148 @@ def certified_boxes(
         WorkspaceError: most_boxes < 1.
         OutputFolderError: The folder cannot be written.
     """
-    words = json.dumps(search.arguments(), sort_keys=True)
-    known, saved = None, time.monotonic()
-
-    def save(journal: BoxJournal) -> None:
-        if folder is None:
-            return
-        verdicts, axes, proven = journal.arrays()
-        arrays = {"about": np.array(words), "verdicts": verdicts, "axes": axes}
-        if len(search.tasks) > 1:
-            arrays["proven"] = proven
-        try:
-            store_arrays(folder / JOURNAL, arrays)
-        except OSError as problem:
-            raise OutputFolderError(f"{folder}: cannot be written: {problem.strerror}") from problem
-
-    last: list[BoxJournal] = []
-
-    def keep(journal: BoxJournal) -> None:
-        nonlocal saved
-        last[:] = [journal]
-        if time.monotonic() - saved > SAVE_SECONDS:
-            save(journal)
-            saved = time.monotonic()
-
-    if folder is not None:
-        stored = load_arrays(folder / JOURNAL)
-        if stored is not None and str(stored["about"]) == words:
-            known = BoxJournal(stored["verdicts"], stored["axes"], stored.get("proven"))
+    kept = _KeptJournal(folder, JOURNAL, search.arguments(), len(search.tasks) > 1)
     found = certify(
         search.tasks, search.box, most_boxes, on_progress=on_progress, should_stop=should_stop,
-        known=known, on_journal=keep,
+        known=kept.known, on_journal=kept.keep,
     )  # fmt: skip
-    if last:
-        save(last[0])
+    kept.save()
     return found
+
+
+@dataclass(frozen=True, eq=False)
+class RefinedBoxes:
+    """Boxes that were cut further along a way.
+
+    Attributes:
+        boxes: All boxes, of the whole.
+        tube: Where they were cut further.
+        before: Open share of the boxes that had a pose in common with it.
+        after: Of those that have one in common now.
+        judged: How many boxes were judged for it.
+    """
+
+    boxes: CertifiedBoxes
+    tube: PathTube
+    before: float
+    after: float
+    judged: int
+
+    def numbers(self) -> dict[str, Any]:
+        """For JSON."""
+        return {
+            "way_m": self.tube.poses[:, :3].tolist(),
+            "reach_m": float(self.tube.reach[0]),
+            "boxes_judged": self.judged,
+            "open_share_before": self.before,
+            "open_share_after": self.after,
+        }
+
+
+def refined_boxes(
+    found: CertifiedBoxes,
+    search: BoxSearch,
+    way: Array,
+    reach: float,
+    most_boxes: int,
+    folder: Path | None = None,
+    *,
+    on_progress: Callable[[int, float], None] | None = None,
+    should_stop: Callable[[], bool] | None = None,
+) -> RefinedBoxes:
+    """Open boxes cut further about a way of Po, at all orientations of the search.
+
+    Args:
+        found: What was found of the whole.
+        search: What is to be proven, and where.
+        way: Corners of the way, shape (n, 3) [m].
+        reach: How far Po may be off it along each axis [m].
+        most_boxes: How many more boxes are judged, at most.
+        folder: As of `certified_boxes`, for `REFINED_JOURNAL`.
+        on_progress: As `workspaces.refine`.
+        should_stop: As `workspaces.refine`.
+
+    Raises:
+        WorkspaceError: A number is not accepted, or the way meets no box.
+        OutputFolderError: The folder cannot be written.
+    """
+    middle = 0.5 * (search.box.lower + search.box.upper)[3:]
+    turns = 0.5 * (search.box.upper - search.box.lower)[3:]
+    tube = PathTube(
+        np.hstack([way, np.repeat(middle[np.newaxis], len(way), axis=0)]),
+        np.concatenate([np.full(3, reach), turns]),
+    )
+    if not np.any(tube.meets(found.poses, found.halves)):
+        raise WorkspaceError(
+            f"refine: found a way that is nowhere within {reach:g} m of the boxes; accepted: one "
+            f"in x, y, z from {search.box.lower[:3]} to {search.box.upper[:3]} m"
+        )
+    asked = search.arguments() | plain({"tube": tube, "boxes": int(found.curve[-1, 0])})
+    kept = _KeptJournal(folder, REFINED_JOURNAL, asked, len(search.tasks) > 1)
+    finer = refine(
+        found, search.tasks, tube, most_boxes, on_progress=on_progress, should_stop=should_stop,
+        known=kept.known, on_journal=kept.keep,
+    )  # fmt: skip
+    kept.save()
+    judged = int(finer.curve[-1, 0] - found.curve[-1, 0])
+    return RefinedBoxes(finer, tube, _open_share(found, tube), _open_share(finer, tube), judged)
+
+
+def _open_share(found: CertifiedBoxes, tube: PathTube) -> float:
+    met = tube.meets(found.poses, found.halves)
+    sizes = np.prod(np.where(found.halves > 0.0, found.halves, 1.0), axis=1)[met]
+    return float(np.sum(sizes[found.verdicts[met] == OPEN]) / np.sum(sizes)) if len(sizes) else 0.0
+
+
+class _KeptJournal:
+    """A journal in a folder, written now and then."""
+
+    def __init__(
+        self, folder: Path | None, name: str, asked: Mapping[str, Any], several: bool
+    ) -> None:
+        """With what it is of; a journal of something else is not read.
+
+        Args:
+            folder: Where it is; None: nowhere.
+            name: Its file.
+            asked: All that verdicts depend on, for JSON.
+            several: Whether it is of several kinds.
+        """
+        self._folder, self._name, self._several = folder, name, several
+        self._words = json.dumps(asked, sort_keys=True)
+        self._last: BoxJournal | None = None
+        self._saved = time.monotonic()
+        self.known: BoxJournal | None = None
+        if folder is not None:
+            stored = load_arrays(folder / name)
+            if stored is not None and str(stored["about"]) == self._words:
+                self.known = BoxJournal(stored["verdicts"], stored["axes"], stored.get("proven"))
+
+    def keep(self, journal: BoxJournal) -> None:
+        """Takes what is known by now."""
+        self._last = journal
+        if time.monotonic() - self._saved > SAVE_SECONDS:
+            self.save()
+
+    def save(self) -> None:
+        """Writes what is known by now, if anything is new.
+
+        Raises:
+            OutputFolderError: The folder cannot be written.
+        """
+        if self._last is None or self._folder is None:
+            return
+        verdicts, axes, proven = self._last.arrays()
+        arrays = {"about": np.array(self._words), "verdicts": verdicts, "axes": axes}
+        if self._several:
+            arrays["proven"] = proven
+        try:
+            store_arrays(self._folder / self._name, arrays)
+        except OSError as problem:
+            raise OutputFolderError(
+                f"{self._folder}: cannot be written: {problem.strerror}"
+            ) from problem
+        self._saved = time.monotonic()
 
 
 def box_numbers(found: CertifiedBoxes, search: BoxSearch | None = None) -> dict[str, Any]:

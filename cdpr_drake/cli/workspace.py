@@ -168,6 +168,12 @@ def print_workspace(found: RobotWorkspace, told: dict[str, Any], folder: Path) -
             f"the box inside, in {proven['outside_share']:.2%} outside, "
             f"{proven['open_share']:.2%} open; {proven['boxes_judged']} boxes"
         )
+    if "refined" in told:
+        more = told["refined"]
+        printer.print(
+            f"boxes within {more['reach_m']:g} m of the way: {more['open_share_before']:.2%} of "
+            f"them were open, {more['open_share_after']:.2%} are; {more['boxes_judged']} boxes"
+        )
     for name, one in told.get("agreement", {}).items():
         printer.print(
             f"boxes against {AGREEING[name]}: {one['contradictions']} contradictions at "
@@ -224,6 +230,7 @@ OPTIONS = {
     "required": "--wrench-set", "required, force or moment": "--wrench-set, --force or --moment",
     "hull": "--hull", "unbounded": "--unbounded", "box": "--box", "mesh": "--mesh",
     "certify": "--certify", "boxes": "--boxes", "boxes_mesh": "--boxes-mesh",
+    "refine": "--refine", "refine_reach": "--refine-reach", "refine_boxes": "--refine-boxes",
     "exit_error": "--exit-error", "anchor_error": "--anchor-error",
 }  # fmt: skip
 """Options by the arguments of `compute_workspace`."""
@@ -322,6 +329,19 @@ def workspace(
         Path | None,
         typer.Option(help=f"File for the boxes as cells of VTK: {', '.join(GRID_ENDINGS)}."),
     ] = None,
+    refine: Annotated[
+        str | None,
+        typer.Option(
+            help="With --certify: corners x,y,z of a way of Po [m], with ; between them, about "
+            "which open boxes are cut further."
+        ),
+    ] = None,
+    refine_reach: Annotated[
+        float, typer.Option(help="With --refine: how far Po may be off the way, by axis [m].")
+    ] = 0.05,
+    refine_boxes: Annotated[
+        int, typer.Option(help="With --refine: boxes that are judged for it, at most.")
+    ] = 100_000,
     exit_error: Annotated[
         float, typer.Option(help="Proven for exit points off by up to so much [m].")
     ] = 0.0,
@@ -346,6 +366,10 @@ def workspace(
     check_mass(mass, zero=False)
     region = parse_box(box)
     center = None if hull is None else parse_numbers("--hull", hull, (3,), "x,y,z [m]")
+    way = None if refine is None else [
+        parse_numbers("--refine", corner, (3,), "corners x,y,z [m], with ; between")
+        for corner in refine.split(";")
+    ]  # fmt: skip
     with named_options(OPTIONS | {f"scenario {scenario}": f"--scenario {scenario}"}):
         asked: dict[str, Any] = {
             "kinds": kind.split(","),
@@ -368,6 +392,7 @@ def workspace(
                     robot, **asked, hull=center, unbounded=unbounded, rays=rays,
                     tolerance=tolerance, mesh=mesh, certify=certify, boxes=boxes,
                     exit_error=exit_error, anchor_error=anchor_error, boxes_mesh=boxes_mesh,
+                    refine=way, refine_reach=refine_reach, refine_boxes=refine_boxes,
                     folder=folder, workers=scheduler or workers, formats=formats, session=session,
                 )  # fmt: skip
             except StoppedError:

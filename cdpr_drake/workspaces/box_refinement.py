@@ -142,7 +142,7 @@ def refine(
             some = wanted[first : first + CHUNK // 2]
             # Of each box that is cut the journal has two rows, of its halves.
             rows = slice(journal.count, journal.count + 2 * len(some))
-            told_before = tuple(one[rows] for one in before)
+            told_before = before[0][rows], before[1][rows], before[2][rows]
             new = _cut_and_judge(tasks, poses[some], halves[some], proven[some], told_before)
             journal.add(*new[2:])
             if on_journal is not None and rows.stop > len(before[0]):

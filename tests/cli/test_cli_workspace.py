@@ -166,6 +166,10 @@ def test_files_of_wrenches_and_obstacles(tmp_path, capsys):
         (["--method", "closed"], ["closed", "closed_form"]),
         (["--method", "barycenter"], ["barycenter", "redundancy"]),
         (["--method", "dykstra", "--kind", "wrench-closure"], ["--method dykstra", "static"]),
+        (["--refine", "0,0,0"], ["--refine", "--certify"]),
+        (["--certify", "--refine", "0,0"], ["--refine", "x,y,z"]),
+        (["--certify", "--refine", "0,0,0", "--refine-boxes", "0"], ["--refine-boxes", "0"]),
+        (["--certify", "--refine", "0,0,0", "--refine-reach", "-1"], ["--refine-reach", "-1"]),
         (["--boxes-mesh", "a.vtu"], ["--boxes-mesh", "--certify"]),
         (["--certify", "--boxes-mesh", "a.stl"], ["a.stl", "vtu"]),
         (["--orientation", "0,0,0:10:0"], ["psi", "step"]),
@@ -254,6 +258,41 @@ def test_more_boxes_continue_a_search_for_fewer(tmp_path, capsys, monkeypatch):
     for name in ("poses", "halves", "verdicts"):
         both = [np.load(folder / "boxes.npz")[name] for folder in (tmp_path / "whole", again)]
         np.testing.assert_array_equal(*both)
+
+
+def test_open_boxes_are_cut_further_along_a_way(tmp_path, capsys):
+    corners = np.array(load_robot("planar").reach())
+    words = ";".join(",".join(str(x) for x in corner) for corner in corners)
+    way = ["--boxes", "900", "--refine", words, "--refine-reach", "0.01"]
+    asked = [*STATIC, *way, "--refine-boxes"]
+    assert ended([*asked, "800", "--out", str(tmp_path / "whole")]) == 0
+    whole = json.loads(printed(capsys).out)
+    more = whole["refined"]
+    assert 0 < more["boxes_judged"] <= 800
+    assert more["open_share_after"] < more["open_share_before"]
+    assert whole["certified"]["boxes_judged"] == 900 + more["boxes_judged"]
+    # Fewer, then the rest: the same boxes, of which the first are not judged again.
+    again = tmp_path / "again"
+    assert ended([*asked, "300", "--out", str(again)]) == 0
+    assert json.loads(printed(capsys).out)["refined"]["boxes_judged"] == 300
+    assert ended([*asked, "800", "--out", str(again)]) == 0
+    assert json.loads(printed(capsys).out)["refined"] == more
+    for name in ("poses", "halves", "verdicts"):
+        both = [np.load(folder / "boxes.npz")[name] for folder in (tmp_path / "whole", again)]
+        np.testing.assert_array_equal(*both)
+    assert (
+        ended([*STATIC, "--boxes", "90", "--refine", "9,9,9", "--out", str(tmp_path / "no")]) == 2
+    )
+    assert "--refine: found a way that is nowhere" in printed(capsys).err
+    poses, halves, verdicts = (
+        np.load(again / "boxes.npz")[name] for name in ("poses", "halves", "verdicts")
+    )
+    line = corners[0] + np.linspace(0.0, 1.0, 500)[:, np.newaxis] * (corners[1] - corners[0])
+    within = np.abs(line[:, np.newaxis, :2] - poses[:, :2]) <= halves[:, :2]
+    hit = np.any(np.all(within, axis=2), axis=0)
+    sizes = np.prod(halves[:, :2], axis=1) * np.where(halves[:, 5] > 0.0, halves[:, 5], 1.0)
+    open_share = np.sum(sizes[hit & (verdicts == 0)]) / np.sum(sizes[hit])
+    assert open_share < more["open_share_before"]
 
 
 OBSTACLES = """\

@@ -101,13 +101,13 @@ def test_a_free_motion_starts_from_it(capsys, planned, tmp_path):
     assert told["arguments"]["guess"] == guess
     proven = json.loads((planned / "summary.json").read_text())
     assert told["duration_s"] < proven["duration_s"]
-    code, _, err = run(capsys, ROBOT, "--free", ENDS[0], "--to=0.2,0,0.25", *asked)
+    code, _, err = run(capsys, ROBOT, "--free", ENDS[0], "--to=0.2,0,0.25", *asked, "--overwrite")
     assert code == 2
     assert "guess: ends 0.05 m and 0 deg from there" in err
 
 
 def test_a_graph_of_convex_sets_is_no_shorter(capsys, planned, tmp_path):
-    asked = ["--no-pulleys", "--no-track", "--json", "--boxes", "1000", "--out", str(tmp_path)]
+    asked = ["--no-pulleys", "--no-track", "--json", "--boxes", "4000", "--out", str(tmp_path)]
     few = ["--from=-0.1,0,0.3", "--to=0.1,0.1,0.3", "--overwrite"]
     told = []
     for method in ("sequences", "gcs"):
