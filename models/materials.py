@@ -5,6 +5,7 @@ Drake's YAML loader reads the annotations themselves, so they are not postponed 
 
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, fields, replace
+from typing import Any
 
 from cdpr_drake.cables.cable_behaviour import CableBehaviour
 from cdpr_drake.schema.fields import number, optional_section
@@ -82,7 +83,8 @@ def given_material(own: OwnMaterial | None) -> dict[str, float]:
 
 def own_material(common: CableMaterial, own: OwnMaterial | None) -> CableMaterial:
     """The material of one cable: its own values, and the common one's where it gives none."""
-    return replace(common, **given_material(own))
+    given: dict[str, Any] = {**given_material(own)}
+    return replace(common, **given)
 
 
 _MOST = {

@@ -167,8 +167,8 @@ def static_at_pose(robot: Robot, X_WP: RigidTransform, model: str, pulleys: bool
         lengths = cable_paths(X_WP, cables).lengths
         counted = counted_lengths(lengths, held.tensions, cables.stiffness, behaviour)
         linear, l0 = tangent_cables(cables, counted, held.tensions, behaviour)
-        state = cable_state(linear, model, X_WP, l0)
-        report = _report(robot, linear, model, X_WP, l0, held.tensions, state=state, others=[])
+        touching = cable_state(linear, model, X_WP, l0)
+        report = _report(robot, linear, model, X_WP, l0, held.tensions, state=touching, others=[])
         return replace(report, cables=cables, l0=counted)
     state = cable_state(cables, model, X_WP, l0) if CABLE_MODELS[model].extensible else None
     return _report(robot, cables, model, X_WP, l0, held.tensions, state=state, others=[])

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cdpr_drake.analyses.calibration.free_motion import earlier
 from cdpr_drake.analyses.calibration.free_motion_report import dominant_frequency
+from cdpr_drake.analyses.calibration.free_motion_sensor import earlier
 from cdpr_drake.analyses.front.free_motion import identify_free_motion
 from cdpr_drake.cli.app import main
 from cdpr_drake.errors import IdentificationError
@@ -40,7 +40,7 @@ def found(tmp_path_factory):
     spans = swings.write(folder / "log.csv", (0, 1, 2))
     args = ["identify", "irma4u", str(folder / "log.csv"), "--free", spans_words(spans[:2])]
     args += ["--hold-out", spans_words(spans[2:]), "--out", str(folder / "out"), "--lead", "0.8"]
-    args += ["--sigma", "turn=0.002,tension=0.5", "--json"]
+    args += ["--sigma", "turn=0.01,tension=2.5", "--json"]
     with pytest.raises(SystemExit) as ended:
         main(args)
     return ended.value.code, json.loads((folder / "out/identification.json").read_text()), folder
@@ -50,7 +50,9 @@ def test_a_swing_by_the_plant_tells_the_platform_and_its_cables(found):
     code, said, folder = found
     assert code == 0
     assert said["status"] == "optimal"
-    assert 0.9 < said["residuals_over_sigma"] < 1.15
+    # Sigmas are five times the noise, as long as they are the search has a wide valley.
+    assert 0.15 < said["residuals_over_sigma"] < 0.3
+    assert not any("before it settled" in words for words in said["remarks"])
     true = {
         "mass": 14.1, "all.stiffness": 4e10 * np.pi * 1e-6, "all.retardation_time": 0.004,
         "drag.force": swings.DRAG[0], "drag.moment": swings.DRAG[1],
@@ -64,8 +66,8 @@ def test_a_swing_by_the_plant_tells_the_platform_and_its_cables(found):
     for name, value in true.items():
         one = by_name[name]
         assert abs(one["value"] - value) < SIGMAS * one["std"], (name, one, value)
-    assert by_name["mass"]["std"] < 0.2
-    assert by_name["all.stiffness"]["std"] < 0.05 * true["all.stiffness"]
+    for name, share in (("mass", 0.05), ("all.stiffness", 0.05), ("inertia.zz", 0.05)):
+        assert by_name[name]["value"] == pytest.approx(true[name], rel=share)
     identified = load_robot(str(folder / "out/robot.yaml"))
     assert identified.platform.mass == pytest.approx(by_name["mass"]["value"])
     np.testing.assert_allclose(

@@ -95,6 +95,9 @@ def meaning(key: str, robot: Robot, of: Robot) -> Any:
         name = "anchor_swivel_axis" if last.endswith("swivel_axis") else "anchor_pulley_radius"
         each = np.atleast_2d(getattr(cables, name)).T
         return _own(of, key, list(each), lambda cable: getattr(cable, name))
+    if key.startswith("cable.behaviour"):
+        laws = robot.cable_behaviour()
+        return [getattr(laws, name) for name in ([last] if last != "behaviour" else asdict(laws))]
     if key.startswith(("cable.", "cables[].material.")):
         each = [asdict(material)[last] for material in robot.materials()]
         return _own(of, key, each, lambda cable: getattr(cable.material, last, None))
