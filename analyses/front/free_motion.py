@@ -58,6 +58,10 @@ class RobotFreeMotion(FittedRobot, FreeMotion):
         ]  # fmt: skip
 
 
+KEPT = ("overwrite", "formats", "say", "session")
+"""Arguments on what is written, and who follows."""
+
+
 def identify_free_motion(
     robot: Robot | str | Path,
     log: CalibrationLog | Path | str,
@@ -70,7 +74,6 @@ def identify_free_motion(
     tracker: bool = False,
     lead: float = 1.0,
     folder: Path | str | None = None,
-    overwrite: bool = False,
     **kept: Any,
 ) -> RobotFreeMotion:
     """Finds a robot's dynamics in a log of a platform that swings on standing winches.
@@ -88,8 +91,7 @@ def identify_free_motion(
         tracker: Whether the frame of a tracker is unknown.
         lead: From so much of a held-out stretch its first state is told [s].
         folder: Where identification.json, robot.yaml and figures are written; None: nowhere.
-        overwrite: Whether results in the folder may be replaced.
-        kept: `formats`: endings of the files of figures; `say`: told what is done now; `session`:
+        kept: `overwrite`: whether results in the folder may be replaced; `formats`: endings of the files of figures; `say`: told what is done now; `session`:
             in the place of it, who follows the identification.
 
     Raises:
@@ -99,10 +101,8 @@ def identify_free_motion(
     """
     loaded = as_robot(robot, "identify")
     for name in kept:
-        if name not in ("formats", "say", "session"):
-            raise IdentificationError(
-                f"{name!r} is unknown; {closest(name, ('formats', 'say', 'session'))}"
-            )
+        if name not in KEPT:
+            raise IdentificationError(f"{name!r} is unknown; {closest(name, KEPT)}")
     if isinstance(log, str | Path):
         log = read_log(Path(log), [cable.name for cable in loaded.cables])
     if isinstance(unknown, str):
@@ -122,7 +122,7 @@ def identify_free_motion(
             fit.write(folder)
         return as_kind(RobotFreeMotion, found, fit=fit)
 
-    keeping = Keeping(folder, overwrite, kept.get("formats", DEFAULT_FORMATS))
+    keeping = Keeping(folder, kept.get("overwrite", False), kept.get("formats", DEFAULT_FORMATS))
     session = kept.get("session") or Session(say=kept.get("say"))
     return kept_fit(keeping, session, f"Identifying {loaded.name}", work)
 

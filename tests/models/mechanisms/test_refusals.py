@@ -40,6 +40,7 @@ ASKED: dict[str, Callable[[Any], object]] = {
     "replay_log": lambda robot: cdpr.replay_log("log.csv", robot),
     "calibrate": lambda robot: cdpr.calibrate(robot, "log.csv"),
     "identify": lambda robot: cdpr.identify(robot, "log.csv"),
+    "identify_free_motion": lambda robot: cdpr.identify_free_motion(robot, "log.csv"),
     "export_robot": lambda robot: cdpr.export_robot(robot, "mjcf"),
 }
 """Questions of the front door about a robot."""
