@@ -91,8 +91,9 @@ def identify_free_motion(
         tracker: Whether the frame of a tracker is unknown.
         lead: From so much of a held-out stretch its first state is told [s].
         folder: Where identification.json, robot.yaml and figures are written; None: nowhere.
-        kept: `overwrite`: whether results in the folder may be replaced; `formats`: endings of the files of figures; `say`: told what is done now; `session`:
-            in the place of it, who follows the identification.
+        kept: `overwrite`: whether results in the folder may be replaced; `formats`: endings of
+            the files of figures; `say`: told what is done now; `session`: in the place of it, who
+            follows the identification.
 
     Raises:
         IdentificationError: The log does not hold, or does not tell, what is asked; names it.
