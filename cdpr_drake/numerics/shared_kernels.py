@@ -19,7 +19,7 @@ from collections.abc import Callable
 from typing import Any
 
 from llvmlite import binding, ir
-from numba.core import cgutils, errors
+from numba.core import cgutils, errors, types
 from numba.core.registry import cpu_target
 from numba.extending import intrinsic, typeof_impl
 
@@ -30,6 +30,9 @@ _ADDRESS, _MAKER = range(2)
 then. numba has no name for either while it compiles a caller, which may be kept on disk."""
 
 _WORD = ir.IntType(64)
+
+VECTOR, MATRIX = types.float64[::1], types.float64[:, ::1]
+"""Arrays as almost all signatures have them."""
 
 
 class SharedKernel:
@@ -138,5 +141,3 @@ def _address(context: Any, builder: Any, symbol: str) -> Any:
         with builder.if_then(failed, likely=False):
             context.call_conv.return_exc(builder)
     return builder.load(place)
-
-
