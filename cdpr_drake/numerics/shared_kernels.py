@@ -7,8 +7,8 @@ goes on. So a robot without pulleys at its platform never waits for their kernel
 ten kernels call is compiled once.
 
 A call costs some nanoseconds, so what takes less than a tenth of a microsecond is not worth it. The
-results are the same to the last bit as long as neither caller nor kernel lets the compiler reorder
-sums (`fastmath`).
+results are the same to the last bit; where the compiler may reorder sums (`fastmath`) in what is
+called, compare golden files.
 """
 
 from __future__ import annotations
@@ -35,6 +35,10 @@ VECTOR, MATRIX = types.float64[::1], types.float64[:, ::1]
 """Arrays as almost all signatures have them."""
 
 
+_KEPT: list[tuple[Any, Any]] = []
+"""Slots and what they point to: compiled code has their addresses as long as the process lives."""
+
+
 class SharedKernel:
     """A kernel for one signature; kernels call it by its slot, Python as any other kernel.
 
@@ -56,9 +60,11 @@ class SharedKernel:
         self.kernel, self.py_func, self.signature = kernel, kernel.py_func, signature
         self.__doc__, self.__name__ = kernel.__doc__, kernel.__name__
         self.__module__ = kernel.__module__
-        self.symbol = f"shared {kernel.__module__}:{kernel.__name__}"
-        self._maker = self.make  # the slot has its address: it must not go
-        self._slot = (ctypes.c_int64 * 2)(0, id(self._maker))
+        # With the types, so that a caller kept on disk never meets a kernel of other ones.
+        self.symbol = f"shared {kernel.__module__}:{kernel.__name__} {signature}"
+        maker = self.make
+        self._slot = (ctypes.c_int64 * 2)(0, id(maker))
+        _KEPT.append((self._slot, maker))
         binding.add_symbol(self.symbol, ctypes.addressof(self._slot))
         self.call = intrinsic(_definition(self))
 
@@ -67,12 +73,22 @@ class SharedKernel:
         return self.kernel(*arguments)
 
     def __getattr__(self, name: str) -> Any:
-        """What numba's dispatchers have, such as `compile` and `signatures`."""
-        return getattr(self.__dict__["kernel"], name)
+        """What numba's dispatchers have, such as `compile` and `signatures`.
+
+        Raises:
+            AttributeError: They have it not.
+        """
+        if "kernel" not in self.__dict__:  # before it is made, as `copy` asks
+            raise AttributeError(name)
+        return getattr(self.kernel, name)
 
     def make(self) -> None:
         """Compiles it or loads it, unless that is done, and puts its address into the slot."""
         self._slot[_ADDRESS] = kernel_address(self.kernel, self.signature)
+
+    def forget(self) -> None:
+        """Empties the slot: the next caller has the kernel made anew."""
+        self._slot[_ADDRESS] = 0
 
     def is_made(self) -> bool:
         """Whether its callers find an address."""
@@ -96,14 +112,15 @@ def _type_of(kernel: SharedKernel, _: Any) -> Any:
 
 def _definition(kernel: SharedKernel) -> Callable[..., Any]:
     """How numba types and writes a call: the function that `intrinsic` takes."""
-    signature, jump = kernel.signature, call_at_address(kernel.signature)
+    signature, name = kernel.signature, kernel.__name__
+    jump = call_at_address(signature)
 
     def definition(typing: Any, *arguments: Any) -> Any:
         if len(arguments) != len(signature.args):
-            raise errors.TypingError(f"{kernel.symbol}: {len(arguments)} arguments")
+            raise errors.TypingError(f"{name}: found {len(arguments)} arguments")
         for found, wanted in zip(arguments, signature.args, strict=True):
             if typing.can_convert(found, wanted) is None:
-                raise errors.TypingError(f"{kernel.symbol}: found {found}; accepted: {wanted}")
+                raise errors.TypingError(f"{name}: found {found}; accepted: {wanted}")
         return signature, generate
 
     def generate(context: Any, builder: Any, given: Any, arguments: Any) -> Any:
@@ -113,9 +130,9 @@ def _definition(kernel: SharedKernel) -> Callable[..., Any]:
     names = inspect.signature(kernel.py_func).parameters
     kind = inspect.Parameter.POSITIONAL_OR_KEYWORD
     definition.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
-        [inspect.Parameter(name, kind) for name in ("typing", *names)]
+        [inspect.Parameter(each, kind) for each in ("typing", *names)]
     )
-    definition.__name__ = kernel.__name__
+    definition.__name__ = name
     return definition
 
 
