@@ -15,17 +15,21 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
+from numba import njit, types
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.catenary_kernel import VERTICAL
 from cdpr_drake.cables.hanging_kernel import sagging_cable, solve_catenary
 from cdpr_drake.geometry.motion_kernel import Motion
 from cdpr_drake.geometry.pulley_kernel import pulley_line, unit_vector_derivative
+from cdpr_drake.numerics.shared_kernels import MATRIX, VECTOR, shared
 
 DERIVATIVES = 8
 """Rows of a cable's derivatives by (p_WB, l0): pull (3), tension at the platform, tension at the
 exit point, length, surplus over the straight path, sag."""
+
+_RESPONSE = types.Tuple((*[types.float64] * 11, types.boolean))
+_POSE, _MOTION = (types.UniTuple(types.float64, count) for count in (12, 18))
 
 
 @njit(cache=True, error_model="numpy")
@@ -57,6 +61,7 @@ def straight_response(X: Motion, cable: Array, l0: float, out: Array) -> Any:
     )  # fmt: skip
 
 
+@shared(_RESPONSE(_POSE, VECTOR, types.float64, VECTOR, MATRIX, MATRIX))
 @njit(cache=True, error_model="numpy")
 def sagging_response(
     X: Motion, cable: Array, l0: float, guess: Array, inner: Array, out: Array
@@ -138,6 +143,7 @@ def damping_tension(
     return T * (stiffness * v + D[3, 3] * l0_dot)
 
 
+@shared(_RESPONSE(_MOTION, VECTOR, types.float64, types.float64, VECTOR, MATRIX, MATRIX))
 @njit(cache=True, error_model="numpy")
 def sagging_motion(
     X: Motion, cable: Array, l0: float, l0_dot: float, guess: Array, inner: Array, D: Array

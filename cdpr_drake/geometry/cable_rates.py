@@ -9,6 +9,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.poses import adjoint_of_arrays
 from cdpr_drake.geometry.pulley_kernel import PULLEY_RADIUS, pulley_line
 from cdpr_drake.geometry.two_pulleys_kernel import ANCHOR_RADIUS
+from cdpr_drake.numerics.shared_kernels import MATRIX, VECTOR, shared
 
 
 @njit(cache=True)
@@ -23,6 +24,7 @@ def _rate_over_pulley(R_WP: Array, p_WP: Array, cable: Array, w: Array, v: Array
     return along + uz * (v[2] + w[0] * ry - w[1] * rx)
 
 
+@shared(VECTOR(MATRIX, VECTOR, MATRIX, VECTOR))
 @njit(cache=True)
 def cable_rates_from_platform_twist(R_WP: Array, p_WP: Array, cables: Array, V_P: Array) -> Array:
     """Rates of the cable lengths, shape (m,) [m/s], by the Jacobian in the platform frame.
@@ -55,6 +57,7 @@ def cable_rates_from_platform_twist(R_WP: Array, p_WP: Array, cables: Array, V_P
     return rates
 
 
+@shared(VECTOR(MATRIX, VECTOR, MATRIX, VECTOR))
 @njit(cache=True)
 def cable_rates_from_base_twist(R_WP: Array, p_WP: Array, cables: Array, V_WP: Array) -> Array:
     """Rates of the cable lengths, shape (m,) [m/s], by the Jacobian in the base frame W.

@@ -126,7 +126,7 @@ def pulley_geometry(X: Motion, cable: Array) -> Any:
         pulley at the platform B is its tangent point B'.
     """
     if cable[13] > 0.0:
-        return two_pulleys_geometry(X, cable)
+        return two_pulleys_geometry(X[:12], cable)
     r = cable[8]
     if r == 0.0:
         length, ux, uy, uz, rx, ry, rz = cable_line(X, cable)
@@ -156,8 +156,10 @@ def unit_vector_derivative(X: Motion, cable: Array, out: Array) -> None:
     """
     if cable[13] > 0.0:
         T = np.empty((6, 6))
-        line_by_pose(X, cable, T)
-        out[:3, :3] = T[3:, 3:]
+        line_by_pose(X[:12], cable, T)
+        for i in range(3):  # a slice would take numba three seconds to compile
+            for j in range(3):
+                out[i, j] = T[3 + i, 3 + j]
         return
     r = cable[8]
     if r == 0.0:

@@ -32,10 +32,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
+from numba import njit, types
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.motion_kernel import Motion
+from cdpr_drake.numerics.shared_kernels import MATRIX, VECTOR, shared
 
 ANCHOR_RADIUS, ANCHOR_AXIS = 13, 14
 """Columns of `CableSet.packed()`: radius s of the groove at the platform [m], its axis in P (3)."""
@@ -51,6 +52,8 @@ SETTLED = 1e-7
 more is exact: it would be the square of this."""
 
 _LARGEST_TURN = 0.5
+
+_POSE = types.UniTuple(types.float64, 12)
 
 
 @njit(cache=True, error_model="numpy")
@@ -255,6 +258,7 @@ def free_line(X: Motion, cable: Array) -> Any:
     )  # fmt: skip
 
 
+@shared(types.UniTuple(types.float64, 7)(_POSE, VECTOR))
 @njit(cache=True, error_model="numpy")
 def two_pulleys_line(X: Motion, cable: Array) -> Any:
     """As `pulley_kernel.pulley_line`, with the arm of B', where the free line ends."""
@@ -267,6 +271,7 @@ def two_pulleys_line(X: Motion, cable: Array) -> Any:
     )  # fmt: skip
 
 
+@shared(types.UniTuple(types.float64, 11)(_POSE, VECTOR))
 @njit(cache=True, error_model="numpy")
 def two_pulleys_geometry(X: Motion, cable: Array) -> Any:
     """As `pulley_kernel.pulley_geometry`: arcs of both grooves together, and the arm of B'."""
@@ -294,6 +299,7 @@ def _turning_of_line(
                 out[i, j] = c_i * c_j / L + sine / rho * y[i] * y[j]
 
 
+@shared(types.void(_POSE, VECTOR, MATRIX))
 @njit(cache=True, error_model="numpy")
 def line_by_pose(X: Motion, cable: Array, out: Array) -> None:
     """Writes how the free line changes with the pose (turn, translation) in W, shape (6, 6).
@@ -364,8 +370,14 @@ def add_platform_turning(X: Motion, cable: Array, tension: float, K: Array) -> N
         tension: Tension [N].
         K: Stiffness by (turn, translation) in W about Po, shape (6, 6), changed.
     """
-    if cable[13] == 0.0:
-        return
+    if cable[13] > 0.0:
+        _add_turning(X[:12], cable, tension, K)
+
+
+@shared(types.void(_POSE, VECTOR, types.float64, MATRIX))
+@njit(cache=True, error_model="numpy")
+def _add_turning(X: Motion, cable: Array, tension: float, K: Array) -> None:
+    """As `add_platform_turning`, with a pulley at the platform."""
     T = np.empty((6, 6))
     line_by_pose(X, cable, T)
     _, ux, uy, uz, rx, ry, rz = two_pulleys_line(X, cable)

@@ -35,10 +35,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+from numba import njit, types
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.numerics.linear_algebra_kernel import least_squares
+from cdpr_drake.numerics.shared_kernels import MATRIX, VECTOR, shared
 from cdpr_drake.servoing.servo_law import (
     AXIS_GAIN,
     EDGE_DISTANCE,
@@ -73,6 +74,7 @@ def edge_push(law: Array, value: float, lowest: float, highest: float) -> float:
     return push
 
 
+@shared(VECTOR(VECTOR, VECTOR, VECTOR, MATRIX, VECTOR, types.float64))
 @njit(cache=True)
 def partitioned_twist(law: Array, s: Array, e: Array, L: Array, rate: Array, gain: float) -> Array:
     """V_C, shape (6,) [rad/s, m/s]; see the module.

@@ -19,7 +19,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+from numba import njit, types
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.cable_rates import (
@@ -30,6 +30,7 @@ from cdpr_drake.geometry.cable_rates import (
 from cdpr_drake.geometry.poses import adjoint_of_arrays
 from cdpr_drake.numerics.kernel_calls import array_addresses, integers_at, matrix_at, vector_at
 from cdpr_drake.numerics.linear_algebra_kernel import least_squares
+from cdpr_drake.numerics.shared_kernels import MATRIX, VECTOR, shared
 from cdpr_drake.servoing.packed_features_kernel import call_features, pose_parts
 from cdpr_drake.servoing.partitioned_law_kernel import partitioned_twist
 from cdpr_drake.servoing.servo_law import (
@@ -114,6 +115,12 @@ def _wanted_twist(
     return wanted
 
 
+@shared(
+    types.Tuple((VECTOR, types.float64))(
+        VECTOR, types.int64, VECTOR, VECTOR, MATRIX, MATRIX, VECTOR, MATRIX, types.int64[::1],
+        VECTOR,
+    )
+)  # fmt: skip
 @njit(cache=True)
 def _asked_twist(
     law: Array, rank: int, s: Array, e: Array, L: Array, reference: Array, X_PC: Array,

@@ -17,9 +17,10 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
+from numba import njit, types
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.numerics.shared_kernels import MATRIX, VECTOR, shared
 from cdpr_drake.servoing.servo_law import (
     AHEAD,
     BEGUN,
@@ -78,6 +79,7 @@ def growth(e: Array, L: Array, V_C: Array, first: int, end: int) -> float:
     return total
 
 
+@shared(types.boolean(VECTOR, VECTOR, MATRIX, VECTOR, types.float64, VECTOR))
 @njit(cache=True)
 def has_to_switch(law: Array, e: Array, L: Array, V_C: Array, time: float, memory: Array) -> bool:
     """Whether the other controller takes over now; see the module.

@@ -5,11 +5,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
+from numba import njit, types
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.rotation_kernel import quaternion_into
 from cdpr_drake.numerics.linear_algebra_kernel import copy_matrix, copy_vector
+from cdpr_drake.numerics.shared_kernels import MATRIX, VECTOR, shared
 from cdpr_drake.stability.criterion_kernel import (
     OUTSIDE,
     camera_rows,
@@ -106,6 +107,18 @@ class Work(NamedTuple):
     F: Array
 
 
+_SCALARS = (types.int64, types.boolean, types.int64, types.boolean)
+CASE_TYPE = types.NamedTuple(
+    (*[MATRIX] * 3, VECTOR, *_SCALARS, MATRIX, VECTOR, types.int64[::1]),
+    CaseArrays,
+)
+ROWS_TYPE = types.NamedTuple(
+    (MATRIX, types.uint64[:, ::1], *[MATRIX] * 3, types.float64[:, :, ::1]), PoseRows
+)
+WORK_TYPE = types.NamedTuple((MATRIX, VECTOR, *[MATRIX] * 14), Work)
+"""The three as numba has them, for kernels that are called by their slot."""
+
+
 @njit(cache=True, error_model="numpy")
 def moves_object(case: CaseArrays) -> bool:
     """Whether the object is perturbed."""
@@ -125,6 +138,7 @@ def new_work(case: CaseArrays) -> Work:
     )  # fmt: skip
 
 
+@shared(types.boolean(CASE_TYPE, ROWS_TYPE, types.int64, WORK_TYPE))
 @njit(cache=True, error_model="numpy")
 def prepare(case: CaseArrays, rows: PoseRows, n: int, w: Work) -> bool:
     """Fills what pose n has in common for all perturbations; False where a matrix is singular."""
@@ -150,6 +164,7 @@ def prepare(case: CaseArrays, rows: PoseRows, n: int, w: Work) -> bool:
     return True
 
 
+@shared(types.boolean(CASE_TYPE, ROWS_TYPE, types.int64, WORK_TYPE, VECTOR))
 @njit(cache=True, error_model="numpy")
 def evaluate(case: CaseArrays, rows: PoseRows, n: int, w: Work, d: Array) -> bool:
     """w.S <- (Pi + Pi') / 2 for the perturbation d; False where a matrix is singular."""

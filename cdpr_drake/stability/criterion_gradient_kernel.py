@@ -10,10 +10,19 @@ d(J^+) = -J^+ dJ J^+ + (J'J)^-1 dJ' (I - J J^+), two more sums of the same kind.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+from numba import njit, types
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.stability.criterion_at_pose_kernel import CaseArrays, PoseRows, Work, moves_object
+from cdpr_drake.numerics.shared_kernels import VECTOR, shared
+from cdpr_drake.stability.criterion_at_pose_kernel import (
+    CASE_TYPE,
+    ROWS_TYPE,
+    WORK_TYPE,
+    CaseArrays,
+    PoseRows,
+    Work,
+    moves_object,
+)
 from cdpr_drake.stability.criterion_kernel import interaction_pair, turn_after
 from cdpr_drake.stability.perturbation_samples_kernel import COMMON, CORNERS, SINGLE
 from cdpr_drake.stability.stability_case import IBVS
@@ -49,6 +58,7 @@ def _turned_back(phi: Array, g: Array, at: int) -> None:
     g[at + 2] = gz + a * cz + b * (x * cy - y * cx)
 
 
+@shared(types.void(CASE_TYPE, WORK_TYPE, *[VECTOR] * 4))
 @njit(cache=True, error_model="numpy")
 def add_camera_gradient(
     case: CaseArrays, w: Work, d: Array, weights: Array, z: Array, g: Array
@@ -126,6 +136,7 @@ def _transposed_times(X: Array, v: Array) -> Array:
     return out
 
 
+@shared(types.void(CASE_TYPE, ROWS_TYPE, types.int64, *[VECTOR] * 4))
 @njit(cache=True, error_model="numpy")
 def _add_object_gradient(
     case: CaseArrays,
@@ -155,6 +166,7 @@ def _add_object_gradient(
                 g[k] += left[i] * (high[i, j] - low[i, j]) / (2.0 * DIFFERENCE_STEP) * right[j]
 
 
+@shared(types.void(CASE_TYPE, ROWS_TYPE, types.int64, WORK_TYPE, *[VECTOR] * 3))
 @njit(cache=True, error_model="numpy")
 def gradient(
     case: CaseArrays, rows: PoseRows, n: int, w: Work, d: Array, v: Array, g: Array
@@ -221,6 +233,7 @@ def _ball_step(g: Array, at: int, radius: float, planar: bool, turn: bool, out: 
         out[at], out[at + 1], out[at + 2] = 0.0, 0.0, 0.0
 
 
+@shared(types.void(CASE_TYPE, VECTOR, VECTOR))
 @njit(cache=True, error_model="numpy")
 def steepest_into(case: CaseArrays, g: Array, out: Array) -> None:
     """out <- the perturbation within the bounds with the smallest g' d."""

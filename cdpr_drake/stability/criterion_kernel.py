@@ -10,11 +10,12 @@ Source: servoing thesis (3.1), (3.8), (3.26); `criterion` is the plain form.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+from numba import njit, types
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.rotation_kernel import rotation_into
 from cdpr_drake.numerics.linear_algebra_kernel import copy_matrix, copy_vector
+from cdpr_drake.numerics.shared_kernels import MATRIX, VECTOR, shared
 from cdpr_drake.servoing.interaction_matrix_kernel import (
     camera_pose_into,
     hybrid_into,
@@ -279,6 +280,7 @@ def embed_planar(L: Array) -> None:
                 L[i, j] = 1.0 if i == j else 0.0
 
 
+@shared(types.boolean(types.int64, types.boolean, types.int64, *[VECTOR] * 4, *[MATRIX] * 4))
 @njit(cache=True, error_model="numpy")
 def interaction_pair(
     scheme: int,

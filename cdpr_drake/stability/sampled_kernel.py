@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+from numba import njit, types
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.numerics.linear_algebra_kernel import factor, smallest_eigenvalue
+from cdpr_drake.numerics.shared_kernels import MATRIX, VECTOR, shared
 from cdpr_drake.stability.criterion_at_pose_kernel import (
+    CASE_TYPE,
+    ROWS_TYPE,
+    WORK_TYPE,
     CaseArrays,
     PoseRows,
     Work,
@@ -25,6 +29,12 @@ from cdpr_drake.stability.perturbation_samples_kernel import draw_into, draw_roo
 from cdpr_drake.stability.stability_case import IBVS
 
 
+@shared(
+    types.float64(
+        CASE_TYPE, ROWS_TYPE, types.int64, WORK_TYPE, VECTOR, VECTOR, MATRIX, types.int64,
+        types.int64, types.boolean, types.boolean, types.int64[::1],
+    )
+)  # fmt: skip
 @njit(cache=True, error_model="numpy")
 def sample_pose(
     case: CaseArrays,

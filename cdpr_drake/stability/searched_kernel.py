@@ -13,11 +13,15 @@ Source: Frank and Wolfe, An algorithm for quadratic programming, 1956.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+from numba import njit, types
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.numerics.linear_algebra_kernel import copy_vector, smallest_eigenpair
+from cdpr_drake.numerics.shared_kernels import VECTOR, shared
 from cdpr_drake.stability.criterion_at_pose_kernel import (
+    CASE_TYPE,
+    ROWS_TYPE,
+    WORK_TYPE,
     CaseArrays,
     PoseRows,
     Work,
@@ -47,6 +51,11 @@ LEAST_DESCENT = 1e-6
 """A search ends when a step lowers the eigenvalue by less than this."""
 
 
+@shared(
+    types.float64(
+        CASE_TYPE, ROWS_TYPE, types.int64, WORK_TYPE, VECTOR, VECTOR, types.int64, types.float64
+    )
+)  # fmt: skip
 @njit(cache=True, error_model="numpy")
 def descend(
     case: CaseArrays,

@@ -14,9 +14,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
+from numba import njit, types
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.numerics.shared_kernels import MATRIX, VECTOR, shared
 from cdpr_drake.tensions.null_space_kernel import balance, factor, null_basis
 
 SINGULAR = -2
@@ -71,6 +72,7 @@ def workspace_shape(n: int, m: int) -> Any:
     return max(m + 3 * (m - n) + 6, 2 * n + 9) + 1, m + 2
 
 
+@shared(types.int64(MATRIX, MATRIX, *[VECTOR] * 5))
 @njit(cache=True)
 def nearest_tensions_in(
     work: Array, W: Array, w: Array, lower: Array, upper: Array, reference: Array, t: Array
@@ -113,6 +115,7 @@ def median(
     return nearest_tensions_in(work, W, w, lower, upper, middle, t)
 
 
+@shared(types.int64(VECTOR, MATRIX, VECTOR, VECTOR, types.float64, MATRIX))
 @njit(cache=True)
 def project_on_polytope(
     t: Array, N: Array, lower: Array, upper: Array, size: float, work: Array
