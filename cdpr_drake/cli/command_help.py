@@ -29,7 +29,7 @@ EXAMPLES: dict[str, tuple[str, str]] = {
     "serve": ("cdpr serve acrobot_pbvs", "cdpr serve acrobot_pbvs --port 5599 --duration 5"),
     "robots": ("cdpr robots", "cdpr robots --json"),
     "scenarios": ("cdpr scenarios", "cdpr scenarios --json"),
-    "new": ("cdpr new robot mine", "cdpr new scenario mine --from caroca_ibvs"),
+    "new": ("cdpr new scenario mine --from caroca_ibvs", "cdpr new controller mine"),
     "check": ("cdpr check mine.yaml", "cdpr check robot.yaml scenario.yaml"),
     "view": ("cdpr view acrobot_large", "cdpr view two_platforms"),
     "studio": ("cdpr studio acrobot_large", "cdpr studio mine.yaml --port 7100"),

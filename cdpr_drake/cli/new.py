@@ -1,7 +1,8 @@
-"""`cdpr new`: a commented file to start from."""
+"""`cdpr new`: a commented file to start from, or a block with its test."""
 
 from __future__ import annotations
 
+import keyword
 import re
 from pathlib import Path
 from typing import Annotated, Any
@@ -10,6 +11,7 @@ import typer
 import yaml
 
 from cdpr_drake.cli.completion import words_among
+from cdpr_drake.cli.notebooks import FOLDER as NOTEBOOKS
 from cdpr_drake.cli.robot_folder import write_files
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models.robot_loader import load_robot, robot_text
@@ -21,6 +23,11 @@ from cdpr_drake.systems.scenarios.visual_servo_scenario import DEFAULT_SCENARIO
 from cdpr_drake.systems.worlds.settings import found_file
 
 ROBOT, SCENARIO = "robot", "scenario"
+BLOCKS = ("controller", "estimator")
+"""Blocks of which there is a template, each with its test."""
+
+KINDS = (ROBOT, SCENARIO, *BLOCKS)
+TEMPLATES = NOTEBOOKS / "templates"
 EXAMPLE = "acrobot_large"
 """The robot that a new one begins as."""
 
@@ -30,9 +37,11 @@ _NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9_.-]{0,63}")
 def new(
     kind: Annotated[
         str,
-        typer.Argument(help="robot or scenario.", autocompletion=words_among((ROBOT, SCENARIO))),
+        typer.Argument(help=f"One of {', '.join(KINDS)}.", autocompletion=words_among(KINDS)),
     ],
-    name: Annotated[str, typer.Argument(help="Its name; the file is NAME.yaml.")],
+    name: Annotated[
+        str, typer.Argument(help="Its name; the file is NAME.yaml, or NAME.py and test_NAME.py.")
+    ],
     source: Annotated[
         str | None,
         typer.Option(
@@ -42,16 +51,24 @@ def new(
     out: Annotated[Path, typer.Option(help="Folder of the file.")] = Path(),
     overwrite: Annotated[bool, typer.Option(help="Replace a file of that name.")] = False,
 ) -> None:
-    """Writes a commented file of a robot or a scenario to edit, and checks it.
+    """Writes a robot, scenario, controller or estimator to start from.
 
-    Every key is there with its meaning, unit and range; those with a default are comments.
+    Of a robot or a scenario every key is there with its meaning, unit and range; those with a
+    default are comments, and the file is checked. A controller or estimator is a program that
+    runs, and a test of it for pytest.
     """
     if not _NAME.fullmatch(name):
         raise CdprError(
             f"name: found {name}; accepted: 1 to 64 letters, digits, _ . -, the first one no ."
         )
-    if kind not in (ROBOT, SCENARIO):
-        raise CdprError(f"kind of file: found {kind}; accepted: {ROBOT}, {SCENARIO}")
+    if kind not in KINDS:
+        raise CdprError(f"kind of file: found {kind}; accepted: {', '.join(KINDS)}")
+    if kind in BLOCKS:
+        if source is not None:
+            raise CdprError(f"--from: found {source} with {kind}; accepted with: robot, scenario")
+        for path in write_files(out, _block(kind, name), overwrite):
+            print(path)
+        return
     of_robot = kind == ROBOT
     schema, content = (
         _robot(source or EXAMPLE) if of_robot else _scenario(source or DEFAULT_SCENARIO)
@@ -62,6 +79,23 @@ def new(
     (path,) = write_files(out, {f"{name}.yaml": text}, overwrite)
     (load_robot if of_robot else load_scenario)(str(path))
     print(path)
+
+
+def _block(kind: str, name: str) -> dict[str, str]:
+    """Program and test of a block, under its name.
+
+    Raises:
+        CdprError: It is no name of a module.
+    """
+    if not name.isidentifier() or keyword.iskeyword(name) or name.lower() != name:
+        raise CdprError(f"name: found {name}; accepted: a module's, small letters, digits and _")
+    title = "".join(part.capitalize() for part in name.split("_")) or "Block"
+    files = {}
+    for stem, new_name in ((f"mine_{kind}", name), (f"test_mine_{kind}", f"test_{name}")):
+        words = (TEMPLATES / f"{stem}.py").read_text(encoding="utf-8")
+        words = re.sub(r"\bMine\b", title, re.sub(r"\bmine\b", name, words))
+        files[f"{new_name}.py"] = words
+    return files
 
 
 def _robot(source: str) -> tuple[type, dict[str, Any]]:
