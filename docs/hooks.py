@@ -167,7 +167,7 @@ def room_page(room: str) -> str:
 def commands_page() -> str:
     """Every subcommand with its arguments and options, as `--help` has them."""
     from cdpr_drake.cli.app import SUBCOMMANDS, make_app
-    from cdpr_drake.cli.command_help import EXAMPLES
+    from cdpr_drake.cli.command_help import COMMANDS
 
     out = ["# Commands\n\nAs `cdpr COMMAND --help` prints them.\n"]
     for name in SUBCOMMANDS:
@@ -177,7 +177,7 @@ def commands_page() -> str:
         rows = [row for parameter in command.params for row in _parameter_row(parameter)]
         if rows:
             out.append("\n| argument or option | |\n| --- | --- |\n" + "\n".join(rows) + "\n")
-        lines = "\n".join(EXAMPLES[name])
+        lines = "\n".join(COMMANDS[name][1:])
         out.append(f"\n```text\n{lines}\n```\n")
     return "".join(out)
 

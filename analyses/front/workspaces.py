@@ -194,6 +194,7 @@ class DrawnWorkspace(RobotWorkspace):
             told["certified"] = box_numbers(self.boxes, self.search)
         if self.refined is not None:
             told["refined"] = self.refined.numbers()
+        if self.boxes is not None:
             told["agreement"] = agreement_numbers(self.agreement)
         return told
 

@@ -20,7 +20,7 @@ from typing import Annotated, Any, NoReturn
 import typer
 from typer.core import TyperGroup
 
-from cdpr_drake.cli.command_help import GROUPS, examples_of, first_steps
+from cdpr_drake.cli.command_help import COMMANDS, examples_of, first_steps, groups
 from cdpr_drake.cli.completion import PROGRAM, asked_words, stand_in
 from cdpr_drake.cli.option_names import SHARED_OPTIONS, with_options
 from cdpr_drake.cli.process import INTERRUPTED, SIGNALS, compile_ahead, exit_with_parent
@@ -48,9 +48,7 @@ def _function_of(name: str) -> str:
     return f"{name}_" if keyword.iskeyword(name) else name.replace("-", "_")
 
 
-SUBCOMMANDS = {
-    name: f"cdpr_drake.cli.{_function_of(name)}" for names in GROUPS.values() for name in names
-}
+SUBCOMMANDS = {name: f"cdpr_drake.cli.{_function_of(name)}" for name in COMMANDS}
 """Subcommands in the order of the help, each with the module whose function of that name it is.
 
 What a subcommand prints as help is the function's docstring, or what the module's `help_words`
@@ -65,7 +63,7 @@ class _Subcommands(TyperGroup):
     """Lets a Ctrl-C through; its help has the whole first line of each subcommand."""
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
-        for title, names in GROUPS.items():
+        for title, names in groups().items():
             helps = [(name, self.commands[name].help or "") for name in names]
             with formatter.section(title):
                 formatter.write_dl([(name, help.partition("\n\n")[0]) for name, help in helps])

@@ -2,18 +2,124 @@
 
 from __future__ import annotations
 
-GROUPS: dict[str, tuple[str, ...]] = {
-    "Run": ("simulate", "serve"),
-    "Robots and scenarios": (
-        "robots", "scenarios", "new", "check", "view", "studio", "import", "export", "schema",
+COMMANDS: dict[str, tuple[str, str, str]] = {
+    "simulate": (
+        "Run",
+        "cdpr simulate",
+        "cdpr simulate caroca_ibvs --camera projected --seeds 0:20",
     ),
-    "Analyse": ("tension", "static", "equilibria", "workspace", "stability"),
-    "Plan and design": ("plan", "reconfigure", "design"),
-    "Real machines": ("import-log", "calibrate", "calibrate-camera", "identify", "replay"),
-    "Reproduce": ("study", "reproduce"),
-    "Tools": ("notebooks", "examples", "doctor", "bench"),
-}  # fmt: skip
-"""Subcommands in the order of the help, by what they are for."""
+    "serve": ("Run", "cdpr serve acrobot_pbvs", "cdpr serve acrobot_pbvs --port 5599 --duration 5"),
+    "robots": ("Robots and scenarios", "cdpr robots", "cdpr robots --json"),
+    "scenarios": ("Robots and scenarios", "cdpr scenarios", "cdpr scenarios --json"),
+    "new": (
+        "Robots and scenarios",
+        "cdpr new scenario mine --from caroca_ibvs",
+        "cdpr new controller mine",
+    ),
+    "check": (
+        "Robots and scenarios",
+        "cdpr check mine.yaml",
+        "cdpr check robot.yaml scenario.yaml",
+    ),
+    "view": ("Robots and scenarios", "cdpr view acrobot_large", "cdpr view two_platforms"),
+    "studio": (
+        "Robots and scenarios",
+        "cdpr studio acrobot_large",
+        "cdpr studio mine.yaml --port 7100",
+    ),
+    "import": (
+        "Robots and scenarios",
+        "cdpr import IPAnema_1_bodies.xml",
+        "cdpr import robot.urdf --out mine",
+    ),
+    "export": (
+        "Robots and scenarios",
+        "cdpr export caroca --format mjcf",
+        "cdpr export caroca --format sdf --out here",
+    ),
+    "schema": ("Robots and scenarios", "cdpr schema robot", "cdpr schema scenario"),
+    "tension": (
+        "Analyse",
+        "cdpr tension acrobot_large",
+        "cdpr tension acrobot_large --pose 0.35,-0.27,0.45 --method all",
+    ),
+    "static": (
+        "Analyse",
+        "cdpr static acrobot_large",
+        "cdpr static caroca --pose 0,0,1.5 --cable-model catenary",
+    ),
+    "equilibria": (
+        "Analyse",
+        "cdpr equilibria grab_four --position 0,0,0.5",
+        "cdpr equilibria acrobot_large --position 0,0,0.3 --taut 1,2,3,4,5,6",
+    ),
+    "workspace": (
+        "Analyse",
+        "cdpr workspace acrobot_large",
+        "cdpr workspace acrobot_large --kind static,interference-free --certify",
+    ),
+    "stability": (
+        "Analyse",
+        "cdpr stability acrobot_large",
+        "cdpr stability acrobot_large --scheme pbvs --json",
+    ),
+    "plan": (
+        "Plan and design",
+        "cdpr plan acrobot_large --proven --from 0,0,0.3 --to 0.2,0,0.4",
+        "cdpr plan acrobot_large --free --from 0,0,0.3 --to 0.2,0,0.4",
+    ),
+    "reconfigure": (
+        "Plan and design",
+        "cdpr reconfigure acrobot_large --rails rails.yaml --poses 0.2,0,0.4",
+        "cdpr reconfigure caroca --rails rails.yaml --path poses.csv",
+    ),
+    "design": (
+        "Plan and design",
+        "cdpr design acrobot_large --goal capacity-margin",
+        "cdpr design acrobot_large --goal static --goal accuracy --quick",
+    ),
+    "import-log": (
+        "Real machines",
+        "cdpr import-log series.txt --out series.csv",
+        "cdpr import-log take.csv --log-format motive --out take_log.csv",
+    ),
+    "calibrate": (
+        "Real machines",
+        "cdpr calibrate acrobot_large --campaign acrobot_sensors",
+        "cdpr calibrate hangprinter_4 series.csv",
+    ),
+    "calibrate-camera": (
+        "Real machines",
+        "cdpr calibrate-camera images/*.png --squares 9x6 --size 0.025",
+        "cdpr calibrate-camera images/*.png --squares 9x6 --size 0.025 --model fisheye",
+    ),
+    "identify": (
+        "Real machines",
+        "cdpr identify acrobot_large --campaign acrobot_computed_torque",
+        "cdpr identify mine.yaml motion.csv --validate other_motion.csv",
+    ),
+    "replay": (
+        "Real machines",
+        "cdpr replay log.csv --robot hangprinter_4",
+        "cdpr replay log.csv --robot mine.yaml --follow",
+    ),
+    "study": ("Reproduce", "cdpr study worked-examples", "cdpr study tension-methods --quick"),
+    "reproduce": ("Reproduce", "cdpr reproduce --quick", "cdpr reproduce --only case-1,case-2"),
+    "notebooks": ("Tools", "cdpr notebooks", "cdpr notebooks my_notebooks"),
+    "examples": ("Tools", "cdpr examples", "cdpr examples own_controller --out here"),
+    "doctor": ("Tools", "cdpr doctor", "cdpr doctor --compile"),
+    "bench": ("Tools", "cdpr bench", "cdpr bench tensions"),
+}
+"""Subcommands in the order of the help: group, and two lines to try or to change."""
+
+
+def groups() -> dict[str, list[str]]:
+    """Names of subcommands by what they are for."""
+    found: dict[str, list[str]] = {}
+    for name, (group, *_) in COMMANDS.items():
+        found.setdefault(group, []).append(name)
+    return found
+
 
 FIRST_STEPS: tuple[tuple[str, str], ...] = (
     ("cdpr robots", "robots that come with the package"),
@@ -24,83 +130,10 @@ FIRST_STEPS: tuple[tuple[str, str], ...] = (
 )
 """What `cdpr` alone shows."""
 
-EXAMPLES: dict[str, tuple[str, str]] = {
-    "simulate": ("cdpr simulate", "cdpr simulate caroca_ibvs --camera projected --seeds 0:20"),
-    "serve": ("cdpr serve acrobot_pbvs", "cdpr serve acrobot_pbvs --port 5599 --duration 5"),
-    "robots": ("cdpr robots", "cdpr robots --json"),
-    "scenarios": ("cdpr scenarios", "cdpr scenarios --json"),
-    "new": ("cdpr new scenario mine --from caroca_ibvs", "cdpr new controller mine"),
-    "check": ("cdpr check mine.yaml", "cdpr check robot.yaml scenario.yaml"),
-    "view": ("cdpr view acrobot_large", "cdpr view two_platforms"),
-    "studio": ("cdpr studio acrobot_large", "cdpr studio mine.yaml --port 7100"),
-    "import": ("cdpr import IPAnema_1_bodies.xml", "cdpr import robot.urdf --out mine"),
-    "export": ("cdpr export caroca --format mjcf", "cdpr export caroca --format sdf --out here"),
-    "schema": ("cdpr schema robot", "cdpr schema scenario"),
-    "tension": (
-        "cdpr tension acrobot_large",
-        "cdpr tension acrobot_large --pose 0.35,-0.27,0.45 --method all",
-    ),
-    "static": (
-        "cdpr static acrobot_large",
-        "cdpr static caroca --pose 0,0,1.5 --cable-model catenary",
-    ),
-    "equilibria": (
-        "cdpr equilibria grab_four --position 0,0,0.5",
-        "cdpr equilibria acrobot_large --position 0,0,0.3 --taut 1,2,3,4,5,6",
-    ),
-    "workspace": (
-        "cdpr workspace acrobot_large",
-        "cdpr workspace acrobot_large --kind static,interference-free --certify",
-    ),
-    "stability": (
-        "cdpr stability acrobot_large",
-        "cdpr stability acrobot_large --scheme pbvs --json",
-    ),
-    "plan": (
-        "cdpr plan acrobot_large --proven --from 0,0,0.3 --to 0.2,0,0.4",
-        "cdpr plan acrobot_large --free --from 0,0,0.3 --to 0.2,0,0.4",
-    ),
-    "reconfigure": (
-        "cdpr reconfigure acrobot_large --rails rails.yaml --poses 0.2,0,0.4",
-        "cdpr reconfigure caroca --rails rails.yaml --path poses.csv",
-    ),
-    "design": (
-        "cdpr design acrobot_large --goal capacity-margin",
-        "cdpr design acrobot_large --goal static --goal accuracy --quick",
-    ),
-    "import-log": (
-        "cdpr import-log series.txt --out series.csv",
-        "cdpr import-log take.csv --log-format motive --out take_log.csv",
-    ),
-    "calibrate": (
-        "cdpr calibrate acrobot_large --campaign acrobot_sensors",
-        "cdpr calibrate hangprinter_4 series.csv",
-    ),
-    "calibrate-camera": (
-        "cdpr calibrate-camera images/*.png --squares 9x6 --size 0.025",
-        "cdpr calibrate-camera images/*.png --squares 9x6 --size 0.025 --model fisheye",
-    ),
-    "identify": (
-        "cdpr identify acrobot_large --campaign acrobot_computed_torque",
-        "cdpr identify mine.yaml motion.csv --validate other_motion.csv",
-    ),
-    "replay": (
-        "cdpr replay log.csv --robot hangprinter_4",
-        "cdpr replay log.csv --robot mine.yaml --follow",
-    ),
-    "study": ("cdpr study worked-examples", "cdpr study tension-methods --quick"),
-    "reproduce": ("cdpr reproduce --quick", "cdpr reproduce --only case-1,case-2"),
-    "notebooks": ("cdpr notebooks", "cdpr notebooks my_notebooks"),
-    "examples": ("cdpr examples", "cdpr examples own_controller --out here"),
-    "doctor": ("cdpr doctor", "cdpr doctor --compile"),
-    "bench": ("cdpr bench", "cdpr bench tensions"),
-}
-"""Two lines to try or to change, by subcommand."""
-
 
 def examples_of(name: str) -> str:
     """Examples of a subcommand, for the end of its help, as Markdown."""
-    lines = "\n\n".join(f"`{line}`" for line in EXAMPLES[name])
+    lines = "\n\n".join(f"`{line}`" for line in COMMANDS[name][1:])
     return f"Examples:\n\n{lines}"
 
 

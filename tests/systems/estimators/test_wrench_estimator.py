@@ -121,7 +121,18 @@ def test_it_is_exact_with_ideal_readings(pushed):
     assert np.all(block_of.GetOutputPort("wrench_sigma").Eval(context) == 0.0)
 
 
-RUN = ("duration=1.2", "integration.engine=compiled", "log_rate=100")
+RUN = ("duration=2.5", "integration.engine=compiled", "log_rate=100")
+
+SETTLED = 1.5
+"""From then on [s] cables no longer ring from the first steps of the winches, at which some go
+slack, which is faster than the estimator samples."""
+
+
+def bias_when_settled(result):
+    """Largest mean error of a component of the force [N]."""
+    there = result.log["time"] > SETTLED
+    wrong = result.log["wrench_estimated"] - result.log["applied_wrench"]
+    return np.max(np.abs(np.mean(wrong[there, 3:], axis=0)))
 
 
 def test_a_scenario_logs_sums_up_and_draws_it():
@@ -130,7 +141,7 @@ def test_a_scenario_logs_sums_up_and_draws_it():
     summary = summarize(result)["wrench_estimation"]
     assert summary["kind"] == "static"
     assert summary["force_rms_n"] < 0.3
-    assert np.max(np.abs(summary["force_bias_n"])) < 0.05
+    assert bias_when_settled(result) < 0.05
     assert "wrench" in {name.split(".")[0] for name in run_figures(result, ("png",))}
     true, found = result.log["applied_wrench"][-20:], result.log["wrench_estimated"][-20:]
     assert np.max(np.abs(true - found)) < 0.5 * np.max(np.abs(true))
@@ -146,7 +157,7 @@ def test_friction_of_pulleys_that_is_not_known_is_seen_and_known_is_undone():
         result = run_scenario(
             load_scenario("acrobot_pushed", (*RUN, f"wrench_estimation={section}"))
         )
-        bias[known] = np.max(np.abs(summarize(result)["wrench_estimation"]["force_bias_n"]))
+        bias[known] = bias_when_settled(result)
     assert bias["0"] > 3.0 * bias["null"]
 
 
