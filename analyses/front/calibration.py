@@ -45,6 +45,12 @@ from cdpr_drake.summaries import as_kind
 MOST_PARAMETERS = 7
 """So many are shown where an identification shows itself."""
 
+UNKNOWN_ZERO = (
+    "its motor angles count from somewhere unknown; say at which pose they were zero: zero in "
+    "Python, --zero home or --zero POSE"
+)
+"""What is often missing where a log with motor angles is refused."""
+
 ASKED = ("priors", "mount", "image_size", "start", "rest", "outliers", "zero", "bounds", "hold_out")
 KEPT = ("propose", "overwrite", "formats")
 """What `calibrate` takes by name besides: fields of its task, and what is done with results."""
@@ -147,7 +153,12 @@ def calibrate(
     )
 
     def work(folder: Path | None, say: Say) -> RobotCalibration:
-        found = calibrate_log(task, read, say)
+        try:
+            found = calibrate_log(task, read, say)
+        except CalibrationError as problem:
+            if read.angles is not None and task.zero is None:
+                problem.add_note(UNKNOWN_ZERO)
+            raise
         fit = calibration_fit(found, *proposed_poses(found, options.get("propose"), folder, say))
         if folder is not None:
             fit.write(folder)

@@ -38,7 +38,7 @@ def check_emergency(scenario: Scenario, robot: Robot, path: Path) -> None:
     if scenario.failures is None:
         raise ScenarioError(
             f"{where}: found a section without failures; accepted: null, or with a section "
-            "failures, which may be {{}}"
+            "failures, which may be {}"
         )
     if robot.winch_groups().are_shared():
         raise ScenarioError(

@@ -67,6 +67,21 @@ def free():
     return calibrated(hold_out="each")
 
 
+def test_the_log_that_import_log_writes_has_the_same_numbers(tmp_path):
+    """The way that the guide goes: recorder's file, import-log, calibrate."""
+    cdpr.import_log(LOG).write(tmp_path / "series.csv")
+    cables = [cable.name for cable in load_robot("hangprinter_4").cables]
+    direct, imported = read_log(LOG, cables), read_log(tmp_path / "series.csv", cables)
+    np.testing.assert_allclose(imported.angles, direct.angles, rtol=1e-12)  # deg, as written
+    np.testing.assert_allclose(imported.points, direct.points, rtol=1e-12)
+
+
+def test_a_log_of_motor_angles_without_a_zero_is_refused_with_what_is_missing():
+    with pytest.raises(CalibrationError, match="does not determine") as caught:
+        cdpr.calibrate("hangprinter_4", LOG)
+    assert any("--zero home" in note for note in caught.value.__notes__)
+
+
 def test_the_published_cost_and_anchors_come_back_under_the_published_bound(bounded):
     result = bounded.result
     assert result.status == "converged"
