@@ -1,4 +1,4 @@
-"""A visual servo over many seeds, with anchor points that are 5 mm off; also on a Dask cluster.
+"""Many seeds: a visual servo with anchor points that are 5 mm off, here or on a Dask cluster.
 
 `workers="tcp://host:8786"` instead of a number sends the runs to a cluster.
 """

@@ -1,4 +1,4 @@
-"""An estimator of your own, logged beside the one in charge.
+"""An estimator of your own: logged beside the one in charge.
 
 `advance` gets what the ports read, the estimate of the step before and the time since then, and
 returns the estimate now. This one reads nothing and drifts back to where the platform began.

@@ -1,4 +1,4 @@
-"""A scheme of visual servoing of your own: features and their interaction matrix, by name."""
+"""A scheme of your own: features of visual servoing and their interaction matrix, by name."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""The fastest motion along a path, followed by the simulated robot with computed torque."""
+"""Plan and follow: the fastest motion along a path, tracked by computed torque."""
 
 import cdpr_drake as cdpr
 

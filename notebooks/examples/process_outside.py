@@ -1,4 +1,4 @@
-"""A process outside closes the loop: this file is server and client; yours may be in any language.
+"""A process outside: it closes the loop of a run, here by a client in the same file.
 
 `cdpr serve acrobot_computed_torque --place trajectory` in another shell is the same server.
 """

@@ -1,4 +1,4 @@
-"""An arm on a platform on cables: tensions that hold both, and how they change with the arm."""
+"""A robot with an arm: tensions that hold both, and how they change with the arm."""
 
 import numpy as np
 

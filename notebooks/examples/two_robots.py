@@ -1,4 +1,4 @@
-"""Two robots and a ball in one MultibodyPlant; one robot winds its cables in, the other waits."""
+"""Two robots: in one MultibodyPlant with a ball; one winds its cables in, the other waits."""
 
 import numpy as np
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
