@@ -1,7 +1,7 @@
 from .camera_catalogue import Camera as Camera
 from .camera_catalogue import CameraFault as CameraFault
-from .camera_catalogue import camera_names as camera_names
 from .camera_catalogue import load_camera as load_camera
+from .camera_files import camera_names as camera_names
 from .mechanism_exchange import ImportedMechanism as ImportedMechanism
 from .mechanism_exchange import export_mechanism as export_mechanism
 from .mechanism_exchange import import_mechanism as import_mechanism
@@ -23,6 +23,10 @@ from .plant_tree import PlantTree as PlantTree
 from .rendered_camera import color_camera as color_camera
 from .rendered_camera import make_depth_camera as make_depth_camera
 from .rendered_camera import make_rgbd_sensor as make_rgbd_sensor
+from .robot_copies import gravity_turn as gravity_turn
+from .robot_copies import moved_robot as moved_robot
+from .robot_copies import turned_robot as turned_robot
+from .robot_copies import world_turn as world_turn
 from .robot_exchange import ImportedRobot as ImportedRobot
 from .robot_exchange import draft_robot as draft_robot
 from .robot_exchange import export_robot as export_robot
@@ -37,15 +41,11 @@ from .robot_in_plant import RobotInPlant as RobotInPlant
 from .robot_in_plant import add_robot as add_robot
 from .robot_in_plant import find_robot as find_robot
 from .robot_in_plant import platform_inertia as platform_inertia
-from .robot_loader import gravity_turn as gravity_turn
 from .robot_loader import load_robot as load_robot
-from .robot_loader import moved_robot as moved_robot
 from .robot_loader import parse_robot as parse_robot
 from .robot_loader import robot_file as robot_file
 from .robot_loader import robot_names as robot_names
 from .robot_loader import robot_text as robot_text
-from .robot_loader import turned_robot as turned_robot
-from .robot_loader import world_turn as world_turn
 from .robot_schema import CameraMount as CameraMount
 from .robot_schema import Pose as Pose
 from .robot_schema import Robot as Robot

@@ -10,15 +10,11 @@ from pathlib import Path
 import numpy as np
 
 from cdpr_drake.errors import RobotFileError
+from cdpr_drake.models.camera_files import CAMERA_FOLDER, CAMERA_SUFFIXES, camera_names
 from cdpr_drake.schema.fields import array, number, optional_section, text, whole
 from cdpr_drake.schema.typed_yaml import closest, load_typed
 from cdpr_drake.vision.lens_distortion import COEFFICIENTS, NO_LENS, LensDistortion
 from cdpr_drake.vision.pinhole import Pinhole
-
-_FOLDER = Path(__file__).parent / "cameras"
-
-CAMERA_SUFFIXES = (".yaml", ".yml")
-"""Of files of cameras; what ends otherwise is a name of the catalogue."""
 
 
 @dataclass(kw_only=True)
@@ -170,11 +166,6 @@ class CameraFault:
         return self.start - 1e-9 <= time < self.start + self.duration - 1e-9
 
 
-def camera_names() -> tuple[str, ...]:
-    """Names of the cameras of the catalogue."""
-    return tuple(sorted(path.stem for path in _FOLDER.glob("*.yaml")))
-
-
 def load_camera(name: str) -> Camera:
     """A camera of the catalogue by its name, or of a file by its path.
 
@@ -212,13 +203,4 @@ def load_camera_file(path: Path) -> Camera:
 def _of_catalogue(name: str) -> Camera:
     if name not in camera_names():
         raise RobotFileError(f"camera {name!r} is unknown; {closest(name, camera_names())}")
-    return load_camera_file(_FOLDER / f"{name}.yaml")
-
-
-def resolved_camera(name: str, folder: Path) -> str:
-    """A camera's name, or the absolute path of its file: in a folder, if it is there, else as it is
-    found from the working folder."""
-    if not name.lower().endswith(CAMERA_SUFFIXES):
-        return name
-    beside = folder / name
-    return str((beside if beside.exists() else Path(name)).absolute())
+    return load_camera_file(CAMERA_FOLDER / f"{name}.yaml")

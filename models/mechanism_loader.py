@@ -76,14 +76,6 @@ def load_robot_or_mechanism(name: str | Path) -> Robot | Mechanism:
     return load_mechanism(name) if is_mechanism(robot_file(str(name))) else load_robot(name)
 
 
-def names_mechanism(name: str | Path) -> bool:
-    """Whether a name or path is that of a mechanism; also False where there is no such file."""
-    try:
-        return is_mechanism(robot_file(str(name)))
-    except RobotFileError:
-        return False
-
-
 def as_mechanism(mechanism: Mechanism | str | Path) -> Mechanism:
     """A mechanism that is given as itself, or by name or path.
 

@@ -23,15 +23,13 @@ from cdpr_drake.models.formats.mjcf import write_mjcf
 from cdpr_drake.models.formats.reprapfirmware import write_reprapfirmware
 from cdpr_drake.models.formats.wirex import write_wirex
 from cdpr_drake.models.materials import given_material
+from cdpr_drake.models.robot_copies import gravity_turn, turned_robot, world_turn
 from cdpr_drake.models.robot_exports import check_format, names_in_file, xml_words
 from cdpr_drake.models.robot_holding import lengths_at_home
 from cdpr_drake.models.robot_in_plant import platform_inertia
 from cdpr_drake.models.robot_loader import (
     as_robot,
-    gravity_turn,
     parse_robot,
-    turned_robot,
-    world_turn,
 )
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.summaries import Summarized

@@ -15,14 +15,15 @@ import numpy as np
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import RobotFileError
-from cdpr_drake.models.formats import klipper, maslow, reprapfirmware
+from cdpr_drake.models.formats import klipper, reprapfirmware
 from cdpr_drake.models.formats.assumptions import complete_draft
 from cdpr_drake.models.formats.caspr_pulleys import short_name
 from cdpr_drake.models.formats.draft import DraftCable, RobotDraft
+from cdpr_drake.models.formats.file_kinds import MASLOW_CORNERS
 from cdpr_drake.models.formats.named_frames import is_frame_name
 from cdpr_drake.models.formats.reading import robot_name
+from cdpr_drake.models.robot_copies import gravity_turn, turned_robot, world_turn
 from cdpr_drake.models.robot_holding import lengths_at_home
-from cdpr_drake.models.robot_loader import gravity_turn, turned_robot, world_turn
 from cdpr_drake.models.robot_schema import Robot
 
 EXPORTS = {
@@ -241,8 +242,10 @@ def _name_of_robot(robot: Robot, format: str) -> dict[str, str]:
 
 
 _FIRMWARE_NAMES: dict[str, Sequence[str]] = {
-    "klipper": klipper.LETTERS, "reprapfirmware": reprapfirmware.LETTERS, "maslow": maslow.CORNERS
-}  # fmt: skip
+    "klipper": klipper.LETTERS,
+    "reprapfirmware": reprapfirmware.LETTERS,
+    "maslow": MASLOW_CORNERS,
+}
 """Names of cables of firmwares, by their places."""
 
 

@@ -9,29 +9,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from copy import deepcopy
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
-from pydrake.common.eigen_geometry import AngleAxis
 from pydrake.common.yaml import yaml_dump_typed
-from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import Problems, RobotFileError
 from cdpr_drake.geometry.motion_type import across
-from cdpr_drake.geometry.poses import angles_from_rotation
 from cdpr_drake.geometry.straight_cables import cable_lengths
-from cdpr_drake.models.camera_catalogue import (
-    CAMERA_SUFFIXES,
-    camera_names,
-    load_camera,
-    resolved_camera,
-)
+from cdpr_drake.models.camera_files import CAMERA_SUFFIXES, camera_names, resolved_camera
 from cdpr_drake.models.exit_points import MARK, check_rail, split_name
-from cdpr_drake.models.formats.assumptions import complete_draft
-from cdpr_drake.models.formats.detection import SUFFIXES, is_foreign, read_foreign
+from cdpr_drake.models.formats.file_kinds import SUFFIXES, is_foreign
 from cdpr_drake.models.materials import check_materials
 from cdpr_drake.models.mechanism_files import (
     MECHANISM_FILE,
@@ -41,8 +31,8 @@ from cdpr_drake.models.mechanism_files import (
     single_platform,
 )
 from cdpr_drake.models.mechanism_schema import Mechanism
-from cdpr_drake.models.robot_schema import SHAPE_INERTIA, Pose, Robot
-from cdpr_drake.models.shapes import MESH, check_shapes, mesh_files
+from cdpr_drake.models.robot_schema import SHAPE_INERTIA, Robot
+from cdpr_drake.models.shapes import check_shapes
 from cdpr_drake.schema.typed_yaml import closest, load_typed, parse_typed
 
 _FOLDER = Path(__file__).parent / "robots"
@@ -112,7 +102,7 @@ def robot_text(name: str, asks: str = "robot_text") -> str:
     """
     path, (_, rails) = robot_file(name), split_name(name)
     if is_foreign(path):
-        content = complete_draft(read_foreign(path)).yaml()
+        content = _foreign_content(path)
     else:
         try:
             content = path.read_text(encoding="utf-8")
@@ -125,6 +115,14 @@ def robot_text(name: str, asks: str = "robot_text") -> str:
     robot = parse_robot(content, path)
     _put_on_rails(robot, rails, path)
     return yaml_dump_typed(robot)
+
+
+def _foreign_content(path: Path) -> str:
+    """The robot file that the file of another tool makes, as YAML; imports all readers."""
+    from cdpr_drake.models.formats.assumptions import complete_draft
+    from cdpr_drake.models.formats.detection import read_foreign
+
+    return complete_draft(read_foreign(path)).yaml()
 
 
 def load_robot(name: str | Path, asks: str = "load_robot") -> Robot:
@@ -143,7 +141,7 @@ def load_robot(name: str | Path, asks: str = "load_robot") -> Robot:
     name = str(name)
     path, (_, rails) = robot_file(name), split_name(name)
     if is_foreign(path):
-        robot = parse_robot(complete_draft(read_foreign(path)).yaml(), path)
+        robot = parse_robot(_foreign_content(path), path)
     else:
         if is_mechanism(path):
             raise single_platform(path, asks)
@@ -153,6 +151,14 @@ def load_robot(name: str | Path, asks: str = "load_robot") -> Robot:
     if rails:
         _put_on_rails(robot, rails, path)
     return robot
+
+
+def names_mechanism(name: str | Path) -> bool:
+    """Whether a name or path is that of a mechanism; also False where there is no such file."""
+    try:
+        return is_mechanism(robot_file(str(name)))
+    except RobotFileError:
+        return False
 
 
 def as_robot(robot: Robot | str | Path, asks: str = "load_robot") -> Robot:
@@ -284,19 +290,8 @@ def _check(robot: Robot, path: Path) -> None:
     rails = [check_rail(index, cable.rail, fail) for index, cable in enumerate(robot.cables)]
     if all(rails):  # else exit points make no sense
         _check_exits(robot, fail)
-    mounts = [mount.name for mount in robot.cameras]
-    for index, mount in enumerate(robot.cameras):
-        if mount.name in mounts[:index]:
-            fail(f"cameras[{index}].name", f"{mount.name} twice", "each name once")
-        mount.model = resolved_camera(mount.model, path.parent)
-        if mount.model.lower().endswith(CAMERA_SUFFIXES):
-            with problems.collected():
-                load_camera(mount.model)
-        elif mount.model not in camera_names():
-            fail(
-                f"cameras[{index}].model", mount.model,
-                "one of " + ", ".join(camera_names()) + ", or the path of a camera file",
-            )  # fmt: skip
+    if robot.cameras:
+        _check_cameras(robot, path, problems)
     platform = robot.platform
     with problems.collected():
         check_shapes(
@@ -319,6 +314,24 @@ def _check_exits(robot: Robot, fail: Callable[[str, object, str], None]) -> None
                 f"anchor point {_words(cable.anchor_point)} at home",
                 f"points at least {SHORTEST_CABLE:g} m apart there",
             )
+
+
+def _check_cameras(robot: Robot, path: Path, problems: Problems) -> None:
+    """Refuses cameras of the same name, of no catalogue, or of a wrong file; resolves the files."""
+    mounts = [mount.name for mount in robot.cameras]
+    for index, mount in enumerate(robot.cameras):
+        place, named = f"{path}: cameras[{index}]", mount.name
+        if named in mounts[:index]:
+            problems.add(f"{place}.name: found {named} twice; accepted: each name once")
+        mount.model = resolved_camera(mount.model, path.parent)
+        if mount.model.lower().endswith(CAMERA_SUFFIXES):
+            from cdpr_drake.models.camera_catalogue import load_camera
+
+            with problems.collected():
+                load_camera(mount.model)
+        elif mount.model not in camera_names():
+            accepted = "one of " + ", ".join(camera_names()) + ", or the path of a camera file"
+            problems.add(f"{place}.model: found {mount.model}; accepted: {accepted}")
 
 
 def _check_motion(robot: Robot, fail: Callable[[str, object, str], None]) -> None:
@@ -458,137 +471,3 @@ def _check_inertia(robot: Robot, fail: object) -> None:
 
 def _words(values: np.ndarray) -> str:
     return "(" + ", ".join(f"{value:g}" for value in values) + ")"
-
-
-_UPRIGHT = 1e-12
-"""Gravity that is no farther from -z, as a unit vector, is along it."""
-
-
-def portable_robot(robot: Robot) -> tuple[Robot, list[Path]]:
-    """A robot whose file can lie in another folder, and the files to lie beside it: of its mesh,
-    and of its cameras, but for one of the same name as another."""
-    shape = robot.platform.shape
-    own: dict[str, str] = {}
-    for mount in robot.cameras:
-        if mount.model.lower().endswith(CAMERA_SUFFIXES):
-            own.setdefault(Path(mount.model).name, mount.model)
-    has_mesh = shape is not None and shape.kind == MESH
-    if not has_mesh and not own:
-        return robot, []
-    portable = deepcopy(robot)
-    for mount in portable.cameras:
-        name = Path(mount.model).name
-        if own.get(name) == mount.model:
-            mount.model = name
-    files = [Path(file) for file in own.values()]
-    if has_mesh:
-        assert portable.platform.shape is not None
-        file = Path(str(portable.platform.shape.file))
-        portable.platform.shape.file = file.name
-        files = mesh_files(file) + files
-    return portable, files
-
-
-def moved_robot(robot: Robot, shift: Array, name: str | None = None) -> Robot:
-    """The same robot with all of its frame shifted in W, for several robots in one world.
-
-    Args:
-        robot: The robot, which stays as it is.
-        shift: Shift in W, shape (3,) [m].
-        name: Another name; the same if None.
-    """
-    shift = np.asarray(shift, float)
-    moved = deepcopy(robot)
-    moved.name = name or robot.name
-    for cable in moved.cables:
-        cable.exit_point = cable.exit_point + shift
-    for camera in moved.cameras:
-        if camera.parent == "world":
-            camera.pose.position = camera.pose.position + shift
-    moved.frame.lower, moved.frame.upper = moved.frame.lower + shift, moved.frame.upper + shift
-    for beam in moved.frame.beams:
-        beam.start, beam.end = beam.start + shift, beam.end + shift
-    moved.home.position = moved.home.position + shift
-    if moved.plane_height is not None:
-        moved.plane_height += float(shift[2])
-    return moved
-
-
-def gravity_turn(robot: Robot) -> RotationMatrix | None:
-    """R_UW of the least turn after which gravity points along -z of a world U.
-
-    None where it does so in W already, or where there is no gravity.
-    """
-    down = np.array(robot.down())
-    if robot.gravity == 0.0 or np.array_equal(down, (0.0, 0.0, -1.0)):
-        return None
-    axis = np.array([-down[1], down[0], 0.0])  # down x (-z)
-    sine = float(np.linalg.norm(axis))
-    if sine == 0.0:
-        return RotationMatrix.MakeXRotation(np.pi)
-    return RotationMatrix(AngleAxis(np.arctan2(sine, -down[2]), axis / sine))
-
-
-def turned_robot(robot: Robot, R_UW: RotationMatrix) -> Robot:
-    """The same robot seen from a world U with the origin of W and other axes.
-
-    The frame's box becomes the box along axes of U that encloses it; a robot in a plane or on a
-    line keeps it, so that an `axis` of W becomes one of U.
-
-    Args:
-        robot: The robot, which stays as it is.
-        R_UW: The axes of W in U.
-    """
-    R, turned = R_UW.matrix(), deepcopy(robot)
-    turn = RigidTransform(R_UW, np.zeros(3))
-    down = R @ np.array(robot.down())
-    upright = float(np.linalg.norm(down - [0.0, 0.0, -1.0])) < _UPRIGHT
-    turned.gravity_direction = np.array([0.0, 0.0, -1.0]) if upright else down
-    turned.pulley.swivel_axis = R @ robot.pulley.swivel_axis
-    for cable in turned.cables:
-        cable.exit_point = R @ cable.exit_point
-        if cable.swivel_axis is not None:
-            cable.swivel_axis = R @ cable.swivel_axis
-        if cable.rail is not None:
-            cable.rail.axis = R @ cable.rail.axis
-    for camera in turned.cameras:
-        if camera.parent == "world":
-            camera.pose = _pose(turn @ camera.pose.transform())
-    low, high = robot.frame.lower, robot.frame.upper
-    corners = R @ np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1])
-                            for z in (low[2], high[2])]).T  # fmt: skip
-    turned.frame.lower, turned.frame.upper = corners.min(axis=1), corners.max(axis=1)
-    for beam in turned.frame.beams:
-        beam.start, beam.end = R @ beam.start, R @ beam.end
-    turned.home = _pose(turn @ robot.home.transform())
-    motion = robot.motion_type()
-    if motion.num_moves < 3:
-        turned.axis = R @ np.array(motion.axis)
-        turned.plane_height = None
-    return turned
-
-
-def world_turn(robot: Robot, format: str) -> str:
-    """What is to be said of a world that is turned for a format; empty: its files are in W.
-
-    All formats but mjcf take gravity to be along -z. A robot whose gravity is not is written as
-    seen from a world U, with the origin of W and -z along gravity.
-
-    Args:
-        robot: The robot.
-        format: A name of `EXPORTS`.
-    """
-    turn = gravity_turn(robot)
-    if turn is None or format == "mjcf":
-        return ""
-    down = ", ".join(f"{x:.9g}" for x in robot.down())
-    rows = ", ".join(f"({', '.join(repr(float(x) + 0.0) for x in row)})" for row in turn.matrix())
-    return (
-        f"The world was turned by {np.degrees(turn.ToAngleAxis().angle()):.6g} deg: {format} has "
-        f"gravity along -z, the robot has it along ({down}) in W. The world of what was written is "
-        f"U, with the origin of W: p_U = R_UW p_W, R_UW by rows {rows}"
-    )
-
-
-def _pose(X: RigidTransform) -> Pose:
-    return Pose(position=X.translation(), angles_deg=np.degrees(angles_from_rotation(X.rotation())))

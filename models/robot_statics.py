@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
@@ -13,12 +14,12 @@ from cdpr_drake.geometry.cable_paths import cable_jacobian
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.geometry.poses import angles_from_rotation, pose_error
 from cdpr_drake.geometry.straight_cables import gravity_wrench
-from cdpr_drake.models.robot_in_plant import platform_inertia
 from cdpr_drake.models.robot_schema import Pose, Robot
-from cdpr_drake.statics.controlled_wrenches import WrenchControl, wrench_control
-from cdpr_drake.statics.inextensible_problem import HangingPlatform
-from cdpr_drake.statics.rigid_platform import RigidPlatform
 from cdpr_drake.tensions.problem import TensionProblem
+
+if TYPE_CHECKING:
+    from cdpr_drake.statics.controlled_wrenches import WrenchControl
+    from cdpr_drake.statics.rigid_platform import RigidPlatform
 
 OFF_JOINT = 1e-6
 """How far a pose may be off what the motion type lets the platform have [m, rad]."""
@@ -34,6 +35,9 @@ EXACT_ROTATION = 1e-14
 
 def rigid_platform(robot: Robot) -> RigidPlatform:
     """The robot's platform for equilibria, stiffness and vibrations."""
+    from cdpr_drake.models.robot_in_plant import platform_inertia
+    from cdpr_drake.statics.rigid_platform import RigidPlatform
+
     spatial = platform_inertia(robot)
     return RigidPlatform(
         robot.platform.mass,
@@ -42,24 +46,6 @@ def rigid_platform(robot: Robot) -> RigidPlatform:
         robot.gravity,
         robot.motion_type(),
         robot.down(),
-    )
-
-
-def hanging_platform(robot: Robot, *, pulleys: bool) -> HangingPlatform:
-    """The robot's platform on its cables, for all its equilibria; over pulleys or without.
-
-    Raises:
-        EquilibriumError: The platform is a beam, whose turn about itself does not count.
-    """
-    cables, motion, home = robot.cable_set(), robot.motion_type(), robot.home.transform()
-    return HangingPlatform(
-        cables=cables if pulleys else cables.without_pulleys(),
-        weight_W=robot.platform.mass * robot.gravity_vector(),
-        p_PCo=robot.center_of_mass(),
-        num_turns=motion.num_turns,
-        num_moves=motion.num_moves,
-        axis=motion.axis,
-        home=robot.joint().nearest(home),
     )
 
 
@@ -124,6 +110,8 @@ class WrenchBalance:
 
     def control(self) -> WrenchControl:
         """What the cables can do about it."""
+        from cdpr_drake.statics.controlled_wrenches import wrench_control
+
         return wrench_control(
             self.W, self.wrench, self.lower, self.upper, self.row_scale, turns=self.turns
         )

@@ -24,7 +24,6 @@ from cdpr_drake.models.robot_statics import WrenchBalance, as_pose, tension_prob
 from cdpr_drake.summaries import Summarized, numbers
 from cdpr_drake.tensions.methods import METHODS, TensionMethod, distribute, feasible_polygon
 from cdpr_drake.tensions.problem import TensionProblem, TensionSolution
-from cdpr_drake.workspaces.available_wrenches import available_wrenches
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -102,6 +101,7 @@ class TensionsAtPose(Summarized):
     def plot_wrenches(self, title: str | None = None) -> Figure:
         """Sections of the wrenches that the cables can give at the pose; `title` as of `plot`."""
         from cdpr_drake.analyses.workspaces.workspace_figures import wrench_set_figure
+        from cdpr_drake.workspaces.available_wrenches import available_wrenches
 
         asked = self.problem
         found = available_wrenches(asked.W, asked.lower, asked.upper, asked.row_scale)

@@ -13,7 +13,6 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.poses import angles_from_rotation
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.models.robot_statics import hanging_platform
 from cdpr_drake.statics.equilibria_at_position import enumerate_at_position
 from cdpr_drake.statics.equilibrium import Stability
 from cdpr_drake.statics.equilibrium_enumeration import enumerate_equilibria
@@ -79,6 +78,24 @@ class EquilibriaReport(Summarized):
         if count > SHOWN:
             rows.append(("...", f"{count - SHOWN} more"))
         return title, [("cables", self.model), ("evidence", self.words), *rows]
+
+
+def hanging_platform(robot: Robot, *, pulleys: bool) -> HangingPlatform:
+    """The robot's platform on its cables, for all its equilibria; over pulleys or without.
+
+    Raises:
+        EquilibriumError: The platform is a beam, whose turn about itself does not count.
+    """
+    cables, motion, home = robot.cable_set(), robot.motion_type(), robot.home.transform()
+    return HangingPlatform(
+        cables=cables if pulleys else cables.without_pulleys(),
+        weight_W=robot.platform.mass * robot.gravity_vector(),
+        p_PCo=robot.center_of_mass(),
+        num_turns=motion.num_turns,
+        num_moves=motion.num_moves,
+        axis=motion.axis,
+        home=robot.joint().nearest(home),
+    )
 
 
 def equilibria_at_lengths(

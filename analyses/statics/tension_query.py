@@ -8,7 +8,6 @@ import numpy as np
 
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import WrenchBalance
-from cdpr_drake.statics.controlled_wrenches import combination_words
 from cdpr_drake.tensions.methods import METHODS, distribute, feasible_polygon, solution_space
 from cdpr_drake.tensions.problem import TensionProblem, TensionSolution, TensionStatus
 
@@ -41,6 +40,8 @@ def underactuated_answer(robot: Robot, balance: WrenchBalance) -> dict[str, Any]
     the wrench's components that no tensions change in words, and what of it nothing balances, in
     N, or N m where it names moments.
     """
+    from cdpr_drake.statics.controlled_wrenches import combination_words
+
     control, words = balance.control(), robot.motion_type().words()
     free = control.free.T
     return {

@@ -15,13 +15,13 @@ from cdpr_drake.cli.import_log import log_lines
 from cdpr_drake.cli.options import AsJson, save_plot
 from cdpr_drake.cli.terminal import print_json
 from cdpr_drake.errors import CdprError
-from cdpr_drake.models.formats.detection import is_foreign
+from cdpr_drake.models.formats.file_kinds import is_foreign
 from cdpr_drake.models.formats.grab_mat import is_grab_mat
 from cdpr_drake.models.mechanism_files import MECHANISM_KEY, SCENARIO_KEY
-from cdpr_drake.models.mechanism_loader import load_mechanism, names_mechanism
+from cdpr_drake.models.mechanism_loader import load_mechanism
 from cdpr_drake.models.robot_exchange import import_robot
 from cdpr_drake.models.robot_holding import hold_robot
-from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_loader import load_robot, names_mechanism
 from cdpr_drake.systems.diagrams.load import load_scenario
 
 WRONG = 2

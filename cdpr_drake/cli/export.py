@@ -12,10 +12,10 @@ from cdpr_drake.cli.options import AsJson, RobotName
 from cdpr_drake.cli.robot_folder import write_files
 from cdpr_drake.cli.terminal import print_json
 from cdpr_drake.models.mechanism_exchange import export_mechanism
-from cdpr_drake.models.mechanism_loader import load_mechanism, names_mechanism
+from cdpr_drake.models.mechanism_loader import load_mechanism
 from cdpr_drake.models.robot_exchange import export_robot
 from cdpr_drake.models.robot_exports import EXPORTS, export_omissions, omission_words
-from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_loader import load_robot, names_mechanism
 
 
 def help_words() -> str:

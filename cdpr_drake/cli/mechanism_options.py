@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 import typer
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from cdpr_drake.analyses.front.mechanisms import MechanismAtRest, MechanismTensions
 from cdpr_drake.cli.terminal import wide_console
 from cdpr_drake.errors import CdprError
+
+if TYPE_CHECKING:
+    from cdpr_drake.analyses.front.mechanisms import MechanismAtRest, MechanismTensions
 
 NONE = "none"
 """In the place of joints: no joint at all."""

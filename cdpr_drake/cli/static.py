@@ -37,10 +37,10 @@ from cdpr_drake.cli.options import (
 from cdpr_drake.cli.terminal import message_console, print_json, wide_console, working
 from cdpr_drake.errors import CdprError
 from cdpr_drake.geometry.poses import angles_from_rotation
-from cdpr_drake.models.mechanism_loader import load_mechanism, names_mechanism
+from cdpr_drake.models.mechanism_loader import load_mechanism
 from cdpr_drake.models.plant_rest import POSE as YIELDING_POSE
 from cdpr_drake.models.plant_rest import PRESTRESS
-from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_loader import load_robot, names_mechanism
 
 
 def static(

@@ -11,7 +11,6 @@ import typer
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from cdpr_drake.analyses.front.mechanisms import solve_mechanism_tensions
 from cdpr_drake.analyses.front.tensions import (
     UNDERACTUATED,
     TensionsAtPose,
@@ -43,8 +42,7 @@ from cdpr_drake.cli.options import (
 )
 from cdpr_drake.cli.terminal import message_console, print_json, wide_console, working
 from cdpr_drake.errors import CdprError
-from cdpr_drake.models.mechanism_loader import load_mechanism, names_mechanism
-from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_loader import load_robot, names_mechanism
 from cdpr_drake.tensions.methods import METHODS
 from cdpr_drake.tensions.problem import TensionSolution
 
@@ -92,6 +90,9 @@ def tension(
             "pose": pose, "wrench": wrench, "mass": mass,
             "wrench-set-plot": wrench_set_plot,
         })  # fmt: skip
+        from cdpr_drake.analyses.front.mechanisms import solve_mechanism_tensions
+        from cdpr_drake.models.mechanism_loader import load_mechanism
+
         mechanism = load_mechanism(robot)
         with working(message_console(), f"Distributing tensions of {mechanism.name}"):
             tensions = solve_mechanism_tensions(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -36,7 +36,6 @@ from cdpr_drake.tensions.problem import (
     TensionStatus,
     refuse,
 )
-from cdpr_drake.tensions.program_method import Build, ProgramKernel, StepTimes
 from cdpr_drake.tensions.quadratic_program_kernel import (
     FEASIBLE,
     INFEASIBLE,
@@ -46,6 +45,9 @@ from cdpr_drake.tensions.quadratic_program_kernel import (
     workspace_shape,
 )
 from cdpr_drake.tensions.slack_kernel import slack_relaxed
+
+if TYPE_CHECKING:
+    from cdpr_drake.tensions.program_method import Build, ProgramKernel, StepTimes
 
 _workspace_shape = workspace_shape.py_func
 """As Python: a call of compiled code costs more than these sums."""
@@ -107,6 +109,8 @@ class TensionMethod:
             raise TensionProblemError(
                 f"from_program: found the name {name!r}; accepted: one that no kernel has"
             )
+        from cdpr_drake.tensions.program_method import ProgramKernel
+
         asked = ProgramKernel(name, build)
         words = title or "a program of one's own"
         METHODS[name] = TensionMethod(words, asked.kernel, starts=True, asked=asked)

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import TensionProblemError
-from cdpr_drake.numerics.own_terms import ProgramReport
 from cdpr_drake.summaries import Summarized
 from cdpr_drake.tensions.null_space_kernel import RANK_TOLERANCE
+
+if TYPE_CHECKING:
+    from cdpr_drake.numerics.own_terms import ProgramReport
 
 RESIDUAL_TOLERANCE = 1e-9
 """Tensions are feasible if |W t + w| is at most this, relative to |w| plus the cables' share."""

@@ -57,11 +57,6 @@ _COORDINATES = {"SPATIAL_EULER_XYZ": 6, "SPATIAL_QUATERNION": 7}
 """Numbers of the joints that are no translations along axes with a turn about the third."""
 
 
-def is_caspr(root: ET.Element) -> bool:
-    """Whether the root of an XML file is one of CASPR's bodies or cables."""
-    return root.tag in ("bodies_system", "links", "cables")
-
-
 def caspr_models(path: Path) -> dict[str, tuple[Path, Path]]:
     """Names of a CASPR list of models, with the files of bodies and cables as the list has them.
 

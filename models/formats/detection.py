@@ -1,57 +1,38 @@
-"""Which tool a file is from, and what reads it."""
+"""What reads a file of another tool. Imports all readers: ask `file_kinds` first."""
 
 from __future__ import annotations
 
-from functools import lru_cache
 from pathlib import Path
 
-import yaml
-
 from cdpr_drake.errors import RobotFileError
-from cdpr_drake.models.formats.caspr import is_caspr, read_caspr
+from cdpr_drake.models.formats.caspr import read_caspr
 from cdpr_drake.models.formats.draft import RobotDraft
-from cdpr_drake.models.formats.gazebo_yaml import is_gazebo_yaml, read_gazebo_yaml
+from cdpr_drake.models.formats.file_kinds import (
+    SUFFIXES,
+    XML_SUFFIXES,
+    YAML_SUFFIXES,
+    is_caspr,
+    is_maslow,
+    is_mjcf,
+    is_sdformat,
+    is_urdf,
+    is_wirex,
+)
+from cdpr_drake.models.formats.gazebo_yaml import read_gazebo_yaml
 from cdpr_drake.models.formats.grab import read_grab
 from cdpr_drake.models.formats.grab_mat import read_grab_mat
 from cdpr_drake.models.formats.klipper import read_klipper
-from cdpr_drake.models.formats.maslow import is_maslow, read_maslow
-from cdpr_drake.models.formats.mjcf import is_mjcf, read_mjcf
-from cdpr_drake.models.formats.named_frames import is_sdformat, is_urdf, read_named_frames
-from cdpr_drake.models.formats.reading import fail, read_text, read_xml, read_yaml
+from cdpr_drake.models.formats.maslow import read_maslow
+from cdpr_drake.models.formats.mjcf import read_mjcf
+from cdpr_drake.models.formats.named_frames import read_named_frames
+from cdpr_drake.models.formats.reading import fail, read_xml, read_yaml
 from cdpr_drake.models.formats.reprapfirmware import read_reprapfirmware
-from cdpr_drake.models.formats.wirex import is_wirex, read_wirex
-from cdpr_drake.schema.yaml_files import too_many_bytes
+from cdpr_drake.models.formats.wirex import read_wirex
 
-YAML_SUFFIXES = (".yaml", ".yml")
-XML_SUFFIXES = (".xml", ".wcrfx", ".sdf", ".world", ".urdf", ".mjcf", ".model")
-FIRMWARE_SUFFIXES = {".cfg": read_klipper, ".g": read_reprapfirmware, ".gcode": read_reprapfirmware}
-SUFFIXES = (*YAML_SUFFIXES, *XML_SUFFIXES, *FIRMWARE_SUFFIXES, ".json", ".csv", ".mat")
-"""Endings of files that robots are read from."""
+_FIRMWARE = {".cfg": read_klipper, ".g": read_reprapfirmware, ".gcode": read_reprapfirmware}
 
 _XML = {is_caspr: read_caspr, is_wirex: read_wirex, is_mjcf: read_mjcf,
         is_sdformat: read_named_frames, is_urdf: read_named_frames}  # fmt: skip
-
-
-def is_foreign(path: Path) -> bool:
-    """Whether a path is of another tool's format rather than a robot file of this package."""
-    if path.is_dir():
-        return not (path / "robot.yaml").is_file()
-    if path.suffix.lower() in YAML_SUFFIXES:
-        try:
-            # One that is too large is refused by the other reader, before it is parsed.
-            return not too_many_bytes(path) and _is_foreign_yaml(read_text(path))
-        except (OSError, RobotFileError):
-            return False  # whose reader says what is wrong with it
-    return True
-
-
-@lru_cache(32)  # the same robots are read again and again
-def _is_foreign_yaml(text: str) -> bool:
-    try:
-        content = yaml.safe_load(text)
-        return is_gazebo_yaml(content) or is_maslow(content)
-    except (yaml.YAMLError, ValueError, RecursionError):
-        return False
 
 
 def read_foreign(path: Path, model: str | None = None, cable_set: str | None = None) -> RobotDraft:
@@ -78,8 +59,8 @@ def read_foreign(path: Path, model: str | None = None, cable_set: str | None = N
         return read_grab(path)
     if suffix == ".mat":
         return read_grab_mat(path)
-    if suffix in FIRMWARE_SUFFIXES:
-        return FIRMWARE_SUFFIXES[suffix](path)
+    if suffix in _FIRMWARE:
+        return _FIRMWARE[suffix](path)
     if suffix not in XML_SUFFIXES:
         raise fail(path, "ending", suffix, "one of " + ", ".join(SUFFIXES))
     root = read_xml(path)

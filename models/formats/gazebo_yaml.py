@@ -19,6 +19,7 @@ from pydrake.math import RollPitchYaw
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.models.formats.draft import DraftCable, RobotDraft
+from cdpr_drake.models.formats.file_kinds import is_gazebo_yaml
 from cdpr_drake.models.formats.reading import (
     YAML_WORDS,
     fail,
@@ -33,14 +34,6 @@ TOOL = "Gazebo cable robot YAML"
 
 _OUTSIDE = 1.5
 """Anchor points farther from the middle than this many half edges are not on the platform."""
-
-
-def is_gazebo_yaml(content: Any) -> bool:
-    """Whether a YAML document is a robot of that simulator."""
-    if not isinstance(content, dict):
-        return False
-    body = content.get("model", content)
-    return isinstance(body, dict) and {"points", "platform"} <= set(body)
 
 
 def read_gazebo_yaml(path: Path) -> RobotDraft:

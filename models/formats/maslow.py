@@ -20,6 +20,11 @@ import yaml
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.models.formats.draft import DraftCable, RobotDraft
+from cdpr_drake.models.formats.file_kinds import (
+    MASLOW_CORNERS,
+    MASLOW_SECTION,
+    maslow_settings,
+)
 from cdpr_drake.models.formats.reading import (
     YAML_WORDS,
     fail,
@@ -33,34 +38,10 @@ TOOL = "Maslow YAML"
 
 MM = 1e-3
 
-CORNERS = ("tl", "tr", "bl", "br")
-"""Names of the cables."""
-
-_SECTION = "MaslowKinematics"
-
 _EXTRA = ("beltEndExtension", "armLength")
 
 _R_UPRIGHT = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 """From the file's axes to those of W, where the board is upright."""
-
-
-def is_maslow(content: Any) -> bool:
-    """Whether a YAML document is one of these."""
-    return isinstance(content, dict) and _settings(content) is not None
-
-
-def _settings(content: dict[Any, Any]) -> dict[str, Any] | None:
-    """Anchors and the like by their names without Maslow_, None where there are none."""
-    kinematics = content.get("kinematics")
-    if isinstance(kinematics, dict) and isinstance(kinematics.get(_SECTION), dict):
-        return {str(key): value for key, value in kinematics[_SECTION].items()}
-    start = "maslow_"
-    old = {
-        str(key)[len(start) :]: value
-        for key, value in content.items()
-        if str(key).lower().startswith(start)
-    }
-    return old if any(f"{corner}X" in old for corner in CORNERS) else None
 
 
 def read_maslow(path: Path) -> RobotDraft:
@@ -70,10 +51,11 @@ def read_maslow(path: Path) -> RobotDraft:
         RobotFileError: The file does not describe one; says where.
     """
     content = read_yaml(path)
-    settings = _settings(content) if isinstance(content, dict) else None
+    settings = maslow_settings(content) if isinstance(content, dict) else None
     if settings is None:
         found = kind_of(content, YAML_WORDS)
-        raise fail(path, "top", found, f"kinematics with {_SECTION}, or Maslow_tlX and the like")
+        accepted = f"kinematics with {MASLOW_SECTION}, or Maslow_tlX and the like"
+        raise fail(path, "top", found, accepted)
     upright = content.get("Maslow_vertical", False)
     if not isinstance(upright, bool):
         raise fail(path, "Maslow_vertical", upright, "true or false")
@@ -81,8 +63,8 @@ def read_maslow(path: Path) -> RobotDraft:
     draft.motion = "2T"
     draft.axis = np.array([0.0, 1.0, 0.0]) if upright else None
     R = _R_UPRIGHT if upright else np.eye(3)
-    points = np.array([_anchor(path, settings, corner) for corner in CORNERS])
-    for corner, point in zip(CORNERS, points, strict=True):
+    points = np.array([_anchor(path, settings, corner) for corner in MASLOW_CORNERS])
+    for corner, point in zip(MASLOW_CORNERS, points, strict=True):
         draft.cables.append(DraftCable(name=corner, exit_point=R @ point, anchor_point=np.zeros(3)))
     middle = np.array([*points[:, :2].mean(axis=0), 0.0])
     draft.home_position = R @ middle
@@ -119,11 +101,11 @@ def write_maslow(draft: RobotDraft) -> str:
     upright = draft.axis is not None and abs(float(draft.axis[1])) == 1.0
     R = _R_UPRIGHT if upright else np.eye(3)
     anchors: dict[str, float] = {}
-    for corner, cable in zip(CORNERS, draft.cables, strict=True):
+    for corner, cable in zip(MASLOW_CORNERS, draft.cables, strict=True):
         point = R.T @ (cable.exit_point - cable.anchor_point) / MM
         if not upright:
             point[2] -= (draft.plane_height or 0.0) / MM
         point[2] *= -1.0
         anchors |= {f"{corner}{k}": float(x) + 0.0 for k, x in zip("XYZ", point, strict=True)}
-    content = {"Maslow_vertical": upright, "kinematics": {_SECTION: anchors}}
+    content = {"Maslow_vertical": upright, "kinematics": {MASLOW_SECTION: anchors}}
     return yaml.safe_dump(content, sort_keys=False)

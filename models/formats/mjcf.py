@@ -44,11 +44,6 @@ class _Compiled(NamedTuple):
     data: Any
 
 
-def is_mjcf(root: ET.Element) -> bool:
-    """Whether the root of an XML file is MJCF."""
-    return root.tag == "mujoco"
-
-
 def read_mjcf(path: Path) -> RobotDraft:
     """Reads a robot in MJCF.
 

@@ -25,6 +25,7 @@ from pydrake.multibody.tree import FrameIndex, PrismaticJoint, RigidBody
 
 from cdpr_drake.errors import RobotFileError
 from cdpr_drake.models.formats.draft import DraftCable, RobotDraft
+from cdpr_drake.models.formats.file_kinds import is_sdformat
 from cdpr_drake.models.formats.reading import fail, numbers, read_xml, robot_name
 
 SDF_TOOL = "SDFormat"
@@ -33,16 +34,6 @@ URDF_TOOL = "URDF"
 _CABLE = r"[_ -]|{0}[_ -]?(?=\d)|{0}[_-])(?P<cable>.+)$"
 _EXIT = re.compile(r"^(?:(?:exit(?:_?point)?|frame|base)" + _CABLE.format("A"), re.IGNORECASE)
 _ANCHOR = re.compile(r"^(?:(?:anchor(?:_?point)?|platform)" + _CABLE.format("B"), re.IGNORECASE)
-
-
-def is_sdformat(root: ET.Element) -> bool:
-    """Whether the root of an XML file is SDFormat."""
-    return root.tag == "sdf"
-
-
-def is_urdf(root: ET.Element) -> bool:
-    """Whether the root of an XML file is URDF."""
-    return root.tag == "robot" and root.find("link") is not None
 
 
 def read_named_frames(path: Path) -> RobotDraft:

@@ -27,11 +27,6 @@ _MOTIONS = {"3R3T": "3R3T", "1R2T": "2T1R", "2T1R": "2T1R", "3T": "3T", "2T": "2
             "2R3T": "2R3T"}  # fmt: skip
 
 
-def is_wirex(root: ET.Element) -> bool:
-    """Whether the root of an XML file is a document of WireX."""
-    return root.tag in ("models", "robot") and next(root.iter("chain"), None) is not None
-
-
 def read_wirex(path: Path) -> RobotDraft:
     """Reads the robot of a wcrfx file.
 

@@ -10,9 +10,9 @@ from typing import Any, Protocol, TypeVar
 import yaml
 
 from cdpr_drake.errors import RobotFileError, ScenarioError
-from cdpr_drake.models.camera_catalogue import resolved_camera
+from cdpr_drake.models.camera_files import resolved_camera
 from cdpr_drake.models.exit_points import MARK as RAILS_MARK
-from cdpr_drake.models.formats.detection import SUFFIXES as ROBOT_SUFFIXES
+from cdpr_drake.models.formats.file_kinds import SUFFIXES as ROBOT_SUFFIXES
 from cdpr_drake.models.mechanism_files import mechanism_names
 from cdpr_drake.models.mechanism_loader import load_mechanism
 from cdpr_drake.models.mechanism_schema import Mechanism

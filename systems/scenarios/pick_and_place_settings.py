@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdpr_drake.models.camera_catalogue import camera_names
+from cdpr_drake.models.camera_files import camera_names
 from cdpr_drake.models.robot_schema import Pose
 from cdpr_drake.schema.fields import FASTEST, array, number, section, text, whole
 from cdpr_drake.systems.cameras.camera_settings import PROJECTED, RENDERED

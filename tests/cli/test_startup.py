@@ -18,6 +18,7 @@ try:
 except SystemExit:
     pass
 heavy = ("pydrake", "numba", "matplotlib", "cv2", "scipy", "distributed", "numpy", "rich")
+print("own:", len([name for name in sys.modules if name.startswith("cdpr_drake")]))
 print("imported:", [name for name in heavy if name in sys.modules], len(sys.modules))
 """
 
@@ -25,16 +26,22 @@ MOST_MODULES = 400
 """Modules of Python and typer; with rich there are twice as many, with Drake above two thousand."""
 
 
+MOST_OF_OUR_OWN = 80
+"""Modules of this package that `cdpr tension` imports, rooms included: methods, robots, geometry.
+Readers of other tools, cameras, mechanisms and equilibria are not among them."""
+
+
 def imported(*arguments):
     words = WORDS.format(arguments=list(arguments))
     done = subprocess.run([sys.executable, "-c", words], capture_output=True, text=True, check=True)
-    names, _, count = done.stdout.rpartition("imported: ")[2].rpartition(" ")
-    return names, int(count)
+    rest, _, last = done.stdout.rpartition("imported: ")
+    names, _, count = last.rpartition(" ")
+    return names, int(count), int(rest.rpartition("own: ")[2])
 
 
 @pytest.mark.parametrize("arguments", [(), ("--help",), ("--version",)])
 def test_help_imports_nothing_heavy(arguments):
-    names, count = imported(*arguments)
+    names, count, _ = imported(*arguments)
     assert names == "[]"
     assert count < MOST_MODULES
 
@@ -48,8 +55,9 @@ def test_the_help_has_the_whole_first_line_of_each_subcommand():
 
 
 def test_a_question_about_tensions_draws_nothing():
-    names, _ = imported("tension", "acrobot_small", "--pose", "0,0,0.3")
+    names, _, own = imported("tension", "acrobot_small", "--pose", "0,0,0.3")
     assert "matplotlib" not in names
+    assert own <= MOST_OF_OUR_OWN
 
 
 def test_a_locale_without_utf_8_is_said_in_one_line():

@@ -11,7 +11,8 @@ from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
 from cdpr_drake.geometry.poses import pose_error
 from cdpr_drake.geometry.straight_cables import gravity_wrench, wrench_matrix
-from cdpr_drake.models.camera_catalogue import camera_names, load_camera
+from cdpr_drake.models.camera_catalogue import load_camera
+from cdpr_drake.models.camera_files import camera_names
 from cdpr_drake.models.mechanism_files import mechanism_names
 from cdpr_drake.models.robot_in_plant import platform_inertia
 from cdpr_drake.models.robot_loader import load_robot, robot_names

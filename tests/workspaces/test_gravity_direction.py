@@ -5,7 +5,8 @@ import pytest
 
 from cdpr_drake.analyses.workspaces.static_feasible import static_case
 from cdpr_drake.geometry.poses import rotation_from_angles
-from cdpr_drake.models.robot_loader import gravity_turn, load_robot, turned_robot
+from cdpr_drake.models.robot_copies import gravity_turn, turned_robot
+from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_statics import rigid_platform
 from cdpr_drake.workspaces.box_expansion_kernel import expand_demand
 from cdpr_drake.workspaces.demanded_wrenches import (

@@ -16,8 +16,8 @@ from xml.etree import ElementTree
 import yaml
 
 from cdpr_drake.errors import CdprError, RobotFileError
-from cdpr_drake.models.formats.detection import SUFFIXES as ROBOT_SUFFIXES
-from cdpr_drake.models.formats.detection import is_foreign
+from cdpr_drake.models.formats.file_kinds import SUFFIXES as ROBOT_SUFFIXES
+from cdpr_drake.models.formats.file_kinds import is_foreign
 from cdpr_drake.models.robot_exchange import export_robot, import_robot
 from cdpr_drake.models.robot_exports import EXPORTS, export_omissions, omission_words
 from cdpr_drake.models.robot_loader import parse_robot, robot_file, robot_names, robot_text

@@ -11,8 +11,9 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import Adder, ConstantVectorSource, MatrixGain
 
 from cdpr_drake.control.task_space import TaskGains
+from cdpr_drake.models.robot_copies import moved_robot
 from cdpr_drake.models.robot_in_plant import add_robot
-from cdpr_drake.models.robot_loader import load_robot, moved_robot
+from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.diagrams.tension_control import TensionControlSettings, add_tension_control
 from cdpr_drake.systems.robots.assembly import add_cable_robot
 from cdpr_drake.systems.robots.cable_robot import CableRobot

@@ -8,8 +8,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import BallRpyJoint, SpatialInertia
 
 from cdpr_drake.errors import CdprError, ScenarioError
-from cdpr_drake.models.mechanism_loader import names_mechanism
-from cdpr_drake.models.robot_loader import robot_file
+from cdpr_drake.models.robot_loader import names_mechanism, robot_file
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.diagrams.mechanism_control import build_mechanism_follower
 from cdpr_drake.systems.scenarios.files import (

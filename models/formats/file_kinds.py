@@ -1,0 +1,102 @@
+"""Which tool a robot's file is from, told by its ending and content; no reader is imported.
+
+Source: each reader's module.
+"""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from cdpr_drake.errors import RobotFileError
+from cdpr_drake.models.formats.reading import read_text
+from cdpr_drake.schema.yaml_files import too_many_bytes
+
+YAML_SUFFIXES = (".yaml", ".yml")
+XML_SUFFIXES = (".xml", ".wcrfx", ".sdf", ".world", ".urdf", ".mjcf", ".model")
+FIRMWARE_SUFFIXES = (".cfg", ".g", ".gcode")
+SUFFIXES = (*YAML_SUFFIXES, *XML_SUFFIXES, *FIRMWARE_SUFFIXES, ".json", ".csv", ".mat")
+"""Endings of files that robots are read from."""
+
+MASLOW_SECTION = "MaslowKinematics"
+
+MASLOW_CORNERS = ("tl", "tr", "bl", "br")
+"""Names of the cables."""
+
+
+def is_foreign(path: Path) -> bool:
+    """Whether a path is of another tool's format rather than a robot file of this package."""
+    if path.is_dir():
+        return not (path / "robot.yaml").is_file()
+    if path.suffix.lower() in YAML_SUFFIXES:
+        try:
+            # One that is too large is refused by the other reader, before it is parsed.
+            return not too_many_bytes(path) and _is_foreign_yaml(read_text(path))
+        except (OSError, RobotFileError):
+            return False  # whose reader says what is wrong with it
+    return True
+
+
+@lru_cache(32)  # the same robots are read again and again
+def _is_foreign_yaml(text: str) -> bool:
+    try:
+        content = yaml.safe_load(text)
+        return is_gazebo_yaml(content) or is_maslow(content)
+    except (yaml.YAMLError, ValueError, RecursionError):
+        return False
+
+
+def is_caspr(root: ET.Element) -> bool:
+    """Whether the root of an XML file is one of CASPR's bodies or cables."""
+    return root.tag in ("bodies_system", "links", "cables")
+
+
+def is_wirex(root: ET.Element) -> bool:
+    """Whether the root of an XML file is a document of WireX."""
+    return root.tag in ("models", "robot") and next(root.iter("chain"), None) is not None
+
+
+def is_mjcf(root: ET.Element) -> bool:
+    """Whether the root of an XML file is MJCF."""
+    return root.tag == "mujoco"
+
+
+def is_sdformat(root: ET.Element) -> bool:
+    """Whether the root of an XML file is SDFormat."""
+    return root.tag == "sdf"
+
+
+def is_urdf(root: ET.Element) -> bool:
+    """Whether the root of an XML file is URDF."""
+    return root.tag == "robot" and root.find("link") is not None
+
+
+def is_gazebo_yaml(content: Any) -> bool:
+    """Whether a YAML document is a robot of the Gazebo simulator."""
+    if not isinstance(content, dict):
+        return False
+    body = content.get("model", content)
+    return isinstance(body, dict) and {"points", "platform"} <= set(body)
+
+
+def is_maslow(content: Any) -> bool:
+    """Whether a YAML document is a machine of Maslow."""
+    return isinstance(content, dict) and maslow_settings(content) is not None
+
+
+def maslow_settings(content: dict[Any, Any]) -> dict[str, Any] | None:
+    """Anchors and the like of a Maslow by their names without Maslow_; None: there are none."""
+    kinematics = content.get("kinematics")
+    if isinstance(kinematics, dict) and isinstance(kinematics.get(MASLOW_SECTION), dict):
+        return {str(key): value for key, value in kinematics[MASLOW_SECTION].items()}
+    start = "maslow_"
+    old = {
+        str(key)[len(start) :]: value
+        for key, value in content.items()
+        if str(key).lower().startswith(start)
+    }
+    return old if any(f"{corner}X" in old for corner in MASLOW_CORNERS) else None
