@@ -29,15 +29,16 @@ SETTINGS = CableRobotSettings(cables=CableSettings(model="elastic"))
 METHODS = {"RK4": "fourth order, four evaluations", "implicitfast": "first order, one evaluation"}
 """MuJoCo's integrators, and what they do in each of ten steps."""
 
-PUSH = 5.0
-"""Force by which each robot is pushed, about [N]: platforms move, and some cables go slack."""
+TURN = 0.5
+"""Moment by which each platform is turned, about [N m]: it moves, and some cables go slack."""
 
 
 def batch_rows(quick: bool) -> list[TimingRow]:
     """All rows of this file; MuJoCo's without it are left out."""
     count, ways, repeats = (64, 5, 2) if quick else (1000, 20, 7)
     robot = load_robot(ROBOT)
-    wrenches = np.random.default_rng(0).normal(0.0, PUSH, (count, 6)) * [0.0, 0.0, 0.0, 1, 1, 1]
+    moments = np.random.default_rng(0).normal(0.0, TURN, (count, 3))
+    wrenches = np.hstack([moments, np.zeros((count, 3))])
     batch = BatchRobots(robot, count, settings=SETTINGS, threads=1)
     both = BatchRobots(robot, count, settings=SETTINGS, threads=2)
     works: dict[str, Callable[[], float]] = {
@@ -47,7 +48,7 @@ def batch_rows(quick: bool) -> list[TimingRow]:
     }
     if importlib.util.find_spec("mujoco") is not None:
         for method, words in METHODS.items():
-            rolled = TendonRollout(robot, wrenches, method)
+            rolled = TendonRollout(robot, moments, method)
             name = f"MuJoCo's rollout of tendons, {method}: {words}"
             works[name] = lambda r=rolled: r.rate(ways)  # type: ignore[misc]
     rates = dict(zip(works, interleaved(list(works.values()), repeats), strict=True))
@@ -81,7 +82,7 @@ def _single_rate(robot: Robot, ways: int) -> float:
     context = simulator.get_mutable_context()
     block.set_at_equilibrium(context, robot.home.transform())
     block.get_input_port(0).FixValue(context, np.zeros(len(robot.cables)))
-    block.GetInputPort("applied_wrench").FixValue(context, [0.0, 0.0, 0.0, PUSH, PUSH, PUSH])
+    block.GetInputPort("applied_wrench").FixValue(context, [TURN, TURN, TURN, 0.0, 0.0, 0.0])
     simulator.Initialize()
 
     def advance() -> None:
@@ -94,33 +95,39 @@ def _single_rate(robot: Robot, ways: int) -> float:
 class TendonRollout:
     """The robots of a batch by `mujoco.rollout`: the file that `cdpr export` writes, in one thread.
 
-    Lengths stay; wrenches on the platform are `xfrc_applied`.
+    Lengths stay. Only moments act on the platforms: MuJoCo's forces act at the centre of mass,
+    which turns about Po.
     """
 
-    def __init__(self, robot: Robot, wrenches: Array, method: str) -> None:
-        """At rest at home, with moments about Po and forces in W, shape (count, 6) [N m, N]."""
+    def __init__(self, robot: Robot, moments: Array, method: str, step: float = STEP) -> None:
+        """At rest at home, with moments in W, shape (count, 3) [N m].
+
+        Args:
+            robot: The robot.
+            moments: On the platform of each.
+            method: A name of `METHODS`.
+            step: Its step [s].
+        """
         import mujoco
         from mujoco import rollout
 
         self._run: Any = rollout.rollout
         (file,) = export_robot(robot, "mjcf").values()
         self._model: Any = mujoco.MjModel.from_xml_string(file)
-        self._model.opt.timestep = STEP
+        self._model.opt.timestep = step
         self._model.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{method.upper()}")
         self._data: Any = mujoco.MjData(self._model)
         self._kind: Any = mujoco.mjtState.mjSTATE_XFRC_APPLIED
         full = mujoco.mjtState.mjSTATE_FULLPHYSICS
         self._start = np.empty(mujoco.mj_stateSize(self._model, full))
         mujoco.mj_getState(self._model, self._data, self._start, full)
-        # MuJoCo's act at the centre of mass, which forces alone through Po would turn about.
-        force = wrenches[:, 3:]
-        moment = wrenches[:, :3] - np.cross(robot.center_of_mass(), force)
-        push = np.concatenate([force, moment], axis=1)
-        self._pushes = np.concatenate([np.zeros_like(push), push], axis=1)[:, None]
+        # Force and moment on the world, then on the platform.
+        push = np.hstack([np.zeros((len(moments), 9)), moments])
+        self._pushes, self._step = push[:, None], step
 
     def roll(self, ways: int) -> Array:
         """States (time, position, quaternion, velocities) at the ends of steps, (count, k, 14)."""
-        steps = round(ways * PERIOD / STEP)
+        steps = round(ways * PERIOD / self._step)
         states, _ = self._run(
             self._model, self._data, self._start[None], self._pushes,
             control_spec=int(self._kind), nstep=steps, skip_checks=False,

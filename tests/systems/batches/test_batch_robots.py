@@ -7,12 +7,14 @@ import pytest
 from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RigidTransform
 
+from cdpr_drake.analyses.benchmarks.batches import TendonRollout
 from cdpr_drake.errors import CdprError, TensionProblemError
 from cdpr_drake.geometry.poses import pose_row
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.batches.batch_robots import DEFAULT_RULE, BatchRobots
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.loops.robot_motion import RobotMotion
+from cdpr_drake.systems.robots.compiled_step import StepRule
 from cdpr_drake.systems.robots.failures import Failure, FailureSettings
 from tests.systems.batches.varied import PERIOD, alone, alone_by_tensions, settings, varied
 
@@ -24,6 +26,10 @@ HELD = 1e-7
 """How far a platform of 350 kN cables moves in 50 ms that is held at rest [m]: rounding of lengths,
 about 1e-16 m times the stiffness, is some 1e-10 N."""
 
+TENDONS = 1e-6
+"""How far MuJoCo's platforms may be off in 0.2 s [m and -]. Found: 2e-9 m and 4e-8, and 100 times
+as much by steps five times as long, as methods of third order do."""
+
 
 def speeds(count, ways, m=8):
     return RANDOM.normal(0.0, 0.02, (ways, count, m))
@@ -33,6 +39,7 @@ CASES = {
     "elastic": ("acrobot_small", ELASTIC),
     "damped, pulleys": ("acrobot_small", settings(model="kelvin_voigt", pulleys=True)),
     "planar": ("planar", settings(model="kelvin_voigt")),
+    "catenary": ("acrobot_small", settings(model="catenary")),
     "several cables a winch": ("caroca", settings(model="kelvin_voigt")),
 }
 
@@ -51,6 +58,18 @@ def test_each_moves_as_alone_by_velocities_and_wrenches(case):
         assert np.array_equal(batch.states[k], state)
         assert np.array_equal(batch.tensions[k], tensions)
     assert len(np.unique(batch.states[:, 0])) == 5 or not robots[0].joint().is_floating
+
+
+def test_each_moves_as_alone_by_the_semi_implicit_method_in_long_steps():
+    rule = StepRule(method="semi_implicit", max_step=5e-3)
+    how = settings(model="kelvin_voigt")
+    robots, commands = varied(ROBOT, 3), speeds(3, 3)
+    batch = BatchRobots(ROBOT, 3, settings=how, parameters=robots, rule=rule)
+    for command in commands:
+        batch.step(command, PERIOD)
+    for k, robot in enumerate(robots):
+        found, _ = alone(robot, how, commands[:, k], rule=rule)
+        assert np.array_equal(batch.states[k], found)
 
 
 @pytest.mark.parametrize("mode", ["torque", "velocity", "position"])
@@ -139,6 +158,21 @@ def test_a_broken_cable_is_the_engine_s():
     assert not batch.broken.any()
     with pytest.raises(CdprError, match="cable: found 8; accepted: 0 to 7"):
         batch.break_cable(0, 8)
+
+
+def test_mujoco_s_tendons_move_alike():
+    """An independent engine, with cables a thousand times softer, that go slack and catch."""
+    soft = load_robot("acrobot_small")
+    soft.cable.youngs_modulus /= 1e3
+    moments = np.random.default_rng(0).normal(0.0, 0.5, (3, 3))
+    batch = BatchRobots(soft, 3, settings=ELASTIC, rule=StepRule(max_step=2e-4))
+    ours = batch.rollout(np.zeros((20, 8)), PERIOD, wrenches=np.hstack([moments, 0.0 * moments]))
+    theirs = TendonRollout(soft, moments, "RK4", 2e-4).roll(20)[:, 49::50].swapaxes(0, 1)
+    assert np.abs(theirs[:, :, 1:4] - ours.states[:, :, 4:7]).max() < TENDONS
+    assert np.abs(theirs[:, :, 4:8] - ours.states[:, :, :4]).max() < TENDONS
+    travel = np.linalg.norm(batch.poses[:, 4:] - soft.home.position, axis=1)
+    assert travel.max() > 0.05
+    assert np.sum(batch.tensions == 0.0) >= 4
 
 
 def test_reset_puts_robots_at_rest_where_they_are_wanted():

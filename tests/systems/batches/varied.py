@@ -3,7 +3,7 @@
 import numpy as np
 from pydrake.systems.analysis import Simulator
 
-from cdpr_drake.models.drawn_robots import ParameterCovariance, drawn_robots
+from cdpr_drake.models.robot_draws import ParameterCovariance, drawn_robots
 from cdpr_drake.systems.batches.batch_robots import DEFAULT_RULE
 from cdpr_drake.systems.robots.compiled_cable_robot import CompiledCableRobot, motion_by_tensions
 from cdpr_drake.systems.robots.settings import CableRobotSettings, CableSettings, WinchSettings

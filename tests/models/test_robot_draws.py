@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cdpr_drake.errors import DataFileError, RobotFileError
-from cdpr_drake.models.drawn_robots import ParameterCovariance, drawn_robots
+from cdpr_drake.models.robot_draws import ParameterCovariance, drawn_robots
 from cdpr_drake.models.robot_in_plant import platform_inertia
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_parameters import changed_robot, parameter_names
