@@ -27,6 +27,8 @@ from .robot_copies import gravity_turn as gravity_turn
 from .robot_copies import moved_robot as moved_robot
 from .robot_copies import turned_robot as turned_robot
 from .robot_copies import world_turn as world_turn
+from .robot_draws import ParameterCovariance as ParameterCovariance
+from .robot_draws import drawn_robots as drawn_robots
 from .robot_exchange import ImportedRobot as ImportedRobot
 from .robot_exchange import draft_robot as draft_robot
 from .robot_exchange import export_robot as export_robot
@@ -46,6 +48,10 @@ from .robot_loader import parse_robot as parse_robot
 from .robot_loader import robot_file as robot_file
 from .robot_loader import robot_names as robot_names
 from .robot_loader import robot_text as robot_text
+from .robot_loader import turned_robot as turned_robot
+from .robot_loader import world_turn as world_turn
+from .robot_parameters import changed_robot as changed_robot
+from .robot_parameters import parameter_names as parameter_names
 from .robot_schema import CameraMount as CameraMount
 from .robot_schema import Pose as Pose
 from .robot_schema import Robot as Robot
