@@ -114,6 +114,7 @@ class ServoEvents:
         servo: FeatureServo,
         monitor: RunMonitor,
         motion: RobotMotion,
+        *,
         offsets: Array | None,
         log: LoopLog,
         state: ServoState,

@@ -264,7 +264,7 @@ class ServoLoop:
         if self._events is None:
             self._events = ServoEvents(
                 self.scenario, self.model, self._servo, self._monitor, self._motion,
-                self._offsets, self.log, self._state(),
+                offsets=self._offsets, log=self.log, state=self._state(),
             )  # fmt: skip
         try:
             self._events.advance_to(boundary)
