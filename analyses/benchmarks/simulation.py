@@ -20,6 +20,7 @@ from cdpr_drake.analyses.reporting.timing import (
     seconds_per_call,
 )
 from cdpr_drake.analyses.simulation.monte_carlo import run_many
+from cdpr_drake.analyses.simulation.run_loop import REPORT_PERIOD
 from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.elastic_law import unstrained_lengths
@@ -30,7 +31,9 @@ from cdpr_drake.models.robot_in_plant import RobotInPlant, add_robot
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.cameras.camera_settings import REGION
 from cdpr_drake.systems.diagrams.load import load_scenario
-from cdpr_drake.systems.loops.loop_choice import choose_compiled_loop
+from cdpr_drake.systems.loops.loop_choice import check_loop, choose_compiled_loop
+from cdpr_drake.systems.loops.servo_loop import ServoLoop
+from cdpr_drake.systems.monitoring.run_monitor import Outcome
 from cdpr_drake.systems.robots.cable_forces import CableForces
 from cdpr_drake.systems.robots.cable_robot import SEMI_IMPLICIT, automatic_step, holding_tensions
 from cdpr_drake.systems.robots.compiled_cable_robot import CompiledCableRobot
@@ -76,6 +79,7 @@ def simulation_rows(quick: bool) -> list[TimingRow]:
     compiled = [PROJECTED, f"integration.engine={COMPILED}"]
     rows.append(loop_row(", projected camera, compiled", SCENARIO, compiled, duration, 3))
     rows += repeated_rows(duration, 2 if quick else 5)
+    rows.append(events_row(duration, 3 if quick else 15))
     rows.append(laps_row(4.0 if quick else 48.0, 2 if quick else 3))
     if not quick:
         rows.append(loop_row(", rendered camera", SCENARIO, [RENDERED], duration, 1))
@@ -355,6 +359,36 @@ def repeated_rows(duration: float, repeats: int) -> list[TimingRow]:
         )
         for words, other in zip(diagrams, slow, strict=True)
     ]
+
+
+def events_row(duration: float, repeats: int) -> TimingRow:
+    """A loop whose kernel goes from event to event, against the same loop in Python; made anew
+    each time, without summary. By processor time, in turns."""
+    options = [PROJECTED, f"duration={duration}", f"integration.loop={COMPILED}"]
+    scenario = check_loop(load_scenario(SCENARIO, options))
+
+    def once(in_python: bool) -> None:
+        loop = ServoLoop(scenario)
+        if in_python:
+            loop.python_reason = "a benchmark asks for it"
+        loop.start()
+        while loop.time < duration and loop.outcome == Outcome.RUNNING:
+            loop.advance_to(min(loop.time + REPORT_PERIOD, duration))
+
+    once(False)  # loads kernels
+    kernel, python = interleaved(
+        [lambda way=way: processor_seconds(lambda: once(way)) for way in (False, True)],  # type: ignore[misc]
+        repeats,
+    )
+    return TimingRow(
+        "servo loop, events in one kernel",
+        1e3 * kernel,
+        "ms of processor time",
+        "its events in Python",
+        1e3 * python,
+        python / kernel,
+        ratio_means="times faster than in Python",
+    )
 
 
 def laps_row(duration: float, repeats: int) -> TimingRow:

@@ -106,12 +106,12 @@ def exponential(twist: Array) -> RigidTransform:
 
     Source: servoing thesis (2.1), there ordered (translation, rotation).
     """
-    X = _exponential(np.ascontiguousarray(twist, dtype=float))
+    X = exponential_of(np.ascontiguousarray(twist, dtype=float))
     return RigidTransform.MakeUnchecked(X)
 
 
 @njit(cache=True)
-def _exponential(twist: Array) -> Array:
+def exponential_of(twist: Array) -> Array:
     """exp of the twist as a matrix, shape (3, 4); R by a unit quaternion, so it is orthonormal."""
     x, y, z = twist[0], twist[1], twist[2]
     square = x * x + y * y + z * z

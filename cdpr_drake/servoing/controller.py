@@ -22,6 +22,9 @@ from cdpr_drake.servoing.servo_task import INTERACTIONS, BelievedRobot, CameraMo
 from cdpr_drake.servoing.target_motion import MotionFilter, feature_drift
 from cdpr_drake.servoing.visual_features import Sighting, columns, packed_sighting
 
+MODE_ENTRIES = [servo_law.MODE, servo_law.SWITCHES, *range(servo_law.OF_POSE, servo_law.FEATURES)]
+"""Where in a memory stands what `ServoController.mode` says."""
+
 
 class Command(NamedTuple):
     """What a step asks for.
@@ -239,6 +242,15 @@ class ServoController:
         look_and_step_at(self._steps[number][0], seen, X_WP, time, memory, out)
         return self._command(out), memory
 
+    def step_tables(self) -> Array:
+        """Of each task what `look_and_step_at` takes as its table, where `sees_packed`, shape
+        (tasks, 8, 4), whole numbers; a controller's as long as it lives."""
+        return np.array([table for table, _ in self._steps])
+
+    def task_begins(self) -> Array:
+        """Times at which tasks take over, shape (tasks,) [s]."""
+        return self._begins.copy()
+
     def _command(self, out: Array) -> Command:
         m = self.cable_count
         return Command(out[:m], out[m : m + 6], out[m + 6 : -1], float(out[-1]))
@@ -295,6 +307,4 @@ class ServoController:
     def mode(self, memory: Array) -> Array:
         """What a switching servo does: number in `MODES` of the features that act, switches since
         the run began, L_P and L_I of the last step and their bounds; shape (6,)."""
-        return memory[
-            [servo_law.MODE, servo_law.SWITCHES, *range(servo_law.OF_POSE, servo_law.FEATURES)]
-        ]
+        return memory[MODE_ENTRIES]

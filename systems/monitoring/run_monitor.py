@@ -71,6 +71,12 @@ class RunMonitor(LeafSystem):
     ========== ============== ==== ==========================================================
 
     When the outcome is known, the simulator is told to terminate.
+
+    Attributes:
+        rules: When the run ends.
+        X_CdO: Desired pose of the target in the camera [m].
+        free_rotation: Whether the rotation about the optical axis does not count.
+        earliest: Time before which the pose does not count as reached [s].
     """
 
     def __init__(
@@ -89,9 +95,9 @@ class RunMonitor(LeafSystem):
         `completed` [s] ends the run instead of what is seen.
         """
         super().__init__()
-        self._rules, self._X_CdO = rules, X_CdO
+        self.rules, self.X_CdO = rules, X_CdO
         self._box = list(zip(rules.lower.tolist(), rules.upper.tolist(), strict=True))
-        self._free_rotation, self._earliest = free_rotation, earliest
+        self.free_rotation, self.earliest = free_rotation, earliest
         self._completed = completed
         self.DeclareAbstractInputPort("X_CO", Value(RigidTransform()))
         self.DeclareVectorInputPort("found", 1)
@@ -131,14 +137,14 @@ class RunMonitor(LeafSystem):
             since: The same times after the step before, `NOT_YET` at the start [s].
             now: Time [s].
         """
-        rules = self._rules
+        rules = self.rules
         reached_since, lost_since = since
         found = read("found")[0] != 0.0
         reached = False
-        if found and now >= self._earliest:
+        if found and now >= self.earliest:
             X_CO = read("X_CO")
-            if place_error(X_CO, self._X_CdO) <= rules.position:  # else no angle matters
-                _, angle = seen_pose_error(X_CO, self._X_CdO, self._free_rotation)
+            if place_error(X_CO, self.X_CdO) <= rules.position:  # else no angle matters
+                _, angle = seen_pose_error(X_CO, self.X_CdO, self.free_rotation)
                 reached = angle <= rules.rotation
         reached_since = _running_since(reached, reached_since, now)
         lost_since = _running_since(not found, lost_since, now)
