@@ -48,8 +48,6 @@ from .robot_loader import parse_robot as parse_robot
 from .robot_loader import robot_file as robot_file
 from .robot_loader import robot_names as robot_names
 from .robot_loader import robot_text as robot_text
-from .robot_loader import turned_robot as turned_robot
-from .robot_loader import world_turn as world_turn
 from .robot_parameters import changed_robot as changed_robot
 from .robot_parameters import parameter_names as parameter_names
 from .robot_schema import CameraMount as CameraMount
