@@ -16,7 +16,7 @@ import numpy as np
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
 
 from cdpr_drake.estimation.failure_detection import AlarmRule, threshold
-from cdpr_drake.schema.fields import FASTEST, number, text, whole
+from cdpr_drake.schema.fields import FASTEST, number, optional_section, text, whole
 
 STOP, REDISTRIBUTE = REACTIONS = ("stop", "redistribute")
 HOLD, CONTINUE = "hold", "continue"
@@ -26,6 +26,32 @@ ACCEPTED = 1e-3
 """False alarms that a threshold accepts in `HOURS` hours of runs."""
 
 HOURS = 1.0
+
+
+@dataclass(kw_only=True)
+class WatchSettings:
+    """When other failures than broken cables are told; nothing is done about them.
+
+    Torque and lag have bounds that undisturbed runs of ACROBOT stay below; see study `detection`.
+    """
+
+    torque: float = number(
+        "Torque of a motor that asked torque, tension, inertia and friction do not explain.",
+        "N m",
+        0.015,
+        above=0.0,
+    )
+    bandwidth: float = number(
+        "At which this torque is smoothed; below a sixth of `emergency.rate`.", "Hz", 10.0,
+        above=0.0,
+    )  # fmt: skip
+    lag: float = number(
+        "By how much a measured length may lag behind the drive's speed.", "m", 1e-3, above=0.0
+    )
+    leak: float = number("Time in which such differences are forgotten.", "s", 1.0, above=0.0)
+    in_a_row: int = whole("Samples in a row of torque and lag that make an alarm.", 5, at_least=1)
+    dark: float = number("Without a sight of the target.", "s", 0.12, above=0.0)
+    late: float = number("With the very same sight of it.", "s", 0.12, above=0.0)
 
 
 @dataclass(kw_only=True)
@@ -62,6 +88,10 @@ class EmergencySettings:
         above=0.0,
     )
     in_a_row: int = whole("Samples in a row that make an alarm.", 3, at_least=1)
+    watch: WatchSettings | None = optional_section(
+        "Watches winches, sensors and camera, too, and logs alarms; null: broken cables alone. "
+        "With winches.mode torque."
+    )
 
     def rule(self, cables: int) -> AlarmRule:
         """When it is found, with so many cables: `ACCEPTED` false alarms in `HOURS`."""

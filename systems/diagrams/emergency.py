@@ -1,24 +1,40 @@
-"""Puts what a robot does when a cable breaks into a diagram, and checks section `emergency`."""
+"""Puts what a robot does when something fails into a diagram, and checks section `emergency`."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
-from cdpr_drake.errors import ScenarioError
+from cdpr_drake.errors import ScenarioError, SensorError
+from cdpr_drake.estimation.failure_detection import AlarmRule
+from cdpr_drake.estimation.failure_watch import EncoderWatch, MotorWatch, repeats_in_a_row
 from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.models.sensor_catalogue import load_tension_sensor
 from cdpr_drake.systems.controllers.emergency import (
+    ACCEPTED,
     CONTINUE,
     FOUND,
     HOLD,
+    HOURS,
     REDISTRIBUTE,
     EmergencyReaction,
+    EmergencySettings,
+    WatchSettings,
 )
 from cdpr_drake.systems.diagrams.servo_blocks import VisualServoBlocks
 from cdpr_drake.systems.diagrams.torque_control import TORQUE
 from cdpr_drake.systems.monitoring.break_detector import BreakDetector
+from cdpr_drake.systems.monitoring.failure_monitor import (
+    FOUND as FOUND_OF_WINCHES,
+)
+from cdpr_drake.systems.monitoring.failure_monitor import (
+    OF_CAMERA,
+    FailureMonitor,
+    WatchRules,
+)
 from cdpr_drake.systems.robots.failures import BROKEN, JAMMED
 
 if TYPE_CHECKING:
@@ -49,6 +65,16 @@ def check_emergency(scenario: Scenario, robot: Robot, path: Path) -> None:
         raise ScenarioError(
             f"{where}.motion: found {CONTINUE} with reaction {settings.reaction}; accepted: {HOLD}"
         )
+    if settings.watch is not None:
+        if scenario.winches.mode != TORQUE:
+            raise ScenarioError(
+                f"{where}.watch: found a section with winches.mode {scenario.winches.mode}; "
+                f"accepted: null, or winches.mode {TORQUE}"
+            )
+        try:
+            watch_rules(scenario, settings, settings.watch, robot)
+        except SensorError as problem:
+            raise ScenarioError(f"{where}.watch: {problem}") from problem
     if settings.reaction == REDISTRIBUTE and scenario.winches.mode != TORQUE:
         raise ScenarioError(
             f"{where}.reaction: found {REDISTRIBUTE} with winches.mode {scenario.winches.mode}; "
@@ -56,12 +82,50 @@ def check_emergency(scenario: Scenario, robot: Robot, path: Path) -> None:
         )
 
 
+def watch_rules(
+    scenario: Scenario, settings: EmergencySettings, watch: WatchSettings, robot: Robot
+) -> WatchRules:
+    """When something other than a broken cable is an alarm.
+
+    Raises:
+        SensorError: A bandwidth does not fit the rate, or the tension sensors have no noise by
+            which a frozen one is told.
+    """
+    law, period = robot.winch_law(), 1.0 / settings.rate
+    count = len(robot.cables)
+    motor = MotorWatch(
+        law.drum.radii(count), law.friction, law.inertia, 2.0 * np.pi * watch.bandwidth, period
+    )
+    sensor = load_tension_sensor(scenario.sensors.tension)
+    rate = scenario.sensors.rate("tension") or settings.rate
+    readings = 3600.0 * HOURS * rate * count
+    repeats = repeats_in_a_row(
+        sensor.repeatability, sensor.resolution, readings=readings, accepted=ACCEPTED
+    )
+    # A look that comes more often than readings finds each of them several times.
+    repeats = int(np.ceil((repeats + SPARE_REPEATS) * max(settings.rate / rate, 1.0)))
+    return WatchRules(
+        motor=motor,
+        torque=AlarmRule(watch.torque, watch.in_a_row),
+        repeats=repeats,
+        encoder=EncoderWatch(period, watch.leak),
+        lag=AlarmRule(watch.lag, watch.in_a_row),
+        dark=watch.dark,
+        late=watch.late,
+    )
+
+
+SPARE_REPEATS = 2
+"""Equal readings beyond those that say that a sensor is frozen: looks and readings have clocks of
+their own, so that one may be found twice."""
+
+
 def add_emergency(
     builder: DiagramBuilder, scenario: Scenario, blocks: VisualServoBlocks
 ) -> dict[str, OutputPort]:
     """Adds a scenario's reaction to a servo; returns what it logs.
 
-    Subsystems: break_detector (where breaks are found), emergency.
+    Subsystems: break_detector (where breaks are found), emergency, failure_monitor (if watched).
     """
     settings = scenario.emergency
     if settings is None:
@@ -93,4 +157,29 @@ def add_emergency(
         assert blocks.torque is not None
         builder.Connect(left_out, blocks.torque.GetInputPort("left_out"))
         builder.Connect(reaction.GetOutputPort("halted"), blocks.torque.GetInputPort("halted"))
-    return logged | {"left_out": left_out}
+    return logged | {"left_out": left_out} | _add_watch(builder, scenario, settings, blocks)
+
+
+def _add_watch(
+    builder: DiagramBuilder,
+    scenario: Scenario,
+    settings: EmergencySettings,
+    blocks: VisualServoBlocks,
+) -> dict[str, OutputPort]:
+    """Adds what watches for other failures, if asked for; returns what it logs."""
+    if settings.watch is None:
+        return {}
+    assert blocks.torque is not None
+    rules = watch_rules(scenario, settings, settings.watch, blocks.robot)
+    monitor = builder.AddNamedSystem("failure_monitor", FailureMonitor(rules))
+    for name, source in (
+        ("torques", blocks.torque.GetOutputPort("motor_torques")),
+        ("tensions", blocks.readings.port("measured_tensions")),
+        ("lengths", blocks.readings.port("measured_lengths")),
+        ("length_rates", blocks.block.GetOutputPort("unstrained_length_rates")),
+        ("found", blocks.measurement.GetOutputPort("found")),
+        ("X_CO", blocks.measurement.GetOutputPort("X_CO")),
+    ):
+        builder.Connect(source, monitor.GetInputPort(name))
+    logged = (*FOUND_OF_WINCHES, *OF_CAMERA, "torque_residual", "length_lag")
+    return {name: monitor.GetOutputPort(name) for name in logged}
