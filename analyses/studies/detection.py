@@ -105,11 +105,8 @@ SEED = 35
 
 
 def cases(form: Form) -> Iterator[Case]:
-    """Undisturbed runs, then all failures."""
+    """All failures, then undisturbed runs."""
     quick = int(form.quick)
-    for number in range(UNDISTURBED[quick]):
-        keys = {"fails": NOTHING, "which": -1, "number": number}
-        yield Case(name=f"undisturbed {number}", keys=keys)
     count = 2 if quick else len(load_robot(load_scenario(SCENARIO).robot).cables)
     for fails in ALARMS:
         for round_ in range((BREAKS if fails == BREAK else OTHERS)[quick]):
@@ -117,6 +114,9 @@ def cases(form: Form) -> Iterator[Case]:
                 number = 100_000 + 1000 * round_ + which
                 keys = {"fails": fails, "which": which, "number": number}
                 yield Case(name=f"{fails} {which} {round_}", keys=keys)
+    for number in range(UNDISTURBED[quick]):
+        keys = {"fails": NOTHING, "which": -1, "number": number}
+        yield Case(name=f"undisturbed {number}", keys=keys)
 
 
 def overrides(keys: Mapping[str, Any]) -> list[str]:
