@@ -6,8 +6,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from pydrake.math import RigidTransform
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
+from cdpr_drake.arrays import Array
 from cdpr_drake.errors import ScenarioError, SensorError
 from cdpr_drake.estimation.failure_detection import AlarmRule
 from cdpr_drake.estimation.failure_watch import EncoderWatch, MotorWatch, repeats_in_a_row
@@ -15,17 +17,24 @@ from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.sensor_catalogue import load_tension_sensor
 from cdpr_drake.systems.controllers.emergency import (
     ACCEPTED,
+    BRAKE,
     CONTINUE,
+    DESCEND,
     FOUND,
     HOLD,
     HOURS,
     REDISTRIBUTE,
+    RETREAT,
+    STOP,
     EmergencyReaction,
     EmergencySettings,
     WatchSettings,
+    WaysOut,
 )
+from cdpr_drake.statics.nearest_held_pose import Load, nearest_held_pose
+from cdpr_drake.systems.controllers.torque_settings import TorqueControl
 from cdpr_drake.systems.diagrams.servo_blocks import VisualServoBlocks
-from cdpr_drake.systems.diagrams.torque_control import TORQUE
+from cdpr_drake.systems.diagrams.torque_control import TORQUE, wanted_limits
 from cdpr_drake.systems.monitoring.break_detector import BreakDetector
 from cdpr_drake.systems.monitoring.failure_monitor import (
     FOUND as FOUND_OF_WINCHES,
@@ -75,10 +84,21 @@ def check_emergency(scenario: Scenario, robot: Robot, path: Path) -> None:
             watch_rules(scenario, settings, settings.watch, robot)
         except SensorError as problem:
             raise ScenarioError(f"{where}.watch: {problem}") from problem
-    if settings.reaction == REDISTRIBUTE and scenario.winches.mode != TORQUE:
+    if settings.reaction != STOP and scenario.winches.mode != TORQUE:
         raise ScenarioError(
-            f"{where}.reaction: found {REDISTRIBUTE} with winches.mode {scenario.winches.mode}; "
-            f"accepted: stop, or winches.mode {TORQUE}"
+            f"{where}.reaction: found {settings.reaction} with winches.mode "
+            f"{scenario.winches.mode}; accepted: {STOP}, or winches.mode {TORQUE}"
+        )
+    if settings.reaction in (RETREAT, DESCEND) and not robot.motion_type().is_free:
+        raise ScenarioError(
+            f"{where}.reaction: found {settings.reaction} with {robot.name}, whose platform does "
+            f"not move freely; accepted: {STOP}, {REDISTRIBUTE}, {BRAKE}"
+        )
+    most = wanted_limits(scenario.torque_control or TorqueControl(), robot)[1]
+    if settings.reaction == RETREAT and settings.least_tension >= most:
+        raise ScenarioError(
+            f"{where}.least_tension: found {settings.least_tension:g}; accepted: below {most:g} "
+            "[N], the largest wanted tension"
         )
 
 
@@ -149,15 +169,50 @@ def add_emergency(
             builder.Connect(source, detector.GetInputPort(name))
         known = detector.GetOutputPort("found_broken")
         logged = {"found_broken": known, "break_residuals": detector.GetOutputPort("residuals")}
-    reaction = builder.AddNamedSystem("emergency", EmergencyReaction(settings, count))
+    ways = _ways_out(scenario, settings, blocks)
+    reaction = builder.AddNamedSystem("emergency", EmergencyReaction(settings, count, ways))
     builder.Connect(known, reaction.GetInputPort("found_broken"))
     builder.Connect(reaction.GetOutputPort("jammed"), block.GetInputPort(JAMMED))
     left_out = reaction.GetOutputPort("left_out")
-    if settings.reaction == REDISTRIBUTE:
+    if settings.reaction != STOP:
         assert blocks.torque is not None
         builder.Connect(left_out, blocks.torque.GetInputPort("left_out"))
         builder.Connect(reaction.GetOutputPort("halted"), blocks.torque.GetInputPort("halted"))
+    if settings.reaction == BRAKE:
+        assert blocks.torque is not None
+        builder.Connect(reaction.GetOutputPort("braking"), blocks.torque.GetInputPort("braking"))
+    if ways is not None:
+        assert blocks.torque is not None
+        builder.Connect(blocks.estimator.GetOutputPort("X_WP"), reaction.GetInputPort("X_WP"))
+        builder.Connect(
+            reaction.GetOutputPort("halted_twist"), blocks.torque.GetInputPort("halted_twist")
+        )
+    if settings.reaction == RETREAT:
+        logged["X_WP_retreat"] = reaction.GetOutputPort("goal")
     return logged | {"left_out": left_out} | _add_watch(builder, scenario, settings, blocks)
+
+
+def _ways_out(
+    scenario: Scenario, settings: EmergencySettings, blocks: VisualServoBlocks
+) -> WaysOut | None:
+    """What a reaction that moves the platform knows of it; None for others."""
+    if settings.reaction not in (RETREAT, DESCEND):
+        return None
+    robot = blocks.robot
+    cables = blocks.believed.cables.without_pulleys()
+    load = Load(robot.platform.mass, robot.center_of_mass(), robot.gravity_vector())
+    most = wanted_limits(scenario.torque_control or TorqueControl(), robot)[1]
+    anchors = cables.p_PB
+    size = float(np.sqrt(np.mean(np.sum(anchors**2, axis=0))))
+    home = robot.home.transform()
+
+    def held(X_WP: RigidTransform, broken: Array) -> RigidTransform:
+        left = broken == 0.0
+        bounds = np.array([settings.least_tension * left, most * left])
+        found = nearest_held_pose(X_WP, cables, load, bounds, size=size, starts=[home])
+        return X_WP if found is None else found.X_WP
+
+    return WaysOut(held, anchors, float(robot.frame.lower[2]))
 
 
 def _add_watch(
