@@ -12,7 +12,8 @@ detectors of section `emergency` look; nobody reacts.
 The bound `pose_bias` of slow errors is most of the threshold of the break detector, and chosen.
 Column `residual_m` is the largest residual of lengths that stayed in a row as long as an alarm
 needs, whether or not a tension was near nothing, too: what the bound has to cover. Torque and lag
-have thresholds of their own, which were chosen with fourteen runs in sight that are not in the study.
+have thresholds of their own, which were chosen with
+fourteen runs in sight that are not in the study.
 """
 
 from __future__ import annotations
@@ -268,7 +269,9 @@ def _found(runs: Runs, kind: str) -> Finding:
     words = f"{kind}: {np.sum(told)} of {len(some)} told"
     if np.any(told):
         delays = 1e3 * some["delay_s"][told]
-        words += f", after {delays.min():.0f} to {delays.max():.0f} ms, median {np.median(delays):.0f}"
+        words += (
+            f", after {delays.min():.0f} to {delays.max():.0f} ms, median {np.median(delays):.0f}"
+        )
     return Finding(found=words, held=list(map(bool, told)))
 
 
@@ -290,6 +293,7 @@ def bias_figure(runs: Runs) -> Figure:
     for place, kind in enumerate(ALARMS):
         found = runs(fails=kind) if runs.has(fails=kind) else None
         if found is None or not np.any(found["told"]):
+            right.plot([], [], color=nth_look(place).color, label=f"{kind}: none told")
             continue
         delays = np.sort(1e3 * found["delay_s"][found["told"].astype(bool)])
         look = nth_look(place)

@@ -32,6 +32,7 @@ from cdpr_drake.tensions.methods import method_for
 from cdpr_drake.tensions.quadratic_program_kernel import workspace_shape
 from cdpr_drake.winches.friction import FrictionLaw
 
+
 def energy_scale(dynamics: Array, n: int) -> Array:
     """Scale of the rows of a wrench that makes its squares energy over mass, shape (n,) [m, -].
 

@@ -23,13 +23,32 @@ ICRA 2005, for the observer.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from scipy.stats import norm
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import SensorError
-from cdpr_drake.winches.friction import FrictionLaw
+
+
+class Friction(Protocol):
+    """What is asked of a law of friction, such as `winches.friction.FrictionLaw`."""
+
+    @property
+    def static(self) -> float:
+        """F_s [N m]."""
+
+    @property
+    def viscous(self) -> float:
+        """F_v [N m s/rad]."""
+
+    @property
+    def settling_time(self) -> float:
+        """T [s]."""
+
+    def dry(self, speed: Array) -> Array:
+        """Largest dry friction at speeds [rad/s], in [N m]."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +64,7 @@ class MotorWatch:
     """
 
     radius: Array
-    friction: FrictionLaw
+    friction: Friction
     inertia: float
     bandwidth: float
     period: float

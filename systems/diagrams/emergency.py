@@ -15,6 +15,7 @@ from cdpr_drake.estimation.failure_detection import AlarmRule
 from cdpr_drake.estimation.failure_watch import EncoderWatch, MotorWatch, repeats_in_a_row
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.sensor_catalogue import load_tension_sensor
+from cdpr_drake.statics.nearest_held_pose import Load, nearest_held_pose
 from cdpr_drake.systems.controllers.emergency import (
     ACCEPTED,
     BRAKE,
@@ -31,7 +32,6 @@ from cdpr_drake.systems.controllers.emergency import (
     WatchSettings,
     WaysOut,
 )
-from cdpr_drake.statics.nearest_held_pose import Load, nearest_held_pose
 from cdpr_drake.systems.controllers.torque_settings import TorqueControl
 from cdpr_drake.systems.diagrams.servo_blocks import VisualServoBlocks
 from cdpr_drake.systems.diagrams.torque_control import TORQUE, wanted_limits
