@@ -312,7 +312,8 @@ def parameters(form: Form) -> Mapping[str, Any]:
     return {
         "scenario": SCENARIO, "undisturbed": UNDISTURBED[quick], "breaks": BREAKS[quick],
         "others": OTHERS[quick], "times_s": TIMES, "after_s": AFTER, "rate_hz": RATE,
-        "durations_s": (SHORT, LONG), "every": EVERY, "schemes": SCHEMES, "methods": METHODS, "lowest_n": LOWEST,
+        "durations_s": (SHORT, LONG), "every": EVERY, "schemes": SCHEMES,
+        "methods": METHODS, "lowest_n": LOWEST,
         "largest": LARGEST, "drawn_by": SEED,
     }  # fmt: skip
 
