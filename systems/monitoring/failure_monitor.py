@@ -131,7 +131,8 @@ class FailureMonitor(LeafSystem):
         encoder = rules.encoder.step(self._part(context, "encoder"), lengths, rates)
         behind, lags = rules.lag.step(self._part(context, "encoder_counts"), np.abs(encoder[0]))
         flags = np.array([
-            np.maximum(flags[0], first & stands), np.maximum(flags[1], first & np.logical_not(stands)),
+            np.maximum(flags[0], first & stands),
+            np.maximum(flags[1], first & np.logical_not(stands)),
             np.maximum(flags[2], repeats[0] >= rules.repeats - 1.0), lags,
         ])  # fmt: skip
         for name, value in (
