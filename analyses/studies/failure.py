@@ -8,13 +8,21 @@ breaks. Every single cable, at several poses and speeds, and every reaction:
 * stop: brakes of all winches close, told at once, `BRAKE` later;
 * redistribute: the cables that are left are asked to hold the platform where it is, told at once;
 * found: as redistribute, when lengths and tensions have told;
-* continue: as redistribute, but on to the goal.
+* continue: as redistribute, but on to the goal;
+* brake: only motion is to end, with least kinetic energy, wherever that is, told at once;
+* retreat: to the nearest pose that the cables left hold, told at once;
+* descend: straight down to the ground, told at once.
 
 The robot hangs: all exit points are above. At most poses seven of its cables hold it only if some
 of them may go slack, or not at all; column `holds` says whether tensions from zero to the upper
 limit balance the weight at the pose where it broke.
 
-Other reactions, and the statements of Boumann and Bruckmann, Robotics 9(2):41, are left out.
+Boumann and Bruckmann (CableCon 2019) propose for such a case to minimize kinetic energy, or to draw
+the platform by potential fields into the workspace that is left, on a robot in a plane; `brake` and
+`retreat` are ours of that kind. Robotics 9(2):41 (2020) is about tensions outside the
+wrench-feasible workspace, by the nearest corner; here those of the nearest wrench are asked for.
+Of all three, and of Actuators 11(2):56 (2022), only abstracts were at hand: no number of theirs is
+compared.
 """
 
 from __future__ import annotations
@@ -48,8 +56,10 @@ SCENARIO = "acrobot_broken_redistributed"
 BRAKE = 0.03
 """Time that brakes take to close [s]."""
 
+ACTUATORS = "Boumann, Bruckmann, Actuators 11(2):56 (2022), abstract"
+
 NONE, STOP, REDISTRIBUTE, FOUND = "none", "stop", "redistribute", "found"
-CONTINUE = "continue"
+CONTINUE, BRAKING, RETREAT, DESCEND = "continue", "brake", "retreat", "descend"
 
 REACTIONS = {
     NONE: "null",
@@ -57,6 +67,9 @@ REACTIONS = {
     REDISTRIBUTE: "{reaction: redistribute}",
     FOUND: "{reaction: redistribute, known: found}",
     CONTINUE: "{reaction: redistribute, motion: continue}",
+    BRAKING: "{reaction: brake}",
+    RETREAT: "{reaction: retreat}",
+    DESCEND: "{reaction: descend}",
 }
 """Section `emergency` of each reaction."""
 
@@ -230,11 +243,58 @@ def redistribution(runs: Runs) -> Finding:
 def worse(runs: Runs) -> Finding:
     """Every reaction beside nothing, with those named that are worse."""
     held, words = [], []
-    for reaction in (STOP, REDISTRIBUTE, FOUND):
+    for reaction in (STOP, REDISTRIBUTE, FOUND, BRAKING, RETREAT):
         better, ratio, _ = beside(runs, reaction, NONE)
         held += better
         words.append(f"{reaction}: farther in {better.count(False)} of {len(better)} ({ratio:.2f})")
     return Finding(found="; ".join(words), held=held)
+
+
+@statement("No reaction goes farther than stopping.", basis=OURS)
+def worse_than_stop(runs: Runs) -> Finding:
+    """Every reaction that holds, brakes or retreats beside stopping, with those that are worse."""
+    held, words = [], []
+    for reaction in (REDISTRIBUTE, FOUND, BRAKING, RETREAT):
+        better, ratio, _ = beside(runs, reaction, STOP)
+        held += better
+        words.append(f"{reaction}: farther in {better.count(False)} of {len(better)} ({ratio:.2f})")
+    return Finding(
+        found="; ".join(words) + "; continue and descend are to go away, and are left out",
+        held=held,
+    )
+
+
+@statement("Braking leaves less speed than holding the place.", basis=OURS)
+def least_energy(runs: Runs) -> Finding:
+    """Largest speed under `brake` beside that under `redistribute`, after the same break."""
+    less, same = [], 0
+    for _, some in runs.by("start", "time_s", "cable"):
+        pair = [some(reaction=reaction) for reaction in (BRAKING, REDISTRIBUTE)]
+        if all(len(each) for each in pair):
+            a, b = (float(each["largest_speed_m_s"][0]) for each in pair)
+            less.append(a <= b)
+            same += a == b
+    if not less:
+        raise MissingRuns(BRAKING)
+    return Finding(
+        found=f"not more in {sum(less)} of {len(less)} cases, the same in {same}", held=less
+    )
+
+
+@statement(
+    "Cables that remain can keep a platform from collisions, with the ground for one.",
+    source=ACTUATORS,
+)
+def no_collision(runs: Runs) -> Finding:
+    """Whether an anchor point left the frame or went into the ground with reactions to a break."""
+    kept, words = [], []
+    for reaction in (REDISTRIBUTE, BRAKING, RETREAT):
+        some = runs(reaction=reaction)
+        kept += [not out for out in some["leaves"]]
+        words.append(f"{reaction}: {some.total('leaves')} of {len(some)} leave the frame")
+    nobody = runs(reaction=NONE)
+    words.append(f"{NONE}: {nobody.total('leaves')} of {len(nobody)}")
+    return Finding(found="; ".join(words), held=kept)
 
 
 def figure(runs: Runs) -> Figure:
@@ -244,7 +304,7 @@ def figure(runs: Runs) -> Figure:
         some, look = runs(reaction=reaction), nth_look(place)
         if not len(some):
             continue
-        across = some["cable"] + 1.0 + 0.16 * (place - 2.0)
+        across = some["cable"] + 1.0 + 0.1 * (place - 0.5 * (len(REACTIONS) - 1.0))
         for axis, column, factor in zip(
             axes, ("excursion_m", "largest_speed_m_s"), (1e3, 1.0), strict=True
         ):
@@ -274,7 +334,7 @@ STUDY = Study(
     cases=cases,
     measure=measure,
     parameters=parameters,
-    checks=(stopping, redistribution, worse),
+    checks=(stopping, redistribution, worse, worse_than_stop, least_energy, no_collision),
     tables=[
         Summary(
             "Runs by reaction",

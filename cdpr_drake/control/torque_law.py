@@ -15,6 +15,7 @@ from cdpr_drake.control.tension_controller_kernel import COULOMB, LOOP_SIZE, RAD
 from cdpr_drake.control.torque_step_kernel import (
     CABLES,
     GATHERED,
+    KAPPA,
     LARGEST_RATE,
     RELAXED,
     RELAXED_STEPS,
@@ -30,6 +31,18 @@ from cdpr_drake.geometry.poses import pose_row
 from cdpr_drake.tensions.methods import method_for
 from cdpr_drake.tensions.quadratic_program_kernel import workspace_shape
 from cdpr_drake.winches.friction import FrictionLaw
+
+
+def energy_scale(dynamics: Array, n: int) -> Array:
+    """Scale of the rows of a wrench that makes its squares energy over mass, shape (n,) [m, -].
+
+    Args:
+        dynamics: `PlatformDynamics.packed`.
+        n: Rows: 6, or 3 of 2T1R (moment about z, forces).
+    """
+    radii = np.sqrt(dynamics[4:7] / dynamics[0])
+    return np.concatenate([radii if n == 6 else radii[2:], np.ones(3 if n == 6 else 2)])
+
 
 FALLBACK = "slack_relaxed"
 """The method that answers where no tensions within the limits give a wrench."""
@@ -224,14 +237,26 @@ class TorqueServoLaw:
             np.ascontiguousarray(row_scale, float), np.empty(workspace_shape(n, m)),
         )  # fmt: skip
 
-    def without(self, broken: Array) -> TorqueServoLaw:
+    def without(self, broken: Array, *, braking: bool = False) -> TorqueServoLaw:
         """The same law that asks nothing of some cables, and least 2-norm of the others.
 
         Its memory is the same. The others may go slack: a smallest tension is a luxury, and with it
         they would hold fewer poses. Where they cannot give a wrench, what comes nearest is asked.
 
+        With `braking` nothing is gathered, so that nothing draws the platform back to where it was,
+        and nearest is what leaves least kinetic energy: for the wrench F that ends a twist V within
+        1 / mu, the energy that a wrench F' would leave then, accelerations being constant, is
+
+            (F' - F)^T M^-1 (F' - F) / (2 mu^2),
+
+        M being the inertia, of which the diagonal about Po, along the axes of P, is taken.
+
         Args:
             broken: Not 0 for each cable to be left out, shape (m,).
+            braking: Whether only motion is to end.
+
+        Source: for the energy, Boumann, Bruckmann: Development of Emergency Strategies for
+        Cable-Driven Parallel Robots after a Cable Break, CableCon 2019, which minimizes it, too.
         """
         other = copy.copy(self)
         chosen = method_for(EMERGENCY, self._redundancy, False).compiled(self._redundancy)
@@ -240,6 +265,9 @@ class TorqueServoLaw:
         limits = limits.copy()
         limits[0] = 0.0
         limits[:, np.asarray(broken) != 0.0] = 0.0
+        if braking:
+            step, scale = step.copy(), energy_scale(dynamics, len(scale))
+            step[KAPPA] = 0.0
         other._given = (step, loops, dynamics, pose, cables, limits, scale, np.empty_like(work))
         return other
 

@@ -2,23 +2,35 @@
 
 * stop: the brakes of all winches close, `delay` after it is known;
 * redistribute: the controller of motor torques asks the cables that are left for the wrench, at
-  once, and the winch of the broken one stands still; by `winches.mode` torque alone. The platform
-  is to stay where it is, or to go on where the servo wants it.
+  once, and the winch of the broken one stands still. The platform is to stay where it is, or to go
+  on where the servo wants it;
+* brake: the same, but only motion is to end, with least kinetic energy, wherever that is;
+* retreat: the same, and the platform goes to the nearest pose that the cables left hold;
+* descend: the same, and it goes straight down until its lowest anchor point is near the ground.
+
+All but stop need `winches.mode` torque.
 
 It is known by being told, as by a switch on the drum, or found by a `BreakDetector`.
 
 Drake's YAML loader reads the annotations themselves, so they are not postponed here.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from pydrake.common.value import Value
+from pydrake.math import RigidTransform
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
 
+from cdpr_drake.arrays import Array
 from cdpr_drake.estimation.failure_detection import AlarmRule, threshold
-from cdpr_drake.schema.fields import FASTEST, number, text, whole
+from cdpr_drake.geometry.poses import pose_from_row, pose_row, rotation_vector
+from cdpr_drake.schema.fields import FASTEST, number, optional_section, text, whole
 
-STOP, REDISTRIBUTE = REACTIONS = ("stop", "redistribute")
+STOP, REDISTRIBUTE, BRAKE, RETREAT, DESCEND = REACTIONS = (
+    "stop", "redistribute", "brake", "retreat", "descend",
+)  # fmt: skip
 HOLD, CONTINUE = "hold", "continue"
 TOLD, FOUND = "told", "found"
 
@@ -26,6 +38,32 @@ ACCEPTED = 1e-3
 """False alarms that a threshold accepts in `HOURS` hours of runs."""
 
 HOURS = 1.0
+
+
+@dataclass(kw_only=True)
+class WatchSettings:
+    """When other failures than broken cables are told; nothing is done about them.
+
+    Torque and lag have bounds that undisturbed runs of ACROBOT stay below; see study `detection`.
+    """
+
+    torque: float = number(
+        "Torque of a motor that asked torque, tension, inertia and friction do not explain.",
+        "N m",
+        0.015,
+        above=0.0,
+    )
+    bandwidth: float = number(
+        "At which this torque is smoothed; below a sixth of `emergency.rate`.", "Hz", 10.0,
+        above=0.0,
+    )  # fmt: skip
+    lag: float = number(
+        "By how much a measured length may lag behind the drive's speed.", "m", 1e-3, above=0.0
+    )
+    leak: float = number("Time in which such differences are forgotten.", "s", 1.0, above=0.0)
+    in_a_row: int = whole("Samples in a row of torque and lag that make an alarm.", 5, at_least=1)
+    dark: float = number("Without a sight of the target.", "s", 0.12, above=0.0)
+    late: float = number("With the very same sight of it.", "s", 0.12, above=0.0)
 
 
 @dataclass(kw_only=True)
@@ -37,6 +75,22 @@ class EmergencySettings:
         "What redistribution is to do with the platform: hold it where it is, or continue.",
         HOLD,
         choices=(HOLD, CONTINUE),
+    )
+    speed: float = number(
+        "Largest speed of a retreat, of which turning counts with the anchor points' distance, and "
+        "that of a descent.",
+        "m/s",
+        0.1,
+        above=0.0,
+    )
+    least_tension: float = number(
+        "Smallest tension of the cables left at the pose of a retreat.", "N", 0.5, at_least=0.0
+    )
+    ground_distance: float = number(
+        "Height of the lowest anchor point over the frame's lower end at which a descent ends.",
+        "m",
+        0.02,
+        at_least=0.0,
     )
     known: str = text(
         "How it is known: told when it happens, or found from lengths and tensions.",
@@ -62,6 +116,10 @@ class EmergencySettings:
         above=0.0,
     )
     in_a_row: int = whole("Samples in a row that make an alarm.", 3, at_least=1)
+    watch: WatchSettings | None = optional_section(
+        "Watches winches, sensors and camera, too, and logs alarms; null: broken cables alone. "
+        "With winches.mode torque."
+    )
 
     def rule(self, cables: int) -> AlarmRule:
         """When it is found, with so many cables: `ACCEPTED` false alarms in `HOURS`."""
@@ -72,45 +130,130 @@ class EmergencySettings:
         return AlarmRule(limit, self.in_a_row)
 
 
+APPROACH = 2.0
+"""Rate at which a retreat's distance fades where its speed does not bound it [1/s]."""
+
+
+@dataclass(frozen=True)
+class WaysOut:
+    """What a reaction that moves the platform knows of it.
+
+    Attributes:
+        held: Gives the nearest pose that the cables left hold, from the believed one and flags of
+            those that are broken, shape (m,).
+        anchors: Anchor points in P, shape (3, m) [m].
+        ground: Height where the ground is [m].
+    """
+
+    held: Callable[[RigidTransform, Array], RigidTransform]
+    anchors: Array
+    ground: float
+
+    @property
+    def size(self) -> float:
+        """Root mean square of the anchor points' distances from Po [m]."""
+        return float(np.sqrt(np.mean(np.sum(self.anchors**2, axis=0))))
+
+
+def retreat_twist(X_WP: RigidTransform, goal: RigidTransform, speed: float, size: float) -> Array:
+    """Twist (w, v) of P in P toward a pose, shape (6,) [rad/s, m/s].
+
+    Args:
+        X_WP: Where it is.
+        goal: Where it is to go.
+        speed: The largest, of |v| and `size` |w| together [m/s].
+        size: Length that makes turns comparable [m].
+    """
+    off = X_WP.inverse() @ goal
+    twist = APPROACH * np.concatenate([rotation_vector(off.rotation()), off.translation()])
+    fast = float(np.hypot(size * np.linalg.norm(twist[:3]), np.linalg.norm(twist[3:])))
+    return np.asarray(twist * min(1.0, speed / fast) if fast > 0.0 else twist)
+
+
+def descent_twist(
+    X_WP: RigidTransform, anchors: Array, ground: float, rule: EmergencySettings
+) -> Array:
+    """Twist (w, v) of P in P straight down, zero near the ground, shape (6,) [rad/s, m/s].
+
+    Args:
+        X_WP: Where it is.
+        anchors: Anchor points in P, shape (3, m) [m].
+        ground: Height of the ground [m].
+        rule: Speed, and where it ends.
+    """
+    over = float(np.min((X_WP @ anchors)[2])) - ground - rule.ground_distance
+    down = -min(rule.speed, max(APPROACH * over, 0.0))
+    v = X_WP.rotation().matrix().T @ np.array([0.0, 0.0, down])
+    return np.concatenate([np.zeros(3), v])
+
+
 class EmergencyReaction(LeafSystem):
     """From cables that are known to be broken to brakes and to what the controller is told.
 
-    ============ ========= ==== ===========================================================
-    port         type      unit meaning
-    ============ ========= ==== ===========================================================
-    found_broken vector(m) -    in, not 0 for each cable that is known to be broken
-    jammed       vector(m) -    out, 1 for each winch that is to stand still
-    left_out     vector(m) -    out, 1 for each cable that is not to be asked any more
-    halted       vector(1) -    out, 1 while the platform is to stay where it is
-    ============ ========= ==== ===========================================================
+    ============ ============== ===== =======================================================
+    port         type           unit  meaning
+    ============ ============== ===== =======================================================
+    found_broken vector(m)      -     in, not 0 for each cable that is known to be broken
+    X_WP         RigidTransform m     in, believed pose; may stay open, but for retreat, descend
+    jammed       vector(m)      -     out, 1 for each winch that is to stand still
+    left_out     vector(m)      -     out, 1 for each cable that is not to be asked any more
+    halted       vector(1)      -     out, 1 while the servo's wish does not count
+    braking      vector(1)      -     out, 1 while motion is to end, wherever that is
+    halted_twist vector(6)      rad/s out, twist (w, v) of P in P that is wanted while halted
+                                m/s
+    goal         vector(7)      -, m  out, where a retreat goes, as `pose_row`; NaN before
+    ============ ============== ===== =======================================================
 
-    Looks at its input at a rate. State: when each cable was known to be broken, and the outputs.
+    Looks at its inputs at a rate. State: when each cable was known to be broken, and the outputs.
+    The goal of a retreat is searched for once for each cable that breaks, when it acts.
     """
 
-    def __init__(self, settings: EmergencySettings, cables: int) -> None:
-        """With settings that are checked, and m cables, each on a winch of its own."""
+    def __init__(
+        self, settings: EmergencySettings, cables: int, ways: WaysOut | None = None
+    ) -> None:
+        """With settings that are checked, and m cables, each on a winch of its own; `ways` for
+        reactions that move the platform."""
         super().__init__()
         self._settings, m = settings, cables
-        self._m = m
+        self._m, self._ways = m, ways
         self._found = self.DeclareVectorInputPort("found_broken", m)
-        state = self.DeclareDiscreteState(np.concatenate([np.full(m, np.inf), np.zeros(2 * m + 1)]))
-        needs = {self.discrete_state_ticket(state)}
-        for name, start, end in (
-            ("jammed", m, 2 * m), ("left_out", 2 * m, 3 * m), ("halted", 3 * m, 3 * m + 1)
-        ):  # fmt: skip
-            part = slice(start, end)
+        self._X_WP = self.DeclareAbstractInputPort("X_WP", Value(RigidTransform()))
+        parts = (
+            ("known", np.full(m, np.inf)), ("jammed", np.zeros(m)), ("left_out", np.zeros(m)),
+            ("halted", np.zeros(1)), ("braking", np.zeros(1)), ("halted_twist", np.zeros(6)),
+            ("goal", np.full(7, np.nan)),
+        )  # fmt: skip
+        state = self.DeclareDiscreteState(np.concatenate([start for _, start in parts]))
+        needs, self._places, at = {self.discrete_state_ticket(state)}, {}, 0
+        for name, start in parts:
+            self._places[name] = slice(at, at + len(start))
+            at += len(start)
+        for name, start in parts[1:]:
+            part = self._places[name]
 
             def write(context: Context, output: BasicVector, part: slice = part) -> None:
                 output.SetFromVector(context.get_discrete_state_vector().value()[part])
 
-            self.DeclareVectorOutputPort(name, end - start, write, needs)
+            self.DeclareVectorOutputPort(name, len(start), write, needs)
         self.DeclarePeriodicDiscreteUpdateEvent(1.0 / settings.rate, 0.0, self._update)
 
     def _update(self, context: Context, state: DiscreteValues) -> None:
-        m, time = self._m, context.get_time()
-        known = context.get_discrete_state_vector().value()[:m]
+        m, time, rule = self._m, context.get_time(), self._settings
+        before = context.get_discrete_state_vector().value()
+        known = before[self._places["known"]]
         known = np.where(self._found.Eval(context) != 0.0, np.minimum(known, time), known)
-        acts = (known + self._settings.delay <= time * (1.0 + 1e-12)).astype(float)
-        stops = np.full(m, np.max(acts)) if self._settings.reaction == STOP else acts
-        halts = np.max(acts) * float(self._settings.motion == HOLD)
-        state.set_value(np.concatenate([known, stops, acts, [halts]]))
+        acts = (known + rule.delay <= time * (1.0 + 1e-12)).astype(float)
+        acting = float(np.max(acts))
+        stops = np.full(m, acting) if rule.reaction == STOP else acts
+        halts, brakes = acting * float(rule.motion == HOLD), acting * float(rule.reaction == BRAKE)
+        twist, goal = np.zeros(6), before[self._places["goal"]]
+        if acting and rule.reaction in (RETREAT, DESCEND):
+            assert self._ways is not None
+            X_WP = self._X_WP.Eval(context)
+            if rule.reaction == DESCEND:
+                twist = descent_twist(X_WP, self._ways.anchors, self._ways.ground, rule)
+            else:
+                if not np.array_equal(acts, before[self._places["left_out"]]):
+                    goal = pose_row(self._ways.held(X_WP, acts))
+                twist = retreat_twist(X_WP, pose_from_row(goal), rule.speed, self._ways.size)
+        state.set_value(np.concatenate([known, stops, acts, [halts], [brakes], twist, goal]))

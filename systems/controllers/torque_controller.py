@@ -25,6 +25,10 @@ class TorqueController(LeafSystem):
                                               broken, of which nothing is asked
     halted            vector(1)      -        in, may stay open: not 0 while the platform is to
                                               stay where it is, whatever the servo wants
+    halted_twist      vector(6)      rad/s,   in, may stay open: twist (w, v) of P in P that is
+                                     m/s      wanted then in place of none
+    braking           vector(1)      -        in, may stay open: not 0 while motion is to end,
+                                              wherever that is, see `TorqueServoLaw.without`
     motor_torques     vector(m)      N m      out, to the winches, positive pays out
     wanted_tensions   vector(m)      N        out, what the torques are for
     desired_wrench    vector(6)      N m, N   out, F_P_W about Po for the servo's acceleration
@@ -45,13 +49,15 @@ class TorqueController(LeafSystem):
         """With a law that is made for steps at a rate [Hz]."""
         super().__init__()
         self.law, m = law, law.cable_count
-        self._others: dict[bytes, TorqueServoLaw] = {}
+        self._others: dict[tuple[bytes, bool], TorqueServoLaw] = {}
         self._twist = self.DeclareVectorInputPort("platform_velocity", 6).Eval
         self._X_WP = self.DeclareAbstractInputPort("X_WP", Value(RigidTransform())).Eval
         self._tensions = self.DeclareVectorInputPort("tensions", m).Eval
         self._rates = self.DeclareVectorInputPort("length_rates", m).Eval
         self._left_out = self.DeclareVectorInputPort("left_out", m)
         self._halted = self.DeclareVectorInputPort("halted", 1)
+        self._halted_twist = self.DeclareVectorInputPort("halted_twist", 6)
+        self._braking = self.DeclareVectorInputPort("braking", 1)
         self._outputs = {
             name: self.DeclareDiscreteState(size)
             for name, size in (
@@ -85,16 +91,18 @@ class TorqueController(LeafSystem):
         flags = self._left_out.Eval(context) != 0.0
         if not np.any(flags):
             return self.law
-        key = flags.tobytes()
+        braking = self._braking.HasValue(context) and self._braking.Eval(context)[0] != 0.0
+        key = flags.tobytes(), bool(braking)
         if key not in self._others:
-            self._others[key] = self.law.without(flags)
+            self._others[key] = self.law.without(flags, braking=bool(braking))
         return self._others[key]
 
     def _update(self, context: Context, state: DiscreteValues) -> None:
         readings = np.array([self._tensions(context), self._rates(context)])
         twist = self._twist(context)
         if self._halted.HasValue(context) and self._halted.Eval(context)[0] != 0.0:
-            twist = np.zeros(6)
+            asked = self._halted_twist
+            twist = asked.Eval(context) if asked.HasValue(context) else np.zeros(6)
         command, memory = self._law_now(context).step(
             context.get_discrete_state(self._memory).value(),
             twist,

@@ -61,11 +61,12 @@ def test_a_run():
 
 def made_up(case, seed, wrong=False):
     """Redistribution holds, stopping lets it move, nothing lets it fall; with `wrong` contrary."""
-    order = [REDISTRIBUTE, "found", "continue", STOP, NONE]
+    order = ["brake", REDISTRIBUTE, "found", "retreat", "continue", STOP, NONE, "descend"]
     place = order.index(case.keys["reaction"])
     return {
-        "outcome": "timeout", "speed_m_s": 0.1, "turn_rad": 0.1, "largest_speed_m_s": 0.2,
-        "excursion_m": 0.01 * (5.0 - place if wrong else 1.0 + place), "leaves": False,
+        "outcome": "timeout", "speed_m_s": 0.1, "turn_rad": 0.1, "leaves": wrong,
+        "largest_speed_m_s": 0.2 - 0.01 * place if wrong else 0.2 + 0.01 * place,
+        "excursion_m": 0.01 * (9.0 - place if wrong else 1.0 + place),
         "impact_m_s": 0.0, "tension_n": 10.0, "slack_s": 0.1, "rest_s": 0.5,
         "holds": case.keys["cable"] % 2 == 0,
     }  # fmt: skip

@@ -12,14 +12,19 @@ from pydrake.systems.primitives import (
     TrajectorySource,
 )
 from pydrake.trajectories import PiecewisePolynomial
+from scipy.optimize import lsq_linear
 
 from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.estimation.failure_detection import AlarmRule
-from cdpr_drake.geometry.cable_paths import cable_paths
+from cdpr_drake.geometry.cable_paths import cable_jacobian, cable_paths
+from cdpr_drake.geometry.poses import pose_from_row
+from cdpr_drake.models.robot_in_plant import platform_inertia
 from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_statics import wrench_balance
 from cdpr_drake.systems.controllers.emergency import EmergencyReaction, EmergencySettings
 from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.diagrams.visual_servo import build_visual_servo
 from cdpr_drake.systems.monitoring.break_detector import BreakDetector
 
 ROBOT = load_robot("acrobot_small")
@@ -47,7 +52,7 @@ def test_acts_after_its_delay_on_what_it_says(reaction):
     settings = EmergencySettings(reaction=reaction, delay=0.055, rate=RATE)
     block = builder.AddSystem(EmergencyReaction(settings, M))
     source = builder.AddSystem(stepped(np.zeros(M), flags.astype(float), 0.1))
-    builder.Connect(source.get_output_port(), block.get_input_port())
+    builder.Connect(source.get_output_port(), block.GetInputPort("found_broken"))
     times, (jammed, left_out, halted) = logged(
         builder, block, ("jammed", "left_out", "halted"), 0.3
     )
@@ -163,3 +168,109 @@ def test_without_a_break_it_changes_nothing():
 def test_what_is_refused(changes, words):
     with pytest.raises(ScenarioError, match=words):
         load_scenario("acrobot_broken_redistributed", changes)
+
+
+ALONE = "emergency={reaction: stop, delay: 100.0, known: found, watch: {}}"
+TOLD = ("found_jammed", "found_powerless", "frozen_tension", "frozen_encoder")
+
+
+@pytest.mark.parametrize(
+    ("event", "name", "which"),
+    [
+        ("{kind: winch_jams, time: 0.3, winch: 3}", "found_jammed", 3),
+        ("{kind: power_lost, time: 0.3, winch: 5}", "found_powerless", 5),
+        ("{kind: sensor_freezes, time: 0.3, sensor: tension, cable: 2}", "frozen_tension", 2),
+        ("{kind: sensor_freezes, time: 0.3, sensor: encoder, cable: 2}", "frozen_encoder", 2),
+    ],
+)
+def test_other_failures_are_told_of_what_failed(event, name, which):
+    log = run(f"failures.events=[{event}]", ALONE)
+    first = {
+        other: log["time"][np.argmax(np.any(log[other] > 0.0, axis=1))]
+        for other in TOLD
+        if np.any(log[other])
+    }
+    assert min(first, key=lambda other: first[other]) == name
+    assert 0.3 < first[name] < 0.56  # an encoder of a drum that hardly turns is the last
+    assert np.array_equal(np.flatnonzero(log[name][-1]), [which])
+
+
+@pytest.mark.parametrize(("kind", "name"), [("dead", "camera_dark"), ("frozen", "camera_late")])
+def test_a_camera_that_shows_nothing_new_is_told(kind, name):
+    log = run("failures={}", ALONE, f"camera.fault={{kind: {kind}, start: 0.3, duration: 9.0}}")
+    told = {other: np.any(log[other]) for other in (*TOLD, "camera_dark", "camera_late")}
+    assert told == {other: other == name for other in told}
+
+
+def test_a_watch_needs_motors_by_torque():
+    with pytest.raises(ScenarioError, match=r"emergency\.watch: found a section with winches"):
+        load_scenario(
+            "acrobot_broken_redistributed",
+            ["emergency={reaction: stop, watch: {}}", "winches={}", "torque_control=null"],
+        )
+
+
+def test_a_watch_is_as_fast_as_its_looks_allow():
+    with pytest.raises(ScenarioError, match=r"emergency\.watch: bandwidth of a motor's watch"):
+        load_scenario(
+            "acrobot_broken_redistributed", ["emergency={reaction: stop, watch: {bandwidth: 90}}"]
+        )
+
+
+def test_a_retreat_ends_where_the_cables_left_hold_the_platform():
+    """Of the pose that is reached, by bounded least squares; it is not held where it broke."""
+    log = run(breaks(7), "emergency={reaction: retreat}", "duration=2.2")
+    robot = load_robot("acrobot_large")
+    own = np.arange(M) != 7
+    balances = [wrench_balance(robot, pose_from_row(row)) for row in log["X_WP"][[100, -1]]]
+    missing = [
+        np.linalg.norm(lsq_linear(one.W[:, own], -one.wrench, bounds=(0.0, 60.0)).fun)
+        for one in balances
+    ]
+    assert missing[0] > 0.1
+    assert missing[1] < 1e-6
+    goal, belief = log["X_WP_retreat"][-1], log["X_WP_estimated"][-1]
+    assert np.linalg.norm(belief[4:] - goal[4:]) < 0.01  # the belief itself drifts when it falls
+    assert np.ptp(log["X_WP"][-50:, 4:], axis=0) == pytest.approx(np.zeros(3), abs=0.004)
+
+
+def test_a_descent_ends_above_the_ground():
+    log = run(breaks(2), "emergency={reaction: descend, speed: 0.3}", "duration=2.6")
+    robot = load_robot("acrobot_large")
+    heights = [np.min((pose_from_row(row) @ robot.cable_set().p_PB)[2]) for row in log["X_WP"]]
+    over = np.array(heights) - robot.frame.lower[2]
+    assert over[0] > 0.1
+    assert over.min() > 0.0
+    assert over[-1] == pytest.approx(0.02, abs=0.01)
+
+
+def test_braking_asks_for_what_leaves_least_energy():
+    """Beside bounded least squares in the metric of energy, where the cables cannot end motion."""
+    scenario = load_scenario("acrobot_broken_redistributed", ["emergency={reaction: brake}"])
+    servo = build_visual_servo(scenario)
+    assert servo.torque is not None
+    robot, broken = load_robot("acrobot_large"), np.arange(M) == 5
+    law = servo.torque.law.without(broken, braking=True)
+    X_WP, pull = scenario.initial_pose.transform(), np.full(M, 20.0)
+    memory, rates = law.fresh_memory(), np.zeros(M)
+    for k in range(400):  # wanted tensions have a largest rate
+        command, memory = law.step(memory, np.zeros(6), X_WP, np.array([pull, rates]), 1e-3 * k)
+    assert command.relaxed
+    inertia = platform_inertia(robot)
+    G = inertia.CalcRotationalInertia().CopyToFullMatrix3()
+    root = np.sqrt([*np.diag(G), *[inertia.get_mass()] * 3])
+    W = -cable_jacobian(X_WP, law_cables(scenario, robot)).T
+    upper = np.where(broken, 1e-9, 60.0)
+
+    def energy(tensions):
+        return float(np.sum(((W @ tensions - command.wrench) / root) ** 2))
+
+    best = lsq_linear(W / root[:, None], command.wrench / root, bounds=(0.0, upper)).x
+    other = lsq_linear(W, command.wrench, bounds=(0.0, upper)).x
+    assert energy(command.tensions) == pytest.approx(energy(best), rel=1e-4)
+    assert energy(other) > 1.01 * energy(best)
+
+
+def law_cables(scenario, robot):
+    cables = scenario.cables.cable_set(robot)
+    return cables if scenario.controller.pulleys else cables.without_pulleys()

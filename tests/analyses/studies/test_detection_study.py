@@ -1,0 +1,75 @@
+"""The study of detectors: what it counts, and its words on made-up runs."""
+
+from collections import Counter
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cdpr_drake.analyses.reporting.progress import StudySession
+from cdpr_drake.analyses.studies.detection import (
+    ALARMS,
+    BREAK,
+    NOTHING,
+    STUDY,
+    first_times,
+    held_in_a_row,
+    measure,
+    threshold,
+)
+from cdpr_drake.analyses.studies.framework.study import Case, Form
+
+
+def test_what_is_above_in_a_row():
+    residuals = np.array([[0, 5, 5, 1, 0], [2, 3, 4, 0, 9]], float).T
+    assert held_in_a_row(residuals, 1) == 9.0
+    assert held_in_a_row(residuals, 2) == 5.0
+    assert held_in_a_row(residuals, 3) == 2.0
+
+
+def test_when_alarms_begin():
+    flags = np.array([[0, 0, 1, 1], [0, 0, 0, 0]], float).T
+    assert np.array_equal(first_times(flags, np.arange(4.0)), [2.0, np.inf])
+
+
+def test_the_full_form_has_what_was_asked_for():
+    counts = Counter(case.keys["fails"] for case in STUDY.plan(Form()))
+    assert counts[NOTHING] == 1000
+    assert counts[BREAK] == 96
+    assert set(counts) == {NOTHING, *ALARMS}
+
+
+def test_a_break_is_found_in_a_run():
+    row = measure(Case(name="a", keys={"fails": BREAK, "which": 0, "number": 100_000}), 0)
+    assert row["told"]
+    assert 0.0 < row["delay_s"] < 0.3
+    assert row["false"] == 0
+    assert row["first"] == BREAK
+    assert 0.0 < row["residual_m"] < threshold()
+
+
+def made_up(case, seed, wrong=False):
+    """Detectors that tell of every failure and of nothing else; with `wrong` contrary."""
+    fails = case.keys["fails"] != NOTHING
+    return {
+        "outcome": "timeout", "time_s": 0.6, "false": int(wrong and not fails),
+        "false_kinds": [BREAK] if wrong and not fails else [], "told": fails and not wrong,
+        "delay_s": 0.1 if fails and not wrong else None, "first": case.keys["fails"],
+        "residual_m": 0.001, "torque_n_m": 0.001, "lag_m": 1e-4, "tension_n": 1.0,
+    }  # fmt: skip
+
+
+def wrong(case, seed):
+    return made_up(case, seed, wrong=True)
+
+
+@pytest.mark.parametrize(
+    ("measured", "verdict"), [(made_up, "confirmed"), (wrong, "not confirmed")]
+)
+def test_statements_tell_detectors_apart(measured, verdict, tmp_path):
+    found = replace(STUDY, measure=measured)(True, StudySession(workers=1))
+    assert {one.verdict for one in found.statements} == {verdict}
+    assert len(found.tables()) > 0
+    problems = found.write(tmp_path)
+    assert not problems
+    assert (tmp_path / "detection.png").is_file()
