@@ -36,7 +36,7 @@ from matplotlib.figure import Figure
 
 from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
 from cdpr_drake.analyses.studies.framework.runs import MissingRuns, Runs
-from cdpr_drake.analyses.studies.framework.statement import OURS, Finding, statement
+from cdpr_drake.analyses.studies.framework.statement import OURS, SOURCE, Finding, statement
 from cdpr_drake.analyses.studies.framework.study import Case, Form, Study
 from cdpr_drake.analyses.studies.framework.summary import Cell, Summary
 from cdpr_drake.analyses.visualization.figure_style import new_figure
@@ -284,6 +284,8 @@ def least_energy(runs: Runs) -> Finding:
 @statement(
     "Cables that remain can keep a platform from collisions, with the ground for one.",
     source=ACTUATORS,
+    cause=SOURCE,
+    why="Only the abstract was at hand: where the cable broke, and from which motion, is not told.",
 )
 def no_collision(runs: Runs) -> Finding:
     """Whether an anchor point left the frame or went into the ground with reactions to a break."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from cdpr_drake.analyses.studies.framework.runs import MissingRuns, Runs
-from cdpr_drake.analyses.studies.framework.statement import OURS, Finding, statement
+from cdpr_drake.analyses.studies.framework.statement import CHOICE, OURS, Finding, statement
 from cdpr_drake.analyses.studies.fusion.configurations import DURATION
 from cdpr_drake.analyses.studies.fusion.slack_trials import SURPLUSES, WAYS
 from cdpr_drake.arrays import Array
@@ -25,6 +25,12 @@ CONSISTENT = 4.0
 """How many standard deviations of a mean of chi-square numbers it may be from their mean."""
 
 
+CHOSEN_SENSORS = (
+    "It is an outlook without numbers: cameras, their places, sensors and noise are chosen here, "
+    "and how many runs."
+)
+
+
 def column(runs: Runs, name: str, key: str) -> np.ndarray:
     """A column of a configuration, shape (runs,)."""
     return runs(configuration=name, duration_s=DURATION)[key]
@@ -39,6 +45,8 @@ def _mm(values: Array) -> str:
     "by the better one alone.",
     rule="mean error with both at most that with the better one; in part: no more than by chance, "
     "two standard deviations of the mean difference",
+    cause=CHOICE,
+    why=CHOSEN_SENSORS,
 )
 def both_as_good_as_the_better(runs: Runs) -> Finding:
     """Errors with two cameras against those with the one that is better over all seeds.
@@ -74,6 +82,8 @@ def _is_consistent(ends: Array) -> bool:
 @statement(
     "Either camera may fail for 3 s under way: the servo goes on and arrives.",
     rule=f"every servo ends within {1e3 * ARRIVED:g} mm; none stops for more than 0.1 s",
+    cause=CHOICE,
+    why=CHOSEN_SENSORS,
 )
 def survives_either_failure(runs: Runs) -> Finding:
     """Runs in which a camera fails for 3 s."""
@@ -97,6 +107,8 @@ def survives_either_failure(runs: Runs) -> Finding:
     source="servoing thesis, perspectives, chapter 2",
     rule=f"told that it may be wrong: at most {EQUAL:g} times the error of the right one on board "
     "alone, and found wrong with more than 50 %; in part: less error than untold",
+    cause=CHOICE,
+    why=CHOSEN_SENSORS,
 )
 def wrong_calibration_is_found(runs: Runs) -> Finding:
     """An external camera that is wrong in calibration."""
@@ -157,6 +169,8 @@ def consistent(runs: Runs) -> Finding:
 @statement(
     "Sensor fusion can be useful: an IMU can provide the moving-platform orientation.",
     rule="by 5 % at least, beside a camera in the world and beside both",
+    cause=CHOICE,
+    why=CHOSEN_SENSORS,
 )
 def imu_improves_rotation(runs: Runs) -> Finding:
     """Rotation with and without an inertial sensor."""
@@ -174,6 +188,8 @@ def imu_improves_rotation(runs: Runs) -> Finding:
 @statement(
     "Sensor fusion can be useful: depth sensors can measure the distance along its axis.",
     rule="by 5 % at least, beside a camera in the world and beside both",
+    cause=CHOICE,
+    why=CHOSEN_SENSORS,
 )
 def depth_improves_position(runs: Runs) -> Finding:
     """Position along the axis with and without depths."""
@@ -197,6 +213,8 @@ def _slack(runs: Runs, way: str, surplus: float, key: str) -> Array:
     "decrease a large slack more rapidly.",
     rule="8 cm are gone first of all ways, and in less than 0.6 of the time of the constant rate; "
     "in part: first",
+    cause=CHOICE,
+    why=CHOSEN_SENSORS,
 )
 def rate_by_seen_slack(runs: Runs) -> Finding:
     """Time to wind in slack at a rate from images."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from cdpr_drake.analyses.studies.framework.runs import MissingRuns, Runs
-from cdpr_drake.analyses.studies.framework.statement import FITTED, OURS, Finding, statement
+from cdpr_drake.analyses.studies.framework.statement import FITTED, OURS, SOURCE, Finding, statement
 from cdpr_drake.analyses.studies.mobile_robot.configurations import (
     CORRECTED,
     NUMBERS,
@@ -24,6 +24,7 @@ from cdpr_drake.analyses.studies.mobile_robot.laps import (
 )
 from cdpr_drake.analyses.studies.mobile_robot.statements import (
     FACTOR,
+    NOT_PRINTED,
     check_laps,
     column,
     laps_words,
@@ -73,6 +74,8 @@ def _ending(runs: Runs, name: str, key: str) -> Array:
     "section 2.4",
     source="servoing thesis 2.4",
     rule=f"each within a factor {FACTOR:g}",
+    cause=SOURCE,
+    why=NOT_PRINTED,
 )
 def fails_far_off(runs: Runs) -> Finding:
     """How far off control integration is when the task fails."""

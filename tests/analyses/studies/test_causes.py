@@ -27,17 +27,7 @@ UNNAMED = {
         "polygon_shrinks", "keeps_limits", "pushes",
     },
     "stability-shapes": {"combinations"},
-    "mobile-robot": {
-        "model_helps", "drift", "known_tag_helps", "lengths", "corrected", "slack", "same_path",
-        "fails_far_off", "far_surpasses", "spikes", "spikes_by_slack", "worse_and_worse",
-        "corners", "noticed_early", "first_laps", "underactuated", "last_seconds", "takes_part",
-        "same_tensions", "only_the_first",
-    },
     "pick-and-place": {"one_camera_fails"},
-    "fusion": {
-        "both_as_good_as_the_better", "survives_either_failure", "wrong_calibration_is_found",
-        "imu_improves_rotation", "depth_improves_position", "rate_by_seen_slack",
-    },
     "case-9": {"sensor_accuracy"},
 }  # fmt: skip
 """Checks of sources that name no cause, by study: where one does not hold, why is not known, or its
