@@ -1,0 +1,1 @@
+from .batch_robots import BatchRobots as BatchRobots
