@@ -16,6 +16,7 @@ from numba import njit, types
 from numba.extending import intrinsic
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.dynamics.advance_kernel import REPORTED
 from cdpr_drake.dynamics.robot_arrays import RobotArrays
 from cdpr_drake.dynamics.robot_kernel import INTEGRATION_OK
 from cdpr_drake.numerics.kernel_calls import array_addresses, call_at_address
@@ -71,9 +72,10 @@ def _outputs(typing: Any, kernel: Any, state: Any, l0: Any, l0_dot: Any, cables:
 @njit(cache=True, nogil=True)
 def advance_rows(
     first: int, past: int, kernel: int, robots: np.ndarray, rule: Array, present: Array,
-    commands: Array, others: Array, times: Array, memory: Array, results: np.ndarray,
+    commands: Array, others: Array, duration: float, memory: Array, reached: Array,
+    results: np.ndarray,
 ) -> None:  # fmt: skip
-    """Takes robots to their times; those that failed before stand still.
+    """Moves robots on, one way after the other; those that failed stand still.
 
     Args:
         first: The first robot.
@@ -83,22 +85,28 @@ def advance_rows(
         rule: As of `integrate_explicit`.
         present: State, its time [s] and its report of each robot, shape (count, k); what is
             reached is written into it, of a robot that fails its last good state.
-        commands: Shape (count, m).
+        commands: Of each way, shape (ways, count, m).
         others: As of `integrate_explicit`, of each robot, shape (count, 2, m).
-        times: Where the ways end, shape (count,) [s].
+        duration: Of each way [s].
         memory: As of `fresh_memory`, shape (count, 2 k + 1 + m); what it had reached is forgotten.
+        reached: Where what is present behind each way is written, shape (ways, count, k), or
+            (0, count, k) where nobody asks.
         results: What moving each came to, as `integrate_explicit`, shape (count,).
     """
     size = present.shape[1]
     for i in range(first, past):
-        if results[i] != INTEGRATION_OK:
-            continue
-        memory[i, 2 * size] = np.nan
-        results[i] = _reach(
-            kernel, robots[i], rule, present[i], commands[i], others[i], times[i], memory[i]
-        )
-        for j in range(size):
-            present[i, j] = memory[i, size + j]
+        for k in range(commands.shape[0]):
+            if results[i] == INTEGRATION_OK:
+                memory[i, 2 * size] = np.nan
+                time = present[i, size - REPORTED - 1] + duration
+                results[i] = _reach(
+                    kernel, robots[i], rule, present[i], commands[k, i], others[i], time, memory[i]
+                )
+                for j in range(size):
+                    present[i, j] = memory[i, size + j]
+            if reached.shape[0] > 0:
+                for j in range(size):
+                    reached[k, i, j] = present[i, j]
 
 
 @njit(cache=True, nogil=True)

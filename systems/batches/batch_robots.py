@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Self
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -26,7 +28,9 @@ from cdpr_drake.dynamics.robot_arrays import APPLIED, MOTORS, TENSIONS
 from cdpr_drake.dynamics.robot_kernel import INTEGRATION_OK
 from cdpr_drake.errors import CdprError
 from cdpr_drake.geometry.poses import pose_row
+from cdpr_drake.models.drawn_robots import Fitted, ParameterCovariance, drawn_robots
 from cdpr_drake.models.robot_in_plant import pose_on_joint
+from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import as_pose
 from cdpr_drake.numerics.kernel_calls import over_rows
@@ -44,6 +48,21 @@ class BatchState:
     """All that what follows depends on, of every robot: from `BatchRobots.save_state`."""
 
     arrays: tuple[np.ndarray, ...]
+
+
+@dataclass(frozen=True)
+class BatchRollout:
+    """What robots reached, from `BatchRobots.rollout`.
+
+    Attributes:
+        times: At the ends of the ways, shape (ways, count) [s].
+        states: Of platform and winches then, as of `BatchRobots.states`, shape (ways, count, n).
+        running: Which robots did not fail, shape (count,).
+    """
+
+    times: Array
+    states: Array
+    running: np.ndarray
 
 
 class BatchRobots:
@@ -68,7 +87,7 @@ class BatchRobots:
 
     def __init__(
         self,
-        robot: Robot,
+        robot: Robot | str | Path,
         count: int,
         *,
         settings: CableRobotSettings | None = None,
@@ -80,9 +99,10 @@ class BatchRobots:
         """All robots at rest at their home poses, at time 0.
 
         Args:
-            robot: The robot.
+            robot: The robot, by name, path, or itself.
             count: Number of robots.
-            settings: Cables, winches and damping; the defaults where None.
+            settings: Cables, winches and damping, as sections of a scenario have them; the
+                defaults where None.
             rule: How they are integrated.
             parameters: The robot of each row, of the same structure, with parameters of its own;
                 None: all are as `robot`.
@@ -98,7 +118,7 @@ class BatchRobots:
             RobotFileError: Winches with motors are asked for that the robot's file does not
                 describe.
         """
-        settings = settings or CableRobotSettings()
+        settings, robot = settings or CableRobotSettings(), as_robot(robot, "BatchRobots")
         if count < 1:
             raise CdprError(f"count: found {count}; accepted: 1 or more")
         robots = [robot] * count if parameters is None else list(parameters)
@@ -132,8 +152,36 @@ class BatchRobots:
         self._commands, self._others = np.zeros((count, m)), np.zeros((count, 2, m))
         self._results = np.full(count, INTEGRATION_OK)
         self._table: Array | None = None
+        boxes = [(one.box_center(), 0.5 * one.platform.size) for one in robots]
+        self._boxes = np.array(boxes, float)
         self._at_home: dict[int, tuple[Array, Array]] = {}
         self.reset()
+
+    @classmethod
+    def drawn(
+        cls,
+        robot: Robot | str | Path,
+        count: int,
+        covariance: Fitted | ParameterCovariance | Path | str,
+        seed: int = 0,
+        **how: Any,
+    ) -> Self:
+        """Robots whose parameters are drawn about those of one, as `drawn_robots`.
+
+        Args:
+            robot: The robot in the middle, as the file `robot.yaml` that `cdpr calibrate` or
+                `cdpr identify` wrote.
+            count: Number of robots.
+            covariance: Of its parameters: such a folder, its results.json or identification.json, a
+                result, or a `ParameterCovariance`.
+            seed: Of the random numbers; robot k is the same whatever the count.
+            how: As for `BatchRobots`: settings, rule, by_tensions, threads.
+
+        Raises:
+            CdprError: As `drawn_robots` and `BatchRobots`.
+        """
+        middle = as_robot(robot, "BatchRobots")
+        return cls(middle, count, parameters=drawn_robots(middle, count, covariance, seed), **how)
 
     # --- Movement -------------------------------------------------------------------------------
 
@@ -222,26 +270,63 @@ class BatchRobots:
         Raises:
             CdprError: An array is of another shape or not finite, or the duration not positive.
         """
-        k = self.commands_per_robot
+        self._move("commands", [commands], duration, rates, brakes, wrenches)
+        return ~self.failed
+
+    def rollout(self, commands: Any, period: float, *, wrenches: object = None) -> BatchRollout:
+        """Moves all robots along commands that hold for a period each, in one compiled call.
+
+        It ends where as many calls of `step` end, to the last bit.
+
+        Args:
+            commands: As of `step`, for each period, shape (ways, k) for all or (ways, count, k).
+            period: For how long each holds [s].
+            wrenches: As of `step`, all the time.
+
+        Returns:
+            What was reached at the ends of the periods; of a robot that fails, its last good state
+            from then on.
+
+        Raises:
+            CdprError: As `step`.
+        """
+        ways = list(np.asarray(commands, float)) if np.ndim(commands) in (2, 3) else []
+        if not ways:
+            raise CdprError(
+                f"commands: found shape {np.shape(commands)}; accepted: (ways, "
+                f"{self.commands_per_robot}) or (ways, {self.count}, {self.commands_per_robot})"
+            )
+        shape = (len(ways), *self._present.shape)
+        reached = self._move("commands", ways, period, None, None, wrenches, np.empty(shape))
+        size = self._size
+        return BatchRollout(reached[:, :, size], reached[:, :, :size], ~self.failed)
+
+    def _move(
+        self, name: str, ways: Sequence[object], duration: float, rates: object, brakes: object,
+        wrenches: object, reached: Array | None = None,
+    ) -> Array:  # fmt: skip
+        """Checks what is commanded, and moves on by a duration for each of some commands."""
+        k, count = self.commands_per_robot, self.count
         if not (duration > 0.0 and np.isfinite(duration)):
             raise CdprError(f"duration: found {duration:g} s; accepted: more than 0")
-        asked = per_robot("commands", commands, self.count, k)[:, self._of_cable]
+        asked = np.empty((len(ways), count, self.cables))
+        for way, given in zip(asked, ways, strict=True):
+            way[:] = per_robot(name, given, count, k)[:, self._of_cable]
         others = np.zeros_like(self._others)
-        for row, (name, given) in enumerate((("rates", rates), ("brakes", brakes))):
+        for row, (what, given) in enumerate((("rates", rates), ("brakes", brakes))):
             if given is not None:
-                others[:, row] = per_robot(name, given, self.count, k)[:, self._of_cable]
-        pushes = None
-        if wrenches is not None:
-            pushes = per_robot("wrenches", wrenches, self.count, 6)
-        self._apply(pushes)
-        self._commands[:], self._others[:] = asked, others
+                others[:, row] = per_robot(what, given, count, k)[:, self._of_cable]
+        self._apply(None if wrenches is None else per_robot("wrenches", wrenches, count, 6))
+        self._commands[:], self._others[:] = asked[-1], others
+        if reached is None:
+            reached = np.empty((0, *self._present.shape))
         over_rows(
-            advance_rows, self.count, self.threads, reach_address(self._packed.reach),
-            self._tables, self._packed.numbers, self._present, self._commands, self._others,
-            self.times + duration, self._memory, self._results,
+            advance_rows, count, self.threads, reach_address(self._packed.reach), self._tables,
+            self._packed.numbers, self._present, asked, self._others, duration, self._memory,
+            reached, self._results,
         )  # fmt: skip
         self._table = None
-        return ~self.failed
+        return reached
 
     def _apply(self, wrenches: Array | None) -> None:
         """As `apply_wrench`, for each robot."""
@@ -309,6 +394,20 @@ class BatchRobots:
             return speeds.copy()
         pairs = zip(self._members, speeds, strict=True)
         return np.array([one.joint.wrench_map().T @ each for one, each in pairs])
+
+    @property
+    def lowest_points(self) -> Array:
+        """Height in W of the lowest corner of each platform's box, shape (count,) [m].
+
+        Nothing of a batch is touched: whoever has a floor looks here, and resets what stands on it.
+        """
+        w, x, y, z, _, _, height = self.poses.T
+        up = np.stack([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)])
+        corner = np.zeros(self.count)
+        for k in range(3):  # along one axis of P after the other, so that no sum depends on counts
+            middle, half = self._boxes[:, 0, k], self._boxes[:, 1, k]
+            corner = corner + up[k] * middle - np.abs(up[k]) * half
+        return np.asarray(height + corner)
 
     @property
     def lengths(self) -> Array:
@@ -413,6 +512,11 @@ def _check(
 ) -> None:
     if len(robots) != count:
         raise CdprError(f"parameters: found {len(robots)} robots; accepted: {count}, as counted")
+    if getattr(settings, "world", None) is not None:
+        raise CdprError(
+            "world: found a section; accepted in a batch: null, since the compiled engine has no "
+            "contact and measures no clearances; lowest_points tells who is at a floor"
+        )
     if settings.failures is not None or settings.disturbances is not None:
         name = "failures" if settings.failures is not None else "disturbances"
         raise CdprError(
