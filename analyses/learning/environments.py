@@ -149,7 +149,7 @@ class RobotVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
             raise gymnasium.error.ResetNeeded("Cannot call env.step() before calling env.reset()")
         begun = np.flatnonzero(self._over)
         taken = np.where(self._over[:, None], 0.0, np.asarray(actions, float))
-        self.task.step(taken)
+        self.task.step(taken, self._over)
         rewards, lost = self.task.rewards.copy(), self.task.lost.copy()
         self._steps += 1
         if len(begun):

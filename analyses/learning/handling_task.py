@@ -140,7 +140,7 @@ class HandlingTask(RobotTask):
         self._cubes[row] += height * self._down  # it stands
         self._placed[row] = np.linalg.norm(self._goals[row] - self._cubes[row]) <= self._grasp
 
-    def _look(self, rows: np.ndarray | None) -> None:
+    def _look(self, rows: np.ndarray, moved: bool) -> None:
         poses = self.batch.poses
         carried = np.empty((self.count, 3))
         place_points(poses, self._p_PL, carried)

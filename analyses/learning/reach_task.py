@@ -41,7 +41,7 @@ class ReachTask(RobotTask):
         self._goals[row] = pose_row(self.box.rest(self._drawn_pose(random)))
         return start
 
-    def _look(self, rows: np.ndarray | None) -> None:
+    def _look(self, rows: np.ndarray, moved: bool) -> None:
         write_aims(self.batch.poses, self._goals, self.scales, self._own(), self._errors)
 
     def _judge(self, actions: Array) -> None:

@@ -175,11 +175,12 @@ class RobotTask(ABC):
         """Draws what an episode is about; the pose at which it starts [m]."""
 
     @abstractmethod
-    def _look(self, rows: np.ndarray | None) -> None:
+    def _look(self, rows: np.ndarray, moved: bool) -> None:
         """Writes observations behind those of the platform, and what rewards need.
 
         Args:
-            rows: Whose episodes begin; None: all robots moved on.
+            rows: Who is looked at; others may be, too, where that draws no random numbers.
+            moved: Whether they moved on; else their episodes begin.
         """
 
     @abstractmethod
@@ -218,7 +219,7 @@ class RobotTask(ABC):
                             f"robot {self.robot.name}: found none of {MOST_STARTS} starts that it "
                             f"holds ({problem}); accepted: parameters that are better known"
                         ) from problem
-        self._observe(np.asarray(rows, dtype=int))
+        self._observe(np.asarray(rows, dtype=int), moved=False)
 
     def _restore(self, row: int, random: np.random.Generator) -> None:
         """Gives a robot the parameters of a new episode."""
@@ -226,11 +227,13 @@ class RobotTask(ABC):
             seed = int(random.integers(2**62))
             self.batch.exchange(row, drawn_robots(self.robot, 1, self._doubt, seed)[0])
 
-    def step(self, actions: Any) -> None:
+    def step(self, actions: Any, over: np.ndarray | None = None) -> None:
         """Moves all robots on by a period; then `observations`, `rewards` and `lost` are new.
 
         Args:
             actions: Shape (count, action_size), cut at -1 and 1.
+            over: Whose episodes are over, shape (count,): they draw no random numbers, and mean
+                nothing till they begin anew. None: nobody's.
 
         Raises:
             CdprError: They are of another shape, or not finite.
@@ -244,7 +247,7 @@ class RobotTask(ABC):
         cut = np.clip(given, -1.0, 1.0)
         self._act(cut)
         self.batch.step(self._commands(cut), self.options.period)
-        self._observe(None)
+        self._observe(np.arange(self.count) if over is None else np.flatnonzero(~over), moved=True)
         self.rewards = np.zeros(self.count)
         places = self.batch.poses[:, 4:]
         outside = np.any((places < self._lower) | (places > self._upper), axis=1)
@@ -276,11 +279,11 @@ class RobotTask(ABC):
         first = [groups.of_cable.index(k) for k in range(self.batch.commands_per_robot)]
         return rates[:, first]
 
-    def _observe(self, rows: np.ndarray | None) -> None:
+    def _observe(self, rows: np.ndarray, *, moved: bool) -> None:
         tensions = self.batch.tensions
         self._tensions = np.where(np.isfinite(tensions), tensions, 0.0)  # of who failed
         self._look_at_platforms()
-        self._look(rows)
+        self._look(rows, moved)
 
     def _look_at_platforms(self) -> None:
         """Writes what robots know of themselves."""
@@ -292,6 +295,12 @@ class RobotTask(ABC):
     def observations(self) -> np.ndarray:
         """What is observed now, shape (count, observation_size), 32 bits [-]."""
         return np.clip(self._numbers, -MOST, MOST).astype(np.float32)
+
+    def _random(self, row: int) -> np.random.Generator:
+        """Where the random numbers of a robot's episode come from."""
+        random = self._randoms[row]
+        assert random is not None  # its episode has begun
+        return random
 
     def _own(self) -> Array:
         """Where a task writes its observations: the rows behind those of the platform."""

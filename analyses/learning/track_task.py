@@ -49,13 +49,13 @@ class TrackTask(ReachTask):
         self._phases[row] = random.uniform(-np.pi, np.pi, k)
         return self.box.home
 
-    def _look(self, rows: np.ndarray | None) -> None:
+    def _look(self, rows: np.ndarray, moved: bool) -> None:
         write_references(
             self.batch.times, self._amplitudes, self._rates, self._phases, RAMP, self._reference
         )
         offset, velocity, acceleration = self._in_world()
         self._goals[:, 4:] = self._home_row[4:] + offset
-        super()._look(rows)
+        super()._look(rows, moved)
         own, speed = self._own(), self.scales[SPEED]
         own[:, 6:9] = velocity / speed
         own[:, 9:12] = acceleration * (self.scales[LENGTH] / speed**2)

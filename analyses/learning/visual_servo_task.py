@@ -115,7 +115,7 @@ class VisualServoTask(RobotTask):
         self._objects[row] = (X_WPd @ self._X_PC @ self._X_CdO).GetAsMatrix34()
         return self._drawn_pose(random, SHARE)
 
-    def _look(self, rows: np.ndarray | None) -> None:
+    def _look(self, rows: np.ndarray, moved: bool) -> None:
         marks = np.zeros_like(self._marks)
         found = np.zeros(self.count, bool)
         write_marks(
@@ -123,11 +123,8 @@ class VisualServoTask(RobotTask):
             self._pinhole.numbers, VISIBLE_BORDER, marks, found,
         )  # fmt: skip
         own = self._own()
-        for row in range(self.count) if rows is None else rows:
-            random = self._randoms[row]
-            if random is None:
-                continue
-            noise = self._noise * random.standard_normal(2 * POINTS)
+        for row in rows:
+            noise = self._noise * self._random(row).standard_normal(2 * POINTS)
             if found[row]:
                 self._marks[row] = marks[row] + noise
             self._found[row] = found[row]
@@ -136,8 +133,8 @@ class VisualServoTask(RobotTask):
             own[row, 2 * POINTS : 4 * POINTS] = error
             own[row, 4 * POINTS] = float(found[row])
             self._errors[row] = np.sqrt(np.mean(error * error))
-            new = rows is not None
-            self._blind[row] = 0.0 if found[row] or new else self._blind[row] + self.options.period
+            waited = self._blind[row] + self.options.period
+            self._blind[row] = waited if moved and not found[row] else 0.0
 
     def _judge(self, actions: Array) -> None:
         add_closeness(
