@@ -103,7 +103,7 @@ class HandlingTask(RobotTask):
 
     def _on_table(self, random: np.random.Generator) -> Array:
         """Middle of a cube under the box's lowest places, where the tip reaches its top [m]."""
-        point = random.uniform(-1.0, 1.0, self.box.directions.shape[1])
+        point = np.array(random.uniform(-1.0, 1.0, self.box.directions.shape[1]), float)
         fall = self.box.directions.T @ self._down
         low = np.abs(fall) > 0.5
         point[low] = np.sign(fall[low])
@@ -161,7 +161,7 @@ class HandlingTask(RobotTask):
         self.rewards += APPROACH * held + self._placed
         self.lost |= self._dropped
 
-    def infos(self) -> dict[str, Array]:
+    def infos(self) -> dict[str, np.ndarray]:
         """Distances of tip and cube's top, cube and goal [m]; whether it is held, stands there."""
         return {
             "tip_distance": self._to_cube.copy(), "goal_distance": self._to_goal.copy(),

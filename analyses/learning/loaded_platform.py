@@ -37,4 +37,3 @@ def loaded_robot(robot: Robot, mass: float, p_PL: Array, edge: float) -> Robot:
             platform, mass=both.get_mass(), center_of_mass=np.array(center), inertia=six
         ),
     )
-

@@ -51,7 +51,7 @@ class ReachTask(RobotTask):
         """Rows of `pose_row` that the platforms shall reach, shape (count, 7) [-, m]."""
         return self._goals.copy()
 
-    def infos(self) -> dict[str, Array]:
+    def infos(self) -> dict[str, np.ndarray]:
         """Distance [m], angle [rad], and whether both are small."""
         distance, angle = self._errors.T.copy()
         near = (distance < NEAR_SHARE * self.reach) & (angle < NEAR_ANGLE)

@@ -188,11 +188,12 @@ class RobotTask(ABC):
         """Adds to `rewards`, shape (count,), before costs, and to `lost` who failed."""
 
     @abstractmethod
-    def infos(self) -> dict[str, Array]:
+    def infos(self) -> dict[str, np.ndarray]:
         """Numbers for people, of each robot, by names; each of shape (count,)."""
 
     def _act(self, actions: Array) -> None:
-        """What actions do beside moving the robots, before they move."""
+        """What actions do beside moving the robots, before they move: nothing."""
+        return
 
     # --- Episodes -------------------------------------------------------------------------------
 
@@ -308,9 +309,9 @@ class RobotTask(ABC):
 
     def _drawn_pose(self, random: np.random.Generator, share: float = 1.0) -> RigidTransform:
         """A pose of the box, or of a share of it [m]."""
-        point = share * random.uniform(-1.0, 1.0, self.box.directions.shape[1])
+        point = np.array(random.uniform(-share, share, self.box.directions.shape[1]), float)
         most = math.radians(self.options.turn_deg)
-        turn = most * random.uniform(-1.0, 1.0, self.box.turns.shape[1])
+        turn = np.array(random.uniform(-most, most, self.box.turns.shape[1]), float)
         return self.box.at(point, turn if most > 0.0 else None)
 
 

@@ -8,8 +8,8 @@ from typing import Any
 from cdpr_drake.analyses.learning.handling_task import HandlingTask
 from cdpr_drake.analyses.learning.reach_task import ReachTask
 from cdpr_drake.analyses.learning.robot_task import RobotTask
-from cdpr_drake.analyses.learning.visual_servo_task import VisualServoTask
 from cdpr_drake.analyses.learning.track_task import TrackTask
+from cdpr_drake.analyses.learning.visual_servo_task import VisualServoTask
 from cdpr_drake.errors import CdprError
 
 TASKS: dict[str, type[RobotTask]] = {

@@ -137,9 +137,7 @@ class VisualServoTask(RobotTask):
             self._blind[row] = waited if moved and not found[row] else 0.0
 
     def _judge(self, actions: Array) -> None:
-        add_closeness(
-            self._errors, np.array([ERROR]), self._found.astype(float), self.rewards
-        )
+        add_closeness(self._errors, np.array([ERROR]), self._found.astype(float), self.rewards)
         self.lost |= self._blind >= BLIND
 
     def observations(self) -> np.ndarray:
@@ -159,7 +157,7 @@ class VisualServoTask(RobotTask):
         """Of an image that is observed; None: features are."""
         return None if self._picture is None else self._picture.shape
 
-    def infos(self) -> dict[str, Array]:
+    def infos(self) -> dict[str, np.ndarray]:
         """Error of the features [-], whether the tag is seen, and whether the error is small."""
         error, found = self._errors[:, 0].copy(), self._found.copy()
         return {"error": error, "found": found, "success": found & (error < NEAR)}
