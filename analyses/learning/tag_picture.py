@@ -19,6 +19,7 @@ class TagPicture:
 
     Attributes:
         shape: Of an image: height, width, 3.
+        pinhole: The camera.
     """
 
     def __init__(self, edge: float, pinhole: Pinhole) -> None:
@@ -37,12 +38,12 @@ class TagPicture:
         self._context = self._diagram.CreateDefaultContext()
         self._scene: SceneGraph = scene_graph
         self._frame = scene_graph.world_frame_id()
-        self._pinhole = pinhole
+        self.pinhole = pinhole
         self.shape = (pinhole.height, pinhole.width, 3)
 
     def draw(self, X_OC: RigidTransform) -> np.ndarray:
         """The image from a pose of the camera in the tag's frame [m], of `shape`, 8 bits."""
         port = self._scene.get_query_output_port()
         query: QueryObject = port.Eval(self._scene.GetMyContextFromRoot(self._context))
-        image = draw_image(query, self._frame, X_OC, self._pinhole)
+        image = draw_image(query, self._frame, X_OC, self.pinhole)
         return np.ascontiguousarray(image[:, :, :3])

@@ -15,6 +15,7 @@ from cdpr_drake.analyses.learning.environments import RobotVectorEnv
 from cdpr_drake.analyses.learning.task_table import TASKS, make_task
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models.robot_loader import robot_names
+from cdpr_drake.vision.apriltags import TagTarget
 
 NAMES = [f"cdpr/{name}-v0" for name in TASKS]
 DOUBT = {"*.exit_point.*": 1e-3, "all.stiffness": 1e4, "mass": 0.1}
@@ -167,3 +168,20 @@ def test_actions_of_another_shape_or_not_finite_are_refused():
     for actions in (np.zeros(8), np.full((2, 8), np.nan)):
         with pytest.raises(CdprError, match="actions: found shape"):
             task.step(actions)
+
+
+def test_images_show_the_tag_where_the_features_are():
+    """The detector of tags finds it in what is drawn, within a pixel of the projected corners."""
+    task = make_task("VisualServo", 2, observation="image", image_width=400, pixel_noise=0.0)
+    task.begin([0, 1], [np.random.default_rng(k) for k in range(2)])
+    for row, image in enumerate(task.observations()):
+        assert image.shape == task.image_shape()
+        found = TagTarget(0, task.reach).find(image)
+        assert found is not None
+        camera, xy = task._picture.pinhole, task._own()[row, :8].reshape(2, 4)
+        expected = camera.project(np.vstack([xy, np.ones(4)])).T.ravel()
+        assert found == pytest.approx(expected, abs=1.0)
+    env = gymnasium.make("cdpr/VisualServo-v0", observation="image")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_env(env.unwrapped)
