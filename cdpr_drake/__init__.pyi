@@ -38,12 +38,14 @@ from .models.mechanism_in_plant import add_mechanism as add_mechanism
 from .models.mechanism_loader import load_mechanism as load_mechanism
 from .models.mechanism_loader import load_robot_or_mechanism as load_robot_or_mechanism
 from .models.mechanism_schema import Mechanism as Mechanism
+from .models.robot_draws import ParameterCovariance as ParameterCovariance
 from .models.robot_exchange import export_robot as export_robot
 from .models.robot_in_plant import add_robot as add_robot
 from .models.robot_loader import load_robot as load_robot
 from .models.robot_loader import robot_names as robot_names
 from .models.robot_schema import Pose as Pose
 from .models.robot_schema import Robot as Robot
+from .systems.batches.batch_robots import BatchRobots as BatchRobots
 from .systems.diagrams.camera import add_camera as add_camera
 from .systems.diagrams.camera import add_target as add_target
 from .systems.diagrams.estimators import add_estimator as add_estimator
@@ -55,6 +57,7 @@ from .systems.remote.remote_client import RemoteClient as RemoteClient
 from .systems.robots.assembly import add_cable_robot as add_cable_robot
 from .systems.robots.cable_robot import CableRobot as CableRobot
 from .systems.robots.compiled_cable_robot import CompiledCableRobot as CompiledCableRobot
+from .systems.robots.compiled_step import StepRule as StepRule
 from .systems.robots.settings import CableRobotSettings as CableRobotSettings
 from .systems.scenarios.files import scenario_names as scenario_names
 from .systems.scenarios.visual_servo_scenario import Scenario as Scenario

@@ -23,6 +23,8 @@ from .plant_tree import PlantTree as PlantTree
 from .rendered_camera import color_camera as color_camera
 from .rendered_camera import make_depth_camera as make_depth_camera
 from .rendered_camera import make_rgbd_sensor as make_rgbd_sensor
+from .robot_draws import ParameterCovariance as ParameterCovariance
+from .robot_draws import drawn_robots as drawn_robots
 from .robot_exchange import ImportedRobot as ImportedRobot
 from .robot_exchange import draft_robot as draft_robot
 from .robot_exchange import export_robot as export_robot
@@ -46,6 +48,8 @@ from .robot_loader import robot_names as robot_names
 from .robot_loader import robot_text as robot_text
 from .robot_loader import turned_robot as turned_robot
 from .robot_loader import world_turn as world_turn
+from .robot_parameters import changed_robot as changed_robot
+from .robot_parameters import parameter_names as parameter_names
 from .robot_schema import CameraMount as CameraMount
 from .robot_schema import Pose as Pose
 from .robot_schema import Robot as Robot

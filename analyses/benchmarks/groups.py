@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from cdpr_drake.analyses.benchmarks.batches import batch_rows
 from cdpr_drake.analyses.benchmarks.cameras import camera_rows
 from cdpr_drake.analyses.benchmarks.constraints import constraint_rows
 from cdpr_drake.analyses.benchmarks.design import design_rows
@@ -20,6 +21,7 @@ from cdpr_drake.analyses.benchmarks.workspaces import workspace_rows
 from cdpr_drake.analyses.reporting.timing import TimingRow
 
 BENCH_GROUPS: dict[str, Callable[[bool], list[TimingRow]]] = {
+    "batch": batch_rows,
     "calibration": lambda quick: [*calibration_rows(quick), *point_calibration_rows(quick)],
     "cameras": camera_rows,
     "constraints": constraint_rows,

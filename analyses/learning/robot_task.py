@@ -23,7 +23,7 @@ from cdpr_drake.analyses.learning.task_kernel import (
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CdprError, InfeasibleTensionError
 from cdpr_drake.geometry.poses import pose_row
-from cdpr_drake.models.drawn_robots import ParameterCovariance, drawn_robots
+from cdpr_drake.models.robot_draws import ParameterCovariance, drawn_robots
 from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_parameters import parameter_names
 from cdpr_drake.models.robot_schema import Robot

@@ -28,7 +28,7 @@ from cdpr_drake.dynamics.robot_arrays import APPLIED, MOTORS, TENSIONS
 from cdpr_drake.dynamics.robot_kernel import INTEGRATION_OK
 from cdpr_drake.errors import CdprError
 from cdpr_drake.geometry.poses import pose_row
-from cdpr_drake.models.drawn_robots import Fitted, ParameterCovariance, drawn_robots
+from cdpr_drake.models.robot_draws import Fitted, ParameterCovariance, drawn_robots
 from cdpr_drake.models.robot_in_plant import pose_on_joint
 from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
@@ -271,7 +271,7 @@ class BatchRobots:
         Raises:
             CdprError: An array is of another shape or not finite, or the duration not positive.
         """
-        self._move("commands", [commands], duration, rates, brakes, wrenches)
+        self._move([commands], duration, wrenches, rates=rates, brakes=brakes)
         return ~self.failed
 
     def rollout(self, commands: Any, period: float, *, wrenches: object = None) -> BatchRollout:
@@ -298,13 +298,13 @@ class BatchRobots:
                 f"{self.commands_per_robot}) or (ways, {self.count}, {self.commands_per_robot})"
             )
         shape = (len(ways), *self._present.shape)
-        reached = self._move("commands", ways, period, None, None, wrenches, np.empty(shape))
+        reached = self._move(ways, period, wrenches, reached=np.empty(shape))
         size = self._size
         return BatchRollout(reached[:, :, size], reached[:, :, :size], ~self.failed)
 
     def _move(
-        self, name: str, ways: Sequence[object], duration: float, rates: object, brakes: object,
-        wrenches: object, reached: Array | None = None,
+        self, ways: Sequence[object], duration: float, wrenches: object, *,
+        rates: object = None, brakes: object = None, reached: Array | None = None,
     ) -> Array:  # fmt: skip
         """Checks what is commanded, and moves on by a duration for each of some commands."""
         k, count = self.commands_per_robot, self.count
@@ -312,7 +312,7 @@ class BatchRobots:
             raise CdprError(f"duration: found {duration:g} s; accepted: more than 0")
         asked = np.empty((len(ways), count, self.cables))
         for way, given in zip(asked, ways, strict=True):
-            way[:] = per_robot(name, given, count, k)[:, self._of_cable]
+            way[:] = per_robot("commands", given, count, k)[:, self._of_cable]
         others = np.zeros_like(self._others)
         for row, (what, given) in enumerate((("rates", rates), ("brakes", brakes))):
             if given is not None:

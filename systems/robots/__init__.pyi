@@ -4,6 +4,7 @@ from .cable_robot import CableRobot as CableRobot
 from .compiled_cable_robot import CompiledCableRobot as CompiledCableRobot
 from .compiled_mechanism import CompiledMechanism as CompiledMechanism
 from .compiled_motion import CompiledMotion as CompiledMotion
+from .compiled_step import StepRule as StepRule
 from .motor_winch import MotorWinch as MotorWinch
 from .platform_pose import PlatformPose as PlatformPose
 from .route_assembly import CablePorts as CablePorts
@@ -15,5 +16,6 @@ from .route_forces import RouteSpatialForces as RouteSpatialForces
 from .route_forces import RouteSpatialForces_ as RouteSpatialForces_
 from .settings import CableRobotSettings as CableRobotSettings
 from .settings import CableSettings as CableSettings
+from .settings import WinchSettings as WinchSettings
 from .tension_driven_routes import TensionDrivenRoutes as TensionDrivenRoutes
 from .ups_robot import UpsRobot as UpsRobot

@@ -183,6 +183,6 @@ def _read(path: Path) -> ParameterCovariance:
         except DataFileError as problem:
             raise DataFileError(f"{file}: {problem}") from None
     raise DataFileError(
-        f"{path}: found no {' or '.join(file.name for file in files)}; accepted: a folder or file "
-        "of cdpr calibrate or cdpr identify"
+        f"{path}: found no such file; accepted: {' or '.join(FILES)} of cdpr calibrate or cdpr "
+        "identify, or its folder"
     )
