@@ -70,6 +70,14 @@ def _package(name: str, module: str) -> Finding:
         return Finding(name, False, str(problem), remedy)
 
 
+def _extra(name: str, extra: str, serves: str) -> Finding:
+    """A package that one part needs and the rest does without: it is no fault that it is absent."""
+    try:
+        return Finding(name, True, version(name))
+    except PackageNotFoundError:
+        return Finding(name, True, f"absent; {serves} need it: pip install 'cdpr_drake[{extra}]'")
+
+
 def _aruco() -> Finding:
     import cv2
 
@@ -115,6 +123,7 @@ CHECKS: tuple[Callable[[], Finding], ...] = (
     lambda: _package("numba", "numba"),
     lambda: _package("opencv-python-headless", "cv2"),
     lambda: _package("matplotlib", "matplotlib"),
+    lambda: _extra("gymnasium", "gym", "learning environments"),
     _aruco,
     _egl,
     _rendering,

@@ -125,6 +125,7 @@ class BatchRobots:
         _check(settings, robots, count, by_tensions)
         self.robot, self.robots, self.count = robot, robots, count
         self.rule, self.threads = rule, threads
+        self._settings, self._by_tensions = settings, by_tensions
         made: dict[int, BatchMember] = {}  # of one robot in many rows only once
         self._members: list[BatchMember] = []
         for each in robots:
@@ -362,6 +363,52 @@ class BatchRobots:
         self._broken[rows, cable] = 1.0
         for row in rows:
             break_cables(self._whole[row], self._broken[row], self._stack.cables[row])
+        self._table = None
+
+    def exchange(self, row: int, robot: Robot) -> None:
+        """Gives a robot other parameters from now on, while it moves or before it is reset.
+
+        Its state stays, that is platform and winches, and which cables are broken.
+
+        Args:
+            row: Number of the robot.
+            robot: Of the same structure, with parameters of its own.
+
+        Raises:
+            CdprError: There is no such row, or the robot is of another structure.
+            CableModelError: As `BatchRobots`, and so on.
+        """
+        (row,) = robot_numbers(int(row), self.count)
+        member = BatchMember.of(robot, self._settings, self._by_tensions)
+        _check_structure([self._members[0], member])
+        self.robots[row], self._members[row] = robot, member
+        applied = self._stack.body[row, APPLIED:].copy()
+        for rows, own in zip(self._stack, member.arrays, strict=True):
+            rows[row] = own
+        self._stack.body[row, APPLIED:] = applied
+        self._whole[row] = member.arrays.cables
+        break_cables(self._whole[row], self._broken[row], self._stack.cables[row])
+        self._rooms[row] = self._fresh_rooms[0][row]
+        self._boxes[row] = robot.box_center(), 0.5 * robot.platform.size
+        self._at_home = {id(each): self._at_home[id(each)] for each in self._members
+                         if id(each) in self._at_home}  # fmt: skip
+        self._table = None
+
+    def set_twists(self, robots: object, twists: object) -> None:
+        """Gives platforms velocities, as a blow would; what their joint cannot do is left out.
+
+        Args:
+            robots: Which, as for `reset`.
+            twists: Angular velocity and velocity of Po in W, shape (6,) or (k, 6) [rad/s, m/s].
+
+        Raises:
+            CdprError: There is no such robot, or an array is of another shape.
+        """
+        rows = robot_numbers(robots, self.count)
+        for row, twist in zip(rows, per_robot("twists", twists, len(rows), 6), strict=True):
+            joint = self._members[row].joint
+            speeds = twist if self._floats else joint.wrench_map() @ twist
+            self._present[row, self._n - joint.num_velocities : self._n] = speeds
         self._table = None
 
     # --- What is read ---------------------------------------------------------------------------

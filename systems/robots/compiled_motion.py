@@ -85,7 +85,8 @@ class CompiledMotion(LeafSystem):
     each step of the simulator, which goes from event to event, it is brought up to date; between
     events, outputs are what the motion has come to by then. Commands are taken as constant from
     event to event, as those of sampled controllers are, but for commanded lengths whose rates are
-    given. Commands that change continuously must be sampled: see `command_period`.
+    given. Commands that change continuously must be sampled: see `command_period`. A simulator
+    that is initialized after the time was set back begins with the state of the last event.
 
     Raises CableGeometryError in a simulation where a cable cannot run, DivergedError where numbers
     are not finite any more.
@@ -160,6 +161,7 @@ class CompiledMotion(LeafSystem):
             self._declare_cables(here)
         if drive.kind == MOTORS:
             self._declare_motors(here)
+        self.DeclareInitializationDiscreteUpdateEvent(self._begin_anew)
         self.DeclarePerStepPublishEvent(self._look)
         self.DeclarePerStepDiscreteUpdateEvent(self._take)
         if command_period is not None:
@@ -380,6 +382,12 @@ class CompiledMotion(LeafSystem):
         ideal_rates(self._arrays.winch[0, 0], command, out)
         return out
 
+    def _begin_anew(self, context: Context, discrete_state: DiscreteValues) -> None:
+        """Takes the state as that of now where the time was set back, as a plant does."""
+        if context.get_time() < context.get_discrete_state_vector().value()[self._size]:
+            state = context.get_discrete_state_vector().value()[: self._size]
+            discrete_state.set_value(self._standing(context, state))
+
     def _look(self, context: Context) -> None:
         """Computes what is reached at the end of a step, with the inputs that led there."""
         self._reached(context)
@@ -399,7 +407,11 @@ class CompiledMotion(LeafSystem):
 
     def set_state(self, context: Context, state: Array) -> None:
         """Sets the state of platform and winches, shape (n,), in this system's own context."""
-        context.SetDiscreteState(np.concatenate([state, [context.get_time()], np.zeros(REPORTED)]))
+        context.SetDiscreteState(self._standing(context, state))
+
+    def _standing(self, context: Context, state: Array) -> Array:
+        """The discrete state in which a state of platform and winches is that of now."""
+        return np.concatenate([state, [context.get_time()], np.zeros(REPORTED)])
 
     def hold(self, context: Context, X_WP: RigidTransform, lengths: Array, tensions: Array) -> None:
         """Puts the platform at rest at a pose, with lengths, and motors that hold tensions.

@@ -29,6 +29,13 @@ def test_a_crash_of_the_renderer_is_a_finding(monkeypatch):
     assert "projected" in finding.remedy
 
 
+def test_what_is_optional_and_absent_is_no_fault_but_named():
+    finding = doctor._extra("no-such-package", "gym", "learning environments")
+    assert finding.passed
+    assert "pip install 'cdpr_drake[gym]'" in finding.found
+    assert "gymnasium" in {one.check for one in doctor.examine()}
+
+
 def test_missing_package_is_named():
     finding = doctor._package("no-such-package", "no_such_module")
     assert not finding.passed

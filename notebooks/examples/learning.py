@@ -1,0 +1,29 @@
+"""Gymnasium: a law that goes straight to the goal, on 32 robots at once that all differ.
+
+Replace `policy` by one that learns. `pip install 'cdpr_drake[gym]'` brings Gymnasium.
+"""
+
+import gymnasium
+import numpy as np
+
+import cdpr_drake.gym  # registers the environments
+
+COUNT = 32
+DOUBT = {"*.exit_point.*": 0.002, "mass": 0.2}  # standard deviations [m, kg]
+
+
+def policy(observation):
+    """Twists, over full speed, from where the goals are: numbers 20 to 22 of eight cables."""
+    action = np.zeros((len(observation), 6), np.float32)
+    action[:, 3:] = 3.0 * observation[:, 20:23]  # cut at -1 and 1 by the environment
+    return action
+
+
+envs = gymnasium.make_vec("cdpr/Reach-v0", COUNT, action="twist", randomise=DOUBT)
+observation, _ = envs.reset(seed=0)
+total = np.zeros(COUNT)
+for _ in range(cdpr_drake.gym.STEPS["Reach"]):
+    observation, reward, lost, late, info = envs.step(policy(observation))
+    total += reward
+print(f"return {total.mean():.1f} +- {total.std():.1f}")
+print(f"{info['success'].sum()} of {COUNT} at their goals, {lost.sum()} lost")
