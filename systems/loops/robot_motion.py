@@ -158,6 +158,7 @@ class RobotMotion:
         """Puts platform and winches into a state at time 0, shape (n,)."""
         self._present[:] = 0.0
         self._state[:] = state
+        self._memory[2 * len(self._present)] = np.nan  # what was reached before is not this run's
         self.command(self._released)
         self._pose = None
 
@@ -167,6 +168,7 @@ class RobotMotion:
         return [
             held("motion", self._present), held("command", self._command),
             held("room", self._room), held("guesses", self._arrays.guesses),
+            held("searches", self._arrays.room),
         ]  # fmt: skip
 
     def forget(self) -> None:

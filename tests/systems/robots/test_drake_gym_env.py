@@ -90,3 +90,15 @@ def test_a_robot_stays_where_it_is_when_the_time_is_set_back():
     assert not block.GetOutputPort("steps").Eval(context).any()
     simulator.AdvanceTo(0.1)
     assert block.GetOutputPort("platform_state").Eval(context)[6] < before[6]
+
+
+@pytest.mark.parametrize("kind", [CableRobot, CompiledCableRobot])
+def test_episodes_of_one_step_follow_their_own_action(kind):
+    """The compiled robot remembers what it reached; that is not another episode's."""
+    env = environment(kind, True)
+    reached = []
+    for speed in (0.02, -0.02, 0.02):
+        env.reset(seed=3)
+        reached.append(env.step(np.full(8, speed))[0])
+    assert np.linalg.norm(reached[1] - reached[0]) > 1e-3
+    assert reached[2].tobytes() == reached[0].tobytes()
