@@ -100,6 +100,8 @@ class RobotMotion:
         law = CABLE_MODELS[self._model].law
         self._room = make_room(self._set.count, law, joint.height)
         self._outputs = outputs_kernel(law)
+        rooms = self._room, self._arrays.room, self._arrays.guesses
+        self._searched = [(searched, searched.copy()) for searched in rooms]
         m = self._m = self._set.count
         self._n = joint.num_states
         self._released, self._calm = np.zeros(m), np.zeros((2, m))
@@ -158,7 +160,10 @@ class RobotMotion:
         """Puts platform and winches into a state at time 0, shape (n,)."""
         self._present[:] = 0.0
         self._state[:] = state
-        self._memory[2 * len(self._present)] = np.nan  # what was reached before is not this run's
+        # What was reached, and where sagging cables were found, by a run before is not this one's.
+        self._memory[2 * len(self._present)] = np.nan
+        for searched, fresh in self._searched:
+            searched[:] = fresh
         self.command(self._released)
         self._pose = None
 
