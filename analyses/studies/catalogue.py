@@ -92,6 +92,7 @@ MODULES = {
     "lenses": "lenses",
     "slack-cycle": "slack_cycle",
     "failure": "failure",
+    "adaptation": "adaptation",
     "calibration": "calibration.study",
     "identification": "identification",
     "case-1": "case_studies.case_1",

@@ -4,7 +4,8 @@ What is learnt are exit points, anchor points and where winches began to count. 
 tag that rests and the lengths at the same instant tell is a station, with residuals and derivatives
 of `terms` and `onboard_terms`; its pose is eliminated. The stations of a window are linearised
 anew with each that comes, and the oldest goes, as it is linearised then, into an information
-matrix that stays: beyond the window this is the extended information filter.
+matrix that stays: beyond the window this is the extended information filter, which is then too
+sure of itself, as what is linearised at an early estimate tells of directions that nothing excites.
 
 Where the platform was when it was first seen, points, offsets and the camera's place are known
 beforehand by standard deviations. The tag's pose is not. So no gauge is free, but what only the
@@ -115,7 +116,7 @@ class LearningRules:
     corner_sigma: float = 2e-4
     spacing: float = 0.005
     turn: float = 0.03
-    window: int = 40
+    window: int = 100
     slack_below: float = 0.2
 
 
@@ -227,7 +228,7 @@ class RecursiveCalibration:
             "corners": (w, CORNER_ROWS), "first": (w,), "gone_S": (f, f), "gone_h": (f,), "mean": (7 * m,),
             "covariance": (7 * m, 7 * m), "excited": (), "squares": (), "freedoms": (),
             "looks": (), "stations": (), "refused": (), "dropped": (m + CORNER_ROWS,),
-            "surprise": (), "frames": (12,),
+            "surprise": (), "frames": (12,), "hessians": (m, 3, 3),
         })  # fmt: skip
         self.memory_size = self._record.size
         self._prior_std = self._std[learnt]
@@ -361,12 +362,17 @@ class RecursiveCalibration:
         names = ("poses", "readings", "strains", "bends", "corners", "first")
         return {name: np.array(now[name][part]) for name in names}
 
-    def _bends(self, now: dict[str, Array], at: Point) -> Array:
+    def _bends(self, now: dict[str, Array], at: Point, hessians: Array) -> Array:
         """What lengths miss by being linearised, shape (k, m) [m]: root mean square of their second
         order in what is not known of the points.
 
         With d the error of an anchor point as its exit point sees it, D its covariance and H the
         Hessian of the length, d' H d / 2 has the mean tr(H D) / 2 and the variance tr(H D H D) / 2.
+
+        Args:
+            now: What is remembered.
+            at: The model and poses.
+            hessians: H there, or by how much they differ from their mean, shape (k, m, 3, 3) [1/m].
         """
         m = self.count
         blocks = now["covariance"][: 6 * m, : 6 * m].reshape(2, m, 3, 2, m, 3)
@@ -376,7 +382,7 @@ class RecursiveCalibration:
         cross = C[:, 0, :, 1] @ np.swapaxes(R, 2, 3)
         D = C[:, 0, :, 0] + R @ C[:, 1, :, 1] @ np.swapaxes(R, 2, 3)
         D = D - cross - np.swapaxes(cross, 2, 3)
-        HD = at.hessians @ D
+        HD = hessians @ D
         mean = 0.5 * np.trace(HD, axis1=2, axis2=3)
         return np.asarray(np.sqrt(mean**2 + 0.5 * np.trace(HD @ HD, axis1=2, axis2=3)))
 
@@ -390,7 +396,8 @@ class RecursiveCalibration:
         """
         some = {name: np.array([value]) for name, value in station.items()}
         at = Point(model, Stations.at([pose_from_row(station["poses"])]), self._layout)
-        station["bends"] = self._bends(now, at)[0]
+        known = now["hessians"] if now["stations"] > 0.0 else at.hessians[0]
+        station["bends"] = self._bends(now, at, at.hessians - known)[0]
         some["bends"] = station["bends"][np.newaxis]
         r, A, B = (part[0] for part in self._problem(now, some).evaluate(at))
         S = self._information(now, model)
@@ -473,7 +480,11 @@ class RecursiveCalibration:
         count = int(now["count"])
         some = self._window(now, slice(count))
         at = self._point(self._model(now), some)
-        some["bends"] = now["bends"][:count] = self._bends(now, at)
+        now["hessians"] += (at.hessians[-1] - now["hessians"]) / now["stations"]
+        # What bends alike at all stations is taken for an offset; what differs is noise.
+        differs = self._bends(now, at, at.hessians - now["hessians"])
+        some["bends"] = now["bends"][:count] = differs
+        alike = self._bends(now, at, np.broadcast_to(now["hessians"], at.hessians.shape))[-1]
         base, problem = self._base_model(now), self._problem(now, some)
         typical = self._layout.typical
         for _ in range(MOST_STEPS):
@@ -492,9 +503,8 @@ class RecursiveCalibration:
         C = np.linalg.inv(S)[np.ix_(self._mine, self._mine)]
         size = (typical[self._free])[self._mine]
         covariance = size[:, None] * C * size
-        # What bends alike at all stations is taken for an offset, and does not average out.
         offsets = np.arange(6 * self.count, 7 * self.count)
-        covariance[offsets, offsets] += some["bends"][-1] ** 2 + self.rules.length_sigma**2
+        covariance[offsets, offsets] += alike**2 + self.rules.length_sigma**2
         frames = frame_motions(at)[self._free][self._mine] * size[:, None]
         self._tell(now, covariance, now["theta"][self._free][self._mine], frames)
 

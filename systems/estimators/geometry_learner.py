@@ -71,7 +71,10 @@ class Adaptation:
         "Way of the platform from one pose that counts to the next.", "m", 0.005, above=0.0
     )
     turn_deg: float = number("Or its turn.", "deg", 2.0, above=0.0)
-    window: int = whole("Poses that are linearised anew.", 40, at_least=2, at_most=1000)
+    window: int = whole(
+        "Poses that are linearised anew; those before them stay linearised as they were, which "
+        "makes standard deviations too small: best as many as a motion has.", 100, at_least=2, at_most=1000,
+    )  # fmt: skip
     period: float = number("Time between models that are offered to the servo.", "s", 0.5, above=0.0)
     believe: bool = switch("Whether the servo gets them; else they are logged alone.", True)
     margin: float = number(
