@@ -80,7 +80,9 @@ def adaptation_summary(log: Log, robot: Robot, believed: BelievedRobot) -> dict[
     m, points = len(robot.cables), 6 * len(robot.cables)
     found, sigma = np.asarray(log[LEARNT][-1]), np.asarray(log[LEARNT_SIGMA][-1])
     first = np.asarray(log[LEARNT_SIGMA][0])
-    believed_points = np.concatenate([believed.cables.p_WA.T.ravel(), believed.cables.p_PB.T.ravel()])
+    believed_points = np.concatenate(
+        [believed.cables.p_WA.T.ravel(), believed.cables.p_PB.T.ravel()]
+    )
     true = np.concatenate([true_points(robot), true_offsets(log, believed)])
     wrong = found - true
     parts = dict(zip(ADAPTATION_PARTS, log[ADAPTATION][-1], strict=True))

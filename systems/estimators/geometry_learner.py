@@ -44,9 +44,7 @@ class Adaptation:
         "Standard deviation of a coordinate of an exit point, before anything is measured.",
         "m", 0.01, above=0.0,
     )  # fmt: skip
-    anchor_points: float = number(
-        "The same of an anchor point.", "m", 0.01, above=0.0
-    )
+    anchor_points: float = number("The same of an anchor point.", "m", 0.01, above=0.0)
     camera_place: float = number(
         "Standard deviation of a coordinate of the camera on the platform; 0: it is exact.",
         "m", 0.0, at_least=0.0,
@@ -64,9 +62,7 @@ class Adaptation:
     pixel_noise: float = number(
         "Standard deviation of a coordinate of a corner that is found.", "px", 0.2, above=0.0
     )
-    slack_below: float = number(
-        "Cables that pull less tell no length.", "N", 0.2, at_least=0.0
-    )
+    slack_below: float = number("Cables that pull less tell no length.", "N", 0.2, at_least=0.0)
     spacing: float = number(
         "Way of the platform from one pose that counts to the next.", "m", 0.005, above=0.0
     )
@@ -75,7 +71,9 @@ class Adaptation:
         "Poses that are linearised anew; those before them stay linearised as they were, which "
         "makes standard deviations too small: best as many as a motion has.", 100, at_least=2, at_most=1000,
     )  # fmt: skip
-    period: float = number("Time between models that are offered to the servo.", "s", 0.5, above=0.0)
+    period: float = number(
+        "Time between models that are offered to the servo.", "s", 0.5, above=0.0
+    )
     believe: bool = switch("Whether the servo gets them; else they are logged alone.", True)
     margin: float = number(
         "Least margin of the stability criterion of a model that is believed.", "-", 0.0
@@ -244,9 +242,7 @@ class GeometryLearner(LeafSystem):
             return
         X_CO = self.GetInputPort("X_CO").Eval(context)
         xy = self._target.normalized(read(self._target.mark), self._pinhole).T
-        memory, _ = self._learner.take(
-            self._remembered(context), Look(X_CO, xy, lengths, tensions)
-        )
+        memory, _ = self._learner.take(self._remembered(context), Look(X_CO, xy, lengths, tensions))
         state.set_value(self._memory, memory)
         offers = np.array(context.get_discrete_state(self._offers).value())
         time = context.get_time()
