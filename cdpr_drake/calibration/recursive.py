@@ -30,6 +30,7 @@ from scipy.linalg import null_space
 from scipy.special import chdtri, ndtri
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.cables.elastic_law import unstrained_lengths
 from cdpr_drake.calibration.elimination import LeastSquares, Prior
 from cdpr_drake.calibration.identifiability import frame_motions
 from cdpr_drake.calibration.onboard_terms import TagCorners
@@ -41,7 +42,6 @@ from cdpr_drake.calibration.parameters import (
 )
 from cdpr_drake.calibration.stations import Point, Stations
 from cdpr_drake.calibration.terms import Lengths, TrackedPoses
-from cdpr_drake.cables.elastic_law import unstrained_lengths
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.geometry.poses import place_error, pose_error, pose_from_row, pose_row
@@ -225,8 +225,8 @@ class RecursiveCalibration:
         self._record = PackedRecord({
             "begun": (), "tag": (7,), "start": (m,), "theta": (layout.size,), "count": (),
             "poses": (w, 7), "readings": (w, m), "strains": (w, m), "bends": (w, m),
-            "corners": (w, CORNER_ROWS), "first": (w,), "gone_S": (f, f), "gone_h": (f,), "mean": (7 * m,),
-            "covariance": (7 * m, 7 * m), "excited": (), "squares": (), "freedoms": (),
+            "corners": (w, CORNER_ROWS), "first": (w,), "gone_S": (f, f), "gone_h": (f,),
+            "mean": (7 * m,), "covariance": (7 * m, 7 * m), "excited": (), "squares": (), "freedoms": (),
             "looks": (), "stations": (), "refused": (), "dropped": (m + CORNER_ROWS,),
             "surprise": (), "frames": (12,), "hessians": (m, 3, 3),
         })  # fmt: skip
@@ -261,7 +261,8 @@ class RecursiveCalibration:
         taut = look.tensions >= self.rules.slack_below
         station = {
             "poses": pose_row(X_WP), "readings": np.where(taut, readings, np.nan),
-            "strains": strain, "bends": np.zeros(self.count), "corners": look.xy.ravel(), "first": float(now["stations"] == 0.0),
+            "strains": strain, "bends": np.zeros(self.count), "corners": look.xy.ravel(),
+            "first": float(now["stations"] == 0.0),
         }  # fmt: skip
         if not self._tested(now, model, station):
             now["refused"] += 1.0

@@ -69,7 +69,8 @@ class Adaptation:
     turn_deg: float = number("Or its turn.", "deg", 2.0, above=0.0)
     window: int = whole(
         "Poses that are linearised anew; those before them stay linearised as they were, which "
-        "makes standard deviations too small: best as many as a motion has.", 100, at_least=2, at_most=1000,
+        "makes standard deviations too small: best as many as a motion has.",
+        100, at_least=2, at_most=1000,
     )  # fmt: skip
     period: float = number(
         "Time between models that are offered to the servo.", "s", 0.5, above=0.0

@@ -161,7 +161,7 @@ def test_a_wrong_length_is_dropped_and_counted():
         for k, look in enumerate(some.looks)
     ]
     memory = taught(some, learner, looks)
-    stations, refused, *dropped = learner.counts(memory)
+    _, refused, *dropped = learner.counts(memory)
     assert dropped[3] > 10
     assert sum(dropped) - dropped[3] <= 1
     assert refused <= 1
@@ -181,8 +181,11 @@ def test_slack_cables_tell_nothing():
     some = motion(0)
     learner = learner_of(some)
     slack = np.arange(some.true.count) == 2
-    looks = [replace(look, tensions=np.where(slack, 0.0, 1.0), lengths=look.lengths + 0.1 * k * slack)
-             for k, look in enumerate(some.looks)]  # fmt: skip
+    tensions = np.where(slack, 0.0, 1.0)
+    looks = [
+        replace(look, tensions=tensions, lengths=look.lengths + 0.1 * k * slack)
+        for k, look in enumerate(some.looks)
+    ]
     memory = taught(some, learner, looks)
     known = learner.learnt(memory)
     np.testing.assert_allclose(known.p_WA[:, 2], some.believed.p_WA[:, 2], atol=1e-9)

@@ -35,13 +35,13 @@ def test_it_is_told_with_the_truth_beside_it(result):
 
 def test_the_servo_goes_by_what_is_believed(result):
     believed = result.log["believed_points"]
-    np.testing.assert_array_equal(believed[0], believed[1])
     assert np.any(believed[-1] != believed[0])
     servo = result.servo.servo
     rows = servo.controller._cable_rows
-    points = believed[-1].reshape(2, -1, 3)
-    np.testing.assert_array_equal(rows[:, :3], points[0])
-    np.testing.assert_array_equal(rows[:, 3:6], points[1])
+    # The last rows of the log: the servo's last step may be older than the last model.
+    points = np.concatenate([rows[:, :3].ravel(), rows[:, 3:6].ravel()])
+    assert np.min(np.max(np.abs(believed[-6:] - points), axis=1)) < 1e-9
+    assert np.max(np.abs(believed[0] - points)) > 1e-4
     assert rows is servo.controller._steps[0][1][6]  # compiled steps read the same numbers
 
 
