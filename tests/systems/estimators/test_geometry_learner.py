@@ -95,8 +95,8 @@ def test_the_block_has_its_ports_and_loops_leave_it_to_a_diagram():
     [
         ("planar_pbvs", (), "found a section with planar, 2T1R"),
         ("acrobot_pbvs", ("cables.model=catenary",), "accepted: cables that do not sag"),
-        ("acrobot_ibvs", ("estimator.kind=cable_lengths",), "estimators cable_lengths"),
-        ("acrobot_partitioned", (), "controller.scheme partitioned"),
+        ("acrobot_pbvs", ("estimator.kind=cable_lengths",), "estimators cable_lengths"),
+        ("acrobot_pbvs", ("controller.free_rotation=true",), "does not judge"),
         ("acrobot_pbvs", ("tension_management={kind: polygon}",), "tension_management.kind"),
         ("acrobot_pbvs", ("stability={}",), "section stability"),
         ("acrobot_sensors", ("sensors.encoder_rate=30",), "encoders at 30 Hz and images at 25"),
