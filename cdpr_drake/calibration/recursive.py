@@ -227,7 +227,8 @@ class RecursiveCalibration:
             "poses": (w, 7), "readings": (w, m), "strains": (w, m), "bends": (w, m),
             "corners": (w, CORNER_ROWS), "first": (w,), "gone_S": (f, f), "gone_h": (f,),
             "mean": (7 * m,), "covariance": (7 * m, 7 * m), "excited": (), "squares": (),
-            "freedoms": (), "looks": (), "stations": (), "refused": (), "dropped": (m + CORNER_ROWS,),
+            "freedoms": (), "looks": (), "stations": (), "refused": (),
+            "dropped": (m + CORNER_ROWS,),
             "surprise": (), "frames": (12,), "hessians": (m, 3, 3),
         })  # fmt: skip
         self.memory_size = self._record.size
