@@ -22,6 +22,7 @@ measurements).
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -260,7 +261,7 @@ class RecursiveCalibration:
             return memory, False
         readings = look.lengths - now["start"]
         taut = look.tensions >= self.rules.slack_below
-        station = {
+        station: dict[str, Any] = {
             "poses": pose_row(X_WP), "readings": np.where(taut, readings, np.nan),
             "strains": strain, "bends": np.zeros(self.count), "corners": look.xy.ravel(),
             "first": float(now["stations"] == 0.0),
@@ -388,7 +389,9 @@ class RecursiveCalibration:
         mean = 0.5 * np.trace(HD, axis1=2, axis2=3)
         return np.asarray(np.sqrt(mean**2 + 0.5 * np.trace(HD @ HD, axis1=2, axis2=3)))
 
-    def _tested(self, now: dict[str, Array], model: CalibrationModel, station: dict) -> bool:
+    def _tested(
+        self, now: dict[str, Array], model: CalibrationModel, station: dict[str, Any]
+    ) -> bool:
         """Whether a station is believed; measurements of it that contradict it are dropped.
 
         The innovation is what of the residuals no step of the pose explains. Its covariance is
@@ -426,7 +429,7 @@ class RecursiveCalibration:
         self._note(now, squares, freedoms)
         return False
 
-    def _drop(self, now: dict[str, Array], station: dict, row: int) -> list[int]:
+    def _drop(self, now: dict[str, Array], station: dict[str, Any], row: int) -> list[int]:
         """Takes a measurement out of a station, a whole corner with either coordinate; its rows."""
         now["dropped"][row] += 1.0
         if row < self.count:
