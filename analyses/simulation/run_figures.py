@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from cdpr_drake.analyses.reporting.deferred_figures import Pictures
+from cdpr_drake.analyses.simulation.adaptation_report import adaptation_figure
 from cdpr_drake.analyses.simulation.hardware_figures import (
     motor_figure,
     reading_figure,
@@ -47,6 +48,7 @@ from cdpr_drake.palette import (
     nth_look,
 )
 from cdpr_drake.systems.diagrams.torque_control import tension_limits
+from cdpr_drake.systems.estimators.geometry_learner import LEARNT
 from cdpr_drake.systems.estimators.wrench_estimator import WRENCH_ESTIMATED
 
 
@@ -82,6 +84,9 @@ def run_figures(result: RunResult, formats: Sequence[str] = DEFAULT_FORMATS) -> 
     if WRENCH_ESTIMATED in log:
         pushed = _title(result, "What pushes the platform beside its cables, true and estimated")
         drawn["wrench"] = lambda: wrench_figure(pushed, log)
+    if LEARNT in log:
+        learnt = _title(result, "Exit and anchor points learnt on the way, and the truth")
+        drawn["adaptation"] = lambda: adaptation_figure(learnt, log, robot)
     world = result.servo.scenario.world
     if world is not None:
         around = _title(result, world_words(world))

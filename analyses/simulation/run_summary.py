@@ -10,6 +10,7 @@ from pydrake.math import RigidTransform
 from cdpr_drake.analyses.reporting.log_files import finite, spread
 from cdpr_drake.analyses.reporting.log_on_disk import Log, log_block, log_rows
 from cdpr_drake.analyses.reporting.provenance import package_versions
+from cdpr_drake.analyses.simulation.adaptation_report import adaptation_summary
 from cdpr_drake.analyses.simulation.run_stability import stability_of_run
 from cdpr_drake.analyses.simulation.visual_servo_run import RunResult
 from cdpr_drake.analyses.simulation.worlds import world_summary
@@ -22,6 +23,7 @@ from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.systems.controllers.torque_settings import TorqueControl
 from cdpr_drake.systems.diagrams.calibration_findings import found_calibrations
 from cdpr_drake.systems.diagrams.visual_servo import VisualServo
+from cdpr_drake.systems.estimators.geometry_learner import LEARNT
 from cdpr_drake.systems.robots.failures import FailureSettings
 from cdpr_drake.systems.robots.platform_wrench import APPLIED_WRENCH
 from cdpr_drake.systems.scenarios.run_settings import engine_of
@@ -173,6 +175,8 @@ def summarize(result: RunResult) -> dict[str, Any]:
     estimation = scenario.wrench_estimation
     if isinstance(servo, VisualServo) and servo.wrench is not None and estimation is not None:
         summary["wrench_estimation"] = wrench_summary(log, estimation.kind, servo.wrench.delay)
+    if LEARNT in log:
+        summary["adaptation"] = adaptation_summary(log, servo.robot, servo.believed)
     if isinstance(servo, VisualServo) and servo.remote is not None:
         summary["remote"] = servo.remote.report()
     cleaned: dict[str, Any] = finite(summary)

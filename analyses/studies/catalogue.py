@@ -93,6 +93,7 @@ MODULES = {
     "slack-cycle": "slack_cycle",
     "failure": "failure",
     "detection": "detection",
+    "adaptation": "adaptation",
     "calibration": "calibration.study",
     "identification": "identification",
     "case-1": "case_studies.case_1",

@@ -177,6 +177,15 @@ class ServoController:
             packed[servo_law.AHEAD] = self._period
         return packed
 
+    def believe(self, p_WA: Array, p_PB: Array) -> None:
+        """Steps from here on go by other exit and anchor points, both shape (3, m) [m].
+
+        The rest of the model, `robot` included, stays. It is a part of the controller and of no
+        memory: who steps several memories says before each step which points it goes by.
+        """
+        self._cable_rows[:, :3] = p_WA.T
+        self._cable_rows[:, 3:6] = p_PB.T
+
     def fresh_memory(self) -> Array:
         """Memory before the first step, shape (memory_size,)."""
         memory = np.zeros(self.memory_size)

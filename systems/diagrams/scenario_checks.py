@@ -24,6 +24,7 @@ from cdpr_drake.numerics.explicit_integration import explicit_integrators
 from cdpr_drake.schema.typed_yaml import closest
 from cdpr_drake.servoing.point_features import interaction_rank
 from cdpr_drake.systems.cameras.camera_settings import REGION, WHOLE, check_camera, check_lens
+from cdpr_drake.systems.diagrams.adaptation import check_adaptation
 from cdpr_drake.systems.diagrams.beliefs import read_camera
 from cdpr_drake.systems.diagrams.controller import check_scheme, make_tasks
 from cdpr_drake.systems.diagrams.emergency import check_emergency
@@ -418,6 +419,7 @@ CHECKS: list[Callable[[Scenario, Robot, Path], None]] = [
     check_estimators,
     check_sensor_fusion,
     check_tension_management,
+    check_adaptation,
     _check_cables,
     _check_disturbances,
     _check_failures,

@@ -12,6 +12,7 @@ from cdpr_drake.systems.cameras.target_measurement import TargetMeasurement
 from cdpr_drake.systems.controllers.feature_servo import FeatureServo
 from cdpr_drake.systems.controllers.tension_corrector import TensionCorrector
 from cdpr_drake.systems.controllers.torque_controller import TorqueController
+from cdpr_drake.systems.diagrams.adaptation import add_geometry_learner
 from cdpr_drake.systems.diagrams.beliefs import winch_offsets
 from cdpr_drake.systems.diagrams.camera import add_camera, add_target
 from cdpr_drake.systems.diagrams.estimators import EstimatorInputs, add_estimator
@@ -24,6 +25,7 @@ from cdpr_drake.systems.diagrams.torque_control import (
 )
 from cdpr_drake.systems.diagrams.wrench_estimation import add_wrench_estimator
 from cdpr_drake.systems.estimators.estimator_kinds import EstimatorSettings, EstimatorTask
+from cdpr_drake.systems.estimators.geometry_learner import GeometryLearner
 from cdpr_drake.systems.estimators.wrench_estimator import WrenchEstimator
 from cdpr_drake.systems.remote.remote_servo import RemoteServo
 from cdpr_drake.systems.robots.assembly import RobotBlock
@@ -47,6 +49,7 @@ class VisualServoBlocks(ServoModel):
         corrector: Takes up slack; None unless asked for.
         torque: Makes torques of the servo's twist; None unless winches are commanded by torque.
         wrench: Estimates what pushes the platform; None unless asked for.
+        learner: Learns exit and anchor points; None unless asked for.
     """
 
     block: RobotBlock
@@ -59,6 +62,7 @@ class VisualServoBlocks(ServoModel):
     corrector: TensionCorrector | None = None
     torque: TorqueController | None = None
     wrench: WrenchEstimator | None = None
+    learner: GeometryLearner | None = None
 
     def take_lengths(self, context: Context, lengths: Array) -> None:
         """Starts what integrates wanted lengths at lengths, shape (m,) [m], in the root context."""
@@ -169,6 +173,17 @@ def add_visual_servo(
             believed=model.believed,
             readings=readings,
             name=prefix + "wrench_estimator",
+        ),
+        learner=add_geometry_learner(
+            builder,
+            settings,
+            robot,
+            model=model,
+            readings=readings,
+            measurement=measurement,
+            servo=servo,
+            estimated=estimator.GetOutputPort("X_WP"),
+            name=prefix + "geometry_learner",
         ),
     )
 

@@ -14,6 +14,14 @@ from cdpr_drake.systems.diagrams.fusion_readings import fusion_ports
 from cdpr_drake.systems.diagrams.servo_blocks import VisualServoBlocks, seen_ports
 from cdpr_drake.systems.diagrams.servo_models import ServoModel
 from cdpr_drake.systems.diagrams.torque_control import tension_limits
+from cdpr_drake.systems.estimators.geometry_learner import (
+    ADAPTATION,
+    BELIEVED_POINTS,
+    DOUBTED,
+    LEARNT,
+    LEARNT_SIGMA,
+    OPEN_FRAMES,
+)
 from cdpr_drake.systems.estimators.wrench_estimator import WRENCH_ESTIMATED, WRENCH_SIGMA
 from cdpr_drake.systems.monitoring.log_row import RunLog, add_log
 from cdpr_drake.systems.monitoring.run_monitor import RunMonitor, StopRules
@@ -234,6 +242,9 @@ def add_servo_log(
     if blocks.wrench is not None:
         for name in (WRENCH_ESTIMATED, WRENCH_SIGMA):
             ports[name] = blocks.wrench.GetOutputPort(name)
+    if blocks.learner is not None:
+        for name in (LEARNT, LEARNT_SIGMA, BELIEVED_POINTS, ADAPTATION, DOUBTED, OPEN_FRAMES):
+            ports[name] = blocks.learner.GetOutputPort(name)
     if blocks.plan is not None:
         ports["X_WP_planned"] = servo.GetOutputPort("X_WP_planned")
     if scenario.pose_plan is not None:

@@ -61,6 +61,8 @@ def _no_loop_reason(scenario: Any) -> str:
         return "its failures are a block of a diagram"
     if scenario.wrench_estimation is not None:
         return "its estimate of wrenches is a block of a diagram"
+    if scenario.adaptation is not None:
+        return "what learns its points is a block of a diagram"
     if scenario.integration.engine == PLANT:
         return "its engine is the plant"
     if scenario.remote is not None:

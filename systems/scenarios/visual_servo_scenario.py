@@ -32,6 +32,7 @@ from cdpr_drake.systems.controllers.servo_settings import (
 from cdpr_drake.systems.controllers.tension_management_settings import TensionManagement
 from cdpr_drake.systems.controllers.torque_settings import TorqueControl
 from cdpr_drake.systems.estimators.estimator_kinds import EstimatorSettings
+from cdpr_drake.systems.estimators.geometry_learner import Adaptation
 from cdpr_drake.systems.estimators.wrench_estimator import WrenchEstimation
 from cdpr_drake.systems.monitoring.stability_watch import StabilitySettings
 from cdpr_drake.systems.remote.settings import RemoteSettings
@@ -75,6 +76,10 @@ class VisualServoSettings:
     )
     wrench_estimation: WrenchEstimation | None = optional_section(
         "An estimate of what pushes the platform, which is logged; null: none."
+    )
+    adaptation: Adaptation | None = optional_section(
+        "Exit and anchor points and lengths at the start, learnt while the servo runs; null: what "
+        "is believed at the start stays."
     )
     torque_control: TorqueControl | None = optional_section(
         "How winches are commanded by torque, with winches.mode torque; null: its defaults."
