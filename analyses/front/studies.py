@@ -32,6 +32,7 @@ from cdpr_drake.analyses.studies.catalogue import (
     STUDIES,
     StudyEntry,
     StudyResult,
+    entry_of,
     studies_that,
     write_study,
 )
@@ -45,6 +46,8 @@ from cdpr_drake.summaries import Summarized
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from cdpr_drake.analyses.studies.framework.study import Study
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -188,7 +191,7 @@ def studies() -> tuple[str, ...]:
 
 
 def run_study(
-    name: str,
+    name: str | Study,
     folder: Path | str | None = None,
     quick: bool = False,
     *,
@@ -203,7 +206,7 @@ def run_study(
     """Runs a study.
 
     Args:
-        name: A name of `studies()`.
+        name: A name of `studies()`, or a Study of your own.
         folder: Where results.json and figures are written; None: nowhere. Many studies continue
             there where they were stopped.
         quick: A short form, to see that it works.
@@ -222,7 +225,11 @@ def run_study(
             no folder of this study in this form.
     """
     earlier = None if runs_from is None else Path(runs_from)
-    entry, told = chosen_studies([name])[name], session or Session()
+    told = session or Session()
+    if isinstance(name, str):
+        entry = chosen_studies([name])[name]
+    else:
+        entry, name = entry_of(name), name.name
     count, scheduler = asked_workers(workers)
     if scheduler is not None:
         check_scheduler(scheduler)
@@ -233,7 +240,7 @@ def run_study(
         if folder is None:
             raise CdprError("runs_from: accepted with a folder")
         check_earlier(earlier, {"quick": quick} if recipe else {"study": name, "quick": quick})
-    entry = _by_recipe(name, recipe)
+    entry = _by_recipe(name, entry, recipe)
 
     def run(where: Path | None) -> StudyResult:
         with told.computing():
@@ -256,13 +263,12 @@ def run_study(
     return StudyRun(name, result, where, failed)
 
 
-def _by_recipe(name: str, recipe: str | None) -> StudyEntry:
+def _by_recipe(name: str, entry: StudyEntry, recipe: str | None) -> StudyEntry:
     """The study, or that of another recipe of it.
 
     Raises:
         CdprError: It has no recipes, or not this one.
     """
-    entry = STUDIES[name]
     if recipe is None:
         return entry
     if not entry.recipes:

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
     from cdpr_drake.analyses.reporting.progress import StudySession
     from cdpr_drake.analyses.studies.framework.case_definition import PublishedNumber
+    from cdpr_drake.analyses.studies.framework.study import Study as FramedStudy
 
 
 class StudyResult(Protocol):
@@ -154,11 +155,15 @@ STUDIES = Catalogue(MODULES)
 
 def _entry(name: str, place: str) -> StudyEntry:
     """The entry of a study of a module."""
-    from cdpr_drake.analyses.studies.framework.case_definition import Plan
-
     module = import_module(f"cdpr_drake.analyses.studies.{place}")
     found = [*getattr(module, "STUDIES", ()), getattr(module, "STUDY", None)]
-    study = next(one for one in found if one is not None and one.name == name)
+    return entry_of(next(one for one in found if one is not None and one.name == name))
+
+
+def entry_of(study: FramedStudy) -> StudyEntry:
+    """The entry of a study, also of one that is in no module of this room."""
+    from cdpr_drake.analyses.studies.framework.case_definition import Plan
+
     return StudyEntry(
         study,
         repeats=study.seeds is not None,

@@ -1,4 +1,4 @@
-"""`cdpr new`: a commented file to start from, or a block with its test."""
+"""`cdpr new`: a commented file to start from, or a block or study with its test."""
 
 from __future__ import annotations
 
@@ -17,14 +17,15 @@ from cdpr_drake.errors import CdprError
 from cdpr_drake.models.robot_loader import load_robot, robot_text
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.schema.templates import commented_yaml
+from cdpr_drake.schema.typed_yaml import closest
 from cdpr_drake.systems.diagrams.load import SCENARIO_SCHEMAS, load_scenario
 from cdpr_drake.systems.scenarios.files import resolve_robot_path, scenario_file, scenario_kind
 from cdpr_drake.systems.scenarios.visual_servo_scenario import DEFAULT_SCENARIO
 from cdpr_drake.systems.worlds.settings import found_file
 
 ROBOT, SCENARIO = "robot", "scenario"
-BLOCKS = ("controller", "estimator")
-"""Blocks of which there is a template, each with its test."""
+BLOCKS = ("controller", "estimator", "study")
+"""What there is a template of, each with its test."""
 
 KINDS = (ROBOT, SCENARIO, *BLOCKS)
 TEMPLATES = NOTEBOOKS / "templates"
@@ -51,18 +52,18 @@ def new(
     out: Annotated[Path, typer.Option(help="Folder of the file.")] = Path(),
     overwrite: Annotated[bool, typer.Option(help="Replace a file of that name.")] = False,
 ) -> None:
-    """Writes a robot, scenario, controller or estimator to start from.
+    """Writes a robot, scenario, controller, estimator or study to start from.
 
     Of a robot or a scenario every key is there with its meaning, unit and range; those with a
-    default are comments, and the file is checked. A controller or estimator is a program that
-    runs, and a test of it for pytest.
+    default are comments, and the file is checked. A controller, estimator or study is a program
+    that runs, and a test of it for pytest.
     """
     if not _NAME.fullmatch(name):
         raise CdprError(
             f"name: found {name}; accepted: 1 to 64 letters, digits, _ . -, the first one no ."
         )
     if kind not in KINDS:
-        raise CdprError(f"kind of file: found {kind}; accepted: {', '.join(KINDS)}")
+        raise CdprError(f"kind of file {kind!r} is unknown; {closest(kind, KINDS)}")
     if kind in BLOCKS:
         if source is not None:
             raise CdprError(f"--from: found {source} with {kind}; accepted with: robot, scenario")

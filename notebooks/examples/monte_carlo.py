@@ -6,7 +6,7 @@
 import cdpr_drake as cdpr
 
 if __name__ == "__main__":  # workers are new processes, which import this file
-    changes = ["camera.kind=projected", "duration=1", "perturbations.anchor_points=0.005"]
+    changes = ["camera.kind=projected", "perturbations.anchor_points=0.005"]
     found = cdpr.simulate("acrobot_pbvs", changes, "runs", seeds=range(4), workers=1)
     print(found)
     print(found.runs.table()["final_position_error_m"])

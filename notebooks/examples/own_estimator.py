@@ -25,7 +25,7 @@ class Homing(PoseEstimator):
 
 ESTIMATORS["homing"] = EstimatorKind("homing", lambda task: Homing(task.robot.X_WP0, task.rate))
 
-changes = ["camera.kind=projected", "duration=1", "estimator.compare=[homing]"]
+changes = ["camera.kind=projected", "estimator.compare=[homing]"]
 run = cdpr.simulate("acrobot_pbvs", changes)
 print(run)
 print([name for name in run.log if "homing" in name])

@@ -24,5 +24,5 @@ class Weighted(ObjectPoseFeatures):
 SCHEMES["weighted"] = lambda settings, target, X_CdO: Weighted(X_CdO)
 
 for scheme in ("pbvs", "weighted"):
-    changes = ["camera.kind=projected", "duration=1", f"controller.scheme={scheme}"]
+    changes = ["camera.kind=projected", f"controller.scheme={scheme}"]
     print(scheme, cdpr.simulate("acrobot_pbvs", changes).as_dict()["final_position_error_m"])

@@ -1,7 +1,8 @@
-"""`cdpr new controller` and `estimator`: what they write runs, and its own test passes."""
+"""`cdpr new controller`, `estimator`, `study`: what they write runs, and its own test passes."""
 
 import sys
 from importlib import import_module
+from inspect import signature
 
 import pytest
 
@@ -16,7 +17,7 @@ def new(capsys, *words):
     return ended.value.code, printed(capsys)
 
 
-@pytest.mark.parametrize("kind", ["controller", "estimator"])
+@pytest.mark.parametrize("kind", ["controller", "estimator", "study"])
 def test_a_new_block_passes_its_own_test(kind, tmp_path, capsys, monkeypatch):
     code, (out, _) = new(capsys, kind, "own_block", "--out", str(tmp_path))
     assert code == 0
@@ -32,7 +33,7 @@ def test_a_new_block_passes_its_own_test(kind, tmp_path, capsys, monkeypatch):
         checks = [tests[name] for name in tests if name.startswith("test_")]
         assert checks
         for check in checks:
-            check()
+            check(**dict.fromkeys(signature(check).parameters, tmp_path))
     finally:
         ESTIMATORS.clear()
         ESTIMATORS.update(before)
@@ -43,7 +44,10 @@ def test_a_new_block_passes_its_own_test(kind, tmp_path, capsys, monkeypatch):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["controler", "x"], "found controler; accepted: robot, scenario, controller, estimator"),
+        (
+            ["controler", "x"],
+            "'controler' is unknown; did you mean controller? known: robot, scenario",
+        ),
         (["controller", "My-Law"], "name: found My-Law; accepted: a module's"),
         (["estimator", "class"], "name: found class; accepted: a module's"),
         (["estimator", "x", "--from", "planar"], "--from: found planar with estimator"),
