@@ -9,7 +9,7 @@ import numpy as np
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.hanging_kernel import SENSITIVITIES
-from cdpr_drake.cables.models import CABLE_MODELS, check_model
+from cdpr_drake.cables.models import cable_law, check_model
 from cdpr_drake.cables.response_kernel import DERIVATIVES
 from cdpr_drake.cables.simulation_kernel import make_room
 from cdpr_drake.geometry.cable_set import CableSet
@@ -128,7 +128,7 @@ def pack_robot(
     Raises:
         CableModelError: The model cannot describe the cables in the joint's frame.
     """
-    m, law = cables.count, CABLE_MODELS[model].law
+    m, law = cables.count, cable_law(model, cables)
     joint = joint or PlatformJoint.of(platform.motion)
     cables = joint.turned(cables)
     if drive.kind != TENSIONS:

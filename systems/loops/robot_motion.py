@@ -6,7 +6,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables.models import CABLE_MODELS
+from cdpr_drake.cables.models import cable_law
 from cdpr_drake.cables.simulation_kernel import OUTPUTS, make_room, outputs_kernel
 from cdpr_drake.dynamics.advance_events_kernel import fresh_memory, robot_addresses
 from cdpr_drake.dynamics.advance_kernel import REPORTED
@@ -63,7 +63,7 @@ class RobotMotion:
             rigid_platform(robot), self._set, self._model, self._drive,
             home=self._home, joint=joint, damping=(damping.translation, damping.rotation),
         )  # fmt: skip
-        law = CABLE_MODELS[self._model].law
+        law = cable_law(self._model, self._set)
         self._room = make_room(self._set.count, law, joint.height)
         self._outputs = outputs_kernel(law)
         m = self._m = self._set.count

@@ -15,8 +15,9 @@ from pydrake.systems.scalar_conversion import TemplateSystem
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.broken_cables import break_cables
+from cdpr_drake.cables.cable_behaviour import behaviour_of
 from cdpr_drake.cables.dispatch_kernel import STRAIGHT
-from cdpr_drake.cables.models import CABLE_MODELS, KELVIN_VOIGT, check_model
+from cdpr_drake.cables.models import CABLE_MODELS, KELVIN_VOIGT, cable_law, check_model
 from cdpr_drake.cables.simulation_autodiff import (
     model_force_and_drums_array,
     model_force_array,
@@ -172,7 +173,7 @@ def CableForces_(T: Any) -> type[LeafSystem]:
             self._rows = self._whole.copy()
             m = cables.count
             kind = CABLE_MODELS[model]
-            self._law = kind.law
+            self._law = cable_law(model, cables)
             self._room = make_room(m, self._law, joint.height, place.start)
             self._work, self._outputs = np.zeros((OUTPUTS, m)), outputs_kernel(self._law)
             # Looked up once: these are called several thousand times per simulated second.
@@ -187,7 +188,8 @@ def CableForces_(T: Any) -> type[LeafSystem]:
             # Only damped cables ask for rates, lengths of straight ones only for the pose. What
             # needs less can be fed back without an algebraic loop.
             state, lengths, rates = (self.input_port_ticket(InputPortIndex(i)) for i in range(3))
-            self._damped = bool(np.any(cables.retardation > 0.0))
+            rubs = behaviour_of(cables).sheave_friction > 0.0
+            self._damped = rubs or bool(np.any(cables.retardation > 0.0))
             pull = {state, lengths, rates} if self._damped else {state, lengths}
             self._broken = None
             extra = set()

@@ -20,7 +20,7 @@ from pydrake.systems.framework import (
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.broken_cables import break_cables
 from cdpr_drake.cables.commanded_tension_kernel import cable_motions
-from cdpr_drake.cables.models import CABLE_MODELS
+from cdpr_drake.cables.models import cable_law
 from cdpr_drake.cables.simulation_kernel import OUTPUTS, make_room, outputs_kernel
 from cdpr_drake.dynamics.advance_events_kernel import BACKWARD, fresh_memory, robot_addresses
 from cdpr_drake.dynamics.advance_kernel import REPORTED, robot_energy
@@ -140,7 +140,7 @@ class CompiledMotion(LeafSystem):
         self._values, self._own = slice(k, 2 * k), slice(k, k + size)
         self._platform, self._told = slice(k, k + self._n), slice(2 * k - REPORTED, 2 * k)
         self._still, self._calm = np.zeros(m), np.zeros((2, m))
-        law = CABLE_MODELS[model].law
+        law = cable_law(model, cables)
         self._room, self._outputs = make_room(m, law, self._height), outputs_kernel(law)
         self._frame = frame
         self._declare_inputs()
