@@ -41,6 +41,20 @@ CREPT, STRAIN = range(2)
 """What stands where catenaries keep their solution: z, which is read, and e, which is written."""
 
 
+@njit(cache=True)
+def put_crept(crept: Array, guesses: Array) -> None:
+    """Puts z of all cables, shape (m,), where `behaving_motion` reads it, shape (m, 2)."""
+    for i in range(crept.shape[0]):
+        guesses[i, CREPT] = crept[i]
+
+
+@njit(cache=True)
+def creep_rates(guesses: Array, cables: Array, out: Array) -> None:
+    """Writes dz/dt of all cables, shape (m,) [1/s], from what `behaving_motion` left."""
+    for i in range(out.shape[0]):
+        out[i] = (guesses[i, STRAIN] - guesses[i, CREPT]) / cables[i, CREEP_TIME]
+
+
 @njit(cache=True, error_model="numpy", inline="always")
 def _stretched(strain: float, ES: float, g: float) -> Any:
     """Tension of the first term and its derivative by the strain [N], of a taut cable."""

@@ -31,8 +31,8 @@ from cdpr_drake.geometry.motion_kernel import Motion
 
 STRAIGHT, HANGING, BEHAVING = range(3)
 """Laws: a straight spring that only pulls, an elastic cable that sags under its own weight, and a
-straight one that does what `cable_behaviour` says. A cable without weight is straight by the second,
-too."""
+straight one that does what `cable_behaviour` says. A cable without weight is straight by the
+second, too."""
 
 SLACK_WEIGHTS = 1.0
 """A cable is slack whose tension at the platform is at most this many times its own weight.

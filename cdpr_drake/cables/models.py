@@ -8,6 +8,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.cables.cable_behaviour import behaviour_of
 from cdpr_drake.cables.dispatch_kernel import (
     BEHAVING,
     HANGING,
@@ -15,7 +16,6 @@ from cdpr_drake.cables.dispatch_kernel import (
     STRAIGHT,
     all_responses,
 )
-from cdpr_drake.cables.cable_behaviour import behaviour_of
 from cdpr_drake.cables.response_kernel import DERIVATIVES, damping_tension
 from cdpr_drake.errors import CableGeometryError, CableModelError
 from cdpr_drake.geometry.cable_paths import cable_paths, impossible_cable, motion_of

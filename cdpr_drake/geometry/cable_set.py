@@ -197,7 +197,8 @@ class CableSet:
         Columns: exit point (3), anchor point (3), E S [N], T [s], radius of the groove [m], weight
         per length [N/m], swivel axis (3), and of a pulley at the platform radius [m] and axis in P
         (3). Kernels of straight cables take the first eight, or
-        these rows, and see cables without pulleys. Behind them is `beyond`, k = 0 of elastic cables.
+        these rows, and see cables without pulleys. Behind them stands `beyond`, k = 0 of elastic
+        cables.
         """
         rows = np.empty((self.count, CABLE_SET_COLUMNS + len(self.beyond)))
         rows[:, 0:3], rows[:, 3:6] = self.p_WA.T, self.p_PB.T
