@@ -355,6 +355,24 @@ def check_breaking(cables: CableSet, tensions: Array, l0: Array) -> None:
         )
 
 
+def crept_at_rest(cables: CableSet, X_WP: RigidTransform, l0: Array) -> Array:
+    """What has crept of cables at rest for long: all of their strain, shape (m,) [-].
+
+    Args:
+        cables: The cables.
+        X_WP: Pose of the platform.
+        l0: Unstrained lengths, shape (m,) [m].
+
+    Returns:
+        Empty where cables do not creep.
+    """
+    behaviour = behaviour_of(cables)
+    if behaviour.creep_stiffness == 0.0:
+        return np.zeros(0)
+    lengths = cable_paths(X_WP, cables).lengths
+    return np.asarray(np.maximum(lengths / (behaviour.longer() * l0) - 1.0, 0.0), float)
+
+
 def check_lengths(l0: Array, cables: CableSet) -> Array:
     """Unstrained lengths as a contiguous array, shape (m,) [m].
 

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.cable_behaviour import behaviour_of
@@ -14,7 +13,6 @@ from cdpr_drake.cables.hanging_kernel import SENSITIVITIES
 from cdpr_drake.cables.models import cable_law, check_model
 from cdpr_drake.cables.response_kernel import DERIVATIVES
 from cdpr_drake.cables.simulation_kernel import make_room
-from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.geometry.platform_joint import PlatformJoint
 from cdpr_drake.statics.rigid_platform import RigidPlatform
@@ -176,24 +174,6 @@ def pack_robot(
         matrices=np.zeros((4, k, k)),
         vectors=np.zeros((10, max(k, m))),
     )
-
-
-def crept_at_rest(cables: CableSet, X_WP: RigidTransform, l0: Array) -> Array:
-    """What has crept of cables at rest for long: all of their strain, shape (m,) [-].
-
-    Args:
-        cables: The cables.
-        X_WP: Pose of the platform.
-        l0: Unstrained lengths, shape (m,) [m].
-
-    Returns:
-        Empty where cables do not creep.
-    """
-    behaviour = behaviour_of(cables)
-    if behaviour.creep_stiffness == 0.0:
-        return np.zeros(0)
-    lengths = cable_paths(X_WP, cables).lengths
-    return np.asarray(np.maximum(lengths / (behaviour.longer() * l0) - 1.0, 0.0), float)
 
 
 def apply_wrench(arrays: RobotArrays, joint: PlatformJoint, wrench: Array | None) -> None:

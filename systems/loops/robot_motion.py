@@ -7,11 +7,11 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.behaving_kernel import put_crept
-from cdpr_drake.cables.models import cable_law
+from cdpr_drake.cables.models import cable_law, crept_at_rest
 from cdpr_drake.cables.simulation_kernel import OUTPUTS, guesses_of, make_room, outputs_kernel
 from cdpr_drake.dynamics.advance_events_kernel import fresh_memory, robot_addresses
 from cdpr_drake.dynamics.advance_kernel import REPORTED
-from cdpr_drake.dynamics.robot_arrays import CREEPING, MOTORS, crept_at_rest, pack_robot
+from cdpr_drake.dynamics.robot_arrays import CREEPING, MOTORS, pack_robot
 from cdpr_drake.dynamics.robot_kernel import INTEGRATION_OK, ideal_rates
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.models.robot_in_plant import pose_on_joint
