@@ -93,7 +93,14 @@ def model_force_array(
 
 
 def model_outputs_array(
-    state: Any, l0: Any, l0_dot: Any, cables: Array, law: int, height: float, crept: Any = None
+    state: Any,
+    l0: Any,
+    l0_dot: Any,
+    cables: Array,
+    law: int,
+    height: float,
+    *,
+    crept: Any = None,
 ) -> tuple[Any, int]:
     """`simulation_kernel.model_outputs` for arrays of any scalar: shape (6, m), dtype object."""
     out = np.zeros((OUTPUTS, len(l0)), dtype=object)
@@ -104,7 +111,7 @@ def model_outputs_array(
 
 
 def creep_rates_array(
-    state: Any, l0: Any, l0_dot: Any, cables: Array, law: int, height: float, crept: Any
+    state: Any, l0: Any, l0_dot: Any, cables: Array, law: int, height: float, *, crept: Any
 ) -> Any:
     """`behaving_kernel.creep_rates` for arrays of any scalar, shape (m,), dtype object."""
     out, rates = np.zeros((OUTPUTS, len(l0)), dtype=object), np.zeros(len(l0), dtype=object)

@@ -259,7 +259,7 @@ def _winch(draft: RobotDraft, assumed: dict[str, str]) -> dict[str, Any]:
         _assume(
             assumed, "winch.motor_speed_rpm", float(rpm), f"for the {whose} {speed:g} m/s of cable"
         )
-    winch = {
+    winch: dict[str, Any] = {
         "drum_radius": _float(radius), "gear_ratio": _float(gear), "motor_speed_rpm": _float(rpm)
     }  # fmt: skip
     if draft.layers is not None:

@@ -271,7 +271,7 @@ def CableForces_(T: Any) -> type[LeafSystem]:
                     raise self._problem(context, state)
                 creep_rates(guesses_of(self._room, len(z)), inputs[3], rates)
             else:
-                rates = creep_rates_array(*inputs, self._law, self._place.joint.height, z)
+                rates = creep_rates_array(*inputs, self._law, self._place.joint.height, crept=z)
             derivatives.get_mutable_vector().SetFromVector(rates)
 
         def _cables_now(self, context: Context) -> Array:
@@ -382,7 +382,7 @@ def CableForces_(T: Any) -> type[LeafSystem]:
                 crept = self._crept(context)
                 if T is not float:
                     height = self._place.joint.height
-                    table, bad = model_outputs_array(*inputs, self._law, height, crept)
+                    table, bad = model_outputs_array(*inputs, self._law, height, crept=crept)
                     output.SetFromVector(with_derivatives(table[row]))
                     return
                 bad = self._outputs(*inputs, self._room, self._work)
