@@ -30,12 +30,22 @@ class BehaviourSettings:
         "Friction of cables in the grooves of their pulleys, tension times exp(mu angle).", "-",
         0.0, at_least=0.0, at_most=2.0,
     )  # fmt: skip
+    sliding_speed: float = number(
+        "Speed at which a cable in motion slides in its groove: friction grows as tanh of the "
+        "speed over this one.", "m/s", 1e-3, at_least=1e-6, at_most=1.0,
+    )  # fmt: skip
+    creep_stiffness: float = number(
+        "Of the part that creeps away under load, over E S; only cables in motion show it.", "-",
+        0.0, at_least=0.0, at_most=10.0,
+    )  # fmt: skip
+    creep_time: float = number("In which it creeps away.", "s", 1.0, at_least=1e-3, at_most=1e7)
 
     def behaviour(self) -> CableBehaviour:
         """These numbers as the laws take them."""
         return CableBehaviour(
             stiffening=self.stiffening, expansion=self.expansion, warmer=self.warmer,
-            sheave_friction=self.sheave_friction,
+            sheave_friction=self.sheave_friction, sliding_speed=self.sliding_speed,
+            creep_stiffness=self.creep_stiffness, creep_time=self.creep_time,
         )  # fmt: skip
 
 
@@ -56,7 +66,7 @@ class CableMaterial:
         "Tension at which a cable breaks; null where unpublished.", "N", None, above=0.0
     )
     behaviour: BehaviourSettings | None = optional_section(
-        "Stiffening, heat and friction of sheaves, for robots at rest; null: none."
+        "Stiffening, heat, creep and friction of sheaves, for straight cables; null: none."
     )
 
 

@@ -125,7 +125,8 @@ def draft_robot(robot: Robot) -> RobotDraft:
                 name=cable.name, exit_point=cables.p_WA[:, k], anchor_point=cables.p_PB[:, k],
                 lower=lower, upper=upper, pulley_radius=float(cables.pulley_radius[k]),
                 swivel_axis=cables.swivel_axis[:, k],
-                material=given_material(cable.material),
+                material=given_material(cable.material), drum_radius=cable.drum_radius,
+                mechanical_advantage=cable.mechanical_advantage,
             )
             for k, cable in enumerate(robot.cables)
         ],
@@ -138,6 +139,7 @@ def draft_robot(robot: Robot) -> RobotDraft:
         diameter=robot.cable.diameter, youngs_modulus=robot.cable.youngs_modulus,
         linear_density=robot.cable.linear_density, breaking_load=robot.cable.breaking_load,
         drum_radius=robot.winch.drum_radius, gear_ratio=robot.winch.gear_ratio,
+        layers=_layers(robot),
         motor_speed_rpm=robot.winch.motor_speed_rpm,
         cable_speed=robot.winch.rated_cable_speed(), motor_inertia=robot.winch.inertia,
         gravity=robot.gravity,
@@ -145,6 +147,14 @@ def draft_robot(robot: Robot) -> RobotDraft:
         if robot.down() == (0.0, 0.0, -1.0)
         else np.asarray(robot.gravity_direction, float),
     )  # fmt: skip
+
+
+def _layers(robot: Robot) -> dict[str, float] | None:
+    layers = robot.winch.layers
+    if layers is None:
+        return None
+    height = robot.cable.diameter if layers.height is None else layers.height
+    return {"turns": layers.turns, "height": height, "wound": layers.wound}
 
 
 def export_robot(robot: Robot | str | Path, format: str) -> dict[str, str]:

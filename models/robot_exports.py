@@ -73,7 +73,8 @@ HELD: dict[str, set[str]] = {
     "gazebo-yaml": _COMMON | _CENTER | _BOX | _HOME | _FRAME | _LIMITS | {"cable.diameter"},
     "klipper": _ANCHORS | {"winch.drum_radius", "winch.gear_ratio"},
     "reprapfirmware": _ANCHORS | _LIMITS | {"platform.mass", "winch.drum_radius",
-                                            "winch.gear_ratio"},
+                                            "winch.gear_ratio", "cables[].drum_radius",
+                                            "cables[].mechanical_advantage"},
     "maslow": _ANCHORS | {"axis"},
 }  # fmt: skip
 """Keys of the schema that each format of `EXPORTS` holds, as its reader gets them back."""
@@ -340,9 +341,19 @@ def _axes_without_pulleys(robot: Robot, format: str) -> dict[str, str]:
 
 
 def _gear(robot: Robot, format: str) -> dict[str, str]:
-    if format != "reprapfirmware" or reprapfirmware.holds_gear(robot.winch.gear_ratio):
+    if format != "reprapfirmware":
         return {}
-    return {"winch.gear_ratio": "gears have whole teeth there"}
+    lost = {}
+    if not reprapfirmware.holds_gear(robot.winch.gear_ratio):
+        lost["winch.gear_ratio"] = "gears have whole teeth there"
+    if any(not float(cable.mechanical_advantage).is_integer() for cable in robot.cables):
+        lost["cables[].mechanical_advantage"] = "lines are counted in whole numbers there"
+    if robot.winch.layers is not None or np.any(robot.diameters() != reprapfirmware.DIAMETER):
+        why = "the radius of the line at the origin is written, and is read back so"
+        lost["winch.drum_radius"] = why
+        if any(cable.drum_radius is not None for cable in robot.cables):
+            lost["cables[].drum_radius"] = why
+    return lost
 
 
 def _inertia(robot: Robot, format: str) -> dict[str, str]:

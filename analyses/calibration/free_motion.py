@@ -38,6 +38,7 @@ from cdpr_drake.analyses.calibration.free_motion_sensor import (
     sensed,
     unsensed,
 )
+from cdpr_drake.analyses.calibration.free_motion_start import MOVED, StartCoordinates
 from cdpr_drake.analyses.calibration.log_file import CalibrationLog
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import EquilibriumError, IdentificationError
@@ -49,11 +50,9 @@ HORIZONS = ((0.6, 12), (1.5, 12), (1e9, 40))
 """So much of each stretch is fitted, with so many steps at most: first what belongs to sensors and
 to the beginning, then all."""
 
-MOVED = np.array([0.5] * 3 + [0.3] * 3 + [5.0] * 3 + [2.0] * 3)
-"""How far a state may usually be from rest: turn [rad], translation [m], their rates."""
-
 SMALL = 1e-5
-"""Differences of the search, in sizes of unknowns: off by 1e-5 of a slope, and rounding below."""
+"""Differences to either side, in sizes of unknowns: slopes are right to some 1e-6. To one side they
+are off by 1e-4, and what singular values 4e4 apart tell of the mass was lost in that."""
 
 INSIDE = 0.03
 """So far from its bounds an unknown starts, in sizes: at a bound the search takes small steps."""
@@ -348,9 +347,12 @@ class _Search:
         out[:, 6:] = np.where(np.isfinite(off), off, 0.0)
         return np.clip(out, -LOST, LOST)
 
-    def part(self, z: Array, y: Array, stretch: Stretch) -> Array:
-        """All residuals that a stretch's first state y (in sizes) belongs to."""
-        return np.concatenate([self.measured(z, MOVED * y, stretch).ravel(), y])
+    def part(self, z: Array, y: Array, at: StartCoordinates, stretch: Stretch) -> Array:
+        """All residuals that a stretch's first state, of coordinates y, belongs to."""
+        moved = at.moved(self.vector(z), y)
+        if not np.isfinite(moved).all():
+            return np.full(stretch.count * (6 + len(self.model.robot.cables)) + START, LOST)
+        return np.concatenate([self.measured(z, moved, stretch).ravel(), moved / MOVED])
 
     def solve(self, z: Array, moved: list[Array], most: int) -> tuple[Array, list[Array], Any]:
         """Least squares from here; the unknowns, first states, and scipy's result."""
@@ -363,29 +365,30 @@ class _Search:
 
         def residuals(x: Array) -> Array:
             z, states = parts(x)
-            each = zip(states, self.stretches, strict=True)
-            return np.concatenate([self.part(z, y, s) for y, s in each] + [x[: len(f)]])
+            each = zip(states, starts, self.stretches, strict=True)
+            return np.concatenate([self.part(z, y, at, s) for y, at, s in each] + [x[: len(f)]])
 
         def jacobian(x: Array) -> Array:
             z, states = parts(x)
             rows = []
-            for j, (y, s) in enumerate(zip(states, self.stretches, strict=True)):
-                now = self.part(z, y, s)
-                J = np.zeros((len(now), len(x)))
+            each = zip(states, starts, self.stretches, strict=True)
+            for j, (y, at, s) in enumerate(each):
+                J = np.zeros((s.count * (6 + len(self.model.robot.cables)) + START, len(x)))
                 for k in range(len(f)):
-                    moved_z = z.copy()
-                    moved_z[f[k]] += SMALL
-                    J[:, k] = (self.part(moved_z, y, s) - now) / SMALL
+                    by = SMALL * np.eye(len(z))[f[k]]
+                    ahead, back = (self.part(z + side * by, y, at, s) for side in (1.0, -1.0))
+                    J[:, k] = (ahead - back) / (2.0 * SMALL)
                 for k in range(START):
-                    moved_y = y.copy()
-                    moved_y[k] += SMALL
-                    column = len(f) + START * j + k
-                    J[:, column] = (self.part(z, moved_y, s) - now) / SMALL
+                    by = SMALL * np.eye(START)[k]
+                    ahead, back = (self.part(z, y + side * by, at, s) for side in (1.0, -1.0))
+                    J[:, len(f) + START * j + k] = (ahead - back) / (2.0 * SMALL)
                 rows.append(J)
             rows.append(np.eye(len(f), len(x)))
             return np.vstack(rows)
 
-        x = np.concatenate([z[f], *(m / MOVED for m in moved)])
+        starts = [StartCoordinates.about(self.model, each) for each in moved]
+        first = [at.of(self.vector(z), m) for at, m in zip(starts, moved, strict=True)]
+        x = np.concatenate([z[f], *first])
         least, largest = np.full(len(x), -np.inf), np.full(len(x), np.inf)
         for k, one in enumerate(np.array(self.model.unknowns, object)[f]):
             least[k] = (one.least - one.before) / one.size
@@ -397,7 +400,8 @@ class _Search:
             x_scale="jac", max_nfev=most, ftol=CLOSE, xtol=1e-9,
         )  # fmt: skip
         z, states = parts(found.x)
-        return z, [MOVED * y for y in states], found
+        vector = self.vector(z)
+        return z, [at.moved(vector, y) for at, y in zip(starts, states, strict=True)], found
 
     def spread(self, z: Array, moved: Sequence[Array]) -> tuple[float, float]:
         """Root mean square of residuals [sigma], and over how many instants they go together."""

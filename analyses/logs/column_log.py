@@ -81,7 +81,12 @@ def read_columns(path: Path, asked: LogRequest) -> RecordedLog:
         LogFileError: It has no headers and no mapping says what its columns are, no column is
             known, two say the same, or a cell is no number; names line and column.
     """
-    text, mapping = log_text(path), asked.mapping
+    return columns_of_text(path, log_text(path), asked)
+
+
+def columns_of_text(path: Path, text: str, asked: LogRequest) -> RecordedLog:
+    """As `read_columns`, of the text of a file."""
+    mapping = asked.mapping
     skip = 0 if mapping is None else mapping.skip_rows
     table = cell_table(path, text, "" if mapping is None else mapping.separator or "", skip)
     headed = any(parsed(cell, table.decimal) is None for cell in table.rows[0])

@@ -13,6 +13,7 @@ from cdpr_drake.analyses.logs.gtgraffiti_log import knows_gtgraffiti, read_gtgra
 from cdpr_drake.analyses.logs.hangprinter_log import knows_hangprinter, read_hangprinter
 from cdpr_drake.analyses.logs.log_request import LogRequest
 from cdpr_drake.analyses.logs.mat_log import knows_mat, read_mat
+from cdpr_drake.analyses.logs.mcap_log import knows_mcap, read_mcap
 from cdpr_drake.analyses.logs.motive import knows_motive, read_motive
 from cdpr_drake.analyses.logs.recorded_log import RecordedLog
 from cdpr_drake.errors import LogFileError
@@ -53,6 +54,9 @@ LOG_READERS = {
     "csv": LogReader("text with columns, with headers or a mapping", read_columns, knows_columns),
     "mat": LogReader(
         "GRAB's parsed .mat, or any with a mapping", read_mat, of_bytes=knows_mat
+    ),
+    "mcap": LogReader(
+        "MCAP with messages in JSON, as runs leave it", read_mcap, of_bytes=knows_mcap
     ),
 }  # fmt: skip
 """Readers by the name of `--log-format`."""

@@ -1,4 +1,4 @@
-"""Logs and tables in the formats of other programs: MATLAB's, and Parquet."""
+"""Logs and tables in the formats of other programs: MATLAB's, Parquet, and MCAP."""
 
 from __future__ import annotations
 
@@ -73,9 +73,23 @@ def _log_to_parquet(folder: Path, path: Path) -> None:
     _save_parquet(path, columns)
 
 
+def _log_to_mcap(folder: Path, path: Path) -> None:
+    """A channel for each quantity, and one of the platform's transforms."""
+    from cdpr_drake.analyses.reporting.mcap_log import write_mcap
+
+    log, names = _read_log(folder)
+    quantities = {
+        quantity: (names[quantity], values.reshape(len(values), -1).astype(float))
+        for quantity, values in log.items()
+        if quantity != "time"
+    }
+    write_mcap(path, log["time"], quantities, log.get("X_WP"))
+
+
 LOG_WRITERS: dict[str, Callable[[Path, Path], None]] = {
     "mat": _log_to_mat,
     "parquet": _log_to_parquet,
+    "mcap": _log_to_mcap,
 }
 """By format: what writes the log of a folder to a path."""
 
@@ -159,8 +173,13 @@ _TABLE_WRITERS: dict[str, Callable[[Path, Columns], None]] = {
 
 
 def _check_installed(name: str, where: str) -> None:
-    if name == "parquet" and find_spec("pyarrow") is None:
+    package = _NEEDED.get(name)
+    if package is not None and find_spec(package) is None:
         raise OutputFormatError(
-            f"{where}: parquet needs pyarrow, which is not installed; "
-            "pip install 'cdpr_drake[parquet]'"
+            f"{where}: {name} needs {package}, which is not installed; "
+            f"pip install 'cdpr_drake[{name}]'"
         )
+
+
+_NEEDED = {"parquet": "pyarrow", "mcap": "mcap"}
+"""Packages that formats need beside what is always installed."""

@@ -40,6 +40,7 @@ class CableBehaviour:
         sheave_friction: mu, of cables in the grooves of their pulleys [-].
         creep_stiffness: E1 over E, of the spring that creeps away [-].
         creep_time: tau, in which it does [s].
+        sliding_speed: v, at which friction in a groove is tanh(1) of all it can be [m/s].
     """
 
     stiffening: float = 0.0
@@ -48,14 +49,57 @@ class CableBehaviour:
     sheave_friction: float = 0.0
     creep_stiffness: float = 0.0
     creep_time: float = 1.0
+    sliding_speed: float = 1e-3
 
     def changes_lengths(self) -> bool:
         """Whether lengths under tension differ from those of the elastic law."""
         return self.stiffening != 0.0 or self.expansion * self.warmer != 0.0
 
+    def is_there(self) -> bool:
+        """Whether the cables do anything beside the elastic law."""
+        return self.changes_lengths() or self.sheave_friction != 0.0 or self.creep_stiffness != 0.0
+
     def longer(self) -> float:
         """By which factor heat makes unstrained lengths longer."""
         return 1.0 + self.expansion * self.warmer
+
+
+def behaving_cables(cables: CableSet, behaviour: CableBehaviour) -> CableSet:
+    """The cables with what they do beside the elastic law, as engines take them.
+
+    Args:
+        cables: The cables.
+        behaviour: What they do; where it is nothing, the same cables come back.
+
+    Raises:
+        CableModelError: A time or speed is not above 0, or a number is below 0.
+    """
+    if not behaviour.is_there():
+        return cables
+    for name in ("stiffening", "sheave_friction", "creep_stiffness"):
+        value = getattr(behaviour, name)
+        if not value >= 0.0:
+            raise CableModelError(f"{name}: found {value:g}; accepted: >= 0")
+    for name, unit in (("creep_time", "s"), ("sliding_speed", "m/s")):
+        value = getattr(behaviour, name)
+        if not value > 0.0:
+            raise CableModelError(f"{name}: found {value:g}; accepted: > 0 [{unit}]")
+    beyond = [
+        behaviour.stiffening, behaviour.longer(), behaviour.sheave_friction,
+        behaviour.sliding_speed, behaviour.creep_stiffness, behaviour.creep_time,
+    ]  # fmt: skip
+    return replace(cables, beyond=np.array(beyond))
+
+
+def behaviour_of(cables: CableSet) -> CableBehaviour:
+    """What cables do beside the elastic law, as `behaving_cables` left it with them."""
+    if not cables.beyond.size:
+        return CableBehaviour()
+    g, longer, friction, speed, creep, time = cables.beyond.tolist()
+    return CableBehaviour(
+        stiffening=g, expansion=longer - 1.0, warmer=1.0, sheave_friction=friction,
+        sliding_speed=speed, creep_stiffness=creep, creep_time=time,
+    )  # fmt: skip
 
 
 def strain_of_tension(tensions: Array, stiffness: Array, stiffening: float = 0.0) -> Array:

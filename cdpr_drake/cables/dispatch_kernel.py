@@ -14,6 +14,11 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.cables.behaving_kernel import (
+    behaving_energy,
+    behaving_motion,
+    behaving_response,
+)
 from cdpr_drake.cables.elastic_law import sagging_energy, straight_energy
 from cdpr_drake.cables.hanging_kernel import SENSITIVITIES
 from cdpr_drake.cables.response_kernel import (
@@ -24,9 +29,10 @@ from cdpr_drake.cables.response_kernel import (
 )
 from cdpr_drake.geometry.motion_kernel import Motion
 
-STRAIGHT, HANGING = range(2)
-"""Laws: a straight spring that only pulls, an elastic cable that sags under its own weight. A
-cable without weight is straight by the second, too."""
+STRAIGHT, HANGING, BEHAVING = range(3)
+"""Laws: a straight spring that only pulls, an elastic cable that sags under its own weight, and a
+straight one that does what `cable_behaviour` says. A cable without weight is straight by the
+second, too."""
 
 SLACK_WEIGHTS = 1.0
 """A cable is slack whose tension at the platform is at most this many times its own weight.
@@ -42,9 +48,9 @@ def cable_response(
     """One cable at rest, and how its response changes with the anchor point and l0.
 
     Args:
-        law: `STRAIGHT` or `HANGING`.
+        law: `STRAIGHT`, `HANGING` or `BEHAVING`.
         X: Pose of the platform, see `pulley_kernel.pulley_plane`.
-        cable: One row of `CableSet.packed()`, shape (17,).
+        cable: One row of `CableSet.packed()`, shape (17,), by `BEHAVING` (23,).
         l0: Unstrained length [m].
         guess: (H, V_A) of a sagging cable to begin with, H = 0: none; the solution is written
             here, shape (2,) [N].
@@ -59,6 +65,8 @@ def cable_response(
     """
     if law == HANGING and cable[9] > 0.0:
         return sagging_response(X[:12], cable, l0, guess, inner, out)
+    if law == BEHAVING:
+        return behaving_response(X[:12], cable, l0, out)
     return straight_response(X[:12], cable, l0, out)
 
 
@@ -69,7 +77,7 @@ def all_responses(
     """All cables: writes `cable_response`'s first eleven results and derivatives.
 
     Args:
-        law: `STRAIGHT` or `HANGING`.
+        law: `STRAIGHT`, `HANGING` or `BEHAVING`.
         X: Pose of the platform.
         cables: `CableSet.packed()`, shape (m, 17).
         l0: Unstrained lengths, shape (m,) [m].
@@ -101,12 +109,13 @@ def cable_motion(
     """One cable in motion: `cable_response` with damping.
 
     Args:
-        law: `STRAIGHT` or `HANGING`.
+        law: `STRAIGHT`, `HANGING` or `BEHAVING`.
         X: Motion of the platform, 18 numbers.
-        cable: One row of `CableSet.packed()`, shape (17,).
+        cable: One row of `CableSet.packed()`, shape (17,), by `BEHAVING` (23,).
         l0: Unstrained length [m].
         l0_dot: Its rate [m/s].
-        guess: As in `cable_response`.
+        guess: As in `cable_response`; by `BEHAVING` what has crept, and the strain, see
+            `behaving_kernel.CREPT`.
         inner: As in `cable_response`.
         D: Room for derivatives, shape (8, 4); written for a catenary only.
 
@@ -115,6 +124,8 @@ def cable_motion(
     """
     if law == HANGING and cable[9] > 0.0:
         return sagging_motion(X, cable, l0, l0_dot, guess, inner, D)
+    if law == BEHAVING:
+        return behaving_motion(X, cable, l0, l0_dot, guess)
     return straight_motion(X, cable, l0, l0_dot)
 
 
@@ -123,14 +134,16 @@ def cable_energy(law: int, X: Motion, cable: Array, l0: float, solved: Array) ->
     """Potential energy of one cable, its weight's from the height of A on [J].
 
     Args:
-        law: `STRAIGHT` or `HANGING`.
+        law: `STRAIGHT`, `HANGING` or `BEHAVING`.
         X: Pose of the platform, see `pulley_kernel.pulley_plane`.
-        cable: One row of `CableSet.packed()`, shape (17,).
+        cable: One row of `CableSet.packed()`, shape (17,), by `BEHAVING` (23,).
         l0: Unstrained length [m].
         solved: (H, V_A) of a sagging cable as `cable_response` leaves them, shape (2,) [N].
     """
     if law == HANGING and cable[9] > 0.0:
         return sagging_energy(X[:12], cable, l0, solved)
+    if law == BEHAVING:
+        return behaving_energy(X[:12], cable, l0)
     return straight_energy(X[:12], cable, l0)
 
 
@@ -139,7 +152,7 @@ def slack_tension(law: int, weight: float, l0: float) -> float:
     """Tension at the platform up to which a cable is slack [N]; 0 where weight does not count.
 
     Args:
-        law: `STRAIGHT` or `HANGING`.
+        law: `STRAIGHT`, `HANGING` or `BEHAVING`.
         weight: Weight per length [N/m].
         l0: Unstrained length [m].
     """

@@ -8,7 +8,14 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables.dispatch_kernel import HANGING, SLACK_WEIGHTS, STRAIGHT, all_responses
+from cdpr_drake.cables.cable_behaviour import behaviour_of
+from cdpr_drake.cables.dispatch_kernel import (
+    BEHAVING,
+    HANGING,
+    SLACK_WEIGHTS,
+    STRAIGHT,
+    all_responses,
+)
 from cdpr_drake.cables.response_kernel import DERIVATIVES, damping_tension
 from cdpr_drake.errors import CableGeometryError, CableModelError
 from cdpr_drake.geometry.cable_paths import cable_paths, impossible_cable, motion_of
@@ -56,6 +63,12 @@ CABLE_MODELS: dict[str, CableModel] = {
 }  # fmt: skip
 """The models by name. Each may run over pulleys: that is a matter of the set's `pulley_radius`. A
 further one is a row, and for a law of its own also what `dispatch_kernel` lists."""
+
+
+def cable_law(model: str, cables: CableSet) -> int:
+    """Number of the law that kernels compute cables of a model by, see `dispatch_kernel`."""
+    return BEHAVING if cables.beyond.size else CABLE_MODELS[model].law
+
 
 TOO_SHORT = 1e-9
 """By how much an inextensible cable may miss its path [m]; rounding of lengths below 1 km."""
@@ -122,12 +135,15 @@ def check_model(model: str, cables: CableSet) -> None:
 
     Raises:
         CableModelError: It is not, or a sagging cable has a swivel axis that is not vertical, or
-            hangs in a frame where gravity does not point along -z.
+            hangs in a frame where gravity does not point along -z, or cables do what this model
+            does not, see `CableSet.beyond`.
     """
     if model not in CABLE_MODELS:
         raise CableModelError(
             f"cable model: found {model!r}; accepted: one of {', '.join(CABLE_MODELS)}"
         )
+    if cables.beyond.size:
+        _check_beyond(model, cables)
     if CABLE_MODELS[model].sags:
         if cables.has_platform_pulleys():
             i = int(np.argmax(cables.anchor_pulley_radius > 0.0))
@@ -151,6 +167,21 @@ def check_model(model: str, cables: CableSet) -> None:
             )
 
 
+def _check_beyond(model: str, cables: CableSet) -> None:
+    kind = CABLE_MODELS[model]
+    if kind.sags or not kind.extensible:
+        raise CableModelError(
+            f"cable model: found {model} for cables with a behaviour beside the elastic law, see "
+            "cable.behaviour; accepted: elastic, kelvin_voigt"
+        )
+    friction = behaviour_of(cables).sheave_friction
+    if friction > 0.0 and cables.has_platform_pulleys():
+        raise CableModelError(
+            f"cable.behaviour.sheave_friction: found {friction:g} with pulleys at the platform; "
+            "accepted: 0, or pulleys at the exit points only"
+        )
+
+
 def check_routes(model: str, routes: CableRoutes) -> None:
     """Checks that a model is known and can describe cables between bodies.
 
@@ -159,6 +190,11 @@ def check_routes(model: str, routes: CableRoutes) -> None:
             moving body over a pulley.
     """
     check_model(model, routes.ends)
+    if routes.ends.beyond.size:
+        raise CableModelError(
+            "cable.behaviour: found cables between bodies that stiffen, are warm, creep or rub; "
+            "accepted there: elastic and damped ones"
+        )
     if not CABLE_MODELS[model].sags:
         return
     for i, name in enumerate(routes.names):
@@ -319,6 +355,24 @@ def check_breaking(cables: CableSet, tensions: Array, l0: Array) -> None:
         )
 
 
+def crept_at_rest(cables: CableSet, X_WP: RigidTransform, l0: Array) -> Array:
+    """What has crept of cables at rest for long: all of their strain, shape (m,) [-].
+
+    Args:
+        cables: The cables.
+        X_WP: Pose of the platform.
+        l0: Unstrained lengths, shape (m,) [m].
+
+    Returns:
+        Empty where cables do not creep.
+    """
+    behaviour = behaviour_of(cables)
+    if behaviour.creep_stiffness == 0.0:
+        return np.zeros(0)
+    lengths = cable_paths(X_WP, cables).lengths
+    return np.asarray(np.maximum(lengths / (behaviour.longer() * l0) - 1.0, 0.0), float)
+
+
 def check_lengths(l0: Array, cables: CableSet) -> Array:
     """Unstrained lengths as a contiguous array, shape (m,) [m].
 
@@ -340,7 +394,7 @@ def _responses(
     values, m = check_lengths(l0, cables), cables.count
     states, D = np.empty((m, 11)), np.zeros((m, DERIVATIVES, 4))
     good = all_responses(
-        CABLE_MODELS[model].law,
+        cable_law(model, cables),
         motion_of(X_WP),
         cables.packed(),
         values,

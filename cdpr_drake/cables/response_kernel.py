@@ -28,8 +28,9 @@ DERIVATIVES = 8
 """Rows of a cable's derivatives by (p_WB, l0): pull (3), tension at the platform, tension at the
 exit point, length, surplus over the straight path, sag."""
 
-_RESPONSE = types.Tuple((*[types.float64] * 11, types.boolean))
-_POSE, _MOTION = (types.UniTuple(types.float64, count) for count in (12, 18))
+RESPONSE = types.Tuple((*[types.float64] * 11, types.boolean))
+POSE, MOTION = (types.UniTuple(types.float64, count) for count in (12, 18))
+"""Types of what kernels of a cable give, and of the pose or motion that they take."""
 
 
 @njit(cache=True, error_model="numpy")
@@ -61,7 +62,7 @@ def straight_response(X: Motion, cable: Array, l0: float, out: Array) -> Any:
     )  # fmt: skip
 
 
-@shared(_RESPONSE(_POSE, VECTOR, types.float64, VECTOR, MATRIX, MATRIX))
+@shared(RESPONSE(POSE, VECTOR, types.float64, VECTOR, MATRIX, MATRIX))
 @njit(cache=True, error_model="numpy")
 def sagging_response(
     X: Motion, cable: Array, l0: float, guess: Array, inner: Array, out: Array
@@ -143,7 +144,7 @@ def damping_tension(
     return T * (stiffness * v + D[3, 3] * l0_dot)
 
 
-@shared(_RESPONSE(_MOTION, VECTOR, types.float64, types.float64, VECTOR, MATRIX, MATRIX))
+@shared(RESPONSE(MOTION, VECTOR, types.float64, types.float64, VECTOR, MATRIX, MATRIX))
 @njit(cache=True, error_model="numpy")
 def sagging_motion(
     X: Motion, cable: Array, l0: float, l0_dot: float, guess: Array, inner: Array, D: Array

@@ -9,10 +9,11 @@ from pydrake.autodiffutils import AutoDiffXd
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables import route_kernel, simulation_kernel
+from cdpr_drake.cables.behaving_kernel import creep_rates, put_crept
 from cdpr_drake.cables.dispatch_kernel import HANGING, STRAIGHT
 from cdpr_drake.cables.hanging_kernel import equations, solve_catenary
 from cdpr_drake.cables.route_kernel import make_route_room, make_tree_room
-from cdpr_drake.cables.simulation_kernel import OUTPUTS, make_room
+from cdpr_drake.cables.simulation_kernel import OUTPUTS, guesses_of, make_room
 from cdpr_drake.geometry.two_pulleys_kernel import begin_swivels
 from cdpr_drake.numerics.kernel_calls import any_scalar
 
@@ -66,6 +67,7 @@ def model_force_array(
     *,
     start: int,
     nv: int,
+    crept: Any = None,
 ) -> tuple[Any, int]:
     """`simulation_kernel.model_force` for arrays of any scalar.
 
@@ -78,24 +80,51 @@ def model_force_array(
         height: Height of the plane of a planar joint [m].
         start: Where the platform's velocities begin among those of the plant.
         nv: Number of the plant's velocities.
+        crept: What has crept of the cables, shape (m,); None: nothing.
 
     Returns:
         Generalized force, shape (nv,), dtype object, and the first cable that cannot run or -1.
     """
     out = np.zeros(nv, dtype=object)
     room = make_room(len(l0), law, height, start, dtype=object)
+    _put_crept(room, crept)
     bad = _force(state, l0, l0_dot, cables, room, out)
     return out, bad
 
 
 def model_outputs_array(
-    state: Any, l0: Any, l0_dot: Any, cables: Array, law: int, height: float
+    state: Any,
+    l0: Any,
+    l0_dot: Any,
+    cables: Array,
+    law: int,
+    height: float,
+    *,
+    crept: Any = None,
 ) -> tuple[Any, int]:
     """`simulation_kernel.model_outputs` for arrays of any scalar: shape (6, m), dtype object."""
     out = np.zeros((OUTPUTS, len(l0)), dtype=object)
     room = make_room(len(l0), law, height, dtype=object)
+    _put_crept(room, crept)
     bad = _outputs(state, l0, l0_dot, cables, room, out)
     return out, bad
+
+
+def creep_rates_array(
+    state: Any, l0: Any, l0_dot: Any, cables: Array, law: int, height: float, *, crept: Any
+) -> Any:
+    """`behaving_kernel.creep_rates` for arrays of any scalar, shape (m,), dtype object."""
+    out, rates = np.zeros((OUTPUTS, len(l0)), dtype=object), np.zeros(len(l0), dtype=object)
+    room = make_room(len(l0), law, height, dtype=object)
+    _put_crept(room, crept)
+    _outputs(state, l0, l0_dot, cables, room, out)
+    creep_rates.py_func(guesses_of.py_func(room, len(l0)), cables, rates)
+    return rates
+
+
+def _put_crept(room: Any, crept: Any) -> None:
+    if crept is not None:
+        put_crept.py_func(crept, guesses_of.py_func(room, len(crept)))
 
 
 def model_force_and_drums_array(
@@ -108,10 +137,12 @@ def model_force_and_drums_array(
     *,
     start: int,
     nv: int,
+    crept: Any = None,
 ) -> tuple[Any, int]:
     """`simulation_kernel.model_force_and_drums` for arrays of any scalar, shape (nv + m,)."""
     out = np.zeros(nv + len(l0), dtype=object)
     room = make_room(len(l0), law, height, start, dtype=object)
+    _put_crept(room, crept)
     bad = _force_and_drums(state, l0, l0_dot, cables, room, nv, out)
     return out, bad
 

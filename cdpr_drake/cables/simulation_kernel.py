@@ -43,6 +43,12 @@ def make_room(m: int, law: int, height: float = 0.0, start: int = 0, dtype: Any 
 
 
 @njit(cache=True)
+def guesses_of(room: Array, m: int) -> Array:
+    """Where catenaries keep their solution, and creeping cables what has crept, shape (m, 2)."""
+    return room[_GUESSES : _GUESSES + 2 * m].reshape(m, 2)
+
+
+@njit(cache=True)
 def _parts(room: Array, m: int) -> Any:
     a = _GUESSES + 2 * m
     b = a + _INNER

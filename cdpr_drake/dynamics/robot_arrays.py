@@ -8,8 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.cables.cable_behaviour import behaviour_of
 from cdpr_drake.cables.hanging_kernel import SENSITIVITIES
-from cdpr_drake.cables.models import CABLE_MODELS, check_model
+from cdpr_drake.cables.models import cable_law, check_model
 from cdpr_drake.cables.response_kernel import DERIVATIVES
 from cdpr_drake.cables.simulation_kernel import make_room
 from cdpr_drake.geometry.cable_set import CableSet
@@ -22,9 +23,10 @@ from cdpr_drake.winches.motor_kernel import pack_winch
 IDEAL, MOTORS, TENSIONS = range(3)
 """What drives the cables: winches that follow velocities at once, motors, or tensions as such."""
 
-DRIVE, MODE, LAW, PUSH, PLATFORM, SPEEDS, WINCH = range(7)
+DRIVE, MODE, LAW, PUSH, PLATFORM, SPEEDS, WINCH, CREEPING = range(8)
 """Entries of `RobotArrays.kinds`: drive, mode of the motors, law of the cables, whether a negative
-tension pushes, states of the platform, its velocities, states of the winches."""
+tension pushes, states of the platform, its velocities, states of the winches, and behind those what
+has crept of the cables: their number, or 0."""
 
 COM, GRAVITY, DAMPING, INERTIA, INVERSE, APPLIED = 1, 4, 7, 9, 18, 54
 """Where in `RobotArrays.body` begin: centre of mass (3), gravity (3), damping (2), rotational
@@ -41,7 +43,7 @@ class RobotArrays(NamedTuple):
     """What the kernels take of a robot; made by `pack_robot`.
 
     Attributes:
-        kinds: See `DRIVE`, shape (7,), whole numbers.
+        kinds: See `DRIVE`, shape (8,), whole numbers.
         body: Mass [kg], then as `COM` says, in SI units, shape (`BODY_SIZE`,).
         cables: `CableSet.packed()` in the joint's frames, shape (m, 17).
         home: Unstrained lengths where the motors' angles are zero, shape (m,) [m].
@@ -128,7 +130,7 @@ def pack_robot(
     Raises:
         CableModelError: The model cannot describe the cables in the joint's frame.
     """
-    m, law = cables.count, CABLE_MODELS[model].law
+    m, law = cables.count, cable_law(model, cables)
     joint = joint or PlatformJoint.of(platform.motion)
     cables = joint.turned(cables)
     if drive.kind != TENSIONS:
@@ -140,7 +142,10 @@ def pack_robot(
         p_MCo, I_MMo = R_PM.T @ p_MCo, R_PM.T @ I_MMo @ R_PM
     winch = m * drive.states_per_cable()
     mode = MODES[drive.mode]
-    kinds = np.array([drive.kind, mode, law, int(drive.push), states, speeds, winch])
+    creeping = 0
+    if drive.kind != TENSIONS and behaviour_of(cables).creep_stiffness > 0.0:
+        creeping = m
+    kinds = np.array([drive.kind, mode, law, int(drive.push), states, speeds, winch, creeping])
     body = np.zeros(BODY_SIZE)
     body[0] = platform.mass
     body[COM : COM + 3] = p_MCo
@@ -162,7 +167,7 @@ def pack_robot(
         room=make_room(m, law, joint.height),
         force=np.zeros(speeds + m),
         command=np.zeros(m),
-        work=np.zeros((STAGES, states + winch)),
+        work=np.zeros((STAGES, states + winch + creeping)),
         guesses=np.zeros((m, 2)),
         inner=np.zeros((SENSITIVITIES, 3)),
         D=np.zeros((DERIVATIVES, 4)),

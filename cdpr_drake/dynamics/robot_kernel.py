@@ -11,12 +11,14 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.cables.behaving_kernel import creep_rates, put_crept
 from cdpr_drake.cables.commanded_tension_kernel import tension_force
 from cdpr_drake.cables.dispatch_kernel import STRAIGHT
-from cdpr_drake.cables.simulation_kernel import model_force_and_drums
+from cdpr_drake.cables.simulation_kernel import guesses_of, model_force_and_drums
 from cdpr_drake.cables.straight_kernel import floating_force, line_force, planar_force
 from cdpr_drake.dynamics.platform_kernel import floating_rates, line_rates, planar_rates
 from cdpr_drake.dynamics.robot_arrays import (
+    CREEPING,
     DRIVE,
     IDEAL,
     LAW,
@@ -94,7 +96,11 @@ def _any_rates(robot: RobotArrays, state: Array, command: Array, brakes: Array, 
             ideal_rates(robot.winch[0, 0], command, rates)
         else:
             rates = state[n + m : n + 2 * m]
+        first = state.shape[0] - robot.kinds[CREEPING]
+        guesses = guesses_of(robot.room, m)
+        put_crept(state[first:], guesses)
         bad = model_force_and_drums(platform, l0, rates, robot.cables, robot.room, nv, force)
+        creep_rates(guesses, robot.cables, out[first:])
         if drive == MOTORS:
             winch_rates(
                 state[n:], force[nv:], command, brakes, robot.home, robot.kinds[MODE],

@@ -26,10 +26,12 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.cables.behaving_kernel import CREEP
 from cdpr_drake.cables.dispatch_kernel import cable_response
 from cdpr_drake.dynamics.explicit_kernel import command_at
 from cdpr_drake.dynamics.platform_kernel import mass_in_world
 from cdpr_drake.dynamics.robot_arrays import (
+    CREEPING,
     DAMPING,
     DRIVE,
     IDEAL,
@@ -130,6 +132,10 @@ def _response(robot: RobotArrays, X: Motion, i: int, l0: float) -> tuple[float, 
     )
     if not good or not t > 0.0:
         return 0.0, 0.0, 0.0, 0.0, rx, ry, rz
+    if robot.kinds[CREEPING] > 0:  # what creeps away in the end is stiff within a step
+        for r in range(robot.D.shape[0]):
+            for c in range(4):
+                robot.D[r, c] *= 1.0 + robot.cables[i, CREEP]
     ux, uy, uz, D = px / t, py / t, pz / t, robot.D
     along = (
         ux * (D[0, 0] * ux + D[0, 1] * uy + D[0, 2] * uz)

@@ -20,6 +20,9 @@ from cdpr_drake.geometry.two_pulleys_kernel import ANCHOR_AXIS, ANCHOR_RADIUS
 
 _VECTORS = ("p_WA", "p_PB", "swivel_axis", "anchor_swivel_axis")
 
+_OF_ALL = ("down", "beyond")
+"""What a set has once for all its cables."""
+
 UNIT_TOLERANCE = 1e-9
 """How far a swivel axis may be from length 1."""
 
@@ -47,6 +50,8 @@ class CableSet:
             pulley at the platform swivels, in the direction in which the cable arrives at B from
             where it is fixed, shape (3, m).
         down: Direction of gravity in W, a unit vector, shape (3,).
+        beyond: Constants of what all cables do beside the elastic law, see
+            `cables.cable_behaviour.behaving_cables`, shape (k,); empty: nothing.
     """
 
     p_WA: Array
@@ -60,6 +65,7 @@ class CableSet:
     anchor_pulley_radius: Array
     anchor_swivel_axis: Array
     down: Array = field(default_factory=lambda: np.array([0.0, 0.0, -1.0]))
+    beyond: Array = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
         """Copies the arrays and checks them.
@@ -70,6 +76,9 @@ class CableSet:
         m = np.shape(self.p_WA)[-1] if np.ndim(self.p_WA) == 2 else 0
         for each in fields(self):
             value = np.array(getattr(self, each.name), dtype=float)
+            if each.name == "beyond":
+                object.__setattr__(self, each.name, value)
+                continue
             points = each.name in _VECTORS
             shape = (3, m) if points else (3,) if each.name == "down" else (m,)
             if m == 0 or value.shape != shape:
@@ -151,7 +160,7 @@ class CableSet:
         parts = {
             each.name: getattr(self, each.name)[..., cables]
             for each in fields(self)
-            if each.name != "down"
+            if each.name not in _OF_ALL
         }
         return replace(self, **parts)
 
@@ -183,18 +192,20 @@ class CableSet:
         return bool(np.any(self.anchor_pulley_radius > 0.0))
 
     def packed(self) -> Array:
-        """One contiguous array for the kernels, shape (m, 17).
+        """One contiguous array for the kernels, shape (m, 17 + k).
 
         Columns: exit point (3), anchor point (3), E S [N], T [s], radius of the groove [m], weight
         per length [N/m], swivel axis (3), and of a pulley at the platform radius [m] and axis in P
         (3). Kernels of straight cables take the first eight, or
-        these rows, and see cables without pulleys.
+        these rows, and see cables without pulleys. Behind them stands `beyond`, k = 0 of elastic
+        cables.
         """
-        rows = np.empty((self.count, CABLE_SET_COLUMNS))
+        rows = np.empty((self.count, CABLE_SET_COLUMNS + len(self.beyond)))
         rows[:, 0:3], rows[:, 3:6] = self.p_WA.T, self.p_PB.T
         rows[:, 6], rows[:, 7] = self.stiffness, self.retardation
         rows[:, PULLEY_RADIUS], rows[:, LINEAR_WEIGHT] = self.pulley_radius, self.linear_weight
         rows[:, SWIVEL_AXIS : SWIVEL_AXIS + 3] = self.swivel_axis.T
         rows[:, ANCHOR_RADIUS] = self.anchor_pulley_radius
-        rows[:, ANCHOR_AXIS:] = self.anchor_swivel_axis.T
+        rows[:, ANCHOR_AXIS : ANCHOR_AXIS + 3] = self.anchor_swivel_axis.T
+        rows[:, CABLE_SET_COLUMNS:] = self.beyond
         return rows

@@ -10,7 +10,14 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables.models import CABLE_MODELS, ELASTIC, TOO_SHORT, cable_state, check_model
+from cdpr_drake.cables.models import (
+    CABLE_MODELS,
+    ELASTIC,
+    TOO_SHORT,
+    cable_law,
+    cable_state,
+    check_model,
+)
 from cdpr_drake.errors import EquilibriumError
 from cdpr_drake.geometry.cable_paths import cable_paths, motion_of
 from cdpr_drake.geometry.cable_set import CableSet
@@ -100,7 +107,7 @@ def equilibrium_near(
         return _inextensible(cables, platform, l0, guess, soften)
     state, solved = np.concatenate([pose_row(guess), np.zeros(6)]), np.zeros((cables.count, 2))
     rows, steps = cables.packed(), 0
-    weight, law, free = platform.packed_weight(), CABLE_MODELS[model].law, platform.motion.packed()
+    weight, law, free = platform.packed_weight(), cable_law(model, cables), platform.motion.packed()
     for softness in SOFTENING if soften else SOFTENING[-1:]:
         code, more, unbalanced = settle(state, law, rows, l0, softness, weight, free, arm, solved)
         steps += more

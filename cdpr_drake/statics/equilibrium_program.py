@@ -11,7 +11,7 @@ from pydrake.solvers import MathematicalProgram, SnoptSolver, SolverOptions
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.dispatch_kernel import STRAIGHT
-from cdpr_drake.cables.models import CABLE_MODELS, check_model
+from cdpr_drake.cables.models import CABLE_MODELS, cable_law, check_model
 from cdpr_drake.errors import EquilibriumError
 from cdpr_drake.geometry.cable_paths import cable_paths, motion_of
 from cdpr_drake.geometry.cable_set import CableSet
@@ -93,13 +93,14 @@ def make_equilibrium_program(
     made = EquilibriumProgram(program, x, none, unit, reference, platform)
 
     kind = CABLE_MODELS[model]
-    if kind.law != STRAIGHT:
+    law = cable_law(model, cables)
+    if law != STRAIGHT:
         packed, solved, g, H = cables.packed(), np.zeros((m, 2)), np.empty(6), np.empty((6, 6))
 
         def energy(values: Array) -> tuple[Array, Array]:
             X = made.pose(values)
             E, _, good = energy_at(
-                kind.law, motion_of(X), packed, l0, 1.0, platform.packed_weight(), FREE.packed(),
+                law, motion_of(X), packed, l0, 1.0, platform.packed_weight(), FREE.packed(),
                 solved, g, H,
             )  # fmt: skip
             if not good:

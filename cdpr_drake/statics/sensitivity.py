@@ -9,7 +9,7 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.dispatch_kernel import STRAIGHT, all_responses
-from cdpr_drake.cables.models import CABLE_MODELS, cable_derivatives, check_model
+from cdpr_drake.cables.models import CABLE_MODELS, cable_derivatives, cable_law, check_model
 from cdpr_drake.cables.response_kernel import DERIVATIVES
 from cdpr_drake.errors import CableGeometryError, CableModelError, EquilibriumError
 from cdpr_drake.geometry.cable_paths import impossible_cable, motion_of
@@ -94,7 +94,7 @@ def pose_sensitivity(
         moved = motion.twist(np.asarray(np.linalg.solve(K, motion.components(flat, R)), float), R)
         return moved.reshape(wrenches.shape)
 
-    packed, law = cables.packed(), kind.law
+    packed, law = cables.packed(), cable_law(model, cables)
     states, D = _responses(cables, packed, law, X_WP, l0)
     arms = states[:, 8:11]
     exit_points, anchor_points = np.empty((6, 3, m)), np.empty((6, 3, m))

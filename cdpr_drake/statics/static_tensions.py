@@ -8,7 +8,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables.dispatch_kernel import STRAIGHT
+from cdpr_drake.cables.cable_behaviour import behaviour_of, counted_lengths
 from cdpr_drake.cables.models import CABLE_MODELS, cable_derivatives, cable_state, check_model
 from cdpr_drake.errors import CableGeometryError
 from cdpr_drake.geometry.cable_paths import cable_paths
@@ -78,14 +78,15 @@ def find_static_tensions(
     lower, upper = np.full(m, bounds[0]), np.full(m, bounds[1])
     J = paths.J
     kind = CABLE_MODELS[model]
-    if kind.law == STRAIGHT:
+    if not kind.sags:
         tensions = _balancing(motion.components(-J.T, R), wanted, lower, upper)
         if tensions is None:
             return None
-        stretch = 1.0 + tensions / cables.stiffness if kind.extensible else 1.0
-        return StaticTensions(tensions, tensions, np.asarray(paths.lengths / stretch, float))
-    if kind.sags:
-        lower = np.maximum(lower, LEAST_TENSION_WEIGHTS * cables.linear_weight * paths.lengths)
+        if not kind.extensible:
+            return StaticTensions(tensions, tensions, np.asarray(paths.lengths, float))
+        counted = counted_lengths(paths.lengths, tensions, cables.stiffness, behaviour_of(cables))
+        return StaticTensions(tensions, tensions, counted)
+    lower = np.maximum(lower, LEAST_TENSION_WEIGHTS * cables.linear_weight * paths.lengths)
     arms = (R @ cables.p_PB).T
     before = np.zeros(m)
     for _ in range(ROUNDS):
@@ -130,9 +131,10 @@ def lengths_for_tensions(
     Raises:
         CableGeometryError: A sagging cable cannot have so little tension, or cannot run.
     """
-    l0 = cable_paths(X_WP, cables).lengths / (1.0 + tensions / cables.stiffness)
-    if CABLE_MODELS[model].law == STRAIGHT:
-        return np.asarray(l0, float)
+    lengths, behaviour = cable_paths(X_WP, cables).lengths, behaviour_of(cables)
+    l0 = counted_lengths(lengths, tensions, cables.stiffness, behaviour)
+    if not CABLE_MODELS[model].sags:
+        return l0
     for _ in range(ROUNDS):
         excess = cable_state(cables, model, X_WP, l0).tensions - tensions
         slope = cable_derivatives(cables, model, X_WP, l0).tensions_by_length

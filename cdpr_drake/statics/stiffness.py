@@ -10,7 +10,7 @@ from scipy.linalg import eigh
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.dispatch_kernel import STRAIGHT
-from cdpr_drake.cables.models import CABLE_MODELS, check_lengths, check_model
+from cdpr_drake.cables.models import CABLE_MODELS, cable_law, check_lengths, check_model
 from cdpr_drake.errors import CableGeometryError, CableModelError
 from cdpr_drake.geometry.cable_paths import cable_paths, impossible_cable
 from cdpr_drake.geometry.cable_set import CableSet
@@ -80,13 +80,18 @@ def platform_stiffness(
     code = BAD_LENGTH
     if lengths.shape == (cables.count,):
         code = stiffness_into(
-            kind.law, X_WP.GetAsMatrix4(), cables.packed(), lengths, platform.packed_weight(), K
+            cable_law(model, cables),
+            X_WP.GetAsMatrix4(),
+            cables.packed(),
+            lengths,
+            platform.packed_weight(),
+            K,
         )
     if code == BAD_LENGTH:
         check_lengths(l0, cables)
     if code == NO_CABLE:
         raise CableGeometryError(impossible_cable(X_WP, cables))
-    straight = kind.law == STRAIGHT
+    straight = cable_law(model, cables) == STRAIGHT
     return PlatformStiffness(
         K[TOTAL],
         K[CABLES],

@@ -130,6 +130,8 @@ def _given(draft: RobotDraft) -> tuple[str, ...]:
         "cable.diameter": draft.diameter, "cable.youngs_modulus": draft.youngs_modulus,
         "cable.linear_density": draft.linear_density, "cable.breaking_load": draft.breaking_load,
         "winch.drum_radius": draft.drum_radius, "winch.gear_ratio": draft.gear_ratio,
+        "winch.layers": draft.layers, "cables[].drum_radius": draft.cables[0].drum_radius,
+        "cables[].mechanical_advantage": draft.cables[0].mechanical_advantage,
         "winch.motor_speed_rpm": draft.motor_speed_rpm, "winch.inertia": draft.motor_inertia,
         "tension_bounds.lower": draft.cables[0].lower,
         "tension_bounds.upper": draft.cables[0].upper,
@@ -257,9 +259,11 @@ def _winch(draft: RobotDraft, assumed: dict[str, str]) -> dict[str, Any]:
         _assume(
             assumed, "winch.motor_speed_rpm", float(rpm), f"for the {whose} {speed:g} m/s of cable"
         )
-    winch = {
+    winch: dict[str, Any] = {
         "drum_radius": _float(radius), "gear_ratio": _float(gear), "motor_speed_rpm": _float(rpm)
     }  # fmt: skip
+    if draft.layers is not None:
+        winch["layers"] = {key: _float(value) for key, value in draft.layers.items()}
     if draft.motor_inertia is not None:
         winch["inertia"] = _float(draft.motor_inertia)
     return winch
@@ -389,6 +393,10 @@ def _cable(cable: Any, draft: RobotDraft) -> dict[str, Any]:
         item["anchor_swivel_axis"] = _list(cable.anchor_swivel_axis)
     if cable.material:
         item["material"] = {key: _float(value) for key, value in cable.material.items()}
+    if cable.drum_radius is not None and cable.drum_radius != draft.drum_radius:
+        item["drum_radius"] = _float(cable.drum_radius)
+    if cable.mechanical_advantage not in (None, 1.0):
+        item["mechanical_advantage"] = _float(cable.mechanical_advantage)
     return item
 
 

@@ -27,6 +27,8 @@ class DraftCable:
             within the platform, shape (3,).
         material: What the file says of this cable's material alone, by the keys of a robot file's
             section `cable`, in SI units.
+        drum_radius: Of its own drum, without cable on it [m].
+        mechanical_advantage: Parts of line side by side.
     """
 
     name: str
@@ -39,6 +41,8 @@ class DraftCable:
     anchor_pulley_radius: float | None = None
     anchor_swivel_axis: Array | None = None
     material: dict[str, float] = field(default_factory=dict)
+    drum_radius: float | None = None
+    mechanical_advantage: float | None = None
 
 
 @dataclass(kw_only=True)
@@ -73,6 +77,7 @@ class RobotDraft:
         breaking_load: Of the cables [N].
         drum_radius: Of the winches [m].
         gear_ratio: Motor turns per drum turn.
+        layers: Of line on the drums, by the keys of a robot file's `winch.layers`.
         motor_speed_rpm: Rated speed of the motors [1/min].
         cable_speed: Largest speed of the cables [m/s], for files without motors.
         motor_inertia: Rotor, gear and drum at the motor's shaft [kg m^2].
@@ -105,6 +110,7 @@ class RobotDraft:
     breaking_load: float | None = None
     drum_radius: float | None = None
     gear_ratio: float | None = None
+    layers: dict[str, float] | None = None
     motor_speed_rpm: float | None = None
     cable_speed: float | None = None
     motor_inertia: float | None = None

@@ -5,7 +5,8 @@ as its height alone. M666 has Q build-up factor, R spool radii [mm], U mechanica
 lines on a spool, L and H teeth of motor and spool gear, J full steps a turn, W mass of the mover
 [kg], S stiffness of a line of unit length, E S of the cables [N], I and X least and largest force
 [N]. Cables end in one point; lengths count from where that is at the origin. With advantage U a
-spool turns U times as far.
+spool turns U times as far. R is the radius of the middle of the line at the origin, which the
+firmware does not correct for its diameter: a drum is half a diameter smaller.
 
 Source: github.com/Duet3D/RepRapFirmware, src/Movement/Kinematics/HangprinterKinematics.cpp
 (3.5-dev): Configure, Recalc, MotorPosToLinePos, SpringK.
@@ -109,30 +110,19 @@ def _spools(path: Path, given: dict[str, list[float]], draft: RobotDraft) -> Non
     for letter, row in (("R", radii), ("H", teeth), ("L", motor), ("U", advantage)):
         if row is not None and np.any(row <= 0.0):
             raise fail(path, f"M666 {letter}", row.min(), "above 0")
-    one = [values is None or np.ptp(values) == 0.0 for values in (radii, teeth, motor, advantage)]
-    if not all(one):
+    build_up = given.get("Q", [0.0])[0]
+    if build_up < 0.0:
+        raise fail(path, "M666 Q", build_up, "at least 0")
+    if any(values is not None and np.ptp(values) > 0.0 for values in (teeth, motor)):
         draft.remarks.append(
-            "Spools, gears or mechanical advantages differ from cable to cable, for which there is "
-            "no place here: M666 "
-            + " ".join(
-                f"{letter}{':'.join(f'{x:g}' for x in given[letter])}"
-                for letter in "RHLU" if letter in given
-            )
+            "Gears differ from cable to cable, for which there is no place here: M666 "
+            + " ".join(f"{x}{':'.join(f'{v:g}' for v in given[x])}" for x in "LH" if x in given)
             + "."
-        )  # fmt: skip
-    else:
-        if radii is not None:
-            draft.drum_radius = MM * float(radii[0])
-        if teeth is not None and motor is not None:
-            draft.gear_ratio = float(teeth[0] / motor[0])
-            if advantage is not None:
-                draft.gear_ratio *= float(advantage[0])
-                if advantage[0] != 1.0:
-                    draft.remarks.append(
-                        f"Mechanical advantage {advantage[0]:g} is in winch.gear_ratio."
-                    )
-    if "Q" in given and given["Q"][0] != 0.0:
-        draft.remarks.append(f"Build-up factor Q {given['Q'][0]:g} of the spools was not kept.")
+        )
+    elif teeth is not None and motor is not None:
+        draft.gear_ratio = float(teeth[0] / motor[0])
+    for k, cable in enumerate(draft.cables):
+        cable.mechanical_advantage = None if advantage is None else float(advantage[k])
     if given.get("W", [0.0])[0] > 0.0:
         draft.mass = given["W"][0]
     if given.get("S", [0.0])[0] > 0.0:
@@ -141,6 +131,8 @@ def _spools(path: Path, given: dict[str, list[float]], draft: RobotDraft) -> Non
         draft.remarks.append(
             f"S {given['S'][0]:g} is E S of the cables [N]: written as 1 mm with that stiffness."
         )
+    if radii is not None:
+        _drums(path, MM * radii, MM * build_up, each("O"), draft)
     low, high = each("I"), each("X")
     for k, cable in enumerate(draft.cables):
         cable.lower = None if low is None else float(low[k])
@@ -150,10 +142,48 @@ def _spools(path: Path, given: dict[str, list[float]], draft: RobotDraft) -> Non
         draft.remarks.append(f"Parameters of M666 that were not kept: {', '.join(rest)}.")
 
 
+def _drums(
+    path: Path, radii: np.ndarray, build_up: float, lines: np.ndarray | None, draft: RobotDraft
+) -> None:
+    """Drums without line, and the line on them, from radii of the line at the origin [m].
+
+    The firmware has r^2 = R^2 + Q O U (what is wound of the cable), that of a spiral of one turn a
+    layer of height pi Q O; it goes on below R, where a drum of ours must have line left.
+    """
+    draft.diameter = draft.diameter or DIAMETER
+    first = radii - 0.5 * draft.diameter
+    if build_up > 0.0:
+        if lines is not None and np.ptp(lines) > 0.0:
+            raise fail(path, "M666 O", ":".join(f"{x:g}" for x in lines), "one number for all")
+        build_up *= 1.0 if lines is None else float(lines[0])
+        longest = max(
+            (cable.mechanical_advantage or 1.0) * float(np.linalg.norm(cable.exit_point))
+            for cable in draft.cables
+        )
+        squares = radii**2 - build_up * longest
+        if np.any(squares <= (0.5 * draft.diameter) ** 2):
+            raise fail(
+                path, "M666 Q", build_up / MM,
+                "so little that line as long as the way to an anchor fits on the spool",
+            )  # fmt: skip
+        first = np.sqrt(squares) - 0.5 * draft.diameter
+        draft.layers = {"turns": 1.0, "height": np.pi * build_up, "wound": longest}
+        draft.remarks.append(
+            f"Spools hold {longest:.6g} m more at the origin than the firmware says, which goes on "
+            "with R and Q when all is paid out: radii of drums are as much smaller."
+        )
+    if np.any(first <= 0.0):
+        raise fail(path, "M666 R", radii.min() / MM, f"above {0.5 * draft.diameter / MM:g}")
+    draft.drum_radius = float(first[0])
+    for cable, radius in zip(draft.cables, first.tolist(), strict=True):
+        cable.drum_radius = radius
+
+
 def write_reprapfirmware(draft: RobotDraft) -> str:
     """The lines M669 and M666.
 
-    It holds exit points, drum radius, gear ratio, mass, E S of the cables and tension limits.
+    It holds exit points, drums with their line, mechanical advantages, gear ratio, mass, E S of the
+    cables and tension limits.
     """
     stiffness = cable_stiffness(draft.youngs_modulus or 0.0, draft.diameter or 0.0)
     m = len(draft.cables)
@@ -162,6 +192,17 @@ def write_reprapfirmware(draft: RobotDraft) -> str:
         for letter, cable in zip(LETTERS, draft.cables, strict=False)
     )
     teeth, motor = _teeth(draft.gear_ratio or 1.0)
+    advantages = [cable.mechanical_advantage or 1.0 for cable in draft.cables]
+    layers = draft.layers or {"turns": 1.0, "height": 0.0, "wound": 0.0}
+    build_up = layers["height"] / (np.pi * layers["turns"])
+    home = np.zeros(3) if draft.home_position is None else draft.home_position
+    radii = []
+    for cable, n in zip(draft.cables, advantages, strict=True):
+        own = draft.drum_radius if cable.drum_radius is None else cable.drum_radius
+        first = (own or 0.0) + 0.5 * cable.material.get("diameter", draft.diameter or 0.0)
+        way = cable.exit_point - cable.anchor_point
+        wound = layers["wound"] + n * float(np.linalg.norm(way - home) - np.linalg.norm(way))
+        radii.append(first if build_up == 0.0 else np.sqrt(first**2 + build_up * wound))
 
     def same(value: float) -> str:
         return ":".join([repr(float(value))] * m)
@@ -171,7 +212,8 @@ def write_reprapfirmware(draft: RobotDraft) -> str:
     return (
         "; Hangprinter parameters. Steps, currents and drivers are the machine's own.\n"
         f"M669 K6 N{m} {anchors}\n"
-        f"M666 Q0.0 R{':'.join([_mm(draft.drum_radius)] * m)} U{':'.join(['1'] * m)} "
+        f"M666 Q{_mm(build_up)} R{':'.join(map(_mm, radii))} "
+        f"U{':'.join(str(round(n)) for n in advantages)} O{':'.join(['1'] * m)} "
         f"L{':'.join([str(motor)] * m)} H{':'.join([str(teeth)] * m)} W{draft.mass!r} "
         f"S{float(stiffness)!r} I{same(low)} X{same(high)}\n"
     )

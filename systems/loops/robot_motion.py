@@ -8,11 +8,12 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables.models import CABLE_MODELS
-from cdpr_drake.cables.simulation_kernel import OUTPUTS, make_room, outputs_kernel
+from cdpr_drake.cables.behaving_kernel import put_crept
+from cdpr_drake.cables.models import cable_law, crept_at_rest
+from cdpr_drake.cables.simulation_kernel import OUTPUTS, guesses_of, make_room, outputs_kernel
 from cdpr_drake.dynamics.advance_events_kernel import fresh_memory, robot_addresses
 from cdpr_drake.dynamics.advance_kernel import REPORTED
-from cdpr_drake.dynamics.robot_arrays import MOTORS, pack_robot
+from cdpr_drake.dynamics.robot_arrays import CREEPING, MOTORS, pack_robot
 from cdpr_drake.dynamics.robot_kernel import INTEGRATION_OK, ideal_rates
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.models.robot_in_plant import pose_on_joint
@@ -97,7 +98,7 @@ class RobotMotion:
             rigid_platform(robot), self._set, self._model, self._drive,
             home=self._home, joint=joint, damping=(damping.translation, damping.rotation),
         )  # fmt: skip
-        law = CABLE_MODELS[self._model].law
+        law = cable_law(self._model, self._set)
         self._room = make_room(self._set.count, law, joint.height)
         self._outputs = outputs_kernel(law)
         rooms = self._room, self._arrays.room, self._arrays.guesses
@@ -110,7 +111,7 @@ class RobotMotion:
             np.zeros(m),
             np.zeros((2, m)),
         )
-        size = self._n + m * self._drive.states_per_cable()
+        size = self._arrays.work.shape[1]
         self._where, self._memory = robot_addresses(self._arrays), fresh_memory(size, m)
         # State, its time and the report, now, and where `integrate_explicit` writes what is next.
         self._present = np.zeros(size + 1 + REPORTED)
@@ -118,6 +119,7 @@ class RobotMotion:
         self._state, self.report = self._present[:size], self._present[size + 1 :]
         self._platform, self._lengths = self._state[: self._n], self._state[self._n : self._n + m]
         self._speeds = self._state[self._n + m : self._n + 2 * m]
+        self._crept = self._state[size - self._arrays.kinds[CREEPING] :]
         self._command = np.zeros(m)
         self._pose: RigidTransform | None = None
         self._known = False
@@ -151,10 +153,11 @@ class RobotMotion:
         X_WP, holding = equilibrium_start(
             self.robot, self._set, self._model, X_WP, slack=slack, at_rest=at_rest
         )
-        return resting_state(
-            self.robot, self._drive, X_WP, holding.unstrained_lengths, holding.drum_tensions,
-            home=self._home,
-        )  # fmt: skip
+        lengths = holding.unstrained_lengths
+        state = resting_state(
+            self.robot, self._drive, X_WP, lengths, holding.drum_tensions, home=self._home
+        )
+        return np.concatenate([state, crept_at_rest(self._set, X_WP, lengths)])
 
     def begin(self, state: Array) -> None:
         """Puts platform and winches into a state at time 0, shape (n,)."""
@@ -233,6 +236,7 @@ class RobotMotion:
             else:
                 ideal_rates(self._arrays.winch[0, 0], self._command, rates)
             self._table = np.empty_like(self._table)  # whoever has the last one may keep it
+            put_crept(self._crept, guesses_of(self._room, self._m))
             bad = self._outputs(
                 self._platform, self._lengths, rates, self._arrays.cables, self._room, self._table
             )

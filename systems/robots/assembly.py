@@ -21,7 +21,7 @@ from cdpr_drake.models.robot_in_plant import RobotInPlant, add_robot, carried_bo
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.scene import add_frame, add_ground
 from cdpr_drake.statics.static_tensions import StaticTensions
-from cdpr_drake.systems.robots.cable_forces import PORTS, CableForces
+from cdpr_drake.systems.robots.cable_forces import CREPT, PORTS, CableForces
 from cdpr_drake.systems.robots.failures import BROKEN, FAULTS
 from cdpr_drake.systems.robots.platform_pose import PlatformPose
 from cdpr_drake.systems.robots.platform_wrench import APPLIED_WRENCH, PlatformWrench
@@ -145,6 +145,8 @@ class CableRobotPorts(NamedPorts):
         X_WP, holding = equilibrium_start(
             self.robot, cables, model, X_WP, slack=slack, at_rest=at_rest
         )
+        cable_context = self.forces.GetMyMutableContextFromRoot(context)
+        self.forces.relax(cable_context, X_WP, holding.unstrained_lengths)
         return set_robot_at_equilibrium(self, plant_context, winch_context, X_WP, holding)
 
 
@@ -249,6 +251,8 @@ def add_cable_robot(
         inputs[APPLIED_WRENCH] = disturbances.GetInputPort(APPLIED_WRENCH)
     outputs = {"platform_state": state, "X_WP": pose.GetOutputPort("X_WP")}
     outputs |= {port: forces.GetOutputPort(port) for port in PORTS}
+    if forces.HasOutputPort(CREPT):
+        outputs[CREPT] = forces.GetOutputPort(CREPT)
     for port_name in ("unstrained_lengths", "unstrained_length_rates"):
         builder.Connect(winch.GetOutputPort(port_name), forces.GetInputPort(port_name))
     for port in map(winch.get_output_port, range(winch.num_output_ports())):

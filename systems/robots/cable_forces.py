@@ -10,20 +10,37 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pydrake.autodiffutils import AutoDiffXd
 from pydrake.math import RigidTransform
-from pydrake.systems.framework import BasicVector, Context, InputPortIndex, LeafSystem, LeafSystem_
+from pydrake.systems.framework import (
+    BasicVector,
+    Context,
+    ContinuousState,
+    InputPortIndex,
+    LeafSystem,
+    LeafSystem_,
+)
 from pydrake.systems.scalar_conversion import TemplateSystem
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.cables.behaving_kernel import creep_rates, put_crept
 from cdpr_drake.cables.broken_cables import break_cables
+from cdpr_drake.cables.cable_behaviour import behaviour_of
 from cdpr_drake.cables.dispatch_kernel import STRAIGHT
-from cdpr_drake.cables.models import CABLE_MODELS, KELVIN_VOIGT, check_model
+from cdpr_drake.cables.models import (
+    CABLE_MODELS,
+    KELVIN_VOIGT,
+    cable_law,
+    check_model,
+    crept_at_rest,
+)
 from cdpr_drake.cables.simulation_autodiff import (
+    creep_rates_array,
     model_force_and_drums_array,
     model_force_array,
     model_outputs_array,
 )
 from cdpr_drake.cables.simulation_kernel import (
     OUTPUTS,
+    guesses_of,
     make_room,
     model_force,
     model_force_and_drums,
@@ -40,6 +57,9 @@ from cdpr_drake.systems.robots.templates import class_for_floats
 
 PULLS = ("tensions", "drum_tensions", "slack")
 """Those of `PORTS` that follow from the pull of a cable."""
+
+CREPT = "crept"
+"""Output port of cables that creep: the strain of the dashpot, shape (m,) [-]."""
 
 PORTS = ("tensions", "drum_tensions", "lengths", "slack", "surplus_lengths", "sags")
 """Output ports with one number a cable, in the order of `model_outputs`' rows."""
@@ -115,6 +135,7 @@ def CableForces_(T: Any) -> type[LeafSystem]:
         surplus_lengths         vector(m)  m     out, by which the unstrained length exceeds the
                                                  straight path
         sags                    vector(m)  m     out, largest distance from the chord
+        crept                   vector(m)  -     out, of cables that creep: the strain that has
         ======================= ========== ===== ==============================================
 
         Cables without pulleys that are straight pull exactly nothing where they are slack. An
@@ -172,7 +193,7 @@ def CableForces_(T: Any) -> type[LeafSystem]:
             self._rows = self._whole.copy()
             m = cables.count
             kind = CABLE_MODELS[model]
-            self._law = kind.law
+            self._law = cable_law(model, cables)
             self._room = make_room(m, self._law, joint.height, place.start)
             self._work, self._outputs = np.zeros((OUTPUTS, m)), outputs_kernel(self._law)
             # Looked up once: these are called several thousand times per simulated second.
@@ -187,13 +208,19 @@ def CableForces_(T: Any) -> type[LeafSystem]:
             # Only damped cables ask for rates, lengths of straight ones only for the pose. What
             # needs less can be fed back without an algebraic loop.
             state, lengths, rates = (self.input_port_ticket(InputPortIndex(i)) for i in range(3))
-            self._damped = bool(np.any(cables.retardation > 0.0))
+            rubs = behaviour_of(cables).sheave_friction > 0.0
+            self._damped = rubs or bool(np.any(cables.retardation > 0.0))
             pull = {state, lengths, rates} if self._damped else {state, lengths}
             self._broken = None
             extra = set()
+            self._creeps = behaviour_of(cables).creep_stiffness > 0.0
+            if self._creeps:
+                self.DeclareContinuousState(m)
+                extra = {self.xc_ticket()}
+                pull |= extra
             if breakable:  # which pulleys a cable runs over changes, too
                 self._broken = self.DeclareVectorInputPort(BROKEN, m)
-                extra = {self._broken.ticket()}
+                extra = extra | {self._broken.ticket()}
                 pull |= extra
             self._zeros, self._ones = np.zeros(m), np.ones(m)
             self.DeclareVectorOutputPort("generalized_force", place.num_velocities, calc, pull)
@@ -206,6 +233,46 @@ def CableForces_(T: Any) -> type[LeafSystem]:
                     needs = {state}
                 writer = self._row_writer(row, len(needs - extra))
                 self.DeclareVectorOutputPort(name, m, writer, needs | extra)
+            if self._creeps:
+                self.DeclareVectorOutputPort(CREPT, m, self._write_crept, {self.xc_ticket()})
+
+        def relax(self, context: Context, X_WP: RigidTransform, l0: Array) -> None:
+            """Has cables been at rest for long, if they creep.
+
+            Args:
+                context: This system's own context.
+                X_WP: Pose of the platform [m].
+                l0: Unstrained lengths, shape (m,) [m].
+            """
+            if self._creeps:
+                context.SetContinuousState(crept_at_rest(self._set, X_WP, l0))
+
+        def _crept(self, context: Context) -> Any:
+            """What has crept, None of cables that do not; kernels for floats find it there."""
+            if not self._creeps:
+                return None
+            z = context.get_continuous_state_vector().CopyToVector()
+            if T is float:
+                put_crept(z, guesses_of(self._room, len(z)))
+            return z
+
+        def _write_crept(self, context: Context, output: BasicVector) -> None:
+            output.SetFromVector(context.get_continuous_state_vector().CopyToVector())
+
+        def DoCalcTimeDerivatives(self, context: Context, derivatives: ContinuousState) -> None:
+            """How fast cables creep."""
+            if not self._creeps:
+                return
+            z, state = self._crept(context), self._state(context)
+            inputs = state, self._l0(context), self._rates(context), self._cables_now(context)
+            if T is float:
+                rates = np.empty(len(z))
+                if self._outputs(*inputs, self._room, self._work) >= 0:
+                    raise self._problem(context, state)
+                creep_rates(guesses_of(self._room, len(z)), inputs[3], rates)
+            else:
+                rates = creep_rates_array(*inputs, self._law, self._place.joint.height, crept=z)
+            derivatives.get_mutable_vector().SetFromVector(rates)
 
         def _cables_now(self, context: Context) -> Array:
             if self._broken is not None and self._broken.HasValue(context):
@@ -252,6 +319,7 @@ def CableForces_(T: Any) -> type[LeafSystem]:
 
         def _calc_force(self, context: Context, output: BasicVector) -> None:
             state = self._state(context)
+            self._crept(context)
             bad = model_force(
                 state,
                 self._l0(context),
@@ -274,6 +342,7 @@ def CableForces_(T: Any) -> type[LeafSystem]:
                 self._place.joint.height,
                 start=self._place.start,
                 nv=self._place.num_velocities,
+                crept=self._crept(context),
             )
             if bad >= 0:
                 raise self._problem(context, np.array([x.value() for x in state]))
@@ -282,6 +351,7 @@ def CableForces_(T: Any) -> type[LeafSystem]:
         def _calc_both(self, context: Context, output: BasicVector) -> None:
             state, place = self._state(context), self._place
             inputs = state, self._l0(context), self._rates(context), self._cables_now(context)
+            crept = self._crept(context)
             if T is float:
                 bad = model_force_and_drums(
                     *inputs, self._room, place.num_velocities, output.get_mutable_value()
@@ -290,7 +360,12 @@ def CableForces_(T: Any) -> type[LeafSystem]:
                     raise self._problem(context, state)
                 return
             both, bad = model_force_and_drums_array(
-                *inputs, self._law, place.joint.height, start=place.start, nv=place.num_velocities
+                *inputs,
+                self._law,
+                place.joint.height,
+                start=place.start,
+                nv=place.num_velocities,
+                crept=crept,
             )
             if bad >= 0:
                 raise self._problem(context, np.array([x.value() for x in state]))
@@ -304,8 +379,10 @@ def CableForces_(T: Any) -> type[LeafSystem]:
                 l0 = self._l0(context) if needs > 1 else self._ones
                 l0_dot = self._l0_dot(context) if needs > 2 else self._zeros
                 inputs = state, l0, l0_dot, self._cables_now(context)
+                crept = self._crept(context)
                 if T is not float:
-                    table, bad = model_outputs_array(*inputs, self._law, self._place.joint.height)
+                    height = self._place.joint.height
+                    table, bad = model_outputs_array(*inputs, self._law, height, crept=crept)
                     output.SetFromVector(with_derivatives(table[row]))
                     return
                 bad = self._outputs(*inputs, self._room, self._work)
@@ -356,5 +433,6 @@ if TYPE_CHECKING:  # what an editor cannot see in a template
         def cables(self) -> Array: ...  # noqa: D102
         def cable_set(self) -> CableSet: ...  # noqa: D102
         def model(self) -> str: ...  # noqa: D102
+        def relax(self, context: Context, X_WP: RigidTransform, l0: Array) -> None: ...  # noqa: D102
 else:
     CableForces = class_for_floats(CableForces_)

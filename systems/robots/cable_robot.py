@@ -13,6 +13,7 @@ from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.cables.cable_behaviour import behaviour_of, tangent_stiffness
 from cdpr_drake.cables.elastic_law import cable_stiffness_matrix
 from cdpr_drake.cables.models import ELASTIC
 from cdpr_drake.errors import InfeasibleTensionError
@@ -166,6 +167,8 @@ class CableRobot(Diagram):
         X_WP, holding = equilibrium_start(
             self.robot, cables, model, X_WP, slack=slack, at_rest=at_rest
         )
+        cable_context = self.GetMutableSubsystemContext(self.forces, context)
+        self.forces.relax(cable_context, X_WP, holding.unstrained_lengths)
         return set_robot_at_equilibrium(
             self,
             self.GetMutableSubsystemContext(self.plant, context),
@@ -217,6 +220,9 @@ def automatic_step(
     if not motion.is_free:
         turned = X_WP.rotation().matrix()
         J, M = motion.columns(J, turned), motion.part(M, turned)
+    behaviour, most = behaviour_of(simulated), np.full(len(robot.cables), robot.tension_limits()[1])
+    stiffest = tangent_stiffness(most, simulated.stiffness, behaviour.stiffening)
+    stiffest = stiffest + behaviour.creep_stiffness * simulated.stiffness
     poles = np.zeros(0)
     if winches.has_motors():
         law, m = robot.winch_law(), len(robot.cables)
@@ -226,8 +232,12 @@ def automatic_step(
         groups, per_angle = robot.winch_groups(), law.drum.length_per_angle(np.zeros(m))
         J = np.hstack([J, -groups.to_cables()])
         own = per_angle[list(groups.first_cables())]
-        M = scipy.linalg.block_diag(M, np.diag(law.inertia / own**2))
-    K = cable_stiffness_matrix(J, simulated.stiffness, paths.lengths)
+        inertia = law.inertia / own**2
+        M = scipy.linalg.block_diag(M, np.diag(inertia))
+        if behaviour.sheave_friction > 0.0:  # in a groove, as a damper of each drum
+            slope = behaviour.sheave_friction * np.pi * most[0] / behaviour.sliding_speed
+            poles = np.concatenate([poles, -slope / inertia])
+    K = cable_stiffness_matrix(J, stiffest, paths.lengths)
     retardation = 0.0 if cables.model == ELASTIC else float(np.max(simulated.retardation))
     eigenvalues = vibration_eigenvalues(M, K, retardation)
     return STEP_SHARE * largest_stable_step(np.concatenate([eigenvalues, poles]), integrator)

@@ -8,7 +8,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables.models import CABLE_MODELS, KELVIN_VOIGT
+from cdpr_drake.cables.models import KELVIN_VOIGT, cable_law
 from cdpr_drake.dynamics.robot_arrays import IDEAL, MOTORS, TENSIONS, Drive
 from cdpr_drake.errors import CdprError
 from cdpr_drake.geometry.cable_set import CableSet
@@ -90,7 +90,9 @@ class CompiledCableRobot(Diagram):
         )
         bodies = builder.AddNamedSystem(
             "bodies",
-            CompiledBodies(motion.arrays(), CABLE_MODELS[settings.cables.model].law, robot.joint()),
+            CompiledBodies(
+                motion.arrays(), cable_law(settings.cables.model, cables), robot.joint()
+            ),
         )
         disturbances = settings.disturbance_block(robot)
         pushed = [system.GetInputPort(APPLIED_WRENCH) for system in (motion, bodies)]

@@ -18,13 +18,15 @@ from pydrake.systems.framework import (
 )
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.cables.behaving_kernel import put_crept
 from cdpr_drake.cables.broken_cables import break_cables
 from cdpr_drake.cables.commanded_tension_kernel import cable_motions
-from cdpr_drake.cables.models import CABLE_MODELS
-from cdpr_drake.cables.simulation_kernel import OUTPUTS, make_room, outputs_kernel
+from cdpr_drake.cables.models import cable_law, crept_at_rest
+from cdpr_drake.cables.simulation_kernel import OUTPUTS, guesses_of, make_room, outputs_kernel
 from cdpr_drake.dynamics.advance_events_kernel import BACKWARD, fresh_memory, robot_addresses
 from cdpr_drake.dynamics.advance_kernel import REPORTED, robot_energy
 from cdpr_drake.dynamics.robot_arrays import (
+    CREEPING,
     MOTORS,
     TENSIONS,
     Drive,
@@ -38,7 +40,7 @@ from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.models.robot_in_plant import pose_on_joint
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import rigid_platform
-from cdpr_drake.systems.robots.cable_forces import PORTS
+from cdpr_drake.systems.robots.cable_forces import CREPT, PORTS
 from cdpr_drake.systems.robots.compiled_step import (
     PackedRule,
     StepRule,
@@ -133,7 +135,7 @@ class CompiledMotion(LeafSystem):
             self._arrays = self._arrays._replace(winch=rows)
         self._whole, self._whole_winch = self._arrays.cables.copy(), self._arrays.winch.copy()
         self._n = joint.num_states
-        self._size = size = self._n + m * drive.states_per_cable()
+        self._size = size = self._arrays.work.shape[1]
         self._where = robot_addresses(self._arrays)
         self._packed = PackedRule(StepRule())
         # Where what was reached has all its values, the state, and the report.
@@ -141,7 +143,7 @@ class CompiledMotion(LeafSystem):
         self._values, self._own = slice(k, 2 * k), slice(k, k + size)
         self._platform, self._told = slice(k, k + self._n), slice(2 * k - REPORTED, 2 * k)
         self._still, self._calm = np.zeros(m), np.zeros((2, m))
-        law = CABLE_MODELS[model].law
+        law = cable_law(model, cables)
         self._room, self._outputs = make_room(m, law, self._height), outputs_kernel(law)
         self._frame = frame
         self._declare_inputs()
@@ -247,6 +249,8 @@ class CompiledMotion(LeafSystem):
         for row, name in enumerate(PORTS):
             self._vector(name, m, reader(row), {table.ticket()})
         self._vector("unstrained_lengths", m, lambda c: self.state(c)[n : n + m], here)
+        if self._arrays.kinds[CREEPING] > 0:
+            self._vector(CREPT, m, lambda c: self.state(c)[self._size - m :], here)
         if self._drive.kind == MOTORS:
             after = n + m
             self._vector("unstrained_length_rates", m, lambda c: self.state(c)[after:][:m], here)
@@ -370,6 +374,7 @@ class CompiledMotion(LeafSystem):
         state, n, m = self.state(context), self._n, self._m
         motors = self._drive.kind == MOTORS
         rates = state[n + m : n + 2 * m] if motors else self._ideal_rates(context)
+        put_crept(state[self._size - self._arrays.kinds[CREEPING] :], guesses_of(self._room, m))
         bad = self._outputs(
             state[:n], state[n : n + m], rates, self._arrays.cables, self._room, table
         )
@@ -425,7 +430,9 @@ class CompiledMotion(LeafSystem):
         self.set_state(context, self._state_at(X_WP, lengths, tensions))
 
     def _state_at(self, X_WP: RigidTransform, lengths: Array, tensions: Array) -> Array:
-        return resting_state(self._robot, self._drive, X_WP, lengths, tensions, home=self._home)
+        state = resting_state(self._robot, self._drive, X_WP, lengths, tensions, home=self._home)
+        crept = crept_at_rest(self._set, X_WP, lengths)[: self._arrays.kinds[CREEPING]]
+        return np.concatenate([state, crept])
 
     def energy(self, context: Context) -> float:
         """Kinetic and potential energy of platform and cables [J], see `robot_energy`."""

@@ -12,12 +12,14 @@ from pydrake.multibody.math import SpatialAcceleration, SpatialVelocity
 from pydrake.systems.framework import Context, LeafSystem
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.cables.behaving_kernel import put_crept
 from cdpr_drake.cables.broken_cables import break_cables
-from cdpr_drake.cables.simulation_kernel import make_room, model_force_and_drums
+from cdpr_drake.cables.simulation_kernel import guesses_of, make_room, model_force_and_drums
 from cdpr_drake.dynamics.advance_events_kernel import integrate_explicit, integrate_semi_implicit
 from cdpr_drake.dynamics.explicit_kernel import METHODS
 from cdpr_drake.dynamics.platform_kernel import floating_rates, line_rates, planar_rates
 from cdpr_drake.dynamics.robot_arrays import (
+    CREEPING,
     IDEAL,
     MOTORS,
     PLATFORM,
@@ -34,6 +36,7 @@ from cdpr_drake.geometry.platform_joint import PlatformJoint
 from cdpr_drake.geometry.poses import pose_row
 from cdpr_drake.models.robot_in_plant import pose_from_state
 from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.systems.robots.cable_forces import CREPT
 from cdpr_drake.systems.robots.failures import BROKEN
 from cdpr_drake.systems.robots.platform_wrench import APPLIED_WRENCH
 from cdpr_drake.winches.motor import MODES, resting_motors
@@ -158,6 +161,7 @@ class CompiledBodies(LeafSystem):
     unstrained_length_rates vector(m)                 m/s     in
     applied_wrench          vector(6)                 N m, N  in, may stay open
     broken                  vector(m)                 -       in, may stay open
+    crept                   vector(m)                 -       in, of cables that creep only
     body_velocities         list[SpatialVelocity]     rad/s   out, of the world and the platform, in
                                                       m/s     W, of the body's origin
     body_accelerations      list[SpatialAcceleration] rad/s^2 out, the same of accelerations
@@ -186,6 +190,9 @@ class CompiledBodies(LeafSystem):
                 ("unstrained_length_rates", m),
             )
         ]
+        self._crept = None
+        if arrays.kinds[CREEPING] > 0:
+            self._crept = self.DeclareVectorInputPort(CREPT, m)
         self._wrench = self.DeclareVectorInputPort(APPLIED_WRENCH, 6)
         self._broken = self.DeclareVectorInputPort(BROKEN, m)
         self.DeclareAbstractOutputPort(
@@ -204,6 +211,8 @@ class CompiledBodies(LeafSystem):
         force, out = np.zeros(self._nv + len(self._cables)), np.zeros(self._n)
         if self._broken.HasValue(context):
             break_cables(self._whole, self._broken.Eval(context), self._cables)
+        if self._crept is not None:
+            put_crept(self._crept.Eval(context), guesses_of(self._room, len(self._cables)))
         model_force_and_drums(state, lengths, rates, self._cables, self._room, self._nv, force)
         pushed = self._wrench.HasValue(context)
         apply_wrench(self._arrays, self._joint, self._wrench.Eval(context) if pushed else None)

@@ -8,9 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from pydrake.systems.primitives import MatrixGain
 
-from cdpr_drake.cables.cable_behaviour import CableBehaviour
+from cdpr_drake.cables.cable_behaviour import behaving_cables
 from cdpr_drake.cables.models import CABLE_MODELS, KELVIN_VOIGT
-from cdpr_drake.errors import CableModelError
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.models.robot_in_plant import RobotInPlant
 from cdpr_drake.models.robot_schema import Robot
@@ -53,15 +52,9 @@ class CableSettings:
     def cable_set(self, robot: Robot) -> CableSet:
         """The cables of a robot, over its pulleys or from fixed exit points.
 
-        Raises:
-            CableModelError: Its cables do what no simulated cable does.
+        With what its file says of them beside the elastic law, see `cables.cable_behaviour`.
         """
-        if robot.cable_behaviour() != CableBehaviour():
-            raise CableModelError(
-                f"robot {robot.name}: cable.behaviour: found a section that changes its cables; "
-                "accepted in a simulation: null, since simulated cables are elastic and damped"
-            )
-        return self.applied(robot.cable_set())
+        return self.applied(behaving_cables(robot.cable_set(), robot.cable_behaviour()))
 
     def applied(self, cables: CableSet) -> CableSet:
         """Cables as these settings want them."""

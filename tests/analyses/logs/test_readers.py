@@ -49,7 +49,7 @@ def test_a_file_is_told_by_what_is_in_it(format, write):
 
 
 def test_every_reader_has_a_file_here():
-    assert {*FILES, "mat"} == set(LOG_READERS)
+    assert {*FILES, "mat", "mcap"} == set(LOG_READERS)
 
 
 @pytest.mark.parametrize("format", FILES)

@@ -8,6 +8,7 @@ import pytest
 
 import cdpr_drake as cdpr
 from cdpr_drake.cables.cable_behaviour import tension_of_strain
+from cdpr_drake.cables.models import check_model
 from cdpr_drake.cli.app import main
 from cdpr_drake.errors import CableModelError
 from cdpr_drake.geometry.cable_paths import cable_paths
@@ -76,8 +77,8 @@ def test_what_does_not_know_them_says_so(tmp_path, capsys):
     one = robot(stiffening=STIFFENING)
     with pytest.raises(CableModelError, match="found catenary for cables that stiffen or are warm"):
         cdpr.solve_static(one, model="catenary")
-    with pytest.raises(CableModelError, match="accepted in a simulation: null"):
-        CableSettings().cable_set(one)
+    with pytest.raises(CableModelError, match="found catenary for cables with a behaviour"):
+        check_model("catenary", CableSettings().cable_set(one))
     assert CableSettings().cable_set(robot(stiffening=0.0)).count == 8
 
 

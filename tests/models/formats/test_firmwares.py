@@ -1,5 +1,7 @@
 """Machines as firmwares of printers and routers on cables know them."""
 
+import re
+
 import numpy as np
 import pytest
 from scipy.io import savemat
@@ -71,11 +73,56 @@ def test_klipper(load):
 def test_reprapfirmware(load):
     robot = load("config.g", REPRAP)
     np.testing.assert_allclose(robot.exit_points()[:, 3], [0.0, 0.0, 2.345])
-    assert robot.winch.gear_ratio == pytest.approx(2.0 * 255.0 / 20.0)
-    assert robot.winch.drum_radius == pytest.approx(0.065)
+    assert robot.winch.gear_ratio == pytest.approx(255.0 / 20.0)
+    assert [cable.mechanical_advantage for cable in robot.cables] == [2.0] * 4
+    assert robot.winch.drum_radius == pytest.approx(0.065 - 0.5e-3)
     assert robot.platform.mass == 2.5
     np.testing.assert_allclose(robot.stiffness(), 20000.0)
     assert (robot.tension_bounds.lower, robot.tension_bounds.upper) == (4.0, 90.0)
+
+
+BUILT_UP = (
+    REPRAP.replace("Q0.0", "Q0.0356")
+    .replace("U2:2:2:2", "U2:2:2:4")
+    .replace("R65.0:65.0:65.0:65.0", "R65.24:65.14:65.3:64.67")
+)
+
+
+def test_motors_turn_as_far_as_the_firmware_turns_them(load):
+    """Drums, tackles and build-up against the firmware's own law of a motor's position."""
+    robot = load("config.g", BUILT_UP)
+    drum, advantage = robot.drum(), np.array([2.0, 2.0, 2.0, 4.0])
+    assert [cable.mechanical_advantage for cable in robot.cables] == advantage.tolist()
+    origin, R = np.linalg.norm(robot.exit_points(), axis=0), [65.24, 65.14, 65.3, 64.67]
+    for point in ([0.2, -0.3, 0.5], [-0.4, 0.1, 1.2], [0.6, 0.7, 0.1]):
+        lengths = np.linalg.norm(robot.exit_points().T - point, axis=1)
+        Q, squares = 0.0356, np.square(R)
+        k2 = -advantage * Q  # mm, as HangprinterKinematics.cpp has k0, k1, k2
+        k1 = squares + Q * advantage * 1e3 * origin
+        k0 = 2.0 * advantage * 12.75 / k2
+        firmware = k0 * (np.sqrt(k1 + 1e3 * lengths * k2) - np.sqrt(k1 + 1e3 * origin * k2))
+        np.testing.assert_allclose(drum.motor_angles(lengths - origin), firmware, rtol=1e-9)
+
+
+def test_drums_tackles_and_build_up_are_read_back(load):
+    robot = load("config.g", BUILT_UP)
+    ((name, text),) = export_robot(robot, "reprapfirmware").items()
+    numbers = re.search(r"M666 Q(\S+) R(\S+) U(\S+)", text)
+    assert float(numbers[1]) == pytest.approx(0.0356, rel=1e-12)
+    radii = [float(each) for each in numbers[2].split(":")]
+    np.testing.assert_allclose(radii, [65.24, 65.14, 65.3, 64.67], rtol=1e-12)
+    assert numbers[3] == "2:2:2:4"
+    again = load(f"again_{name}", text)
+    np.testing.assert_allclose(again.drum().radii(4), robot.drum().radii(4), rtol=1e-12)
+    assert again.winch.layers.wound == pytest.approx(robot.winch.layers.wound)
+    catalogue = load_robot("hangprinter_4")
+    ((name, text),) = export_robot(catalogue, "reprapfirmware").items()
+    read, still = load(f"catalogue_{name}", text), np.zeros(4)
+    for paid_out in (still, still + 0.4, still - 0.7):
+        np.testing.assert_allclose(
+            read.drum().motor_angles(paid_out), catalogue.drum().motor_angles(paid_out),
+            rtol=1e-9, atol=1e-12,
+        )  # fmt: skip
 
 
 def test_the_last_anchor_of_older_firmware_is_a_height(load):
@@ -126,6 +173,9 @@ def test_what_is_written_is_read_back(format, name, text, load):
         ("a.g", REPRAP.replace("B1312.5:", "B"), "M669 B: found 1270.9:-162.2; accepted: x:y:z"),
         ("a.g", REPRAP.replace("N4", "N5"), "found anchors A, B, C, D and N 5"),
         ("a.g", REPRAP.replace("R65.0:65.0:65.0:", "R65.0:"), "M666 R: found 2 numbers"),
+        ("a.g", REPRAP.replace("Q0.0", "Q-1"), "M666 Q: found -1.0; accepted: at least 0"),
+        ("a.g", REPRAP.replace("Q0.0", "Q900"), "M666 Q: found 900.0; accepted: so little that"),
+        ("a.g", REPRAP.replace("Q0.0", "Q.1").replace("O1:", "O2:"), "M666 O: found 2:1:1:1; acc"),
         ("a.g", "G28\n", "M669: found nothing"),
         ("a.yaml", MASLOW.replace("trX: 3600.0", "trX: wide"), "trX: found wide; accepted: a fin"),
         ("a.yaml", MASLOW.replace("true", "perhaps"), "Maslow_vertical: found perhaps"),

@@ -1,0 +1,115 @@
+"""Logs in MCAP: by the format's own reader, and read back as text with the same columns is."""
+
+import json
+
+import numpy as np
+import pytest
+
+from cdpr_drake.analyses.logs.log_formats import detect_log, read_recorded
+from cdpr_drake.analyses.reporting.exported_logs import LOG_WRITERS
+from cdpr_drake.errors import LogFileError, OutputFormatError
+
+reader = pytest.importorskip("mcap.reader")
+
+
+@pytest.fixture
+def run_folder(tmp_path):
+    """A results folder as a run leaves it: log.npz and log.csv."""
+    random, n = np.random.default_rng(3), 40
+    q = random.normal(size=(n, 4))
+    X_WP = np.hstack([q / np.linalg.norm(q, axis=1, keepdims=True), random.normal(size=(n, 3))])
+    log = {"time": np.arange(n) * 0.01, "X_WP": X_WP, "tensions": random.uniform(1, 90, (n, 2))}
+    log["error"] = random.normal(size=n)
+    np.savez(tmp_path / "log.npz", **log)
+    names = ["time", *(f"X_WP.{a}" for a in ("qw", "qx", "qy", "qz", "x", "y", "z"))]
+    names += ["tensions.C1", "tensions.C2", "error"]
+    table = np.column_stack(list(log.values()))
+    rows = [",".join(map(repr, row)) for row in table.tolist()]
+    (tmp_path / "log.csv").write_text("\n".join([",".join(names), *rows]) + "\n")
+    return tmp_path, log
+
+
+def write(folder):
+    LOG_WRITERS["mcap"](folder, folder / "log.mcap")
+    return folder / "log.mcap"
+
+
+def test_its_own_reader_finds_transforms_and_quantities(run_folder):
+    folder, log = run_folder
+    with write(folder).open("rb") as stream:
+        made = reader.make_reader(stream)
+        messages = list(made.iter_messages())
+        summary = made.get_summary()
+    topics = {c.topic: summary.schemas[c.schema_id] for c in summary.channels.values()}
+    assert topics["/tf"].name == "foxglove.FrameTransform"
+    assert topics["/tf"].encoding == "jsonschema"
+    assert set(topics) == {"/tf", "/X_WP", "/tensions", "/error"}
+    assert json.loads(topics["/tensions"].data)["properties"]["tensions.C2"] == {"type": "number"}
+    frames = [json.loads(m.data) for _, c, m in messages if c.topic == "/tf"]
+    places = [[f["translation"][a] for a in "xyz"] for f in frames]
+    turns = [[f["rotation"][a] for a in "wxyz"] for f in frames]
+    np.testing.assert_array_equal(np.hstack([turns, places]), log["X_WP"])
+    assert frames[7]["timestamp"] == {"sec": 0, "nsec": 70_000_000}
+    assert (frames[0]["parent_frame_id"], frames[0]["child_frame_id"]) == ("world", "platform")
+    times = [m.log_time for _, c, m in messages if c.topic == "/error"]
+    assert times == [10_000_000 * k for k in range(40)]
+
+
+def test_it_is_read_back_as_its_text_is(run_folder):
+    folder, _ = run_folder
+    path = write(folder)
+    assert detect_log(path).format == "mcap"
+    log, text = read_recorded(path), read_recorded(folder / "log.csv")
+    assert log.format == "mcap"
+    assert list(log.columns) == list(text.columns)
+    assert len(log.columns) > 9
+    for header, values in text.columns.items():
+        np.testing.assert_array_equal(log.columns[header], values)
+
+
+def test_what_is_not_finite_is_null_and_comes_back_so(run_folder):
+    folder, log = run_folder
+    log["tensions"][3, 1] = np.nan
+    np.savez(folder / "log.npz", **log)
+    path = write(folder)
+    back = read_recorded(path)
+    header = next(name for name in back.columns if "C2" in name)
+    assert np.flatnonzero(np.isnan(back.columns[header])).tolist() == [3]
+
+
+def test_transforms_alone_are_poses(run_folder):
+    from mcap.writer import Writer
+
+    folder, log = run_folder
+    path = folder / "poses.mcap"
+    with write(folder).open("rb") as source, path.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start()
+        schema = writer.register_schema("foxglove.FrameTransform", "jsonschema", b"{}")
+        channel = writer.register_channel("/tf", "json", schema)
+        image = writer.register_channel("/image", "protobuf", schema)
+        for _, each, m in reader.make_reader(source).iter_messages():
+            if each.topic == "/tf":
+                writer.add_message(channel, m.log_time, m.data, m.publish_time)
+        writer.add_message(image, 0, b"\1\2", 0)
+        writer.finish()
+    back = read_recorded(path)
+    columns = ("qw", "qx", "qy", "qz", "x_m", "y_m", "z_m")
+    np.testing.assert_allclose(back.table(columns), log["X_WP"], rtol=1e-15)
+    np.testing.assert_allclose(back.time, log["time"], atol=1e-12)
+    assert any("/image" in words for words in back.remarks)
+
+
+def test_what_cannot_be_is_said_in_one_line(run_folder, monkeypatch):
+    folder, log = run_folder
+    path = write(folder)
+    path.write_bytes(path.read_bytes()[:300])
+    with pytest.raises(LogFileError, match=r"log.mcap: cannot be read as MCAP") as refused:
+        read_recorded(path)
+    assert "\n" not in str(refused.value)
+    np.savez(folder / "log.npz", **{**log, "time": log["time"] - 1.0})
+    with pytest.raises(OutputFormatError, match="time: found -1; accepted by mcap: >= 0"):
+        write(folder)
+    monkeypatch.setattr("cdpr_drake.analyses.logs.mcap_log.find_spec", lambda name: None)
+    with pytest.raises(LogFileError, match=r"pip install 'cdpr_drake\[mcap\]'"):
+        read_recorded(path)
