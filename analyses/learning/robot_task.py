@@ -143,7 +143,7 @@ class RobotTask(ABC):
         half = min(ROOM_SHARE * float(room), REACH_SHARE * speed * REACH_TIME)
         self.box = HeldBox(robot, settings, half)
         self.reach = self.box.half
-        arm = float(np.sqrt(np.mean(np.sum(np.square(robot.anchor_points()), axis=0))))
+        arm = float(np.sqrt(np.mean(np.sum(np.square(robot.cable_set().p_PB), axis=0))))
         turn_speed = min(1.0, speed / arm) if arm > 0.0 else 1.0
         self.scales = np.array([self.reach, speed, turn_speed, robot.tension_limits()[1]])
         self._basis = basis

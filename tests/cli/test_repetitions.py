@@ -67,8 +67,8 @@ def test_finished_runs_are_found_again_and_other_seeds_can_follow(capsys, tmp_pa
 
     _, first, said = repeat("0:2")
     assert said.splitlines() == [
-        f"{DEFAULT_SCENARIO}: by the compiled loop, as the run is repeated; else with "
-        "--set integration.loop=diagram"
+        f"{DEFAULT_SCENARIO}: by the compiled loop (its events in Python, since its tensions are "
+        "managed), as the run is repeated; else with --set integration.loop=diagram"
     ]
     assert {(run["engine"], run["loop"]) for run in first} == {("compiled", "compiled")}
     _, again, said = repeat("0:2")
