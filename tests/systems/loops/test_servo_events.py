@@ -4,10 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import yaml
 
 from cdpr_drake.analyses.simulation.monte_carlo import run_many, with_seeds
 from cdpr_drake.errors import DivergedError
 from cdpr_drake.geometry.drake_pose_kernel import agrees
+from cdpr_drake.models.robot_loader import robot_text
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.loops.loop_choice import check_loop, set_loop
 from cdpr_drake.systems.loops.servo_events import KINDS
@@ -92,6 +94,28 @@ def test_schemes_and_estimators(name, overrides, kind):
 )  # fmt: skip
 def test_tasks_mountings_integrators_and_winches(name, overrides):
     check(scenario_of(name, *overrides))
+
+
+@pytest.fixture
+def behaving(tmp_path):
+    def write(**behaviour):
+        content = yaml.safe_load(robot_text("acrobot_small"))
+        content["cable"]["behaviour"] = behaviour
+        path = tmp_path / "behaving.yaml"
+        path.write_text(yaml.safe_dump(content))
+        return scenario_of("acrobot_pbvs", f"robot={path}")
+
+    return write
+
+
+@needs_kernel
+def test_cables_that_stiffen_and_rub(behaving):
+    check(behaving(stiffening=2e-3, sheave_friction=0.03))
+
+
+def test_cables_that_creep_stay_in_python(behaving):
+    loop = ServoLoop(behaving(creep_stiffness=2.0, creep_time=0.3))
+    assert loop.python_reason == "its cables creep"
 
 
 @needs_kernel
