@@ -12,7 +12,7 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.broken_cables import break_cables
-from cdpr_drake.cables.models import CABLE_MODELS
+from cdpr_drake.cables.models import cable_law
 from cdpr_drake.cables.simulation_kernel import OUTPUTS, make_room, outputs_kernel
 from cdpr_drake.dynamics.advance_events_kernel import fresh_memory
 from cdpr_drake.dynamics.advance_kernel import REPORTED
@@ -143,7 +143,7 @@ class BatchRobots:
         self.commands_per_robot = max(self._of_cable) + 1
         self._n, self._floats = first.joint.num_states, first.joint.is_floating
         self._size = self._n + m * drive.states_per_cable()
-        law = CABLE_MODELS[first.model].law
+        law = cable_law(first.model, first.cables)
         rooms = [make_room(m, law, each.joint.height) for each in self._members]
         self._rooms, self._outputs = np.array(rooms), outputs_kernel(law)
         self._fresh_rooms = self._rooms.copy(), self._stack.room.copy()
@@ -569,6 +569,11 @@ def _check(
         raise CdprError(
             f"{name}: found a section; accepted in a batch: null, with wrenches and break_cable "
             "between steps"
+        )
+    creeping = max((each.cable_behaviour().creep_stiffness for each in robots), default=0.0)
+    if creeping > 0.0:
+        raise CdprError(
+            f"cable.behaviour.creep_stiffness: found {creeping:g}; accepted in a batch: 0"
         )
     if by_tensions and settings.winches.has_motors():
         raise CdprError("winches.kind: found motor for robots by tensions; accepted: ideal")

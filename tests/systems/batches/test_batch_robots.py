@@ -16,7 +16,14 @@ from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.loops.robot_motion import RobotMotion
 from cdpr_drake.systems.robots.compiled_step import StepRule
 from cdpr_drake.systems.robots.failures import Failure, FailureSettings
-from tests.systems.batches.varied import PERIOD, alone, alone_by_tensions, settings, varied
+from tests.systems.batches.varied import (
+    PERIOD,
+    alone,
+    alone_by_tensions,
+    behaving,
+    settings,
+    varied,
+)
 
 ROBOT = load_robot("acrobot_small")
 ELASTIC = settings()
@@ -58,6 +65,17 @@ def test_each_moves_as_alone_by_velocities_and_wrenches(case):
         assert np.array_equal(batch.states[k], state)
         assert np.array_equal(batch.tensions[k], tensions)
     assert len(np.unique(batch.states[:, 0])) == 5 or not robots[0].joint().is_floating
+
+
+def test_each_moves_as_alone_on_cables_that_stiffen_and_rub():
+    robots = varied(behaving(stiffening=2e-3, sheave_friction=0.03), 3)
+    batch, commands = BatchRobots(robots[0], 3, settings=ELASTIC, parameters=robots), speeds(3, 3)
+    for command in commands:
+        batch.step(command, PERIOD)
+    for k, robot in enumerate(robots):
+        state, tensions = alone(robot, ELASTIC, commands[:, k])
+        assert np.array_equal(batch.states[k], state)
+        assert np.array_equal(batch.tensions[k], tensions)
 
 
 def test_each_moves_as_alone_by_the_semi_implicit_method_in_long_steps():
@@ -295,6 +313,7 @@ def test_a_robot_that_fails_stops_and_the_others_go_on():
             lambda: BatchRobots(ROBOT, 2).step(np.full(8, np.nan), PERIOD),
             "commands: found numbers that are not finite",
         ),
+        (lambda: BatchRobots(behaving(creep_stiffness=2.0), 1), "creep_stiffness: found 2"),
         (lambda: BatchRobots(ROBOT, 2).step(np.zeros(8), -1.0), "duration: found -1 s"),
         (lambda: BatchRobots(ROBOT, 2).rollout(np.zeros(8), PERIOD), r"found shape \(8,\)"),
         (lambda: BatchRobots(ROBOT, 2).reset(poses=np.ones((2, 7))), "a quaternion of norm 2"),

@@ -3,7 +3,9 @@
 import numpy as np
 from pydrake.systems.analysis import Simulator
 
+from cdpr_drake.models.materials import BehaviourSettings
 from cdpr_drake.models.robot_draws import ParameterCovariance, drawn_robots
+from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.batches.batch_robots import DEFAULT_RULE
 from cdpr_drake.systems.robots.compiled_cable_robot import CompiledCableRobot, motion_by_tensions
 from cdpr_drake.systems.robots.settings import CableRobotSettings, CableSettings, WinchSettings
@@ -16,6 +18,13 @@ def settings(mode="ideal", model="elastic", pulleys=False, **more):
     return CableRobotSettings(
         cables=CableSettings(model=model, pulleys=pulleys), winches=winches, **more
     )
+
+
+def behaving(name="acrobot_small", **behaviour):
+    """A robot whose cables do more than the elastic law."""
+    robot = load_robot(name)
+    robot.cable.behaviour = BehaviourSettings(**behaviour)
+    return robot
 
 
 def varied(robot, count, seed=0):
