@@ -86,7 +86,8 @@ ITEMS = (
     ),
     Item(
         "image_path", "What the camera sees", "cdpr simulate --out servo", "servo/image_path.png",
-        "Paths of the tag's corners in the image, from start to goal.",
+        "The tag's centre in the image, from start to goal, and how far it is from a straight "
+        "line.",
     ),
     Item(
         "tensions", "Tensions of a run", "cdpr simulate --out servo", "servo/tensions.png",
