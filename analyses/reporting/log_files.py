@@ -31,6 +31,7 @@ _PARTS = {
     "wrench_estimated": ("mx_nm", "my_nm", "mz_nm", "fx_n", "fy_n", "fz_n"),
     "displacement": ("rx_rad", "ry_rad", "rz_rad", "x_m", "y_m", "z_m"),
     "wrench_sigma": ("mx_nm", "my_nm", "mz_nm", "fx_n", "fy_n", "fz_n"),
+    "wrench_skipped": ("no_pose", "no_direction"),
     "feasible": ("flag",),
     "failures": ("count",),
     "specific_force": ("x_m_s2", "y_m_s2", "z_m_s2"),

@@ -11,7 +11,11 @@ from cdpr_drake.analyses.reporting.log_on_disk import Log
 from cdpr_drake.analyses.visualization.figure_style import line_style, new_figure
 from cdpr_drake.arrays import Array
 from cdpr_drake.palette import ESTIMATED, IDEAL
-from cdpr_drake.systems.estimators.wrench_estimator import WRENCH_ESTIMATED, WRENCH_SIGMA
+from cdpr_drake.systems.estimators.wrench_estimator import (
+    WRENCH_ESTIMATED,
+    WRENCH_SIGMA,
+    WRENCH_SKIPPED,
+)
 from cdpr_drake.systems.robots.platform_wrench import APPLIED_WRENCH
 
 PARTS = (("force", "n", slice(3, 6)), ("moment", "nm", slice(0, 3)))
@@ -36,7 +40,11 @@ def wrench_summary(log: Log, kind: str, delay: float) -> dict[str, Any]:
     time, found = log["time"], np.asarray(log[WRENCH_ESTIMATED])
     true = np.column_stack([np.interp(time - delay, time, row) for row in true_wrench(log).T])
     wrong = found - true
-    summary: dict[str, Any] = {"kind": kind, "delay_s": delay}
+    no_pose, no_direction = (int(x) for x in log[WRENCH_SKIPPED][-1])
+    summary: dict[str, Any] = {
+        "kind": kind, "delay_s": delay,
+        "samples_without_pose": no_pose, "samples_without_direction": no_direction,
+    }  # fmt: skip
     for name, unit, part in PARTS:
         summary[f"{name}_rms_{unit}"] = float(np.sqrt(np.mean(np.sum(wrong[:, part] ** 2, axis=1))))
         mean = np.mean(wrong[:, part], axis=0)

@@ -22,7 +22,11 @@ from cdpr_drake.systems.estimators.geometry_learner import (
     LEARNT_SIGMA,
     OPEN_FRAMES,
 )
-from cdpr_drake.systems.estimators.wrench_estimator import WRENCH_ESTIMATED, WRENCH_SIGMA
+from cdpr_drake.systems.estimators.wrench_estimator import (
+    WRENCH_ESTIMATED,
+    WRENCH_SIGMA,
+    WRENCH_SKIPPED,
+)
 from cdpr_drake.systems.monitoring.log_row import RunLog, add_log
 from cdpr_drake.systems.monitoring.run_monitor import RunMonitor, StopRules
 from cdpr_drake.systems.monitoring.stability_watch import (
@@ -240,7 +244,7 @@ def add_servo_log(
     if scenario.failures is not None:
         ports |= {name: block.GetOutputPort(name) for name in FAULTS if block.HasOutputPort(name)}
     if blocks.wrench is not None:
-        for name in (WRENCH_ESTIMATED, WRENCH_SIGMA):
+        for name in (WRENCH_ESTIMATED, WRENCH_SIGMA, WRENCH_SKIPPED):
             ports[name] = blocks.wrench.GetOutputPort(name)
     if blocks.learner is not None:
         for name in (LEARNT, LEARNT_SIGMA, BELIEVED_POINTS, ADAPTATION, DOUBTED, OPEN_FRAMES):

@@ -7,7 +7,6 @@ worth.
 Drake's YAML loader reads the annotations themselves, so they are not postponed here.
 """
 
-from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,6 +35,9 @@ from cdpr_drake.systems.estimators.length_estimator import EncoderLengths
 
 WRENCH_ESTIMATED, WRENCH_SIGMA = "wrench_estimated", "wrench_sigma"
 """Outputs: the estimate, and the standard deviation of each of its components."""
+
+WRENCH_SKIPPED = "wrench_skipped"
+"""Output: how many samples so far fitted no pose, and in how many a cable had no direction."""
 
 MISFIT = 0.02
 """Lengths that fit a pose this badly [m] tell none: the pose before stays."""
@@ -95,9 +97,11 @@ class WrenchEstimator(LeafSystem):
     measured_lengths  vector(m) m      in, unstrained lengths that the encoders count
     wrench_estimated  vector(6) N m, N out, moment about Po and force, in W
     wrench_sigma      vector(6) N m, N out, standard deviation of each, of what readings err by
+    wrench_skipped    vector(2) -      out, samples so far without a pose, without a direction
     ================= ========= ====== =======================================================
 
-    Samples at a rate of its own. Where lengths fit no pose, the pose before stays.
+    Samples at a rate of its own. Where lengths fit no pose, the pose before stays; where a cable
+    has no direction, the estimate before. `wrench_skipped` counts both.
     """
 
     def __init__(
@@ -134,10 +138,12 @@ class WrenchEstimator(LeafSystem):
         self._pose = self.DeclareDiscreteState(pose_row(X_WP0))
         self._reference = self.DeclareDiscreteState(np.full(m, np.nan))
         self._before = self.DeclareDiscreteState(np.full(m, np.nan))
+        self._skipped = self.DeclareDiscreteState(2)
         self.DeclarePeriodicDiscreteUpdateEvent(self.period, 0.0, self._update)
         self.DeclareForcedDiscreteUpdateEvent(self._update)
         self.DeclareStateOutputPort(WRENCH_ESTIMATED, self._found)
         self.DeclareStateOutputPort(WRENCH_SIGMA, self._sigma)
+        self.DeclareStateOutputPort(WRENCH_SKIPPED, self._skipped)
 
     @property
     def delay(self) -> float:
@@ -155,8 +161,12 @@ class WrenchEstimator(LeafSystem):
         reference = kept(self._reference)
         if np.isnan(reference[0]):
             reference = self._counted.reference(X_WP, counts, tensions)
-        X_WP = self._where(X_WP, self._counted.lengths(counts, reference, tensions), tensions)
-        with suppress(CableGeometryError):
+        skipped = kept(self._skipped)
+        try:
+            X_WP = self._where(X_WP, self._counted.lengths(counts, reference, tensions), tensions)
+        except ForwardKinematicsError:
+            skipped[0] += 1.0
+        try:
             J = cable_jacobian(X_WP, self._counted.cables)
             observer = self._observer
             observer.memory[:] = kept(self._memory)
@@ -167,8 +177,11 @@ class WrenchEstimator(LeafSystem):
                 (counts + reference) / self._counted.cables.stiffness,
             )  # fmt: skip
             state.set_value(self._sigma, np.sqrt(np.diag(spread)))
+        except CableGeometryError:
+            skipped[1] += 1.0
         for index, value in (
             (self._pose, pose_row(X_WP)), (self._reference, reference), (self._before, counts),
+            (self._skipped, skipped),
         ):  # fmt: skip
             state.set_value(index, value)
 
@@ -181,10 +194,12 @@ class WrenchEstimator(LeafSystem):
         return np.maximum(found, 0.0)
 
     def _where(self, X_WP: RigidTransform, lengths: Array, tensions: Array) -> RigidTransform:
-        """The pose that lengths tell, near the one before."""
+        """The pose that lengths tell, near the one before.
+
+        Raises:
+            ForwardKinematicsError: They fit none.
+        """
         used = np.flatnonzero(tensions >= self._settings.slack_below)
         if len(used) < self._kinematics.num_unknowns:
             used = tautest_cables(tensions, self._kinematics.num_unknowns)
-        with suppress(ForwardKinematicsError):
-            return self._kinematics.pose(lengths, X_WP, used, MISFIT).X_WP
-        return X_WP
+        return self._kinematics.pose(lengths, X_WP, used, MISFIT).X_WP

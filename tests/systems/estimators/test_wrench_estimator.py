@@ -121,6 +121,26 @@ def test_it_is_exact_with_ideal_readings(pushed):
     assert np.all(block_of.GetOutputPort("wrench_sigma").Eval(context) == 0.0)
 
 
+@pytest.mark.parametrize(("lengths", "skipped"), [(9.0, [1, 0]), (None, [0, 0])])
+def test_lengths_that_fit_no_pose_are_counted(pushed, lengths, skipped):
+    robot, block, log, _ = pushed
+    block_of = WrenchEstimator(
+        WrenchEstimation(kind="static", bandwidth=5.0),
+        EncoderLengths(block.forces.cable_set(), elastic=True), rigid_platform(robot),
+        robot.home.transform(), reading_error(SensorSettings(), robot, 0.0),
+    )  # fmt: skip
+    context = block_of.CreateDefaultContext()
+    for k, (t, l0) in enumerate(
+        zip(log["tensions"][:2], log["unstrained_lengths"][:2], strict=True)
+    ):
+        wrong = k == 1 and lengths is not None
+        counted = l0 + lengths * np.arange(8.0) if wrong else l0  # no pose is so far from all
+        block_of.GetInputPort("measured_tensions").FixValue(context, t)
+        block_of.GetInputPort("measured_lengths").FixValue(context, counted)
+        block_of.ExecuteForcedEvents(context)
+    assert block_of.GetOutputPort("wrench_skipped").Eval(context).tolist() == skipped
+
+
 RUN = ("duration=2.5", "integration.engine=compiled", "log_rate=100")
 
 SETTLED = 1.5
@@ -141,6 +161,7 @@ def test_a_scenario_logs_sums_up_and_draws_it():
     summary = summarize(result)["wrench_estimation"]
     assert summary["kind"] == "static"
     assert summary["force_rms_n"] < 0.3
+    assert summary["samples_without_pose"] == result.log["wrench_skipped"][-1, 0]
     assert bias_when_settled(result) < 0.05
     assert "wrench" in {name.split(".")[0] for name in run_figures(result, ("png",))}
     true, found = result.log["applied_wrench"][-20:], result.log["wrench_estimated"][-20:]
