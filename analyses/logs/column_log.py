@@ -54,6 +54,10 @@ _DIMENSION = {
     TAIT: "angle", TURN: "angle", TENSIONS: "force", TORQUES: "torque", TIME: "time",
 }  # fmt: skip
 
+COUNTED, PATHS = "unstrained_lengths.", "lengths."
+"""How headers of a run's log begin: lengths that winches count, and those of the cables' paths. A
+machine's log has the first; where both are there, the second keep their names."""
+
 _HEADER = re.compile(r"[A-Za-z_]")
 
 
@@ -154,11 +158,13 @@ def _converted(
     units: dict[str, str] = {}
     unread = []
     known = 0
+    own_paths = any(header.startswith(COUNTED) for header in headers)
     for j, header in enumerate(headers):
         if not header:
             continue
         prefix, words = _plain(header)
-        column = read_header(words, names, start)
+        of_paths = own_paths and header.startswith(PATHS)
+        column = None if of_paths else read_header(words, names, start)
         values = np.full(len(table.rows) - first, np.nan)
         if column is None:
             numbers = [parsed(row[j], table.decimal) for row in table.rows[first:]]
@@ -182,8 +188,10 @@ def _converted(
             f"{path}: columns: found {', '.join(h for h in headers if h)[:120]}; accepted: time_s, "
             "C1_length_m, x_m, qw, C1_tension_n and the like, or a mapping that says so"
         )
-    remarks = (f"columns with words were left out: {', '.join(unread)}",) if unread else ()
-    return columns, _joined(units), remarks
+    remarks = [f"columns with words were left out: {', '.join(unread)}"] if unread else []
+    if own_paths and any(header.startswith(PATHS) for header in headers):
+        remarks.append(f"lengths are those of {COUNTED}*, which winches count; {PATHS}* stay too")
+    return columns, _joined(units), tuple(remarks)
 
 
 def _name(column: Column, names: list[str]) -> str:

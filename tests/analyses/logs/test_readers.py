@@ -293,3 +293,15 @@ def test_a_part_of_a_log(write):
 def test_axes_are_right_handed(words):
     with pytest.raises(LogFileError, match="right-handed"):
         axes_rotation(words)
+
+
+def test_a_run_s_own_log_is_read(tmp_path):
+    """It has lengths that winches count, and of the cables' paths: once these were refused."""
+    path = tmp_path / "log.csv"
+    headers = "time_s,X_WP.x_m,lengths.C1_m,lengths.C2_m,unstrained_lengths.C1_m"
+    headers += ",unstrained_lengths.C2_m"
+    path.write_text(f"{headers}\n0,0.5,1.1,1.2,1.05,1.15\n0.1,0.6,1.1,1.2,1.06,1.16\n")
+    log = read_recorded(path)
+    assert log.columns["C2_length_m"].tolist() == [1.15, 1.16]
+    assert log.columns["lengths.C2_m"].tolist() == [1.2, 1.2]
+    assert any("winches count" in remark for remark in log.remarks)
