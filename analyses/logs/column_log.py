@@ -26,6 +26,7 @@ from cdpr_drake.analyses.calibration.columns import (
     TURN,
     Column,
     first_number,
+    preference,
     read_header,
     split_unit,
 )
@@ -53,10 +54,6 @@ _DIMENSION = {
     LENGTHS: "length", POSITION: "length", ANGLES: "angle", SWIVELS: "angle", RPY: "angle",
     TAIT: "angle", TURN: "angle", TENSIONS: "force", TORQUES: "torque", TIME: "time",
 }  # fmt: skip
-
-COUNTED, PATHS = "unstrained_lengths.", "lengths."
-"""How headers of a run's log begin: lengths that winches count, and those of the cables' paths. A
-machine's log has the first; where both are there, the second keep their names."""
 
 _HEADER = re.compile(r"[A-Za-z_]")
 
@@ -156,15 +153,15 @@ def _converted(
     start = first_number([_plain(header)[1] for header in headers], len(asked.cables or ()) or -1)
     columns: Columns = {}
     units: dict[str, str] = {}
-    unread = []
+    unread: list[str] = []
+    worse: list[str] = []
+    taken: dict[str, str] = {}
     known = 0
-    own_paths = any(header.startswith(COUNTED) for header in headers)
     for j, header in enumerate(headers):
         if not header:
             continue
         prefix, words = _plain(header)
-        of_paths = own_paths and header.startswith(PATHS)
-        column = None if of_paths else read_header(words, names, start)
+        column = read_header(words, names, start)
         values = np.full(len(table.rows) - first, np.nan)
         if column is None:
             numbers = [parsed(row[j], table.decimal) for row in table.rows[first:]]
@@ -178,8 +175,14 @@ def _converted(
             factor, told = _factor(path, header, words, column, asked)
             numbers = [table.number(k, j) for k in range(first, len(table.rows))]
         if name in columns:
-            raise LogFileError(f"{path}: column {header!r}: found {name} twice; accepted: once")
-        values[:] = numbers
+            here, there = preference(header), preference(taken[name])
+            if here == there:
+                raise LogFileError(f"{path}: column {header!r}: found {name} twice; accepted: once")
+            worse.append(header if here < there else taken[name])
+            if here < there:
+                continue
+            units.pop(taken[name], None)
+        values[:], taken[name] = numbers, header
         columns[name] = factor * values
         if told:
             units[header] = told
@@ -189,8 +192,9 @@ def _converted(
             "C1_length_m, x_m, qw, C1_tension_n and the like, or a mapping that says so"
         )
     remarks = [f"columns with words were left out: {', '.join(unread)}"] if unread else []
-    if own_paths and any(header.startswith(PATHS) for header in headers):
-        remarks.append(f"lengths are those of {COUNTED}*, which winches count; {PATHS}* stay too")
+    if worse:
+        told = "what is measured, or what winches count, stands for them"
+        remarks.append(f"left out, since {told}: {', '.join(worse)}")
     return columns, _joined(units), tuple(remarks)
 
 
