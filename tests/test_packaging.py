@@ -108,6 +108,7 @@ def test_the_citation_and_the_changelog_are_of_this_version():
     assert citation["version"] == __version__
     assert citation["license"] == PROJECT["project"]["license"]
     assert citation["keywords"] == PROJECT["project"]["keywords"]
+    assert citation["authors"] == PROJECT["project"]["authors"]
     changes = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
     newest, second = re.findall(r"^## (.*)$", changes, re.MULTILINE)[:2]
     assert newest == "[Unreleased]"
