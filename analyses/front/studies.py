@@ -36,6 +36,7 @@ from cdpr_drake.analyses.studies.catalogue import (
     studies_that,
     write_study,
 )
+from cdpr_drake.analyses.studies.framework.study import Study
 from cdpr_drake.analyses.studies.published.register import published_registers
 from cdpr_drake.analyses.sweeps.earlier_runs import check_earlier
 from cdpr_drake.analyses.sweeps.workers import check_scheduler
@@ -46,8 +47,6 @@ from cdpr_drake.summaries import Summarized
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from cdpr_drake.analyses.studies.framework.study import Study
 
 
 @dataclass(frozen=True, eq=False, repr=False)
