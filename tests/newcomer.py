@@ -47,7 +47,7 @@ LISTS = ("scenarios", "examples", "robots")
 SERVERS = ("studio",)
 """Commands that go on until they are stopped; they are, once they have told their address."""
 
-LONG = {"reproduce": "a quarter of an hour and more; the tests have parts of it"}
+LONG = {"reproduce": "a quarter of an hour or hours; .ci and the tests have parts of it"}
 """Commands that are not played, and why."""
 
 INSTALLATION = ("pip install", "mkdocs build")

@@ -94,4 +94,4 @@ def test_what_takes_hours_is_named_and_not_played(tmp_path):
     played = Player(Path(sys.prefix), tmp_path).play(Step(page="p", words="cdpr reproduce --quick"))
     assert isinstance(played, Played)
     assert "hours" in played.left_out
-    assert "not played: hours" in table([played])
+    assert "not played: a quarter of an hour" in table([played])
