@@ -5,11 +5,29 @@ A message is one line; of a file that has several problems, one line for each.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import difflib
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 
 MOST_PROBLEMS = 20
 """Problems of one file that are said; who has more begins with these."""
+
+
+def meant_names(found: object, known: Iterable[object]) -> list[str]:
+    """The known name that was probably meant by one that is unknown; none where none is close."""
+    return difflib.get_close_matches(str(found), [str(name) for name in known], n=1)
+
+
+def accepted_names(found: object, known: Iterable[object]) -> str:
+    """Words that follow "found X; ": the name that was probably meant, and all that are accepted.
+
+    Args:
+        found: The name that was found, which is not among them.
+        known: Those that are accepted, in the order in which they are said.
+    """
+    names = [str(name) for name in known]
+    hint = "".join(f"did you mean {name}? " for name in meant_names(found, names))
+    return f"{hint}accepted: {', '.join(names)}"
 
 
 class CdprError(Exception):

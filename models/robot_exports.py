@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import RobotFileError
+from cdpr_drake.errors import RobotFileError, accepted_names
 from cdpr_drake.models.formats import klipper, reprapfirmware
 from cdpr_drake.models.formats.assumptions import complete_draft
 from cdpr_drake.models.formats.caspr_pulleys import short_name
@@ -204,7 +204,7 @@ def check_format(format: str) -> None:
         RobotFileError: It is not.
     """
     if format not in EXPORTS:
-        raise RobotFileError(f"format: found {format}; accepted: {', '.join(EXPORTS)}")
+        raise RobotFileError(f"format: found {format}; {accepted_names(format, EXPORTS)}")
 
 
 def omission_words(lost: dict[str, str]) -> list[str]:

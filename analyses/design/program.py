@@ -30,7 +30,7 @@ from cdpr_drake.analyses.reporting.progress import (
 )
 from cdpr_drake.analyses.workspaces.conditions import KINDS
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import DesignError
+from cdpr_drake.errors import DesignError, accepted_names
 from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.numerics.own_terms import OwnTerms, ProgramValues
@@ -139,7 +139,7 @@ class DesignProgram(OwnTerms):
         for one in [of] if isinstance(of, str) else of:
             mine = [k for k, name in enumerate(names) if fnmatchcase(name, one)]
             if not mine:
-                raise DesignError(f"of: found {one!r}; accepted: {', '.join(names)}")
+                raise DesignError(f"of: found {one!r}; {accepted_names(one, names)}")
             chosen |= set(mine)
         return every.only(np.array(sorted(chosen)))
 

@@ -16,7 +16,7 @@ from pydrake.math import RigidTransform
 from cdpr_drake.analyses.reporting.log_files import finite, write_json, write_whole
 from cdpr_drake.analyses.workspaces.static_feasible import static_case
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import DataFileError, PlanningError
+from cdpr_drake.errors import DataFileError, PlanningError, accepted_names
 from cdpr_drake.geometry.poses import angles_from_rotation
 from cdpr_drake.models.exit_points import Rail
 from cdpr_drake.models.robot_loader import load_robot
@@ -307,7 +307,7 @@ def reconfigured(
         CdprError: The robot cannot be asked.
     """
     if goal not in RAIL_GOALS:
-        raise PlanningError(f"goal: found {goal!r}; accepted: {', '.join(RAIL_GOALS)}")
+        raise PlanningError(f"goal: found {goal!r}; {accepted_names(goal, RAIL_GOALS)}")
     if starts < 1:
         raise PlanningError(f"starts: found {starts}; accepted: at least 1")
     where, tell = around or Around(), say or (lambda words: None)

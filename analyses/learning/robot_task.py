@@ -21,7 +21,7 @@ from cdpr_drake.analyses.learning.task_kernel import (
     write_rates,
 )
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import CdprError, InfeasibleTensionError
+from cdpr_drake.errors import CdprError, InfeasibleTensionError, accepted_names
 from cdpr_drake.geometry.poses import pose_row
 from cdpr_drake.models.robot_draws import ParameterCovariance, drawn_robots
 from cdpr_drake.models.robot_loader import as_robot
@@ -344,7 +344,9 @@ def _doubt(
 
 def _check(options: TaskOptions) -> None:
     if options.action not in ACTIONS:
-        raise CdprError(f"action: found {options.action!r}; accepted: {', '.join(ACTIONS)}")
+        raise CdprError(
+            f"action: found {options.action!r}; {accepted_names(options.action, ACTIONS)}"
+        )
     if options.winches == "motor" and options.action == TENSIONS:
         raise CdprError("winches: found motor for the action tensions; accepted: ideal")
     if options.winches not in ("ideal", "motor"):

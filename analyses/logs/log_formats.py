@@ -16,7 +16,7 @@ from cdpr_drake.analyses.logs.mat_log import knows_mat, read_mat
 from cdpr_drake.analyses.logs.mcap_log import knows_mcap, read_mcap
 from cdpr_drake.analyses.logs.motive import knows_motive, read_motive
 from cdpr_drake.analyses.logs.recorded_log import RecordedLog
-from cdpr_drake.errors import LogFileError
+from cdpr_drake.errors import LogFileError, accepted_names
 
 AUTO = "auto"
 
@@ -129,7 +129,7 @@ def read_recorded(path: Path, format: str = AUTO, asked: LogRequest | None = Non
     if format != AUTO:
         if format not in LOG_READERS:
             raise LogFileError(
-                f"log format: found {format!r}; accepted: {', '.join(LOG_READERS)}, {AUTO}"
+                f"log format: found {format!r}; {accepted_names(format, (*LOG_READERS, AUTO))}"
             )
         return LOG_READERS[format].read(path, asked)
     detected = detect_log(path)

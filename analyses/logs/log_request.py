@@ -12,7 +12,7 @@ import yaml
 
 from cdpr_drake.analyses.calibration.columns import UNITS
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import LogFileError
+from cdpr_drake.errors import LogFileError, accepted_names
 
 DIMENSIONS = tuple(sorted({dimension for dimension, _ in UNITS.values()}))
 """Of what a unit may be told."""
@@ -96,9 +96,13 @@ def checked_units(units: Mapping[str, str]) -> dict[str, str]:
     for dimension, unit in units.items():
         known = [name for name, (of, _) in UNITS.items() if of == dimension]
         if not known:
-            raise LogFileError(f"unit: found {dimension!r}; accepted: {', '.join(DIMENSIONS)}")
+            raise LogFileError(
+                f"unit: found {dimension!r}; {accepted_names(dimension, DIMENSIONS)}"
+            )
         if unit.lower() not in known:
-            raise LogFileError(f"unit of {dimension}: found {unit!r}; accepted: {', '.join(known)}")
+            raise LogFileError(
+                f"unit of {dimension}: found {unit!r}; {accepted_names(unit, known)}"
+            )
         found[dimension] = unit.lower()
     return found
 
@@ -140,7 +144,7 @@ def read_mapping(path: Path) -> ColumnMapping:
         raise LogFileError(f"{path}: found no columns; accepted: YAML with the key columns")
     other = [str(key) for key in content if key not in MAPPING_KEYS]
     if other:
-        raise LogFileError(f"{path}: found {other[0]!r}; accepted: {', '.join(MAPPING_KEYS)}")
+        raise LogFileError(f"{path}: found {other[0]!r}; {accepted_names(other[0], MAPPING_KEYS)}")
     skip, mark, rate = (content.get(key) for key in ("skip_rows", "separator", "rate_hz"))
     if skip is not None and (isinstance(skip, bool) or not isinstance(skip, int) or skip < 0):
         raise LogFileError(f"{path}: skip_rows: found {skip!r}; accepted: a whole number from 0")

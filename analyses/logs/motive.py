@@ -20,7 +20,7 @@ from cdpr_drake.analyses.logs.recorded_log import POSITION, QUATERNION, TIME, Re
 from cdpr_drake.analyses.logs.text_tables import cell_table, log_text
 from cdpr_drake.analyses.reporting.exported_logs import Columns
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import LogFileError
+from cdpr_drake.errors import LogFileError, accepted_names
 
 FIRST = "Format Version"
 
@@ -119,7 +119,7 @@ def _unit(path: Path, settings: dict[str, str], asked: LogRequest) -> tuple[floa
     known = _UNITS.get(given.lower())
     if known is None and told is None:
         raise LogFileError(
-            f"{path}: Length Units: found {given or 'none'}; accepted: {', '.join(_UNITS)}, or "
+            f"{path}: Length Units: found {given or 'none'}; {accepted_names(given, _UNITS)}, or "
             "--unit length=m, mm or cm"
         )
     if known is not None and told is not None and known != told:

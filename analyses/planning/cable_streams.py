@@ -27,7 +27,7 @@ from cdpr_drake.cables.models import (
     cable_derivatives,
     cable_state,
 )
-from cdpr_drake.errors import CdprError, PlanningError
+from cdpr_drake.errors import CdprError, PlanningError, accepted_names
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.geometry.poses import pose_from_row
@@ -168,7 +168,7 @@ def cable_stream(run: MotionRun, rate: float, model: str = ELASTIC) -> CableStre
     """
     robot = run.robot
     if model not in MODELS:
-        raise PlanningError(f"stream: model: found {model!r}; accepted: {', '.join(MODELS)}")
+        raise PlanningError(f"stream: model: found {model!r}; {accepted_names(model, MODELS)}")
     if not RATES[0] <= rate <= RATES[1]:
         raise PlanningError(
             f"stream: rate: found {rate:g} Hz; accepted: {RATES[0]:g} to {RATES[1]:g} Hz"

@@ -11,7 +11,7 @@ from pydrake.math import RigidTransform
 from cdpr_drake.analyses.planning.free_detours import detours, is_free
 from cdpr_drake.analyses.planning.robot_path_task import length_scale
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import PlanningError, TensionProblemError
+from cdpr_drake.errors import PlanningError, TensionProblemError, accepted_names
 from cdpr_drake.geometry.convex_shapes import ConvexShape
 from cdpr_drake.geometry.poses import pose_error, pose_row
 from cdpr_drake.models.camera_catalogue import load_camera
@@ -101,7 +101,7 @@ class FreeSettings:
             PlanningError: It is not accepted; names it.
         """
         if self.least not in LEAST:
-            raise PlanningError(f"least: found {self.least!r}; accepted: {', '.join(LEAST)}")
+            raise PlanningError(f"least: found {self.least!r}; {accepted_names(self.least, LEAST)}")
         if self.least == "time" and self.duration is not None:
             raise PlanningError("duration: found one with the least time; accepted: none")
         if self.least == "tension" and self.duration is None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cdpr_drake.errors import PlanningError, TensionProblemError
+from cdpr_drake.errors import PlanningError, TensionProblemError, accepted_names
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import check_pose
@@ -152,7 +152,7 @@ def make_path(
         TrajectoryError: The poses make no path.
     """
     if corners not in CORNERS:
-        raise PlanningError(f"corners: found {corners!r}; accepted: {', '.join(CORNERS)}")
+        raise PlanningError(f"corners: found {corners!r}; {accepted_names(corners, CORNERS)}")
     if not (np.isfinite(tolerance) and tolerance > 0.0):
         raise PlanningError(f"tolerance: found {tolerance:g}; accepted: above 0 [m]")
     for number, X in enumerate(poses, 1):

@@ -17,7 +17,7 @@ from cdpr_drake.cables.dispatch_kernel import (
     all_responses,
 )
 from cdpr_drake.cables.response_kernel import DERIVATIVES, damping_tension
-from cdpr_drake.errors import CableGeometryError, CableModelError
+from cdpr_drake.errors import CableGeometryError, CableModelError, accepted_names
 from cdpr_drake.geometry.cable_paths import cable_paths, impossible_cable, motion_of
 from cdpr_drake.geometry.cable_routes import WORLD_BODY, CableRoutes
 from cdpr_drake.geometry.cable_set import CableSet
@@ -140,7 +140,7 @@ def check_model(model: str, cables: CableSet) -> None:
     """
     if model not in CABLE_MODELS:
         raise CableModelError(
-            f"cable model: found {model!r}; accepted: one of {', '.join(CABLE_MODELS)}"
+            f"cable model: found {model!r}; {accepted_names(model, CABLE_MODELS)}"
         )
     if cables.beyond.size:
         _check_beyond(model, cables)

@@ -14,15 +14,16 @@ from cdpr_drake.analyses.logs.log_formats import detect_log
 from cdpr_drake.cli.import_log import log_lines
 from cdpr_drake.cli.options import AsJson, save_plot
 from cdpr_drake.cli.terminal import print_json
-from cdpr_drake.errors import CdprError
+from cdpr_drake.errors import CdprError, meant_names
 from cdpr_drake.models.formats.file_kinds import is_foreign
 from cdpr_drake.models.formats.grab_mat import is_grab_mat
 from cdpr_drake.models.mechanism_files import MECHANISM_KEY, SCENARIO_KEY
 from cdpr_drake.models.mechanism_loader import load_mechanism
 from cdpr_drake.models.robot_exchange import import_robot
 from cdpr_drake.models.robot_holding import hold_robot
-from cdpr_drake.models.robot_loader import load_robot, names_mechanism
+from cdpr_drake.models.robot_loader import load_robot, names_mechanism, robot_file, robot_names
 from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.scenarios.files import scenario_file, scenario_names
 
 WRONG = 2
 
@@ -41,8 +42,7 @@ def checked(path: Path) -> dict[str, Any]:
 
 def _read(path: Path) -> tuple[str, list[str]]:
     """What a file is, and notes; raises what is wrong with it."""
-    if not path.exists():
-        raise CdprError(f"{path}: there is no such file")
+    path = _file_of(path)
     if is_log(path):
         told = log_lines(import_log(path))
         return "log, " + told[0].removeprefix(f"{path}: "), [line.strip() for line in told[1:]]
@@ -62,6 +62,20 @@ def _read(path: Path) -> tuple[str, list[str]]:
     except CdprError as problem:
         return "robot", [f"the home pose: {problem}"]
     return "robot", []
+
+
+def _file_of(path: Path) -> Path:
+    """A file, or that of the robot or scenario of this name."""
+    if path.exists():
+        return path
+    name = str(path)
+    robots, scenarios = robot_names(), scenario_names()
+    if name in robots:
+        return robot_file(name)
+    if name in scenarios:
+        return scenario_file(name)
+    hint = "".join(f"; did you mean {near}?" for near in meant_names(name, (*robots, *scenarios)))
+    raise CdprError(f"{path}: there is no such file, robot or scenario{hint}")
 
 
 def is_log(path: Path) -> bool:
@@ -94,7 +108,8 @@ def _is_scenario(path: Path) -> bool:
 
 def check(
     files: Annotated[
-        list[Path], typer.Argument(help="Robot or scenario files, also of other tools, or logs.")
+        list[Path],
+        typer.Argument(help="Robot or scenario files or names, files of other tools, or logs."),
     ],
     plot: Annotated[Path | None, typer.Option(help="File of a figure of the one log.")] = None,
     as_json: AsJson = False,

@@ -36,7 +36,7 @@ from cdpr_drake.cli.options import (
 from cdpr_drake.cli.process import INTERRUPTED
 from cdpr_drake.cli.run_endings import report_failures
 from cdpr_drake.cli.terminal import print_json, wide_console
-from cdpr_drake.errors import CdprError
+from cdpr_drake.errors import CdprError, accepted_names
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.schema.typed_yaml import closest
 
@@ -109,7 +109,7 @@ def design(
             setattr(settings, name, value)
     if by is not None:
         if by not in SEARCHES:
-            raise CdprError(f"--search: found {by!r}; accepted: {', '.join(SEARCHES)}")
+            raise CdprError(f"--search: found {by!r}; {accepted_names(by, SEARCHES)}")
         settings.search = by
     if goal:
         settings.goals = [_goal(words) for words in goal]

@@ -15,7 +15,7 @@ from pydrake.math import RigidTransform
 from cdpr_drake.arrays import Array
 from cdpr_drake.cli.completion import robot_words
 from cdpr_drake.cli.option_names import with_options
-from cdpr_drake.errors import CdprError, OutputFolderError
+from cdpr_drake.errors import CdprError, OutputFolderError, accepted_names
 from cdpr_drake.geometry.poses import pose_from_angles
 
 if TYPE_CHECKING:
@@ -181,6 +181,6 @@ def named_values(
         if not mark or not (0.0 < number < 1e30 or (shares and number == 0.0)):
             raise CdprError(f"{option}: found {item.strip()!r}; accepted: name=number > 0")
         if names is not None and name not in names:
-            raise CdprError(f"{option}: found {name!r}; accepted: {', '.join(names)}")
+            raise CdprError(f"{option}: found {name!r}; {accepted_names(name, names)}")
         found[name] = number
     return found

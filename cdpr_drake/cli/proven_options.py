@@ -11,7 +11,7 @@ from rich.console import Console
 
 from cdpr_drake.cli.completion import words_among
 from cdpr_drake.cli.options import parse_numbers, parse_pose
-from cdpr_drake.errors import CdprError
+from cdpr_drake.errors import CdprError, accepted_names
 from cdpr_drake.planning.path_in_sets import METHODS
 
 Proven = Annotated[
@@ -80,7 +80,9 @@ class ProvenWords:
         if self.boxes is not None and self.boxes < 1:
             raise CdprError(f"--boxes: found {self.boxes}; accepted: at least 1")
         if self.method is not None and self.method not in METHODS:
-            raise CdprError(f"--method: found {self.method!r}; accepted: {', '.join(METHODS)}")
+            raise CdprError(
+                f"--method: found {self.method!r}; {accepted_names(self.method, METHODS)}"
+            )
         if self.acceleration is not None:
             meaning = "a or ax,ay,az, each above 0, or 0 [m/s^2]"
             numbers = parse_numbers("--acceleration", self.acceleration, (1, 3), meaning)

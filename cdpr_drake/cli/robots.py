@@ -15,7 +15,7 @@ from rich.table import Table
 from cdpr_drake.cli.options import AsJson
 from cdpr_drake.cli.robot_folder import write_files
 from cdpr_drake.cli.terminal import print_json, wide_console
-from cdpr_drake.errors import CdprError, OutputFolderError
+from cdpr_drake.errors import CdprError, OutputFolderError, accepted_names
 from cdpr_drake.models.mechanism_files import mechanism_names
 from cdpr_drake.models.mechanism_loader import load_mechanism
 from cdpr_drake.models.mechanism_schema import Mechanism
@@ -156,7 +156,7 @@ def _chosen(
     if motion is not None:
         known = sorted({robot.motion for robot in everything})
         if motion.upper() not in known:
-            raise CdprError(f"--motion: found {motion!r}; accepted: one of {', '.join(known)}")
+            raise CdprError(f"--motion: found {motion!r}; {accepted_names(motion, known)}")
         tests.append(lambda robot: robot.motion == motion.upper())
     if cables is not None:
         low, high = _range(cables)

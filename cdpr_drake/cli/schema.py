@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from cdpr_drake.cli.completion import words_among
-from cdpr_drake.errors import CdprError
+from cdpr_drake.errors import CdprError, accepted_names
 from cdpr_drake.models.mechanism_schema import Mechanism
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.schema.json_schemas import json_schema
@@ -29,7 +29,7 @@ def file_schema(kind: str) -> dict[str, Any]:
     if kind == MECHANISM:
         return json_schema(Mechanism, "mechanism of cdpr_drake")
     if kind != SCENARIO:
-        raise CdprError(f"kind of file: found {kind}; accepted: {', '.join(FILES)}")
+        raise CdprError(f"kind of file: found {kind}; {accepted_names(kind, FILES)}")
     kinds = {
         name: json_schema(schema, f"scenario of cdpr_drake, {name}")
         for name, (schema, _) in SCENARIO_SCHEMAS.items()

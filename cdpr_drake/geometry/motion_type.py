@@ -18,7 +18,7 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import CableGeometryError
+from cdpr_drake.errors import CableGeometryError, accepted_names
 from cdpr_drake.geometry.motion_kernel import Motion
 from cdpr_drake.geometry.straight_cables import ALL_ROWS, PLANAR_ROWS
 
@@ -66,7 +66,7 @@ class MotionType:
         """
         if self.name not in MOTION_TYPES:
             raise CableGeometryError(
-                f"motion: found {self.name}; accepted: {', '.join(MOTION_TYPES)}"
+                f"motion: found {self.name}; {accepted_names(self.name, MOTION_TYPES)}"
             )
         axis = np.asarray(self.axis, float)
         size = float(np.linalg.norm(axis)) if axis.shape == (3,) else 0.0

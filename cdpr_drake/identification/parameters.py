@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import IdentificationError
+from cdpr_drake.errors import IdentificationError, accepted_names
 from cdpr_drake.identification.regressor import (
     MASS,
     MOMENT,
@@ -129,12 +129,12 @@ class Layout:
             for word in words:
                 if word not in GROUPS:
                     raise IdentificationError(
-                        f"{what}: found {word!r}; accepted: {', '.join(GROUPS)}"
+                        f"{what}: found {word!r}; {accepted_names(word, GROUPS)}"
                     )
         for word in self.common:
             if word in PLATFORM:
                 raise IdentificationError(
-                    f"common: found {word}; accepted: {', '.join((*CABLES, *WINCHES))}"
+                    f"common: found {word}; {accepted_names(word, (*CABLES, *WINCHES))}"
                 )
         own = STIFFNESS in self.unknown and STIFFNESS not in self.common
         if DAMPING in self.common and own and DAMPING in self.unknown:

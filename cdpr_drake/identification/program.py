@@ -13,7 +13,7 @@ from pydrake.solvers import Binding, MathematicalProgram, Solve
 from scipy.linalg import null_space
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import IdentificationError
+from cdpr_drake.errors import IdentificationError, accepted_names
 from cdpr_drake.identification.identifiability import unidentifiable_words
 from cdpr_drake.identification.motion_term import MotionTerm
 from cdpr_drake.identification.parameters import GROUPS, DynamicModel, Layout, offsets_needed
@@ -172,7 +172,7 @@ class IdentificationProgram(OwnTerms):
         self._still_grows("AddPrior")
         _positive("prior", std)
         if group not in GROUPS:
-            raise IdentificationError(f"priors: found {group!r}; accepted: {', '.join(GROUPS)}")
+            raise IdentificationError(f"priors: found {group!r}; {accepted_names(group, GROUPS)}")
         self._priors += prior_rows(self.layout.model, group, std)
 
     def names(self) -> tuple[str, ...]:
@@ -370,7 +370,7 @@ class IdentificationProgram(OwnTerms):
             mine = [k for k, name in enumerate(names) if fnmatchcase(name, one)]
             mine = mine or [k for k, name in enumerate(names) if name.startswith(f"{one}.")]
             if not mine:
-                raise IdentificationError(f"of: found {one!r}; accepted: {', '.join(names)}")
+                raise IdentificationError(f"of: found {one!r}; {accepted_names(one, names)}")
             chosen |= set(mine)
         return sorted(chosen)
 

@@ -30,7 +30,7 @@ from pydrake.solvers import (
 )
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import CdprError
+from cdpr_drake.errors import CdprError, accepted_names
 from cdpr_drake.numerics.program_functions import Function, ValueCost, ValueFunction
 
 CONVEX = (
@@ -474,7 +474,7 @@ def chosen_names(
     asked = [of] if isinstance(of, str) else list(of)
     unknown = [one for one in asked if one not in names]
     if unknown:
-        raise error(f"of: found {unknown[0]!r}; accepted: {', '.join(names)}")
+        raise error(f"of: found {unknown[0]!r}; {accepted_names(unknown[0], names)}")
     return np.array([list(names).index(one) for one in asked], dtype=int)
 
 

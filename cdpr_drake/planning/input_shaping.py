@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import PlanningError
+from cdpr_drake.errors import PlanningError, accepted_names
 
 INSENSITIVE = 0.05
 """Share of vibration that EI leaves at its frequency."""
@@ -86,7 +86,7 @@ def make_shaper(kind: str, frequency: float, damping: float = 0.0) -> Shaper:
         PlanningError: The kind is unknown or a number is not accepted.
     """
     if kind not in SHAPERS:
-        raise PlanningError(f"shaper: found {kind!r}; accepted: {', '.join(SHAPERS)}")
+        raise PlanningError(f"shaper: found {kind!r}; {accepted_names(kind, SHAPERS)}")
     if not (np.isfinite(frequency) and frequency > 0.0):
         raise PlanningError(f"shaper: frequency: found {frequency:g} rad/s; accepted: above 0")
     if not 0.0 <= damping <= LARGEST_DAMPING:

@@ -21,7 +21,7 @@ from pydrake.planning import GcsTrajectoryOptimization
 from pydrake.solvers import ClarabelSolver
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import PlanningError
+from cdpr_drake.errors import PlanningError, accepted_names
 from cdpr_drake.geometry.poses import pose_from_angles, pose_row
 from cdpr_drake.planning.box_timing import BoxTiming, time_within_box
 from cdpr_drake.planning.path_task import PathTask
@@ -202,7 +202,7 @@ def proven_motion(
         PlanningError: As `proven_path`; or the path cannot be timed.
     """
     if cost not in COSTS:
-        raise PlanningError(f"cost: found {cost!r}; accepted: {', '.join(COSTS)}")
+        raise PlanningError(f"cost: found {cost!r}; {accepted_names(cost, COSTS)}")
     given = sets.about.get("accelerations_m_s2")
     box = None if given is None or np.any(sets.axes >= 3) else np.array(given, float)
 
@@ -249,7 +249,7 @@ def _graph(
     sets: PoseSets, start: Array, goal: Array, length_scale: float, method: str
 ) -> tuple[OverlapGraph, Array]:
     if method not in METHODS:
-        raise PlanningError(f"method: found {method!r}; accepted: {', '.join(METHODS)}")
+        raise PlanningError(f"method: found {method!r}; {accepted_names(method, METHODS)}")
     for where, pose in (("from", start), ("to", goal)):
         if not sets.covers(pose):
             raise PlanningError(

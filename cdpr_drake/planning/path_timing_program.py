@@ -18,7 +18,7 @@ from pydrake.solvers import MathematicalProgram, RotatedLorentzConeConstraint
 from scipy.linalg import null_space
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import PlanningError
+from cdpr_drake.errors import PlanningError, accepted_names
 from cdpr_drake.numerics.own_terms import OwnTerms, ProgramValues, is_convex
 from cdpr_drake.numerics.program_functions import ProgramCost
 from cdpr_drake.planning.path_task import PathTask, samples_at
@@ -211,7 +211,7 @@ class PathTimingProgram(OwnTerms):
             by = (np.eye(n, n + 1, 1) - np.eye(n, n + 1)) / (2.0 * self._ways[:, None])
             return ProgramValues(self._x, by, np.zeros(n), tuple(f"u{i}" for i in range(n)))
         if not isinstance(kind, str) or (kind != TENSIONS and kind not in cables):
-            raise PlanningError(f"of: found {kind!r}; accepted: {', '.join((*KINDS, *cables))}")
+            raise PlanningError(f"of: found {kind!r}; {accepted_names(kind, (*KINDS, *cables))}")
         t = self._t.ravel() if kind == TENSIONS else self._t[:, cables.index(kind)]
         size = np.full(len(t), 1.0 / self._scale)
         names = tuple(str(one.get_name()) for one in t)

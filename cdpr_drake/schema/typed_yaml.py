@@ -7,7 +7,6 @@ fields, so the YAML nodes are checked against the rules of `fields` first.
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import math
 import re
 import types
@@ -18,7 +17,7 @@ from typing import Any, TypeVar
 
 import yaml
 
-from cdpr_drake.errors import DataFileError, Problems
+from cdpr_drake.errors import DataFileError, Problems, meant_names
 from cdpr_drake.schema.fields import NAMED, FieldRule
 from cdpr_drake.schema.yaml_files import cached_yaml, other_kind, too_many_bytes, too_many_nodes
 
@@ -57,14 +56,8 @@ _BOOLEANS = yaml.SafeLoader.bool_values
 def closest(name: str, known: Iterable[str]) -> str:
     """Words that help after an unknown name: the likely one, then all that exist."""
     names = list(known)
-    likely = _likely(name, names)
-    hint = f"did you mean {likely[0]}? " if likely else ""
+    hint = "".join(f"did you mean {likely}? " for likely in meant_names(name, names))
     return f"{hint}known: {', '.join(names)}"
-
-
-def _likely(name: str, known: Iterable[str]) -> list[str]:
-    """The known name that was meant, if there is one that is close."""
-    return difflib.get_close_matches(name, known, n=1)
 
 
 def load_typed(
@@ -291,7 +284,7 @@ class _Checker:
             full = f"{key}.{name}" if key else name
             if name not in rules:
                 self.fail(name_node, full, f"unknown key; {closest(name, rules)}")
-                meant.update(_likely(name, rules))
+                meant.update(meant_names(name, rules))
             elif name in seen:
                 self.fail(name_node, full, "found twice; accepted: once")
             else:
@@ -368,7 +361,8 @@ class _Checker:
     def scalar(self, rule: FieldRule, node: yaml.Node, key: str) -> None:
         if not _convert(rule, node):
             found = node.value if isinstance(node, yaml.ScalarNode) else ""
-            self.fail(node, key, f"found {show(node)}; accepted: {rule.accepts(found)}")
+            hint = "".join(f"did you mean {name}? " for name in meant_names(found, rule.choices))
+            self.fail(node, key, f"found {show(node)}; {hint}accepted: {rule.accepts(found)}")
 
 
 def _convert(rule: FieldRule, node: yaml.Node) -> bool:

@@ -30,7 +30,7 @@ from typing import Any
 import numpy as np
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import StabilityError
+from cdpr_drake.errors import StabilityError, accepted_names
 
 POSE_BLOCKS = 6
 """Blocks before those of the exit points."""
@@ -83,10 +83,9 @@ class PerturbationBounds:
                 accepted = "0 <= angle <= pi [rad]" if angle else "a number >= 0 [m]"
                 raise StabilityError(f"{name}: found {value:g}; accepted: {accepted}")
         for name in ("exits", "anchors"):
-            if getattr(self, name) not in DIRECTIONS:
-                raise StabilityError(
-                    f"{name}: found {getattr(self, name)}; accepted: {', '.join(DIRECTIONS)}"
-                )
+            found = getattr(self, name)
+            if found not in DIRECTIONS:
+                raise StabilityError(f"{name}: found {found}; {accepted_names(found, DIRECTIONS)}")
 
     def radii(self) -> Array:
         """Bounds in the order of the blocks, exit and anchor points once each, shape (8,)."""

@@ -8,7 +8,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import StabilityError
+from cdpr_drake.errors import StabilityError, accepted_names
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.stability.desired_view import FixedError, ServoTarget
 
@@ -73,10 +73,9 @@ class StabilityCase:
             ("perturbed", SIDES),
             ("lever", OBJECT_POSE_MODELS),
         ):
-            if getattr(self, name) not in accepted:
-                raise StabilityError(
-                    f"{name}: found {getattr(self, name)}; accepted: {', '.join(accepted)}"
-                )
+            found = getattr(self, name)
+            if found not in accepted:
+                raise StabilityError(f"{name}: found {found}; {accepted_names(found, accepted)}")
         if self.planar and self.scheme in SPATIAL_SCHEMES:
             raise StabilityError(
                 f"scheme: found {self.scheme} for a planar robot; accepted: pbvs, pbvs-line"

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import StabilityError
+from cdpr_drake.errors import StabilityError, accepted_names
 from cdpr_drake.geometry.rotation_kernel import rotations_of_quaternions
 from cdpr_drake.numerics.kernel_calls import over_rows
 from cdpr_drake.stability.certified_kernel import MOST_CABLES, certified_margins
@@ -119,7 +119,7 @@ def judge_stability(
             object's orientation, or of its position under 2 1/2 D and IBVS.
     """
     if verdict not in VERDICTS:
-        raise StabilityError(f"verdict: found {verdict}; accepted: {', '.join(VERDICTS)}")
+        raise StabilityError(f"verdict: found {verdict}; {accepted_names(verdict, VERDICTS)}")
     return _judged(case, bounds, poses, (verdict,), options or VerdictOptions())[verdict]
 
 

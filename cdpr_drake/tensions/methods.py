@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import TensionProblemError
+from cdpr_drake.errors import TensionProblemError, accepted_names
 from cdpr_drake.tensions import objectives
 from cdpr_drake.tensions.barrier_kernel import log_barrier
 from cdpr_drake.tensions.closed_form_kernel import (
@@ -203,7 +203,7 @@ def method_for(name: str, redundancy: int, has_reference: bool) -> TensionMethod
             reference.
     """
     if name not in METHODS:
-        raise TensionProblemError(f"method: found {name}; accepted: {', '.join(METHODS)}")
+        raise TensionProblemError(f"method: found {name}; {accepted_names(name, METHODS)}")
     method = METHODS[name]
     if not method.takes(redundancy):
         accepted = " or ".join(str(r) for r in method.redundancies or ())

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.errors import accepted_names
 
 SLACK_SHARE = 0.25
 """A cable that has less than this of its least tension is taken for slack: it does not answer. Half
@@ -89,7 +90,7 @@ def length_thresholds(
         return lowest + share * np.subtract(highest, lowest)
     if shape == "exponential":
         return np.asarray(lowest * np.exp(share * np.log(np.divide(highest, lowest))))
-    raise ValueError(f"shape: found {shape!r}; accepted: {', '.join(SHAPES)}")
+    raise ValueError(f"shape: found {shape!r}; {accepted_names(shape, SHAPES)}")
 
 
 def length_correction(

@@ -17,7 +17,7 @@ import cv2
 import numpy as np
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import CameraCalibrationError
+from cdpr_drake.errors import CameraCalibrationError, accepted_names
 
 CHESSBOARD, CHARUCO, TAGS = "chessboard", "charuco", "tags"
 BOARDS = (CHARUCO, TAGS, CHESSBOARD)
@@ -66,7 +66,7 @@ class CalibrationBoard:
         """
         if self.kind not in BOARDS:
             raise CameraCalibrationError(
-                f"board: found {self.kind!r}; accepted: {', '.join(BOARDS)}"
+                f"board: found {self.kind!r}; {accepted_names(self.kind, BOARDS)}"
             )
         least = 1 if self.kind == TAGS else 3
         if not (least <= self.columns <= 100 and least <= self.rows <= 100):
@@ -95,7 +95,7 @@ class CalibrationBoard:
             if not hasattr(cv2.aruco, f"DICT_{found}"):
                 known = [name[5:] for name in dir(cv2.aruco) if name.startswith("DICT_")]
                 raise CameraCalibrationError(
-                    f"markers: found {found!r}; accepted: {', '.join(sorted(known))}"
+                    f"markers: found {found!r}; {accepted_names(found, sorted(known))}"
                 )
 
     @cached_property

@@ -21,7 +21,7 @@ import cv2
 import numpy as np
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import CameraCalibrationError
+from cdpr_drake.errors import CameraCalibrationError, accepted_names
 from cdpr_drake.vision.lens_distortion import COEFFICIENTS, NO_LENS, LensDistortion
 from cdpr_drake.vision.pinhole import Pinhole
 
@@ -151,7 +151,7 @@ def fit_camera(
         CameraCalibrationError: There are too few views, or they do not tell the camera; names why.
     """
     if model not in MODELS:
-        raise CameraCalibrationError(f"model: found {model!r}; accepted: {', '.join(MODELS)}")
+        raise CameraCalibrationError(f"model: found {model!r}; {accepted_names(model, MODELS)}")
     if not 0.0 <= hold_out <= 0.5:
         raise CameraCalibrationError(f"hold_out: found {hold_out:g}; accepted: 0 to 0.5")
     if len(views) < FEWEST_VIEWS:

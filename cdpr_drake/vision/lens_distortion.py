@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import LensDistortionError
+from cdpr_drake.errors import LensDistortionError, accepted_names
 from cdpr_drake.vision.lens_kernel import (
     BROWN_CONRADY,
     FIRST,
@@ -65,7 +65,7 @@ class LensDistortion:
         """
         if self.kind not in KINDS:
             raise LensDistortionError(
-                f"kind of lens: found {self.kind!r}; accepted: {', '.join(KINDS)}"
+                f"kind of lens: found {self.kind!r}; {accepted_names(self.kind, KINDS)}"
             )
         names = COEFFICIENTS[self.kind]
         if len(self.coefficients) > len(names) or not np.all(np.isfinite(self.coefficients)):

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import WorkspaceError
+from cdpr_drake.errors import WorkspaceError, accepted_names
 from cdpr_drake.workspaces.hull import WorkspaceHull
 
 GRID_ENDINGS = ("vtk", "vtu")
@@ -69,7 +69,7 @@ def mesh_ending(path: Path, accepted: tuple[str, ...]) -> str:
     """
     kind = path.suffix.lstrip(".").lower()
     if kind not in accepted:
-        raise WorkspaceError(f"{path}: found the ending {kind!r}; accepted: {', '.join(accepted)}")
+        raise WorkspaceError(f"{path}: found the ending {kind!r}; {accepted_names(kind, accepted)}")
     library = "meshio" if kind in GRID_ENDINGS else "trimesh"
     if find_spec(library) is None:
         raise WorkspaceError(f"{path}: needs {library}; install cdpr_drake[mesh]")

@@ -9,7 +9,7 @@ from enum import StrEnum
 from typing import Any
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import BridgeError, CdprError, ClientEndedError
+from cdpr_drake.errors import BridgeError, CdprError, ClientEndedError, accepted_names
 from cdpr_drake.systems.remote.messages import JSON, MSGPACK, decode, encode, listed, shown, vector
 from cdpr_drake.systems.remote.server_socket import GONE, ServerSocket
 
@@ -249,7 +249,7 @@ class Driver:
         ports = self._inputs
         if not isinstance(found, dict) or found.keys() != ports.keys():
             names = shown(sorted(map(str, found))) if isinstance(found, dict) else shown(found)
-            raise BridgeError(f"inputs: found {names}; accepted: {', '.join(ports)}")
+            raise BridgeError(f"inputs: found {names}; {accepted_names(names, ports)}")
         return {name: vector(name, found[name], port.size) for name, port in ports.items()}
 
     def _answer(self, envelope: list[bytes], message: Mapping[str, Any], codec: str) -> None:
@@ -283,7 +283,7 @@ class Driver:
                     f"do: found {asked} from a client that does not drive this run, or drives it "
                     "already"
                 )
-            raise BridgeError(f"do: found {shown(asked)}; accepted: one of {', '.join(words)}")
+            raise BridgeError(f"do: found {shown(asked)}; {accepted_names(shown(asked), words)}")
 
     def _asked_for(self, names: object) -> list[str]:
         if names is None:

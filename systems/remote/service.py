@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
-from cdpr_drake.errors import BridgeError
+from cdpr_drake.errors import BridgeError, accepted_names
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.geometry.poses import pose_from_row
 from cdpr_drake.models.robot_schema import Robot
@@ -47,9 +47,8 @@ def tension_service(
     def answer(request: Mapping[str, Any]) -> dict[str, Any]:
         unknown = [name for name in request if name not in FIELDS]
         if unknown:
-            raise BridgeError(
-                f"distribute: found {shown(unknown[0])}; accepted: {', '.join(FIELDS[1:])}"
-            )
+            known = accepted_names(unknown[0], FIELDS[1:])
+            raise BridgeError(f"distribute: found {shown(unknown[0])}; {known}")
         row = vector("pose", request.get("pose"), 7)
         norm = math.hypot(*row[:4])  # NumPy's overflows, and warns
         if abs(norm - 1.0) > UNIT:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from cdpr_drake.errors import ScenarioError
+from cdpr_drake.errors import ScenarioError, accepted_names
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.schema.fields import number, text
 from cdpr_drake.systems.remote.remote_driver import SyncMode
@@ -48,9 +48,8 @@ def check_place(settings: RemoteSettings | None, accepted: Collection[str], path
         ScenarioError: It is none of them.
     """
     if settings is not None and settings.place not in accepted:
-        raise ScenarioError(
-            f"{path}: remote.place: found {settings.place}; accepted: one of {', '.join(accepted)}"
-        )
+        known = accepted_names(settings.place, accepted)
+        raise ScenarioError(f"{path}: remote.place: found {settings.place}; {known}")
 
 
 def check_servo_place(scenario: Any, robot: Robot, path: Path) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from pydrake.multibody.plant import ExternallyAppliedSpatialForceMultiplexer, MultibodyPlant
 from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
 
-from cdpr_drake.errors import CableModelError
+from cdpr_drake.errors import CableModelError, accepted_names
 from cdpr_drake.geometry.cable_routes import CableRoutes
 from cdpr_drake.models.plant_cables import PlantCables
 from cdpr_drake.models.plant_rest import Rest, hang
@@ -110,7 +110,7 @@ def add_cables(
         CableGeometryError: At the plant's default positions a cable cannot run.
     """
     if method not in METHODS:
-        raise CableModelError(f"method: found {method!r}; accepted: one of {', '.join(METHODS)}")
+        raise CableModelError(f"method: found {method!r}; {accepted_names(method, METHODS)}")
     settings, prefix = settings or CableSettings(), f"{name}_" if name else ""
     routes = routes.with_cables(settings.applied(routes.ends))
     cables = PlantCables(plant, routes, settings.model)

@@ -9,7 +9,7 @@ from typing import Any, Protocol, TypeVar
 
 import yaml
 
-from cdpr_drake.errors import RobotFileError, ScenarioError
+from cdpr_drake.errors import RobotFileError, ScenarioError, accepted_names
 from cdpr_drake.models.camera_files import resolved_camera
 from cdpr_drake.models.exit_points import MARK as RAILS_MARK
 from cdpr_drake.models.formats.file_kinds import SUFFIXES as ROBOT_SUFFIXES
@@ -45,7 +45,7 @@ def scenario_names(kind: str | None = None) -> tuple[str, ...]:
     if kind is None:
         return names
     if kind not in KINDS:
-        raise ScenarioError(f"kind: found {kind!r}; accepted: {', '.join(KINDS)}")
+        raise ScenarioError(f"kind: found {kind!r}; {accepted_names(kind, KINDS)}")
     return tuple(name for name in names if scenario_kind(name) == kind)
 
 

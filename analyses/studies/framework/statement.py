@@ -30,6 +30,7 @@ from cdpr_drake.analyses.reporting.statements import (
     new_table,
 )
 from cdpr_drake.analyses.studies.framework.runs import MissingRuns, Runs
+from cdpr_drake.errors import accepted_names
 
 TEST, FITTED, CONSTRUCTION, OURS = "test", "fitted", "construction", "ours"
 """What a statement rests on: runs that could have said otherwise; parameters that were chosen with
@@ -171,7 +172,8 @@ def check_cause(cause: str) -> None:
 
 def _check_known(what: str, value: str, accepted: Sequence[str]) -> None:
     if value not in accepted:
-        raise ValueError(f"{what}: found {value!r}; accepted: {', '.join(map(repr, accepted))}")
+        known = accepted_names(repr(value), map(repr, accepted))
+        raise ValueError(f"{what}: found {value!r}; {known}")
 
 
 def statement(
