@@ -209,17 +209,19 @@ def stability_multiples(title: str, shown: Shown) -> Figure:
     columns = min(len(shown), 4)
     rows = -(-len(shown) // columns)
     size = (max(4.2 * columns, 8.0), 2.4 * rows + 1.4)
-    figure = bare_figure(size, f"Cables that pull; red: the platform is underactuated\n{title}")
+    figure = bare_figure(size, f"Cables that pull; hatched: too few to hold the platform\n{title}")
     grid = figure.subplots(rows, columns, squeeze=False, sharey=True)
+    most = 0
     for axes, (configuration, run, _) in zip(grid.flat, shown, strict=False):
-        planar = load_robot(run["summary"]["robot"]).motion_type().is_horizontal_body
-        times, freedom = run["stability_time"], 3 if planar else 6
+        robot = load_robot(run["summary"]["robot"])
+        times, freedom = run["stability_time"], 3 if robot.motion_type().is_horizontal_body else 6
+        most = max(most, len(robot.cables))
         lost = run["jacobian_rank"] < freedom
         shade(axes, times, lost, None, LOST)
         draw_steps(axes, times, run["taut_cables"], lost)
         axes.axhline(freedom, **line_style(BOUND))
         axes.set_title(configuration.label, fontsize=10)
-        axes.set(xlim=(times[0], times[-1]), ylim=(-0.2, None))
+        axes.set(xlim=(times[0], times[-1]), ylim=(-0.2, most + 0.4))
         axes.grid(alpha=0.3)
     for axes in grid.flat[len(shown) :]:
         axes.remove()
