@@ -28,8 +28,8 @@ MISSPELT = {
 @pytest.mark.parametrize(("words", "meant"), MISSPELT.items())
 def test_the_name_that_was_meant_is_told(words, meant, capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    code, _, err = run(capsys, *words.split())
-    told = err.lower().replace("'", "")
+    code, out, err = run(capsys, *words.split())
+    told = (out + err).lower().replace("'", "")
     assert code == 2
     assert f"did you mean {meant}?" in told or f"did you mean {meant}, " in told
     assert not list(tmp_path.iterdir())
