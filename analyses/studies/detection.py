@@ -189,9 +189,9 @@ def measure(case: Case, _seed: int) -> dict[str, Any]:
         outcome; time_s, how long it was; false, how many alarms there were before something failed,
         of all kinds; told, whether the right detector told of the right cable or device, and
         delay_s, of a break until the right cable is named for good; first, what was told first
-        after something failed; named, how many cables were named wrongly after a break, all taken back if
-        it was told; carried_n, what the cable that broke pulled; residual_m, torque_n_m and lag_m,
-        the largest before something failed; tension_n, the smallest reading before.
+        after something failed; named, how many other cables were named after a break; carried_n,
+        what the cable that broke pulled; residual_m, torque_n_m and lag_m, the largest before
+        something failed; tension_n, the smallest reading before.
     """
     scenario = load_scenario(SCENARIO, overrides(case.keys))
     run = run_scenario(scenario)
