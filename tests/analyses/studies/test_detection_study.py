@@ -1,12 +1,9 @@
 """The study of detectors: what it counts, and its words on made-up runs."""
 
 from collections import Counter
-from dataclasses import replace
 
 import numpy as np
-import pytest
 
-from cdpr_drake.analyses.reporting.progress import StudySession
 from cdpr_drake.analyses.studies.detection import (
     ALARMS,
     BREAK,
@@ -21,6 +18,7 @@ from cdpr_drake.analyses.studies.detection import (
 )
 from cdpr_drake.analyses.studies.framework.runs import Run, Runs
 from cdpr_drake.analyses.studies.framework.study import Case, Form
+from tests.analyses.studies.made_up_studies import check_statements_tell_apart, check_written
 
 
 def test_what_is_above_in_a_row():
@@ -92,17 +90,9 @@ def made_up(case, seed, wrong=False):
     }  # fmt: skip
 
 
-def wrong(case, seed):
-    return made_up(case, seed, wrong=True)
+def test_statements_tell_detectors_apart():
+    check_statements_tell_apart(STUDY, made_up)
 
 
-@pytest.mark.parametrize(
-    ("measured", "verdict"), [(made_up, "confirmed"), (wrong, "not confirmed")]
-)
-def test_statements_tell_detectors_apart(measured, verdict, tmp_path):
-    found = replace(STUDY, measure=measured)(True, StudySession(workers=1))
-    assert {one.verdict for one in found.statements} == {verdict}
-    assert len(found.tables()) > 0
-    problems = found.write(tmp_path)
-    assert not problems
-    assert (tmp_path / "detection.png").is_file()
+def test_tables_and_figure(tmp_path):
+    check_written(STUDY, made_up, tmp_path)
