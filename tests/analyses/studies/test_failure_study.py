@@ -3,16 +3,18 @@
 import numpy as np
 import pytest
 
+from cdpr_drake.analyses.simulation.break_report import (
+    holds_without,
+    leaves,
+    rest_time,
+    speeds,
+)
 from cdpr_drake.analyses.studies.failure import (
     NONE,
     REDISTRIBUTE,
     STOP,
     STUDY,
-    holds_without,
-    leaves,
     measure,
-    rest_time,
-    speeds,
 )
 from cdpr_drake.analyses.studies.framework.study import Case
 from cdpr_drake.geometry.poses import pose_row
