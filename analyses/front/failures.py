@@ -115,6 +115,9 @@ def compare_reactions(
     for name, value in (("time", time), ("after", after)):
         if not 0.0 < value < float("inf"):
             raise ScenarioError(f"{name}: found {value:g}; accepted: a number > 0 [s]")
+    plain = load_scenario(scenario, overrides)
+    if not isinstance(plain, Scenario):
+        raise ScenarioError(f"{plain.name}: found kind {plain.kind}; accepted: a visual servo")
     rows: dict[str, dict[str, Any]] = {}
     for reaction in reactions:
         loaded = load_scenario(scenario, [
@@ -123,10 +126,7 @@ def compare_reactions(
             f"emergency={REACTIONS[reaction]}",
             f"duration={time + after!r}", f"log_rate={ROWS:g}",
         ])  # fmt: skip
-        if not isinstance(loaded, Scenario):
-            raise ScenarioError(
-                f"{loaded.name}: found kind {loaded.kind}; accepted: a visual servo"
-            )
+        assert isinstance(loaded, Scenario)
         robot = load_robot(loaded.robot)
         names = [one.name for one in robot.cables]
         told.say(f"{names[cable]} breaks: {reaction}")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from pydrake.math import RigidTransform, RollPitchYaw
-from scipy.optimize import lsq_linear
+from scipy.optimize import linprog, lsq_linear
 from scipy.spatial.transform import Rotation
 
 from cdpr_drake.geometry.cable_paths import cable_jacobian
@@ -113,22 +113,32 @@ def test_other_starts_find_nearer_ones_and_the_nearest_counts(broken, angles, po
     assert same.distance <= near.distance * (1.0 + 1e-6)
 
 
-def test_a_cable_whose_tension_is_given_has_it_and_others_stay_within():
-    """Tensions of least sum: no others within the bounds have less, by their own program."""
+def test_a_cable_whose_tension_is_given_has_it():
+    """At home the others cannot hold against 45 N of one; the pose that is found is held so."""
     given = np.tile([[LEAST], [MOST]], (1, CABLES.count))
-    given[:, 2] = 7.0
+    given[:, 2] = 45.0
+    assert holding_tensions(HOME, CABLES, LOAD, given, SIZE) is None
     found = nearest_held_pose(HOME, CABLES, LOAD, given, size=SIZE)
     assert found is not None
-    assert found.tensions[2] == pytest.approx(7.0, abs=1e-9)
-    assert np.all(found.tensions >= LEAST - 1e-9)
-    W = -cable_jacobian(found.X_WP, CABLES).T
+    assert found.distance > 1e-3
+    assert found.tensions[2] == pytest.approx(45.0, abs=1e-9)
+    W, wrench = -cable_jacobian(found.X_WP, CABLES).T, LOAD.wrench(found.X_WP)
     ROOM = 1e-5 * LOAD.weight  # balance is asked to 1e-6 of the weight
-    np.testing.assert_allclose(W @ found.tensions, -LOAD.wrench(found.X_WP), atol=ROOM)
-    nothing = np.linalg.svd(W)[2][6:]  # directions that change no wrench
-    for way in (*nothing, *-nothing):
-        less = way if way.sum() < 0.0 else -way
-        moved = found.tensions + 1e-3 * less
-        assert np.any(moved < given[0] - 1e-6) or np.any(moved > given[1] + 1e-6)
+    np.testing.assert_allclose(W @ found.tensions, -wrench, atol=ROOM)
+
+
+def test_tensions_that_hold_a_pose_have_the_least_sum():
+    """Beside the same program with equations in place of a room."""
+    every = np.tile([[LEAST], [MOST]], (1, CABLES.count))
+    tensions = holding_tensions(HOME, CABLES, LOAD, every, SIZE)
+    assert tensions is not None
+    W = -cable_jacobian(HOME, CABLES).T
+    ends = [
+        linprog(sign * np.ones(CABLES.count), A_eq=W, b_eq=-LOAD.wrench(HOME), bounds=every.T)
+        for sign in (1.0, -1.0)
+    ]
+    assert np.sum(tensions) == pytest.approx(ends[0].fun, rel=1e-4)
+    assert -ends[1].fun > 1.001 * ends[0].fun
 
 
 def test_a_pose_that_is_held_stays():

@@ -52,7 +52,7 @@ def test_it_shows_itself(compared):
         ({"cable": 8}, "cable: found 8; accepted: 0 to 7"),
         ({"time": 0.0}, "time: found 0; accepted: a number > 0"),
         ({"after": float("nan")}, "after: found nan"),
-        ({"scenario": "planar_computed_torque"}, "found"),
+        ({"scenario": "planar_computed_torque"}, "found kind .*; accepted: a visual servo"),
     ],
 )
 def test_what_is_refused(asked, words):
