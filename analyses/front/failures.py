@@ -112,15 +112,16 @@ def compare_reactions(
     if unknown or not reactions:
         found = ", ".join(map(repr, unknown)) or "none"
         raise ScenarioError(f"reactions: found {found}; accepted: {', '.join(REACTIONS)}")
-    for name, value in (("time", time), ("after", after)):
+    for key, value in (("time", time), ("after", after)):
         if not 0.0 < value < float("inf"):
-            raise ScenarioError(f"{name}: found {value:g}; accepted: a number > 0 [s]")
-    plain = load_scenario(scenario, overrides)
+            raise ScenarioError(f"{key}: found {value:g}; accepted: a number > 0 [s]")
+    name = str(scenario)
+    plain = load_scenario(name, overrides)
     if not isinstance(plain, Scenario):
         raise ScenarioError(f"{plain.name}: found kind {plain.kind}; accepted: a visual servo")
     rows: dict[str, dict[str, Any]] = {}
     for reaction in reactions:
-        loaded = load_scenario(scenario, [
+        loaded = load_scenario(name, [
             *overrides,
             f"failures.events=[{{kind: cable_breaks, time: {time!r}, cable: {cable}}}]",
             f"emergency={REACTIONS[reaction]}",
