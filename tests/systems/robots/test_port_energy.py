@@ -18,21 +18,24 @@ from cdpr_drake.systems.robots.settings import CableRobotSettings, CableSettings
 
 ROBOT = load_robot("acrobot_large")
 HOW = CableRobotSettings(
-    cables=CableSettings(model="elastic", stiffness_ratio=0.01, retardation_time=2e-3),
+    cables=CableSettings(stiffness_ratio=0.01, retardation_time=2e-3),
     damping=DampingSettings(translation=8.0, rotation=0.05),
 )
 
 STEP, ROW, HELD, LASTS = 1e-4, 2.5e-4, 5e-3, 0.1
 """Integration step, rows of the log, time for which a wrench is held, and one push [s]."""
 
+OF_LAW = 1e-8
+"""Tensions by the law written once more [N]: lengths are rounded to 1e-16 m of cables of kN."""
+
 CLOSED = 1e-6
 """What is left of the balance of a push, per energy that went through the port, the dampers, or the
 storage in it, whichever is most: Simpson's rule over twenty rows of modes below 40 Hz, and the
 integration's steps of 0.1 ms, each err by the fourth power of the step or less."""
 
-SLACK = 1e-5
-"""The same for pushes in which a cable goes slack or taut: its damping has a kink there, at which
-Simpson's rule errs by the square of a row."""
+SLACK = 1e-3
+"""The same for pushes in which a cable goes slack or taut: its damping begins and ends with a jump
+there, at which Simpson's rule errs by the power that jumps times a row."""
 
 
 def pushes(count, seed):
@@ -117,7 +120,11 @@ def balances(kind, count, seed):
     lengths, rates = straight(state)
     w, v = state[:, 7:10], state[:, 10:13]
     elastic = stiffness() * np.maximum(lengths / unstrained - 1.0, 0.0)
-    lost = np.sum((tensions - elastic) * rates, axis=1)
+    # Kelvin and Voigt, as long as the cable pulls; by the law, so that it is not what is left.
+    damping = stiffness() * HOW.cables.retardation_time * rates / unstrained
+    pulls = np.where(elastic > 0.0, np.maximum(elastic + damping, 0.0), 0.0)
+    np.testing.assert_allclose(tensions, pulls, atol=OF_LAW)
+    lost = np.sum((pulls - elastic) * rates, axis=1)
     lost += HOW.damping.translation * np.sum(v**2, axis=1)
     lost += HOW.damping.rotation * np.sum(w**2, axis=1)
     energy, per = stored(state, lengths, unstrained), round(HELD / ROW)
@@ -145,4 +152,4 @@ def test_the_balance_of_every_push_closes(kind, count):
     share = np.abs(left) / most
     assert np.all(share[~slack] < CLOSED)
     assert np.all(share[slack] < SLACK)
-    assert np.sum(~slack) > 0
+    assert np.sum(~slack) >= 0.5 * count
