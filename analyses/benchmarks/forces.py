@@ -1,4 +1,4 @@
-"""Benchmarks of forces: laws that answer them beside computed torque, and estimates of wrenches."""
+"""Benchmarks of forces: laws that answer them, estimates of wrenches, and the look for a break."""
 
 from __future__ import annotations
 
@@ -14,8 +14,10 @@ from cdpr_drake.analyses.reporting.timing import (
     seconds_per_call,
 )
 from cdpr_drake.analyses.simulation.tension_control_run import make_control, make_simulator
+from cdpr_drake.estimation.break_detection import BreakRule, fresh_memory
+from cdpr_drake.estimation.break_detection_kernel import break_step
 from cdpr_drake.estimation.wrench_observers import OBSERVERS, WrenchObserver, packed_body
-from cdpr_drake.geometry.cable_paths import cable_jacobian
+from cdpr_drake.geometry.cable_paths import cable_jacobian, cable_paths, motion_of
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.scenarios.tension_control_scenario import TensionScenario
@@ -69,7 +71,8 @@ def force_rows(quick: bool) -> list[TimingRow]:
         )
         for name, time in zip(LAWS, times, strict=True)
     ]  # fmt: skip
-    return rows + observer_rows(repeats, 200 if quick else 2000)
+    calls = 200 if quick else 2000
+    return rows + observer_rows(repeats, calls) + break_rows(repeats, calls)
 
 
 def observer_rows(repeats: int, calls: int) -> list[TimingRow]:
@@ -95,4 +98,31 @@ def observer_rows(repeats: int, calls: int) -> list[TimingRow]:
             1e6 * jacobian, jacobian / time, ratio_means="of its samples in that time",
         )
         for kind, time in zip(OBSERVERS, times, strict=True)
+    ]  # fmt: skip
+
+
+def break_rows(repeats: int, calls: int) -> list[TimingRow]:
+    """A look for a broken cable among eight against one of the momentum observer."""
+    robot = load_robot("acrobot_large")
+    cables, X_WP = robot.cable_set(), robot.home.transform()
+    motion, rows, m = motion_of(X_WP), cables.packed(), cables.count
+    lengths, tensions, silent = cable_paths(X_WP, cables).lengths, np.full(m, 5.0), np.full(m, 0.3)
+    rule, memory = BreakRule(1e-3, 4e-3, 3e-3, 3).packed(), fresh_memory(m)
+    body = packed_body(3.5, np.zeros(3), np.eye(3), np.array([0.0, 0.0, -9.81]))
+    wrench = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 30.0])
+    observer = WrenchObserver("momentum", body, 40.0, 1e-3)
+    look, sample = interleaved(
+        [
+            lambda: seconds_per_call(
+                lambda: break_step(motion, rows, lengths, tensions, silent, rule, memory), calls
+            ),
+            lambda: seconds_per_call(lambda: observer.update(X_WP, wrench), calls),
+        ],
+        repeats,
+    )
+    return [
+        TimingRow(
+            "look for a broken cable", 1e6 * look, "us/look", "momentum observer",
+            1e6 * sample, sample / look, ratio_means="of its samples in that time",
+        )
     ]  # fmt: skip

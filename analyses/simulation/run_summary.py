@@ -22,6 +22,7 @@ from cdpr_drake.geometry.rotation_kernel import rotations_of_quaternions
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.systems.controllers.torque_settings import TorqueControl
 from cdpr_drake.systems.diagrams.calibration_findings import found_calibrations
+from cdpr_drake.systems.diagrams.tension_management import used_gain
 from cdpr_drake.systems.diagrams.visual_servo import VisualServo
 from cdpr_drake.systems.estimators.geometry_learner import LEARNT
 from cdpr_drake.systems.robots.failures import FailureSettings
@@ -168,6 +169,8 @@ def summarize(result: RunResult) -> dict[str, Any]:
         "step_error": _step_errors(result),
         "versions": package_versions(),
     }
+    if (gain := _tension_gain(result)) is not None:
+        summary["tension_gain"] = gain
     if APPLIED_WRENCH in log:
         summary["disturbances"] = disturbance_summary(log)
     if scenario.failures is not None:
@@ -181,6 +184,20 @@ def summarize(result: RunResult) -> dict[str, Any]:
         summary["remote"] = servo.remote.report()
     cleaned: dict[str, Any] = finite(summary)
     return cleaned
+
+
+def _tension_gain(result: RunResult) -> dict[str, Any] | None:
+    """The gain of a correction of tensions that states none: per length, and at the start."""
+    servo, scenario = result.servo, result.servo.scenario
+    wanted = scenario.tension_management
+    if wanted is None:
+        return None
+    robot = servo.robot
+    found = used_gain(scenario, wanted, robot, servo.believed, scenario.cables.cable_set(robot))
+    if found is None:
+        return None
+    at_start = found.each(result.log["lengths"][0])
+    return {"per_length_1_per_ns": found.share.tolist(), "at_start_m_per_ns": at_start.tolist()}
 
 
 def disturbance_summary(log: Log) -> dict[str, float]:

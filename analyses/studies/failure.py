@@ -34,44 +34,32 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from cdpr_drake.analyses.simulation.break_report import (
+    BRAKE,
+    BRAKING,
+    FOUND,
+    NONE,
+    REACTIONS,
+    REDISTRIBUTE,
+    RESTS,
+    RETREAT,
+    STOP,
+    after_break,
+)
 from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
 from cdpr_drake.analyses.studies.framework.runs import MissingRuns, Runs
 from cdpr_drake.analyses.studies.framework.statement import OURS, SOURCE, Finding, statement
 from cdpr_drake.analyses.studies.framework.study import Case, Form, Study
 from cdpr_drake.analyses.studies.framework.summary import Cell, Summary
 from cdpr_drake.analyses.visualization.figure_style import new_figure
-from cdpr_drake.arrays import Array
-from cdpr_drake.geometry.poses import pose_from_row, pose_rows_distance
 from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.models.robot_statics import wrench_balance
 from cdpr_drake.palette import nth_look
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
-from cdpr_drake.tensions.methods import distribute
-from cdpr_drake.tensions.problem import TensionProblem, TensionStatus
 
 SCENARIO = "acrobot_broken_redistributed"
 
-BRAKE = 0.03
-"""Time that brakes take to close [s]."""
-
 ACTUATORS = "Boumann, Bruckmann, Actuators 11(2):56 (2022), abstract"
-
-NONE, STOP, REDISTRIBUTE, FOUND = "none", "stop", "redistribute", "found"
-CONTINUE, BRAKING, RETREAT, DESCEND = "continue", "brake", "retreat", "descend"
-
-REACTIONS = {
-    NONE: "null",
-    STOP: f"{{reaction: stop, delay: {BRAKE:g}}}",
-    REDISTRIBUTE: "{reaction: redistribute}",
-    FOUND: "{reaction: redistribute, known: found}",
-    CONTINUE: "{reaction: redistribute, motion: continue}",
-    BRAKING: "{reaction: brake}",
-    RETREAT: "{reaction: retreat}",
-    DESCEND: "{reaction: descend}",
-}
-"""Section `emergency` of each reaction."""
 
 SHIFTS = ((0.0, 0.0, 0.0), (0.03, 0.03, 0.02), (-0.03, 0.03, 0.04), (0.03, -0.03, -0.02))
 """By how much the start is moved from that of the scenario [m]."""
@@ -87,9 +75,6 @@ QUICK = (0, 5)
 
 RATE = 500.0
 """Rows of the log per second [Hz]."""
-
-RESTS = (0.005, 0.05)
-"""Speeds below which the platform is at rest [m/s, rad/s]."""
 
 SAME = 1e-3
 """Excursions that differ by less are the same [m]."""
@@ -123,72 +108,12 @@ def measure(case: Case, _seed: int) -> dict[str, Any]:
     """A run.
 
     Returns:
-        outcome; speed_m_s, that of the platform when the cable broke; excursion_m and turn_rad, the
-        largest from its pose then; largest_speed_m_s; leaves, whether an anchor point left the
-        frame or went into the ground, and impact_m_s, the speed then, 0 without; tension_n, the
-        largest; slack_s, seconds that cables which are left were slack; rest_s, time until at rest,
-        or `AFTER`; holds, whether tensions that only pull hold the pose without the cable.
+        outcome, and what `after_break` says.
     """
     scenario = load_scenario(SCENARIO, overrides(case.keys))
     run = run_scenario(scenario)
-    robot, log = load_robot(scenario.robot), run.log
-    cable, time = case.keys["cable"], case.keys["time_s"]
-    # A row holds what stood there before its instant.
-    since = log["time"] >= time - 0.5 / RATE
-    X_WP, times = log["X_WP"][since], log["time"][since]
-    distance, angle = pose_rows_distance(X_WP, np.broadcast_to(X_WP[0], X_WP.shape))
-    speed, turning = speeds(X_WP, times)
-    out = np.flatnonzero(leaves(robot, X_WP))
-    left = np.arange(len(robot.cables)) != cable
-    slack = log["slack"][since][:, left]
-    return {
-        "outcome": Outcome(run.outcome).name.lower(),
-        "speed_m_s": float(speed[0]),
-        "excursion_m": float(np.max(distance)),
-        "turn_rad": float(np.max(angle)),
-        "largest_speed_m_s": float(np.max(speed)),
-        "leaves": bool(len(out)),
-        "impact_m_s": float(speed[out[0]]) if len(out) else 0.0,
-        "tension_n": float(np.max(log["tensions"][since])),
-        "slack_s": float(np.sum(slack[:-1] * np.diff(times)[:, np.newaxis])),
-        "rest_s": rest_time(times - times[0], speed, turning),
-        "holds": holds_without(robot, X_WP[0], cable),
-    }
-
-
-def speeds(X_WP: Array, times: Array) -> tuple[Array, Array]:
-    """Speeds of Po [m/s] and of turning [rad/s] over rows of poses, shape (n, 7), at times [s]."""
-    speed = np.linalg.norm(np.gradient(X_WP[:, 4:], times, axis=0), axis=1)
-    _, angles = pose_rows_distance(X_WP[1:], X_WP[:-1])
-    turning = angles / np.diff(times)
-    return speed, np.append(turning, turning[-1])
-
-
-def leaves(robot: Robot, X_WP: Array) -> np.ndarray:
-    """Whether an anchor point is outside the frame or in the ground, of rows of poses."""
-    p_PB = robot.cable_set().p_PB
-    low, high = robot.frame.lower, robot.frame.upper
-    found = []
-    for row in X_WP:
-        p_WB = pose_from_row(row) @ p_PB
-        found.append(bool(np.any(p_WB < low[:, np.newaxis]) or np.any(p_WB > high[:, np.newaxis])))
-    return np.array(found)
-
-
-def rest_time(times: Array, speed: Array, turning: Array) -> float:
-    """When the platform comes to rest for good [s]; the last time where it does not."""
-    moves = np.flatnonzero((speed > RESTS[0]) | (turning > RESTS[1]))
-    last = int(moves[-1]) + 1 if len(moves) else 0
-    return float(times[min(last, len(times) - 1)])
-
-
-def holds_without(robot: Robot, row: Array, cable: int) -> bool:
-    """Whether tensions from zero to the upper limit hold a pose without a cable."""
-    balance = wrench_balance(robot, pose_from_row(row))
-    lower, upper = np.zeros_like(balance.upper), balance.upper.copy()
-    upper[cable] = 0.0
-    problem = TensionProblem(balance.W, balance.wrench, lower, upper, None, balance.row_scale)
-    return distribute(problem).status == TensionStatus.FEASIBLE
+    told = after_break(run.log, load_robot(scenario.robot), case.keys["cable"], case.keys["time_s"])
+    return {"outcome": Outcome(run.outcome).name.lower(), **told}
 
 
 def beside(runs: Runs, one: str, other: str) -> tuple[list[bool], float, str]:

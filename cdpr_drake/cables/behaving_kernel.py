@@ -20,7 +20,7 @@ import numpy as np
 from numba import njit, types
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables.response_kernel import MOTION, POSE, RESPONSE
+from cdpr_drake.cables.response_kernel import MOTION, POSE, RESPONSE, straight_derivatives
 from cdpr_drake.geometry.motion_kernel import Motion
 from cdpr_drake.geometry.pulley_kernel import (
     CABLE_SET_COLUMNS,
@@ -77,22 +77,9 @@ def behaving_response(X: Motion, cable: Array, l0: float, out: Array) -> Any:
     if strain > 0.0:
         tension, slope = _stretched(strain, cable[6], cable[STIFFENING])
         by_length = slope / natural
-    u = (ux, uy, uz)
     unit_vector_derivative(X, cable, out[:3])
-    for i in range(3):
-        for j in range(3):
-            out[i, j] = tension * out[i, j] + by_length * u[i] * u[j]
-        out[i, 3] = -by_length * length / l0 * u[i]
-        out[3, i] = by_length * u[i]
-        out[4, i] = out[3, i]
-        out[5, i] = u[i]
-        out[6, i] = 0.0 if strain > 0.0 else -u[i]
-        out[7, i] = 0.0
-    out[3, 3] = -by_length * length / l0
-    out[4, 3] = out[3, 3]
-    out[5, 3] = 0.0
-    out[6, 3] = 0.0 if strain > 0.0 else cable[LONGER]
-    out[7, 3] = 0.0
+    slack = not strain > 0.0
+    straight_derivatives((ux, uy, uz), length, l0, tension, by_length, slack, cable[LONGER], out)
     return (
         tension * ux, tension * uy, tension * uz, tension, tension,
         length, max(natural - length, 0.0), 0.0, rx, ry, rz, ux == ux,

@@ -34,14 +34,22 @@ POSE, MOTION = (types.UniTuple(types.float64, count) for count in (12, 18))
 
 
 @njit(cache=True, error_model="numpy")
-def straight_response(X: Motion, cable: Array, l0: float, out: Array) -> Any:
-    """A straight elastic cable; see `dispatch_kernel.cable_response`."""
-    length, ux, uy, uz, rx, ry, rz = pulley_line(X, cable)
-    strain = length / l0 - 1.0
-    tension = cable[6] * strain if strain > 0.0 else 0.0
-    by_length = cable[6] / l0 if strain > 0.0 else 0.0
-    u = (ux, uy, uz)
-    unit_vector_derivative(X, cable, out[:3])  # without gaps, as all others give it
+def straight_derivatives(
+    u: Any, length: float, l0: float, tension: float, by_length: float, slack: bool,
+    longer: float, out: Array,
+) -> None:  # fmt: skip
+    """Derivatives of a straight cable, shape (`DERIVATIVES`, 4), whose first three rows hold du/dp.
+
+    Args:
+        u: Unit vector of the pull.
+        length: Of the path [m].
+        l0: Unstrained length [m].
+        tension: Of the cable [N].
+        by_length: Its derivative by the path's length [N/m].
+        slack: Whether it is slack.
+        longer: Factor by which it is longer than l0 when nothing pulls.
+        out: Written.
+    """
     for i in range(3):
         for j in range(3):
             out[i, j] = tension * out[i, j] + by_length * u[i] * u[j]
@@ -49,13 +57,25 @@ def straight_response(X: Motion, cable: Array, l0: float, out: Array) -> Any:
         out[3, i] = by_length * u[i]
         out[4, i] = out[3, i]
         out[5, i] = u[i]
-        out[6, i] = 0.0 if strain > 0.0 else -u[i]
+        out[6, i] = -u[i] if slack else 0.0
         out[7, i] = 0.0
     out[3, 3] = -by_length * length / l0
     out[4, 3] = out[3, 3]
     out[5, 3] = 0.0
-    out[6, 3] = 0.0 if strain > 0.0 else 1.0
+    out[6, 3] = longer if slack else 0.0
     out[7, 3] = 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def straight_response(X: Motion, cable: Array, l0: float, out: Array) -> Any:
+    """A straight elastic cable; see `dispatch_kernel.cable_response`."""
+    length, ux, uy, uz, rx, ry, rz = pulley_line(X, cable)
+    strain = length / l0 - 1.0
+    tension = cable[6] * strain if strain > 0.0 else 0.0
+    by_length = cable[6] / l0 if strain > 0.0 else 0.0
+    unit_vector_derivative(X, cable, out[:3])  # without gaps, as all others give it
+    slack = not strain > 0.0
+    straight_derivatives((ux, uy, uz), length, l0, tension, by_length, slack, 1.0, out)
     return (
         tension * ux, tension * uy, tension * uz, tension, tension,
         length, max(l0 - length, 0.0), 0.0, rx, ry, rz, ux == ux,

@@ -30,6 +30,7 @@ from scipy.stats import norm
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import SensorError
+from cdpr_drake.estimation.failure_detection import threshold
 
 
 class Friction(Protocol):
@@ -85,6 +86,31 @@ class MotorWatch:
     def fresh(self) -> Array:
         """The memory before the first sample: integral and residual, shape (2, m)."""
         return np.array([np.full(len(self.radius), np.nan), np.zeros(len(self.radius))])
+
+    def limit(
+        self, accuracy: float, noise: float, *, samples: float, in_a_row: int, false_alarms: float
+    ) -> float:  # fmt: skip
+        """Torque that friction and tension sensors may leave unexplained [N m].
+
+        Static friction: which way it acts while a drum turns round, no sensor tells. Then what a
+        sensor's constant error makes, and its noise behind the observer's smoothing.
+
+        Args:
+            accuracy: Largest constant error of a tension sensor [N].
+            noise: Standard deviation of its readings [N].
+            samples: How many there will be.
+            in_a_row: How many must lie above, of either sign.
+            false_alarms: How many are accepted.
+
+        Raises:
+            SensorError: A number makes no sense.
+        """
+        share, radius = self.bandwidth * self.period, float(np.max(self.radius))
+        sigma = radius * noise * float(np.sqrt(share / (2.0 - share)))
+        return threshold(
+            sigma, bias=self.friction.static + radius * accuracy, samples=samples,
+            residuals=2 * len(self.radius), in_a_row=in_a_row, false_alarms=false_alarms,
+        )  # fmt: skip
 
     def slowest(self) -> float:
         """Speed below which a drum counts as standing [rad/s]."""

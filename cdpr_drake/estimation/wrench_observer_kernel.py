@@ -61,30 +61,39 @@ def _turn(R: Array, wx: float, wy: float, wz: float) -> None:
 
 
 @njit(cache=True)
+def _turned(R: Array, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """R times a vector."""
+    return (
+        R[0] * x + R[1] * y + R[2] * z,
+        R[3] * x + R[4] * y + R[5] * z,
+        R[6] * x + R[7] * y + R[8] * z,
+    )
+
+
+@njit(cache=True)
+def _turned_back(R: Array, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """R' times a vector."""
+    return (
+        R[0] * x + R[3] * y + R[6] * z,
+        R[1] * x + R[4] * y + R[7] * z,
+        R[2] * x + R[5] * y + R[8] * z,
+    )
+
+
+@njit(cache=True)
 def _inertia_times(
     R: Array, body: Array, x: float, y: float, z: float
 ) -> tuple[float, float, float]:
     """R I R' times a vector in W."""
-    p0 = R[0] * x + R[3] * y + R[6] * z
-    p1 = R[1] * x + R[4] * y + R[7] * z
-    p2 = R[2] * x + R[5] * y + R[8] * z
-    J = body[INERTIA : INERTIA + 9]
-    q0 = J[0] * p0 + J[1] * p1 + J[2] * p2
-    q1 = J[3] * p0 + J[4] * p1 + J[5] * p2
-    q2 = J[6] * p0 + J[7] * p1 + J[8] * p2
-    return (
-        R[0] * q0 + R[1] * q1 + R[2] * q2,
-        R[3] * q0 + R[4] * q1 + R[5] * q2,
-        R[6] * q0 + R[7] * q1 + R[8] * q2,
-    )
+    p0, p1, p2 = _turned_back(R, x, y, z)
+    q0, q1, q2 = _turned(body[INERTIA : INERTIA + 9], p0, p1, p2)
+    return _turned(R, q0, q1, q2)
 
 
 @njit(cache=True)
 def _solve_inertia(R: Array, body: Array, n0: float, n1: float, n2: float, out: Array) -> None:
     """out <- (R I R')^-1 n, by Cramer's rule."""
-    p0 = R[0] * n0 + R[3] * n1 + R[6] * n2
-    p1 = R[1] * n0 + R[4] * n1 + R[7] * n2
-    p2 = R[2] * n0 + R[5] * n1 + R[8] * n2
+    p0, p1, p2 = _turned_back(R, n0, n1, n2)
     a, b, c, d, e, f = body[4], body[5], body[6], body[8], body[9], body[12]
     A, B, C = d * f - e * e, c * e - b * f, b * e - c * d
     D, E, F = a * f - c * c, b * c - a * e, a * d - b * b
@@ -92,17 +101,26 @@ def _solve_inertia(R: Array, body: Array, n0: float, n1: float, n2: float, out: 
     q0 = (A * p0 + B * p1 + C * p2) / det
     q1 = (B * p0 + D * p1 + E * p2) / det
     q2 = (C * p0 + E * p1 + F * p2) / det
-    out[0] = R[0] * q0 + R[1] * q1 + R[2] * q2
-    out[1] = R[3] * q0 + R[4] * q1 + R[5] * q2
-    out[2] = R[6] * q0 + R[7] * q1 + R[8] * q2
+    out[0], out[1], out[2] = _turned(R, q0, q1, q2)
+
+
+@njit(cache=True)
+def _arm(R: Array, body: Array) -> tuple[float, float, float]:
+    """From Po to C in W."""
+    return _turned(R, body[COM], body[COM + 1], body[COM + 2])
+
+
+@njit(cache=True)
+def _centre(R: Array, p: Array, body: Array, i: int) -> float:
+    """Coordinate i of C in W."""
+    at: float = p[i] + R[3 * i] * body[1] + R[3 * i + 1] * body[2] + R[3 * i + 2] * body[3]
+    return at
 
 
 @njit(cache=True)
 def known_about_com(R: Array, cables: Array, body: Array, out: Array) -> None:
     """out[:6] <- moment about C and force of cables, given about Po, and of the weight."""
-    c0 = R[0] * body[1] + R[1] * body[2] + R[2] * body[3]
-    c1 = R[3] * body[1] + R[4] * body[2] + R[5] * body[3]
-    c2 = R[6] * body[1] + R[7] * body[2] + R[8] * body[3]
+    c0, c1, c2 = _arm(R, body)
     fx, fy, fz = cables[3], cables[4], cables[5]
     out[0] = cables[0] - (c1 * fz - c2 * fy)
     out[1] = cables[1] - (c2 * fx - c0 * fz)
@@ -114,9 +132,7 @@ def known_about_com(R: Array, cables: Array, body: Array, out: Array) -> None:
 @njit(cache=True)
 def about_origin(R: Array, outer: Array, body: Array, out: Array) -> None:
     """out[:6] <- a wrench about C as one about Po."""
-    c0 = R[0] * body[1] + R[1] * body[2] + R[2] * body[3]
-    c1 = R[3] * body[1] + R[4] * body[2] + R[5] * body[3]
-    c2 = R[6] * body[1] + R[7] * body[2] + R[8] * body[3]
+    c0, c1, c2 = _arm(R, body)
     fx, fy, fz = outer[3], outer[4], outer[5]
     out[0] = outer[0] + c1 * fz - c2 * fy
     out[1] = outer[1] + c2 * fx - c0 * fz
@@ -162,6 +178,7 @@ def momentum_step(
     kept, seen = np.exp(-rates[0] * T), memory[SEEN]
     outer, known = memory[OUTER : OUTER + 6], memory[KNOWN : KNOWN + 6]
     momentum, turn = memory[MOMENTUM : MOMENTUM + 6], memory[W_AT : W_AT + 3]
+    arm = _arm(R, body)
     if seen > 0.0:
         _log(R, before, turn)
         _turn(before, 0.5 * turn[0], 0.5 * turn[1], 0.5 * turn[2])
@@ -169,8 +186,7 @@ def momentum_step(
         now = memory[V_AT : V_AT + 3]
         now[0], now[1], now[2] = h0, h1, h2
         for i in range(3):
-            c = R[3 * i] * body[1] + R[3 * i + 1] * body[2] + R[3 * i + 2] * body[3] + p[i]
-            linear = body[MASS] * (c - memory[C_AT + i]) / T
+            linear = body[MASS] * (arm[i] + p[i] - memory[C_AT + i]) / T
             if seen > 1.0:
                 share = 1.0 - kept
                 angular = (now[i] - momentum[i]) / T - known[i]
@@ -181,8 +197,7 @@ def momentum_step(
     for i in range(9):
         before[i] = R[i]
     for i in range(3):
-        c = R[3 * i] * body[1] + R[3 * i + 1] * body[2] + R[3 * i + 2] * body[3]
-        memory[C_AT + i] = p[i] + c
+        memory[C_AT + i] = p[i] + arm[i]
     known_about_com(R, cables, body, known)
     memory[SEEN] += 1.0
     about_origin(R, outer, body, out)
@@ -205,7 +220,7 @@ def extended_step(
         for i in range(9):
             own[i] = R[i]
         for i in range(3):
-            c[i] = p[i] + R[3 * i] * body[1] + R[3 * i + 1] * body[2] + R[3 * i + 2] * body[3]
+            c[i] = _centre(R, p, body, i)
         for i in range(6):
             outer[i] = -now[i]  # at rest
     else:
@@ -229,8 +244,7 @@ def extended_step(
             a = (outer[3 + i] + 0.5 * (known[3 + i] + now[3 + i])) / body[MASS]
             c[i] += T * (v[i] + 0.5 * T * a)
             v[i] += T * a
-            seen = p[i] + R[3 * i] * body[1] + R[3 * i + 1] * body[2] + R[3 * i + 2] * body[3]
-            wrong = seen - c[i]
+            wrong = _centre(R, p, body, i) - c[i]
             c[i] += first * wrong
             v[i] += second * wrong
             outer[3 + i] += body[MASS] * third * wrong

@@ -24,7 +24,7 @@ from pydrake.math import RigidTransform
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.estimation.failure_detection import AlarmRule, threshold
+from cdpr_drake.estimation.break_detection import BreakRule, residual_noise
 from cdpr_drake.geometry.poses import pose_from_row, pose_row, rotation_vector
 from cdpr_drake.schema.fields import FASTEST, number, optional_section, text, whole
 
@@ -44,13 +44,14 @@ HOURS = 1.0
 class WatchSettings:
     """When other failures than broken cables are told; nothing is done about them.
 
-    Torque and lag have bounds that undisturbed runs of ACROBOT stay below; see study `detection`.
+    A reading of an encoder is up to a period old: by default `lag` covers 0.5 m/s at 512 Hz.
     """
 
-    torque: float = number(
-        "Torque of a motor that asked torque, tension, inertia and friction do not explain.",
+    torque: float | None = number(
+        "Torque of a motor that asked torque, tension, inertia and friction do not explain; null: "
+        "static friction, the tension sensor's constant error, and noise.",
         "N m",
-        0.015,
+        None,
         above=0.0,
     )
     bandwidth: float = number(
@@ -108,12 +109,25 @@ class EmergencySettings:
         2e-4,
         at_least=0.0,
     )
-    pose_bias: float = number("Bound of the slow errors of these lengths.", "m", 5e-3, at_least=0.0)
-    slack_below: float = number(
-        "Measured tension below which a cable may be broken: what its sensor may read without one.",
+    pose_accuracy: float = number(
+        "By how much the error of the believed pose, at an anchor point, may change while a cable "
+        "does not pull.",
+        "m",
+        3e-3,
+        at_least=0.0,
+    )
+    exit_accuracy: float = number(
+        "Bound of the errors of believed exit points.", "m", 3e-3, at_least=0.0
+    )
+    anchor_accuracy: float = number(
+        "Bound of the errors of believed anchor points.", "m", 1e-3, at_least=0.0
+    )
+    slack_below: float | None = number(
+        "Measured tension up to which a cable may be broken: what its sensor may read without one; "
+        "null: by the sensor's accuracy and noise.",
         "N",
-        0.5,
-        above=0.0,
+        None,
+        at_least=0.0,
     )
     in_a_row: int = whole("Samples in a row that make an alarm.", 3, at_least=1)
     watch: WatchSettings | None = optional_section(
@@ -121,13 +135,17 @@ class EmergencySettings:
         "With winches.mode torque."
     )
 
-    def rule(self, cables: int) -> AlarmRule:
+    def samples(self) -> float:
+        """Looks in `HOURS`."""
+        return 3600.0 * HOURS * self.rate
+
+    def rule(self, cables: int) -> BreakRule:
         """When it is found, with so many cables: `ACCEPTED` false alarms in `HOURS`."""
-        limit = threshold(
-            self.pose_noise, bias=self.pose_bias, samples=3600.0 * HOURS * self.rate,
-            residuals=cables, in_a_row=self.in_a_row, false_alarms=ACCEPTED,
-        )  # fmt: skip
-        return AlarmRule(limit, self.in_a_row)
+        noise = residual_noise(
+            self.pose_noise, samples=self.samples(), cables=cables, false_alarms=ACCEPTED
+        )
+        points = self.exit_accuracy + self.anchor_accuracy
+        return BreakRule(noise, points, self.pose_accuracy, self.in_a_row)
 
 
 APPROACH = 2.0
@@ -205,6 +223,7 @@ class EmergencyReaction(LeafSystem):
     ============ ============== ===== =======================================================
 
     Looks at its inputs at a rate. State: when each cable was known to be broken, and the outputs.
+    Where a detector takes back what it told, the cable is asked again; brakes that closed stay so.
     The goal of a retreat is searched for once for each cable that breaks, when it acts.
     """
 
@@ -241,7 +260,8 @@ class EmergencyReaction(LeafSystem):
         m, time, rule = self._m, context.get_time(), self._settings
         before = context.get_discrete_state_vector().value()
         known = before[self._places["known"]]
-        known = np.where(self._found.Eval(context) != 0.0, np.minimum(known, time), known)
+        told, back = self._found.Eval(context) != 0.0, known if rule.reaction == STOP else np.inf
+        known = np.where(told, np.minimum(known, time), back)
         acts = (known + rule.delay <= time * (1.0 + 1e-12)).astype(float)
         acting = float(np.max(acts))
         stops = np.full(m, acting) if rule.reaction == STOP else acts

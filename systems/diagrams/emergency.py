@@ -11,10 +11,11 @@ from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import ScenarioError, SensorError
+from cdpr_drake.estimation.break_detection import silent_reading
 from cdpr_drake.estimation.failure_detection import AlarmRule
 from cdpr_drake.estimation.failure_watch import EncoderWatch, MotorWatch, repeats_in_a_row
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.models.sensor_catalogue import load_tension_sensor
+from cdpr_drake.models.sensor_catalogue import TensionSensorModel, load_tension_sensor
 from cdpr_drake.statics.nearest_held_pose import Load, nearest_held_pose
 from cdpr_drake.systems.controllers.emergency import (
     ACCEPTED,
@@ -126,13 +127,40 @@ def watch_rules(
     repeats = int(np.ceil((repeats + SPARE_REPEATS) * max(settings.rate / rate, 1.0)))
     return WatchRules(
         motor=motor,
-        torque=AlarmRule(watch.torque, watch.in_a_row),
+        torque=AlarmRule(_torque_limit(settings, watch, motor, sensor), watch.in_a_row),
         repeats=repeats,
         encoder=EncoderWatch(period, watch.leak),
         lag=AlarmRule(watch.lag, watch.in_a_row),
         dark=watch.dark,
         late=watch.late,
     )
+
+
+def _torque_limit(
+    settings: EmergencySettings, watch: WatchSettings, motor: MotorWatch, sensor: TensionSensorModel
+) -> float:
+    """Torque that nothing explains from which on it is an alarm [N m]."""
+    if watch.torque is not None:
+        return watch.torque
+    return motor.limit(
+        sensor.accuracy, sensor.repeatability, samples=settings.samples(),
+        in_a_row=watch.in_a_row, false_alarms=ACCEPTED,
+    )  # fmt: skip
+
+
+def silent_readings(scenario: Scenario, settings: EmergencySettings, robot: Robot) -> Array:
+    """What tension sensors read at most of cables that pull nothing, shape (m,) [N]."""
+    count = len(robot.cables)
+    if settings.slack_below is not None:
+        return np.full(count, settings.slack_below)
+    most = 0.0
+    if scenario.sensors.rate("tension") is not None:
+        sensor = load_tension_sensor(scenario.sensors.tension)
+        most = sensor.resolution + silent_reading(
+            sensor.accuracy, sensor.repeatability, samples=settings.samples(), cables=count,
+            false_alarms=ACCEPTED,
+        )  # fmt: skip
+    return most + (np.zeros(count) if robot.slack_readings is None else robot.slack_readings)
 
 
 SPARE_REPEATS = 2
@@ -159,7 +187,12 @@ def add_emergency(
             believed = believed.without_pulleys()
         detector = builder.AddNamedSystem(
             "break_detector",
-            BreakDetector(believed, settings.rule(count), settings.rate, settings.slack_below),
+            BreakDetector(
+                believed,
+                settings.rule(count),
+                settings.rate,
+                silent_readings(scenario, settings, blocks.robot),
+            ),
         )
         for name, source in (
             ("X_WP", blocks.estimator.GetOutputPort("X_WP")),

@@ -257,6 +257,34 @@ def _sight(robot: Robot, settings: TensionManagement) -> Pinhole:
     return camera.pinhole(camera.width, camera.height)
 
 
+def used_gain(
+    settings: VisualServoSettings,
+    wanted: TensionManagement,
+    robot: Robot,
+    believed: BelievedRobot,
+    real: CableSet,
+) -> LengthGain | None:
+    """The gain where a section states none and its kind has one, else None.
+
+    Stiffness and damping of the cables are known as they are, `real`, or are those of the robot
+    that is believed in, if that is another one.
+
+    Raises:
+        ScenarioError: None is stable.
+    """
+    if not wanted.needs_gain():
+        return None
+    cables, rate = believed.cables, wanted.rate or settings.controller.rate
+    if not settings.controller.pulleys:
+        cables = cables.without_pulleys()
+    if settings.perturbations.believed_robot is None:
+        cables = replace(cables, stiffness=real.stiffness, retardation=real.retardation)
+    readings, delay = settings.sensors.rate("tension"), wanted.delay
+    if delay is None:
+        delay = 0.0 if readings is None else 1.0 / readings
+    return automatic_gain(robot, cables, believed.X_WP0, rate, delay)
+
+
 def make_corrector(
     settings: VisualServoSettings,
     wanted: TensionManagement,
@@ -264,10 +292,7 @@ def make_corrector(
     believed: BelievedRobot,
     real: CableSet,
 ) -> TensionCorrector:
-    """What takes up slack beside a servo, with what is believed of the robot.
-
-    Where no gain is stated, stiffness and damping of the cables are known as they are, `real`, or
-    are those of the robot that is believed in, if that is another one.
+    """What takes up slack beside a servo, with what is believed of the robot; see `used_gain`.
 
     Raises:
         ScenarioError: No gain is stated, and none is stable.
@@ -275,17 +300,10 @@ def make_corrector(
     cables = believed.cables
     if not settings.controller.pulleys:
         cables = cables.without_pulleys()
-    by_length, rate = None, wanted.rate or settings.controller.rate
-    if wanted.needs_gain():
-        known = cables
-        if settings.perturbations.believed_robot is None:
-            known = replace(cables, stiffness=real.stiffness, retardation=real.retardation)
-        readings, delay = settings.sensors.rate("tension"), wanted.delay
-        if delay is None:
-            delay = 0.0 if readings is None else 1.0 / readings
-        by_length = automatic_gain(robot, known, believed.X_WP0, rate, delay)
+    by_length = used_gain(settings, wanted, robot, believed, real)
     law = correction_law(wanted, robot, cables, robot.winch.rated_cable_speed(), by_length)
     points = SEEN_POINTS if wanted.kind == IMAGE else 0
+    rate = wanted.rate or settings.controller.rate
     return TensionCorrector(law, cables.count, rate, points)
 
 

@@ -33,6 +33,7 @@ from cdpr_drake.systems.remote.remote_servo import RemoteServo
 from cdpr_drake.systems.robots.cable_robot import STEP_SHARE, CableRobot, automatic_step
 from cdpr_drake.systems.robots.compiled_cable_robot import CompiledCableRobot
 from cdpr_drake.systems.robots.compiled_step import StepRule
+from cdpr_drake.systems.robots.failures import LATE
 from cdpr_drake.systems.robots.settings import COMPILED
 from cdpr_drake.systems.scenarios.files import VISUAL_SERVO
 from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
@@ -179,9 +180,10 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
     log = add_servo_log(
         builder, scenario, blocks, stability, looking, watches.meters, reacting=reacting
     )
-    for event in () if scenario.failures is None else scenario.failures.frozen():
+    for event in () if scenario.failures is None else scenario.failures.of_sensors():
         assert event.sensor is not None
-        blocks.readings.freeze(event.sensor, event.begins, event.cable)
+        late = event.delay if event.kind == LATE else None
+        blocks.readings.fail(event.sensor, event.begins, event.cable, late)
     max_step = integration_step(scenario, blocks)
     if scenario.integration.max_step is None:
         max_step = min(max_step, blocks.readings.shortest_period(), scenario.sensors.own_period())

@@ -191,10 +191,10 @@ def _see(kind: int, X_WP: Array, X_CO: Array, fixed: Array, memory: Array) -> No
 
 @njit(cache=True)
 def _upcoming(
-    kind: int, memory: Array, now: float, period: float, found: float, X_CO: Array, twist: Array,
-    fixed: Array, after: Array,
-) -> None:  # fmt: skip
-    """after <- memory of an estimator after a step now, as `PoseEstimator.upcoming`."""
+    table: np.ndarray, e: int, now: float, found: float, X_CO: Array, twist: Array, after: Array
+) -> None:
+    """after <- memory of estimator e after a step now, as `PoseEstimator.upcoming`."""
+    kind, memory = integers_at(table, KINDS)[e], matrix_at(table, ESTIMATES)[e]
     for i in range(memory.shape[0]):
         after[i] = memory[i]
     X_WP = np.empty(12)
@@ -204,8 +204,8 @@ def _upcoming(
         if elapsed != 0.0:
             _moved(X_WP, twist, elapsed)
     elif found != 0.0:
-        _see(kind, X_WP, X_CO, fixed, after)
-    after[UPDATED], after[DUE] = now, now + period
+        _see(kind, X_WP, X_CO, matrix_at(table, FIXED), after)
+    after[UPDATED], after[DUE] = now, now + vector_at(table, NUMBERS)[CONTROL_PERIOD]
     pack_rows(X_WP, after, POSE)
 
 
@@ -409,17 +409,7 @@ def _update(table: np.ndarray, steps: np.ndarray) -> None:
         after = np.empty(memories.shape[1])
         found = _seen_pose(frames, oldest, size, X_CO)
         for e in range(kinds.shape[0]):
-            _upcoming(
-                kinds[e],
-                memories[e],
-                now,
-                numbers[CONTROL_PERIOD],
-                found,
-                X_CO,
-                twist,
-                fixed,
-                after,
-            )
+            _upcoming(table, e, now, found, X_CO, twist, after)
             for i in range(after.shape[0]):
                 memories[e, i] = after[i]
         _estimate(kinds[0], memories[0], now, twist, X_believed)
@@ -441,11 +431,7 @@ def _log_pose(X: Array, row: Array, first: int) -> None:
 @njit(cache=True)
 def _log_row(table: np.ndarray) -> bool:
     """Writes a row of the log, as `LoopLog.append`; False where a cable cannot run."""
-    whole, numbers, columns = (
-        integers_at(table, WHOLE),
-        vector_at(table, NUMBERS),
-        integers_at(table, COLUMNS),
-    )
+    whole, columns = integers_at(table, WHOLE), integers_at(table, COLUMNS)
     run, present, frames = (
         vector_at(table, RUN),
         vector_at(table, PRESENT),
@@ -456,11 +442,7 @@ def _log_row(table: np.ndarray) -> bool:
         matrix_at(table, OUTPUT),
         matrix_at(table, CABLES),
     )
-    kinds, memories, fixed = (
-        integers_at(table, KINDS),
-        matrix_at(table, ESTIMATES),
-        matrix_at(table, FIXED),
-    )
+    kinds, memories = integers_at(table, KINDS), matrix_at(table, ESTIMATES)
     command, now, size, n = vector_at(table, COMMAND), run[TIME], whole[SIZE], whole[PLATFORM]
     m, k = command.shape[0], whole[FEATURES]
     row = matrix_at(table, ROWS)[whole[LOGGED]]
@@ -501,17 +483,7 @@ def _log_row(table: np.ndarray) -> bool:
         for i in range(after.shape[0]):
             after[i] = memories[e, i]
         if now >= memories[e, DUE] - NOW:
-            _upcoming(
-                kinds[e],
-                memories[e],
-                now,
-                numbers[CONTROL_PERIOD],
-                found,
-                X_CO,
-                twist,
-                fixed,
-                after,
-            )
+            _upcoming(table, e, now, found, X_CO, twist, after)
         _estimate(kinds[e], after, now, twist, X)
         _log_pose(X, row, columns[C_ESTIMATES + e])
     vector_at(table, TIMES)[whole[LOGGED]] = now

@@ -7,7 +7,9 @@ Every failure begins at a time and lasts. See `FAILURES` for what there is:
   settling time of its friction;
 * power_lost: the motor has no torque; cable, friction and inertia turn it;
 * brake_closes: as winch_jams, `delay` after it was asked to; that it may slip is left out;
-* sensor_freezes: a sensor goes on to give what it read last, of one cable or of all.
+* sensor_freezes: a sensor goes on to give what it read last, of one cable or of all;
+* message_late: what a sensor reads comes `delay` later from then on, of one cable or of all; until
+  the first of that comes, it gives what it read last.
 
 A camera that goes dark is `camera.fault` of a scenario.
 
@@ -31,17 +33,20 @@ BROKEN, JAMMED, POWERLESS = FAULTS = ("broken", "jammed", "powerless")
 winch that stands still, for each motor without power; else 0."""
 
 BREAKS, JAMS, POWER, BRAKE = "cable_breaks", "winch_jams", "power_lost", "brake_closes"
-FREEZES = "sensor_freezes"
+FREEZES, LATE = OF_SENSORS = "sensor_freezes", "message_late"
 
 FAILURES: dict[str, str | None] = {
-    BREAKS: BROKEN, JAMS: JAMMED, POWER: POWERLESS, BRAKE: JAMMED, FREEZES: None,
+    BREAKS: BROKEN, JAMS: JAMMED, POWER: POWERLESS, BRAKE: JAMMED, FREEZES: None, LATE: None,
 }  # fmt: skip
 """Kinds of failures, and the flag of the robot that each sets."""
 
-NEEDS = {BREAKS: "cable", JAMS: "winch", POWER: "winch", BRAKE: "winch", FREEZES: "sensor"}
-"""Field that each kind needs."""
+NEEDS = {
+    BREAKS: ("cable",), JAMS: ("winch",), POWER: ("winch",), BRAKE: ("winch",),
+    FREEZES: ("sensor",), LATE: ("sensor", "delay"),
+}  # fmt: skip
+"""Fields that each kind needs."""
 
-OPTIONAL = {BRAKE: ("delay",), FREEZES: ("cable",)}
+OPTIONAL = {BRAKE: ("delay",), FREEZES: ("cable",), LATE: ("cable",)}
 """Further fields that a kind may have."""
 
 WORDS = {
@@ -50,6 +55,7 @@ WORDS = {
     POWER: "loses power",
     BRAKE: "brake has closed",
     FREEZES: "sensor freezes",
+    LATE: "messages are late",
 }
 """The same as figures say it."""
 
@@ -77,7 +83,7 @@ class Equipment:
         """What there is, in words."""
         if name == "sensor":
             return ", ".join(self.sensors) or "one of sensors.log that samples, of which is none"
-        return f"0 to {self._count(name) - 1}"
+        return "a number of seconds" if name == "delay" else f"0 to {self._count(name) - 1}"
 
     def _count(self, name: str) -> int:
         return self.cables if name == "cable" else self.winches
@@ -97,9 +103,12 @@ class Failure:
         at_least=0,
     )
     delay: float | None = number(
-        "From the time until a brake has closed; null: at once.", "s", None, at_least=0.0
+        "From the time until a brake has closed, null: at once; of messages that are late.",
+        "s",
+        None,
+        at_least=0.0,
     )
-    sensor: str | None = text("Which sensor freezes, as section sensors names it.", None)
+    sensor: str | None = text("Which sensor freezes or is late, as section sensors names it.", None)
 
     def check(self, where: str, has: Equipment) -> None:
         """Checks what belongs together.
@@ -109,7 +118,7 @@ class Failure:
                 winch or sensor; names it.
         """
         for name in ("cable", "winch", "sensor", "delay"):
-            found, mine = getattr(self, name), NEEDS[self.kind] == name
+            found, mine = getattr(self, name), name in NEEDS[self.kind]
             if found is None and mine:
                 raise ScenarioError(
                     f"{where}.{name}: found none with {self.kind}; accepted: {has.accepted(name)}"
@@ -139,7 +148,7 @@ class Failure:
             for cable, winch in zip(robot.cables, robot.winch_groups().of_cable, strict=True)
             if winch == self.winch
         ]
-        if self.kind == FREEZES:
+        if self.kind in OF_SENSORS:
             of = "" if self.cable is None else f" of {robot.cables[self.cable].name}"
             return f"{self.sensor}{of}: {WORDS[self.kind]}"
         what = robot.cables[self.index].name if self.kind == BREAKS else "winch of " + ", ".join(on)
@@ -155,7 +164,7 @@ class Failure:
     @property
     def begins(self) -> float:
         """When it acts [s]."""
-        return self.time + (self.delay or 0.0)
+        return self.time + (self.delay or 0.0 if self.kind == BRAKE else 0.0)
 
 
 @dataclass(kw_only=True)
@@ -185,9 +194,9 @@ class FailureSettings:
                 out[flag][event.index] = 1.0
         return out
 
-    def frozen(self) -> Iterator[Failure]:
+    def of_sensors(self) -> Iterator[Failure]:
         """Those of sensors."""
-        return (event for event in self.events if event.kind == FREEZES)
+        return (event for event in self.events if event.kind in OF_SENSORS)
 
 
 def check_failures(

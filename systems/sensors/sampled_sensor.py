@@ -11,7 +11,7 @@ from abc import abstractmethod
 from typing import Any
 
 import numpy as np
-from pydrake.systems.framework import BasicVector, Context, LeafSystem, State
+from pydrake.systems.framework import BasicVector, Context, DiscreteStateIndex, LeafSystem, State
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import SensorError
@@ -40,6 +40,7 @@ class SampledSensor(LeafSystem):
         self.period = 1.0 / rate
         self._size = size
         self._frozen: list[tuple[float, Array]] = []
+        self._late: list[tuple[float, Array, int, DiscreteStateIndex]] = []
         self._sample = self.DeclareDiscreteState(size)
         self.DeclareInitializationUnrestrictedUpdateEvent(self._take_sample)
         self.DeclarePeriodicUnrestrictedUpdateEvent(1.0 / rate, 0.0, self._take_sample)
@@ -72,6 +73,17 @@ class SampledSensor(LeafSystem):
         """From a time [s] on, gives numbers of its sample as they were, True in `entries`."""
         self._frozen.append((begins, np.asarray(entries, bool)))
 
+    def delay(self, begins: float, entries: Array, delay: float) -> None:
+        """From a time [s] on, gives numbers of its sample, True in `entries`, later by so much [s],
+        rounded up to whole periods; before the first of these comes, as they were.
+
+        To be called before there is a context: samples on their way are part of its state.
+        """
+        periods = int(np.ceil(delay * self._rate * (1.0 - 1e-12)))
+        if periods > 0:
+            room = self.DeclareDiscreteState(periods * self._size)
+            self._late.append((begins, np.asarray(entries, bool), periods, room))
+
     def channels(self, cable: int | None) -> Array:
         """Which numbers of a sample belong to a cable, shape (size,); None: all.
 
@@ -92,7 +104,25 @@ class SampledSensor(LeafSystem):
         for begins, entries in self._frozen:
             if time >= begins:
                 sample = np.where(entries, self.sample(context), sample)
+        for begins, entries, periods, room in self._late:
+            sample = self._arrived(context, state, sample, (begins, entries, periods, room))
         values.SetFromVector(sample)
+
+    def _arrived(
+        self, context: Context, state: State, sample: Array,
+        late: tuple[float, Array, int, DiscreteStateIndex],
+    ) -> Array:  # fmt: skip
+        """Sends a sample off, and gives what has come of those that are late."""
+        begins, entries, periods, room = late
+        way = state.get_mutable_discrete_state().get_mutable_vector(room)
+        on_the_way = way.value().reshape(periods, self._size)
+        first, time = on_the_way[0].copy(), context.get_time()
+        way.SetFromVector(np.concatenate([on_the_way[1:].ravel(), sample]))
+        if time < begins:
+            return sample
+        sent = time - periods * self.period
+        last = first if sent >= begins - 1e-9 * self.period else self.sample(context)
+        return np.where(entries, last, sample)
 
     def _declare_slice(self, name: str, start: int, size: int) -> None:
         """Adds a vector output port with a part of the sample."""

@@ -89,16 +89,21 @@ class SensorReadings:
         for sensor, rate in self._added():
             check_rate(sensor, rate, max_step)
 
-    def freeze(self, sensor: str, begins: float, cable: int | None) -> None:
-        """Has one of `SENSORS` give what it read last from a time on.
+    def fail(self, sensor: str, begins: float, cable: int | None, late: float | None) -> None:
+        """Has one of `SENSORS` fail from a time on.
 
         Args:
             sensor: Its name; it is there and samples.
             begins: The time [s].
             cable: Of which cable; None: of all, or of a pose.
+            late: By how much its messages are late [s]; None: it gives what it read last.
         """
         system = self._systems[sensor]
-        system.freeze(begins, system.channels(cable))
+        entries = system.channels(cable)
+        if late is None:
+            system.freeze(begins, entries)
+        else:
+            system.delay(begins, entries, late)
 
     def _added(self) -> Iterator[tuple[str, float]]:
         """Sensors that were added and sample, with their rates [Hz]."""

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 from cdpr_drake.errors import SensorError
 from cdpr_drake.estimation.failure_watch import (
@@ -89,3 +90,22 @@ def test_an_encoder_that_stands_lags_behind_its_drive():
     assert abs(good[0, 0]) < 1e-12
     way = rate * 49 * PERIOD
     assert way * np.exp(-49 * PERIOD) < frozen[0, 0] < way
+
+
+def test_the_limit_of_torque_is_friction_and_what_sensors_make():
+    """Noise of tensions behind the observer has the deviation that the limit counts with."""
+    watch = MotorWatch(RADIUS, LAW.friction, LAW.inertia, BANDWIDTH, PERIOD)
+    asked = {"samples": 1e6, "in_a_row": 1, "false_alarms": 1e-3}
+    exact = watch.limit(0.0, 0.0, **asked)
+    assert exact == pytest.approx(LAW.friction.static)
+    assert watch.limit(0.24, 0.0, **asked) - exact == pytest.approx(0.24 * RADIUS[0])
+    noise, samples, draws = 0.5, 20_000, np.random.default_rng(2)
+    tail = norm.isf(1e-3 / (1e6 * 2 * len(RADIUS)))
+    sigma = (watch.limit(0.0, noise, **asked) - exact) / tail
+    memory, found = watch.fresh(), np.empty((samples, len(RADIUS)))
+    for k in range(samples):  # tensions below what friction holds would be hidden by it
+        tensions = 5.0 + noise * draws.standard_normal(len(RADIUS))
+        memory = watch.step(memory, np.zeros(len(RADIUS)), tensions, RADIUS * 20.0)
+        found[k] = memory[1]
+    SEEDS = 0.05  # of a standard deviation from so many samples that follow each other
+    assert np.std(found[1000:]) == pytest.approx(sigma, rel=SEEDS)

@@ -1,9 +1,7 @@
 """The study of learning on the way: statements can fail, tables and figure are written."""
 
-from dataclasses import replace
-
-from cdpr_drake.analyses.reporting.progress import StudySession
 from cdpr_drake.analyses.studies.adaptation import LEARNT, NOTHING, STUDY, TRUE
+from tests.analyses.studies.made_up_studies import check_statements_tell_apart, check_written
 
 
 def made_up(case, seed, wrong=False):
@@ -22,21 +20,9 @@ def made_up(case, seed, wrong=False):
     }  # fmt: skip
 
 
-def wrong(case, seed):
-    return made_up(case, seed, wrong=True)
-
-
-def results(measured):
-    return replace(STUDY, measure=measured)(True, StudySession(workers=1))
-
-
 def test_statements_tell_good_learning_from_bad():
-    assert {one.verdict for one in results(made_up).statements} == {"confirmed"}
-    assert {one.verdict for one in results(wrong).statements} == {"not confirmed"}
+    check_statements_tell_apart(STUDY, made_up)
 
 
 def test_tables_and_figure(tmp_path):
-    found = results(made_up)
-    assert len(found.tables()) > 0
-    found.write(tmp_path)
-    assert (tmp_path / "adaptation.png").is_file()
+    check_written(STUDY, made_up, tmp_path)

@@ -1,12 +1,9 @@
 """The study of detectors: what it counts, and its words on made-up runs."""
 
 from collections import Counter
-from dataclasses import replace
 
 import numpy as np
-import pytest
 
-from cdpr_drake.analyses.reporting.progress import StudySession
 from cdpr_drake.analyses.studies.detection import (
     ALARMS,
     BREAK,
@@ -14,10 +11,14 @@ from cdpr_drake.analyses.studies.detection import (
     STUDY,
     first_times,
     held_in_a_row,
+    limits,
     measure,
-    threshold,
+    missed_breaks,
+    named_for_good,
 )
+from cdpr_drake.analyses.studies.framework.runs import Run, Runs
 from cdpr_drake.analyses.studies.framework.study import Case, Form
+from tests.analyses.studies.made_up_studies import check_statements_tell_apart, check_written
 
 
 def test_what_is_above_in_a_row():
@@ -45,7 +46,36 @@ def test_a_break_is_found_in_a_run():
     assert 0.0 < row["delay_s"] < 0.3
     assert row["false"] == 0
     assert row["first"] == BREAK
-    assert 0.0 < row["residual_m"] < threshold()
+    assert 0.0 <= row["residual_m"] < limits()[0]
+    assert row["named"] == 0
+    assert row["carried_n"] > limits()[1]
+
+
+def test_since_when_a_cable_is_named_for_good():
+    times = np.arange(4.0)
+    assert named_for_good(np.array([0.0, 1.0, 0.0, 1.0]), times) == 3.0
+    assert named_for_good(np.ones(4), times) == 0.0
+    assert named_for_good(np.array([1.0, 1.0, 0.0, 0.0]), times) == np.inf
+
+
+def test_late_and_weak_breaks_are_counted_apart():
+    """A late one of a cable that pulls is missed; one of a cable that hardly pulls is not."""
+    least = limits()[1]
+    rows = [
+        {"fails": BREAK, "told": True, "delay_s": delay, "carried_n": pull, "named": named}
+        for delay, pull, named in (
+            (0.1, 2.0 * least, 0),
+            (1.2, 2.0 * least, 1),
+            (1.2, 0.5 * least, 0),
+        )
+    ]
+    runs = Runs(
+        [Run(f"run {k}", None, {"fails": BREAK}, row, {}) for k, row in enumerate(rows)],
+        lambda: {"fails": [BREAK]},
+    )
+    found = missed_breaks.find(runs)
+    assert found.held == [True, False]
+    assert "late 2, first another cable 1" in found.found
 
 
 def made_up(case, seed, wrong=False):
@@ -55,21 +85,14 @@ def made_up(case, seed, wrong=False):
         "outcome": "timeout", "time_s": 0.6, "false": int(wrong and not fails),
         "false_kinds": [BREAK] if wrong and not fails else [], "told": fails and not wrong,
         "delay_s": 0.1 if fails and not wrong else None, "first": case.keys["fails"],
+        "named": 0, "carried_n": 5.0,
         "residual_m": 0.001, "torque_n_m": 0.001, "lag_m": 1e-4, "tension_n": 1.0,
     }  # fmt: skip
 
 
-def wrong(case, seed):
-    return made_up(case, seed, wrong=True)
+def test_statements_tell_detectors_apart():
+    check_statements_tell_apart(STUDY, made_up)
 
 
-@pytest.mark.parametrize(
-    ("measured", "verdict"), [(made_up, "confirmed"), (wrong, "not confirmed")]
-)
-def test_statements_tell_detectors_apart(measured, verdict, tmp_path):
-    found = replace(STUDY, measure=measured)(True, StudySession(workers=1))
-    assert {one.verdict for one in found.statements} == {verdict}
-    assert len(found.tables()) > 0
-    problems = found.write(tmp_path)
-    assert not problems
-    assert (tmp_path / "detection.png").is_file()
+def test_tables_and_figure(tmp_path):
+    check_written(STUDY, made_up, tmp_path)

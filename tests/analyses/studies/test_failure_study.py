@@ -1,25 +1,25 @@
 """The study of broken cables: what it measures, and its words on made-up runs."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.reporting.progress import StudySession
+from cdpr_drake.analyses.simulation.break_report import (
+    holds_without,
+    leaves,
+    rest_time,
+    speeds,
+)
 from cdpr_drake.analyses.studies.failure import (
     NONE,
     REDISTRIBUTE,
     STOP,
     STUDY,
-    holds_without,
-    leaves,
     measure,
-    rest_time,
-    speeds,
 )
 from cdpr_drake.analyses.studies.framework.study import Case
 from cdpr_drake.geometry.poses import pose_row
 from cdpr_drake.models.robot_loader import load_robot
+from tests.analyses.studies.made_up_studies import check_statements_tell_apart, check_written
 
 ROBOT = load_robot("acrobot_large")
 
@@ -72,21 +72,9 @@ def made_up(case, seed, wrong=False):
     }  # fmt: skip
 
 
-def wrong(case, seed):
-    return made_up(case, seed, wrong=True)
-
-
-def results(measured):
-    return replace(STUDY, measure=measured)(True, StudySession(workers=1))
-
-
 def test_statements_tell_reactions_apart():
-    assert {one.verdict for one in results(made_up).statements} == {"confirmed"}
-    assert {one.verdict for one in results(wrong).statements} == {"not confirmed"}
+    check_statements_tell_apart(STUDY, made_up)
 
 
 def test_tables_and_figure(tmp_path):
-    found = results(made_up)
-    assert len(found.tables()) > 0
-    found.write(tmp_path)
-    assert (tmp_path / "failure.png").is_file()
+    check_written(STUDY, made_up, tmp_path)

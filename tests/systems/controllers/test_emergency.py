@@ -16,7 +16,7 @@ from scipy.optimize import lsq_linear
 
 from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
 from cdpr_drake.errors import ScenarioError
-from cdpr_drake.estimation.failure_detection import AlarmRule
+from cdpr_drake.estimation.break_detection import BreakRule
 from cdpr_drake.geometry.cable_paths import cable_jacobian, cable_paths
 from cdpr_drake.geometry.poses import pose_from_row
 from cdpr_drake.models.robot_in_plant import platform_inertia
@@ -62,17 +62,26 @@ def test_acts_after_its_delay_on_what_it_says(reaction):
     assert np.array_equal(jammed, np.outer(acts, np.ones(M) if reaction == "stop" else flags))
 
 
-def detected(lengths_after, tensions_after, in_a_row=3, **more):
-    """What a detector finds whose inputs jump at 0.1 s."""
+RULE = BreakRule(noise=1e-3, points=0.0, pose=0.0, in_a_row=3)
+
+
+def detected(lengths_after, tensions_after, rule=RULE, pull=5.0, again=None, **more):
+    """What a detector finds whose inputs jump at 0.1 s, and tensions once more at 0.2 s."""
     cables, X_WP = ROBOT.cable_set().without_pulleys(), ROBOT.home.transform()
-    paths, pull = cable_paths(X_WP, cables).lengths, np.full(M, 5.0)
+    paths, pull = cable_paths(X_WP, cables).lengths, np.full(M, pull)
     taut = paths / (1.0 + pull / cables.stiffness)
     builder = DiagramBuilder()
-    block = builder.AddSystem(BreakDetector(cables, AlarmRule(1e-3, in_a_row), RATE, **more))
+    block = builder.AddSystem(BreakDetector(cables, rule, RATE, **more))
+    after = tensions_after * pull
+    later = after if again is None else again * pull
     sources = {
         "X_WP": ConstantValueSource(Value(RigidTransform(X_WP))),
         "lengths": stepped(taut, taut + lengths_after, 0.1),
-        "tensions": stepped(pull, tensions_after * pull, 0.1),
+        "tensions": TrajectorySource(
+            PiecewisePolynomial.ZeroOrderHold(
+                [0.0, 0.1, 0.2, 9.0], np.array([pull, after, later, later]).T
+            )
+        ),
     }
     for name, source in sources.items():
         builder.AddSystem(source)
@@ -80,41 +89,87 @@ def detected(lengths_after, tensions_after, in_a_row=3, **more):
     return logged(builder, block, ("found_broken", "residuals"), 0.3)
 
 
+def only(which, value, others=0.0):
+    """A number for a cable and another one for the rest."""
+    return np.where(np.arange(M) == which, value, others)
+
+
 def test_a_cable_that_is_wound_up_and_does_not_pull_is_found():
-    broken = np.arange(M) == 4
-    times, (found, residuals) = detected(np.where(broken, -0.005, 0.0), ~broken)
-    assert np.array_equal(found, np.outer(times > 0.1 + 2.5 / RATE, broken))
-    assert residuals[-1, 4] == pytest.approx(0.005, rel=0.02)
+    times, (found, residuals) = detected(only(4, -0.005), only(4, 0.0, 1.0), silent=0.3)
+    assert np.array_equal(found, np.outer(times > 0.1 + 2.5 / RATE, np.arange(M) == 4))
+    released = 5.0 / ROBOT.cable_set().stiffness[4] * residual_length(4)
+    assert residuals[-1, 4] == pytest.approx(0.005 + released, rel=1e-6)
+
+
+def residual_length(cable):
+    """Unstrained length of a cable that pulls with 5 N and ends 5 mm shorter [m]."""
+    cables = ROBOT.cable_set().without_pulleys()
+    path = cable_paths(ROBOT.home.transform(), cables).lengths[cable]
+    return path / (1.0 + 5.0 / cables.stiffness[cable])
 
 
 def test_a_slack_cable_is_not_found():
-    slack = np.arange(M) == 4
-    _, (found, residuals) = detected(np.where(slack, 0.01, 0.0), ~slack)
+    _, (found, residuals) = detected(only(4, 0.01), only(4, 0.0, 1.0), silent=0.3)
     assert np.all(found == 0.0)
     assert residuals[-1, 4] < 0.0
 
 
 def test_it_is_the_one_that_fell_silent_at_once():
     """Another is slack, too, and believed to be longer than it is."""
-    wound = np.where(np.arange(M) == 1, -0.005, 0.0)
     pulls = np.where(np.arange(M) == 4, 0.0, np.where(np.arange(M) == 1, 0.08, 1.0))
-    _, (found, _) = detected(wound, pulls, slack_below=0.5)
+    _, (found, _) = detected(only(1, -0.005), pulls, silent=0.5)
     assert np.array_equal(np.flatnonzero(found[-1]), [4])
 
 
 def test_one_that_pulls_is_there():
-    shorter = np.where(np.arange(M) == 4, -0.005, 0.0)
-    _, (found, _) = detected(shorter, np.ones(M), slack_below=0.5)
+    _, (found, _) = detected(only(4, -0.005), np.ones(M), silent=0.5)
     assert np.all(found == 0.0)
-    _, (found, _) = detected(shorter, np.ones(M))
+    _, (found, _) = detected(only(4, -0.005), np.zeros(M), silent=0.5, pull=0.4)
     assert found[-1, 4] == 1.0
 
 
-def test_of_several_the_largest_is_found():
-    shorter = np.zeros(M)
-    shorter[[1, 6]] = -0.003, -0.005
-    _, (found, _) = detected(shorter, shorter == 0.0)
-    assert np.array_equal(np.flatnonzero(found[-1]), [6])
+def test_one_that_was_named_and_pulls_is_named_no_more():
+    """Cable 1 falls farther and is named first; when it pulls, it is the other one."""
+    wound = np.where(np.isin(np.arange(M), (1, 4)), -0.005, 0.0)
+    falls = np.where(np.arange(M) == 4, 0.05, np.where(np.arange(M) == 1, 0.0, 1.0))
+    times, (found, _) = detected(wound, falls, again=only(4, 0.05, 1.0), silent=0.5)
+    first = np.argmax(np.any(found > 0.0, axis=1))
+    assert np.array_equal(np.flatnonzero(found[first]), [1])
+    assert np.array_equal(np.flatnonzero(found[-1]), [4])
+    assert np.all(found.sum(axis=1) <= 1.0)
+    changes = times[np.argmax(found[:, 4] > 0.0)]
+    assert 0.2 < changes < 0.2 + 6.0 / RATE
+
+
+def test_what_is_wrong_with_points_counts_as_far_as_the_cable_turned():
+    """At the same pose, so that a cable that pulled has the plain limit, and another one all."""
+    rule = BreakRule(noise=1e-3, points=0.01, pose=0.0, in_a_row=3)
+    _, (found, _) = detected(only(4, -0.005), only(4, 0.0, 1.0), rule, silent=0.3)
+    assert found[-1, 4] == 1.0
+    _, (found, _) = detected(only(4, -0.005), np.zeros(M), rule, silent=0.5, pull=0.4)
+    assert np.all(found == 0.0)
+    _, (found, _) = detected(only(4, -0.012), np.zeros(M), rule, silent=0.5, pull=0.4)
+    assert found[-1, 4] == 1.0
+
+
+def test_what_was_taken_back_is_asked_again_but_for_brakes():
+    for reaction, after in (("redistribute", 0.0), ("stop", 1.0)):
+        builder = DiagramBuilder()
+        block = builder.AddSystem(EmergencyReaction(EmergencySettings(reaction=reaction), M))
+        flags = TrajectorySource(
+            PiecewisePolynomial.ZeroOrderHold(
+                [0.0, 0.1, 0.2, 9.0],
+                np.array([only(2, 0.0), only(2, 1.0), only(2, 0.0), only(2, 0.0)]).T,
+            )
+        )
+        builder.AddSystem(flags)
+        builder.Connect(flags.get_output_port(), block.GetInputPort("found_broken"))
+        times, (left_out, jammed) = logged(builder, block, ("left_out", "jammed"), 0.3)
+        told = (times > 0.1 + 1e-9) & (times <= 0.2 + 1e-9)
+        assert np.array_equal(
+            left_out[:, 2] > 0.0, told if reaction != "stop" else times > 0.1 + 1e-9
+        )
+        assert np.all(jammed[-1] == after)
 
 
 CHEAP = ["duration=0.6", "integration.engine=compiled", "log_rate=500"]

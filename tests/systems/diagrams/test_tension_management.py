@@ -25,6 +25,7 @@ from cdpr_drake.systems.controllers.tension_corrector import TensionCorrector
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.diagrams.tension_management import automatic_gain
 from cdpr_drake.systems.diagrams.visual_servo import build_visual_servo
+from cdpr_drake.tensions.correction_gain import tension_gain
 from cdpr_drake.tensions.slack_correction import TensionFollower
 
 PROJECTED = "camera.kind=projected"
@@ -159,6 +160,29 @@ def test_without_a_gain_it_is_proportional_to_stiffness_and_to_the_period():
 
     np.testing.assert_allclose(gain(1.0, 25.0), 1e-2 * gain(1e-2, 25.0), rtol=1e-9)
     assert np.all(gain(1.0, 25.0) > 0.0)
+
+
+@pytest.mark.parametrize("loop", ["compiled", "diagram"])
+def test_a_summary_has_the_gain_that_nobody_stated(loop):
+    """Of `tension_gain` at the pose of the start, less by the share that modes ask for."""
+    shared = ("duration=0.2", "integration.engine=compiled", f"integration.loop={loop}")
+    result = run_scenario(load("tension_management={}", *shared))
+    found = summarize(result)["tension_gain"]
+    lengths = result.log["lengths"][0]
+    each = np.array(found["per_length_1_per_ns"])
+    np.testing.assert_allclose(found["at_start_m_per_ns"], each * lengths, rtol=1e-12)
+    scenario = result.servo.scenario
+    cables = scenario.cables.cable_set(result.servo.robot)
+    rate = scenario.controller.rate
+    readings = scenario.sensors.rate("tension")
+    delay = 0.0 if readings is None else 1.0 / readings
+    most = tension_gain(cables.stiffness, rate, delay)  # of a cable of 1 m
+    shares = each / most
+    assert 0.0 < shares[0] <= 1.0
+    np.testing.assert_allclose(shares, shares[0], rtol=1e-9)
+    assert "tension_gain" not in summarize(
+        run_scenario(load("tension_management={gain: 0.04}", *shared))
+    )
 
 
 def test_where_no_gain_is_stable_that_is_said():

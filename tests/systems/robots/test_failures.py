@@ -2,15 +2,20 @@
 
 import copy
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import DiagramBuilder
-from pydrake.systems.primitives import LogVectorOutput
+from pydrake.systems.primitives import LogVectorOutput, TrajectorySource
+from pydrake.trajectories import PiecewisePolynomial
 
+from cdpr_drake.analyses.simulation.run_summary import summarize
+from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.sensor_catalogue import load_tension_sensor
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.diagrams.visual_servo import build_visual_servo
 from cdpr_drake.systems.loops.loop_choice import diagram_reason
@@ -24,6 +29,7 @@ from cdpr_drake.systems.robots.failures import (
     FailureSettings,
 )
 from cdpr_drake.systems.robots.settings import CableRobotSettings, WinchSettings
+from cdpr_drake.systems.sensors.tension_sensor import TensionSensor
 
 ROBOT = load_robot("acrobot_small")
 M = len(ROBOT.cables)
@@ -172,6 +178,14 @@ HAS = Equipment(8, 7, motors=False, sensors=("tension", "tracker"))
             "sensor: found encoder; accepted: tension, tracker",
         ),
         (
+            Failure(kind="message_late", time=0.0, sensor="tension"),
+            "delay: found none with message_late; accepted: a number of seconds",
+        ),
+        (
+            Failure(kind="message_late", time=0.0, delay=0.1),
+            "sensor: found none with message_late; accepted: tension, tracker",
+        ),
+        (
             Failure(kind="sensor_freezes", time=0.0, sensor="tracker", cable=1),
             "cable: found 1 with tracker; accepted: null",
         ),
@@ -184,9 +198,9 @@ def test_what_is_not_accepted(event, words):
 
 
 def test_unknown_kinds_are_named():
-    with pytest.raises(ScenarioError, match="message_late"):
+    with pytest.raises(ScenarioError, match="cable_thaws"):
         load_scenario(
-            "acrobot_broken_cable", ["failures.events=[{kind: message_late, time: 1.0, cable: 1}]"]
+            "acrobot_broken_cable", ["failures.events=[{kind: cable_thaws, time: 1.0, cable: 1}]"]
         )
 
 
@@ -219,3 +233,40 @@ def test_a_sensor_that_freezes_gives_what_it_read_last():
     simulator.AdvanceTo(0.6)
     port = servo.readings.port("measured_lengths")
     assert np.array_equal(port.Eval(port.get_system().GetMyContextFromRoot(context)), frozen)
+
+
+@pytest.mark.parametrize("periods", [1, 3.4])
+def test_late_messages_come_late_and_the_last_one_stands_until_then(periods):
+    """Readings are numbered by their time: a ramp, without noise, of two cables of three."""
+    rate, begins = 100.0, 0.2
+    builder, model = DiagramBuilder(), load_tension_sensor("vlu850")
+    exact = replace(model, accuracy=0.0, repeatability=0.0)
+    sensor = builder.AddSystem(TensionSensor(exact, 3, rate=rate))
+    ramp = PiecewisePolynomial.FirstOrderHold([0.0, 9.0], np.array([[0.0, 9.0]] * 3))
+    source = builder.AddSystem(TrajectorySource(ramp))
+    builder.Connect(source.get_output_port(), sensor.GetInputPort("tensions"))
+    sensor.delay(begins, np.array([True, False, True]), periods / rate)
+    simulator = Simulator(builder.Build())
+    context, late = simulator.get_context(), int(np.ceil(periods))
+    for k in range(40):
+        time = (k + 0.5) / rate
+        simulator.AdvanceTo(time)
+        own = sensor.GetMyContextFromRoot(context)
+        found = sensor.GetOutputPort("measured_tensions").Eval(own)
+        first = round(begins * rate)
+        seen = k if k < first else max(k - late, min(first - 1, k))
+        assert found == pytest.approx([seen / rate, k / rate, seen / rate], abs=1e-12)
+
+
+def test_a_run_with_late_messages_says_so():
+    late = "failures.events=[{kind: message_late, time: 0.2, sensor: tension, delay: 0.05}]"
+    scenario = load_scenario("acrobot_broken_redistributed", [
+        late, "emergency=null", "duration=0.4", "log_rate=500", "integration.engine=compiled",
+    ])  # fmt: skip
+    result = run_scenario(scenario)
+    readings, times = result.log["measured_tensions"], result.log["time"]
+    held = (times > 0.21) & (times < 0.245)
+    assert np.ptp(readings[held], axis=0) == pytest.approx(np.zeros(M))
+    assert np.all(np.ptp(readings[times > 0.3], axis=0) > 0.0)
+    events = summarize(result)["failures"]["events"]
+    assert events[0]["what"] == "tension: messages are late"
