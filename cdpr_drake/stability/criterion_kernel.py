@@ -42,6 +42,7 @@ def turn_after(R: Array, vector: Array, out: Array) -> None:
             out[i, j] = R[i, 0] * E[0, j] + R[i, 1] * E[1, j] + R[i, 2] * E[2, j]
 
 
+@shared(types.void(MATRIX, VECTOR, *[MATRIX] * 3, VECTOR, VECTOR, MATRIX))
 @njit(cache=True, error_model="numpy")
 def camera_rows(
     R: Array, p: Array, A: Array, B: Array, C: Array, t: Array, d: Array, J: Array
@@ -85,6 +86,7 @@ def camera_rows(
         J[i, 3], J[i, 4], J[i, 5] = ux, uy, uz
 
 
+@shared(types.boolean(MATRIX, types.boolean, MATRIX))
 @njit(cache=True, error_model="numpy")
 def left_inverse(J: Array, planar: bool, M: Array) -> bool:
     """M <- J^+ = (J'J)^-1 J', shape (6, m); False where J has not full column rank.
