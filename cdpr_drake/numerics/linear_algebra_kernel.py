@@ -1,7 +1,7 @@
 """Small linear algebra in kernels: elimination, least squares, smallest eigenpair, copies.
 
-`eliminate` and `substitute`, or `solve`, solve small linear systems, `least_squares` those of
-limited rank; it alone allocates.
+`eliminate` and `substitute` solve small linear systems, `least_squares` those of limited rank;
+`least_squares` alone allocates.
 
 Source: Golub and Van Loan, Matrix Computations, 3.4, 8.3 and 8.4.
 """
@@ -61,17 +61,6 @@ def substitute(A: Array, n: int, pivots: Array, x: Array) -> None:
         for j in range(i + 1, n):
             x[i] -= A[i, j] * x[j]
         x[i] /= A[i, i]
-
-
-@shared(types.void(MATRIX, types.int64, VECTOR, VECTOR))
-@njit(cache=True, error_model="numpy")
-def solve(A: Array, n: int, pivots: Array, x: Array) -> None:
-    """`eliminate` and `substitute` at once, outside of the caller.
-
-    Where the size is known to the compiler it would write all loops out: seconds for sizes 3 to 8.
-    """
-    eliminate(A, n, pivots)
-    substitute(A, n, pivots, x)
 
 
 @njit(cache=True)

@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.numerics.linear_algebra_kernel import solve
+from cdpr_drake.numerics.linear_algebra_kernel import eliminate, substitute
 
 STEPS = 300
 """Largest number of steps of the least squares; about five are needed, more where both minima are
@@ -47,7 +47,9 @@ def _homography(xy: Array, image: Array, H: Array) -> None:
                 b[i] += row[i] * seen
                 for j in range(8):
                     A[i, j] += row[i] * row[j]
-    solve(A, 8, pivots, b)
+    n = A.shape[0]  # written out, 8 would have these kernels compiled once more
+    eliminate(A, n, pivots)
+    substitute(A, n, pivots, b)
     for i in range(8):
         H[i // 3, i % 3] = b[i]
     H[2, 2] = 1.0
@@ -107,7 +109,8 @@ def _position(xy: Array, image: Array, R: Array, p: Array) -> None:
             A[2, 2] += seen * seen
             p[axis] += right
             p[2] -= seen * right
-    solve(A, 3, pivots, p)
+    eliminate(A, A.shape[0], pivots)
+    substitute(A, A.shape[0], pivots, p)
 
 
 @njit(error_model="numpy", inline="always")
@@ -177,7 +180,8 @@ def _least_reprojection(xy: Array, uv: Array, camera: Array, R: Array, p: Array)
                 for j in range(6):
                     S[i, j] = N[i, j]
                 S[i, i] *= 1.0 + damping
-            solve(S, 6, pivots, x)
+            eliminate(S, S.shape[0], pivots)
+            substitute(S, S.shape[0], pivots, x)
         _turned(R, x, R_next)
         for i in range(3):
             p_next[i] = p[i] + x[3 + i]
