@@ -7,6 +7,7 @@ another folder (`portable_robot`).
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -68,7 +69,9 @@ def robot_file(name: str) -> Path:
         RobotFileError: There is no such robot; says which exist.
     """
     name, _ = split_name(name)
-    path, is_ours = Path(name), name in robot_names()
+    path = Path(name)
+    # One look at the folder and not into each robot's: repeated runs ask again and again.
+    is_ours = name in os.listdir(_FOLDER) and (_FOLDER / name / "robot.yaml").is_file()
     if not is_ours and path.is_dir():
         for own in (path / "robot.yaml", path / MECHANISM_FILE):
             if own.is_file():

@@ -6,7 +6,7 @@ what these have printed by `printed`, and what a process said by `messages`.
 
 from typing import NamedTuple
 
-from cdpr_drake.cli.terminal import PROGRESS
+from cdpr_drake.cli.process import PROGRESS
 
 
 class Printed(NamedTuple):

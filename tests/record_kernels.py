@@ -14,7 +14,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from cdpr_drake.cli.process import DEFAULT, GROUPS
+from cdpr_drake.cli.process import DEFAULT, GROUPS, QUESTIONS
 from cdpr_drake.kernel_cache import kernel_list
 
 UNOPTIMISED = {
@@ -118,12 +118,35 @@ def simulate():
                 print(DEFAULT, camera, ended.code, file=sys.stderr)
 
 
+WORDS = {
+    "workspace": ("--grid", "5,5,5", "--workers", "1"),
+    "stability": ("--grid", "3,3,3", "--workers", "1"),
+    "plan": ("--waypoints", "0,0,0.2; 0.1,-0.1,0.3", "--limits", "1,60"),
+}
+"""What commands are asked with, beside a robot with pulleys."""
+
+
+def ask(command):
+    """A command with its defaults, in this process."""
+    from cdpr_drake.cli.app import main
+
+    with tempfile.TemporaryDirectory() as folder:
+        out = ("--out", f"{folder}/found") if command in WORDS else ()
+        try:
+            main([command, "acrobot_large", *WORDS.get(command, ()), *out])
+        except SystemExit as ended:
+            print(command, ended.code, file=sys.stderr)
+
+
 def do(group):
     """What a group of kernels is for."""
     from cdpr_drake.analyses.installation import compilation_steps
 
     if group == DEFAULT:
         simulate()
+        return
+    if group in QUESTIONS:
+        ask(group)
         return
     dict(compilation_steps())[group]()
 

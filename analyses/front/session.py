@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from cdpr_drake.analyses.reporting.output_folder import ResultsFolder, continued_folder
-from cdpr_drake.analyses.simulation.scenario_kinds import ScenarioKind
-from cdpr_drake.analyses.visualization.live_view import Prepare
-from cdpr_drake.systems.remote.remote_place import Remote
+
+if TYPE_CHECKING:  # workspaces and others that are followed need no simulation
+    from cdpr_drake.analyses.simulation.scenario_kinds import ScenarioKind
+    from cdpr_drake.analyses.visualization.live_view import Prepare
+    from cdpr_drake.systems.remote.remote_place import Remote
 
 Say = Callable[[str], None]
 """Told what is done now."""

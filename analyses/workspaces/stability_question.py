@@ -29,7 +29,6 @@ from cdpr_drake.stability.desired_view import FixedObject, OppositeCorner, Servo
 from cdpr_drake.stability.perturbation_bounds import RADII, PerturbationBounds
 from cdpr_drake.stability.stability_case import StabilityCase
 from cdpr_drake.stability.verdict import VERDICTS, VerdictOptions
-from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.workspaces.pose_grid import WorkspaceGrid, grid_by_step
 from cdpr_drake.workspaces.static_feasibility import StaticCase
 
@@ -252,6 +251,8 @@ def scenario_task(robot: Robot | str | Path, scenario: str) -> CameraTask:
             about neither.
         ScenarioError: There is no such scenario, or the robot does not fit into it.
     """
+    from cdpr_drake.systems.diagrams.load import load_scenario  # most questions have none
+
     with robot_reference(robot, "stability") as name:
         loaded = load_scenario(scenario, [f"robot={name}"])
     where = f"scenario {scenario}"

@@ -28,7 +28,6 @@ from cdpr_drake.models.robot_statics import rigid_platform
 from cdpr_drake.schema.typed_yaml import closest
 from cdpr_drake.systems.cameras.camera_settings import servo_pinhole
 from cdpr_drake.systems.cameras.targets import TARGETS
-from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.tensions.methods import method_for
 from cdpr_drake.workspaces.cable_interference import Obstacles, Surroundings, beams, box_row
 from cdpr_drake.workspaces.demanded_wrenches import MotionDemand, SpatialSet
@@ -340,6 +339,8 @@ def camera_view(robot: Robot, scenario: str) -> CameraView:
         WorkspaceError: The camera is not on the platform, or the target does not rest.
         ScenarioError: There is no such scenario, or the robot does not fit into it.
     """
+    from cdpr_drake.systems.diagrams.load import load_scenario  # most questions have none
+
     with robot_reference(robot, "a workspace") as name:
         loaded = load_scenario(scenario, [f"robot={name}"])
     if loaded.target.carrier != "world" or loaded.target.motion is not None:

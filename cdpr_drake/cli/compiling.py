@@ -9,6 +9,7 @@ import time
 from pathlib import Path
 from typing import Any
 
+from cdpr_drake.cli.process import expected_kernels
 from cdpr_drake.kernel_cache.background import helpers_started
 from cdpr_drake.kernel_cache.locks import compilation_waits
 
@@ -27,7 +28,7 @@ FIRST_USE = helpers_started() > 0 or _is_first_use()
 
 
 class _Compilations:
-    """Counts what numba compiles in this process, once numba is there.
+    """Counts what numba compiles in this process, but for its own functions, once numba is there.
 
     Meanwhile garbage is not searched for: the compiler makes many objects and little garbage, and
     each search walks through all of Drake and numba, an eighth of the time.
@@ -46,7 +47,7 @@ class _Compilations:
 
         class Listener(event.Listener):  # type: ignore[name-defined]
             def on_start(self, event: Any) -> None:
-                outer.count += 1
+                outer.count += not _is_of_numba(event.data)
                 outer._depth += 1
                 if gc.isenabled():
                     gc.disable()
@@ -66,6 +67,13 @@ class _Compilations:
         return self._depth > 0 or compilation_waits() or time.monotonic() - self._last < LINGER
 
 
+def _is_of_numba(data: Any) -> bool:
+    """Whether an event of the compiler is about one of numba's functions, as `np.empty`."""
+    compiled = (data or {}).get("dispatcher")
+    module = getattr(getattr(compiled, "py_func", None), "__module__", None)
+    return str(module).startswith("numba.")
+
+
 _compilations = _Compilations()
 
 
@@ -74,4 +82,7 @@ def compiling() -> str:
     _compilations.listen()
     if not _compilations.under_way():
         return ""
-    return f"compiling, first use, {_compilations.count} kernels so far"
+    count, listed = _compilations.count, expected_kernels()
+    if 0 < count <= listed:
+        return f"compiling, first use, {count} of up to {listed} kernels"
+    return f"compiling, first use, {count} kernels so far"

@@ -3,7 +3,7 @@
 * `StopRequest`: Ctrl-C, and SIGTERM as batch systems and containers send it, as a polite request.
 * `exit_with_parent`: a command that another program started ends with it, also where it was killed.
 * `compile_ahead`: which kernels a command will need, so that other processes compile them while it
-  starts.
+  starts, and that is told at once.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from __future__ import annotations
 import os
 import signal
 import stat
+import sys
 import threading
 import time
 from collections.abc import Iterator, Sequence
@@ -18,6 +19,7 @@ from contextlib import contextmanager, suppress
 from types import FrameType
 
 from cdpr_drake.kernel_cache.background import compile_in_background
+from cdpr_drake.kernel_cache.kernel_list import missing_kernels, needed_kernels
 
 INTERRUPTED = 130
 """Exit code of what Ctrl-C or SIGTERM ended, as shells have it for the former."""
@@ -112,17 +114,28 @@ DEFAULT = "acrobot_pbvs_taut"
 
 COMPILED = "acrobot_pbvs, compiled engine"
 
-GROUPS = (DEFAULT, COMPILED)
+QUESTIONS = ("tension", "static", "workspace", "stability", "plan")
+"""Commands with a group of their own, of the same name: what they need with their defaults."""
+
+GROUPS = (DEFAULT, COMPILED, *QUESTIONS)
 """All groups of the list."""
 
 SIMULATIONS = ("simulate", "serve", "studio")
 
+PROGRESS = "progress: "
+"""How a line of progress begins where there is no terminal, and no other line on stderr does."""
+
 QUIET = ("--help", "--finish")
-"""Words with which nothing is simulated."""
+"""Words with which nothing is computed."""
+
+_expected = 0
 
 
 def compile_ahead(words: Sequence[str]) -> int:
     """Starts processes that compile what a command line will need, before it imports Drake.
+
+    Where most of it is missing, a line on stderr says so at once: the first use of a command may
+    take many times as long as the second.
 
     Args:
         words: The command line after `cdpr`.
@@ -130,8 +143,31 @@ def compile_ahead(words: Sequence[str]) -> int:
     Returns:
         How many were started: 0 where all is there, and for commands that need little.
     """
+    global _expected
     command = next((word for word in words if not word.startswith("-")), "")
-    if command not in SIMULATIONS or any(word in QUIET for word in words):
+    groups = _groups(command, words)
+    if not groups:
         return 0
+    _expected = missing = missing_kernels(groups)
+    if 2 * missing > len(needed_kernels(groups)):
+        start = "" if sys.stderr.isatty() else PROGRESS
+        said = f"first use of cdpr {command}: compiling up to {missing} kernels, which are kept"
+        print(f"{start}{said}", file=sys.stderr)
+    return compile_in_background(groups)
+
+
+def expected_kernels() -> int:
+    """How many kernels were missing when the command began, of those that it is listed with."""
+    return _expected
+
+
+def _groups(command: str, words: Sequence[str]) -> list[str]:
+    """Groups of the kernels that a command line needs."""
+    if any(word in QUIET for word in words):
+        return []
+    if command in QUESTIONS:
+        return [command]
+    if command not in SIMULATIONS:
+        return []
     compiled = "--seeds" in words or any(word.startswith("integration.") for word in words)
-    return compile_in_background([DEFAULT, COMPILED] if compiled else [DEFAULT])
+    return [DEFAULT, COMPILED] if compiled else [DEFAULT]

@@ -18,6 +18,7 @@ from rich.table import Table
 from rich.text import Text
 
 from cdpr_drake.cli.compiling import FIRST_USE, compiling
+from cdpr_drake.cli.process import PROGRESS
 
 PROGRESS_PERIOD = "CDPR_PROGRESS_PERIOD"
 """Environment variable of the time between lines of progress [s], for programs that read them."""
@@ -29,9 +30,6 @@ def _line_period() -> float:
     except ValueError:
         return 10.0
 
-
-PROGRESS = "progress: "
-"""How a line of progress begins where there is no terminal, and no other line on stderr does."""
 
 LINE_PERIOD = _line_period()
 """Time between lines of progress where there is no terminal [s]."""

@@ -19,7 +19,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import SensorError
@@ -85,7 +85,7 @@ def threshold(
         if not (fits and np.isfinite(value)):
             raise SensorError(f"threshold: {name}: found {value}; accepted: a number > 0")
     share = min(false_alarms / (samples * residuals), 0.5)
-    return float(bias + sigma * norm.isf(share ** (1.0 / in_a_row)))
+    return float(bias - sigma * ndtri(share ** (1.0 / in_a_row)))
 
 
 @dataclass(frozen=True)

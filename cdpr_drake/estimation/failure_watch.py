@@ -26,7 +26,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtr
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import SensorError
@@ -161,7 +161,7 @@ def repeats_in_a_row(noise: float, resolution: float, *, readings: float, accept
         )
     if resolution == 0.0:
         return 2
-    same = float(2.0 * norm.cdf(0.5 * resolution / noise) - 1.0)  # in the middle of a step
+    same = float(2.0 * ndtr(0.5 * resolution / noise) - 1.0)  # in the middle of a step
     count = np.inf if same >= 1.0 else np.log(accepted / readings) / np.log(same)
     if not count <= MOST_REPEATS:
         raise SensorError(

@@ -87,6 +87,17 @@ def needed_kernels(groups: Collection[str]) -> list[ListedKernel]:
     return [kernel for kernel in kernels if kernel.groups & numbers]
 
 
+def missing_kernels(groups: Collection[str]) -> int:
+    """How many kernels of some groups were never compiled and kept, by the names of files.
+
+    numba is not imported for it, so that kernels of the same name for other arguments count as one.
+    """
+    folder = Path(os.environ.get("NUMBA_CACHE_DIR", ""))
+    there = {path.name.rpartition("-")[0] for path in folder.glob("*/*.nbi")}
+    names = {kernel.name for kernel in needed_kernels(groups)}
+    return sum(name.rpartition(".")[2].replace(":", ".") not in there for name in names)
+
+
 def is_complete(groups: Collection[str]) -> bool:
     """Whether all kernels of these groups have been compiled for these sources, on this machine."""
     return all(_marker(group).is_file() for group in groups)

@@ -9,9 +9,10 @@ Source: Golub and Van Loan, Matrix Computations, 3.4, 8.3 and 8.4.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+from numba import njit, types
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.numerics.shared_kernels import MATRIX, VECTOR, shared
 
 SHIFT = 1e-7
 """How far below the eigenvalue the factor for its vector is shifted, relative to the largest
@@ -95,6 +96,7 @@ def least_squares(L: Array, rate: Array, rank: int) -> tuple[Array, Array]:
     return v, free
 
 
+@shared(types.float64(MATRIX, MATRIX))
 @njit(cache=True, error_model="numpy")
 def smallest_eigenvalue(S: Array, T: Array) -> float:
     """Smallest eigenvalue of S; minus infinity where a number is not finite.
@@ -173,6 +175,7 @@ def smallest_eigenvalue(S: Array, T: Array) -> float:
     return 0.5 * (low + high)
 
 
+@shared(types.float64(*[MATRIX] * 3, VECTOR))
 @njit(cache=True, error_model="numpy")
 def smallest_eigenpair(S: Array, T: Array, F: Array, v: Array) -> float:
     """Smallest eigenvalue of S, as `smallest_eigenvalue`; v <- a unit vector of it.

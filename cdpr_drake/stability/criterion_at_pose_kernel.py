@@ -119,13 +119,13 @@ WORK_TYPE = types.NamedTuple((MATRIX, VECTOR, *[MATRIX] * 14), Work)
 """The three as numba has them, for kernels that are called by their slot."""
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def moves_object(case: CaseArrays) -> bool:
     """Whether the object is perturbed."""
     return case.radii[4] != 0.0 or case.radii[5] != 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def new_work(case: CaseArrays) -> Work:
     """Work space for one pose at a time."""
     m = case.A.shape[0]

@@ -13,7 +13,8 @@ import numpy as np
 from numba import njit, types
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.numerics.shared_kernels import VECTOR, shared
+from cdpr_drake.numerics.kernel_calls import as_number
+from cdpr_drake.numerics.shared_kernels import MATRIX, VECTOR, shared
 from cdpr_drake.stability.criterion_at_pose_kernel import (
     CASE_TYPE,
     ROWS_TYPE,
@@ -58,24 +59,35 @@ def _turned_back(phi: Array, g: Array, at: int) -> None:
     g[at + 2] = gz + a * cz + b * (x * cy - y * cx)
 
 
-@shared(types.void(CASE_TYPE, WORK_TYPE, *[VECTOR] * 4))
+@shared(types.void(*[MATRIX] * 3, VECTOR, MATRIX, *[VECTOR] * 5))
 @njit(cache=True, error_model="numpy")
 def add_camera_gradient(
-    case: CaseArrays, w: Work, d: Array, weights: Array, z: Array, g: Array
+    A: Array,
+    B: Array,
+    C: Array,
+    t: Array,
+    R: Array,
+    p: Array,
+    d: Array,
+    weights: Array,
+    z: Array,
+    g: Array,
 ) -> None:
-    """g += gradient of sum_i weights_i (J z)_i over d, body turns for the two rotations."""
-    A, B = case.A, case.B
+    """g += gradient of sum_i weights_i (J z)_i over d, body turns for the two rotations.
+
+    Arguments as `CaseArrays` and `Work` have them: tuples of so many arrays cost more to compile.
+    """
     m = A.shape[0]
     Rd, Cd = np.empty((3, 3)), np.empty((3, 3))
-    turn_after(w.R, d[0:3], Rd)
-    turn_after(case.C, d[6:9], Cd)
-    tx, ty, tz = case.t[0] + d[9], case.t[1] + d[10], case.t[2] + d[11]
+    turn_after(R, d[0:3], Rd)
+    turn_after(C, d[6:9], Cd)
+    tx, ty, tz = t[0] + d[9], t[1] + d[10], t[2] + d[11]
     for i in range(m):
         a, b = 18 + 3 * i, 18 + 3 * (m + i)
         bx, by, bz = B[i, 0] + d[b], B[i, 1] + d[b + 1], B[i, 2] + d[b + 2]  # in P
-        Qx = w.p[0] + d[3] + Rd[0, 0] * bx + Rd[0, 1] * by + Rd[0, 2] * bz - A[i, 0] - d[a]
-        Qy = w.p[1] + d[4] + Rd[1, 0] * bx + Rd[1, 1] * by + Rd[1, 2] * bz - A[i, 1] - d[a + 1]
-        Qz = w.p[2] + d[5] + Rd[2, 0] * bx + Rd[2, 1] * by + Rd[2, 2] * bz - A[i, 2] - d[a + 2]
+        Qx = p[0] + d[3] + Rd[0, 0] * bx + Rd[0, 1] * by + Rd[0, 2] * bz - A[i, 0] - d[a]
+        Qy = p[1] + d[4] + Rd[1, 0] * bx + Rd[1, 1] * by + Rd[1, 2] * bz - A[i, 1] - d[a + 1]
+        Qz = p[2] + d[5] + Rd[2, 0] * bx + Rd[2, 1] * by + Rd[2, 2] * bz - A[i, 2] - d[a + 2]
         qx = Rd[0, 0] * Qx + Rd[1, 0] * Qy + Rd[2, 0] * Qz  # in P
         qy = Rd[0, 1] * Qx + Rd[1, 1] * Qy + Rd[2, 1] * Qz
         qz = Rd[0, 2] * Qx + Rd[1, 2] * Qy + Rd[2, 2] * Qz
@@ -188,16 +200,18 @@ def gradient(
     else:
         left, z = _transposed_times(L_true, v), _times(L_hat_inverse, v)
     weights = _transposed_times(J_true_inverse, left)
+    A, B, C, t, R, p = case.A, case.B, case.C, case.t, w.R, w.p
     if case.truth:
         y = _times(J_hat, z)
         x = _times(J_true_inverse, y)
-        add_camera_gradient(case, w, d, -weights, x, g)
+        add_camera_gradient(A, B, C, t, R, p, d, -weights, x, g)
         # (J'J)^-1 left = J^+ (J^+)' left
-        add_camera_gradient(case, w, d, y - _times(w.Jd, x), _times(J_true_inverse, weights), g)
+        rest = y - _times(w.Jd, x)
+        add_camera_gradient(A, B, C, t, R, p, d, rest, _times(J_true_inverse, weights), g)
     else:
-        add_camera_gradient(case, w, d, weights, z, g)
-    _turned_back(d[0:3], g, 0)
-    _turned_back(d[6:9], g, 6)
+        add_camera_gradient(A, B, C, t, R, p, d, weights, z, g)
+    _turned_back(d[0:3], g, as_number(0))
+    _turned_back(d[6:9], g, as_number(6))
     if not moved:
         return
     if case.scheme != IBVS:
@@ -233,33 +247,35 @@ def _ball_step(g: Array, at: int, radius: float, planar: bool, turn: bool, out: 
         out[at], out[at + 1], out[at + 2] = 0.0, 0.0, 0.0
 
 
-@shared(types.void(CASE_TYPE, VECTOR, VECTOR))
+@shared(types.void(types.int64, types.boolean, VECTOR, types.int64[::1], VECTOR, VECTOR))
 @njit(cache=True, error_model="numpy")
-def steepest_into(case: CaseArrays, g: Array, out: Array) -> None:
-    """out <- the perturbation within the bounds with the smallest g' d."""
-    m = case.A.shape[0]
+def steepest_into(
+    m: int, planar: bool, radii: Array, directions: np.ndarray, g: Array, out: Array
+) -> None:
+    """out <- the perturbation of m cables within the bounds with the smallest g' d."""
     for block in range(6):
-        _ball_step(g, 3 * block, case.radii[block], case.planar, block % 2 == 0, out)
+        _ball_step(g, 3 * block, radii[block], planar, block % 2 == 0, out)
     total = np.empty(3)
+    shift = m < 0  # no turn; a False written out would compile `_ball_step` once more
     for part in range(2):
-        at, radius = 18 + 3 * m * part, case.radii[6 + part]
-        if case.directions[part] == COMMON:
+        at, radius = 18 + 3 * m * part, radii[6 + part]
+        if directions[part] == COMMON:
             total[:] = 0.0
             for i in range(m):
                 for j in range(3):
                     total[j] += g[at + 3 * i + j]
-            _ball_step(total, 0, radius, case.planar, False, total)
+            _ball_step(total, as_number(0), radius, planar, shift, total)
             for i in range(m):
                 for j in range(3):
                     out[at + 3 * i + j] = total[j]
-        elif case.directions[part] == CORNERS:
+        elif directions[part] == CORNERS:
             for i in range(3 * m):
-                flat = case.planar and i % 3 == 2
+                flat = planar and i % 3 == 2
                 out[at + i] = 0.0 if flat else -radius * np.sign(g[at + i])
         else:
             for i in range(m):
-                _ball_step(g, at + 3 * i, radius, case.planar, False, out)
-            if case.directions[part] == SINGLE:
+                _ball_step(g, at + 3 * i, radius, planar, shift, out)
+            if directions[part] == SINGLE:
                 _keep_steepest(g, at, m, out)
 
 

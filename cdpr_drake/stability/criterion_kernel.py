@@ -42,6 +42,7 @@ def turn_after(R: Array, vector: Array, out: Array) -> None:
             out[i, j] = R[i, 0] * E[0, j] + R[i, 1] * E[1, j] + R[i, 2] * E[2, j]
 
 
+@shared(types.void(MATRIX, VECTOR, *[MATRIX] * 3, VECTOR, VECTOR, MATRIX))
 @njit(cache=True, error_model="numpy")
 def camera_rows(
     R: Array, p: Array, A: Array, B: Array, C: Array, t: Array, d: Array, J: Array
@@ -85,6 +86,7 @@ def camera_rows(
         J[i, 3], J[i, 4], J[i, 5] = ux, uy, uz
 
 
+@shared(types.boolean(MATRIX, types.boolean, MATRIX))
 @njit(cache=True, error_model="numpy")
 def left_inverse(J: Array, planar: bool, M: Array) -> bool:
     """M <- J^+ = (J'J)^-1 J', shape (6, m); False where J has not full column rank.
@@ -128,38 +130,6 @@ def left_inverse(J: Array, planar: bool, M: Array) -> bool:
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def object_state(
-    d: Array, theta_u: Array, error: Array, p_CO: Array, R_CO: Array, s: Array, R: Array
-) -> None:
-    """s, R <- the perturbed (theta u, error, p_CO), shape (3, 3), and R_CO, shape (3, 3)."""
-    turned = d[12] != 0.0 or d[13] != 0.0 or d[14] != 0.0
-    E, T, Q = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
-    for j in range(3):
-        s[0, j] = theta_u[j]
-        s[1, j] = error[j] + d[15 + j]
-        s[2, j] = p_CO[j] + d[15 + j]
-    copy_matrix(R_CO, R)
-    if turned:
-        rotation_into(d[12:15], E)
-        rotation_into(theta_u, T)
-        for i in range(3):
-            for j in range(3):
-                Q[i, j] = E[i, 0] * T[0, j] + E[i, 1] * T[1, j] + E[i, 2] * T[2, j]
-        rotation_vector_into(Q, s[0])
-        for i in range(3):  # R_CdC = R_CdO R_OC, so R_CO becomes R_CO turned back by T' E' T
-            for j in range(3):
-                T[i, j] = R_CO[i, j]
-        rotation_into(theta_u, Q)
-        turn = np.empty(3)
-        for i in range(3):  # -T' d
-            turn[i] = -(Q[0, i] * d[12] + Q[1, i] * d[13] + Q[2, i] * d[14])
-        rotation_into(turn, E)
-        for i in range(3):
-            for j in range(3):
-                R[i, j] = E[i, 0] * T[0, j] + E[i, 1] * T[1, j] + E[i, 2] * T[2, j]
-
-
-@njit(cache=True, error_model="numpy", inline="always")
 def rotation_vector_into(R: Array, out: Array) -> None:
     """out <- theta u of R, theta in [0, pi].
 
@@ -190,6 +160,47 @@ def rotation_vector_into(R: Array, out: Array) -> None:
     norm = np.sqrt(x * x + y * y + z * z)
     f = 2.0 * np.arctan2(norm, w) / norm if norm > 1e-300 else 0.0
     out[0], out[1], out[2] = f * x, f * y, f * z
+
+
+@shared(types.void(VECTOR, VECTOR, MATRIX, VECTOR, MATRIX))
+@njit(cache=True, error_model="numpy")
+def _turn_object(d: Array, theta_u: Array, R_CO: Array, seen: Array, R: Array) -> None:
+    """seen, R <- theta u of R_CdC, shape (3,), and R_CO, of an object that d turns.
+
+    Of its own, as most questions know the object.
+    """
+    E, T, Q = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    rotation_into(d[12:15], E)
+    rotation_into(theta_u, T)
+    for i in range(3):
+        for j in range(3):
+            Q[i, j] = E[i, 0] * T[0, j] + E[i, 1] * T[1, j] + E[i, 2] * T[2, j]
+    rotation_vector_into(Q, seen)
+    for i in range(3):  # R_CdC = R_CdO R_OC, so R_CO becomes R_CO turned back by T' E' T
+        for j in range(3):
+            T[i, j] = R_CO[i, j]
+    rotation_into(theta_u, Q)
+    turn = np.empty(3)
+    for i in range(3):  # -T' d
+        turn[i] = -(Q[0, i] * d[12] + Q[1, i] * d[13] + Q[2, i] * d[14])
+    rotation_into(turn, E)
+    for i in range(3):
+        for j in range(3):
+            R[i, j] = E[i, 0] * T[0, j] + E[i, 1] * T[1, j] + E[i, 2] * T[2, j]
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def object_state(
+    d: Array, theta_u: Array, error: Array, p_CO: Array, R_CO: Array, s: Array, R: Array
+) -> None:
+    """s, R <- the perturbed (theta u, error, p_CO), shape (3, 3), and R_CO, shape (3, 3)."""
+    for j in range(3):
+        s[0, j] = theta_u[j]
+        s[1, j] = error[j] + d[15 + j]
+        s[2, j] = p_CO[j] + d[15 + j]
+    copy_matrix(R_CO, R)
+    if d[12] != 0.0 or d[13] != 0.0 or d[14] != 0.0:
+        _turn_object(d, theta_u, R_CO, s[0], R)
 
 
 @njit(cache=True, error_model="numpy")
@@ -223,6 +234,30 @@ def interaction_into(scheme: int, s: Array, R_CO: Array, p_OK: Array, L: Array) 
         hybrid_into(s[0], R, s[2, 0] / s[2, 2], s[2, 1] / s[2, 2], s[2, 2], L)
 
 
+@shared(types.boolean(MATRIX, MATRIX))
+@njit(cache=True, error_model="numpy")
+def _invert_hybrid(L: Array, Li: Array) -> bool:
+    """The upper blocks of Li, whose lower right one is R', for the L of 2 1/2 D."""
+    a, b, c = L[0, 0], L[0, 1], L[0, 2]
+    e, f, g = L[1, 0], L[1, 1], L[1, 2]
+    h, k, o = L[2, 0], L[2, 1], L[2, 2]
+    determinant = a * (f * o - g * k) - b * (e * o - g * h) + c * (e * k - f * h)
+    if not abs(determinant) > 1e-9:
+        return False
+    q = 1.0 / determinant
+    Li[0, 0], Li[0, 1], Li[0, 2] = q * (f * o - g * k), q * (c * k - b * o), q * (b * g - c * f)
+    Li[1, 0], Li[1, 1], Li[1, 2] = q * (g * h - e * o), q * (a * o - c * h), q * (c * e - a * g)
+    Li[2, 0], Li[2, 1], Li[2, 2] = q * (e * k - f * h), q * (b * h - a * k), q * (a * f - b * e)
+    U = np.empty((3, 3))  # the upper right block of L times R'
+    for i in range(3):
+        for j in range(3):
+            U[i, j] = L[i, 3] * L[3 + j, 3] + L[i, 4] * L[3 + j, 4] + L[i, 5] * L[3 + j, 5]
+    for i in range(3):
+        for j in range(3):
+            Li[i, 3 + j] = -(Li[i, 0] * U[0, j] + Li[i, 1] * U[1, j] + Li[i, 2] * U[2, j])
+    return True
+
+
 @njit(cache=True, error_model="numpy", inline="always")
 def inverse_interaction_into(scheme: int, s: Array, L: Array, Li: Array) -> bool:
     """Li <- L^+, shape (6, f); False where L is singular. Closed forms where there are any.
@@ -251,24 +286,7 @@ def inverse_interaction_into(scheme: int, s: Array, L: Array, Li: Array) -> bool
     if scheme == PBVS_LINE:
         theta_u_into(s[0], Li, -1.0)
         return True
-    a, b, c = L[0, 0], L[0, 1], L[0, 2]
-    e, f, g = L[1, 0], L[1, 1], L[1, 2]
-    h, k, o = L[2, 0], L[2, 1], L[2, 2]
-    determinant = a * (f * o - g * k) - b * (e * o - g * h) + c * (e * k - f * h)
-    if not abs(determinant) > 1e-9:
-        return False
-    q = 1.0 / determinant
-    Li[0, 0], Li[0, 1], Li[0, 2] = q * (f * o - g * k), q * (c * k - b * o), q * (b * g - c * f)
-    Li[1, 0], Li[1, 1], Li[1, 2] = q * (g * h - e * o), q * (a * o - c * h), q * (c * e - a * g)
-    Li[2, 0], Li[2, 1], Li[2, 2] = q * (e * k - f * h), q * (b * h - a * k), q * (a * f - b * e)
-    U = np.empty((3, 3))  # the upper right block of L times R'
-    for i in range(3):
-        for j in range(3):
-            U[i, j] = L[i, 3] * L[3 + j, 3] + L[i, 4] * L[3 + j, 4] + L[i, 5] * L[3 + j, 5]
-    for i in range(3):
-        for j in range(3):
-            Li[i, 3 + j] = -(Li[i, 0] * U[0, j] + Li[i, 1] * U[1, j] + Li[i, 2] * U[2, j])
-    return True
+    return _invert_hybrid(L, Li)
 
 
 @njit(cache=True, error_model="numpy")

@@ -9,9 +9,11 @@ allocated.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+from numba import njit, types
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.numerics.kernel_calls import as_number
+from cdpr_drake.numerics.shared_kernels import MATRIX, VECTOR, shared
 from cdpr_drake.stability.criterion_at_pose_kernel import (
     CaseArrays,
     PoseRows,
@@ -42,13 +44,13 @@ FREEDOM = {"contract", "nsz", "arcp", "reassoc"}
 """What the compiler may do with sums and quotients; infinities and NaN keep their meaning."""
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def is_quick(case: CaseArrays) -> bool:
     """Whether `evaluate_quick` applies."""
     return not case.truth and not moves_object(case) and case.A.shape[0] <= WIDTH
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def quick_size() -> int:
     """Numbers in the flat array of `pack_quick`."""
     return FINAL
@@ -105,6 +107,7 @@ def _turn(d: Array, at: int, q: Array, base: int, out: int) -> None:
         q[out + 3 * i + 2] = r * e02 + s * e12 + t * e22
 
 
+@shared(types.void(VECTOR, types.int64, types.boolean, types.boolean, VECTOR, MATRIX))
 @njit(cache=True, error_model="numpy", fastmath=FREEDOM)
 def evaluate_quick(q: Array, m: int, local: bool, planar: bool, d: Array, S: Array) -> None:
     """S <- (Pi + Pi') / 2 for the perturbation d, where `is_quick`.
@@ -118,11 +121,11 @@ def evaluate_quick(q: Array, m: int, local: bool, planar: bool, d: Array, S: Arr
         S: Output, shape (6, 6).
     """
     lanes = LANES * ((m + LANES - 1) // LANES)
-    _turn(d, 0, q, TURN, PRODUCT)
+    _turn(d, as_number(0), q, as_number(TURN), PRODUCT)
     r00, r01, r02 = q[PRODUCT], q[PRODUCT + 1], q[PRODUCT + 2]
     r10, r11, r12 = q[PRODUCT + 3], q[PRODUCT + 4], q[PRODUCT + 5]
     r20, r21, r22 = q[PRODUCT + 6], q[PRODUCT + 7], q[PRODUCT + 8]
-    _turn(d, 6, q, CAMERA, PRODUCT)
+    _turn(d, as_number(6), q, as_number(CAMERA), PRODUCT)
     c00, c01, c02 = q[PRODUCT], q[PRODUCT + 1], q[PRODUCT + 2]
     c10, c11, c12 = q[PRODUCT + 3], q[PRODUCT + 4], q[PRODUCT + 5]
     c20, c21, c22 = q[PRODUCT + 6], q[PRODUCT + 7], q[PRODUCT + 8]
@@ -181,7 +184,7 @@ def evaluate_quick(q: Array, m: int, local: bool, planar: bool, d: Array, S: Arr
             S[i, i] += OUTSIDE[i]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def evaluate_any(
     case: CaseArrays, rows: PoseRows, n: int, w: Work, q: Array, quick: bool, d: Array
 ) -> bool:

@@ -11,9 +11,11 @@ Source: Steele, Lea and Flood, Fast splittable pseudorandom number generators, O
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+from numba import njit, types
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.numerics.kernel_calls import as_number
+from cdpr_drake.numerics.shared_kernels import MATRIX, VECTOR, shared
 from cdpr_drake.stability.perturbation_bounds import DIRECTIONS, PerturbationBounds, vector_size
 
 LANES = 8
@@ -118,6 +120,12 @@ def _corners(
             d[at + 3 * i + 2] = 0.0
 
 
+@shared(
+    types.void(
+        types.uint64, types.int64, VECTOR, types.int64[::1], types.boolean, types.boolean,
+        types.int64, MATRIX, VECTOR,
+    )
+)  # fmt: skip
 @njit(cache=True, error_model="numpy")
 def draw_into(
     key: np.uint64,
@@ -159,8 +167,8 @@ def draw_into(
         for k in range(3):
             d[3 * i + k] = radii[i] * room[k, i]
         if inside:
-            _fill_balls(base, i, 1, 1.0 if turn else power, d, 3 * i)
-    first = 6
+            _fill_balls(base, i, as_number(1), 1.0 if turn else power, d, 3 * i)
+    first = as_number(6)
     for part in range(2):
         at, radius = 18 + 3 * m * part, radii[6 + part]
         if directions[part] == CORNERS:

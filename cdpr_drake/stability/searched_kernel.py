@@ -71,7 +71,7 @@ def descend(
 
     It ends early once the eigenvalue is not above `enough`.
     """
-    quick = is_quick(case)
+    quick, m = is_quick(case), case.A.shape[0]
     # Half-way between errors of two points lies one of both: no step back.
     whole = case.directions[0] == SINGLE or case.directions[1] == SINGLE
     halvings = 0 if whole else HALVINGS
@@ -84,7 +84,7 @@ def descend(
         if value <= enough:
             break
         gradient(case, rows, n, w, d, v, g)
-        steepest_into(case, g, goal)
+        steepest_into(m, case.planar, case.radii, case.directions, g, goal)
         share, found = 1.0, value
         for _ in range(halvings + 1):
             for i in range(len(d)):
@@ -139,7 +139,7 @@ def search_pose(
     enough = 0.0 if first_only else -np.inf
     if margin <= enough:
         return margin
-    quick = is_quick(case)
+    quick, m = is_quick(case), case.A.shape[0]
     for number in range(from_draws):
         if worst[number] < 0:
             break
@@ -166,7 +166,7 @@ def search_pose(
         at[:] = 0.0
         evaluate_any(case, rows, n, w, q, quick, at)
         gradient(case, rows, n, w, at, v, g)
-        steepest_into(case, g, at)
+        steepest_into(m, case.planar, case.radii, case.directions, g, at)
         found = descend(case, rows, n, w, q, at, steps, enough)
         if found < margin:
             margin = found

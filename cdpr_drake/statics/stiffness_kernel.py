@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+from numba import njit, types
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.dispatch_kernel import STRAIGHT, all_responses
@@ -11,6 +11,7 @@ from cdpr_drake.cables.response_kernel import DERIVATIVES
 from cdpr_drake.geometry.cable_paths import SHORTEST
 from cdpr_drake.geometry.pulley_kernel import pulley_line, unit_vector_derivative
 from cdpr_drake.geometry.two_pulleys_kernel import add_platform_turning
+from cdpr_drake.numerics.shared_kernels import MATRIX, VECTOR, shared
 
 TOTAL, CABLES, WEIGHT, ELASTIC, TENSION = range(5)
 """Rows of what `stiffness_into` writes."""
@@ -19,6 +20,7 @@ DONE, BAD_LENGTH, NO_CABLE = range(3)
 """What it returns: an unstrained length that is not finite or not above 0; a cable cannot run."""
 
 
+@shared(types.void(VECTOR, VECTOR, MATRIX, MATRIX))
 @njit(cache=True, error_model="numpy")
 def _add_turning(r: Array, f: Array, D: Array, K: Array) -> None:
     """Adds the stiffness of a pull f at arm r that changes by D with the anchor point.

@@ -13,10 +13,11 @@ Reentrant polygon clipping, 1974.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+from numba import njit, types
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.pulley_kernel import pulley_jacobian
+from cdpr_drake.numerics.shared_kernels import MATRIX, VECTOR, shared
 from cdpr_drake.tensions.quadratic_program_kernel import (
     FEASIBLE,
     nearest_tensions_in,
@@ -36,6 +37,7 @@ UNKNOWN = 0
 """Answer of `quick_answer`: neither proven."""
 
 
+@shared(types.int64(MATRIX, VECTOR, VECTOR, types.float64, types.int64[::1], MATRIX, MATRIX))
 @njit(cache=True, error_model="numpy")
 def quick_answer(
     table: Array, lower: Array, upper: Array, slack: float, order: np.ndarray, px: Array, py: Array
@@ -86,6 +88,7 @@ def quick_answer(
     return UNKNOWN if _leaves_something(table, lower, upper, slack, order, px, py) else -1
 
 
+@shared(types.boolean(MATRIX, VECTOR, VECTOR, types.float64, types.int64[::1], MATRIX, MATRIX))
 @njit(cache=True, error_model="numpy")
 def _leaves_something(
     table: Array, lower: Array, upper: Array, out: float, order: np.ndarray, px: Array, py: Array

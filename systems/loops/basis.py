@@ -10,7 +10,7 @@ from pathlib import Path
 from cdpr_drake.arrays import Array
 from cdpr_drake.models.robot_loader import load_robot, robot_file
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.systems.diagrams.servo_models import servo_model
+from cdpr_drake.systems.diagrams.servo_models import ServoModel, servo_model
 from cdpr_drake.systems.diagrams.visual_servo import integration_step
 from cdpr_drake.systems.loops.robot_motion import RobotMotion
 from cdpr_drake.systems.robots.compiled_step import StepRule
@@ -25,11 +25,15 @@ class LoopBasis:
         robot: The robot.
         max_step: Integration step [s], but for sensors that read more often.
         resting: State of platform and winches at the start, shape (n,).
+        model: What the servo is about, for a seed of 0.
+        motion: A motion of the robot; others are made like it.
     """
 
     robot: Robot
     max_step: float
     resting: Array
+    model: ServoModel
+    motion: RobotMotion
 
 
 def loop_basis(scenario: Scenario) -> LoopBasis:
@@ -49,9 +53,10 @@ def loop_basis(scenario: Scenario) -> LoopBasis:
 def _basis(common: bytes, path: Path, changed: int, size: int) -> LoopBasis:
     scenario: Scenario = pickle.loads(common)
     robot = load_robot(scenario.robot)
-    max_step = integration_step(scenario, servo_model(scenario, robot))
+    model = servo_model(scenario, robot)
+    max_step = integration_step(scenario, model)
     motion = RobotMotion(robot, scenario, StepRule())
     wrong = scenario.perturbations
     X_WP = scenario.initial_pose.transform()
     resting = motion.resting(X_WP, wrong.slack, wrong.slack_at_rest)
-    return LoopBasis(robot, max_step, resting)
+    return LoopBasis(robot, max_step, resting, model, motion)

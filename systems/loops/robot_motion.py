@@ -78,8 +78,21 @@ class RobotMotion:
         report: Errors and numbers of steps so far, as `advance_kernel.REPORTED` says, shape (4,).
     """
 
-    def __init__(self, robot: Robot, settings: CableRobotSettings, rule: StepRule) -> None:
+    def __init__(
+        self,
+        robot: Robot,
+        settings: CableRobotSettings,
+        rule: StepRule,
+        like: RobotMotion | None = None,
+    ) -> None:
         """A robot at rest at its home pose, and how it is integrated.
+
+        Args:
+            robot: The robot.
+            settings: Its cables, winches and damping.
+            rule: How it is integrated.
+            like: A motion of the same robot and settings, whose constants it shares; its arrays
+                are its own.
 
         Raises:
             CableModelError: The cables' model cannot describe the robot's cables.
@@ -89,13 +102,18 @@ class RobotMotion:
         """
         self.robot, self.rule, self._packed = robot, rule, PackedRule(rule)
         self._model = settings.cables.model
-        self._set = simulated_cables(settings.cables.cable_set(robot), self._model)
-        self._drive = winch_drive(robot, settings.winches)
-        self._home = cable_paths(robot.home.transform(), self._set).lengths
-        joint = self._joint = robot.joint()
+        if like is None:
+            self._set = simulated_cables(settings.cables.cable_set(robot), self._model)
+            self._drive = winch_drive(robot, settings.winches)
+            self._home = cable_paths(robot.home.transform(), self._set).lengths
+            self._joint, self._body = robot.joint(), rigid_platform(robot)
+        else:
+            self._set, self._drive, self._home = like._set, like._drive, like._home
+            self._joint, self._body = like._joint, like._body
+        joint = self._joint
         damping = settings.damping
         self._arrays = pack_robot(
-            rigid_platform(robot), self._set, self._model, self._drive,
+            self._body, self._set, self._model, self._drive,
             home=self._home, joint=joint, damping=(damping.translation, damping.rotation),
         )  # fmt: skip
         law = cable_law(self._model, self._set)

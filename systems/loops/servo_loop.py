@@ -79,7 +79,7 @@ class ServoLoop:
         """
         basis = loop_basis(scenario)
         robot = basis.robot
-        self.scenario, self.model = scenario, servo_model(scenario, robot)
+        self.scenario, self.model = scenario, servo_model(scenario, robot, basis.model)
         self.time = 0.0
         self._since, self._judged = NOT_YET, Outcome.RUNNING
         self.outcome = Outcome.RUNNING
@@ -119,6 +119,7 @@ class ServoLoop:
             StepRule(
                 method=integration.integrator, max_step=self.max_step, accuracy=integration.accuracy
             ),
+            basis.motion,
         )
         self._motion.begin(basis.resting)
         if self._offsets is not None:  # winches run off before anybody commands them

@@ -16,9 +16,9 @@ from rich.console import Console
 from rich.table import Table
 
 from cdpr_drake.cli import compiling as compiling_module
-from cdpr_drake.cli import terminal
+from cdpr_drake.cli import process, terminal
 from cdpr_drake.cli.compiling import _compilations, compiling
-from cdpr_drake.cli.terminal import PROGRESS
+from cdpr_drake.cli.process import PROGRESS
 from cdpr_drake.studio.workbench import job_process as child
 from tests.messages import messages, printed
 
@@ -142,7 +142,22 @@ def test_a_kernel_that_is_compiled_is_noticed(monkeypatch):
     four_times(1.0)
     assert _compilations.count == before + 2
     monkeypatch.setattr(compiling_module, "LINGER", np.inf)
+    monkeypatch.setattr(process, "_expected", 0)
     assert compiling() == f"compiling, first use, {before + 2} kernels so far"
+    monkeypatch.setattr(process, "_expected", before + 9)
+    assert compiling() == f"compiling, first use, {before + 2} of up to {before + 9} kernels"
+
+
+def test_functions_of_numba_are_no_kernels_of_ours():
+    compiling()
+    before = _compilations.count
+
+    @njit
+    def pair():
+        return np.zeros(2)
+
+    pair()
+    assert _compilations.count == before + 1
 
 
 def test_nothing_of_a_table_is_cut_in_a_pipe(capsys):

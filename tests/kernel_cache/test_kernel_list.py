@@ -1,10 +1,14 @@
 """The list of kernels names what exists, and commands ask for groups that it has."""
 
+import sys
+from io import StringIO
+
 import pytest
 
 from cdpr_drake.analyses.installation import compilation_steps
 from cdpr_drake.cli import process as first_use
-from cdpr_drake.kernel_cache.kernel_list import group_names, needed_kernels
+from cdpr_drake.cli.app import SUBCOMMANDS
+from cdpr_drake.kernel_cache.kernel_list import group_names, missing_kernels, needed_kernels
 from cdpr_drake.systems.scenarios.visual_servo_scenario import DEFAULT_SCENARIO
 from tests.record_kernels import signature_words
 
@@ -15,6 +19,7 @@ def test_its_groups_are_what_commands_ask_for():
     assert group_names() == first_use.GROUPS
     assert first_use.DEFAULT == DEFAULT_SCENARIO
     assert first_use.COMPILED in dict(compilation_steps())
+    assert set(first_use.QUESTIONS) <= set(SUBCOMMANDS)
 
 
 def test_its_kernels_exist_and_follow_those_that_they_call():
@@ -43,7 +48,12 @@ def test_what_a_group_needs_calls_what_it_needs():
         ("simulate --set integration.engine=compiled", [*DEFAULT, first_use.COMPILED]),
         ("studio", DEFAULT),
         ("doctor --compile", None),
-        ("tension acrobot_small", None),
+        ("tension acrobot_small", ["tension"]),
+        ("static --json acrobot_small", ["static"]),
+        ("workspace planar --kind dynamic", ["workspace"]),
+        ("stability", ["stability"]),
+        ("plan mine.yaml --path way.csv", ["plan"]),
+        ("plan --help", None),
         ("simulate --help", None),
         ("doctor", None),
         ("robots", None),
@@ -58,3 +68,31 @@ def test_a_command_asks_for_what_it_needs(line, groups, monkeypatch):
     first_use.compile_ahead(line.split())
     assert asked[-1] == groups
     assert set(groups or []) <= set(group_names())
+
+
+def keep(folder, kernels):
+    """Index files as numba has them, empty: of the names alone."""
+    for name in {kernel.name for kernel in kernels}:
+        module, _, function = name.partition(":")
+        room, _, file = module.rpartition(".")
+        (folder / f"{room}_0123").mkdir(exist_ok=True)
+        (folder / f"{room}_0123" / f"{file}.{function}-12.py311.nbi").touch()
+
+
+def test_a_first_use_is_told_at_once_with_what_is_missing(tmp_path, monkeypatch):
+    stream = StringIO()
+    monkeypatch.setattr(sys, "stderr", stream)
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr(first_use, "compile_in_background", lambda _: 0)
+    monkeypatch.setattr(first_use, "_expected", 0)
+    kernels = needed_kernels(["tension"])
+    names = len({kernel.name for kernel in kernels})
+    assert missing_kernels(["tension"]) == names > 5
+    first_use.compile_ahead(["tension", "planar"])
+    said = f"progress: first use of cdpr tension: compiling up to {names} kernels, which are kept\n"
+    assert stream.getvalue() == said
+    assert first_use.expected_kernels() == names
+    keep(tmp_path, kernels)
+    assert missing_kernels(["tension"]) == 0
+    first_use.compile_ahead(["tension", "planar"])
+    assert stream.getvalue() == said

@@ -78,7 +78,8 @@ def test_gradient_is_that_of_differences(case: StabilityCase, perturbed: str) ->
     kept = mask(case)
     np.testing.assert_allclose(found * kept, np.array(slope) * kept, atol=DIFFERENCE_TOLERANCE)
     goal, other = np.empty_like(d), d * 0.9
-    steepest_into(arrays, found, goal)
+    m = arrays.A.shape[0]
+    steepest_into(m, arrays.planar, arrays.radii, arrays.directions, found, goal)
     assert found @ goal < found @ other  # within the bounds nothing is steeper
     np.testing.assert_array_equal(goal[kept == 0.0], 0.0)
 
