@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from pydrake.geometry import FrameId, SceneGraph
-from pydrake.systems.framework import DiagramBuilder, OutputPort
+from pydrake.systems.framework import DiagramBuilder, OutputPort, System
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.models.rendered_camera import add_renderer
@@ -112,6 +112,7 @@ def add_camera(
     seed: int = 0,
     image_bias: Array | None = None,
     name: str = "",
+    X_BC: OutputPort | None = None,
 ) -> TargetMeasurement:
     """Adds a camera that measures a target.
 
@@ -127,6 +128,7 @@ def add_camera(
         image_bias: Shift (u, v) of all that is measured, shape (2,) [px]; none if None.
         name: Put before the names of the blocks "camera" and, if whole images are rendered,
             "detector".
+        X_BC: Pose of a camera that turns on its carrier [m]; None: it is fixed.
 
     Returns:
         The system with the ports of `TargetMeasurement`.
@@ -137,9 +139,11 @@ def add_camera(
     prefix = f"{name}_" if name else ""
     if settings.kind == PROJECTED:
         camera = projected_camera(
-            settings, target, mounting, pinhole, seed=seed, image_bias=image_bias
-        )
+            settings, target, mounting, pinhole, seed=seed, image_bias=image_bias,
+            turns=X_BC is not None,
+        )  # fmt: skip
         projected = builder.AddNamedSystem(prefix + "camera", camera)
+        _turn(builder, projected, X_BC)
         builder.Connect(robot.GetOutputPort("X_WP"), projected.GetInputPort("X_WP"))
         if X_WO is not None and not mounting.is_eye_to_hand():
             builder.Connect(X_WO, projected.GetInputPort("X_WO"))
@@ -155,6 +159,7 @@ def add_camera(
             pinhole=pinhole,
             image_bias=image_bias,
             name=prefix + "camera",
+            X_BC=X_BC,
         )
     spoiled = None if settings.flaws is None else SpoiledImages(
         flaws=settings.flaws.flaws(),
@@ -163,7 +168,7 @@ def add_camera(
         frame=robot.plant.GetBodyFrameIdOrThrow(robot.in_plant.body.index()),
         body=int(robot.in_plant.body_index),
     )  # fmt: skip
-    sensor = add_sensor(builder, robot, mounting, pinhole, spoiled, name=prefix + "camera")
+    sensor = add_sensor(builder, robot, mounting, pinhole, spoiled, name=prefix + "camera", X_BC=X_BC)
     detector = TargetDetector(target, pinhole, settings.rate, settings.latency_frames, image_bias)
     builder.AddNamedSystem(prefix + "detector", detector)
     builder.Connect(sensor.GetOutputPort("color_image"), detector.GetInputPort("color_image"))
@@ -180,6 +185,7 @@ def add_region_camera(
     pinhole: Pinhole,
     image_bias: Array | None,
     name: str,
+    X_BC: OutputPort | None = None,
 ) -> RegionCamera:
     """Adds a camera that draws a window round a target, to a robot whose scene has a renderer."""
     camera = RegionCamera(
@@ -190,8 +196,10 @@ def add_region_camera(
         X_BC=mounting.X_BC,
         latency_frames=settings.latency_frames,
         image_bias=image_bias,
+        turns=X_BC is not None,
     )
     builder.AddNamedSystem(name, camera)
+    _turn(builder, camera, X_BC)
     builder.Connect(robot.GetOutputPort("query_object"), camera.GetInputPort("query_object"))
     return camera
 
@@ -204,6 +212,7 @@ def projected_camera(
     *,
     seed: int = 0,
     image_bias: Array | None = None,
+    turns: bool = False,
 ) -> ProjectedCamera:
     """The projected camera of some settings; arguments as for `add_camera`."""
     return ProjectedCamera(
@@ -217,6 +226,7 @@ def projected_camera(
         image_bias=image_bias,
         focus=(settings.focus_zoom, settings.focus_period) if settings.focus_zoom > 0.0 else None,
         fault=settings.fault,
+        turns=turns,
     )
 
 
@@ -228,16 +238,25 @@ def add_sensor(
     spoiled: SpoiledImages | None = None,
     *,
     name: str = "camera",
+    X_BC: OutputPort | None = None,
 ) -> SceneCamera:
     """Adds the rendering camera to a robot whose scene graph has a renderer."""
     frame = _camera_frame(robot, mounting)
-    sensor = builder.AddNamedSystem(name, SceneCamera(frame, mounting.X_BC, pinhole, spoiled))
+    camera = SceneCamera(frame, mounting.X_BC, pinhole, spoiled, X_BC is not None)
+    sensor = builder.AddNamedSystem(name, camera)
+    _turn(builder, sensor, X_BC)
     if sensor.HasInputPort("body_velocities"):
         builder.Connect(
             robot.GetOutputPort("body_velocities"), sensor.GetInputPort("body_velocities")
         )
     builder.Connect(robot.GetOutputPort("query_object"), sensor.GetInputPort("query_object"))
     return sensor
+
+
+def _turn(builder: DiagramBuilder, camera: System, X_BC: OutputPort | None) -> None:
+    """Connects where a camera is on its carrier, if it turns."""
+    if X_BC is not None:
+        builder.Connect(X_BC, camera.GetInputPort("X_BC"))
 
 
 def _camera_frame(robot: RobotBlock, mounting: CameraMounting) -> FrameId:
