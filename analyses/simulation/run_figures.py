@@ -48,8 +48,8 @@ from cdpr_drake.palette import (
     TARGET,
     nth_look,
 )
-from cdpr_drake.systems.diagrams.torque_control import tension_limits
 from cdpr_drake.systems.diagrams.pan_tilt import LOGGED_JOINTS
+from cdpr_drake.systems.diagrams.torque_control import tension_limits
 from cdpr_drake.systems.estimators.geometry_learner import LEARNT
 from cdpr_drake.systems.estimators.wrench_estimator import WRENCH_ESTIMATED
 

@@ -120,9 +120,7 @@ def find_sags(
     m = cables.count
     found = np.full((4, m), np.nan)
     verdict, points = np.full(m, UNSEEN), [np.empty((2, 0))] * m
-    strips = [
-        _Strip.of(paths.p_WT[:, k], ends[:, k], X_WE, pinhole, wanted) for k in range(m)
-    ]
+    strips = [_Strip.of(paths.p_WT[:, k], ends[:, k], X_WE, pinhole, wanted) for k in range(m)]
     for k, fit in _shared_out(strips, grey, wanted).items():
         strip = strips[k]
         assert strip is not None
@@ -262,9 +260,7 @@ class _Strip:
         size = np.linalg.norm(drop[:, len(drop[0]) // 2])
         chord = float(np.hypot(span, rise[2]))
         # A few pixels above the line, too: what is believed of the ends is a little off.
-        drops = np.arange(
-            -6.0 * wanted.near / size, wanted.largest_sag * chord, wanted.step / size
-        )
+        drops = np.arange(-6.0 * wanted.near / size, wanted.largest_sag * chord, wanted.step / size)
         return _Strip(start, out, span, float(rise[2]), camera, x, drops, spread)
 
     def pixels(self, x: Array, drop: Array) -> Array:
@@ -306,7 +302,9 @@ class _Strip:
         response = -cv2.filter2D(plain, cv2.CV_64F, kernel[:, np.newaxis])
         whole = cv2.erode(good.astype(np.uint8), np.ones((2 * reach + 1, 1), np.uint8)) > 0
         response[~whole] = 0.0
-        noise = float(np.median(np.abs(response[whole]))) / MEDIAN_SHARE if np.any(whole) else np.inf
+        noise = (
+            float(np.median(np.abs(response[whole]))) / MEDIAN_SHARE if np.any(whole) else np.inf
+        )
         least = max(wanted.contrast * noise, wanted.levels)
         middle = response[1:-1]
         peak = (middle > least) & (middle >= response[:-2]) & (middle > response[2:])

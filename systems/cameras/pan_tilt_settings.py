@@ -44,9 +44,7 @@ class CameraPanTilt:
         0.2,
         at_least=0.0,
     )
-    search_deg: float = number(
-        "Speed of the look-out.", "deg/s", 60.0, above=0.0, at_most=10_000.0
-    )
+    search_deg: float = number("Speed of the look-out.", "deg/s", 60.0, above=0.0, at_most=10_000.0)
     counts_per_turn: int = whole("Counts of an encoder per turn.", 4096, at_least=4)
     zero_error_deg: float = number(
         "Standard deviation of an encoder's zero.", "deg", 0.0, at_least=0.0

@@ -168,7 +168,9 @@ def add_camera(
         frame=robot.plant.GetBodyFrameIdOrThrow(robot.in_plant.body.index()),
         body=int(robot.in_plant.body_index),
     )  # fmt: skip
-    sensor = add_sensor(builder, robot, mounting, pinhole, spoiled, name=prefix + "camera", X_BC=X_BC)
+    sensor = add_sensor(
+        builder, robot, mounting, pinhole, spoiled, name=prefix + "camera", X_BC=X_BC
+    )
     detector = TargetDetector(target, pinhole, settings.rate, settings.latency_frames, image_bias)
     builder.AddNamedSystem(prefix + "detector", detector)
     builder.Connect(sensor.GetOutputPort("color_image"), detector.GetInputPort("color_image"))

@@ -92,7 +92,7 @@ def test_a_rendered_camera_turns_too():
         load_scenario(
             "acrobot_pan_tilt",
             [
-                COMPILED, "camera.kind=rendered", "camera.width=320", "camera.height=240",
+                COMPILED, "camera.kind=rendered",
                 "camera.pan_tilt.start_deg=[-34, 36]", "duration=0.3", "camera.rate=10",
                 "controller.rate=10",
             ],
