@@ -2,9 +2,9 @@
 
 ACROBOT approaches a tag from 50 starts, by its camera as it is mounted, and by the same camera on
 two joints that keep the tag in the middle of the image, with the errors of their encoders that the
-scenario has. Starts are drawn evenly: positions in a box, angles about x and y up to `TILT`, about z
-up to `TURN`. Nobody tells the joints where the tag is; what they do not see they look for. Of the two
-pose-based schemes, pbvs takes the tag, pbvs-line the camera along a straight line.
+scenario has. Starts are drawn evenly: positions in a box, angles about x and y up to `TILT`, about
+z up to `TURN`. Nobody tells the joints where the tag is; what they do not see they look for. Of the
+two pose-based schemes, pbvs takes the tag, pbvs-line the camera along a straight line.
 """
 
 from __future__ import annotations

@@ -11,9 +11,9 @@ that the encoders read (`steady_view`), so that features, their interaction matr
 mounting are those of a fixed camera, whose image has no rim, and the joints' motion is none of the
 platform's.
 
-Source: Chaumette and Hutchinson, Visual servo control, Part I, IEEE Robotics and Automation Magazine
-13(4), 2006, for the interaction matrix of a point; a camera that is turned beside the robot is named
-in the servoing thesis, 1.4.2.
+Source: Chaumette and Hutchinson, Visual servo control, Part I, IEEE Robotics and Automation
+Magazine 13(4), 2006, for the interaction matrix of a point; a camera that is turned beside the
+robot is named in the servoing thesis, 1.4.2.
 """
 
 from __future__ import annotations

@@ -2,9 +2,9 @@
 
 The believed pose and cables put the two ends of a cable into space; a cable that hangs does so in
 the vertical plane through them. `find_sags` looks into the image along that plane: a strip of it,
-stations along the cable by drops below the line between the ends, is read from the image, thin dark lines
-are made out in each station, and the inextensible catenary that most of them are on is fitted to
-them, with what the ends may be off. The fit's covariance is that of the sag.
+stations along the cable by drops below the line between the ends, is read from the image, thin dark
+lines are made out in each station, and the inextensible catenary that most of them are on is fitted
+to them, with what the ends may be off. The fit's covariance is that of the sag.
 
 Source: servoing thesis, perspectives; Irvine, Cable Structures, 1981, 1.1 and 2.1.
 """
@@ -47,7 +47,8 @@ class SightSettings:
         near: How far from a curve a line may be to be on it [px].
         share: Of the stations that must have a line on the curve.
         noise: By how much a line is off its curve, about [px].
-        ends: Standard deviation of where an end is, by the errors of pose and points [m].
+        ends: Standard deviation of each coordinate of where an end is, by the errors of pose and
+            points [m].
         least_sag: From which a cable counts as slack [m].
         sigmas: By how many standard deviations a sag must be above zero to count.
     """
@@ -215,6 +216,8 @@ class _Strip:
         x: Stations, shape (n,) [m].
         drops: Shape (k,) [m].
         across: Pixels across the line for a metre of drop, by station, shape (n,) [px/m].
+        slant: Pixels for a metre across the line of sight over those, at both ends, shape (2,) [-]:
+            an end that is off by a metre in any direction is off by so many metres of drop.
     """
 
     start: Array
@@ -225,6 +228,7 @@ class _Strip:
     x: Array
     drops: Array
     across: Array
+    slant: Array
 
     @staticmethod
     def of(
@@ -239,7 +243,7 @@ class _Strip:
         normal = np.array([-out[1], out[0], 0.0])
         R_EW = X_WE.rotation().matrix().T
         camera = pinhole.matrix() @ R_EW, -pinhole.matrix() @ R_EW @ X_WE.translation()
-        coarse = _Strip(start, out, span, float(rise[2]), camera, *3 * (np.empty(0),))
+        coarse = _Strip(start, out, span, float(rise[2]), camera, *4 * (np.empty(0),))
         x = span * np.linspace(0.02, 0.98, 97)
         uv, down = coarse.pixels(x, np.zeros_like(x)), coarse.pixels(x, np.full_like(x, 1e-3))
         if not np.all(np.isfinite(uv)):
@@ -260,8 +264,10 @@ class _Strip:
         size = np.linalg.norm(drop[:, len(drop[0]) // 2])
         chord = float(np.hypot(span, rise[2]))
         # A few pixels above the line, too: what is believed of the ends is a little off.
+        depths = R_EW[2] @ sight[:, [0, -1]]
+        slant = np.sqrt(pinhole.fx * pinhole.fy) / depths / across[[0, -1]]
         drops = np.arange(-6.0 * wanted.near / size, wanted.largest_sag * chord, wanted.step / size)
-        return _Strip(start, out, span, float(rise[2]), camera, x, drops, spread)
+        return _Strip(start, out, span, float(rise[2]), camera, x, drops, spread, slant)
 
     def pixels(self, x: Array, drop: Array) -> Array:
         """Pixels of points of the plane, shape (2, ...) [px]; NaN behind the camera."""
@@ -356,7 +362,7 @@ class _Strip:
             J = np.column_stack([1.0 - t[at], t[at], slope[at]]) * self.across[at][:, np.newaxis]
             size = max(float(np.median(np.abs(off[chosen]))) / MEDIAN_SHARE, LEAST_NOISE)
             weight = np.sqrt(1.0 / (1.0 + (off[chosen] / (CAUCHY * size)) ** 2))
-            prior = size / wanted.ends * np.eye(2, 3)
+            prior = np.eye(2, 3) * (size / (wanted.ends * self.slant))[:, np.newaxis]
             A = np.vstack([J * weight[:, np.newaxis], prior])
             b = np.concatenate([off[chosen] * weight, -prior @ state])
             normal = np.linalg.inv(A.T @ A)
@@ -370,7 +376,7 @@ class _Strip:
         uv = self.pixels(self.x[station[chosen]], drop[chosen])
         weights = 1.0 / (1.0 + (off[chosen] / wanted.noise) ** 2)
         # Another cable's line may be as long and as smooth, but ends elsewhere.
-        far = float(np.max(np.abs(state[:2]))) / wanted.ends
+        far = float(np.max(np.abs(state[:2]) / self.slant)) / wanted.ends
         share = float(np.sum(weights)) / len(self.x) / (1.0 + (far / FAR) ** 4)
         return _Fit(float(state[2]), here, float(sigma), uv, share)
 
@@ -394,7 +400,7 @@ MEDIAN_SHARE = 0.6745
 """Median of the absolute value of a normal number, of its standard deviation."""
 
 LEAST_NOISE = 0.05
-"""Of a line's place in the image at least [px]: residuals of few points may be smaller by chance."""
+"""Of a line's place in the image at least [px]: residuals of few may be smaller by chance."""
 
 
 def _nearest(station: np.ndarray, off: Array, near: float) -> np.ndarray:

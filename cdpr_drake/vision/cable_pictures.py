@@ -20,7 +20,7 @@ from cdpr_drake.vision.pinhole import Pinhole
 CABLE_COLOR = np.array([35.0, 35.0, 38.0])
 """Red, green and blue of a dark rope, of 255."""
 
-FINER = 4
+FINER = 8
 """Parts of a pixel, across and down, in which covered shares are counted."""
 
 SHIFT = 6
@@ -106,13 +106,14 @@ def _draw_line(drawn: Array, uv: Array, width: float) -> None:
     columns, rows = high - low
     if columns <= 0 or rows <= 0:
         return
-    thick = max(round(FINER * width), 1)
+    # OpenCV's lines are a fine pixel wider than it is told.
+    thick = max(round(FINER * width) - 1, 1)
     fine = np.zeros((FINER * rows, FINER * columns), np.uint8)
     # Pixel k spans fine pixels FINER k to FINER (k + 1) - 1; its middle is between them.
     points = FINER * (uv - low[:, np.newaxis] + 0.5) - 0.5
     whole = np.round(points.T * 2**SHIFT).astype(np.int32).reshape(-1, 1, 2)
     cv2.polylines(fine, [whole], False, 255, thick, cv2.LINE_8, SHIFT)
     share = cv2.resize(fine, (int(columns), int(rows)), interpolation=cv2.INTER_AREA) / 255.0
-    share = np.minimum(share * (FINER * width / thick), 1.0)[:, :, np.newaxis]
+    share = np.minimum(share * (FINER * width / (thick + 1)), 1.0)[:, :, np.newaxis]
     part = drawn[low[1] : high[1], low[0] : high[0]]
     part[:] = (1.0 - share) * part + share * CABLE_COLOR

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from pydrake.common.value import AbstractValue
+from pydrake.common.value import AbstractValue, Value
 from pydrake.geometry import FrameId, QueryObject
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, State

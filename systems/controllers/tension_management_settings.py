@@ -123,7 +123,7 @@ class TensionManagement:
         "Images of the cables per second; kind image.", "Hz", 25.0, above=0.0, at_most=FASTEST
     )
     sight_noise: float = number(
-        "Standard deviation of a point of a cable in the image; kind image with a projected camera.",
+        "Standard deviation of a point of a cable in the image; kind image, projected camera.",
         "px",
         0.5,
         at_least=0.0,

@@ -75,7 +75,7 @@ def test_slack_and_taut_cables_are_told_apart_and_measured():
 
 def test_where_they_are_believed_to_end_is_off():
     """By a millimetre: errors of sags stay within what the fit says."""
-    wrong = pose_from_angles(POSE.translation() + [1e-3, -5e-4, 5e-4], ANGLES)
+    wrong = pose_from_angles(POSE.translation() + np.array([1e-3, -5e-4, 5e-4]), ANGLES)
     seen = found(picture(), wrong)
     assert list(seen.verdict) == [SLACK if s > 0.0 else TAUT for s in SURPLUS]
     np.testing.assert_array_less(np.abs(seen.sag - truth()), KNOWN * seen.sigma)

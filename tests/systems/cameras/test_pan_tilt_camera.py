@@ -6,8 +6,9 @@ import pytest
 from cdpr_drake.analyses.simulation.run_summary import summarize
 from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
 from cdpr_drake.errors import ScenarioError
+from cdpr_drake.geometry.poses import pose_from_row
 from cdpr_drake.systems.diagrams.load import load_scenario
-from cdpr_drake.systems.loops.loop_choice import diagram_reason
+from cdpr_drake.systems.loops.loop_choice import check_loop, diagram_reason
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
 
 COMPILED = "integration.engine=compiled"
@@ -33,11 +34,8 @@ COMPILED = "integration.engine=compiled"
     ],
 )
 def test_refused_by_name(override, words):
-    from cdpr_drake.systems.loops.loop_choice import check_loop
-
     with pytest.raises(ScenarioError) as found:
-        scenario = load_scenario("acrobot_pan_tilt", override.split("; "))
-        check_loop(scenario)
+        check_loop(load_scenario("acrobot_pan_tilt", override.split("; ")))
     assert words in str(found.value)
 
 
@@ -68,8 +66,6 @@ def test_the_steady_view_is_that_of_the_mounting(run):
     log, servo = run.log, run.servo
     row = len(log["time"]) - 40
     assert log["found"][row] == 1.0
-    from cdpr_drake.geometry.poses import pose_from_row
-
     seen = pose_from_row(log["X_CO_measured"][row])
     time = np.floor(log["time"][row] * 25.0 - 1e-6) / 25.0
     k = int(np.argmin(np.abs(log["time"] - time)))
