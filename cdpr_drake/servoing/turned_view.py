@@ -63,6 +63,16 @@ def centring_rates(center: Array, tilt: float, gain: float) -> Array:
     return np.asarray(-gain * np.linalg.solve(J.T @ J + DAMPING**2 * np.eye(2), J.T @ center))
 
 
+def pointing_angles(p_MO: Array) -> Array:
+    """Pan and tilt at which z of the camera points along a line of sight, shape (2,) [rad].
+
+    Args:
+        p_MO: A point on the line from where the axes meet, in M, shape (3,) [m].
+    """
+    x, y, z = p_MO
+    return np.array([np.arctan2(x, z), np.arctan2(-y, np.hypot(x, z))])
+
+
 def spiral(time: float, pitch: float, speed: float, reach: float) -> Array:
     """Angles of a search round where a target was, shape (2,) [rad].
 

@@ -14,6 +14,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.servoing.servo_task import CameraMounting
+from cdpr_drake.servoing.turned_view import pointing_angles
 from cdpr_drake.systems.cameras.camera_settings import CameraSettings
 from cdpr_drake.systems.cameras.pan_tilt_settings import CameraPanTilt
 from cdpr_drake.systems.cameras.steady_view import SteadyView
@@ -69,6 +70,21 @@ def turned_mounting(
     arm = np.asarray(settings.arm, float)
     X_BM = mounting.X_BC @ RigidTransform(-arm)
     return replace(mounting, X_BC=head_pose(X_BM, arm, angles))
+
+
+def aimed_mounting(
+    mounting: CameraMounting, settings: CameraPanTilt, X_C0O: RigidTransform
+) -> CameraMounting:
+    """The mounting of a camera that its joints aim at a target, as far as they can.
+
+    Args:
+        mounting: The mounting, with both angles zero.
+        settings: The joints.
+        X_C0O: Pose of the target in the camera with both angles zero [m].
+    """
+    p_MO = X_C0O.translation() + np.asarray(settings.arm, float)
+    lower, upper = np.radians(settings.lower_deg), np.radians(settings.upper_deg)
+    return turned_mounting(mounting, settings, np.clip(pointing_angles(p_MO), lower, upper))
 
 
 def add_camera_joints(

@@ -9,6 +9,7 @@ from cdpr_drake.servoing.turned_view import (
     centre_jacobian,
     centring_rates,
     encoder_turn,
+    pointing_angles,
     spiral,
     steady_view,
 )
@@ -87,6 +88,12 @@ def test_errors_of_encoders_turn_the_camera_by_no_more():
         turns.append((R.inverse() @ R_wrong).ToAngleAxis().angle())
     np.testing.assert_allclose(turns, bound, rtol=1e-9)
     assert encoder_turn(0.05, 0.0) == pytest.approx(0.05)
+
+
+def test_pointing_angles_look_at_a_point():
+    for point in (POINT, np.array([-0.4, 0.7, 0.3]), np.array([0.2, 0.1, -0.5])):
+        p = head_pose(RigidTransform(), np.zeros(3), pointing_angles(point)).inverse() @ point
+        np.testing.assert_allclose(p, [0.0, 0.0, np.linalg.norm(point)], atol=1e-12)
 
 
 def test_the_search_leaves_nothing_out():

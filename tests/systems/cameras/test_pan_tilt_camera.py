@@ -4,10 +4,12 @@ import numpy as np
 import pytest
 
 from cdpr_drake.analyses.simulation.run_summary import summarize
+from cdpr_drake.analyses.simulation.start_checks import check_start
 from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.geometry.poses import pose_from_row
 from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.diagrams.visual_servo import build_visual_servo
 from cdpr_drake.systems.loops.loop_choice import check_loop, diagram_reason
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
 
@@ -80,6 +82,14 @@ def test_the_fixed_camera_sees_nothing():
         load_scenario("acrobot_pan_tilt", [COMPILED, "camera.pan_tilt=null", "duration=1.0"])
     )
     assert not np.any(fixed.log["found"])
+
+
+def test_a_start_that_no_angles_show_is_refused():
+    shown = build_visual_servo(load_scenario("acrobot_pan_tilt", [COMPILED]))
+    check_start(shown)
+    few = [COMPILED, "camera.pan_tilt.upper_deg=[75, 5]"]
+    with pytest.raises(ScenarioError, match=r"aimed by camera\.pan_tilt, does not see"):
+        check_start(build_visual_servo(load_scenario("acrobot_pan_tilt", few)))
 
 
 def test_a_rendered_camera_turns_too():
