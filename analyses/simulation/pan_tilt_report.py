@@ -75,6 +75,6 @@ def camera_joints_figure(title: str, log: Log, pinhole: Pinhole) -> Figure:
     axes[2].axhline(rim, color="0.4", linestyle="--", label="nearest rim of the image")
     labels = ("angle [deg]", "encoder - angle [deg]", "off the image's middle [px]")
     for each, label in zip(axes, labels, strict=True):
-        each.set(xlabel="time [s]", ylabel=label)
+        each.set(xlabel="time [s]", ylabel=label, xlim=axes[0].get_xlim())
         each.legend(loc="best")
     return figure

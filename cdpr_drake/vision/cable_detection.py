@@ -134,7 +134,8 @@ def find_sags(
         # A sag is known to be there, and more than what is left alone.
         least = max(wanted.least_sag, wanted.sigmas * fit.sigma)
         verdict[k] = SLACK if fit.sag > least else TAUT
-    return SeenSags(*found, verdict, points)
+    sag, sigma, surplus, surplus_sigma = found
+    return SeenSags(sag, sigma, surplus, surplus_sigma, verdict, points)
 
 
 @dataclass(frozen=True)
