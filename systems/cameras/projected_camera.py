@@ -54,7 +54,6 @@ class ProjectedCamera(TargetMeasurement):
         image_bias: Array | None = None,
         focus: tuple[float, float] | None = None,
         fault: CameraFault | None = None,
-        turns: bool = False,
     ) -> None:
         """For a target, and where it and the camera are fixed.
 
@@ -62,7 +61,7 @@ class ProjectedCamera(TargetMeasurement):
         each coordinate of what is measured [px]; `image_bias` as for `TargetMeasurement`;
         `fault` says when it fails. With a `focus` of share a and period T [s] the focal length
         that it has is 1 + a sin(2 pi t / T) times the one it is believed to have, as where an
-        auto-focus goes in and out; None: it is the same. If it `turns`, an input says where it is.
+        auto-focus goes in and out; None: it is the same. If it turns, an input says where it is.
         """
         super().__init__(target, pinhole, rate, latency_frames, image_bias)
         self._mounting, self._camera, self._focus = mounting, pinhole, focus
@@ -71,8 +70,7 @@ class ProjectedCamera(TargetMeasurement):
         self.DeclareAbstractInputPort("X_WP", Value(RigidTransform()))
         if not mounting.is_eye_to_hand():
             self.DeclareAbstractInputPort("X_WO", Value(RigidTransform()))
-        self._turns = turns
-        if turns:
+        if mounting.turns:
             self.DeclareAbstractInputPort("X_BC", Value(RigidTransform()))
 
     def find_marks(self, context: Context) -> Array | None:
@@ -104,7 +102,7 @@ class ProjectedCamera(TargetMeasurement):
         target in the camera frame [m]."""
         X_WO = None if self._mounting.is_eye_to_hand() else read("X_WO")
         mounting = self._mounting
-        if self._turns:
+        if mounting.turns:
             mounting = replace(mounting, X_BC=read("X_BC"))
         X_CO = mounting.X_CO(read("X_WP"), X_WO)
         if X_off is not None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from pydrake.geometry import FrameId, SceneGraph
-from pydrake.systems.framework import DiagramBuilder, OutputPort, System
+from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.models.rendered_camera import add_renderer
@@ -112,7 +112,6 @@ def add_camera(
     seed: int = 0,
     image_bias: Array | None = None,
     name: str = "",
-    X_BC: OutputPort | None = None,
 ) -> TargetMeasurement:
     """Adds a camera that measures a target.
 
@@ -127,8 +126,7 @@ def add_camera(
         seed: Seed of the noise of a projected camera, or of spoiled images.
         image_bias: Shift (u, v) of all that is measured, shape (2,) [px]; none if None.
         name: Put before the names of the blocks "camera" and, if whole images are rendered,
-            "detector".
-        X_BC: Pose of a camera that turns on its carrier [m]; None: it is fixed.
+            "detector". The input X_BC of a camera that turns is left open.
 
     Returns:
         The system with the ports of `TargetMeasurement`.
@@ -139,11 +137,9 @@ def add_camera(
     prefix = f"{name}_" if name else ""
     if settings.kind == PROJECTED:
         camera = projected_camera(
-            settings, target, mounting, pinhole, seed=seed, image_bias=image_bias,
-            turns=X_BC is not None,
-        )  # fmt: skip
+            settings, target, mounting, pinhole, seed=seed, image_bias=image_bias
+        )
         projected = builder.AddNamedSystem(prefix + "camera", camera)
-        _turn(builder, projected, X_BC)
         builder.Connect(robot.GetOutputPort("X_WP"), projected.GetInputPort("X_WP"))
         if X_WO is not None and not mounting.is_eye_to_hand():
             builder.Connect(X_WO, projected.GetInputPort("X_WO"))
@@ -159,7 +155,6 @@ def add_camera(
             pinhole=pinhole,
             image_bias=image_bias,
             name=prefix + "camera",
-            X_BC=X_BC,
         )
     spoiled = None if settings.flaws is None else SpoiledImages(
         flaws=settings.flaws.flaws(),
@@ -168,9 +163,7 @@ def add_camera(
         frame=robot.plant.GetBodyFrameIdOrThrow(robot.in_plant.body.index()),
         body=int(robot.in_plant.body_index),
     )  # fmt: skip
-    sensor = add_sensor(
-        builder, robot, mounting, pinhole, spoiled, name=prefix + "camera", X_BC=X_BC
-    )
+    sensor = add_sensor(builder, robot, mounting, pinhole, spoiled, name=prefix + "camera")
     detector = TargetDetector(target, pinhole, settings.rate, settings.latency_frames, image_bias)
     builder.AddNamedSystem(prefix + "detector", detector)
     builder.Connect(sensor.GetOutputPort("color_image"), detector.GetInputPort("color_image"))
@@ -187,7 +180,6 @@ def add_region_camera(
     pinhole: Pinhole,
     image_bias: Array | None,
     name: str,
-    X_BC: OutputPort | None = None,
 ) -> RegionCamera:
     """Adds a camera that draws a window round a target, to a robot whose scene has a renderer."""
     camera = RegionCamera(
@@ -198,10 +190,9 @@ def add_region_camera(
         X_BC=mounting.X_BC,
         latency_frames=settings.latency_frames,
         image_bias=image_bias,
-        turns=X_BC is not None,
+        turns=mounting.turns,
     )
     builder.AddNamedSystem(name, camera)
-    _turn(builder, camera, X_BC)
     builder.Connect(robot.GetOutputPort("query_object"), camera.GetInputPort("query_object"))
     return camera
 
@@ -214,7 +205,6 @@ def projected_camera(
     *,
     seed: int = 0,
     image_bias: Array | None = None,
-    turns: bool = False,
 ) -> ProjectedCamera:
     """The projected camera of some settings; arguments as for `add_camera`."""
     return ProjectedCamera(
@@ -228,7 +218,6 @@ def projected_camera(
         image_bias=image_bias,
         focus=(settings.focus_zoom, settings.focus_period) if settings.focus_zoom > 0.0 else None,
         fault=settings.fault,
-        turns=turns,
     )
 
 
@@ -240,25 +229,17 @@ def add_sensor(
     spoiled: SpoiledImages | None = None,
     *,
     name: str = "camera",
-    X_BC: OutputPort | None = None,
 ) -> SceneCamera:
     """Adds the rendering camera to a robot whose scene graph has a renderer."""
     frame = _camera_frame(robot, mounting)
-    camera = SceneCamera(frame, mounting.X_BC, pinhole, spoiled, X_BC is not None)
+    camera = SceneCamera(frame, mounting.X_BC, pinhole, spoiled, mounting.turns)
     sensor = builder.AddNamedSystem(name, camera)
-    _turn(builder, sensor, X_BC)
     if sensor.HasInputPort("body_velocities"):
         builder.Connect(
             robot.GetOutputPort("body_velocities"), sensor.GetInputPort("body_velocities")
         )
     builder.Connect(robot.GetOutputPort("query_object"), sensor.GetInputPort("query_object"))
     return sensor
-
-
-def _turn(builder: DiagramBuilder, camera: System, X_BC: OutputPort | None) -> None:
-    """Connects where a camera is on its carrier, if it turns."""
-    if X_BC is not None:
-        builder.Connect(X_BC, camera.GetInputPort("X_BC"))
 
 
 def _camera_frame(robot: RobotBlock, mounting: CameraMounting) -> FrameId:

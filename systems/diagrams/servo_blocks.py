@@ -135,10 +135,11 @@ def add_visual_servo(
         seed=settings.seed,
         image_bias=settings.perturbations.image_bias,
         name=name,
-        X_BC=None if joints is None else joints.GetOutputPort("X_BH"),
     )
     turning = None
     if joints is not None:
+        camera = builder.GetMutableSubsystemByName(prefix + "camera")
+        builder.Connect(joints.GetOutputPort("X_BH"), camera.GetInputPort("X_BC"))
         turning = add_centring(
             builder, settings.camera, joints, measurement, mounting=model.mounting,
             pinhole=pinhole, prefix=prefix,
