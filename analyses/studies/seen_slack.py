@@ -16,6 +16,7 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from pydrake.math import RigidTransform
 
@@ -35,7 +36,14 @@ from cdpr_drake.palette import nth_look
 from cdpr_drake.systems.cameras.cable_picture_camera import CablePicture
 from cdpr_drake.systems.diagrams.camera import pictured_robot
 from cdpr_drake.systems.robots.cable_robot import CableRobot
-from cdpr_drake.vision.cable_detection import SLACK, UNSEEN, SeenSags, SightSettings, find_sags
+from cdpr_drake.vision.cable_detection import (
+    SLACK,
+    TAUT,
+    UNSEEN,
+    SeenSags,
+    SightSettings,
+    find_sags,
+)
 from cdpr_drake.vision.cable_images import sag_of_surplus
 
 ROBOT, MOUNT = "acrobot_small", "overview"
@@ -204,28 +212,38 @@ def spread(runs: Runs) -> Finding:
     return Finding(found="; ".join(words), held=held)
 
 
+def draw_found(axis: Axes, seed: int) -> None:
+    """An image with what is found in it, cut to where cables are; slack ones with their sags."""
+    image, found, true = seen(seed, EXACT)
+    axis.imshow(image)
+    everywhere = np.hstack(found.points)
+    labels = {TAUT: "on a taut cable", SLACK: "on a slack cable, sag found (true)"}
+    for verdict, words in labels.items():
+        look = nth_look(verdict)
+        chosen = [
+            uv for uv, said in zip(found.points, found.verdict, strict=True) if said == verdict
+        ]
+        if chosen:
+            axis.plot(
+                *np.hstack(chosen), "x" if verdict == SLACK else ".", color=look.color,
+                markersize=4.0 if verdict == SLACK else 2.0, linestyle="none", label=words,
+            )  # fmt: skip
+    for k in np.flatnonzero(found.verdict == SLACK):
+        uv = found.points[k]
+        axis.annotate(
+            f"{1e3 * found.sag[k]:.1f} mm ({1e3 * true[k]:.1f})", uv[:, uv.shape[1] // 3],
+            fontsize=9, xytext=(8, -2), textcoords="offset points",
+        )  # fmt: skip
+    low, high = np.min(everywhere, axis=1) - 15.0, np.max(everywhere, axis=1) + 45.0
+    axis.set(xlabel="u [px]", ylabel="v [px]", xlim=(low[0], high[0]), ylim=(high[1], low[1]))
+    axis.grid(visible=False)
+    axis.legend(loc="lower left")
+
+
 def figure(runs: Runs) -> Figure:
     """An image with what is found in it, and errors of all."""
     drawn, axes = new_figure(1, 2, (14.0, 5.4), "Cables found in a rendered image, and their sags")
-    seed = int(runs["seed"][0])
-    image, found, true = seen(seed, EXACT)
-    axes[0].imshow(image)
-    for k, uv in enumerate(found.points):
-        if uv.shape[1] == 0:
-            continue
-        slack = found.verdict[k] == SLACK
-        look = nth_look(1 if slack else 0)
-        axes[0].plot(
-            *uv, ".", color=look.color, markersize=2.5 if slack else 1.2,
-        )  # fmt: skip
-        j = uv.shape[1] // 2
-        axes[0].annotate(
-            f"{1e3 * found.sag[k]:.1f} mm ({1e3 * true[k]:.1f})", uv[:, j], fontsize=8,
-            xytext=(6, 0), textcoords="offset points",
-        )  # fmt: skip
-    axes[0].set(xlabel="u [px]", ylabel="v [px]")
-    axes[0].set_title("found sag (true); large dots: slack", fontsize=11)
-    axes[0].grid(visible=False)
+    draw_found(axes[0], int(runs["seed"][0]))
     for k, (pose, some) in enumerate(runs.by("pose")):
         look = nth_look(k)
         axes[1].plot(
