@@ -218,7 +218,7 @@ def spread(runs: Runs) -> Finding:
     return Finding(
         found="; ".join(words),
         held=held,
-        why="Lines of neighbours that run along a cable for a part of its way draw its curve over.",
+        why="Errors have a longer tail than normal ones: a few cables make the mean.",
     )
 
 
