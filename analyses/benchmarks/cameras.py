@@ -1,4 +1,4 @@
-"""Benchmarks of cameras with a lens beside cameras without one."""
+"""Benchmarks of cameras with a lens beside cameras without one, and of cables in images."""
 
 from __future__ import annotations
 
@@ -10,11 +10,16 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.reporting.timing import TimingRow, interleaved, seconds_per_call
 from cdpr_drake.arrays import Array
+from cdpr_drake.cables.curves import cable_curves
+from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.poses import pose_from_angles
 from cdpr_drake.models.camera_catalogue import load_camera
+from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.servoing.servo_task import CameraMounting
 from cdpr_drake.systems.cameras.projected_camera import ProjectedCamera
 from cdpr_drake.vision.apriltags import TagTarget
+from cdpr_drake.vision.cable_detection import find_sags
+from cdpr_drake.vision.cable_pictures import draw_cables
 from cdpr_drake.vision.lens_distortion import LensDistortion
 from cdpr_drake.vision.lens_picture import StraightPicture, lens_picture, without_lens
 from cdpr_drake.vision.pinhole import Pinhole
@@ -40,7 +45,35 @@ def camera_rows(quick: bool) -> list[TimingRow]:
         camera = replace(pinhole, distortion=lens)
         rows.append(projected_row(name, (pinhole, camera), repeats, calls))
         rows.append(rendered_row(name, (pinhole, camera), repeats, max(calls // 20, 2)))
-    return rows
+    return [*rows, cables_row(repeats, max(calls // 40, 2))]
+
+
+def cables_row(repeats: int, calls: int) -> TimingRow:
+    """The search for eight cables in an image, beside that for a tag in one of the same size."""
+    robot = load_robot("acrobot_small")
+    mount = robot.camera_mount("overview")
+    camera = load_camera(mount.model)
+    pinhole, cables = camera.pinhole(camera.width, camera.height), robot.cable_set()
+    X_WE, X_WP = mount.pose.transform(), RigidTransform([0.1, 0.02, 0.3])
+    lengths = cable_paths(X_WP, cables).lengths + np.tile([-1e-4, 0.01], cables.count // 2)
+    plain = np.full((pinhole.height, pinhole.width, 3), 157, np.uint8)
+    image = draw_cables(
+        plain, np.full(plain.shape[:2], np.inf), cable_curves(cables, "elastic", X_WP, lengths, 65),
+        0.5 * robot.diameters(), X_WE, pinhole,
+    )  # fmt: skip
+    tag = TagTarget(0, TAG_SIZE)
+    drawn = drawn_image(tag, X_CO, pinhole)
+    found, search = interleaved(
+        [
+            lambda: seconds_per_call(lambda: find_sags(image, cables, X_WP, X_WE, pinhole), calls),
+            lambda: seconds_per_call(lambda: tag.find(drawn), calls),
+        ],
+        repeats,
+    )
+    return TimingRow(
+        "eight cables in an image", 1e3 * found, "ms/image", "AprilTag", 1e3 * search,
+        found / search, ratio_means="of the search for a tag in an image as large",
+    )  # fmt: skip
 
 
 def projected_row(

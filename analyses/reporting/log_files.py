@@ -39,6 +39,9 @@ _PARTS = {
     "imu_biases": ("ax_m_s2", "ay_m_s2", "az_m_s2", "wx_rad_s", "wy_rad_s", "wz_rad_s"),
     "pan_tilt_angles": ("pan_rad", "tilt_rad"),
     "pan_tilt_encoders": ("pan_rad", "tilt_rad"),
+    "camera_joints": ("pan_rad", "tilt_rad"),
+    "camera_encoders": ("pan_rad", "tilt_rad"),
+    "turned_found": ("flag",),
     "wheel_distances": ("left_m", "right_m"),
     "contact_force": ("x_n", "y_n", "z_n"),
     "contact_count": ("count",),
@@ -96,7 +99,7 @@ def column_names(
             own = _POSE
         elif quantity == "error":
             own = tuple(features)
-        elif quantity == "corners_px":
+        elif quantity in ("corners_px", "turned_corners_px"):
             own = tuple(f"{axis}{k}_px" for k in range(size // 2) for axis in "uv")
         elif quantity == "ellipses_px":
             own = tuple(f"{part}{k}_{unit}" for k in (0, 1) for part, unit in _ELLIPSE)

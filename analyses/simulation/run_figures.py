@@ -14,6 +14,7 @@ from cdpr_drake.analyses.simulation.hardware_figures import (
     reading_figure,
     tension_loop_figure,
 )
+from cdpr_drake.analyses.simulation.pan_tilt_report import camera_joints_figure
 from cdpr_drake.analyses.simulation.perception_figures import looking_figures
 from cdpr_drake.analyses.simulation.run_stability import stability_of_run
 from cdpr_drake.analyses.simulation.run_summary import camera_line, image_path
@@ -47,6 +48,7 @@ from cdpr_drake.palette import (
     TARGET,
     nth_look,
 )
+from cdpr_drake.systems.diagrams.pan_tilt import LOGGED_JOINTS
 from cdpr_drake.systems.diagrams.torque_control import tension_limits
 from cdpr_drake.systems.estimators.geometry_learner import LEARNT
 from cdpr_drake.systems.estimators.wrench_estimator import WRENCH_ESTIMATED
@@ -87,6 +89,9 @@ def run_figures(result: RunResult, formats: Sequence[str] = DEFAULT_FORMATS) -> 
     if LEARNT in log:
         learnt = _title(result, "Exit and anchor points learnt on the way, and the truth")
         drawn["adaptation"] = lambda: adaptation_figure(learnt, log, robot)
+    if LOGGED_JOINTS in log:
+        turned = _title(result, "Joints of the camera, and where the target is in its image")
+        drawn["camera_joints"] = lambda: camera_joints_figure(turned, log, result.servo.pinhole)
     world = result.servo.scenario.world
     if world is not None:
         around = _title(result, world_words(world))

@@ -11,6 +11,7 @@ from cdpr_drake.analyses.reporting.log_files import finite, spread
 from cdpr_drake.analyses.reporting.log_on_disk import Log, log_block, log_rows
 from cdpr_drake.analyses.reporting.provenance import package_versions
 from cdpr_drake.analyses.simulation.adaptation_report import adaptation_summary
+from cdpr_drake.analyses.simulation.pan_tilt_report import pan_tilt_summary
 from cdpr_drake.analyses.simulation.run_stability import stability_of_run
 from cdpr_drake.analyses.simulation.visual_servo_run import RunResult
 from cdpr_drake.analyses.simulation.worlds import world_summary
@@ -180,6 +181,9 @@ def summarize(result: RunResult) -> dict[str, Any]:
         summary["wrench_estimation"] = wrench_summary(log, estimation.kind, servo.wrench.delay)
     if LEARNT in log:
         summary["adaptation"] = adaptation_summary(log, servo.robot, servo.believed)
+    if scenario.camera.pan_tilt is not None:
+        turned = pan_tilt_summary(log, scenario.camera.pan_tilt, servo.pinhole)
+        summary["pan_tilt"] = turned
     if isinstance(servo, VisualServo) and servo.remote is not None:
         summary["remote"] = servo.remote.report()
     cleaned: dict[str, Any] = finite(summary)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from cdpr_drake.errors import InfeasibleTensionError, ScenarioError, TensionProblemError
 from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.systems.diagrams.pan_tilt import aimed_mounting
 from cdpr_drake.systems.diagrams.servo_models import LoopServo
 from cdpr_drake.systems.diagrams.visual_servo import VisualServo
 from cdpr_drake.systems.robots.cable_robot import (
@@ -21,13 +22,17 @@ MOST_STEPS = 1e9
 
 
 def check_start(servo: VisualServo | LoopServo) -> None:
-    """Makes sure that the camera sees the target at the start.
+    """Makes sure that the camera sees the target at the start, or can be turned so that it does.
 
     Raises:
         ScenarioError: It does not; says where the target would be.
     """
     scenario, pinhole = servo.scenario, servo.pinhole
-    X_CO = servo.X_CO(scenario.initial_pose.transform(), 0.0)
+    X_WP, joints = scenario.initial_pose.transform(), scenario.camera.pan_tilt
+    X_CO, aimed = servo.X_CO(X_WP, 0.0), ""
+    if joints is not None:
+        mounting = aimed_mounting(servo.mounting, joints, X_CO)
+        X_CO, aimed = mounting.X_CO(X_WP, servo.motion.at(0.0)), ", aimed by camera.pan_tilt,"
     if servo.target.in_view(X_CO, pinhole):
         return
     depth = float(X_CO.translation()[2])
@@ -41,8 +46,8 @@ def check_start(servo: VisualServo | LoopServo) -> None:
         if low_u <= u <= high_u and low_v <= v <= high_v:
             where += "; it is turned away from the camera, or a part of it is outside"
     raise ScenarioError(
-        f"{scenario.name}: initial_pose: the camera does not see the target at the start: {where}; "
-        f"accepted: all of it within {pinhole.width} x {pinhole.height} px, face on"
+        f"{scenario.name}: initial_pose: the camera{aimed} does not see the target at the start: "
+        f"{where}; accepted: all of it within {pinhole.width} x {pinhole.height} px, face on"
     )
 
 

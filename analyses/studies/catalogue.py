@@ -95,6 +95,8 @@ MODULES = {
     "failure": "failure",
     "detection": "detection",
     "adaptation": "adaptation",
+    "pan-tilt": "pan_tilt",
+    "seen-slack": "seen_slack",
     "calibration": "calibration.study",
     "identification": "identification",
     "case-1": "case_studies.case_1",

@@ -44,7 +44,9 @@ from cdpr_drake.models.robot_holding import rest_as_long
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.palette import CAMERA, PLATFORM, Look, rgb
 from cdpr_drake.servoing.servo_task import CameraMounting
+from cdpr_drake.systems.cameras.pan_tilt_settings import CameraPanTilt
 from cdpr_drake.systems.diagrams.camera import pictured_robot
+from cdpr_drake.systems.diagrams.pan_tilt import LOGGED_JOINTS, turned_mounting
 from cdpr_drake.systems.monitoring.meshcat_cables import CablePictures
 from cdpr_drake.systems.robots.cable_robot import CableRobot, holding_tensions
 from cdpr_drake.systems.robots.settings import CableSettings
@@ -301,7 +303,8 @@ def write_replay(
         picture.title = title or picture.title
         picture.show_things(things)
         most = min(most, _affordable_frames(picture, log, len(things)))
-        shown, frames = _record(picture, log, camera, most, things)
+        joints = None if scenario is None else scenario.camera.pan_tilt
+        shown, frames = _record(picture, log, camera, most, things, joints)
         seen = None if view is None else camera_signals(view, log, shown, images)
         return Recorded(picture.recording_html(frames, curves, seen), len(shown), most)
 
@@ -384,6 +387,7 @@ def _record(
     camera: tuple[CameraMounting, Pinhole] | None,
     most: int,
     things: Sequence[Any] = (),
+    joints: CameraPanTilt | None = None,
 ) -> tuple[list[int], dict[str, Any]]:
     """Records at most so many frames; rows of the log that they show, and their numbers."""
     times = log["time"]  # a log on disk is read where it is looked at: once, only what is shown
@@ -391,6 +395,7 @@ def _record(
     poses, tensions = log["X_WP"][shown], log["tensions"][shown]
     unstrained = log["unstrained_lengths"][shown] if "unstrained_lengths" in log else None
     slack = np.zeros(tensions.shape, bool)
+    angles = None if joints is None else log[LOGGED_JOINTS][shown]
     mover = ThingMover(picture.meshcat, things, log, shown)
     picture.start_recording()
     for frame, time in enumerate(times[shown]):
@@ -400,7 +405,10 @@ def _record(
         mover.place(frame, float(time))
         slack[frame] = picture.cables.slack(tensions[frame], lengths)
         if camera is not None:
-            picture.place_camera(camera[0].X_WC(X_WP), float(time))
+            mounting = camera[0]
+            if joints is not None and angles is not None:
+                mounting = turned_mounting(mounting, joints, angles[frame])
+            picture.place_camera(mounting.X_WC(X_WP), float(time))
     return shown, frame_signals(log, shown, slack)
 
 

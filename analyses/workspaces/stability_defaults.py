@@ -14,6 +14,7 @@ from cdpr_drake.models.robot_loader import robot_file, robot_names
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.schema.fields import array, number, section, text
 from cdpr_drake.schema.typed_yaml import load_typed
+from cdpr_drake.servoing.turned_view import encoder_turn
 from cdpr_drake.stability.perturbation_bounds import (
     BASELINE,
     DIRECTIONS,
@@ -50,6 +51,13 @@ class BoundsSettings:
     d_theta_s_deg: float = number(
         "Orientation of the object seen by the camera.", "deg", 0.0, at_least=0.0, at_most=180.0
     )
+    encoders_deg: np.ndarray = array(
+        "Encoders of the joints, pan and tilt, of a camera that turns on such.",
+        "deg",
+        (2,),
+        (0.0, 0.0),
+        at_least=0.0,
+    )
     exits: str = text(
         "How exit points are wrong: each by itself in a ball, all by one common shift, or each in "
         "a cube.",
@@ -69,6 +77,7 @@ class BoundsSettings:
             d_theta_bp=float(np.radians(self.d_theta_bp_deg)),
             d_theta_pc=float(np.radians(self.d_theta_pc_deg)),
             d_theta_s=float(np.radians(self.d_theta_s_deg)),
+            d_theta_joints=encoder_turn(*np.radians(self.encoders_deg)),
             exits=self.exits,
             anchors=self.anchors,
         )

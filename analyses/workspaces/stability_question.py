@@ -26,7 +26,7 @@ from cdpr_drake.models.robot_loader import as_robot, robot_reference
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.schema.typed_yaml import closest
 from cdpr_drake.stability.desired_view import FixedObject, OppositeCorner, ServoTarget
-from cdpr_drake.stability.perturbation_bounds import RADII, PerturbationBounds
+from cdpr_drake.stability.perturbation_bounds import BOUNDS, PerturbationBounds
 from cdpr_drake.stability.stability_case import StabilityCase
 from cdpr_drake.stability.verdict import VERDICTS, VerdictOptions
 from cdpr_drake.workspaces.pose_grid import WorkspaceGrid, grid_by_step
@@ -219,8 +219,8 @@ def varied(base: PerturbationBounds, parameter: str, value: float) -> Perturbati
     """
     name = parameter.removesuffix(DEGREES)
     angle = name.startswith("d_theta")
-    if name not in RADII or (parameter != name and not angle):
-        known = [one for r in RADII for one in ((r, r + DEGREES) if "theta" in r else (r,))]
+    if name not in BOUNDS or (parameter != name and not angle):
+        known = [one for r in BOUNDS for one in ((r, r + DEGREES) if "theta" in r else (r,))]
         raise StabilityError(f"bound {parameter!r} is unknown; {closest(parameter, known)}")
     if parameter != name:
         if not 0.0 <= value <= 180.0:

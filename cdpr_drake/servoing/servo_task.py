@@ -78,10 +78,12 @@ class CameraMounting:
         X_BC: Pose of the camera C on its carrier B: the platform P (eye in hand), or the world W
             (eye to hand) [m].
         X_PO: Pose of the object O on the platform, for eye to hand; None: eye in hand [m].
+        turns: Whether joints turn the camera about X_BC, where both of their angles are zero.
     """
 
     X_BC: RigidTransform
     X_PO: RigidTransform | None = None
+    turns: bool = False
 
     def is_eye_to_hand(self) -> bool:
         """Whether the camera stands in the world and the object moves with the platform."""

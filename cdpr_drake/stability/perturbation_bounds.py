@@ -54,6 +54,9 @@ class PerturbationBounds:
         d_theta_bp: Platform orientation [rad].
         d_theta_pc: Camera orientation on the platform [rad].
         d_theta_s: Orientation of the object in the camera frame [rad].
+        d_theta_joints: Rotation of a camera on joints that errors of their encoders hide, as
+            `servoing.turned_view.encoder_turn` has it [rad]; it adds to d_theta_pc, in whose ball
+            the rotations of both together are.
         exits: One of `DIRECTIONS`, for the exit points.
         anchors: One of `DIRECTIONS`, for the anchor points.
     """
@@ -66,6 +69,7 @@ class PerturbationBounds:
     d_theta_bp: float = 0.0
     d_theta_pc: float = 0.0
     d_theta_s: float = 0.0
+    d_theta_joints: float = 0.0
     exits: str = "independent"
     anchors: str = "independent"
 
@@ -76,7 +80,7 @@ class PerturbationBounds:
             StabilityError: A bound is negative or not finite, an angle is above pi, or a direction
                 is unknown.
         """
-        for name in RADII:
+        for name in BOUNDS:
             value = getattr(self, name)
             angle = name.startswith("d_theta")
             if not (math.isfinite(value) and value >= 0.0 and not (angle and value > math.pi)):
@@ -89,11 +93,14 @@ class PerturbationBounds:
 
     def radii(self) -> Array:
         """Bounds in the order of the blocks, exit and anchor points once each, shape (8,)."""
-        return np.array([getattr(self, name) for name in RADII], float)
+        radii = np.array([getattr(self, name) for name in RADII], float)
+        if self.d_theta_joints > 0.0:
+            radii[CAMERA_TURN] = min(radii[CAMERA_TURN] + self.d_theta_joints, math.pi)
+        return radii
 
     def scaled(self, share: float) -> PerturbationBounds:
         """All bounds times `share`."""
-        return replace(self, **{name: share * getattr(self, name) for name in RADII})
+        return replace(self, **{name: share * getattr(self, name) for name in BOUNDS})
 
     def varied(self, **changes: Any) -> PerturbationBounds:
         """The same with some fields changed."""
@@ -106,12 +113,20 @@ class PerturbationBounds:
         return replace(self, **changes)
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON, radians and metres."""
-        return asdict(self)
+        """For JSON, radians and metres; without joints where the camera has none."""
+        found = asdict(self)
+        if self.d_theta_joints == 0.0:
+            del found["d_theta_joints"]
+        return found
 
 
 RADII = ("d_theta_bp", "r_bp", "d_theta_pc", "r_pc", "d_theta_s", "r_s", "r_A", "r_B")
 """Names of the bounds in the order of the blocks."""
+
+CAMERA_TURN = RADII.index("d_theta_pc")
+
+BOUNDS = (*RADII, "d_theta_joints")
+"""Names of all bounds."""
 
 BASELINE = PerturbationBounds(
     r_bp=0.03,

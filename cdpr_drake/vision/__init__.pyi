@@ -1,3 +1,6 @@
+from .cable_detection import SeenSags as SeenSags
+from .cable_detection import SightSettings as SightSettings
+from .cable_detection import find_sags as find_sags
 from .cable_images import slack_from_image as slack_from_image
 from .pinhole import Pinhole as Pinhole
 from .target import PointTarget as PointTarget

@@ -249,6 +249,17 @@ def surplus_of_drops(x: Array, drops: Array, span: float, rise: float) -> tuple[
     return root**2, 2.0 * root * slope / (slope @ slope)
 
 
+def sag_of_surplus(surplus: float, span: float, rise: float) -> float:
+    """How far the middle of a hanging cable is below the line between its ends [m]; arguments as
+    for `catenary_drop`."""
+    return float(catenary_drop(np.array([0.5 * span]), span, rise, surplus)[0])
+
+
+def drop_per_root(span: float, rise: float) -> float:
+    """How far the middle of a flat cable hangs by the root of its surplus, about [m^0.5]."""
+    return _per_root(span, float(np.hypot(span, rise)))
+
+
 def _per_root(span: float, chord: float) -> float:
     """Drop of a flat parabola's middle by the root of its surplus, for ends so far apart [m^0.5].
 

@@ -1,3 +1,5 @@
+from .cable_picture_camera import CablePicture as CablePicture
+from .cable_picture_camera import CablePictureCamera as CablePictureCamera
 from .camera_settings import PROJECTED as PROJECTED
 from .camera_settings import CameraSettings as CameraSettings
 from .projected_camera import ProjectedCamera as ProjectedCamera

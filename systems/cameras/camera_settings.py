@@ -10,6 +10,7 @@ from cdpr_drake.errors import RobotFileError, ScenarioError
 from cdpr_drake.models.camera_catalogue import CameraFault, Distortion, fold_problem, load_camera
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.schema.fields import FASTEST, number, optional_section, text, whole
+from cdpr_drake.systems.cameras.pan_tilt_settings import CameraPanTilt
 from cdpr_drake.vision.image_flaws import ImageFlaws
 from cdpr_drake.vision.pinhole import Pinhole
 
@@ -109,6 +110,9 @@ class CameraSettings:
     )
     fault: CameraFault | None = optional_section(
         "When it fails; null: never; projected camera only."
+    )
+    pan_tilt: CameraPanTilt | None = optional_section(
+        "Two joints that turn it and keep the target in view; null: it is fixed."
     )
 
 

@@ -30,6 +30,7 @@ class ProjectedCamera(TargetMeasurement):
     X_WP        RigidTransform m    in, true pose of the platform
     X_WO        RigidTransform m    in, true pose of the object; only if it is not on the
                                     platform
+    X_BC        RigidTransform m    in, true pose of the camera on its carrier; only if it turns
     corners     vector(2 n)    px   out, or `ellipses`: as `TargetMeasurement`
     X_CO        RigidTransform m    out, as `TargetMeasurement`
     found       vector(1)      -    out, as `TargetMeasurement`
@@ -60,7 +61,7 @@ class ProjectedCamera(TargetMeasurement):
         each coordinate of what is measured [px]; `image_bias` as for `TargetMeasurement`;
         `fault` says when it fails. With a `focus` of share a and period T [s] the focal length
         that it has is 1 + a sin(2 pi t / T) times the one it is believed to have, as where an
-        auto-focus goes in and out; None: it is the same.
+        auto-focus goes in and out; None: it is the same. If it turns, an input says where it is.
         """
         super().__init__(target, pinhole, rate, latency_frames, image_bias)
         self._mounting, self._camera, self._focus = mounting, pinhole, focus
@@ -69,6 +70,8 @@ class ProjectedCamera(TargetMeasurement):
         self.DeclareAbstractInputPort("X_WP", Value(RigidTransform()))
         if not mounting.is_eye_to_hand():
             self.DeclareAbstractInputPort("X_WO", Value(RigidTransform()))
+        if mounting.turns:
+            self.DeclareAbstractInputPort("X_BC", Value(RigidTransform()))
 
     def find_marks(self, context: Context) -> Array | None:
         """Projected marks with noise, or None if out of view."""
@@ -98,7 +101,10 @@ class ProjectedCamera(TargetMeasurement):
         """As `find_marks` of a camera without a fault, at a time [s], from where X_off puts the
         target in the camera frame [m]."""
         X_WO = None if self._mounting.is_eye_to_hand() else read("X_WO")
-        X_CO = self._mounting.X_CO(read("X_WP"), X_WO)
+        mounting = self._mounting
+        if mounting.turns:
+            mounting = replace(mounting, X_BC=read("X_BC"))
+        X_CO = mounting.X_CO(read("X_WP"), X_WO)
         if X_off is not None:
             X_CO = X_off @ X_CO
         random = _ImageNoise(self._seed, round(time * self._rate))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from pydrake.common.value import AbstractValue
+from pydrake.common.value import AbstractValue, Value
 from pydrake.geometry import FrameId, QueryObject
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, State
@@ -27,6 +27,7 @@ class RegionCamera(TargetMeasurement):
     port         type           unit meaning
     ============ ============== ==== ========================================================
     query_object QueryObject    -    in, of the scene graph
+    X_BC         RigidTransform m    in, pose of the camera on B; only if it turns
     corners      vector(2 n)    px   out, or `ellipses`: as `TargetMeasurement`
     X_CO         RigidTransform m    out, as `TargetMeasurement`
     found        vector(1)      -    out, as `TargetMeasurement`
@@ -52,6 +53,7 @@ class RegionCamera(TargetMeasurement):
         X_BC: RigidTransform,
         latency_frames: int = 0,
         image_bias: Array | None = None,
+        turns: bool = False,
     ) -> None:
         """For one target, and a camera of the scene.
 
@@ -63,6 +65,7 @@ class RegionCamera(TargetMeasurement):
             X_BC: Pose of the camera frame C in B, z forward, y down [m].
             latency_frames: Latency in whole frames.
             image_bias: As for `TargetMeasurement`.
+            turns: Whether an input says where it is on B.
 
         Raises:
             LensDistortionError: The lens distorts, or is believed to be another.
@@ -77,6 +80,9 @@ class RegionCamera(TargetMeasurement):
         self._query = self.DeclareAbstractInputPort(
             "query_object", AbstractValue.Make(QueryObject())
         )
+        self._turned = None
+        if turns:
+            self._turned = self.DeclareAbstractInputPort("X_BC", Value(RigidTransform()))
         self._memory = self.DeclareDiscreteState(np.concatenate([[0.0, 0.0], np.full(4, np.nan)]))
 
     def images(self, context: Context) -> tuple[int, int]:
@@ -87,7 +93,13 @@ class RegionCamera(TargetMeasurement):
     def picture(self, context: Context) -> np.ndarray:
         """The whole image of now, shape (height, width, 4), 8 bits a channel, for people to look
         at, from the block's own context."""
-        return draw_image(self._query.Eval(context), self._parent, self._X_BC, self.pinhole)
+        return draw_image(
+            self._query.Eval(context), self._parent, self._place(context), self.pinhole
+        )
+
+    def _place(self, context: Context) -> RigidTransform:
+        """Where the camera is on B."""
+        return self._X_BC if self._turned is None else self._turned.Eval(context)
 
     def find_marks(self, context: Context) -> Array | None:
         """The target's marks in the scene of now, or None; [px] of the whole image."""
@@ -106,15 +118,16 @@ class RegionCamera(TargetMeasurement):
 
     def _find(self, context: Context) -> tuple[Array | None, bool]:
         """Marks, and whether the whole image was drawn."""
-        query, everything = self._query.Eval(context), whole_image(self.pinhole)
+        scene = self._query.Eval(context), self._place(context)
+        everything = whole_image(self.pinhole)
         before = context.get_discrete_state(self._memory).value()[_BOX]
         seen = self.newest_marks(context)
         window = expected_window(self._last_box(context), before, self.pinhole)
         if window is not None and window != everything:
-            marks = self._search(query, window, seen)
+            marks = self._search(scene, window, seen)
             if marks is not None:
                 return marks, False
-        return self._search(query, everything, seen), True
+        return self._search(scene, everything, seen), True
 
     def _last_box(self, context: Context) -> Array:
         """Where the target was in the newest image, shape (4,) [px]; NaN where it was not seen."""
@@ -124,11 +137,17 @@ class RegionCamera(TargetMeasurement):
         box = target_box(self.target, X_CO, self.pinhole)
         return box if self.bias is None else box - np.tile(self.bias, 2)
 
-    def _search(self, query: QueryObject, window: ImageWindow, seen: Array | None) -> Array | None:
+    def _search(
+        self,
+        scene: tuple[QueryObject, RigidTransform],
+        window: ImageWindow,
+        seen: Array | None,
+    ) -> Array | None:
+        query, X_BC = scene
         if window == whole_image(self.pinhole):
-            picture = draw_image(query, self._parent, self._X_BC, self.pinhole)
+            picture = draw_image(query, self._parent, X_BC, self.pinhole)
         else:
-            picture = draw_window(query, self._parent, self._X_BC, self.pinhole, window)
+            picture = draw_window(query, self._parent, X_BC, self.pinhole, window)
         corner = np.array([window.u, window.v], float)
         before = None if seen is None else shifted_marks(self.target, seen, -corner)
         marks = self.target.follow(picture, before)

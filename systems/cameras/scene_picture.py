@@ -75,6 +75,7 @@ class SceneCamera(LeafSystem):
                                                 `add_renderer`
     body_velocities list[SpatialVelocity] rad/s in, of all bodies in W, as MultibodyPlant gives
                                           m/s   them; only if images take time
+    X_BC            RigidTransform        m     in, pose of the camera on B; only if it turns
     color_image     ImageRgba8U           -     out
     =============== ===================== ===== ==================================================
 
@@ -90,6 +91,7 @@ class SceneCamera(LeafSystem):
         X_BC: RigidTransform,
         pinhole: Pinhole,
         spoiled: SpoiledImages | None = None,
+        turns: bool = False,
     ) -> None:
         """For a camera on a body B.
 
@@ -98,6 +100,7 @@ class SceneCamera(LeafSystem):
             X_BC: Pose of the camera frame C in B, z forward, y down [m].
             pinhole: Intrinsic parameters [px] and lens.
             spoiled: What spoils its images; None: nothing.
+            turns: Whether an input says where it is on B; it rests there while an image is exposed.
 
         Raises:
             LensDistortionError: The lens has no valid field in all of the image.
@@ -111,6 +114,9 @@ class SceneCamera(LeafSystem):
             )
         query = AbstractValue.Make(QueryObject())
         self._query = self.DeclareAbstractInputPort("query_object", query)
+        self._turned = None
+        if turns:
+            self._turned = self.DeclareAbstractInputPort("X_BC", Value(RigidTransform()))
         self.DeclareAbstractOutputPort(
             "color_image",
             lambda: Value(ImageRgba8U(pinhole.width, pinhole.height)),
@@ -119,13 +125,14 @@ class SceneCamera(LeafSystem):
 
     def _calc_image(self, context: Context, output: AbstractValue) -> None:
         query, spoiled = self._query.Eval(context), self._spoiled
+        X_BC = self._X_BC if self._turned is None else self._turned.Eval(context)
         if spoiled is None:
-            output.get_mutable_value().mutable_data[:] = self._seen(query, self._X_BC)
+            output.get_mutable_value().mutable_data[:] = self._seen(query, X_BC)
             return
-        flaws, places = spoiled.flaws, [self._X_BC]
+        flaws, places = spoiled.flaws, [X_BC]
         if flaws.moves:
             V_WP = self._velocities.Eval(context)[spoiled.body]
-            places = self._places(query, V_WP, flaws.instants)
+            places = self._places(query, V_WP, flaws.instants, X_BC)
         image = flaws.expose(np.array([self._seen(query, place) for place in places]))
         number = round(context.get_time() * spoiled.rate)
         random = np.random.default_rng([spoiled.seed, _IMAGE_STREAM, number])
@@ -137,7 +144,7 @@ class SceneCamera(LeafSystem):
         return drawn if self._pinhole.distortion is None else lens_picture(drawn, self._pinhole)
 
     def _places(
-        self, query: QueryObject, V_WP: SpatialVelocity, instants: Array
+        self, query: QueryObject, V_WP: SpatialVelocity, instants: Array, X_BC: RigidTransform
     ) -> list[RigidTransform]:
         """Poses in B from which the scene of now looks as it did before, at instants [s], from
         where the camera was then."""
@@ -146,9 +153,9 @@ class SceneCamera(LeafSystem):
         R_PW = X_WP.rotation().inverse()
         V_P = np.concatenate([R_PW @ V_WP.rotational(), R_PW @ V_WP.translational()])
         if self._parent == self._spoiled.frame:
-            return [exponential(V_P * t) @ self._X_BC for t in instants]
+            return [exponential(V_P * t) @ X_BC for t in instants]
         X_PB = X_WP.inverse() @ query.GetPoseInWorld(self._parent)
-        return [X_PB.inverse() @ exponential(-V_P * t) @ X_PB @ self._X_BC for t in instants]
+        return [X_PB.inverse() @ exponential(-V_P * t) @ X_PB @ X_BC for t in instants]
 
 
 def draw_window(

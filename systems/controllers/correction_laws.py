@@ -58,6 +58,12 @@ class CorrectionReadings:
         return np.asarray(self._read("cable_points"))
 
     @cached_property
+    def cable_surplus(self) -> Array:
+        """Seen surplus lengths and their standard deviations, as `CablePictureCamera` gives them
+        [m]."""
+        return np.asarray(self._read("cable_surplus"))
+
+    @cached_property
     def X_WP(self) -> RigidTransform:
         """Believed pose of the platform [m]."""
         pose: RigidTransform = self._read("X_WP")
@@ -331,3 +337,39 @@ class ImageSlackRate:
             allowance=self.allowance, time=self.time, fastest=self.fastest,
         )  # fmt: skip
         return found, self.threshold, True
+
+
+@dataclass(frozen=True, eq=False)
+class DetectedSlackRate:
+    """As `ImageSlackRate`, of surplus lengths that were found in rendered images.
+
+    Attributes:
+        threshold: Tension below which a cable counts as slack, shape (m,) [N].
+        gain: Velocity per missing tension, shape (m,) [m/(N s)], or one by length.
+        allowance: Surplus that is left to the tension [m].
+        time: In which the rest is wound in [s].
+        fastest: Largest velocity of a correction [m/s].
+    """
+
+    threshold: Array
+    gain: Array | LengthGain
+    allowance: float
+    time: float
+    fastest: float
+    memory: int = 0
+
+    def step(self, readings: CorrectionReadings, memory: Array) -> tuple[Array, Array, bool]:
+        """As `CorrectionLaw`; of a surplus only what is more than `CERTAIN` of its deviations."""
+        gains = each_gain(self.gain, readings)
+        alone = tension_correction(readings.tensions, self.threshold, gains)
+        surplus, sigma = readings.cable_surplus.reshape(2, -1)
+        found = slack_rates(
+            alone, readings.tensions, self.threshold, surplus - CERTAIN * sigma,
+            allowance=self.allowance, time=self.time, fastest=self.fastest,
+        )  # fmt: skip
+        return found, self.threshold, True
+
+
+CERTAIN = 2.0
+"""Standard deviations that a seen surplus is taken to be smaller: what is not there is not wound
+in."""

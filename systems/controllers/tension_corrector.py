@@ -25,6 +25,8 @@ class TensionCorrector(LeafSystem):
     lengths              vector(m)      m    in, unstrained lengths that the winches count
     X_WP                 RigidTransform m    in, believed pose of the platform
     cable_points         vector(2 m n)  px   in, from `CableCamera`; only for laws that look
+    cable_surplus        vector(2 m)    m    in, from `CablePictureCamera`; only for laws that look
+                                             at rendered images
     cable_velocities     vector(m)      m/s  out, to the winches, positive pays out
     tension_corrections  vector(m)      m/s  out, of these what was added
     tension_thresholds   vector(m)      N    out, NaN for a law without
@@ -37,9 +39,16 @@ class TensionCorrector(LeafSystem):
     Source: servoing thesis 5.2, Figs 5.2 to 5.4.
     """
 
-    def __init__(self, law: CorrectionLaw, cables: int, rate: float, image_points: int = 0) -> None:
+    def __init__(
+        self,
+        law: CorrectionLaw,
+        cables: int,
+        rate: float,
+        image_points: int = 0,
+        detected: bool = False,
+    ) -> None:
         """With a law for a number of cables, asked at a rate [Hz], that looks at so many points of
-        each in an image; 0: at none."""
+        each in an image; 0: at none; or at surplus lengths that were `detected`."""
         super().__init__()
         self._law, self.period = law, 1.0 / rate
         self._commanded = self.DeclareVectorInputPort("commanded_velocities", cables)
@@ -48,6 +57,8 @@ class TensionCorrector(LeafSystem):
         self.DeclareAbstractInputPort("X_WP", Value(RigidTransform()))
         if image_points:
             self.DeclareVectorInputPort("cable_points", 2 * cables * image_points)
+        if detected:
+            self.DeclareVectorInputPort("cable_surplus", 2 * cables)
         self._added = self.DeclareDiscreteState(cables)
         self._thresholds = self.DeclareDiscreteState(np.full(cables, np.nan))
         self._failures = self.DeclareDiscreteState(1)

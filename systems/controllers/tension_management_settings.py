@@ -123,10 +123,24 @@ class TensionManagement:
         "Images of the cables per second; kind image.", "Hz", 25.0, above=0.0, at_most=FASTEST
     )
     sight_noise: float = number(
-        "Standard deviation of a point of a cable in the image; kind image.",
+        "Standard deviation of a point of a cable in the image; kind image, projected camera.",
         "px",
         0.5,
         at_least=0.0,
+    )
+    sight_grain: float = number(
+        "Standard deviation of every colour of a pixel, of 255; kind image with a rendered camera.",
+        "-",
+        2.0,
+        at_least=0.0,
+        at_most=255.0,
+    )
+    sight_ends: float = number(
+        "Standard deviation of where a cable is believed to begin and end; kind image with a "
+        "rendered camera.",
+        "m",
+        0.002,
+        above=0.0,
     )
     closing_time: float = number(
         "Time in which what is seen to hang through is wound in; kind image.", "s", 0.2, above=0.0

@@ -126,7 +126,7 @@ def add_camera(
         seed: Seed of the noise of a projected camera, or of spoiled images.
         image_bias: Shift (u, v) of all that is measured, shape (2,) [px]; none if None.
         name: Put before the names of the blocks "camera" and, if whole images are rendered,
-            "detector".
+            "detector". The input X_BC of a camera that turns is left open.
 
     Returns:
         The system with the ports of `TargetMeasurement`.
@@ -190,6 +190,7 @@ def add_region_camera(
         X_BC=mounting.X_BC,
         latency_frames=settings.latency_frames,
         image_bias=image_bias,
+        turns=mounting.turns,
     )
     builder.AddNamedSystem(name, camera)
     builder.Connect(robot.GetOutputPort("query_object"), camera.GetInputPort("query_object"))
@@ -231,7 +232,8 @@ def add_sensor(
 ) -> SceneCamera:
     """Adds the rendering camera to a robot whose scene graph has a renderer."""
     frame = _camera_frame(robot, mounting)
-    sensor = builder.AddNamedSystem(name, SceneCamera(frame, mounting.X_BC, pinhole, spoiled))
+    camera = SceneCamera(frame, mounting.X_BC, pinhole, spoiled, mounting.turns)
+    sensor = builder.AddNamedSystem(name, camera)
     if sensor.HasInputPort("body_velocities"):
         builder.Connect(
             robot.GetOutputPort("body_velocities"), sensor.GetInputPort("body_velocities")

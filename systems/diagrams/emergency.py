@@ -265,8 +265,8 @@ def _add_watch(
         ("tensions", blocks.readings.port("measured_tensions")),
         ("lengths", blocks.readings.port("measured_lengths")),
         ("length_rates", blocks.block.GetOutputPort("unstrained_length_rates")),
-        ("found", blocks.measurement.GetOutputPort("found")),
-        ("X_CO", blocks.measurement.GetOutputPort("X_CO")),
+        ("found", blocks.sight.GetOutputPort("found")),
+        ("X_CO", blocks.sight.GetOutputPort("X_CO")),
     ):
         builder.Connect(source, monitor.GetInputPort(name))
     logged = (*FOUND_OF_WINCHES, *OF_CAMERA, "torque_residual", "length_lag")

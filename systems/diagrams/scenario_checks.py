@@ -29,6 +29,7 @@ from cdpr_drake.systems.diagrams.beliefs import read_camera
 from cdpr_drake.systems.diagrams.controller import check_scheme, make_tasks
 from cdpr_drake.systems.diagrams.emergency import check_emergency
 from cdpr_drake.systems.diagrams.fusion_checks import check_sensor_fusion
+from cdpr_drake.systems.diagrams.pan_tilt import check_pan_tilt
 from cdpr_drake.systems.diagrams.tension_management import check_tension_management
 from cdpr_drake.systems.diagrams.torque_control import (
     check_pose_plan,
@@ -411,6 +412,7 @@ def words(values: np.ndarray) -> str:
 CHECKS: list[Callable[[Scenario, Robot, Path], None]] = [
     _check_mount,
     _check_camera,
+    check_pan_tilt,
     _check_poses,
     _check_gains,
     _check_target,

@@ -17,6 +17,11 @@ from cdpr_drake.systems.diagrams.beliefs import winch_offsets
 from cdpr_drake.systems.diagrams.camera import add_camera, add_target
 from cdpr_drake.systems.diagrams.estimators import EstimatorInputs, add_estimator
 from cdpr_drake.systems.diagrams.fusion_models import steers
+from cdpr_drake.systems.diagrams.pan_tilt import (
+    TurningCamera,
+    add_camera_joints,
+    add_centring,
+)
 from cdpr_drake.systems.diagrams.servo_models import ServoModel, servo_model
 from cdpr_drake.systems.diagrams.tension_management import add_tension_corrector
 from cdpr_drake.systems.diagrams.torque_control import (
@@ -50,6 +55,7 @@ class VisualServoBlocks(ServoModel):
         torque: Makes torques of the servo's twist; None unless winches are commanded by torque.
         wrench: Estimates what pushes the platform; None unless asked for.
         learner: Learns exit and anchor points; None unless asked for.
+        turning: The joints of a camera that turns, and what turns them; None: it is fixed.
     """
 
     block: RobotBlock
@@ -63,6 +69,13 @@ class VisualServoBlocks(ServoModel):
     torque: TorqueController | None = None
     wrench: WrenchEstimator | None = None
     learner: GeometryLearner | None = None
+    turning: TurningCamera | None = None
+
+    @property
+    def sight(self) -> System:
+        """What shows the target as a camera at its mounting has it: the camera, or the steady view
+        of one that turns; with the outputs X_CO, found and marks."""
+        return self.measurement if self.turning is None else self.turning.view
 
     def take_lengths(self, context: Context, lengths: Array) -> None:
         """Starts what integrates wanted lengths at lengths, shape (m,) [m], in the root context."""
@@ -105,6 +118,12 @@ def add_visual_servo(
             X_WO = robot.GetOutputPort("X_WO")
         elif robot.scene_graph is not None:
             X_WO = add_target(builder, robot.scene_graph, settings.target, name=prefix + "target")
+    joints = None
+    if settings.camera.pan_tilt is not None:
+        joints = add_camera_joints(
+            builder, settings.camera.pan_tilt, model.mounting, seed=settings.seed,
+            name=prefix + "camera_joints",
+        )  # fmt: skip
     measurement = add_camera(
         builder,
         robot,
@@ -117,11 +136,20 @@ def add_visual_servo(
         image_bias=settings.perturbations.image_bias,
         name=name,
     )
+    turning = None
+    if joints is not None:
+        camera = builder.GetMutableSubsystemByName(prefix + "camera")
+        builder.Connect(joints.GetOutputPort("X_BH"), camera.GetInputPort("X_BC"))
+        turning = add_centring(
+            builder, settings.camera, joints, measurement, mounting=model.mounting,
+            pinhole=pinhole, prefix=prefix,
+        )  # fmt: skip
+    looking = measurement if turning is None else turning.view
     servo = model.make_servo(settings)
     builder.AddNamedSystem(prefix + "servo", servo)
     task = model.estimator_task(settings)
     readings = SensorReadings(builder, robot, settings.sensors, seed=settings.seed, name=name)
-    ports = {port: measurement.GetOutputPort(port) for port in ("X_CO", "found")}
+    ports = {port: looking.GetOutputPort(port) for port in ("X_CO", "found")}
     ports["platform_velocity"] = servo.GetOutputPort("platform_velocity")
     torque = add_torque_controller(
         builder, settings, robot, believed=model.believed, name=prefix + "torque_controller"
@@ -139,7 +167,7 @@ def add_visual_servo(
         name=name,
     )
     estimator, *compared = _add_estimators(builder, settings.estimator, task, inputs, prefix)
-    sight = seen_ports(settings, measurement, estimator, target.mark)
+    sight = seen_ports(settings, looking, estimator, target.mark)
     for port, source in sight.items():
         builder.Connect(source, servo.GetInputPort(port))
     builder.Connect(estimator.GetOutputPort("X_WP"), servo.GetInputPort("X_WP"))
@@ -166,6 +194,7 @@ def add_visual_servo(
         wanted_lengths=_command_winches(builder, velocities, robot, prefix),
         corrector=corrector,
         torque=torque,
+        turning=turning,
         wrench=add_wrench_estimator(
             builder,
             settings,
@@ -189,14 +218,14 @@ def add_visual_servo(
 
 
 def seen_ports(
-    settings: VisualServoSettings, measurement: TargetMeasurement, estimator: System, mark: str
+    settings: VisualServoSettings, looking: System, estimator: System, mark: str
 ) -> dict[str, OutputPort]:
-    """What shows a servo its target, by the names of its inputs: the camera, or the estimator where
-    that fuses cameras and steers."""
+    """What shows a servo its target, by the names of its inputs: what looks at it, see
+    `VisualServoBlocks.sight`, or the estimator where that fuses cameras and steers."""
     if steers(settings):
         names = {"X_CO": "X_CO_fused", "found": "fused_found", mark: "fused_marks"}
         return {name: estimator.GetOutputPort(port) for name, port in names.items()}
-    return {name: measurement.GetOutputPort(name) for name in ("X_CO", "found", mark)}
+    return {name: looking.GetOutputPort(name) for name in ("X_CO", "found", mark)}
 
 
 def _add_estimators(

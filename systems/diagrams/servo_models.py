@@ -177,7 +177,11 @@ def servo_model(
     mount = robot.camera_mount(settings.camera.mount)
     target, motion = settings.target.target(), settings.target.path()
     on_platform = settings.target.carrier == "platform"
-    mounting = CameraMounting(mount.pose.transform(), motion.at(0.0) if on_platform else None)
+    mounting = CameraMounting(
+        mount.pose.transform(),
+        motion.at(0.0) if on_platform else None,
+        settings.camera.pan_tilt is not None,
+    )
     last_task = settings.tasks()[-1]
     X_CdO = last_task.desired.transform()
     return ServoModel(

@@ -11,6 +11,7 @@ from pydrake.systems.framework import DiagramBuilder, OutputPort
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.systems.cameras.camera_settings import RENDERED
 from cdpr_drake.systems.diagrams.fusion_readings import fusion_ports
+from cdpr_drake.systems.diagrams.pan_tilt import turning_ports
 from cdpr_drake.systems.diagrams.servo_blocks import VisualServoBlocks, seen_ports
 from cdpr_drake.systems.diagrams.servo_models import ServoModel
 from cdpr_drake.systems.diagrams.torque_control import tension_limits
@@ -108,7 +109,7 @@ def _add_monitor(
     """Adds what ends the run."""
     monitor = make_monitor(scenario, blocks)
     builder.AddNamedSystem("monitor", monitor)
-    sight = seen_ports(scenario, blocks.measurement, blocks.estimator, blocks.target.mark)
+    sight = seen_ports(scenario, blocks.sight, blocks.estimator, blocks.target.mark)
     for name in ("X_CO", "found"):
         builder.Connect(sight[name], monitor.GetInputPort(name))
     builder.Connect(blocks.block.GetOutputPort("X_WP"), monitor.GetInputPort("X_WP"))
@@ -224,17 +225,19 @@ def add_servo_log(
     reacting: Mapping[str, OutputPort],
 ) -> RunLog:
     """Logs what the summary, the figures and the replay need."""
-    block, measurement, servo = blocks.block, blocks.measurement, blocks.servo
+    block, servo, sight = blocks.block, blocks.servo, blocks.sight
     mark = blocks.target.mark
     ports = {
         "X_WP": block.GetOutputPort("X_WP"),
         "X_WP_estimated": blocks.estimator.GetOutputPort("X_WP"),
-        "X_CO_measured": measurement.GetOutputPort("X_CO"),
-        "found": measurement.GetOutputPort("found"),
-        f"{mark}_px": measurement.GetOutputPort(mark),
+        "X_CO_measured": sight.GetOutputPort("X_CO"),
+        "found": sight.GetOutputPort("found"),
+        f"{mark}_px": sight.GetOutputPort(mark),
     }
     if blocks.target.quality and scenario.camera.kind == RENDERED:
-        ports["quality"] = measurement.GetOutputPort("quality")
+        ports["quality"] = blocks.measurement.GetOutputPort("quality")
+    if blocks.turning is not None:
+        ports |= turning_ports(blocks.turning, blocks.measurement)
     for name in servo.logged():
         ports[name] = servo.GetOutputPort(name)
     for name in LOGGED_OF_CABLES:

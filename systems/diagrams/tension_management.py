@@ -16,14 +16,18 @@ from cdpr_drake.errors import ScenarioError, TensionProblemError
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.models.camera_catalogue import load_camera
+from cdpr_drake.models.rendered_camera import add_renderer
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import rigid_platform
 from cdpr_drake.servoing.servo_task import BelievedRobot
 from cdpr_drake.systems.cameras.cable_camera import CableCamera
+from cdpr_drake.systems.cameras.cable_picture_camera import CablePicture, CablePictureCamera
+from cdpr_drake.systems.cameras.camera_settings import RENDERED
 from cdpr_drake.systems.controllers.correction_laws import (
     AdaptiveCorrection,
     ConstantThreshold,
     CorrectionLaw,
+    DetectedSlackRate,
     ExpectedLength,
     FollowedDistribution,
     ImageSlackRate,
@@ -47,6 +51,7 @@ from cdpr_drake.systems.sensors.sensor_readings import SensorReadings
 from cdpr_drake.tensions.correction_gain import SHARES, SampledCorrection, tension_gain
 from cdpr_drake.tensions.methods import method_for
 from cdpr_drake.tensions.slack_correction import TensionFollower
+from cdpr_drake.vision.cable_detection import SightSettings
 from cdpr_drake.vision.pinhole import Pinhole
 
 if TYPE_CHECKING:
@@ -89,7 +94,7 @@ def check_tension_management(scenario: Scenario, robot: Robot, path: Path) -> No
     if settings.kind == BY_LENGTH:
         _check_by_length(settings, refuse)
     if settings.kind == IMAGE:
-        _check_sight(settings, robot, refuse)
+        _check_sight(settings, robot, refuse, scenario.camera.kind == RENDERED)
     if distributed:
         try:
             method = getattr(settings, distributed)
@@ -113,7 +118,7 @@ def check_tension_management(scenario: Scenario, robot: Robot, path: Path) -> No
             )
 
 
-def _check_sight(settings: TensionManagement, robot: Robot, refuse: object) -> None:
+def _check_sight(settings: TensionManagement, robot: Robot, refuse: object, rendered: bool) -> None:
     assert callable(refuse)
     mounts = {mount.name: mount.model for mount in robot.cameras if mount.parent == "world"}
     if settings.sight_mount not in mounts:
@@ -122,6 +127,11 @@ def _check_sight(settings: TensionManagement, robot: Robot, refuse: object) -> N
     fastest = load_camera(mounts[settings.sight_mount]).rate_hz
     if settings.sight_rate > fastest:
         raise refuse("sight_rate", f"{settings.sight_rate:g}", f"at most {fastest:g} [Hz]")
+    if rendered and not _sight(robot, settings).is_ideal:
+        raise refuse(
+            "sight_mount", f"{settings.sight_mount}, whose lens distorts",
+            "with a rendered camera one without distortion",
+        )  # fmt: skip
 
 
 def _check_by_length(settings: TensionManagement, refuse: object) -> None:
@@ -194,6 +204,7 @@ def correction_law(
     cables: CableSet,
     fastest: float,
     by_length: LengthGain | None = None,
+    rendered: bool = False,
 ) -> CorrectionLaw:
     """The law that settings ask for, with what is believed of the cables.
 
@@ -203,6 +214,7 @@ def correction_law(
         cables: The believed cables.
         fastest: Rated cable speed of the winches [m/s].
         by_length: The gain where the section states none; needed by kinds that have one.
+        rendered: Whether cables are found in rendered images; kind image.
     """
 
     def each(values: Array) -> Array:
@@ -241,6 +253,10 @@ def correction_law(
             robot, cables, float(threshold[0]), robot.tension_bounds.upper, settings.margin,
             settings.set_point, settings.gain or by_length or 0.0, settings.fastest or fastest,
         )  # fmt: skip
+    if settings.kind == IMAGE and rendered:
+        return DetectedSlackRate(
+            threshold, gain, settings.allowance, settings.closing_time, settings.fastest or fastest
+        )
     if settings.kind == IMAGE:
         mount = robot.camera_mount(settings.sight_mount)
         return ImageSlackRate(
@@ -301,10 +317,11 @@ def make_corrector(
     if not settings.controller.pulleys:
         cables = cables.without_pulleys()
     by_length = used_gain(settings, wanted, robot, believed, real)
-    law = correction_law(wanted, robot, cables, robot.winch.rated_cable_speed(), by_length)
-    points = SEEN_POINTS if wanted.kind == IMAGE else 0
     rate = wanted.rate or settings.controller.rate
-    return TensionCorrector(law, cables.count, rate, points)
+    drawn = wanted.kind == IMAGE and settings.camera.kind == RENDERED
+    law = correction_law(wanted, robot, cables, robot.winch.rated_cable_speed(), by_length, drawn)
+    points = SEEN_POINTS if wanted.kind == IMAGE and not drawn else 0
+    return TensionCorrector(law, cables.count, rate, points, drawn)
 
 
 def add_tension_corrector(
@@ -336,7 +353,10 @@ def add_tension_corrector(
         ("X_WP", estimator.GetOutputPort("X_WP")),
     ):
         builder.Connect(source, corrector.GetInputPort(port))
-    if wanted.kind == IMAGE:
+    if wanted.kind == IMAGE and settings.camera.kind == RENDERED:
+        camera = _add_picture_camera(builder, robot, settings, wanted, believed, corrector)
+        builder.Connect(estimator.GetOutputPort("X_WP"), camera.GetInputPort("X_WP_believed"))
+    elif wanted.kind == IMAGE:
         _add_cable_camera(builder, robot, settings, wanted, corrector)
     return corrector, corrector.GetOutputPort("cable_velocities")
 
@@ -361,3 +381,38 @@ def _add_cable_camera(
     for port in ("X_WP", "unstrained_lengths"):
         builder.Connect(robot.GetOutputPort(port), camera.GetInputPort(port))
     builder.Connect(camera.GetOutputPort("cable_points"), corrector.GetInputPort("cable_points"))
+
+
+def _add_picture_camera(
+    builder: DiagramBuilder,
+    robot: RobotBlock,
+    settings: VisualServoSettings,
+    wanted: TensionManagement,
+    believed: BelievedRobot,
+    corrector: TensionCorrector,
+) -> CablePictureCamera:
+    """Adds the camera in the world that draws the cables and finds them, named after the corrector;
+    its input X_WP_believed is left open."""
+    cables = believed.cables
+    if not settings.controller.pulleys:
+        cables = cables.without_pulleys()
+    add_renderer(robot.scene_graph)
+    picture = CablePicture(
+        cables=robot.forces.cable_set(),
+        model=robot.forces.model(),
+        radii=0.5 * robot.robot.diameters(),
+        world=robot.plant.GetBodyFrameIdOrThrow(robot.plant.world_body().index()),
+        X_WE=robot.robot.camera_mount(wanted.sight_mount).pose.transform(),
+        pinhole=_sight(robot.robot, wanted),
+        grain=wanted.sight_grain,
+        seed=settings.seed,
+    )
+    looks = SightSettings(ends=wanted.sight_ends)
+    camera = builder.AddNamedSystem(
+        f"{corrector.get_name()}_camera",
+        CablePictureCamera(picture, cables, wanted.sight_rate, looks),
+    )
+    for port in ("query_object", "X_WP", "unstrained_lengths"):
+        builder.Connect(robot.GetOutputPort(port), camera.GetInputPort(port))
+    builder.Connect(camera.GetOutputPort("cable_surplus"), corrector.GetInputPort("cable_surplus"))
+    return camera

@@ -198,7 +198,7 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
         )
     for system, names in (
         (block, ("platform_state", "X_WP", *LOGGED_OF_CABLES)),
-        (blocks.measurement, (blocks.target.mark, "X_CO", "found")),
+        (blocks.sight, (blocks.target.mark, "X_CO", "found")),
         (blocks.servo, ("cable_velocities", "platform_velocity", "error", "gain")),
         (watches.monitor, ("outcome",)),
     ):

@@ -11,7 +11,7 @@ from pydrake.systems.framework import BasicVector, Context, DiscreteValues, Leaf
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import SensorError
-from cdpr_drake.estimation.sensor_noise import encoder_readings, sensor_random
+from cdpr_drake.estimation.sensor_noise import encoder_readings, sample_noise, sensor_random
 from cdpr_drake.systems.sensors.sampled_sensor import PAN_TILT
 
 MODES = ("velocity", "position")
@@ -29,6 +29,8 @@ class PanTiltJoints:
         speed: Largest speeds, shape (2,) [rad/s].
         counts_per_turn: Counts of the encoders per turn of a joint.
         zero_error: Standard deviation of the angle at which an encoder says zero [rad].
+        offset: What the encoders read too much beside that, shape (2,) [rad]; None: nothing.
+        noise: Standard deviation of a reading, of which there is one at each look [rad].
     """
 
     lower: Array
@@ -36,6 +38,8 @@ class PanTiltJoints:
     speed: Array
     counts_per_turn: int = 4096
     zero_error: float = 0.0
+    offset: Array | None = None
+    noise: float = 0.0
 
 
 def head_pose(X_BM: RigidTransform, arm: Array, angles: Array) -> RigidTransform:
@@ -79,6 +83,8 @@ class PanTilt(LeafSystem):
         mode: str = "velocity",
         rate: float = 100.0,
         seed: int = 0,
+        start: Array | None = None,
+        stream: int = PAN_TILT,
     ) -> None:
         """With joints on a body.
 
@@ -88,7 +94,9 @@ class PanTilt(LeafSystem):
             arm: Position of Ho from where the axes meet, shape (3,) [m]; zero if None.
             mode: One of `MODES`.
             rate: Looks at the command per second [Hz].
-            seed: Seed of the encoders' zeros.
+            seed: Seed of the encoders' zeros and noise.
+            start: Angles at the start, shape (2,) [rad]; zero if None.
+            stream: Which of a run's random numbers these are.
 
         Raises:
             SensorError: The mode, the rate or the limits cannot be.
@@ -102,8 +110,11 @@ class PanTilt(LeafSystem):
             raise SensorError("lower: accepted: at most upper, of both joints [rad]")
         self.joints, self._X_BM, self._mode, self._rate = joints, X_BM, mode, rate
         self._arm = np.zeros(3) if arm is None else np.asarray(arm, float)
-        self._zero = joints.zero_error * sensor_random(seed, PAN_TILT).standard_normal(2)
-        start = np.clip(np.zeros(2), joints.lower, joints.upper)
+        self._zero = joints.zero_error * sensor_random(seed, stream).standard_normal(2)
+        if joints.offset is not None:
+            self._zero = self._zero - joints.offset
+        self._seed, self._stream = seed, stream
+        start = np.clip(np.zeros(2) if start is None else start, joints.lower, joints.upper)
         self.DeclareVectorInputPort("command", 2)
         self.DeclareDiscreteState(np.concatenate([start, np.zeros(3)]))
         self.DeclarePeriodicDiscreteUpdateEvent(1.0 / rate, 0.0, self._look)
@@ -121,7 +132,13 @@ class PanTilt(LeafSystem):
 
     def encoder_angles(self, context: Context) -> Array:
         """What the encoders say now, shape (2,) [rad], from this system's own context."""
-        return encoder_readings(self.angles(context) - self._zero, self.joints.counts_per_turn)
+        angles = self.angles(context) - self._zero
+        if self.joints.noise > 0.0:
+            number = round(context.get_time() * self._rate)
+            angles = angles + self.joints.noise * sample_noise(
+                self._seed, self._stream, number, len(angles)
+            )
+        return encoder_readings(angles, self.joints.counts_per_turn)
 
     def head(self, angles: Array) -> RigidTransform:
         """X_BH at angles, shape (2,) [rad]."""

@@ -134,6 +134,7 @@ class SampledSensor(LeafSystem):
 
 
 RANGES, INERTIAL, DEPTH, ODOMETRY, PAN_TILT, DEPTH_POINTS = 211, 223, 227, 229, 233, 239
+CAMERA_JOINTS = 241
 """Tell the random numbers of sensors of one kind from those of others."""
 
 

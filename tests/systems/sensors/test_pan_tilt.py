@@ -155,3 +155,18 @@ def test_a_camera_on_it_keeps_a_passing_target_in_the_middle():
     rate = 0.2 * 2.0 / (x**2 + 4.0)
     assert angles[0] == pytest.approx(np.arctan2(x, 2.0) - rate / gain, abs=0.004)
     assert angles[1] == pytest.approx(np.arctan2(0.2, np.hypot(x, 2.0)), abs=0.004)
+
+
+def test_encoders_read_an_offset_and_noise_that_change_with_each_look():
+    from dataclasses import replace
+
+    wrong = replace(JOINTS, offset=np.array([0.02, -0.03]), noise=1e-3, counts_per_turn=10**7)
+    read = []
+    for duration in (0.5001, 0.5101, 0.5101):
+        head, own = turned([0.0, 0.0], duration, joints=wrong, start=np.array([0.2, 0.1]))
+        read.append(head.GetOutputPort("encoder_angles").Eval(own))
+        np.testing.assert_allclose(head.GetOutputPort("angles").Eval(own), [0.2, 0.1])
+    np.testing.assert_array_equal(read[1], read[2])
+    assert np.all(read[0] != read[1])
+    # Five standard deviations.
+    np.testing.assert_allclose(read, np.tile([0.22, 0.07], (3, 1)), atol=5e-3)

@@ -1,0 +1,108 @@
+"""The section camera.pan_tilt: what is refused, what is steady, and that it is needed."""
+
+import numpy as np
+import pytest
+
+from cdpr_drake.analyses.simulation.run_summary import summarize
+from cdpr_drake.analyses.simulation.start_checks import check_start
+from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
+from cdpr_drake.errors import ScenarioError
+from cdpr_drake.geometry.poses import pose_from_row
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.diagrams.visual_servo import build_visual_servo
+from cdpr_drake.systems.loops.loop_choice import check_loop, diagram_reason
+from cdpr_drake.systems.monitoring.run_monitor import Outcome
+
+COMPILED = "integration.engine=compiled"
+
+
+@pytest.mark.parametrize(
+    ("override", "words"),
+    [
+        ("camera.pan_tilt.lower_deg=[80, -75]", "camera.pan_tilt.lower_deg: found (80, -75)"),
+        ("camera.pan_tilt.upper_deg=[200, 75]", "camera.pan_tilt: found limits"),
+        ("camera.pan_tilt.start_deg=[0, 76]", "camera.pan_tilt.start_deg: found (0, 76)"),
+        ("camera.pan_tilt.gain=0", "camera.pan_tilt.gain"),
+        ("target.kind=circles; controller.scheme=circles", "target.kind: found circles"),
+        ("estimator.kind=fusion", "estimator.kind: found fusion with camera.pan_tilt"),
+        ("estimator.compare=[fusion]", "estimator.compare[0]: found fusion"),
+        ("adaptation={}", "adaptation: found a section with camera.pan_tilt"),
+        ("stability={}", "stability: found a section with camera.pan_tilt"),
+        (
+            "camera.kind=rendered; camera.flaws={exposure: 0.01}",
+            "camera.flaws: found images that take time",
+        ),
+        ("integration.loop=compiled", "camera turns on two joints"),
+    ],
+)
+def test_refused_by_name(override, words):
+    with pytest.raises(ScenarioError) as found:
+        check_loop(load_scenario("acrobot_pan_tilt", override.split("; ")))
+    assert words in str(found.value)
+
+
+def test_loops_leave_it_to_a_diagram():
+    assert "camera turns" in diagram_reason(load_scenario("acrobot_pan_tilt", []))
+
+
+@pytest.fixture(scope="module")
+def run():
+    return run_scenario(load_scenario("acrobot_pan_tilt", [COMPILED]))
+
+
+def test_it_finds_the_tag_and_keeps_it(run):
+    """From a start where the fixed camera sees nothing."""
+    assert run.outcome == Outcome.CONVERGED
+    told = summarize(run)["pan_tilt"]
+    assert told["first_seen_s"] > 0.1
+    assert told["unseen_after_s"] == 0.0
+    assert told["off_center_px"]["end"] < 5.0
+    assert max(told["largest_angles_deg"]) > 20.0
+    assert told["at_limits_s"] == 0.0
+    # A zero of 0.1 deg and noise of 0.02 deg, a count of 0.09 deg.
+    assert 0.0 < max(told["encoder_error_deg"]) < 0.4
+
+
+def test_the_steady_view_is_that_of_the_mounting(run):
+    """Marks and pose as if the camera were fixed, to what pixels and encoders leave."""
+    log, servo = run.log, run.servo
+    row = len(log["time"]) - 40
+    assert log["found"][row] == 1.0
+    seen = pose_from_row(log["X_CO_measured"][row])
+    time = np.floor(log["time"][row] * 25.0 - 1e-6) / 25.0
+    k = int(np.argmin(np.abs(log["time"] - time)))
+    true = servo.X_CO(pose_from_row(log["X_WP"][k]), time)
+    assert np.linalg.norm(seen.translation() - true.translation()) < 5e-3
+    uv = servo.pinhole.project(true @ servo.target.points).T.ravel()
+    assert np.max(np.abs(uv - log["corners_px"][row])) < 12.0
+
+
+def test_the_fixed_camera_sees_nothing():
+    fixed = run_scenario(
+        load_scenario("acrobot_pan_tilt", [COMPILED, "camera.pan_tilt=null", "duration=1.0"])
+    )
+    assert not np.any(fixed.log["found"])
+
+
+def test_a_start_that_no_angles_show_is_refused():
+    shown = build_visual_servo(load_scenario("acrobot_pan_tilt", [COMPILED]))
+    check_start(shown)
+    few = [COMPILED, "camera.pan_tilt.upper_deg=[75, 5]"]
+    with pytest.raises(ScenarioError, match=r"aimed by camera\.pan_tilt, does not see"):
+        check_start(build_visual_servo(load_scenario("acrobot_pan_tilt", few)))
+
+
+def test_a_rendered_camera_turns_too():
+    """Few images: it sees the tag turned, at angles it starts from."""
+    seen = run_scenario(
+        load_scenario(
+            "acrobot_pan_tilt",
+            [
+                COMPILED, "camera.kind=rendered",
+                "camera.pan_tilt.start_deg=[-34, 36]", "duration=0.3", "camera.rate=10",
+                "controller.rate=10",
+            ],
+        )
+    )  # fmt: skip
+    assert seen.log["turned_found"][-1] == 1.0
+    assert seen.log["found"][-1] == 1.0
