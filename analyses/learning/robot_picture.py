@@ -31,8 +31,8 @@ VIEW = np.radians(40.0)
 FROM = np.array([0.45, -1.0, 0.45])
 """From which side of the frame's middle it is seen, in W."""
 
-MARGIN = 1.05
-"""So much more than the ball round the frame is in the picture."""
+MARGIN = 1.0
+"""So much of the ball round the frame is in the picture; corners are off its rim."""
 
 CABLE_SHARE = 0.004
 """Radius at which cables are drawn, of the frame's half diagonal."""
@@ -76,13 +76,12 @@ class RobotPicture:
         middle = 0.5 * (robot.frame.upper + robot.frame.lower)
         half = 0.5 * float(np.linalg.norm(robot.frame.upper - robot.frame.lower))
         self._radius = CABLE_SHARE * half
-        self._cables: list[GeometryId] = [
-            plant.RegisterVisualGeometry(
-                plant.world_body(), RigidTransform(exit_point), Cylinder(self._radius, half),
-                f"cable_{k}", CABLE_COLOR,
-            )
-            for k, exit_point in enumerate(self._exits)
-        ]  # fmt: skip
+        self._rods = [add_shown_body(plant, f"cable_{k}") for k in range(len(self._exits))]
+        rod = Cylinder(self._radius, half)
+        self._shapes: list[GeometryId] = [
+            plant.RegisterVisualGeometry(body, RigidTransform(), rod, body.name(), CABLE_COLOR)
+            for body in self._rods
+        ]
         plant.Finalize()
         self._plant, self._scene = plant, scene_graph
         self._diagram = builder.Build()
@@ -110,8 +109,9 @@ class RobotPicture:
                 end = start + self._radius * np.array([0.0, 0.0, -1.0])
             length = max(float(np.linalg.norm(end - start)), self._radius)
             X = RigidTransform(_along(end - start), 0.5 * (start + end))
+            self._plant.SetFreeBodyPose(own, self._rods[k], X)
             rod = Cylinder(self._radius, length)
-            scene.ChangeShape(of_scene, source, self._cables[k], rod, X)
+            scene.ChangeShape(of_scene, source, self._shapes[k], rod)
         query: QueryObject = scene.get_query_output_port().Eval(of_scene)
         image = draw_image(query, scene.world_frame_id(), self._X_WC, self._pinhole)
         return np.ascontiguousarray(image[:, :, :3])
