@@ -5,13 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from importlib import import_module
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from cdpr_drake.errors import CdprError
 from cdpr_drake.schema.typed_yaml import closest
-
-if TYPE_CHECKING:
-    from cdpr_drake.analyses.learning.environments import RobotEnv, RobotVectorEnv
 
 BEGIN, END = "cdpr/", "-v0"
 """Round the name of a task in Gymnasium's list."""
@@ -26,9 +23,7 @@ def environment_names() -> list[str]:
     return [f"{BEGIN}{name}{END}" for name in _registered().STEPS]
 
 
-def make_environment(
-    name: str, count: int | None = None, **options: Any
-) -> RobotEnv | RobotVectorEnv:
+def make_environment(name: str, count: int | None = None, **options: Any) -> Any:
     """A learning environment: `gymnasium.make`, or `make_vec` for many robots at once.
 
         envs = cdpr.make_environment("Reach", 256, robot="caroca", action="twist")
@@ -38,6 +33,9 @@ def make_environment(
             round it, as in cdpr/Reach-v0.
         count: Number of robots, moved by one compiled call; None: one, alone.
         options: Fields of the task's options, such as robot, action, randomise; render_mode.
+
+    Returns:
+        A `gymnasium.Env`, or of many a `gymnasium.vector.VectorEnv`.
 
     Raises:
         CdprError: Gymnasium is not installed; there is no such environment, or an option is not
@@ -54,8 +52,7 @@ def make_environment(
     make: Callable[..., Any] = gymnasium.make if count is None else gymnasium.make_vec
     if count is not None:
         options = {"num_envs": count, **options}
-    env: RobotEnv | RobotVectorEnv = make(asked, **options)
-    return env
+    return make(asked, **options)
 
 
 def _registered() -> ModuleType:
