@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from matplotlib import colormaps
@@ -20,7 +19,7 @@ from cdpr_drake.analyses.studies.framework.runs import Runs
 from cdpr_drake.analyses.visualization.figure_style import few_ticks, line_style, new_figure
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.poses import pose_rows_distance
-from cdpr_drake.palette import VERDICTS, Look
+from cdpr_drake.palette import SHADED, VERDICTS, Look, nth_look
 
 LABELS = {"pbvs": "PBVS", "2.5d": "2 1/2 D", "ibvs": "IBVS"}
 
@@ -30,14 +29,8 @@ LAYERS = 4
 LEAST_IN_CELL, MOST_CELLS = 6, 24
 """Cells along x and y are as many as leave so many loops in one on average, at most so many."""
 
-NEARLY_ALL = 0.95
-"""The outline goes round cells of whose loops at least this share converges."""
-
-DARKEST = 0.5
-"""Share of loops that converge at which cells are black."""
-
-LARGEST_DOT = 90.0
-"""Area of the dot of a cell all of whose starts are certified [pt^2]."""
+HALF = 0.5
+"""Outlines go round cells of whose starts at least this share converges, or is found stable."""
 
 LEAST_IN_BIN, MOST_BINS = 10, 20
 """Of turns in a bin, and of bins."""
@@ -45,13 +38,10 @@ LEAST_IN_BIN, MOST_BINS = 10, 20
 LEVEL = np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
 """A pose without a turn, as that of the goal, as `pose_row`."""
 
-LOOKS: dict[str, Look] = {CONVERGED: Look("#303030", "-", "D"), **VERDICTS}
+LOOKS: dict[str, Look] = {CONVERGED: nth_look(7), **VERDICTS}
 """Of curves by what they count."""
 
-EDGE: dict[str, Any] = {"colors": "#000000", "linestyles": "-", "linewidths": 1.8}
-DOTS: dict[str, Any] = {
-    "marker": "o", "facecolors": "none", "edgecolors": VERDICTS[CERTIFIED].color, "linewidths": 1.4
-}  # fmt: skip
+OUTLINES = {CONVERGED: LOOKS[CONVERGED], CERTIFIED: LOOKS[CERTIFIED]}
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,45 +74,44 @@ def basin_figure(runs: Runs) -> Figure:
         len(schemes), LAYERS, (2.6 * LAYERS + 1.0, 2.7 * len(schemes) + 1.6),
         "From where loops converge: starts of all turns that are held and see the tag, from above",
     )  # fmt: skip
-    grid, shades = np.atleast_2d(panels), colormaps.get_cmap("gray")
-    norm = Normalize(DARKEST, 1.0)
-    for row, (scheme, loops) in zip(grid, schemes.items(), strict=True):
+    shades = colormaps.get_cmap("gray")
+    for row, (scheme, loops) in zip(np.atleast_2d(panels), schemes.items(), strict=True):
         for k, panel in enumerate(row):
             height = loops.poses[:, 6]
             within = (height >= z[k]) & ((height < z[k + 1]) | (k == LAYERS - 1))
             counts = np.histogram2d(*loops.poses[within, 4:6].T, bins=(x, y))[0]
-            converge, certified = (
-                _share(loops.poses[within & loops.holds[name]], counts, x, y)
-                for name in (CONVERGED, CERTIFIED)
-            )
-            panel.patch.set(hatch="////", edgecolor="0.75")
-            drawn = np.ma.masked_invalid(converge.T)
-            panel.pcolormesh(x, y, drawn, cmap=shades, norm=norm)
-            _outline(panel, x, y, np.nan_to_num(converge) >= NEARLY_ALL)
-            places = np.meshgrid((x[1:] + x[:-1]) / 2.0, (y[1:] + y[:-1]) / 2.0, indexing="ij")
-            area = LARGEST_DOT * (MOST_CELLS / 3.0 / cells) ** 2 * np.nan_to_num(certified)
-            panel.scatter(*places, s=area, **DOTS)
+            shares = {
+                name: _share(loops.poses[within & mask], counts, x, y)
+                for name, mask in loops.holds.items()
+            }
+            panel.set_facecolor(SHADED.color)
+            drawn = np.ma.masked_invalid(shares[CONVERGED].T)
+            panel.pcolormesh(x, y, drawn, cmap=shades, vmin=-0.5, vmax=1.0)
+            panel.pcolor(
+                x, y, np.ma.masked_where(counts.T > 0, counts.T), hatch="///", alpha=0.0,
+                edgecolor="0.6", linewidth=0.0,
+            )  # fmt: skip
+            for name, look in OUTLINES.items():
+                _outline(panel, x, y, np.nan_to_num(shares[name]) >= HALF, look)
             panel.set_aspect("equal")
-            panel.set(xlim=x[[0, -1]], ylim=y[[0, -1]])
             panel.grid(visible=False)
             panel.tick_params(labelsize=8, labelleft=k == 0)
             for axis in (panel.xaxis, panel.yaxis):
                 few_ticks(axis, 4)
             if scheme == next(iter(schemes)):
-                panel.set_title(f"z = {z[k]:.2f} to {z[k + 1]:.2f} m", fontsize=10)
+                panel.set_title(f"z = {z[k]:.2f} to {z[k + 1]:.2f} m", fontsize=9)
         row[0].set_ylabel(f"{LABELS.get(scheme, scheme)}\ny in W [m]", fontsize=10)
-    for panel in grid[-1]:
+    for panel in np.atleast_2d(panels)[-1]:
         panel.set_xlabel("x in W [m]", fontsize=10)
     bar = figure.colorbar(
-        ScalarMappable(norm, shades), ax=panels, location="right", aspect=40, shrink=0.8,
-        extend="min",
+        ScalarMappable(Normalize(-0.5, 1.0), shades), ax=panels, location="right", aspect=40,
+        shrink=0.8, boundaries=np.linspace(0.0, 1.0, 101), ticks=np.linspace(0.0, 1.0, 6),
     )  # fmt: skip
     bar.set_label("share of a cell's loops that converge [-]", fontsize=10)
-    style = {name[:-1]: value for name, value in EDGE.items()}
-    percent = f"{100.0 * NEARLY_ALL:g} %"
+    words = {CONVERGED: "half of a cell's loops converge", CERTIFIED: "half are certified"}
     handles = [
-        Line2D([], [], label=f"basin: {percent} and more converge", **style),
-        panel.scatter([], [], s=LARGEST_DOT, label="all certified; smaller: fewer", **DOTS),
+        Line2D([], [], label=f"inside: at least {words[name]}", **_edge(look))
+        for name, look in OUTLINES.items()
     ]
     figure.legend(
         handles=handles, loc="outside lower center", ncols=2, fontsize=9, title_fontsize=9,
@@ -137,14 +126,30 @@ def _share(poses: Array, counts: Array, x: Array, y: Array) -> Array:
     return np.asarray(np.divide(some, counts, out=np.full_like(some, np.nan), where=counts > 0))
 
 
-def _outline(panel: Axes, x: Array, y: Array, inside: np.ndarray) -> None:
-    """Draws round cells, shape (nx, ny)."""
+def _edge(look: Look) -> dict[str, object]:
+    return {"color": look.color, "linestyle": look.dash, "linewidth": 2.0}
+
+
+def _outline(panel: Axes, x: Array, y: Array, inside: np.ndarray, look: Look) -> None:
+    """Draws round cells."""
     padded = np.pad(inside, 1)
-    lines = [[(x[i], y[j - 1]), (x[i], y[j])] for i, j in np.argwhere(padded[1:] != padded[:-1])]
-    lines += [
-        [(x[i - 1], y[j]), (x[i], y[j])] for i, j in np.argwhere(padded[:, 1:] != padded[:, :-1])
+    lines = [
+        [(x[i], y[j - 1]), (x[i], y[j])]
+        for i, j in np.argwhere(padded[1:] != padded[:-1])
+        if 0 < j <= len(y) - 1
     ]
-    panel.add_collection(LineCollection(lines, clip_on=False, **EDGE))
+    lines += [
+        [(x[i - 1], y[j]), (x[i], y[j])]
+        for i, j in np.argwhere(padded[:, 1:] != padded[:, :-1])
+        if 0 < i <= len(x) - 1
+    ]
+    style = _edge(look)
+    panel.add_collection(
+        LineCollection(
+            lines, colors=[style["color"]], linestyles=[style["linestyle"]], linewidths=2.0,
+            clip_on=False,
+        )
+    )  # fmt: skip
 
 
 def turn_figure(runs: Runs) -> Figure:
