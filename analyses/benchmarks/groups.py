@@ -10,6 +10,7 @@ from cdpr_drake.analyses.benchmarks.constraints import constraint_rows
 from cdpr_drake.analyses.benchmarks.design import design_rows
 from cdpr_drake.analyses.benchmarks.forces import force_rows
 from cdpr_drake.analyses.benchmarks.identification import calibration_rows, identification_rows
+from cdpr_drake.analyses.benchmarks.learning import learning_rows
 from cdpr_drake.analyses.benchmarks.package import package_rows
 from cdpr_drake.analyses.benchmarks.planning import planning_rows
 from cdpr_drake.analyses.benchmarks.point_calibration import point_calibration_rows
@@ -29,6 +30,7 @@ BENCH_GROUPS: dict[str, Callable[[bool], list[TimingRow]]] = {
     "design": design_rows,
     "forces": force_rows,
     "identification": identification_rows,
+    "learning": learning_rows,
     "package": package_rows,
     "physics": lambda quick: [*physics_rows(quick), *effect_rows(quick)],
     "planning": planning_rows,

@@ -11,10 +11,14 @@ from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
+from cdpr_drake.analyses.learning.robot_picture import RobotPicture
 from cdpr_drake.analyses.learning.robot_task import MOST, RobotTask
 from cdpr_drake.analyses.learning.task_table import TASKS, make_task
 from cdpr_drake.analyses.learning.visual_servo_task import VisualServoTask
 from cdpr_drake.errors import CdprError
+
+RENDER_MODES = ("rgb_array",)
+"""How `render` shows robots."""
 
 
 def action_space(task: RobotTask) -> gymnasium.spaces.Box:
@@ -37,16 +41,24 @@ class RobotEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         task: The task.
     """
 
-    metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012
+    metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES)}  # noqa: RUF012
 
     def __init__(self, task: str, render_mode: str | None = None, **options: Any) -> None:
         """A task of `TASKS` with the fields of its `Options`.
 
+        Args:
+            task: Its name.
+            render_mode: "rgb_array": `render` gives pictures; None: it gives none.
+            options: The fields.
+
         Raises:
-            CdprError: As `make_task`, or a way to render is asked for: there is none.
+            CdprError: As `make_task`, or `render_mode` is another one.
         """
-        _refuse(render_mode)
+        _check(render_mode)
         self.task = make_task(task, 1, **options)
+        self.render_mode = render_mode
+        self.metadata = _metadata(self.metadata, self.task)
+        self._picture: RobotPicture | None = None
         self.action_space = action_space(self.task)
         self.observation_space = observation_space(self.task)
 
@@ -65,6 +77,18 @@ class RobotEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         reward = float(self.task.rewards[0])
         return self.task.observations()[0], reward, lost, False, self._info()
 
+    def render(self) -> np.ndarray | None:  # type: ignore[override]
+        """A picture of the robot now, shape (height, width, 3), 8 bits; None without rendering.
+
+        Raises:
+            RenderingError: This machine cannot render.
+        """
+        if self.render_mode is None:
+            return None
+        if self._picture is None:
+            self._picture = RobotPicture(self.task)
+        return self._picture.draw(0)
+
     def _info(self) -> dict[str, Any]:
         return {name: values[0].item() for name, values in self.task.infos().items()}
 
@@ -80,7 +104,7 @@ class RobotVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012
-        "render_modes": [], "autoreset_mode": AutoresetMode.NEXT_STEP
+        "render_modes": list(RENDER_MODES), "autoreset_mode": AutoresetMode.NEXT_STEP
     }  # fmt: skip
 
     def __init__(
@@ -96,8 +120,11 @@ class RobotVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
         Raises:
             CdprError: As `RobotEnv`.
         """
-        _refuse(render_mode)
+        _check(render_mode)
         self.task = make_task(task, num_envs, **options)
+        self.render_mode = render_mode
+        self.metadata = _metadata(self.metadata, self.task)
+        self._picture: RobotPicture | None = None
         self.num_envs = num_envs
         self._most = TASKS[task].steps if max_episode_steps is None else max_episode_steps
         self.single_action_space = action_space(self.task)
@@ -159,6 +186,14 @@ class RobotVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
         self._over = lost | late
         return self.task.observations(), rewards, lost, late, self._infos()
 
+    def render(self) -> tuple[np.ndarray, ...] | None:
+        """Pictures of all robots, as `RobotEnv.render`."""
+        if self.render_mode is None:
+            return None
+        if self._picture is None:
+            self._picture = RobotPicture(self.task)
+        return tuple(self._picture.draw(row) for row in range(self.num_envs))
+
     def _infos(self) -> dict[str, Any]:
         """Numbers of all robots, each with a mask that all have them, as of `SyncVectorEnv`."""
         infos: dict[str, Any] = {}
@@ -167,8 +202,13 @@ class RobotVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
         return infos
 
 
-def _refuse(render_mode: str | None) -> None:
-    if render_mode is not None:
+def _check(render_mode: str | None) -> None:
+    if render_mode not in (None, *RENDER_MODES):
         raise CdprError(
-            f"render_mode: found {render_mode!r}; accepted: null; cdpr simulate draws runs"
+            f"render_mode: found {render_mode!r}; accepted: null, {', '.join(RENDER_MODES)}"
         )
+
+
+def _metadata(common: dict[str, Any], task: RobotTask) -> dict[str, Any]:
+    """With as many pictures per second as there are steps."""
+    return {**common, "render_fps": round(1.0 / task.options.period)}

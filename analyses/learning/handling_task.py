@@ -19,9 +19,13 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from pydrake.math import RigidTransform
+from pydrake.geometry import Box, Sphere
+from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import RigidBody
 
 from cdpr_drake.analyses.learning.loaded_platform import loaded_robot
+from cdpr_drake.analyses.learning.robot_picture import GOAL_COLOR, add_shown_body
 from cdpr_drake.analyses.learning.robot_task import DISTANCE_SHARE, TWIST, RobotTask, TaskOptions
 from cdpr_drake.analyses.learning.task_kernel import (
     LENGTH,
@@ -40,6 +44,11 @@ GRASP_SHARE = 0.1
 
 TOOL_SHARE, EDGE_SHARE = 0.3, 0.2
 """Length of the tool under Po, and edge of the cube, of the reach."""
+
+TIP_SHARE = 0.15
+"""Radius at which the tip is drawn, of the cube's edge."""
+
+CUBE_COLOR = np.array([0.8, 0.4, 0.1, 1.0])
 
 APPROACH, CARRY = 0.3, 0.5
 """What free and held cubes are worth at most, see the module."""
@@ -160,6 +169,25 @@ class HandlingTask(RobotTask):
         add_closeness(self._to_goal[:, None], scale, CARRY * held, self.rewards)
         self.rewards += APPROACH * held + self._placed
         self.lost |= self._dropped
+
+    def add_bodies(self, plant: MultibodyPlant) -> list[RigidBody]:
+        """The cube, where it shall stand, and the tool's tip."""
+        bodies = [add_shown_body(plant, name) for name in ("cube", "goal", "tip")]
+        cube, tip = Box(*(3 * [self._edge])), Sphere(TIP_SHARE * self._edge)
+        looks = ((cube, CUBE_COLOR), (cube, GOAL_COLOR), (tip, CUBE_COLOR))
+        for body, (shape, color) in zip(bodies, looks, strict=True):
+            plant.RegisterVisualGeometry(body, RigidTransform(), shape, body.name(), color)
+        return bodies
+
+    def places(self, row: int) -> list[RigidTransform]:
+        """Those of the cube, unturned while it is free, of its goal, and of the tip."""
+        R_WP = pose_from_row(self.batch.poses[row]).rotation()
+        turned = R_WP if self._held[row] else RotationMatrix()
+        return [
+            RigidTransform(turned, self._cubes[row]),
+            RigidTransform(self._goals[row]),
+            RigidTransform(self._tips[row]),
+        ]
 
     def infos(self) -> dict[str, np.ndarray]:
         """Distances of tip and cube's top, cube and goal [m]; whether it is held, stands there."""

@@ -9,7 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 from pydrake.math import RigidTransform
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import RigidBody
 
+from cdpr_drake.analyses.learning.robot_picture import GOAL_COLOR, add_shown_body
 from cdpr_drake.analyses.learning.robot_task import (
     ANGLE,
     DISTANCE_SHARE,
@@ -20,7 +23,8 @@ from cdpr_drake.analyses.learning.robot_task import (
 )
 from cdpr_drake.analyses.learning.task_kernel import add_closeness, write_aims
 from cdpr_drake.arrays import Array
-from cdpr_drake.geometry.poses import pose_row
+from cdpr_drake.geometry.poses import pose_from_row, pose_row
+from cdpr_drake.models.robot_in_plant import platform_shape
 
 
 class ReachTask(RobotTask):
@@ -50,6 +54,17 @@ class ReachTask(RobotTask):
     def goals(self) -> Array:
         """Rows of `pose_row` that the platforms shall reach, shape (count, 7) [-, m]."""
         return self._goals.copy()
+
+    def add_bodies(self, plant: MultibodyPlant) -> list[RigidBody]:
+        """The platform where it shall be."""
+        goal = add_shown_body(plant, "goal")
+        X_PShape, shape = platform_shape(self.robot)
+        plant.RegisterVisualGeometry(goal, X_PShape, shape, "goal", GOAL_COLOR)
+        return [goal]
+
+    def places(self, row: int) -> list[RigidTransform]:
+        """That of the goal."""
+        return [pose_from_row(self._goals[row])]
 
     def infos(self) -> dict[str, np.ndarray]:
         """Distance [m], angle [rad], and whether both are small."""

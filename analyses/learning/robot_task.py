@@ -12,6 +12,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 from pydrake.math import RigidTransform
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import RigidBody
 
 from cdpr_drake.analyses.learning.held_box import HeldBox
 from cdpr_drake.analyses.learning.task_kernel import (
@@ -194,6 +196,14 @@ class RobotTask(ABC):
     def _act(self, actions: Array) -> None:
         """What actions do beside moving the robots, before they move: nothing."""
         return
+
+    def add_bodies(self, plant: MultibodyPlant) -> list[RigidBody]:
+        """Adds what pictures show beside the robot: nothing."""
+        return []
+
+    def places(self, row: int) -> list[RigidTransform]:
+        """Where these bodies are for a robot, X_W of each [m]."""
+        return []
 
     # --- Episodes -------------------------------------------------------------------------------
 

@@ -15,7 +15,10 @@ from typing import ClassVar
 
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import RigidBody
 
+from cdpr_drake.analyses.learning.robot_picture import add_shown_body
 from cdpr_drake.analyses.learning.robot_task import TWIST, RobotTask, TaskOptions
 from cdpr_drake.analyses.learning.tag_picture import TagPicture
 from cdpr_drake.analyses.learning.task_kernel import add_closeness, write_marks
@@ -24,6 +27,7 @@ from cdpr_drake.errors import CdprError
 from cdpr_drake.geometry.poses import pose_from_row
 from cdpr_drake.models.camera_catalogue import load_camera
 from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.models.scene import add_tag
 from cdpr_drake.vision.apriltags import tag_corners
 from cdpr_drake.vision.pinhole import Pinhole, normalize_points
 from cdpr_drake.vision.target import VISIBLE_BORDER
@@ -148,10 +152,22 @@ class VisualServoTask(RobotTask):
             self._picture.draw(self._X_OC(row)) for row in range(self.count)
         ])  # fmt: skip
 
-    def _X_OC(self, row: int) -> RigidTransform:
+    def add_bodies(self, plant: MultibodyPlant) -> list[RigidBody]:
+        """The tag."""
+        tag = add_shown_body(plant, "tag")
+        add_tag(plant, 0, EDGE * self.reach, RigidTransform(), tag)
+        return [tag]
+
+    def places(self, row: int) -> list[RigidTransform]:
+        """That of the tag."""
+        return [self._X_WO(row)]
+
+    def _X_WO(self, row: int) -> RigidTransform:
         O = self._objects[row]  # noqa: E741
-        X_WO = RigidTransform(RotationMatrix.ProjectToRotationMatrix(O[:, :3]), O[:, 3])
-        return X_WO.inverse() @ pose_from_row(self.batch.poses[row]) @ self._X_PC
+        return RigidTransform(RotationMatrix.ProjectToRotationMatrix(O[:, :3]), O[:, 3])
+
+    def _X_OC(self, row: int) -> RigidTransform:
+        return self._X_WO(row).inverse() @ pose_from_row(self.batch.poses[row]) @ self._X_PC
 
     def image_shape(self) -> tuple[int, int, int] | None:
         """Of an image that is observed; None: features are."""

@@ -80,6 +80,7 @@ MODULES = {
     "stability-ranges": "stability_ranges.study",
     "stability-shapes": "stability_shapes.study",
     "stability-bounds": "stability_bounds.study",
+    "basin": "basin.study",
     "workspaces": "workspaces.study",
     "design": "design",
     "engines": "engines.study",

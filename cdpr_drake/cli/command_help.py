@@ -9,6 +9,11 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
         "cdpr simulate caroca_ibvs --camera projected --seeds 0:20",
     ),
     "serve": ("Run", "cdpr serve acrobot_pbvs", "cdpr serve acrobot_pbvs --port 5599 --duration 5"),
+    "environments": (
+        "Run",
+        "cdpr environments",
+        "cdpr environments Reach --robot acrobot_small --picture reach.png",
+    ),
     "robots": ("Robots and scenarios", "cdpr robots", "cdpr robots --json"),
     "scenarios": ("Robots and scenarios", "cdpr scenarios", "cdpr scenarios --json"),
     "new": (

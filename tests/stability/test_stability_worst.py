@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.studies.closed_loops.servo_models import Perturbation, perturbed_servo
+from cdpr_drake.analyses.studies.framework.servo_models import Perturbation, perturbed_servo
 from cdpr_drake.geometry.poses import pose_from_row
 from cdpr_drake.stability.criterion_at_pose_kernel import evaluate, new_work, prepare
 from cdpr_drake.stability.desired_view import FixedObject

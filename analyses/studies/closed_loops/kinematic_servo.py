@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.studies.closed_loops.servo_models import PerturbedServo
+from cdpr_drake.analyses.studies.framework.servo_models import PerturbedServo
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.poses import exponential
 from cdpr_drake.systems.cameras.camera_settings import servo_pinhole

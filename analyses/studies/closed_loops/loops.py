@@ -10,13 +10,13 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.simulation.visual_servo_run import RunResult, run_scenario
 from cdpr_drake.analyses.studies.closed_loops.kinematic_servo import STEP, kinematic_path
-from cdpr_drake.analyses.studies.closed_loops.servo_models import (
+from cdpr_drake.analyses.studies.framework.runs import Row
+from cdpr_drake.analyses.studies.framework.servo_models import (
     Perturbation,
     PerturbedServo,
     perturbed_scenario,
     perturbed_servo,
 )
-from cdpr_drake.analyses.studies.framework.runs import Row
 from cdpr_drake.analyses.studies.framework.study import Case
 from cdpr_drake.analyses.workspaces.stability_defaults import workspace_defaults
 from cdpr_drake.analyses.workspaces.static_feasible import static_case

@@ -6,6 +6,9 @@ from .experiments import between as between
 from .experiments import turned as turned
 from .runs import Run as Run
 from .runs import Runs as Runs
+from .servo_models import Perturbation as Perturbation
+from .servo_models import perturbed_scenario as perturbed_scenario
+from .servo_models import perturbed_servo as perturbed_servo
 from .statement import Finding as Finding
 from .study import Case as Case
 from .study import Form as Form

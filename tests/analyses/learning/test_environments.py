@@ -152,7 +152,7 @@ def test_any_robot_takes_part(name, robot):
         ({"period": 0.0}, "period: found 0.0"),
         ({"turn_deg": 200.0}, "turn_deg: found 200.0"),
         ({"winches": "motor", "action": "tensions"}, "winches: found motor"),
-        ({"render_mode": "human"}, "render_mode: found 'human'"),
+        ({"render_mode": "human"}, "render_mode: found 'human'; accepted: null, rgb_array"),
     ],
 )
 def test_what_is_not_accepted_is_said_in_one_line(options, words):

@@ -6,7 +6,7 @@ import pytest
 from cdpr_drake.analyses.simulation.run_stability import stability_along
 from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
 from cdpr_drake.analyses.studies.closed_loops.loops import SETTINGS, loop_setup, perturbation_of
-from cdpr_drake.analyses.studies.closed_loops.servo_models import (
+from cdpr_drake.analyses.studies.framework.servo_models import (
     perturbed_scenario,
     perturbed_servo,
 )

@@ -5,7 +5,7 @@ import pytest
 from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.analyses.studies.closed_loops.kinematic_servo import REACHED, STEP, kinematic_path
-from cdpr_drake.analyses.studies.closed_loops.servo_models import (
+from cdpr_drake.analyses.studies.framework.servo_models import (
     Perturbation,
     perturbed_scenario,
     perturbed_servo,

@@ -77,14 +77,25 @@ def pose_of(X: RigidTransform) -> Pose:
 
 
 def perturbed_scenario(
-    scenario: Scenario, X_WP: RigidTransform, perturbation: Perturbation
+    scenario: Scenario,
+    X_WP: RigidTransform,
+    perturbation: Perturbation,
+    X_PC: RigidTransform | None = None,
 ) -> Scenario:
-    """A scenario that starts at a pose [m], with a perturbation of what the servo believes."""
+    """A scenario that starts at a pose [m], with a perturbation of what the servo believes.
+
+    Args:
+        scenario: The scenario; it stays as it is.
+        X_WP: Where the platform starts.
+        perturbation: What is believed wrongly.
+        X_PC: True camera on the platform, who knows it saves reading the robot's file [m].
+    """
+    if X_PC is None:
+        X_PC = load_robot(scenario.robot).camera_mount(scenario.camera.mount).pose.transform()
     made = copy.deepcopy(scenario)
-    mount = load_robot(scenario.robot).camera_mount(scenario.camera.mount).pose.transform()
     made.initial_pose = pose_of(X_WP)
     made.perturbations.initial_pose = pose_of(perturbation.platform(X_WP))
-    made.perturbations.camera_pose = pose_of(mount.inverse() @ perturbation.camera(mount))
+    made.perturbations.camera_pose = pose_of(X_PC.inverse() @ perturbation.camera(X_PC))
     made.perturbations.exit_point_shifts = perturbation.exits.T.copy()
     made.perturbations.anchor_point_shifts = perturbation.anchors.T.copy()
     return made
