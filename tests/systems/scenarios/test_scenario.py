@@ -234,7 +234,10 @@ def test_overrides_add_up():
         ("duration=", "overrides duration: found null; accepted: a number > 0 [s]"),
         ("duration=[", "overrides duration: found '[', which is not YAML"),
         ("camera.kind=painted", "overrides camera.kind: found painted; accepted: one of rendered"),
-        ("controller.scheme=ibsv", "controller.scheme: found ibsv; did you mean ibvs? accepted: one of pbvs"),
+        (
+            "controller.scheme=ibsv",
+            "found ibsv; did you mean ibvs? accepted: one of pbvs",
+        ),
         ("target.tag_id=587", "overrides target.tag_id: found 587; accepted: a whole number >= 0"),
         ("initial_pose.position=[0.1, 0.2]", "overrides initial_pose.position: found [0.1, 0.2]"),
         ("integration.integrator=euler", "overrides integration.integrator: found euler"),
