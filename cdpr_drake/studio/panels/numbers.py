@@ -84,15 +84,35 @@ def cable_table(
     return (
         f'<table class="studio-cables"><caption>tensions, limits {low:g} to {high:g} N{beyond}'
         "</caption><thead><tr><th>cable</th>"
-        f"<th>tension</th><th>N</th><th></th>{heads}</tr>"
+        f"<th>tension</th><th>[N]</th><th>state</th>{heads}</tr>"
         f"</thead><tbody>{''.join(rows)}</tbody></table>"
     )
 
 
 def fact_table(facts: Mapping[str, str]) -> str:
     """Facts by what they are, in two columns."""
+    return fact_rows(facts.items())
+
+
+def plain_table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A table of words, the first of each row its name."""
+    top = "".join(f'<th scope="col">{escape(words)}</th>' for words in heads)
+    body = "".join(
+        f'<tr><th scope="row">{escape(row[0])}</th>'
+        + "".join(f"<td>{escape(words)}</td>" for words in row[1:])
+        + "</tr>"
+        for row in rows
+    )
+    return (
+        '<div class="studio-wide" tabindex="0" role="group" aria-label="Table"><table '
+        f'class="studio-facts"><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table></div>'
+    )
+
+
+def fact_rows(facts: Iterable[tuple[str, str]]) -> str:
+    """Facts in two columns; the same name may be there twice."""
     rows = "".join(
         f'<tr><th scope="row">{escape(name)}</th><td>{escape(words)}</td></tr>'
-        for name, words in facts.items()
+        for name, words in facts
     )
     return f'<table class="studio-facts"><tbody>{rows}</tbody></table>'

@@ -41,6 +41,11 @@ SPANS = {"all": None, "last 5 s": 5.0, "last 20 s": 20.0}
 
 NOTHING = "none"
 
+EMPTY = (
+    "No run is shown. Choose a scenario and press Start to simulate the open robot, or choose one "
+    "of the runs in the working folder."
+)
+
 RUN, COMPARED = "run", "compared"
 """Names of the results: the run that is shown, and the one behind it."""
 
@@ -163,6 +168,7 @@ class RunPanel:
             self._run = ui.select({}, label="run", on_change=self._choose_run)
             self._run.props("dense outlined").classes("col").mark("run")
             self._bar = SteeringBar(self._board, lambda: self._watch.job if self._key else None)
+        self._empty = ui.label(EMPTY).classes("studio-empty").mark("run-empty")
         self._watch = RunWatch(self._board, self._scene.draw)
         with ui.row().classes("w-full items-center"):
             self._compare = ui.select({NOTHING: NOTHING}, value=NOTHING, label="compare with")
@@ -325,6 +331,7 @@ class RunPanel:
             self._run.value = board.shown or None
             self._watch.show(choices.get(board.shown))
         self._bar.refresh()
+        self._empty.set_visibility(not board.shown)
         shown = self._watch.shown
         there = shown is not None and shown.folder.is_dir()
         if self._download.visible != there:
