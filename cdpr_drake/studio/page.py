@@ -209,6 +209,8 @@ body.body--dark .bg-primary .q-btn__content {{ color: #101418; }}
 .studio-label {{ color: var(--studio-soft); }}
 .studio-parts {{ display: flex; gap: 0.25rem; min-width: 0; }}
 .studio-field {{ width: 100%; max-width: 26rem; }}
+.studio-named .q-field__label {{ display: none; }}
+.studio-named .q-field__control-container {{ padding-top: 0 !important; }}
 .studio-cell {{ flex: 1; min-width: 0; max-width: 9rem; }}
 .studio-cell .q-field__control, .studio-table .studio-field .q-field__control {{
   padding: 0 0.4rem; }}

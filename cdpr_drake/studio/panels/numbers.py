@@ -10,6 +10,7 @@ import numpy as np
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.palette import SLACK, nth_look
+from cdpr_drake.studio.workbench.side_by_side import Pair
 
 OVER = 1.08
 """How far a scale goes beyond the upper limit, so that one sees whether it is passed."""
@@ -107,6 +108,23 @@ def plain_table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
         '<div class="studio-wide" tabindex="0" role="group" aria-label="Table"><table '
         f'class="studio-facts"><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table></div>'
     )
+
+
+def pair_table(pairs: Iterable[Pair], one: str, other: str) -> str:
+    """Two robots or runs beside each other, with differences; both have a name."""
+    rows = [
+        (pair.name, _either(pair.one), _either(pair.other), _signed(pair.difference))
+        for pair in pairs
+    ]
+    return plain_table(("what", one, other, "difference"), rows)
+
+
+def _either(value: float | str | None) -> str:
+    return value if isinstance(value, str) else number_words(value, 6)
+
+
+def _signed(value: float | None) -> str:
+    return "" if value is None else "0" if value == 0.0 else f"{value:+.4g}"
 
 
 def fact_rows(facts: Iterable[tuple[str, str]]) -> str:

@@ -9,6 +9,7 @@ from nicegui import ui
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.studio.panels.panel import on_page, show_errors
 from cdpr_drake.studio.panels.point_dragging import add_point_dragging
+from cdpr_drake.studio.panels.robot_beside import RobotBeside
 from cdpr_drake.studio.panels.robot_dialogs import (
     export_dialog,
     open_dialog,
@@ -47,6 +48,7 @@ def robot_panel(bench: Workbench) -> None:
         with show_errors():
             groups.refresh()
 
+    RobotBeside(bench)
     add_point_dragging(bench)
     refresh()
     on_page(bench.robot.changed, refresh)

@@ -119,7 +119,8 @@ class SchemaForm:
         elif rule.kind == "text" and rule.choices:
             options = [*(() if not rule.nullable else ("",)), *rule.choices]
             element = ui.select(options, value="" if value is None else value)
-            element.props("dense outlined options-dense hide-bottom-space")
+            element.props(f'dense outlined options-dense hide-bottom-space label="{words}"')
+            element.classes("studio-named")  # the list's name for programs that read aloud
         else:
             shown = field_words(rule, value) if index is None else number_text(value[index])
             element = ui.input(value=shown).props("dense outlined hide-bottom-space")

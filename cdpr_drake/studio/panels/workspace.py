@@ -318,9 +318,11 @@ class _WorkspacePanel:
             what.props("dense outlined").classes("col").mark("plane-of")
             usual = 2 if 2 in normals else normals[0]
             across = ui.select(
-                {k: f"across {AXES[k]}" for k in normals}, value=plane.along if plane else usual
+                {k: AXES[k] for k in normals},
+                value=plane.along if plane else usual,
+                label="across",
             )
-            across.props('dense outlined aria-label="Axis across the plane"').mark("plane-along")
+            across.props("dense outlined").mark("plane-along")
         last = len(regions.axes[int(across.value)]) - 1
         where = ui.slider(min=0, max=last, step=1, value=plane.index if plane else last // 2)
         where.props('aria-label="place of the plane"').mark("plane-index")
