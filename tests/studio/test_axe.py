@@ -38,6 +38,7 @@ def page(started_browser, studio):
 @pytest.mark.parametrize("size", ["1280", "phone"])
 def test_no_tab_has_serious_findings(page, studio, size, dark):
     look(page, size, dark)
+    page.execute_cdp_cmd("Network.clearBrowserCookies", {})  # a session keeps its theme
     page.get(studio[1])
     wait_for(page, "document.querySelectorAll('.q-tab').length > 0")
     titles = page.execute_script(

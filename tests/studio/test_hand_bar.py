@@ -4,7 +4,7 @@ import asyncio
 
 from cdpr_drake.studio.panels.run import _boards
 from cdpr_drake.systems.diagrams.load import load_scenario
-from tests.studio.pages import field, opened_page, problems, until
+from tests.studio.pages import field, opened_page, problems, shown, until
 from tests.studio.run_page import write_scenario
 
 
@@ -46,5 +46,4 @@ def test_buttons_break_and_push_and_the_scenario_keeps_it(tmp_path):
 
 
 def _ready(user):
-    found = user.find(marker="break").elements
-    return bool(found) and next(iter(found)).enabled
+    return shown(user, "break") and field(user, "break").enabled

@@ -5,7 +5,7 @@ import asyncio
 
 from cdpr_drake.studio.workbench.yaml_edit import with_value
 from tests.models.formats.foreign_files import caspr
-from tests.studio.pages import field, opened_page, type_into, until
+from tests.studio.pages import field, opened_page, shown, type_into, until
 
 
 def said(user):
@@ -40,20 +40,19 @@ def test_what_an_import_assumed_stays_as_a_card_until_it_is_seen(tmp_path):
 
     async def look():
         async with opened_page(tmp_path, "acrobot_small") as (user, bench, _):
-            card = field(user, "assumed")
-            assert not card.visible
+            assert not shown(user, "assumed")
             opened = bench.upload(files)
             assert any(line.startswith("assumed ") for line in opened.notes)
-            assert card.visible
+            assert shown(user, "assumed")
             assert bench.assumed == opened.notes
             bench.save("toy.yaml", overwrite=False)
             assert bench.assumed == opened.notes
             bench.open("planar")
-            assert not card.visible
+            assert not shown(user, "assumed")
             bench.robot.undo()
-            assert card.visible
+            assert shown(user, "assumed")
             user.find(marker="assumed-seen").click()
-            await until(lambda: not card.visible)
+            await until(lambda: not shown(user, "assumed"))
 
     asyncio.run(look())
 

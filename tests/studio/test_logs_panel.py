@@ -15,7 +15,7 @@ from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.studio.panels.logs import _views
 from cdpr_drake.studio.workbench.recorded_logs import log_contents, log_files, read_comparison
 from cdpr_drake.studio.workbench.working_folder import WorkingFolder
-from tests.studio.pages import field, opened_page, problems, until
+from tests.studio.pages import field, opened_page, problems, shown, until
 
 OFFSET = 0.004
 """By which the first cable's length is wrong in the log of the test [m]."""
@@ -74,7 +74,7 @@ def test_a_log_is_compared_with_the_open_robot_as_the_command_does(folder):
     async def look():
         async with opened_page(folder, "acrobot_small") as (user, bench, _):
             user.find(marker="tab-logs").click()
-            await until(lambda: user.find(marker="logs-empty").elements)
+            await until(lambda: shown(user, "logs-empty"))
             field(user, "log").value = "circle.csv"
             await until(lambda: "1 gaps" in _content(user, "log-facts"))
             assert "C8_length_m" in _content(user, "log-channels")
@@ -96,7 +96,7 @@ def test_a_file_that_is_no_log_is_said(folder):
     async def look():
         async with opened_page(folder, "acrobot_small") as (user, _, _):
             user.find(marker="tab-logs").click()
-            await until(lambda: user.find(marker="log").elements)
+            await until(lambda: shown(user, "log"))
             field(user, "log").value = "notes.txt"
             await until(lambda: any("notes.txt" in words for words in problems(user)))
 

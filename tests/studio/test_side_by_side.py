@@ -10,7 +10,7 @@ from cdpr_drake.analyses.front.tensions import solve_tensions
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.studio.workbench.side_by_side import robots_side_by_side, runs_side_by_side
 from cdpr_drake.studio.workbench.yaml_edit import with_value
-from tests.studio.pages import field, opened_page, until
+from tests.studio.pages import field, opened_page, shown, until
 
 
 def by_name(pairs):
@@ -66,7 +66,7 @@ def test_the_panels_show_both(tmp_path, alone):
             field(user, "run").value = "folder first"
             await until(lambda: "folder second" in field(user, "compare").options)
             field(user, "compare").value = "folder second"
-            await until(lambda: field(user, "both-runs").visible)
+            await until(lambda: shown(user, "both-runs"))
             assert "final position error [m]" in field(user, "run-pairs").content
 
     asyncio.run(look())
