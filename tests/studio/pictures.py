@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import io
+import json
 import tempfile
 import time
 from pathlib import Path
@@ -15,6 +16,9 @@ from PIL import Image
 
 from cdpr_drake.analyses.front.logs import replay_log
 from cdpr_drake.analyses.front.simulation import simulate
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.studio.workbench.command_board import ABOUT
+from cdpr_drake.studio.workbench.result_subject import subject_of
 from cdpr_drake.systems.diagrams.load import load_scenario
 from tests.chromium import chromium, wait_for
 from tests.studio.served import served
@@ -22,13 +26,13 @@ from tests.studio.served import served
 SIZES = {"1280": (1280, 800, 1.0), "1920": (1920, 1080, 1.0), "phone": (390, 844, 2.0)}
 IMAGES = Path(__file__).parents[2] / "docs" / "images"
 GUIDE = {
-    ("robot", False): "studio.png", ("robot", True): "studio_dark.png",
-    ("logs", False): "studio_logs.png",
+    ("robot", False): "studio.webp", ("robot", True): "studio_dark.webp",
+    ("logs", False): "studio_logs.webp",
 }  # fmt: skip
 """Pictures of the guide by panel and whether they are dark."""
 
-COLOURS = 128
-"""Of the guide's pictures, so that they stay small."""
+QUALITY = 80
+"""Of the guide's pictures, so that they stay small and cables keep their colours."""
 SETTLED = 4.0
 """Until fonts, scene and numbers are there [s]."""
 
@@ -50,12 +54,14 @@ def fill(folder: Path) -> None:
     scenario = load_scenario("acrobot_pbvs", ["camera.kind=projected", "duration=2.0"])
     simulate(scenario, folder=run)
     replay_log(run / "log.csv", "acrobot_small", folder=folder / "logs" / "acrobot_pbvs")
+    about = {"robot": "acrobot_small", "digest": subject_of(load_robot("acrobot_small")).digest}
+    (folder / "logs" / f".acrobot_pbvs{ABOUT}").write_text(json.dumps(about))
 
 
 def keep(page: object, name: str) -> None:
     """Writes a picture of the guide."""
     with Image.open(io.BytesIO(page.get_screenshot_as_png())) as image:  # type: ignore[attr-defined]
-        image.convert("RGB").quantize(COLOURS).save(IMAGES / name, optimize=True)
+        image.convert("RGB").save(IMAGES / name, quality=QUALITY, method=6)
 
 
 def main() -> None:
