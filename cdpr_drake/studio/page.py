@@ -72,8 +72,6 @@ def _build(bench: Workbench) -> None:
     turn.on_click(lambda: show(not bench.dark))
     _undo_by_keys(bench)
     with ui.element("div").classes("studio-main"):
-        with ui.element("section").classes("studio-scene").props('aria-label="Scene"'):
-            ui.element("iframe").props(f'src="{SCENE}" title="The robot in space" id="scene"')
         with ui.tab_panels(tabs, value=shown, animated=False) as pages:
             pages.classes("studio-panels").on_value_change(
                 lambda event: setattr(bench, "panel", event.value)
@@ -82,6 +80,9 @@ def _build(bench: Workbench) -> None:
                 with ui.tab_panel(panel.name), show_errors():
                     place_remarks(bench, panel)
                     panel.build(bench)
+        # After the panels: keys get into the scene's own controls, which are many.
+        with ui.element("section").classes("studio-scene").props('aria-label="Scene"'):
+            ui.element("iframe").props(f'src="{SCENE}" title="The robot in space" id="scene"')
 
     async def ask_for_dark() -> None:
         if bench.dark is None:
@@ -240,8 +241,9 @@ body.body--dark .bg-primary .q-btn__content {{ color: #101418; }}
   .studio-main {{ grid-template-columns: minmax(0, 860px) minmax(0, 1fr); }}
 }}
 @media (max-width: 860px) {{
-  .studio-main {{ display: block; height: auto; }}
-  .studio-scene {{ height: 38vh; border-left: 0; border-bottom: 1px solid var(--studio-line); }}
+  .studio-main {{ display: flex; flex-direction: column; height: auto; }}
+  .studio-panels {{ order: 2; }}
+  .studio-scene {{ order: 1; height: 38vh; border-left: 0; border-bottom: 1px solid var(--studio-line); }}
   .studio-header {{ flex-wrap: wrap; padding: 0.1rem 0.4rem 0; row-gap: 0; }}
   .studio-header .q-tabs {{ order: 3; flex: 1 1 100%; }}
   .studio-header .q-tab {{ padding: 0; min-width: 0; flex: 1 1 0; }}
