@@ -243,7 +243,8 @@ body.body--dark .bg-primary .q-btn__content {{ color: #101418; }}
 @media (max-width: 860px) {{
   .studio-main {{ display: flex; flex-direction: column; height: auto; }}
   .studio-panels {{ order: 2; }}
-  .studio-scene {{ order: 1; height: 38vh; border-left: 0; border-bottom: 1px solid var(--studio-line); }}
+  .studio-scene {{ order: 1; height: 38vh; border-left: 0;
+    border-bottom: 1px solid var(--studio-line); }}
   .studio-header {{ flex-wrap: wrap; padding: 0.1rem 0.4rem 0; row-gap: 0; }}
   .studio-header .q-tabs {{ order: 3; flex: 1 1 100%; }}
   .studio-header .q-tab {{ padding: 0; min-width: 0; flex: 1 1 0; }}

@@ -74,7 +74,7 @@ def test_all_of_the_page_is_reached_by_keys_and_focus_is_seen(page, studio):
     wait_for(page, "document.querySelector('input[aria-label=\"seeds\"]') !== null")
     page.execute_script("document.activeElement.blur()")
     seen, unseen = set(), []
-    for _ in range(30):
+    for _ in range(20):
         ActionChains(page).send_keys(Keys.TAB).perform()
         name, outline = page.execute_script(
             "const e = document.activeElement, f = e.closest('.q-field__control') || e;"
@@ -83,10 +83,8 @@ def test_all_of_the_page_is_reached_by_keys_and_focus_is_seen(page, studio):
             "e.tagName === 'IFRAME' || e === document.body || [e, f].some("
             "  one => drawn(getComputedStyle(one)))]"
         )
-        seen.add(name.split("\n")[-1])
+        seen.add(name.split("\n")[0].strip())
         if not outline:
             unseen.append(name)
-    assert {"Dark or light", "seeds", "More options"} <= seen | {name.strip() for name in seen}, (
-        seen
-    )
+    assert {"Dark or light", "seeds", "More options"} <= seen
     assert unseen == []
