@@ -86,5 +86,6 @@ def test_all_of_the_page_is_reached_by_keys_and_focus_is_seen(page, studio):
         seen.add(name.split("\n")[0].strip())
         if not outline:
             unseen.append(name)
-    assert {"Dark or light", "seeds", "More options"} <= seen
+    assert {"Dark or light", "seeds"} <= seen
+    assert any("More options" in name for name in seen), seen  # Quasar says that it can be unfolded
     assert unseen == []
