@@ -146,12 +146,11 @@ body.body--dark .bg-primary .q-btn__content {{ color: #101418; }}
 .studio-subject-name {{ font-weight: 600; overflow: hidden; text-overflow: ellipsis; }}
 .studio-state {{ border: 1px solid #ffffff; border-radius: 0.7rem; padding: 0 0.5rem; }}
 .studio-print {{ font-family: monospace; }}
-:focus-visible {{ outline: 3px solid #e08a00 !important; outline-offset: 2px; }}
-.studio-header :focus-visible {{ outline-color: #ffffff !important; outline-offset: -3px; }}
+:focus-visible {{ box-shadow: 0 0 0 3px #e08a00 !important; }}
+.studio-header :focus-visible {{ box-shadow: inset 0 0 0 3px #ffffff !important; }}
 .q-field--focused:has(:focus-visible) .q-field__control {{
   outline: 3px solid #e08a00; outline-offset: -1px; }}
-.q-field--focused :focus-visible, .q-field__control :focus-visible {{ outline: 0 !important; }}
-.q-slider__track-container:focus-visible {{ outline-offset: 0; }}
+.q-field--focused :focus-visible, .q-field__control :focus-visible {{ box-shadow: none !important; }}
 .studio-empty {{ border: 1px dashed var(--studio-line); padding: 0.6rem 0.8rem; width: 100%;
   color: var(--studio-soft); }}
 .studio-card {{ border: 1px solid var(--studio-line); border-left: 4px solid {COLORS[1]};

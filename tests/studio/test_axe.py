@@ -78,7 +78,8 @@ def test_all_of_the_page_is_reached_by_keys_and_focus_is_seen(page, studio):
         ActionChains(page).send_keys(Keys.TAB).perform()
         name, outline = page.execute_script(
             "const e = document.activeElement, f = e.closest('.q-field__control') || e;"
-            "const drawn = s => s.outlineStyle !== 'none' && parseFloat(s.outlineWidth) >= 2;"
+            "const drawn = s => s.boxShadow.includes('0px 0px 0px 3px') ||"
+            " parseFloat(s.outlineWidth) >= 3 && s.outlineStyle === 'solid';"
             "return [e.ariaLabel || e.innerText || e.tagName, "
             "e.tagName === 'IFRAME' || e === document.body || [e, f].some("
             "  one => drawn(getComputedStyle(one)))]"

@@ -322,7 +322,7 @@ class _WorkspacePanel:
                 value=plane.along if plane else usual,
                 label="across",
             )
-            across.props("dense outlined").mark("plane-along")
+            across.props("dense outlined").classes("w-24").mark("plane-along")
         last = len(regions.axes[int(across.value)]) - 1
         where = ui.slider(min=0, max=last, step=1, value=plane.index if plane else last // 2)
         where.props('aria-label="place of the plane"').mark("plane-index")
