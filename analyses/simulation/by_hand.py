@@ -50,9 +50,7 @@ class ByHand:
         # With events from the start their times are fixed in the diagram.
         may_break = failures is not None and not failures.events
         self.takes = tuple(
-            name
-            for name, can in ((BREAK, may_break), (PUSH, disturbances is not None))
-            if can
+            name for name, can in ((BREAK, may_break), (PUSH, disturbances is not None)) if can
         )
         self._cables = [cable.name for cable in load_robot(scenario.robot).cables]
         self._broken: set[int] = set()

@@ -150,7 +150,8 @@ body.body--dark .bg-primary .q-btn__content {{ color: #101418; }}
 .studio-header :focus-visible {{ box-shadow: inset 0 0 0 3px #ffffff !important; }}
 .q-field--focused:has(:focus-visible) .q-field__control {{
   outline: 3px solid #e08a00; outline-offset: -1px; }}
-.q-field--focused :focus-visible, .q-field__control :focus-visible {{ box-shadow: none !important; }}
+.q-field--focused :focus-visible, .q-field__control :focus-visible {{
+  box-shadow: none !important; }}
 .studio-empty {{ border: 1px dashed var(--studio-line); padding: 0.6rem 0.8rem; width: 100%;
   color: var(--studio-soft); }}
 .studio-card {{ border: 1px solid var(--studio-line); border-left: 4px solid {COLORS[1]};
