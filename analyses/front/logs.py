@@ -6,8 +6,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cdpr_drake.analyses.logs.clock_pairs import JoinedLogs, join_logs
-from cdpr_drake.analyses.logs.followed_log import FollowedLog, follow_log
 from cdpr_drake.analyses.logs.log_formats import AUTO, read_recorded
 from cdpr_drake.analyses.logs.log_replay import SUMMARY, LogReplay
 from cdpr_drake.analyses.logs.log_replay import replay_log as compare_log
@@ -22,6 +20,9 @@ from cdpr_drake.summaries import Summarized
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from cdpr_drake.analyses.logs.clock_pairs import JoinedLogs
+    from cdpr_drake.analyses.logs.followed_log import FollowedLog
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -93,6 +94,8 @@ def import_log(
     log = read_recorded(Path(path), format, asked)
     joined = None
     if beside is not None:
+        from cdpr_drake.analyses.logs.clock_pairs import join_logs  # which loads SciPy's signals
+
         other = LogRequest(
             cables=asked.cables, units=asked.units, body=asked.body, rate=asked.rate,
             R_WF=asked.R_WF,
@@ -170,7 +173,12 @@ def replay_log(
     if asked.cables is None:
         asked = replace(asked, cables=tuple(cable.name for cable in loaded.cables))
     found = compare_log(loaded, read_recorded(Path(path), format, asked), fit_frame)
-    result = ReplayedLog(found, follow_log(found) if follow else None)
+    followed = None
+    if follow:
+        from cdpr_drake.analyses.logs.followed_log import follow_log
+
+        followed = follow_log(found)
+    result = ReplayedLog(found, followed)
     if folder is not None:
         from cdpr_drake.analyses.logs.replay_figures import replay_pictures
 

@@ -11,6 +11,7 @@ from typing import Any
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, Diagram, EventStatus
 
+from cdpr_drake.analyses.simulation.by_hand import BREAK, PUSH, ByHand
 from cdpr_drake.analyses.simulation.live_messages import Message, receive, send
 from cdpr_drake.analyses.simulation.live_samples import Moments
 from cdpr_drake.analyses.simulation.realtime_rate import FASTEST_SPEED, SLOWEST_SPEED, RealtimeRate
@@ -46,8 +47,9 @@ def check_steered(scenario: Any) -> None:
 class Steering:
     """Shows a run to who holds the other end of a connection, and obeys.
 
-    It looks between steps and changes nothing in the simulation. Where the other end does not read,
-    samples and images are left out: nobody makes a run wait but by asking for it.
+    It looks between steps and changes nothing in the simulation, but what it is told to break or to
+    push. Where the other end does not read, samples and images are left out: nobody makes a run
+    wait but by asking for it.
     """
 
     def __init__(
@@ -78,10 +80,14 @@ class Steering:
         self._sample_due = self._image_due = self._listen_due = 0.0
         self._told: tuple[bool, float | None] | None = None
         self._is_there = True
-        self._send(self._moments.begin(), always=True)
+        self._by_hand = ByHand(scenario)
+        begin = self._moments.begin()
+        takes = {"takes": list(self._by_hand.takes)}
+        self._send(Message("begin", begin.data | takes), always=True)
 
     def prepare(self, simulator: Simulator, diagram: Diagram) -> None:
         """Looks at a run from now on; for `run_scenario`."""
+        self._by_hand.find(diagram)
         simulator.set_monitor(lambda context: self._look(diagram, context))
 
     def _look(self, diagram: Diagram, context: Context) -> EventStatus:
@@ -175,6 +181,12 @@ class Steering:
             pace.go()
             pace.go_at(None)
             self._ask_stop()
+        elif what in (BREAK, PUSH):
+            try:
+                done = self._by_hand.do(data, now)
+            except ScenarioError as problem:
+                done = {"t": now, "refused": str(problem)}
+            self._send(Message("event", done), always=True)
 
 
 def _has_room(connection: Connection) -> bool:

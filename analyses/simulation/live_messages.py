@@ -6,15 +6,17 @@ A run says:
 kind     with
 ======== ==========================================================================================
 begin    scenario, title, robot, cables (names), limits (two tensions [N]), duration [s], period of
-         the log [s]
+         the log [s], takes (what may be done to it by hand: break, push)
 sample   t [s], position_error [m], rotation_error [rad], tensions [N], lengths [m], unstrained
          [m] or null, pose (quaternion w x y z, position [m]), outcome
 image    t [s], then the image as JPEG
 pace     t [s], paused, speed: a factor, or null for as fast as possible; after each change of them
+event    t [s], words: what was done by hand, or refused: why it was not
 ======== ==========================================================================================
 
 It is told by messages of the kind `do`, with `what`: pause, go, step (with `seconds`, or null for
-the period of the log), speed (with `factor`, or null), stop. Who hangs up stops the run.
+the period of the log), speed (with `factor`, or null), stop, break (with `cable`, its number), push
+(with `force` [N] in W and `seconds`, a half sine). Who hangs up stops the run.
 """
 
 from __future__ import annotations

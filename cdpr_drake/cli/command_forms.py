@@ -9,6 +9,7 @@ from typing import Any, get_args, get_origin, get_type_hints
 
 from typer.models import OptionInfo
 
+from cdpr_drake.cli.replay import replay
 from cdpr_drake.cli.stability import stability
 from cdpr_drake.cli.study import study
 from cdpr_drake.cli.workspace import workspace
@@ -18,10 +19,12 @@ OFFERED: dict[str, Callable[..., Any]] = {
     "workspace": workspace,
     "stability": stability,
     "study": study,
+    "replay": replay,
 }
 """Commands that the studio runs."""
 
-LEFT_OUT = {"out", "json", "overwrite", "help", "scheduler", "along", "threshold"}
+LEFT_OUT = {"out", "json", "overwrite", "help", "scheduler", "along", "threshold",
+            "robot"}  # fmt: skip
 """Options that are the studio's own business, or of another use of the command."""
 
 KINDS_OF = {

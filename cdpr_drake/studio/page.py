@@ -9,11 +9,11 @@ from collections.abc import Callable
 from contextlib import suppress
 
 from fastapi import Request
-from nicegui import ui
+from nicegui import events, ui
 
 from cdpr_drake.palette import COLORS, SLACK
 from cdpr_drake.studio.guard import SESSION
-from cdpr_drake.studio.panels.panel import message, place_remarks, show_errors
+from cdpr_drake.studio.panels.panel import message, on_page, place_remarks, show_errors
 from cdpr_drake.studio.panels.table import PANELS
 from cdpr_drake.studio.scene_relay import SCENE
 from cdpr_drake.studio.sessions import Sessions
@@ -35,6 +35,7 @@ def make_page(
     def page() -> None:
         ui.page_title("cdpr studio")
         ui.add_css(STYLE)
+        ui.add_head_html(LANGUAGE)
         session = session_of(ui.context.client.request)
         try:
             bench = sessions.open_page(session)
@@ -53,12 +54,13 @@ def _build(bench: Workbench) -> None:
     dark = ui.dark_mode(value=bench.dark)
     shown = bench.panel if bench.panel in PANELS else next(iter(PANELS))
     with ui.header().classes("studio-header"):
-        ui.label("cdpr studio").classes("studio-name")
+        name = ui.label("cdpr studio").classes("studio-name")
+        name.props('role="heading" aria-level="1"')
         with ui.tabs() as tabs:
             tabs.props("dense inline-label mobile-arrows outside-arrows no-caps")
             for panel in PANELS.values():
                 ui.tab(panel.name, label=panel.title, icon=panel.icon).mark(f"tab-{panel.name}")
-        ui.space()
+        _place_subject(bench)
         turn = ui.button(icon="contrast").props("flat round dense color=white")
         turn.props('aria-label="Dark or light" title="Dark or light"')
 
@@ -68,9 +70,8 @@ def _build(bench: Workbench) -> None:
         bench.draw(lambda scene: scene.set_dark(is_dark))
 
     turn.on_click(lambda: show(not bench.dark))
-    with ui.element("main").classes("studio-main"):
-        with ui.element("section").classes("studio-scene").props('aria-label="Scene"'):
-            ui.element("iframe").props(f'src="{SCENE}" title="The robot in space" id="scene"')
+    _undo_by_keys(bench)
+    with ui.element("div").classes("studio-main"):
         with ui.tab_panels(tabs, value=shown, animated=False) as pages:
             pages.classes("studio-panels").on_value_change(
                 lambda event: setattr(bench, "panel", event.value)
@@ -79,6 +80,9 @@ def _build(bench: Workbench) -> None:
                 with ui.tab_panel(panel.name), show_errors():
                     place_remarks(bench, panel)
                     panel.build(bench)
+        # After the panels: keys get into the scene's own controls, which are many.
+        with ui.element("section").classes("studio-scene").props('aria-label="Scene"'):
+            ui.element("iframe").props(f'src="{SCENE}" title="The robot in space" id="scene"')
 
     async def ask_for_dark() -> None:
         if bench.dark is None:
@@ -87,6 +91,42 @@ def _build(bench: Workbench) -> None:
 
     ui.context.client.on_connect(ask_for_dark)
 
+
+def _place_subject(bench: Workbench) -> None:
+    """Says in every tab which robot is open, whether it is saved, and its fingerprint."""
+    with ui.element("div").classes("studio-subject").props('role="status"'):
+        name = ui.label().classes("studio-subject-name").mark("subject-name")
+        state = ui.label().classes("studio-state").mark("subject-state")
+        print_ = ui.label().classes("studio-print").mark("subject-fingerprint")
+
+    def refresh() -> None:
+        name.text, state.text = bench.robot.value.name, bench.state
+        print_.text = bench.subject.fingerprint
+        name.props["title"] = bench.file or bench.robot.value.title
+        print_.props["title"] = "Fingerprint of the robot; results carry that of theirs"
+
+    refresh()
+    on_page(bench.robot.changed, refresh)
+
+
+def _undo_by_keys(bench: Workbench) -> None:
+    """Ctrl-Z, Ctrl-Y and Ctrl-Shift-Z in every tab, but in fields, which have their own."""
+
+    def pressed(event: events.KeyEventArguments) -> None:
+        if not event.action.keydown or not (event.modifiers.ctrl or event.modifiers.meta):
+            return
+        key = str(event.key).lower()
+        with show_errors():
+            if key == "y" or (key == "z" and event.modifiers.shift):
+                bench.robot.redo()
+            elif key == "z":
+                bench.robot.undo()
+
+    ui.keyboard(pressed, ignore=["input", "textarea"])
+
+
+LANGUAGE = '<script>document.documentElement.lang = "en"</script>'
+"""Programs that read pages aloud choose a voice by it."""
 
 STYLE = f"""
 :root {{ --studio-line: #c8ccd2; --studio-soft: #5a6068; --studio-problem: {SLACK};
@@ -100,6 +140,23 @@ body.body--dark .bg-primary .q-btn__content {{ color: #101418; }}
 .studio-header {{ padding: 0 0.8rem; gap: 0.6rem; align-items: center; flex-wrap: nowrap;
   min-height: 2.8rem; background: #24476b !important; }}
 .studio-name {{ font-weight: 600; white-space: nowrap; }}
+.studio-header .q-tabs {{ flex: 0 1 auto; min-width: 0; }}
+.studio-subject {{ flex: 1 1 auto; min-width: 0; display: flex; gap: 0.5rem; align-items: center;
+  justify-content: flex-end; white-space: nowrap; font-size: 0.86rem; }}
+.studio-subject-name {{ font-weight: 600; overflow: hidden; text-overflow: ellipsis; }}
+.studio-state {{ border: 1px solid #ffffff; border-radius: 0.7rem; padding: 0 0.5rem; }}
+.studio-print {{ font-family: monospace; }}
+:focus-visible {{ box-shadow: 0 0 0 3px #e08a00 !important; }}
+.studio-header :focus-visible {{ box-shadow: inset 0 0 0 3px #ffffff !important; }}
+.q-field--focused:has(:focus-visible) .q-field__control {{
+  outline: 3px solid #e08a00; outline-offset: -1px; }}
+.q-field--focused :focus-visible, .q-field__control :focus-visible {{
+  box-shadow: none !important; }}
+.studio-empty {{ border: 1px dashed var(--studio-line); padding: 0.6rem 0.8rem; width: 100%;
+  color: var(--studio-soft); }}
+.studio-card {{ border: 1px solid var(--studio-line); border-left: 4px solid {COLORS[1]};
+  padding: 0.4rem 0.8rem; width: 100%; font-size: 0.9rem; }}
+.studio-card ul {{ margin: 0.2rem 0; padding-left: 1.1rem; overflow-wrap: anywhere; }}
 .studio-main {{ display: grid; grid-template-columns: minmax(0, 1.2fr) minmax(0, 1fr);
   width: 100%;
   height: calc(100vh - 2.8rem); }}
@@ -114,6 +171,9 @@ body.body--dark .bg-primary .q-btn__content {{ color: #101418; }}
 .studio-stale {{ color: var(--studio-problem); font-size: 0.86rem; min-height: 1.3rem; }}
 .studio-stale:empty:not(.studio-kept) {{ display: none; }}
 .studio-soft {{ color: var(--studio-soft); }}
+.studio-stale.studio-soft {{ color: var(--studio-soft); }}
+.studio-fingerprint {{ color: var(--studio-soft); font-size: 0.8rem; }}
+.studio-fingerprint:empty {{ display: none; }}
 .studio-row {{ width: 100%; gap: 0.6rem; flex-wrap: wrap; margin: 0.4rem 0; }}
 .studio-sliders {{ display: grid; width: 100%; grid-template-columns: 1.2rem minmax(0, 1fr) 8.2rem;
   gap: 0.15rem 0.8rem; align-items: center; }}
@@ -127,6 +187,8 @@ body.body--dark .bg-primary .q-btn__content {{ color: #101418; }}
 .studio-facts td {{ text-align: left; }}
 .studio-facts th {{ font-weight: 500; color: var(--studio-soft); white-space: nowrap; }}
 .studio-facts td {{ overflow-wrap: anywhere; }}
+.studio-wide {{ overflow-x: auto; width: 100%; }}
+.studio-wide td {{ overflow-wrap: normal; }}
 .studio-cables .swatch {{ display: inline-block; width: 0.75rem; height: 0.75rem;
   border-radius: 50%; margin-right: 0.4rem; vertical-align: -1px;
   outline: 1px solid var(--studio-line); }}
@@ -148,6 +210,8 @@ body.body--dark .bg-primary .q-btn__content {{ color: #101418; }}
 .studio-label {{ color: var(--studio-soft); }}
 .studio-parts {{ display: flex; gap: 0.25rem; min-width: 0; }}
 .studio-field {{ width: 100%; max-width: 26rem; }}
+.studio-named .q-field__label {{ display: none; }}
+.studio-named .q-field__control-container {{ padding-top: 0 !important; }}
 .studio-cell {{ flex: 1; min-width: 0; max-width: 9rem; }}
 .studio-cell .q-field__control, .studio-table .studio-field .q-field__control {{
   padding: 0 0.4rem; }}
@@ -177,9 +241,19 @@ body.body--dark .bg-primary .q-btn__content {{ color: #101418; }}
   .studio-main {{ grid-template-columns: minmax(0, 860px) minmax(0, 1fr); }}
 }}
 @media (max-width: 860px) {{
-  .studio-main {{ display: block; height: auto; }}
-  .studio-scene {{ height: 38vh; border-left: 0; border-bottom: 1px solid var(--studio-line); }}
-  .studio-name {{ display: none; }}
+  .studio-main {{ display: flex; flex-direction: column; height: auto; }}
+  .studio-panels {{ order: 2; }}
+  .studio-scene {{ order: 1; height: 38vh; border-left: 0;
+    border-bottom: 1px solid var(--studio-line); }}
+  .studio-header {{ flex-wrap: wrap; padding: 0.1rem 0.4rem 0; row-gap: 0; }}
+  .studio-header .q-tabs {{ order: 3; flex: 1 1 100%; }}
+  .studio-header .q-tab {{ padding: 0; min-width: 0; flex: 1 1 0; }}
+  .studio-header .q-tab__content {{ flex-direction: column; min-width: 0; padding: 0.15rem 0; }}
+  .studio-header .q-tab__icon {{ font-size: 1.15rem; width: auto; height: auto; }}
+  .studio-header .q-tab__label {{ padding: 0; margin: 0; font-size: 0.7rem; line-height: 1rem; }}
+  .studio-name {{ position: absolute; clip-path: inset(50%); width: 1px; height: 1px;
+    overflow: hidden; }}
+  .studio-subject {{ justify-content: flex-start; }}
   .studio-form {{ grid-template-columns: minmax(0, 1fr); }}
   .studio-table {{ overflow-x: auto; }}
   .studio-cables th, .studio-cables td, .studio-facts th, .studio-facts td {{

@@ -107,6 +107,7 @@ def serve(options: StudioOptions) -> None:
     app.on_startup(lambda: background_tasks.create(announce(), name="announce"))
     app.on_shutdown(end)
     _put_before_all(options.host, Entrance(token, port))
+    app.config.quasar_config["loadingBar"] = {"skipHijack": True}  # it has no name to be read aloud
     ui.run(
         make_page(sessions), host=host, port=port, title="cdpr studio", show=False, reload=False,
         show_welcome_message=False, access_log=False, dark=None, reconnect_timeout=LONGEST_ABSENCE,

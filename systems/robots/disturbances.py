@@ -237,6 +237,22 @@ class Disturbances(LeafSystem):
         self.DeclareInitializationDiscreteUpdateEvent(self._begin)
         self.DeclarePeriodicDiscreteUpdateEvent(self._period, 0.0, self._update)
 
+    @property
+    def period(self) -> float:
+        """Time between changes of the wrench [s]."""
+        return self._period
+
+    def add(self, push: Push) -> None:
+        """Adds a push that begins later, but no wind, whose gusts are part of the state.
+
+        It stands in the settings then: a run with those from the start is the same run.
+        """
+        if push.kind == WIND:
+            raise ScenarioError("push: found wind; accepted: a kind without gusts")
+        push.check("push")
+        self._settings.pushes.append(push)
+        self._turbulence.append((0.0, 0.0))
+
     def _calc(self, context: Context, output: BasicVector) -> None:
         own = context.get_discrete_state_vector().value()[:6]
         more = self._more.Eval(context) if self._more.HasValue(context) else 0.0

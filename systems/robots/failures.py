@@ -21,7 +21,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
+from pydrake.systems.framework import (
+    BasicVector,
+    Context,
+    DiscreteValues,
+    EventStatus,
+    LeafSystem,
+)
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import Problems, ScenarioError
@@ -239,7 +245,7 @@ class Failures(LeafSystem):
     ========= ========= ==== ===================================================
 
     State: the flags of what is in the settings. They change at the times that these say, where a
-    simulator ends its steps.
+    simulator ends its steps. Without events it looks at each step, for what is added by hand.
     """
 
     def __init__(self, settings: FailureSettings, cables: int, winches: int) -> None:
@@ -266,6 +272,21 @@ class Failures(LeafSystem):
         self.DeclareInitializationDiscreteUpdateEvent(self._update)
         for time in sorted({e.begins for e in settings.events if FAILURES[e.kind] is not None}):
             self.DeclarePeriodicDiscreteUpdateEvent(_ONCE, time, self._update)
+        if not settings.events:
+            self.DeclarePerStepDiscreteUpdateEvent(self._update_by_hand)
+
+    def add(self, event: Failure) -> None:
+        """Lets something fail at the next step, where the settings had no events at the start.
+
+        The event stands in the settings then: a run with those from the start is the same run.
+        """
+        self._settings.events.append(event)
+
+    def _update_by_hand(self, context: Context, state: DiscreteValues) -> EventStatus:
+        if not self._settings.events:
+            return EventStatus.DidNothing()
+        self._update(context, state)
+        return EventStatus.Succeeded()
 
     def _update(self, context: Context, state: DiscreteValues) -> None:
         flags = self._settings.flags(context.get_time(), *self._counts)

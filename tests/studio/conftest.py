@@ -6,6 +6,7 @@ from io import StringIO
 
 import pytest
 
+from cdpr_drake.analyses.front.logs import replay_log
 from cdpr_drake.cli.app import main
 from tests.studio.served import served
 
@@ -40,6 +41,14 @@ def computed(tmp_path_factory):
         main(["workspace", "acrobot_small", "--grid", "5,5,5", "--kind", "static,wrench-feasible",
               "--force", "1", "--measure", "capacity-margin", "--out", str(folder)])  # fmt: skip
     (folder / "printed.txt").write_text(printed.getvalue())
+    return folder
+
+
+@pytest.fixture(scope="session")
+def beside(alone, tmp_path_factory):
+    """The log of that run beside the model, as the command leaves it."""
+    folder = tmp_path_factory.mktemp("work") / "logs" / "small"
+    replay_log(alone / "log.csv", "acrobot_small", folder=folder)
     return folder
 
 

@@ -47,6 +47,14 @@ def field(user, name):
     return element
 
 
+def shown(user, name):
+    """Whether an element with a mark is to be seen."""
+    try:
+        return bool(user.find(marker=name).elements)
+    except AssertionError:
+        return False
+
+
 def type_into(user, name, words):
     """Types words into a field, and presses Enter."""
     found = user.find(marker=name)

@@ -1,20 +1,38 @@
 """Pictures of the studio's panels, to be looked at, and the one of its guide.
 
-`python -m tests.studio.pictures FOLDER`, or with `--guide` the picture of docs/guides/studio.md.
+`python -m tests.studio.pictures FOLDER`, or with `--guide` the pictures of docs/guides/studio.md.
 """
 
 from __future__ import annotations
 
 import argparse
+import io
+import json
 import tempfile
 import time
 from pathlib import Path
 
+from PIL import Image
+
+from cdpr_drake.analyses.front.logs import replay_log
+from cdpr_drake.analyses.front.simulation import simulate
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.studio.workbench.command_board import ABOUT
+from cdpr_drake.studio.workbench.result_subject import subject_of
+from cdpr_drake.systems.diagrams.load import load_scenario
 from tests.chromium import chromium, wait_for
 from tests.studio.served import served
 
 SIZES = {"1280": (1280, 800, 1.0), "1920": (1920, 1080, 1.0), "phone": (390, 844, 2.0)}
-GUIDE = Path(__file__).parents[2] / "docs" / "images" / "studio.png"
+IMAGES = Path(__file__).parents[2] / "docs" / "images"
+GUIDE = {
+    ("robot", False): "studio.webp", ("robot", True): "studio_dark.webp",
+    ("logs", False): "studio_logs.webp",
+}  # fmt: skip
+"""Pictures of the guide by panel and whether they are dark."""
+
+QUALITY = 80
+"""Of the guide's pictures, so that they stay small and cables keep their colours."""
 SETTLED = 4.0
 """Until fonts, scene and numbers are there [s]."""
 
@@ -30,14 +48,38 @@ def look(page: object, size: str, dark: bool) -> None:
     page.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": liking})  # type: ignore[attr-defined]
 
 
+def fill(folder: Path) -> None:
+    """A run, and its log beside the model of its robot."""
+    run = folder / "runs" / "acrobot_pbvs"
+    scenario = load_scenario("acrobot_pbvs", ["camera.kind=projected", "duration=2.0"])
+    simulate(scenario, folder=run)
+    replay_log(run / "log.csv", "acrobot_small", folder=folder / "logs" / "acrobot_pbvs")
+    about = {"robot": "acrobot_small", "digest": subject_of(load_robot("acrobot_small")).digest}
+    (folder / "logs" / f".acrobot_pbvs{ABOUT}").write_text(json.dumps(about))
+
+
+def keep(page: object, name: str) -> None:
+    """Writes a picture of the guide."""
+    with Image.open(io.BytesIO(page.get_screenshot_as_png())) as image:  # type: ignore[attr-defined]
+        image.convert("RGB").save(IMAGES / name, quality=QUALITY, method=6)
+
+
 def main() -> None:
     """Writes them."""
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("folder", type=Path, nargs="?")
     options.add_argument("--guide", action="store_true")
     asked = options.parse_args()
-    looks = [("1280", False)] if asked.guide else [(s, d) for d in (False, True) for s in SIZES]
-    with tempfile.TemporaryDirectory() as folder, served(Path(folder)) as (address, _):
+    sizes = ("1280",) if asked.guide else tuple(SIZES)
+    looks = [(size, dark) for dark in (False, True) for size in sizes]
+    with tempfile.TemporaryDirectory() as folder:
+        fill(Path(folder))
+        photograph(Path(folder), looks, asked)
+
+
+def photograph(folder: Path, looks: list[tuple[str, bool]], asked: argparse.Namespace) -> None:
+    """Takes pictures of all panels of a studio that works in a folder."""
+    with served(folder, "acrobot_small") as (address, _):
         for size, dark in looks:
             with tempfile.TemporaryDirectory() as profile, chromium(Path(profile)) as page:
                 look(page, size, dark)
@@ -49,8 +91,8 @@ def main() -> None:
                     name = tab.text.split("\n")[-1].lower()
                     tab.click()
                     time.sleep(SETTLED)
-                    if asked.guide and name == "robot":
-                        page.save_screenshot(str(GUIDE))
+                    if asked.guide and (name, dark) in GUIDE:
+                        keep(page, GUIDE[name, dark])
                     elif not asked.guide:
                         asked.folder.mkdir(parents=True, exist_ok=True)
                         kind = "dark" if dark else "light"

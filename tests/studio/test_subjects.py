@@ -37,13 +37,17 @@ async def compared(user, bench, folder):
     await until(lambda: bench.results.subject("compared") is not None)
 
 
+async def log(user, bench, folder):
+    await until(lambda: bench.results.subject("log") is not None)
+
+
 async def study(user, bench, folder):
     pass
 
 
 RESULTS = {
     "robot": {}, "pose": {"pose-numbers": pose_numbers}, "workspace": {"workspaces": workspaces},
-    "run": {"run": run, "compared": compared}, "studies": {"study": study},
+    "run": {"run": run, "compared": compared}, "logs": {"log": log}, "studies": {"study": study},
 }  # fmt: skip
 """How each result of each panel comes to be; a panel that is new has to be here, and be marked."""
 
@@ -57,11 +61,12 @@ def test_all_panels_say_which_results_they_show():
 
 
 @pytest.fixture
-def folder(tmp_path, computed, alone):
+def folder(tmp_path, computed, alone, beside):
     """With a workspace and two runs of `ROBOT`, each with what the studio keeps of it."""
     shutil.copytree(computed, tmp_path / "workspaces" / "small")
     for name in ("first", "second"):
         shutil.copytree(alone, tmp_path / "runs" / name)
+    shutil.copytree(beside, tmp_path / "logs" / "small")
     return tmp_path
 
 
@@ -78,7 +83,8 @@ def open_panel(user, name):
 async def opened(folder):
     async with opened_page(folder, ROBOT) as (user, bench, _):
         about = {"robot": ROBOT, "digest": bench.subject.digest}
-        (folder / "workspaces" / ".small.about.json").write_text(json.dumps(about))
+        for below in ("workspaces", "logs"):
+            (folder / below / ".small.about.json").write_text(json.dumps(about))
         yield user, bench
 
 

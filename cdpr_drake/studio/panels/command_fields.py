@@ -106,6 +106,7 @@ class CommandFields:
             made: Any = ui.checkbox(words, value=bool(before))
         elif key in self._choices:
             made = self._choice(self._choices[key], str(before or option.usual))
+            made.props(f'label="{key}"').classes("studio-named")
         else:
             made = ui.input(value=str(before or ""), placeholder=option.usual or None)
             made.props(f'dense outlined hide-bottom-space aria-label="{key}"')

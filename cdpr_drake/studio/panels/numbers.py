@@ -10,6 +10,7 @@ import numpy as np
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.palette import SLACK, nth_look
+from cdpr_drake.studio.workbench.side_by_side import Pair
 
 OVER = 1.08
 """How far a scale goes beyond the upper limit, so that one sees whether it is passed."""
@@ -84,15 +85,52 @@ def cable_table(
     return (
         f'<table class="studio-cables"><caption>tensions, limits {low:g} to {high:g} N{beyond}'
         "</caption><thead><tr><th>cable</th>"
-        f"<th>tension</th><th>N</th><th></th>{heads}</tr>"
+        f"<th>tension</th><th>[N]</th><th>state</th>{heads}</tr>"
         f"</thead><tbody>{''.join(rows)}</tbody></table>"
     )
 
 
 def fact_table(facts: Mapping[str, str]) -> str:
     """Facts by what they are, in two columns."""
+    return fact_rows(facts.items())
+
+
+def plain_table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A table of words, the first of each row its name."""
+    top = "".join(f'<th scope="col">{escape(words)}</th>' for words in heads)
+    body = "".join(
+        f'<tr><th scope="row">{escape(row[0])}</th>'
+        + "".join(f"<td>{escape(words)}</td>" for words in row[1:])
+        + "</tr>"
+        for row in rows
+    )
+    return (
+        '<div class="studio-wide" tabindex="0" role="group" aria-label="Table"><table '
+        f'class="studio-facts"><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table></div>'
+    )
+
+
+def pair_table(pairs: Iterable[Pair], one: str, other: str) -> str:
+    """Two robots or runs beside each other, with differences; both have a name."""
+    rows = [
+        (pair.name, _either(pair.one), _either(pair.other), _signed(pair.difference))
+        for pair in pairs
+    ]
+    return plain_table(("what", one, other, "difference"), rows)
+
+
+def _either(value: float | str | None) -> str:
+    return value if isinstance(value, str) else number_words(value, 6)
+
+
+def _signed(value: float | None) -> str:
+    return "" if value is None else "0" if value == 0.0 else f"{value:+.4g}"
+
+
+def fact_rows(facts: Iterable[tuple[str, str]]) -> str:
+    """Facts in two columns; the same name may be there twice."""
     rows = "".join(
         f'<tr><th scope="row">{escape(name)}</th><td>{escape(words)}</td></tr>'
-        for name, words in facts.items()
+        for name, words in facts
     )
     return f'<table class="studio-facts"><tbody>{rows}</tbody></table>'

@@ -15,6 +15,7 @@ from nicegui import ui
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models.robot_loader import robot_names
 from cdpr_drake.studio.workbench.calculator import Signal
+from cdpr_drake.studio.workbench.result_subject import Subject
 from cdpr_drake.studio.workbench.session import POSE_NUMBERS, Workbench
 
 
@@ -41,10 +42,12 @@ class Panel:
 
 def place_remarks(bench: Workbench, panel: Panel) -> None:
     """Places what is to be said about the results of a panel that are about something else."""
-    labels = {
-        name: ui.label().classes("studio-stale").props('role="status"').mark(f"about-{name}")
-        for name in panel.results
-    }
+    labels, prints = {}, {}
+    for name in panel.results:
+        labels[name] = ui.label().classes("studio-stale").props('role="status"')
+        labels[name].mark(f"about-{name}")
+        if name != POSE_NUMBERS:  # which are always of the robot that is open
+            prints[name] = ui.label().classes("studio-fingerprint").mark(f"fingerprint-{name}")
     if POSE_NUMBERS in labels:  # they change at each step of a slider: nothing may jump
         labels[POSE_NUMBERS].classes("studio-kept")
 
@@ -54,9 +57,23 @@ def place_remarks(bench: Workbench, panel: Panel) -> None:
             said = f"{panel.results[name]}: {words}." if words else ""
             if label.text != said:
                 label.text = said
+        for name, label in prints.items():
+            subject = bench.results.subject(name)
+            if subject is not None:  # robots of its own are nothing to be warned of
+                labels[name].classes(
+                    add="" if subject.robot else "studio-soft",
+                    remove="studio-soft" if subject.robot else "",
+                )
+            said = "" if subject is None else _fingerprint(panel.results[name], subject)
+            if label.text != said:
+                label.text = said
 
     refresh()
     on_page(bench.results.changed, refresh)
+
+
+def _fingerprint(words: str, subject: Subject) -> str:
+    return f"{words}: {subject.robot}, {subject.fingerprint}" if subject.digest else ""
 
 
 def on_page(signal: Signal, listener: Callable[[], None]) -> None:

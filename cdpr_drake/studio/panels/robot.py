@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from nicegui import events, ui
+from html import escape
+
+from nicegui import ui
 
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.studio.panels.panel import on_page, show_errors
 from cdpr_drake.studio.panels.point_dragging import add_point_dragging
+from cdpr_drake.studio.panels.robot_beside import RobotBeside
 from cdpr_drake.studio.panels.robot_dialogs import (
     export_dialog,
     open_dialog,
@@ -33,30 +36,44 @@ def robot_panel(bench: Workbench) -> None:
         _button("As text", "notes", lambda: text_dialog(bench)).mark("as-text")
     title = ui.label().classes("studio-title").mark("robot-title")
     where = ui.label().classes("studio-soft").mark("robot-file")
+    _assumptions(bench)
     groups = SchemaGroups(bench.robot, Robot, first=FIRST, opened=OPENED, colored=("cables",))
 
     def refresh() -> None:
         robot = bench.robot.value
         title.text = f"{robot.name}: {robot.title}" if robot.title else robot.name
-        state = "" if bench.is_saved else ", with changes that are not saved"
-        where.text = f"{bench.file}{state}" if bench.file else "not in a file of the folder yet"
+        where.text = f"{bench.file}: {bench.state}" if bench.file else _NO_FILE
         undo.set_enabled(bench.robot.can_undo)
         redo.set_enabled(bench.robot.can_redo)
         with show_errors():
             groups.refresh()
 
-    def pressed(event: events.KeyEventArguments) -> None:
-        if not event.action.keydown or not (event.modifiers.ctrl or event.modifiers.meta):
-            return
-        name = str(event.key).lower()
-        with show_errors():
-            if name == "y" or (name == "z" and event.modifiers.shift):
-                bench.robot.redo()
-            elif name == "z":
-                bench.robot.undo()
-
-    ui.keyboard(pressed, ignore=["input", "textarea"])
+    RobotBeside(bench)
     add_point_dragging(bench)
+    refresh()
+    on_page(bench.robot.changed, refresh)
+
+
+_NO_FILE = "not in a file of the folder yet; Save as puts it there"
+
+
+def _assumptions(bench: Workbench) -> None:
+    """A card of what was assumed when another tool's file was read, until it is closed."""
+    card = ui.element("section").classes("studio-card").mark("assumed")
+    card.props('aria-label="What was assumed"')
+
+    def refresh() -> None:
+        lines = bench.assumed
+        card.set_visibility(bool(lines))
+        card.clear()
+        with card:
+            if lines:
+                ui.label("What this robot's file did not say").classes("studio-subtitle")
+                items = "".join(f"<li>{escape(line)}</li>" for line in lines)
+                ui.html(f"<ul>{items}</ul>", sanitize=False)
+                done = ui.button("Seen", icon="check", on_click=bench.forget_assumed)
+                done.props("flat dense no-caps").mark("assumed-seen")
+
     refresh()
     on_page(bench.robot.changed, refresh)
 

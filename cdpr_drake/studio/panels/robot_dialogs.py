@@ -50,9 +50,9 @@ def _attempt(said: Any, action: Callable[[], None]) -> bool:
 
 
 def tell_opened(opened: OpenedRobot) -> None:
-    """Says what had to be assumed of a robot from a file of another tool."""
+    """Says that a robot comes from another tool's file; a card has what was assumed."""
     if opened.notes:
-        notify("\n".join(opened.notes), "info")
+        notify(opened.notes[0], "info")
 
 
 def open_dialog(bench: Workbench) -> None:

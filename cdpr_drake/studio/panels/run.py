@@ -15,6 +15,7 @@ from nicegui import run, ui
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.studio.panels.hand_bar import HandBar
 from cdpr_drake.studio.panels.live_bar import SteeringBar
 from cdpr_drake.studio.panels.panel import on_page, robot_argument, show_errors
 from cdpr_drake.studio.panels.run_watch import RUN_STYLE, RunWatch
@@ -40,6 +41,11 @@ SPANS = {"all": None, "last 5 s": 5.0, "last 20 s": 20.0}
 """Times that plots show."""
 
 NOTHING = "none"
+
+EMPTY = (
+    "No run is shown. Choose a scenario and press Start to simulate the open robot, or choose one "
+    "of the runs in the working folder."
+)
 
 RUN, COMPARED = "run", "compared"
 """Names of the results: the run that is shown, and the one behind it."""
@@ -150,6 +156,8 @@ class RunPanel:
             self._scenario.on_value_change(lambda: self._choose_scenario(self._scenario.value))
             self._paused = ui.checkbox("paused").mark("paused")
             self._paused.props('title="Stands at the start"')
+            self._by_hand = ui.checkbox("by hand").mark("by-hand")
+            self._by_hand.props('title="Cables can be broken and the platform pushed"')
             start = ui.button("Start", icon="play_circle", on_click=self._start).mark("start")
             start.props("no-caps")
 
@@ -163,6 +171,8 @@ class RunPanel:
             self._run = ui.select({}, label="run", on_change=self._choose_run)
             self._run.props("dense outlined").classes("col").mark("run")
             self._bar = SteeringBar(self._board, lambda: self._watch.job if self._key else None)
+        self._hands = HandBar(lambda: self._watch.job if self._key else None)
+        self._empty = ui.label(EMPTY).classes("studio-empty").mark("run-empty")
         self._watch = RunWatch(self._board, self._scene.draw)
         with ui.row().classes("w-full items-center"):
             self._compare = ui.select({NOTHING: NOTHING}, value=NOTHING, label="compare with")
@@ -244,7 +254,8 @@ class RunPanel:
             self._take_robot()
             if self._board.draft is not None and ROBOT in self._board.draft.changes:
                 robot_argument(self._bench)  # says why there is none
-            await run.io_bound(lambda: self._board.start(paused=bool(self._paused.value)))
+            paused, by_hand = bool(self._paused.value), bool(self._by_hand.value)
+            await run.io_bound(lambda: self._board.start(paused=paused, by_hand=by_hand))
             self._refresh_runs()
 
     def _choose_run(self) -> None:
@@ -325,6 +336,8 @@ class RunPanel:
             self._run.value = board.shown or None
             self._watch.show(choices.get(board.shown))
         self._bar.refresh()
+        self._hands.refresh()
+        self._empty.set_visibility(not board.shown)
         shown = self._watch.shown
         there = shown is not None and shown.folder.is_dir()
         if self._download.visible != there:

@@ -12,12 +12,14 @@ from typing import Any
 from nicegui import run, ui
 
 from cdpr_drake.studio.panels.moving_plots import MovingPlots, Row
+from cdpr_drake.studio.panels.numbers import pair_table
 from cdpr_drake.studio.panels.panel import show_errors
 from cdpr_drake.studio.workbench.finished_run import FinishedRun, is_run
 from cdpr_drake.studio.workbench.job import JobState, Listener
 from cdpr_drake.studio.workbench.plot_rows import charts_of, plot_row
 from cdpr_drake.studio.workbench.run_board import RunBoard, RunEntry, outcome_words
 from cdpr_drake.studio.workbench.run_job import RunJob
+from cdpr_drake.studio.workbench.side_by_side import runs_side_by_side
 
 STATES = {
     JobState.QUEUED: "waits for a place", JobState.RUNNING: "runs", JobState.PAUSED: "paused",
@@ -66,12 +68,17 @@ class RunWatch:
                 self._key = ui.label("Camera: orange is found, green is wanted.")
                 self._key.classes("cdpr-soft")
         self._plots = MovingPlots(self._begin)
+        self._both = ui.expansion("Both runs in numbers").classes("w-full studio-group")
+        with self._both.mark("both-runs"):
+            self._pairs = ui.html("", sanitize=False).classes("w-full").mark("run-pairs")
         with ui.row().classes("w-full items-center no-wrap") as self._scrub:
             self._time = ui.label("0.00 s").classes("cdpr-time")
             self._slider = ui.slider(min=0.0, max=1.0, step=0.001, value=0.0).classes("col")
             self._slider.props('aria-label="Time"').mark("cursor")
             self._slider.on_value_change(lambda: self._scrubbed())
         self._figure.visible = self._key.visible = self._scrub.visible = False
+        self._both.visible = False
+        self._other: FinishedRun | None = None
 
     @property
     def job(self) -> RunJob | None:
@@ -88,6 +95,7 @@ class RunWatch:
         self.forget()
         self._shown, self._finished, self._known = shown, None, ()
         self._begun = self._loading = False
+        self._say_pairs()
         self._jpeg = b""
         self._figure.visible = self._key.visible = self._scrub.visible = False
         if shown is not None and shown.job is not None:
@@ -155,6 +163,7 @@ class RunWatch:
         self._slider.props(f"max={end} step={max(end / 2000.0, 1e-3)}")
         self._slider.value = self._board.cursor
         self._scrub.visible = True
+        self._say_pairs()
         self._begin()
         self._scrubbed()
 
@@ -217,13 +226,22 @@ class RunWatch:
     async def compare(self, other: RunEntry | None) -> None:
         """Shows another run behind this one; None: that ends."""
         with show_errors():
-            self._others = ([], "")
+            self._others, self._other = ([], ""), None
             if other is not None:
                 done = await run.io_bound(self._board.finished, other.folder)
                 if done is not None:
                     rows = [plot_row(sample) for sample in done.samples]
-                    self._others = (rows, other.folder.name)
+                    self._others, self._other = (rows, other.folder.name), done
             self._plots.compare(*self._others)
+        self._say_pairs()
+
+    def _say_pairs(self) -> None:
+        """Both runs in numbers, once both are finished."""
+        one, other = self._finished, self._other
+        self._both.visible = one is not None and other is not None
+        if one is not None and other is not None:
+            pairs = runs_side_by_side(one.summary, other.summary)
+            self._pairs.content = pair_table(pairs, one.folder.name, other.folder.name)
 
     def _say(self) -> None:
         """State, outcome and progress in words, where they have changed."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -119,7 +119,8 @@ class SchemaForm:
         elif rule.kind == "text" and rule.choices:
             options = [*(() if not rule.nullable else ("",)), *rule.choices]
             element = ui.select(options, value="" if value is None else value)
-            element.props("dense outlined options-dense hide-bottom-space")
+            element.props(f'dense outlined options-dense hide-bottom-space label="{words}"')
+            element.classes("studio-named")  # the list's name for programs that read aloud
         else:
             shown = field_words(rule, value) if index is None else number_text(value[index])
             element = ui.input(value=shown).props("dense outlined hide-bottom-space")
@@ -137,12 +138,17 @@ class SchemaForm:
             return
         cell.element.on("keydown.enter", lambda: self.commit(cell))
         cell.element.on("blur", lambda: self.commit(cell))
-        cell.element.on("keydown.ctrl.z", lambda: self._undo_in(cell))
+        for keys in ("keydown.ctrl.z", "keydown.meta.z", "keydown.ctrl.y", "keydown.meta.y"):
+            cell.element.on(
+                keys, lambda event: self._step_in(cell, event.args), ["key", "shiftKey"]
+            )
 
-    def _undo_in(self, cell: _Cell) -> None:
-        """Ctrl-Z in a field takes a change back where there is nothing typed to take back."""
-        if cell.element.value == self._shown(cell):
-            self._document.undo()
+    def _step_in(self, cell: _Cell, pressed: Mapping[str, Any]) -> None:
+        """Ctrl-Z, Ctrl-Y and Ctrl-Shift-Z in a field, where nothing typed is to be taken back."""
+        if cell.element.value != self._shown(cell):
+            return
+        again = str(pressed["key"]).lower() == "y" or pressed["shiftKey"]
+        (self._document.redo if again else self._document.undo)()
 
     def _shown(self, cell: _Cell) -> Any:
         value = value_at(self._document.value, cell.place)

@@ -129,7 +129,8 @@ class SchemaGroups:
             ui.label()
             for name, rule in columns.items():
                 unit = f" [{rule.unit}]" if rule.unit not in ("", "-") else ""
-                head = ui.label(f"{name.replace('_', ' ')}{unit}").classes("studio-head")
+                axes = " x, y, z" if in_parts(rule) else ""
+                head = ui.label(f"{name.replace('_', ' ')}{axes}{unit}").classes("studio-head")
                 head.props["title"] = hint(rule)
             ui.label()
             for number in range(len(items)):

@@ -36,6 +36,11 @@ MOST_IN_GALLERY = 24
 
 TYPES = {".png": "image/png", ".svg": "image/svg+xml"}
 
+EMPTY = (
+    "No study yet. Choose one and press Start; quick takes a short form of it. Statements with "
+    "their verdicts, tables and figures come here."
+)
+
 SHADES = {"confirmed": "#1b7f4f", "in part": "#a86200", "not confirmed": "#c01010"}
 """Behind the words of verdicts."""
 
@@ -82,6 +87,7 @@ class _StudiesPanel:
             bench.commands["study"], view.filled, ("quick", "seeds"), {}, bench.folder
         )
         self._bar = JobBar(view.board, "results")
+        self._empty = ui.label(EMPTY).classes("studio-empty").mark("study-empty")
         self._body = ui.element("div").classes("w-full").mark("study-results")
         with ui.expansion("Finished studies in the working folder", value=True) as gallery:
             gallery.classes("w-full studio-group")
@@ -107,6 +113,7 @@ class _StudiesPanel:
     async def _tick(self) -> None:
         with show_errors():
             self._bar.refresh()
+            self._empty.set_visibility(not self._view.board.shown)
             self._say_mistake()
             computed = self._bar.computed
             folder = computed.folder if computed is not None and computed.is_whole else None
@@ -142,7 +149,9 @@ class _StudiesPanel:
     def _place_card(self, study: StudyFolder) -> None:
         with ui.card().classes("cdpr-study-card").props("flat bordered") as card:
             card.style("width: 14rem; cursor: pointer").mark(f"card-{study.folder.name}")
-            card.on("click", lambda name=study.folder.name: self._open(name))
+            card.props(f'tabindex=0 role="button" aria-label="Show {study.folder.name}"')
+            for event in ("click", "keydown.enter", "keydown.space"):
+                card.on(event, lambda name=study.folder.name: self._open(name))
             if study.figures:
                 _place_figure(study.figures[0], "height: 7rem; width: 100%; object-fit: contain")
             ui.label(study.folder.name).classes("studio-title")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from cdpr_drake.studio.panels.logs import LOG, logs_panel
 from cdpr_drake.studio.panels.panel import Panel
 from cdpr_drake.studio.panels.pose import pose_panel
 from cdpr_drake.studio.panels.robot import robot_panel
@@ -23,6 +24,7 @@ PANELS = {
             {RUN: "The run that is shown", COMPARED: "The run behind it"},
             run_panel,
         ),
+        Panel("logs", "Logs", "timeline", {LOG: "The comparison"}, logs_panel),
         Panel("studies", "Studies", "science", {STUDY: "Studies"}, studies_panel),
     )
 }

@@ -50,6 +50,11 @@ FIRST = {
 WORKSPACES = "workspaces"
 """Name of the result."""
 
+EMPTY = (
+    "No workspace yet. Choose what the cables must hold (kind) or what is measured at each pose "
+    "(measure), then press Start: the open robot is taken, and the result is drawn in the scene."
+)
+
 AXES = "xyz"
 NOTHING = "none"
 
@@ -163,6 +168,7 @@ class _WorkspacePanel:
         self._place_form(view.command)
         self._bar = JobBar(view.board, "results")
         self._note = ui.label().classes("studio-soft").mark("regions-note")
+        self._empty = ui.label(EMPTY).classes("studio-empty").mark("workspace-empty")
         self._body = ui.element("div").classes("w-full")
         self._shown: Regions | None = None
         self._refresh()
@@ -213,6 +219,7 @@ class _WorkspacePanel:
         with show_errors():
             self._bar.refresh()
             self._say_mistake()
+            self._empty.set_visibility(self._view.regions is None and not self._view.board.shown)
             computed = self._bar.computed
             job = None if computed is None else computed.job
             over = computed is not None and (job is None or job.state == JobState.FINISHED)
@@ -255,6 +262,7 @@ class _WorkspacePanel:
                 if regions is not None:
                     self._place_layers(regions)
                     self._place_plane(regions)
+        self._empty.set_visibility(regions is None and not self._view.board.shown)
         words = ""
         if regions is not None and self._view.is_hidden:
             words = f"They are not in the scene, which does not show that {regions.robot}."
@@ -310,9 +318,11 @@ class _WorkspacePanel:
             what.props("dense outlined").classes("col").mark("plane-of")
             usual = 2 if 2 in normals else normals[0]
             across = ui.select(
-                {k: f"across {AXES[k]}" for k in normals}, value=plane.along if plane else usual
+                {k: AXES[k] for k in normals},
+                value=plane.along if plane else usual,
+                label="across",
             )
-            across.props("dense outlined").mark("plane-along")
+            across.props("dense outlined").classes("w-24").mark("plane-along")
         last = len(regions.axes[int(across.value)]) - 1
         where = ui.slider(min=0, max=last, step=1, value=plane.index if plane else last // 2)
         where.props('aria-label="place of the plane"').mark("plane-index")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -39,6 +39,7 @@ class CommandEntry:
         asked: Arguments by which it goes on, without --out and --json; empty: nobody knows them,
             or it is done.
         about: Name and digest of the robot that it is about; empty: not known.
+        is_whole: Whether all results are there.
     """
 
     name: str
@@ -46,16 +47,12 @@ class CommandEntry:
     folder: Path
     asked: tuple[str, ...] = ()
     about: Mapping[str, str] = field(default_factory=dict)
+    is_whole: bool = False
 
     @property
     def key(self) -> str:
         """For lists of choices."""
         return self.folder.name
-
-    @property
-    def is_whole(self) -> bool:
-        """Whether all results are there."""
-        return (self.folder / "results.json").is_file()
 
 
 class CommandBoard:
@@ -67,7 +64,13 @@ class CommandBoard:
     """
 
     def __init__(
-        self, jobs: JobManager, root: Path, below: str, forms: Mapping[str, CommandForm]
+        self,
+        jobs: JobManager,
+        root: Path,
+        below: str,
+        forms: Mapping[str, CommandForm],
+        *,
+        is_whole: Callable[[Path], bool] = lambda folder: (folder / "results.json").is_file(),
     ) -> None:
         """With the server's jobs, the working folder, and the name of a folder in it.
 
@@ -76,7 +79,9 @@ class CommandBoard:
             root: The working folder.
             below: The name.
             forms: Of the commands that may go on; what a file asks for beyond them is not run.
+            is_whole: Whether all results are in a folder.
         """
+        self._is_whole = is_whole
         self._jobs, self._root, self.name, self._forms = jobs, root, below, forms
         self.shown = ""
 
@@ -161,15 +166,18 @@ class CommandBoard:
                     words = f"{key}, {job.state.value}"
                     over = job.state.is_over
                     asked = self._how(job.folder) if over else ()
-                    found[key] = CommandEntry(
-                        words, job, job.folder, asked, self._about(job.folder)
-                    )
+                    found[key] = self._entry(words, job, job.folder, asked)
         for folder in self._results():
             if folder.name not in found:
                 asked = self._how(folder)
                 words = f"{folder.name}, stopped" if asked else folder.name
-                found[folder.name] = CommandEntry(words, None, folder, asked, self._about(folder))
+                found[folder.name] = self._entry(words, None, folder, asked)
         return found
+
+    def _entry(
+        self, words: str, job: CommandJob | None, folder: Path, asked: tuple[str, ...]
+    ) -> CommandEntry:
+        return CommandEntry(words, job, folder, asked, self._about(folder), self._is_whole(folder))
 
     def _results(self) -> list[Path]:
         """Folders with results, whole or not, the newest first; none that a link leads to."""
@@ -179,7 +187,7 @@ class CommandBoard:
             path for path in self.folder.iterdir()
             if not path.is_symlink() and not path.name.startswith(".")
             and path.is_dir()
-            and ((path / "results.json").is_file() or self._asked(path).is_file())
+            and (self._is_whole(path) or self._asked(path).is_file())
         ]  # fmt: skip
         return sorted(some, key=lambda path: -path.stat().st_mtime)[:MOST_FOLDERS]
 

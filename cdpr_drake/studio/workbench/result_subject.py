@@ -16,6 +16,9 @@ from cdpr_drake.geometry.poses import pose_row
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.studio.workbench.calculator import Signal
 
+FINGERPRINT = 8
+"""Digits of a digest that are shown; two of a thousand robots share them about once in 10,000."""
+
 
 @dataclass(frozen=True)
 class Subject:
@@ -44,6 +47,11 @@ class Subject:
         if self.pose is not None and self.pose != now.pose:
             return "of the pose before, not of this one"
         return ""
+
+    @property
+    def fingerprint(self) -> str:
+        """Short form of the digest, by which a robot as it was is told; empty: not known."""
+        return self.digest[:FINGERPRINT]
 
     def is_another(self, now: Subject) -> bool:
         """Whether it is known to be about another robot, or the robot as it was before."""

@@ -108,6 +108,15 @@ class RobotFiles:
             raise RobotFileError(f"{name[:200]}: there is no such file in the working folder")
         return self._read_file(path)
 
+    def robot(self, name: str) -> Robot:
+        """The robot that `open` would open.
+
+        Raises:
+            CdprError: See `open`.
+        """
+        opened = self.open(name)
+        return self.read(opened.text, opened.path)
+
     def _read_file(self, path: Path) -> OpenedRobot:
         if path.suffix.lower() not in UPLOADS:
             raise RobotFileError(

@@ -77,8 +77,12 @@ class RunBoard:
             self.draft = ScenarioDraft(scenario, self._root)
         return self.draft
 
-    def start(self, *, paused: bool = False) -> RunJob:
+    def start(self, *, paused: bool = False, by_hand: bool = False) -> RunJob:
         """Begins a run of the draft, and looks at it.
+
+        Args:
+            paused: Whether it stands at the start.
+            by_hand: Whether cables can be broken and the platform pushed while it runs.
 
         Raises:
             CdprError: The draft is not accepted.
@@ -88,7 +92,8 @@ class RunBoard:
         folder = self._jobs.free_folder(self._root / RUNS / scenario.name)
         job = RunJob(
             self.draft.name, self._root, folder,
-            settings=self.draft.settings(), speed=self.speed, paused=paused,
+            settings=(*self.draft.settings(), *(self.draft.by_hand() if by_hand else ())),
+            speed=self.speed, paused=paused,
         )  # fmt: skip
         self._jobs.submit(job)
         self.shown, self.cursor = key_of(job), None

@@ -15,6 +15,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
+from cdpr_drake.analyses.simulation.by_hand import BREAK, PUSH
 from cdpr_drake.analyses.simulation.live_messages import Message, receive, send
 from cdpr_drake.analyses.simulation.realtime_rate import FASTEST_SPEED, SLOWEST_SPEED
 from cdpr_drake.studio.workbench.command_job import CommandJob
@@ -70,6 +71,7 @@ class RunJob(CommandJob):
         header: What it said at its beginning, see `analyses.simulation.live_messages`; empty
             before.
         image: The newest image as JPEG; empty where there is none.
+        events: What was done to it by hand, or refused, see `analyses.simulation.live_messages`.
         pace: Whether it stands, and its speed, as it said last.
     """
 
@@ -104,6 +106,7 @@ class RunJob(CommandJob):
         self.samples = Samples()
         self.header: dict[str, Any] = {}
         self.image = b""
+        self.events: list[dict[str, Any]] = []
         self.pace: dict[str, Any] = {"paused": paused, "speed": _checked_speed(speed)}
         self._connection: Connection | None = None
 
@@ -126,6 +129,14 @@ class RunJob(CommandJob):
             JobError: It is not accepted.
         """
         self._tell(what="speed", factor=_checked_speed(factor))
+
+    def break_cable(self, number: int) -> None:
+        """Lets a cable break, by its number from 0."""
+        self._tell(what=BREAK, cable=number)
+
+    def push(self, force: Sequence[float], seconds: float) -> None:
+        """Pushes the platform by a half sine with this peak in W [N], so long [s]."""
+        self._tell(what=PUSH, force=list(force), seconds=seconds)
 
     def _tell(self, **words: Any) -> None:
         """Tells the run something, or keeps in mind how it is to start."""
@@ -183,6 +194,8 @@ class RunJob(CommandJob):
                 self.set_progress(min(data["t"] / duration, 1.0), _words(data))
         elif message.kind == "image":
             self.image = message.blob
+        elif message.kind == "event":
+            self.events.append(data)
         elif message.kind == "pace":
             self.pace = data
             if self.state in (JobState.RUNNING, JobState.PAUSED):

@@ -6,6 +6,7 @@ import dataclasses
 import json
 import re
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,8 +15,9 @@ import yaml
 from pydrake.common.yaml import yaml_dump_typed
 
 import cdpr_drake
+from cdpr_drake.analyses.simulation.by_hand import UNTOUCHED
 from cdpr_drake.analyses.simulation.live_control import check_steered
-from cdpr_drake.errors import DataFileError, ScenarioError
+from cdpr_drake.errors import CdprError, DataFileError, ScenarioError
 from cdpr_drake.schema.fields import FieldRule
 from cdpr_drake.schema.typed_yaml import rules_of
 from cdpr_drake.systems.diagrams.load import load_scenario
@@ -135,6 +137,21 @@ class ScenarioDraft:
             elif rule.kind == "text" and not (text == "null" and rule.nullable):
                 value = json.dumps(text)
             made.append(f"{key}={value}")
+        return tuple(made)
+
+    def by_hand(self) -> tuple[str, ...]:
+        """What --set is given besides, so that cables can be broken and the platform pushed.
+
+        Of the sections that this takes, those that the scenario has not and accepts.
+        """
+        made: list[str] = []
+        for key, least in UNTOUCHED.values():
+            field = self._fields.get(key)
+            if field is None or self.changes.get(key, field.text) != "null":
+                continue
+            with suppress(CdprError):
+                load_scenario(self.name, (*self.settings(), *made, f"{key}={least}"))
+                made.append(f"{key}={least}")
         return tuple(made)
 
     def check(self) -> Any:

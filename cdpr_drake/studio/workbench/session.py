@@ -83,6 +83,7 @@ class Workbench:
             robot_text(robot, "the studio"), where, self.files.read
         )
         self._saved: dict[Path, str] = {}
+        self._assumed: dict[Path, list[str]] = {}
         is_own = where.is_relative_to(folder.root) and where.is_file() and not is_foreign(where)
         if is_own:  # with rails that the name moves, the text is not that of the file
             self._saved[where] = where.read_text(encoding="utf-8")
@@ -132,6 +133,25 @@ class Workbench:
         return self._saved.get(self.robot.path) == self.robot.text
 
     @property
+    def assumed(self) -> list[str]:
+        """What was assumed of the robot when another tool's file was read, a sentence each."""
+        return self._assumed.get(self.robot.path, [])
+
+    def forget_assumed(self) -> None:
+        """Says no more what was assumed, once somebody has read it."""
+        self._assumed.pop(self.robot.path, None)
+        self.robot.changed.emit()
+
+    @property
+    def state(self) -> str:
+        """How the robot stands to its file, in a word or two."""
+        if self.file:
+            return "saved" if self.is_saved else "edited, not saved"
+        if self.command_name:
+            return "of the package"
+        return "not saved"
+
+    @property
     def command_name(self) -> str:
         """By which commands know the robot as it is, in the folder; empty: they do not."""
         name = self.robot.value.name
@@ -149,8 +169,13 @@ class Workbench:
         own = opened.path.is_relative_to(self.folder.root) and opened.path.is_file()
         if own and not opened.notes:
             self._saved[opened.path] = opened.text
-        self.robot.change(opened.text, opened.path)
+        self._take_opened(opened)
         return opened
+
+    def _take_opened(self, opened: OpenedRobot) -> None:
+        if opened.notes:
+            self._assumed[opened.path] = opened.notes
+        self.robot.change(opened.text, opened.path)
 
     def upload(self, files: Mapping[str, bytes]) -> OpenedRobot:
         """Works with a robot from uploaded files, which has no file in the folder yet.
@@ -160,7 +185,7 @@ class Workbench:
         """
         opened = self.files.upload(files)
         self._saved.pop(opened.path, None)
-        self.robot.change(opened.text, opened.path)
+        self._take_opened(opened)
         return opened
 
     def save(self, name: str, overwrite: bool) -> None:
@@ -176,6 +201,8 @@ class Workbench:
         text = self.robot.text
         self.folder.write(name, text, overwrite or name == self.file)
         self._saved[path] = text
+        if self.assumed:
+            self._assumed[path] = self.assumed
         self.robot.belongs_to(path)
 
     def go_home(self) -> None:

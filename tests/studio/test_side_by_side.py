@@ -1,0 +1,72 @@
+"""Two robots, and two runs, beside each other with their differences."""
+
+import asyncio
+import json
+import shutil
+
+import pytest
+
+from cdpr_drake.analyses.front.tensions import solve_tensions
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.studio.workbench.side_by_side import robots_side_by_side, runs_side_by_side
+from cdpr_drake.studio.workbench.yaml_edit import with_value
+from tests.studio.pages import field, opened_page, shown, until
+
+
+def by_name(pairs):
+    return {pair.name: pair for pair in pairs}
+
+
+def test_a_robot_beside_itself_differs_in_nothing():
+    robot = load_robot("acrobot_small")
+    pairs = robots_side_by_side(robot, load_robot("acrobot_small"))
+    assert all(pair.name.startswith("at home") and not pair.differs for pair in pairs)
+    assert len(pairs) == 6
+
+
+def test_fields_that_differ_have_axes_units_and_differences():
+    one, other = load_robot("acrobot_small"), load_robot("acrobot_small")
+    other.cables[2].exit_point[1] += 0.02
+    other.platform.mass *= 2.0
+    found = by_name(robots_side_by_side(one, other))
+    assert found["cables 3 exit point y [m]"].difference == pytest.approx(0.02)
+    mass = one.platform.mass
+    assert found["platform mass [kg]"].difference == pytest.approx(mass)
+    tension = found["at home: largest tension [N]"]
+    wanted = solve_tensions(one, one.home.transform(), method="quadratic_program")
+    assert tension.one == pytest.approx(max(wanted.as_dict()["tensions_n"]))
+    assert tension.difference > 0.5 * tension.one
+
+
+def test_a_run_beside_another_has_numbers_of_both(alone):
+    summary = json.loads((alone / "summary.json").read_text())
+    other = summary | {"final_position_error_m": summary["final_position_error_m"] + 0.01}
+    found = by_name(runs_side_by_side(summary, other))
+    assert found["final position error [m]"].difference == pytest.approx(0.01)
+    assert found["tension min [N]"].difference == 0.0
+    assert found["outcome"].one == summary["outcome"]
+    assert not any("wall time" in name or "drake" in name for name in found)
+
+
+def test_the_panels_show_both(tmp_path, alone):
+    for name in ("first", "second"):
+        shutil.copytree(alone, tmp_path / "runs" / name)
+
+    async def look():
+        async with opened_page(tmp_path, "acrobot_small") as (user, bench, _):
+            field(user, "robot-beside").value = True
+            field(user, "other-robot").value = "acrobot_large"
+            await until(lambda: "platform mass [kg]" in field(user, "robot-pairs").content)
+            before = field(user, "robot-pairs").content
+            bench.robot.change(with_value(bench.robot.text, ("platform", "mass"), 5.25))
+            await until(lambda: field(user, "robot-pairs").content != before)
+            assert "5.25" in field(user, "robot-pairs").content
+            user.find(marker="tab-run").click()
+            await until(lambda: "folder first" in field(user, "run").options)
+            field(user, "run").value = "folder first"
+            await until(lambda: "folder second" in field(user, "compare").options)
+            field(user, "compare").value = "folder second"
+            await until(lambda: shown(user, "both-runs"))
+            assert "final position error [m]" in field(user, "run-pairs").content
+
+    asyncio.run(look())
