@@ -52,8 +52,9 @@ class Effort:
         cells: Cells of their raster, at most.
         more_boxes: The same for one problem whose ends these do not connect; 0: not again.
         more_cells: Likewise.
-        samples: Of a path, that the exact checks judge.
+        samples: Of a proven path or a free motion, that the exact checks judge.
         vertices: Samples of RRT*.
+        looks: Samples of its paths, that the exact checks judge.
     """
 
     boxes: int
@@ -62,10 +63,11 @@ class Effort:
     more_cells: int
     samples: int
     vertices: int
+    looks: int
 
 
 def measure_problem(spec: Spec, effort: Effort) -> dict[str, Any]:
-    """The row of a problem; NaN and empty where there is nothing to tell."""
+    """Of the proven motion of a problem; NaN and empty where there is nothing to tell."""
     scene = scene_of(spec.robot, spec.scene)
     start, goal = ends = scene.ends[spec.number - 1]
     sets, took = sets_of(spec.robot, spec.scene, effort.boxes, effort.cells)
@@ -81,9 +83,7 @@ def measure_problem(spec: Spec, effort: Effort) -> dict[str, Any]:
         "again_s": again, "ends_m": np.array([start[:3], goal[:3]]),
         "boxes_m": scene.boxes[:, 9:],
     }  # fmt: skip
-    row |= _proven(scene, sets, ends, effort.samples if status == FOUND else 0)
-    row |= _sampled(scene, ends, effort)
-    return row
+    return row | _proven(scene, sets, ends, effort.samples if status == FOUND else 0)
 
 
 def _status(sets: ProvenSets, ends: tuple[Array, Array]) -> str:
@@ -129,8 +129,10 @@ def _judged(scene: Scene, positions: Array) -> dict[str, Any]:
     return {"infeasible": scene.wrong(positions), "judge_s": time.process_time() - begin}
 
 
-def _sampled(scene: Scene, ends: tuple[Array, Array], effort: Effort) -> dict[str, Any]:
+def measure_sampled(spec: Spec, effort: Effort) -> dict[str, Any]:
     """Of RRT* and shortcuts: our own, and OMPL's where it is installed."""
+    scene = scene_of(spec.robot, spec.scene)
+    ends = scene.ends[spec.number - 1]
     low, high = scene.robot.reach()
     space = Space(low, high, scene.good)
     start, goal = ends[0][:3], ends[1][:3]
@@ -138,7 +140,8 @@ def _sampled(scene: Scene, ends: tuple[Array, Array], effort: Effort) -> dict[st
     corners = rrt_star(space, start, goal, effort.vertices, seed=0)
     if corners is not None:
         corners = shortcut(space, corners, seed=0)
-    row = _corners_row("rrt", scene, corners, effort.samples, time.process_time() - begin)
+    row = _corners_row("rrt", scene, corners, effort.looks, time.process_time() - begin)
+    row["looks"] = effort.looks
     row["rrt_path_m"] = np.empty((0, 3)) if corners is None else corners
     begin = time.process_time()
     try:
@@ -146,7 +149,7 @@ def _sampled(scene: Scene, ends: tuple[Array, Array], effort: Effort) -> dict[st
         took = time.process_time() - begin
     except ImportError:
         other, took = None, np.nan
-    return row | _corners_row("ompl", scene, other, effort.samples, took)
+    return row | _corners_row("ompl", scene, other, effort.looks, took)
 
 
 def _corners_row(

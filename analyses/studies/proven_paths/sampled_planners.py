@@ -35,7 +35,7 @@ NEIGHBOURS = 1.1
 SHORTCUTS = 300
 """Pairs of points of a path that a shortcut is tried between."""
 
-OMPL_SECONDS = 5.0
+OMPL_SECONDS = 4.0
 """Processor time of OMPL's RRT* [s]."""
 
 

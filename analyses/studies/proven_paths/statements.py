@@ -8,7 +8,7 @@ from cdpr_drake.analyses.studies.framework.runs import Run, Runs
 from cdpr_drake.analyses.studies.framework.statement import CHOICE, OURS, Finding, statement
 from cdpr_drake.analyses.studies.proven_paths.measured import FOUND, FREE_FOUND, PARTED
 
-PROBLEM, FREE = "problem", "free motion"
+PROBLEM, SAMPLED, FREE = "problem", "sampled", "free motion"
 """Kinds of cases."""
 
 NO_LONGER = 1.05
@@ -81,15 +81,28 @@ def settled(runs: Runs) -> Finding:
 )
 def beside_sampling(runs: Runs) -> Finding:
     """Lengths beside those of sampled planners."""
-    both = [run for run in runs(kind=PROBLEM, status=FOUND) if np.isfinite(sampled_length(run))]
-    ratios = np.array([run["length_m"] / sampled_length(run) for run in both])
-    wrong = sum(run["rrt_infeasible"] + run["ompl_infeasible"] > 0 for run in both)
+    both = [
+        (run["length_m"] / sampled_length(other), other)
+        for run, other in beside(runs)
+        if run["status"] == FOUND and np.isfinite(sampled_length(other))
+    ]
+    ratios = np.array([ratio for ratio, _ in both])
+    wrong = sum(other["rrt_infeasible"] + other["ompl_infeasible"] > 0 for _, other in both)
     return Finding(
         found=f"{min(ratios):.3f} to {max(ratios):.3f} times in {len(both)}; of the sampled paths "
         f"of {wrong} problems some samples are infeasible"
         if both else "no problem in which both found a path",
         held=(ratios <= NO_LONGER).tolist(),
     )  # fmt: skip
+
+
+def beside(runs: Runs) -> list[tuple[Run, Run]]:
+    """Each problem with what sampled planners found of it."""
+    sampled = runs(kind=SAMPLED)
+    return [
+        (run, sampled.one(robot=run["robot"], scene=run["scene"], number=run["number"]))
+        for run in runs(kind=PROBLEM)
+    ]
 
 
 def sampled_length(run: Run) -> float:
@@ -107,11 +120,9 @@ def sampled_length(run: Run) -> float:
 )
 def finds_what_samples_find(runs: Runs) -> Finding:
     """Problems that sampled planners solve."""
-    some = [run for run in runs(kind=PROBLEM) if np.isfinite(sampled_length(run))]
-    more = sum(
-        run["status"] == FOUND and not np.isfinite(sampled_length(run))
-        for run in runs(kind=PROBLEM)
-    )
+    pairs = [(run, np.isfinite(sampled_length(other))) for run, other in beside(runs)]
+    some = [run for run, solved in pairs if solved]
+    more = sum(run["status"] == FOUND for run, solved in pairs if not solved)
     return Finding(
         found=f"{sum(run['status'] == FOUND for run in some)} of {len(some)}; and {more} that "
         "RRT* did not solve",

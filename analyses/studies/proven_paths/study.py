@@ -24,6 +24,7 @@ from cdpr_drake.analyses.studies.proven_paths.measured import (
     Effort,
     measure_free,
     measure_problem,
+    measure_sampled,
 )
 from cdpr_drake.analyses.studies.proven_paths.problems import (
     PROBLEMS,
@@ -38,6 +39,7 @@ from cdpr_drake.analyses.studies.proven_paths.statements import (
     CHECKS,
     FREE,
     PROBLEM,
+    SAMPLED,
     sampled_length,
 )
 from cdpr_drake.analyses.visualization.figure_style import line_style, new_figure
@@ -45,12 +47,18 @@ from cdpr_drake.palette import BOUND, DISTANCE, IDEAL
 
 EFFORT = Effort(
     boxes=150_000, cells=2**18, more_boxes=1_000_000, more_cells=2**21, samples=100_000,
-    vertices=300,
+    vertices=200, looks=10_000,
 )  # fmt: skip
 """Of the full form."""
 
 QUICK_EFFORT = Effort(
-    boxes=30_000, cells=2**15, more_boxes=0, more_cells=0, samples=2_000, vertices=100
+    boxes=30_000,
+    cells=2**15,
+    more_boxes=0,
+    more_cells=0,
+    samples=2_000,
+    vertices=100,
+    looks=2_000,
 )
 """Of the quick form."""
 
@@ -68,10 +76,14 @@ FREE_SECONDS = 40.0
 
 
 def cases(form: Form) -> Iterator[Case]:
-    """The problems, scene by scene, then free motions."""
+    """The problems, scene by scene; then sampled planners on them; then free motions."""
     effort = QUICK_EFFORT if form.quick else EFFORT
-    for spec in QUICK if form.quick else SPECS:
+    specs = QUICK if form.quick else SPECS
+    for spec in specs:
         yield _case(spec, PROBLEM, spec.name, partial(measure_problem, spec, effort))
+    for spec in specs:
+        call = partial(measure_sampled, spec, effort)
+        yield _case(spec, SAMPLED, f"{spec.name}, RRT*", call)
     for spec in () if form.quick else FREE_SPECS:
         call = partial(measure_free, spec, FREE_SECONDS, effort.samples)
         yield _case(spec, FREE, f"{spec.name}, free motion", call)
@@ -112,22 +124,22 @@ def problems_table(runs: Runs) -> Table:
         ),
     )  # fmt: skip
     for run in runs(kind=PROBLEM):
+        other = _same(runs, run, SAMPLED)
         sampled = [
             words
             for name in ("rrt", "ompl")
             for words in (
-                _number(run, f"{name}_m", ".3f"),
-                _number(run, f"{name}_infeasible", "d") if np.isfinite(run[f"{name}_m"]) else EMPTY,
-                _number(run, f"{name}_s", ".1f"),
+                _number(other, f"{name}_m", ".3f"),
+                _number(other, f"{name}_infeasible", "d", f"{name}_m"),
+                _number(other, f"{name}_s", ".1f"),
             )
         ]
         again = 0.0 if np.isnan(run["again_s"]) else run["again_s"]
-        ratio = run["length_m"] / sampled_length(run)
+        ratio = np.nan if other is None else run["length_m"] / sampled_length(other)
         table.add_row(
             run["robot"], run["scene"], str(run["number"]), run["status"],
             _number(run, "straight_m", ".3f"), _number(run, "length_m", ".3f"),
-            _number(run, "bound_m", ".3f"),
-            f"{run['infeasible']}" if run["samples"] else EMPTY,
+            _number(run, "bound_m", ".3f"), _number(run, "infeasible", "d", "length_m"),
             f"{run['sets_s'] + again:.1f}", _number(run, "path_s", ".2f"), *sampled,
             f"{ratio:.3f}" if np.isfinite(ratio) else EMPTY,
         )  # fmt: skip
@@ -141,24 +153,33 @@ def free_table(runs: Runs) -> Table:
         ("robot", "scene", "number"),
         ("free [s]", "free [m]", "i", "took [s]", "proven [s]", "proven [m]", "what came of it"),
     )
-    problems = runs(kind=PROBLEM)
     for run in runs(kind=FREE):
-        same = {key: run[key] for key in ("robot", "scene", "number")}
-        proven = problems(**same)
-        other = proven.rows[0] if len(proven) else None
+        proven = _same(runs, run, PROBLEM)
         table.add_row(
             run["robot"], run["scene"], str(run["number"]), _number(run, "duration_s", ".3f"),
-            _number(run, "length_m", ".3f"),
-            f"{run['infeasible']}" if run["samples"] else EMPTY, _number(run, "free_s", ".1f"),
-            EMPTY if other is None else _number(other, "duration_s", ".3f"),
-            EMPTY if other is None else _number(other, "length_m", ".3f"), run["status"],
+            _number(run, "length_m", ".3f"), _number(run, "infeasible", "d", "length_m"),
+            _number(run, "free_s", ".1f"), _number(proven, "duration_s", ".3f"),
+            _number(proven, "length_m", ".3f"), run["status"],
         )  # fmt: skip
     return table
 
 
-def _number(run: Run, column: str, words: str) -> str:
-    value = run[column]
-    return format(value, words) if value is not None and np.isfinite(value) else EMPTY
+def _same(runs: Runs, run: Run, kind: str) -> Run | None:
+    """The run of another kind of the same problem; None while it is not there."""
+    same = ("robot", "scene", "number")
+    for other in runs:
+        if other["kind"] == kind and all(other[key] == run[key] for key in same):
+            return other
+    return None
+
+
+def _number(run: Run | None, column: str, words: str, where: str = "") -> str:
+    """A number of a run in words, `EMPTY` where it, or the one of another column, is not there."""
+    if run is None:
+        return EMPTY
+    needed = [run[name] for name in (column, where or column)]
+    there = all(value is not None and np.isfinite(value) for value in needed)
+    return format(run[column], words) if there else EMPTY
 
 
 def paths_figure(runs: Runs) -> Figure:
@@ -175,7 +196,9 @@ def paths_figure(runs: Runs) -> Figure:
             corners = np.array([low, [high[0], low[1]], high, [low[0], high[1]], low])
             place.fill(*corners.T, color=BOUND.color, alpha=0.3, label="obstacle")
         for run in some:
-            place.plot(*run["rrt_path_m"][:, :2].T, label="RRT*", **line_style(IDEAL))
+            other = _same(runs, run, SAMPLED)
+            if other is not None:
+                place.plot(*other["rrt_path_m"][:, :2].T, label="RRT*", **line_style(IDEAL))
             place.plot(*run["path_m"][:, :2].T, label="proven", **line_style(DISTANCE))
             place.plot(
                 *run["ends_m"][:, :2].T, "o", color="black", markerfacecolor="white",
