@@ -58,7 +58,8 @@ class ProvenSettings:
         obstacles: What cables and platform stay off, as `ProvenSets.find` takes it, or a file.
         accelerations: Half widths of the box of accelerations that the motion stays in, one or
             three; 0: none, so that only poses are proven; None: `ACCELERATION`, or none where the
-            orientation changes [m/s^2].
+            orientation changes [m/s^2]. Where it changes, six, (angular, linear), see
+            `ProvenSets.find` [rad/s^2, m/s^2].
         clearance: Least clearance of cables and platform [m].
         method: sequences or gcs.
         boxes: Boxes that are judged.
@@ -109,8 +110,9 @@ def plan_proven_motion(
 ) -> DrawnProvenPlan:
     """A motion of a robot from one pose to another in sets of poses that are proven.
 
-    At one orientation, and with accelerations, it is proven of every instant that tensions within
-    the limits (less the reserve) give the motion, and that cables and platform meet nothing.
+    With accelerations, where it turns also angular ones, it is proven of every instant that
+    tensions within the limits (less the reserve) give the motion, and that cables and platform meet
+    nothing.
 
     Args:
         robot: The robot, or its name or path.

@@ -1,4 +1,4 @@
-"""Wrenches of moving platforms: each of them lies in the set that stands for all, and it is tight."""
+"""Wrenches of moving platforms: each lies in the set that stands for all, and that is tight."""
 
 import numpy as np
 import pytest
