@@ -13,6 +13,7 @@ from cdpr_drake.planning.box_timing import inertial_terms, mass_of, time_within_
 from cdpr_drake.planning.path_in_sets import proven_motion
 from cdpr_drake.planning.turning_bounds import turning_bounds
 from cdpr_drake.trajectories.pose_path import smooth_path
+from cdpr_drake.trajectories.timed_path import TimedPath
 from cdpr_drake.workspaces.inertial_wrenches import moment_box, turning_wrenches
 from cdpr_drake.workspaces.proven_sets import PoseSets
 
@@ -69,6 +70,32 @@ def test_bounds_hold_at_samples_and_are_tight(task, path, moments):
     ]
     assert 0.5 * bounds.anchor_speed < max(rates) <= bounds.anchor_speed
     assert found.slowed < 1.02
+
+
+def test_bounds_hold_where_quaternions_are_far_from_unit_length():
+    """A spline through poses far apart: |q| sinks, and every part of the quotients counts."""
+    angles = [np.zeros(3), np.array([1.5, -0.9, 0.4]), np.array([0.2, 1.1, -2.0])]
+    poses = [pose_from_angles(0.1 * np.array([k, k % 2, 0.0]), a) for k, a in enumerate(angles)]
+    path = smooth_path(poses, 0.2)
+    stations = np.union1d(np.linspace(0.0, path.length, 400), path.breaks)
+    x = np.sin(np.linspace(0.0, np.pi, len(stations))) ** 2 + 0.01
+    x[[0, -1]] = 0.0
+    motion = TimedPath.make(path, stations, x)
+    assert np.ptp([np.linalg.norm(_quaternion(path, s)) for s in stations]) > 0.05
+    c, inertia = np.array([0.3, -0.2, 0.1]), np.diag([0.3, 0.5, 0.7])
+    found = turning_bounds(motion, c, inertia, np.array([[0.2], [0.1], [0.3]]))
+    values = np.abs(inertial_terms(sampled(motion, 20_001), c, inertia)[1])
+    for bound, some in ((found.accelerations, values[:, :3]), (found.moments, values[:, 3:])):
+        most = np.max(some, axis=0)
+        assert np.all(most <= bound * (1.0 + ROUNDING))
+        assert np.all(bound <= 1.05 * most)
+
+
+def _quaternion(path, s):
+    """As the polynomials have it, of any length."""
+    piece = min(np.searchsorted(path.breaks, s, side="right") - 1, len(path.pieces) - 1)
+    powers = (s - path.breaks[piece]) ** np.arange(6)
+    return powers @ path.pieces[piece].reshape(6, 7)[:, :4]
 
 
 def test_terms_are_those_of_differences_of_poses(task, path):
