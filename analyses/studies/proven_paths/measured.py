@@ -140,26 +140,33 @@ def measure_sampled(spec: Spec, effort: Effort) -> dict[str, Any]:
     corners = rrt_star(space, start, goal, effort.vertices, seed=0)
     if corners is not None:
         corners = shortcut(space, corners, seed=0)
-    row = _corners_row("rrt", scene, corners, effort.looks, time.process_time() - begin)
-    row["looks"] = effort.looks
-    row["rrt_path_m"] = np.empty((0, 3)) if corners is None else corners
+    row = _corners_row(OWN_COLUMNS, scene, corners, effort.looks, time.process_time() - begin)
+    row |= {
+        "looks": effort.looks,
+        "rrt_path_m": np.empty((0, 3)) if corners is None else corners,
+    }
     begin = time.process_time()
     try:
         other = ompl_path(space, start, goal)
         took = time.process_time() - begin
     except ImportError:
         other, took = None, np.nan
-    return row | _corners_row("ompl", scene, other, effort.looks, took)
+    return row | _corners_row(OMPL_COLUMNS, scene, other, effort.looks, took)
+
+
+OWN_COLUMNS = ("rrt_m", "rrt_infeasible", "rrt_s")
+OMPL_COLUMNS = ("ompl_m", "ompl_infeasible", "ompl_s")
+"""Length, samples that do not hold, and processor time of a sampled path."""
 
 
 def _corners_row(
-    name: str, scene: Scene, corners: Array | None, samples: int, took: float
+    columns: tuple[str, str, str], scene: Scene, corners: Array | None, looks: int, took: float
 ) -> dict[str, Any]:
     if corners is None:
-        return {f"{name}_m": np.nan, f"{name}_infeasible": 0, f"{name}_s": took}
+        return dict(zip(columns, (np.nan, 0, took), strict=True))
     length = length_of(corners)
-    wrong = scene.wrong(along(corners, np.linspace(0.0, length, samples)))
-    return {f"{name}_m": length, f"{name}_infeasible": wrong, f"{name}_s": took}
+    wrong = scene.wrong(along(corners, np.linspace(0.0, length, looks)))
+    return dict(zip(columns, (length, wrong, took), strict=True))
 
 
 def measure_free(spec: Spec, most_seconds: float, samples: int) -> dict[str, Any]:

@@ -21,6 +21,8 @@ from cdpr_drake.analyses.studies.framework.runs import Run, Runs
 from cdpr_drake.analyses.studies.framework.study import Case, Form, Study
 from cdpr_drake.analyses.studies.framework.summary import EMPTY
 from cdpr_drake.analyses.studies.proven_paths.measured import (
+    OMPL_COLUMNS,
+    OWN_COLUMNS,
     Effort,
     measure_free,
     measure_problem,
@@ -127,11 +129,11 @@ def problems_table(runs: Runs) -> Table:
         other = _same(runs, run, SAMPLED)
         sampled = [
             words
-            for name in ("rrt", "ompl")
+            for length, wrong, took in (OWN_COLUMNS, OMPL_COLUMNS)
             for words in (
-                _number(other, f"{name}_m", ".3f"),
-                _number(other, f"{name}_infeasible", "d", f"{name}_m"),
-                _number(other, f"{name}_s", ".1f"),
+                _number(other, length, ".3f"),
+                _number(other, wrong, "d", length),
+                _number(other, took, ".1f"),
             )
         ]
         again = 0.0 if np.isnan(run["again_s"]) else run["again_s"]
