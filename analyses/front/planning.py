@@ -24,6 +24,7 @@ from cdpr_drake.analyses.planning.robot_path_task import (
     robot_limits,
 )
 from cdpr_drake.analyses.workspaces.workspace_files import load_obstacles, load_wrench_set
+from cdpr_drake.arrays import Array
 from cdpr_drake.errors import PlanningError, WrenchSetError
 from cdpr_drake.geometry.poses import angles_from_rotation
 from cdpr_drake.models.robot_loader import as_robot
@@ -205,27 +206,20 @@ def plan_free_motion(
     Raises:
         PlanningError: No motion was found, or something is not accepted; names it.
     """
-    for name in asked:
-        if name not in ASKED:
-            raise PlanningError(f"{name!r} is unknown; {closest(name, ASKED)}")
+    check_asked(asked, ASKED)
     loaded, given = as_robot(robot, "plan_free_motion"), chosen_limits(limits)
-    if isinstance(asked.get("obstacles"), str | Path):
-        asked["obstacles"] = load_obstacles(Path(asked["obstacles"]))
-    if isinstance(asked.get("guess"), str | Path):
-        asked["guess"] = read_motion(Path(asked["guess"]))
+    for name, read in (("obstacles", load_obstacles), ("guess", read_motion)):
+        if name in asked:
+            asked[name] = read_where_file(asked[name], read)
     settings = FreeSettings(start=as_pose(loaded, start), goal=as_pose(loaded, goal), **asked)
     task = planned_for(loaded, given, pulleys)
     begin = time.perf_counter()
-    found = solve_free_motion(loaded, task, settings, say or _silent)
+    found = solve_free_motion(loaded, task, settings, say or silent)
     took = time.perf_counter() - begin
     arguments = limits_told(given, pulleys) | {
         "from": _row(settings.start),
         "to": _row(settings.goal),
-        **{
-            name: value.tolist() if isinstance(value, np.ndarray) else value
-            for name, value in asked.items()
-            if name not in ("obstacles", "guess")
-        },
+        **asked_told(asked, ("obstacles", "guess")),
         **{
             name: settings.solids().boxes.tolist() if name == "obstacles" else "given"
             for name in ("obstacles", "guess")
@@ -254,7 +248,7 @@ def tracked_by(
     """The robot's limits without reserve, and what it does with a motion, if that is wanted."""
     own, tracked = robot_limits(robot, given), None
     if track:
-        tell, end = say or _silent, found.duration
+        tell, end = say or silent, found.duration
         tell(f"Tracking the plan of {robot.name}")
 
         def show(now: float) -> None:
@@ -311,8 +305,7 @@ def _is_file(path: object) -> bool:
 
 def _row(X_WP: RigidTransform) -> list[float]:
     """x, y, z [m], phi, theta, psi [deg]."""
-    angles = np.degrees(angles_from_rotation(X_WP.rotation()))
-    return [*X_WP.translation().tolist(), *angles.tolist()]
+    return in_degrees(pose_numbers(X_WP))
 
 
 def pose_numbers(X_WP: RigidTransform) -> np.ndarray:
@@ -320,5 +313,31 @@ def pose_numbers(X_WP: RigidTransform) -> np.ndarray:
     return np.concatenate([X_WP.translation(), angles_from_rotation(X_WP.rotation())])
 
 
-def _silent(words: str) -> None:
+def in_degrees(numbers: Array) -> list[float]:
+    """x, y, z [m], phi, theta, psi [deg] of position and angles, shape (6,) [m, rad]."""
+    return [*numbers[:3].tolist(), *np.degrees(numbers[3:]).tolist()]
+
+
+def check_asked(asked: Mapping[str, Any], known: Sequence[str]) -> None:
+    """Raises PlanningError for a name that is not known."""
+    for name in asked:
+        if name not in known:
+            raise PlanningError(f"{name!r} is unknown; {closest(name, known)}")
+
+
+def asked_told(asked: Mapping[str, Any], without: Sequence[str]) -> dict[str, Any]:
+    """What was asked for by name, for JSON, but some of it."""
+    return {
+        name: value.tolist() if isinstance(value, np.ndarray) else value
+        for name, value in asked.items()
+        if name not in without
+    }
+
+
+def read_where_file(value: Any, read: Callable[[Path], Any]) -> Any:
+    """What a file has where its path is given; else the value."""
+    return read(Path(value)) if _is_file(value) else value
+
+
+def silent(words: str) -> None:
     """Tells nobody."""

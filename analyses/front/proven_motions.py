@@ -12,10 +12,15 @@ import numpy as np
 from cdpr_drake.analyses.front.planning import (
     Limits,
     Say,
+    asked_told,
+    check_asked,
     chosen_limits,
+    in_degrees,
     limits_told,
     planned_for,
     pose_numbers,
+    read_where_file,
+    silent,
     tracked_by,
 )
 from cdpr_drake.analyses.planning.proven_plan_results import ProvenRun
@@ -34,7 +39,6 @@ from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import as_pose
 from cdpr_drake.planning.path_in_sets import SEQUENCES, proven_motion
 from cdpr_drake.planning.path_timing import STATIONS, PathPlan
-from cdpr_drake.schema.typed_yaml import closest
 from cdpr_drake.workspaces.proven_cells import CELLS
 from cdpr_drake.workspaces.proven_sets import COVER
 
@@ -58,7 +62,8 @@ class ProvenSettings:
         obstacles: What cables and platform stay off, as `ProvenSets.find` takes it, or a file.
         accelerations: Half widths of the box of accelerations that the motion stays in, one or
             three; 0: none, so that only poses are proven; None: `ACCELERATION`, or none where the
-            orientation changes [m/s^2].
+            orientation changes [m/s^2]. Where it changes, six, (angular, linear), see
+            `ProvenSets.find` [rad/s^2, m/s^2].
         clearance: Least clearance of cables and platform [m].
         method: sequences or gcs.
         boxes: Boxes that are judged.
@@ -109,8 +114,9 @@ def plan_proven_motion(
 ) -> DrawnProvenPlan:
     """A motion of a robot from one pose to another in sets of poses that are proven.
 
-    At one orientation, and with accelerations, it is proven of every instant that tensions within
-    the limits (less the reserve) give the motion, and that cables and platform meet nothing.
+    With accelerations, where it turns also angular ones, it is proven of every instant that
+    tensions within the limits (less the reserve) give the motion, and that cables and platform meet
+    nothing.
 
     Args:
         robot: The robot, or its name or path.
@@ -127,16 +133,12 @@ def plan_proven_motion(
         WorkspaceError: Something does not hold at an end, or is not proven there: which kind, and
             numbers.
     """
-    for name in asked:
-        if name not in ASKED:
-            raise PlanningError(f"{name!r} is unknown; {closest(name, ASKED)}")
-    settings, tell = ProvenSettings(**asked), say or _silent
+    check_asked(asked, ASKED)
+    settings, tell = ProvenSettings(**asked), say or silent
     loaded, given = as_robot(robot, "plan_proven_motion"), chosen_limits(limits)
     task = planned_for(loaded, given, pulleys)
     ends = [pose_numbers(as_pose(loaded, pose)) for pose in (start, goal)]
-    obstacles = settings.obstacles
-    if isinstance(obstacles, str | Path):
-        obstacles = load_obstacles(Path(obstacles))
+    obstacles = read_where_file(settings.obstacles, load_obstacles)
     begin = time.perf_counter()
     sets = settings.sets
     if sets is None:
@@ -165,13 +167,9 @@ def plan_proven_motion(
         ) from problem
     took = time.perf_counter() - between
     arguments = limits_told(given, pulleys) | {
-        "from": _degrees(ends[0]),
-        "to": _degrees(ends[1]),
-        **{
-            name: _plain(value)
-            for name, value in asked.items()
-            if name not in ("sets", "obstacles")
-        },
+        "from": in_degrees(ends[0]),
+        "to": in_degrees(ends[1]),
+        **asked_told(asked, ("sets", "obstacles")),
     }
     run = DrawnProvenPlan(
         robot=loaded, limits=task.limits, arguments=arguments, planning_time=took, found=found,
@@ -208,16 +206,3 @@ def _check_ends(sets: ProvenSets, ends: list[Array]) -> None:
                 f"{where}: lies in none of {len(sets)} sets{': ' * bool(why)}{why}; accepted: a "
                 "pose in one of them"
             )
-
-
-def _degrees(numbers: Array) -> list[float]:
-    """x, y, z [m], phi, theta, psi [deg]."""
-    return [*numbers[:3].tolist(), *np.degrees(numbers[3:]).tolist()]
-
-
-def _plain(value: object) -> object:
-    return value.tolist() if isinstance(value, np.ndarray) else value
-
-
-def _silent(words: str) -> None:
-    """Tells nobody."""

@@ -24,6 +24,7 @@ from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS, figu
 from cdpr_drake.analyses.visualization.figure_style import bare_figure, line_style, styled
 from cdpr_drake.arrays import Array
 from cdpr_drake.palette import BOUND, DESIRED, OUTLINE, PLATFORM, SHADED, TARGET, nth_look
+from cdpr_drake.planning.box_timing import inertial_terms, mass_of
 
 VIEWS = ((0, 1), (0, 2), (1, 2))
 """Coordinates across and up of the three views."""
@@ -99,25 +100,44 @@ def sets_figure(run: ProvenRun) -> Figure:
 
 
 def acceleration_figure(run: ProvenRun) -> Figure:
-    """Accelerations of Po over time, with the box for which tensions are proven."""
-    motion, box = run.motion, np.array(run.sets.about["accelerations_m_s2"])
+    """Accelerations over time with the box for which tensions are proven; of a turn moments, too.
+
+    Without turns they are those of Po, with turns those of the centre of mass.
+    """
+    motion, about, box = run.motion, run.sets.about, run.found.box
     times = np.linspace(motion.start_time, motion.end_time, 2 * POINTS)
-    rows = np.array([motion.motion(t)[16:19] for t in times])
-    figure = bare_figure((10.0, 5.0), f"Acceleration of Po in the proven box\n{run.about}")
+    rows = np.array([motion.motion(t) for t in times])
+    limits = np.array(about["accelerations_m_s2"])
+    if box is None or box.moments is None:
+        panels = [(rows[:, 16:19], limits, "acceleration in W [m/s²]")]
+        of = "Acceleration of Po in the proven box"
+    else:
+        _, terms = inertial_terms(rows, *mass_of(run.task))
+        panels = [
+            (terms[:, :3], limits, "acceleration in W [m/s²]"),
+            (terms[:, 3:], np.array(about["moments_n_m"]), "moment in P [N m]"),
+        ]
+        of = "Acceleration of the centre of mass, and moment about it, in the proven boxes"
+    figure = bare_figure((10.0, 5.0 + 3.5 * (len(panels) - 1)), f"{of}\n{run.about}")
     with styled():
-        axes = figure.subplots()
-        for k in range(3):
-            draw_curve(
-                axes, times, rows[:, k], nth_look(k), f"along {'xyz'[k]}", phase=(k + 0.5) / 3
-            )
-        for number, bound in enumerate(np.unique(box)):
-            for side in (-bound, bound):
-                label = "proven box" if side > 0.0 and number == 0 else None
-                axes.axhline(side, label=label, **line_style(BOUND))
-        axes.set(xlabel="time [s]", ylabel="acceleration in W [m/s²]")
-        axes.margins(x=0.01)
-        axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
+        grid = figure.subplots(len(panels), 1, squeeze=False, sharex=True)
+        for axes, (values, halves, label) in zip(grid[:, 0], panels, strict=True):
+            _draw_in_box(axes, times, values, halves)
+            axes.set_ylabel(label)
+        grid[-1, 0].set_xlabel("time [s]")
     return figure
+
+
+def _draw_in_box(axes: Any, times: Array, values: Array, halves: Array) -> None:
+    for k in range(3):
+        look = nth_look(k)
+        draw_curve(axes, times, values[:, k], look, f"along {'xyz'[k]}", phase=(k + 0.5) / 3)
+    for number, bound in enumerate(np.unique(halves)):
+        for side in (-bound, bound):
+            name = "proven box" if side > 0.0 and number == 0 else None
+            axes.axhline(side, label=name, **line_style(BOUND))
+    axes.margins(x=0.01)
+    axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
 
 
 def _corners(run: ProvenRun) -> Array:

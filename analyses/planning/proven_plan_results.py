@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from cdpr_drake.analyses.planning.plan_results import MotionRun
+from cdpr_drake.planning.box_timing import BoxTiming
 from cdpr_drake.planning.path_in_sets import ProvenMotion
 from cdpr_drake.planning.path_task import MotionSamples, PathTask
 from cdpr_drake.trajectories.timed_path import TimedPath
@@ -92,12 +93,20 @@ class ProvenRun(MotionRun):
         tensions = f"tensions from {least:g} to {most:g} N"
         yes, no = [], []
         if self.found.box is not None:
-            yes.append(f"{tensions} give the motion, its acceleration and any other in the box")
+            what = "its acceleration and any other in the box"
+            if self.found.box.moments is not None:
+                what = (
+                    "its accelerations, angular and gyroscopic terms with them, and any others in "
+                    "the boxes of accelerations and moments"
+                )
+            yes.append(f"{tensions} give the motion, {what}")
             if np.isfinite(lim.cable_speed):
                 yes.append(f"cables are not faster than {lim.cable_speed:.4g} m/s")
         else:
             yes.append(f"{tensions} hold the platform at rest")
-            why = "angles vary" if self.found.turns else "no accelerations were asked for"
+            why = "no accelerations were asked for"
+            if self.found.turns:
+                why = "angles vary, and no angular accelerations were asked for"
             no.append(f"tensions of the motion, looked at between stations by samples: {why}")
         words = {
             "interference-free": "cables touch neither each other, platform, frame nor obstacles",
@@ -129,6 +138,7 @@ class ProvenRun(MotionRun):
             "shortest_polyline_m": path.length,
             "curve_at_most_m": path.curve.polygon,
             "largest_accelerations_m_s2": None if box is None else box.accelerations.tolist(),
+            **_moments_told(box),
             "largest_speed_m_s": None if box is None else box.speed,
             "stretches": [
                 {"from_m": a, "to_m": b, "set": int(n)} for a, b, n in path.stretches()
@@ -149,3 +159,10 @@ class ProvenRun(MotionRun):
         """Writes the sets, too."""
         self.sets.save(folder / SETS)
         return super().write(folder)
+
+
+def _moments_told(box: BoxTiming | None) -> dict[str, list[float]]:
+    """Bounds of moments of a motion that turns, for JSON."""
+    return (
+        {} if box is None or box.moments is None else {"largest_moments_n_m": box.moments.tolist()}
+    )

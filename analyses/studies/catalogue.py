@@ -86,6 +86,7 @@ MODULES = {
     "engines": "engines.study",
     "scenarios": "scenarios",
     "planning": "planning.study",
+    "proven-paths": "proven_paths.study",
     "mobile-robot": "mobile_robot.study",
     "pick-and-place": "pick_and_place",
     "fusion": "fusion.study",

@@ -26,6 +26,7 @@ from cdpr_drake.workspaces.box_judges import CertifiedKind, CertifyTask
 from cdpr_drake.workspaces.cable_interference import PART_NAMES, Obstacles, clearances
 from cdpr_drake.workspaces.certified_boxes import PoseBox
 from cdpr_drake.workspaces.demanded_wrenches import SpatialSet, resisting, spatial_inertias
+from cdpr_drake.workspaces.inertial_wrenches import moment_box, turning_wrenches
 from cdpr_drake.workspaces.pose_grid import WorkspaceGrid
 from cdpr_drake.workspaces.proven_cells import CELLS, prove_cells
 from cdpr_drake.workspaces.proven_connection import connect_poses, inside_cell
@@ -100,8 +101,10 @@ class ProvenSets(PoseSets):
             obstacles: What cables and platform stay off, boxes, shape (o, 15), or these and convex
                 shapes; None: nothing.
             accelerations: Half widths of a box of accelerations of Po in W, one or three, any of
-                which the cables can give at every pose, for the kind wrench-feasible; only where no
-                angle varies [m/s^2].
+                which the cables can give at every pose, for the kind wrench-feasible [m/s^2]. Where
+                angles vary, six: of angular accelerations in P, and of accelerations of the centre
+                of mass in W, with all gyroscopic terms, see `inertial_wrenches`
+                [rad/s^2, m/s^2].
             cover: Share of what is proven that the sets cover.
             must: Poses in sets, shape (6,) each [m, rad], or these by the names that refusals
                 begin with; where open cells keep them from each other, in their order, these are
@@ -115,11 +118,12 @@ class ProvenSets(PoseSets):
         """
         loaded = as_robot(robot, "proven sets")
         turned = np.zeros((1, 3)) if angles is None else np.asarray(angles, float).reshape(-1, 3)
-        box = acceleration_box(accelerations)
-        if box is not None and np.any(np.ptp(turned, axis=0) > 0.0):
+        box, angular = acceleration_box(accelerations)
+        if box is not None and angular is None and np.any(np.ptp(turned, axis=0) > 0.0):
             raise WorkspaceError(
-                "accelerations: found with a range of angles; accepted: one orientation, since a "
-                "turn adds inertial terms that a box of accelerations of Po has not"
+                "accelerations: found with a range of angles; accepted: one orientation, or six "
+                "half widths (angular, linear), since a turn adds inertial terms that a box of "
+                "accelerations of Po has not"
             )
         chosen = tuple(motion_kinds(box is not None) if kinds is None else kinds)
         if (box is not None) != ("wrench-feasible" in chosen):
@@ -128,6 +132,10 @@ class ProvenSets(PoseSets):
                 "accelerations with wrench-feasible"
             )
         required = None if box is None else accelerated_wrenches(loaded, box, turned[0])
+        moments = None
+        if box is not None and angular is not None:
+            moments = angular_moments(loaded, angular)
+            required = turning_about(loaded, box, moments, turned)
         around = interference_bodies(
             loaded, obstacles, settings.exit_free, settings.anchor_free, settings.pulleys
         )
@@ -147,7 +155,8 @@ class ProvenSets(PoseSets):
             kinds=chosen,
             conditions=question.about,
             tasks=search.tasks,
-            about=_about(loaded, chosen, turned, obstacles, box, settings),
+            about=_about(loaded, chosen, turned, obstacles, box, settings)
+            | _turning_told(angular, moments),
         )
         named = must if isinstance(must, Mapping) else {f"must[{k}]": p for k, p in enumerate(must)}
         return _prove(loaded, search.box, draft, (cover, dict(named), settings), say)
@@ -180,21 +189,53 @@ def motion_kinds(accelerated: bool) -> list[str]:
     return [first.value, "interference-free", *(["collision-free"] * ("collision-free" in known))]
 
 
-def acceleration_box(given: Array | float | None) -> Array | None:
-    """Half widths, shape (3,) [m/s^2]; None for None.
+def acceleration_box(given: Array | float | None) -> tuple[Array | None, Array | None]:
+    """Half widths, linear [m/s^2] and angular [rad/s^2], shape (3,) each; None: not given.
 
     Raises:
         WorkspaceError: They are not accepted.
     """
     if given is None:
-        return None
+        return None, None
     found = np.asarray(given, float).ravel()
-    if found.size not in (1, 3) or not np.all(np.isfinite(found) & (found > 0.0)):
+    linear, angular = found[-3:], found[:3]
+    good = found.size in (1, 3, 6) and np.all(np.isfinite(found)) and np.all(linear > 0.0)
+    if not good or (found.size == 6 and not (np.all(angular >= 0.0) and np.any(angular > 0.0))):
         raise WorkspaceError(
             f"accelerations: found {np.array2string(found)}; accepted: one or three half widths, "
-            "finite and above 0 [m/s^2]"
+            "finite and above 0 [m/s^2], or three angular ones before these, at least 0, one of "
+            "them above [rad/s^2]"
         )
-    return np.array(np.broadcast_to(found, 3))
+    return np.array(np.broadcast_to(linear, 3)), angular if found.size == 6 else None
+
+
+def angular_moments(robot: Robot, angular: Array) -> Array:
+    """Moments about the centre of mass in P that angular accelerations ask, shape (3,) [N m]."""
+    body = rigid_platform(robot)
+    return moment_box(body.mass, body.p_PCo, body.I_PPo, angular)
+
+
+def turning_about(robot: Robot, box: Array, moments: Array, angles: Array) -> SpatialSet:
+    """External wrenches that stand for all motions in a range of orientations, at any velocity.
+
+    Args:
+        robot: The robot.
+        box: Half widths of accelerations of the centre of mass in W, shape (3,) [m/s^2].
+        moments: Half widths of moments about it in P, shape (3,) [N m].
+        angles: Orientations between which it turns, shape (n, 3) [rad].
+    """
+    body, low, high = rigid_platform(robot), angles.min(axis=0), angles.max(axis=0)
+    return turning_wrenches(
+        body.mass, body.p_PCo, moments, box, 0.5 * (low + high), 0.5 * (high - low)
+    )
+
+
+def _turning_told(angular: Array | None, moments: Array | None) -> dict[str, Any]:
+    if angular is None or moments is None:
+        return {}
+    return {
+        "angular_accelerations_rad_s2": angular.tolist(), "moments_n_m": moments.tolist(),
+    }  # fmt: skip
 
 
 def accelerated_wrenches(robot: Robot, box: Array, angles: Array) -> SpatialSet:
@@ -305,7 +346,7 @@ def _prove(
 def _about(
     robot: Robot, kinds: tuple[str, ...], angles: Array, obstacles: Array | Obstacles | None,
     box: Array | None, settings: ProofSettings,
-) -> Mapping[str, Any]:  # fmt: skip
+) -> dict[str, Any]:  # fmt: skip
     there = obstacles if isinstance(obstacles, Obstacles) else Obstacles()
     if obstacles is not None and not isinstance(obstacles, Obstacles):
         there = Obstacles(np.asarray(obstacles, float))

@@ -29,7 +29,8 @@ Acceleration = Annotated[
     typer.Option(
         help="With --proven: the motion stays within accelerations a or ax,ay,az of Po, any "
         "of which the cables are proven to give; 0: poses only; without, 0.25, or 0 where the "
-        "platform turns [m/s^2]."
+        "platform turns [m/s^2]. Where it turns: a,alpha, of the centre of mass and about it, with "
+        "gyroscopic terms [m/s^2, rad/s^2]."
     ),
 ]
 Method = Annotated[
@@ -84,10 +85,12 @@ class ProvenWords:
                 f"--method: found {self.method!r}; {accepted_names(self.method, METHODS)}"
             )
         if self.acceleration is not None:
-            meaning = "a or ax,ay,az, each above 0, or 0 [m/s^2]"
-            numbers = parse_numbers("--acceleration", self.acceleration, (1, 3), meaning)
+            meaning = "a or ax,ay,az or a,alpha, each above 0, or 0 [m/s^2, rad/s^2]"
+            numbers = parse_numbers("--acceleration", self.acceleration, (1, 2, 3), meaning)
             if min(numbers) <= 0.0 and numbers != [0.0]:
                 raise CdprError(f"--acceleration: found {self.acceleration!r}; accepted: {meaning}")
+            if len(numbers) == 2:
+                numbers = [*[numbers[1]] * 3, *[numbers[0]] * 3]
             found["accelerations"] = numbers[0] if len(numbers) == 1 else numbers
         ends = (("start", "--from", self.start), ("goal", "--to", self.goal))
         return found | {name: one_pose(option, words or "") for name, option, words in ends}

@@ -23,7 +23,7 @@ from pydrake.solvers import ClarabelSolver
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import PlanningError, accepted_names
 from cdpr_drake.geometry.poses import pose_from_angles, pose_row
-from cdpr_drake.planning.box_timing import BoxTiming, time_within_box
+from cdpr_drake.planning.box_timing import BoxTiming, mass_centres, time_within_box
 from cdpr_drake.planning.path_task import PathTask
 from cdpr_drake.planning.path_timing import STATIONS, PathPlan, plan_along_path
 from cdpr_drake.planning.set_curve import SetCurve, fast_curve, floored, shares_of, smooth_curve
@@ -119,15 +119,16 @@ class ProvenMotion:
     def time_bound(self) -> float:
         """No motion in these sets within these limits is faster [s].
 
-        From rest to rest over the distance along each axis with the acceleration of the box, and
-        over the shortest path with the largest speed.
+        From rest to rest over the distance along each axis with the acceleration of the box, of Po
+        or where it turns of the centre of mass, and over the shortest path with the largest speed.
         """
         lim, bound = self.plan.task.limits, 0.0
         speed = min(lim.speed, lim.cable_speed) if self.box is not None else lim.speed
         if np.isfinite(speed) and not self.turns:
             bound = self.path.lower_bound / speed
         if self.box is not None:
-            ends = self.path.path.points(np.array([0.0, self.path.path.length]))[:, 4:7]
+            ends = self.path.path.points(np.array([0.0, self.path.path.length]))
+            ends = ends[:, 4:7] if self.box.moments is None else mass_centres(self.plan.task, ends)
             box = np.array(self.path.sets.about["accelerations_m_s2"], float)
             bound = max(bound, float(np.max(2.0 * np.sqrt(np.abs(ends[1] - ends[0]) / box))))
         return bound
@@ -183,8 +184,8 @@ def proven_motion(
 ) -> ProvenMotion:
     """A motion along a path in sets: of the shortest path, or the fastest of several.
 
-    Where the sets prove a box of accelerations (`about`) and nothing turns, the motion stays in it
-    at every instant, so that tensions within their limits exist at every instant.
+    Where the sets prove a box of accelerations (`about`), and where angles vary one of moments, the
+    motion stays in it at every instant, so that tensions within their limits always exist.
 
     Args:
         sets: The sets.
@@ -204,12 +205,15 @@ def proven_motion(
     if cost not in COSTS:
         raise PlanningError(f"cost: found {cost!r}; {accepted_names(cost, COSTS)}")
     given = sets.about.get("accelerations_m_s2")
-    box = None if given is None or np.any(sets.axes >= 3) else np.array(given, float)
+    turning = sets.about.get("moments_n_m") if np.any(sets.axes >= 3) else None
+    still = given is None or (np.any(sets.axes >= 3) and turning is None)
+    box = None if still else np.array(given, float)
+    moments = None if turning is None else np.array(turning, float)
 
     def timed(path: PosePath) -> tuple[PathPlan, BoxTiming | None]:
         if box is None:
             return plan_along_path(task, path, stations), None
-        found = time_within_box(task, path, box, stations)
+        found = time_within_box(task, path, box, stations, moments)
         return found.plan, found
 
     say("Looking for sets that lead to the goal")
@@ -224,6 +228,8 @@ def proven_motion(
     limits = np.full(6, NOMINAL)
     if box is not None:
         limits[:3] = box
+    if moments is not None:
+        limits[3:] = length_scale * np.array(sets.about["angular_accelerations_rad_s2"], float)
     best: tuple[SetSequence, SetCurve, PathPlan, BoxTiming | None] | None = None
     for number, sequence in enumerate(found[:TIMED], 1):
         say(f"Timing way {number} of {min(len(found), TIMED)}")

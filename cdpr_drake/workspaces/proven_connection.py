@@ -39,6 +39,24 @@ def connected(cells: ProvenCells, first: Array, second: Array) -> bool:
     return numbers[0] == numbers[1] > 0
 
 
+def separated(cells: ProvenCells, first: Array, second: Array) -> bool:
+    """Whether cells that are proven outside part two poses, so that no path joins them in the box.
+
+    A path may go from cell to cell over faces, edges and corners; so all neighbours count, and only
+    cells that are proven outside one kind in all their poses are in its way. The poses are those of
+    the box: with other angles, or beyond its borders, there may be a way.
+
+    Args:
+        cells: What is proven by now.
+        first: Position and angles, shape (6,) [m, rad].
+        second: Likewise.
+    """
+    free = ~cells.excluded
+    parts, _ = ndimage.label(free, np.ones((3,) * free.ndim, bool))
+    near = [{int(parts[tuple(at)]) for at in cells.cells_at(p)} - {0} for p in (first, second)]
+    return not near[0] & near[1]
+
+
 def connect_poses(
     cells: ProvenCells,
     tasks: Sequence[CertifyTask],

@@ -15,6 +15,8 @@ from pydrake.geometry.optimization import (
     LoadIrisRegionsYamlFile,
     SaveIrisRegionsYamlFile,
 )
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import DataFileError, WorkspaceError
@@ -87,6 +89,14 @@ class PoseSets:
     def covers(self, pose: Array) -> bool:
         """Whether a pose, shape (6,) [m, rad], lies in a set."""
         return len(self.containing(pose)) > 0
+
+    def joined(self, first: Array, second: Array) -> bool:
+        """Whether overlapping sets lead from one pose, shape (6,) [m, rad], to another."""
+        n, pairs = len(self), self.graph
+        edges = csr_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(n, n))
+        _, parts = connected_components(edges, directed=False)
+        ends = [set(parts[self.containing(pose)].tolist()) for pose in (first, second)]
+        return bool(ends[0] & ends[1])
 
     def regions(self) -> list[HPolyhedron]:
         """The sets over the numbers that vary, for Drake's `GcsTrajectoryOptimization`."""

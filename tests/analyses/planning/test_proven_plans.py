@@ -151,6 +151,43 @@ def test_sets_are_the_same_every_time_and_used_again(tmp_path):
         plan_proven_motion(ROBOT, _pose(start), _pose([0.5, 0, 0.3]), pulleys=False, sets=first)
 
 
+def test_a_motion_that_turns_is_proven_with_angular_accelerations(capsys, tmp_path):
+    asked = [
+        "acrobot_large", "--proven", "--from=-0.1,0,0.3,0,0,-2", "--to=0.1,0.05,0.3,0,0,2",
+        "--no-pulleys", "--boxes", "60000", "--no-track", "--json", "--out", str(tmp_path / "out"),
+    ]  # fmt: skip
+    code, out, _ = run(capsys, *asked, "--acceleration", "0.25,2")
+    assert code == 0
+    told = json.loads(out)
+    assert told["proven"]["motion"]
+    assert told["proven"]["not_of"] == []
+    assert "gyroscopic" in told["proven"]["of"][0]
+    assert not any(told["judged_infeasible"].values())
+    assert told["sets"]["angular_accelerations_rad_s2"] == [2.0] * 3
+    limits = np.array(told["sets"]["moments_n_m"])
+    assert np.all(np.array(told["largest_moments_n_m"]) <= limits * (1.0 + 1e-9))
+    assert max(told["largest_accelerations_m_s2"]) == pytest.approx(0.25, rel=1e-3)
+    assert told["largest_share_of_limits"] <= 1.0
+    table = np.genfromtxt(tmp_path / "out" / "motion.csv", delimiter=",", names=True)
+    assert len(table) > 100
+    assert (tmp_path / "out" / "accelerations.png").stat().st_size > 10_000
+    sets = PoseSets.load(tmp_path / "out" / "sets.yaml")
+    assert sets.about["moments_n_m"] == limits.tolist()
+    code, out, _ = run(capsys, *asked, "--overwrite")
+    told = json.loads(out)
+    assert not told["proven"]["motion"]
+    assert "no angular accelerations were asked for" in told["proven"]["not_of"][0]
+    assert "largest_moments_n_m" not in told
+
+
+@pytest.mark.parametrize(
+    "given", [np.zeros(3), np.full(2, 1.0), [0, 0, 0, 1, 1, 1], [-1, 1, 1, 1, 1, 1], [np.inf]]
+)
+def test_accelerations_that_make_no_box_are_refused(given):
+    with pytest.raises(WorkspaceError, match="accelerations: found"):
+        ProvenSets.find(ROBOT, None, None, None, np.array(given, float))
+
+
 def _pose(position):
     X = np.eye(4)
     X[:3, 3] = position
@@ -178,7 +215,7 @@ def test_accelerations_without_turns_are_wrenches_on_the_platform_at_rest():
         (["--proven", *ENDS, "--waypoints", "0,0,1;0,0,2"], "--proven: found --waypoints too"),
         (["--time", "--waypoints", "0,0,1;0,0,2"], "--time: accepted with --proven"),
         (["--proven", *ENDS, "--acceleration", "-1"], "--acceleration: found '-1'"),
-        (["--proven", *ENDS, "--acceleration", "1,2"], "--acceleration: found '1,2'"),
+        (["--proven", *ENDS, "--acceleration", "1,2,3,4"], "--acceleration: found '1,2,3,4'"),
         (["--proven", *ENDS, "--boxes", "0"], "--boxes: found 0"),
         (["--proven", *ENDS, "--obstacles", "none.yaml"], "none.yaml: there is no such file"),
         (["--proven", ENDS[0], "--to=0.5,0,0.2", "--boxes", "500"],
