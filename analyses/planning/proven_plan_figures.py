@@ -18,6 +18,7 @@ from cdpr_drake.analyses.planning.plan_figures import (
     winch_figure,
 )
 from cdpr_drake.analyses.planning.proven_plan_results import ProvenRun
+from cdpr_drake.analyses.planning.timed_plan_results import TimedRun
 from cdpr_drake.analyses.reporting.deferred_figures import Pictures
 from cdpr_drake.analyses.visualization.curves import draw_curve
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS, figure_writers
@@ -98,7 +99,7 @@ def sets_figure(run: ProvenRun) -> Figure:
     return figure
 
 
-def acceleration_figure(run: ProvenRun) -> Figure:
+def acceleration_figure(run: ProvenRun | TimedRun) -> Figure:
     """Accelerations of Po over time, with the box for which tensions are proven."""
     motion, box = run.motion, np.array(run.sets.about["accelerations_m_s2"])
     times = np.linspace(motion.start_time, motion.end_time, 2 * POINTS)

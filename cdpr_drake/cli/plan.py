@@ -24,6 +24,7 @@ from cdpr_drake.analyses.planning.free_motion import LEAST
 from cdpr_drake.analyses.planning.free_plan_results import FreeRun
 from cdpr_drake.analyses.planning.plan_results import MotionRun, PlanRun
 from cdpr_drake.analyses.planning.proven_plan_results import ProvenRun
+from cdpr_drake.analyses.planning.timed_plan_results import TimedRun
 from cdpr_drake.analyses.planning.robot_path_task import (
     CORNERS,
     RESERVE,
@@ -415,9 +416,12 @@ def _pictures(run: MotionRun, formats: tuple[str, ...]) -> Pictures:
     from cdpr_drake.analyses.planning.free_plan_figures import free_pictures
     from cdpr_drake.analyses.planning.plan_figures import plan_pictures
     from cdpr_drake.analyses.planning.proven_plan_figures import proven_pictures
+    from cdpr_drake.analyses.planning.timed_plan_figures import timed_pictures
 
     if isinstance(run, ProvenRun):
         return proven_pictures(run, formats)
+    if isinstance(run, TimedRun):
+        return timed_pictures(run, formats)
     if isinstance(run, FreeRun):
         return free_pictures(run, formats)
     assert isinstance(run, PlanRun)

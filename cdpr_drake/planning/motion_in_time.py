@@ -173,7 +173,11 @@ def _best(
     reached = False
     for care in CARE:
         better = False
-        for sequence in graph.sequences(hop_times(graph, limits, care), cost == "time"):
+        hops = hop_times(graph, limits, care)
+        found = graph.sequences(hops, False)
+        if cost == "time":  # the earliest sequence may be a worse start than a short one
+            found += graph.sequences(hops, True)
+        for sequence in found:
             reached = True
             key = (*sequence.sets, *np.round(1e3 * sequence.times).astype(int).tolist())
             if key in seen:
@@ -250,11 +254,12 @@ def _motion(
         if found is None:
             break
         curve = found
-    longest = np.inf if cost == "time" else (1.0 + LONGER) * curve.polygon
+    boxes = _chosen(graph.sets, curve)
     if cost == "length":
-        found = _earliest(graph, _chosen(graph.sets, curve), limits, longest)
-        return curve if found is None else found
-    return curve
+        found = _earliest(graph, boxes, limits, (1.0 + LONGER) * curve.polygon)
+    else:  # as early, and no longer than it must be
+        found = timed_curve(boxes, graph.start, graph.goal, limits)
+    return curve if found is None else found
 
 
 def _earliest(
@@ -300,8 +305,7 @@ def _chosen(sets: TimedSets, curve: SetCurve) -> TimedBoxes:
     for (a, b), points, now in zip(pairwise(curve.breaks.tolist()), curve.controls, curve.sets,
                                    strict=True):  # fmt: skip
         held = (sets.times[:, 0] <= a) & (b <= sets.times[:, 1])
-        held &= np.all(sets.lower <= np.min(points, axis=0), axis=1)
-        held &= np.all(np.max(points, axis=0) <= sets.upper, axis=1)
+        held &= sets.holding(np.min(points, axis=0)) & sets.holding(np.max(points, axis=0))
         numbers.append(int(np.argmax(np.where(held, sizes, -1.0))) if np.any(held) else now)
     return TimedBoxes(sets.lower[numbers], sets.upper[numbers], curve.breaks, tuple(numbers))
 
@@ -315,3 +319,16 @@ def _plan(task: PathTask, sets: TimedSets, curve: SetCurve) -> PathPlan:
     n = len(curve.breaks)
     motion = TimedPath.make(path, curve.breaks, np.ones(n))
     return PathPlan(task, path, motion, np.full((n, 2), np.nan), np.full(n, np.nan))
+
+
+def straight_time(task: PathTask, start: Array, goal: Array, box: Array) -> float:
+    """About how long a straight motion takes, from rest to rest, without anything in its way [s].
+
+    Args:
+        task: The robot and its limits.
+        start: Position and angles, shape (6,) [m, rad].
+        goal: Likewise.
+        box: Half widths of accelerations, shape (3,) [m/s^2].
+    """
+    limits = RateLimits(min(task.limits.speed, task.limits.cable_speed), np.asarray(box, float))
+    return float(_rest_to_rest(np.abs(goal - start)[np.newaxis, :3], limits)[0])

@@ -18,6 +18,7 @@ from pydrake.solvers import ClarabelSolver, MathematicalProgram
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.planning.set_curve import DEGREE, MARGIN, SetCurve
+from cdpr_drake.workspaces.timed_cells import BORDER
 
 INNER = 1e-6
 """Limits of speed and acceleration are kept by this share of them more than is asked, as the solver
@@ -173,7 +174,7 @@ def largest_rates(curve: SetCurve) -> tuple[float, Array]:
 
 def keeps(curve: SetCurve, boxes: TimedBoxes, limits: RateLimits) -> bool:
     """Whether control points prove that a motion stays in its boxes and keeps its limits."""
-    low, high = boxes.lower[:, np.newaxis], boxes.upper[:, np.newaxis]
+    low, high = boxes.lower[:, np.newaxis] - BORDER, boxes.upper[:, np.newaxis] + BORDER
     inside = np.all((low <= curve.controls) & (curve.controls <= high))
     speed, acceleration = largest_rates(curve)
     return bool(inside and speed <= limits.speed and np.all(acceleration <= limits.acceleration))

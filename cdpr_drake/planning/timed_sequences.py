@@ -88,8 +88,7 @@ class TimedGraph:
 
     def holds(self, point: Array, number: int) -> bool:
         """Whether a set holds a point."""
-        low, high = self.sets.lower[number], self.sets.upper[number]
-        return bool(np.all((low <= point) & (point <= high)))
+        return bool(self.sets.holding(point)[number])
 
     def sequences(self, hops: HopTimes, by_time: bool) -> list[TimedSequence]:
         """Sequences to the goal, the shortest first, or the earliest; none is worse in both."""

@@ -17,6 +17,7 @@ from typing import Protocol
 import numpy as np
 from pydrake.math import RigidTransform
 
+from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.convex_shapes import ConvexShape
 
 
@@ -63,6 +64,9 @@ class MovingObstacle(Protocol):
     def settled(self) -> float:
         """From when on it rests for ever [s]; infinite: never."""
 
+    def shown(self, times: Array) -> Sequence[tuple[ConvexShape, Sequence[RigidTransform]]]:
+        """Shapes to show, in frames of their own, and the poses X_WB of these at times [s]."""
+
 
 @dataclass(frozen=True, eq=False)
 class MovingShape:
@@ -89,6 +93,10 @@ class MovingShape:
     def settled(self) -> float:
         """As `MovingObstacle` has it."""
         return self.motion.settled()
+
+    def shown(self, times: Array) -> Sequence[tuple[ConvexShape, Sequence[RigidTransform]]]:
+        """As `MovingObstacle` has it."""
+        return [(self.shape, [self.motion.at(float(time)) for time in times])]
 
 
 def swept_shape(shape: ConvexShape, span: PoseSpan) -> ConvexShape:

@@ -24,6 +24,10 @@ from cdpr_drake.workspaces.cuboid_cover_kernel import count_cells
 from cdpr_drake.workspaces.moving_shapes import MovingObstacle, shapes_at, swept_by
 from cdpr_drake.workspaces.proven_cells import ProvenCells
 
+BORDER = 1e-11
+"""Poses so far beside a cell count as in it, as its border is a rounded number; what is judged is
+wider than a cell by twice as much [m, rad]."""
+
 
 @dataclass(frozen=True, eq=False)
 class PoseRaster:
@@ -159,8 +163,7 @@ def _pose_boxes(raster: PoseRaster, boxes: np.ndarray) -> tuple[Array, Array]:
     low = raster.lower + raster.width * boxes[:, 0, :d]
     high = raster.lower + raster.width * boxes[:, 1, :d]
     poses[:, raster.axes], halves[:, raster.axes] = 0.5 * (low + high), 0.5 * (high - low)
-    # Borders are rounded in other ways elsewhere: cells overlap by more than that.
-    halves[:, raster.axes] *= 1.0 + 1e-12
+    halves[:, raster.axes] += 2.0 * BORDER
     return poses, halves
 
 

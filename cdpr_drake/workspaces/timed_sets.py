@@ -17,7 +17,7 @@ from cdpr_drake.errors import WorkspaceError
 from cdpr_drake.workspaces.cuboid_cover import cover_with
 from cdpr_drake.workspaces.cuboid_cover_kernel import overlapping_pairs
 from cdpr_drake.workspaces.proven_sets import ABOUT, NUMBER_NAMES, REGIONS
-from cdpr_drake.workspaces.timed_cells import TimedCells
+from cdpr_drake.workspaces.timed_cells import BORDER, TimedCells
 from cdpr_drake.workspaces.timed_ways import CellWay, earliest_way
 
 COVER, MOST_SETS = 0.9, 150
@@ -63,9 +63,13 @@ class TimedSets:
 
     def containing(self, pose: Array, time: float) -> np.ndarray:
         """Numbers of the sets that hold a pose, shape (6,) [m, rad], at a time [s]."""
-        place = np.asarray(pose, float)[self.axes]
-        held = np.all((self.lower <= place) & (place <= self.upper), axis=1)
+        held = self.holding(np.asarray(pose, float)[self.axes])
         return np.flatnonzero(held & (self.times[:, 0] <= time) & (time <= self.times[:, 1]))
+
+    def holding(self, place: Array) -> np.ndarray:
+        """Which sets hold numbers of a pose that vary, shape (d,), at some time, shape (k,)."""
+        held = (self.lower - BORDER <= place) & (place <= self.upper + BORDER)
+        return np.asarray(np.all(held, axis=1))
 
     def covers(self, pose: Array, time: float) -> bool:
         """Whether a pose lies in a set at a time."""
@@ -73,8 +77,7 @@ class TimedSets:
 
     def clear_from(self, pose: Array) -> float:
         """From when on a pose is in sets until the horizon [s]; infinite: it is not then."""
-        place = np.asarray(pose, float)[self.axes]
-        held = np.all((self.lower <= place) & (place <= self.upper), axis=1)
+        held = self.holding(np.asarray(pose, float)[self.axes])
         since = self.horizon
         for begin, end in sorted(self.times[held].tolist(), key=lambda one: -one[1]):
             if end >= since:
