@@ -83,8 +83,9 @@ def space_time_figure(run: TimedRun) -> Figure:
         for time, place, look in ((0.0, 0.0, DESIRED), (times[-1], along[-1], TARGET)):
             axes.plot(time, place, zorder=6, linestyle="none", marker=look.marker, markersize=11.0,
                       markerfacecolor="white", color=look.color)  # fmt: skip
-        axes.set(xlabel="time [s]", ylabel="way of Po [m]", xlim=(0.0, until))
-        axes.margins(y=0.08)
+        edge = 0.05 * along[-1]
+        axes.set(xlabel="time [s]", ylabel="way of Po [m]", xlim=(-0.01 * until, until),
+                 ylim=(-edge, along[-1] + edge))  # fmt: skip
         shade = Patch(facecolor="#9a9a9a", edgecolor=BOUND.color, label="something is there")
         ends = [
             Line2D([], [], linewidth=0, marker=look.marker, color=look.color, label=label,

@@ -40,7 +40,7 @@ CARE = (0.0, 0.05, 0.1, 0.2, 0.35, 0.6, 1.0)
 PIECES = 16
 """Pieces of a motion, about, so that it can wait and go within one set."""
 
-ROUNDS = 6
+ROUNDS = 4
 """Times that pieces choose their sets anew."""
 
 BETTER = 0.005
@@ -168,36 +168,35 @@ def _best(
     Raises:
         PlanningError: There is none.
     """
-    best: tuple[float, TimedSequence, SetCurve] | None = None
+    found: list[tuple[TimedSequence, SetCurve]] = []
     seen: set[tuple[int, ...]] = set()
     reached = False
     for care in CARE:
-        better = False
-        hops = hop_times(graph, limits, care)
-        found = graph.sequences(hops, False)
+        hops, before = hop_times(graph, limits, care), len(found)
+        sequences = graph.sequences(hops, False)
         if cost == "time":  # the earliest sequence may be a worse start than a short one
-            found += graph.sequences(hops, True)
-        for sequence in found:
+            sequences += graph.sequences(hops, True)
+        for sequence in sequences:
             reached = True
             key = (*sequence.sets, *np.round(1e3 * sequence.times).astype(int).tolist())
             if key in seen:
                 continue
             seen.add(key)
             curve = _motion(graph, sequence, limits, cost)
-            if curve is None:
-                continue
-            value = float(curve.breaks[-1]) if cost == "time" else curve.polygon
-            if best is None or value < best[0] * (1.0 - BETTER):
-                best, better = (value, sequence, curve), True
-        if best is not None and not better:
+            if curve is not None:
+                found.append((sequence, curve))
+        if before:  # the next slower ones were looked at, too
             break
-    if best is None:
+    if not found:
         why = "no motion within the limits" if reached else "no way in time"
         raise PlanningError(
             f"from, to: found {why} in {len(graph.sets)} proven sets until "
             f"{graph.sets.horizon:.4g} s; accepted: poses that one joins, or more cells"
         )
-    return best[1], best[2]
+    if cost == "length":  # of those that are about as short, the first to arrive
+        most = (1.0 + LONGER) * min(curve.polygon for _, curve in found)
+        found = [one for one in found if one[1].polygon <= most]
+    return min(found, key=lambda one: float(one[1].breaks[-1]))
 
 
 def hop_times(
