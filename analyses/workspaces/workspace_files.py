@@ -9,16 +9,36 @@ from pathlib import Path
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cdpr_drake.errors import CableGeometryError, DataFileError, WrenchSetError
+from cdpr_drake.analyses.workspaces.workspace_question import interference_bodies
+from cdpr_drake.errors import (
+    CableGeometryError,
+    CdprError,
+    DataFileError,
+    TrajectoryError,
+    WrenchSetError,
+)
 from cdpr_drake.geometry.convex_shapes import ConvexShape, mesh_vertices
+from cdpr_drake.geometry.poses import pose_row
+from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import Pose
-from cdpr_drake.schema.fields import array, number, optional_section, section, sections, text
+from cdpr_drake.schema.fields import (
+    array,
+    number,
+    optional_section,
+    section,
+    sections,
+    switch,
+    text,
+)
 from cdpr_drake.schema.typed_yaml import load_typed
 from cdpr_drake.systems.worlds.checks import motion_problems
 from cdpr_drake.systems.worlds.settings import ObstacleMotion, body_motion
+from cdpr_drake.trajectories.pose_trajectory import MOTION_SIZE
+from cdpr_drake.trajectories.sampled_motion import read_motion, sampled_motion
 from cdpr_drake.workspaces.cable_distance_kernel import BOX_COLUMNS
 from cdpr_drake.workspaces.cable_interference import Obstacles, box_row
 from cdpr_drake.workspaces.demanded_wrenches import SpatialSet
+from cdpr_drake.workspaces.moving_robots import MovingRobot, PlannedMotion
 from cdpr_drake.workspaces.moving_shapes import MovingObstacle, MovingShape
 
 MOTION = "How it moves, as a body of a scenario's world does; null: it rests."
@@ -78,6 +98,21 @@ class ObstacleMesh:
 
 
 @dataclass(kw_only=True)
+class OtherRobot:
+    """Another robot in the same room, which moves as was planned for it, or rests."""
+
+    robot: str = text("Its name, or its file, beside this one or in the working folder.")
+    pose: Pose = section("Pose of its W in this robot's W.", Pose)
+    plan: str | None = text(
+        "Folder that cdpr plan wrote for it, or a table as its motion.csv, beside this file; null: "
+        "it rests at home.",
+        None,
+    )
+    later: float = number("How much later than its plan says it starts.", "s", 0.0, at_least=0.0)
+    beams: bool = switch("Whether the beams of its frame stand there, too.", True)
+
+
+@dataclass(kw_only=True)
 class ObstacleFile:
     """What cables and platform may not touch."""
 
@@ -85,6 +120,7 @@ class ObstacleFile:
     spheres: list[ObstacleSphere] = sections("Balls.", required=False)
     capsules: list[ObstacleCapsule] = sections("Capsules.", required=False)
     meshes: list[ObstacleMesh] = sections("Convex hulls of meshes.", required=False)
+    robots: list[OtherRobot] = sections("Other robots, with their plans.", required=False)
 
 
 def load_wrench_set(path: Path) -> SpatialSet:
@@ -134,9 +170,9 @@ def load_all_obstacles(path: Path) -> tuple[Obstacles, tuple[MovingObstacle, ...
     if not path.is_file():
         raise DataFileError(f"{path}: there is no such file of obstacles")
     found = load_typed(ObstacleFile, path)
-    if not (found.boxes or found.spheres or found.capsules or found.meshes):
+    if not any((found.boxes, found.spheres, found.capsules, found.meshes, found.robots)):
         raise DataFileError(
-            f"{path}: found no obstacle; accepted: some of boxes, spheres, capsules, meshes"
+            f"{path}: found no obstacle; accepted: some of boxes, spheres, capsules, meshes, robots"
         )
     boxes: list[np.ndarray] = []
     solids: list[ConvexShape] = []
@@ -175,6 +211,7 @@ def load_all_obstacles(path: Path) -> tuple[Obstacles, tuple[MovingObstacle, ...
         else:
             X = one.pose.transform()
             moving.append(_moving(path, f"meshes[{k}]", shape, X, one.motion))
+    moving += [_robot(path, f"robots[{k}]", one) for k, one in enumerate(found.robots)]
     resting = Obstacles(np.array(boxes, float).reshape(-1, BOX_COLUMNS), tuple(solids))
     return resting, tuple(moving)
 
@@ -190,3 +227,31 @@ def _moving(
     for problem in motion_problems(start, motion, f"{key}.motion"):
         raise DataFileError(f"{path}: {problem}")
     return MovingShape(shape, body_motion(start, motion), key)
+
+
+def _robot(path: Path, key: str, one: OtherRobot) -> MovingRobot:
+    """Another robot.
+
+    Raises:
+        DataFileError: The robot or its plan cannot be read.
+    """
+    beside = path.parent / one.robot
+    try:
+        robot = load_robot(str(beside) if beside.exists() else one.robot)
+    except CdprError as problem:
+        raise DataFileError(f"{path}: {key}.robot: {problem}") from problem
+    if one.plan is None:
+        row = np.zeros((2, MOTION_SIZE))
+        row[:, :7] = pose_row(robot.home.transform())
+        motion = sampled_motion(np.array([0.0, 1e-3]), row)
+    else:
+        table = path.parent / one.plan
+        if table.is_dir():
+            table = table / "motion.csv"
+        try:
+            motion = read_motion(table, one.later)
+        except TrajectoryError as problem:
+            raise DataFileError(f"{path}: {key}.plan: {problem}") from problem
+    around = interference_bodies(robot, pulleys=True)
+    planned = PlannedMotion(motion, one.pose.transform())
+    return MovingRobot(around, planned, f"{key} {robot.name}", one.beams)
