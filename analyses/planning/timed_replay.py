@@ -30,9 +30,7 @@ def write_timed_replay(path: Path, run: TimedRun) -> None:
     end = run.motion.end_time
     times = np.arange(0.0, min(end + AFTER, run.sets.horizon), 1.0 / RATE)
     samples = run.samples
-    tensions = np.column_stack(
-        [np.interp(times, samples.times, one) for one in samples.tensions.T]
-    )
+    tensions = np.column_stack([np.interp(times, samples.times, one) for one in samples.tensions.T])
     log: dict[str, Array] = {
         "time": times,
         "X_WP": np.array([pose_row(run.motion.pose(float(t))) for t in times]),

@@ -44,6 +44,7 @@ from cdpr_drake.workspaces.moving_shapes import MovingObstacle, MovingShape
 MOTION = "How it moves, as a body of a scenario's world does; null: it rests."
 """Documentation of the section of obstacles that move."""
 
+
 @dataclass(kw_only=True)
 class WrenchSetFile:
     """Wrenches about Po in W: every sum of one of the polytope, the box and the ellipsoid."""

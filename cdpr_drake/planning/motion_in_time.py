@@ -160,9 +160,7 @@ def motion_in_time(
     )
 
 
-def _best(
-    graph: TimedGraph, limits: RateLimits, cost: str
-) -> tuple[TimedSequence, SetCurve]:
+def _best(graph: TimedGraph, limits: RateLimits, cost: str) -> tuple[TimedSequence, SetCurve]:
     """The best motion of the sequences that are found.
 
     Raises:

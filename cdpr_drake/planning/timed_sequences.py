@@ -106,9 +106,7 @@ class TimedGraph:
         def spread(point: Array, time: float, length: float, number: int, before: int) -> None:
             nodes = self.of_set[number]
             if len(nodes):
-                arrive = np.maximum(
-                    self.spans[nodes, 0], time + hops(point, self.points[nodes])
-                )
+                arrive = np.maximum(self.spans[nodes, 0], time + hops(point, self.points[nodes]))
                 ways = np.linalg.norm(self.points[nodes] - point, axis=1) + HOP * straight
                 for k in np.flatnonzero(arrive <= self.spans[nodes, 1]):
                     push(int(nodes[k]), length + float(ways[k]), float(arrive[k]), number, before)
@@ -127,9 +125,7 @@ class TimedGraph:
             _, _, label, node = heapq.heappop(heap)
             _, length, time, number, _ = labels[label]
             others = kept.setdefault(node, [])
-            if len(others) >= MOST_LABELS or any(
-                a <= length and b <= time for a, b in others
-            ):
+            if len(others) >= MOST_LABELS or any(a <= length and b <= time for a, b in others):
                 continue
             others.append((length, time))
             if node == goal_node:

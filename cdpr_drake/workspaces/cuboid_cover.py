@@ -189,7 +189,9 @@ class _Cover:
             smallest = min(lone, key=lambda k: (np.count_nonzero(groups == k), k))
             way = self._way(boxes, groups == smallest, parts)
             for first, second in pairwise(way):
-                self.take_round(np.stack([np.minimum(first, second), np.maximum(first, second) + 1]))
+                self.take_round(
+                    np.stack([np.minimum(first, second), np.maximum(first, second) + 1])
+                )
 
     def _way(self, boxes: np.ndarray, own: np.ndarray, parts: np.ndarray) -> np.ndarray:
         """The shortest way over faces of cells from some cuboids to the others of their part."""

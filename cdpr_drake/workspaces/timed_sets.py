@@ -56,8 +56,9 @@ class TimedSets:
     @cached_property
     def graph(self) -> np.ndarray:
         """Pairs of sets that share poses and times, wide along every number, shape (p, 2)."""
-        low, high = np.column_stack([self.lower, self.times[:, 0]]), np.column_stack(
-            [self.upper, self.times[:, 1]]
+        low, high = (
+            np.column_stack([self.lower, self.times[:, 0]]),
+            np.column_stack([self.upper, self.times[:, 1]]),
         )
         return np.asarray(overlapping_pairs(low, high, low.shape[1]))
 

@@ -22,9 +22,7 @@ SHAPE = ConvexShape.box_at(np.array([0.1, 0.0, 0.05]), [0.2, 0.1, 0.3])
 
 
 def random_pose(random, far=0.5):
-    return RigidTransform(
-        RollPitchYaw(random.uniform(-1.5, 1.5, 3)), random.uniform(-far, far, 3)
-    )
+    return RigidTransform(RollPitchYaw(random.uniform(-1.5, 1.5, 3)), random.uniform(-far, far, 3))
 
 
 def motions(seed):
