@@ -15,7 +15,7 @@ from cdpr_drake.workspaces.timed_cells import PoseRaster, clear_cells
 from cdpr_drake.workspaces.timed_sets import TimedSets, sets_in_time
 
 POSE_CELLS = 2**15
-"""Cells of poses, at most; each is looked at at `FEWEST_STEPS` to `MOST_STEPS` intervals of time."""
+"""Cells of poses, at most; each in `FEWEST_STEPS` to `MOST_STEPS` intervals of time."""
 
 FEWEST_STEPS, MOST_STEPS = 32, 128
 FINE = 24

@@ -24,13 +24,13 @@ from cdpr_drake.analyses.planning.free_motion import LEAST
 from cdpr_drake.analyses.planning.free_plan_results import FreeRun
 from cdpr_drake.analyses.planning.plan_results import MotionRun, PlanRun
 from cdpr_drake.analyses.planning.proven_plan_results import ProvenRun
-from cdpr_drake.analyses.planning.timed_plan_results import TimedRun
 from cdpr_drake.analyses.planning.robot_path_task import (
     CORNERS,
     RESERVE,
     TOLERANCE,
     LimitSettings,
 )
+from cdpr_drake.analyses.planning.timed_plan_results import TimedRun
 from cdpr_drake.analyses.reporting.deferred_figures import Pictures, write_pictures
 from cdpr_drake.analyses.reporting.folder_lock import free_folder
 from cdpr_drake.analyses.reporting.output_folder import results_folder, shown_path
@@ -157,7 +157,7 @@ Obstacles = Annotated[
     Path | None,
     typer.Option(
         help="With --free or --proven: what stands in the way, YAML as of cdpr workspace "
-        "--obstacles."
+        "--obstacles; with --proven it may move, and be other robots with their plans."
     ),
 ]
 KeepInView = Annotated[

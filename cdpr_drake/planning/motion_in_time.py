@@ -37,6 +37,9 @@ from cdpr_drake.workspaces.timed_sets import TimedSets
 CARE = (0.0, 0.05, 0.1, 0.2, 0.35, 0.6, 1.0)
 """Between the time of a straight motion and that with a rest at every corner: what is tried."""
 
+QUICK = 0.45
+"""What the fastest motion takes of the time of one polynomial whose control points keep limits."""
+
 PIECES = 16
 """Pieces of a motion, about, so that it can wait and go within one set."""
 
@@ -206,7 +209,7 @@ def hop_times(
     """
     way = np.abs(graph.goal - graph.start)
     whole = _rest_to_rest(way[np.newaxis], limits)[0]
-    pace = 0.5 * whole / float(np.linalg.norm(way))
+    pace = QUICK * whole / float(np.linalg.norm(way))
 
     def hops(point: Array, others: Array) -> Array:
         ways = np.abs(others - point)

@@ -169,7 +169,7 @@ class MovingRobot:
         return [shape.moved(self.motion.X_FW) for shape in frame]
 
     def shown(self, times: Array) -> Sequence[tuple[ConvexShape, Sequence[RigidTransform]]]:
-        """As `MovingObstacle` has it; a cable is as long as at its longest, from the platform on."""
+        """As `MovingObstacle` has it; a cable is as long as it ever is, from the platform on."""
         at = [self.motion.at(float(time)) for time in times]
         found = [(shape, at) for shape in self.around.platform_shapes()]
         runs = [self.at(float(time))[len(found) :] for time in times]

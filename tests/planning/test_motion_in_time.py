@@ -85,18 +85,18 @@ def test_a_gate_that_is_shut_too_early_is_no_way(task):
     sets = gate()
     # Two rooms 0.1 m apart, with a passage for 0.3 s: no motion gets through in that.
     shut = TimedSets(
-        sets.lower + [[0, 0, 0], [0, 0, 0], [0.05, 0, 0]],
-        sets.upper - [[0.05, 0, 0], [0, 0, 0], [0, 0, 0]],
+        sets.lower + np.array([[0, 0, 0], [0, 0, 0], [0.05, 0, 0]]),
+        sets.upper - np.array([[0.05, 0, 0], [0, 0, 0], [0, 0, 0]]),
         np.array([[0.0, HORIZON], [OPENS, OPENS + 0.3], [0.0, HORIZON]]), sets.axes, sets.fixed,
         HORIZON, sets.about,
     )  # fmt: skip
-    with pytest.raises(PlanningError, match="no motion within the limits|no way in time"):
+    with pytest.raises(PlanningError, match=r"no motion within the limits|no way in time"):
         motion_in_time(shut, START, GOAL, task, BOX)
 
 
 def test_a_start_or_goal_in_no_set_is_named(task):
     with pytest.raises(PlanningError, match="from, to: found a pose in no proven set"):
-        motion_in_time(gate(), START + [0, 0.5, 0, 0, 0, 0], GOAL, task, BOX)
+        motion_in_time(gate(), START + np.array([0, 0.5, 0, 0, 0, 0]), GOAL, task, BOX)
     with pytest.raises(PlanningError, match="to: found the pose of the start"):
         motion_in_time(gate(), START, START, task, BOX)
     with pytest.raises(PlanningError, match="cost: found 'speed'"):

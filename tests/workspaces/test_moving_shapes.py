@@ -105,7 +105,7 @@ def timed():
         (RigidTransform(middle - far), RigidTransform(middle + far)), (4.0,)
     ))  # fmt: skip
     spun = JointedBody(
-        RigidTransform(middle + [0.3 * size[0], 0, 0]), middle, [0, 0, 1.0], rate=0.8,
+        RigidTransform(middle + np.array([0.3 * size[0], 0, 0])), middle, [0, 0, 1.0], rate=0.8,
         amplitude=0.0, period=1.0,
     )  # fmt: skip
     things = (
