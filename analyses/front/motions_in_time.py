@@ -83,6 +83,11 @@ def plan_among_moving(
         WorkspaceError: As `find_timed_sets`.
         PlanningError: As `motion_in_time`.
     """
+    if sets.about["accelerations_m_s2"] is None or sets.conditions is None:
+        raise PlanningError(
+            "sets: found sets of a file, or without accelerations, with obstacles that move; "
+            "accepted: sets that were found with accelerations"
+        )
     box = np.array(sets.about["accelerations_m_s2"], float)
     clearance = float(sets.about["clearance_m"])
     whole = straight_time(task, ends[0], ends[1], box)
@@ -90,7 +95,6 @@ def plan_among_moving(
     between = time.perf_counter()
     found = motion_in_time(timed, *ends, task, box, cost=least, say=say)
     took = time.perf_counter() - between
-    assert sets.conditions is not None
     around = sets.conditions.around
     assert around is not None
     return DrawnTimedPlan(
