@@ -176,7 +176,9 @@ class MovingRobot:
         for k, radius in enumerate(self.around.radius):
             lines = np.array([run[k].points for run in runs])
             longest = float(np.max(np.linalg.norm(lines[:, 0] - lines[:, 1], axis=1)))
-            shape = ConvexShape.capsule([0, 0, 0], [0, 0, longest], float(radius), f"cable {k + 1}")
+            shape = ConvexShape(
+                np.array([[0.0, 0.0, 0.0], [0.0, 0.0, longest]]), float(radius), f"cable {k + 1}"
+            )
             poses = [
                 RigidTransform(RotationMatrix.MakeFromOneVector(line[0] - line[1], 2), line[1])
                 for line in lines

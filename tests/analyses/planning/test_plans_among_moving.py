@@ -96,7 +96,10 @@ def test_a_plan_writes_table_sets_figures_and_replay(run, tmp_path):
     ("motion", "words"),
     [
         ({"waypoints": [{"time": 1.0}, {"time": 0.5}]}, r"boxes\[0\].motion.waypoints: .*growing"),
-        ({"velocity": [1, 0, 0], "waypoints": [{"time": 1.0}]}, r"boxes\[0\].motion: .*one of them"),
+        (
+            {"velocity": [1, 0, 0], "waypoints": [{"time": 1.0}]},
+            r"boxes\[0\].motion: .*one of them",
+        ),
         ({"speed": 1.0}, "speed"),
     ],
 )
