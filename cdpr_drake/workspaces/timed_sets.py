@@ -24,8 +24,8 @@ COVER, MOST_SETS = 0.9, 150
 """Usual share of the clear cells that sets cover, and sets at most, before those of ways."""
 
 SLOWER = (0.4, 1.0, 2.0, 4.0)
-"""Ways that sets are sure to hold are looked for with so many times the time that a cell takes: from
-about the fastest motion on the fly to one that rests often."""
+"""Ways that sets are sure to hold are looked for with so many times the time that a cell takes:
+from about the fastest motion on the fly to one that rests often."""
 
 
 @dataclass(frozen=True, eq=False)
