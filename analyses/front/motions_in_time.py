@@ -63,7 +63,7 @@ def check_timed(method: str, accelerations: Any, ends: Sequence[Array]) -> None:
 
 def plan_among_moving(
     robot: Robot, sets: ProvenSets, things: Sequence[MovingObstacle], ends: tuple[Array, Array],
-    task: PathTask, least: str, arguments: dict[str, Any], begin: float,
+    task: PathTask, least: str, *, arguments: dict[str, Any], begin: float,
     say: Callable[[str], None],
 ) -> DrawnTimedPlan:  # fmt: skip
     """A motion among what moves, in sets that are proven otherwise.

@@ -176,7 +176,15 @@ def plan_proven_motion(
     }
     if moving:
         timed = plan_among_moving(
-            loaded, sets, moving, (ends[0], ends[1]), task, settings.least, arguments, begin, tell
+            loaded,
+            sets,
+            moving,
+            (ends[0], ends[1]),
+            task,
+            settings.least,
+            arguments=arguments,
+            begin=begin,
+            say=tell,
         )
         own, log = tracked_by(loaded, given, timed.found.plan, say, track)
         return replace(timed, limits=own, tracked=log)

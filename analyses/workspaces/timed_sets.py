@@ -67,7 +67,7 @@ def find_timed_sets(
 
     raster = PoseRaster.of(static.cells, POSE_CELLS)
     around = static.conditions.around
-    cells = clear_cells(raster, around, things, clearance, horizon, steps, tell)
+    cells = clear_cells(raster, around, things, clearance, horizon, steps, on_progress=tell)
     speed = float(np.linalg.norm(ends[1][:3] - ends[0][:3])) / whole
     about = {**static.about, "moving": [thing.name for thing in things]}
     return sets_in_time(cells, *ends, speed, about=about, say=say)

@@ -102,6 +102,7 @@ def clear_cells(
     clearance: float,
     horizon: float,
     steps: int,
+    *,
     on_progress: Callable[[int, float], None] | None = None,
 ) -> TimedCells:
     """Proves cells of poses and time.
