@@ -95,9 +95,12 @@ def test_a_plan_writes_table_sets_figures_and_replay(run, tmp_path):
 @pytest.mark.parametrize(
     ("motion", "words"),
     [
-        ({"waypoints": [{"time": 1.0}, {"time": 0.5}]}, r"boxes\[0\].motion.waypoints: .*growing"),
         (
-            {"velocity": [1, 0, 0], "waypoints": [{"time": 1.0}]},
+            {"waypoints": [{"time": t, "pose": {"position": AWAY}} for t in (1.0, 0.5)]},
+            r"boxes\[0\].motion.waypoints: .*growing",
+        ),
+        (
+            {"velocity": [1, 0, 0], "joint": {"point": AWAY, "axis": [0, 0, 1]}},
             r"boxes\[0\].motion: .*one of them",
         ),
         ({"speed": 1.0}, "speed"),
@@ -124,7 +127,7 @@ def test_all_shapes_and_other_robots_move(tmp_path):
         "capsules": [
             {"start": AWAY, "end": [0.0, -0.5, 0.6], "radius": 0.02, "motion": velocity}
         ],
-        "meshes": [{"file": "tip.obj", "motion": velocity}],
+        "meshes": [{"file": "tip.obj", "pose": {"position": AWAY}, "motion": velocity}],
         "robots": [{"robot": ROBOT, "pose": {"position": [0, 0, -0.5]}, "beams": False}],
     })  # fmt: skip
     resting, moving = load_all_obstacles(path)
@@ -138,10 +141,12 @@ def test_all_shapes_and_other_robots_move(tmp_path):
 
 
 def test_a_robot_without_its_plan_is_named(tmp_path):
-    path = write(tmp_path, {"robots": [{"robot": ROBOT, "plan": "nowhere"}]})
+    path = write(
+        tmp_path, {"robots": [{"robot": ROBOT, "pose": {"position": AWAY}, "plan": "nowhere"}]}
+    )
     with pytest.raises(DataFileError, match=r"robots\[0\].plan: .*no such file"):
         load_all_obstacles(path)
-    path = write(tmp_path, {"robots": [{"robot": "nobody"}]})
+    path = write(tmp_path, {"robots": [{"robot": "nobody", "pose": {"position": AWAY}}]})
     with pytest.raises(DataFileError, match=r"robots\[0\].robot: .*nobody"):
         load_all_obstacles(path)
 
