@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import linprog
 
+from cdpr_drake.analyses.benchmarks.moving_obstacles import timed_cells_row
 from cdpr_drake.analyses.planning.robot_path_task import LimitSettings, make_path, path_task
 from cdpr_drake.analyses.reporting.timing import TimingRow, interleaved, processor_seconds
 from cdpr_drake.analyses.workspaces.static_feasible import static_case
@@ -35,7 +36,12 @@ POSES = [
 def planning_rows(quick: bool) -> list[TimingRow]:
     """All rows of this file; `quick` repeats less."""
     repeats = 3 if quick else 7
-    return [path_row(repeats), resistance_row(repeats), rails_row(repeats)]
+    return [
+        path_row(repeats),
+        resistance_row(repeats),
+        rails_row(repeats),
+        timed_cells_row(repeats),
+    ]
 
 
 def path_row(repeats: int) -> TimingRow:

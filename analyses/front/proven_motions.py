@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cdpr_drake.analyses.front.motions_in_time import (
+    DrawnTimedPlan,
+    check_timed,
+    plan_among_moving,
+)
 from cdpr_drake.analyses.front.planning import (
     Limits,
     Say,
@@ -19,7 +25,6 @@ from cdpr_drake.analyses.front.planning import (
     limits_told,
     planned_for,
     pose_numbers,
-    read_where_file,
     silent,
     tracked_by,
 )
@@ -31,7 +36,7 @@ from cdpr_drake.analyses.workspaces.proven_sets import (
     ProvenSets,
     explain_pose,
 )
-from cdpr_drake.analyses.workspaces.workspace_files import load_obstacles
+from cdpr_drake.analyses.workspaces.workspace_files import load_all_obstacles
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import PlanningError, WorkspaceError
 from cdpr_drake.models.robot_loader import as_robot
@@ -39,6 +44,7 @@ from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import as_pose
 from cdpr_drake.planning.path_in_sets import SEQUENCES, proven_motion
 from cdpr_drake.planning.path_timing import STATIONS, PathPlan
+from cdpr_drake.workspaces.moving_shapes import MovingObstacle
 from cdpr_drake.workspaces.proven_cells import CELLS
 from cdpr_drake.workspaces.proven_sets import COVER
 
@@ -59,7 +65,9 @@ class ProvenSettings:
 
     Attributes:
         least: length or time.
-        obstacles: What cables and platform stay off, as `ProvenSets.find` takes it, or a file.
+        obstacles: What cables and platform stay off, as `ProvenSets.find` takes it, or a file, in
+            which they may also move.
+        moving: Obstacles that move, beside those of a file.
         accelerations: Half widths of the box of accelerations that the motion stays in, one or
             three; 0: none, so that only poses are proven; None: `ACCELERATION`, or none where the
             orientation changes [m/s^2]. Where it changes, six, (angular, linear), see
@@ -76,6 +84,7 @@ class ProvenSettings:
 
     least: str = "length"
     obstacles: Any = None
+    moving: Sequence[MovingObstacle] = ()
     accelerations: Array | float | None = None
     clearance: float = 0.0
     method: str = "sequences"
@@ -111,12 +120,13 @@ def plan_proven_motion(
     track: bool = False,
     say: Say | None = None,
     **asked: Any,
-) -> DrawnProvenPlan:
+) -> DrawnProvenPlan | DrawnTimedPlan:
     """A motion of a robot from one pose to another in sets of poses that are proven.
 
     With accelerations, where it turns also angular ones, it is proven of every instant that
     tensions within the limits (less the reserve) give the motion, and that cables and platform meet
-    nothing.
+    nothing. Among obstacles that move the sets are of poses and time, and the motion waits where it
+    must.
 
     Args:
         robot: The robot, or its name or path.
@@ -138,8 +148,13 @@ def plan_proven_motion(
     loaded, given = as_robot(robot, "plan_proven_motion"), chosen_limits(limits)
     task = planned_for(loaded, given, pulleys)
     ends = [pose_numbers(as_pose(loaded, pose)) for pose in (start, goal)]
-    obstacles = read_where_file(settings.obstacles, load_obstacles)
+    obstacles, moving = settings.obstacles, tuple(settings.moving)
+    if isinstance(obstacles, str | Path):
+        obstacles, found_moving = load_all_obstacles(Path(obstacles))
+        moving = (*found_moving, *moving)
     begin = time.perf_counter()
+    if moving:
+        check_timed(settings.method, settings.accelerations, ends)
     sets = settings.sets
     if sets is None:
         proof = ProofSettings(
@@ -153,6 +168,25 @@ def plan_proven_motion(
         )  # fmt: skip
     else:
         _check_ends(sets, ends)
+    arguments = limits_told(given, pulleys) | {
+        "from": in_degrees(ends[0]),
+        "to": in_degrees(ends[1]),
+        **asked_told(asked, ("sets", "obstacles", "moving")),
+    }
+    if moving:
+        timed = plan_among_moving(
+            loaded,
+            sets,
+            moving,
+            (ends[0], ends[1]),
+            task,
+            settings.least,
+            arguments=arguments,
+            begin=begin,
+            say=tell,
+        )
+        own, log = tracked_by(loaded, given, timed.found.plan, say, track)
+        return replace(timed, limits=own, tracked=log)
     between = time.perf_counter()
     try:
         found = proven_motion(
@@ -166,11 +200,6 @@ def plan_proven_motion(
             f"{problem}; {sets.cut} open cells between them were cut further"
         ) from problem
     took = time.perf_counter() - between
-    arguments = limits_told(given, pulleys) | {
-        "from": in_degrees(ends[0]),
-        "to": in_degrees(ends[1]),
-        **asked_told(asked, ("sets", "obstacles")),
-    }
     run = DrawnProvenPlan(
         robot=loaded, limits=task.limits, arguments=arguments, planning_time=took, found=found,
         sets_time=between - begin, judged=judged(sets, found.plan, JUDGED),

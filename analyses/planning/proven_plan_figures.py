@@ -18,6 +18,7 @@ from cdpr_drake.analyses.planning.plan_figures import (
     winch_figure,
 )
 from cdpr_drake.analyses.planning.proven_plan_results import ProvenRun
+from cdpr_drake.analyses.planning.timed_plan_results import TimedRun
 from cdpr_drake.analyses.reporting.deferred_figures import Pictures
 from cdpr_drake.analyses.visualization.curves import draw_curve
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS, figure_writers
@@ -99,12 +100,13 @@ def sets_figure(run: ProvenRun) -> Figure:
     return figure
 
 
-def acceleration_figure(run: ProvenRun) -> Figure:
+def acceleration_figure(run: ProvenRun | TimedRun) -> Figure:
     """Accelerations over time with the box for which tensions are proven; of a turn moments, too.
 
     Without turns they are those of Po, with turns those of the centre of mass.
     """
-    motion, about, box = run.motion, run.sets.about, run.found.box
+    motion, about = run.motion, run.sets.about
+    box = run.found.box if isinstance(run, ProvenRun) else None  # what moves has no turns
     times = np.linspace(motion.start_time, motion.end_time, 2 * POINTS)
     rows = np.array([motion.motion(t) for t in times])
     limits = np.array(about["accelerations_m_s2"])

@@ -7,15 +7,42 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from pydrake.math import RigidTransform
 
-from cdpr_drake.errors import CableGeometryError, DataFileError, WrenchSetError
+from cdpr_drake.analyses.workspaces.workspace_question import interference_bodies
+from cdpr_drake.errors import (
+    CableGeometryError,
+    CdprError,
+    DataFileError,
+    TrajectoryError,
+    WrenchSetError,
+)
 from cdpr_drake.geometry.convex_shapes import ConvexShape, mesh_vertices
+from cdpr_drake.geometry.poses import pose_row
+from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import Pose
-from cdpr_drake.schema.fields import array, number, section, sections, text
+from cdpr_drake.schema.fields import (
+    array,
+    number,
+    optional_section,
+    section,
+    sections,
+    switch,
+    text,
+)
 from cdpr_drake.schema.typed_yaml import load_typed
+from cdpr_drake.systems.worlds.checks import motion_problems
+from cdpr_drake.systems.worlds.settings import ObstacleMotion, body_motion
+from cdpr_drake.trajectories.pose_trajectory import MOTION_SIZE
+from cdpr_drake.trajectories.sampled_motion import read_motion, sampled_motion
 from cdpr_drake.workspaces.cable_distance_kernel import BOX_COLUMNS
 from cdpr_drake.workspaces.cable_interference import Obstacles, box_row
 from cdpr_drake.workspaces.demanded_wrenches import SpatialSet
+from cdpr_drake.workspaces.moving_robots import MovingRobot, PlannedMotion
+from cdpr_drake.workspaces.moving_shapes import MovingObstacle, MovingShape
+
+MOTION = "How it moves, as a body of a scenario's world does; null: it rests."
+"""Documentation of the section of obstacles that move."""
 
 
 @dataclass(kw_only=True)
@@ -37,6 +64,7 @@ class ObstacleBox:
 
     pose: Pose = section("Pose of its middle in W.", Pose)
     size: np.ndarray = array("Its edges.", "m", (3,), above=0.0)
+    motion: ObstacleMotion | None = optional_section(MOTION)
 
 
 @dataclass(kw_only=True)
@@ -45,6 +73,7 @@ class ObstacleSphere:
 
     position: np.ndarray = array("Its middle in W.", "m", (3,))
     radius: float = number("Its radius.", "m", above=0.0)
+    motion: ObstacleMotion | None = optional_section(MOTION)
 
 
 @dataclass(kw_only=True)
@@ -54,6 +83,9 @@ class ObstacleCapsule:
     start: np.ndarray = array("One end of the line in W.", "m", (3,))
     end: np.ndarray = array("The other.", "m", (3,))
     radius: float = number("The radius.", "m", above=0.0)
+    motion: ObstacleMotion | None = optional_section(
+        MOTION + " Its frame is in the middle of the line, along W."
+    )
 
 
 @dataclass(kw_only=True)
@@ -63,6 +95,22 @@ class ObstacleMesh:
     file: str = text("Mesh in metres, beside this file: .obj; .stl and .ply with trimesh.")
     pose: Pose = section("Pose of the mesh in W.", Pose)
     scale: float = number("What its coordinates are multiplied by.", "-", 1.0, above=0.0)
+    motion: ObstacleMotion | None = optional_section(MOTION)
+
+
+@dataclass(kw_only=True)
+class OtherRobot:
+    """Another robot in the same room, which moves as was planned for it, or rests."""
+
+    robot: str = text("Its name, or its file, beside this one or in the working folder.")
+    pose: Pose = section("Pose of its W in this robot's W.", Pose)
+    plan: str | None = text(
+        "Folder that cdpr plan wrote for it, or a table as its motion.csv, beside this file; null: "
+        "it rests at home.",
+        None,
+    )
+    later: float = number("How much later than its plan says it starts.", "s", 0.0, at_least=0.0)
+    beams: bool = switch("Whether the beams of its frame stand there, too.", True)
 
 
 @dataclass(kw_only=True)
@@ -73,6 +121,7 @@ class ObstacleFile:
     spheres: list[ObstacleSphere] = sections("Balls.", required=False)
     capsules: list[ObstacleCapsule] = sections("Capsules.", required=False)
     meshes: list[ObstacleMesh] = sections("Convex hulls of meshes.", required=False)
+    robots: list[OtherRobot] = sections("Other robots, with their plans.", required=False)
 
 
 def load_wrench_set(path: Path) -> SpatialSet:
@@ -98,7 +147,23 @@ def load_wrench_set(path: Path) -> SpatialSet:
 
 
 def load_obstacles(path: Path) -> Obstacles:
-    """Reads boxes, balls, capsules and convex hulls of meshes; keys as `ObstacleFile`.
+    """Reads boxes, balls, capsules and convex hulls of meshes that rest; keys as `ObstacleFile`.
+
+    Raises:
+        DataFileError: The file or a mesh cannot be read, a value is not accepted, or an obstacle
+            moves.
+    """
+    resting, moving = load_all_obstacles(path)
+    if moving:
+        raise DataFileError(
+            f"{path}: {moving[0].name}: found an obstacle that moves; accepted: those that rest; "
+            "ones that move with cdpr plan --proven"
+        )
+    return resting
+
+
+def load_all_obstacles(path: Path) -> tuple[Obstacles, tuple[MovingObstacle, ...]]:
+    """Reads obstacles that rest, and those that move; keys as `ObstacleFile`.
 
     Raises:
         DataFileError: The file or a mesh cannot be read, or a value is not accepted.
@@ -106,27 +171,88 @@ def load_obstacles(path: Path) -> Obstacles:
     if not path.is_file():
         raise DataFileError(f"{path}: there is no such file of obstacles")
     found = load_typed(ObstacleFile, path)
-    if not (found.boxes or found.spheres or found.capsules or found.meshes):
+    if not any((found.boxes, found.spheres, found.capsules, found.meshes, found.robots)):
         raise DataFileError(
-            f"{path}: found no obstacle; accepted: some of boxes, spheres, capsules, meshes"
+            f"{path}: found no obstacle; accepted: some of boxes, spheres, capsules, meshes, robots"
         )
-    X = [box.pose.transform() for box in found.boxes]
-    boxes = [
-        box_row(pose.translation(), box.size, pose.rotation().matrix())
-        for pose, box in zip(X, found.boxes, strict=True)
-    ]
-    solids = [
-        ConvexShape.sphere(one.position, one.radius, f"sphere {k}")
-        for k, one in enumerate(found.spheres, 1)
-    ]
-    solids += [
-        ConvexShape.capsule(one.start, one.end, one.radius, f"capsule {k}")
-        for k, one in enumerate(found.capsules, 1)
-    ]
+    boxes: list[np.ndarray] = []
+    solids: list[ConvexShape] = []
+    moving: list[MovingObstacle] = []
+    for k, box in enumerate(found.boxes):
+        if box.motion is None:
+            X = box.pose.transform()
+            boxes.append(box_row(X.translation(), box.size, X.rotation().matrix()))
+        else:
+            shape = ConvexShape.box_at(np.zeros(3), box.size, name=f"box {k + 1}")
+            moving.append(_moving(path, f"boxes[{k}]", shape, box.pose.transform(), box.motion))
+    for k, ball in enumerate(found.spheres):
+        name = f"sphere {k + 1}"
+        if ball.motion is None:
+            solids.append(ConvexShape.sphere(ball.position, ball.radius, name))
+        else:
+            shape, start = ConvexShape.sphere(np.zeros(3), ball.radius, name), ball.position
+            X = RigidTransform(start)
+            moving.append(_moving(path, f"spheres[{k}]", shape, X, ball.motion))
+    for k, line in enumerate(found.capsules):
+        name, half = f"capsule {k + 1}", 0.5 * (line.end - line.start)
+        if line.motion is None:
+            solids.append(ConvexShape.capsule(line.start, line.end, line.radius, name))
+        else:
+            shape = ConvexShape.capsule(-half, half, line.radius, name)
+            X = RigidTransform(line.start + half)
+            moving.append(_moving(path, f"capsules[{k}]", shape, X, line.motion))
     for k, one in enumerate(found.meshes):
         try:
             vertices = one.scale * mesh_vertices(path.parent / one.file)
-            solids.append(ConvexShape.mesh(vertices, name=one.file).moved(one.pose.transform()))
+            shape = ConvexShape.mesh(vertices, name=one.file)
         except CableGeometryError as problem:
             raise DataFileError(f"{path}: meshes[{k}].file: {problem}") from problem
-    return Obstacles(np.array(boxes, float).reshape(-1, BOX_COLUMNS), tuple(solids))
+        if one.motion is None:
+            solids.append(shape.moved(one.pose.transform()))
+        else:
+            X = one.pose.transform()
+            moving.append(_moving(path, f"meshes[{k}]", shape, X, one.motion))
+    moving += [_robot(path, f"robots[{k}]", one) for k, one in enumerate(found.robots)]
+    resting = Obstacles(np.array(boxes, float).reshape(-1, BOX_COLUMNS), tuple(solids))
+    return resting, tuple(moving)
+
+
+def _moving(
+    path: Path, key: str, shape: ConvexShape, start: RigidTransform, motion: ObstacleMotion
+) -> MovingShape:
+    """A shape with its motion.
+
+    Raises:
+        DataFileError: The motion is not accepted.
+    """
+    for problem in motion_problems(start, motion, f"{key}.motion"):
+        raise DataFileError(f"{path}: {problem}")
+    return MovingShape(shape, body_motion(start, motion), key)
+
+
+def _robot(path: Path, key: str, one: OtherRobot) -> MovingRobot:
+    """Another robot.
+
+    Raises:
+        DataFileError: The robot or its plan cannot be read.
+    """
+    beside = path.parent / one.robot
+    try:
+        robot = load_robot(str(beside) if beside.exists() else one.robot)
+    except CdprError as problem:
+        raise DataFileError(f"{path}: {key}.robot: {problem}") from problem
+    if one.plan is None:
+        row = np.zeros((2, MOTION_SIZE))
+        row[:, :7] = pose_row(robot.home.transform())
+        motion = sampled_motion(np.array([0.0, 1e-3]), row)
+    else:
+        table = path.parent / one.plan
+        if table.is_dir():
+            table = table / "motion.csv"
+        try:
+            motion = read_motion(table, one.later)
+        except TrajectoryError as problem:
+            raise DataFileError(f"{path}: {key}.plan: {problem}") from problem
+    around = interference_bodies(robot, pulleys=True)
+    planned = PlannedMotion(motion, one.pose.transform())
+    return MovingRobot(around, planned, f"{key} {robot.name}", one.beams)

@@ -30,6 +30,7 @@ from cdpr_drake.analyses.planning.robot_path_task import (
     TOLERANCE,
     LimitSettings,
 )
+from cdpr_drake.analyses.planning.timed_plan_results import TimedRun
 from cdpr_drake.analyses.reporting.deferred_figures import Pictures, write_pictures
 from cdpr_drake.analyses.reporting.folder_lock import free_folder
 from cdpr_drake.analyses.reporting.output_folder import results_folder, shown_path
@@ -156,7 +157,7 @@ Obstacles = Annotated[
     Path | None,
     typer.Option(
         help="With --free or --proven: what stands in the way, YAML as of cdpr workspace "
-        "--obstacles."
+        "--obstacles; with --proven it may move, and be other robots with their plans."
     ),
 ]
 KeepInView = Annotated[
@@ -415,9 +416,12 @@ def _pictures(run: MotionRun, formats: tuple[str, ...]) -> Pictures:
     from cdpr_drake.analyses.planning.free_plan_figures import free_pictures
     from cdpr_drake.analyses.planning.plan_figures import plan_pictures
     from cdpr_drake.analyses.planning.proven_plan_figures import proven_pictures
+    from cdpr_drake.analyses.planning.timed_plan_figures import timed_pictures
 
     if isinstance(run, ProvenRun):
         return proven_pictures(run, formats)
+    if isinstance(run, TimedRun):
+        return timed_pictures(run, formats)
     if isinstance(run, FreeRun):
         return free_pictures(run, formats)
     assert isinstance(run, PlanRun)

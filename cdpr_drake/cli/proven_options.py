@@ -127,6 +127,8 @@ def print_proven(console: Console, told: dict[str, Any]) -> None:
     )
     what = "the motion" if proven["motion"] else "the path" if proven["path"] else "CABLES ALONE"
     console.print(f"proven at every instant: {what}")
+    for wait in told.get("waits", []):
+        console.print(f"waits from {wait['from_s']:.4g} to {wait['to_s']:.4g} s")
     for words in proven["of"]:
         console.print(f"  {words}")
     for words in proven["not_of"]:

@@ -1,5 +1,6 @@
 from .free_path import FreePathProgram as FreePathProgram
 from .input_shaping import make_shaper as make_shaper
+from .motion_in_time import motion_in_time as motion_in_time
 from .path_in_sets import proven_motion as proven_motion
 from .path_in_sets import proven_path as proven_path
 from .path_task import sample_motion as sample_motion

@@ -8,9 +8,13 @@ from .cable_interference import clearances as clearances
 from .certified_boxes import PoseBox as PoseBox
 from .certified_boxes import certify as certify
 from .demanded_wrenches import SpatialSet as SpatialSet
+from .moving_robots import MovingRobot as MovingRobot
+from .moving_robots import PlannedMotion as PlannedMotion
+from .moving_shapes import MovingShape as MovingShape
 from .pose_grid import grid_by_count as grid_by_count
 from .proven_sets import PoseSets as PoseSets
 from .single_failure import breaks_survived as breaks_survived
 from .single_failure import survives_breaks as survives_breaks
 from .static_feasibility import StaticCase as StaticCase
+from .timed_sets import TimedSets as TimedSets
 from .volume import triangles as triangles

@@ -84,6 +84,32 @@ def cover_cells(
     return np.array(cover.taken)
 
 
+def cover_with(good: np.ndarray, share: float, seeds: np.ndarray, most: int) -> np.ndarray:
+    """Covers a share of good cells by the cuboids that cover most, and cuboids round seeds.
+
+    Args:
+        good: Of the raster, d-dimensional, bool.
+        share: Share of the good cells to be covered, above 0, at most 1.
+        seeds: Cuboids of good cells, each of which lies in one of those that are taken, (n, 2, d).
+        most: Cuboids beside those of the seeds, at most.
+
+    Returns:
+        As `cover_cells`.
+
+    Raises:
+        WorkspaceError: A seed has a cell that is not good, or the share is not accepted.
+    """
+    if not 0.0 < share <= 1.0:
+        raise WorkspaceError(f"cover: found {share:g}; accepted: above 0, at most 1")
+    cover = _Cover(good)
+    cover.take_best(share, most)
+    for seed in np.asarray(seeds, np.int64).reshape(-1, 2, good.ndim):
+        if not np.all(good[tuple(slice(a, b) for a, b in seed.T)]):
+            raise WorkspaceError("seeds: found a cell that is not proven; accepted: proven ones")
+        cover.take_round(seed)
+    return np.array(cover.taken)
+
+
 class _Cover:
     """Cuboids that were taken, and what they cover."""
 
@@ -131,7 +157,15 @@ class _Cover:
 
     def take_from(self, first: np.ndarray, second: np.ndarray) -> None:
         """Takes the cuboid round two neighbours, or a cell, that covers most of what is not."""
-        seed = np.stack([np.minimum(first, second), np.maximum(first, second) + 1])
+        self._take_grown(np.stack([np.minimum(first, second), np.maximum(first, second) + 1]))
+
+    def take_round(self, seed: np.ndarray) -> None:
+        """Takes the cuboid round a seed that covers most of what is not, if none holds the seed."""
+        held = np.array(self.taken).reshape(-1, 2, self.good.ndim)
+        if not np.any(np.all((held[:, 0] <= seed[0]) & (held[:, 1] >= seed[1]), axis=1)):
+            self._take_grown(seed)
+
+    def _take_grown(self, seed: np.ndarray) -> None:
         found = self.grown(seed[np.newaxis])
         left = SumTable.of(self.good & ~self.covered)
         gains = np.full(len(found), np.iinfo(np.int64).max)
@@ -155,11 +189,9 @@ class _Cover:
             smallest = min(lone, key=lambda k: (np.count_nonzero(groups == k), k))
             way = self._way(boxes, groups == smallest, parts)
             for first, second in pairwise(way):
-                held = np.array(self.taken)
-                pair = np.stack([np.minimum(first, second), np.maximum(first, second) + 1])
-                both = np.all((held[:, 0] <= pair[0]) & (held[:, 1] >= pair[1]), axis=1)
-                if not np.any(both):
-                    self.take_from(first, second)
+                self.take_round(
+                    np.stack([np.minimum(first, second), np.maximum(first, second) + 1])
+                )
 
     def _way(self, boxes: np.ndarray, own: np.ndarray, parts: np.ndarray) -> np.ndarray:
         """The shortest way over faces of cells from some cuboids to the others of their part."""

@@ -109,7 +109,8 @@ def _obstacle_problems(settings: WorldSettings) -> Iterator[str]:
         yield from _dimension_problems(obstacle, key)
         yield from _place_problems(obstacle, key)
         if obstacle.motion is not None:
-            yield from _motion_problems(obstacle, obstacle.motion, f"{key}.motion")
+            start = obstacle.pose.transform()
+            yield from motion_problems(start, obstacle.motion, f"{key}.motion")
 
 
 def _dimension_problems(obstacle: ObstacleSettings, key: str) -> Iterator[str]:
@@ -137,7 +138,8 @@ def _place_problems(obstacle: ObstacleSettings, key: str) -> Iterator[str]:
             )
 
 
-def _motion_problems(obstacle: ObstacleSettings, motion: ObstacleMotion, key: str) -> Iterator[str]:
+def motion_problems(start: RigidTransform, motion: ObstacleMotion, key: str) -> Iterator[str]:
+    """What is wrong with the motion of an obstacle from its pose at time 0, a sentence each."""
     kinds = {
         "waypoints": bool(motion.waypoints),
         "a velocity": motion.has_velocity(),
@@ -154,7 +156,7 @@ def _motion_problems(obstacle: ObstacleSettings, motion: ObstacleMotion, key: st
             yield f"{key}.repeat: found true without waypoints; accepted: false"
         else:
             ends = motion.waypoints[-1].pose.transform()
-            if max(pose_error(ends, obstacle.pose.transform())) > SAME_POSE:
+            if max(pose_error(ends, start)) > SAME_POSE:
                 yield (
                     f"{key}.repeat: found true, but the last waypoint is not the obstacle's pose; "
                     "accepted: false, or a way that ends where it begins"

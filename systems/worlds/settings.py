@@ -130,14 +130,18 @@ class ObstacleSettings:
 
     def path(self) -> BodyMotion:
         """Its pose over time."""
-        start, motion = self.pose.transform(), self.motion or ObstacleMotion()
-        if motion.joint is not None:
-            return _jointed(start, motion.joint)
-        if motion.waypoints:
-            times = np.array([0.0, *(point.time for point in motion.waypoints)])
-            poses = (start, *(point.pose.transform() for point in motion.waypoints))
-            return PathBody(PoseTrajectory(poses, tuple(np.diff(times))), motion.repeat)
-        return SteadyBody(start, motion.velocity, np.radians(motion.angular_velocity_deg))
+        return body_motion(self.pose.transform(), self.motion or ObstacleMotion())
+
+
+def body_motion(start: RigidTransform, motion: ObstacleMotion) -> BodyMotion:
+    """The pose over time of a body that is at `start` at time 0."""
+    if motion.joint is not None:
+        return _jointed(start, motion.joint)
+    if motion.waypoints:
+        times = np.array([0.0, *(point.time for point in motion.waypoints)])
+        poses = (start, *(point.pose.transform() for point in motion.waypoints))
+        return PathBody(PoseTrajectory(poses, tuple(np.diff(times))), motion.repeat)
+    return SteadyBody(start, motion.velocity, np.radians(motion.angular_velocity_deg))
 
 
 def _jointed(start: RigidTransform, joint: ObstacleJoint) -> JointedBody:
