@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from cdpr_drake.analyses.benchmarks.batches import batch_rows
+from cdpr_drake.analyses.benchmarks.behaviours import behaviour_rows
 from cdpr_drake.analyses.benchmarks.cameras import camera_rows
 from cdpr_drake.analyses.benchmarks.constraints import constraint_rows
 from cdpr_drake.analyses.benchmarks.design import design_rows
@@ -32,7 +33,7 @@ BENCH_GROUPS: dict[str, Callable[[bool], list[TimingRow]]] = {
     "identification": identification_rows,
     "learning": learning_rows,
     "package": package_rows,
-    "physics": lambda quick: [*physics_rows(quick), *effect_rows(quick)],
+    "physics": lambda quick: [*physics_rows(quick), *effect_rows(quick), *behaviour_rows(quick)],
     "planning": planning_rows,
     "servo": servo_rows,
     "simulation": simulation_rows,

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import importlib.util
+from importlib import import_module
 from typing import Any
 
 import numpy as np
 
-from cdpr_drake.analyses.front.environments import make_environment
 from cdpr_drake.analyses.reporting.timing import TimingRow, interleaved, processor_seconds
 
 TASKS = ("Reach", "Track", "VisualServo", "PickAndPlace")
@@ -16,14 +17,19 @@ ONE_BY_ONE = 8
 
 
 def learning_rows(quick: bool) -> list[TimingRow]:
-    """All rows of this file."""
+    """All rows of this file; none where Gymnasium is not installed."""
+    if importlib.util.find_spec("gymnasium") is None:
+        return []
     count, steps, repeats = (32, 5, 2) if quick else (256, 50, 5)
     return [_row(task, count, steps, repeats) for task in TASKS]
 
 
 def _row(task: str, count: int, steps: int, repeats: int) -> TimingRow:
+    gymnasium: Any = import_module("gymnasium")
+    import_module("cdpr_drake.gym")  # registers them
+    name = f"cdpr/{task}-v0"
     many, alone = (
-        make_environment(task, number, action="twist", vectorization_mode=mode)
+        gymnasium.make_vec(name, number, action="twist", vectorization_mode=mode)
         for number, mode in ((count, "vector_entry_point"), (ONE_BY_ONE, "sync"))
     )
     for envs in (many, alone):

@@ -6,7 +6,14 @@ import numpy as np
 from scipy.optimize import linprog
 
 from cdpr_drake.analyses.benchmarks.moving_obstacles import timed_cells_row
-from cdpr_drake.analyses.planning.robot_path_task import LimitSettings, make_path, path_task
+from cdpr_drake.analyses.planning.cable_streams import cable_stream
+from cdpr_drake.analyses.planning.plan_results import PlanRun
+from cdpr_drake.analyses.planning.robot_path_task import (
+    LimitSettings,
+    make_path,
+    path_task,
+    robot_limits,
+)
 from cdpr_drake.analyses.reporting.timing import TimingRow, interleaved, processor_seconds
 from cdpr_drake.analyses.workspaces.static_feasible import static_case
 from cdpr_drake.arrays import Array
@@ -19,6 +26,8 @@ from cdpr_drake.trajectories.pose_path import PosePath
 from cdpr_drake.workspaces.demanded_wrenches import SpatialSet
 
 ROBOT, TENSIONS = "acrobot_large", (1.0, 60.0)
+
+STREAMED = "maslow_4"
 
 STATIONS = 500
 
@@ -39,6 +48,7 @@ def planning_rows(quick: bool) -> list[TimingRow]:
     return [
         path_row(repeats),
         resistance_row(repeats),
+        stream_row(repeats),
         rails_row(repeats),
         timed_cells_row(repeats),
     ]
@@ -91,6 +101,26 @@ def resistance_row(repeats: int) -> TimingRow:
     name = f"{ROBOT}: plan that resists {len(resisting.resist)} wrenches"
     baseline = "the plan without"
     return TimingRow(name, own, "ms", baseline, other, own / other, ratio_means="times as long")
+
+
+def stream_row(repeats: int) -> TimingRow:
+    """Motor angles of a router at 100 Hz, with the check between points, against the plan."""
+    places = ([2.0, 1.5, 0.0], [2.2, 1.7, 0.0], [2.4, 1.4, 0.0])
+    poses = [pose_from_angles(np.array(place), np.zeros(3)) for place in places]
+    robot, given = load_robot(STREAMED), LimitSettings(cable_speed=0.05)
+    task, path = path_task(robot, given), make_path(robot, poses, "smooth")
+    run = PlanRun(
+        robot=robot, limits=robot_limits(robot, given), arguments={}, planning_time=0.0,
+        plan=plan_along_path(task, path, STATIONS), source="three places",
+    )  # fmt: skip
+    stream = cable_stream(run, 100.0)
+    works = [
+        lambda: 1e3 * processor_seconds(lambda: cable_stream(run, 100.0)),
+        lambda: 1e3 * processor_seconds(lambda: plan_along_path(task, path, STATIONS)),
+    ]
+    own, other = interleaved(works, repeats)
+    name = f"{STREAMED}: stream of {len(stream.times)} points with its check"
+    return TimingRow(name, own, "ms", "the plan", other, own / other, ratio_means="times as long")
 
 
 def rails_row(repeats: int) -> TimingRow:

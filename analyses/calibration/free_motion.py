@@ -21,6 +21,7 @@ from scipy.spatial.transform import Rotation
 
 from cdpr_drake.analyses.calibration.free_motion_model import (
     FREE_GROUPS,
+    HYSTERESIS,
     START,
     FreeMotionModel,
     Unknown,
@@ -89,7 +90,8 @@ class FreeMotionTask:
 
     Attributes:
         robot: As it is believed.
-        unknown: Groups of `FREE_GROUPS`; None: all that the log can tell.
+        unknown: Groups of `FREE_GROUPS` and `ASKED_GROUPS`; None: all of the first that the log
+            can tell.
         stretches: First and last instants of stretches that are fitted [s]; none: the first half
             of the log.
         held_out: Of those that are predicted; none: the second half of the log, where stretches
@@ -225,7 +227,7 @@ def fit_free_motion(
     groups = _groups(task, log, fitted)
     model = FreeMotionModel.of(task.robot, start, groups, not tracked, tracked and task.tracker)
     model = _sensor_believed(model, fitted)
-    z, steps = np.zeros(len(model.unknowns)), 0
+    z, steps = model.first(), 0
     moved = [first_state(model, model.before(), s) for s in fitted]
     sensor = np.array([one.group in ("", "sensor") for one in model.unknowns])
     for n, (horizon, most) in enumerate(HORIZONS):
@@ -494,6 +496,11 @@ def _remarks(model: FreeMotionModel, std: Array, spread: float, vector: Array) -
     ]  # fmt: skip
     if edge:
         said.append(f"at a bound: {', '.join(edge)}")
+    if any(one.group == HYSTERESIS for one in model.unknowns):
+        said.append(
+            "hysteresis is in no robot file and no engine: simulations with what was found swing "
+            "longer; modes are those of swings that slip"
+        )
     if spread > 1.0:
         said.append(
             f"residuals are {spread:.3g} sigma: standard errors are as much larger, and for "

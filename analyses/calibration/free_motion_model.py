@@ -12,12 +12,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from pydrake.math import RigidTransform
+from scipy.spatial.transform import Rotation
 
 from cdpr_drake.analyses.calibration.identified_robots import dynamic_model, platform_size
 from cdpr_drake.arrays import Array
+from cdpr_drake.cables.cable_behaviour import CableBehaviour, behaving_cables, behaviour_of
 from cdpr_drake.cables.models import ELASTIC, KELVIN_VOIGT, cable_derivatives
 from cdpr_drake.dynamics.free_run_kernel import free_run
-from cdpr_drake.dynamics.robot_arrays import Drive, RobotArrays, pack_robot
+from cdpr_drake.dynamics.hysteretic_run_kernel import hysteretic_run
+from cdpr_drake.dynamics.robot_arrays import CREEPING, Drive, RobotArrays, pack_robot
 from cdpr_drake.dynamics.robot_kernel import INTEGRATION_OK
 from cdpr_drake.errors import IdentificationError
 from cdpr_drake.geometry.cable_paths import cable_paths
@@ -32,6 +35,15 @@ from cdpr_drake.statics.stiffness import natural_modes
 
 FREE_GROUPS = (MASS_GROUP, CENTER, MOMENTS, STIFFNESS, DAMPING)
 """Groups that a motion on standing winches can tell."""
+
+HYSTERESIS, STIFFENING, CREEP = "hysteresis", "stiffening", "creep"
+
+ASKED_GROUPS = (HYSTERESIS, STIFFENING, CREEP)
+"""Groups that are unknown where they are asked for alone: friction in what a platform hangs on, and
+what cables do beside the elastic law."""
+
+TURNING = 0.5
+"""Angular velocity from which on contacts count as bent as far as they go at first [rad/s]."""
 
 STATE, START = 13, 12
 """Numbers of a platform's state, and of what moves the state at the first instant."""
@@ -59,6 +71,7 @@ class Unknown:
         size: How far it may usually be from that; weighs as a prior of this standard deviation.
         least: Bounds.
         most: See there.
+        first: Where the search begins; None: as it is believed.
     """
 
     name: str
@@ -68,6 +81,7 @@ class Unknown:
     size: float
     least: float = -np.inf
     most: float = np.inf
+    first: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +111,7 @@ class FreeMotionModel:
         Args:
             robot: As it is believed.
             start: A pose near which it hangs.
-            groups: Names of `FREE_GROUPS`.
+            groups: Names of `FREE_GROUPS` and `ASKED_GROUPS`.
             turns: Whether a sensor tells turns alone, from an unknown heading, mounted unknown.
             tracker: Whether a tracker's frame is unknown.
 
@@ -105,9 +119,10 @@ class FreeMotionModel:
             IdentificationError: The robot does not move freely in space, or a group is not known.
         """
         for word in groups:
-            if word not in FREE_GROUPS:
+            if word not in (*FREE_GROUPS, *ASKED_GROUPS):
                 raise IdentificationError(
-                    f"unknown: found {word!r}; accepted of a free motion: {', '.join(FREE_GROUPS)}"
+                    f"unknown: found {word!r}; accepted of a free motion: "
+                    f"{', '.join((*FREE_GROUPS, *ASKED_GROUPS))}"
                 )
         all_of = _all_unknowns(robot, start, turns, tracker)
         asked = [one for one in all_of if one.group in (*groups, "", "sensor")]
@@ -130,6 +145,12 @@ class FreeMotionModel:
     def before(self) -> Array:
         """The vector as it is believed."""
         return np.array([one.before for one in self.unknowns])
+
+    def first(self) -> Array:
+        """Where the search begins, in sizes from what is believed, shape (f,)."""
+        starts = [one.before if one.first is None else one.first for one in self.unknowns]
+        sizes = np.array([one.size for one in self.unknowns])
+        return np.asarray((np.array(starts) - self.before()) / sizes)
 
     def by_name(self, vector: Array) -> dict[str, float]:
         """All numbers at a vector."""
@@ -159,9 +180,18 @@ class FreeMotionModel:
             cables, stiffness=cables.stiffness * share,
             retardation=np.full(cables.count, n["all.retardation_time"]),
         )  # fmt: skip
+        cables = behaving_cables(cables, self.behaviour(vector))
         return pack_robot(
             self.platform(vector), cables, KELVIN_VOIGT, Drive(), home=self.lengths(vector),
             damping=(n["drag.force"], n["drag.moment"]),
+        )  # fmt: skip
+
+    def behaviour(self, vector: Array) -> CableBehaviour:
+        """What the cables do beside the elastic law at a vector."""
+        n = self.by_name(vector)
+        return replace(
+            behaviour_of(self.robot.cable_set()), stiffening=n["all.stiffening"],
+            creep_stiffness=n["all.creep_stiffness"], creep_time=n["all.creep_time"],
         )  # fmt: skip
 
     def run(self, vector: Array, moved: Array, count: int, step: float) -> tuple[Array, Array]:
@@ -181,10 +211,21 @@ class FreeMotionModel:
         turn_pose(state, *moved[:3])
         state[4:7] += moved[3:6]
         state[7:STATE], state[STATE:] = moved[6:], self.lengths(vector)
-        states, tensions = np.full((count, STATE + m), np.nan), np.full((count, m), np.nan)
-        bad = free_run(
-            self.arrays(vector), state, np.zeros(m), step, self.step, states, tensions, np.zeros(4)
-        )
+        arrays, n = self.arrays(vector), self.by_name(vector)
+        if arrays.kinds[CREEPING] > 0:  # strains about which the platform swings
+            l0 = state[STATE:] * self.behaviour(vector).longer()
+            at_rest = cable_paths(self.start, self.robot.cable_set()).lengths / l0 - 1.0
+            state = np.concatenate([state, np.maximum(at_rest, 0.0)])
+        states, tensions = np.full((count, len(state)), np.nan), np.full((count, m), np.nan)
+        asked = (np.zeros(m), step, self.step, states, tensions, np.zeros(4))
+        K = np.array([n[f"hysteresis.{a}"] for a in ("tilt", "tilt", "turn")])
+        if np.any(K > 0.0):
+            slip, w = n["hysteresis.slip"], Rotation.from_quat(state[[1, 2, 3, 0]])
+            w_P = w.inv().apply(moved[6:9])
+            bent = slip * w_P / np.hypot(np.linalg.norm(w_P), TURNING)
+            bad = hysteretic_run(arrays, state, *asked, K, slip, bent)
+        else:
+            bad = free_run(arrays, state, *asked)
         if bad != INTEGRATION_OK:
             states[-1] = np.nan
         return states[:, :STATE], tensions
@@ -229,12 +270,28 @@ def _all_unknowns(robot: Robot, start: RigidTransform, turns: bool, tracker: boo
             Unknown(f"inertia.{words}", "kg m^2", MOMENTS, float(model.inertia[k]), mean, least)
         )
     T = float(np.mean(model.retardation))
+    rubs = model.mass * platform.gravity * size if platform.gravity > 0.0 else 1.0
+    does = behaviour_of(cables)
     found += [
         Unknown("all.stiffness", "N", STIFFNESS, EA, EA, 0.02 * EA, STIFFER**2 * EA),
         Unknown("all.retardation_time", "s", DAMPING, T, 0.01, 0.0),
         Unknown("drag.force", "N s/m", DAMPING, 0.0, damped, 0.0),
         Unknown("drag.moment", "N m s/rad", DAMPING, 0.0, damped * size**2, 0.0),
     ]
+    found += [
+        Unknown("hysteresis.tilt", "N m/rad", HYSTERESIS, 0.0, rubs, 0.0, first=0.3 * rubs),
+        Unknown("hysteresis.turn", "N m/rad", HYSTERESIS, 0.0, rubs, 0.0, first=0.3 * rubs),
+        Unknown("hysteresis.slip", "rad", HYSTERESIS, 0.1, 0.1, 0.005, 1.0),
+        Unknown(
+            "all.stiffening", "1/N", STIFFENING, does.stiffening, 1.0 / share, 0.0,
+            max(2.0 / share, 2.0 * does.stiffening), first=max(0.1 / share, does.stiffening),
+        ),
+        Unknown(
+            "all.creep_stiffness", "", CREEP, does.creep_stiffness, 0.5, 0.0, 2.0,
+            first=max(0.1, does.creep_stiffness),
+        ),
+        Unknown("all.creep_time", "s", CREEP, does.creep_time, 0.5, 0.01, 100.0),
+    ]  # fmt: skip
     if turns:
         found.append(Unknown("sensor.heading", "rad", "sensor", 0.0, 0.5))
         found += [Unknown(f"sensor.mount_{a}", "rad", "sensor", 0.0, 0.2) for a in "xyz"]

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from rich.table import Table
 
 from cdpr_drake.analyses.calibration.free_motion import FollowedStretch, FreeMotion
+from cdpr_drake.analyses.calibration.free_motion_model import CREEP, STIFFENING
 from cdpr_drake.analyses.calibration.log_fit import LogFit
 from cdpr_drake.analyses.reporting.log_files import finite
 from cdpr_drake.analyses.reporting.provenance import package_versions
@@ -18,7 +19,7 @@ from cdpr_drake.analyses.reporting.statements import new_table
 from cdpr_drake.analyses.visualization.figure_style import line_style, new_figure
 from cdpr_drake.arrays import Array
 from cdpr_drake.identification.result import MISFIT, MISFIT_FACTOR
-from cdpr_drake.models.materials import OwnMaterial
+from cdpr_drake.models.materials import BehaviourSettings, OwnMaterial
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.palette import nth_look
 
@@ -206,9 +207,17 @@ def freely_moved_robot(found: FreeMotion) -> Robot:
         if "damping" in unknown:
             own = replace(own, retardation_time=n["all.retardation_time"])
         cables[k] = replace(cable, material=own)
+    material = robot.cable
+    if unknown & {STIFFENING, CREEP}:
+        does = found.model.behaviour(found.values)
+        settings = replace(
+            material.behaviour or BehaviourSettings(), stiffening=does.stiffening,
+            creep_stiffness=does.creep_stiffness, creep_time=does.creep_time,
+        )  # fmt: skip
+        material = replace(material, behaviour=settings)
     words = f"Identified from free motion: {found.status}, {len(found.unknowns)} parameters."
     return replace(
-        robot, platform=platform, cables=cables,
+        robot, platform=platform, cables=cables, cable=material,
         assumptions=f"{robot.assumptions} {words}".strip(),
     )  # fmt: skip
 

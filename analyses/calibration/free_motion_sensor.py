@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 from cdpr_drake.analyses.calibration.free_motion_model import FreeMotionModel
 from cdpr_drake.analyses.calibration.free_motion_samples import Stretch
 from cdpr_drake.arrays import Array
+from cdpr_drake.cables.cable_behaviour import strain_of_tension
 from cdpr_drake.errors import CableGeometryError
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.poses import pose_from_row
@@ -112,6 +113,8 @@ def places_by_lengths(
     cables, l0 = model.robot.cable_set(), model.lengths(vector)
     n = model.by_name(vector)
     EA = cables.stiffness * n["all.stiffness"] / float(np.mean(cables.stiffness))
+    does = model.behaviour(vector)
+    l0 = l0 * does.longer()
     places = np.array(guesses, float)
     if cables.count < 3:
         return np.full_like(places, np.nan)
@@ -120,7 +123,8 @@ def places_by_lengths(
         try:
             for _ in range(6):
                 paths = cable_paths(pose_from_row(np.concatenate([q, places[k]])), cables)
-                lacking = l0 * (1.0 + tensions[k] / EA) - paths.lengths
+                strains = strain_of_tension(tensions[k], EA, does.stiffening)
+                lacking = l0 * (1.0 + strains) - paths.lengths
                 places[k] += np.linalg.lstsq(paths.J[:, 3:], lacking, rcond=None)[0]
         except CableGeometryError:
             places[k] = np.nan

@@ -82,8 +82,8 @@ def identify_free_motion(
         robot: The robot as it is believed, or its name or path.
         log: The log, or its file: times; poses, or roll, pitch, yaw; tensions, without which the
             mass is not told.
-        unknown: Groups of `analyses.calibration.free_motion_model.FREE_GROUPS`; None: all that the
-            log can tell.
+        unknown: Groups of `FREE_GROUPS` and `ASKED_GROUPS` of
+            `analyses.calibration.free_motion_model`; None: of the first all that the log can tell.
         stretches: That are fitted; none: the first half of the log.
         held_out: That are predicted; none: the second half, where no stretches are given.
         start: A pose near which the platform hangs; None: it is looked for.

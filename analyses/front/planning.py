@@ -112,6 +112,9 @@ def path_poses(robot: Robot, path: PathPoses | Path | str | Sequence[object]) ->
     return PathPoses(poses, f"{len(poses)} waypoints")
 
 
+TRACKING = "computed torque, which --track asks for"
+
+
 def plan_path(
     robot: Robot | str | Path,
     path: PathPoses | Path | str | Sequence[object],
@@ -148,6 +151,8 @@ def plan_path(
         CdprError: The path makes no sense.
     """
     loaded, given = as_robot(robot, "plan_path"), chosen_limits(limits)
+    if track:
+        loaded.servo_rows(TRACKING)  # a refusal comes before the work
     task = planned_for(loaded, given, pulleys, resist)
     found = path_poses(loaded, path)
     moves = found.moves

@@ -77,7 +77,7 @@ class RobotEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         reward = float(self.task.rewards[0])
         return self.task.observations()[0], reward, lost, False, self._info()
 
-    def render(self) -> np.ndarray | None:  # type: ignore[override]
+    def render(self) -> np.ndarray | None:
         """A picture of the robot now, shape (height, width, 3), 8 bits; None without rendering.
 
         Raises:

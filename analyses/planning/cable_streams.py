@@ -192,7 +192,7 @@ def cable_stream(run: MotionRun, rate: float, model: str = ELASTIC) -> CableStre
     )
     straight = np.array([cable_paths(X, cables).lengths for X in poses])
     zero = _zero_lengths(robot, cables, model, lengths[0])
-    drum = robot.winch.drum(robot.cable.diameter)
+    drum = robot.drum()
     return CableStream(
         robot, model, rate, times, lengths, np.asarray(drum.motor_angles(lengths - zero)), zero,
         straight - lengths, _checked(run, cables, model, times, lengths),

@@ -8,8 +8,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cdpr_drake.errors import PlanningError, TensionProblemError, accepted_names
+from cdpr_drake.control.task_space import PlatformDynamics
+from cdpr_drake.errors import (
+    PlanningError,
+    RobotFileError,
+    TensionProblemError,
+    accepted_names,
+)
 from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.geometry.straight_cables import ALL_ROWS, PLANAR_ROWS
+from cdpr_drake.models.robot_in_plant import platform_inertia
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import check_pose
 from cdpr_drake.planning.limits import MotionLimits
@@ -18,6 +26,9 @@ from cdpr_drake.systems.controllers.computed_torque import platform_dynamics
 from cdpr_drake.trajectories.curved_path import Move, curved_path, points_on_arcs
 from cdpr_drake.trajectories.pose_path import PosePath, smooth_path, straight_path
 from cdpr_drake.workspaces.demanded_wrenches import SpatialSet
+
+UPWARDS = 5
+"""Row of a spatial vector along which the weight acts."""
 
 CORNERS = ("smooth", "blend", "rest")
 """What a path does at its poses: a spline through them, straight lines with rounded corners, or
@@ -107,20 +118,46 @@ def path_task(
         resist: Wrenches on the platform that every point of a path must resist; None: none.
 
     Raises:
-        PlanningError: A limit is not accepted, or there are too few cables.
+        PlanningError: A limit is not accepted, there are too few cables, or the platform moves
+            along no axes of W.
         WrenchSetError: The wrenches are no polytope, or have too many corners.
     """
-    weight = 0.0 if robot.is_planar() else robot.platform.mass * robot.gravity
+    dynamics = moved_dynamics(robot)
+    lifts = UPWARDS in dynamics.motions
+    weight = robot.platform.mass * robot.gravity if lifts else 0.0
     limits = robot_limits(robot, given).within(given.reserve, weight)
     cables = robot.cable_set() if cables is None else cables
     names = [cable.name for cable in robot.cables]
-    dynamics = platform_dynamics(robot)
     if resist is None:
         return PathTask(cables, dynamics, limits, names)
     found = resist.corners(dynamics.motions)  # what a planar platform does not feel is left out
     corners = np.zeros((len(found), 6))
     corners[:, list(dynamics.motions)] = found
     return PathTask(cables, dynamics, limits, names, corners)
+
+
+def moved_dynamics(robot: Robot) -> PlatformDynamics:
+    """A robot's platform: a body as computed torque knows it, or a point mass along axes of W.
+
+    Raises:
+        PlanningError: It moves otherwise.
+        RobotFileError: Its gravity is tilted.
+    """
+    kind = robot.motion_type()
+    if not kind.is_point and kind.rows in (ALL_ROWS, PLANAR_ROWS):
+        return platform_dynamics(robot)
+    if not kind.is_point or kind.rows is None:
+        axis = "" if robot.axis is None else f", axis {np.round(robot.axis, 6).tolist()}"
+        raise PlanningError(
+            f"robot {robot.name}: motion: found {robot.motion}{axis}; accepted by a plan: 3R3T, "
+            "2T1R in a horizontal plane, or 1T, 2T, 3T along axes of W"
+        )
+    if robot.gravity > 0.0 and robot.down() != (0.0, 0.0, -1.0):
+        raise RobotFileError(
+            f"robot {robot.name}: gravity_direction: found {robot.gravity_direction.tolist()}; "
+            "accepted by a plan: along -z of W"
+        )
+    return PlatformDynamics(platform_inertia(robot), robot.gravity, kind.rows)
 
 
 def length_scale(robot: Robot) -> float:

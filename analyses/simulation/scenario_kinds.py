@@ -55,6 +55,7 @@ from cdpr_drake.analyses.simulation.start_checks import (
     check_start,
     contact_warnings,
     goal_warnings,
+    sheave_warnings,
     step_warnings,
 )
 from cdpr_drake.analyses.simulation.tension_control_run import error_figure as tension_error_figure
@@ -152,14 +153,16 @@ def _check_servo(scenario: Scenario) -> list[str]:
     check_length(scenario.name, scenario.duration, servo.max_step)
     loop = loop_warnings(scenario, servo.robot)
     steps = [*step_warnings(servo), *contact_warnings(scenario, servo.robot)]
-    return [*steps, *loop, *goal_warnings(servo)]
+    return [*steps, *loop, *sheave_warnings(scenario, servo.robot), *goal_warnings(servo)]
 
 
 def _check_tension(scenario: TensionScenario) -> list[str]:
     control = make_control(scenario)
     control.make_context()
     check_length(scenario.name, scenario.duration, scenario.integration.max_step)
-    return contact_warnings(scenario, control.robot)
+    return [
+        *contact_warnings(scenario, control.robot), *sheave_warnings(scenario, control.robot)
+    ]  # fmt: skip
 
 
 def _check_pick_and_place(scenario: PickAndPlaceScenario) -> list[str]:

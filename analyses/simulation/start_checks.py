@@ -101,6 +101,18 @@ def contact_warnings(scenario: Scenario | TensionScenario, robot: Robot) -> list
     ]
 
 
+def sheave_warnings(scenario: Scenario | TensionScenario, robot: Robot) -> list[str]:
+    """What is said where friction in grooves is in the robot's file, and cables run in none."""
+    friction = robot.cable_behaviour().sheave_friction
+    runs = scenario.cables.pulleys and robot.cable_set().has_pulleys()
+    if friction == 0.0 or runs:
+        return []
+    return [
+        f"{scenario.name}: cable.behaviour.sheave_friction {friction:g} of {robot.name} does "
+        "nothing without pulleys; cables.pulleys=true has cables run over those of the robot"
+    ]
+
+
 def step_warnings(servo: VisualServo | LoopServo) -> list[str]:
     """What speaks against a given integration step: a stiff cable then swings without end."""
     scenario, given = servo.scenario, servo.scenario.integration.max_step

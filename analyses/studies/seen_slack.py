@@ -240,8 +240,9 @@ def draw_found(axis: Axes, seed: int) -> None:
             )  # fmt: skip
     for k in np.flatnonzero(found.verdict == SLACK):
         uv = found.points[k]
+        third = uv[:, uv.shape[1] // 3].tolist()
         axis.annotate(
-            f"{1e3 * found.sag[k]:.1f} mm ({1e3 * true[k]:.1f})", uv[:, uv.shape[1] // 3],
+            f"{1e3 * found.sag[k]:.1f} mm ({1e3 * true[k]:.1f})", tuple(third),
             fontsize=9, xytext=(8, -2), textcoords="offset points",
         )  # fmt: skip
     low, high = np.min(everywhere, axis=1) - 15.0, np.max(everywhere, axis=1) + 45.0

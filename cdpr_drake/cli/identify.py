@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
+from cdpr_drake.analyses.calibration.free_motion_model import ASKED_GROUPS, FREE_GROUPS
 from cdpr_drake.analyses.calibration.identification_campaign import CAMPAIGN_UNKNOWN
 from cdpr_drake.analyses.calibration.identification_task import UNKNOWN
 from cdpr_drake.analyses.front.calibration import identify as run_identification
@@ -64,7 +65,8 @@ def help_words() -> str:
         "cables than degrees of freedom that was pushed: its whole motion is predicted. Columns: "
         "time_s; poses, or roll, pitch and yaw; C1_tension_n ..., without which the mass is not "
         "told. --hold-out stretches are predicted, and not fitted.\n\n"
-        f"--unknown: {', '.join(GROUPS)}. Writes robot.yaml, which scenarios take as "
+        f"--unknown: {', '.join(GROUPS)}; with --free {', '.join(FREE_GROUPS)}, and where they are "
+        f"named {', '.join(ASKED_GROUPS)}. Writes robot.yaml, which scenarios take as "
         "perturbations.believed_robot, identification.json and figures. The exit code is 2 where "
         f"the log cannot tell what is asked, 6 where residuals are more than {MISFIT_FACTOR:g} "
         "times what noise says: status misfit, with the largest by time and equation."

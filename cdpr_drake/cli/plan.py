@@ -104,7 +104,14 @@ Resist = Annotated[
         "workspace --wrench-set: vertices, a box."
     ),
 ]
-Track = Annotated[bool, typer.Option(help="Also have the simulated robot track the plan at 1 kHz.")]
+Track = Annotated[
+    bool | None,
+    typer.Option(
+        "--track/--no-track",
+        help="Also have the simulated robot track the plan at 1 kHz; without, bodies do, point "
+        "masses do not.",
+    ),
+]
 Stream = Annotated[
     float | None,
     typer.Option(
@@ -296,7 +303,7 @@ def plan(
     acceleration: Acceleration = None,
     boxes: Boxes = None,
     method: Method = None,
-    track: Track = True,
+    track: Track = None,
     stream: Stream = None,
     stream_model: StreamModel = ELASTIC,
     out: Out = None,
@@ -321,6 +328,10 @@ def plan(
         guess,
     )  # fmt: skip
     sure = ProvenWords(start, goal, clearance, obstacles, time, acceleration, boxes, method)
+    if track is None:
+        track = not loaded.motion_type().is_point
+        if not track:
+            message_console().print("note: not tracked: computed torque moves bodies alone")
     planner: Planner
     if not proven and sure.given():
         raise CdprError(f"{sure.given()[0]}: accepted with --proven; found no --proven")

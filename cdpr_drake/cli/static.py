@@ -130,6 +130,11 @@ def static(
         given = parse_numbers("--lengths", lengths, (m,), f"{m} lengths [m]")
     with working(message_console(), f"{loaded.name} at rest"):
         report = solve_static(loaded, X_WP, given, cable_model, pulleys)
+    friction = loaded.cable_behaviour().sheave_friction
+    if friction > 0.0 and not report.cables.has_pulleys():
+        message_console().print(
+            f"note: sheave_friction {friction:g} of {loaded.name} does nothing without pulleys"
+        )
     if plot is not None:
         save_plot(report.plot(), plot)
     if as_json:

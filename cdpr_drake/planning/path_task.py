@@ -13,7 +13,6 @@ from cdpr_drake.errors import PlanningError
 from cdpr_drake.geometry.cable_paths import impossible_cable
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.geometry.poses import angles_from_rotation, pose_from_row
-from cdpr_drake.geometry.straight_cables import PLANAR_ROWS
 from cdpr_drake.planning.limits import MotionLimits
 from cdpr_drake.planning.margin_kernel import PATH_SPEED_USE, TENSION_USE, uses_of
 from cdpr_drake.planning.resistance import check_resistance, resistance_bounds
@@ -32,7 +31,7 @@ class PathTask:
 
     Attributes:
         cables: Its cables, as they are believed to be.
-        dynamics: Its platform; `motions` says whether it is planar.
+        dynamics: Its platform; `motions` says what of it moves.
         limits: What the motion may ask.
         names: Of the cables, for messages; empty: by number.
         resist: Wrenches on the platform about Po in W, (moment, force), shape (k, 6): at every
@@ -76,14 +75,13 @@ class PathTask:
             PlanningError: A cable cannot run, or the wrench matrix is singular; names the pose.
         """
         m = self.cables.count
-        planar = tuple(self.dynamics.motions) == tuple(PLANAR_ROWS)
-        rank = 3 if planar else 6
+        rank = len(self.dynamics.motions)
         out, reach = np.empty((len(points), BASIS + m - rank, m)), np.empty(len(points))
         problem, where = stations_of(
             np.ascontiguousarray(points),
             self.cables.packed(),
             self.dynamics.packed(),
-            planar,
+            np.array(self.dynamics.motions, np.int64),
             out,
             reach,
         )

@@ -35,7 +35,7 @@ GOOD, NO_CABLE, SINGULAR = range(3)
 
 @njit(cache=True)
 def stations_of(
-    points: Array, cables: Array, dynamics: Array, planar: bool, out: Array, reach: Array
+    points: Array, cables: Array, dynamics: Array, moves: np.ndarray, out: Array, reach: Array
 ) -> tuple[int, int]:
     """Fills the rows of all stations.
 
@@ -43,21 +43,21 @@ def stations_of(
         points: Points of the path as `pose_path.PosePath.points`, shape (n, 19).
         cables: `CableSet.packed`, shape (m, 17).
         dynamics: `PlatformDynamics.packed`.
-        planar: Whether the platform moves by (turn about z, x, y) only.
-        out: Gets the rows, shape (n, 5 + r, m), r = m - 6, or m - 3 where planar.
+        moves: Components of a spatial vector in W that the platform can move, whole numbers in
+            growing order, shape (f,).
+        out: Gets the rows, shape (n, 5 + r, m), r = m - f.
         reach: Gets |p'| of Po, shape (n,).
 
     Returns:
         (`GOOD`, n), or what is wrong and the first station where it is.
     """
     n, m = points.shape[0], cables.shape[0]
-    rows = 3 if planar else 6
-    first = 2 if planar else 0
+    rows = moves.shape[0]
     state, desired, still = np.zeros(13), np.zeros(19), np.zeros(4)
     F0, Fu, Fx = np.empty(6), np.empty(6), np.empty(6)
     W, D = np.empty((rows, m)), np.empty((3, 3))
     N, spare = np.empty((m - rows, m)), np.empty((m - rows, m))
-    w, turning = np.empty((3, rows)), np.empty((6, 6))
+    w, turning, pull = np.empty((3, rows)), np.empty((6, 6)), np.empty(6)
     for i in range(n):
         point = points[i]
         for k in range(7):
@@ -78,9 +78,9 @@ def stations_of(
             desired[13 + k] = point[13 + k]
         floating_wrench(state, desired, dynamics, still, Fx)
         for k in range(rows):
-            w[0, k] = -F0[first + k]
-            w[1, k] = F0[first + k] - Fu[first + k]
-            w[2, k] = F0[first + k] - Fx[first + k]
+            w[0, k] = -F0[moves[k]]
+            w[1, k] = F0[moves[k]] - Fu[moves[k]]
+            w[2, k] = F0[moves[k]] - Fx[moves[k]]
         X = floating_motion(state)[:12]
         wx, wy, wz = point[7], point[8], point[9]
         ax, ay, az = point[13], point[14], point[15]
@@ -88,12 +88,10 @@ def stations_of(
             _, ux, uy, uz, rx, ry, rz = pulley_line(X, cables[j])
             if ux != ux:
                 return NO_CABLE, i
-            moment = (ry * uz - rz * uy, rz * ux - rx * uz, rx * uy - ry * ux)
-            if planar:
-                W[0, j], W[1, j], W[2, j] = -moment[2], -ux, -uy
-            else:
-                W[0, j], W[1, j], W[2, j] = -moment[0], -moment[1], -moment[2]
-                W[3, j], W[4, j], W[5, j] = -ux, -uy, -uz
+            pull[0], pull[1], pull[2] = ry * uz - rz * uy, rz * ux - rx * uz, rx * uy - ry * ux
+            pull[3], pull[4], pull[5] = ux, uy, uz
+            for k in range(rows):
+                W[k, j] = -pull[moves[k]]
             # First and second derivative of the anchor point's place by s.
             tx, ty, tz = wy * rz - wz * ry, wz * rx - wx * rz, wx * ry - wy * rx
             vx, vy, vz = point[10] + tx, point[11] + ty, point[12] + tz

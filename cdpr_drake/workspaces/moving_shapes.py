@@ -53,7 +53,9 @@ class SpannedMotion(Protocol):
 class MovingObstacle(Protocol):
     """Something of convex shapes that moves, whatever it meets."""
 
-    name: str
+    @property
+    def name(self) -> str:
+        """How messages call it."""
 
     def at(self, time: float) -> tuple[ConvexShape, ...]:
         """Its shapes in W at a time [s]."""

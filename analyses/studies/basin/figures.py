@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from matplotlib import colormaps
@@ -79,7 +80,7 @@ def basin_figure(runs: Runs) -> Figure:
         for k, panel in enumerate(row):
             height = loops.poses[:, 6]
             within = (height >= z[k]) & ((height < z[k + 1]) | (k == LAYERS - 1))
-            counts = np.histogram2d(*loops.poses[within, 4:6].T, bins=(x, y))[0]
+            counts = _counts(loops.poses[within], x, y)
             shares = {
                 name: _share(loops.poses[within & mask], counts, x, y)
                 for name, mask in loops.holds.items()
@@ -120,13 +121,18 @@ def basin_figure(runs: Runs) -> Figure:
     return figure
 
 
+def _counts(poses: Array, x: Array, y: Array) -> Array:
+    """Starts in each cell, from above."""
+    return np.histogram2d(poses[:, 4], poses[:, 5], bins=[x, y])[0]
+
+
 def _share(poses: Array, counts: Array, x: Array, y: Array) -> Array:
     """Of the loops of each cell, NaN where there is none."""
-    some = np.histogram2d(*poses[:, 4:6].T, bins=(x, y))[0]
+    some = _counts(poses, x, y)
     return np.asarray(np.divide(some, counts, out=np.full_like(some, np.nan), where=counts > 0))
 
 
-def _edge(look: Look) -> dict[str, object]:
+def _edge(look: Look) -> dict[str, Any]:
     return {"color": look.color, "linestyle": look.dash, "linewidth": 2.0}
 
 

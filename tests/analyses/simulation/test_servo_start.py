@@ -10,12 +10,15 @@ from cdpr_drake.analyses.simulation.start_checks import (
     check_length,
     check_start,
     goal_warnings,
+    sheave_warnings,
     step_warnings,
 )
 from cdpr_drake.analyses.simulation.tension_control_run import run_tension_scenario
 from cdpr_drake.analyses.simulation.visual_servo_run import run_built, run_scenario, warm_up
 from cdpr_drake.cli.app import main
 from cdpr_drake.errors import ScenarioError
+from cdpr_drake.models.materials import BehaviourSettings
+from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.diagrams.visual_servo import build_visual_servo
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
@@ -66,6 +69,15 @@ def test_a_goal_outside_the_static_workspace_is_a_warning():
     built = servo("desired.position=[0.0, 0.0, 1.12]")
     (warning,) = goal_warnings(built)
     assert warning.startswith("acrobot_pbvs: desired: outside the static workspace: ")
+
+
+def test_friction_of_sheaves_without_pulleys_is_said_to_do_nothing():
+    scenario, robot = load_scenario("acrobot_pbvs"), load_robot("acrobot_small")
+    assert sheave_warnings(scenario, robot) == []
+    robot.cable.behaviour = BehaviourSettings(sheave_friction=0.05)
+    (warning,) = sheave_warnings(scenario, robot)
+    assert "cable.behaviour.sheave_friction 0.05 of acrobot_small does nothing without" in warning
+    assert sheave_warnings(load_scenario("acrobot_pbvs", ["cables.pulleys=true"]), robot) == []
 
 
 def test_a_step_beyond_the_stable_one_is_warned_of_with_the_number():

@@ -16,6 +16,7 @@ from cdpr_drake.geometry.poses import pose_from_angles
 from cdpr_drake.models.materials import BehaviourSettings
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.robots.settings import CableSettings
+from tests.messages import printed
 
 STIFFENING, EXPANSION, WARMER, FRICTION = 2e-3, 1.2e-5, 12.0, 0.03
 
@@ -92,3 +93,15 @@ def test_the_command_prints_drum_tensions(tmp_path, capsys):
     said = capsys.readouterr().out
     assert ended.value.code == 0
     assert "tensions at the drums while cable is wound up [N]:" in said
+
+
+def test_friction_without_pulleys_is_said_to_do_nothing(tmp_path, capsys):
+    from pydrake.common.yaml import yaml_dump_typed
+
+    path = tmp_path / "robot.yaml"
+    path.write_text(yaml_dump_typed(robot("irma4u", sheave_friction=FRICTION)))
+    with pytest.raises(SystemExit) as ended:
+        main(["static", str(path), "--pose", "0,0,0.4,0,0,0", "--no-pulleys"])
+    assert ended.value.code == 0
+    words = "note: sheave_friction 0.03 of irma4u does nothing without pulleys"
+    assert words in printed(capsys).err
