@@ -12,6 +12,7 @@ import tempfile
 import time
 from pathlib import Path
 
+import numpy as np
 from PIL import Image
 
 from cdpr_drake.analyses.front.logs import replay_log
@@ -20,7 +21,7 @@ from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.studio.workbench.command_board import ABOUT
 from cdpr_drake.studio.workbench.result_subject import subject_of
 from cdpr_drake.systems.diagrams.load import load_scenario
-from tests.chromium import chromium, wait_for
+from tests.chromium import LONGEST_WAIT, chromium, wait_for
 from tests.studio.served import served
 
 SIZES = {"1280": (1280, 800, 1.0), "1920": (1920, 1080, 1.0), "phone": (390, 844, 2.0)}
@@ -34,7 +35,10 @@ GUIDE = {
 QUALITY = 80
 """Of the guide's pictures, so that they stay small and cables keep their colours."""
 SETTLED = 4.0
-"""Until fonts, scene and numbers are there [s]."""
+"""Until fonts and numbers are there [s]."""
+
+COLOURED = 800
+"""So many pixels have a colour in a scene with a robot; an empty one is grey but for its axes."""
 
 
 def look(page: object, size: str, dark: bool) -> None:
@@ -56,6 +60,23 @@ def fill(folder: Path) -> None:
     replay_log(run / "log.csv", "acrobot_small", folder=folder / "logs" / "acrobot_pbvs")
     about = {"robot": "acrobot_small", "digest": subject_of(load_robot("acrobot_small")).digest}
     (folder / "logs" / f".acrobot_pbvs{ABOUT}").write_text(json.dumps(about))
+
+
+def coloured(page: object) -> int:
+    """How many pixels in the right half of the page have a colour."""
+    with Image.open(io.BytesIO(page.get_screenshot_as_png())) as image:  # type: ignore[attr-defined]
+        pixels = np.asarray(image.convert("RGB"), int)
+    scene = pixels[100:, pixels.shape[1] * 6 // 10 :]
+    return int(np.count_nonzero(np.ptp(scene, axis=2) > 60))
+
+
+def wait_for_scene(page: object) -> None:
+    """Returns once the robot is drawn; in software that may take long."""
+    end = time.monotonic() + LONGEST_WAIT
+    while coloured(page) < COLOURED:
+        if time.monotonic() > end:
+            raise TimeoutError("the scene shows no robot")
+        time.sleep(1.0)
 
 
 def keep(page: object, name: str) -> None:
@@ -85,6 +106,8 @@ def photograph(folder: Path, looks: list[tuple[str, bool]], asked: argparse.Name
                 look(page, size, dark)
                 page.get(address)
                 wait_for(page, "document.querySelectorAll('.q-tab').length > 0")
+                if size != "phone":  # there the scene is below the panel
+                    wait_for_scene(page)
                 count = page.execute_script("return document.querySelectorAll('.q-tab').length")
                 for number in range(count):
                     tab = page.find_elements("css selector", ".q-tab")[number]
