@@ -9,13 +9,16 @@ import difflib
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 
+LEAST_ALIKE = 0.65
+"""How alike a name must be to one that was meant, of 1 [-]; "magic" and "image" are by 0.6."""
+
 MOST_PROBLEMS = 20
 """Problems of one file that are said; who has more begins with these."""
 
 
 def meant_names(found: object, known: Iterable[object]) -> list[str]:
     """The known name that was probably meant by one that is unknown; none where none is close."""
-    return difflib.get_close_matches(str(found), [str(name) for name in known], n=1)
+    return difflib.get_close_matches(str(found), [str(name) for name in known], 1, LEAST_ALIKE)
 
 
 def accepted_names(found: object, known: Iterable[object]) -> str:

@@ -16,6 +16,7 @@ import yaml
 
 from tests.fuzz_damage import (
     CATALOGUES,
+    ROBOT_SCENARIOS,
     ROBOTS,
     SCENARIOS,
     change,
@@ -132,7 +133,7 @@ def scenario_file(rng: random.Random) -> Case:
 
 def scenario_of_robot(rng: random.Random) -> Case:
     """A good scenario with a bad robot."""
-    path = rng.choice(SCENARIOS)
+    path = rng.choice(ROBOT_SCENARIOS)
     tree = yaml.safe_load(path.read_text(encoding="utf-8"))
     robot = next(file for file in ROBOTS if file.parent.name == tree["robot"])
     case = _with_file(rng, "robot.yaml", robot, _simulate(path))

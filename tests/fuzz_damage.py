@@ -9,9 +9,12 @@ from typing import Any
 
 import yaml
 
+from cdpr_drake.systems.scenarios.files import MECHANISM, scenario_kind
+
 ROOT = Path(__file__).parent.parent
 ROBOTS = sorted((ROOT / "models" / "robots").glob("*/robot.yaml"))
 SCENARIOS = sorted((ROOT / "systems" / "scenarios").glob("*.yaml"))
+ROBOT_SCENARIOS = [path for path in SCENARIOS if scenario_kind(str(path)) != MECHANISM]
 CATALOGUES = {
     "cameras": sorted((ROOT / "models" / "cameras").glob("*.yaml")),
     "sensors": sorted((ROOT / "models" / "sensors").glob("*/*.yaml")),

@@ -63,7 +63,7 @@ def test_a_short_chain_runs_and_what_fails_is_seen(tmp_path):
     made, checked, missing, program = map(player.play, page_steps("page", page))
     assert (made.problem, checked.problem) == ("", "")
     assert checked.processor > 0.0
-    assert missing.problem == "exit code 2: nowhere.yaml: there is no such file"
+    assert missing.problem == "exit code 2: nowhere.yaml: there is no such file, robot or scenario"
     assert program.problem == 'a run ends by "timeout"'
     assert "4 steps, 2 failed" in table([made, checked, missing, program])
 

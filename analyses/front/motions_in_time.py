@@ -14,8 +14,8 @@ from cdpr_drake.analyses.workspaces.timed_sets import find_timed_sets
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import PlanningError
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.planning.motion_in_time import MotionInTime, motion_in_time, straight_time
 from cdpr_drake.planning.path_task import PathTask
+from cdpr_drake.planning.timed_motion import MotionInTime, motion_in_time, straight_time
 from cdpr_drake.workspaces.cable_interference import Surroundings
 from cdpr_drake.workspaces.moving_clearances import moving_clearances
 from cdpr_drake.workspaces.moving_shapes import MovingObstacle

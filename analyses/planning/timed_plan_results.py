@@ -12,8 +12,8 @@ import numpy as np
 
 from cdpr_drake.analyses.planning.plan_results import MotionRun
 from cdpr_drake.arrays import Array
-from cdpr_drake.planning.motion_in_time import MotionInTime
 from cdpr_drake.planning.path_task import MotionSamples, PathTask
+from cdpr_drake.planning.timed_motion import MotionInTime
 from cdpr_drake.trajectories.timed_path import TimedPath
 from cdpr_drake.workspaces.cable_interference import Surroundings
 from cdpr_drake.workspaces.moving_shapes import MovingObstacle

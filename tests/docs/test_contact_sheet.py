@@ -6,6 +6,7 @@ import pytest
 from PIL import Image
 
 from docs import contact_sheet
+from tests.messages import printed
 
 
 def draw(path, colour):
@@ -32,7 +33,7 @@ def test_every_figure_stands_in_colour_and_in_grey(tmp_path, capsys):
 def test_a_folder_without_figures_is_refused(tmp_path, capsys):
     with pytest.raises(SystemExit, match="2"):
         contact_sheet.main([str(tmp_path), "--no-run"])
-    assert "found no figures" in capsys.readouterr().err
+    assert "found no figures" in printed(capsys).err
 
 
 def test_a_command_that_fails_is_named_and_the_others_are_shown(tmp_path, monkeypatch, capsys):

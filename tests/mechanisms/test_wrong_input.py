@@ -114,7 +114,7 @@ WRONG = {
         lambda: route([("upper", (0, 0, 0)), (upper(), (0, 0, 1))])(),
         "found str for a frame; accepted: a Frame or a body",
     ),
-    "method": (lambda: add(method="rows"), "method: found 'rows'; accepted: one of automatic"),
+    "method": (lambda: add(method="rows"), "method: found 'rows'; accepted: automatic"),
     "joints of a screw": (
         lambda: add_to(screw),
         "joint thread: found a ScrewJoint; accepted by the compiled joints",
@@ -144,7 +144,7 @@ WRONG = {
         "at an exit point on a moving body; accepted for the catenary: 0 [m]",
     ),
     "sagging where gravity is aslant": (sideways, "accepted: gravity along -z, or straight"),
-    "model": (lambda: add(CableSettings(model="rubber")), "found 'rubber'; accepted: one of"),
+    "model": (lambda: add(CableSettings(model="rubber")), "found 'rubber'; accepted: inextensible"),
     "lengths to settle": (
         lambda: settle(cables_of("planar_arm"), alone("planar_arm").home(), [1.0, -1.0, 1.0, 1.0]),
         "accepted: 4 numbers > 0 [m]",

@@ -6,8 +6,8 @@ import pytest
 from cdpr_drake.analyses.planning.robot_path_task import LimitSettings, path_task
 from cdpr_drake.errors import PlanningError
 from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.planning.motion_in_time import hop_times, motion_in_time, straight_time
 from cdpr_drake.planning.timed_curve import RateLimits, TimedBoxes, keeps, timed_curve
+from cdpr_drake.planning.timed_motion import hop_times, motion_in_time, straight_time
 from cdpr_drake.planning.timed_sequences import TimedGraph
 from cdpr_drake.workspaces.timed_sets import TimedSets
 

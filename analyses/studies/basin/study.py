@@ -88,8 +88,10 @@ def numbers(runs: Runs) -> Mapping[str, Any]:
     found: dict[str, Any] = {}
     for scheme, some in runs.by("scheme"):
         counts: dict[str, Any] = {name: some.total(name) for name in names}
-        counts["certified_not_converged"] = failed(some)
-        counts |= {f"converged_per_{name}": _ratio(some, name) for name in VERDICTS}
+        counts |= {
+            "certified_not_converged": failed(some),
+            **{f"converged_per_{name}": _ratio(some, name) for name in VERDICTS},
+        }
         found[scheme] = counts
     return {"schemes": found}
 

@@ -5,7 +5,7 @@ import pytest
 from cdpr_drake.errors import CdprError, ScenarioError
 from cdpr_drake.studio.workbench.scenario_draft import COMMON, ScenarioDraft
 from cdpr_drake.systems.diagrams.load import load_scenario
-from cdpr_drake.systems.scenarios.files import scenario_file, scenario_names
+from cdpr_drake.systems.scenarios.files import robot_scenario_names, scenario_file
 
 
 @pytest.mark.parametrize("name", ["acrobot_pbvs", "planar_computed_torque", "caroca_world"])
@@ -77,5 +77,5 @@ def test_no_file_outside_of_the_folder_is_read(tmp_path):
 
 
 def test_all_scenarios_of_the_package_can_be_worked_on(tmp_path):
-    for name in scenario_names()[::6]:
+    for name in robot_scenario_names()[::6]:
         assert ScenarioDraft(name, tmp_path).settings() == ()
