@@ -123,7 +123,7 @@ def test_a_known_tag_begins_estimates_anew(camera):
         ("estimator.kind=known_tag", "estimator.known_tag: found none"),
         (KNOWN_TAG.replace("tag_id: 7", "tag_id: 0"), "that of the target"),
         ("estimator.compare=[fusion, fusion]", "found fusion twice"),
-        ("estimator.compare=[fussion]", "found fussion; did you mean fusion? accepted: one of"),
+        ("estimator.compare=[fussion]", "found fussion; did you mean fusion"),
         ("estimator.compare=fusion", "found fusion; accepted: a list of control_integration"),
         ("estimator.fusion.legnth=1", "did you mean length"),
         ("sensors.tension=vlu580", "accepted: one of ideal, tractel, vlu850"),
