@@ -35,6 +35,7 @@ class HandBar:
         self._current = current
         self._of: RunJob | None = None
         self._told = -1
+        self._names: list[str] = []
         with ui.element("div").classes("cdpr-hands w-full") as self._box:
             with ui.row().classes("w-full items-center"):
                 self._cable = ui.select({}, label="cable")
@@ -77,17 +78,17 @@ class HandBar:
         if job is None:
             self._of = None
             return
-        if job is not self._of or len(events) != self._told:
-            self._show(job, events)
+        names = list(job.header.get("cables", ()))  # the header may come after the job
+        if job is not self._of or len(events) != self._told or names != self._names:
+            self._show(job, events, names)
         working = job.state in (JobState.RUNNING, JobState.PAUSED)
         self._break.set_enabled(working and BREAK in takes and self._cable.value is not None)
         self._push.set_enabled(working and PUSH in takes)
 
-    def _show(self, job: RunJob, events: list[dict[str, object]]) -> None:
+    def _show(self, job: RunJob, events: list[dict[str, object]], names: list[str]) -> None:
         before = self._told if job is self._of else len(events)
-        self._of, self._told = job, len(events)
+        self._of, self._told, self._names = job, len(events), names
         broken = {event.get("cable") for event in events}
-        names = list(job.header.get("cables", ()))
         left = {k: name for k, name in enumerate(names) if k not in broken}
         kept = self._cable.value if self._cable.value in left else next(iter(left), None)
         self._cable.set_options(left, value=kept)
