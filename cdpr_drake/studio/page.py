@@ -146,7 +146,7 @@ body.body--dark .bg-primary .q-btn__content {{ color: #101418; }}
 .studio-subject-name {{ font-weight: 600; overflow: hidden; text-overflow: ellipsis; }}
 .studio-state {{ border: 1px solid #ffffff; border-radius: 0.7rem; padding: 0 0.5rem; }}
 .studio-print {{ font-family: monospace; }}
-.q-chip__icon--remove {{ opacity: 1 !important; }}
+.q-chip .q-chip__icon {{ color: inherit; opacity: 1; }}
 :focus-visible {{ box-shadow: 0 0 0 3px #e08a00 !important; }}
 .studio-header :focus-visible {{ box-shadow: inset 0 0 0 3px #ffffff !important; }}
 .q-field--focused:has(:focus-visible) .q-field__control {{
