@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.studies.framework.runs import Runs
@@ -261,7 +262,8 @@ def figure(runs: Runs) -> Figure:
             some["seed"], 1e3 * some["rms_m"], look.marker or "o", color=look.color,
             markerfacecolor="none", linestyle="none", label=f"pose {pose}",
         )  # fmt: skip
-    axes[1].set(xlabel="pose (seed)", ylabel="rms error of sags [mm]", yscale="log")
+    axes[1].set(xlabel="pose (seed)", ylabel="rms error of sags [mm]", ylim=(0.0, None))
+    axes[1].xaxis.set_major_locator(MaxNLocator(integer=True))
     axes[1].legend(loc="best")
     return drawn
 

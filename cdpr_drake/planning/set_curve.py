@@ -268,7 +268,7 @@ class _CurveProgram:
         controls = self.origin + self.unit * found
         controls[0, 0], controls[-1, -1] = self.ends
         breaks = whole * np.concatenate([[0.0], np.cumsum(self.shares)])
-        controls = _joined(controls, np.diff(breaks))
+        controls = joined_controls(controls, np.diff(breaks))
         low, high = (each[list(self.sets)][:, np.newaxis] for each in self.box)
         slack = 1e-12 * (1.0 + np.abs(controls))
         if np.any((controls < low - slack) | (controls > high + slack)):
@@ -279,8 +279,18 @@ class _CurveProgram:
         return SetCurve(self.sets, breaks, controls)
 
 
-def _joined(controls: Array, ways: Array) -> Array:
-    """Makes value and two derivatives the same on both sides of every joint, to rounding."""
+def joined_controls(controls: Array, ways: Array) -> Array:
+    """Makes value and two derivatives the same on both sides of every joint, to rounding.
+
+    Args:
+        controls: Control points of Bezier curves of degree 5, shape (k, 6, d).
+        ways: Lengths of the curves' intervals, shape (k,).
+
+    Returns:
+        Control points that differ from these by what a solver left at the joints. With the means
+        v, s, b there of value, slope and bend: P5 = v, P4 = v - a s, P3 = a^2 b + 2 P4 - v, where a
+        is the interval, and likewise the first three of the next curve.
+    """
     P = controls.copy()
     for k, (a, b) in enumerate(pairwise(ways.tolist())):
         A, B = P[k], P[k + 1]

@@ -11,13 +11,12 @@ Source: Farouki, The Bernstein polynomial basis, 2012.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from pydrake.solvers import ClarabelSolver, MathematicalProgram
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.planning.set_curve import DEGREE, MARGIN, SetCurve
+from cdpr_drake.planning.set_curve import DEGREE, MARGIN, SetCurve, joined_controls
 from cdpr_drake.workspaces.timed_cells import BORDER
 
 INNER = 1e-6
@@ -136,7 +135,7 @@ def timed_curve(
         return None
     controls = start + unit * np.array([result.GetSolution(one) for one in P], float)
     controls[0, :3], controls[-1, -3:] = start, goal
-    found = SetCurve(boxes.sets, boxes.breaks, _joined(controls, h))
+    found = SetCurve(boxes.sets, boxes.breaks, joined_controls(controls, h))
     return found if keeps(found, boxes, limits) else None
 
 
@@ -178,17 +177,3 @@ def keeps(curve: SetCurve, boxes: TimedBoxes, limits: RateLimits) -> bool:
     inside = np.all((low <= curve.controls) & (curve.controls <= high))
     speed, acceleration = largest_rates(curve)
     return bool(inside and speed <= limits.speed and np.all(acceleration <= limits.acceleration))
-
-
-def _joined(controls: Array, ways: Array) -> Array:
-    """Makes value and two derivatives the same on both sides of every joint, to rounding."""
-    P = controls.copy()
-    for k, (a, b) in enumerate(pairwise(ways.tolist())):
-        A, B = P[k], P[k + 1]
-        value = 0.5 * (A[5] + B[0])
-        slope = 0.5 * ((A[5] - A[4]) / a + (B[1] - B[0]) / b)
-        bend = 0.5 * ((A[5] - 2 * A[4] + A[3]) / a**2 + (B[2] - 2 * B[1] + B[0]) / b**2)
-        A[5], B[0] = value, value
-        A[4], B[1] = value - a * slope, value + b * slope
-        A[3], B[2] = a**2 * bend + 2 * A[4] - value, b**2 * bend + 2 * B[1] - value
-    return P

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -42,7 +42,8 @@ LEVEL = np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
 LOOKS: dict[str, Look] = {CONVERGED: nth_look(7), **VERDICTS}
 """Of curves by what they count."""
 
-OUTLINES = {CONVERGED: LOOKS[CONVERGED], CERTIFIED: LOOKS[CERTIFIED]}
+OUTLINES = {CONVERGED: replace(LOOKS[CONVERGED], dash="-"), CERTIFIED: LOOKS[CERTIFIED]}
+"""Of planes; solid and dotted, so that grey tells them apart."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,13 +86,9 @@ def basin_figure(runs: Runs) -> Figure:
                 name: _share(loops.poses[within & mask], counts, x, y)
                 for name, mask in loops.holds.items()
             }
-            panel.set_facecolor(SHADED.color)
+            panel.patch.set(facecolor=SHADED.color, hatch="///", edgecolor="0.5", linewidth=0.0)
             drawn = np.ma.masked_invalid(shares[CONVERGED].T)
             panel.pcolormesh(x, y, drawn, cmap=shades, vmin=-0.5, vmax=1.0)
-            panel.pcolor(
-                x, y, np.ma.masked_where(counts.T > 0, counts.T), hatch="///", alpha=0.0,
-                edgecolor="0.6", linewidth=0.0,
-            )  # fmt: skip
             for name, look in OUTLINES.items():
                 _outline(panel, x, y, np.nan_to_num(shares[name]) >= HALF, look)
             panel.set_aspect("equal")
