@@ -73,6 +73,12 @@ class Run:
             return self.seed
         raise UnknownName(f"column {column!r} is unknown; {closest(column, self.columns())}")
 
+    def has_column(self, column: str) -> bool:
+        """Whether it has a column, without a list of all: picking asks this of every row."""
+        if column in self.keys or column in self.measured.keys():  # noqa: SIM118 - as `columns` has it
+            return True
+        return column == "seed" and self.seed is not None
+
     def columns(self) -> list[str]:
         """Names of its columns."""
         seed = [] if self.seed is None else ["seed"]
@@ -117,9 +123,9 @@ class Runs:
             accepted = value if isinstance(value, tuple) else (value,)
             if self._is_key(column):
                 self._check_planned(rows, column, accepted)
-            elif rows and not any(column in run.columns() for run in rows):
+            elif rows and not any(run.has_column(column) for run in rows):
                 raise self._unknown(column)
-            rows = [run for run in rows if column in run.columns() and run[column] in accepted]
+            rows = [run for run in rows if run.has_column(column) and run[column] in accepted]
         return Runs(rows, self.planned)
 
     def __getitem__(self, column: str) -> npt.NDArray[Any]:
@@ -274,7 +280,7 @@ class Runs:
     def _is_key(self, column: str) -> bool:
         if any(column in run.keys for run in self.rows):
             return True
-        return not any(column in run.columns() for run in self.rows) and column in self.planned()
+        return not any(run.has_column(column) for run in self.rows) and column in self.planned()
 
     def _check_planned(self, rows: Sequence[Run], column: str, accepted: tuple[Any, ...]) -> None:
         """Raises as a call does where a key column lacks an accepted value."""

@@ -74,17 +74,43 @@ def start_trials(quick: bool) -> list[StartTrial]:
     if quick:
         combinations = [(error_name(QUICK_ERROR), RATES[-1], one) for one in (WRENCH, FORCE)]
         pulses, gains = [(ON_PATH, NOTHING)], GAINS[:1]
+    places = {method: _Places(path_of(method)) for method in PRINTED}  # once: they ask the robot
     return [
-        _trial(START_ERROR, method, gain, *combination, between="", quick=quick)
+        _trial(
+            START_ERROR, method, gain, *combination,
+            between="", quick=quick, places=places[method],
+        )
         for combination in combinations
         for method, gain in product(PRINTED, gains)
     ] + [
         _trial(
-            ONE_STEP, method, gain, start, RATES[-1], balance=FORCE, between=between, quick=quick
+            ONE_STEP, method, gain, start, RATES[-1],
+            balance=FORCE, between=between, quick=quick, places=places[method],
         )
         for start, between in pulses
         for method, gain in product(PRINTED, gains)
-    ]
+    ]  # fmt: skip
+
+
+class _Places:
+    """Where runs of a method start.
+
+    Attributes:
+        path: Start and end of the path of Po, shape (3,) each [m].
+    """
+
+    def __init__(self, path: tuple[Array, Array]) -> None:
+        self.path = path
+        self._launch = np.array(load_robot(THESIS_ROBOT).home.position, float)
+
+    def of(self, start: str) -> Array:
+        """Where Po starts, shape (3,) [m]."""
+        if start == LAUNCH:
+            return self._launch.copy()
+        error = 0.0 if start == ON_PATH else ERRORS[STARTS.index(start)]
+        begins = self.path[0]
+        way = self._launch - begins
+        return np.asarray(begins + error * way / np.linalg.norm(way))
 
 
 def path_of(method: str) -> tuple[Array, Array]:
@@ -97,13 +123,12 @@ def path_of(method: str) -> tuple[Array, Array]:
 
 def _trial(
     experiment: str, method: str, gain: float, start: str, rate: float, balance: str,
-    *, between: str, quick: bool,
+    *, between: str, quick: bool, places: _Places,
 ) -> StartTrial:  # fmt: skip
-    path = path_of(method)
     return StartTrial(
         experiment=experiment,
         robot=THESIS_ROBOT,
-        path=path,
+        path=(places.path[0].copy(), places.path[1].copy()),
         leg=THESIS_DURATION,
         method=method,
         gain=gain,
@@ -111,17 +136,7 @@ def _trial(
         balance=balance,
         rate=rate,
         start=start,
-        position=_place(start, path[0]),
+        position=places.of(start),
         duration=QUICK_TIME if quick else THESIS_DURATION,
         between=between,
     )
-
-
-def _place(start: str, begins: Array) -> Array:
-    """Where Po starts, shape (3,) [m]."""
-    launch = np.array(load_robot(THESIS_ROBOT).home.position, float)
-    if start == LAUNCH:
-        return launch
-    error = 0.0 if start == ON_PATH else ERRORS[STARTS.index(start)]
-    way = launch - begins
-    return np.asarray(begins + error * way / np.linalg.norm(way))
