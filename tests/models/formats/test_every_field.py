@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from dataclasses import dataclass, fields
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -29,9 +30,9 @@ AT_HOME = "home"
 """Named where a robot is not at rest at home, which is no field."""
 
 
-@pytest.fixture(params=[*UNUSUAL, *MOTIONS, *models.robot_names()])
-def robot(request):
-    name = request.param
+@cache
+def made(name):
+    """The robot of a name; nobody changes it."""
     if name in UNUSUAL:
         return UNUSUAL[name]()
     return small_robot(name) if name in MOTIONS else models.load_robot(name)
@@ -50,6 +51,17 @@ def through(robot, format, folder):
     return models.load_robot(str(folder / next(iter(files))))
 
 
+@pytest.fixture(scope="module")
+def back(tmp_path_factory):
+    """What comes back of a robot by name from a format: several tests ask for the same."""
+
+    @cache
+    def again(name, format):
+        return through(made(name), format, tmp_path_factory.mktemp(format))
+
+    return again
+
+
 def formats():
     """Those that can be read here: MJCF is read by MuJoCo."""
     try:
@@ -59,9 +71,11 @@ def formats():
     return list(EXPORTS)
 
 
-def test_no_field_is_lost_unsaid(robot, tmp_path):
+@pytest.mark.parametrize("name", [*UNUSUAL, *MOTIONS, *models.robot_names()])
+def test_no_field_is_lost_unsaid(name, back):
+    robot = made(name)
     for format in formats():
-        again = through(robot, format, tmp_path)
+        again = back(name, format)
         if again is None:
             continue
         unsaid = fields_that_differ(robot, again) - set(export_omissions(robot, format))
@@ -69,13 +83,13 @@ def test_no_field_is_lost_unsaid(robot, tmp_path):
 
 
 @pytest.mark.parametrize("name", ["tilted", "tilted_gravity"])
-def test_in_a_turned_world_all_is_as_that_world_has_it(name, tmp_path):
-    robot = UNUSUAL[name]() if name in UNUSUAL else small_robot(name)
+def test_in_a_turned_world_all_is_as_that_world_has_it(name, back):
+    robot = made(name)
     seen = models.turned_robot(robot, models.gravity_turn(robot))
     for format in formats():
         if format == "mjcf":  # which has gravity in any direction
             continue
-        again = through(robot, format, tmp_path)
+        again = back(name, format)
         if again is None:
             continue
         unsaid = fields_that_differ(seen, again) - set(export_omissions(seen, format))
@@ -86,11 +100,11 @@ def test_in_a_turned_world_all_is_as_that_world_has_it(name, tmp_path):
 
 
 @pytest.mark.parametrize("name", UNUSUAL)
-def test_nothing_is_named_that_comes_back(name, tmp_path):
+def test_nothing_is_named_that_comes_back(name, back):
     """No value of these robots is one that an import assumes."""
-    robot = UNUSUAL[name]()
+    robot = made(name)
     for format in formats():
-        again = through(robot, format, tmp_path)
+        again = back(name, format)
         if again is not None:
             assert set(export_omissions(robot, format)) <= fields_that_differ(robot, again), format
 
