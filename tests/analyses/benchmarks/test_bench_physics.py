@@ -8,6 +8,7 @@ from cdpr_drake.analyses.benchmarks.statics import _starts, length_residuals, ph
 from cdpr_drake.geometry.poses import pose_error, pose_from_row, pose_row
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.statics.forward_kinematics import ForwardKinematics
+from tests.analyses.benchmarks.once import without_repeats
 
 
 def test_scipy_finds_the_same_pose_from_the_same_residual():
@@ -21,7 +22,8 @@ def test_scipy_finds_the_same_pose_from_the_same_residual():
         np.testing.assert_allclose(residuals, 0.0, atol=1e-9)
 
 
-def test_rows():
+def test_rows(monkeypatch):
+    without_repeats(monkeypatch)
     rows = physics_rows(quick=True)
     assert len({(row.name, row.baseline) for row in rows}) == len(rows) == 19
     for row in rows:

@@ -11,6 +11,7 @@ from cdpr_drake.analyses.benchmarks.learning import learning_rows
 from cdpr_drake.cli.app import main
 from cdpr_drake.errors import CdprError
 from cdpr_drake.gym import STEPS
+from tests.analyses.benchmarks.once import without_repeats
 from tests.messages import printed
 
 
@@ -86,6 +87,7 @@ def test_bad_input_is_told_in_one_line(capsys, tmp_path, monkeypatch, words, tol
     assert not list(tmp_path.iterdir())
 
 
-def test_benchmarks_compare_every_task():
+def test_benchmarks_compare_every_task(monkeypatch):
+    without_repeats(monkeypatch)
     rows = learning_rows(quick=True)
     assert [row.as_dict()["name"].split(",")[0] for row in rows] == cdpr.environment_names()

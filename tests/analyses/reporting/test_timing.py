@@ -4,6 +4,7 @@ import pytest
 
 from cdpr_drake.analyses.benchmarks.groups import BENCH_GROUPS
 from cdpr_drake.analyses.reporting.timing import interleaved, seconds_per_call
+from tests.analyses.benchmarks.once import without_repeats
 
 
 def test_interleaved_takes_turns_and_drops_the_first():
@@ -28,8 +29,9 @@ def test_seconds_per_call_calls():
 
 
 @pytest.mark.parametrize("group", sorted(set(BENCH_GROUPS) - {"physics"}))
-def test_every_group_has_rows_with_a_ratio(group):
+def test_every_group_has_rows_with_a_ratio(group, monkeypatch):
     """The rows of physics have tests of their own, which take long enough once."""
+    without_repeats(monkeypatch)
     for row in BENCH_GROUPS[group](True):
         assert row.ratio > 0.0
         assert row.as_dict()["ratio_means"]

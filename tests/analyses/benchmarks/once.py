@@ -1,0 +1,36 @@
+"""Benchmarks without their repeats, for tests that ask what rows say and not how long it took."""
+
+import sys
+
+from cdpr_drake.analyses.reporting.timing import seconds_per_call
+
+ROOM = "cdpr_drake.analyses.benchmarks."
+
+FEW = 10
+"""Calls in a row are no more than these."""
+
+
+def once(works, repeats):
+    """Calls each work once, as `interleaved` does several times."""
+    assert repeats >= 1
+    return [work() for work in works]
+
+
+def few_calls(work, calls):
+    """As `seconds_per_call`, with few of them."""
+    return seconds_per_call(work, min(calls, FEW))
+
+
+def without_repeats(monkeypatch):
+    """All modules of benchmarks that are imported do their works once.
+
+    Args:
+        monkeypatch: That of the test; it puts everything back.
+    """
+    replaced = 0
+    for name in [name for name in sys.modules if name.startswith(ROOM)]:
+        for word, other in (("interleaved", once), ("seconds_per_call", few_calls)):
+            if hasattr(sys.modules[name], word):
+                monkeypatch.setattr(sys.modules[name], word, other)
+                replaced += 1
+    assert replaced
