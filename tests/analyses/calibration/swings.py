@@ -4,6 +4,7 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
+from pydrake.common.yaml import yaml_dump_typed
 from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator
 from scipy.spatial.transform import Rotation
@@ -32,6 +33,19 @@ LATE, HEADING, MOUNT = 0.012, 0.7, (0.01, 0.05, 0.0)
 
 CHANGED = {"mass": 14.1, "center_of_mass": (0.008, -0.004, 0.155)}
 """What the true platform has otherwise, beside inertia and cables."""
+
+
+SOFTER = 3e10
+"""Young's modulus as the search believes it [Pa]: the true one of 4e10 is not far, and steps of the
+search's motions, which follow the fastest mode, are longer than with the catalogue's 1e11."""
+
+
+def believed_file(folder):
+    """The robot as it is believed, on softer cables, as a file that commands take."""
+    softer = replace(BELIEVED, cable=replace(BELIEVED.cable, youngs_modulus=SOFTER))
+    path = folder / "believed.yaml"
+    path.write_text(yaml_dump_typed(softer), encoding="utf-8")
+    return str(path)
 
 
 def true_robot():

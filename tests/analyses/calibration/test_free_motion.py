@@ -41,7 +41,8 @@ def found(tmp_path_factory):
     """The command on two fitted swings and one that is held out: exit code, JSON and folder."""
     folder = tmp_path_factory.mktemp("swings")
     spans = swings.write(folder / "log.csv", (0, 1, 2))
-    args = ["identify", "irma4u", str(folder / "log.csv"), "--free", spans_words(spans[:2])]
+    believed = swings.believed_file(folder)
+    args = ["identify", believed, str(folder / "log.csv"), "--free", spans_words(spans[:2])]
     args += ["--hold-out", spans_words(spans[2:]), "--out", str(folder / "out"), "--lead", "0.8"]
     args += ["--sigma", f"turn={swings.NOISE['turn']},tension={swings.NOISE['tension']}", "--json"]
     with pytest.raises(SystemExit) as ended:
