@@ -45,7 +45,7 @@ def write(folder, content):
 @pytest.fixture(scope="module")
 def sets():
     numbers = [np.concatenate([X.translation(), np.zeros(3)]) for X in (START, GOAL)]
-    settings = ProofSettings(boxes=40_000, cells=2**15)
+    settings = ProofSettings(boxes=20_000, cells=2**15)
     return ProvenSets.find(ROBOT, accelerations=0.25, must=numbers, settings=settings)
 
 
