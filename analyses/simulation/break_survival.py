@@ -30,7 +30,7 @@ from cdpr_drake.analyses.simulation.break_report import (
     leaves,
 )
 from cdpr_drake.arrays import Array
-from cdpr_drake.control.torque_law import TorqueServoLaw
+from cdpr_drake.control.torque_law import EMERGENCY, TorqueServoLaw
 from cdpr_drake.errors import (
     CableGeometryError,
     InfeasibleTensionError,
@@ -56,6 +56,7 @@ from cdpr_drake.systems.robots.cable_robot import automatic_step
 from cdpr_drake.systems.robots.compiled_step import StepRule
 from cdpr_drake.systems.robots.settings import CableRobotSettings
 from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
+from cdpr_drake.tensions.methods import method_for
 
 SAVING = {
     STOP: EmergencySettings(reaction="stop", delay=BRAKE),
@@ -97,6 +98,17 @@ class BreakRequest:
     after: float = 2.0
     limits: tuple[float, float] | None = None
 
+    def torque_control(self, robot: Robot) -> TorqueControl:
+        """Its controller of torques: of another robot than the scenario's, limits and method of
+        tensions, which belong to a robot, are the robot's and the default."""
+        settings = self.scenario.torque_control or TorqueControl()
+        if self.limits is not None:
+            settings = replace(settings, limits=np.array(self.limits))
+        if robot.name == load_robot(self.scenario.robot).name:
+            return settings
+        own = settings.limits if self.limits is not None else None
+        return replace(settings, limits=own, method=TorqueControl().method)
+
     def check(self, robot: Robot) -> None:
         """Refuses what is not possible.
 
@@ -132,6 +144,12 @@ class BreakRequest:
                 f"kinds survives: found {robot.name}, whose platform does not move freely; "
                 "accepted: robots with six degrees of freedom"
             )
+        settings, spare = self.torque_control(robot), len(robot.cables) - 6
+        try:
+            for name in (settings.method, EMERGENCY):
+                method_for(name, spare, False)
+        except TensionProblemError as problem:
+            raise WorkspaceError(f"kinds survives: {robot.name}: {problem}") from problem
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,11 +205,11 @@ def breaks_at(robot: Robot, X_WP: RigidTransform, asked: BreakRequest) -> BreakO
     Raises:
         RobotFileError: The robot's file does not say enough of its motors.
     """
+    hung = _Hung(robot, asked)
     try:
-        hung = _Hung(robot, X_WP, asked)
         state = hung.fly_to(X_WP)
     except (InfeasibleTensionError, CableGeometryError, TensionProblemError):
-        return None
+        return None  # a pose outside the frame, too
     return None if state is None else hung.break_all(state)
 
 
@@ -206,33 +224,21 @@ class _Moment:
 class _Hung:
     """A robot under its controller of torques, on the way to a pose."""
 
-    def __init__(self, robot: Robot, X_WP: RigidTransform, asked: BreakRequest) -> None:
-        scenario, self._asked = asked.scenario, asked
-        self._robot = robot
-        settings = scenario.torque_control or TorqueControl()
-        if asked.limits is not None:
-            settings = replace(settings, limits=np.array(asked.limits))
-        elif robot.name != load_robot(scenario.robot).name:  # limits belong to a robot
-            settings = replace(settings, limits=None)
+    def __init__(self, robot: Robot, asked: BreakRequest) -> None:
+        scenario, self._asked, self._robot = asked.scenario, asked, robot
+        settings = asked.torque_control(robot)
         self._believed = scenario.cables.cable_set(robot)
         self._most = wanted_limits(settings, robot)[1]
-        believed = BelievedRobot(self._believed, RigidTransform(), X_WP)  # without a camera
+        # Without a camera: the law reads its cables alone.
+        believed = BelievedRobot(self._believed, RigidTransform(), robot.home.transform())
         self._law = torque_law(settings, robot, believed, scenario)
         self._period = 1.0 / settings.rate
         self._simulated = CableRobotSettings(
             cables=scenario.cables, winches=scenario.winches, damping=scenario.damping
         )
-        method = scenario.integration.integrator
-        step = scenario.integration.max_step
-        if step is None:
-            step = min(automatic_step(robot, X_WP, method, self._simulated), self._period)
-        self._rule = StepRule(method=method, max_step=step, accuracy=scenario.integration.accuracy)
         self._velocity = np.asarray(asked.velocity, float)
-        flies = bool(np.any(self._velocity))
-        self._lead = SETS_OUT if flies else 0.0
-        start = RigidTransform(X_WP.rotation(), X_WP.translation() - self._lead * self._velocity)
-        self._one = self._robots(1)
-        self._one.reset(poses=[start])
+        self._lead = SETS_OUT if np.any(self._velocity) else 0.0
+        self._rule = StepRule()
 
     def _robots(self, count: int) -> BatchRobots:
         return BatchRobots(self._robot, count, settings=self._simulated, rule=self._rule, threads=1)
@@ -240,7 +246,16 @@ class _Hung:
     def fly_to(self, X_WP: RigidTransform) -> _Moment | None:
         """Lets it settle, and fly until it passes the pose, which takes no longer than twice as
         long as at its speed; None where its cables do not hold it."""
-        one, memory = self._one, self._law.fresh_memory()
+        integration = self._asked.scenario.integration
+        method, step = integration.integrator, integration.max_step
+        if step is None:
+            step = automatic_step(self._robot, X_WP, method, self._simulated)
+        self._rule = StepRule(
+            method=method, max_step=min(step, self._period), accuracy=integration.accuracy
+        )
+        one, memory = self._robots(1), self._law.fresh_memory()
+        start = X_WP.translation() - self._lead * self._velocity
+        one.reset(poses=[RigidTransform(X_WP.rotation(), start)])
         steps = round(SETTLES / self._period)
         for k in range(steps + round(2.0 * self._lead / self._period)):
             seen, wanted = _Seen(one), np.zeros(6)

@@ -274,7 +274,8 @@ def figure(runs: Runs) -> Figure:
 def parameters(_form: Form) -> Mapping[str, Any]:
     """What all images have in common."""
     return {
-        "robot": ROBOT, "mount": MOUNT, "errors": ERRORS, "points_m": POINTS, "lower_m": LOWER, "upper_m": UPPER,
+        "robot": ROBOT, "mount": MOUNT, "errors": ERRORS, "points_m": POINTS,
+        "lower_m": LOWER, "upper_m": UPPER,
         "tilt_deg": TILT, "surplus_m": (SHORTEST, LONGEST), "grain": GRAIN,
     }  # fmt: skip
 
