@@ -453,16 +453,107 @@ class _Strip:
 
 
 def _repeated(station: np.ndarray, off: Array) -> float:
-    """How many residuals, in the order of their stations, count as one: (1 + c) / (1 - c) by the
-    correlation c of neighbours, as of a first-order process; 1 where there is none."""
+    """How many residuals, in the order of their stations, count as one; 1 where they are
+    independent.
+
+    Lines are made out from pixels that neighbouring stations share, but no others: by the
+    correlation c of neighbours a smooth curve through many is known as through 1 / (1 + 2 c) of
+    them, and c of such a process is at most 1 / 2.
+    """
     order = np.argsort(station)
     at, r = station[order], off[order] - np.mean(off)
     near, power = np.diff(at) == 1, float(np.mean(r * r))
     if np.count_nonzero(near) < LEAST_PAIRS or power == 0.0:
         return 1.0
     c = float(np.mean((r[:-1] * r[1:])[near])) / power
-    c = min(max(c, 0.0), MOST_CORRELATED)
-    return (1.0 + c) / (1.0 - c)
+    return 1.0 + 2.0 * min(max(c, 0.0), MOST_CORRELATED)
+
+
+LEAST_PAIRS = 8
+"""Pairs of neighbouring stations of which a correlation is taken."""
+
+MOST_CORRELATED = 0.5
+"""Correlation of neighbours where those farther off are independent, at most."""
+
+SMALL_DROP) - base
+        per_drop = np.sum(down * normal, axis=0) / SMALL_DROP
+        flat = np.abs(per_drop) < 1e-6 * np.linalg.norm(normal, axis=0)
+        middle = float(self.curve(root, np.array([0.5 * self.span]))[0])
+        rows, sags = np.zeros((len(self.x), len(self.moved))), np.zeros(len(self.moved))
+        for k, (start, end) in enumerate(self.moved):
+            rise = end - start
+            span = float(np.hypot(rise[0], rise[1]))
+            out = np.array([rise[0], rise[1], 0.0]) / span
+            other = replace(self, start=start, out=out, span=span, rise=float(rise[2]))
+            x = self.x * span / self.span
+            off = np.sum((other.pixels(x, other.curve(root, x)) - base) * normal, axis=0)
+            rows[:, k] = np.where(flat, 0.0, off / np.where(flat, 1.0, per_drop))
+            sags[k] = float(other.curve(root, np.array([0.5 * span]))[0]) - middle
+        return rows, sags
+
+    def _refined(
+        self, station: np.ndarray, drop: Array, root: float, wanted: SightSettings
+    ) -> _Fit | None:
+        """The fit of both ends, the root of the surplus [m^0.5], and how far the pose is off, in
+        standard deviations, to lines near the curve, by Gauss and Newton, with Cauchy's weights."""
+        t, (of_pose, of_sag) = self.x / self.span, self._pose_rows(root)
+        size, q = np.inf, len(of_sag)
+        state, normal = np.concatenate([[0.0, 0.0, root], np.zeros(q)]), np.eye(3 + q)
+        chosen = np.zeros(0, int)
+        for _ in range(FITS):
+            curve = state[0] * (1.0 - t) + state[1] * t + self.curve(state[2])
+            curve = curve + of_pose @ state[3:]
+            off = (drop - curve[station]) * self.across[station]
+            chosen = _nearest(station, off, 2.0 * wanted.near)
+            if len(chosen) < wanted.share * len(self.x):
+                return None
+            at = station[chosen]
+            slope = (self.curve(state[2] + STEP) - self.curve(state[2] - STEP)) / (2.0 * STEP)
+            # Pixels across the line for both ends, the root, and the pose.
+            J = np.column_stack([1.0 - t[at], t[at], slope[at], of_pose[at]])
+            J *= self.across[at][:, np.newaxis]
+            size = max(float(np.median(np.abs(off[chosen]))) / MEDIAN_SHARE, LEAST_NOISE)
+            weight = np.sqrt(1.0 / (1.0 + (off[chosen] / (CAUCHY * size)) ** 2))
+            size *= np.sqrt(_repeated(at, off[chosen] * weight))
+            prior = np.zeros((2 + q, 3 + q))
+            prior[[0, 1], [0, 1]] = size / (wanted.ends * self.slant)
+            prior[range(2, 2 + q), range(3, 3 + q)] = size
+            A = np.vstack([J * weight[:, np.newaxis], prior])
+            b = np.concatenate([off[chosen] * weight, -prior @ state])
+            normal = np.linalg.inv(A.T @ A)
+            change = normal @ (A.T @ b)
+            state = state + change
+            if abs(change[2]) < 1e-7:
+                break
+        middle = np.array([0.5 * self.span])
+        here, there = (float(self.curve(state[2] + k * STEP, middle)[0]) for k in (0.0, 1.0))
+        per_state = np.concatenate([[0.0, 0.0, (there - here) / STEP], of_sag])
+        sigma = size * np.sqrt(per_state @ normal @ per_state)
+        uv = self.pixels(self.x[station[chosen]], drop[chosen])
+        weights = 1.0 / (1.0 + (off[chosen] / wanted.noise) ** 2)
+        # Another cable's line may be as long and as smooth, but ends elsewhere.
+        far = float(np.max(np.abs(state[:2]) / self.slant)) / wanted.ends
+        far = max(far, float(np.max(np.abs(state[3:]), initial=0.0)))
+        share = float(np.sum(weights)) / len(self.x) / (1.0 + (far / FAR) ** 4)
+        sag = here + float(of_sag @ state[3:])
+        return _Fit(float(state[2]), sag, float(sigma), uv, share)
+
+
+def _repeated(station: np.ndarray, off: Array) -> float:
+    """How many residuals, in the order of their stations, count as one; 1 where they are
+    independent.
+
+    Lines are made out from pixels that neighbouring stations share, but no others: by the
+    correlation c of neighbours a smooth curve through many is known as through 1 / (1 + 2 c) of
+    them, and c of such a process is at most 1 / 2.
+    """
+    order = np.argsort(station)
+    at, r = station[order], off[order] - np.mean(off)
+    near, power = np.diff(at) == 1, float(np.mean(r * r))
+    if np.count_nonzero(near) < LEAST_PAIRS or power == 0.0:
+        return 1.0
+    c = float(np.mean((r[:-1] * r[1:])[near])) / power
+    return 1.0 + 2.0 * min(max(c, 0.0), MOST_CORRELATED)
 
 
 LEAST_PAIRS = 8

@@ -56,7 +56,8 @@ def test_it_is_near_to_runs_in_a_diagram(found):
             "initial_pose.angles_deg=[0, 0, 0]", "desired.position=[0, 0, 0.35]",
             "desired.angles_deg=[180, 0, 0]", f"target.pose.position={listed(X_WO.translation())}",
             f"target.pose.angles_deg={listed(np.degrees(angles_from_rotation(X_WO.rotation())))}",
-            "estimator.kind=measured", "controller.lambda_0=1e-9", "controller.lambda_infinity=1e-9",
+            "estimator.kind=measured", "controller.lambda_0=1e-9",
+            "controller.lambda_infinity=1e-9",
         ],
     )  # fmt: skip
     for k, name in enumerate((STOP, REDISTRIBUTE)):
