@@ -13,7 +13,13 @@ import numpy as np
 from cdpr_drake.analyses.reporting.log_files import finite
 from cdpr_drake.analyses.reporting.progress import WorkProgress
 from cdpr_drake.analyses.reporting.provenance import package_versions
-from cdpr_drake.analyses.workspaces.break_tasks import BEST, EXCURSION, SURVIVES, WORST
+from cdpr_drake.analyses.workspaces.break_tasks import (
+    BEST,
+    EXCURSION,
+    NUMBERED,
+    SURVIVES,
+    WORST,
+)
 from cdpr_drake.analyses.workspaces.conditions import KINDS, MEASURES
 from cdpr_drake.analyses.workspaces.grid_results import load_grid, region_numbers, save_grid
 from cdpr_drake.analyses.workspaces.grid_runs import SweepOptions, run_poses
@@ -168,7 +174,7 @@ class RobotWorkspace(Tabulated):
             volume = self.volume(name)
             share = f"{100.0 * numbers['pose_share']:.4g} % of the poses"
             rows.append((name, f"{share}, {volume.value:.4g} {volume.unit}"))
-        for name in list(self.values)[:SHOWN]:
+        for name in [one for one in self.values if one not in NUMBERED][:SHOWN]:
             one = told["measured"][name]
             least, most = one["least"], one["largest"]
             words = "none" if least is None else f"{least:.4g} to {most:.4g} {one['unit']}"

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from cdpr_drake.cables.curves import cable_curves
-from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.errors import CdprError
+from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.poses import exponential, pose_from_angles
 from cdpr_drake.models.camera_catalogue import load_camera
 from cdpr_drake.models.robot_loader import load_robot
