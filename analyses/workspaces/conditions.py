@@ -203,6 +203,9 @@ KINDS: dict[str, Kind] = {
 }
 """Kinds of workspaces by name. Source: Gazebo thesis 2.6; servoing thesis 1.2.2, (1.25), (3.27)."""
 
+OF_POSES = tuple(name for name in KINDS if name != SURVIVES)
+"""Kinds that are decided without simulating what follows."""
+
 
 def _capacity(about: PoseConditions, at: Poses) -> Array:
     demand = resisting(about.case, about.required or SpatialSet(), at.rotations)
