@@ -48,7 +48,7 @@ class BreakTask:
             "moving_m_s": plain(np.asarray(asked.velocity, float)),
             "after_s": asked.after,
             "limits_n": None if asked.limits is None else list(asked.limits),
-            "cables": [one.name for one in self.robot.cables],
+            "cable_names": [one.name for one in self.robot.cables],
             **{name: plain(getattr(asked.scenario, name)) for name in SECTIONS},
         }
 

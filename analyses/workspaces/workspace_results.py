@@ -120,7 +120,7 @@ class RobotWorkspace(Tabulated):
         Names are null where all cables do not hold the pose.
         """
         about = self.arguments["breaks"]
-        names = {WORST: about["cables"], BEST: about["reactions"]}
+        names = {WORST: about["cable_names"], BEST: about["reactions"]}
         told = {
             key: [None if np.isnan(n) else of[int(n) - 1] for n in self.values[key].ravel()]
             for key, of in names.items()

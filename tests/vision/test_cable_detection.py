@@ -145,9 +145,11 @@ def test_an_error_of_the_pose_is_in_the_deviations_of_sags():
     assert list(seen.verdict) == [SLACK if s > 0.0 else TAUT for s in SURPLUS]
     np.testing.assert_array_less(np.abs(seen.sag - truth()), KNOWN * seen.sigma)
     exact = find_sags(image, cables, POSE, X_WE, pinhole, sure, np.zeros((6, 6)))
-    np.testing.assert_array_less(exact.sigma, seen.sigma)
+    assert np.mean(exact.sigma) < 0.8 * np.mean(seen.sigma)
     np.testing.assert_array_less(np.abs(exact.sag - truth()), KNOWN * exact.sigma)
     more = find_sags(image, cables, wrong, X_WE, pinhole, sure, 4.0 * told)
-    np.testing.assert_array_less(seen.sigma, more.sigma * (1.0 + 1e-3))
+    assert np.mean(seen.sigma) < np.mean(more.sigma)
+    blind = find_sags(image, cables, wrong, X_WE, pinhole, sure, np.zeros((6, 6)))
+    assert not np.all(np.abs(blind.sag - truth()) < KNOWN * blind.sigma)
     with pytest.raises(CdprError, match="pose_covariance: found shape"):
         find_sags(image, cables, POSE, X_WE, pinhole, sure, -np.eye(6))
