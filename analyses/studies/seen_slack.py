@@ -54,7 +54,7 @@ EXACT, OFF = "exact", "off"
 ERRORS = {EXACT: (0.0, 0.0), OFF: (0.8e-3, 0.1)}
 """Standard deviations of each coordinate of the believed pose, drawn and told [m] and [deg]."""
 
-POINTS = 5e-5
+POINTS = 2e-5
 """Standard deviation of each coordinate of exit and anchor points as told [m]; they are exact."""
 
 LOWER, UPPER = (-0.2, -0.2, 0.2), (0.2, 0.2, 0.6)

@@ -137,6 +137,8 @@ def find_sags(
     for k, fit in _shared_out(strips, grey, wanted).items():
         strip = strips[k]
         assert strip is not None
+        if fit.sag < -IMPOSSIBLE * fit.sigma:  # no cable hangs upwards: its line is not its own
+            continue
         points[k] = fit.uv
         # By the sag's own growth with the root, about constant.
         flat = drop_per_root(strip.span, strip.rise)
@@ -483,6 +485,9 @@ HYPOTHESES = 6
 
 FAR = 4.0
 """Error of an end, in standard deviations, by which a curve counts half."""
+
+IMPOSSIBLE = 4.0
+"""Standard deviations of a sag by which it may be below zero by chance."""
 
 FITS = 15
 """Of Gauss and Newton's method, which chooses its points anew each time."""
