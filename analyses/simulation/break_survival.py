@@ -22,10 +22,11 @@ from pydrake.math import RigidTransform
 from cdpr_drake.analyses.simulation.break_report import (
     BRAKE,
     BRAKING,
+    DEFAULT_SAVING,
     DESCEND,
-    REDISTRIBUTE,
     RESTS,
     RETREAT,
+    SAVING,
     STOP,
     leaves,
 )
@@ -58,16 +59,10 @@ from cdpr_drake.systems.robots.settings import CableRobotSettings
 from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
 from cdpr_drake.tensions.methods import method_for
 
-SAVING = {
-    STOP: EmergencySettings(reaction="stop", delay=BRAKE),
-    REDISTRIBUTE: EmergencySettings(reaction="redistribute"),
-    BRAKING: EmergencySettings(reaction="brake"),
-    RETREAT: EmergencySettings(reaction="retreat"),
-    DESCEND: EmergencySettings(reaction="descend"),
+RULES = {
+    name: EmergencySettings(reaction=name, delay=BRAKE if name == STOP else 0.0) for name in SAVING
 }
-"""Reactions of `break_report.REACTIONS` that need neither a detector nor a goal of a servo."""
-
-DEFAULT_REACTIONS = (STOP, REDISTRIBUTE, BRAKING, RETREAT)
+"""Section `emergency` of each reaction."""
 
 SETTLES = 0.3
 """For how long the platform stands before a break, so that tensions are those of the law [s]."""
@@ -93,7 +88,7 @@ class BreakRequest:
     """
 
     scenario: Scenario
-    reactions: tuple[str, ...] = DEFAULT_REACTIONS
+    reactions: tuple[str, ...] = DEFAULT_SAVING
     velocity: Array
     after: float = 2.0
     limits: tuple[float, float] | None = None
@@ -279,10 +274,10 @@ class _Hung:
         for row, (cable, _) in enumerate(pairs):
             many.break_cable([row], cable)
         ways = {
-            name: ways_out(SAVING[name], self._robot, self._believed, self._most) for name in names
+            name: ways_out(RULES[name], self._robot, self._believed, self._most) for name in names
         }
         runs = [
-            _Reacting(self._law, SAVING[name], cable, at, ways[name], self._velocity)
+            _Reacting(self._law, RULES[name], cable, at, ways[name], self._velocity)
             for cable, name in pairs
         ]
         rows = self._rows(many, runs)
@@ -366,7 +361,7 @@ class _Reacting:
         self._rule, self._cable, self._ways, self._velocity = rule, cable, ways, velocity
         self._broken = np.arange(law.cable_count) == cable
         self._before = law
-        self._after = law.without(self._broken, braking=rule.reaction == "brake")
+        self._after = law.without(self._broken, braking=rule.reaction == BRAKING)
         self._memory, self._twist = at.memory, np.zeros(6)
         self._goal: RigidTransform | None = None
         self._acts = self._halts = False
@@ -383,7 +378,7 @@ class _Reacting:
         """
         rule, X_WP = self._rule, pose_from_row(seen.poses[row])
         law, wanted = self._before, np.zeros(6)
-        if self._acts and rule.reaction != "stop":
+        if self._acts and rule.reaction != STOP:
             law, wanted = self._after, self._twist
         else:
             wanted[3:] = X_WP.rotation().matrix().T @ self._velocity
@@ -396,14 +391,14 @@ class _Reacting:
                 self._twist = self._out(X_WP)
         if not self._acts:
             return torques, np.zeros(len(torques))
-        return torques, np.where(self._broken | (rule.reaction == "stop"), 1.0, 0.0)
+        return torques, np.where(self._broken | (rule.reaction == STOP), 1.0, 0.0)
 
     def _out(self, X_WP: RigidTransform) -> Array:
         """Twist that is wanted, shape (6,) [rad/s, m/s]."""
         rule, ways = self._rule, self._ways
-        if rule.reaction == "descend":
+        if rule.reaction == DESCEND:
             return descent_twist(X_WP, ways.anchors, ways.ground, rule)
-        if rule.reaction != "retreat":
+        if rule.reaction != RETREAT:
             return np.zeros(6)
         if self._goal is None:
             self._goal = ways.held(X_WP, self._broken.astype(float))

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cdpr_drake.analyses.simulation.break_survival import BreakRequest, breaks_at
 from cdpr_drake.analyses.workspaces.pose_grid import plain
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.workspaces.pose_grid import WorkspaceGrid
+
+if TYPE_CHECKING:
+    from cdpr_drake.analyses.simulation.break_survival import BreakRequest
 
 SURVIVES, EXCURSION, WORST, BEST = "survives", "break-excursion", "worst-cable", "best-reaction"
 
@@ -71,6 +73,8 @@ class BreakTask:
         return self._last[start, stop]
 
     def _at(self, number: int) -> tuple[float, float, float, float]:
+        from cdpr_drake.analyses.simulation.break_survival import breaks_at  # most ask no such
+
         outcomes = breaks_at(self.robot, self.grid.poses(number, number + 1)[0], self.asked)
         if outcomes is None:
             return 0.0, np.nan, np.nan, np.nan

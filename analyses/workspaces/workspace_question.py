@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from cdpr_drake.analyses.reporting.provenance import code_version
-from cdpr_drake.analyses.simulation.break_survival import DEFAULT_REACTIONS, BreakRequest
 from cdpr_drake.analyses.workspaces.break_tasks import OF_BREAKS, SURVIVES, BreakTask
 from cdpr_drake.analyses.workspaces.conditions import (
     KINDS,
@@ -30,8 +29,6 @@ from cdpr_drake.models.robot_statics import rigid_platform
 from cdpr_drake.schema.typed_yaml import closest
 from cdpr_drake.systems.cameras.camera_settings import servo_pinhole
 from cdpr_drake.systems.cameras.targets import TARGETS
-from cdpr_drake.systems.diagrams.load import load_scenario
-from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
 from cdpr_drake.tensions.methods import method_for
 from cdpr_drake.workspaces.cable_interference import Obstacles, Surroundings, beams, box_row
 from cdpr_drake.workspaces.demanded_wrenches import MotionDemand, SpatialSet
@@ -184,7 +181,7 @@ class WorkspaceRequest:
         pulleys: Whether cables run over the robot's pulleys; else from fixed exit points.
         method: Name of the method whose tensions must hold the weight, of `tensions.METHODS`, for
             the kind `static`; None: any tensions.
-        reactions: For the kind `survives`, names of `break_survival.SAVING`; None: stop,
+        reactions: For the kind `survives`, names of `break_report.SAVING`; None: stop,
             redistribute, brake, retreat.
         moving: For the kind `survives`, velocity of Po in W when a cable breaks, shape (3,) [m/s];
             None: at rest.
@@ -317,6 +314,11 @@ def _break_task(robot: Robot, asked: WorkspaceRequest, grid: WorkspaceGrid) -> B
         WorkspaceError: Something is asked for that is not simulated, or makes no sense.
         ScenarioError: There is no such scenario, or it is no visual servo.
     """
+    from cdpr_drake.analyses.simulation.break_report import DEFAULT_SAVING
+    from cdpr_drake.analyses.simulation.break_survival import BreakRequest
+    from cdpr_drake.systems.diagrams.load import load_scenario  # most questions have none
+    from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
+
     for name in ("mass", "wrench", "required", "accelerations"):
         if getattr(asked, name) is not None:
             raise WorkspaceError(
@@ -331,7 +333,7 @@ def _break_task(robot: Robot, asked: WorkspaceRequest, grid: WorkspaceGrid) -> B
         )
     request = BreakRequest(
         scenario=scenario,
-        reactions=DEFAULT_REACTIONS if asked.reactions is None else tuple(asked.reactions),
+        reactions=DEFAULT_SAVING if asked.reactions is None else tuple(asked.reactions),
         velocity=np.zeros(3) if asked.moving is None else np.asarray(asked.moving, float),
         after=asked.after,
         limits=asked.limits,
@@ -399,6 +401,8 @@ def camera_view(robot: Robot, scenario: str) -> CameraView:
         WorkspaceError: The camera is not on the platform, or the target does not rest.
         ScenarioError: There is no such scenario, or the robot does not fit into it.
     """
+    from cdpr_drake.systems.diagrams.load import load_scenario  # most questions have none
+
     with robot_reference(robot, "a workspace") as name:
         loaded = load_scenario(scenario, [f"robot={name}"])
     if loaded.target.carrier != "world" or loaded.target.motion is not None:

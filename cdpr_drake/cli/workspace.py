@@ -21,7 +21,7 @@ from cdpr_drake.analyses.front.workspaces import (
     workspace_question,
 )
 from cdpr_drake.analyses.reporting.output_folder import shown_path
-from cdpr_drake.analyses.simulation.break_survival import DEFAULT_REACTIONS, SAVING
+from cdpr_drake.analyses.simulation.break_report import DEFAULT_SAVING, SAVING
 from cdpr_drake.analyses.workspaces.break_tasks import NUMBERED
 from cdpr_drake.analyses.workspaces.conditions import KINDS, MEASURES
 from cdpr_drake.analyses.workspaces.workspace_results import RobotWorkspace
@@ -330,7 +330,7 @@ def workspace(
         str | None,
         typer.Option(
             help="For survives: one or several, separated by commas: " + ", ".join(SAVING) + "; "
-            "without it " + ", ".join(DEFAULT_REACTIONS) + "."
+            "without it " + ", ".join(DEFAULT_SAVING) + "."
         ),
     ] = None,
     moving: Annotated[

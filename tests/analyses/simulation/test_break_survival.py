@@ -7,6 +7,7 @@ import pytest
 from pydrake.math import RigidTransform
 
 import cdpr_drake as cdpr
+from cdpr_drake.analyses.simulation import break_survival
 from cdpr_drake.analyses.simulation.break_report import REDISTRIBUTE, STOP
 from cdpr_drake.analyses.simulation.break_survival import (
     CALM,
@@ -23,8 +24,12 @@ SCENARIO = "acrobot_broken_redistributed"
 POSITION = np.array([0.05, 0.02, 0.35])
 AFTER = 0.3
 
-NEAR = 0.06
-"""Runs begin with other tensions: static friction of drums holds what noise of sensors left."""
+NEAR = 0.04
+"""Sensors of tensions have noise in the diagram, and static friction of drums keeps what it does;
+rows of its log are 2 ms apart."""
+
+BREAK = 0.01
+"""When the cable breaks in both, so that tensions are still those at the start [s]."""
 
 
 def request(**changes):
@@ -32,25 +37,21 @@ def request(**changes):
     return BreakRequest(**{**asked, **changes})
 
 
-@pytest.fixture(scope="module")
-def found():
-    asked = request(reactions=(STOP, REDISTRIBUTE))
-    return breaks_at(load_robot("acrobot_large"), RigidTransform(POSITION), asked)
-
-
 def listed(numbers):
     return "[" + ", ".join(f"{x:.9g}" for x in numbers) + "]"
 
 
-def test_it_is_near_to_runs_in_a_diagram(found):
+def test_it_is_near_to_runs_in_a_diagram(monkeypatch):
     """A servo that sees its goal from the start, and hardly moves, holds the platform there."""
     robot, scenario = load_robot("acrobot_large"), load_scenario(SCENARIO)
     X_WP = RigidTransform(POSITION)
     X_CO = pose_from_angles(np.array([0.0, 0.0, 0.35]), np.radians([180.0, 0.0, 0.0]))
     X_WO = X_WP @ robot.camera_mount(scenario.camera.mount).pose.transform() @ X_CO
     cable = 5
+    monkeypatch.setattr(break_survival, "SETTLES", BREAK)
+    found = breaks_at(robot, X_WP, request(reactions=(STOP, REDISTRIBUTE)))
     compared = cdpr.compare_reactions(
-        SCENARIO, cable=cable, time=0.3, after=AFTER, reactions=(STOP, REDISTRIBUTE),
+        SCENARIO, cable=cable, time=BREAK, after=AFTER, reactions=(STOP, REDISTRIBUTE),
         overrides=[
             "integration.engine=compiled", f"initial_pose.position={listed(POSITION)}",
             "initial_pose.angles_deg=[0, 0, 0]", "desired.position=[0, 0, 0.35]",
