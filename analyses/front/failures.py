@@ -134,7 +134,8 @@ def compare_reactions(
     ) as results:  # fmt: skip
         if results is not None:
             told.opened(results)
-        rows, name, loaded = {}, "", ""
+        rows: dict[str, dict[str, Any]] = {}
+        name, loaded = "", ""
         for reaction in reactions:
             scene = _scene(str(scenario), overrides, cable, (time, after), reaction)
             robot = load_robot(scene.robot)

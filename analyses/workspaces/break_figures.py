@@ -82,14 +82,13 @@ def breaks_figure(workspace: RobotWorkspace) -> Figure:
     return figure
 
 
-def _draw(
-    axes: Axes, edges: tuple[Array, Array], planes: list[np.ndarray], smallest: float
-) -> None:
+def _draw(axes: Axes, edges: list[Array], planes: list[np.ndarray], smallest: float) -> None:
     """Cells of a plane: verdicts, numbers of cables and of reactions, shape (nv, nu) each."""
     survives, worst, best = planes
     across, up = edges
     for j, i in np.ndindex(*survives.shape):
-        low, high = (across[i], up[j]), (across[i + 1], up[j + 1])
+        low = float(across[i]), float(up[j])
+        high = float(across[i + 1]), float(up[j + 1])
         held = bool(np.isfinite(worst[j, i]))
         color = KEPT if survives[j, i] else LOST if held else UNHELD
         axes.add_patch(
