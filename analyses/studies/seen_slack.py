@@ -147,7 +147,7 @@ def seen(seed: int, knowledge: str) -> tuple[np.ndarray, SeenSags, Array]:
     deviations = np.repeat([np.radians(degrees), metres], 3)
     found = find_sags(
         image, picture.cables, X_WP @ exponential(wrong * deviations), picture.X_WE,
-        picture.pinhole, SightSettings(ends=POINTS), np.diag(deviations**2),
+        picture.pinhole, SightSettings(ends=POINTS), pose_covariance=np.diag(deviations**2),
     )  # fmt: skip
     return image, found, true_sags(picture.cables, X_WP, surplus)
 

@@ -101,6 +101,7 @@ def find_sags(
     X_WE: RigidTransform,
     pinhole: Pinhole,
     settings: SightSettings | None = None,
+    *,
     pose_covariance: Array | None = None,
 ) -> SeenSags:
     """Sags of cables in an image.
