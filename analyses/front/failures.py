@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cdpr_drake.analyses.front.session import Session
+from cdpr_drake.analyses.reporting.deferred_figures import write_pictures
+from cdpr_drake.analyses.reporting.left_folders import RESULTS
+from cdpr_drake.analyses.reporting.log_files import write_json
+from cdpr_drake.analyses.reporting.output_folder import results_folder
 from cdpr_drake.analyses.simulation.break_report import REACTIONS, after_break
 from cdpr_drake.analyses.simulation.session import RunSession
 from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
+from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS, figure_writers
 from cdpr_drake.errors import ScenarioError, StoppedError
 from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.schema.typed_yaml import closest
 from cdpr_drake.summaries import Tabulated
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
@@ -21,6 +28,8 @@ from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+
+KEPT = ("folder", "overwrite", "formats")
 
 ROWS = 500.0
 """Rows of a run per second, of which the largest numbers are taken [Hz]."""
@@ -35,12 +44,14 @@ class BreakReactions(Tabulated):
         cable: Name of the cable that broke.
         time: When [s].
         rows: By reaction the outcome of its run, and what `after_break` says.
+        failed: Of each picture that could not be written, the file and why.
     """
 
     scenario: str
     cable: str
     time: float
     rows: dict[str, dict[str, Any]]
+    failed: Mapping[str, str] = field(default_factory=dict)
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON; keys end in units."""
@@ -90,6 +101,7 @@ def compare_reactions(
     after: float = 2.0,
     overrides: Sequence[str] = (),
     session: Session | None = None,
+    **kept: Any,
 ) -> BreakReactions:
     """Breaks a cable of a visual servo by motor torques, once for each reaction.
 
@@ -101,44 +113,78 @@ def compare_reactions(
         after: For how long runs go on after the break [s].
         overrides: Further items "key.subkey=value" that replace what the file says.
         session: Who follows the runs and may stop them; None: nobody.
+        kept: `folder`: for `results.json` and the figure; None: nothing is written. `overwrite`:
+            whether results in the folder may be replaced. `formats`: endings of the figure's file.
 
     Raises:
+        OutputFolderError: The folder holds something, or cannot be written.
         ScenarioError: A reaction is unknown, there is no such cable, or the scenario cannot react.
         CdprError: It cannot be built.
         StoppedError: The session asked to stop.
     """
     told = session or Session()
+    for option in kept:
+        if option not in KEPT:
+            raise ScenarioError(f"{option!r} is unknown; {closest(option, KEPT)}")
+    _check(reactions, {"time": time, "after": after})
+    folder, formats = kept.get("folder"), kept.get("formats", DEFAULT_FORMATS)
+    with (
+        nullcontext() if folder is None
+        else results_folder(Path(folder), kept.get("overwrite", False))
+    ) as results:  # fmt: skip
+        if results is not None:
+            told.opened(results)
+        rows: dict[str, dict[str, Any]] = {}
+        name, loaded = "", ""
+        for reaction in reactions:
+            scene = _scene(str(scenario), overrides, cable, (time, after), reaction)
+            robot = load_robot(scene.robot)
+            name, loaded = robot.cables[cable].name, scene.name
+            told.say(f"{name} breaks: {reaction}")
+            run = run_scenario(scene, RunSession(should_stop=told.stop))
+            if run.outcome == Outcome.INTERRUPTED:
+                raise StoppedError(f"stopped after {len(rows)} of {len(reactions)} reactions")
+            end = float(run.log["time"][-1])
+            if end <= time:
+                raise ScenarioError(
+                    f"time: found {time:g}; accepted: before the run of {loaded} ends, {end:g} s"
+                )
+            told_of = after_break(run.log, robot, cable, time)
+            rows[reaction] = {"outcome": Outcome(run.outcome).name.lower(), **told_of}
+        found = BreakReactions(loaded, name, time, rows)
+        if results is None:
+            return found
+        write_json(results.path / RESULTS, found.as_dict())
+        pictures = figure_writers({"reactions": found.plot}, formats)
+        failed = write_pictures(results.path, dict(pictures))
+        results.publish()
+        return replace(found, failed=failed)
+
+
+def _check(reactions: Sequence[str], numbers: Mapping[str, float]) -> None:
+    """Refuses reactions that there are not, and times that make no sense."""
     unknown = [name for name in reactions if name not in REACTIONS]
     if unknown or not reactions:
         found = ", ".join(map(repr, unknown)) or "none"
         raise ScenarioError(f"reactions: found {found}; accepted: {', '.join(REACTIONS)}")
-    for key, value in (("time", time), ("after", after)):
+    for key, value in numbers.items():
         if not 0.0 < value < float("inf"):
             raise ScenarioError(f"{key}: found {value:g}; accepted: a number > 0 [s]")
-    name = str(scenario)
+
+
+def _scene(
+    name: str, overrides: Sequence[str], cable: int, times: tuple[float, float], reaction: str
+) -> Scenario:
+    """A scenario in which a cable breaks, after the first time, for the second one [s]."""
     plain = load_scenario(name, overrides)
     if not isinstance(plain, Scenario):
         raise ScenarioError(f"{plain.name}: found kind {plain.kind}; accepted: a visual servo")
-    rows: dict[str, dict[str, Any]] = {}
-    for reaction in reactions:
-        loaded = load_scenario(name, [
-            *overrides,
-            f"failures.events=[{{kind: cable_breaks, time: {time!r}, cable: {cable}}}]",
-            f"emergency={REACTIONS[reaction]}",
-            f"duration={time + after!r}", f"log_rate={ROWS:g}",
-        ])  # fmt: skip
-        assert isinstance(loaded, Scenario)
-        robot = load_robot(loaded.robot)
-        names = [one.name for one in robot.cables]
-        told.say(f"{names[cable]} breaks: {reaction}")
-        run = run_scenario(loaded, RunSession(should_stop=told.stop))
-        if run.outcome == Outcome.INTERRUPTED:
-            raise StoppedError(f"stopped after {len(rows)} of {len(reactions)} reactions")
-        if float(run.log["time"][-1]) <= time:
-            raise ScenarioError(
-                f"time: found {time:g}; accepted: before the run of {loaded.name} ends, "
-                f"{float(run.log['time'][-1]):g} s"
-            )
-        told_of = after_break(run.log, robot, cable, time)
-        rows[reaction] = {"outcome": Outcome(run.outcome).name.lower(), **told_of}
-    return BreakReactions(loaded.name, names[cable], time, rows)
+    time, after = times
+    loaded = load_scenario(name, [
+        *overrides,
+        f"failures.events=[{{kind: cable_breaks, time: {time!r}, cable: {cable}}}]",
+        f"emergency={REACTIONS[reaction]}",
+        f"duration={time + after!r}", f"log_rate={ROWS:g}",
+    ])  # fmt: skip
+    assert isinstance(loaded, Scenario)
+    return loaded

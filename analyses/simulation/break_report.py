@@ -44,6 +44,12 @@ REACTIONS = {
 }
 """Section `emergency` of each reaction."""
 
+SAVING = (STOP, REDISTRIBUTE, BRAKING, RETREAT, DESCEND)
+"""Those that need neither a detector nor a goal of a servo, see `break_survival`."""
+
+DEFAULT_SAVING = SAVING[:4]
+"""Those of them that do not go to the ground."""
+
 RESTS = (0.005, 0.05)
 """Speeds below which the platform is at rest [m/s, rad/s]."""
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -10,6 +10,9 @@ from cdpr_drake.analyses.simulation.visual_servo_run import RunResult
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CableGeometryError
 from cdpr_drake.geometry.poses import pose_from_row
+from cdpr_drake.servoing.servo_task import CameraMounting
+from cdpr_drake.systems.cameras.pan_tilt_settings import CameraPanTilt
+from cdpr_drake.systems.diagrams.pan_tilt import LOGGED_ENCODERS, LOGGED_JOINTS, turned_mounting
 from cdpr_drake.systems.diagrams.servo_models import LoopServo
 from cdpr_drake.systems.diagrams.servo_watches import criterion_of, servo_criterion
 from cdpr_drake.systems.diagrams.visual_servo import VisualServo
@@ -63,6 +66,30 @@ def run_criterion(servo: VisualServo | LoopServo) -> ServoCriterion:
     return criterion_of(servo, servo.scenario.controller.pulleys)
 
 
+def turned_criterion(
+    criterion: ServoCriterion, mounting: CameraMounting, settings: CameraPanTilt, joints: Array
+) -> ServoCriterion:
+    """The criterion while a camera's joints are at angles and their encoders read others.
+
+    The servo goes by what the camera would see at rest, reckoned with the encoders: that is what a
+    camera at rest sees whose mounting is off by what the encoders are wrong.
+
+    Args:
+        criterion: Of the camera at rest.
+        mounting: Its mounting, both angles zero.
+        settings: The joints.
+        joints: True angles, and those of the encoders, shape (2, 2) [rad].
+    """
+    true, told = (turned_mounting(mounting, settings, angles).X_BC for angles in joints)
+    off = mounting.X_BC.inverse() @ true @ told.inverse() @ mounting.X_BC
+    sees = criterion.sees
+    return replace(
+        criterion,
+        camera=criterion.camera @ off,
+        sees=lambda X_WP, time: off.inverse() @ sees(X_WP, time),
+    )
+
+
 def stability_along(result: RunResult, threshold: float | None = None) -> StabilityAlong:
     """Cables that pull and the stability criterion along a run, from its log.
 
@@ -74,12 +101,16 @@ def stability_along(result: RunResult, threshold: float | None = None) -> Stabil
     count = len(log["time"])
     rows = np.unique(np.linspace(0, count - 1, min(count, MOST_ROWS)).astype(int))
     slack = log["slack"][rows] > 0.0 if threshold is None else log["tensions"][rows] < threshold
-    criterion = run_criterion(servo)
+    criterion, turns = run_criterion(servo), servo.scenario.camera.pan_tilt
     times, true, estimated = (log[name][rows] for name in ("time", "X_WP", "X_WP_estimated"))
     rank, margin = np.zeros(len(rows)), np.full(len(rows), np.nan)
     for k, time in enumerate(times):
+        at = criterion
+        if turns is not None:
+            angles = np.array([log[name][rows[k]] for name in (LOGGED_JOINTS, LOGGED_ENCODERS)])
+            at = turned_criterion(criterion, servo.mounting, turns, angles)
         try:
-            rank[k], margin[k] = criterion.at(
+            rank[k], margin[k] = at.at(
                 pose_from_row(true[k]), pose_from_row(estimated[k]), ~slack[k], float(time)
             )
         except CableGeometryError:  # of a run that diverged

@@ -187,11 +187,12 @@ def measure(case: Case, _seed: int) -> dict[str, Any]:
 
     Returns:
         outcome; time_s, how long it was; false, how many alarms there were before something failed,
-        of all kinds; told, whether the right detector told of the right cable or device, and
-        delay_s, of a break until the right cable is named for good; first, what was told first
-        after something failed; named, how many other cables were named after a break; carried_n,
-        what the cable that broke pulled; residual_m, torque_n_m and lag_m, the largest before
-        something failed; tension_n, the smallest reading before.
+        of all kinds; told, whether the right detector told of the right cable or device, or, of a
+        motor without power, of a drum that is blocked; by_name, whether as what it is; delay_s, of
+        a break until the right cable is named for good; first, what was told first after something
+        failed; named, how many other cables were named after a break; carried_n, what the cable
+        that broke pulled; residual_m, torque_n_m and lag_m, the largest before something failed;
+        tension_n, the smallest reading before.
     """
     scenario = load_scenario(SCENARIO, overrides(case.keys))
     run = run_scenario(scenario)
@@ -208,6 +209,9 @@ def measure(case: Case, _seed: int) -> dict[str, Any]:
     found = alarms[fails][which] if fails in alarms else np.inf
     if fails == BREAK:
         found = named_for_good(log[ALARMS[BREAK]][:, which], times)
+    by_name = bool(begins <= found < np.inf)
+    if fails == POWER:  # a drum that friction holds is told as blocked: a winch has failed
+        found = min(found, alarms[JAM][which])
     told = bool(begins <= found < np.inf)
     wrong = np.delete(log[ALARMS[BREAK]][~before], max(which, 0), axis=1)
     row = scenario.emergency
@@ -218,6 +222,7 @@ def measure(case: Case, _seed: int) -> dict[str, Any]:
         "false": sum(false.values()),
         "false_kinds": [kind for kind, count in false.items() if count],
         "told": told,
+        "by_name": by_name,
         "delay_s": float(found - begins) if told else None,
         "first": min(after, key=lambda kind: after[kind]) if after else "nothing",
         "named": int(np.sum(np.any(wrong > 0.0, axis=0))) if fails == BREAK else 0,
@@ -323,6 +328,8 @@ def _found(runs: Runs, kind: str) -> Finding:
 def _told(some: Runs, kind: str) -> str:
     told = some["told"].astype(bool)
     words = f"{kind}: {np.sum(told)} of {len(some)} told"
+    if kind == POWER:
+        words += f", {int(np.sum(some['by_name']))} by name, the others as a drum that is blocked"
     if np.any(told):
         delays = 1e3 * some["delay_s"][told]
         words += (

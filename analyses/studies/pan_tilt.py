@@ -66,6 +66,7 @@ def overrides(scheme: str, view: str, seed: int) -> list[str]:
     words = [
         f"seed={seed}", f"initial_pose={{position: {position}, angles_deg: {angles}}}",
         "integration.engine=compiled", f"controller.scheme={scheme}",
+        "tension_management=null",  # of cameras alone
     ]  # fmt: skip
     return words if view == TURNED else [*words, "camera.pan_tilt=null"]
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
+from cdpr_drake.analyses.workspaces.break_tasks import BEST, EXCURSION, SURVIVES, WORST, BreakTask
 from cdpr_drake.analyses.workspaces.stability_tasks import StabilityTask
 from cdpr_drake.arrays import Array
 from cdpr_drake.vision.pinhole import Pinhole
@@ -68,6 +69,7 @@ class PoseConditions:
         view: What the camera shall see; None: none was given.
         stable: The sweep task of the criterion of stability; None: it was not asked for.
         method: Name of the method of tensions for the kind `static`; None: any tensions.
+        breaks: The sweep task of single breaks that are simulated; None: it was not asked for.
     """
 
     case: StaticCase
@@ -80,6 +82,7 @@ class PoseConditions:
     view: CameraView | None = None
     stable: StabilityTask | None = None
     method: str | None = None
+    breaks: BreakTask | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,6 +161,11 @@ def _stable(about: PoseConditions, at: Poses) -> np.ndarray:
     return about.stable(at.start, at.stop)["stable"]
 
 
+def _of_breaks(about: PoseConditions, at: Poses, name: str) -> np.ndarray:
+    assert about.breaks is not None
+    return about.breaks(at.start, at.stop)[name]
+
+
 KINDS: dict[str, Kind] = {
     "static": Kind("the weight can be held", _static),
     "wrench-feasible": Kind("every required wrench can be held", _wrench_feasible, "required"),
@@ -186,9 +194,17 @@ KINDS: dict[str, Kind] = {
         lambda about, at: _far(about, at, slice(4, 5)),
     ),
     "target-visible": Kind("the camera sees the target", _visible, "view"),
+    SURVIVES: Kind(
+        "whichever cable breaks, a reaction keeps the platform in the frame and ends at rest",
+        lambda about, at: _of_breaks(about, at, SURVIVES),
+        "breaks",
+    ),
     "stable": Kind("the visual servo is stable (Z of cdpr stability)", _stable, "stable"),
 }
 """Kinds of workspaces by name. Source: Gazebo thesis 2.6; servoing thesis 1.2.2, (1.25), (3.27)."""
+
+OF_POSES = tuple(name for name in KINDS if name != SURVIVES)
+"""Kinds that are decided without simulating what follows."""
 
 
 def _capacity(about: PoseConditions, at: Poses) -> Array:
@@ -217,6 +233,15 @@ MEASURES: dict[str, Measure] = {
         "N",
         lambda a, at: break_margins(a.case, at.positions, at.rotations, a.required),
     ),
+    EXCURSION: Measure(
+        "largest excursion by the best reaction to the worst break",
+        "m",
+        lambda about, at: _of_breaks(about, at, EXCURSION),
+    ),
+    WORST: Measure(
+        "cable whose break is worst", "number", lambda about, at: _of_breaks(about, at, WORST)
+    ),
+    BEST: Measure("best reaction to that", "number", lambda about, at: _of_breaks(about, at, BEST)),
     "tension-factor": Measure(
         "tension factor", "-", lambda a, at: tension_factors(a.case, at.positions, at.rotations)
     ),

@@ -17,6 +17,8 @@ from matplotlib.ticker import MaxNLocator
 from cdpr_drake.analyses.reporting.deferred_figures import Pictures
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS, figure_writers
 from cdpr_drake.analyses.visualization.figure_style import line_style, new_figure, plain_numbers
+from cdpr_drake.analyses.workspaces.break_figures import breaks_figure
+from cdpr_drake.analyses.workspaces.break_tasks import NUMBERED, SURVIVES
 from cdpr_drake.analyses.workspaces.conditions import MEASURES
 from cdpr_drake.analyses.workspaces.stability_figures import cell_edges, even_choice, plane_axes
 from cdpr_drake.analyses.workspaces.workspace_question import RULES
@@ -57,7 +59,10 @@ def workspace_pictures(
     """What draws the figures that a result suffices for, by the names of their files."""
     drawn: dict[str, Callable[[], Figure]] = {"planes": lambda: planes_figure(workspace)}
     for name in workspace.values:
-        drawn[name] = partial(planes_figure, workspace, name)
+        if name not in NUMBERED:
+            drawn[name] = partial(planes_figure, workspace, name)
+    if SURVIVES in workspace.holds:
+        drawn["breaks"] = partial(breaks_figure, workspace)
     if boxes is not None:
         about = workspace.arguments
         drawn["open_share"] = partial(boxes_figure, boxes, about["robot"], about["cables"])

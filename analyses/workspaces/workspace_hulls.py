@@ -28,8 +28,9 @@ def question_holds(question: WorkspaceQuestion) -> Callable[[Array], np.ndarray]
     Raises:
         WorkspaceError: It has a kind that knows the poses of its grid only.
     """
-    if "stable" in question.kinds:
-        raise WorkspaceError("hull: found kinds stable; accepted: kinds other than that")
+    for name in ("stable", "survives"):
+        if name in question.kinds:
+            raise WorkspaceError(f"hull: found kinds {name}; accepted: kinds other than that")
     turns = np.array([rotation_from_angles(a).matrix() for a in question.grid.angles])
     every = question.rule == "all"
 

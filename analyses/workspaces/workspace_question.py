@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from cdpr_drake.analyses.reporting.provenance import code_version
+from cdpr_drake.analyses.workspaces.break_tasks import OF_BREAKS, SURVIVES, BreakTask
 from cdpr_drake.analyses.workspaces.conditions import (
     KINDS,
     MEASURES,
@@ -104,6 +105,8 @@ class WorkspaceQuestion:
                 },
             }
         )
+        if about.breaks is not None:
+            found["breaks"] = about.breaks.arguments()
         return found
 
 
@@ -178,6 +181,11 @@ class WorkspaceRequest:
         pulleys: Whether cables run over the robot's pulleys; else from fixed exit points.
         method: Name of the method whose tensions must hold the weight, of `tensions.METHODS`, for
             the kind `static`; None: any tensions.
+        reactions: For the kind `survives`, names of `break_report.SAVING`; None: stop,
+            redistribute, brake, retreat.
+        moving: For the kind `survives`, velocity of Po in W when a cable breaks, shape (3,) [m/s];
+            None: at rest.
+        after: For the kind `survives`, how long runs go on after a break [s].
     """
 
     limits: tuple[float, float] | None = None
@@ -191,6 +199,9 @@ class WorkspaceRequest:
     scenario: str | None = None
     pulleys: bool = False
     method: str | None = None
+    reactions: Sequence[str] | None = None
+    moving: Array | Sequence[float] | None = None
+    after: float = 2.0
 
 
 DEFAULT_REQUEST = WorkspaceRequest()
@@ -241,7 +252,19 @@ def make_workspace_question(
         raise WorkspaceError(f"clearance: found {asked.clearance:g}; accepted: >= 0 [m]")
     given, robot = robot, as_robot(robot, "a workspace")
     check_grid(robot, grid)
-    about = pose_conditions(robot, asked)
+    falls = SURVIVES in kinds or bool({*measures} & {*OF_BREAKS})
+    if falls:
+        measures = [*measures, *(name for name in OF_BREAKS if name not in measures)]
+    # Of a scenario whose winches and controller count, nothing is to be seen.
+    sees = not falls or bool({*kinds} & {"target-visible", "stable"})
+    about = pose_conditions(robot, asked if sees else replace(asked, scenario=None))
+    if falls:
+        about = replace(about, breaks=_break_task(robot, asked, grid))
+    elif asked.reactions is not None or asked.moving is not None:
+        given = "moving" if asked.reactions is None else "reactions"
+        raise WorkspaceError(
+            f"{given}: found kinds {','.join(kinds)}; accepted: {SURVIVES} among them"
+        )
     if "stable" in kinds:
         task = None if asked.scenario is None else scenario_task(given, asked.scenario)
         stability = make_question(given, grid=grid, task=task)
@@ -278,6 +301,45 @@ def make_workspace_question(
         asked.scenario or "",
         _cable_words(robot, about.case.cables.has_pulleys(), "stable" in kinds),
     )
+
+
+BREAKING = "acrobot_broken_redistributed"
+"""The scenario whose sections count for the kind `survives` where none is given."""
+
+
+def _break_task(robot: Robot, asked: WorkspaceRequest, grid: WorkspaceGrid) -> BreakTask:
+    """The sweep task of single breaks.
+
+    Raises:
+        WorkspaceError: Something is asked for that is not simulated, or makes no sense.
+        ScenarioError: There is no such scenario, or it is no visual servo.
+    """
+    from cdpr_drake.analyses.simulation.break_report import DEFAULT_SAVING
+    from cdpr_drake.analyses.simulation.break_survival import BreakRequest
+    from cdpr_drake.systems.diagrams.load import load_scenario  # most questions have none
+    from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
+
+    for name in ("mass", "wrench", "required", "accelerations"):
+        if getattr(asked, name) is not None:
+            raise WorkspaceError(
+                f"{name}: found with kinds {SURVIVES}, which simulates the robot as its file has "
+                "it; accepted: without"
+            )
+    scenario = load_scenario(asked.scenario or BREAKING)
+    if not isinstance(scenario, Scenario):
+        raise WorkspaceError(
+            f"scenario {asked.scenario}: found kind {scenario.kind}; accepted for the kind "
+            f"{SURVIVES}: a visual servo"
+        )
+    request = BreakRequest(
+        scenario=scenario,
+        reactions=DEFAULT_SAVING if asked.reactions is None else tuple(asked.reactions),
+        velocity=np.zeros(3) if asked.moving is None else np.asarray(asked.moving, float),
+        after=asked.after,
+        limits=asked.limits,
+    )
+    request.check(robot)
+    return BreakTask(robot, request, grid)
 
 
 def _cable_words(robot: Robot, pulleys: bool, stable: bool) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +13,13 @@ import numpy as np
 from cdpr_drake.analyses.reporting.log_files import finite
 from cdpr_drake.analyses.reporting.progress import WorkProgress
 from cdpr_drake.analyses.reporting.provenance import package_versions
+from cdpr_drake.analyses.workspaces.break_tasks import (
+    BEST,
+    EXCURSION,
+    NUMBERED,
+    SURVIVES,
+    WORST,
+)
 from cdpr_drake.analyses.workspaces.conditions import KINDS, MEASURES
 from cdpr_drake.analyses.workspaces.grid_results import load_grid, region_numbers, save_grid
 from cdpr_drake.analyses.workspaces.grid_runs import SweepOptions, run_poses
@@ -103,7 +111,37 @@ class RobotWorkspace(Tabulated):
             "versions": self.versions,
             "workspaces": {name: self._numbers(name) for name in names},
             "measured": {name: self._range(name) for name in self.values},
+            **({} if WORST not in self.values else {"broken": self._broken()}),
         }
+
+    def _broken(self) -> dict[str, Any]:
+        """What single breaks led to: how often a cable was worst, a reaction best, and each pose.
+
+        Names are null where all cables do not hold the pose.
+        """
+        about = self.arguments["breaks"]
+        names = {WORST: about["cable_names"], BEST: about["reactions"]}
+        told = {
+            key: [None if np.isnan(n) else of[int(n) - 1] for n in self.values[key].ravel()]
+            for key, of in names.items()
+        }
+        far = [finite(float(one)) for one in self.values[EXCURSION].ravel()]
+        rows = self.grid.pose_rows(0, self.grid.size)
+        kept = self.holds.get(SURVIVES)
+        verdicts = [None] * len(far) if kept is None else kept.ravel().tolist()
+        return {
+            "worst_cables": dict(Counter(filter(None, told[WORST]))),
+            "best_reactions": dict(Counter(filter(None, told[BEST]))),
+            "poses": [
+                {
+                    "pose_m_rad": row.tolist(), "survives": verdict, "worst_cable": cable,
+                    "best_reaction": reaction, "excursion_m": excursion,
+                }
+                for row, verdict, cable, reaction, excursion in zip(
+                    rows, verdicts, told[WORST], told[BEST], far, strict=True
+                )
+            ],
+        }  # fmt: skip
 
     def _numbers(self, kind: str) -> dict[str, Any]:
         inside = self.inside(kind)
@@ -136,7 +174,7 @@ class RobotWorkspace(Tabulated):
             volume = self.volume(name)
             share = f"{100.0 * numbers['pose_share']:.4g} % of the poses"
             rows.append((name, f"{share}, {volume.value:.4g} {volume.unit}"))
-        for name in list(self.values)[:SHOWN]:
+        for name in [one for one in self.values if one not in NUMBERED][:SHOWN]:
             one = told["measured"][name]
             least, most = one["least"], one["largest"]
             words = "none" if least is None else f"{least:.4g} to {most:.4g} {one['unit']}"
@@ -218,6 +256,8 @@ def robot_workspace(
         )
 
     size = SLOW_CHUNK_POSES if SLOW & {*question.kinds} else CHUNK_POSES
+    if question.about.breaks is not None:
+        size = 1  # seconds of work
     tasks = {TASK: (question.task(), question.grid.size)}
     how = SweepOptions(folder, workers, scheduler, on_progress, should_stop)
     run = run_poses(arguments, tasks, size, assemble, load_robot_workspace, how)

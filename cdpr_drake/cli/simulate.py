@@ -16,6 +16,7 @@ from cdpr_drake.analyses.front.simulation import simulate as run_scenario
 from cdpr_drake.analyses.reporting.exported_logs import checked_log_formats
 from cdpr_drake.analyses.reporting.folder_lock import free_folder
 from cdpr_drake.analyses.reporting.progress import WorkProgress
+from cdpr_drake.analyses.simulation.break_report import REACTIONS
 from cdpr_drake.analyses.simulation.live_control import Steering
 from cdpr_drake.analyses.simulation.live_messages import open_connection
 from cdpr_drake.analyses.simulation.monte_carlo_report import repetition_table
@@ -37,6 +38,7 @@ from cdpr_drake.cli.options import (
     parse_formats,
 )
 from cdpr_drake.cli.process import INTERRUPTED
+from cdpr_drake.cli.reactions import tell_reactions
 from cdpr_drake.cli.run_endings import CLIENT_ENDED, INCOMPLETE, report_failures
 from cdpr_drake.cli.terminal import print_json, wide_console
 from cdpr_drake.errors import ScenarioError
@@ -116,6 +118,29 @@ def simulate(
     ] = False,
     host: Host = None,
     port: Port = None,
+    compare: Annotated[
+        int | None,
+        typer.Option(
+            "--compare-reactions",
+            help="Breaks this cable (numbered from 0) once for each reaction, and compares; takes "
+            "--set, --camera, --seed, --out and --json.",
+        ),
+    ] = None,
+    break_time: Annotated[
+        float | None, typer.Option(help="With --compare-reactions: when it breaks [s]; 1.")
+    ] = None,
+    after: Annotated[
+        float | None,
+        typer.Option(help="With --compare-reactions: for how long runs go on after it [s]; 2."),
+    ] = None,
+    reactions: Annotated[
+        str | None,
+        typer.Option(
+            help="With --compare-reactions: which, separated by commas; all: "
+            + ", ".join(REACTIONS)
+            + "."
+        ),
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
     steered_by: Annotated[
         int | None,
@@ -127,7 +152,7 @@ def simulate(
     if left is not None:
         given: list[object] = [out, camera, duration, seed, seeds, workers, settings, host, port]
         given += [overwrite or None, meshcat or None, log_rate, finish and resume, scheduler]
-        given += [steered_by]
+        given += [steered_by, compare]
         if scenario != DEFAULT_SCENARIO or any(option is not None for option in given):
             raise ScenarioError(
                 f"--{'continue' if finish is None else 'finish'}: accepted with --format, "
@@ -138,8 +163,30 @@ def simulate(
             "video": video,
         }  # fmt: skip
         return _left(left, resume is not None, as_json, wanted)
+    of_break = {"time": break_time, "after": after, "reactions": reactions}
+    if compare is not None:
+        others = {
+            "--duration": duration, "--seeds": seeds, "--workers": workers, "--video": video,
+            "--scheduler": scheduler, "--log-rate": log_rate, "--log-format": log_format,
+            "--meshcat": meshcat, "--host": host, "--port": port, "--steered-by": steered_by,
+        }  # fmt: skip
+        _refuse(*(
+            (value not in (None, False), f"{name}: accepted without --compare-reactions")
+            for name, value in others.items()
+        ))  # fmt: skip
+        return tell_reactions(
+            scenario, compare, of_break, out,
+            overrides=_overrides(settings, {"camera.kind": camera, "seed": seed}),
+            formats=parse_formats(figure_format), overwrite=overwrite, as_json=as_json,
+        )  # fmt: skip
+    _refuse(*(
+        (value is not None, f"{name}: accepted with --compare-reactions only")
+        for name, value in zip(
+            ("--break-time", "--after", "--reactions"), of_break.values(), strict=True
+        )
+    ))  # fmt: skip
     kind = SCENARIO_KINDS[scenario_kind(scenario)]
-    overrides, formats = list(settings or []), parse_formats(figure_format)
+    formats = parse_formats(figure_format)
     _refuse(
         (
             not kind.has_camera and (camera is not None or video),
@@ -179,11 +226,10 @@ def simulate(
     )
     repeated = None if seeds is None else parse_seeds(seeds)
     exports = _log_formats(log_format)
-    for key, value in (
-        ("camera.kind", camera), ("duration", duration), ("seed", seed), ("log_rate", log_rate)
-    ):  # fmt: skip
-        if value is not None:
-            overrides.append(f"{key}={value}")
+    overrides = _overrides(
+        settings,
+        {"camera.kind": camera, "duration": duration, "seed": seed, "log_rate": log_rate},
+    )
     loaded = load_scenario(scenario, overrides)
     if repeated is not None:
         folder = out if out is not None else repetition_folder(set_loop(loaded, True)[0])
@@ -204,6 +250,12 @@ def simulate(
         code = tell_run(found, session, as_json)
     session.say_kept()
     return code
+
+
+def _overrides(settings: list[str] | None, given: dict[str, object]) -> list[str]:
+    """Items of --set, and those of options that were given."""
+    more = [f"{key}={value}" for key, value in given.items() if value is not None]
+    return [*(settings or []), *more]
 
 
 def _left(folder: Path, goes_on: bool, as_json: bool, wanted: dict[str, Any]) -> int:

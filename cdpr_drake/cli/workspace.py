@@ -21,6 +21,8 @@ from cdpr_drake.analyses.front.workspaces import (
     workspace_question,
 )
 from cdpr_drake.analyses.reporting.output_folder import shown_path
+from cdpr_drake.analyses.simulation.break_report import DEFAULT_SAVING, SAVING
+from cdpr_drake.analyses.workspaces.break_tasks import NUMBERED
 from cdpr_drake.analyses.workspaces.conditions import KINDS, MEASURES
 from cdpr_drake.analyses.workspaces.workspace_results import RobotWorkspace
 from cdpr_drake.cli.completion import words_among
@@ -147,13 +149,19 @@ def print_workspace(found: RobotWorkspace, told: dict[str, Any], folder: Path) -
         table.add_column("measure", no_wrap=True)
         for heading in ("least", "median", "largest"):
             table.add_column(heading, justify="right", no_wrap=True)
-        for numbers in told["measured"].values():
+        for name, numbers in told["measured"].items():
+            if name in NUMBERED:
+                continue
             values = [numbers[key] for key in ("least", "median", "largest")]
             table.add_row(
                 f"{numbers['title']} [{numbers['unit']}]",
                 *("-" if value is None else f"{value:.4g}" for value in values),
             )
         printer.print(table)
+    if "broken" in told:
+        for words, key in (("worst cable", "worst_cables"), ("best reaction", "best_reactions")):
+            counts = ", ".join(f"{name} at {n}" for name, n in told["broken"][key].items())
+            printer.print(f"{words} of the poses: {counts or 'none'}")
     if "hull" in told:
         hull = told["hull"]
         printer.print(
@@ -231,7 +239,8 @@ OPTIONS = {
     "hull": "--hull", "unbounded": "--unbounded", "box": "--box", "mesh": "--mesh",
     "certify": "--certify", "boxes": "--boxes", "boxes_mesh": "--boxes-mesh",
     "refine": "--refine", "refine_reach": "--refine-reach", "refine_boxes": "--refine-boxes",
-    "exit_error": "--exit-error", "anchor_error": "--anchor-error",
+    "exit_error": "--exit-error", "anchor_error": "--anchor-error", "reactions": "--reactions",
+    "moving": "--moving", "after": "--after",
 }  # fmt: skip
 """Options by the arguments of `compute_workspace`."""
 
@@ -284,7 +293,11 @@ def workspace(
         typer.Option(help="Length next to exit points not compared with the frame [m]."),
     ] = None,
     scenario: Annotated[
-        str | None, typer.Option(help="Scenario whose camera and target count.")
+        str | None,
+        typer.Option(
+            help="Scenario whose camera and target count; for survives, cables, winches and "
+            "torque_control."
+        ),
     ] = None,
     hull: Annotated[
         str | None,
@@ -313,6 +326,20 @@ def workspace(
             autocompletion=words_among(list(METHODS)),
         ),
     ] = None,
+    reactions: Annotated[
+        str | None,
+        typer.Option(
+            help="For survives: one or several, separated by commas: " + ", ".join(SAVING) + "; "
+            "without it " + ", ".join(DEFAULT_SAVING) + "."
+        ),
+    ] = None,
+    moving: Annotated[
+        str | None,
+        typer.Option(help="For survives: velocity x,y,z when a cable breaks [m/s]; at rest."),
+    ] = None,
+    after: Annotated[
+        float, typer.Option(help="For survives: how long runs go on after a break [s].")
+    ] = 2.0,
     rays: Annotated[int, typer.Option(help="Rays of the hull, at most.")] = 10_000,
     tolerance: Annotated[
         float, typer.Option(help="How near to the border rays of the hull end [m].")
@@ -380,7 +407,11 @@ def workspace(
             "moment": moment, "accelerations": parse_accelerations(acceleration),
             "velocities": parse_velocities(velocity or []), "clearance": clearance,
             "obstacles": obstacles, "exit_free": exit_free, "anchor_free": anchor_free,
-            "scenario": scenario, "pulleys": pulleys, "method": method,
+            "scenario": scenario, "pulleys": pulleys, "method": method, "after": after,
+            "reactions": None if reactions is None else reactions.split(","),
+            "moving": None if moving is None else parse_numbers(
+                "--moving", moving, (3,), "x,y,z [m/s]"
+            ),
         }  # fmt: skip
         question = workspace_question(robot, **asked)
         some = question.kinds[0] if len(question.kinds) == 1 else f"{len(question.kinds)}-kinds"

@@ -4,22 +4,26 @@ The believed pose and cables put the two ends of a cable into space; a cable tha
 the vertical plane through them. `find_sags` looks into the image along that plane: a strip of it,
 stations along the cable by drops below the line between the ends, is read from the image, thin dark
 lines are made out in each station, and the inextensible catenary that most of them are on is fitted
-to them, with what the ends may be off. The fit's covariance is that of the sag.
+to them, with what the ends may be off, and with the error of the believed pose, which moves the
+whole curve in the image. The fit's covariance is that of the sag. Neighbouring stations do not err
+independently of each other: by the correlation of their residuals they count for fewer.
 
 Source: servoing thesis, perspectives; Irvine, Cable Structures, 1981, 1.1 and 2.1.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.errors import CdprError
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.geometry.poses import exponential
 from cdpr_drake.vision.cable_images import (
     LEAST_ANGLE,
     LEAST_SPAN,
@@ -47,8 +51,8 @@ class SightSettings:
         near: How far from a curve a line may be to be on it [px].
         share: Of the stations that must have a line on the curve.
         noise: By how much a line is off its curve, about [px].
-        ends: Standard deviation of each coordinate of where an end is, by the errors of pose and
-            points [m].
+        ends: Standard deviation of each coordinate of where an end is, by the errors of points,
+            and by those of the pose where `find_sags` is not told its covariance [m].
         least_sag: From which a cable counts as slack [m].
         sigmas: By how many standard deviations a sag must be above zero to count.
     """
@@ -97,6 +101,8 @@ def find_sags(
     X_WE: RigidTransform,
     pinhole: Pinhole,
     settings: SightSettings | None = None,
+    *,
+    pose_covariance: Array | None = None,
 ) -> SeenSags:
     """Sags of cables in an image.
 
@@ -107,9 +113,12 @@ def find_sags(
         X_WE: The camera E in W as believed [m].
         pinhole: Its intrinsic parameters; without a lens.
         settings: How they are looked for; None: the defaults.
+        pose_covariance: Of the twist (w, v) of P in P by which the believed pose is off, shape
+            (6, 6) [rad, m]; None: `settings.ends` has it.
 
     Raises:
         CableGeometryError: An anchor point lies in the groove of its pulley.
+        CdprError: The covariance is of another shape, or none.
     """
     wanted = settings or SightSettings()
     grey = image if image.ndim == 2 else cv2.cvtColor(
@@ -121,10 +130,16 @@ def find_sags(
     m = cables.count
     found = np.full((4, m), np.nan)
     verdict, points = np.full(m, UNSEEN), [np.empty((2, 0))] * m
-    strips = [_Strip.of(paths.p_WT[:, k], ends[:, k], X_WE, pinhole, wanted) for k in range(m)]
+    moved = _moved_ends(cables, X_WP, pose_covariance)
+    strips = [
+        _Strip.of(paths.p_WT[:, k], ends[:, k], X_WE, pinhole, wanted, moved[:, :, :, k])
+        for k in range(m)
+    ]
     for k, fit in _shared_out(strips, grey, wanted).items():
         strip = strips[k]
         assert strip is not None
+        if fit.sag < -IMPOSSIBLE * fit.sigma:  # no cable hangs upwards: its line is not its own
+            continue
         points[k] = fit.uv
         # By the sag's own growth with the root, about constant.
         flat = drop_per_root(strip.span, strip.rise)
@@ -136,6 +151,25 @@ def find_sags(
         verdict[k] = SLACK if fit.sag > least else TAUT
     sag, sigma, surplus, surplus_sigma = found
     return SeenSags(sag, sigma, surplus, surplus_sigma, verdict, points)
+
+
+def _moved_ends(cables: CableSet, X_WP: RigidTransform, covariance: Array | None) -> Array:
+    """Ends of cables by poses that are off by a standard deviation along each independent
+    direction, shape (q, 2, 3, m) [m]; q = 0 without a covariance."""
+    if covariance is None:
+        return np.empty((0, 2, 3, cables.count))
+    given = np.asarray(covariance, float)
+    values, vectors = np.linalg.eigh(given) if given.shape == (6, 6) else (np.array([-1.0]), given)
+    if not np.all(np.isfinite(given)) or np.min(values) < -1e-9 * np.max(np.abs(values)):
+        raise CdprError(
+            f"pose_covariance: found shape {given.shape} with least eigenvalue {np.min(values):g}; "
+            "accepted: a covariance of (w, v), shape (6, 6) [rad, m]"
+        )
+    found = []
+    for value, vector in zip(values, vectors.T, strict=True):
+        paths = cable_paths(X_WP @ exponential(np.sqrt(max(value, 0.0)) * vector), cables)
+        found.append([paths.p_WT, paths.p_WT + paths.free * paths.u_W])
+    return np.array(found)
 
 
 @dataclass(frozen=True)
@@ -219,6 +253,7 @@ class _Strip:
         across: Pixels across the line for a metre of drop, by station, shape (n,) [px/m].
         slant: Pixels for a metre across the line of sight over those, at both ends, shape (2,) [-]:
             an end that is off by a metre in any direction is off by so many metres of drop.
+        moved: Both ends by poses that are off, shape (q, 2, 3), see `_moved_ends` [m].
     """
 
     start: Array
@@ -230,11 +265,13 @@ class _Strip:
     drops: Array
     across: Array
     slant: Array
+    moved: Array
 
     @staticmethod
     def of(
-        start: Array, end: Array, X_WE: RigidTransform, pinhole: Pinhole, wanted: SightSettings
-    ) -> _Strip | None:
+        start: Array, end: Array, X_WE: RigidTransform, pinhole: Pinhole, wanted: SightSettings,
+        moved: Array,
+    ) -> _Strip | None:  # fmt: skip
         """The strip of a cable; None where its sag could not be seen."""
         rise = end - start
         span = float(np.hypot(rise[0], rise[1]))
@@ -244,7 +281,7 @@ class _Strip:
         normal = np.array([-out[1], out[0], 0.0])
         R_EW = X_WE.rotation().matrix().T
         camera = pinhole.matrix() @ R_EW, -pinhole.matrix() @ R_EW @ X_WE.translation()
-        coarse = _Strip(start, out, span, float(rise[2]), camera, *4 * (np.empty(0),))
+        coarse = _Strip(start, out, span, float(rise[2]), camera, *5 * (np.empty(0),))
         x = span * np.linspace(0.02, 0.98, 97)
         uv, down = coarse.pixels(x, np.zeros_like(x)), coarse.pixels(x, np.full_like(x, 1e-3))
         if not np.all(np.isfinite(uv)):
@@ -268,7 +305,7 @@ class _Strip:
         depths = R_EW[2] @ sight[:, [0, -1]]
         slant = np.sqrt(pinhole.fx * pinhole.fy) / depths / across[[0, -1]]
         drops = np.arange(-6.0 * wanted.near / size, wanted.largest_sag * chord, wanted.step / size)
-        return _Strip(start, out, span, float(rise[2]), camera, x, drops, spread, slant)
+        return _Strip(start, out, span, float(rise[2]), camera, x, drops, spread, slant, moved)
 
     def pixels(self, x: Array, drop: Array) -> Array:
         """Pixels of points of the plane, shape (2, ...) [px]; NaN behind the camera."""
@@ -344,49 +381,114 @@ class _Strip:
         at = self.x if x is None else x
         return np.sign(root) * catenary_drop(at, self.span, self.rise, root**2)
 
+    def _pose_rows(self, root: float) -> tuple[Array, Array]:
+        """What the curve of a root does where the pose is off by a standard deviation along each
+        direction: drops at the stations, shape (n, q), and sags, shape (q,) [m].
+
+        The curve moves in the image with both its ends, along itself, too: what counts is how far
+        it moves across itself there.
+        """
+        base = self.pixels(self.x, self.curve(root))
+        tangent = np.gradient(base, axis=1)
+        normal = np.array([-tangent[1], tangent[0]])
+        down = self.pixels(self.x, self.curve(root) + SMALL_DROP) - base
+        per_drop = np.sum(down * normal, axis=0) / SMALL_DROP
+        flat = np.abs(per_drop) < 1e-6 * np.linalg.norm(normal, axis=0)
+        middle = float(self.curve(root, np.array([0.5 * self.span]))[0])
+        rows, sags = np.zeros((len(self.x), len(self.moved))), np.zeros(len(self.moved))
+        for k, (start, end) in enumerate(self.moved):
+            rise = end - start
+            span = float(np.hypot(rise[0], rise[1]))
+            out = np.array([rise[0], rise[1], 0.0]) / span
+            other = replace(self, start=start, out=out, span=span, rise=float(rise[2]))
+            x = self.x * span / self.span
+            off = np.sum((other.pixels(x, other.curve(root, x)) - base) * normal, axis=0)
+            rows[:, k] = np.where(flat, 0.0, off / np.where(flat, 1.0, per_drop))
+            sags[k] = float(other.curve(root, np.array([0.5 * span]))[0]) - middle
+        return rows, sags
+
     def _refined(
         self, station: np.ndarray, drop: Array, root: float, wanted: SightSettings
     ) -> _Fit | None:
-        """The fit of both ends and the root of the surplus [m^0.5] to lines near the curve, by
-        Gauss and Newton, with Cauchy's weights."""
-        state, t = np.array([0.0, 0.0, root]), self.x / self.span
-        chosen, covariance = np.zeros(0, int), np.full((3, 3), np.nan)
+        """The fit of both ends, the root of the surplus [m^0.5], and how far the pose is off, in
+        standard deviations, to lines near the curve, by Gauss and Newton, with Cauchy's weights."""
+        t, (of_pose, of_sag) = self.x / self.span, self._pose_rows(root)
+        size, q = np.inf, len(of_sag)
+        state, normal = np.concatenate([[0.0, 0.0, root], np.zeros(q)]), np.eye(3 + q)
+        chosen = np.zeros(0, int)
         for _ in range(FITS):
             curve = state[0] * (1.0 - t) + state[1] * t + self.curve(state[2])
+            curve = curve + of_pose @ state[3:]
             off = (drop - curve[station]) * self.across[station]
             chosen = _nearest(station, off, 2.0 * wanted.near)
             if len(chosen) < wanted.share * len(self.x):
                 return None
             at = station[chosen]
             slope = (self.curve(state[2] + STEP) - self.curve(state[2] - STEP)) / (2.0 * STEP)
-            # Pixels across the line for both ends and the root.
-            J = np.column_stack([1.0 - t[at], t[at], slope[at]]) * self.across[at][:, np.newaxis]
+            # Pixels across the line for both ends, the root, and the pose.
+            J = np.column_stack([1.0 - t[at], t[at], slope[at], of_pose[at]])
+            J *= self.across[at][:, np.newaxis]
             size = max(float(np.median(np.abs(off[chosen]))) / MEDIAN_SHARE, LEAST_NOISE)
             weight = np.sqrt(1.0 / (1.0 + (off[chosen] / (CAUCHY * size)) ** 2))
-            prior = np.eye(2, 3) * (size / (wanted.ends * self.slant))[:, np.newaxis]
+            size *= np.sqrt(_repeated(at, off[chosen] * weight))
+            prior = np.zeros((2 + q, 3 + q))
+            prior[[0, 1], [0, 1]] = size / (wanted.ends * self.slant)
+            prior[range(2, 2 + q), range(3, 3 + q)] = size
             A = np.vstack([J * weight[:, np.newaxis], prior])
             b = np.concatenate([off[chosen] * weight, -prior @ state])
             normal = np.linalg.inv(A.T @ A)
             change = normal @ (A.T @ b)
-            state, covariance = state + change, size**2 * normal
+            state = state + change
             if abs(change[2]) < 1e-7:
                 break
         middle = np.array([0.5 * self.span])
         here, there = (float(self.curve(state[2] + k * STEP, middle)[0]) for k in (0.0, 1.0))
-        sigma = abs(there - here) / STEP * np.sqrt(covariance[2, 2])
+        per_state = np.concatenate([[0.0, 0.0, (there - here) / STEP], of_sag])
+        sigma = size * np.sqrt(per_state @ normal @ per_state)
         uv = self.pixels(self.x[station[chosen]], drop[chosen])
         weights = 1.0 / (1.0 + (off[chosen] / wanted.noise) ** 2)
         # Another cable's line may be as long and as smooth, but ends elsewhere.
         far = float(np.max(np.abs(state[:2]) / self.slant)) / wanted.ends
+        far = max(far, float(np.max(np.abs(state[3:]), initial=0.0)))
         share = float(np.sum(weights)) / len(self.x) / (1.0 + (far / FAR) ** 4)
-        return _Fit(float(state[2]), here, float(sigma), uv, share)
+        sag = here + float(of_sag @ state[3:])
+        return _Fit(float(state[2]), sag, float(sigma), uv, share)
 
+
+def _repeated(station: np.ndarray, off: Array) -> float:
+    """How many residuals, in the order of their stations, count as one; 1 where they are
+    independent.
+
+    Lines are made out from pixels that neighbouring stations share, but no others: by the
+    correlation c of neighbours a smooth curve through many is known as through 1 / (1 + 2 c) of
+    them, and c of such a process is at most 1 / 2.
+    """
+    order = np.argsort(station)
+    at, r = station[order], off[order] - np.mean(off)
+    near, power = np.diff(at) == 1, float(np.mean(r * r))
+    if np.count_nonzero(near) < LEAST_PAIRS or power == 0.0:
+        return 1.0
+    c = float(np.mean((r[:-1] * r[1:])[near])) / power
+    return 1.0 + 2.0 * min(max(c, 0.0), MOST_CORRELATED)
+
+
+LEAST_PAIRS = 8
+"""Pairs of neighbouring stations of which a correlation is taken."""
+
+MOST_CORRELATED = 0.5
+"""Correlation of neighbours where those farther off are independent, at most."""
+
+SMALL_DROP = 1e-4
+"""Of derivatives by drops [m]."""
 
 HYPOTHESES = 6
 """Curves of a cable that are fitted, of which the best counts."""
 
 FAR = 4.0
 """Error of an end, in standard deviations, by which a curve counts half."""
+
+IMPOSSIBLE = 4.0
+"""Standard deviations of a sag by which it may be below zero by chance."""
 
 FITS = 15
 """Of Gauss and Newton's method, which chooses its points anew each time."""

@@ -14,6 +14,7 @@ from cdpr_drake.errors import ScenarioError, SensorError
 from cdpr_drake.estimation.break_detection import silent_reading
 from cdpr_drake.estimation.failure_detection import AlarmRule
 from cdpr_drake.estimation.failure_watch import EncoderWatch, MotorWatch, repeats_in_a_row
+from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.sensor_catalogue import TensionSensorModel, load_tension_sensor
 from cdpr_drake.statics.nearest_held_pose import Load, nearest_held_pose
@@ -231,10 +232,21 @@ def _ways_out(
     """What a reaction that moves the platform knows of it; None for others."""
     if settings.reaction not in (RETREAT, DESCEND):
         return None
-    robot = blocks.robot
-    cables = blocks.believed.cables.without_pulleys()
+    most = wanted_limits(scenario.torque_control or TorqueControl(), blocks.robot)[1]
+    return ways_out(settings, blocks.robot, blocks.believed.cables, most)
+
+
+def ways_out(settings: EmergencySettings, robot: Robot, believed: CableSet, most: float) -> WaysOut:
+    """What a reaction that moves the platform knows of a robot.
+
+    Args:
+        settings: The reaction.
+        robot: The robot.
+        believed: Its cables as believed.
+        most: Largest tension that is asked for [N].
+    """
+    cables = believed.without_pulleys()
     load = Load(robot.platform.mass, robot.center_of_mass(), robot.gravity_vector())
-    most = wanted_limits(scenario.torque_control or TorqueControl(), robot)[1]
     anchors = cables.p_PB
     size = float(np.sqrt(np.mean(np.sum(anchors**2, axis=0))))
     home = robot.home.transform()

@@ -31,6 +31,11 @@ if TYPE_CHECKING:
 UNFIT_ESTIMATORS = ("fusion", "sensor_fusion", "known_tag", "eye_to_hand")
 """Estimators with cameras or errors of images of their own, which know nothing of joints."""
 
+LATER = {
+    "stability": ", and run_stability.stability_along after the run, which reckons with the joints"
+}
+"""What does the same for a camera that turns."""
+
 LOGGED_JOINTS, LOGGED_ENCODERS = "camera_joints", "camera_encoders"
 LOGGED_IMAGE, LOGGED_FOUND = "turned_corners_px", "turned_found"
 
@@ -203,7 +208,7 @@ def check_pan_tilt(scenario: Scenario, robot: Robot, path: Path) -> None:
         if section is not None:
             raise ScenarioError(
                 f"{path}: {key}: found a section with camera.pan_tilt, of whose joints it knows "
-                "nothing; accepted: null"
+                f"nothing; accepted: null{LATER.get(key, '')}"
             )
     flaws = scenario.camera.flaws
     if flaws is not None and flaws.flaws().moves:

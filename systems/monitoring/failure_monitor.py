@@ -66,9 +66,11 @@ class FailureMonitor(LeafSystem):
     length_lag      vector(m)      m    out, by how much each encoder lags behind its drive
     =============== ============== ==== ========================================================
 
-    Samples its inputs at a rate; alarms stay. A drum that is blocked, and one whose static friction
-    holds it although its motor has no power, look alike: both are `found_jammed`. After one
-    failure others may be told that it brings with it: the first one counts.
+    Samples its inputs at a rate; alarms stay, but for one. A drum that is blocked, and one whose
+    static friction holds it although its motor has no power, look alike while they stand: both are
+    `found_jammed`. A cable can turn the second one only: a drum that was told jammed and turns, as
+    often in a row as makes an alarm, is `found_powerless` from then on. After one failure others
+    may be told that it brings with it: the first one counts.
     """
 
     def __init__(self, rules: WatchRules) -> None:
@@ -90,6 +92,7 @@ class FailureMonitor(LeafSystem):
             "encoder_counts": (5, np.zeros(m)),
             # Flags, for how long without a sight, with the same one, and that.
             "camera": (6, np.concatenate([np.zeros(4), np.full(7, np.nan)])),
+            "turns": (7, np.zeros(m)),
         }
         tickets = {}
         for name, (_, start) in self._parts.items():
@@ -127,18 +130,20 @@ class FailureMonitor(LeafSystem):
         )
         first = (unexplained > 0.0) & (flags[0] + flags[1] == 0.0)
         stands = rules.motor.stands(rates)
+        turns = np.where(stands, 0.0, self._part(context, "turns") + 1.0)
+        driven = (flags[0] > 0.0) & (turns >= rules.torque.in_a_row)
         repeats = count_repeats(self._part(context, "repeats"), tensions)
         encoder = rules.encoder.step(self._part(context, "encoder"), lengths, rates)
         behind, lags = rules.lag.step(self._part(context, "encoder_counts"), np.abs(encoder[0]))
         flags = np.array([
-            np.maximum(flags[0], first & stands),
-            np.maximum(flags[1], first & np.logical_not(stands)),
+            np.maximum(flags[0], first & stands) * np.logical_not(driven),
+            np.maximum(flags[1], driven | (first & np.logical_not(stands))),
             np.maximum(flags[2], repeats[0] >= rules.repeats - 1.0), lags,
         ])  # fmt: skip
         for name, value in (
             ("flags", flags), ("motor", motor), ("motor_counts", strange), ("repeats", repeats),
             ("encoder", encoder), ("encoder_counts", behind),
-            ("camera", self._look(self._part(context, "camera"), context)),
+            ("camera", self._look(self._part(context, "camera"), context)), ("turns", turns),
         ):  # fmt: skip
             state.set_value(self._parts[name][0], np.asarray(value, float).ravel())
 

@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 from cdpr_drake.cables.curves import cable_curves
+from cdpr_drake.errors import CdprError
 from cdpr_drake.geometry.cable_paths import cable_paths
-from cdpr_drake.geometry.poses import pose_from_angles
+from cdpr_drake.geometry.poses import exponential, pose_from_angles
 from cdpr_drake.models.camera_catalogue import load_camera
 from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.vision.cable_detection import SLACK, TAUT, UNSEEN, find_sags
+from cdpr_drake.vision.cable_detection import SLACK, TAUT, UNSEEN, SightSettings, find_sags
 from cdpr_drake.vision.cable_images import sag_of_surplus
 from cdpr_drake.vision.cable_pictures import CABLE_COLOR, draw_cables
 
@@ -130,3 +131,25 @@ def test_grey_images_are_taken_too():
     image = picture()
     grey = cv2.cvtColor(image, cv2.COLOR_RGB2GRAY)
     np.testing.assert_array_equal(found(grey).sag, found(image).sag)
+
+
+def test_an_error_of_the_pose_is_in_the_deviations_of_sags():
+    """What is told of the pose counts, and only that: deviations grow with it, and sags of a pose
+    that is off stay within them, which they would not as if it were exact."""
+    cables, _, X_WE, pinhole = scene()
+    image, sure = picture(), SightSettings(ends=5e-5)
+    twist = np.concatenate([np.radians([0.1, -0.1, 0.1]), [1e-3, -5e-4, 5e-4]])
+    told = np.diag(np.repeat([np.radians(0.1), 8e-4], 3) ** 2)
+    wrong = POSE @ exponential(twist)
+    seen = find_sags(image, cables, wrong, X_WE, pinhole, sure, pose_covariance=told)
+    assert list(seen.verdict) == [SLACK if s > 0.0 else TAUT for s in SURPLUS]
+    np.testing.assert_array_less(np.abs(seen.sag - truth()), KNOWN * seen.sigma)
+    exact = find_sags(image, cables, POSE, X_WE, pinhole, sure, pose_covariance=np.zeros((6, 6)))
+    assert np.mean(exact.sigma) < 0.8 * np.mean(seen.sigma)
+    np.testing.assert_array_less(np.abs(exact.sag - truth()), KNOWN * exact.sigma)
+    more = find_sags(image, cables, wrong, X_WE, pinhole, sure, pose_covariance=4.0 * told)
+    assert np.mean(seen.sigma) < np.mean(more.sigma)
+    blind = find_sags(image, cables, wrong, X_WE, pinhole, sure, pose_covariance=np.zeros((6, 6)))
+    assert not np.all(np.abs(blind.sag - truth()) < KNOWN * blind.sigma)
+    with pytest.raises(CdprError, match="pose_covariance: found shape"):
+        find_sags(image, cables, POSE, X_WE, pinhole, sure, pose_covariance=-np.eye(6))

@@ -19,7 +19,7 @@ from cdpr_drake.analyses.studies.workspaces.items import (
 )
 from cdpr_drake.analyses.visualization.figure_style import bar_style, bare_figure, new_figure
 from cdpr_drake.analyses.visualization.solids import draw_solid
-from cdpr_drake.analyses.workspaces.conditions import KINDS
+from cdpr_drake.analyses.workspaces.conditions import OF_POSES
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.palette import WORKSPACES, look_of
 from cdpr_drake.workspaces.volume import surface_quads
@@ -83,7 +83,7 @@ def static_figure(runs: Runs, number: str, robots: tuple[str, ...]) -> Figure:
 def kinds_figure(runs: Runs) -> Figure:
     """Share of the frame's poses where each kind holds, a bar for each robot."""
     kinds = runs(group=EVERY)
-    names = [*KINDS, ALL_BUT_CLOSURE, ALL]
+    names = [*OF_POSES, ALL_BUT_CLOSURE, ALL]
     robots = kinds.list("robot")
     figure, axes = new_figure(1, 1, (10.0, 9.5), "Where each kind holds, of the poses in the frame")
     size = 0.85 / len(kinds)
@@ -121,7 +121,7 @@ def pairs_figure(runs: Runs) -> Figure:
     panels = list(np.ravel(grid))
     image = None
     for number, (axes, one) in enumerate(zip(panels, kinds, strict=False)):
-        names, together = list(KINDS), one["pose_shares_of_pairs"]
+        names, together = list(OF_POSES), one["pose_shares_of_pairs"]
         shares = np.full((len(names), len(names)), np.nan)
         for a, first in enumerate(names):
             for b, second in enumerate(names[: a + 1]):

@@ -15,7 +15,7 @@ from cdpr_drake.analyses.studies.framework.runs import Run
 from cdpr_drake.analyses.studies.framework.study import Case, Form
 from cdpr_drake.analyses.studies.workspaces.distances import POSES, QUICK_POSES, DistanceTask
 from cdpr_drake.analyses.studies.workspaces.distances import ROBOTS as DISTANCE_ROBOTS
-from cdpr_drake.analyses.workspaces.conditions import KINDS
+from cdpr_drake.analyses.workspaces.conditions import OF_POSES
 from cdpr_drake.analyses.workspaces.workspace_question import (
     WorkspaceQuestion,
     WorkspaceRequest,
@@ -262,7 +262,7 @@ def robot_cases(name: str, counts: Sequence[int]) -> Iterator[Case]:
     grid = frame_grid(robot, counts)
     asked, problem = _asked_of(robot, name, grid)
     left_out = {} if problem is None else {CAMERA_KIND: problem}
-    wanted = [kind for kind in KINDS if kind != CAMERA_KIND or problem is None]
+    wanted = [kind for kind in OF_POSES if kind != CAMERA_KIND or problem is None]
     try:
         every = make_workspace_question(name, wanted, grid, asked=asked)
     except CdprError:

@@ -8,7 +8,7 @@ from cdpr_drake.analyses.reporting.statements import new_table
 from cdpr_drake.analyses.studies.framework.runs import Runs
 from cdpr_drake.analyses.studies.framework.summary import note_coarse
 from cdpr_drake.analyses.studies.workspaces.items import ALL, ALL_BUT_CLOSURE, EVERY, FIGURE
-from cdpr_drake.analyses.workspaces.conditions import KINDS
+from cdpr_drake.analyses.workspaces.conditions import OF_POSES
 
 
 def figure_table(runs: Runs) -> Table:
@@ -41,7 +41,7 @@ def kind_table(runs: Runs) -> Table:
         kinds.list("robot"),
     )
     shares = kinds.list("pose_shares")
-    for name in (*KINDS, ALL_BUT_CLOSURE, ALL):
+    for name in (*OF_POSES, ALL_BUT_CLOSURE, ALL):
         cells = [f"{100.0 * mine[name]:.1f}" if name in mine else "-" for mine in shares]
         table.add_row(name, *cells)
     left_out = [

@@ -84,6 +84,7 @@ def made_up(case, seed, wrong=False):
     return {
         "outcome": "timeout", "time_s": 0.6, "false": int(wrong and not fails),
         "false_kinds": [BREAK] if wrong and not fails else [], "told": fails and not wrong,
+        "by_name": fails and not wrong,
         "delay_s": 0.1 if fails and not wrong else None, "first": case.keys["fails"],
         "named": 0, "carried_n": 5.0,
         "residual_m": 0.001, "torque_n_m": 0.001, "lag_m": 1e-4, "tension_n": 1.0,

@@ -10,7 +10,12 @@ from pydrake.math import RigidTransform
 from cdpr_drake.analyses.reporting.log_files import write_log
 from cdpr_drake.analyses.reporting.provenance import write_run_inputs
 from cdpr_drake.analyses.simulation.run_figures import run_figures
-from cdpr_drake.analyses.simulation.run_stability import StabilityAlong, stability_along
+from cdpr_drake.analyses.simulation.run_stability import (
+    StabilityAlong,
+    run_criterion,
+    stability_along,
+    turned_criterion,
+)
 from cdpr_drake.analyses.simulation.run_summary import summarize
 from cdpr_drake.analyses.simulation.stability_files import stability_figure, stability_of_folder
 from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
@@ -192,3 +197,22 @@ def test_a_log_that_lacks_something_is_refused(tmp_path):
     (tmp_path / "log.npz").write_bytes(b"PK broken")
     with pytest.raises(OutputFolderError, match=r"log\.npz cannot be read"):
         stability_of_folder(tmp_path)
+
+
+def test_joints_of_a_camera_count_by_the_errors_of_their_encoders():
+    """As a camera at rest whose mounting is off by that turn; nothing, where they are right."""
+    scenario = load_scenario("acrobot_pan_tilt", ["integration.engine=compiled"])
+    servo = build_visual_servo(scenario)
+    criterion, turns = run_criterion(servo), scenario.camera.pan_tilt
+    at = servo.block.robot.home.transform()
+    taut = np.ones(8, bool)
+    right = np.radians([[20.0, -10.0], [20.0, -10.0]])
+    same = turned_criterion(criterion, servo.mounting, turns, right)
+    assert same.at(at, at, taut, 0.0)[1] == pytest.approx(criterion.at(at, at, taut, 0.0)[1])
+    wrong = np.radians([[20.0, 0.0], [0.0, 0.0]])
+    turned = turned_criterion(criterion, servo.mounting, turns, wrong)
+    angle = (criterion.camera.inverse() @ turned.camera).rotation().ToAngleAxis().angle()
+    assert np.degrees(angle) == pytest.approx(20.0)
+    assert turned.at(at, at, taut, 0.0)[1] < 0.99 * criterion.at(at, at, taut, 0.0)[1]
+    seen = turned.camera @ turned.sees(at, 0.0)
+    assert seen.IsNearlyEqualTo(criterion.camera @ criterion.sees(at, 0.0), 1e-12)

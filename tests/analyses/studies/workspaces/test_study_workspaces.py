@@ -28,7 +28,7 @@ from cdpr_drake.analyses.studies.workspaces.items import (
 )
 from cdpr_drake.analyses.studies.workspaces.statements import CHECKS
 from cdpr_drake.analyses.studies.workspaces.study import STUDY
-from cdpr_drake.analyses.workspaces.conditions import KINDS
+from cdpr_drake.analyses.workspaces.conditions import OF_POSES
 from cdpr_drake.errors import OutputFolderError
 from cdpr_drake.models.robot_loader import load_robot
 
@@ -68,9 +68,9 @@ def test_every_robot_has_every_kind_that_it_can_have(study):
     assert not study.interrupted
     every = {run["robot"]: run for run in study.runs(group=EVERY)}
     assert tuple(every) == ROBOTS
-    assert set(every["planar"]["kinds"]) == set(KINDS)
+    assert set(every["planar"]["kinds"]) == set(OF_POSES)
     assert every["planar"]["left_out"] == {}
-    assert set(KINDS) - set(every["caroca_gazebo"]["kinds"]) == {"target-visible"}
+    assert set(OF_POSES) - set(every["caroca_gazebo"]["kinds"]) == {"target-visible"}
     ((kind, why),) = every["caroca_gazebo"]["left_out"].items()
     assert kind == "target-visible"
     assert why.startswith("caroca_pbvs.yaml: camera.mount")
@@ -89,7 +89,7 @@ def test_a_kind_that_is_refused_is_left_out_and_named(monkeypatch):
     by_group = {case.keys["group"]: case for case in study_cases(Form(quick=True))}
     assert HEAVY not in by_group
     assert by_group[EVERY].data == {"wrench-closure": "no closure here"}
-    assert set(by_group[EVERY].task.question.kinds) == set(KINDS) - {"wrench-closure"}
+    assert set(by_group[EVERY].task.question.kinds) == set(OF_POSES) - {"wrench-closure"}
 
 
 def test_figures_take_the_upper_limit_of_the_robot_file(study):

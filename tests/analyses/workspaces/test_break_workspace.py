@@ -1,0 +1,108 @@
+"""The kind `survives`: single breaks over a grid, as `breaks_at` says of each pose."""
+
+import json
+
+import numpy as np
+import pytest
+from pydrake.math import RigidTransform
+
+import cdpr_drake as cdpr
+from cdpr_drake.analyses.simulation.break_survival import BreakRequest, breaks_at
+from cdpr_drake.analyses.workspaces.break_figures import breaks_figure
+from cdpr_drake.cli.app import main
+from cdpr_drake.errors import StoppedError, WorkspaceError
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.workspaces.pose_grid import grid_by_count
+from tests.messages import printed
+
+AFTER, REACTIONS = 0.2, ["stop", "redistribute"]
+GRID = grid_by_count(np.array([0.0, 0.0, 0.35]), np.array([0.1, 0.0, 0.35]), (2, 1, 1))
+ASKED = {"grid": GRID, "reactions": REACTIONS, "after": AFTER}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Stopped after the first pose, and continued."""
+    where = tmp_path_factory.mktemp("breaks") / "found"
+    seen = []
+
+    class Impatient(cdpr.Session):
+        def progress(self, progress):
+            seen.append(progress.done)
+
+        def stop(self):
+            return bool(seen) and seen[-1] >= 1
+
+    with pytest.raises(StoppedError, match="after 1 of 2 poses"):
+        cdpr.compute_workspace(
+            "acrobot_large", "survives", folder=where, session=Impatient(), **ASKED
+        )
+    return where
+
+
+@pytest.fixture(scope="module")
+def found(folder):
+    seen = []
+
+    class Watching(cdpr.Session):
+        def progress(self, progress):
+            seen.append(progress.found)
+
+    result = cdpr.compute_workspace(
+        "acrobot_large", "survives", folder=folder, session=Watching(), **ASKED
+    )
+    assert seen[-1] == 1  # of the two poses one was there
+    return result
+
+
+def test_each_pose_is_what_its_runs_say(found):
+    robot = load_robot("acrobot_large")
+    asked = BreakRequest(
+        scenario=load_scenario("acrobot_broken_redistributed"), reactions=tuple(REACTIONS),
+        velocity=np.zeros(3), after=AFTER,
+    )  # fmt: skip
+    told = found.as_dict()["broken"]
+    for k, pose in enumerate(GRID.poses()):
+        cable, reaction, far, saved = breaks_at(robot, RigidTransform(pose), asked).worst()
+        row = told["poses"][k]
+        assert row["worst_cable"] == robot.cables[cable].name
+        assert row["best_reaction"] == REACTIONS[reaction]
+        assert row["excursion_m"] == far == found.values["break-excursion"].ravel()[k]
+        assert row["survives"] == saved == bool(found.inside("survives").ravel()[k])
+    assert sum(told["worst_cables"].values()) == sum(told["best_reactions"].values()) == 2
+
+
+def test_it_is_written_and_drawn(found, folder):
+    told = json.loads((folder / "results.json").read_text())
+    assert told["broken"]["poses"] == found.as_dict()["broken"]["poses"]
+    assert told["breaks"]["after_s"] == AFTER
+    assert (folder / "breaks.png").stat().st_size > 10_000
+    assert not (folder / "worst-cable.png").exists()
+    drawn = breaks_figure(found)
+    numbers = [one.get_text() for axes in drawn.axes for one in axes.texts]
+    assert numbers == [f"{int(n)}" for n in found.values["worst-cable"].ravel()]
+
+
+@pytest.mark.parametrize(
+    ("robot", "asked", "words"),
+    [
+        ("acrobot_large", {"reactions": ["pray"]}, "reactions 'pray' is unknown"),
+        ("acrobot_large", {"moving": [1.0, 0.0]}, "moving: found .*; accepted: three finite"),
+        ("acrobot_large", {"mass": 2.0}, "mass: found with kinds survives"),
+        ("acrobot_large", {"scenario": "acrobot_pbvs"}, "winches.mode: found velocity"),
+        ("acrobot_large", {"hull": [0.0, 0.0, 0.3]}, "hull: found kinds survives"),
+        ("acrobot_large", {"certify": True}, "certify: found kinds survives"),
+        ("planar", {}, "kinds survives: found planar"),
+    ],
+)
+def test_what_is_refused(robot, asked, words):
+    with pytest.raises(WorkspaceError, match=words):
+        cdpr.compute_workspace(robot, "survives", **asked)
+
+
+def test_options_that_only_it_takes_are_refused_without_it(capsys):
+    with pytest.raises(SystemExit) as end:
+        main(["workspace", "acrobot_large", "--moving", "0.1,0,0"])
+    assert end.value.code == 2
+    assert "--moving: found --kind static; accepted: survives among them" in printed(capsys).err
