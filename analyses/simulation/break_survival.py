@@ -127,7 +127,7 @@ class BreakRequest:
         if self.scenario.winches.mode != TORQUE:
             raise WorkspaceError(
                 f"scenario {self.scenario.name}: winches.mode: found "
-                f"{self.scenario.winches.mode}; accepted for the kind survives: {TORQUE}"
+                f"{self.scenario.winches.mode}; accepted for the kind dynamic-single-failure: {TORQUE}"
             )
         if robot.winch_groups().are_shared():
             raise WorkspaceError(

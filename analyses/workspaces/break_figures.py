@@ -39,7 +39,7 @@ def breaks_figure(workspace: RobotWorkspace) -> Figure:
     Of several orientations the first one is drawn, and the title says so.
 
     Args:
-        workspace: A result with the kind `survives`.
+        workspace: A result with the kind `dynamic-single-failure`.
     """
     about, shape = workspace.arguments["breaks"], workspace.grid.shape[1:]
     normal, u, v = plane_axes(shape)

@@ -28,7 +28,7 @@ def question_holds(question: WorkspaceQuestion) -> Callable[[Array], np.ndarray]
     Raises:
         WorkspaceError: It has a kind that knows the poses of its grid only.
     """
-    for name in ("stable", "survives"):
+    for name in ("stable", "dynamic-single-failure"):
         if name in question.kinds:
             raise WorkspaceError(f"hull: found kinds {name}; accepted: kinds other than that")
     turns = np.array([rotation_from_angles(a).matrix() for a in question.grid.angles])

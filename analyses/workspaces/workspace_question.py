@@ -181,11 +181,11 @@ class WorkspaceRequest:
         pulleys: Whether cables run over the robot's pulleys; else from fixed exit points.
         method: Name of the method whose tensions must hold the weight, of `tensions.METHODS`, for
             the kind `static`; None: any tensions.
-        reactions: For the kind `survives`, names of `break_report.SAVING`; None: stop,
+        reactions: For the kind `dynamic-single-failure`, names of `break_report.SAVING`; None: stop,
             redistribute, brake, retreat.
-        moving: For the kind `survives`, velocity of Po in W when a cable breaks, shape (3,) [m/s];
+        moving: For the kind `dynamic-single-failure`, velocity of Po in W when a cable breaks, shape (3,) [m/s];
             None: at rest.
-        after: For the kind `survives`, how long runs go on after a break [s].
+        after: For the kind `dynamic-single-failure`, how long runs go on after a break [s].
     """
 
     limits: tuple[float, float] | None = None
@@ -304,7 +304,7 @@ def make_workspace_question(
 
 
 BREAKING = "acrobot_broken_redistributed"
-"""The scenario whose sections count for the kind `survives` where none is given."""
+"""The scenario whose sections count for the kind `dynamic-single-failure` where none is given."""
 
 
 def _break_task(robot: Robot, asked: WorkspaceRequest, grid: WorkspaceGrid) -> BreakTask:

@@ -1,4 +1,4 @@
-"""The kind `survives`: single breaks over a grid, as `breaks_at` says of each pose."""
+"""The kind `dynamic-single-failure`: single breaks over a grid, as `breaks_at` says of each pose."""
 
 import json
 
@@ -36,7 +36,7 @@ def folder(tmp_path_factory):
 
     with pytest.raises(StoppedError, match="after 1 of 2 poses"):
         cdpr.compute_workspace(
-            "acrobot_large", "survives", folder=where, session=Impatient(), **ASKED
+            "acrobot_large", "dynamic-single-failure", folder=where, session=Impatient(), **ASKED
         )
     return where
 
@@ -50,7 +50,7 @@ def found(folder):
             seen.append(progress.found)
 
     result = cdpr.compute_workspace(
-        "acrobot_large", "survives", folder=folder, session=Watching(), **ASKED
+        "acrobot_large", "dynamic-single-failure", folder=folder, session=Watching(), **ASKED
     )
     assert seen[-1] == 1  # of the two poses one was there
     return result
@@ -69,7 +69,7 @@ def test_each_pose_is_what_its_runs_say(found):
         assert row["worst_cable"] == robot.cables[cable].name
         assert row["best_reaction"] == REACTIONS[reaction]
         assert row["excursion_m"] == far == found.values["break-excursion"].ravel()[k]
-        assert row["survives"] == saved == bool(found.inside("survives").ravel()[k])
+        assert row["survives"] == saved == bool(found.inside("dynamic-single-failure").ravel()[k])
     assert sum(told["worst_cables"].values()) == sum(told["best_reactions"].values()) == 2
 
 
@@ -98,7 +98,7 @@ def test_it_is_written_and_drawn(found, folder):
 )
 def test_what_is_refused(robot, asked, words):
     with pytest.raises(WorkspaceError, match=words):
-        cdpr.compute_workspace(robot, "survives", **asked)
+        cdpr.compute_workspace(robot, "dynamic-single-failure", **asked)
 
 
 def test_options_that_only_it_takes_are_refused_without_it(capsys):
