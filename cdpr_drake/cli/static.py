@@ -184,6 +184,14 @@ def _print(report: StaticReport) -> None:
     if report.frequencies is not None:
         words = ", ".join(f"{f:.4g}" if np.isfinite(f) else "unstable" for f in report.frequencies)
         console.print(f"natural frequencies [Hz]: {words}")
+    if report.contacts is not None:
+        within, *moments = report.contacts.tolist()
+        held = ", ".join(f"{moment:.3g}" for moment in moments)
+        console.print(
+            f"rest is not unique: contacts hold moments up to ({held}) N m about x, y, z of P, so "
+            f"that the platform may rest turned by up to {np.degrees(within):.3g} deg from here; "
+            "frequencies are those of swings that slip, small swings are faster"
+        )
     if report.others:
         console.print(f"other poses of rest that were found: {len(report.others)}, higher ones")
 
