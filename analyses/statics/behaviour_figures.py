@@ -69,9 +69,7 @@ def behaviour_figure(robot: Robot, report: StaticReport) -> Figure:
     return figure
 
 
-def _elongation(
-    axes: Any, robot: Robot, report: StaticReport, behaviour: CableBehaviour
-) -> None:
+def _elongation(axes: Any, robot: Robot, report: StaticReport, behaviour: CableBehaviour) -> None:
     """Tension over elongation of the cable with the largest tension at the pose."""
     k = int(np.argmax(report.tensions))
     ES, t = robot.stiffness()[k], float(report.tensions[k])
@@ -122,7 +120,9 @@ def _drums(axes: Any, report: StaticReport, behaviour: CableBehaviour) -> None:
     k = int(np.argmax(wraps))
     t = np.linspace(0.0, BEYOND * float(np.max(report.tensions)), POINTS)
     up, down = (
-        drum_tensions(t, np.full(POINTS, wraps[k]), behaviour.sheave_friction, sign * np.ones(POINTS))
+        drum_tensions(
+            t, np.full(POINTS, wraps[k]), behaviour.sheave_friction, sign * np.ones(POINTS)
+        )
         for sign in (1.0, -1.0)
     )
     axes.fill_between(t, down, up, facecolor="0.85", label="standing: anything between")

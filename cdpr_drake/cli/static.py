@@ -83,6 +83,12 @@ def static(
     ] = None,
     as_json: AsJson = False,
     plot: Annotated[Path | None, typer.Option(help="Draw cables, tensions, frequencies.")] = None,
+    plot_behaviour: Annotated[
+        Path | None,
+        typer.Option(
+            help="Draw what the file says of stiffening, heat, creep, sheaves, hysteresis."
+        ),
+    ] = None,
 ) -> None:
     """Lengths, tensions, stiffness, vibrations and sag of a robot at rest.
 
@@ -93,7 +99,7 @@ def static(
         "limits": limits,
     }  # fmt: skip
     if names_mechanism(robot):
-        refuse_for_mechanisms({"pose": pose})
+        refuse_for_mechanisms({"pose": pose, "plot_behaviour": plot_behaviour})
         mechanism = load_mechanism(robot)
         m = len(mechanism.cables)
         with working(message_console(), f"{mechanism.name} at rest"):
@@ -137,6 +143,8 @@ def static(
         )
     if plot is not None:
         save_plot(report.plot(), plot)
+    if plot_behaviour is not None:
+        save_plot(report.plot_behaviour(loaded), plot_behaviour)
     if as_json:
         print_json(report.as_dict())
     else:

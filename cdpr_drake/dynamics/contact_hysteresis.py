@@ -22,6 +22,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.platform_joint import PlatformJoint
@@ -91,6 +92,21 @@ class ContactHysteresis:
             turned: s, any shape, >= 0 [rad].
         """
         return np.asarray(-self.slip * np.expm1(-np.asarray(turned, float) / self.slip))
+
+    def bent_along(self, turns: Rotation) -> Array:
+        """z where a platform turned from one orientation to the next, from unbent contacts at the
+        first one, shape (n, 3) in P [rad]; how fast it turned does not matter.
+
+        Args:
+            turns: R_WP at n instants, each less than half a turn from the one before.
+        """
+        ways = (turns[:-1].inv() * turns[1:]).as_rotvec()
+        out = np.zeros((len(ways) + 1, 3))
+        x = np.linalg.norm(ways, axis=1) / self.slip
+        slides = np.where(x > 1e-9, -np.expm1(-x) / np.where(x > 1e-9, x, 1.0), 1.0)
+        for k, (way, kept, slide) in enumerate(zip(ways, np.exp(-x), slides, strict=True)):
+            out[k + 1] = kept * out[k] + slide * way
+        return out
 
     def loop(self, turns: Array, amplitude: float, stiffness: float) -> tuple[Array, Array]:
         """Moments against turns between +-A, going up and coming back, shape (k,) each [N m].
