@@ -60,6 +60,9 @@ def _elongations(axes: Any, robot: Robot, log: Log) -> None:
         xlabel="elongation of the counted length [%]", ylabel="tension at the platform [N]",
         title="cables; the mark is the beginning",
     )  # fmt: skip
+    most = float(np.max(strains))
+    if most > 0.0:  # how far slack cables are paid out would press the loops together
+        axes.set_xlim(-0.1 * most, 1.05 * most)
 
 
 def _moments(axes: Any, contacts: ContactHysteresis, log: Log) -> None:
