@@ -9,10 +9,11 @@ import yaml
 
 import cdpr_drake as cdpr
 from cdpr_drake.analyses.simulation.behaviour_loops import loop_figure, shows_loops
-from cdpr_drake.analyses.statics.static_query import static_at_pose
+from cdpr_drake.analyses.statics.static_query import static_at_lengths, static_at_pose
 from cdpr_drake.cli.app import main
 from cdpr_drake.dynamics.contact_hysteresis import ContactHysteresis
 from cdpr_drake.errors import CableModelError
+from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.poses import rotation_from_angles
 from cdpr_drake.models.materials import BehaviourSettings
 from cdpr_drake.models.robot_schema import HysteresisSettings
@@ -39,12 +40,23 @@ def test_no_held_moment_turns_the_platform_further():
     assert np.max(turns) > 0.999 * contacts.turns_of_rest(C, R)
 
 
+def lengths_at_home(robot):
+    return cable_paths(robot.home.transform(), robot.cable_set()).lengths
+
+
+def at_rest(robot):
+    """At its home pose, or where it hangs with such lengths."""
+    if robot.is_underactuated():
+        return static_at_lengths(robot, lengths_at_home(robot), "elastic", True)
+    return static_at_pose(robot, robot.home.transform(), "elastic", True)
+
+
 @pytest.mark.parametrize("name", ["hanging_four", "oblique_body"])
 def test_it_may_rest_as_far_as_its_stiffness_lets_contacts_hold_it(name):
     """Each bent contact is put on as a moment, and the platform's turn by its stiffness found."""
     robot = rubbing(small_robot(name))
-    X_WP = robot.home.transform()
-    report = static_at_pose(robot, X_WP, "elastic", True)
+    report = at_rest(robot)
+    X_WP = report.X_WP
     R, motion = X_WP.rotation().matrix(), robot.motion_type()
     most = 0.0
     for z in np.vstack([np.eye(3), -np.eye(3), np.random.default_rng(1).normal(size=(500, 3))]):
@@ -56,7 +68,7 @@ def test_it_may_rest_as_far_as_its_stiffness_lets_contacts_hold_it(name):
     assert report.contacts[0] == pytest.approx(most, rel=0.02)
     assert report.contacts[0] >= most * (1.0 - 1e-9)
     np.testing.assert_allclose(report.contacts[1:], 0.02 * np.array([0.3, 0.3, 0.5]))
-    assert static_at_pose(small_robot(name), X_WP, "elastic", True).contacts is None
+    assert at_rest(small_robot(name)).contacts is None
 
 
 def test_the_command_says_so(tmp_path, capsys):
@@ -64,9 +76,10 @@ def test_the_command_says_so(tmp_path, capsys):
     path = tmp_path / "hanging_four.yaml"
     path.write_text(yaml.safe_dump(content("hanging_four", platform=platform)))
     drawn = tmp_path / "does.png"
+    lengths = ",".join(map(str, lengths_at_home(small_robot("hanging_four"))))
     for more, code in ((["--plot-behaviour", str(drawn)], 0), (["--json"], 0)):
         with pytest.raises(SystemExit) as stop:
-            main(["static", str(path), *more])
+            main(["static", str(path), "--lengths", lengths, *more])
         assert stop.value.code == code
         out = printed(capsys).out
         if more == ["--json"]:
