@@ -364,6 +364,10 @@ def _check_motion(robot: Robot, fail: Callable[[str, object, str], None]) -> Non
     if max(radii) > 0.0 and (motion.is_point or robot.motion == "2R3T"):
         fail("platform_pulley", f"pulleys at the platform of {robot.motion}",
              "none there, since a cable over one pulls beside Po or the beam")  # fmt: skip
+    rubs = robot.platform.hysteresis is not None
+    if rubs and (motion.is_point or robot.motion == "2R3T"):
+        fail("platform.hysteresis", f"a section for {robot.motion}",
+             "null, or a body in space or in a plane: 3R3T, 2T1R, 1R2T")  # fmt: skip
     if robot.motion == "2R3T":
         _check_beam(robot, np.array(motion.axis), fail)
 

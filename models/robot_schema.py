@@ -11,6 +11,7 @@ from pydrake.math import RigidTransform
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.cable_behaviour import CableBehaviour
 from cdpr_drake.cables.elastic_law import axial_stiffness
+from cdpr_drake.dynamics.contact_hysteresis import ContactHysteresis
 from cdpr_drake.errors import RobotFileError
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.geometry.motion_type import MOTION_TYPES, MotionType
@@ -51,6 +52,26 @@ class Pose:
 
 
 @dataclass(kw_only=True)
+class HysteresisSettings:
+    """Friction against turns of the platform, in what it hangs on; see
+    `dynamics.contact_hysteresis`."""
+
+    tilt: float = number(
+        "Stiffness of contacts that stick, about x and y of P.", "N m/rad", 0.0, at_least=0.0,
+        at_most=1e6,
+    )  # fmt: skip
+    turn: float = number("The same about z of P.", "N m/rad", 0.0, at_least=0.0, at_most=1e6)
+    slip: float = number(
+        "Turn at which contacts slip; the largest moment is this times the stiffness.", "rad", 0.1,
+        at_least=1e-4, at_most=10.0,
+    )  # fmt: skip
+
+    def contacts(self) -> ContactHysteresis:
+        """These numbers as the law takes them."""
+        return ContactHysteresis(tilt=self.tilt, turn=self.turn, slip=self.slip)
+
+
+@dataclass(kw_only=True)
 class Platform:
     """The moving platform; its frame P lies at the middle of the bottom face, z up, unless
     `box_center` says otherwise."""
@@ -81,6 +102,10 @@ class Platform:
         "of mass that is not.",
         BOX_INERTIA,
         choices=(BOX_INERTIA, SHAPE_INERTIA),
+    )
+    hysteresis: HysteresisSettings | None = optional_section(
+        "Friction against its turns, by Dahl, in knots, joints, ropes that bend and wires that "
+        "hang on it; null: none."
     )
 
 
@@ -241,6 +266,12 @@ class Robot(Summarized):
         """What the cables do beside the elastic law; nothing where the file does not say."""
         settings = self.cable.behaviour
         return CableBehaviour() if settings is None else settings.behaviour()
+
+    def contact_hysteresis(self) -> ContactHysteresis | None:
+        """Friction against turns of the platform; None where the file gives none."""
+        settings = self.platform.hysteresis
+        contacts = None if settings is None else settings.contacts()
+        return contacts if contacts is not None and contacts.is_there() else None
 
     def diameters(self) -> Array:
         """Of the cables, shape (m,) [m]."""

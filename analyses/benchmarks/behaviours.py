@@ -11,9 +11,9 @@ from cdpr_drake.analyses.reporting.timing import TimingRow, interleaved, process
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.cable_behaviour import CableBehaviour, behaving_cables
 from cdpr_drake.cables.models import KELVIN_VOIGT
+from cdpr_drake.dynamics.contact_hysteresis import ContactHysteresis
 from cdpr_drake.dynamics.free_run_kernel import free_run
-from cdpr_drake.dynamics.hysteretic_run_kernel import hysteretic_run
-from cdpr_drake.dynamics.robot_arrays import CREEPING, Drive, RobotArrays, pack_robot
+from cdpr_drake.dynamics.robot_arrays import CREEPING, RUBBING, Drive, RobotArrays, pack_robot
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.poses import pose_from_angles, pose_row
 from cdpr_drake.models.robot_loader import load_robot
@@ -55,24 +55,24 @@ def _swing(does: CableBehaviour, count: int, rubs: bool = False) -> Callable[[],
     lengths, m = cable_paths(X_WP, cables).lengths, cables.count
     cables = behaving_cables(replace(cables, stiffness=np.full(m, 9e4)), does)
     l0 = lengths * (1.0 - 5e-4)
-    packed = pack_robot(rigid_platform(robot), cables, KELVIN_VOIGT, Drive(), home=l0)
+    contacts = ContactHysteresis(tilt=5.0, turn=5.0, slip=0.08) if rubs else None
+    packed = pack_robot(
+        rigid_platform(robot), cables, KELVIN_VOIGT, Drive(), home=l0, contacts=contacts
+    )
     first = np.zeros(13 + m)
     first[:7], first[7:10], first[13:] = pose_row(X_WP), [1.0, -1.0, 2.0], l0
     if packed.kinds[CREEPING] > 0:
         first = np.concatenate([first, lengths / l0 - 1.0])
+    first = np.concatenate([first, np.zeros(packed.kinds[RUBBING])])
 
     def work() -> None:
-        _run(packed, first.copy(), count, rubs)
+        _run(packed, first.copy(), count)
 
     work()
     return work
 
 
-def _run(robot: RobotArrays, state: Array, count: int, rubs: bool) -> None:
+def _run(robot: RobotArrays, state: Array, count: int) -> None:
     m = robot.cables.shape[0]
     states, tensions = np.empty((count, len(state))), np.empty((count, m))
-    asked = (np.zeros(m), STEP, LARGEST, states, tensions, np.zeros(4))
-    if rubs:
-        hysteretic_run(robot, state, *asked, np.full(3, 5.0), 0.08, np.zeros(3))
-    else:
-        free_run(robot, state, *asked)
+    free_run(robot, state, np.zeros(m), STEP, LARGEST, states, tensions, np.zeros(4))

@@ -498,8 +498,8 @@ def _remarks(model: FreeMotionModel, std: Array, spread: float, vector: Array) -
         said.append(f"at a bound: {', '.join(edge)}")
     if any(one.group == HYSTERESIS for one in model.unknowns):
         said.append(
-            "hysteresis is in no robot file and no engine: simulations with what was found swing "
-            "longer; modes are those of swings that slip"
+            "with hysteresis the platform rests beside its pose by as much as contacts hold; modes "
+            "are those of swings that slip"
         )
     if spread > 1.0:
         said.append(

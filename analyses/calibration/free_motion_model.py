@@ -18,16 +18,16 @@ from cdpr_drake.analyses.calibration.identified_robots import dynamic_model, pla
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.cable_behaviour import CableBehaviour, behaving_cables, behaviour_of
 from cdpr_drake.cables.models import ELASTIC, KELVIN_VOIGT, cable_derivatives
+from cdpr_drake.dynamics.contact_hysteresis import ContactHysteresis
 from cdpr_drake.dynamics.free_run_kernel import free_run
-from cdpr_drake.dynamics.hysteretic_run_kernel import hysteretic_run
-from cdpr_drake.dynamics.robot_arrays import CREEPING, Drive, RobotArrays, pack_robot
+from cdpr_drake.dynamics.robot_arrays import CREEPING, RUBBING, Drive, RobotArrays, pack_robot
 from cdpr_drake.dynamics.robot_kernel import INTEGRATION_OK
 from cdpr_drake.errors import IdentificationError
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.poses import cross_matrix, pose_row
 from cdpr_drake.geometry.rotation_kernel import turn_pose
 from cdpr_drake.identification.parameters import CENTER, DAMPING, MASS_GROUP, MOMENTS, STIFFNESS
-from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.models.robot_schema import HysteresisSettings, Robot
 from cdpr_drake.models.robot_statics import rigid_platform
 from cdpr_drake.statics.equilibrium import equilibrium_near
 from cdpr_drake.statics.rigid_platform import RigidPlatform
@@ -183,8 +183,15 @@ class FreeMotionModel:
         cables = behaving_cables(cables, self.behaviour(vector))
         return pack_robot(
             self.platform(vector), cables, KELVIN_VOIGT, Drive(), home=self.lengths(vector),
-            damping=(n["drag.force"], n["drag.moment"]),
+            damping=(n["drag.force"], n["drag.moment"]), contacts=self.contacts(vector),
         )  # fmt: skip
+
+    def contacts(self, vector: Array) -> ContactHysteresis:
+        """Friction against turns of the platform at a vector."""
+        n = self.by_name(vector)
+        return ContactHysteresis(
+            tilt=n["hysteresis.tilt"], turn=n["hysteresis.turn"], slip=n["hysteresis.slip"]
+        )
 
     def behaviour(self, vector: Array) -> CableBehaviour:
         """What the cables do beside the elastic law at a vector."""
@@ -211,21 +218,19 @@ class FreeMotionModel:
         turn_pose(state, *moved[:3])
         state[4:7] += moved[3:6]
         state[7:STATE], state[STATE:] = moved[6:], self.lengths(vector)
-        arrays, n = self.arrays(vector), self.by_name(vector)
+        arrays = self.arrays(vector)
+        if arrays.kinds[RUBBING] > 0:
+            turn = Rotation.from_quat(state[[1, 2, 3, 0]])
+            w_P = turn.inv().apply(moved[6:9])
+            bent = self.contacts(vector).slip * w_P / np.hypot(np.linalg.norm(w_P), TURNING)
+            state = np.concatenate([state, bent])
         if arrays.kinds[CREEPING] > 0:  # strains about which the platform swings
-            l0 = state[STATE:] * self.behaviour(vector).longer()
+            l0 = self.lengths(vector) * self.behaviour(vector).longer()
             at_rest = cable_paths(self.start, self.robot.cable_set()).lengths / l0 - 1.0
             state = np.concatenate([state, np.maximum(at_rest, 0.0)])
         states, tensions = np.full((count, len(state)), np.nan), np.full((count, m), np.nan)
         asked = (np.zeros(m), step, self.step, states, tensions, np.zeros(4))
-        K = np.array([n[f"hysteresis.{a}"] for a in ("tilt", "tilt", "turn")])
-        if np.any(K > 0.0):
-            slip, w = n["hysteresis.slip"], Rotation.from_quat(state[[1, 2, 3, 0]])
-            w_P = w.inv().apply(moved[6:9])
-            bent = slip * w_P / np.hypot(np.linalg.norm(w_P), TURNING)
-            bad = hysteretic_run(arrays, state, *asked, K, slip, bent)
-        else:
-            bad = free_run(arrays, state, *asked)
+        bad = free_run(arrays, state, *asked)
         if bad != INTEGRATION_OK:
             states[-1] = np.nan
         return states[:, :STATE], tensions
@@ -272,6 +277,7 @@ def _all_unknowns(robot: Robot, start: RigidTransform, turns: bool, tracker: boo
     T = float(np.mean(model.retardation))
     rubs = model.mass * platform.gravity * size if platform.gravity > 0.0 else 1.0
     does = behaviour_of(cables)
+    rubbing = robot.platform.hysteresis or HysteresisSettings()
     found += [
         Unknown("all.stiffness", "N", STIFFNESS, EA, EA, 0.02 * EA, STIFFER**2 * EA),
         Unknown("all.retardation_time", "s", DAMPING, T, 0.01, 0.0),
@@ -279,9 +285,18 @@ def _all_unknowns(robot: Robot, start: RigidTransform, turns: bool, tracker: boo
         Unknown("drag.moment", "N m s/rad", DAMPING, 0.0, damped * size**2, 0.0),
     ]
     found += [
-        Unknown("hysteresis.tilt", "N m/rad", HYSTERESIS, 0.0, rubs, 0.0, first=0.3 * rubs),
-        Unknown("hysteresis.turn", "N m/rad", HYSTERESIS, 0.0, rubs, 0.0, first=0.3 * rubs),
-        Unknown("hysteresis.slip", "rad", HYSTERESIS, 0.1, 0.1, 0.005, 1.0),
+        Unknown(
+            "hysteresis.tilt", "N m/rad", HYSTERESIS, rubbing.tilt, rubs, 0.0,
+            first=rubbing.tilt or 0.3 * rubs,
+        ),
+        Unknown(
+            "hysteresis.turn", "N m/rad", HYSTERESIS, rubbing.turn, rubs, 0.0,
+            first=rubbing.turn or 0.3 * rubs,
+        ),
+        Unknown(
+            "hysteresis.slip", "rad", HYSTERESIS, rubbing.slip, 0.1, min(0.005, rubbing.slip),
+            max(1.0, rubbing.slip),
+        ),
         Unknown(
             "all.stiffening", "1/N", STIFFENING, does.stiffening, 1.0 / share, 0.0,
             max(2.0 / share, 2.0 * does.stiffening), first=max(0.1 / share, does.stiffening),

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from rich.table import Table
 
 from cdpr_drake.analyses.calibration.free_motion import FollowedStretch, FreeMotion
-from cdpr_drake.analyses.calibration.free_motion_model import CREEP, STIFFENING
+from cdpr_drake.analyses.calibration.free_motion_model import CREEP, HYSTERESIS, STIFFENING
 from cdpr_drake.analyses.calibration.log_fit import LogFit
 from cdpr_drake.analyses.reporting.log_files import finite
 from cdpr_drake.analyses.reporting.provenance import package_versions
@@ -20,7 +20,7 @@ from cdpr_drake.analyses.visualization.figure_style import line_style, new_figur
 from cdpr_drake.arrays import Array
 from cdpr_drake.identification.result import MISFIT, MISFIT_FACTOR
 from cdpr_drake.models.materials import BehaviourSettings, OwnMaterial
-from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.models.robot_schema import HysteresisSettings, Robot
 from cdpr_drake.palette import nth_look
 
 RESULTS = "identification.json"
@@ -198,6 +198,12 @@ def freely_moved_robot(found: FreeMotion) -> Robot:
         center_of_mass=np.array([n[f"center_of_mass.{a}"] for a in "xyz"]),
         inertia=np.array([n[f"inertia.{a}"] for a in ("xx", "yy", "zz", "xy", "xz", "yz")]),
     )  # fmt: skip
+    if HYSTERESIS in unknown:
+        rubbing = HysteresisSettings(
+            tilt=n["hysteresis.tilt"], turn=n["hysteresis.turn"], slip=n["hysteresis.slip"]
+        )
+        rubs = rubbing.contacts().is_there()
+        platform = replace(platform, hysteresis=rubbing if rubs else None)
     share = n["all.stiffness"] / float(np.mean(robot.cable_set().stiffness))
     cables = list(robot.cables)
     for k, (cable, material) in enumerate(zip(robot.cables, robot.materials(), strict=True)):

@@ -45,6 +45,20 @@ class RobotAtRest(StaticReport):
 
         return static_figure(self, f"{self.robot} at rest, {self.model} cables")
 
+    def plot_behaviour(self, robot: Robot | str | Path) -> Figure:
+        """What the robot's file says that cables and contacts do: force over elongation, tensions
+        at the drums, moments of contacts.
+
+        Args:
+            robot: The robot that is at rest, or its name or path.
+
+        Raises:
+            CableModelError: Its file says nothing of them.
+        """
+        from cdpr_drake.analyses.statics.behaviour_figures import behaviour_figure
+
+        return behaviour_figure(as_robot(robot, "plot_behaviour"), self)
+
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class RobotEquilibria(EquilibriaReport):

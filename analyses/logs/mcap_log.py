@@ -56,18 +56,13 @@ def read_mcap(path: Path, asked: LogRequest) -> RecordedLog:
                 f"{path}: {topic}: found {len(others)} messages at other times than the "
                 f"{len(times)} of {first}; accepted: the same times"
             )
-    headers = {topic: list(next(iter(each.values()))) for topic, each in chosen.items()}
+    headers = {topic: _keys(each) for topic, each in chosen.items()}
     lines = [",".join([TIME, *(name for names in headers.values() for name in names)])]
     for t in times:
         cells = [repr(t)]
         for topic, names in headers.items():
-            row = chosen[topic][t]
-            if list(row) != names:
-                raise LogFileError(
-                    f"{path}: {topic} at {t:g} s: found keys {', '.join(row)[:80]}; accepted: "
-                    f"{', '.join(names)[:80]}"
-                )
-            cells += ["" if row[name] is None else repr(float(row[name])) for name in names]
+            row = [chosen[topic][t].get(name) for name in names]
+            cells += ["" if value is None else repr(float(value)) for value in row]
         lines.append(",".join(cells))
     log = columns_of_text(path, "\n".join(lines) + "\n", asked)
     remarks = log.remarks
@@ -77,6 +72,14 @@ def read_mcap(path: Path, asked: LogRequest) -> RecordedLog:
 
 
 _Rows = dict[float, dict[str, Any]]
+
+
+def _keys(rows: _Rows) -> list[str]:
+    """All keys of a channel, in the order of the first message that has them all, else as they
+    come: what is not finite, or not known, is in no message."""
+    known = dict.fromkeys(name for row in rows.values() for name in row)
+    whole = next((row for row in rows.values() if len(row) == len(known)), known)
+    return list(whole)
 
 
 def _messages(path: Path) -> tuple[dict[str, _Rows], dict[str, _Rows], set[str]]:

@@ -169,6 +169,11 @@ class _Shooter:
     def __init__(self, plain: ShapedRest, ratio: float) -> None:
         """For cables of so many times the stiffness of those of a motion."""
         robot, given = plain.robot, plain.cables
+        if robot.contact_hysteresis() is not None:
+            raise PlanningError(
+                f"platform.hysteresis of {robot.name}: found a section; accepted by a motion from "
+                "rest to rest: null, since such a platform does not rest at one pose"
+            )
         self.plain, self.m = plain, len(robot.cables)
         self._knots, _ = _splines(plain.duration)
         settings = replace(given, stiffness_ratio=ratio * given.stiffness_ratio)

@@ -2,9 +2,12 @@
 
 A channel `/tf` has `foxglove.FrameTransform` of the platform's pose, where the log has one. Each
 quantity of the log has a channel of its name, of objects with its columns and `time_s`, by which it
-is read back as it was; times of messages are whole nanoseconds. What is not finite is null.
+is read back as it was; times of messages are whole nanoseconds. What is not finite is left out of a
+message, and a pose that is not has no transform: JSON has no such numbers, and null is no number of
+the schema.
 
-Source: mcap.dev/spec; docs.foxglove.dev/docs/sdk/schemas, FrameTransform.
+Source: mcap.dev/spec; docs.foxglove.dev/docs/sdk/schemas, FrameTransform, whose JSON schema says
+which keys a message must have; docs.foxglove.dev/docs/getting-started/custom, schema encodings.
 """
 
 from __future__ import annotations
@@ -35,11 +38,15 @@ _NUMBER = {"type": "number"}
 
 
 def _object(**properties: Any) -> dict[str, Any]:
-    return {"type": "object", "properties": properties}
+    """The schema of an object that has all of these."""
+    return {"type": "object", "properties": properties, "required": list(properties)}
 
 
 _TRANSFORM = _object(
-    timestamp=_object(sec={"type": "integer"}, nsec={"type": "integer"}),
+    timestamp=_object(
+        sec={"type": "integer", "minimum": 0},
+        nsec={"type": "integer", "minimum": 0, "maximum": 999_999_999},
+    ),
     parent_frame_id={"type": "string"},
     child_frame_id={"type": "string"},
     translation=_object(x=_NUMBER, y=_NUMBER, z=_NUMBER),
@@ -85,18 +92,25 @@ def write_mcap(
             channels.append((frames, _transforms(time, pose)))
         for quantity, (names, values) in quantities.items():
             schema = _object(**dict.fromkeys((TIME_KEY, *names), _NUMBER))
+            schema["required"] = [TIME_KEY]
             number = channel(f"/{quantity}", f"cdpr_drake.{quantity}", schema)
             channels.append((number, _rows(time, names, values)))
         for k, messages in enumerate(zip(*(each for _, each in channels), strict=True)):
             at = nanoseconds(float(time[k]))
             for (number, _), message in zip(channels, messages, strict=True):
+                if message is None:
+                    continue
                 data = json.dumps(message, allow_nan=False).encode()
                 writer.add_message(number, log_time=at, data=data, publish_time=at, sequence=k)
         writer.finish()
 
 
-def _transforms(time: Array, pose: Array) -> Iterator[dict[str, Any]]:
-    for t, (w, x, y, z, px, py, pz) in zip(time.tolist(), pose.tolist(), strict=True):
+def _transforms(time: Array, pose: Array) -> Iterator[dict[str, Any] | None]:
+    for t, row in zip(time.tolist(), pose.tolist(), strict=True):
+        if not np.isfinite(row).all():
+            yield None
+            continue
+        w, x, y, z, px, py, pz = row
         sec, nsec = divmod(nanoseconds(t), 1_000_000_000)
         yield {
             "timestamp": {"sec": sec, "nsec": nsec},
@@ -109,5 +123,5 @@ def _transforms(time: Array, pose: Array) -> Iterator[dict[str, Any]]:
 def _rows(time: Array, names: list[str], values: Array) -> Iterator[dict[str, Any]]:
     good = np.isfinite(values)
     for t, row, known in zip(time.tolist(), values.tolist(), good.tolist(), strict=True):
-        numbers = [x if finite else None for x, finite in zip(row, known, strict=True)]
-        yield {TIME_KEY: t, **dict(zip(names, numbers, strict=True))}
+        each = zip(names, row, known, strict=True)
+        yield {TIME_KEY: t, **{name: x for name, x, finite in each if finite}}

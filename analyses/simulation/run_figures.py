@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 
 from cdpr_drake.analyses.reporting.deferred_figures import Pictures
 from cdpr_drake.analyses.simulation.adaptation_report import adaptation_figure
+from cdpr_drake.analyses.simulation.behaviour_loops import loop_figure, shows_loops
 from cdpr_drake.analyses.simulation.hardware_figures import (
     motor_figure,
     reading_figure,
@@ -74,6 +75,9 @@ def run_figures(result: RunResult, formats: Sequence[str] = DEFAULT_FORMATS) -> 
         )
         limits = tension_limits(result.servo.scenario, robot)
         drawn["tension_loop"] = lambda: tension_loop_figure(loop, robot, log, limits)
+    if shows_loops(robot):
+        does = _title(result, "What cables and contacts of the platform went through")
+        drawn["behaviour"] = lambda: loop_figure(does, robot, log)
     sensors = result.servo.scenario.sensors
     if sensors.log:
         readings = _title(result, "What the sensors read beyond the truth")

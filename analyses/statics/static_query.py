@@ -81,6 +81,9 @@ class StaticReport(Summarized):
             of the motions that these leave, None where they leave none.
         modes: Their shapes, columns (turn, translation), shape (6, k); None likewise.
         others: Other poses of rest that were found, by energy.
+        contacts: How far the platform may rest beside this pose [rad], since contacts hold it, and
+            the moments that they hold about x, y, z of P [N m], shape (4,); None where nothing
+            rubs, or with inextensible cables.
         drums: Tensions at the drums while all cables are wound up, and while all are paid out,
             shape (2, m) [N]; None without friction of sheaves.
     """
@@ -105,6 +108,7 @@ class StaticReport(Summarized):
     modes: Array | None
     others: list[Equilibrium]
     drums: Array | None = None
+    contacts: Array | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """The report for JSON; what is infinite or does not apply is null."""
@@ -114,6 +118,9 @@ class StaticReport(Summarized):
                 "drum_tensions_winding_up_n": self.drums[0].tolist(),
                 "drum_tensions_paying_out_n": self.drums[1].tolist(),
             }
+        if self.contacts is not None:
+            drums["rests_within_rad"] = _finite(self.contacts)[0]
+            drums["held_moments_n_m"] = self.contacts[1:].tolist()
         return {
             "robot": self.robot,
             "cable_model": self.model,
@@ -396,7 +403,29 @@ def _report(
         modes=shapes,
         others=others,
         drums=_drums(robot, cables, X_WP, tensions),
+        contacts=None if K is None else _contacts(robot, K, X_WP),
     )
+
+
+def _contacts(robot: Robot, K: Array, X_WP: RigidTransform) -> Array | None:
+    """How far the platform may rest beside a pose [rad], and held moments [N m], shape (4,).
+
+    Infinite where the pose is not stable.
+
+    Args:
+        robot: The robot.
+        K: Stiffness of the motions that it has, shape (n, n).
+        X_WP: The pose.
+    """
+    contacts = robot.contact_hysteresis()
+    if contacts is None:
+        return None
+    R, motion = X_WP.rotation().matrix(), robot.motion_type()
+    B = motion.basis(R)
+    if np.min(np.linalg.eigvalsh(0.5 * (K + K.T))) <= 0.0:
+        return np.array([np.inf, *contacts.held_moments()])
+    compliance = (B @ np.linalg.inv(K) @ B.T)[:3, :3]
+    return np.array([contacts.turns_of_rest(compliance, R), *contacts.held_moments()])
 
 
 def _pose(X_WP: RigidTransform) -> dict[str, list[float]]:

@@ -411,7 +411,12 @@ def _run(robot: Robot, planner: Planner, folder: Path, ending: _Ending) -> int:
             if ending.stream is not None:
                 streamed = cable_stream(run, *ending.stream)
                 told["stream"] = streamed.write(results.path)
-            failed = write_pictures(results.path, _pictures(run, ending.formats), say)
+            pictures = _pictures(run, ending.formats)
+            if streamed is not None:
+                from cdpr_drake.analyses.planning.stream_figures import stream_pictures
+
+                pictures = {**pictures, **stream_pictures(streamed, ending.formats)}
+            failed = write_pictures(results.path, pictures, say)
             folder = shown_path(results.publish())
     report_kept_files(console, results.kept)
     if ending.as_json:

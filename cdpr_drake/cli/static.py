@@ -83,6 +83,12 @@ def static(
     ] = None,
     as_json: AsJson = False,
     plot: Annotated[Path | None, typer.Option(help="Draw cables, tensions, frequencies.")] = None,
+    plot_behaviour: Annotated[
+        Path | None,
+        typer.Option(
+            help="Draw what the file says of stiffening, heat, creep, sheaves, hysteresis."
+        ),
+    ] = None,
 ) -> None:
     """Lengths, tensions, stiffness, vibrations and sag of a robot at rest.
 
@@ -93,7 +99,7 @@ def static(
         "limits": limits,
     }  # fmt: skip
     if names_mechanism(robot):
-        refuse_for_mechanisms({"pose": pose})
+        refuse_for_mechanisms({"pose": pose, "plot_behaviour": plot_behaviour})
         mechanism = load_mechanism(robot)
         m = len(mechanism.cables)
         with working(message_console(), f"{mechanism.name} at rest"):
@@ -137,6 +143,8 @@ def static(
         )
     if plot is not None:
         save_plot(report.plot(), plot)
+    if plot_behaviour is not None:
+        save_plot(report.plot_behaviour(loaded), plot_behaviour)
     if as_json:
         print_json(report.as_dict())
     else:
@@ -184,6 +192,14 @@ def _print(report: StaticReport) -> None:
     if report.frequencies is not None:
         words = ", ".join(f"{f:.4g}" if np.isfinite(f) else "unstable" for f in report.frequencies)
         console.print(f"natural frequencies [Hz]: {words}")
+    if report.contacts is not None:
+        within, *moments = report.contacts.tolist()
+        held = ", ".join(f"{moment:.3g}" for moment in moments)
+        console.print(
+            f"rest is not unique: contacts hold moments up to ({held}) N m about x, y, z of P, so "
+            f"that the platform may rest turned by up to {np.degrees(within):.3g} deg from here; "
+            "frequencies are those of swings that slip, small swings are faster"
+        )
     if report.others:
         console.print(f"other poses of rest that were found: {len(report.others)}, higher ones")
 

@@ -13,6 +13,8 @@ from cdpr_drake.cables.hanging_kernel import SENSITIVITIES
 from cdpr_drake.cables.models import cable_law, check_model
 from cdpr_drake.cables.response_kernel import DERIVATIVES
 from cdpr_drake.cables.simulation_kernel import make_room
+from cdpr_drake.dynamics.contact_hysteresis import ContactHysteresis
+from cdpr_drake.dynamics.contact_kernel import CONTACTS, pack_contacts
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.geometry.platform_joint import PlatformJoint
 from cdpr_drake.statics.rigid_platform import RigidPlatform
@@ -23,17 +25,19 @@ from cdpr_drake.winches.motor_kernel import pack_winch
 IDEAL, MOTORS, TENSIONS = range(3)
 """What drives the cables: winches that follow velocities at once, motors, or tensions as such."""
 
-DRIVE, MODE, LAW, PUSH, PLATFORM, SPEEDS, WINCH, CREEPING = range(8)
+DRIVE, MODE, LAW, PUSH, PLATFORM, SPEEDS, WINCH, CREEPING, RUBBING = range(9)
 """Entries of `RobotArrays.kinds`: drive, mode of the motors, law of the cables, whether a negative
-tension pushes, states of the platform, its velocities, states of the winches, and behind those what
-has crept of the cables: their number, or 0."""
+tension pushes, states of the platform, its velocities, states of the winches, and behind those at
+the end of the state what has crept of the cables: their number, or 0; before that how far contacts
+are bent that rub as the platform turns: the number of its turns, or 0."""
 
-COM, GRAVITY, DAMPING, INERTIA, INVERSE, APPLIED = 1, 4, 7, 9, 18, 54
+COM, GRAVITY, DAMPING, INERTIA, INVERSE, APPLIED, RUB = 1, 4, 7, 9, 18, 54, 61
 """Where in `RobotArrays.body` begin: centre of mass (3), gravity (3), damping (2), rotational
-inertia (9), inverse of the mass matrix in P (36, or 9 of a planar platform), and what else acts on
-the platform: 1 where something does, and its generalized force (6, or less), see `apply_wrench`."""
+inertia (9), inverse of the mass matrix in P (36, or 9 of a planar platform), what else acts on the
+platform: 1 where something does, and its generalized force (6, or less), see `apply_wrench`; and
+the law of contacts, see `contact_kernel.pack_contacts`."""
 
-BODY_SIZE = 61
+BODY_SIZE = RUB + CONTACTS
 
 STAGES = 8
 """Rows of `RobotArrays.work`, each as long as the state."""
@@ -43,7 +47,7 @@ class RobotArrays(NamedTuple):
     """What the kernels take of a robot; made by `pack_robot`.
 
     Attributes:
-        kinds: See `DRIVE`, shape (8,), whole numbers.
+        kinds: See `DRIVE`, shape (9,), whole numbers.
         body: Mass [kg], then as `COM` says, in SI units, shape (`BODY_SIZE`,).
         cables: `CableSet.packed()` in the joint's frames, shape (m, 17).
         home: Unstrained lengths where the motors' angles are zero, shape (m,) [m].
@@ -115,6 +119,7 @@ def pack_robot(
     home: Array,
     joint: PlatformJoint | None = None,
     damping: tuple[float, float] = (0.0, 0.0),
+    contacts: ContactHysteresis | None = None,
 ) -> RobotArrays:
     """Packs a robot.
 
@@ -126,6 +131,7 @@ def pack_robot(
         home: Unstrained lengths where the motors' angles are zero, shape (m,) [m].
         joint: What it moves by; None: that of its motion type, through the origin of W.
         damping: Force per velocity of Po [N s/m], moment per angular velocity [N m s/rad].
+        contacts: Friction against turns of the platform; None: there is none.
 
     Raises:
         CableModelError: The model cannot describe the cables in the joint's frame.
@@ -145,12 +151,16 @@ def pack_robot(
     creeping = 0
     if drive.kind != TENSIONS and behaviour_of(cables).creep_stiffness > 0.0:
         creeping = m
-    kinds = np.array([drive.kind, mode, law, int(drive.push), states, speeds, winch, creeping])
+    rubbing, rubs = pack_contacts(contacts, joint)
+    kinds = np.array(
+        [drive.kind, mode, law, int(drive.push), states, speeds, winch, creeping, rubbing]
+    )
     body = np.zeros(BODY_SIZE)
     body[0] = platform.mass
     body[COM : COM + 3] = p_MCo
     body[GRAVITY : GRAVITY + 3] = joint.in_frame(platform.acceleration())
     body[DAMPING : DAMPING + 2] = damping
+    body[RUB : RUB + CONTACTS] = rubs
     body[INERTIA : INERTIA + 9] = I_MMo.ravel()
     inverse = np.linalg.inv(_mass_matrix(platform.mass, p_MCo, I_MMo, speeds)).ravel()
     body[INVERSE : INVERSE + len(inverse)] = inverse
@@ -167,7 +177,7 @@ def pack_robot(
         room=make_room(m, law, joint.height),
         force=np.zeros(speeds + m),
         command=np.zeros(m),
-        work=np.zeros((STAGES, states + winch + creeping)),
+        work=np.zeros((STAGES, states + winch + rubbing + creeping)),
         guesses=np.zeros((m, 2)),
         inner=np.zeros((SENSITIVITIES, 3)),
         D=np.zeros((DERIVATIVES, 4)),

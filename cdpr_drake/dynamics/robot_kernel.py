@@ -1,8 +1,9 @@
 """Numba kernel for the derivative of a whole robot's state: platform, cables, winches.
 
 The state is that of the platform (13, 6 or 2 numbers) and, behind it, unstrained lengths of ideal
-winches, or what `motor_kernel.winch_rates` integrates. Laws of forces are those of `cables`, of
-winches those of `winches`.
+winches, or what `motor_kernel.winch_rates` integrates, then how far contacts are bent that rub as
+the platform turns, and what has crept of the cables, where they do. Laws of forces are those of
+`cables`, of winches those of `winches`.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from cdpr_drake.cables.commanded_tension_kernel import tension_force
 from cdpr_drake.cables.dispatch_kernel import STRAIGHT
 from cdpr_drake.cables.simulation_kernel import guesses_of, model_force_and_drums
 from cdpr_drake.cables.straight_kernel import floating_force, line_force, planar_force
+from cdpr_drake.dynamics.contact_kernel import CONTACTS, rub
 from cdpr_drake.dynamics.platform_kernel import floating_rates, line_rates, planar_rates
 from cdpr_drake.dynamics.robot_arrays import (
     CREEPING,
@@ -26,6 +28,8 @@ from cdpr_drake.dynamics.robot_arrays import (
     MOTORS,
     PLATFORM,
     PUSH,
+    RUB,
+    RUBBING,
     SPEEDS,
     TENSIONS,
     RobotArrays,
@@ -50,7 +54,9 @@ def ideal_rates(limit: float, command: Array, out: Array) -> None:
 
 @njit(cache=True)
 def is_plain(robot: RobotArrays) -> bool:
-    """Whether all cables are straight, from fixed exit points."""
+    """Whether all cables are straight, from fixed exit points, and nothing rubs."""
+    if robot.kinds[RUBBING] > 0:
+        return False
     for i in range(robot.cables.shape[0]):
         if robot.cables[i, PULLEY_RADIUS] > 0.0 or robot.cables[i, ANCHOR_RADIUS] > 0.0:
             return False
@@ -106,6 +112,11 @@ def _any_rates(robot: RobotArrays, state: Array, command: Array, brakes: Array, 
                 state[n:], force[nv:], command, brakes, robot.home, robot.kinds[MODE],
                 robot.winch, out[n:],
             )  # fmt: skip
+    turns = robot.kinds[RUBBING]
+    if turns > 0:
+        at = state.shape[0] - robot.kinds[CREEPING] - turns
+        law = robot.body[RUB : RUB + CONTACTS]
+        rub(state, state[at : at + turns], law, force, out[at : at + turns])
     if n == 6:
         planar_rates(platform, force, robot.body, out)
     elif n == 2:

@@ -11,10 +11,11 @@ is infinitely stiff by 2.4 times, and cables that only pull answer to that with 
 cables of 350 kN bounced and was lost with steps of 5 and 10 ms.
 
 A holds what is stiff: how the pull of each cable changes with the pose, with its unstrained length
-and with their rates, and how motors answer to tension and speed. A cable that would become stiffer
-within the step counts as stiff already, or its catching would be met by the second stage alone, as
-a blow that puts energy in. Weight and gyroscopic moments are left to f. Vibrations faster than the
-step are damped away; what is slower is followed. Poses are stepped by rotation vectors in W.
+and with their rates, how motors answer to tension and speed, and the spring of contacts that rub. A
+cable that would become stiffer within the step counts as stiff already, or its catching would be
+met by the second stage alone, as a blow that puts energy in. Weight and gyroscopic moments are left
+to f. Vibrations faster than the step are damped away; what is slower is followed. Poses are stepped
+by rotation vectors in W.
 
 Source: Verwer, Spee, Blom and Hundsdorfer, SIAM J. Sci. Comput. 20, 1999, ROS2; Iserles et al.,
 Acta Numerica 9, 2000, for steps on rotations.
@@ -28,6 +29,12 @@ from numba import njit
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.behaving_kernel import CREEP
 from cdpr_drake.cables.dispatch_kernel import cable_response
+from cdpr_drake.dynamics.contact_kernel import (
+    CONTACTS,
+    bend_by_stage,
+    push_by_contacts,
+    stiffen_by_contacts,
+)
 from cdpr_drake.dynamics.explicit_kernel import command_at
 from cdpr_drake.dynamics.platform_kernel import mass_in_world
 from cdpr_drake.dynamics.robot_arrays import (
@@ -39,6 +46,8 @@ from cdpr_drake.dynamics.robot_arrays import (
     MODE,
     MOTORS,
     PLATFORM,
+    RUB,
+    RUBBING,
     SPEEDS,
     TENSIONS,
     RobotArrays,
@@ -254,6 +263,10 @@ def _stage(robot: RobotArrays, right: Array, share: float, paying: float, k: Arr
         for c in range(nv):
             total -= share * K[r, c] * right[c]
         x[r] = total
+    turns, y, law = robot.kinds[RUBBING], robot.work[0], robot.body[RUB : RUB + CONTACTS]
+    at = nw - robot.kinds[CREEPING] - turns
+    if turns > 0:
+        push_by_contacts(y, turns, law, share, right[at : at + turns], x)
     substitute(S, size, robot.vectors[7], x)
     for c in range(nv):
         k[nv + c] = x[c]
@@ -264,6 +277,8 @@ def _stage(robot: RobotArrays, right: Array, share: float, paying: float, k: Arr
         for i in range(m):
             k[first + m + i] = x[nv + i]
             k[first + i] = right[first + i] + share * x[nv + i]
+    if turns > 0:
+        bend_by_stage(y, turns, share, x, k[at : at + turns])
 
 
 @njit(cache=True, inline="always")
@@ -288,6 +303,9 @@ def semi_implicit_step(
     for r in range(S.shape[0]):
         for c in range(S.shape[0]):
             S[r, c] = M[r, c] + share * (D[r, c] + share * K[r, c])
+    if robot.kinds[RUBBING] > 0:
+        law = robot.body[RUB : RUB + CONTACTS]
+        stiffen_by_contacts(y, robot.kinds[RUBBING], law, share, S)
     eliminate(S, S.shape[0], robot.vectors[7])
     for i in range(nv):
         right[i], right[nv + i] = y[n - nv + i], f[n - nv + i]

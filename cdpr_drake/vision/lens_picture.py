@@ -9,6 +9,7 @@ one drawn so large: `LensMap.scale` says by how much, over the image.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -17,6 +18,7 @@ import numpy as np
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import LensDistortionError
+from cdpr_drake.vision.image_window import ImageWindow, whole_image, window_round
 from cdpr_drake.vision.lens_distortion import FARTHEST
 from cdpr_drake.vision.pinhole import Pinhole
 
@@ -118,6 +120,34 @@ def without_lens(camera: Pinhole) -> Pinhole:
     return lens_map(camera).wide
 
 
+def _cut(u: np.ndarray, v: np.ndarray, window: ImageWindow) -> tuple[np.ndarray, np.ndarray]:
+    """A window of maps."""
+    rows = slice(window.v, window.v + window.height)
+    columns = slice(window.u, window.u + window.width)
+    return u[rows, columns], v[rows, columns]
+
+
+def _window_with(u: np.ndarray, v: np.ndarray, within: ImageWindow) -> ImageWindow:
+    """The window of a picture that maps look up, those beyond its rim there."""
+    u, v = (
+        np.clip(value, 0.0, size - 1.0) for value, size in ((u, within.width), (v, within.height))
+    )
+    box = np.array([np.min(u), np.min(v), np.max(u), np.max(v)], float)
+    found = window_round(box, MARGIN, within)
+    assert found is not None
+    return found
+
+
+def _looked_up(
+    picture: np.ndarray, u: np.ndarray, v: np.ndarray, window: ImageWindow
+) -> np.ndarray:
+    """What maps look up, of a window of the picture that they are for."""
+    shifted = u - np.float32(window.u), v - np.float32(window.v)
+    return np.asarray(
+        cv2.remap(picture, *shifted, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    )
+
+
 class StraightPicture:
     """Pictures of a camera with a lens as the pinhole of `lens_map` would have taken them.
 
@@ -149,6 +179,23 @@ class StraightPicture:
         return np.asarray(
             cv2.remap(image, self._u, self._v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
         )
+
+    def window(self, wanted: ImageWindow, draw: Callable[[ImageWindow], np.ndarray]) -> np.ndarray:
+        """A window of the straight picture of an image through the lens, drawn no larger than that.
+
+        It goes through the lens and back as the whole picture does: what the lens softens is soft.
+
+        Args:
+            wanted: The window of the straight picture.
+            draw: Draws a window of the pinhole's picture `wide`, shape (height, width, ...).
+        """
+        lens = lens_map(self._camera)
+        back = _cut(self._u, self._v, wanted)
+        image = _window_with(*back, whole_image(self._camera))
+        through = _cut(lens.u, lens.v, image)
+        drawn = _window_with(*through, whole_image(self.wide))
+        seen = _looked_up(draw(drawn), *through, drawn)
+        return _looked_up(seen, *back, image)
 
     def to_ideal(self, uv: Array) -> Array:
         """Pixels of the straight picture in those of the camera without its lens, shape (2, n)."""

@@ -575,6 +575,8 @@ def _check(
         raise CdprError(
             f"cable.behaviour.creep_stiffness: found {creeping:g}; accepted in a batch: 0"
         )
+    if any(each.contact_hysteresis() is not None for each in robots):
+        raise CdprError("platform.hysteresis: found a section; accepted in a batch: null")
     if by_tensions and settings.winches.has_motors():
         raise CdprError("winches.kind: found motor for robots by tensions; accepted: ideal")
 

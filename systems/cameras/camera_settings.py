@@ -165,7 +165,7 @@ def servo_pinhole(camera: CameraSettings, robot: Robot) -> Pinhole:
 
 
 def check_lens(camera: CameraSettings, robot: Robot, path: Path) -> None:
-    """Refuses a camera that is none, and a lens that folds its image over or that no region takes.
+    """Refuses a camera that is none, and a lens that folds its image over.
 
     Args:
         camera: The settings, with a mounting that the robot has.
@@ -184,7 +184,3 @@ def check_lens(camera: CameraSettings, robot: Robot, path: Path) -> None:
     fold = fold_problem(pinhole)
     if fold:
         raise ScenarioError(f"{path}: camera.distortion: {fold}")
-    if camera.region == REGION and pinhole.distortion is not None:
-        raise ScenarioError(
-            f"{path}: camera.region: found {REGION} with a lens that distorts; accepted: {WHOLE}"
-        )

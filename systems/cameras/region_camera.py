@@ -13,6 +13,8 @@ from cdpr_drake.errors import LensDistortionError
 from cdpr_drake.systems.cameras.scene_picture import draw_image, draw_window
 from cdpr_drake.systems.cameras.target_measurement import TargetMeasurement, shifted_marks
 from cdpr_drake.vision.image_window import ImageWindow, expected_window, target_box, whole_image
+from cdpr_drake.vision.lens_picture import StraightPicture, lens_picture, without_lens
+from cdpr_drake.vision.mark_reading import found_marks, moved_marks, read_marks
 from cdpr_drake.vision.pinhole import Pinhole
 from cdpr_drake.vision.target import Target
 
@@ -40,7 +42,8 @@ class RegionCamera(TargetMeasurement):
     `TargetDetector` finds is missed.
 
     Drake draws windows only that have the principal point inside, so what is drawn may be larger
-    than what is read and searched.
+    than what is read and searched. Where the lens distorts, windows are of the image as
+    `StraightPicture` shows it, and of what is drawn wider no more is drawn than they need.
     """
 
     def __init__(
@@ -68,14 +71,17 @@ class RegionCamera(TargetMeasurement):
             turns: Whether an input says where it is on B.
 
         Raises:
-            LensDistortionError: The lens distorts, or is believed to be another.
+            LensDistortionError: The camera is believed to be another, or the lens has no valid
+                field in all of the image.
         """
-        if not pinhole.is_ideal:
+        if pinhole.believed is not None:
             raise LensDistortionError(
-                "camera.region: found target with a lens that distorts, or that is believed to be "
-                "another; accepted: whole, or a camera without distortion"
+                "camera.region: found target with a camera that is believed to be another; "
+                "accepted: whole, or the camera as it is"
             )
         super().__init__(target, pinhole, rate, latency_frames, image_bias)
+        self._straight = None if pinhole.distortion is None else StraightPicture(pinhole)
+        self._searched = pinhole if self._straight is None else self._straight.wide
         self._parent, self._X_BC = parent, X_BC
         self._query = self.DeclareAbstractInputPort(
             "query_object", AbstractValue.Make(QueryObject())
@@ -93,9 +99,11 @@ class RegionCamera(TargetMeasurement):
     def picture(self, context: Context) -> np.ndarray:
         """The whole image of now, shape (height, width, 4), 8 bits a channel, for people to look
         at, from the block's own context."""
-        return draw_image(
-            self._query.Eval(context), self._parent, self._place(context), self.pinhole
+        camera = self.pinhole
+        drawn = draw_image(
+            self._query.Eval(context), self._parent, self._place(context), without_lens(camera)
         )
+        return drawn if camera.distortion is None else lens_picture(drawn, camera)
 
     def _place(self, context: Context) -> RigidTransform:
         """Where the camera is on B."""
@@ -119,10 +127,10 @@ class RegionCamera(TargetMeasurement):
     def _find(self, context: Context) -> tuple[Array | None, bool]:
         """Marks, and whether the whole image was drawn."""
         scene = self._query.Eval(context), self._place(context)
-        everything = whole_image(self.pinhole)
+        everything = whole_image(self._searched)
         before = context.get_discrete_state(self._memory).value()[_BOX]
         seen = self.newest_marks(context)
-        window = expected_window(self._last_box(context), before, self.pinhole)
+        window = expected_window(self._last_box(context), before, self._searched)
         if window is not None and window != everything:
             marks = self._search(scene, window, seen)
             if marks is not None:
@@ -130,10 +138,17 @@ class RegionCamera(TargetMeasurement):
         return self._search(scene, everything, seen), True
 
     def _last_box(self, context: Context) -> Array:
-        """Where the target was in the newest image, shape (4,) [px]; NaN where it was not seen."""
+        """Where the target was in the newest image as it is searched, shape (4,) [px]; NaN where
+        it was not seen."""
         X_CO = self.newest_pose(context)
         if X_CO is None:
             return np.full(4, np.nan)
+        if self._straight is not None:
+            uv = self.pinhole.found_at(self.pinhole.ideal.project(X_CO @ self.target.outline))
+            if self.bias is not None:
+                uv = uv - self.bias[:, np.newaxis]
+            uv = self._straight.from_ideal(self.pinhole.read(uv))
+            return np.concatenate([np.min(uv, axis=1), np.max(uv, axis=1)])
         box = target_box(self.target, X_CO, self.pinhole)
         return box if self.bias is None else box - np.tile(self.bias, 2)
 
@@ -144,6 +159,8 @@ class RegionCamera(TargetMeasurement):
         seen: Array | None,
     ) -> Array | None:
         query, X_BC = scene
+        if self._straight is not None:
+            return self._search_straight(self._straight, scene, window, seen)
         if window == whole_image(self.pinhole):
             picture = draw_image(query, self._parent, X_BC, self.pinhole)
         else:
@@ -152,3 +169,33 @@ class RegionCamera(TargetMeasurement):
         before = None if seen is None else shifted_marks(self.target, seen, -corner)
         marks = self.target.follow(picture, before)
         return None if marks is None else shifted_marks(self.target, marks, corner)
+
+    def _search_straight(
+        self,
+        straight: StraightPicture,
+        scene: tuple[QueryObject, RigidTransform],
+        window: ImageWindow,
+        seen: Array | None,
+    ) -> Array | None:
+        """As `_search`, in a window of the straight picture; marks are in pixels of the image."""
+        (query, X_BC), wide, target = scene, straight.wide, self.target
+        if window == whole_image(wide):
+            drawn = draw_image(query, self._parent, X_BC, wide)
+            picture = straight.picture(lens_picture(drawn, self.pinhole))
+        else:
+            picture = straight.window(
+                window, lambda part: draw_window(query, self._parent, X_BC, wide, part)
+            )
+        corner, size = np.array([window.u, window.v], float), target.size
+        before = None
+        if seen is not None:
+            ideal = read_marks(seen, target.mark, size, self.pinhole)
+            before = moved_marks(ideal, target.mark, size, straight.from_ideal)
+            before = shifted_marks(target, before, -corner)
+        marks = target.follow(picture, before)
+        if marks is None:
+            return None
+        marks = moved_marks(
+            shifted_marks(target, marks, corner), target.mark, size, straight.to_ideal
+        )
+        return found_marks(marks, target.mark, size, self.pinhole)

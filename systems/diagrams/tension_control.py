@@ -25,7 +25,7 @@ from cdpr_drake.systems.controllers.tension_distributor import TensionDistributo
 from cdpr_drake.systems.monitoring.log_row import RunLog, add_log
 from cdpr_drake.systems.remote.remote_place import DISTRIBUTOR, TRAJECTORY, Remote
 from cdpr_drake.systems.remote.remote_tensions import RemoteDistributor, RemoteTracking
-from cdpr_drake.systems.robots.assembly import apply_force
+from cdpr_drake.systems.robots.assembly import add_hysteresis, apply_force
 from cdpr_drake.systems.robots.compiled_cable_robot import motion_by_tensions
 from cdpr_drake.systems.robots.compiled_motion import MEMORY, CompiledMotion
 from cdpr_drake.systems.robots.compiled_step import StepRule
@@ -284,6 +284,10 @@ def add_tension_control(
             builder.Connect(driven.GetOutputPort("lengths"), block.GetInputPort("lengths"))
     if isinstance(driven, TensionDrivenCables):
         apply_force(builder, in_plant.plant, driven.GetOutputPort("generalized_force"), name=name)
+        friction = add_hysteresis(builder, in_plant, name=name)
+        if friction is not None:
+            rubbing = friction.GetOutputPort("generalized_force")
+            apply_force(builder, in_plant.plant, rubbing, name=prefix + "rubbing")
     pushes = _add_pushes(builder, in_plant, settings, control, name)
     return TensionControlBlocks(control, distribution, driven, real, state, pushes)
 

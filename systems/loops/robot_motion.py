@@ -13,7 +13,7 @@ from cdpr_drake.cables.models import cable_law, crept_at_rest
 from cdpr_drake.cables.simulation_kernel import OUTPUTS, guesses_of, make_room, outputs_kernel
 from cdpr_drake.dynamics.advance_events_kernel import fresh_memory, robot_addresses
 from cdpr_drake.dynamics.advance_kernel import REPORTED
-from cdpr_drake.dynamics.robot_arrays import CREEPING, MOTORS, pack_robot
+from cdpr_drake.dynamics.robot_arrays import CREEPING, MOTORS, RUBBING, pack_robot
 from cdpr_drake.dynamics.robot_kernel import INTEGRATION_OK, ideal_rates
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.models.robot_in_plant import pose_on_joint
@@ -115,6 +115,7 @@ class RobotMotion:
         self._arrays = pack_robot(
             self._body, self._set, self._model, self._drive,
             home=self._home, joint=joint, damping=(damping.translation, damping.rotation),
+            contacts=robot.contact_hysteresis(),
         )  # fmt: skip
         law = cable_law(self._model, self._set)
         self._room = make_room(self._set.count, law, joint.height)
@@ -175,7 +176,8 @@ class RobotMotion:
         state = resting_state(
             self.robot, self._drive, X_WP, lengths, holding.drum_tensions, home=self._home
         )
-        return np.concatenate([state, crept_at_rest(self._set, X_WP, lengths)])
+        unbent = np.zeros(self._arrays.kinds[RUBBING])
+        return np.concatenate([state, unbent, crept_at_rest(self._set, X_WP, lengths)])
 
     def begin(self, state: Array) -> None:
         """Puts platform and winches into a state at time 0, shape (n,)."""

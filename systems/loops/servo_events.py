@@ -52,6 +52,7 @@ def python_reason(scenario: Scenario, model: ServoModel) -> str:
         "it follows a plan": model.plan is not None or scenario.pose_plan is not None,
         "its tensions are managed": scenario.tension_management is not None,
         "its cables creep": model.robot.cable_behaviour().creep_stiffness > 0.0,
+        "its platform rubs as it turns": model.robot.contact_hysteresis() is not None,
         "its winches have motors": scenario.winches.has_motors(),
         "its sensors are logged": bool(scenario.sensors.log),
         f"its estimator is {', '.join(others)}": bool(others),

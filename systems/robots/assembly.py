@@ -23,6 +23,7 @@ from cdpr_drake.models.scene import add_frame, add_ground
 from cdpr_drake.statics.static_tensions import StaticTensions
 from cdpr_drake.systems.robots.cable_forces import CREPT, PORTS, CableForces
 from cdpr_drake.systems.robots.failures import BROKEN, FAULTS
+from cdpr_drake.systems.robots.platform_hysteresis import BENT, PlatformHysteresis
 from cdpr_drake.systems.robots.platform_pose import PlatformPose
 from cdpr_drake.systems.robots.platform_wrench import APPLIED_WRENCH, PlatformWrench
 from cdpr_drake.systems.robots.settings import CableRobotSettings
@@ -233,6 +234,10 @@ def add_cable_robot(
         brake = builder.AddNamedSystem(prefix + "damping", settings.damping.block(in_plant))
         builder.Connect(state, brake.get_input_port())
         applied = _sum(builder, prefix + "applied_force", applied, brake.get_output_port())
+    friction = add_hysteresis(builder, in_plant, name=name)
+    if friction is not None:
+        rubbing = friction.GetOutputPort("generalized_force")
+        applied = _sum(builder, prefix + "force_and_friction", applied, rubbing)
     wrench = builder.AddNamedSystem(prefix + "platform_wrench", PlatformWrench(in_plant))
     applied = _sum(builder, prefix + "force_and_wrench", applied, wrench.get_output_port())
     apply_force(builder, plant, applied, name=name)
@@ -253,6 +258,8 @@ def add_cable_robot(
     outputs |= {port: forces.GetOutputPort(port) for port in PORTS}
     if forces.HasOutputPort(CREPT):
         outputs[CREPT] = forces.GetOutputPort(CREPT)
+    if friction is not None:
+        outputs[BENT] = friction.GetOutputPort(BENT)
     for port_name in ("unstrained_lengths", "unstrained_length_rates"):
         builder.Connect(winch.GetOutputPort(port_name), forces.GetInputPort(port_name))
     for port in map(winch.get_output_port, range(winch.num_output_ports())):
@@ -275,6 +282,29 @@ def add_cable_robot(
         inputs, outputs, robot=robot, in_plant=in_plant, plant=plant, scene_graph=scene_graph,
         forces=forces, winches=winch,
     )  # fmt: skip
+
+
+def add_hysteresis(
+    builder: DiagramBuilder, in_plant: RobotInPlant, *, name: str = ""
+) -> PlatformHysteresis | None:
+    """Adds the friction against turns of a platform that its file gives, which acts on nothing yet.
+
+    Args:
+        builder: The builder that has the plant.
+        in_plant: The platform in the plant.
+        name: Put before the name of the block.
+
+    Returns:
+        The block, with the platform's state; None where the file gives none.
+    """
+    contacts = in_plant.robot.contact_hysteresis()
+    if contacts is None:
+        return None
+    prefix = f"{name}_" if name else ""
+    friction = builder.AddNamedSystem(prefix + "hysteresis", PlatformHysteresis(in_plant, contacts))
+    state = in_plant.plant.get_state_output_port(in_plant.model_instance)
+    builder.Connect(state, friction.get_input_port())
+    return friction
 
 
 def set_robot_at_equilibrium(

@@ -69,6 +69,8 @@ class CableRobot(Diagram):
     sags                    vector(m)                 m       out
     unstrained_lengths      vector(m)                 m       out
     unstrained_length_rates vector(m)                 m/s     out
+    bent                    vector(3 or 1)            rad     out, only of a platform that rubs as
+                                                              it turns, see `PlatformHysteresis`
     body_poses              list[RigidTransform]      m       out, from the plant
     body_velocities         list[SpatialVelocity]     rad/s   out, from the plant, of bodies in W
                                                       m/s
@@ -238,6 +240,12 @@ def automatic_step(
             slope = behaviour.sheave_friction * np.pi * most[0] / behaviour.sliding_speed
             poles = np.concatenate([poles, -slope / inertia])
     K = cable_stiffness_matrix(J, stiffest, paths.lengths)
+    contacts = robot.contact_hysteresis()
+    if contacts is not None:  # that stick
+        whole = np.zeros((6, 6))
+        whole[:3, :3] = contacts.stiffness_in_world(X_WP.rotation().matrix())
+        own = whole if motion.is_free else motion.part(whole, X_WP.rotation().matrix())
+        K[: len(own), : len(own)] += own
     retardation = 0.0 if cables.model == ELASTIC else float(np.max(simulated.retardation))
     eigenvalues = vibration_eigenvalues(M, K, retardation)
     return STEP_SHARE * largest_stable_step(np.concatenate([eigenvalues, poles]), integrator)

@@ -28,6 +28,7 @@ from cdpr_drake.dynamics.advance_kernel import REPORTED, robot_energy
 from cdpr_drake.dynamics.robot_arrays import (
     CREEPING,
     MOTORS,
+    RUBBING,
     TENSIONS,
     Drive,
     RobotArrays,
@@ -50,6 +51,7 @@ from cdpr_drake.systems.robots.compiled_step import (
 )
 from cdpr_drake.systems.robots.failures import BROKEN, JAMMED, POWERLESS
 from cdpr_drake.systems.robots.motor_winch import COMMAND_PORTS
+from cdpr_drake.systems.robots.platform_hysteresis import BENT
 from cdpr_drake.systems.robots.platform_wrench import APPLIED_WRENCH
 from cdpr_drake.winches.failed_winches import fail_winches, pack_failing_winches
 from cdpr_drake.winches.motor import MODES
@@ -76,6 +78,8 @@ class CompiledMotion(LeafSystem):
     jammed                 vector(k)       -        in, for each winch that stands still
     powerless              vector(k)       -        in, with motors: for each that has no power
     geometry_pose          FramePoseVector m        out, of the platform's frame; not without one
+    bent                   vector(3 or 1)  rad      out, only of a platform that rubs as it turns;
+                                                    see `PlatformHysteresis`
     step_errors            vector(2)       m, rad   out, largest estimated error of one step so
                                                     far, in position and rotation
     steps                  vector(2)       -        out, steps taken, and taken back, so far
@@ -127,7 +131,7 @@ class CompiledMotion(LeafSystem):
         self._height = joint.height
         self._arrays = pack_robot(
             rigid_platform(robot), cables, model, drive,
-            home=self._home, joint=joint, damping=damping,
+            home=self._home, joint=joint, damping=damping, contacts=robot.contact_hysteresis(),
         )  # fmt: skip
         self._may_fail = may_fail and drive.kind != TENSIONS
         if self._may_fail and drive.law is not None:
@@ -233,6 +237,10 @@ class CompiledMotion(LeafSystem):
             self.DeclareAbstractOutputPort(
                 "geometry_pose", lambda: Value(FramePoseVector()), calc_frames, here
             )
+        turns = self._arrays.kinds[RUBBING]
+        if turns > 0:
+            end = self._size - self._arrays.kinds[CREEPING]
+            self._vector(BENT, turns, lambda c: self.state(c)[end - turns : end], here)
         self._vector("step_errors", 2, lambda context: self.report(context)[:2], here)
         self._vector("steps", 2, lambda context: self.report(context)[2:], here)
 
@@ -432,7 +440,7 @@ class CompiledMotion(LeafSystem):
     def _state_at(self, X_WP: RigidTransform, lengths: Array, tensions: Array) -> Array:
         state = resting_state(self._robot, self._drive, X_WP, lengths, tensions, home=self._home)
         crept = crept_at_rest(self._set, X_WP, lengths)[: self._arrays.kinds[CREEPING]]
-        return np.concatenate([state, crept])
+        return np.concatenate([state, np.zeros(self._arrays.kinds[RUBBING]), crept])
 
     def energy(self, context: Context) -> float:
         """Kinetic and potential energy of platform and cables [J], see `robot_energy`."""

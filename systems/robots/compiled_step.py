@@ -16,6 +16,7 @@ from cdpr_drake.cables.behaving_kernel import put_crept
 from cdpr_drake.cables.broken_cables import break_cables
 from cdpr_drake.cables.simulation_kernel import guesses_of, make_room, model_force_and_drums
 from cdpr_drake.dynamics.advance_events_kernel import integrate_explicit, integrate_semi_implicit
+from cdpr_drake.dynamics.contact_kernel import CONTACTS, rub
 from cdpr_drake.dynamics.explicit_kernel import METHODS
 from cdpr_drake.dynamics.platform_kernel import floating_rates, line_rates, planar_rates
 from cdpr_drake.dynamics.robot_arrays import (
@@ -23,6 +24,8 @@ from cdpr_drake.dynamics.robot_arrays import (
     IDEAL,
     MOTORS,
     PLATFORM,
+    RUB,
+    RUBBING,
     SPEEDS,
     Drive,
     RobotArrays,
@@ -38,6 +41,7 @@ from cdpr_drake.models.robot_in_plant import pose_from_state
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.systems.robots.cable_forces import CREPT
 from cdpr_drake.systems.robots.failures import BROKEN
+from cdpr_drake.systems.robots.platform_hysteresis import BENT
 from cdpr_drake.systems.robots.platform_wrench import APPLIED_WRENCH
 from cdpr_drake.winches.motor import MODES, resting_motors
 
@@ -162,6 +166,7 @@ class CompiledBodies(LeafSystem):
     applied_wrench          vector(6)                 N m, N  in, may stay open
     broken                  vector(m)                 -       in, may stay open
     crept                   vector(m)                 -       in, of cables that creep only
+    bent                    vector(3 or 1)            rad     in, of platforms that rub only
     body_velocities         list[SpatialVelocity]     rad/s   out, of the world and the platform, in
                                                       m/s     W, of the body's origin
     body_accelerations      list[SpatialAcceleration] rad/s^2 out, the same of accelerations
@@ -193,6 +198,9 @@ class CompiledBodies(LeafSystem):
         self._crept = None
         if arrays.kinds[CREEPING] > 0:
             self._crept = self.DeclareVectorInputPort(CREPT, m)
+        self._bent = None
+        if arrays.kinds[RUBBING] > 0:
+            self._bent = self.DeclareVectorInputPort(BENT, arrays.kinds[RUBBING])
         self._wrench = self.DeclareVectorInputPort(APPLIED_WRENCH, 6)
         self._broken = self.DeclareVectorInputPort(BROKEN, m)
         self.DeclareAbstractOutputPort(
@@ -214,6 +222,9 @@ class CompiledBodies(LeafSystem):
         if self._crept is not None:
             put_crept(self._crept.Eval(context), guesses_of(self._room, len(self._cables)))
         model_force_and_drums(state, lengths, rates, self._cables, self._room, self._nv, force)
+        if self._bent is not None:
+            bent = self._bent.Eval(context)
+            rub(state, bent, self._arrays.body[RUB : RUB + CONTACTS], force, np.empty(len(bent)))
         pushed = self._wrench.HasValue(context)
         apply_wrench(self._arrays, self._joint, self._wrench.Eval(context) if pushed else None)
         _RATES[self._n](state, force, self._arrays.body, out)

@@ -173,6 +173,27 @@ def test_a_view_that_a_lens_sees_in_full(coefficients):
         assert not camera.sees(camera.project(np.vstack([np.array(sides).T, np.ones(82)])))
 
 
+@pytest.mark.parametrize("name", ["barrel", "pincushion", "fisheye", "equidistant"])
+def test_the_view_of_a_plan_is_seen_by_opencv(name):
+    """Where a plan keeps targets: none of a million directions in it is out of OpenCV's image, and
+    none of four sides can be moved out by a hundredth."""
+    width, height = 660, 440
+    camera = Pinhole(width, height, K[0, 0], K[1, 1], K[0, 2], K[1, 2], distortion=LENSES[name])
+    x, y = camera.view_slopes()
+    a, b = np.meshgrid(np.linspace(-1.0, 1.0, 1001), np.linspace(-1.0, 1.0, 1001))
+    uv = by_opencv(LENSES[name], 0.9999 * np.vstack([x * a.ravel(), y * b.ravel()]))
+    assert np.all((uv > -0.5) & (uv < np.array([[width], [height]]) - 0.5))
+    edge = np.linspace(-1.0, 1.0, 1001)
+    for k, size, slopes in ((0, width, (1.01 * x, y)), (1, height, (x, 1.01 * y))):
+        sides = []
+        for sign in (1.0, -1.0):
+            side = np.array([slopes[0] * edge, slopes[1] * edge])
+            side[k] = sign * slopes[k]
+            at = by_opencv(LENSES[name], side)[k]
+            sides.append(np.all((at > -0.5) & (at < size - 0.5)))
+        assert not all(sides)
+
+
 def test_without_a_lens_the_view_is_that_of_the_angles():
     camera = Pinhole.from_view_angles(640, 480, 0.9, 0.7)
     assert camera.view_slopes() == pytest.approx((np.tan(0.45), np.tan(0.35)))

@@ -84,8 +84,16 @@ def test_what_a_swing_was_made_with_is_found(group):
         assert abs(at - value) < SIGMAS * std, (name, at, std)
         assert std < 0.5 * value  # it is told
     said = " ".join(found.remarks)
-    assert ("in no robot file" in said) == (group == "hysteresis")
-    does = freely_moved_robot(found).cable_behaviour()
+    assert ("rests beside its pose" in said) == (group == "hysteresis")
+    moved = freely_moved_robot(found)
+    rubs = moved.platform.hysteresis
+    assert (rubs is not None) == (group == "hysteresis")
+    if rubs is not None:  # the file holds what was found, and a fit begins there
+        for name in ("tilt", "turn", "slip"):
+            assert getattr(rubs, name) == by_name[f"hysteresis.{name}"][0]
+        again = FreeMotionModel.of(moved, START, ("hysteresis",), False, False)
+        assert again.by_name(again.before())["hysteresis.tilt"] == rubs.tilt
+    does = moved.cable_behaviour()
     assert does.stiffening == pytest.approx(by_name.get("all.stiffening", (0.0, 0.0))[0])
     assert does.creep_stiffness == pytest.approx(by_name.get("all.creep_stiffness", (0.0, 0.0))[0])
 

@@ -67,14 +67,58 @@ def test_it_is_read_back_as_its_text_is(run_folder):
         np.testing.assert_array_equal(log.columns[header], values)
 
 
-def test_what_is_not_finite_is_null_and_comes_back_so(run_folder):
+@pytest.mark.parametrize("row", [0, 3])
+def test_what_is_not_finite_is_left_out_and_comes_back_so(run_folder, row):
     folder, log = run_folder
-    log["tensions"][3, 1] = np.nan
+    log["tensions"][row, 1] = np.nan
     np.savez(folder / "log.npz", **log)
     path = write(folder)
     back = read_recorded(path)
     header = next(name for name in back.columns if "C2" in name)
-    assert np.flatnonzero(np.isnan(back.columns[header])).tolist() == [3]
+    assert np.flatnonzero(np.isnan(back.columns[header])).tolist() == [row]
+
+
+def made_of(**keys):
+    """A JSON schema of an object that has all of these."""
+    return {"type": "object", "properties": keys, "required": list(keys)}
+
+
+NUMBER, TEXT = {"type": "number"}, {"type": "string"}
+FOXGLOVE = made_of(
+    timestamp=made_of(
+        sec={"type": "integer", "minimum": 0},
+        nsec={"type": "integer", "minimum": 0, "maximum": 999_999_999},
+    ),
+    parent_frame_id=TEXT, child_frame_id=TEXT, translation=made_of(x=NUMBER, y=NUMBER, z=NUMBER),
+    rotation=made_of(x=NUMBER, y=NUMBER, z=NUMBER, w=NUMBER),
+)  # fmt: skip
+"""What Foxglove's own schema of FrameTransform asks of a message (foxglove-sdk,
+schemas/jsonschema/FrameTransform.json)."""
+
+
+def test_every_message_is_what_its_schema_and_foxglove_s_say(run_folder):
+    """Also with numbers that are not finite, which JSON has not; such a pose has no transform."""
+    jsonschema = pytest.importorskip("jsonschema")
+    folder, log = run_folder
+    log["tensions"][3, 1], log["error"][5], log["X_WP"][7, 2] = np.nan, np.inf, np.nan
+    np.savez(folder / "log.npz", **log)
+    counts = {}
+    with write(folder).open("rb") as stream:
+        for schema, channel, message in reader.make_reader(
+            stream, validate_crcs=True
+        ).iter_messages():
+            assert (schema.encoding, channel.message_encoding) == ("jsonschema", "json")
+            own = json.loads(schema.data)
+            assert own["type"] == "object"  # as Foxglove demands
+            jsonschema.Draft202012Validator.check_schema(own)
+            told = json.loads(message.data)
+            jsonschema.validate(told, own)
+            if schema.name == "foxglove.FrameTransform":
+                jsonschema.validate(told, FOXGLOVE)
+                stamp = told["timestamp"]["sec"] * 10**9 + told["timestamp"]["nsec"]
+                assert stamp == message.log_time
+            counts[channel.topic] = counts.get(channel.topic, 0) + 1
+    assert counts == {"/tf": 39, "/X_WP": 40, "/tensions": 40, "/error": 40}
 
 
 def test_transforms_alone_are_poses(run_folder):

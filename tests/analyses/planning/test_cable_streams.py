@@ -7,6 +7,7 @@ import pytest
 
 import cdpr_drake as cdpr
 from cdpr_drake.analyses.planning.cable_streams import CHECK, LENGTHS, cable_stream
+from cdpr_drake.analyses.planning.stream_figures import stream_figure
 from cdpr_drake.cables.models import CATENARY, ELASTIC, cable_state
 from cdpr_drake.errors import PlanningError
 from cdpr_drake.geometry.poses import pose_from_row
@@ -49,6 +50,24 @@ def test_a_stream_that_is_too_coarse_lets_cables_go_slack(run):
     assert not coarse.check.keeps_taut
     assert np.min(coarse.check.least) < np.min(fine.check.least)
     assert "CABLES GO SLACK" in coarse.words()
+
+
+@pytest.mark.parametrize("model", [ELASTIC, CATENARY])
+def test_its_figure_has_what_drives_are_sent(run, model):
+    stream = cable_stream(run, 50.0, model)
+    figure = stream_figure(stream)
+    lengths, angles, stretch = figure.axes
+    m = len(run.robot.cables)
+    for place, values in (
+        (lengths, stream.lengths), (angles, stream.motor_angles / (2.0 * np.pi)),
+        (stretch, 1e3 * stream.stretch),
+    ):  # fmt: skip
+        drawn = [line.get_ydata() for line in place.lines if len(line.get_xdata()) > 2][:m]
+        assert max(map(np.max, drawn)) == pytest.approx(np.max(values))
+        assert min(map(np.min, drawn)) == pytest.approx(np.min(values))
+        assert "[" in place.get_ylabel()
+    assert ("sag" in stretch.get_ylabel()) == (model == CATENARY)
+    assert len(lengths.get_legend().get_texts()) == m
 
 
 def test_files_of_a_stream(run, tmp_path):

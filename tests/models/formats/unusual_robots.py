@@ -53,7 +53,7 @@ def robot_with_everything(**changes: object) -> Robot:
         "shape": {"kind": "cylinder", "radius": float(size[:2].min()) / 2.5,
                   "height": float(size[2]) / 2, "position": [0.011, -0.021, 0.045],
                   "angles_deg": [0.0, 0.0, 20.0]},
-        "inertia_of": "shape",
+        "inertia_of": "shape", "hysteresis": {"tilt": 0.7, "turn": 1.3, "slip": 0.03},
     }  # fmt: skip
     made["frame"] |= {
         "beam": 0.033,

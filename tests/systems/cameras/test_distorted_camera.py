@@ -265,8 +265,6 @@ def test_robots_and_scenarios_take_camera_files(tmp_path):
         (["perturbations.camera_distortion={kind: brown_conrady, k1: -0.9}"],
          "perturbations.camera_distortion: found a brown"),
         (["perturbations.camera_distortion={k2: 1}"], "perturbations.camera_distortion.k2: found"),
-        (["camera.kind=rendered", "camera.region=target",
-          "camera.distortion={kind: fisheye}"], "camera.region: found target with a lens"),
         (["camera.kind=rendered", "camera.region=target", "perturbations.camera_model=astra"],
          "camera.region: found target with a camera that is believed to be another"),
     ],
