@@ -127,24 +127,27 @@ class BreakRequest:
         if self.scenario.winches.mode != TORQUE:
             raise WorkspaceError(
                 f"scenario {self.scenario.name}: winches.mode: found "
-                f"{self.scenario.winches.mode}; accepted for the kind dynamic-single-failure: {TORQUE}"
+                f"{self.scenario.winches.mode}; accepted for the kind dynamic-single-failure: "
+                f"{TORQUE}"
             )
         if robot.winch_groups().are_shared():
             raise WorkspaceError(
-                f"kinds survives: found {robot.name}, which has several cables on one winch; "
-                "accepted: robots with a winch for each cable"
+                f"kind dynamic-single-failure: found {robot.name}, which has several cables on one "
+                "winch; accepted: robots with a winch for each cable"
             )
         if not robot.joint().is_floating:
             raise WorkspaceError(
-                f"kinds survives: found {robot.name}, whose platform does not move freely; "
-                "accepted: robots with six degrees of freedom"
+                f"kind dynamic-single-failure: found {robot.name}, whose platform does not move "
+                "freely; accepted: robots with six degrees of freedom"
             )
         settings, spare = self.torque_control(robot), len(robot.cables) - 6
         try:
             for name in (settings.method, EMERGENCY):
                 method_for(name, spare, False)
         except TensionProblemError as problem:
-            raise WorkspaceError(f"kinds survives: {robot.name}: {problem}") from problem
+            raise WorkspaceError(
+                f"kind dynamic-single-failure: {robot.name}: {problem}"
+            ) from problem
 
 
 @dataclass(frozen=True, eq=False)

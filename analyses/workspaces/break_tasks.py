@@ -14,7 +14,12 @@ from cdpr_drake.workspaces.pose_grid import WorkspaceGrid
 if TYPE_CHECKING:
     from cdpr_drake.analyses.simulation.break_survival import BreakRequest
 
-SURVIVES, EXCURSION, WORST, BEST = "dynamic-single-failure", "break-excursion", "worst-cable", "best-reaction"
+SURVIVES, EXCURSION, WORST, BEST = (
+    "dynamic-single-failure",
+    "break-excursion",
+    "worst-cable",
+    "best-reaction",
+)
 
 OF_BREAKS = (EXCURSION, WORST, BEST)
 """Measures that come with the kind."""

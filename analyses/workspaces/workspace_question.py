@@ -181,10 +181,10 @@ class WorkspaceRequest:
         pulleys: Whether cables run over the robot's pulleys; else from fixed exit points.
         method: Name of the method whose tensions must hold the weight, of `tensions.METHODS`, for
             the kind `static`; None: any tensions.
-        reactions: For the kind `dynamic-single-failure`, names of `break_report.SAVING`; None: stop,
-            redistribute, brake, retreat.
-        moving: For the kind `dynamic-single-failure`, velocity of Po in W when a cable breaks, shape (3,) [m/s];
-            None: at rest.
+        reactions: For the kind `dynamic-single-failure`, names of `break_report.SAVING`; None:
+            stop, redistribute, brake, retreat.
+        moving: For the kind `dynamic-single-failure`, velocity of Po in W when a cable breaks,
+            shape (3,) [m/s]; None: at rest.
         after: For the kind `dynamic-single-failure`, how long runs go on after a break [s].
     """
 

@@ -295,8 +295,8 @@ def workspace(
     scenario: Annotated[
         str | None,
         typer.Option(
-            help="Scenario whose camera and target count; for survives, cables, winches and "
-            "torque_control."
+            help="Scenario whose camera and target count; for dynamic-single-failure, cables, "
+            "winches and torque_control."
         ),
     ] = None,
     hull: Annotated[
@@ -329,16 +329,19 @@ def workspace(
     reactions: Annotated[
         str | None,
         typer.Option(
-            help="For survives: one or several, separated by commas: " + ", ".join(SAVING) + "; "
-            "without it " + ", ".join(DEFAULT_SAVING) + "."
+            help="For dynamic-single-failure: one or several, separated by commas: "
+            f"{', '.join(SAVING)}; without it {', '.join(DEFAULT_SAVING)}."
         ),
     ] = None,
     moving: Annotated[
         str | None,
-        typer.Option(help="For survives: velocity x,y,z when a cable breaks [m/s]; at rest."),
+        typer.Option(
+            help="For dynamic-single-failure: velocity x,y,z when a cable breaks [m/s]; at rest."
+        ),
     ] = None,
     after: Annotated[
-        float, typer.Option(help="For survives: how long runs go on after a break [s].")
+        float,
+        typer.Option(help="For dynamic-single-failure: how long runs go on after a break [s]."),
     ] = 2.0,
     rays: Annotated[int, typer.Option(help="Rays of the hull, at most.")] = 10_000,
     tolerance: Annotated[

@@ -1,4 +1,4 @@
-"""The kind `dynamic-single-failure`: single breaks over a grid, as `breaks_at` says of each pose."""
+"""The kind `dynamic-single-failure` over a grid, as `breaks_at` says of each pose."""
 
 import json
 
@@ -89,11 +89,11 @@ def test_it_is_written_and_drawn(found, folder):
     [
         ("acrobot_large", {"reactions": ["pray"]}, "reactions 'pray' is unknown"),
         ("acrobot_large", {"moving": [1.0, 0.0]}, "moving: found .*; accepted: three finite"),
-        ("acrobot_large", {"mass": 2.0}, "mass: found with kinds survives"),
+        ("acrobot_large", {"mass": 2.0}, "mass: found with kinds dynamic-single-failure"),
         ("acrobot_large", {"scenario": "acrobot_pbvs"}, "winches.mode: found velocity"),
-        ("acrobot_large", {"hull": [0.0, 0.0, 0.3]}, "hull: found kinds survives"),
-        ("acrobot_large", {"certify": True}, "certify: found kinds survives"),
-        ("planar", {}, "kinds survives: found planar"),
+        ("acrobot_large", {"hull": [0.0, 0.0, 0.3]}, "hull: found kinds dynamic-single-failure"),
+        ("acrobot_large", {"certify": True}, "certify: found kinds dynamic-single-failure"),
+        ("planar", {}, "kind dynamic-single-failure: found planar"),
     ],
 )
 def test_what_is_refused(robot, asked, words):
