@@ -178,6 +178,30 @@ def _add_object_gradient(
                 g[k] += left[i] * (high[i, j] - low[i, j]) / (2.0 * DIFFERENCE_STEP) * right[j]
 
 
+@shared(
+    types.void(
+        *[MATRIX] * 3, VECTOR, MATRIX, VECTOR, *[MATRIX] * 3, types.boolean, *[VECTOR] * 3
+    )
+)  # fmt: skip
+@njit(cache=True, error_model="numpy")
+def gradient_known_object(
+    A: Array, B: Array, C: Array, t: Array, R: Array, p: Array, L: Array, Li: Array, M: Array,
+    local: bool, d: Array, v: Array, g: Array,
+) -> None:  # fmt: skip
+    """As `gradient` where the estimate is perturbed and the object known: what most questions need.
+
+    Arguments as `CaseArrays` and `Work` have them; `local` says whether the scheme is IBVS.
+    """
+    g[:] = 0.0
+    if local:
+        left, z = v.copy(), v.copy()
+    else:
+        left, z = _transposed_times(L, v), _times(Li, v)
+    add_camera_gradient(A, B, C, t, R, p, d, _transposed_times(M, left), z, g)
+    _turned_back(d[0:3], g, as_number(0))
+    _turned_back(d[6:9], g, as_number(6))
+
+
 @shared(types.void(CASE_TYPE, ROWS_TYPE, types.int64, WORK_TYPE, *[VECTOR] * 3))
 @njit(cache=True, error_model="numpy")
 def gradient(
@@ -188,8 +212,13 @@ def gradient(
     `evaluate` has just seen d; where `evaluate_quick` is used instead, it need not have, since
     what the perturbation changes is not read then.
     """
-    g[:] = 0.0
     moved = moves_object(case)
+    A, B, C, t, R, p = case.A, case.B, case.C, case.t, w.R, w.p
+    if not (moved or case.truth):
+        local = case.scheme == IBVS
+        gradient_known_object(A, B, C, t, R, p, w.L, w.Lid, w.M, local, d, v, g)
+        return
+    g[:] = 0.0
     L_true, L_hat_inverse = (w.Ld, w.Li) if case.truth else (w.L, w.Lid)
     J_true_inverse = w.Md if case.truth else w.M
     J_hat = w.J if case.truth else w.Jd
@@ -200,7 +229,6 @@ def gradient(
     else:
         left, z = _transposed_times(L_true, v), _times(L_hat_inverse, v)
     weights = _transposed_times(J_true_inverse, left)
-    A, B, C, t, R, p = case.A, case.B, case.C, case.t, w.R, w.p
     if case.truth:
         y = _times(J_hat, z)
         x = _times(J_true_inverse, y)
