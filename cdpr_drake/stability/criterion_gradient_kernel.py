@@ -78,6 +78,7 @@ def add_camera_gradient(
     Arguments as `CaseArrays` and `Work` have them: tuples of so many arrays cost more to compile.
     """
     m = A.shape[0]
+    turn, place = as_number(0), as_number(9)  # of the platform, and of the camera on it
     Rd, Cd = np.empty((3, 3)), np.empty((3, 3))
     turn_after(R, d[0:3], Rd)
     turn_after(C, d[6:9], Cd)
@@ -117,9 +118,9 @@ def add_camera_gradient(
         g[b + 1] += hy
         g[b + 2] += hz
         _cross_add(ux, uy, uz, ox, oy, oz, s, g, b)
-        _cross_add(ux, uy, uz, ox, oy, oz, -s, g, 9)
-        _cross_add(bx, by, bz, hx, hy, hz, 1.0, g, 0)
-        _cross_add(ux, uy, uz, nx, ny, nz, -s, g, 0)
+        _cross_add(ux, uy, uz, ox, oy, oz, -s, g, place)
+        _cross_add(bx, by, bz, hx, hy, hz, 1.0, g, turn)
+        _cross_add(ux, uy, uz, nx, ny, nz, -s, g, turn)
         # A body turn of the camera, in C: first in P, then turned.
         kx, ky, kz = uy * oz - uz * oy, uz * ox - ux * oz, ux * oy - uy * ox
         vx = -s * (uy * nz - uz * ny + ry * kz - rz * ky)
