@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from pydrake.geometry import Meshcat, MeshcatVisualizer, MeshcatVisualizerParams, Rgba
@@ -50,9 +50,11 @@ from cdpr_drake.systems.diagrams.pan_tilt import LOGGED_JOINTS, turned_mounting
 from cdpr_drake.systems.monitoring.meshcat_cables import CablePictures
 from cdpr_drake.systems.robots.cable_robot import CableRobot, holding_tensions
 from cdpr_drake.systems.robots.settings import CableSettings
-from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
 from cdpr_drake.systems.worlds.settings import WorldSettings
 from cdpr_drake.vision.pinhole import Pinhole
+
+if TYPE_CHECKING:  # all that a servo may be made of, which other scenes do without
+    from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
 
 REPLAY_RATE = 25.0
 """Frames per second of a recording [Hz]; the browser interpolates between them."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import faulthandler
+import gc
 import keyword
 import logging
 import os
@@ -190,15 +191,17 @@ def main(arguments: list[str] | None = None) -> None:
     """Runs the command; a `CdprError` becomes one line on stderr and exit code 2.
 
     Without arguments it is the program of this process: SIGTERM ends it as Ctrl-C does, and both
-    end it at once when there is nothing left to do.
+    end it at once when there is nothing left to do. Garbage is never searched for among what is
+    imported: that stays, and each search would walk through hundreds of thousands of objects.
     """
     if arguments is not None:
         _main(arguments)
         return
     for each in SIGNALS:
         signal.signal(each, _end_at_once)
+    gc.disable()
     try:
-        _main(sys.argv[1:], _interrupt_from_now_on)
+        _main(sys.argv[1:], _begin)
     finally:
         for each in SIGNALS:
             signal.signal(each, signal.SIG_DFL)
@@ -214,7 +217,13 @@ def _end_at_once(number: int, frame: FrameType | None) -> None:
     os._exit(INTERRUPTED)
 
 
-def _interrupt_from_now_on() -> None:
+def _begin() -> None:
+    """From here on the subcommand runs, and an interruption is for it."""
+    from cdpr_drake.cli.compiling import pause_for_compilation  # it looks which helpers there are
+
+    pause_for_compilation()
+    gc.freeze()
+    gc.enable()
     for each in SIGNALS:
         signal.signal(each, signal.default_int_handler)
 

@@ -77,6 +77,11 @@ def _is_of_numba(data: Any) -> bool:
 _compilations = _Compilations()
 
 
+def pause_for_compilation() -> None:
+    """Lets no garbage be searched for from now on while kernels are compiled."""
+    _compilations.listen()
+
+
 def compiling() -> str:
     """Words for what is compiled now; empty where nothing is."""
     _compilations.listen()

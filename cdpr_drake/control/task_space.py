@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
+from numba import njit, types
 from pydrake.math import RigidTransform
 from pydrake.multibody.tree import SpatialInertia
 
@@ -16,6 +16,7 @@ from cdpr_drake.geometry.motion_kernel import Motion, floating_motion, planar_mo
 from cdpr_drake.geometry.poses import pose_row
 from cdpr_drake.geometry.straight_cables import ALL_ROWS
 from cdpr_drake.numerics.kernel_calls import array_addresses, matrix_at, vector_at
+from cdpr_drake.numerics.shared_kernels import VECTOR, shared
 from cdpr_drake.trajectories.pose_trajectory import MOTION_SIZE, motion_row, write_motion
 
 
@@ -134,6 +135,7 @@ def computed_torque(
     return F
 
 
+@shared(types.void(*[VECTOR] * 5))
 @njit(cache=True)
 def floating_wrench(
     state: Array, desired: Array, dynamics: Array, gains: Array, out: Array

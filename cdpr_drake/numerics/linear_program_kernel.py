@@ -9,9 +9,11 @@ Source: Nocedal and Wright, Numerical Optimization, chapters 13 and 16.5.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+from numba import njit, types
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.numerics.kernel_calls import as_number
+from cdpr_drake.numerics.shared_kernels import MATRIX, VECTOR, shared
 
 DIRECTION_ROUNDING = 1e-11
 """A direction shorter than this, relative to the cost, is none: the point is a minimum of its
@@ -21,6 +23,7 @@ PARALLEL = 1e-12
 """A row does not block a direction along which it changes by less than this."""
 
 
+@shared(types.boolean(VECTOR, MATRIX, *[VECTOR] * 3))
 @njit(cache=True)
 def lowest_point(cost: Array, rows: Array, low: Array, high: Array, x: Array) -> bool:
     """Moves x to where cost' x is least, subject to low <= rows x <= high.
@@ -44,10 +47,10 @@ def lowest_point(cost: Array, rows: Array, low: Array, high: Array, x: Array) ->
     side = np.empty(k)
     direction = np.empty(k)
     weights = np.empty(k)
-    size = np.sqrt(np.sum(cost * cost))
+    size = _length(cost)
     if size == 0.0:
         return True
-    q = 0
+    q = as_number(0)
     stalled = False
     for _ in range(200 * (p + k)):
         for j in range(k):
@@ -59,7 +62,7 @@ def lowest_point(cost: Array, rows: Array, low: Array, high: Array, x: Array) ->
                     dot += Q[j, c] * direction[j]
                 for j in range(k):
                     direction[j] -= dot * Q[j, c]
-        length = np.sqrt(np.sum(direction * direction))
+        length = _length(direction)
         if q == k or length <= DIRECTION_ROUNDING * size:
             # -cost = sum of weights times the outward active rows; all weights >= 0: optimum.
             for c in range(q - 1, -1, -1):
@@ -108,13 +111,22 @@ def lowest_point(cost: Array, rows: Array, low: Array, high: Array, x: Array) ->
                     step, block, blocked_side = room, i, -1.0
         if block < 0:
             return False
-        stalled = step <= 1e-14 * (1.0 + np.sqrt(np.sum(x * x)))
+        stalled = step <= 1e-14 * (1.0 + _length(x))
         for j in range(k):
             x[j] += step * direction[j] / length
         active[q], side[q] = block, blocked_side
         append_column(rows[block], blocked_side, q, Q, R)
         q += 1
     return False
+
+
+@njit(cache=True)
+def _length(x: Array) -> float:
+    square = 0.0
+    for j in range(x.shape[0]):
+        square += x[j] * x[j]
+    length: float = np.sqrt(square)
+    return length
 
 
 @njit(cache=True)

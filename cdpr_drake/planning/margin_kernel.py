@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+from numba import njit, types
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.numerics.linear_program_kernel import lowest_point
+from cdpr_drake.numerics.shared_kernels import MATRIX, VECTOR, shared
 from cdpr_drake.planning.limits import (
     CABLE_ACCELERATION,
     CABLE_SPEED,
@@ -27,6 +28,7 @@ TENSION_USE, SPEED_USE, ACCELERATION_USE, PATH_SPEED_USE = range(4)
 of Po."""
 
 
+@shared(types.float64(VECTOR, VECTOR, MATRIX, VECTOR, VECTOR))
 @njit(cache=True)
 def margin(tensions: Array, accelerations: Array, basis: Array, limits: Array, eta: Array) -> float:
     """Largest d so that some tensions keep d half ranges away from all their limits.

@@ -19,10 +19,12 @@ analysis, 2018; the constraint at both stations is its interpolation scheme.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+from numba import njit, types
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.numerics.kernel_calls import as_number
 from cdpr_drake.numerics.linear_program_kernel import lowest_point
+from cdpr_drake.numerics.shared_kernels import MATRIX, VECTOR, shared
 from cdpr_drake.planning.limits import CABLE_ACCELERATION, INERTIA, LOWER, RATIO, TORQUE, UPPER
 from cdpr_drake.planning.margin_kernel import ROUNDING
 from cdpr_drake.planning.resistance_kernel import BY_U, BY_X, ROOM
@@ -95,6 +97,12 @@ def _write_station(
     return at
 
 
+@shared(
+    types.void(
+        MATRIX, MATRIX, types.float64[:, :, ::1], types.float64, VECTOR, types.float64, VECTOR,
+        MATRIX, VECTOR, VECTOR,
+    )
+)  # fmt: skip
 @njit(cache=True)
 def write_program(
     here: Array, there: Array, bounds: Array, way: float, limits: Array, fastest: float,
@@ -116,7 +124,7 @@ def write_program(
     """
     r = here.shape[0] - BASIS
     rows[:] = 0.0
-    at = _write_station(here, bounds[0], limits, 0.0, 2, 0, rows, low, high)
+    at = _write_station(here, bounds[0], limits, 0.0, as_number(2), as_number(0), rows, low, high)
     at = _write_station(there, bounds[1], limits, 2.0 * way, 2 + r, at, rows, low, high)
     rows[at, 0], rows[at, 1] = 2.0 * way, 1.0
     low[at], high[at] = goal[0], goal[1]
@@ -124,6 +132,7 @@ def write_program(
     low[at + 1], high[at + 1] = 0.0, fastest
 
 
+@shared(types.float64(MATRIX, VECTOR, VECTOR, types.float64, VECTOR, VECTOR))
 @njit(cache=True)
 def feasible_point(
     rows: Array, low: Array, high: Array, way: float, limits: Array, z: Array
@@ -144,7 +153,8 @@ def feasible_point(
     """
     p, k = rows.shape
     hard = 2  # the last two, on x, which the start below keeps
-    wide, least, most = np.zeros((2 * p, k + 1)), np.full(2 * p, -np.inf), np.full(2 * p, np.inf)
+    wide = np.zeros((2 * p + 1, k + 1))  # the last row keeps what is missed from falling below 0
+    least, most = np.full(2 * p + 1, -np.inf), np.full(2 * p + 1, np.inf)
     start, cost = np.zeros(k + 1), np.zeros(k + 1)
     cost[k] = 1.0
     start[0] = low[p - 2] / (2.0 * way)
@@ -162,10 +172,7 @@ def feasible_point(
         if i < p - hard:
             worst = max(worst, (value - high[i]) / scale, (low[i] - value) / scale)
     start[k] = worst
-    floor = np.zeros((1, k + 1))
-    floor[0, k] = 1.0
-    wide = np.concatenate((wide, floor))
-    least, most = np.append(least, 0.0), np.append(most, np.inf)
+    wide[2 * p, k], least[2 * p] = 1.0, 0.0
     solved = lowest_point(cost, wide, least, most, start)
     for j in range(k):
         z[j] = start[j]
@@ -255,7 +262,12 @@ def forward(
     rows, low, high = np.empty((p, k)), np.empty(p), np.empty(p)
     fewer, z, cost = np.empty((p, k - 1)), np.empty(k - 1), np.zeros(k - 1)
     cost[0] = -1.0
-    least = STANDSTILL * np.max(speeds)
+    largest = speeds[0, 0]
+    for i in range(n + 1):
+        for j in range(2):
+            if speeds[i, j] > largest or speeds[i, j] != speeds[i, j]:  # what is no number stays
+                largest = speeds[i, j]
+    least = STANDSTILL * largest
     for i in range(n):
         write_program(
             stations[i], stations[i + 1], bounds[i : i + 2], ways[i], limits, fastest[i],
@@ -305,7 +317,9 @@ def largest_speeds(
     cost[1] = -1.0
     for i in range(stations.shape[0]):
         rows[:] = 0.0
-        at = _write_station(stations[i], bounds[i], limits, 0.0, 2, 0, rows, low, high)
+        at = _write_station(
+            stations[i], bounds[i], limits, 0.0, as_number(2), as_number(0), rows, low, high
+        )
         rows[at, 1], low[at], high[at] = 1.0, 0.0, fastest[i]
         z[:] = 0.0
         for j in range(r):

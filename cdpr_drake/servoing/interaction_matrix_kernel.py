@@ -11,6 +11,7 @@ from numba import njit
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.rotation_kernel import turning_into
+from cdpr_drake.numerics.kernel_calls import as_number
 
 
 @njit(cache=True)
@@ -93,7 +94,7 @@ def hybrid_into(theta_u: Array, R_CdC: Array, x: float, y: float, Z: float, L: A
     Source: servoing thesis (1.50)-(1.52).
     """
     camera_pose_into(theta_u, R_CdC, L)
-    point_into(x, y, Z, L, 0)
+    point_into(x, y, Z, L, as_number(0))
 
 
 @njit(cache=True)

@@ -78,6 +78,7 @@ def add_camera_gradient(
     Arguments as `CaseArrays` and `Work` have them: tuples of so many arrays cost more to compile.
     """
     m = A.shape[0]
+    turn, place = as_number(0), as_number(9)  # of the platform, and of the camera on it
     Rd, Cd = np.empty((3, 3)), np.empty((3, 3))
     turn_after(R, d[0:3], Rd)
     turn_after(C, d[6:9], Cd)
@@ -117,9 +118,9 @@ def add_camera_gradient(
         g[b + 1] += hy
         g[b + 2] += hz
         _cross_add(ux, uy, uz, ox, oy, oz, s, g, b)
-        _cross_add(ux, uy, uz, ox, oy, oz, -s, g, 9)
-        _cross_add(bx, by, bz, hx, hy, hz, 1.0, g, 0)
-        _cross_add(ux, uy, uz, nx, ny, nz, -s, g, 0)
+        _cross_add(ux, uy, uz, ox, oy, oz, -s, g, place)
+        _cross_add(bx, by, bz, hx, hy, hz, 1.0, g, turn)
+        _cross_add(ux, uy, uz, nx, ny, nz, -s, g, turn)
         # A body turn of the camera, in C: first in P, then turned.
         kx, ky, kz = uy * oz - uz * oy, uz * ox - ux * oz, ux * oy - uy * ox
         vx = -s * (uy * nz - uz * ny + ry * kz - rz * ky)
@@ -178,6 +179,30 @@ def _add_object_gradient(
                 g[k] += left[i] * (high[i, j] - low[i, j]) / (2.0 * DIFFERENCE_STEP) * right[j]
 
 
+@shared(
+    types.void(
+        *[MATRIX] * 3, VECTOR, MATRIX, VECTOR, *[MATRIX] * 3, types.boolean, *[VECTOR] * 3
+    )
+)  # fmt: skip
+@njit(cache=True, error_model="numpy")
+def gradient_known_object(
+    A: Array, B: Array, C: Array, t: Array, R: Array, p: Array, L: Array, Li: Array, M: Array,
+    local: bool, d: Array, v: Array, g: Array,
+) -> None:  # fmt: skip
+    """As `gradient` where the estimate is perturbed and the object known: what most questions need.
+
+    Arguments as `CaseArrays` and `Work` have them; `local` says whether the scheme is IBVS.
+    """
+    g[:] = 0.0
+    if local:
+        left, z = v.copy(), v.copy()
+    else:
+        left, z = _transposed_times(L, v), _times(Li, v)
+    add_camera_gradient(A, B, C, t, R, p, d, _transposed_times(M, left), z, g)
+    _turned_back(d[0:3], g, as_number(0))
+    _turned_back(d[6:9], g, as_number(6))
+
+
 @shared(types.void(CASE_TYPE, ROWS_TYPE, types.int64, WORK_TYPE, *[VECTOR] * 3))
 @njit(cache=True, error_model="numpy")
 def gradient(
@@ -188,8 +213,13 @@ def gradient(
     `evaluate` has just seen d; where `evaluate_quick` is used instead, it need not have, since
     what the perturbation changes is not read then.
     """
-    g[:] = 0.0
     moved = moves_object(case)
+    A, B, C, t, R, p = case.A, case.B, case.C, case.t, w.R, w.p
+    if not (moved or case.truth):
+        local = case.scheme == IBVS
+        gradient_known_object(A, B, C, t, R, p, w.L, w.Lid, w.M, local, d, v, g)
+        return
+    g[:] = 0.0
     L_true, L_hat_inverse = (w.Ld, w.Li) if case.truth else (w.L, w.Lid)
     J_true_inverse = w.Md if case.truth else w.M
     J_hat = w.J if case.truth else w.Jd
@@ -200,7 +230,6 @@ def gradient(
     else:
         left, z = _transposed_times(L_true, v), _times(L_hat_inverse, v)
     weights = _transposed_times(J_true_inverse, left)
-    A, B, C, t, R, p = case.A, case.B, case.C, case.t, w.R, w.p
     if case.truth:
         y = _times(J_hat, z)
         x = _times(J_true_inverse, y)

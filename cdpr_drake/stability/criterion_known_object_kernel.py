@@ -57,28 +57,34 @@ def quick_size() -> int:
 
 
 @njit(cache=True, error_model="numpy")
-def pack_quick(case: CaseArrays, w: Work, q: Array) -> None:
-    """q <- all that `evaluate_quick` needs of the pose that `prepare` has seen."""
-    m = case.A.shape[0]
+def pack_quick(
+    A: Array, B: Array, C: Array, t: Array, R: Array, p: Array, LM: Array, Li: Array, local: bool,
+    q: Array,
+) -> None:  # fmt: skip
+    """q <- all that `evaluate_quick` needs of the pose that `prepare` has seen.
+
+    Arguments as `CaseArrays` and `Work` have them: tuples of so many arrays cost more to compile.
+    """
+    m = A.shape[0]
     for i in range(WIDTH):  # columns without a cable repeat the first, with a weight of 0
         cable = i if i < m else 0
         for k in range(3):
-            q[WIDTH * k + i] = case.A[cable, k]
-            q[WIDTH * (3 + k) + i] = case.B[cable, k]
-            q[WIDTH * (6 + k) + i] = case.A[cable, k]
-            q[WIDTH * (9 + k) + i] = case.B[cable, k]
+            q[WIDTH * k + i] = A[cable, k]
+            q[WIDTH * (3 + k) + i] = B[cable, k]
+            q[WIDTH * (6 + k) + i] = A[cable, k]
+            q[WIDTH * (9 + k) + i] = B[cable, k]
         for k in range(6):
-            q[LEFT + WIDTH * k + i] = w.LM[k, i] if i < m else 0.0
+            q[LEFT + WIDTH * k + i] = LM[k, i] if i < m else 0.0
     for i in range(3):
         for k in range(3):
-            q[TURN + 3 * i + k] = w.R[i, k]
-            q[CAMERA + 3 * i + k] = case.C[i, k]
-        q[PLACE + i] = w.p[i]
-        q[MOUNT + i] = case.t[i]
-    if case.scheme != IBVS:
+            q[TURN + 3 * i + k] = R[i, k]
+            q[CAMERA + 3 * i + k] = C[i, k]
+        q[PLACE + i] = p[i]
+        q[MOUNT + i] = t[i]
+    if not local:
         for i in range(6):
             for k in range(6):
-                q[RIGHT + 6 * i + k] = w.Li[i, k]
+                q[RIGHT + 6 * i + k] = Li[i, k]
 
 
 @njit(cache=True, error_model="numpy", fastmath=FREEDOM)

@@ -112,7 +112,9 @@ def sampled_margins(
         margins[n] = -np.inf
         if prepare(case, rows, n, w):
             if is_quick(case):
-                pack_quick(case, w, q)
+                pack_quick(
+                    case.A, case.B, case.C, case.t, w.R, w.p, w.LM, w.Li, case.scheme == IBVS, q
+                )
             margins[n] = sample_pose(
                 case,
                 rows,

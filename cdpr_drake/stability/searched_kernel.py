@@ -28,7 +28,11 @@ from cdpr_drake.stability.criterion_at_pose_kernel import (
     new_work,
     prepare,
 )
-from cdpr_drake.stability.criterion_gradient_kernel import gradient, steepest_into
+from cdpr_drake.stability.criterion_gradient_kernel import (
+    gradient,
+    gradient_known_object,
+    steepest_into,
+)
 from cdpr_drake.stability.criterion_known_object_kernel import (
     evaluate_any,
     is_quick,
@@ -43,12 +47,26 @@ from cdpr_drake.stability.perturbation_samples_kernel import (
     pose_key,
 )
 from cdpr_drake.stability.sampled_kernel import sample_pose
+from cdpr_drake.stability.stability_case import IBVS
 
 HALVINGS = 4
 """How often a step is halved before a search ends."""
 
 LEAST_DESCENT = 1e-6
 """A search ends when a step lowers the eigenvalue by less than this."""
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _gradient_any(
+    case: CaseArrays, rows: PoseRows, n: int, w: Work, quick: bool, d: Array, v: Array, g: Array
+) -> None:
+    """Calls `gradient_known_object` if `quick`, else `gradient`, which then is never compiled."""
+    if quick:
+        gradient_known_object(
+            case.A, case.B, case.C, case.t, w.R, w.p, w.L, w.Lid, w.M, case.scheme == IBVS, d, v, g
+        )
+    else:
+        gradient(case, rows, n, w, d, v, g)
 
 
 @shared(
@@ -83,7 +101,7 @@ def descend(
     for _ in range(steps):
         if value <= enough:
             break
-        gradient(case, rows, n, w, d, v, g)
+        _gradient_any(case, rows, n, w, quick, d, v, g)
         steepest_into(m, case.planar, case.radii, case.directions, g, goal)
         share, found = 1.0, value
         for _ in range(halvings + 1):
@@ -165,7 +183,7 @@ def search_pose(
             v[i] /= np.sqrt(square)
         at[:] = 0.0
         evaluate_any(case, rows, n, w, q, quick, at)
-        gradient(case, rows, n, w, at, v, g)
+        _gradient_any(case, rows, n, w, quick, at, v, g)
         steepest_into(m, case.planar, case.radii, case.directions, g, at)
         found = descend(case, rows, n, w, q, at, steps, enough)
         if found < margin:
@@ -215,7 +233,9 @@ def searched_margins(
         margins[n] = -np.inf
         if prepare(case, rows, n, w):
             if is_quick(case):
-                pack_quick(case, w, q)
+                pack_quick(
+                    case.A, case.B, case.C, case.t, w.R, w.p, w.LM, w.Li, case.scheme == IBVS, q
+                )
             margins[n] = search_pose(
                 case, rows, n, w, q, d, room, draws, seed, inside, first_only, from_draws,
                 from_vectors, steps,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from pydrake.math import RigidTransform
-from scipy.optimize import nnls
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.models import INEXTENSIBLE, TOO_SHORT
@@ -77,6 +76,8 @@ def taut_tensions(
     tensions = np.zeros(len(lacking))
     near = np.flatnonzero(lacking < NEARLY_TAUT)
     if len(near):
+        from scipy.optimize import nnls  # a tenth of a second, and few robots have such cables
+
         J = motion.columns(paths.J[near], R_WP)
         tensions[near] = nnls(J.T, motion.components(wrench, R_WP))[0]
     return tensions

@@ -51,10 +51,11 @@ def wrench_matrix_at(state: Array, cables: Array, height: float, W: Array) -> No
         W: Gets the matrix, shape (6, m), or (3, m) for 2T1R; without moments, where forces alone
             are balanced, (3, m), or (2, m).
     """
-    if state.shape[0] == 6:
-        _write_wrench_matrix(planar_motion(state, height), cables, True, W)
+    planar = state.shape[0] == 6  # True and False written out would be compiled twice
+    if planar:
+        _write_wrench_matrix(planar_motion(state, height), cables, planar, W)
     else:
-        _write_wrench_matrix(floating_motion(state), cables, False, W)
+        _write_wrench_matrix(floating_motion(state), cables, planar, W)
 
 
 @njit(cache=True)

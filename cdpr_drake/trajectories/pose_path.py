@@ -16,7 +16,6 @@ from itertools import pairwise
 import numpy as np
 from numba import njit
 from pydrake.math import RigidTransform
-from scipy.interpolate import CubicSpline
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import TrajectoryError
@@ -159,6 +158,8 @@ def smooth_path(poses: Sequence[RigidTransform], length_scale: float) -> PosePat
     rows, ways = _distinct_rows(poses, length_scale)
     if len(rows) == 2:
         return straight_path(poses, length_scale)
+    from scipy.interpolate import CubicSpline  # a tenth of a second, and few paths are splines
+
     breaks = np.concatenate([[0.0], np.cumsum(ways)])
     spline = CubicSpline(breaks, rows, bc_type="natural")
     c = np.zeros((len(ways), DEGREE + 1, POSE_NUMBERS))
@@ -270,8 +271,14 @@ def path_points(breaks: Array, pieces: Array, parameters: Array, out: Array) -> 
     k = pieces.shape[0]
     for i in range(parameters.shape[0]):
         s = min(max(parameters[i], breaks[0]), breaks[k])
-        j = min(max(np.searchsorted(breaks, s, side="right") - 1, 0), k - 1)
-        path_point(pieces[j], s - breaks[j], out[i])
+        first, past = 0, k  # numpy.searchsorted takes half a second to compile
+        while past - first > 1:
+            middle = (first + past) // 2
+            if breaks[middle] <= s:
+                first = middle
+            else:
+                past = middle
+        path_point(pieces[first], s - breaks[first], out[i])
 
 
 def hermite(way: float, start: tuple[Array, ...], end: tuple[Array, ...]) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 from pydrake.geometry import FrameId, SceneGraph
 from pydrake.systems.framework import DiagramBuilder, OutputPort
@@ -22,11 +23,13 @@ from cdpr_drake.systems.cameras.target_measurement import TargetDetector, Target
 from cdpr_drake.systems.cameras.targets import TargetSettings
 from cdpr_drake.systems.robots.assembly import RobotBlock, SceneAdder
 from cdpr_drake.systems.robots.cable_robot import CableRobot
-from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario, VisualServoSettings
 from cdpr_drake.systems.worlds.adding import WorldInScene
 from cdpr_drake.systems.worlds.settings import WorldSettings
 from cdpr_drake.vision.pinhole import Pinhole
 from cdpr_drake.vision.target import Target
+
+if TYPE_CHECKING:  # a workspace is drawn by `pictured_robot`, and has no servo
+    from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario, VisualServoSettings
 
 
 def scene_adder(

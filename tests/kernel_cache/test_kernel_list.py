@@ -38,6 +38,13 @@ def test_what_a_group_needs_calls_what_it_needs():
         assert all(kernel.calls <= numbers for kernel in kernels)
 
 
+def test_a_question_about_stability_compiles_nothing_of_moved_objects():
+    names = {kernel.name for kernel in needed_kernels(["stability"])}
+    gradients = "stability.criterion_gradient_kernel:"
+    assert f"{gradients}gradient_known_object" in names
+    assert not names & {f"{gradients}gradient", f"{gradients}_add_object_gradient"}
+
+
 @pytest.mark.parametrize(
     ("line", "groups"),
     [

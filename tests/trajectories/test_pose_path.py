@@ -6,7 +6,13 @@ from pydrake.math import RigidTransform, RollPitchYaw
 
 from cdpr_drake.errors import TrajectoryError
 from cdpr_drake.geometry.poses import pose_error, rotation_vector
-from cdpr_drake.trajectories.pose_path import PosePath, smooth_path, straight_path
+from cdpr_drake.trajectories.pose_path import (
+    POINT_SIZE,
+    PosePath,
+    path_point,
+    smooth_path,
+    straight_path,
+)
 from cdpr_drake.trajectories.timed_path import TimedPath
 
 SCALE = 0.1
@@ -56,6 +62,19 @@ def test_paths_have_no_kink(name):
     inner = path.breaks[1:-1]
     before, after = path.points(inner - 1e-9), path.points(inner + 1e-9)
     np.testing.assert_allclose(before, after, atol=1e-5)
+
+
+@pytest.mark.parametrize("name", PATHS)
+def test_a_parameter_is_in_the_piece_that_numpy_finds(name):
+    path = PATHS[name]
+    breaks, last = path.breaks, len(path.pieces) - 1
+    asked = np.concatenate([breaks, breaks[:-1] + 0.3 * np.diff(breaks), [-1.0, path.length + 1.0]])
+    for s, found in zip(asked, path.points(asked), strict=True):
+        inside = np.clip(s, breaks[0], breaks[-1])
+        piece = int(np.clip(np.searchsorted(breaks, inside, side="right") - 1, 0, last))
+        expected = np.empty(POINT_SIZE)
+        path_point(path.pieces[piece], inside - breaks[piece], expected)
+        np.testing.assert_array_equal(found, expected)
 
 
 def test_a_smooth_path_meets_its_poses():
