@@ -1,7 +1,7 @@
 """A static workspace in few poses, for who changes a robot and wants to see what that does.
 
 The numbers are those of `cdpr workspace` of the robot's file with as many poses: kind static, a
-level platform, cables from fixed exit points, a grid in the box of the frame.
+level platform, a grid in the box of the frame.
 """
 
 from __future__ import annotations
@@ -61,7 +61,8 @@ class SketchWork:
         Raises:
             CdprError: The robot has no static workspace.
         """
-        self._case, self._grid = static_case(robot), sketch_grid(robot, poses)
+        self._case = static_case(robot, pulleys=True)
+        self._grid = sketch_grid(robot, poses)
         self._inside = np.zeros(self._grid.size, bool)
         self._done = 0
 
