@@ -93,7 +93,8 @@ def matched(told: list[dict], drawn: list[dict]) -> list[tuple[dict, dict]]:
         before = [
             event
             for event in told
-            if event["t"] < one["came"] and np.max(np.abs(np.subtract(event["at"], one["at"]))) < SAME
+            if event["t"] < one["came"]
+            and np.max(np.abs(np.subtract(event["at"], one["at"]))) < SAME
         ]
         if before:
             pairs.append((before[-1], one))

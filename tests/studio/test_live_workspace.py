@@ -113,7 +113,7 @@ def test_a_scene_that_others_had_gets_it_back(bench):
 
 
 def test_a_robot_without_a_static_workspace_says_why(tmp_path):
-    made = Workbench(WorkingFolder(tmp_path), "suspended_four_cables")
+    made = Workbench(WorkingFolder(tmp_path), "grab_four")
     try:
         made.ask()
         made.drag_point("exit", 0, made.robot.value.cable_set().p_WA[:, 0] + 0.01, done=False)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 from concurrent.futures import Future
+from contextlib import suppress
 from typing import Any
 
 from cdpr_drake.errors import CdprError
@@ -44,7 +45,7 @@ class LiveWorkspace:
         self.sketch: WorkspaceSketch | None = None
         self.is_fine, self.problem = False, ""
         self.changed = Signal()
-        self._wanted = True
+        self._wanted, self._is_cold = True, True
         self._robot: Robot | None = None
         self._found: tuple[Robot, WorkspaceSketch | None, str] | None = None
         self._rest: asyncio.TimerHandle | None = None
@@ -81,6 +82,8 @@ class LiveWorkspace:
     def take(self) -> None:
         """Tells what was drawn, and refines it after a rest; in the thread of the page."""
         robot, sketch, problem = self._found or (None, None, "")
+        if self._is_cold:
+            self._warm()
         if (sketch, problem) == (self.sketch, self.problem):
             return
         self.sketch, self.problem, self.is_fine = sketch, problem, False
@@ -94,6 +97,19 @@ class LiveWorkspace:
         except RuntimeError:
             return  # who has no event loop asks for it
         self._rest = loop.call_later(REST, self.refine)
+
+    def _warm(self) -> None:
+        """Has kernels loaded, or compiled at the first use, before somebody drags."""
+        self._is_cold = False
+        scene = self._scene
+
+        def load() -> None:
+            robot = scene().robot
+            with suppress(CdprError):
+                if robot is not None:
+                    SketchWork(robot, COARSE).go_on(1)
+
+        self._calculate(load, lambda _: None)
 
     def refine(self) -> None:
         """Computes a finer workspace of the robot, unless it changes meanwhile."""

@@ -103,6 +103,11 @@ class RobotScene:
             self.meshcat.SetTransform(f"{EXITS}/{k}", RigidTransform(exits[:, k]))
         self._robot, self._name, self._size = robot, robot.name, size
 
+    @property
+    def robot(self) -> Robot | None:
+        """The robot that is drawn; None: none yet."""
+        return self._robot
+
     def show_workspace(self, solid: Solid | None) -> None:
         """Draws the workspace that follows the robot, or takes it out."""
         if solid is self._workspace:

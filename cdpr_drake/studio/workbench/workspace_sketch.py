@@ -95,5 +95,5 @@ def sketch_grid(robot: Robot, poses: int) -> WorkspaceGrid:
     size = defaults.upper - defaults.lower
     moving = size > 0.0
     step = (float(np.prod(size[moving])) / poses) ** (1.0 / max(int(np.count_nonzero(moving)), 1))
-    counts = np.where(moving, np.maximum(np.round(size / step), 1.0) + 1.0, 1.0).astype(int)
+    counts = np.where(moving, np.maximum(np.round(size / step), 2.0), 1.0).astype(int)
     return grid_by_count(defaults.lower, defaults.upper, counts.tolist())
