@@ -18,6 +18,7 @@ import argparse
 import json
 import tempfile
 import time
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -86,16 +87,16 @@ PERIOD = 0.06
 REFINED = "document.querySelector('.studio-live').innerText.includes('refined')"
 
 
+def _same(event: dict, one: dict) -> bool:
+    """Whether a workspace is of the place that an event told."""
+    return bool(np.max(np.abs(np.subtract(event["at"], one["at"]))) < SAME)
+
+
 def matched(told: list[dict], drawn: list[dict]) -> list[tuple[dict, dict]]:
     """Each workspace that was drawn, with the last event before it that told its place."""
     pairs = []
     for one in drawn:
-        before = [
-            event
-            for event in told
-            if event["t"] < one["came"]
-            and np.max(np.abs(np.subtract(event["at"], one["at"]))) < SAME
-        ]
+        before = [event for event in told if event["t"] < one["came"] and _same(event, one)]
         if before:
             pairs.append((before[-1], one))
     return pairs
@@ -107,7 +108,7 @@ def ages(pairs: list[tuple[dict, dict]], told: list[dict]) -> np.ndarray:
     Counted from the event after the one that is shown: until that the scene shows the newest.
     """
     found = []
-    for (shown, _), (_, following) in zip(pairs, pairs[1:], strict=False):
+    for (shown, _), (_, following) in pairwise(pairs):
         newer = [event["t"] for event in told if event["t"] > shown["t"]]
         if newer and newer[0] < following["t"]:
             found.append(following["t"] - newer[0])
