@@ -124,6 +124,7 @@ def main() -> None:
     """Measures, and prints JSON."""
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("--drags", type=int, default=150, help="events of the mouse")
+    options.add_argument("--longest", type=float, default=600.0, help="time for them [s]")
     options.add_argument("--robot", default="acrobot_large")
     asked = options.parse_args()
     with (
@@ -142,9 +143,12 @@ def main() -> None:
         hand.pointer_action.move_to_location(int(x), int(y)).pointer_down()
         hand.perform()
         ActionChains(page, duration=0).move_by_offset(-STEP, 0).perform()
-        wait_for(page, "document.querySelector('.studio-live').innerText.includes('coarse')")
+        wait_for(page, "document.querySelector('.studio-live').innerText.includes('grid')")
         page.execute_script(WATCH, CABLE)
+        end = time.monotonic() + asked.longest
         for k in range(asked.drags):
+            if time.monotonic() > end:
+                break
             there = -STEP if k // 20 % 2 == 0 else STEP
             ActionChains(page, duration=0).move_by_offset(there, there // STEP).perform()
             time.sleep(PERIOD)
