@@ -37,7 +37,8 @@ const viewer = document.getElementById('scene').contentWindow.viewer;
 const exit = '/drake/studio/exit/' + arguments[0];
 const told = window.dragTold = [], drawn = window.dragDrawn = [];
 let moved = 0;
-viewer.renderer.domElement.addEventListener('pointermove', () => moved = performance.now(), true);
+document.getElementById('scene').contentWindow.addEventListener(
+  'pointermove', () => moved = performance.now(), true);
 const emit = window.emitEvent;
 window.emitEvent = (name, ...rest) => {
   if (name === 'studio_point') told.push({t: performance.now(), moved, at: rest[0].at});
@@ -93,11 +94,12 @@ def _same(event: dict, one: dict) -> bool:
 
 
 def matched(told: list[dict], drawn: list[dict]) -> list[tuple[dict, dict]]:
-    """Each workspace that was drawn, with the last event before it that told its place."""
+    """Each coarse workspace that was drawn, with the last event before it that told its place."""
     pairs = []
     for one in drawn:
         before = [event for event in told if event["t"] < one["came"] and _same(event, one)]
-        if before:
+        # What comes once more for the same event is the refined workspace.
+        if before and (not pairs or pairs[-1][0] is not before[-1]):
             pairs.append((before[-1], one))
     return pairs
 
