@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from cdpr_drake.analyses.visualization.figure_style import line_style
 from cdpr_drake.arrays import Array
 from cdpr_drake.palette import SHADED, Look
 
@@ -97,6 +96,9 @@ def draw_curve(
             each other take different ones.
         more: Passed on to `plot`.
     """
+    # Heavy by matplotlib, which scenes that thin their paths by this file need not.
+    from cdpr_drake.analyses.visualization.figure_style import line_style
+
     rows = extreme_rows(values)
     t, y = np.asarray(times)[rows], scale * np.asarray(values[rows], float)
     style = line_style(look) | more

@@ -7,16 +7,17 @@ are for what is transparent there.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.colors import LightSource
-from matplotlib.lines import Line2D
-from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from pydrake.geometry import Meshcat, Rgba, Role, SceneGraphInspector
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.palette import OUTLINE
+
+if TYPE_CHECKING:
+    from matplotlib.lines import Line2D
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 VIEW = 22.0, -58.0
 """Elevation and azimuth from which solids are seen [deg]."""
@@ -53,6 +54,9 @@ def draw_solid(
 
 
 def _shaded(quads: Array, color: str) -> Poly3DCollection:
+    from matplotlib.colors import LightSource  # heavy, and a scene in Meshcat needs none of it
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
     return Poly3DCollection(
         quads,
         facecolors=color,

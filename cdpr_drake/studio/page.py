@@ -158,6 +158,8 @@ body.body--dark .bg-primary .q-btn__content {{ color: #101418; }}
 .studio-card {{ border: 1px solid var(--studio-line); border-left: 4px solid {COLORS[1]};
   padding: 0.4rem 0.8rem; width: 100%; font-size: 0.9rem; }}
 .studio-card ul {{ margin: 0.2rem 0; padding-left: 1.1rem; overflow-wrap: anywhere; }}
+.studio-live {{ width: 100%; font-size: 0.86rem; min-height: 4.4rem;
+  font-variant-numeric: tabular-nums; }}
 .studio-main {{ display: grid; grid-template-columns: minmax(0, 1.2fr) minmax(0, 1fr);
   width: 100%;
   height: calc(100vh - 2.8rem); }}

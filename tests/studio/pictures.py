@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 from PIL import Image
+from selenium.webdriver.common.keys import Keys
 
 from cdpr_drake.analyses.front.logs import replay_log
 from cdpr_drake.analyses.front.simulation import simulate
@@ -22,6 +23,7 @@ from cdpr_drake.studio.workbench.command_board import ABOUT
 from cdpr_drake.studio.workbench.result_subject import subject_of
 from cdpr_drake.systems.diagrams.load import load_scenario
 from tests.chromium import LONGEST_WAIT, chromium, wait_for
+from tests.studio.run_page import press
 from tests.studio.served import served
 
 SIZES = {"1280": (1280, 800, 1.0), "1920": (1920, 1080, 1.0), "phone": (390, 844, 2.0)}
@@ -31,6 +33,12 @@ GUIDE = {
     ("logs", False): "studio_logs.webp",
 }  # fmt: skip
 """Pictures of the guide by panel and whether they are dark."""
+
+DRAGGED = "studio_drag.webp"
+"""Picture of the guide with an exit point elsewhere, and the workspace that follows."""
+
+MOVED = "cables 0 exit point x"
+"""Name of the field that moves it."""
 
 QUALITY = 80
 """Of the guide's pictures, so that they stay small and cables keep their colours."""
@@ -85,6 +93,16 @@ def keep(page: object, name: str) -> None:
         image.convert("RGB").save(IMAGES / name, quality=QUALITY, method=6)
 
 
+def move_a_point(page: object) -> None:
+    """Gives an exit point another place, and waits for the workspace that follows."""
+    press(page, "Robot")
+    field = page.find_element("css selector", f'input[aria-label="{MOVED}"]')  # type: ignore[attr-defined]
+    field.send_keys(Keys.CONTROL, "a")
+    field.send_keys("-0.3", Keys.ENTER)
+    wait_for(page, "document.querySelector('.studio-live').innerText.includes('refined')")
+    time.sleep(SETTLED)
+
+
 def main() -> None:
     """Writes them."""
     options = argparse.ArgumentParser(description=__doc__)
@@ -120,6 +138,12 @@ def photograph(folder: Path, looks: list[tuple[str, bool]], asked: argparse.Name
                         asked.folder.mkdir(parents=True, exist_ok=True)
                         kind = "dark" if dark else "light"
                         page.save_screenshot(str(asked.folder / f"{name}_{size}_{kind}.png"))
+                if not dark and size == "1280":
+                    move_a_point(page)
+                    if asked.guide:
+                        keep(page, DRAGGED)
+                    else:
+                        page.save_screenshot(str(asked.folder / "moved_1280_light.png"))
 
 
 if __name__ == "__main__":

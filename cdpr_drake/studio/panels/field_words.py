@@ -67,6 +67,11 @@ def in_parts(rule: FieldRule) -> bool:
     return rule.kind == "array" and rule.shape == (SHORT,) and not rule.nullable
 
 
+def axis_names(rule: FieldRule) -> tuple[str, str, str]:
+    """Names of the three numbers of a field: along axes, or of angles."""
+    return ("phi", "theta", "psi") if rule.unit in ("deg", "rad") else ("x", "y", "z")
+
+
 def hint(rule: FieldRule) -> str:
     """What a field is and what it accepts, for who hesitates."""
     return f"{rule.doc} Accepted: {rule.accepts()}"

@@ -22,11 +22,11 @@ SCRIPT = """
 (() => {
   if (window.studioDragging) return;
   window.studioDragging = true;
-  const NEAR = 14;
+  const NEAR = 14, PERIOD = 50;
   const times = (M, v) => [0, 1, 2, 3].map(
     (i) => M[i] * v[0] + M[i + 4] * v[1] + M[i + 8] * v[2] + M[i + 12] * v[3]);
   const frame = () => document.getElementById('scene');
-  let held = null, last = 0;
+  let held = null, last = 0, waiting = 0;
 
   function points(viewer) {
     const found = [];
@@ -55,10 +55,18 @@ SCRIPT = """
   }
   // Meshcat turns the world, whose z is up, to that of its library, whose y is up.
   const inWorld = (p) => [p[0], -p[2], p[1]];
-  function tell(event, done) {
-    const viewer = frame().contentWindow.viewer;
-    const p = inSpace(viewer, event.offsetX + held.dx, event.offsetY + held.dy, held.depth);
+  function tell(x, y, done) {
+    clearTimeout(waiting);
+    last = performance.now();
+    const p = inSpace(frame().contentWindow.viewer, x + held.dx, y + held.dy, held.depth);
     emitEvent('studio_point', {kind: held.kind, number: held.number, done, at: inWorld(p)});
+  }
+  // Not each step of the pointer, but always the last one, at which the hand may rest.
+  function tellSoon(x, y) {
+    clearTimeout(waiting);
+    const left = PERIOD - (performance.now() - last);
+    if (left <= 0) tell(x, y, false);
+    else waiting = setTimeout(() => { if (held) tell(x, y, false); }, left);
   }
   function listen() {
     const w = frame() && frame().contentWindow;
@@ -87,13 +95,12 @@ SCRIPT = """
     canvas.addEventListener('pointermove', (event) => {
       if (!held) { canvas.style.cursor = under(event) ? 'grab' : ''; return; }
       event.stopImmediatePropagation();
-      const now = performance.now();
-      if (now - last > 50) { last = now; tell(event, false); }
+      tellSoon(event.offsetX, event.offsetY);
     }, true);
     const end = (event) => {
       if (!held) return;
       event.stopImmediatePropagation();
-      tell(event, true);
+      tell(event.offsetX, event.offsetY, true);
       held = null;
     };
     canvas.addEventListener('pointerup', end, true);

@@ -7,6 +7,7 @@ from html import escape
 from nicegui import ui
 
 from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.studio.panels.live_workspace import live_workspace_bar
 from cdpr_drake.studio.panels.panel import on_page, show_errors
 from cdpr_drake.studio.panels.point_dragging import add_point_dragging
 from cdpr_drake.studio.panels.robot_beside import RobotBeside
@@ -37,6 +38,7 @@ def robot_panel(bench: Workbench) -> None:
     title = ui.label().classes("studio-title").mark("robot-title")
     where = ui.label().classes("studio-soft").mark("robot-file")
     _assumptions(bench)
+    live_workspace_bar(bench)
     groups = SchemaGroups(bench.robot, Robot, first=FIRST, opened=OPENED, colored=("cables",))
 
     def refresh() -> None:

@@ -13,6 +13,7 @@ from cdpr_drake.errors import CdprError
 from cdpr_drake.schema.fields import FieldRule
 from cdpr_drake.schema.typed_yaml import rules_of
 from cdpr_drake.studio.panels.field_words import (
+    axis_names,
     field_words,
     hint,
     in_parts,
@@ -80,7 +81,8 @@ class SchemaForm:
 
     def _row(self, rule: FieldRule, place: Place, order: Sequence[str]) -> None:
         name = str(place[-1])
-        label = ui.label(name.replace("_", " ")).classes("studio-label")
+        axes = f" {', '.join(axis_names(rule))}" if in_parts(rule) else ""
+        label = ui.label(f"{name.replace('_', ' ')}{axes}").classes("studio-label")
         label.props["title"] = hint(rule)
         with ui.element("div").classes("studio-parts"):
             cells = self.inputs(rule, place, order, problem=None)
@@ -112,7 +114,7 @@ class SchemaForm:
 
     def _input(self, rule: FieldRule, place: Place, index: int | None, value: Any) -> Any:
         words = " ".join(str(key).replace("_", " ") for key in place)
-        words += "" if index is None else f" {'xyz'[index]}"
+        words += "" if index is None else f" {axis_names(rule)[index]}"
         name = _test_name(place, index)
         if rule.kind == "switch":
             element: Any = ui.switch(value=bool(value))

@@ -10,7 +10,7 @@ from nicegui import ui
 from cdpr_drake.palette import nth_look
 from cdpr_drake.schema.fields import FieldRule
 from cdpr_drake.schema.typed_yaml import rules_of
-from cdpr_drake.studio.panels.field_words import hint, in_parts, typed_value
+from cdpr_drake.studio.panels.field_words import axis_names, hint, in_parts, typed_value
 from cdpr_drake.studio.panels.panel import notify
 from cdpr_drake.studio.panels.schema_form import Place, SchemaForm, value_at
 from cdpr_drake.studio.workbench.document import Document
@@ -129,7 +129,7 @@ class SchemaGroups:
             ui.label()
             for name, rule in columns.items():
                 unit = f" [{rule.unit}]" if rule.unit not in ("", "-") else ""
-                axes = " x, y, z" if in_parts(rule) else ""
+                axes = f" {', '.join(axis_names(rule))}" if in_parts(rule) else ""
                 head = ui.label(f"{name.replace('_', ' ')}{axes}{unit}").classes("studio-head")
                 head.props["title"] = hint(rule)
             ui.label()

@@ -14,6 +14,7 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.visualization.meshcat_window import open_meshcat
 from cdpr_drake.analyses.visualization.replay import RobotPicture
+from cdpr_drake.analyses.visualization.solids import add_solid
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.poses import pose_from_row
 from cdpr_drake.models.robot_loader import load_robot
@@ -26,6 +27,15 @@ from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
 
 EXITS, ANCHORS = "studio/exit", "studio/anchor"
 """Paths of the points in the scene, below which each has its number."""
+
+WORKSPACE = "studio_workspace"
+"""Path of the workspace that follows; not below that of the points, which a change deletes."""
+
+WORKSPACE_COLOR = Rgba(0.94, 0.76, 0.48, 0.45)
+"""Its colour; those that were computed by a command are green and blue."""
+
+Solid = tuple[Array, np.ndarray]
+"""Vertices, shape (n, 3) [m], and triangles, shape (k, 3)."""
 
 POINT_SIZE = 0.011
 """Radius of a point, of the diagonal of the frame."""
@@ -48,6 +58,7 @@ class RobotScene:
         self._name, self._size = "", 0.0
         self._dark, self._solids = False, ""
         self._picture: RobotPicture | None = None
+        self._workspace: Solid | None = None
 
     def show(self, robot: Robot, X_WP: RigidTransform, tensions: Array) -> None:
         """Draws a robot at a pose.
@@ -92,6 +103,21 @@ class RobotScene:
             self.meshcat.SetTransform(f"{EXITS}/{k}", RigidTransform(exits[:, k]))
         self._robot, self._name, self._size = robot, robot.name, size
 
+    @property
+    def robot(self) -> Robot | None:
+        """The robot that is drawn; None: none yet."""
+        return self._robot
+
+    def show_workspace(self, solid: Solid | None) -> None:
+        """Draws the workspace that follows the robot, or takes it out."""
+        if solid is self._workspace:
+            return
+        self._workspace = solid
+        if solid is None:
+            self.meshcat.Delete(WORKSPACE)
+        else:
+            add_solid(self.meshcat, WORKSPACE, *solid, WORKSPACE_COLOR)
+
     def set_dark(self, dark: bool) -> None:
         """Paints the background for a dark page, or a light one."""
         self._dark = dark
@@ -101,7 +127,7 @@ class RobotScene:
 
     def redraw(self) -> None:
         """The next `show` draws everything anew, as after others have drawn into the scene."""
-        self._robot, self._solids = None, ""
+        self._robot, self._solids, self._workspace = None, "", None
 
 
 def _solids(robot: Robot) -> str:
@@ -115,7 +141,7 @@ def _solids(robot: Robot) -> str:
 Draw = Callable[[RobotScene], Any]
 """What draws into a scene."""
 
-PATHS = ("visualizer", "cables", "studio")
+PATHS = ("visualizer", "cables", "studio", WORKSPACE)
 """What is taken out of a scene before a run's robot is put there."""
 
 

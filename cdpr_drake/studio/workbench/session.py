@@ -22,6 +22,7 @@ from cdpr_drake.studio.workbench.calculator import Calculator, Signal
 from cdpr_drake.studio.workbench.command_form import CommandForm
 from cdpr_drake.studio.workbench.document import Document
 from cdpr_drake.studio.workbench.job_manager import JobManager
+from cdpr_drake.studio.workbench.live_workspace import LiveWorkspace
 from cdpr_drake.studio.workbench.pose_answer import USUAL_METHOD, PoseAnswer, RobotQuestions
 from cdpr_drake.studio.workbench.pose_axes import axis_values, pose_at
 from cdpr_drake.studio.workbench.result_subject import Results, Subject, subject_of
@@ -58,6 +59,7 @@ class Workbench:
         commands: Forms of the commands that there are, by name.
         results: What is shown of results, and what each is about.
         drawn: What the scene shows in the place of the robot; None: the robot.
+        live: The static workspace that follows the robot while it is changed.
     """
 
     def __init__(
@@ -106,6 +108,7 @@ class Workbench:
         self._busy = self._wanted = False
         self._scene: RobotScene | None = None
         self._opened: Future[str] | None = None
+        self.live = LiveWorkspace(self.calculator.run, self.scene)
         self.go_home()
         self.robot.changed.connect(self._robot_changed)
 
@@ -244,16 +247,22 @@ class Workbench:
         if self.problem is not None:  # the robot is drawn all the same, with grey cables
             robot, X_WP = self._questions.robot, self.X_WP
             unknown = np.full(len(robot.cables), np.nan)
-            self._calculate(lambda: self.scene().show(robot, X_WP, unknown), lambda _: self._end())
+            self._calculate(lambda: self._show(robot, X_WP, unknown), lambda _: self._end())
             return
         answer = self.answer = future.result()
         self.results.show(POSE_NUMBERS, subject_of(answer.robot, answer.X_WP))
         self.answered.emit()
         X_WP, tensions = answer.X_WP, answer.tensions
-        self._calculate(lambda: self.scene().show(answer.robot, X_WP, tensions), self._drawn)
+        self._calculate(lambda: self._show(answer.robot, X_WP, tensions), self._drawn)
+
+    def _show(self, robot: Robot, X_WP: RigidTransform, tensions: Array) -> None:
+        """Draws a robot, then its workspace; in the calculator's thread."""
+        self.scene().show(robot, X_WP, tensions)
+        self.live.draw(self.scene())
 
     def _drawn(self, future: Future[Any]) -> None:
         self.problem = future.exception()
+        self.live.take()
         self._end(self.problem is not None)
 
     def _end(self, tell: bool = True) -> None:
@@ -282,6 +291,7 @@ class Workbench:
         if not done:
             setattr(cable, f"{kind}_point", p)
             self._take_robot(robot)
+            self.live.follow(robot)
             self.ask()
             return ""
         place = ("cables", number, f"{kind}_point")
@@ -303,6 +313,7 @@ class Workbench:
     def _robot_changed(self) -> None:
         before, robot = self._questions.robot, self.robot.value
         self._take_robot(robot)
+        self.live.follow(robot if robot.name == before.name else None)
         if robot.name != before.name or robot.motion != before.motion or self._is_outside():
             self.go_home()
         self.ask()

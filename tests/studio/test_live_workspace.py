@@ -1,0 +1,157 @@
+"""The static workspace that follows a robot while it is changed."""
+
+import asyncio
+import json
+
+import numpy as np
+import pytest
+
+from cdpr_drake.cli.app import main
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.studio.workbench import live_workspace
+from cdpr_drake.studio.workbench.scene import WORKSPACE
+from cdpr_drake.studio.workbench.session import Workbench
+from cdpr_drake.studio.workbench.working_folder import WorkingFolder
+from cdpr_drake.studio.workbench.workspace_sketch import COARSE, FINE, SketchWork, sketch_grid
+from tests.studio.pages import field, opened_page, type_into, until
+
+THERE, FARTHER = np.array([-0.4, -0.5, 1.1]), np.array([-0.3, -0.5, 1.1])
+"""Places for the first exit point of acrobot_large [m]."""
+
+SHARE_OF_COUNT = 0.35
+"""By which a grid may have more or fewer poses than it shall: counts of three axes are whole."""
+
+
+@pytest.fixture
+def bench(tmp_path):
+    made = Workbench(WorkingFolder(tmp_path))
+    made.ask()
+    yield made
+    made.calculator.close()
+
+
+def in_scene(bench):
+    return bench.calculator.submit(lambda: bench.scene().meshcat.HasPath(WORKSPACE)).result()
+
+
+def whole(robot, poses=COARSE):
+    return SketchWork(robot, poses).go_on(10 * poses)
+
+
+def test_a_sketch_is_what_the_command_computes(bench, tmp_path, capsys):
+    bench.drag_point("exit", 0, THERE, done=True)
+    bench.save("moved.yaml", overwrite=False)
+    sketch = bench.live.sketch
+    grid = ",".join(str(count) for count in sketch.counts)
+    with pytest.raises(SystemExit):
+        main(["workspace", str(tmp_path / "moved.yaml"), "--grid", grid, "--json",
+              "--out", str(tmp_path / "own")])  # fmt: skip
+    told = json.loads(capsys.readouterr().out)["workspaces"]["static"]
+    assert told["corners_m3"] == sketch.volume.value
+    assert 0.0 < sketch.volume.share < 1.0
+
+
+@pytest.mark.parametrize("name", ["acrobot_large", "planar", "caroca"])
+@pytest.mark.parametrize("poses", [COARSE, FINE])
+def test_grids_have_about_the_poses_that_are_wanted(name, poses):
+    grid = sketch_grid(load_robot(name), poses)
+    assert abs(grid.size / poses - 1.0) < SHARE_OF_COUNT
+    steps = grid.steps[grid.steps > 0.0]
+    assert np.ptp(steps) < 0.2 * np.max(steps)
+
+
+def test_pieces_make_the_same_as_the_whole():
+    robot = load_robot("acrobot_large")
+    work, found = SketchWork(robot, COARSE), None
+    while found is None:
+        found = work.go_on(100)
+    assert found.volume == whole(robot).volume
+    np.testing.assert_array_equal(found.solid[0], whole(robot).solid[0])
+
+
+def test_it_is_drawn_when_a_point_moves_and_not_before(bench):
+    assert not in_scene(bench)
+    bench.drag_point("exit", 0, THERE, done=False)
+    assert in_scene(bench)
+    coarse = bench.live.sketch
+    assert not bench.live.is_fine
+    bench.drag_point("exit", 0, FARTHER, done=False)
+    assert bench.live.sketch.volume != coarse.volume
+    bench.live.refine()
+    assert bench.live.is_fine
+    assert np.prod(bench.live.sketch.counts) > 10 * np.prod(coarse.counts)
+    bench.drag_point("exit", 0, THERE, done=False)
+    assert not bench.live.is_fine
+    assert bench.live.sketch.volume == coarse.volume
+
+
+def test_a_changed_value_has_it_follow_and_another_robot_takes_it_away(bench):
+    bench.drag_point("exit", 0, THERE, done=True)
+    assert in_scene(bench)
+    assert bench.live.sketch.volume == whole(bench.robot.value).volume
+    bench.open("acrobot_small")
+    assert not in_scene(bench)
+    assert bench.live.sketch is None
+
+
+def test_it_can_be_switched_off_and_on(bench):
+    bench.drag_point("exit", 0, THERE, done=False)
+    bench.live.want(False)
+    assert not in_scene(bench)
+    bench.drag_point("exit", 0, FARTHER, done=False)
+    assert not in_scene(bench)
+    bench.live.want(True)
+    assert in_scene(bench)
+
+
+def test_a_scene_that_others_had_gets_it_back(bench):
+    bench.drag_point("exit", 0, THERE, done=False)
+    bench.calculator.submit(lambda: bench.scene().meshcat.Delete(WORKSPACE)).result()
+    bench.draw(lambda scene: scene.redraw())
+    bench.ask()
+    assert in_scene(bench)
+
+
+def test_a_robot_without_a_static_workspace_says_why(tmp_path):
+    made = Workbench(WorkingFolder(tmp_path), "grab_four")
+    try:
+        made.ask()
+        made.drag_point("exit", 0, made.robot.value.cable_set().p_WA[:, 0] + 0.01, done=False)
+        assert "degrees of freedom" in made.live.problem
+        assert not in_scene(made)
+    finally:
+        made.calculator.close()
+
+
+def test_of_many_robots_the_newest_is_computed_and_the_rest_dropped(tmp_path, monkeypatch):
+    computed = []
+
+    class Counted(SketchWork):
+        def __init__(self, robot, poses):
+            computed.append((poses, robot.cables[0].exit_point[0]))
+            super().__init__(robot, poses)
+
+    monkeypatch.setattr(live_workspace, "SketchWork", Counted)
+    monkeypatch.setattr(live_workspace, "REST", 0.05)
+
+    async def act():
+        async with opened_page(tmp_path) as (user, bench, _):
+            await until(lambda: bench.answer is not None)
+            computed.clear()
+            places = np.linspace(-0.45, -0.3, 31)
+            for x in places:
+                bench.drag_point("exit", 0, np.array([x, -0.5, 1.1]), done=False)
+            await until(lambda: bench.live.is_fine)
+            coarse = [x for poses, x in computed if poses == COARSE]
+            assert len(coarse) < 4
+            assert coarse[-1] == pytest.approx(places[-1])
+            assert computed[-1] == (FINE, coarse[-1])
+            words = field(user, "live-size").text
+            assert "refined" in words
+            assert "% of the grid's box" in words
+            assert "limits 0 to 60 N" in field(user, "live-tensions").text
+            type_into(user, "cell-cables-0-exit_point-0", "-0.35")
+            await until(lambda: computed[-1][1] == pytest.approx(-0.35))
+            await until(lambda: "refined" in field(user, "live-size").text)
+
+    asyncio.run(act())
