@@ -24,6 +24,12 @@ from cdpr_drake.geometry.poses import cross_matrix
 MOVED = np.array([0.5] * 3 + [0.3] * 3 + [5.0] * 3 + [2.0] * 3)
 """How far a state may usually be from rest: turn [rad], translation [m], their rates."""
 
+
+def moved_sizes(moved: Array) -> Array:
+    """`MOVED`, and 1 for each number behind it: shares of what contacts can be bent by."""
+    return np.concatenate([MOVED, np.ones(len(moved) - len(MOVED))])
+
+
 FELT = 1e-6
 """Share of the largest singular value from which on cables feel a motion."""
 
@@ -33,7 +39,7 @@ ROUNDS, SETTLED = 12, 1e-13
 
 @dataclass(frozen=True, eq=False)
 class StartCoordinates:
-    """Coordinates of the first state of one stretch, shape (12,).
+    """Coordinates of the first state of one stretch, shape (12,) and what contacts remember.
 
     Attributes:
         model: The robot.
@@ -73,13 +79,16 @@ class StartCoordinates:
         """
         stretched, _ = self._stretched(vector, moved)
         return np.concatenate(
-            [stretched / self.unit, self.free.T @ (moved[:6] / MOVED[:6]), moved[6:] / MOVED[6:]]
-        )
+            [
+                stretched / self.unit, self.free.T @ (moved[:6] / MOVED[:6]),
+                moved[6:] / moved_sizes(moved)[6:],
+            ]
+        )  # fmt: skip
 
     def moved(self, vector: Array, y: Array) -> Array:
         """The first state of coordinates; NaN where none is found."""
         r = self.pulls.shape[1]
-        found = np.concatenate([self.near[:6], y[6:] * MOVED[6:]])
+        found = np.concatenate([self.near[:6], y[6:] * moved_sizes(y)[6:]])
         try:
             for _ in range(ROUNDS):
                 stretched, J = self._stretched(vector, found)
@@ -91,7 +100,7 @@ class StartCoordinates:
                 if np.max(np.abs(step)) < SETTLED:
                     break
         except (CableGeometryError, np.linalg.LinAlgError):
-            return np.full(len(MOVED), np.nan)
+            return np.full(len(y), np.nan)
         return found
 
     def _stretched(self, vector: Array, moved: Array) -> tuple[Array, Array]:
