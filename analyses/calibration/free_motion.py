@@ -19,6 +19,12 @@ from pydrake.math import RigidTransform, RollPitchYaw
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
+from cdpr_drake.analyses.calibration.free_motion_balance import (
+    PULL,
+    PULLED,
+    Unexplained,
+    unexplained,
+)
 from cdpr_drake.analyses.calibration.free_motion_model import (
     FREE_GROUPS,
     HYSTERESIS,
@@ -132,6 +138,7 @@ class FollowedStretch:
         positions: Measured in W, or where the measured turns and the cables' lengths put Po,
             shape (n, 3) [m]; NaN where neither does.
         places: Predicted for the times at which those were measured, shape (n, 3) [m].
+        unexplained: What pulls beside cables and weight; None: it is not told.
     """
 
     stretch: Stretch
@@ -143,6 +150,7 @@ class FollowedStretch:
     predicted_turns: Array
     positions: Array
     places: Array
+    unexplained: Unexplained | None = None
 
     def after_lead(self) -> np.typing.NDArray[np.bool_]:
         """Instants that are predicted, or all, shape (n,)."""
@@ -255,7 +263,9 @@ def fit_free_motion(
     predicted = [
         _followed(model, vector, s, lead_state(model, task, z, s), task.lead) for s in held
     ]
-    remarks = _remarks(model, std, spread, vector)
+    remarks = (
+        *_remarks(model, std, spread, vector), *_pulled(model, vector, (*followed, *predicted))
+    )  # fmt: skip
     if found.status == 0:
         remarks = (
             f"the search ended after {HORIZONS[-1][1]} steps before it settled: values may be off "
@@ -490,7 +500,27 @@ def _followed(
         turned=(turns.inv() * measured).as_rotvec(), positions=p, places=places,
         measured_turns=(middle * measured).as_rotvec(),
         predicted_turns=(middle * turns).as_rotvec(),
+        unexplained=unexplained(model, vector, stretch, places),
     )  # fmt: skip
+
+
+def _pulled(
+    model: FreeMotionModel, vector: Array, ones: Sequence[FollowedStretch]
+) -> tuple[str, ...]:
+    """Of stretches in which something else than cables and weight pulls."""
+    weight = model.by_name(vector)["mass"] * float(np.linalg.norm(model.robot.gravity_vector()))
+    said = []
+    for one in ones:
+        if one.unexplained is None:
+            continue
+        force, at = one.unexplained.largest(one.unexplained.force)
+        if force > PULLED * weight:
+            time = one.stretch.time
+            said.append(
+                f"stretch {time[0]:.6g}:{time[-1]:.6g}: about {at:.4g} s neither cables nor weight "
+                f"explain {force:.3g} N, the mean over {PULL:g} s: a hand, or a wire?"
+            )
+    return tuple(said)
 
 
 def _modes(model: FreeMotionModel, vector: Array) -> Array:

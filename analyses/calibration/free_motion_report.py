@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from rich.table import Table
 
 from cdpr_drake.analyses.calibration.free_motion import FollowedStretch, FreeMotion
+from cdpr_drake.analyses.calibration.free_motion_balance import PULL
 from cdpr_drake.analyses.calibration.free_motion_model import CREEP, STIFFENING
 from cdpr_drake.analyses.calibration.log_fit import LogFit
 from cdpr_drake.analyses.reporting.log_files import finite
@@ -83,6 +84,20 @@ def _stretch_dict(one: FollowedStretch) -> dict[str, Any]:
         "state_from_first_s": finite(one.lead), "turn_rms_rad": one.turn_rms(),
         "position_rms_m": one.position_rms(), "tension_rms_n": one.tension_rms(),
         "frequencies": axis_frequencies(one),
+        "unexplained": _unexplained_dict(one),
+    }  # fmt: skip
+
+
+def _unexplained_dict(one: FollowedStretch) -> dict[str, float] | None:
+    """Largest means of what neither cables nor weight explain, and when."""
+    rest = one.unexplained
+    if rest is None:
+        return None
+    force, force_at = rest.largest(rest.force)
+    moment, moment_at = rest.largest(rest.moment)
+    return {
+        "force_n": force, "force_at_s": force_at, "moment_nm": moment, "moment_at_s": moment_at,
+        "mean_over_s": PULL,
     }  # fmt: skip
 
 
@@ -108,6 +123,7 @@ def free_motion_dict(found: FreeMotion) -> dict[str, Any]:
                 "turn_rad": found.task.sigmas.turn, "position_m": found.task.sigmas.position,
                 "tension_n": found.task.sigmas.tension,
             },
+            "priors": dict(found.task.priors),
             "positions": by,
             "fitted": [_stretch_dict(one) for one in found.fitted],
             "held_out": [_stretch_dict(one) for one in found.held_out],
@@ -131,7 +147,8 @@ def _tables(found: FreeMotion) -> list[Table]:
         table.add_row(u.name, f"{u.before:.5g}", f"{x:.5g}", f"{s:.2g}", u.unit)
     follow = new_table(
         "Predicted beside measured", ("stretch [s]",),
-        ("turn rms [deg]", "position rms [mm]", "tension rms [N]", "frequencies [Hz]"),
+        ("turn rms [deg]", "position rms [mm]", "tension rms [N]", "unexplained [N]",
+         "frequencies [Hz]"),
     )  # fmt: skip
     for words, ones in (("fitted", found.fitted), ("held out", found.held_out)):
         for one in ones:
@@ -146,7 +163,9 @@ def _tables(found: FreeMotion) -> list[Table]:
                 f"{words} {told['from_s']:.6g}:{told['until_s']:.6g}{lead}",
                 f"{np.degrees(told['turn_rms_rad']):.3g}",
                 "" if place is None else f"{1e3 * place:.3g}",
-                "" if pull is None else f"{pull:.3g}", frequencies,
+                "" if pull is None else f"{pull:.3g}",
+                "" if (rest := told["unexplained"]) is None else f"{rest['force_n']:.3g}",
+                frequencies,
             )  # fmt: skip
     modes = new_table("Modes about rest [Hz]", ("robot",), tuple("123456"))
     for words, row in (("found", found.modes[0]), ("as believed before", found.modes[1])):
