@@ -37,16 +37,16 @@ FREE_GROUPS = (MASS_GROUP, CENTER, MOMENTS, STIFFNESS, DAMPING)
 """Groups that a motion on standing winches can tell."""
 
 HYSTERESIS, STIFFENING, CREEP = "hysteresis", "stiffening", "creep"
-LOAD_CELLS = "load_cells"
+LOAD_CELLS, LOAD_ZEROS = "load_cells", "load_cell_zeros"
 
-ASKED_GROUPS = (HYSTERESIS, STIFFENING, CREEP, LOAD_CELLS)
+ASKED_GROUPS = (HYSTERESIS, STIFFENING, CREEP, LOAD_CELLS, LOAD_ZEROS)
 """Groups that are unknown where they are asked for alone: friction in what a platform hangs on,
-what cables do beside the elastic law, and what load cells tell of no load and of a known one."""
+what cables do beside the elastic law, and what load cells tell of a known load and of none."""
 
 PRIOR_UNITS = {MASS_GROUP: "kg", CENTER: "m", MOMENTS: "kg m^2", STIFFNESS: "N"}
 """Groups of which something may be known beforehand, with the unit of its standard deviation."""
 
-SENSORS = ("sensor", LOAD_CELLS)
+SENSORS = ("sensor", LOAD_CELLS, LOAD_ZEROS)
 """Groups that the motion does not depend on."""
 
 TURNING = 0.5
@@ -349,7 +349,7 @@ def _all_unknowns(robot: Robot, start: RigidTransform, turns: bool, tracker: boo
         Unknown("load_cells.scale", "", LOAD_CELLS, 1.0, 0.1, 0.5, 2.0),
     ]  # fmt: skip
     found += [
-        Unknown(f"{c.name}.load_cell_zero", "N", LOAD_CELLS, 0.0, 0.1 * share) for c in robot.cables
+        Unknown(f"{c.name}.load_cell_zero", "N", LOAD_ZEROS, 0.0, 0.1 * share) for c in robot.cables
     ]
     if turns:
         found.append(Unknown("sensor.heading", "rad", "sensor", 0.0, 0.5))

@@ -165,6 +165,7 @@ def main():
             rows.append(off_by(group, found))
             spreads.append(found.spread)
             unsettled += any("before it settled" in words for words in found.remarks)
+            print(f"{group} {seed}: {found.steps} steps, {np.round(rows[-1], 2)}", flush=True)
         table = np.array(rows)
         print(
             f"{group}: {len(table)} seeds, {clock.process_time() - began:.0f} s of processor; "

@@ -120,6 +120,26 @@ def test_what_cables_pull_at_first_stays_while_their_lengths_are_sought():
     np.testing.assert_allclose(again * 1.03, pulled, rtol=1e-9)
 
 
+def test_what_stiffening_cables_pull_at_first_stays_while_it_is_sought():
+    start = RigidTransform([0.01, -0.02, 0.45])
+    model = FreeMotionModel.of(swings.BELIEVED, start, (*FREE_GROUPS, "stiffening"), True, False)
+    near = np.array([0.2, -0.1, 0.3, 0.02, 0.01, -0.02, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    vector, k = model.before(), model.names.index("all.stiffening")
+    vector[k] = 2e-3
+    at = StartCoordinates.about(model, near)
+    # A pose in which every cable pulls: from coordinates, as a search would come to it.
+    y = at.of(model.before(), near)
+    y[: at.pulls.shape[1]] = at.pulls.T @ np.array([1.0, 1.3, 0.8, 1.1])
+    moved = at.moved(vector, y)
+    np.testing.assert_allclose(at.of(vector, moved), y, rtol=0.0, atol=1e-9)
+    pulled = model.run(vector, moved, 2, 0.01)[1][0]
+    assert np.min(pulled) > 0.0
+    stiffer = vector.copy()
+    stiffer[k] = 8e-3
+    again = model.run(stiffer, at.moved(stiffer, y), 2, 0.01)[1][0]
+    np.testing.assert_allclose(again, pulled, rtol=1e-9)
+
+
 def test_states_a_time_earlier_are_those_of_the_motion():
     step, late, w = 0.02, 0.013, np.array([0.3, -1.2, 0.8])
     t = np.arange(60) * step

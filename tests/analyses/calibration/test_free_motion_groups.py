@@ -40,7 +40,8 @@ TRUE = {
     "hysteresis": {"hysteresis.tilt": 4.0, "hysteresis.turn": 6.0, "hysteresis.slip": 0.08},
     "stiffening": {"all.stiffening": 6e-3},
     "creep": {"all.creep_stiffness": 0.3, "all.creep_time": 0.3},
-    "load_cells": {"load_cells.scale": 0.94, "C3.load_cell_zero": -4.0},
+    "load_cells": {"load_cells.scale": 0.94},
+    "load_cell_zeros": {"C1.load_cell_zero": 3.0, "C3.load_cell_zero": -4.0},
 }
 
 FIRST_STEP = 0.02
@@ -151,7 +152,7 @@ def test_contacts_begin_where_they_are_said_to_be():
 
 
 def test_what_load_cells_tell_goes_back_to_tensions():
-    model = FreeMotionModel.of(soft(), START, ("load_cells",), False, False)
+    model = FreeMotionModel.of(soft(), START, ("load_cells", "load_cell_zeros"), False, False)
     vector = model.before() + 0.3 * np.arange(len(model.names))
     pulls = np.array([[40.0, 50.0, 60.0, 0.0]])
     told = sensed_tensions(model, vector, pulls)
