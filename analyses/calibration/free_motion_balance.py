@@ -50,14 +50,21 @@ class Unexplained:
     force: Array
     moment: Array
 
+    def means(self, values: Array) -> Array:
+        """Means of forces or moments over `PULL` from each instant on, shape (j, 3)."""
+        n = self._count()
+        sums = np.cumsum(np.vstack([np.zeros(3), values]), axis=0)
+        return np.asarray((sums[n:] - sums[:-n]) / n)
+
     def largest(self, values: Array) -> tuple[float, float]:
         """The largest mean over `PULL` of forces or moments, and its middle instant [s]."""
+        sizes = np.linalg.norm(self.means(values), axis=1)
+        k = int(np.argmax(sizes))
+        return float(sizes[k]), float(np.mean(self.time[k : k + self._count()]))
+
+    def _count(self) -> int:
         step = float(self.time[1] - self.time[0])
-        n = min(max(round(PULL / step), 1), len(values))
-        sums = np.cumsum(np.vstack([np.zeros(3), values]), axis=0)
-        means = np.linalg.norm(sums[n:] - sums[:-n], axis=1) / n
-        k = int(np.argmax(means))
-        return float(means[k]), float(np.mean(self.time[k : k + n]))
+        return min(max(round(PULL / step), 1), len(self.time))
 
 
 def unexplained(

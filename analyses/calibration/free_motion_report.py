@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from rich.table import Table
 
 from cdpr_drake.analyses.calibration.free_motion import FollowedStretch, FreeMotion
-from cdpr_drake.analyses.calibration.free_motion_balance import PULL
+from cdpr_drake.analyses.calibration.free_motion_balance import PULL, PULLED
 from cdpr_drake.analyses.calibration.free_motion_model import CREEP, STIFFENING
 from cdpr_drake.analyses.calibration.log_fit import LogFit
 from cdpr_drake.analyses.reporting.log_files import finite
@@ -208,6 +208,35 @@ def _figure(found: FreeMotion, which: str) -> Figure:
     return figure
 
 
+def _unexplained_figure(found: FreeMotion) -> Figure:
+    """What neither cables nor weight explain, a panel a stretch, beside what is worth a word."""
+    ones = [one for one in (*found.fitted, *found.held_out) if one.unexplained is not None]
+    fitted = len([one for one in found.fitted if one.unexplained is not None])
+    weight = found.model.by_name(found.values)["mass"] * float(
+        np.linalg.norm(found.task.robot.gravity_vector())
+    )
+    figure, axes = new_figure(
+        1, len(ones), (max(7.0, 4.0 * len(ones)), 4.0),
+        f"Free motion of {found.task.robot.name}: what neither cables nor weight explain",
+    )  # fmt: skip
+    row = np.array(axes, dtype=object).reshape(len(ones))
+    for j, one in enumerate(ones):
+        rest = one.unexplained
+        assert rest is not None
+        force, means = np.linalg.norm(rest.force, axis=1), rest.means(rest.force)
+        row[j].plot(rest.time, force, label="at an instant", **line_style(nth_look(0)))
+        row[j].plot(
+            rest.time[: len(means)] + 0.5 * PULL, np.linalg.norm(means, axis=1),
+            label=f"mean over {PULL:g} s", **line_style(nth_look(1)),
+        )  # fmt: skip
+        row[j].axhline(PULLED * weight, color="0.4", linestyle="--", linewidth=1.0)
+        words = "fitted" if j < fitted else "held out"
+        row[j].set(title=f"{words}, from {one.stretch.time[0]:.6g} s", xlabel="time [s]", ylim=0.0)
+    row[0].set(ylabel="force [N]")
+    row[0].legend()
+    return figure
+
+
 def freely_moved_robot(found: FreeMotion) -> Robot:
     """The robot with what was found."""
     robot, n = found.task.robot, found.model.by_name(found.values)
@@ -243,9 +272,11 @@ def freely_moved_robot(found: FreeMotion) -> Robot:
 
 def free_motion_fit(found: FreeMotion) -> LogFit:
     """What is told of an identification from free motion."""
-    drawings = {"fitted": partial(_figure, found, "fitted")}
+    drawings: dict[str, partial[Figure]] = {"fitted": partial(_figure, found, "fitted")}
     if found.held_out:
         drawings = {"held_out": partial(_figure, found, "held_out"), **drawings}
+    if any(one.unexplained is not None for one in (*found.fitted, *found.held_out)):
+        drawings["unexplained"] = partial(_unexplained_figure, found)
     return LogFit(
         freely_moved_robot(found), RESULTS, free_motion_dict(found), _tables(found), drawings,
         found.status != MISFIT,

@@ -175,3 +175,22 @@ def test_what_is_known_beforehand_weighs_and_counts():
             model.knowing(given)
     with pytest.raises(IdentificationError, match="found 'mass'; accepted: of what is unknown, st"):
         FreeMotionModel.of(soft(), START, ("stiffness",), False, False).knowing({"mass": 0.1})
+
+
+def test_a_swing_tells_masses_and_forces_only_beside_what_load_cells_tell():
+    groups = (*FREE_GROUPS, "hysteresis", "load_cells")
+    model = FreeMotionModel.of(soft(), START, groups, False, False)
+    vector = model.before()
+    for name, value in {**TRUE["hysteresis"], "drag.force": 1.2, "drag.moment": 0.1}.items():
+        vector[model.names.index(name)] = value
+    heavier, share = vector.copy(), 1.1
+    grows = ("mass", "inertia.", "all.stiffness", "drag.", "hysteresis.t")
+    for k, name in enumerate(model.names):
+        heavier[k] *= share if name.startswith(grows) else 1.0
+    heavier[model.names.index("load_cells.scale")] /= share
+    moved = np.concatenate([np.zeros(3), [0.0, 0.0, -0.002], [0.6, -0.3, 0.9], np.zeros(3), BENT])
+    (states, pulls), (again, other) = (model.run(v, moved, 30, 0.02) for v in (vector, heavier))
+    np.testing.assert_allclose(again, states, atol=1e-9)
+    assert np.max(other) > 1.05 * np.max(pulls)
+    told = [sensed_tensions(model, v, t) for v, t in ((vector, pulls), (heavier, other))]
+    np.testing.assert_allclose(told[1], told[0], atol=1e-6)
