@@ -169,12 +169,12 @@ class FreeMotionModel:
             accepted = [name for name in PRIOR_UNITS if name in asked]
             if group not in accepted:
                 raise IdentificationError(
-                    f"prior: found {group!r}; accepted: of what is unknown, "
+                    f"priors: found {group!r}; accepted: of what is unknown, "
                     f"{', '.join(accepted) or 'none'}"
                 )
             if not 0.0 < sigma < np.inf:
                 raise IdentificationError(
-                    f"prior of {group}: found {sigma:g}; accepted: > 0 [{PRIOR_UNITS[group]}]"
+                    f"priors: {group}: found {sigma:g}; accepted: > 0 [{PRIOR_UNITS[group]}]"
                 )
         unknowns = tuple(
             replace(one, size=sigmas[one.group], known=True) if one.group in sigmas else one

@@ -7,6 +7,7 @@ import pytest
 from pydrake.math import RigidTransform
 from scipy.spatial.transform import Rotation
 
+from cdpr_drake.analyses.calibration.free_motion_balance import PULLED
 from cdpr_drake.analyses.calibration.free_motion_model import FREE_GROUPS, FreeMotionModel
 from cdpr_drake.analyses.calibration.free_motion_report import dominant_frequency
 from cdpr_drake.analyses.calibration.free_motion_sensor import earlier
@@ -77,6 +78,10 @@ def test_a_swing_by_the_plant_tells_the_platform_and_its_cables(found):
         identified.cable_set().stiffness, by_name["all.stiffness"]["value"], rtol=1e-9
     )
     assert (folder / "out/held_out.png").exists()
+    assert (folder / "out/unexplained.png").exists()
+    for one in said["fitted"] + said["held_out"]:
+        assert one["unexplained"]["force_n"] < PULLED * 14.1 * 9.80665
+    assert not any("neither cables nor weight" in words for words in said["remarks"])
 
 
 def test_a_held_out_swing_is_predicted(found):
@@ -175,6 +180,7 @@ REFUSED = [
         "unknown: found 'friction'; accepted of a free",
     ),
     (["--free", "halves", "--lead", "-1"], "--lead: found -1; accepted: > 0 [s]"),
+    (["--free", "halves", "--prior", "turn=1"], "--prior: found 'turn'; accepted: of what is"),
     (["--free", "halves", "--sigma", "turns=1"], "'turns' is unknown; did you mean turn?"),
 ]
 

@@ -168,8 +168,8 @@ def test_what_is_known_beforehand_weighs_and_counts():
     assert (mass.size, mass.known) == (0.1, True)
     assert [one.known for one in known.unknowns].count(True) == 1
     for given, words in (
-        ({"masses": 1.0}, "prior: found 'masses'; accepted: of what is unknown, mass, center"),
-        ({"mass": -1.0}, r"prior of mass: found -1; accepted: > 0 \[kg\]"),
+        ({"masses": 1.0}, "priors: found 'masses'; accepted: of what is unknown, mass, center"),
+        ({"mass": -1.0}, r"priors: mass: found -1; accepted: > 0 \[kg\]"),
     ):
         with pytest.raises(IdentificationError, match=words):
             model.knowing(given)
