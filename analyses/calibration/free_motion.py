@@ -10,7 +10,7 @@ tells.
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -19,6 +19,12 @@ from pydrake.math import RigidTransform, RollPitchYaw
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
+from cdpr_drake.analyses.calibration.free_motion_balance import (
+    PULL,
+    PULLED,
+    Unexplained,
+    unexplained,
+)
 from cdpr_drake.analyses.calibration.free_motion_model import (
     FREE_GROUPS,
     HYSTERESIS,
@@ -37,9 +43,11 @@ from cdpr_drake.analyses.calibration.free_motion_sensor import (
     first_state,
     places_by_lengths,
     sensed,
+    sensed_tensions,
     unsensed,
+    unsensed_tensions,
 )
-from cdpr_drake.analyses.calibration.free_motion_start import MOVED, StartCoordinates
+from cdpr_drake.analyses.calibration.free_motion_start import StartCoordinates, moved_sizes
 from cdpr_drake.analyses.calibration.log_file import CalibrationLog
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import EquilibriumError, IdentificationError
@@ -100,6 +108,7 @@ class FreeMotionTask:
         start: A pose near which the platform hangs; None: see `start_pose`.
         tracker: Whether the frame of a tracker of poses is unknown; else it is W.
         lead: From so much of a held-out stretch its first state is told [s].
+        priors: Standard deviations of what is known beforehand, by groups of `PRIOR_UNITS`.
     """
 
     robot: Robot
@@ -110,6 +119,7 @@ class FreeMotionTask:
     start: RigidTransform | None = None
     tracker: bool = False
     lead: float = 1.0
+    priors: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -120,7 +130,7 @@ class FollowedStretch:
         stretch: What was measured.
         lead: From so much of it the first state was told [s]; all of it where it was fitted.
         states: Of the platform, shape (n, 13).
-        tensions: Shape (n, m) [N].
+        tensions: As load cells would tell them, shape (n, m) [N].
         turned: Rotation vectors from predicted to measured turns, in the sensor's frame, shape
             (n, 3) [rad].
         measured_turns: Rotation vectors from the mean measured turn, shape (n, 3) [rad].
@@ -128,6 +138,7 @@ class FollowedStretch:
         positions: Measured in W, or where the measured turns and the cables' lengths put Po,
             shape (n, 3) [m]; NaN where neither does.
         places: Predicted for the times at which those were measured, shape (n, 3) [m].
+        unexplained: What pulls beside cables and weight; None: it is not told.
     """
 
     stretch: Stretch
@@ -139,6 +150,7 @@ class FollowedStretch:
     predicted_turns: Array
     positions: Array
     places: Array
+    unexplained: Unexplained | None = None
 
     def after_lead(self) -> np.typing.NDArray[np.bool_]:
         """Instants that are predicted, or all, shape (n,)."""
@@ -226,9 +238,10 @@ def fit_free_motion(
     start = start_pose(task.robot, fitted, tracked and not task.tracker, task.start)
     groups = _groups(task, log, fitted)
     model = FreeMotionModel.of(task.robot, start, groups, not tracked, tracked and task.tracker)
-    model = _sensor_believed(model, fitted)
+    model = _sensor_believed(model.knowing(task.priors), fitted)
     z, steps = model.first(), 0
-    moved = [first_state(model, model.before(), s) for s in fitted]
+    begun = _Search(model, task.sigmas, fitted, np.ones(len(z), bool)).vector(z)
+    moved = [first_state(model, begun, s) for s in fitted]
     sensor = np.array([one.group in ("", "sensor") for one in model.unknowns])
     for n, (horizon, most) in enumerate(HORIZONS):
         say(f"{'first ' + str(horizon) + ' s' if horizon < 1e3 else 'whole'} of each stretch")
@@ -250,7 +263,9 @@ def fit_free_motion(
     predicted = [
         _followed(model, vector, s, lead_state(model, task, z, s), task.lead) for s in held
     ]
-    remarks = _remarks(model, std, spread, vector)
+    remarks = (
+        *_remarks(model, std, spread, vector), *_pulled(model, vector, (*followed, *predicted))
+    )  # fmt: skip
     if found.status == 0:
         remarks = (
             f"the search ended after {HORIZONS[-1][1]} steps before it settled: values may be off "
@@ -345,7 +360,8 @@ class _Search:
         if measured is not None:
             out[:, 3:6] = (measured - p) / self.sigmas.position
         out[:, :6] *= stretch.known[:, None]
-        off = (stretch.tensions - tensions) / self.sigmas.tension
+        told = sensed_tensions(self.model, vector, tensions)
+        off = (stretch.tensions - told) / self.sigmas.tension
         out[:, 6:] = np.where(np.isfinite(off), off, 0.0)
         return np.clip(out, -LOST, LOST)
 
@@ -353,17 +369,20 @@ class _Search:
         """All residuals that a stretch's first state, of coordinates y, belongs to."""
         moved = at.moved(self.vector(z), y)
         if not np.isfinite(moved).all():
-            return np.full(stretch.count * (6 + len(self.model.robot.cables)) + START, LOST)
-        return np.concatenate([self.measured(z, moved, stretch).ravel(), moved / MOVED])
+            return np.full(stretch.count * (6 + len(self.model.robot.cables)) + len(y), LOST)
+        return np.concatenate(
+            [self.measured(z, moved, stretch).ravel(), moved / moved_sizes(moved)]
+        )
 
     def solve(self, z: Array, moved: list[Array], most: int) -> tuple[Array, list[Array], Any]:
         """Least squares from here; the unknowns, first states, and scipy's result."""
         f, base = np.flatnonzero(self.free), z.copy()
+        one = START + self.model.memory  # numbers of a first state
 
         def parts(x: Array) -> tuple[Array, list[Array]]:
             z = base.copy()
             z[f] = x[: len(f)]
-            return z, [x[len(f) + START * j :][:START] for j in range(len(self.stretches))]
+            return z, [x[len(f) + one * j :][:one] for j in range(len(self.stretches))]
 
         def residuals(x: Array) -> Array:
             z, states = parts(x)
@@ -375,15 +394,15 @@ class _Search:
             rows = []
             each = zip(states, starts, self.stretches, strict=True)
             for j, (y, at, s) in enumerate(each):
-                J = np.zeros((s.count * (6 + len(self.model.robot.cables)) + START, len(x)))
+                J = np.zeros((s.count * (6 + len(self.model.robot.cables)) + one, len(x)))
                 for k in range(len(f)):
                     by = SMALL * np.eye(len(z))[f[k]]
                     ahead, back = (self.part(z + side * by, y, at, s) for side in (1.0, -1.0))
                     J[:, k] = (ahead - back) / (2.0 * SMALL)
-                for k in range(START):
-                    by = SMALL * np.eye(START)[k]
+                for k in range(one):
+                    by = SMALL * np.eye(one)[k]
                     ahead, back = (self.part(z, y + side * by, at, s) for side in (1.0, -1.0))
-                    J[:, len(f) + START * j + k] = (ahead - back) / (2.0 * SMALL)
+                    J[:, len(f) + one * j + k] = (ahead - back) / (2.0 * SMALL)
                 rows.append(J)
             rows.append(np.eye(len(f), len(x)))
             return np.vstack(rows)
@@ -392,9 +411,12 @@ class _Search:
         first = [at.of(self.vector(z), m) for at, m in zip(starts, moved, strict=True)]
         x = np.concatenate([z[f], *first])
         least, largest = np.full(len(x), -np.inf), np.full(len(x), np.inf)
-        for k, one in enumerate(np.array(self.model.unknowns, object)[f]):
-            least[k] = (one.least - one.before) / one.size
-            largest[k] = (one.most - one.before) / one.size
+        for k, u in enumerate(np.array(self.model.unknowns, object)[f]):
+            least[k] = (u.least - u.before) / u.size
+            largest[k] = (u.most - u.before) / u.size
+        for j in range(len(self.stretches) if self.model.memory else 0):
+            bent = slice(len(f) + one * j + START, len(f) + one * (j + 1))
+            least[bent], largest[bent] = -1.0, 1.0
         room = INSIDE * np.minimum(1.0, largest - least)
         x = np.clip(x, least + room, largest - room)
         found = least_squares(
@@ -427,7 +449,8 @@ class _Search:
         n = count
         information = J.T @ J / (max(spread, 1.0) ** 2 * together)
         information[n:, n:] += np.eye(len(information) - n) * 1e-6
-        whole = information + np.diag(np.r_[np.full(n, 1e-4), np.zeros(len(information) - n)])
+        beforehand = [1.0 if u.known else 1e-4 for u in self.model.unknowns]
+        whole = information + np.diag(np.r_[beforehand, np.zeros(len(information) - n)])
         variance = np.diag(np.linalg.pinv(whole, hermitian=True))[:n]
         sizes = np.array([one.size for one in self.model.unknowns])
         std = sizes * np.sqrt(np.maximum(variance, 0.0))
@@ -467,15 +490,37 @@ def _followed(
     measured = stretch.recorded.turns_at(stretch.time)
     R_WP, p = unsensed(model, vector, measured, stretch.recorded.positions_at(stretch.time))
     if p is None:
-        pulled = np.where(np.isfinite(stretch.tensions), stretch.tensions, tensions)
+        told = unsensed_tensions(model, vector, stretch.tensions)
+        pulled = np.where(np.isfinite(told), told, tensions)
         p = places_by_lengths(model, vector, R_WP, pulled, places)
     middle = measured.mean().inv()
     return FollowedStretch(
-        stretch=stretch, lead=np.inf if lead is None else lead, states=states, tensions=tensions,
+        stretch=stretch, lead=np.inf if lead is None else lead, states=states,
+        tensions=sensed_tensions(model, vector, tensions),
         turned=(turns.inv() * measured).as_rotvec(), positions=p, places=places,
         measured_turns=(middle * measured).as_rotvec(),
         predicted_turns=(middle * turns).as_rotvec(),
+        unexplained=unexplained(model, vector, stretch, places),
     )  # fmt: skip
+
+
+def _pulled(
+    model: FreeMotionModel, vector: Array, ones: Sequence[FollowedStretch]
+) -> tuple[str, ...]:
+    """Of stretches in which something else than cables and weight pulls."""
+    weight = model.by_name(vector)["mass"] * float(np.linalg.norm(model.robot.gravity_vector()))
+    said = []
+    for one in ones:
+        if one.unexplained is None:
+            continue
+        force, at = one.unexplained.largest(one.unexplained.force)
+        if force > PULLED * weight:
+            time = one.stretch.time
+            said.append(
+                f"stretch {time[0]:.6g}:{time[-1]:.6g}: about {at:.4g} s neither cables nor weight "
+                f"explain {force:.3g} N, the mean over {PULL:g} s: a hand, or a wire?"
+            )
+    return tuple(said)
 
 
 def _modes(model: FreeMotionModel, vector: Array) -> Array:

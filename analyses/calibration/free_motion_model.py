@@ -7,8 +7,8 @@ is apart. The motion is that of the room `dynamics`, with cables of Kelvin and V
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -37,16 +37,24 @@ FREE_GROUPS = (MASS_GROUP, CENTER, MOMENTS, STIFFNESS, DAMPING)
 """Groups that a motion on standing winches can tell."""
 
 HYSTERESIS, STIFFENING, CREEP = "hysteresis", "stiffening", "creep"
+LOAD_CELLS, LOAD_ZEROS = "load_cells", "load_cell_zeros"
 
-ASKED_GROUPS = (HYSTERESIS, STIFFENING, CREEP)
-"""Groups that are unknown where they are asked for alone: friction in what a platform hangs on, and
-what cables do beside the elastic law."""
+ASKED_GROUPS = (HYSTERESIS, STIFFENING, CREEP, LOAD_CELLS, LOAD_ZEROS)
+"""Groups that are unknown where they are asked for alone: friction in what a platform hangs on,
+what cables do beside the elastic law, and what load cells tell of a known load and of none."""
+
+PRIOR_UNITS = {MASS_GROUP: "kg", CENTER: "m", MOMENTS: "kg m^2", STIFFNESS: "N"}
+"""Groups of which something may be known beforehand, with the unit of its standard deviation."""
+
+SENSORS = ("sensor", LOAD_CELLS, LOAD_ZEROS)
+"""Groups that the motion does not depend on."""
 
 TURNING = 0.5
 """Angular velocity from which on contacts count as bent as far as they go at first [rad/s]."""
 
-STATE, START = 13, 12
-"""Numbers of a platform's state, and of what moves the state at the first instant."""
+STATE, START, BENT = 13, 12, 3
+"""Numbers of a platform's state, of what moves the state at the first instant, and of how far
+contacts are bent then."""
 
 ANGLE_OF_STEP = 0.7
 """Largest step times the fastest mode of the cables [rad]: the method is stable up to 1.7, and what
@@ -72,6 +80,7 @@ class Unknown:
         least: Bounds.
         most: See there.
         first: Where the search begins; None: as it is believed.
+        known: Whether the size is what is known beforehand, and counts in standard errors.
     """
 
     name: str
@@ -82,6 +91,7 @@ class Unknown:
     least: float = -np.inf
     most: float = np.inf
     first: float | None = None
+    known: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,6 +111,7 @@ class FreeMotionModel:
     unknowns: tuple[Unknown, ...]
     step: float
     fixed: dict[str, float]
+    _last: dict[bytes, tuple[Array, Array]] = field(default_factory=dict, init=False, repr=False)
 
     @staticmethod
     def of(
@@ -141,6 +152,35 @@ class FreeMotionModel:
     def names(self) -> list[str]:
         """Of the vector."""
         return [one.name for one in self.unknowns]
+
+    @property
+    def memory(self) -> int:
+        """Numbers of a first state beside those of the platform: how far contacts are bent."""
+        return BENT if any(one.group == HYSTERESIS for one in self.unknowns) else 0
+
+    def knowing(self, sigmas: Mapping[str, float]) -> FreeMotionModel:
+        """The model with groups that are known beforehand, by standard deviations.
+
+        Raises:
+            IdentificationError: A group is not unknown, or is none of `PRIOR_UNITS`.
+        """
+        asked = {one.group for one in self.unknowns}
+        for group, sigma in sigmas.items():
+            accepted = [name for name in PRIOR_UNITS if name in asked]
+            if group not in accepted:
+                raise IdentificationError(
+                    f"priors: found {group!r}; accepted: of what is unknown, "
+                    f"{', '.join(accepted) or 'none'}"
+                )
+            if not 0.0 < sigma < np.inf:
+                raise IdentificationError(
+                    f"priors: {group}: found {sigma:g}; accepted: > 0 [{PRIOR_UNITS[group]}]"
+                )
+        unknowns = tuple(
+            replace(one, size=sigmas[one.group], known=True) if one.group in sigmas else one
+            for one in self.unknowns
+        )
+        return replace(self, unknowns=unknowns)
 
     def before(self) -> Array:
         """The vector as it is believed."""
@@ -203,27 +243,35 @@ class FreeMotionModel:
 
     def run(self, vector: Array, moved: Array, count: int, step: float) -> tuple[Array, Array]:
         """States and tensions at even instants, shapes (count, 13) and (count, m); NaN behind an
-        instant at which the motion cannot go on.
+        instant at which the motion cannot go on. Both are read, not written: who asks again for
+        the same motion, as slopes over what sensors have do, gets the same arrays.
 
         Args:
             vector: The unknown vector.
             moved: From `start` at rest to the first state: rotation vector and translation in W,
-                then V_WP, shape (12,).
+                then V_WP, shape (12,); behind it how far contacts are bent, in P, as shares of
+                the slip, shape (12 + 3,), or nothing: as far as they go by their velocity.
             count: Instants.
             step: Between them [s].
         """
+        moves = [x for u, x in zip(self.unknowns, vector, strict=True) if u.group not in SENSORS]
+        key = np.array([*moves, *moved, count, step]).tobytes()
+        if key not in self._last:
+            self._last.clear()
+            self._last[key] = self._moved(vector, moved, count, step)
+        return self._last[key]
+
+    def _moved(self, vector: Array, moved: Array, count: int, step: float) -> tuple[Array, Array]:
         m = len(self.robot.cables)
         state = np.zeros(STATE + m)
         state[:7] = pose_row(self.start)
         turn_pose(state, *moved[:3])
         state[4:7] += moved[3:6]
-        state[7:STATE], state[STATE:] = moved[6:], self.lengths(vector)
+        state[7:STATE], state[STATE:] = moved[6:START], self.lengths(vector)
         arrays = self.arrays(vector)
         if arrays.kinds[RUBBING] > 0:
-            turn = Rotation.from_quat(state[[1, 2, 3, 0]])
-            w_P = turn.inv().apply(moved[6:9])
-            bent = self.contacts(vector).slip * w_P / np.hypot(np.linalg.norm(w_P), TURNING)
-            state = np.concatenate([state, bent])
+            share = moved[START:] if len(moved) > START else usually_bent(state, moved[6:9])
+            state = np.concatenate([state, self.contacts(vector).slip * share])
         if arrays.kinds[CREEPING] > 0:  # strains about which the platform swings
             l0 = self.lengths(vector) * self.behaviour(vector).longer()
             at_rest = cable_paths(self.start, self.robot.cable_set()).lengths / l0 - 1.0
@@ -250,6 +298,12 @@ class FreeMotionModel:
         K = platform.weight_stiffness(X_WP)
         K = K - cable_derivatives(cables, ELASTIC, X_WP, l0).wrench_by_pose
         return np.sort(natural_modes(K, platform, X_WP).frequencies)
+
+
+def usually_bent(state: Array, turning: Array) -> Array:
+    """How far contacts are bent by an angular velocity in W, in P, as shares of the slip."""
+    w_P = Rotation.from_quat(state[[1, 2, 3, 0]]).inv().apply(turning)
+    return np.asarray(w_P / np.hypot(np.linalg.norm(w_P), TURNING))
 
 
 def _all_unknowns(robot: Robot, start: RigidTransform, turns: bool, tracker: bool) -> list[Unknown]:
@@ -306,7 +360,11 @@ def _all_unknowns(robot: Robot, start: RigidTransform, turns: bool, tracker: boo
             first=max(0.1, does.creep_stiffness),
         ),
         Unknown("all.creep_time", "s", CREEP, does.creep_time, 0.5, 0.01, 100.0),
+        Unknown("load_cells.scale", "", LOAD_CELLS, 1.0, 0.1, 0.5, 2.0),
     ]  # fmt: skip
+    found += [
+        Unknown(f"{c.name}.load_cell_zero", "N", LOAD_ZEROS, 0.0, 0.1 * share) for c in robot.cables
+    ]
     if turns:
         found.append(Unknown("sensor.heading", "rad", "sensor", 0.0, 0.5))
         found += [Unknown(f"sensor.mount_{a}", "rad", "sensor", 0.0, 0.2) for a in "xyz"]

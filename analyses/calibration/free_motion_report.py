@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from rich.table import Table
 
 from cdpr_drake.analyses.calibration.free_motion import FollowedStretch, FreeMotion
+from cdpr_drake.analyses.calibration.free_motion_balance import PULL, PULLED
 from cdpr_drake.analyses.calibration.free_motion_model import CREEP, HYSTERESIS, STIFFENING
 from cdpr_drake.analyses.calibration.log_fit import LogFit
 from cdpr_drake.analyses.reporting.log_files import finite
@@ -83,6 +84,20 @@ def _stretch_dict(one: FollowedStretch) -> dict[str, Any]:
         "state_from_first_s": finite(one.lead), "turn_rms_rad": one.turn_rms(),
         "position_rms_m": one.position_rms(), "tension_rms_n": one.tension_rms(),
         "frequencies": axis_frequencies(one),
+        "unexplained": _unexplained_dict(one),
+    }  # fmt: skip
+
+
+def _unexplained_dict(one: FollowedStretch) -> dict[str, float] | None:
+    """Largest means of what neither cables nor weight explain, and when."""
+    rest = one.unexplained
+    if rest is None:
+        return None
+    force, force_at = rest.largest(rest.force)
+    moment, moment_at = rest.largest(rest.moment)
+    return {
+        "force_n": force, "force_at_s": force_at, "moment_nm": moment, "moment_at_s": moment_at,
+        "mean_over_s": PULL,
     }  # fmt: skip
 
 
@@ -108,6 +123,7 @@ def free_motion_dict(found: FreeMotion) -> dict[str, Any]:
                 "turn_rad": found.task.sigmas.turn, "position_m": found.task.sigmas.position,
                 "tension_n": found.task.sigmas.tension,
             },
+            "priors": dict(found.task.priors),
             "positions": by,
             "fitted": [_stretch_dict(one) for one in found.fitted],
             "held_out": [_stretch_dict(one) for one in found.held_out],
@@ -131,7 +147,8 @@ def _tables(found: FreeMotion) -> list[Table]:
         table.add_row(u.name, f"{u.before:.5g}", f"{x:.5g}", f"{s:.2g}", u.unit)
     follow = new_table(
         "Predicted beside measured", ("stretch [s]",),
-        ("turn rms [deg]", "position rms [mm]", "tension rms [N]", "frequencies [Hz]"),
+        ("turn rms [deg]", "position rms [mm]", "tension rms [N]", "unexplained [N]",
+         "frequencies [Hz]"),
     )  # fmt: skip
     for words, ones in (("fitted", found.fitted), ("held out", found.held_out)):
         for one in ones:
@@ -146,7 +163,9 @@ def _tables(found: FreeMotion) -> list[Table]:
                 f"{words} {told['from_s']:.6g}:{told['until_s']:.6g}{lead}",
                 f"{np.degrees(told['turn_rms_rad']):.3g}",
                 "" if place is None else f"{1e3 * place:.3g}",
-                "" if pull is None else f"{pull:.3g}", frequencies,
+                "" if pull is None else f"{pull:.3g}",
+                "" if (rest := told["unexplained"]) is None else f"{rest['force_n']:.3g}",
+                frequencies,
             )  # fmt: skip
     modes = new_table("Modes about rest [Hz]", ("robot",), tuple("123456"))
     for words, row in (("found", found.modes[0]), ("as believed before", found.modes[1])):
@@ -186,6 +205,35 @@ def _figure(found: FreeMotion, which: str) -> Figure:
         grid[0, j].set(title=f"from {one.stretch.time[0]:.6g} s")
         grid[2, j].set(xlabel="time [s]")
     grid[0, 0].legend()
+    return figure
+
+
+def _unexplained_figure(found: FreeMotion) -> Figure:
+    """What neither cables nor weight explain, a panel a stretch, beside what is worth a word."""
+    ones = [one for one in (*found.fitted, *found.held_out) if one.unexplained is not None]
+    fitted = len([one for one in found.fitted if one.unexplained is not None])
+    weight = found.model.by_name(found.values)["mass"] * float(
+        np.linalg.norm(found.task.robot.gravity_vector())
+    )
+    figure, axes = new_figure(
+        1, len(ones), (max(7.0, 4.0 * len(ones)), 4.0),
+        f"Free motion of {found.task.robot.name}: what neither cables nor weight explain",
+    )  # fmt: skip
+    row = np.array(axes, dtype=object).reshape(len(ones))
+    for j, one in enumerate(ones):
+        rest = one.unexplained
+        assert rest is not None
+        force, means = np.linalg.norm(rest.force, axis=1), rest.means(rest.force)
+        row[j].plot(rest.time, force, label="at an instant", **line_style(nth_look(0)))
+        row[j].plot(
+            rest.time[: len(means)] + 0.5 * PULL, np.linalg.norm(means, axis=1),
+            label=f"mean over {PULL:g} s", **line_style(nth_look(1)),
+        )  # fmt: skip
+        row[j].axhline(PULLED * weight, color="0.4", linestyle="--", linewidth=1.0)
+        words = "fitted" if j < fitted else "held out"
+        row[j].set(title=f"{words}, from {one.stretch.time[0]:.6g} s", xlabel="time [s]", ylim=0.0)
+    row[0].set(ylabel="force [N]")
+    row[0].legend()
     return figure
 
 
@@ -230,9 +278,11 @@ def freely_moved_robot(found: FreeMotion) -> Robot:
 
 def free_motion_fit(found: FreeMotion) -> LogFit:
     """What is told of an identification from free motion."""
-    drawings = {"fitted": partial(_figure, found, "fitted")}
+    drawings: dict[str, partial[Figure]] = {"fitted": partial(_figure, found, "fitted")}
     if found.held_out:
         drawings = {"held_out": partial(_figure, found, "held_out"), **drawings}
+    if any(one.unexplained is not None for one in (*found.fitted, *found.held_out)):
+        drawings["unexplained"] = partial(_unexplained_figure, found)
     return LogFit(
         freely_moved_robot(found), RESULTS, free_motion_dict(found), _tables(found), drawings,
         found.status != MISFIT,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from cdpr_drake.analyses.calibration.free_motion_model import FreeMotionModel
+from cdpr_drake.analyses.calibration.free_motion_model import FreeMotionModel, usually_bent
 from cdpr_drake.analyses.calibration.free_motion_samples import Stretch
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.cable_behaviour import strain_of_tension
@@ -74,6 +74,23 @@ def unsensed(
     return turns, positions
 
 
+def sensed_tensions(model: FreeMotionModel, vector: Array, tensions: Array) -> Array:
+    """What load cells would tell of tensions, shape (n, m) [N]."""
+    zeros, n = _zeros(model, vector), model.by_name(vector)
+    return np.asarray(zeros + n["load_cells.scale"] * tensions)
+
+
+def unsensed_tensions(model: FreeMotionModel, vector: Array, told: Array) -> Array:
+    """The inverse of `sensed_tensions`."""
+    zeros, n = _zeros(model, vector), model.by_name(vector)
+    return np.asarray((told - zeros) / n["load_cells.scale"])
+
+
+def _zeros(model: FreeMotionModel, vector: Array) -> Array:
+    n = model.by_name(vector)
+    return np.array([n[f"{c.name}.load_cell_zero"] for c in model.robot.cables])
+
+
 def first_state(model: FreeMotionModel, vector: Array, stretch: Stretch) -> Array:
     """From rest at the start to the first state, as measured; see `FreeMotionModel.run`."""
     first = stretch.time[0] + model.by_name(vector)["sensor.late"]
@@ -94,7 +111,11 @@ def first_state(model: FreeMotionModel, vector: Array, stretch: Stretch) -> Arra
         J = _jacobian(model, turns[0], place)
         v = np.linalg.lstsq(J[:, 3:], -J[:, :3] @ w, rcond=None)[0]
     turn = (turns[0] * R_start.inv()).as_rotvec()
-    return np.concatenate([turn, place - model.start.translation(), w, v])
+    moved = np.concatenate([turn, place - model.start.translation(), w, v])
+    if model.memory:
+        row = np.concatenate([turns[0].as_quat()[[3, 0, 1, 2]], place])
+        moved = np.concatenate([moved, usually_bent(row, w)])
+    return moved
 
 
 def _jacobian(model: FreeMotionModel, turn: Rotation, place: Array) -> Array:

@@ -24,8 +24,17 @@ from cdpr_drake.geometry.poses import cross_matrix
 MOVED = np.array([0.5] * 3 + [0.3] * 3 + [5.0] * 3 + [2.0] * 3)
 """How far a state may usually be from rest: turn [rad], translation [m], their rates."""
 
+
+def moved_sizes(moved: Array) -> Array:
+    """`MOVED`, and 1 for each number behind it: shares of what contacts can be bent by."""
+    return np.concatenate([MOVED, np.ones(len(moved) - len(MOVED))])
+
+
 FELT = 1e-6
 """Share of the largest singular value from which on cables feel a motion."""
+
+MOST_EXPONENT = 50.0
+"""Of stiffening cables: beyond it a search is lost, and numbers shall not be infinite."""
 
 ROUNDS, SETTLED = 12, 1e-13
 """Newton's steps for a pose, and where they end [rad, m]."""
@@ -33,7 +42,7 @@ ROUNDS, SETTLED = 12, 1e-13
 
 @dataclass(frozen=True, eq=False)
 class StartCoordinates:
-    """Coordinates of the first state of one stretch, shape (12,).
+    """Coordinates of the first state of one stretch, shape (12,) and what contacts remember.
 
     Attributes:
         model: The robot.
@@ -71,39 +80,74 @@ class StartCoordinates:
         Raises:
             CableGeometryError: A cable cannot run there.
         """
-        stretched, _ = self._stretched(vector, moved)
+        off, _ = self._stretches(vector, moved)
         return np.concatenate(
-            [stretched / self.unit, self.free.T @ (moved[:6] / MOVED[:6]), moved[6:] / MOVED[6:]]
-        )
+            [
+                self.pulls.T @ self._by_tension(vector, off) / self.unit,
+                self.free.T @ (moved[:6] / MOVED[:6]), moved[6:] / moved_sizes(moved)[6:],
+            ]
+        )  # fmt: skip
 
     def moved(self, vector: Array, y: Array) -> Array:
         """The first state of coordinates; NaN where none is found."""
         r = self.pulls.shape[1]
-        found = np.concatenate([self.near[:6], y[6:] * MOVED[6:]])
+        found = np.concatenate([self.near[:6], y[6:] * moved_sizes(y)[6:]])
+        goal = y[:r] * self.unit
+        if self._stiffens(vector):
+            goal = self.pulls.T @ self._by_stretch(vector, self.pulls @ goal)
         try:
             for _ in range(ROUNDS):
-                stretched, J = self._stretched(vector, found)
+                off, J = self._stretches(vector, found)
                 lacking = np.concatenate(
-                    [y[:r] * self.unit - stretched, y[r:6] - self.free.T @ (found[:6] / MOVED[:6])]
+                    [goal - self.pulls.T @ off, y[r:6] - self.free.T @ (found[:6] / MOVED[:6])]
                 )
-                step = np.linalg.solve(np.vstack([J, self.free.T / MOVED[:6]]), lacking)
+                slopes = np.vstack([self.pulls.T @ J, self.free.T / MOVED[:6]])
+                step = np.linalg.solve(slopes, lacking)
                 found[:6] += step
                 if np.max(np.abs(step)) < SETTLED:
                     break
         except (CableGeometryError, np.linalg.LinAlgError):
-            return np.full(len(MOVED), np.nan)
+            return np.full(len(y), np.nan)
         return found
 
-    def _stretched(self, vector: Array, moved: Array) -> tuple[Array, Array]:
-        """How far cables are stretched at a first state, as stiff as believed, shape (r,) [m], and
-        its derivatives by rotation vector and translation, shape (r, 6)."""
+    def _stretches(self, vector: Array, moved: Array) -> tuple[Array, Array]:
+        """How far cables are stretched at a first state, times how stiff they are beside what is
+        believed, shape (m,) [m], and its derivatives by rotation vector and translation, (m, 6)."""
         model = self.model
         cables = model.robot.cable_set()
         share = model.by_name(vector)["all.stiffness"] / float(np.mean(cables.stiffness))
         paths = cable_paths(_pose(model, moved), cables)
-        off = paths.lengths - model.lengths(vector)
         J = np.hstack([paths.J[:, :3] @ _turning(moved[:3]), paths.J[:, 3:]])
-        return share * self.pulls.T @ off, share * self.pulls.T @ J
+        return share * (paths.lengths - model.lengths(vector)), share * J
+
+    def _stiffens(self, vector: Array) -> bool:
+        """Whether cables stiffen, and the pose feels each of them: then stretches that stay would
+        have tensions of another exponential at each step, and the valley would bend again."""
+        apart = self.pulls.shape[0] == self.pulls.shape[1]
+        return apart and self.model.behaviour(vector).stiffening > 0.0
+
+    def _by_tension(self, vector: Array, off: Array) -> Array:
+        """How far linear cables would be stretched by the tensions of stretches, shape (m,) [m]."""
+        if not self._stiffens(vector):
+            return off
+        EA, g, l0 = self._law(vector)
+        x = np.minimum(g * EA * np.maximum(off, 0.0) / l0, MOST_EXPONENT)
+        return np.asarray(np.expm1(x) * l0 / (EA * g) + np.minimum(off, 0.0))
+
+    def _by_stretch(self, vector: Array, off: Array) -> Array:
+        """The inverse of `_by_tension`."""
+        EA, g, l0 = self._law(vector)
+        x = np.log1p(g * EA * np.maximum(off, 0.0) / l0)
+        return np.asarray(x * l0 / (EA * g) + np.minimum(off, 0.0))
+
+    def _law(self, vector: Array) -> tuple[Array, float, Array]:
+        """Stiffnesses as they are believed [N], as the stretches are scaled to, stiffening [1/N],
+        unstrained lengths [m]."""
+        model = self.model
+        return (
+            model.robot.cable_set().stiffness, model.behaviour(vector).stiffening,
+            model.lengths(vector),
+        )  # fmt: skip
 
 
 def _turning(v: Array) -> Array:

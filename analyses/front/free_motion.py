@@ -71,6 +71,7 @@ def identify_free_motion(
     held_out: Spans = (),
     start: Any = None,
     sigmas: FreeSigmas | Mapping[str, float] | None = None,
+    priors: Mapping[str, float] | None = None,
     tracker: bool = False,
     lead: float = 1.0,
     folder: Path | str | None = None,
@@ -88,6 +89,9 @@ def identify_free_motion(
         held_out: That are predicted; none: the second half, where no stretches are given.
         start: A pose near which the platform hangs; None: it is looked for.
         sigmas: Standard deviations: `FreeSigmas`, or some of its fields by name.
+        priors: Standard deviations of what is known beforehand, as {"mass": 0.1} [kg]; groups of
+            `analyses.calibration.free_motion_model.PRIOR_UNITS`. What is left out of `unknown` is
+            held.
         tracker: Whether the frame of a tracker is unknown.
         lead: From so much of a held-out stretch its first state is told [s].
         folder: Where identification.json, robot.yaml and figures are written; None: nowhere.
@@ -114,6 +118,7 @@ def identify_free_motion(
         robot=loaded, unknown=None if unknown is None else tuple(unknown),
         stretches=tuple(stretches), held_out=tuple(held_out), sigmas=_sigmas(sigmas),
         start=None if start is None else as_pose(loaded, start), tracker=tracker, lead=lead,
+        priors=dict(priors or {}),
     )  # fmt: skip
 
     def work(folder: Path | None, say: Say) -> RobotFreeMotion:

@@ -10,6 +10,7 @@ from cdpr_drake.analyses.logs.log_formats import AUTO, read_recorded
 from cdpr_drake.analyses.logs.log_replay import SUMMARY, LogReplay
 from cdpr_drake.analyses.logs.log_replay import replay_log as compare_log
 from cdpr_drake.analyses.logs.log_request import LogRequest
+from cdpr_drake.analyses.logs.packets import without_packets
 from cdpr_drake.analyses.logs.recorded_log import RecordedLog
 from cdpr_drake.analyses.reporting.deferred_figures import write_pictures
 from cdpr_drake.analyses.reporting.log_files import write_json
@@ -91,7 +92,7 @@ def import_log(
         ClockError: Both are not of one motion, or it repeats itself.
     """
     asked = LogRequest() if request is None else request
-    log = read_recorded(Path(path), format, asked)
+    log = without_packets(read_recorded(Path(path), format, asked))
     joined = None
     if beside is not None:
         from cdpr_drake.analyses.logs.clock_pairs import join_logs  # which loads SciPy's signals
@@ -100,7 +101,7 @@ def import_log(
             cables=asked.cables, units=asked.units, body=asked.body, rate=asked.rate,
             R_WF=asked.R_WF,
         )  # fmt: skip
-        joined = join_logs(log, read_recorded(Path(beside), beside_format, other))
+        joined = join_logs(log, without_packets(read_recorded(Path(beside), beside_format, other)))
         log = joined.log
     if start is not None or end is not None or every != 1:
         log = log.part(start, end, every)

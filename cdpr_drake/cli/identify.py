@@ -171,7 +171,8 @@ def identify(
                 loaded, file, asked, stretches=_spans("--free", free),
                 held_out=_spans("--hold-out", hold_out), lead=lead, folder=folder,
                 start=None if start is None else parse_pose(start, "--start"),
-                sigmas=named_values("--sigma", sigma), tracker=tracker_frame, session=session,
+                sigmas=named_values("--sigma", sigma), priors=named_values("--prior", prior),
+                tracker=tracker_frame, session=session,
                 **kept,
             )  # fmt: skip
         return tell_fit(swung, session, as_json)

@@ -7,6 +7,7 @@ import pytest
 from pydrake.math import RigidTransform
 from scipy.spatial.transform import Rotation
 
+from cdpr_drake.analyses.calibration.free_motion_balance import PULLED
 from cdpr_drake.analyses.calibration.free_motion_model import FREE_GROUPS, FreeMotionModel
 from cdpr_drake.analyses.calibration.free_motion_report import dominant_frequency
 from cdpr_drake.analyses.calibration.free_motion_sensor import earlier
@@ -78,6 +79,10 @@ def test_a_swing_by_the_plant_tells_the_platform_and_its_cables(found):
         identified.cable_set().stiffness, by_name["all.stiffness"]["value"], rtol=1e-9
     )
     assert (folder / "out/held_out.png").exists()
+    assert (folder / "out/unexplained.png").exists()
+    for one in said["fitted"] + said["held_out"]:
+        assert one["unexplained"]["force_n"] < PULLED * 14.1 * 9.80665
+    assert not any("neither cables nor weight" in words for words in said["remarks"])
 
 
 def test_a_held_out_swing_is_predicted(found):
@@ -121,6 +126,26 @@ def test_what_cables_pull_at_first_stays_while_their_lengths_are_sought():
     np.testing.assert_allclose(again * 1.03, pulled, rtol=1e-9)
 
 
+def test_what_stiffening_cables_pull_at_first_stays_while_it_is_sought():
+    start = RigidTransform([0.01, -0.02, 0.45])
+    model = FreeMotionModel.of(swings.BELIEVED, start, (*FREE_GROUPS, "stiffening"), True, False)
+    near = np.array([0.2, -0.1, 0.3, 0.02, 0.01, -0.02, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    vector, k = model.before(), model.names.index("all.stiffening")
+    vector[k] = 2e-3
+    at = StartCoordinates.about(model, near)
+    # A pose in which every cable pulls: from coordinates, as a search would come to it.
+    y = at.of(model.before(), near)
+    y[: at.pulls.shape[1]] = at.pulls.T @ np.array([1.0, 1.3, 0.8, 1.1])
+    moved = at.moved(vector, y)
+    np.testing.assert_allclose(at.of(vector, moved), y, rtol=0.0, atol=1e-9)
+    pulled = model.run(vector, moved, 2, 0.01)[1][0]
+    assert np.min(pulled) > 0.0
+    stiffer = vector.copy()
+    stiffer[k] = 8e-3
+    again = model.run(stiffer, at.moved(stiffer, y), 2, 0.01)[1][0]
+    np.testing.assert_allclose(again, pulled, rtol=1e-9)
+
+
 def test_states_a_time_earlier_are_those_of_the_motion():
     step, late, w = 0.02, 0.013, np.array([0.3, -1.2, 0.8])
     t = np.arange(60) * step
@@ -156,6 +181,7 @@ REFUSED = [
         "unknown: found 'friction'; accepted of a free",
     ),
     (["--free", "halves", "--lead", "-1"], "--lead: found -1; accepted: > 0 [s]"),
+    (["--free", "halves", "--prior", "turn=1"], "--prior: found 'turn'; accepted: of what is"),
     (["--free", "halves", "--sigma", "turns=1"], "'turns' is unknown; did you mean turn?"),
 ]
 

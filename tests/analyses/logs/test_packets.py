@@ -1,0 +1,89 @@
+"""Readings that came in packets are put back to when they were taken."""
+
+import numpy as np
+import pytest
+from scipy.io import savemat
+
+from cdpr_drake.analyses.front.logs import import_log
+from cdpr_drake.analyses.logs.packets import packet_clock, without_packets
+from cdpr_drake.analyses.logs.recorded_log import ANGLES, TIME, RecordedLog
+
+SPEED, SWING = 13.0, np.radians(25.0)
+"""Of a platform that swings twice a second [rad/s], and how far [rad]."""
+
+STEP, PERIOD, PACKET = 1e-3, 0.01, 3
+"""Rows, readings [s], and how many come together."""
+
+OFF = SWING * (SPEED * PERIOD) ** 4 / 384 + SWING * SPEED * STEP
+"""Cubics between readings, and the row at which a reading comes first, a millisecond late."""
+
+
+def turns(time):
+    """Roll, pitch, yaw, shape (k, 3) [rad]; yaw goes through 180 degrees."""
+    return np.column_stack([
+        SWING * np.sin(SPEED * time), 0.5 * SWING * np.cos(SPEED * time),
+        np.pi + 0.4 * np.sin(0.7 * SPEED * time),
+    ])  # fmt: skip
+
+
+def packed(packet=PACKET, span=4.0):
+    """A log whose rows hold the reading that came last; three come in three rows."""
+    time = 20.0 + np.arange(round(span / STEP)) * STEP
+    taken = 20.0 + np.arange(round(span / PERIOD)) * PERIOD
+    number = np.arange(len(taken))
+    last = np.minimum(number - number % packet + packet - 1, len(taken) - 1)
+    came = taken[last] + (number % packet - packet + 1) * STEP  # in rows, one after the other
+    held = np.searchsorted(came, time + 1e-9, side="right") - 1
+    told = turns(taken)[np.maximum(held, 0)]
+    told = np.arctan2(np.sin(told), np.cos(told))
+    columns = {TIME: time, **dict(zip(ANGLES, told.T, strict=True))}
+    return RecordedLog("made", "made", "it was made", columns)
+
+
+def off(log, late=0.0):
+    """Largest error of angles [rad], late by a constant time."""
+    time = log.columns[TIME]
+    wrong = log.table(ANGLES) - turns(time - late)
+    wrong = np.arctan2(np.sin(wrong), np.cos(wrong))
+    return np.nanmax(np.abs(wrong[(time > 20.1) & (time < 23.9)]))
+
+
+def test_packets_are_spread_over_the_time_in_which_they_were_taken():
+    log = packed()
+    clock = packet_clock(log.time, log.table(ANGLES))
+    assert clock.period == pytest.approx(PERIOD, rel=1e-5)
+    assert clock.packet == pytest.approx(PACKET, rel=0.01)
+    spread = without_packets(log)
+    # Held readings are wrong even with the best constant delay; these are not.
+    assert min(off(log, late) for late in np.arange(0.0, 0.03, 0.002)) > 0.05
+    assert off(spread) < OFF
+    assert off(spread) < 0.1 * off(log)
+    assert "packets of 3 readings" in spread.remarks[-1]
+    assert "every 10 ms" in spread.remarks[-1]
+
+
+def test_readings_that_came_one_by_one_stay():
+    log = packed(packet=1)
+    assert without_packets(log) is log
+    still = RecordedLog("made", "made", "", {**log.columns, ANGLES[0]: 0.0 * log.time})
+    assert without_packets(still) is still
+    bare = RecordedLog("made", "made", "", {TIME: log.time, "C1_length_m": 0.0 * log.time})
+    assert without_packets(bare) is bare
+
+
+def test_packets_without_an_even_clock_stay():
+    log = packed()
+    kept = (log.time < 21.0) | (log.time > 21.5)  # the recorder missed half a second
+    holed = RecordedLog("made", "made", "", {h: v[kept] for h, v in log.columns.items()})
+    assert without_packets(holed) is holed
+
+
+def test_an_import_keeps_every_reading_where_rows_are_left_out(tmp_path):
+    log = packed()
+    epsilon = np.degrees(log.table(ANGLES)).T
+    st = {"t_r": log.time, "epsilon_r": epsilon, "tensions_r": np.ones((4, len(log.time)))}
+    savemat(tmp_path / "fast.mat", {"st": st})
+    found = import_log(tmp_path / "fast.mat", every=5)
+    assert found.log.count == pytest.approx(len(log.time) / 5, abs=1)
+    assert off(found.log) < OFF
+    assert any("packets" in words for words in found.log.remarks)
