@@ -19,7 +19,7 @@ from cdpr_drake.dynamics.robot_arrays import (
     TENSIONS,
     RobotArrays,
 )
-from cdpr_drake.dynamics.robot_kernel import INTEGRATION_DIVERGED, INTEGRATION_OK, is_plain
+from cdpr_drake.dynamics.robot_kernel import INTEGRATION_DIVERGED, INTEGRATION_OK, lay_out_cables
 from cdpr_drake.dynamics.semi_implicit_kernel import semi_implicit_step
 from cdpr_drake.geometry.motion_kernel import joint_motion
 
@@ -42,12 +42,12 @@ def _is_lost(state: Array) -> bool:
     return lost
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _first_step(duration: float, max_step: float) -> float:
     return duration / max(np.ceil(duration / max_step - 1e-9), 1.0)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _judge(robot: RobotArrays, bad: int, bound: float, report: Array) -> tuple[int, bool, float]:
     """Result of a step, whether its error is within the bound, and the error; see `REPORTED`."""
     if bad == INTEGRATION_OK and _is_lost(robot.work[1]):
@@ -61,7 +61,7 @@ def _judge(robot: RobotArrays, bad: int, bound: float, report: Array) -> tuple[i
     return bad, error <= bound, error
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _accept(robot: RobotArrays, report: Array) -> None:
     """Makes the step's end the beginning of the next one, with a unit quaternion."""
     y, n = robot.work[0], robot.kinds[PLATFORM]
@@ -73,13 +73,13 @@ def _accept(robot: RobotArrays, report: Array) -> None:
             y[i] *= per_norm
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def advance_explicitly(
     robot: RobotArrays, method: int, state: Array, command: Array, rate: Array, brakes: Array,
     duration: float, max_step: float, bound: float, report: Array,
 ) -> int:  # fmt: skip
     """As `advance_robot` by one of the explicit methods."""
-    plain, h, time = is_plain(robot), _first_step(duration, max_step), 0.0
+    plain, h, time = lay_out_cables(robot), _first_step(duration, max_step), 0.0
     whole, least = h, h * 0.5**HALVINGS
     robot.work[0][:] = state
     while time < duration * (1.0 - 1e-12):
@@ -103,13 +103,13 @@ def advance_explicitly(
     return INTEGRATION_OK
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def advance_semi_implicitly(
     robot: RobotArrays, state: Array, command: Array, rate: Array, brakes: Array,
     duration: float, max_step: float, bound: float, report: Array,
 ) -> int:  # fmt: skip
     """As `advance_robot` by the semi-implicit method; of its own, since it compiles longer."""
-    plain, h, time = is_plain(robot), _first_step(duration, max_step), 0.0
+    plain, h, time = lay_out_cables(robot), _first_step(duration, max_step), 0.0
     whole, least = h, h * 0.5**HALVINGS
     robot.work[0][:] = state
     while time < duration * (1.0 - 1e-12):

@@ -14,6 +14,7 @@ from cdpr_drake.cables.models import cable_law, check_model
 from cdpr_drake.cables.response_kernel import DERIVATIVES
 from cdpr_drake.cables.simulation_kernel import make_room
 from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.geometry.motion_kernel import CABLE_COLUMNS
 from cdpr_drake.geometry.platform_joint import PlatformJoint
 from cdpr_drake.statics.rigid_platform import RigidPlatform
 from cdpr_drake.winches.groups import WinchGroups
@@ -34,6 +35,9 @@ inertia (9), inverse of the mass matrix in P (36, or 9 of a planar platform), an
 the platform: 1 where something does, and its generalized force (6, or less), see `apply_wrench`."""
 
 BODY_SIZE = 61
+
+COLUMNS = 10
+"""Row of `RobotArrays.vectors` from which on the cables stand by columns, one row for each."""
 
 STAGES = 8
 """Rows of `RobotArrays.work`, each as long as the state."""
@@ -56,7 +60,8 @@ class RobotArrays(NamedTuple):
         inner: Work space, shape (6, 3).
         D: Work space, shape (8, 4).
         matrices: Work space of the semi-implicit step, shape (4, k, k), k velocities.
-        vectors: Work space of the semi-implicit step, shape (10, max(k, m)).
+        vectors: Work space of the semi-implicit step, and from row `COLUMNS` on of straight cables,
+            shape (18, max(k, m)).
     """
 
     kinds: Array
@@ -172,7 +177,7 @@ def pack_robot(
         inner=np.zeros((SENSITIVITIES, 3)),
         D=np.zeros((DERIVATIVES, 4)),
         matrices=np.zeros((4, k, k)),
-        vectors=np.zeros((10, max(k, m))),
+        vectors=np.zeros((COLUMNS + CABLE_COLUMNS, max(k, m))),
     )
 
 

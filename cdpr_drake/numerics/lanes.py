@@ -1,0 +1,225 @@
+"""Eight numbers at once in kernels: a type of numba with the arithmetic of floats, lane by lane.
+
+`Lanes` has +, -, *, / among themselves and with floats, which stand for eight of the same. Each
+lane is rounded as a float is, so a kernel in lanes gives the bits of its scalar form wherever the
+order of operations is the same. LLVM makes of them what the processor has: one register of
+AVX-512, two of AVX, four of SSE. Nothing is left to its own search for loops that it can widen,
+which finds no sums in a fixed order, and nothing with a branch.
+
+Arrays need not be filled up: what is loaded beyond the last number is zero.
+"""
+
+from __future__ import annotations
+
+import operator
+from typing import Any
+
+from llvmlite import ir
+from numba import types
+from numba.core.datamodel import PrimitiveModel
+from numba.core.typing.templates import ConcreteTemplate, infer_global, signature
+from numba.extending import intrinsic, lower_builtin, register_model
+
+COUNT = 8
+"""Numbers in lanes."""
+
+_DOUBLE, _WHOLE = ir.DoubleType(), ir.IntType(64)
+_VECTOR = ir.VectorType(_DOUBLE, COUNT)
+_MASK = ir.VectorType(ir.IntType(1), COUNT)
+_INDICES = ir.VectorType(ir.IntType(32), COUNT)
+
+
+class Lanes(types.Type):
+    """The type of eight numbers."""
+
+    def __init__(self) -> None:
+        """There is one."""
+        super().__init__(name="Lanes")
+
+
+LANES = Lanes()
+
+
+@register_model(Lanes)
+class _LanesModel(PrimitiveModel):  # type: ignore[misc]
+    def __init__(self, manager: Any, kind: Any) -> None:
+        super().__init__(manager, kind, _VECTOR)
+
+
+def _spread(builder: Any, value: Any) -> Any:
+    """Eight of a float."""
+    if value.type == _VECTOR:
+        return value
+    one = builder.insert_element(ir.Constant(_VECTOR, ir.Undefined), value, _index(0))
+    return builder.shuffle_vector(one, one, ir.Constant(_INDICES, [0] * COUNT))
+
+
+def _index(k: int) -> Any:
+    return ir.Constant(ir.IntType(32), k)
+
+
+def _define(operation: Any, instruction: str) -> None:
+    pairs = [(LANES, LANES), (LANES, types.float64), (types.float64, LANES)]
+
+    class Template(ConcreteTemplate):  # type: ignore[misc]
+        cases = [signature(LANES, *pair) for pair in pairs]
+
+    infer_global(operation)(Template)
+
+    def lower(context: Any, builder: Any, given: Any, arguments: Any) -> Any:
+        return getattr(builder, instruction)(*(_spread(builder, one) for one in arguments))
+
+    for pair in pairs:
+        lower_builtin(operation, *pair)(lower)
+
+
+for _operation, _instruction in (
+    (operator.add, "fadd"),
+    (operator.sub, "fsub"),
+    (operator.mul, "fmul"),
+    (operator.truediv, "fdiv"),
+):
+    _define(_operation, _instruction)
+
+
+def _call(builder: Any, name: str, arguments: list[Any]) -> Any:
+    """What an intrinsic function of LLVM makes of lanes."""
+    kind = ir.FunctionType(_VECTOR, [one.type for one in arguments])
+    function = builder.module.globals.get(name) or ir.Function(builder.module, kind, name)
+    return builder.call(function, arguments)
+
+
+@intrinsic
+def root_of(typing: Any, x: Any) -> Any:
+    """Square roots of lanes; of what is negative NaN."""
+    if x != LANES:
+        return None
+
+    def generate(context: Any, builder: Any, given: Any, arguments: Any) -> Any:
+        return _call(builder, "llvm.sqrt.v8f64", list(arguments))
+
+    return LANES(LANES), generate
+
+
+@intrinsic
+def positive_where(typing: Any, condition: Any, x: Any) -> Any:
+    """x where the condition is above zero and x is not below zero, else 0.0; NaN in x stays."""
+    if (condition, x) != (LANES, LANES):
+        return None
+
+    def generate(context: Any, builder: Any, given: Any, arguments: Any) -> Any:
+        condition, x = arguments
+        zero = ir.Constant(_VECTOR, [0.0] * COUNT)
+        pulls = builder.fcmp_ordered(">", condition, zero)
+        kept = builder.fcmp_unordered(">=", x, zero)
+        return builder.select(builder.and_(pulls, kept), x, zero)
+
+    return LANES(LANES, LANES), generate
+
+
+@intrinsic
+def load_lanes(typing: Any, array: Any, first: Any) -> Any:
+    """Lanes of array[first:first + 8], zero beyond the array's end.
+
+    Args:
+        array: One axis, without gaps.
+        first: Not negative, and within the array.
+    """
+    if not isinstance(array, types.Array) or array.ndim != 1 or array.layout != "C":
+        return None
+
+    def generate(context: Any, builder: Any, given: Any, arguments: Any) -> Any:
+        made = context.make_array(given.args[0])(context, builder, arguments[0])
+        first = context.cast(builder, arguments[1], given.args[1], types.int64)
+        place = builder.gep(made.data, [first])
+        left = builder.sub(made.nitems, first)
+        numbers = ir.Constant(ir.VectorType(_WHOLE, COUNT), list(range(COUNT)))
+        some = ir.Constant(numbers.type, ir.Undefined)
+        some = builder.insert_element(some, left, _index(0))
+        some = builder.shuffle_vector(some, some, ir.Constant(_INDICES, [0] * COUNT))
+        mask = builder.icmp_signed("<", numbers, some)
+        pointer = builder.bitcast(place, _VECTOR.as_pointer())
+        zero = ir.Constant(_VECTOR, [0.0] * COUNT)
+        return _call(builder, "llvm.masked.load.v8f64.p0", [pointer, _index(8), mask, zero])
+
+    return LANES(array, first), generate
+
+
+@intrinsic
+def lane_of(typing: Any, x: Any, k: Any) -> Any:
+    """Lane k of lanes, a float."""
+    if x != LANES:
+        return None
+
+    def generate(context: Any, builder: Any, given: Any, arguments: Any) -> Any:
+        return builder.extract_element(arguments[0], arguments[1])
+
+    return types.float64(LANES, types.int64), generate
+
+
+def _transposed(builder: Any, rows: list[Any]) -> list[Any]:
+    """Lane j of row i as lane i of row j, of eight rows."""
+    for step in (1, 2, 4):
+        mixed = list(rows)
+        for i in range(COUNT):
+            if i & step:
+                continue
+            upper = [k + COUNT - step if k & step else k for k in range(COUNT)]
+            lower = [k + COUNT if k & step else k + step for k in range(COUNT)]
+            for place, picked in ((i, upper), (i + step, lower)):
+                chosen = ir.Constant(_INDICES, picked)
+                mixed[place] = builder.shuffle_vector(rows[i], rows[i + step], chosen)
+        rows = mixed
+    return rows
+
+
+@intrinsic
+def less_sums(
+    typing: Any, sums: Any, a: Any, b: Any, c: Any, d: Any, e: Any, f: Any, count: Any
+) -> Any:
+    """Lanes of six totals, each less the lanes of its terms, in their order from the first on.
+
+    So each total is rounded as in a loop over its terms.
+
+    Args:
+        sums: Totals in the first six lanes; what stands in the others is not kept.
+        a: Terms of the first total, and so on.
+        b: See a.
+        c: See a.
+        d: See a.
+        e: See a.
+        f: See a.
+        count: How many terms count; more than eight count as eight.
+    """
+    if any(one != LANES for one in (sums, a, b, c, d, e, f)):
+        return None
+
+    def generate(context: Any, builder: Any, given: Any, arguments: Any) -> Any:
+        sums, *terms, count = arguments
+        zero = ir.Constant(_VECTOR, [0.0] * COUNT)
+        rows = _transposed(builder, [*terms, zero, zero])
+        whole = builder.icmp_signed(">=", count, _WHOLE(COUNT))
+        with builder.if_else(whole) as (then, otherwise):
+            with then:
+                all_of = sums
+                for row in rows:
+                    all_of = builder.fsub(all_of, row)
+                after_all = builder.basic_block
+            with otherwise:
+                some_of = sums
+                for j, row in enumerate(rows):
+                    counts = builder.icmp_signed("<", _WHOLE(j), count)
+                    some_of = builder.select(counts, builder.fsub(some_of, row), some_of)
+                after_some = builder.basic_block
+        total = builder.phi(_VECTOR)
+        total.add_incoming(all_of, after_all)
+        total.add_incoming(some_of, after_some)
+        return total
+
+    return LANES(LANES, LANES, LANES, LANES, LANES, LANES, LANES, types.int64), generate
+
+
+@intrinsic
+def no_lanes(typing: Any) -> Any:
+    """Eight zeros."""
+    return LANES(), lambda *_: ir.Constant(_VECTOR, [0.0] * COUNT)
