@@ -6,10 +6,12 @@ millions of times a second is worth a second form: eight cables take a third of 
 
 from __future__ import annotations
 
+from typing import Any
+
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.geometry.motion_kernel import CABLE_COLUMNS, floating_motion
+from cdpr_drake.geometry.motion_kernel import CABLE_COLUMNS, Motion, floating_motion
 from cdpr_drake.numerics.lanes import (
     COUNT,
     lane_of,
@@ -23,26 +25,23 @@ from cdpr_drake.numerics.lanes import (
 
 @njit(cache=True)
 def put_columns(cables: Array, columns: Array) -> None:
-    """columns[:8, :m] <- what `floating_lanes_force` reads of packed cables, shape (m, 8) or more."""
+    """columns[:8, :m] <- what `lanes_force` reads of packed cables, shape (m, 8) or more."""
     for i in range(cables.shape[0]):
         for k in range(CABLE_COLUMNS):
             columns[k, i] = cables[i, k]
 
 
-@njit(cache=True, error_model="numpy")
-def floating_lanes_force(
-    state: Array, l0: Array, l0_dot: Array, columns: Array, out: Array
-) -> None:
-    """Writes what `straight_kernel.floating_force` does to `out[:6]`, to the same bits.
+@njit(cache=True, error_model="numpy", forceinline=True)
+def lanes_force(X: Motion, l0: Array, l0_dot: Array, columns: Array) -> Any:
+    """Moment about Po and force in W [N m, N] of all cables, in the first six lanes.
 
     Args:
-        state: Begins with the state of the platform, shape (13,).
+        X: Motion of the platform from `floating_motion`.
         l0: Unstrained lengths, shape (m,) [m].
         l0_dot: Their rates, shape (m,) [m/s].
         columns: As `put_columns` wrote them, shape (8, m) or more.
-        out: Moment about Po and force in W [N m, N].
     """
-    X, m, sums = floating_motion(state), l0.shape[0], no_lanes()
+    m, sums = l0.shape[0], no_lanes()
     for i in range(0, m, COUNT):
         bx, by, bz = load_lanes(columns[3], i), load_lanes(columns[4], i), load_lanes(columns[5], i)
         rx = X[0] * bx + X[1] * by + X[2] * bz
@@ -70,5 +69,22 @@ def floating_lanes_force(
             t * ux, t * uy, t * uz,
             m - i,
         )  # fmt: skip
+    return sums
+
+
+@njit(cache=True, error_model="numpy")
+def floating_lanes_force(
+    state: Array, l0: Array, l0_dot: Array, columns: Array, out: Array
+) -> None:
+    """Writes what `straight_kernel.floating_force` does to `out[:6]`, to the same bits.
+
+    Args:
+        state: Begins with the state of the platform, shape (13,).
+        l0: See `lanes_force`.
+        l0_dot: See `lanes_force`.
+        columns: See `lanes_force`.
+        out: Moment about Po and force in W [N m, N].
+    """
+    sums = lanes_force(floating_motion(state), l0, l0_dot, columns)
     for k in range(6):
         out[k] = lane_of(sums, k)

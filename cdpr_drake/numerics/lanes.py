@@ -12,7 +12,7 @@ Arrays need not be filled up: what is loaded beyond the last number is zero.
 from __future__ import annotations
 
 import operator
-from typing import Any
+from typing import Any, ClassVar
 
 from llvmlite import ir
 from numba import types
@@ -62,7 +62,7 @@ def _define(operation: Any, instruction: str) -> None:
     pairs = [(LANES, LANES), (LANES, types.float64), (types.float64, LANES)]
 
     class Template(ConcreteTemplate):  # type: ignore[misc]
-        cases = [signature(LANES, *pair) for pair in pairs]
+        cases: ClassVar = [signature(LANES, *pair) for pair in pairs]
 
     infer_global(operation)(Template)
 
@@ -82,9 +82,9 @@ for _operation, _instruction in (
     _define(_operation, _instruction)
 
 
-def _call(builder: Any, name: str, arguments: list[Any]) -> Any:
+def _call(builder: Any, name: str, arguments: list[Any], result: Any = _VECTOR) -> Any:
     """What an intrinsic function of LLVM makes of lanes."""
-    kind = ir.FunctionType(_VECTOR, [one.type for one in arguments])
+    kind = ir.FunctionType(result, [one.type for one in arguments])
     function = builder.module.globals.get(name) or ir.Function(builder.module, kind, name)
     return builder.call(function, arguments)
 
@@ -118,6 +118,44 @@ def positive_where(typing: Any, condition: Any, x: Any) -> Any:
 
 
 @intrinsic
+def within(typing: Any, x: Any, limit: Any) -> Any:
+    """max(min(x, limit), -limit) of lanes and a float; NaN in x stays."""
+    if (x, limit) != (LANES, types.float64):
+        return None
+
+    def generate(context: Any, builder: Any, given: Any, arguments: Any) -> Any:
+        x, limit = arguments
+        top, bottom = _spread(builder, limit), _spread(builder, builder.fneg(limit))
+        x = builder.select(builder.fcmp_ordered("<", top, x), top, x)
+        return builder.select(builder.fcmp_ordered(">", bottom, x), bottom, x)
+
+    return LANES(LANES, types.float64), generate
+
+
+def _place(context: Any, builder: Any, given: Any, arguments: Any) -> tuple[Any, Any]:
+    """Where lanes of an array begin, and which of them lie within it.
+
+    Args:
+        context: Of numba.
+        builder: Of LLVM.
+        given: Types of the array and of a whole number.
+        arguments: The array and the number of the first lane in it.
+    """
+    made = context.make_array(given[0])(context, builder, arguments[0])
+    first = context.cast(builder, arguments[1], given[1], types.int64)
+    numbers = ir.Constant(ir.VectorType(_WHOLE, COUNT), list(range(COUNT)))
+    left = ir.Constant(numbers.type, ir.Undefined)
+    left = builder.insert_element(left, builder.sub(made.nitems, first), _index(0))
+    left = builder.shuffle_vector(left, left, ir.Constant(_INDICES, [0] * COUNT))
+    pointer = builder.bitcast(builder.gep(made.data, [first]), _VECTOR.as_pointer())
+    return pointer, builder.icmp_signed("<", numbers, left)
+
+
+def _is_vector(array: Any) -> bool:
+    return isinstance(array, types.Array) and (array.ndim, array.layout) == (1, "C")
+
+
+@intrinsic
 def load_lanes(typing: Any, array: Any, first: Any) -> Any:
     """Lanes of array[first:first + 8], zero beyond the array's end.
 
@@ -125,24 +163,31 @@ def load_lanes(typing: Any, array: Any, first: Any) -> Any:
         array: One axis, without gaps.
         first: Not negative, and within the array.
     """
-    if not isinstance(array, types.Array) or array.ndim != 1 or array.layout != "C":
+    if not _is_vector(array):
         return None
 
     def generate(context: Any, builder: Any, given: Any, arguments: Any) -> Any:
-        made = context.make_array(given.args[0])(context, builder, arguments[0])
-        first = context.cast(builder, arguments[1], given.args[1], types.int64)
-        place = builder.gep(made.data, [first])
-        left = builder.sub(made.nitems, first)
-        numbers = ir.Constant(ir.VectorType(_WHOLE, COUNT), list(range(COUNT)))
-        some = ir.Constant(numbers.type, ir.Undefined)
-        some = builder.insert_element(some, left, _index(0))
-        some = builder.shuffle_vector(some, some, ir.Constant(_INDICES, [0] * COUNT))
-        mask = builder.icmp_signed("<", numbers, some)
-        pointer = builder.bitcast(place, _VECTOR.as_pointer())
+        place, mask = _place(context, builder, given.args, arguments)
         zero = ir.Constant(_VECTOR, [0.0] * COUNT)
-        return _call(builder, "llvm.masked.load.v8f64.p0", [pointer, _index(8), mask, zero])
+        name = "llvm.masked.load.v8f64.p0"
+        return _call(builder, name, [place, _index(8), mask, zero])
 
     return LANES(array, first), generate
+
+
+@intrinsic
+def store_lanes(typing: Any, array: Any, first: Any, x: Any) -> Any:
+    """array[first:first + 8] <- lanes, those within the array; arguments as of `load_lanes`."""
+    if not _is_vector(array) or x != LANES:
+        return None
+
+    def generate(context: Any, builder: Any, given: Any, arguments: Any) -> Any:
+        place, mask = _place(context, builder, given.args[:2], arguments[:2])
+        name = "llvm.masked.store.v8f64.p0"
+        _call(builder, name, [arguments[2], place, _index(8), mask], ir.VoidType())
+        return context.get_dummy_value()
+
+    return types.none(array, first, LANES), generate
 
 
 @intrinsic
