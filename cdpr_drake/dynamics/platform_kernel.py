@@ -24,12 +24,12 @@ from numba import njit
 from cdpr_drake.arrays import Array
 from cdpr_drake.dynamics.robot_arrays import APPLIED, COM, DAMPING, GRAVITY, INERTIA, INVERSE
 from cdpr_drake.geometry.motion_kernel import Motion, floating_motion
+from cdpr_drake.numerics.kernel_calls import as_number
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def _inverse_row(body: Array, i: int, b: tuple[float, ...]) -> float:
-    """Row i of the mass matrix' inverse by what stands beside it, shape (6,)."""
-    k = INVERSE + 6 * i
+def _row(body: Array, k: int, b: tuple[float, ...]) -> float:
+    """The row of the mass matrix' inverse that begins at k by what stands beside it, shape (6,)."""
     total = body[k] * b[0] + body[k + 1] * b[1] + body[k + 2] * b[2]
     total += body[k + 3] * b[3] + body[k + 4] * b[4] + body[k + 5] * b[5]
     return float(total)
@@ -79,9 +79,9 @@ def floating_derivative(state: Any, X: Motion, force: tuple[float, ...], body: A
     b3 = X[0] * fx + X[3] * fy + X[6] * fz - m * (ay * vz - az * vy)
     b4 = X[1] * fx + X[4] * fy + X[7] * fz - m * (az * vx - ax * vz)
     b5 = X[2] * fx + X[5] * fy + X[8] * fz - m * (ax * vy - ay * vx)
-    b = b0, b1, b2, b3, b4, b5
-    r0, r1, r2 = _inverse_row(body, 0, b), _inverse_row(body, 1, b), _inverse_row(body, 2, b)
-    s0, s1, s2 = _inverse_row(body, 3, b), _inverse_row(body, 4, b), _inverse_row(body, 5, b)
+    b, k = (b0, b1, b2, b3, b4, b5), as_number(INVERSE)
+    r0, r1, r2 = _row(body, k, b), _row(body, k + 6, b), _row(body, k + 12, b)
+    s0, s1, s2 = _row(body, k + 18, b), _row(body, k + 24, b), _row(body, k + 30, b)
     return (
         0.5 * (-wx * qx - wy * qy - wz * qz),
         0.5 * (wx * qw + wy * qz - wz * qy),
