@@ -83,7 +83,8 @@ def plain_step(
             lane_of(sums, 0), lane_of(sums, 1), lane_of(sums, 2),
             lane_of(sums, 3), lane_of(sums, 4), lane_of(sums, 5),
         )  # fmt: skip
-        k = floating_derivative(state, X, force, body)
+        q = state[0], state[1], state[2], state[3]
+        k = floating_derivative(q, X, force, body)
         if stage == 0:
             k1, ahead = k, 0.5 * h if third else h
             state = _along(y, ahead, k)

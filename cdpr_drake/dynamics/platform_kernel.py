@@ -36,16 +36,18 @@ def _row(body: Array, k: int, b: tuple[float, ...]) -> float:
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def floating_derivative(state: Any, X: Motion, force: tuple[float, ...], body: Array) -> Any:
+def floating_derivative(
+    q: tuple[float, ...], X: Motion, force: tuple[float, ...], body: Array
+) -> Any:
     """The derivative of a floating platform's state, 13 numbers.
 
     Args:
-        state: Begins with the state: an array or a tuple.
+        q: Its quaternion wxyz.
         X: Its motion, see `floating_motion`.
         force: Moment about Po and force in W, 6 numbers [N m, N], without weight.
         body: `RobotArrays.body`.
     """
-    qw, qx, qy, qz = state[0], state[1], state[2], state[3]
+    qw, qx, qy, qz = q
     wx, wy, wz = X[12], X[13], X[14]
     m = body[0]
     px, py, pz = m * body[GRAVITY], m * body[GRAVITY + 1], m * body[GRAVITY + 2]
@@ -117,7 +119,8 @@ def floating_rates(state: Array, force: Array, body: Array, out: Array) -> None:
         out: Where it is written.
     """
     wrench = force[0], force[1], force[2], force[3], force[4], force[5]
-    put_state(floating_derivative(state, floating_motion(state), wrench, body), out)
+    q = state[0], state[1], state[2], state[3]
+    put_state(floating_derivative(q, floating_motion(state), wrench, body), out)
 
 
 @njit(cache=True)
