@@ -41,7 +41,7 @@ LANES = Lanes()
 
 
 @register_model(Lanes)
-class _LanesModel(PrimitiveModel):  # type: ignore[misc]
+class _LanesModel(PrimitiveModel):
     def __init__(self, manager: Any, kind: Any) -> None:
         super().__init__(manager, kind, _VECTOR)
 
@@ -61,7 +61,7 @@ def _index(k: int) -> Any:
 def _define(operation: Any, instruction: str) -> None:
     pairs = [(LANES, LANES), (LANES, types.float64), (types.float64, LANES)]
 
-    class Template(ConcreteTemplate):  # type: ignore[misc]
+    class Template(ConcreteTemplate):
         cases: ClassVar = [signature(LANES, *pair) for pair in pairs]
 
     infer_global(operation)(Template)
