@@ -63,12 +63,11 @@ def lanes_force(X: Motion, l0: Array, l0_dot: Array, columns: Array) -> Any:
         strain_rate = (length_dot - length * load_lanes(l0_dot, i) * per_l0) * per_l0
         pull = load_lanes(columns[6], i) * (strain + load_lanes(columns[7], i) * strain_rate)
         t = positive_where(strain, pull)
-        sums = less_sums(
-            sums,
+        terms = (
             t * (ry * uz - rz * uy), t * (rz * ux - rx * uz), t * (rx * uy - ry * ux),
             t * ux, t * uy, t * uz,
-            m - i,
         )  # fmt: skip
+        sums = less_sums(sums, terms, m - i)
     return sums
 
 

@@ -16,6 +16,7 @@ from typing import Any, ClassVar
 
 from llvmlite import ir
 from numba import types
+from numba.core import cgutils
 from numba.core.datamodel import PrimitiveModel
 from numba.core.typing.templates import ConcreteTemplate, infer_global, signature
 from numba.extending import intrinsic, lower_builtin, register_model
@@ -219,30 +220,23 @@ def _transposed(builder: Any, rows: list[Any]) -> list[Any]:
 
 
 @intrinsic
-def less_sums(
-    typing: Any, sums: Any, a: Any, b: Any, c: Any, d: Any, e: Any, f: Any, count: Any
-) -> Any:
+def less_sums(typing: Any, sums: Any, terms: Any, count: Any) -> Any:
     """Lanes of six totals, each less the lanes of its terms, in their order from the first on.
 
     So each total is rounded as in a loop over its terms.
 
     Args:
         sums: Totals in the first six lanes; what stands in the others is not kept.
-        a: Terms of the first total, and so on.
-        b: See a.
-        c: See a.
-        d: See a.
-        e: See a.
-        f: See a.
+        terms: Six lanes, terms of the first total, of the second and so on.
         count: How many terms count; more than eight count as eight.
     """
-    if any(one != LANES for one in (sums, a, b, c, d, e, f)):
+    if sums != LANES or terms != types.UniTuple(LANES, 6):
         return None
 
     def generate(context: Any, builder: Any, given: Any, arguments: Any) -> Any:
-        sums, *terms, count = arguments
+        sums, terms, count = arguments
         zero = ir.Constant(_VECTOR, [0.0] * COUNT)
-        rows = _transposed(builder, [*terms, zero, zero])
+        rows = _transposed(builder, [*cgutils.unpack_tuple(builder, terms), zero, zero])
         whole = builder.icmp_signed(">=", count, _WHOLE(COUNT))
         with builder.if_else(whole) as (then, otherwise):
             with then:
@@ -261,7 +255,7 @@ def less_sums(
         total.add_incoming(some_of, after_some)
         return total
 
-    return LANES(LANES, LANES, LANES, LANES, LANES, LANES, LANES, types.int64), generate
+    return LANES(LANES, terms, types.int64), generate
 
 
 @intrinsic

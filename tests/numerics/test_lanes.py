@@ -42,12 +42,11 @@ def _clipped(a, limit, out):
 def _totals(terms, out):
     sums, m = no_lanes(), terms.shape[1]
     for i in range(0, m, COUNT):
-        sums = less_sums(
-            sums,
+        each = (
             load_lanes(terms[0], i), load_lanes(terms[1], i), load_lanes(terms[2], i),
             load_lanes(terms[3], i), load_lanes(terms[4], i), load_lanes(terms[5], i),
-            m - i,
         )  # fmt: skip
+        sums = less_sums(sums, each, m - i)
     for k in range(6):
         out[k] = lane_of(sums, k)
 
