@@ -7,21 +7,30 @@ from numba import njit
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.dispatch_kernel import cable_energy, cable_response
-from cdpr_drake.dynamics.explicit_kernel import SEMI_IMPLICIT, explicit_step, pose_distance
+from cdpr_drake.dynamics.explicit_kernel import (
+    RUNGE_KUTTA_3,
+    SEMI_IMPLICIT,
+    explicit_step,
+    pose_distance,
+)
+from cdpr_drake.dynamics.plain_step_kernel import plain_step
 from cdpr_drake.dynamics.platform_kernel import mass_in_world
 from cdpr_drake.dynamics.robot_arrays import (
+    COLUMNS,
     COM,
     DRIVE,
     GRAVITY,
+    IDEAL,
     LAW,
     PLATFORM,
     SPEEDS,
     TENSIONS,
     RobotArrays,
 )
-from cdpr_drake.dynamics.robot_kernel import INTEGRATION_DIVERGED, INTEGRATION_OK, is_plain
+from cdpr_drake.dynamics.robot_kernel import INTEGRATION_DIVERGED, INTEGRATION_OK, lay_out_cables
 from cdpr_drake.dynamics.semi_implicit_kernel import semi_implicit_step
 from cdpr_drake.geometry.motion_kernel import joint_motion
+from cdpr_drake.numerics.linear_algebra_kernel import copy_vector
 
 HALVINGS = 12
 """How often a step may be halved for the sake of the error."""
@@ -38,16 +47,16 @@ that were taken, steps that were taken back."""
 def _is_lost(state: Array) -> bool:
     lost = False
     for value in state:
-        lost = lost or not abs(value) < LARGEST
+        lost |= not abs(value) < LARGEST
     return lost
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _first_step(duration: float, max_step: float) -> float:
     return duration / max(np.ceil(duration / max_step - 1e-9), 1.0)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _judge(robot: RobotArrays, bad: int, bound: float, report: Array) -> tuple[int, bool, float]:
     """Result of a step, whether its error is within the bound, and the error; see `REPORTED`."""
     if bad == INTEGRATION_OK and _is_lost(robot.work[1]):
@@ -61,11 +70,11 @@ def _judge(robot: RobotArrays, bad: int, bound: float, report: Array) -> tuple[i
     return bad, error <= bound, error
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _accept(robot: RobotArrays, report: Array) -> None:
     """Makes the step's end the beginning of the next one, with a unit quaternion."""
     y, n = robot.work[0], robot.kinds[PLATFORM]
-    y[:] = robot.work[1]
+    copy_vector(robot.work[1], y)
     report[2] += 1.0
     if n == 13:
         per_norm = 1.0 / np.sqrt(y[0] * y[0] + y[1] * y[1] + y[2] * y[2] + y[3] * y[3])
@@ -73,25 +82,33 @@ def _accept(robot: RobotArrays, report: Array) -> None:
             y[i] *= per_norm
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def advance_explicitly(
     robot: RobotArrays, method: int, state: Array, command: Array, rate: Array, brakes: Array,
     duration: float, max_step: float, bound: float, report: Array,
 ) -> int:  # fmt: skip
     """As `advance_robot` by one of the explicit methods."""
-    plain, h, time = is_plain(robot), _first_step(duration, max_step), 0.0
+    plain, h, time = lay_out_cables(robot), _first_step(duration, max_step), 0.0
+    ordinary = plain and robot.kinds[DRIVE] == IDEAL and robot.kinds[PLATFORM] == 13
     whole, least = h, h * 0.5**HALVINGS
-    robot.work[0][:] = state
+    copy_vector(state, robot.work[0])
     while time < duration * (1.0 - 1e-12):
         h = min(h, duration - time)
-        bad = explicit_step(robot, method, h, command, rate, brakes, time, plain)
+        if ordinary:
+            bad = INTEGRATION_OK
+            plain_step(
+                robot.work, robot.body, robot.vectors[COLUMNS:], robot.winch[0, 0],
+                method == RUNGE_KUTTA_3, h, command, rate, time,
+            )  # fmt: skip
+        else:
+            bad = explicit_step(robot, method, h, command, rate, brakes, time, plain)
         bad, good, error = _judge(robot, bad, bound, report)
         if not good and bound < np.inf and h > least * 1.01:
             h *= 0.5
             report[3] += 1.0
             continue
         if bad != INTEGRATION_OK:
-            state[:] = robot.work[0]
+            copy_vector(robot.work[0], state)
             return bad
         if not good:  # the least step; its error is what it is, and is told
             _judge(robot, bad, np.inf, report)
@@ -99,19 +116,19 @@ def advance_explicitly(
         time += h
         if error < bound / 16.0:
             h = min(2.0 * h, whole)
-    state[:] = robot.work[0]
+    copy_vector(robot.work[0], state)
     return INTEGRATION_OK
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def advance_semi_implicitly(
     robot: RobotArrays, state: Array, command: Array, rate: Array, brakes: Array,
     duration: float, max_step: float, bound: float, report: Array,
 ) -> int:  # fmt: skip
     """As `advance_robot` by the semi-implicit method; of its own, since it compiles longer."""
-    plain, h, time = is_plain(robot), _first_step(duration, max_step), 0.0
+    plain, h, time = lay_out_cables(robot), _first_step(duration, max_step), 0.0
     whole, least = h, h * 0.5**HALVINGS
-    robot.work[0][:] = state
+    copy_vector(state, robot.work[0])
     while time < duration * (1.0 - 1e-12):
         h = min(h, duration - time)
         bad = semi_implicit_step(robot, h, command, rate, brakes, time, plain)
@@ -121,7 +138,7 @@ def advance_semi_implicitly(
             report[3] += 1.0
             continue
         if bad != INTEGRATION_OK:
-            state[:] = robot.work[0]
+            copy_vector(robot.work[0], state)
             return bad
         if not good:
             _judge(robot, bad, np.inf, report)
@@ -129,7 +146,7 @@ def advance_semi_implicitly(
         time += h
         if error < bound / 16.0:
             h = min(2.0 * h, whole)
-    state[:] = robot.work[0]
+    copy_vector(robot.work[0], state)
     return INTEGRATION_OK
 
 

@@ -55,7 +55,7 @@ def pose_distance(one: Array, other: Array, n: int) -> tuple[float, float]:
     return np.sqrt(square), 2.0 * np.sqrt(angle)
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, inline="always", error_model="numpy")
 def explicit_step(
     robot: RobotArrays, method: int, h: float, command: Array, rate: Array, brakes: Array,
     time: float, plain: bool,
@@ -70,7 +70,7 @@ def explicit_step(
         rate: Its rate, shape (m,).
         brakes: See `robot_rates`.
         time: Time of the command at the beginning of the step [s].
-        plain: What `is_plain` says.
+        plain: What `lay_out_cables` says.
 
     Returns:
         As `robot_rates`, for the worst stage.

@@ -16,32 +16,39 @@ Source: Featherstone, Rigid Body Dynamics Algorithms, 2008, 2.15.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.dynamics.robot_arrays import APPLIED, COM, DAMPING, GRAVITY, INERTIA, INVERSE
-from cdpr_drake.geometry.motion_kernel import floating_motion
+from cdpr_drake.geometry.motion_kernel import Motion, floating_motion
+from cdpr_drake.numerics.kernel_calls import as_number
 
 
-@njit(cache=True)
-def floating_rates(state: Array, force: Array, body: Array, out: Array) -> None:
-    """Writes the derivative of a floating platform's state to `out[:13]`.
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _row(body: Array, k: int, b: tuple[float, ...]) -> float:
+    """The row of the mass matrix' inverse that begins at k by what stands beside it, shape (6,)."""
+    total = body[k] * b[0] + body[k + 1] * b[1] + body[k + 2] * b[2]
+    total += body[k + 3] * b[3] + body[k + 4] * b[4] + body[k + 5] * b[5]
+    return float(total)
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def floating_derivative(
+    q: tuple[float, ...], X: Motion, force: tuple[float, ...], body: Array
+) -> Any:
+    """The derivative of a floating platform's state, 13 numbers.
 
     Args:
-        state: Begins with the state, shape (13,).
-        force: Begins with moment about Po and force in W, shape (6,) [N m, N], without weight.
+        q: Its quaternion wxyz.
+        X: Its motion, see `floating_motion`.
+        force: Moment about Po and force in W, 6 numbers [N m, N], without weight.
         body: `RobotArrays.body`.
-        out: Where it is written.
     """
-    X = floating_motion(state)
-    qw, qx, qy, qz = state[0], state[1], state[2], state[3]
+    qw, qx, qy, qz = q
     wx, wy, wz = X[12], X[13], X[14]
-    out[0] = 0.5 * (-wx * qx - wy * qy - wz * qz)
-    out[1] = 0.5 * (wx * qw + wy * qz - wz * qy)
-    out[2] = 0.5 * (wy * qw + wz * qx - wx * qz)
-    out[3] = 0.5 * (wz * qw + wx * qy - wy * qx)
-    out[4], out[5], out[6] = X[15], X[16], X[17]
     m = body[0]
     px, py, pz = m * body[GRAVITY], m * body[GRAVITY + 1], m * body[GRAVITY + 2]
     brake_v, brake_w = body[DAMPING], body[DAMPING + 1]
@@ -74,18 +81,46 @@ def floating_rates(state: Array, force: Array, body: Array, out: Array) -> None:
     b3 = X[0] * fx + X[3] * fy + X[6] * fz - m * (ay * vz - az * vy)
     b4 = X[1] * fx + X[4] * fy + X[7] * fz - m * (az * vx - ax * vz)
     b5 = X[2] * fx + X[5] * fy + X[8] * fz - m * (ax * vy - ay * vx)
-    for half in range(2):
-        k = INVERSE + 18 * half
-        s0 = body[k] * b0 + body[k + 1] * b1 + body[k + 2] * b2
-        s0 += body[k + 3] * b3 + body[k + 4] * b4 + body[k + 5] * b5
-        s1 = body[k + 6] * b0 + body[k + 7] * b1 + body[k + 8] * b2
-        s1 += body[k + 9] * b3 + body[k + 10] * b4 + body[k + 11] * b5
-        s2 = body[k + 12] * b0 + body[k + 13] * b1 + body[k + 14] * b2
-        s2 += body[k + 15] * b3 + body[k + 16] * b4 + body[k + 17] * b5
-        i = 7 + 3 * half
-        out[i] = X[0] * s0 + X[1] * s1 + X[2] * s2
-        out[i + 1] = X[3] * s0 + X[4] * s1 + X[5] * s2
-        out[i + 2] = X[6] * s0 + X[7] * s1 + X[8] * s2
+    b, k = (b0, b1, b2, b3, b4, b5), as_number(INVERSE)
+    r0, r1, r2 = _row(body, k, b), _row(body, k + 6, b), _row(body, k + 12, b)
+    s0, s1, s2 = _row(body, k + 18, b), _row(body, k + 24, b), _row(body, k + 30, b)
+    return (
+        0.5 * (-wx * qx - wy * qy - wz * qz),
+        0.5 * (wx * qw + wy * qz - wz * qy),
+        0.5 * (wy * qw + wz * qx - wx * qz),
+        0.5 * (wz * qw + wx * qy - wy * qx),
+        X[15], X[16], X[17],
+        X[0] * r0 + X[1] * r1 + X[2] * r2,
+        X[3] * r0 + X[4] * r1 + X[5] * r2,
+        X[6] * r0 + X[7] * r1 + X[8] * r2,
+        X[0] * s0 + X[1] * s1 + X[2] * s2,
+        X[3] * s0 + X[4] * s1 + X[5] * s2,
+        X[6] * s0 + X[7] * s1 + X[8] * s2,
+    )  # fmt: skip
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def put_state(numbers: tuple[float, ...], out: Array) -> None:
+    """out[:13] <- thirteen numbers."""
+    out[0], out[1], out[2], out[3] = numbers[0], numbers[1], numbers[2], numbers[3]
+    out[4], out[5], out[6] = numbers[4], numbers[5], numbers[6]
+    out[7], out[8], out[9] = numbers[7], numbers[8], numbers[9]
+    out[10], out[11], out[12] = numbers[10], numbers[11], numbers[12]
+
+
+@njit(cache=True, error_model="numpy")
+def floating_rates(state: Array, force: Array, body: Array, out: Array) -> None:
+    """Writes the derivative of a floating platform's state to `out[:13]`.
+
+    Args:
+        state: Begins with the state, shape (13,).
+        force: Begins with moment about Po and force in W, shape (6,) [N m, N], without weight.
+        body: `RobotArrays.body`.
+        out: Where it is written.
+    """
+    wrench = force[0], force[1], force[2], force[3], force[4], force[5]
+    q = state[0], state[1], state[2], state[3]
+    put_state(floating_derivative(q, floating_motion(state), wrench, body), out)
 
 
 @njit(cache=True)

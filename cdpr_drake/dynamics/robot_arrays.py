@@ -16,6 +16,7 @@ from cdpr_drake.cables.simulation_kernel import make_room
 from cdpr_drake.dynamics.contact_hysteresis import ContactHysteresis
 from cdpr_drake.dynamics.contact_kernel import CONTACTS, pack_contacts
 from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.geometry.motion_kernel import CABLE_COLUMNS
 from cdpr_drake.geometry.platform_joint import PlatformJoint
 from cdpr_drake.statics.rigid_platform import RigidPlatform
 from cdpr_drake.winches.groups import WinchGroups
@@ -39,6 +40,9 @@ the law of contacts, see `contact_kernel.pack_contacts`."""
 
 BODY_SIZE = RUB + CONTACTS
 
+COLUMNS = 10
+"""Row of `RobotArrays.vectors` from which on the cables stand by columns, one row for each."""
+
 STAGES = 8
 """Rows of `RobotArrays.work`, each as long as the state."""
 
@@ -60,7 +64,8 @@ class RobotArrays(NamedTuple):
         inner: Work space, shape (6, 3).
         D: Work space, shape (8, 4).
         matrices: Work space of the semi-implicit step, shape (4, k, k), k velocities.
-        vectors: Work space of the semi-implicit step, shape (10, max(k, m)).
+        vectors: Work space of the semi-implicit step, and from row `COLUMNS` on of straight cables,
+            shape (18, max(k, m)).
     """
 
     kinds: Array
@@ -182,7 +187,7 @@ def pack_robot(
         inner=np.zeros((SENSITIVITIES, 3)),
         D=np.zeros((DERIVATIVES, 4)),
         matrices=np.zeros((4, k, k)),
-        vectors=np.zeros((10, max(k, m))),
+        vectors=np.zeros((COLUMNS + CABLE_COLUMNS, max(k, m))),
     )
 
 

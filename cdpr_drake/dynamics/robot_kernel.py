@@ -16,10 +16,12 @@ from cdpr_drake.cables.behaving_kernel import creep_rates, put_crept
 from cdpr_drake.cables.commanded_tension_kernel import tension_force
 from cdpr_drake.cables.dispatch_kernel import STRAIGHT
 from cdpr_drake.cables.simulation_kernel import guesses_of, model_force_and_drums
-from cdpr_drake.cables.straight_kernel import floating_force, line_force, planar_force
+from cdpr_drake.cables.straight_kernel import line_force, planar_force
+from cdpr_drake.cables.straight_lanes_kernel import floating_lanes_force, put_columns
 from cdpr_drake.dynamics.contact_kernel import CONTACTS, rub
 from cdpr_drake.dynamics.platform_kernel import floating_rates, line_rates, planar_rates
 from cdpr_drake.dynamics.robot_arrays import (
+    COLUMNS,
     CREEPING,
     DRIVE,
     IDEAL,
@@ -53,20 +55,26 @@ def ideal_rates(limit: float, command: Array, out: Array) -> None:
 
 
 @njit(cache=True)
-def is_plain(robot: RobotArrays) -> bool:
-    """Whether all cables are straight, from fixed exit points, and nothing rubs."""
+def lay_out_cables(robot: RobotArrays) -> bool:
+    """Whether all cables are straight, from fixed exit points, and nothing rubs.
+
+    Then it puts the cables by columns, for `robot_rates`, anew where a way begins: cables break.
+    """
     if robot.kinds[RUBBING] > 0:
         return False
     for i in range(robot.cables.shape[0]):
         if robot.cables[i, PULLEY_RADIUS] > 0.0 or robot.cables[i, ANCHOR_RADIUS] > 0.0:
             return False
-    return robot.kinds[LAW] == STRAIGHT
+    if robot.kinds[LAW] != STRAIGHT:
+        return False
+    put_columns(robot.cables, robot.vectors[COLUMNS:])
+    return True
 
 
 @njit(cache=True)
 def _plain_rates(
-    state: Array, command: Array, limit: float, cables: Array, height: float, body: Array,
-    n: int, force: Array, out: Array,
+    state: Array, command: Array, limit: float, cables: Array, columns: Array, height: float,
+    body: Array, n: int, force: Array, out: Array,
 ) -> int:  # fmt: skip
     if n == 6:
         ideal_rates(limit, command, out[6:])
@@ -78,7 +86,7 @@ def _plain_rates(
         line_rates(state, force, body, out)
     else:
         ideal_rates(limit, command, out[13:])
-        floating_force(state, state[13:], out[13:], cables, as_number(0), force)
+        floating_lanes_force(state, state[13:], out[13:], columns, force)
         floating_rates(state, force, body, out)
     return INTEGRATION_OK
 
@@ -138,7 +146,7 @@ def robot_rates(
         command: What the drive takes: cable velocities [m/s], motor torques [N m], unstrained
             lengths [m] or tensions [N], shape (m,).
         brakes: 1 where the motor's brake holds, shape (m,).
-        plain: What `is_plain` says.
+        plain: What `lay_out_cables` says.
         out: Where it is written, shape (n,).
 
     Returns:
@@ -147,7 +155,7 @@ def robot_rates(
     # A robot is many arrays, and to hand them on costs half as much as the forces of its cables.
     if plain and robot.kinds[DRIVE] == IDEAL:
         return _plain_rates(
-            state, command, robot.winch[0, 0], robot.cables, robot.room[_HEIGHT], robot.body,
-            robot.kinds[PLATFORM], robot.force, out,
+            state, command, robot.winch[0, 0], robot.cables, robot.vectors[COLUMNS:],
+            robot.room[_HEIGHT], robot.body, robot.kinds[PLATFORM], robot.force, out,
         )  # fmt: skip
     return _any_rates(robot, state, command, brakes, out)

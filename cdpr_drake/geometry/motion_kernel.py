@@ -39,9 +39,13 @@ def cable_line(X: Motion, cable: Array) -> Any:
     return length, dx * per_length, dy * per_length, dz * per_length, rx, ry, rz
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def floating_motion(state: Array) -> Any:
-    """Rotation (row by row), position, angular velocity, velocity of a floating platform in W."""
+    """Rotation (row by row), position, angular velocity, velocity of a floating platform in W.
+
+    Of a quaternion of no length NaN: a kernel that may raise counts references of all its arrays,
+    which takes as long as three cables.
+    """
     w, x, y, z = state[0], state[1], state[2], state[3]
     s = 2.0 / (w * w + x * x + y * y + z * z)
     return (

@@ -14,6 +14,7 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.numerics.lanes import COUNT, lane_of, load_lanes, no_lanes, store_lanes
 from cdpr_drake.numerics.linear_algebra_kernel import eliminate, substitute
 
 STEPS = 300
@@ -114,15 +115,28 @@ def _position(xy: Array, image: Array, R: Array, p: Array) -> None:
 
 
 @njit(error_model="numpy", inline="always")
-def _reprojection(
-    xy: Array, uv: Array, camera: Array, R: Array, p: Array, N: Array, g: Array
-) -> float:
-    """Sum of squares e'e [px^2], and J'J and -J'e for a rotation vector and a displacement in C."""
-    row, total = np.empty(6), 0.0
+def _squares(xy: Array, uv: Array, camera: Array, R: Array, p: Array) -> float:
+    """Sum of squares e'e of the reprojection [px^2]."""
+    total = 0.0
+    for k in range(xy.shape[0]):
+        x, y = xy[k, 0], xy[k, 1]
+        Z = R[2, 0] * x + R[2, 1] * y + p[2]
+        for axis in range(2):
+            along = R[axis, 0] * x + R[axis, 1] * y + p[axis]
+            e = camera[axis] * along / Z + camera[2 + axis] - uv[k, axis]
+            total += e * e
+    return total
+
+
+@njit(error_model="numpy", inline="always")
+def _normal_equations(xy: Array, uv: Array, camera: Array, R: Array, p: Array, N: Array) -> None:
+    """J'J and, as column 6, -J'e of the reprojection, shape (6, 8), the last column zero.
+
+    For a rotation vector and a displacement in C.
+    """
+    row = np.zeros(COUNT)
     for i in range(6):
-        g[i] = 0.0
-        for j in range(6):
-            N[i, j] = 0.0
+        store_lanes(N[i], 0, no_lanes())
     for k in range(xy.shape[0]):
         x, y = xy[k, 0], xy[k, 1]
         rx, ry, rz = (
@@ -135,18 +149,40 @@ def _reprojection(
             f = camera[axis]
             along = rx + p[0] if axis == 0 else ry + p[1]
             e = f * along / Z + camera[2 + axis] - uv[k, axis]
-            total += e * e
             row[3], row[4], row[5] = 0.0, 0.0, -f * along / (Z * Z)
             row[3 + axis] = f / Z
             # The point moves by w x r + d.
             row[0] = ry * row[5] - rz * row[4]
             row[1] = rz * row[3] - rx * row[5]
             row[2] = rx * row[4] - ry * row[3]
+            row[6] = -e
             for i in range(6):
-                g[i] -= row[i] * e
-                for j in range(6):
-                    N[i, j] += row[i] * row[j]
-    return total
+                store_lanes(N[i], 0, load_lanes(N[i], 0) + row[i] * load_lanes(row, 0))
+
+
+@njit(error_model="numpy", inline="always")
+def _solve(N: Array, damping: float, S: Array, x: Array) -> None:
+    """x with (N + damping diag N) x = column 6 of N, shape (6, 8), by Gauss with row pivots."""
+    for i in range(6):
+        store_lanes(S[i], 0, load_lanes(N[i], 0))
+        S[i, i] *= 1.0 + damping
+    for k in range(6):
+        best = k
+        for i in range(k + 1, 6):
+            if abs(S[i, k]) > abs(S[best, k]):
+                best = i
+        top = load_lanes(S[best], 0)
+        if best != k:
+            store_lanes(S[best], 0, load_lanes(S[k], 0))
+            store_lanes(S[k], 0, top)
+        pivot = lane_of(top, k)
+        for i in range(k + 1, 6):
+            store_lanes(S[i], 0, load_lanes(S[i], 0) - S[i, k] / pivot * top)
+    for i in range(5, -1, -1):
+        x[i] = S[i, 6]
+        for j in range(i + 1, 6):
+            x[i] -= S[i, j] * x[j]
+        x[i] /= S[i, i]
 
 
 @njit(error_model="numpy", inline="always")
@@ -169,37 +205,28 @@ def _turned(R: Array, w: Array, out: Array) -> None:
 @njit(error_model="numpy", inline="always")
 def _least_reprojection(xy: Array, uv: Array, camera: Array, R: Array, p: Array) -> float:
     """Moves a pose to the minimum that it belongs to; the sum of squares there [px^2]."""
-    N, g, x, pivots = np.empty((6, 6)), np.empty(6), np.zeros(6), np.empty(6)
-    N_next, g_next, S = np.empty((6, 6)), np.empty(6), np.empty((6, 6))
+    N, S, x = np.empty((6, COUNT)), np.empty((6, COUNT)), np.zeros(6)
     R_next, p_next = np.empty((3, 3)), np.empty(3)
     error, damping = np.inf, 1e-6
     for step in range(STEPS):
         if step > 0:
-            for i in range(6):
-                x[i] = g[i]
-                for j in range(6):
-                    S[i, j] = N[i, j]
-                S[i, i] *= 1.0 + damping
-            eliminate(S, S.shape[0], pivots)
-            substitute(S, S.shape[0], pivots, x)
+            _solve(N, damping, S, x)
         _turned(R, x, R_next)
         for i in range(3):
             p_next[i] = p[i] + x[3 + i]
-        new = _reprojection(xy, uv, camera, R_next, p_next, N_next, g_next)
+        # At the minimum most steps end above it by rounding: they need no derivatives.
+        new = _squares(xy, uv, camera, R_next, p_next)
         turn = np.sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2])
         move = np.sqrt(x[3] * x[3] + x[4] * x[4] + x[5] * x[5])
         last = step > 0 and turn < SETTLED and move < SETTLED * abs(p[2])
         if new <= error:
             error = new
             damping *= 0.1
-            for i in range(6):
-                g[i] = g_next[i]
-                for j in range(6):
-                    N[i, j] = N_next[i, j]
             for i in range(3):
                 p[i] = p_next[i]
                 for j in range(3):
                     R[i, j] = R_next[i, j]
+            _normal_equations(xy, uv, camera, R, p, N)
         else:  # also where it is not a number
             damping = max(damping, 1e-12) * 10.0
         if last or damping > 1e12 or not error < np.inf:

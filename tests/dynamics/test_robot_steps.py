@@ -11,7 +11,7 @@ from cdpr_drake.dynamics.robot_arrays import GRAVITY, MOTORS, TENSIONS, Drive
 from cdpr_drake.dynamics.robot_kernel import (
     INTEGRATION_DIVERGED,
     INTEGRATION_OK,
-    is_plain,
+    lay_out_cables,
     robot_rates,
 )
 from cdpr_drake.dynamics.semi_implicit_kernel import linearise
@@ -50,7 +50,7 @@ def pushed(state, amount=0.02):
 
 def reference(arrays, state, duration, command, rate=None):
     """By SciPy, with the same law for the derivative and its own integrator."""
-    m, plain = arrays.cables.shape[0], is_plain(arrays)
+    m, plain = arrays.cables.shape[0], lay_out_cables(arrays)
     rate = np.zeros(m) if rate is None else rate
 
     def derivative(t, y):
@@ -185,7 +185,7 @@ def test_linearisation_has_the_slopes_of_the_derivative(kind):
         law = load_robot("acrobot_small").winch_law()
         drive = Drive(kind=MOTORS, law=law, mode="velocity")
     arrays, state, _ = robot_arrays("acrobot_small", drive=drive, pulleys=True)
-    m, zeros, plain = 8, np.zeros(8), is_plain(arrays)
+    m, zeros, plain = 8, np.zeros(8), lay_out_cables(arrays)
     state[13 : 13 + m] *= 1.0 - 1e-4
     if kind == "motors":
         state[21:29] = 0.3  # sliding
