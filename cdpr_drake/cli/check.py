@@ -114,7 +114,7 @@ def check(
     plot: Annotated[Path | None, typer.Option(help="File of a figure of the one log.")] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Checks files of robots, mechanisms, scenarios; lists every problem; exit code 2 if there is one.
+    """Checks files of robots, mechanisms, scenarios; lists every problem; then exit code 2.
 
     For a log it says which reader reads it and what it contains: rows, gaps, columns, units. What
     the log does not state, cdpr import-log takes as options.

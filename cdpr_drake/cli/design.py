@@ -93,7 +93,7 @@ def design(
 ) -> int:
     """Searches for the best points, number of cables, drum and motor of a robot.
 
-    Writes the best design as a robot file. Its gain is proven afterwards, not taken from the search.
+    Writes the best design as a robot file. Its gain is proven afterwards, not read off the search.
     The same command continues an interrupted one.
     """
     formats = parse_formats(figure_format)

@@ -131,5 +131,7 @@ def test_what_nobody_is_told_goes_to_the_log(caplog):
     caplog.clear()
     seen = []
     cdpr.simulate("planar_pbvs", UNSEEN, session=Session(say=seen.append))
-    assert [line for line in seen if line.startswith("warning: ")] == [f"warning: {x}" for x in told]
+    assert [line for line in seen if line.startswith("warning: ")] == [
+        f"warning: {x}" for x in told
+    ]
     assert caplog.records == []
