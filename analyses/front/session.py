@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
@@ -13,6 +14,8 @@ if TYPE_CHECKING:  # workspaces and others that are followed need no simulation
     from cdpr_drake.analyses.simulation.scenario_kinds import ScenarioKind
     from cdpr_drake.analyses.visualization.live_view import Prepare
     from cdpr_drake.systems.remote.remote_place import Remote
+
+_LOG = logging.getLogger(__name__)
 
 Say = Callable[[str], None]
 """Told what is done now."""
@@ -30,6 +33,9 @@ class Outside(Protocol):
 
 class Session:
     """Who follows a call and may stop it; results do not depend on it.
+
+    What nobody is told goes to the logger "cdpr_drake", as INFO; warnings as WARNING, which Python
+    prints on stderr unless the program configures logging.
 
     The commands derive theirs, which show bars and write lines.
 
@@ -53,7 +59,7 @@ class Session:
             on_progress: Told how far the call is: a `Progress` of one run, a `StudyOfMany` of a
                 reproduction, else a `WorkProgress`.
             should_stop: Asked often; True ends the call early, with what it has.
-            say: Told what is done now, and what should be known of it, a line each.
+            say: Told what is done now, and what should be known of it, a line each; None: the log.
         """
         self._on_progress, self._should_stop, self._say = on_progress, should_stop, say
 
@@ -67,9 +73,18 @@ class Session:
         return self._should_stop is not None and self._should_stop()
 
     def say(self, words: str) -> None:
-        """Takes a line that should be read."""
-        if self._say is not None:
+        """Takes a line on what is done."""
+        if self._say is None:
+            _LOG.info("%s", words)
+        else:
             self._say(words)
+
+    def warn(self, words: str) -> None:
+        """Takes a line that should be read: what was asked may not be what was meant."""
+        if self._say is None:
+            _LOG.warning("%s", words)
+        else:
+            self._say(f"warning: {words}")
 
     def opened(self, results: ResultsFolder) -> None:
         """Takes the results folder when it is there, before anything is computed."""

@@ -322,8 +322,10 @@ def _check(kind: ScenarioKind, scenario: Any, note: str, session: Session) -> No
     """Checks a scenario before it is simulated, and says a note and what speaks against it."""
     with session.doing(f"{scenario.name}: building the diagram"):
         warnings = kind.check(scenario)
-    for line in ([note] if note else []) + [f"warning: {warning}" for warning in warnings]:
-        session.say(line)
+    if note:
+        session.say(note)
+    for warning in warnings:
+        session.warn(warning)
 
 
 def _run(

@@ -202,7 +202,7 @@ class DrawnWorkspace(RobotWorkspace):
         """Planes of the grid, coloured by what holds, or by a measure."""
         from cdpr_drake.analyses.workspaces.workspace_figures import planes_figure
 
-        return planes_figure(self, measure)
+        return planes_figure(self, measure, self.robot)
 
     def summary(self) -> tuple[str, list[tuple[str, str]]]:
         """What it shows of itself: shares and volumes of the first kinds, of hull and boxes."""
@@ -242,7 +242,8 @@ class DrawnWorkspace(RobotWorkspace):
         page, note = workspace_page(self, self.robot, self.hull, self.boxes)
         if note and say is not None:
             say(f"note: {note}")
-        return write_pictures(folder, workspace_pictures(self, formats, self.boxes) | page)
+        drawn = workspace_pictures(self, formats, self.boxes, self.robot)
+        return write_pictures(folder, drawn | page)
 
 
 def default_box(

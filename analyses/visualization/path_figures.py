@@ -146,6 +146,7 @@ def set_box(axes: Any, lower: Array, upper: Array) -> None:
     for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
         axis.set_major_locator(MaxNLocator(4))
         axis.labelpad = 7.0
+    axes.zaxis.labelpad = 12.0  # its numbers stand beside the axis, where its label would be
     axes.tick_params(labelsize=9)
 
 

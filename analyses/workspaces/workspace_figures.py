@@ -24,7 +24,8 @@ from cdpr_drake.analyses.workspaces.stability_figures import cell_edges, even_ch
 from cdpr_drake.analyses.workspaces.workspace_question import RULES
 from cdpr_drake.analyses.workspaces.workspace_results import ALL, RobotWorkspace
 from cdpr_drake.arrays import Array
-from cdpr_drake.palette import nth_look
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.palette import OUTLINE, nth_look
 from cdpr_drake.workspaces import box_expansion_kernel
 from cdpr_drake.workspaces.available_wrenches import AvailableWrenches
 from cdpr_drake.workspaces.certified_boxes import CertifiedBoxes
@@ -47,6 +48,9 @@ COLUMNS = 4
 LINE = 60
 """Characters in a line of a title."""
 
+ROOM = 0.04
+"""Round frame and exit points in a plane, as a share of its larger side."""
+
 CONTOURS = 6
 """Contour lines of a measure, about."""
 
@@ -55,12 +59,20 @@ def workspace_pictures(
     workspace: RobotWorkspace,
     formats: Sequence[str] = DEFAULT_FORMATS,
     boxes: CertifiedBoxes | None = None,
+    robot: Robot | None = None,
 ) -> Pictures:
-    """What draws the figures that a result suffices for, by the names of their files."""
-    drawn: dict[str, Callable[[], Figure]] = {"planes": lambda: planes_figure(workspace)}
-    for name in workspace.values:
-        if name not in NUMBERED:
-            drawn[name] = partial(planes_figure, workspace, name)
+    """What draws the figures that a result suffices for, by the names of their files.
+
+    Args:
+        workspace: The result.
+        formats: Endings of the files.
+        boxes: Certified boxes; None: there are none.
+        robot: Whose frame and exit points are drawn; None: nothing but the grid is.
+    """
+    drawn: dict[str, Callable[[], Figure]] = {
+        name or "planes": partial(planes_figure, workspace, name, robot)
+        for name in (None, *workspace.values) if name not in NUMBERED
+    }  # fmt: skip
     if SURVIVES in workspace.holds:
         drawn["breaks"] = partial(breaks_figure, workspace)
     if boxes is not None:
@@ -70,7 +82,9 @@ def workspace_pictures(
     return dict(figure_writers(drawn, formats))
 
 
-def planes_figure(workspace: RobotWorkspace, measure: str | None = None) -> Figure:
+def planes_figure(
+    workspace: RobotWorkspace, measure: str | None = None, robot: Robot | None = None
+) -> Figure:
     """Planes of a grid, coloured by what holds, or by a measure where all kinds hold.
 
     Planes are horizontal, but where the grid has one point along x or y and several along z. With
@@ -79,6 +93,7 @@ def planes_figure(workspace: RobotWorkspace, measure: str | None = None) -> Figu
     Args:
         workspace: The result.
         measure: Name of a measure of the result; None: what holds.
+        robot: Whose frame and exit points are drawn; None: nothing but the grid is.
     """
     normal, u, v = plane_axes(workspace.grid.shape[1:])
     places = workspace.grid.axes[normal]
@@ -86,7 +101,10 @@ def planes_figure(workspace: RobotWorkspace, measure: str | None = None) -> Figu
     edges = cell_edges(workspace.grid.axes, (u, v))
     rows = -(-len(chosen) // COLUMNS)
     columns = -(-len(chosen) // rows)
-    extents = np.array([float(np.ptp(e)) for e in edges])
+    lower, upper = np.array([[e[0], e[-1]] for e in edges]).T
+    if robot is not None:
+        lower, upper = _around(robot, (u, v), lower, upper)
+    extents = upper - lower
     width, height = extents * (3.0 if columns > 1 else 5.5) / np.max(extents)
     figure, grid = new_figure(
         rows,
@@ -113,6 +131,9 @@ def planes_figure(workspace: RobotWorkspace, measure: str | None = None) -> Figu
         mesh = axes.pcolormesh(*edges, plane, cmap=colors, vmin=limits[0], vmax=limits[1])
         if measure is not None and min(plane.shape) > 1 and np.ptp(limits) > 0.0:
             _contours(axes, [workspace.grid.axes[k] for k in (u, v)], plane, limits)
+        if robot is not None:
+            _draw_robot(axes, robot, (u, v), edges)
+            axes.set(xlim=(lower[0], upper[0]), ylim=(lower[1], upper[1]))
         axes.set_aspect("equal")
         axes.grid(False)
         axes.set_title(f"{'xyz'[normal]} = {places[k]:.3g} m", fontsize=11)
@@ -125,12 +146,16 @@ def planes_figure(workspace: RobotWorkspace, measure: str | None = None) -> Figu
         axes.set_xlabel(f"{'xyz'[u]} [m]" if lowest else "")
     for axes in panels[len(chosen) :]:
         axes.remove()
+    lines, _ = panels[0].get_legend_handles_labels()
     if measure is None:
         labels = {OUTSIDE: "outside", SOME: "some of the kinds", INSIDE: "inside"}
         if len(workspace.holds) == 1:
             del labels[SOME]
         figure.legend(
-            handles=[Patch(facecolor=color, label=label) for color, label in labels.items()],
+            handles=[
+                *(Patch(facecolor=color, label=label) for color, label in labels.items()),
+                *lines,
+            ],
             loc="outside lower center",
             ncols=3,
             title="Each point of the grid colours the cell around it.",
@@ -139,7 +164,38 @@ def planes_figure(workspace: RobotWorkspace, measure: str | None = None) -> Figu
     elif mesh is not None:
         about = MEASURES[measure]
         figure.colorbar(mesh, ax=panels[: len(chosen)], label=f"{about.title} [{about.unit}]")
+        if lines:
+            figure.legend(handles=lines, loc="outside lower center", ncols=3)
     return figure
+
+
+def _around(
+    robot: Robot, plane: tuple[int, int], lower: Array, upper: Array
+) -> tuple[Array, Array]:
+    """Corners, shape (2,) each [m], of what holds a grid, the frame and the exit points."""
+    across = list(plane)
+    points = np.column_stack([robot.frame.lower, robot.frame.upper, robot.exit_points()])[across]
+    lower = np.minimum(lower, points.min(axis=1))
+    upper = np.maximum(upper, points.max(axis=1))
+    room = ROOM * np.max(upper - lower)
+    return lower - room, upper + room
+
+
+def _draw_robot(axes: Axes, robot: Robot, plane: tuple[int, int], edges: Sequence[Array]) -> None:
+    """The grid's box, the frame, and the exit points of the cables, as they are seen in a plane."""
+    u, v = plane
+    boxes = (
+        ("box of the grid", (edges[0][0], edges[1][0]), (edges[0][-1], edges[1][-1]), ":"),
+        ("frame", robot.frame.lower[list(plane)], robot.frame.upper[list(plane)], "-"),
+    )
+    for label, low, high, dash in boxes:
+        corners = np.asarray(low) + SQUARE[[*range(4), 0]] * np.subtract(high, low)
+        axes.plot(*corners.T, color=OUTLINE.color, linestyle=dash, linewidth=1.2, label=label)
+    points = robot.exit_points()
+    axes.plot(
+        points[u], points[v], "^", color=OUTLINE.color, markersize=6, clip_on=False,
+        label="exit points of the cables",
+    )  # fmt: skip
 
 
 def boxes_figure(found: CertifiedBoxes, robot: str, cables: str = "") -> Figure:

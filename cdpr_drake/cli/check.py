@@ -114,10 +114,10 @@ def check(
     plot: Annotated[Path | None, typer.Option(help="File of a figure of the one log.")] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Checks files of robots, mechanisms, scenarios; says all that is wrong; exit code 2 then.
+    """Checks files of robots, mechanisms, scenarios; lists every problem; then exit code 2.
 
-    Of a log it says which reader knows it, and what is in it: rows, gaps, columns, units; what a
-    log does not say, cdpr import-log takes as options.
+    For a log it says which reader reads it and what it contains: rows, gaps, columns, units. What
+    the log does not state, cdpr import-log takes as options.
     """
     if plot is not None and (len(files) != 1 or not is_log(files[0])):
         raise CdprError(f"--plot: found for {', '.join(map(str, files))}; accepted: for one log")

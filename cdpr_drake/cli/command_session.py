@@ -67,6 +67,10 @@ class CommandSession(Session):
         """Prints a line."""
         self.console.print(with_options(words, SHARED_OPTIONS))
 
+    def warn(self, words: str) -> None:
+        """Prints a warning."""
+        self.say(f"warning: {words}")
+
     def opened(self, results: ResultsFolder) -> None:
         """Says where results of killed runs went."""
         self._results = results

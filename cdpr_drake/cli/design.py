@@ -91,10 +91,10 @@ def design(
     figure_format: FigureFormats = "png",
     as_json: ResultsAsJson = False,
 ) -> int:
-    """Searches where points of a robot should be, how many cables, which drum and motor.
+    """Searches for the best points, number of cables, drum and motor of a robot.
 
-    The best design becomes a robot file; what it is better by is proven, not taken from the search.
-    Run again with the same arguments, it continues where it was stopped or killed.
+    Writes the best design as a robot file. Its gain is proven afterwards, not read off the search.
+    The same command continues an interrupted one.
     """
     formats = parse_formats(figure_format)
     source = "design" if parameters is None else str(parameters)

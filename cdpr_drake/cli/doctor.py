@@ -27,7 +27,7 @@ def doctor(
         ),
     ] = False,
 ) -> int:
-    """Checks Drake, EGL and OpenCV, and says the remedy; exit code 1 if something is missing."""
+    """Checks Drake, EGL and OpenCV and names the remedy; exit code 1 if something is missing."""
     if compile_all:
         return _compile(as_json)
     with message_console().status("Looking"):

@@ -36,7 +36,7 @@ def environments(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Lists learning environments, as Gymnasium makes them, with their sizes for a robot."""
+    """Lists the Gymnasium environments, with the sizes of action and observation for a robot."""
     if picture is not None and (name is None or picture.suffix != ".png"):
         raise CdprError(
             f"--picture: found {picture} for {name or 'all environments'}; accepted: a .png of one"

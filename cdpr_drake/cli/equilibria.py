@@ -52,7 +52,7 @@ def equilibria(
     seed: Annotated[int, typer.Option(help="Of the random starts, elastic cables.")] = 0,
     as_json: AsJson = False,
 ) -> None:
-    """All poses of rest, stable or not, any cables slack, for given lengths or at a position."""
+    """Finds all poses of rest, stable or not, with any cables slack, for lengths or a position."""
     if (position is None) == (lengths is None):
         found = "neither" if position is None else "both"
         raise CdprError(f"--lengths, --position: found {found}; accepted: one of them")

@@ -37,7 +37,7 @@ def examples(
     out: Annotated[Path, typer.Option(help="Folder to copy to.")] = Path(),
     as_json: AsJson = False,
 ) -> None:
-    """Lists short programs to start from, or copies one; nothing is ever overwritten."""
+    """Lists short programs to start from, or copies one; never overwrites a file."""
     titles = {each: _title(each) for each in example_names()}
     if name is not None:
         if name not in (*titles, "all"):

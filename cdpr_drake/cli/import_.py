@@ -45,8 +45,8 @@ def import_(
 ) -> None:
     """Imports a robot from a file of another tool into a folder.
 
-    The folder gets robot.yaml, which every command takes, and a README that says what came from
-    the file, what it lacked and what was assumed. Commands also take the foreign file itself.
+    Writes robot.yaml, which every command takes, and a README that lists what the file states,
+    what it lacks and what was assumed. Commands also take the foreign file itself.
     CASPR's models of several links give mechanism.yaml, and MJCF for links and joints.
     """
     if is_foreign_mechanism(file, model):

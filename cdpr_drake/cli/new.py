@@ -54,9 +54,8 @@ def new(
 ) -> None:
     """Writes a robot, scenario, controller, estimator or study to start from.
 
-    Of a robot or a scenario every key is there with its meaning, unit and range; those with a
-    default are comments, and the file is checked. A controller, estimator or study is a program
-    that runs, and a test of it for pytest.
+    A robot or scenario file has every key with its meaning, unit and range; keys with a default
+    are comments. A controller, estimator or study is a program that runs, with a test for pytest.
     """
     if not _NAME.fullmatch(name):
         raise CdprError(

@@ -24,7 +24,7 @@ def notebooks(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Copies the notebooks to a folder, or lists them; what is there is never overwritten."""
+    """Copies the notebooks to a folder, or lists them; never overwrites a file."""
     paths = [*sorted(FOLDER.glob("*.ipynb")), *sorted(FOLDER.glob("*.py"))]
     contents = {path.name: path.read_bytes() for path in paths}
     if folder is not None:

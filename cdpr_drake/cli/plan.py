@@ -314,8 +314,8 @@ def plan(
     """Plans a motion within limits of tensions and winches: on a path, a free one, or a proven one.
 
     Writes motion.csv, summary.json and figures; scenarios of dynamic control track the motion by
-    trajectory.file. The exit code is 2 where there is no motion: the message says where, and which
-    cable.
+    trajectory.file. If there is no motion, the exit code is 2 and the message names the place and
+    the cable.
     """
     formats = parse_formats(figure_format)
     loaded = load_robot(robot, "cdpr plan")

@@ -85,11 +85,11 @@ def reconfigure(
     figure_format: FigureFormats = "png",
     as_json: ResultsAsJson = False,
 ) -> int:
-    """Puts exit points along rails so that poses or a path are possible, or best; proves it.
+    """Places exit points along rails so that poses or a path are feasible or best, with a proof.
 
-    Writes robot.yaml, the robot with its exit points where they should be, summary.json and a
-    figure. The exit code is 2 where no position of the rails does it: the message says at which
-    pose and under which wrench. Cables are straight from their exit points, and may meet.
+    Writes robot.yaml with the new exit points, summary.json and a figure. If no position on the
+    rails works, the exit code is 2 and the message names the pose and the wrench. Cables are taken
+    as straight from their exit points; whether they collide is not checked.
     """
     formats = parse_formats(figure_format)
     loaded = load_robot(robot, "cdpr reconfigure")

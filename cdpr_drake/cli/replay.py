@@ -45,10 +45,10 @@ def replay(
 ) -> None:
     """Replays a log of a machine beside a model of it, with residuals by cable.
 
-    Writes replay.html, the measured run with the model's platform beside it, residuals, replay.csv
-    and summary.json. Lengths are compared at measured poses, poses by measured lengths, tensions
-    with those that carry the weight. With --follow the simulated robot follows the log's lengths,
-    and its distance from what was measured is the error from simulation to machine.
+    Writes replay.html with the measured run and the model's platform, residuals, replay.csv and
+    summary.json. Compares lengths at the measured poses, poses from the measured lengths, and
+    tensions with those that carry the weight. With --follow the simulated robot follows the log's
+    lengths; its distance from the measured poses is the error between simulation and machine.
     """
     formats = parse_formats(figure_format)
     request = log_request(robot, None, unit, mapping=mapping, rate=rate, body=body, axes=axes)

@@ -69,12 +69,12 @@ def reproduce(
         typer.Option(help="Folder of an older report, whose counts are shown beside the new ones."),
     ] = None,
 ) -> int:
-    """Runs every study and writes one report on all that was published beside what is found.
+    """Runs every study and writes one report that compares published and computed results.
 
-    A study that is finished is not run again unless the code has changed; what was stopped or
-    killed continues when the same command is given again. One that fails does not end the others.
-    Figures are in PNG, which the report shows, and in the formats that are asked for beside. A
-    digest of about twelve pages is written as PDF, where reportlab is installed.
+    Finished studies run again only if the code has changed. The same command continues an
+    interrupted one. A study that fails does not stop the others. Figures are PNG files, which the
+    report shows, and any other formats you ask for. If reportlab is installed, a digest of about
+    twelve pages is written as PDF.
     """
     formats = parse_formats(figure_format)
     asked = None if only is None else [name.strip() for name in only.split(",") if name.strip()]

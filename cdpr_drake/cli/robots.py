@@ -102,7 +102,7 @@ def robots(
     ] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Lists the robots that come with the package, all or those that options choose."""
+    """Lists the robots that come with the package; options filter them."""
     if mechanisms:
         choices = (motion, cables, suspended, underactuated, camera, search, gallery)
         if any(choice is not None for choice in choices):

@@ -9,7 +9,7 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from cdpr_drake.cli.options import AsJson
-from cdpr_drake.cli.terminal import print_json, wide_console
+from cdpr_drake.cli.terminal import message_console, print_json, wide_console, working
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.scenarios.files import scenario_names
 from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
@@ -40,7 +40,8 @@ def _end(facts: dict[str, Any]) -> str:
 
 def scenarios(as_json: AsJson = False) -> None:
     """Lists the scenarios that come with the package."""
-    facts = [scenario_facts(load_scenario(name)) for name in scenario_names()]
+    with working(message_console(), "Reading scenarios"):
+        facts = [scenario_facts(load_scenario(name)) for name in scenario_names()]
     if as_json:
         print_json(facts)
         return

@@ -80,10 +80,10 @@ def serve(
     figure_format: FigureFormats = "png",
     as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
 ) -> int:
-    """Runs a scenario with a process outside in its loop, over ZeroMQ.
+    """Runs a scenario with an external process in its loop, over ZeroMQ.
 
-    The client may be written in any language; cdpr_drake.systems.remote explains the messages, and
-    has RemoteClient, one in Python. notebooks/plain_client.py is one without this package.
+    The client may be in any language: cdpr_drake.systems.remote documents the messages and offers
+    RemoteClient for Python. notebooks/plain_client.py is a client that does not use this package.
     """
     check_available()
     kind = SCENARIO_KINDS[scenario_kind(scenario)]

@@ -166,7 +166,7 @@ def stability(
 ) -> int:
     """Finds where a visual servo is stable (Z), the platform can be held (S), and both (SZ).
 
-    Run again with the same arguments, it continues where it was stopped or killed.
+    The same command continues an interrupted one.
     """
     if along is not None:
         _refuse_beside_along(context)

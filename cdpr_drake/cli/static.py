@@ -90,9 +90,9 @@ def static(
         ),
     ] = None,
 ) -> None:
-    """Lengths, tensions, stiffness, vibrations and sag of a robot at rest.
+    """Computes lengths, tensions, stiffness, vibrations and sag of a robot at rest.
 
-    A mechanism is held at its home by tensions, or with --lengths comes to rest from there.
+    Tensions hold a mechanism at its home; with --lengths it comes to rest from there.
     """
     own = {
         "joint": joint, "yields": yields, "prestress": prestress, "free": free, "held": held,

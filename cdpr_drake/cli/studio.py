@@ -54,8 +54,8 @@ def studio(
 ) -> None:
     """Opens the studio: a local page to edit a robot, see what it can do, and run it.
 
-    The address that is printed has a token, new at each start, without which nobody gets in;
-    CDPR_STUDIO_TOKEN in the environment sets it, and then it is not printed.
+    The printed address contains a token, new at each start, that every request needs. The
+    environment variable CDPR_STUDIO_TOKEN sets the token, which is then not printed.
 
     Needs the extra `studio`: pip install 'cdpr_drake[studio]'.
     """

@@ -77,13 +77,13 @@ def tension(
 ) -> None:
     """Finds cable tensions that hold the platform at a pose, or proves that there are none.
 
-    A mechanism is held at its home, on all that no motor holds.
+    For a mechanism: tensions at its home, on the joints that no motor holds.
 
-    With fewer cables than degrees of freedom: which combinations of the wrench's components the
-    cables cannot change, and tensions where nothing is left unbalanced.
+    With fewer cables than degrees of freedom: the combinations of the wrench's components that
+    cables cannot change, and the tensions if nothing stays unbalanced.
 
-    The exit code is 0 for every answer, `infeasible` and `missed` included: read `status` in the
-    table or with --json. It is 2 where the question is not accepted.
+    The exit code is 0 for every answer, also `infeasible` and `missed`: read `status` in the table
+    or with --json. It is 2 if the input is not accepted.
     """
     if names_mechanism(robot):
         refuse_for_mechanisms({

@@ -36,7 +36,7 @@ def view(
 ) -> None:
     """Shows a robot or a mechanism at its home, held by its cables, in Meshcat.
 
-    A robot that cannot be held there is shown with grey cables, and stderr says why.
+    If no tensions hold it there, its cables are grey and stderr gives the reason.
     """
     if html is not None and (host is not None or port is not None):
         raise CdprError("--host, --port: accepted without --html only, which needs no server")

@@ -387,9 +387,9 @@ def workspace(
     figure_format: FigureFormats = "png",
     as_json: ResultsAsJson = False,
 ) -> int:
-    """Finds where a robot can work: kinds of workspaces, what they have in common, and measures.
+    """Finds where a robot can work: kinds of workspaces, their intersection, and measures.
 
-    Run again with the same arguments, it continues where it was stopped or killed.
+    The same command continues an interrupted one.
     """
     formats = parse_formats(figure_format)
     check_workers(workers)

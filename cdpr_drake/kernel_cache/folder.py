@@ -10,6 +10,7 @@ from __future__ import annotations
 import atexit
 import functools
 import hashlib
+import logging
 import os
 import shutil
 import stat
@@ -20,6 +21,8 @@ from contextlib import suppress
 from pathlib import Path
 
 import platformdirs
+
+_LOG = logging.getLogger(__name__)
 
 KEPT = 3
 """Folders of so many states of the sources are kept, the youngest ones."""
@@ -71,10 +74,10 @@ def _kept_folder() -> Path:
     fresh = Path(tempfile.mkdtemp(prefix="cdpr_drake-kernels-"))
     atexit.register(_remove, fresh, os.getpid())
     why = "; ".join(problems) or "no cache folder can be written"
-    print(
-        f"cdpr_drake: compiled kernels are not kept: {why}; {NUMBA_VARIABLE} names another folder",
-        file=sys.stderr,
-    )
+    _LOG.warning(
+        "cdpr_drake: compiled kernels are not kept: %s; %s names another folder",
+        why, NUMBA_VARIABLE,
+    )  # fmt: skip
     return fresh
 
 

@@ -9,18 +9,15 @@ import numpy as np
 from pydrake.math import RigidTransform
 from scipy.stats import qmc
 
+from cdpr_drake.analyses.studies.framework.servo_cases import servo_case
 from cdpr_drake.analyses.studies.framework.servo_models import (
-    Perturbation,
     PerturbedServo,
-    perturbed_servo,
 )
-from cdpr_drake.analyses.workspaces.stability_defaults import workspace_defaults
 from cdpr_drake.analyses.workspaces.static_feasible import static_case
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.poses import pose_from_angles
 from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.stability.desired_view import FixedObject
-from cdpr_drake.stability.perturbation_bounds import PerturbationBounds, vector_size
+from cdpr_drake.stability.perturbation_bounds import PerturbationBounds
 from cdpr_drake.stability.stability_case import StabilityCase
 from cdpr_drake.stability.verdict import VerdictOptions
 from cdpr_drake.systems.cameras.camera_settings import servo_pinhole
@@ -97,18 +94,8 @@ class BasinSetup:
 def basin_setup(scheme: str) -> BasinSetup:
     """What all loops of a scheme have in common."""
     scenario = load_scenario("acrobot_pbvs", [*SETTINGS, f"controller.scheme={scheme}"])
-    robot = load_robot(ROBOT)
-    defaults = workspace_defaults(robot, ROBOT)
-    none = Perturbation.from_vector(np.zeros(vector_size(len(robot.cables))))
-    servo = perturbed_servo(scenario, none)
-    case = StabilityCase(
-        robot.cable_set().without_pulleys(),
-        scheme,
-        X_PC=servo.X_PC,
-        target=FixedObject(servo.X_WO, scenario.desired.transform()),
-        lever="object",
-    )
-    box = np.maximum(defaults.lower, [-np.inf, -np.inf, LOWEST]), defaults.upper
+    robot, common = load_robot(ROBOT), servo_case(scenario, LOWEST)
+    box = common.box
     # One step for all loops: to find one for each start takes as long as a third of the loop.
     corners = np.stack(np.meshgrid(*np.transpose(box), indexing="ij"), axis=-1).reshape(-1, 3)
     scenario.integration.max_step = min(
@@ -117,11 +104,11 @@ def basin_setup(scheme: str) -> BasinSetup:
     )
     return BasinSetup(
         scenario=check_loop(scenario),
-        servo=servo,
+        servo=common.servo,
         pinhole=servo_pinhole(scenario.camera, robot),
-        case=case,
+        case=common.case,
         statics=static_case(robot),
-        bounds=defaults.bounds,
+        bounds=common.bounds,
         box=box,
     )
 

@@ -11,6 +11,7 @@ from pydrake.math import RigidTransform
 from cdpr_drake.analyses.simulation.visual_servo_run import RunResult, run_scenario
 from cdpr_drake.analyses.studies.closed_loops.kinematic_servo import STEP, kinematic_path
 from cdpr_drake.analyses.studies.framework.runs import Row
+from cdpr_drake.analyses.studies.framework.servo_cases import servo_case
 from cdpr_drake.analyses.studies.framework.servo_models import (
     Perturbation,
     PerturbedServo,
@@ -18,7 +19,6 @@ from cdpr_drake.analyses.studies.framework.servo_models import (
     perturbed_servo,
 )
 from cdpr_drake.analyses.studies.framework.study import Case
-from cdpr_drake.analyses.workspaces.stability_defaults import workspace_defaults
 from cdpr_drake.analyses.workspaces.static_feasible import static_case
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import StabilityError
@@ -29,9 +29,7 @@ from cdpr_drake.geometry.poses import (
     pose_row,
     pose_rows_distance,
 )
-from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.stability.desired_view import FixedObject
-from cdpr_drake.stability.perturbation_bounds import PerturbationBounds, vector_size
+from cdpr_drake.stability.perturbation_bounds import PerturbationBounds
 from cdpr_drake.stability.perturbation_samples_kernel import draw_perturbations
 from cdpr_drake.stability.stability_case import StabilityCase
 from cdpr_drake.stability.verdict import VerdictOptions, judge_stability, worst_perturbations
@@ -118,24 +116,14 @@ def loop_setup(scheme: str) -> LoopSetup:
     """What all loops of a scheme have in common."""
     settings = [*SETTINGS, f"controller.scheme={scheme}"]
     scenario = load_scenario("acrobot_pbvs", settings)
-    robot = load_robot(ROBOT)
-    defaults = workspace_defaults(robot, ROBOT)
-    none = Perturbation.from_vector(np.zeros(vector_size(len(robot.cables))))
-    servo = perturbed_servo(scenario, none)
-    case = StabilityCase(
-        robot.cable_set().without_pulleys(),
-        scheme,
-        X_PC=servo.X_PC,
-        target=FixedObject(servo.X_WO, scenario.desired.transform()),
-        lever="object",
-    )
+    common = servo_case(scenario, LOWEST)
     return LoopSetup(
         scenario=scenario,
         managed=load_scenario("acrobot_pbvs", [*settings, MANAGEMENT]),
-        servo=servo,
-        case=case,
-        bounds=defaults.bounds,
-        box=(np.maximum(defaults.lower, [-np.inf, -np.inf, LOWEST]), defaults.upper),
+        servo=common.servo,
+        case=common.case,
+        bounds=common.bounds,
+        box=common.box,
     )
 
 

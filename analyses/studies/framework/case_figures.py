@@ -125,6 +125,10 @@ MULTIPLES = {
 """Figures with a small picture a configuration: column, label, factor."""
 
 
+NOT_MEASURED = "not measured in this run"
+"""In a panel whose quantity a run has not, such as features without a camera."""
+
+
 def image_figure(title: str, shown: Shown, runs: Runs) -> Figure:
     """Paths of the object's centre in the image, and their distance from the straight line."""
     figure, (image, deviation) = new_figure(
@@ -179,6 +183,9 @@ def small_multiples(title: str, shown: Shown, quantity: str, label: str, factor:
     for axes, (configuration, run, _) in zip(grid.flat, shown, strict=False):
         values = run[quantity]
         count = values.shape[1]
+        if not np.any(np.isfinite(values)):
+            axes.text(0.5, 0.5, NOT_MEASURED, transform=axes.transAxes, ha="center", va="center")
+            axes.set_xticks([])
         if quantity == "error":
             names = [feature_words(name) for name in run["features"]]
         else:

@@ -308,9 +308,9 @@ def draw_path(axes: Any, points: Array, look: Look, label: str) -> None:
 
 def fit_box(axes: Any, points: Array) -> None:
     """Makes 3D axes show points, shape (n, 3), in true proportions; no edge is shorter than half
-    of the longest, so that the numbers on it can be read."""
+    of the longest, so that the numbers on it can be read, and no point is on a face."""
     low, high = points.min(axis=0), points.max(axis=0)
-    edges = np.maximum(high - low, 0.5 * max(float(np.max(high - low)), 1e-3))
+    edges = 1.08 * np.maximum(high - low, 0.5 * max(float(np.max(high - low)), 1e-3))
     middle = (low + high) / 2.0
     set_box(axes, middle - edges / 2.0, middle + edges / 2.0)
     axes.set_box_aspect(edges, zoom=0.85)

@@ -94,10 +94,10 @@ def views_figure(runs: Runs) -> Figure:
         axes.axhline(PUBLISHED_LAPS[kind], linewidth=0.8, linestyle=":", color=look.color)
         axes.annotate(
             f"published, estimator {NUMBERS[kind]}",
-            (0.99, PUBLISHED_LAPS[kind]),
+            (1.01, PUBLISHED_LAPS[kind]),
             xycoords=("axes fraction", "data"),
-            ha="right",
-            va="bottom",
+            ha="left",
+            va="center",
             fontsize=8,
         )
     axes.set(xlabel="margin of the tag along the image's short side [mm]",
@@ -187,8 +187,10 @@ def _draw_paths(axes: Any, runs: Runs) -> None:
             number += 1
     axes.set_aspect("equal", adjustable="datalim")
     axes.set(xlabel="x [m]", ylabel="y [m]", title="path of the platform, first run")
-    if number:
-        axes.legend(loc="best", fontsize=8)
+    if number:  # below the axes: lost platforms go through the middle
+        axes.legend(
+            loc="upper center", bbox_to_anchor=(0.5, 0.0), borderaxespad=6.0, fontsize=8, ncols=3
+        )
 
 
 def _draw_choices(axes: Any, shown: Mapping[str, Runs], names: Sequence[str]) -> None:

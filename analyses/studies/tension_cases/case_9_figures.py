@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import product
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.optimize import lsq_linear
 
@@ -27,6 +29,9 @@ from cdpr_drake.tensions.problem import TensionProblem
 
 ACCURACY = 0.3
 """Accuracy of the sensors by which figure 5.15 varies readings [N]."""
+
+NEAR = 1.0
+"""Names of points within this distance of each other would meet [N]."""
 
 PRINTED_RESIDUALS = {
     "E1": 1.21, "E2": 0.68, "E3": 0.99, "E4": 0.88, "E5": 1.54, "E6": 0.96, "E7": 1.09,
@@ -139,13 +144,13 @@ def polygon_figure(runs: Runs) -> Figure:
             *eta, look.marker, color=look.color, markersize=9, label=name,
             fillstyle="full" if corrected else "none", linestyle="",
         )  # fmt: skip
-    for number, name in enumerate(EXPERIMENTS):
-        eta = N.T @ (np.array(PUBLISHED_TENSIONS[int(name[1:])]) - particular)
-        axes.plot(
-            *eta, PUBLISHED.marker, color=PUBLISHED.color, markersize=9, linestyle="",
-            label="table 5.1" if number == 0 else None,
-        )  # fmt: skip
-        axes.annotate(name, eta, (4, 4), textcoords="offset points", fontsize=8)
+    printed = np.array([PUBLISHED_TENSIONS[int(name[1:])] for name in EXPERIMENTS])
+    etas = (printed - particular) @ N
+    axes.plot(
+        *etas.T, PUBLISHED.marker, color=PUBLISHED.color, markersize=9, linestyle="",
+        label="table 5.1",
+    )  # fmt: skip
+    _name_points(axes, etas, EXPERIMENTS)
     axes.set_aspect("equal", adjustable="datalim")
     axes.set(
         xlabel=r"$\eta_1$ [N]", ylabel=r"$\eta_2$ [N]",
@@ -153,6 +158,19 @@ def polygon_figure(runs: Runs) -> Figure:
     )  # fmt: skip
     axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
     return figure
+
+
+def _name_points(axes: Axes, points: Array, names: Sequence[str]) -> None:
+    """Writes names beside points, shape (n, 2), on the sides where points near them are not."""
+    for point, name in zip(points, names, strict=True):
+        near = points[np.linalg.norm(points - point, axis=1) < NEAR]
+        on_right = near[:, 0] >= np.median(near[:, 0])
+        right = bool(point[0] >= np.median(near[:, 0]))
+        above = bool(point[1] >= np.median(near[on_right == right, 1]))
+        axes.annotate(
+            name, point, (5 if right else -5, 2 if above else -2), textcoords="offset points",
+            ha="left" if right else "right", va="bottom" if above else "top", fontsize=8,
+        )  # fmt: skip
 
 
 def residual_figure(runs: Runs) -> Figure:

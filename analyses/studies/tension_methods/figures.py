@@ -30,6 +30,10 @@ NEAR = 1.5
 SHORT = 0.05
 """The curve of a run that fell within this share of its duration would not be seen."""
 
+LEGEND_DISTANCE = 5.0
+"""From the axes to a legend below them, for numbers and label between [font sizes of the legend]:
+a length, so that axes of any height keep it."""
+
 LEAST_DRAWN_ERROR = 1e-9
 """Smaller errors are drawn as this, on a logarithmic axis [mm]."""
 
@@ -76,7 +80,8 @@ def error_figure(experiment: str, all_runs: Runs) -> Figure:
             fontsize=7,
             ncols=2,
             loc="upper center",
-            bbox_to_anchor=(0.5, -0.24),  # below the axes, where no curve runs
+            bbox_to_anchor=(0.5, 0.0),
+            borderaxespad=LEGEND_DISTANCE,  # below the axes, where no curve runs
         )
     low = min(axes.get_ylim()[0] for axes in panels)
     high = max(axes.get_ylim()[1] for axes in panels)

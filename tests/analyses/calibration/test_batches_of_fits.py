@@ -5,8 +5,8 @@ import pytest
 
 import cdpr_drake as cdpr
 from cdpr_drake.models.robot_draws import ParameterCovariance
+from tests.analyses.front.test_front_fits import tracked_poses
 from tests.identification.logs import log as motion_log
-from tests.test_front_door import tracked_poses
 
 COUNT = 300
 

@@ -1,0 +1,63 @@
+"""What all results and refusals of the verbs are asked."""
+
+import ast
+import inspect
+import json
+from pathlib import Path
+from typing import Any, get_args, get_type_hints
+
+import pytest
+from matplotlib.figure import Figure
+
+import cdpr_drake as cdpr
+from cdpr_drake.analyses.front.simulation import RepeatedRuns, Run
+from cdpr_drake.summaries import MOST_LINES
+
+STUB = Path(cdpr.__file__).with_suffix(".pyi")
+HOMES = {
+    alias.name: node.module for node in ast.parse(STUB.read_text()).body for alias in node.names
+}
+"""Names of the front door, with the module of each."""
+
+
+def shows_itself(result):
+    """In a few lines, as text and as HTML; what a verb returned also for JSON, and as a figure."""
+    if type(result) in RESULTS:
+        assert as_json(result)
+        assert isinstance(result.plot(), Figure)
+    lines = repr(result).splitlines()
+    assert 2 <= len(lines) <= MOST_LINES
+    assert " object at 0x" not in repr(result)
+    assert result._repr_html_().count("<tr>") >= len(lines) - 1
+    return repr(result)
+
+
+def verbs():
+    """Functions of the front door that answer, by name."""
+    homes = {name: home for name, home in HOMES.items() if home.startswith("analyses.front.")}
+    return {n: getattr(cdpr, n) for n in homes if inspect.isfunction(getattr(cdpr, n))}
+
+
+def result_classes():
+    """What the verbs return; `simulate` says so in words, since mypy could not tell which."""
+    found = {Run, RepeatedRuns}
+    for verb in verbs().values():
+        told = get_type_hints(verb)["return"]
+        found |= {one for one in (get_args(told) or (told,)) if inspect.isclass(one)}
+    return found - {tuple, str, Any}
+
+
+RESULTS = result_classes()
+
+
+def as_json(result):
+    return json.loads(json.dumps(result.as_dict()))
+
+
+def one_line(call, *words):
+    """A call that is refused with one line that has these words."""
+    with pytest.raises(cdpr.CdprError) as problem:
+        call()
+    assert "\n" not in str(problem.value)
+    for word in words:
+        assert word in str(problem.value)

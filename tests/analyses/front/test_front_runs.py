@@ -1,0 +1,137 @@
+"""Verbs of motion: plans, runs, studies."""
+
+import json
+
+from matplotlib.figure import Figure
+
+import cdpr_drake as cdpr
+from cdpr_drake.analyses.front.session import Session
+from cdpr_drake.analyses.planning.robot_path_task import LimitSettings, make_path, path_task
+from cdpr_drake.analyses.simulation.tension_control_run import (
+    run_tension_scenario,
+    summarize_tension_run,
+)
+from cdpr_drake.analyses.studies.catalogue import STUDIES, StudyEntry
+from cdpr_drake.planning.path_timing import plan_along_path
+from cdpr_drake.systems.diagrams.load import load_scenario
+from tests.analyses.front.front_checks import as_json, one_line, shows_itself
+
+
+def test_a_plan(planar, aside):
+    found = cdpr.plan_path(planar, [None, aside], {"speed": 0.5}, stations=60)
+    given = LimitSettings(speed=0.5)
+    way = make_path(planar, [planar.home.transform(), aside.transform()], "smooth")
+    expected = plan_along_path(path_task(planar, given), way, 60)
+    assert found.plan.duration == expected.duration
+    told = as_json(found)
+    assert told["duration_s"] == expected.duration
+    assert told["arguments"]["speed_m_s"] == 0.5
+    assert "waypoints" in shows_itself(found)
+    assert isinstance(found.plot(), Figure)
+    one_line(lambda: cdpr.plan_path(planar, [None]), "1 poses")
+    one_line(lambda: cdpr.plan_path(planar, "no.csv"), "no.csv")
+    one_line(lambda: cdpr.plan_path(planar, [None, aside], {"sped": 1.0}), "sped", "speed")
+    one_line(lambda: cdpr.plan_free_motion(planar, None, aside, last="time"), "last", "least")
+
+
+def test_a_run(tmp_path):
+    asked = ["duration=0.2", "integration.engine=compiled"]
+    seen = []
+    session = Session(on_progress=lambda now: seen.append(now.sim_time))
+    found = cdpr.simulate("planar_computed_torque", asked, session=session)
+    assert seen
+    assert max(seen) <= 0.2
+    scenario = load_scenario("planar_computed_torque", asked)
+    expected = summarize_tension_run(run_tension_scenario(scenario))
+    same = ("outcome", "sim_time_s", "position_error_m", "tension_n")
+    assert {k: found.as_dict()[k] for k in same} == {k: expected[k] for k in same}
+    assert found.log["tensions"].shape[1] == 4
+    assert "outcome" not in shows_itself(found)
+    assert isinstance(found.plot(), Figure)
+    stopped = cdpr.simulate(scenario, session=Session(should_stop=lambda: True))
+    assert stopped.as_dict()["outcome"] == "interrupted"
+    one_line(lambda: cdpr.simulate(scenario, video=True), "video")
+    one_line(lambda: cdpr.simulate(scenario, log_formats=["xls"]), "log_formats", "xls")
+    one_line(lambda: cdpr.finish_run(tmp_path / "none"), "none")
+    kept = cdpr.simulate(scenario, folder=tmp_path / "run", formats=("svg",))
+    assert kept.failed == {}
+    written = json.loads((tmp_path / "run" / "summary.json").read_text())
+    assert written == as_json(kept)
+    assert (tmp_path / "run" / "error.svg").is_file()
+    one_line(lambda: cdpr.simulate(scenario, ["duration=1"]), "overrides")
+    one_line(lambda: cdpr.simulate(scenario, seeds=[1, 2]), "seeds")
+    one_line(lambda: cdpr.simulate("planar_pbsv"), "planar_pbvs")
+
+
+def test_runs_over_seeds():
+    asked = ["duration=0.2", "camera.kind=projected"]
+    found = cdpr.simulate("planar_pbvs", asked, seeds=[3, 5], workers=1)
+    assert found.as_dict()["seeds"] == [3, 5]
+    assert "2 of 2 runs" in shows_itself(found)
+    one_line(lambda: cdpr.simulate("planar_pbvs", asked, seeds=[3, 3]), "different")
+
+
+class ToyResult:
+    interrupted = False
+
+    def as_dict(self):
+        return {"quick": True}
+
+    def drawings(self):
+        return {"errors": Figure}
+
+    def tables(self):
+        return []
+
+    def write(self, folder, formats=()):
+        (folder / "results.json").write_text(json.dumps(self.as_dict()))
+
+
+def test_studies(monkeypatch, tmp_path):
+    asked = []
+
+    def study(quick, session):
+        asked.append((quick, session.workers))
+        return ToyResult()
+
+    monkeypatch.setitem(STUDIES, "case-8", StudyEntry(study))
+    assert cdpr.studies() == tuple(STUDIES)
+    seen = []
+    session = Session(say=seen.append)
+    found = cdpr.run_study("case-8", quick=True, workers=1, session=session)
+    assert isinstance(found.result, ToyResult)
+    assert "Study case-8" in shows_itself(found)
+    one_line(lambda: found.plot("ways"), "ways", "errors")
+    cdpr.run_study("case-8", tmp_path / "s", quick=True, session=session)
+    assert seen == ["Writing results"]
+    assert json.loads((tmp_path / "s" / "results.json").read_text()) == {"quick": True}
+    found = cdpr.reproduce(tmp_path / "r", quick=True, only=["case-8"])
+    assert found.page.is_file()
+    assert found.states["case-8"].status == "finished"
+    assert json.loads((tmp_path / "r" / "summary.json").read_text())["studies"]
+    assert "report" in shows_itself(found)
+    assert [quick for quick, _ in asked] == [True] * 3
+    one_line(lambda: cdpr.run_study("case-88"), "case-88")
+    one_line(lambda: cdpr.run_study("case-8", seeds=3), "seeds")
+    one_line(lambda: cdpr.reproduce(tmp_path / "x", only=["case-88"]), "case-88")
+
+
+UNSEEN = ["duration=0.05", "camera.kind=projected", "desired.position=[1.0, 0.0, 0.3]"]
+"""A goal outside the frame, from which the camera does not see its target."""
+
+
+def test_what_nobody_is_told_goes_to_the_log(caplog):
+    with caplog.at_level("INFO", "cdpr_drake"):
+        cdpr.simulate("planar_pbvs", UNSEEN)
+    warnings = [one for one in caplog.records if one.levelname == "WARNING"]
+    assert all(one.name.startswith("cdpr_drake.") for one in warnings)
+    told = [one.getMessage() for one in warnings]
+    assert ["does not see" in told[0], "outside the frame" in told[1], len(told)] == [True, True, 2]
+    assert "building the diagram" in caplog.text
+    caplog.clear()
+    seen = []
+    cdpr.simulate("planar_pbvs", UNSEEN, session=Session(say=seen.append))
+    assert [line for line in seen if line.startswith("warning: ")] == [
+        f"warning: {x}" for x in told
+    ]
+    assert caplog.records == []
