@@ -2,8 +2,8 @@
 
     python -m tests.analyses.calibration.many_swings --seeds 100 --group creep
 
-The swing is made once by Drake's plant, of hysteresis by the kernel of free runs, as no plant has
-it; every seed has noise of its own, and is identified from what is believed beforehand.
+The swing is made once by Drake's plant; every seed has noise of its own, and is identified from
+what is believed beforehand.
 """
 
 import argparse
@@ -21,14 +21,12 @@ from cdpr_drake.analyses.calibration.free_motion import (
     FreeSigmas,
     fit_free_motion,
 )
-from cdpr_drake.analyses.calibration.free_motion_model import FreeMotionModel
 from cdpr_drake.analyses.calibration.log_file import CalibrationLog
-from cdpr_drake.cables.models import ELASTIC
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.poses import pose_row
 from cdpr_drake.models.materials import BehaviourSettings
 from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.statics.equilibrium import equilibrium_near
+from cdpr_drake.models.robot_schema import HysteresisSettings
 from cdpr_drake.systems.robots.cable_robot import CableRobot
 from cdpr_drake.systems.robots.settings import CableRobotSettings, CableSettings
 
@@ -61,7 +59,12 @@ def soft(group):
             **{name.removeprefix("all."): value for name, value in TRUE[group].items()}
         )
     cable = replace(robot.cable, youngs_modulus=3e10, retardation_time=0.004, behaviour=does)
-    return replace(robot, cable=cable)
+    rubs = None
+    if group == "hysteresis":
+        rubs = HysteresisSettings(
+            **{name.removeprefix("hysteresis."): value for name, value in TRUE[group].items()}
+        )
+    return replace(robot, cable=cable, platform=replace(robot.platform, hysteresis=rubs))
 
 
 def believed(group):
@@ -100,28 +103,10 @@ def plant_swing(group):
     return poses, tensions
 
 
-@cache
-def kernel_swing(group):
-    """The same by the kernel that a fit uses, with contacts bent as the push leaves them."""
-    robot = soft(group)
-    model = FreeMotionModel.of(robot, START, (group,), False, False)
-    vector = model.before()
-    for name, value in TRUE[group].items():
-        vector[model.names.index(name)] = value
-    cables, l0 = robot.cable_set(), model.lengths(vector)
-    rest = equilibrium_near(cables, ELASTIC, model.platform(vector), l0, START).X_WP
-    turn = Rotation.from_matrix((rest.rotation() @ START.rotation().inverse()).matrix())
-    moved = np.concatenate(
-        [turn.as_rotvec(), rest.translation() - START.translation(), push(rest, cables)]
-    )
-    states, tensions = model.run(vector, moved, COUNT, 1.0 / RATE)
-    return states[:, :7].copy(), tensions.copy()
-
-
 def noisy_log(group, seed):
     """The swing with the noise of a seed."""
     random = np.random.default_rng([seed, 34])
-    poses, tensions = (kernel_swing if group == "hysteresis" else plant_swing)(group)
+    poses, tensions = plant_swing(group)
     turns = Rotation.from_quat(poses[:, [1, 2, 3, 0]])
     turns = turns * Rotation.from_rotvec(NOISE.turn * random.standard_normal((COUNT, 3)))
     places = poses[:, 4:7] + NOISE.position * random.standard_normal((COUNT, 3))

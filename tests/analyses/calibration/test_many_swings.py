@@ -12,7 +12,7 @@ SEEDS = (0,)
 """Each costs some seconds; `python -m tests.analyses.calibration.many_swings` does a hundred."""
 
 
-@pytest.mark.parametrize("group", [name for name in TRUE if name != "hysteresis"])
+@pytest.mark.parametrize("group", list(TRUE))
 def test_what_the_plant_swung_with_is_found(group):
     for seed in SEEDS:
         found = identified(group, seed)
