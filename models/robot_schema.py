@@ -4,6 +4,7 @@ Drake's YAML loader reads the annotations themselves, so they are not postponed 
 """
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -11,7 +12,6 @@ from pydrake.math import RigidTransform
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.cable_behaviour import CableBehaviour
 from cdpr_drake.cables.elastic_law import axial_stiffness
-from cdpr_drake.dynamics.contact_hysteresis import ContactHysteresis
 from cdpr_drake.errors import RobotFileError
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.geometry.motion_type import MOTION_TYPES, MotionType
@@ -35,6 +35,9 @@ from cdpr_drake.summaries import Summarized, numbers
 from cdpr_drake.winches.drum import Drum
 from cdpr_drake.winches.groups import WinchGroups
 from cdpr_drake.winches.motor import WinchLaw
+
+if TYPE_CHECKING:
+    from cdpr_drake.dynamics.contact_hysteresis import ContactHysteresis
 
 BOX_INERTIA, SHAPE_INERTIA = "box", "shape"
 
@@ -66,8 +69,10 @@ class HysteresisSettings:
         at_least=1e-4, at_most=10.0,
     )  # fmt: skip
 
-    def contacts(self) -> ContactHysteresis:
+    def contacts(self) -> "ContactHysteresis":
         """These numbers as the law takes them."""
+        from cdpr_drake.dynamics.contact_hysteresis import ContactHysteresis
+
         return ContactHysteresis(tilt=self.tilt, turn=self.turn, slip=self.slip)
 
 
@@ -267,7 +272,7 @@ class Robot(Summarized):
         settings = self.cable.behaviour
         return CableBehaviour() if settings is None else settings.behaviour()
 
-    def contact_hysteresis(self) -> ContactHysteresis | None:
+    def contact_hysteresis(self) -> "ContactHysteresis | None":
         """Friction against turns of the platform; None where the file gives none."""
         settings = self.platform.hysteresis
         contacts = None if settings is None else settings.contacts()

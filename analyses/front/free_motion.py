@@ -58,7 +58,7 @@ class RobotFreeMotion(FittedRobot, FreeMotion):
         ]  # fmt: skip
 
 
-KEPT = ("overwrite", "formats", "say", "session")
+KEPT = ("folder", "overwrite", "formats", "say", "session")
 """Arguments on what is written, and who follows."""
 
 
@@ -74,7 +74,6 @@ def identify_free_motion(
     priors: Mapping[str, float] | None = None,
     tracker: bool = False,
     lead: float = 1.0,
-    folder: Path | str | None = None,
     **kept: Any,
 ) -> RobotFreeMotion:
     """Finds a robot's dynamics in a log of a platform that swings on standing winches.
@@ -94,10 +93,10 @@ def identify_free_motion(
             held.
         tracker: Whether the frame of a tracker is unknown.
         lead: From so much of a held-out stretch its first state is told [s].
-        folder: Where identification.json, robot.yaml and figures are written; None: nowhere.
-        kept: `overwrite`: whether results in the folder may be replaced; `formats`: endings of
-            the files of figures; `say`: told what is done now; `session`: in the place of it, who
-            follows the identification.
+        kept: `folder`: where identification.json, robot.yaml and figures are written; None:
+            nowhere; `overwrite`: whether results in the folder may be replaced; `formats`: endings
+            of the files of figures; `say`: told what is done now; `session`: in the place of it,
+            who follows the identification.
 
     Raises:
         IdentificationError: The log does not hold, or does not tell, what is asked; names it.
@@ -128,7 +127,9 @@ def identify_free_motion(
             fit.write(folder)
         return as_kind(RobotFreeMotion, found, fit=fit)
 
-    keeping = Keeping(folder, kept.get("overwrite", False), kept.get("formats", DEFAULT_FORMATS))
+    keeping = Keeping(
+        kept.get("folder"), kept.get("overwrite", False), kept.get("formats", DEFAULT_FORMATS)
+    )
     session = kept.get("session") or Session(say=kept.get("say"))
     return kept_fit(keeping, session, f"Identifying {loaded.name}", work)
 

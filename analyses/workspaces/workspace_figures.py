@@ -174,7 +174,7 @@ def _around(
 ) -> tuple[Array, Array]:
     """Corners, shape (2,) each [m], of what holds a grid, the frame and the exit points."""
     across = list(plane)
-    points = np.column_stack([robot.frame.lower, robot.frame.upper, robot.exit_points()])[across]
+    points = np.column_stack([robot.frame.lower, robot.frame.upper, robot.cable_set().p_WA])[across]
     lower = np.minimum(lower, points.min(axis=1))
     upper = np.maximum(upper, points.max(axis=1))
     room = ROOM * np.max(upper - lower)
@@ -191,7 +191,7 @@ def _draw_robot(axes: Axes, robot: Robot, plane: tuple[int, int], edges: Sequenc
     for label, low, high, dash in boxes:
         corners = np.asarray(low) + SQUARE[[*range(4), 0]] * np.subtract(high, low)
         axes.plot(*corners.T, color=OUTLINE.color, linestyle=dash, linewidth=1.2, label=label)
-    points = robot.exit_points()
+    points = robot.cable_set().p_WA
     axes.plot(
         points[u], points[v], "^", color=OUTLINE.color, markersize=6, clip_on=False,
         label="exit points of the cables",

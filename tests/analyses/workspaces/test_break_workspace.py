@@ -105,4 +105,7 @@ def test_options_that_only_it_takes_are_refused_without_it(capsys):
     with pytest.raises(SystemExit) as end:
         main(["workspace", "acrobot_large", "--moving", "0.1,0,0"])
     assert end.value.code == 2
-    assert "--moving: found --kind static; accepted: survives among them" in printed(capsys).err
+    assert (
+        "--moving: found --kind static; accepted: dynamic-single-failure among them"
+        in printed(capsys).err
+    )
