@@ -33,6 +33,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter
 
 from cdpr_drake.analyses.simulation.break_report import (
     BRAKE,
@@ -51,7 +52,7 @@ from cdpr_drake.analyses.studies.framework.runs import MissingRuns, Runs
 from cdpr_drake.analyses.studies.framework.statement import OURS, SOURCE, Finding, statement
 from cdpr_drake.analyses.studies.framework.study import Case, Form, Study
 from cdpr_drake.analyses.studies.framework.summary import Cell, Summary
-from cdpr_drake.analyses.visualization.figure_style import new_figure
+from cdpr_drake.analyses.visualization.figure_style import new_figure, plain_numbers
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.palette import nth_look
 from cdpr_drake.systems.diagrams.load import load_scenario
@@ -243,7 +244,11 @@ def figure(runs: Runs) -> Figure:
     axes[1].set(ylabel="largest speed [m/s]")
     for axis in axes:
         axis.set(xlabel="cable that breaks", yscale="log")
-        axis.legend(loc="best")
+        axis.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axis.yaxis.set_minor_formatter(NullFormatter())
+        plain_numbers(axis.yaxis)
+    handles, names = axes[0].get_legend_handles_labels()
+    drawn.legend(handles, names, loc="outside lower center", ncols=len(REACTIONS))
     return drawn
 
 
