@@ -28,6 +28,8 @@ from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from cdpr_drake.models.robot_schema import Robot
+
 
 KEPT = ("folder", "overwrite", "formats")
 
@@ -135,11 +137,14 @@ def compare_reactions(
         if results is not None:
             told.opened(results)
         rows: dict[str, dict[str, Any]] = {}
-        name, loaded = "", ""
-        for reaction in reactions:
-            scene = _scene(str(scenario), overrides, cable, (time, after), reaction)
-            robot = load_robot(scene.robot)
-            name, loaded = robot.cables[cable].name, scene.name
+        robot = _robot(str(scenario), overrides, cable)
+        scenes = {  # all of them before the first run: a scenario may not know a reaction
+            reaction: _scene(str(scenario), overrides, cable, (time, after), reaction)
+            for reaction in reactions
+        }
+        name, loaded = robot.cables[cable].name, ""
+        for reaction, scene in scenes.items():
+            loaded = scene.name
             told.say(f"{name} breaks: {reaction}")
             run = run_scenario(scene, RunSession(should_stop=told.stop))
             if run.outcome == Outcome.INTERRUPTED:
@@ -172,13 +177,22 @@ def _check(reactions: Sequence[str], numbers: Mapping[str, float]) -> None:
             raise ScenarioError(f"{key}: found {value:g}; accepted: a number > 0 [s]")
 
 
+def _robot(name: str, overrides: Sequence[str], cable: int) -> Robot:
+    """The robot of a visual servo, which has such a cable."""
+    plain = load_scenario(name, overrides)
+    if not isinstance(plain, Scenario):
+        raise ScenarioError(f"{plain.name}: found kind {plain.kind}; accepted: a visual servo")
+    robot = load_robot(plain.robot)
+    last = len(robot.cables) - 1
+    if not 0 <= cable <= last:
+        raise ScenarioError(f"cable: found {cable}; accepted: 0 to {last} of {robot.name}")
+    return robot
+
+
 def _scene(
     name: str, overrides: Sequence[str], cable: int, times: tuple[float, float], reaction: str
 ) -> Scenario:
     """A scenario in which a cable breaks, after the first time, for the second one [s]."""
-    plain = load_scenario(name, overrides)
-    if not isinstance(plain, Scenario):
-        raise ScenarioError(f"{plain.name}: found kind {plain.kind}; accepted: a visual servo")
     time, after = times
     loaded = load_scenario(name, [
         *overrides,
