@@ -1,7 +1,7 @@
 """What cables and contacts went through in a run: force over elongation, moment over turn.
 
-Drawn for robots whose files say more than the elastic law. Loops that are gone through as clocks
-go take energy out of the motion.
+Drawn for robots whose files say more than the elastic law. A loop that runs clockwise takes energy
+out of the motion: its area.
 """
 
 from __future__ import annotations
