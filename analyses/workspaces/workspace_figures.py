@@ -121,7 +121,9 @@ def planes_figure(
         limits = (-0.5, 2.5)
         colors = ListedColormap([OUTSIDE, SOME, INSIDE])
     else:
-        shown = _least(workspace.values[measure], workspace.inside())
+        held = workspace.inside()
+        # With no pose inside there is nothing else to see; the title says so.
+        shown = _least(workspace.values[measure], held if held.any() else np.ones_like(held))
         known = shown[np.isfinite(shown)]
         limits = (float(np.min(known)), float(np.max(known))) if len(known) else (0.0, 1.0)
         colors = None
@@ -296,6 +298,8 @@ def _title(workspace: RobotWorkspace, measure: str | None) -> str:
     turns = len(workspace.grid.angles)
     rule = f"\n{RULES[about['orientations']]}, {turns} orientations" if turns > 1 else ""
     share = f"cells inside: {100.0 * volume.share:.1f} % of the grid's box"
+    if measure is not None and not workspace.inside().any():
+        share = "no pose inside: numbers of all poses"
     words = wrap(f"{about['robot']}: {what}; cables {about['cables']}", LINE)
     return "\n".join(words) + f"\n{share}{rule}"
 

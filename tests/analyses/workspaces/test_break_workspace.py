@@ -1,6 +1,7 @@
 """The kind `dynamic-single-failure` over a grid, as `breaks_at` says of each pose."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from pydrake.math import RigidTransform
 import cdpr_drake as cdpr
 from cdpr_drake.analyses.simulation.break_survival import BreakRequest, breaks_at
 from cdpr_drake.analyses.workspaces.break_figures import breaks_figure
+from cdpr_drake.analyses.workspaces.workspace_figures import planes_figure
 from cdpr_drake.cli.app import main
 from cdpr_drake.errors import StoppedError, WorkspaceError
 from cdpr_drake.models.robot_loader import load_robot
@@ -99,6 +101,15 @@ def test_it_is_written_and_drawn(found, folder):
 def test_what_is_refused(robot, asked, words):
     with pytest.raises(WorkspaceError, match=words):
         cdpr.compute_workspace(robot, "dynamic-single-failure", **asked)
+
+
+def test_excursions_are_drawn_where_no_pose_survives(found):
+    kind = "dynamic-single-failure"
+    nobody = replace(found, holds={kind: np.zeros_like(found.holds[kind])})
+    drawn = planes_figure(nobody, "break-excursion")
+    shown = np.ravel(drawn.axes[0].collections[0].get_array())
+    np.testing.assert_array_equal(shown, found.values["break-excursion"].ravel())
+    assert "no pose inside" in drawn.get_suptitle()
 
 
 def test_options_that_only_it_takes_are_refused_without_it(capsys):
