@@ -12,13 +12,21 @@ from multiprocessing.context import SpawnContext, SpawnProcess
 from typing import Any, Self, TypeVar
 
 from cdpr_drake.kernel_cache.locks import share_compilation
-from cdpr_drake.worker_process import become_worker
+from cdpr_drake.worker_process import become_worker, resident_memory
 
 Job = TypeVar("Job")
 Result = TypeVar("Result")
 
 POLL = 0.2
 """Time between two looks at a request to stop, and at whether all processes live [s]."""
+
+
+MOST_GROWTH = 2**30
+"""Memory that a process may keep after its first job, before others take the place of all [bytes].
+
+Drake's systems written in Python are never freed (Drake issue 24162): a process that builds many
+diagrams grows until the machine has no memory left.
+"""
 
 
 def default_workers() -> int:
@@ -41,6 +49,7 @@ def run_jobs(
     survive a fork. They ignore Ctrl-C and SIGTERM: it is for this process to ask them to stop;
     should it be killed, they end too. Any exception here, and who leaves the loop, ends them at
     once, in the middle of their jobs. With one worker the jobs are done in this process, in order.
+    Processes whose memory has grown by `MOST_GROWTH` are replaced between two jobs.
 
     Args:
         work: A function of a module, so that a process can find it by name.
@@ -72,19 +81,28 @@ def run_jobs(
         return
     pool = standing or PersistentPool(count)
     waiting, suspects = deque(range(len(jobs))), deque[int]()
-    running: dict[Future[Result], int] = {}
+    running: dict[Future[tuple[Result, bool]], int] = {}
     alone = False  # whether what runs is a suspect, with nobody beside it
+    grown = False  # whether a process keeps too much memory
     try:
         while True:
             broken = False
-            while not stop() and (not running if suspects or alone else len(running) < count):
+            if grown and not running:
+                pool.renew()
+                grown = False
+            while (
+                not grown
+                and not stop()
+                and (not running if suspects or alone else len(running) < count)
+            ):
                 alone = bool(suspects)
                 queue = suspects or waiting
                 if not queue:
                     break
                 index = queue.popleft()
                 try:
-                    running[pool.there.submit(_work_in_turns, work, jobs[index])] = index
+                    future = pool.there.submit(_work_in_turns, work, jobs[index], MOST_GROWTH)
+                    running[future] = index
                 except BrokenProcessPool:  # one died since the last look
                     queue.appendleft(index)
                     broken = True
@@ -99,7 +117,9 @@ def run_jobs(
                 pool.there.kill()  # and what runs there is broken at the next look
             dead = [future for future in done if isinstance(future.exception(), BrokenProcessPool)]
             for future in done - set(dead):
-                yield running.pop(future), future.result()
+                result, swollen = future.result()
+                grown = grown or swollen
+                yield running.pop(future), result
             if not dead:
                 continue
             if on_lost is None:
@@ -120,10 +140,23 @@ def run_jobs(
             pool.end()
 
 
-def _work_in_turns(work: Callable[[Job], Result], job: Job) -> Result:
-    """Does a job in a process of a pool; of kernels that are missing each compiles others."""
+def _work_in_turns(
+    work: Callable[[Job], Result], job: Job, most_growth: int
+) -> tuple[Result, bool]:
+    """Does a job in a process of a pool; of kernels that are missing each compiles others.
+
+    Returns:
+        The result, and whether the process keeps more memory than `most_growth` [bytes] since its
+        first job.
+    """
     share_compilation()
-    return work(job)
+    result = work(job)
+    used = resident_memory()
+    return result, used - _after_first_job.setdefault("memory", used) > most_growth
+
+
+_after_first_job: dict[str, int] = {}
+"""Memory of this process when its first job was done [bytes]."""
 
 
 class PersistentPool:

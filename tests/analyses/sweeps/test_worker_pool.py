@@ -12,7 +12,7 @@ from cdpr_drake.analyses.sweeps import worker_pool
 from cdpr_drake.analyses.sweeps.worker_pool import PersistentPool, run_jobs
 from cdpr_drake.analyses.sweeps.workers import run_jobs_somewhere
 from cdpr_drake.errors import SweepError
-from tests.analyses.sweeps.dying_jobs import die_for, newest_dies
+from tests.analyses.sweeps.dying_jobs import die_for, hold, newest_dies
 
 
 @pytest.mark.parametrize("workers", [1, 2])
@@ -54,6 +54,20 @@ def test_a_process_that_dies_costs_its_own_job_only():
     found = dict(run_jobs(die_for, jobs, 2, on_lost=lost.append))
     assert sorted(lost) == [2, 5]
     assert found == {0: 1, 1: 2, 3: 4, 4: 5, 6: 7}
+
+
+def test_processes_that_keep_memory_are_replaced_and_no_job_is_lost(monkeypatch):
+    """Each start of the study of basins left 0.2 MB: 14,000 of them filled a machine."""
+    size, jobs = 20_000_000, 6
+
+    def hosts(most_growth):
+        monkeypatch.setattr(worker_pool, "MOST_GROWTH", most_growth)
+        found = dict(run_jobs(hold, [size] * jobs, 2))
+        assert set(found) == set(range(jobs))
+        return set(found.values())
+
+    assert len(hosts(100 * size)) <= 2
+    assert len(hosts(size // 2)) > 2
 
 
 def processes(pool, jobs=8):
