@@ -49,7 +49,8 @@ def run_jobs(
     survive a fork. They ignore Ctrl-C and SIGTERM: it is for this process to ask them to stop;
     should it be killed, they end too. Any exception here, and who leaves the loop, ends them at
     once, in the middle of their jobs. With one worker the jobs are done in this process, in order.
-    Processes whose memory has grown by `MOST_GROWTH` are replaced between two jobs.
+    Processes whose memory has grown by `MOST_GROWTH` are replaced between two jobs; of one worker,
+    another process does the rest.
 
     Args:
         work: A function of a module, so that a process can find it by name.
@@ -73,14 +74,17 @@ def run_jobs(
     if standing is not None:
         count = standing.count
     stop = should_stop or (lambda: False)
+    waiting, suspects = deque(range(len(jobs))), deque[int]()
     if count == 1:
-        for index, job in enumerate(jobs):
+        before = resident_memory()
+        while waiting and resident_memory() - before <= MOST_GROWTH:
             if stop():
                 return
-            yield index, work(job)
-        return
+            index = waiting.popleft()
+            yield index, work(jobs[index])
+        if not waiting:
+            return
     pool = standing or PersistentPool(count)
-    waiting, suspects = deque(range(len(jobs))), deque[int]()
     running: dict[Future[tuple[Result, bool]], int] = {}
     alone = False  # whether what runs is a suspect, with nobody beside it
     grown = False  # whether a process keeps too much memory

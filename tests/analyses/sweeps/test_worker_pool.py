@@ -56,18 +56,19 @@ def test_a_process_that_dies_costs_its_own_job_only():
     assert found == {0: 1, 1: 2, 3: 4, 4: 5, 6: 7}
 
 
-def test_processes_that_keep_memory_are_replaced_and_no_job_is_lost(monkeypatch):
+@pytest.mark.parametrize(("workers", "most"), [(1, 1), (2, 2)])
+def test_processes_that_keep_memory_are_replaced_and_no_job_is_lost(monkeypatch, workers, most):
     """Each start of the study of basins left 0.2 MB: 14,000 of them filled a machine."""
     size, jobs = 20_000_000, 6
 
     def hosts(most_growth):
         monkeypatch.setattr(worker_pool, "MOST_GROWTH", most_growth)
-        found = dict(run_jobs(hold, [size] * jobs, 2))
+        found = dict(run_jobs(hold, [size] * jobs, workers))
         assert set(found) == set(range(jobs))
         return set(found.values())
 
-    assert len(hosts(100 * size)) <= 2
-    assert len(hosts(size // 2)) > 2
+    assert len(hosts(100 * size)) <= most
+    assert len(hosts(size // 2)) > most
 
 
 def processes(pool, jobs=8):
