@@ -1,11 +1,14 @@
 """Numba kernel for the pose of a plane with points on it, from one image.
 
 A homography gives the two poses of a plane that its image allows to first order (IPPE); from each
-of them least squares over the reprojection, in pixels, leads to a minimum, and the lower one is the
-pose. Rotations are matrices all the way, so that half turns are nothing special.
+of them Newton's method leads to a minimum of the squares of the reprojection, in pixels, and the
+lower one is the pose. Rotations are matrices all the way, so that half turns are nothing special.
+Seen nearly head on, an image with noise leaves residuals that bend the sum of squares as much as
+its first derivatives do: there the second ones save tens of steps.
 
 Source: Collins and Bartoli, Infinitesimal plane-based pose estimation, IJCV 109, 2014; Marquardt,
-J. SIAM 11, 1963, for the least squares.
+J. SIAM 11, 1963, for the damping; Nocedal and Wright, Numerical Optimization, 3.3 and 10.2, for
+the second derivatives.
 """
 
 from __future__ import annotations
@@ -18,13 +21,26 @@ from cdpr_drake.numerics.lanes import COUNT, lane_of, load_lanes, no_lanes, stor
 from cdpr_drake.numerics.linear_algebra_kernel import eliminate, substitute
 
 STEPS = 300
-"""Largest number of steps of the least squares; about five are needed, more where both minima are
-nearly one."""
+"""Largest number of steps; about five are needed, more where both minima are nearly one."""
 
 # Its parts are put into it as they are written: a kernel of kernels compiles all of them anew.
 
 SETTLED = 1e-13
-"""A step that turns [rad] and moves, as a share of the distance, by less is the last."""
+"""Where less than this is left, as an angle [rad] or a share of the distance, a step is the last;
+rounding of pixels leaves about as much."""
+
+CLOSE = 1e-7
+"""Below this size of a step sums of squares tell no more by their digits which pose is better."""
+
+STALLED = 0.9
+"""A close step of a larger share of the one before is rounding, and the last."""
+
+TRUSTED = 0.1
+"""Largest step whose fall of the sum of squares tells what is to come."""
+
+LARGEST_FALL = 10.0
+"""The sum of squares may still fall by this many times what the next step makes of it: steps that
+shrink by a tenth only, each a tenth of what is left, add up to so much."""
 
 
 @njit(error_model="numpy", inline="always")
@@ -129,14 +145,18 @@ def _squares(xy: Array, uv: Array, camera: Array, R: Array, p: Array) -> float:
 
 
 @njit(error_model="numpy", inline="always")
-def _normal_equations(xy: Array, uv: Array, camera: Array, R: Array, p: Array, N: Array) -> None:
+def _normal_equations(
+    xy: Array, uv: Array, camera: Array, R: Array, p: Array, N: Array, C: Array
+) -> float:
     """J'J and, as column 6, -J'e of the reprojection, shape (6, 8), the last column zero.
 
-    For a rotation vector and a displacement in C.
+    For a rotation vector and a displacement in C. J'J and C, shape (6, 8), its last columns zero,
+    add up to all second derivatives of e'e / 2. The sum of squares e'e is returned [px^2].
     """
-    row = np.zeros(COUNT)
+    row, total = np.zeros(COUNT), 0.0
     for i in range(6):
         store_lanes(N[i], 0, no_lanes())
+        store_lanes(C[i], 0, no_lanes())
     for k in range(xy.shape[0]):
         x, y = xy[k, 0], xy[k, 1]
         rx, ry, rz = (
@@ -144,45 +164,75 @@ def _normal_equations(xy: Array, uv: Array, camera: Array, R: Array, p: Array, N
             R[1, 0] * x + R[1, 1] * y,
             R[2, 0] * x + R[2, 1] * y,
         )
-        Z = rz + p[2]
+        near = 1.0 / (rz + p[2])
+        gx, gy, gz = 0.0, 0.0, 0.0
         for axis in range(2):
-            f = camera[axis]
-            along = rx + p[0] if axis == 0 else ry + p[1]
-            e = f * along / Z + camera[2 + axis] - uv[k, axis]
-            row[3], row[4], row[5] = 0.0, 0.0, -f * along / (Z * Z)
-            row[3 + axis] = f / Z
+            along = (rx + p[0] if axis == 0 else ry + p[1]) * near
+            scale = camera[axis] * near
+            e = camera[axis] * along + camera[2 + axis] - uv[k, axis]
+            row[3], row[4], row[5] = 0.0, 0.0, -scale * along
+            row[3 + axis] = scale
             # The point moves by w x r + d.
             row[0] = ry * row[5] - rz * row[4]
             row[1] = rz * row[3] - rx * row[5]
             row[2] = rx * row[4] - ry * row[3]
             row[6] = -e
+            total += e * e
+            gx, gy, gz = gx + e * row[3], gy + e * row[4], gz + e * row[5]
             for i in range(6):
                 store_lanes(N[i], 0, load_lanes(N[i], 0) + row[i] * load_lanes(row, 0))
+        # g is the derivative of e'e / 2 by the point; of what is left of its second derivatives by
+        # it, beside J'J, these are (x, z), (y, z) and (z, z), and the others zero.
+        hx, hy, hz = -near * gx, -near * gy, -2.0 * near * gz
+        C[3, 5] += hx
+        C[4, 5] += hy
+        C[5, 5] += hz
+        a, b, c = hz * ry - hy * rz, hx * rz - hz * rx, hx * ry - hy * rx
+        C[0, 3] += hx * ry
+        C[0, 4] += hy * ry
+        C[0, 5] += a
+        C[1, 3] -= hx * rx
+        C[1, 4] -= hy * rx
+        C[1, 5] += b
+        C[2, 5] -= c
+        # To second order the point moves by w x (w x r) / 2 more.
+        gr = gx * rx + gy * ry + gz * rz
+        C[0, 0] += ry * (a - hy * rz) + gx * rx - gr
+        C[0, 1] += rz * hx * ry - rx * a + 0.5 * (gx * ry + gy * rx)
+        C[0, 2] += 0.5 * (gx * rz + gz * rx) - ry * c
+        C[1, 1] += gy * ry - gr - rx * (b + hx * rz)
+        C[1, 2] += rx * c + 0.5 * (gy * rz + gz * ry)
+        C[2, 2] += gz * rz - gr
+    for i in range(6):
+        for j in range(i):
+            C[i, j] = C[j, i]
+    return total
 
 
 @njit(error_model="numpy", inline="always")
-def _solve(N: Array, damping: float, S: Array, x: Array) -> None:
-    """x with (N + damping diag N) x = column 6 of N, shape (6, 8), by Gauss with row pivots."""
-    for i in range(6):
-        store_lanes(S[i], 0, load_lanes(N[i], 0))
-        S[i, i] *= 1.0 + damping
-    for k in range(6):
-        best = k
-        for i in range(k + 1, 6):
-            if abs(S[i, k]) > abs(S[best, k]):
-                best = i
-        top = load_lanes(S[best], 0)
-        if best != k:
-            store_lanes(S[best], 0, load_lanes(S[k], 0))
-            store_lanes(S[k], 0, top)
-        pivot = lane_of(top, k)
-        for i in range(k + 1, 6):
-            store_lanes(S[i], 0, load_lanes(S[i], 0) - S[i, k] / pivot * top)
+def _solve(N: Array, C: Array, damping: float, S: Array, x: Array) -> bool:
+    """x with (N + C + damping diag N) x = column 6 of N, shape (6, 8), by Gauss; without C, and
+    False, where that matrix is not positive definite."""
+    for weight in (1.0, 0.0):
+        for i in range(6):
+            store_lanes(S[i], 0, load_lanes(N[i], 0) + weight * load_lanes(C[i], 0))
+            S[i, i] += damping * N[i, i]
+        definite = True
+        for k in range(6):  # a positive definite matrix needs no other order of pivots
+            top = load_lanes(S[k], 0)
+            pivot = lane_of(top, k)
+            definite = definite and pivot > 0.0
+            share = 1.0 / pivot
+            for i in range(k + 1, 6):
+                store_lanes(S[i], 0, load_lanes(S[i], 0) - S[i, k] * share * top)
+        if definite:
+            break
     for i in range(5, -1, -1):
         x[i] = S[i, 6]
         for j in range(i + 1, 6):
             x[i] -= S[i, j] * x[j]
         x[i] /= S[i, i]
+    return weight > 0.0
 
 
 @njit(error_model="numpy", inline="always")
@@ -203,34 +253,59 @@ def _turned(R: Array, w: Array, out: Array) -> None:
 
 
 @njit(error_model="numpy", inline="always")
-def _least_reprojection(xy: Array, uv: Array, camera: Array, R: Array, p: Array) -> float:
-    """Moves a pose to the minimum that it belongs to; the sum of squares there [px^2]."""
-    N, S, x = np.empty((6, COUNT)), np.empty((6, COUNT)), np.zeros(6)
+def _least_reprojection(
+    xy: Array, uv: Array, camera: Array, R: Array, p: Array, bound: float
+) -> float:
+    """Moves a pose to the minimum that it belongs to; the sum of squares there [px^2].
+
+    Infinite, and the pose anywhere, where the minimum lies above a bound [px^2].
+    """
+    N, C, S = np.empty((6, COUNT)), np.empty((6, COUNT)), np.empty((6, COUNT))
+    x = np.zeros(6)
     R_next, p_next = np.empty((3, 3)), np.empty(3)
-    error, damping = np.inf, 1e-6
-    for step in range(STEPS):
-        if step > 0:
-            _solve(N, damping, S, x)
+    error, damping, before, close = np.inf, 1e-6, np.inf, False
+    for _ in range(STEPS):
         _turned(R, x, R_next)
         for i in range(3):
             p_next[i] = p[i] + x[3 + i]
-        # At the minimum most steps end above it by rounding: they need no derivatives.
-        new = _squares(xy, uv, camera, R_next, p_next)
-        turn = np.sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2])
-        move = np.sqrt(x[3] * x[3] + x[4] * x[4] + x[5] * x[5])
-        last = step > 0 and turn < SETTLED and move < SETTLED * abs(p[2])
-        if new <= error:
+        new = _normal_equations(xy, uv, camera, R_next, p_next, N, C)
+        if close or new <= error:
             error = new
             damping *= 0.1
             for i in range(3):
                 p[i] = p_next[i]
                 for j in range(3):
                     R[i, j] = R_next[i, j]
-            _normal_equations(xy, uv, camera, R, p, N)
-        else:  # also where it is not a number
-            damping = max(damping, 1e-12) * 10.0
-        if last or damping > 1e12 or not error < np.inf:
+        else:  # also where it is not a number: back, to find the same sum and go on from it
+            damping = max(damping, 1e-12) * 100.0
+            before = np.inf
+            for i in range(6):
+                x[i] = 0.0
+            if damping > 1e12 or not error < np.inf:
+                break
+            continue
+        is_newton = _solve(N, C, damping, S, x)
+        turn = np.sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2])
+        move = np.sqrt(x[3] * x[3] + x[4] * x[4] + x[5] * x[5])
+        size, fall = max(turn, move / abs(p[2])), 0.0
+        for i in range(6):
+            fall += x[i] * N[i, 6]
+        if size < TRUSTED and error - LARGEST_FALL * fall > bound:
+            return np.inf
+        close = size < CLOSE
+        # What is left after a step is about as much smaller than it as it is than the one before,
+        # and after one of Newton's as the square of that.
+        share = min(size / before, 1.0)
+        if is_newton:
+            share *= share
+        if close and (size * share < SETTLED or size > STALLED * before):
+            _turned(R, x, R_next)
+            for i in range(3):
+                p[i] += x[3 + i]
+                for j in range(3):
+                    R[i, j] = R_next[i, j]
             break
+        before = size
     return error
 
 
@@ -261,13 +336,19 @@ def planar_pose(p_OK: Array, uv: Array, camera: Array, R_CO: Array, p_CO: Array)
         xy[k, 0], xy[k, 1] = (p_OK[k, 0] - mx) / size, (p_OK[k, 1] - my) / size
         image[k, 0] = (uv[k, 0] - camera[2]) / camera[0]
         image[k, 1] = (uv[k, 1] - camera[3]) / camera[1]
-    H, R, p = np.empty((3, 3)), np.empty((2, 3, 3)), np.empty(3)
+    H, R = np.empty((3, 3)), np.empty((2, 3, 3))
     _homography(xy, image, H)
     _two_rotations(H, R)
-    best, found = np.inf, False
+    # The better start goes first, to spare the other most of its way.
+    places, starts = np.empty((2, 3)), np.empty(2)
     for k in range(2):
-        _position(xy, image, R[k], p)
-        error = _least_reprojection(xy, uv, camera, R[k], p)
+        _position(xy, image, R[k], places[k])
+        starts[k] = _squares(xy, uv, camera, R[k], places[k])
+    best, found, first = np.inf, False, 1 if starts[1] < starts[0] else 0
+    for turn in range(2):
+        k = first if turn == 0 else 1 - first
+        p = places[k]
+        error = _least_reprojection(xy, uv, camera, R[k], p, best)
         if error < best and p[2] > 0.0:
             best, found = error, True
             for i in range(3):

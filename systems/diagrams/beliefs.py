@@ -23,20 +23,49 @@ _POINTS, _INITIAL_POSE, _CAMERA, _WINCHES, _EXTERNAL_CAMERA, _TOLD_OBJECT = 1, 2
 """Streams of random numbers of one seed, so that one perturbation does not change another."""
 
 
-def believed_robot(settings: VisualServoSettings, robot: Robot) -> BelievedRobot:
+def unshifted_robot(settings: VisualServoSettings, robot: Robot) -> BelievedRobot:
+    """What is believed of the robot before anything is drawn or points are shifted.
+
+    Of settings that differ in nothing but the seed it is the same.
+
+    Raises:
+        RobotFileError: The file that is believed cannot be read.
+    """
+    perturbations = settings.perturbations
+    file = perturbations.believed_robot
+    base = robot if file is None else load_robot(file)
+    X_PC = base.camera_mount(settings.camera.mount).pose.transform()
+    if perturbations.camera_pose is not None:
+        X_PC = X_PC @ perturbations.camera_pose.transform()
+    return BelievedRobot(
+        cables=base.cable_set(),
+        X_PC=X_PC,
+        X_WP0=(perturbations.initial_pose or settings.initial_pose).transform(),
+        motions=robot.servo_rows("a visual servo"),
+        cable_speed=robot.winch.rated_cable_speed(),
+    )
+
+
+def believed_robot(
+    settings: VisualServoSettings, robot: Robot, unshifted: BelievedRobot | None = None
+) -> BelievedRobot:
     """The robot as controller and estimators believe it to be.
+
+    Args:
+        settings: The servo.
+        robot: The robot.
+        unshifted: What `unshifted_robot` gave for them, or for another seed; None: found here.
 
     Raises:
         RobotFileError: The file that they believe cannot be read.
     """
     perturbations = settings.perturbations
-    file = perturbations.believed_robot
-    base = robot if file is None else load_robot(file)
+    before = unshifted_robot(settings, robot) if unshifted is None else unshifted
 
     def stream(number: int) -> np.random.Generator:
         return np.random.default_rng([settings.seed, number])
 
-    true = base.cable_set()
+    true = before.cables
     m, points = true.count, stream(_POINTS)
     p_WA = true.p_WA + random_shifts(
         m, perturbations.exit_points, points, perturbations.exit_points_together
@@ -48,18 +77,13 @@ def believed_robot(settings: VisualServoSettings, robot: Robot) -> BelievedRobot
         p_WA = p_WA + perturbations.exit_point_shifts.T
     if perturbations.anchor_point_shifts is not None:
         p_PB = p_PB + perturbations.anchor_point_shifts.T
-    X_PC = base.camera_mount(settings.camera.mount).pose.transform()
-    if perturbations.camera_pose is not None:
-        X_PC = X_PC @ perturbations.camera_pose.transform()
-    X_WP0 = (perturbations.initial_pose or settings.initial_pose).transform()
-    motions = robot.servo_rows("a visual servo")
-    planar = motions == PLANAR_ROWS
-    return BelievedRobot(
+    planar = before.motions == PLANAR_ROWS
+    start, shift = before.X_WP0, perturbations.initial_pose_shift
+    return replace(
+        before,
         cables=replace(true, p_WA=p_WA, p_PB=p_PB),
-        X_PC=shifted_pose(X_PC, perturbations.camera_pose_shift, stream(_CAMERA)),
-        X_WP0=shifted_pose(X_WP0, perturbations.initial_pose_shift, stream(_INITIAL_POSE), planar),
-        motions=motions,
-        cable_speed=robot.winch.rated_cable_speed(),
+        X_PC=shifted_pose(before.X_PC, perturbations.camera_pose_shift, stream(_CAMERA)),
+        X_WP0=shifted_pose(start, shift, stream(_INITIAL_POSE), planar),
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -77,10 +78,21 @@ def make_controller(
         partition=_partition(settings, pinhole) if c.scheme == "partitioned" else None,
         switching=_switching(settings) if c.scheme == "switching" else None,
     )
+    return controller_of(settings, robot, law, make_tasks(settings, target))
+
+
+def controller_of(
+    settings: VisualServoSettings,
+    robot: BelievedRobot,
+    law: ServoLaw,
+    tasks: Sequence[ServoTask],
+) -> ServoController:
+    """The servo of a law and tasks that were made for these settings, or for another seed."""
+    c = settings.controller
     cables = robot.cables if c.pulleys else robot.cables.without_pulleys()
     return ServoController(
         law,
-        make_tasks(settings, target),
+        tasks,
         replace(robot, cables=cables),
         1.0 / c.rate,
         settings.target.pose.transform() if settings.target.carrier == "platform" else None,

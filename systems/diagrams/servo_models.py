@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import pickle
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
 
 from pydrake.math import RigidTransform
 
@@ -21,8 +19,9 @@ from cdpr_drake.systems.diagrams.beliefs import (
     believed_robot,
     read_camera,
     told_object,
+    unshifted_robot,
 )
-from cdpr_drake.systems.diagrams.controller import make_controller
+from cdpr_drake.systems.diagrams.controller import controller_of, make_controller
 from cdpr_drake.systems.diagrams.fusion_models import fusion_task
 from cdpr_drake.systems.estimators.estimator_kinds import EstimatorTask
 from cdpr_drake.systems.remote.remote_servo import RemoteServo
@@ -38,6 +37,7 @@ class ServoModel:
 
     Attributes:
         robot: The robot's data.
+        unshifted: What is believed of it before a seed is drawn from, see `unshifted_robot`.
         believed: That robot as it is believed to be.
         target: What the camera looks at.
         motion: How the target moves in its carrier.
@@ -50,6 +50,7 @@ class ServoModel:
     """
 
     robot: Robot
+    unshifted: BelievedRobot
     believed: BelievedRobot
     target: Target
     motion: MovingPose
@@ -165,15 +166,17 @@ def servo_model(
     Args:
         settings: The settings.
         robot: The robot.
-        known: One of the same robot, and of settings that differ in nothing but the seed. Where
-            that makes no difference to what is believed, to the last bit, it is taken over.
+        known: One of the same robot, and of settings that differ in nothing but the seed: what no
+            seed changes is taken over. Where the seed makes no difference to what is believed, to
+            the last bit, that is all of it.
 
     Raises:
         VisualFeatureError: The target does not have what the scheme needs.
     """
-    believed, pinhole = believed_robot(settings, robot), read_camera(settings, robot)
-    if known is not None and _same((believed, pinhole), (known.believed, known.pinhole)):
-        return known
+    if known is not None:
+        return _of_another_seed(settings, known)
+    unshifted = unshifted_robot(settings, robot)
+    believed, pinhole = believed_robot(settings, robot, unshifted), read_camera(settings, robot)
     mount = robot.camera_mount(settings.camera.mount)
     target, motion = settings.target.target(), settings.target.path()
     on_platform = settings.target.carrier == "platform"
@@ -186,6 +189,7 @@ def servo_model(
     X_CdO = last_task.desired.transform()
     return ServoModel(
         robot=robot,
+        unshifted=unshifted,
         believed=believed,
         target=target,
         motion=motion,
@@ -198,6 +202,22 @@ def servo_model(
     )
 
 
-def _same(one: Any, other: Any) -> bool:
-    """Whether two beliefs are equal to the last bit, signs of zeros included."""
-    return pickle.dumps(one) == pickle.dumps(other)
+def _of_another_seed(settings: VisualServoSettings, known: ServoModel) -> ServoModel:
+    """As `servo_model` with `known`."""
+    believed = believed_robot(settings, known.robot, known.unshifted)
+    if _shifts(believed) == _shifts(known.believed):
+        return known
+    X_WP = known.mounting.X_WP(known.X_CdO, known.motion.at(0.0))
+    return replace(
+        known,
+        believed=believed,
+        controller=controller_of(settings, believed, known.controller.law, known.controller.tasks),
+        plan=open_loop_plan(settings.open_loop, believed, X_WP),
+    )
+
+
+def _shifts(believed: BelievedRobot) -> bytes:
+    """All that a seed changes of a belief, to the last bit, signs of zeros included."""
+    cables, poses = believed.cables, (believed.X_PC, believed.X_WP0)
+    arrays = (cables.p_WA, cables.p_PB, *(X.GetAsMatrix34() for X in poses))
+    return b"".join(array.tobytes() for array in arrays)

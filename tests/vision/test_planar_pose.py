@@ -17,6 +17,10 @@ SQUARE = 0.03 * np.array([[-1.0, 1.0, 1.0, -1.0], [1.0, 1.0, -1.0, -1.0], [0.0, 
 EXACT = 1e-9
 """Of a pose from exact images [m, rad]: rounding of pixels over a square of 60 px."""
 
+AT_REST = 1e-10
+"""Of a step of Gauss and Newton from the pose where the sum of squares is least [m, rad]. Rounding
+of pixels gives 1e-12; where the sum of squares falls no more by its digits it is 1e-8."""
+
 NO_HIGHER = 1e-9
 """Share by which a sum of squares may pass OpenCV's, which its steps leave just as uncertain."""
 
@@ -84,6 +88,30 @@ def test_no_pose_of_opencv_fits_noisy_images_better():
         uv += 0.3 * random.standard_normal(uv.shape)
         found = pose_from_points(points, uv, CAMERA)
         assert squares(found, points, uv) <= by_opencv(points, uv) * (1.0 + NO_HIGHER)
+
+
+def last_step(X_CO, points, uv):
+    """The step of Gauss and Newton from a pose, as a rotation vector [rad] and a displacement [m];
+    derivatives by complex steps."""
+    r, tiny = X_CO.rotation().matrix() @ points, 1e-30
+    f, c = np.array([[CAMERA.fx], [CAMERA.fy]]), np.array([[CAMERA.cx], [CAMERA.cy]])
+
+    def errors(x):
+        q = r + np.cross(x[:3], r, axis=0) + (X_CO.translation() + x[3:])[:, np.newaxis]
+        return (f * q[:2] / q[2] + c - uv).ravel()
+
+    J = np.array([errors(1j * tiny * axis).imag / tiny for axis in np.eye(6)]).T
+    return np.linalg.lstsq(J, -errors(np.zeros(6)), rcond=None)[0]
+
+
+def test_the_pose_is_the_minimum_to_more_than_the_sum_of_squares_tells():
+    random = np.random.default_rng(3)
+    for number in range(60):
+        tilt = [0.0, 0.02, 0.1, 0.4, 0.7][number % 5] * random.normal(size=3)
+        X_CO = facing(tilt, [*random.uniform(-0.05, 0.05, 2), random.uniform(0.1, 0.4)])
+        uv = CAMERA.project(X_CO @ SQUARE) + 0.3 * random.standard_normal((2, 4))
+        found = pose_from_points(SQUARE, uv, CAMERA)
+        assert np.linalg.norm(last_step(found, SQUARE, uv)) < AT_REST
 
 
 def test_what_has_no_pose_gives_none():
