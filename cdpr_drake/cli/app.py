@@ -145,7 +145,13 @@ def _show_version(wanted: bool) -> None:
 def _options(
     context: typer.Context,
     version: Annotated[
-        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Versions.")
+        bool,
+        typer.Option(
+            "--version",
+            callback=_show_version,
+            is_eager=True,
+            help="Print the versions of the package and of Drake.",
+        ),
     ] = False,
 ) -> None:
     """Cable-driven parallel robots in Drake."""

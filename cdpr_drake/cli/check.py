@@ -111,7 +111,9 @@ def check(
         list[Path],
         typer.Argument(help="Robot or scenario files or names, files of other tools, or logs."),
     ],
-    plot: Annotated[Path | None, typer.Option(help="File of a figure of the one log.")] = None,
+    plot: Annotated[
+        Path | None, typer.Option(help="File for a figure of the log, where one log is checked.")
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Checks files of robots, mechanisms, scenarios; lists every problem; then exit code 2.

@@ -33,19 +33,19 @@ LogFormat = Annotated[
 ]
 LogRobot = Annotated[
     str | None,
-    typer.Option(help="Robot whose cables' names the log takes.", autocompletion=robot_words),
+    typer.Option(help="Robot whose cable names the columns take.", autocompletion=robot_words),
 ]
 Cables = Annotated[
     str | None, typer.Option(help="Names of the cables in the order of the log, as A,B,C,D.")
 ]
 Units = Annotated[
     str | None,
-    typer.Option("--unit", help="Units that the file does not say, as length=mm,force=N."),
+    typer.Option("--unit", help="Units that the file does not state, as length=mm,force=N."),
 ]
 Mapping = Annotated[
     Path | None,
     typer.Option(
-        help="YAML that says what columns are: columns: [time_s, C1_length_mm, ''], or name: "
+        help="YAML file of what columns are: columns: [time_s, C1_length_mm, ''], or name: "
         "header; skip_rows, separator, rate_hz."
     ),
 ]
@@ -71,7 +71,7 @@ def help_words() -> str:
 
 def import_log(
     file: Annotated[Path, typer.Argument(help="The log.")],
-    out: Annotated[Path | None, typer.Option(help="The log that is written, CSV.")] = None,
+    out: Annotated[Path | None, typer.Option(help="CSV file to write.")] = None,
     beside: Annotated[
         Path | None, typer.Option("--with", help="Log of the same motion by another recorder.")
     ] = None,
@@ -86,8 +86,8 @@ def import_log(
     axes: Axes = None,
     start: Annotated[float | None, typer.Option("--from", help="First instant [s].")] = None,
     until: Annotated[float | None, typer.Option(help="Last instant [s].")] = None,
-    every: Annotated[int, typer.Option(min=1, help="Keep one of so many rows.")] = 1,
-    plot: Annotated[Path | None, typer.Option(help="File of a figure of the log.")] = None,
+    every: Annotated[int, typer.Option(min=1, help="Keep every n-th row.")] = 1,
+    plot: Annotated[Path | None, typer.Option(help="File for a figure of the log.")] = None,
     overwrite: Annotated[bool, typer.Option(help="Replace the file.")] = False,
     as_json: AsJson = False,
 ) -> None:

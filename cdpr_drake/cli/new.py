@@ -41,15 +41,15 @@ def new(
         typer.Argument(help=f"One of {', '.join(KINDS)}.", autocompletion=words_among(KINDS)),
     ],
     name: Annotated[
-        str, typer.Argument(help="Its name; the file is NAME.yaml, or NAME.py and test_NAME.py.")
+        str, typer.Argument(help="Name; the file is NAME.yaml, or NAME.py and test_NAME.py.")
     ],
     source: Annotated[
         str | None,
         typer.Option(
-            "--from", help=f"Robot or scenario to begin as; {EXAMPLE} or {DEFAULT_SCENARIO}."
+            "--from", help=f"Robot or scenario to copy; default: {EXAMPLE} or {DEFAULT_SCENARIO}."
         ),
     ] = None,
-    out: Annotated[Path, typer.Option(help="Folder of the file.")] = Path(),
+    out: Annotated[Path, typer.Option(help="Folder for the file.")] = Path(),
     overwrite: Annotated[bool, typer.Option(help="Replace a file of that name.")] = False,
 ) -> None:
     """Writes a robot, scenario, controller, estimator or study to start from.

@@ -20,7 +20,7 @@ FOLDER = Path(__file__).parent.parent / "notebooks"
 
 def notebooks(
     folder: Annotated[
-        Path | None, typer.Argument(help="Folder to copy them to; without it, they are listed.")
+        Path | None, typer.Argument(help="Folder to copy them to; without it they are listed.")
     ] = None,
     as_json: AsJson = False,
 ) -> None:

@@ -52,17 +52,20 @@ def tension(
     pose: Annotated[str | None, POSE] = None,
     method: Annotated[
         str,
-        typer.Option(help="Method by name, or all.", autocompletion=words_among([*METHODS, "all"])),
+        typer.Option(
+            help="Tension distribution method by name, or all.",
+            autocompletion=words_among([*METHODS, "all"]),
+        ),
     ] = "quadratic_program",
     wrench: Wrench = None,
     limits: Limits = None,
     mass: Mass = None,
     reference: Annotated[
-        float | None, typer.Option(help="Wanted tension of all cables [N], for reference_program.")
+        float | None, typer.Option(help="Desired tension of all cables [N], for reference_program.")
     ] = None,
     length_scale: Annotated[
         float | None,
-        typer.Option(help="By which slack_relaxed and log_barrier divide moments [m]."),
+        typer.Option(help="Length by which slack_relaxed and log_barrier divide moments [m]."),
     ] = None,
     joint: Joint = None,
     held: Held = None,
