@@ -183,7 +183,7 @@ def calibrate(
             )
         return tell_fit(simulated, session, as_json)
     if poses_from is not None:
-        raise CdprError("--poses-from: found without --campaign; accepted: with it")
+        raise CdprError("--poses-from: found without --campaign; accepted: with --campaign")
     name, file = robot_and_log("calibrate", robot, log)
     loaded = load_robot(name, "cdpr calibrate")
     folder = results_below_runs(out, f"calibrate-{loaded.name}")

@@ -12,7 +12,7 @@ from cdpr_drake.analyses.front.logs import import_log
 from cdpr_drake.analyses.front.mechanisms import hang_mechanism
 from cdpr_drake.analyses.logs.log_formats import detect_log
 from cdpr_drake.cli.import_log import log_lines
-from cdpr_drake.cli.options import AsJson, save_plot
+from cdpr_drake.cli.options import AsJson, check_plots, save_plot
 from cdpr_drake.cli.terminal import print_json
 from cdpr_drake.errors import CdprError, meant_names
 from cdpr_drake.models.formats.file_kinds import is_foreign
@@ -122,7 +122,8 @@ def check(
     the log does not state, cdpr import-log takes as options.
     """
     if plot is not None and (len(files) != 1 or not is_log(files[0])):
-        raise CdprError(f"--plot: found for {', '.join(map(str, files))}; accepted: for one log")
+        raise CdprError(f"--plot: found with {', '.join(map(str, files))}; accepted: with one log")
+    check_plots(plot)
     found = [checked(path) for path in files]
     if as_json:
         print_json(found)

@@ -121,7 +121,7 @@ def design(
         raise CdprError(f"--goal: found none; accepted: {', '.join(GOALS)}")
     names = [one.name for one in settings.goals]
     if len(set(names)) < len(names):
-        raise CdprError(f"--goal: found {', '.join(names)}; accepted: each once")
+        raise CdprError(f"--goal: found {', '.join(names)}; accepted: each goal once")
     loaded = load_robot(robot, "cdpr design")
     if parameters is None and loaded.is_planar():
         settings.exit_points.reach = np.array([REACH, REACH, 0.0])

@@ -72,8 +72,8 @@ def import_(
         return
     if repair_inertia:
         raise RobotFileError(
-            f"--repair-inertia: found for {file}; accepted for CASPR's models of several links, or "
-            "of joints that no platform on cables has"
+            f"--repair-inertia: found with {file}; accepted: with a CASPR model of several links, "
+            "or of joints that no platform on cables has"
         )
     imported = import_robot(file, name=name, model=model, cable_set=cable_set)
     folder = out or Path(imported.robot.name)

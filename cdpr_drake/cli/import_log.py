@@ -14,10 +14,11 @@ from cdpr_drake.analyses.logs.log_request import (
     LogRequest,
     axes_rotation,
     checked_units,
+    is_rate,
     read_mapping,
 )
 from cdpr_drake.cli.completion import robot_words, words_among
-from cdpr_drake.cli.options import AsJson, save_plot
+from cdpr_drake.cli.options import AsJson, check_plots, save_plot
 from cdpr_drake.cli.terminal import print_json
 from cdpr_drake.errors import CdprError, OutputFolderError
 from cdpr_drake.models.robot_loader import load_robot
@@ -92,8 +93,12 @@ def import_log(
     as_json: AsJson = False,
 ) -> None:
     """Reads a log of a machine or tracker, and writes one that calibrate and identify take."""
+    for read in (file, beside):
+        if out is not None and read is not None and out.resolve() == read.resolve():
+            raise OutputFolderError(f"--out: found {out}, the log itself; accepted: another file")
     if out is not None and out.exists() and not overwrite:
         raise OutputFolderError(f"--out: found {out}; accepted: a new file, or --overwrite")
+    check_plots(plot)
     request = log_request(robot, cables, unit, mapping=mapping, rate=rate, body=body, axes=axes)
     found = read_logs(
         file, request, format=log_format, beside=beside, beside_format=with_format, start=start,
@@ -132,6 +137,8 @@ def log_request(
     """
     if robot is not None and cables is not None:
         raise CdprError("--cables: found beside --robot; accepted: one of them")
+    if rate is not None and not is_rate(rate):
+        raise CdprError(f"--rate: found {rate:g}; accepted: above 0 [1/s]")
     names = None
     if robot is not None:
         names = tuple(c.name for c in load_robot(robot, "cdpr import-log").cables)
@@ -143,7 +150,9 @@ def log_request(
     for item in [] if unit is None else unit.split(","):
         dimension, mark, word = item.strip().partition("=")
         if not mark:
-            raise CdprError(f"--unit: found {item.strip()!r}; accepted: length=mm and the like")
+            raise CdprError(
+                f"--unit: found {item.strip()!r}; accepted: DIMENSION=UNIT, as length=mm"
+            )
         units[dimension] = word
     return LogRequest(
         cables=names, units=checked_units(units), body=body, rate=rate,

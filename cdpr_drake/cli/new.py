@@ -59,13 +59,14 @@ def new(
     """
     if not _NAME.fullmatch(name):
         raise CdprError(
-            f"name: found {name}; accepted: 1 to 64 letters, digits, _ . -, the first one no ."
+            f"name: found {name!r}; accepted: 1 to 64 letters, digits, '_', '.' or '-', not "
+            "beginning with '.'"
         )
     if kind not in KINDS:
         raise CdprError(f"kind of file {kind!r} is unknown; {closest(kind, KINDS)}")
     if kind in BLOCKS:
         if source is not None:
-            raise CdprError(f"--from: found {source} with {kind}; accepted with: robot, scenario")
+            raise CdprError(f"--from: found {source} with {kind}; accepted: with robot, scenario")
         for path in write_files(out, _block(kind, name), overwrite):
             print(path)
         return
@@ -88,7 +89,10 @@ def _block(kind: str, name: str) -> dict[str, str]:
         CdprError: It is no name of a module.
     """
     if not name.isidentifier() or keyword.iskeyword(name) or name.lower() != name:
-        raise CdprError(f"name: found {name}; accepted: a module's, small letters, digits and _")
+        raise CdprError(
+            f"name: found {name!r}; accepted: the name of a Python module, of small letters, "
+            "digits and _"
+        )
     title = "".join(part.capitalize() for part in name.split("_")) or "Block"
     files = {}
     for stem, new_name in ((f"mine_{kind}", name), (f"test_mine_{kind}", f"test_{name}")):

@@ -69,8 +69,8 @@ def copy_new(contents: dict[str, bytes], folder: Path) -> list[str]:
     other = [name for name in found if not _holds(folder / name, contents[name])]
     if other:
         raise OutputFolderError(
-            f"{folder}: holds {', '.join(other)} with another content, which is never "
-            "overwritten; name another folder"
+            f"{folder}: found {', '.join(other)} with other content, which is never "
+            "overwritten; accepted: another folder"
         )
     written: list[str] = []
     try:

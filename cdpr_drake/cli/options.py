@@ -152,6 +152,38 @@ def parse_limits(words: str | None) -> tuple[float, float] | None:
     return low, high
 
 
+PICTURES = (
+    ".png",
+    ".pdf",
+    ".svg",
+    ".jpg",
+    ".jpeg",
+    ".tif",
+    ".tiff",
+    ".webp",
+    ".eps",
+    ".ps",
+    ".pgf",
+)
+"""Endings of files that pictures of --plot are written as."""
+
+
+def check_plots(*paths: Path | None) -> None:
+    """Refuses files of --plot before anything is computed or written; None: none is asked for.
+
+    Raises:
+        OutputFolderError: The ending is no picture's, or there is no such folder.
+    """
+    for path in paths:
+        if path is None:
+            continue
+        if path.suffix.lower() not in PICTURES:
+            found = f"the ending {path.suffix}" if path.suffix else "no ending"
+            raise OutputFolderError(f"{path}: found {found}; accepted: {', '.join(PICTURES)}")
+        if not path.parent.is_dir():
+            raise OutputFolderError(f"{path}: cannot be written: there is no folder {path.parent}")
+
+
 def save_plot(figure: Figure, path: Path) -> None:
     """Writes the figure of --plot.
 

@@ -29,6 +29,7 @@ from cdpr_drake.cli.options import (
     POSE,
     AsJson,
     RobotName,
+    check_plots,
     parse_limits,
     parse_numbers,
     pose_or_home,
@@ -95,6 +96,7 @@ def static(
 
     Tensions hold a mechanism at its home; with --lengths it comes to rest from there.
     """
+    check_plots(plot, plot_behaviour)
     own = {
         "joint": joint, "yields": yields, "prestress": prestress, "free": free, "held": held,
         "limits": limits,

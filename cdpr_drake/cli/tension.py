@@ -35,6 +35,7 @@ from cdpr_drake.cli.options import (
     Mass,
     RobotName,
     Wrench,
+    check_plots,
     parse_limits,
     parse_wrench,
     pose_or_home,
@@ -88,6 +89,7 @@ def tension(
     The exit code is 0 for every answer, also `infeasible` and `missed`: read `status` in the table
     or with --json. It is 2 if the input is not accepted.
     """
+    check_plots(plot, wrench_set_plot)
     if names_mechanism(robot):
         refuse_for_mechanisms({
             "pose": pose, "wrench": wrench, "mass": mass,
