@@ -84,9 +84,9 @@ def identify_free_motion(
             mass is not told.
         unknown: Groups of `FREE_GROUPS` and `ASKED_GROUPS` of
             `analyses.calibration.free_motion_model`; None: of the first all that the log can tell.
-        stretches: That are fitted; none: the first half of the log.
-        held_out: That are predicted; none: the second half, where no stretches are given.
-        start: A pose near which the platform hangs; None: it is looked for.
+        stretches: Stretches to fit; none: the first half of the log.
+        held_out: Stretches to predict; none: the second half, where no stretches are given.
+        start: A pose near which the platform hangs; None: it is searched for.
         sigmas: Standard deviations: `FreeSigmas`, or some of its fields by name.
         priors: Standard deviations of what is known beforehand, as {"mass": 0.1} [kg]; groups of
             `analyses.calibration.free_motion_model.PRIOR_UNITS`. What is left out of `unknown` is

@@ -82,7 +82,7 @@ def import_log(
         beside_format: Its format.
         start: First instant that is kept [s].
         end: Last instant that is kept [s].
-        every: Of how many rows one is kept.
+        every: Keeps every n-th row.
 
     Returns:
         The log; `write` gives the file that `calibrate` and `identify` take.
