@@ -35,6 +35,12 @@ def ended(*words):
         (["log.csv", "--out", "x.csv", "--rate", "nan"], "--rate: found nan; accepted: above 0"),
         (["log.csv", "--out", "x.csv", "--from", "5"], "found no rows from 5 s; accepted: a part"),
         (["log.csv", "--out", "x.csv", "--unit", "mm"], "accepted: DIMENSION=UNIT, as length=mm"),
+        (["log.csv", "--out", "x.csv", "--every", "0"], "--every: found '0'; accepted: at least 1"),
+        (["log.csv", "--out", "x.csv", "--every", "few"], "found 'few'; accepted: a whole number"),
+        (
+            ["log.csv", "--out", "x.csv", "--from", "dawn"],
+            "--from: found 'dawn'; accepted: a number",
+        ),
         (["empty.csv", "--out", "x.csv"], "empty.csv: found an empty file; accepted: a log"),
         (["folder", "--out", "x.csv"], "folder: found a folder; accepted: a log"),
         (["none.csv", "--out", "x.csv"], "none.csv: found no such file; accepted: a log"),
