@@ -20,7 +20,7 @@ from cdpr_drake.analyses.calibration.log_file import CalibrationLog, read_log
 from cdpr_drake.analyses.front.fitted_robots import FittedRobot, Keeping, kept_fit
 from cdpr_drake.analyses.front.session import Say, Session
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
-from cdpr_drake.errors import IdentificationError
+from cdpr_drake.errors import IdentificationError, accepted_names
 from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import as_pose
@@ -140,7 +140,7 @@ def _sigmas(given: FreeSigmas | Mapping[str, float] | None) -> FreeSigmas:
     known = [field.name for field in fields(FreeSigmas)]
     for name, value in (given or {}).items():
         if name not in known:
-            raise IdentificationError(f"{name!r} is unknown; {closest(name, known)}")
+            raise IdentificationError(f"sigmas: found {name!r}; {accepted_names(name, known)}")
         if not 0.0 < value < np.inf:
-            raise IdentificationError(f"sigma of {name}: found {value:g}; accepted: > 0")
+            raise IdentificationError(f"sigmas: {name}: found {value:g}; accepted: > 0")
     return replace(FreeSigmas(), **(given or {}))

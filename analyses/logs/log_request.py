@@ -12,7 +12,7 @@ import yaml
 
 from cdpr_drake.analyses.calibration.columns import UNITS
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import LogFileError, accepted_names
+from cdpr_drake.errors import LogFileError, accepted_names, why_not_read
 
 DIMENSIONS = tuple(sorted({dimension for dimension, _ in UNITS.values()}))
 """Of what a unit may be told."""
@@ -142,7 +142,7 @@ def read_mapping(path: Path) -> ColumnMapping:
             raise LogFileError(f"{path}: found more than {MOST_MAPPING:,} bytes; accepted: fewer")
         content = yaml.safe_load(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, yaml.YAMLError, RecursionError) as problem:
-        words = " ".join(str(problem).split())
+        words = " ".join(why_not_read(problem).split())
         raise LogFileError(f"{path}: cannot be read: {words[:200]}") from problem
     if not isinstance(content, dict) or "columns" not in content:
         raise LogFileError(f"{path}: found no columns; accepted: YAML with the key columns")

@@ -210,6 +210,9 @@ def _spans(option: str, words: str | None) -> tuple[tuple[float, float], ...]:
         except ValueError:
             first = last = 0.0
         if not -1e12 < first < last < 1e12:
-            raise CdprError(f"{option}: found {item!r}; accepted: first:last, as 20:24.5 [s]")
+            raise CdprError(
+                f"{option}: found {item!r}; accepted: first:last, the first below the last, as "
+                "20:24.5 [s]"
+            )
         found.append((first, last))
     return tuple(found)
