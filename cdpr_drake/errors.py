@@ -21,6 +21,11 @@ def meant_names(found: object, known: Iterable[object]) -> list[str]:
     return difflib.get_close_matches(str(found), [str(name) for name in known], 1, LEAST_ALIKE)
 
 
+def why_not_read(problem: Exception) -> str:
+    """Why a file cannot be read, in the system's words, without the path that the message has."""
+    return str(getattr(problem, "strerror", None) or problem)
+
+
 def accepted_names(found: object, known: Iterable[object]) -> str:
     """Words that follow "found X; ": the name that was probably meant, and all that are accepted.
 

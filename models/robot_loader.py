@@ -17,7 +17,7 @@ import numpy as np
 from pydrake.common.yaml import yaml_dump_typed
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import Problems, RobotFileError
+from cdpr_drake.errors import Problems, RobotFileError, why_not_read
 from cdpr_drake.geometry.motion_type import across
 from cdpr_drake.geometry.straight_cables import cable_lengths
 from cdpr_drake.models.camera_files import CAMERA_SUFFIXES, camera_names, resolved_camera
@@ -110,7 +110,7 @@ def robot_text(name: str, asks: str = "robot_text") -> str:
         try:
             content = path.read_text(encoding="utf-8")
         except (OSError, UnicodeDecodeError) as problem:
-            raise RobotFileError(f"{path}: cannot be read: {problem}") from problem
+            raise RobotFileError(f"{path}: cannot be read: {why_not_read(problem)}") from problem
         if is_mechanism_text(content):
             raise single_platform(path, asks)
     if not rails:

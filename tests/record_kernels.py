@@ -14,7 +14,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from cdpr_drake.cli.process import DEFAULT, GROUPS, QUESTIONS
+from cdpr_drake.cli.process import BROKEN, DEFAULT, GROUPS, QUESTIONS
 from cdpr_drake.kernel_cache import kernel_list
 
 UNOPTIMISED = {
@@ -122,20 +122,24 @@ WORDS = {
     "workspace": ("--grid", "5,5,5", "--workers", "1"),
     "stability": ("--grid", "3,3,3", "--workers", "1"),
     "plan": ("--waypoints", "0,0,0.2; 0.1,-0.1,0.3", "--limits", "1,60"),
-}
-"""What commands are asked with, beside a robot with pulleys."""
+    BROKEN: (
+        "--kind", BROKEN.rpartition(" ")[2], "--grid", "2,1,1", "--after", "0.2", "--workers", "1",
+    ),
+}  # fmt: skip
+"""What commands are asked with, beside a robot with pulleys; by group."""
 
 
-def ask(command):
+def ask(group):
     """A command with its defaults, in this process."""
     from cdpr_drake.cli.app import main
 
+    command = group.partition(",")[0]
     with tempfile.TemporaryDirectory() as folder:
-        out = ("--out", f"{folder}/found") if command in WORDS else ()
+        out = ("--out", f"{folder}/found") if group in WORDS else ()
         try:
-            main([command, "acrobot_large", *WORDS.get(command, ()), *out])
+            main([command, "acrobot_large", *WORDS.get(group, ()), *out])
         except SystemExit as ended:
-            print(command, ended.code, file=sys.stderr)
+            print(group, ended.code, file=sys.stderr)
 
 
 def do(group):
@@ -145,7 +149,7 @@ def do(group):
     if group == DEFAULT:
         simulate()
         return
-    if group in QUESTIONS:
+    if group in (*QUESTIONS, BROKEN):
         ask(group)
         return
     dict(compilation_steps())[group]()

@@ -11,7 +11,6 @@ from cdpr_drake.analyses.reporting.timing import (
     TimingRow,
     interleaved,
     processor_seconds,
-    seconds_per_call,
 )
 from cdpr_drake.analyses.simulation.tension_control_run import make_control, make_simulator
 from cdpr_drake.estimation.break_detection import BreakRule, fresh_memory
@@ -52,7 +51,10 @@ def _advancer(change: str) -> Callable[[float], None]:
 
 
 def force_rows(quick: bool) -> list[TimingRow]:
-    """Each law at 1 kHz through the diagram against computed torque; observers by a Jacobian."""
+    """Each law at 1 kHz through the diagram against computed torque; observers, looks for a break.
+
+    All by processor time of this process, since each row is work of one thread.
+    """
     repeats, duration = (3, 0.1) if quick else (9, 0.5)
     ways = [_advancer("force_control=null"), *map(_advancer, LAWS.values())]
     torque, *times = interleaved(
@@ -76,7 +78,8 @@ def force_rows(quick: bool) -> list[TimingRow]:
 
 
 def observer_rows(repeats: int, calls: int) -> list[TimingRow]:
-    """A sample of each observer against the Jacobian of eight cables in Python."""
+    """A sample of each observer against the Jacobian of eight cables over pulleys, both called from
+    Python."""
     robot = load_robot("acrobot_large")
     cables, X_WP = robot.cable_set(), robot.home.transform()
     body = packed_body(3.5, np.zeros(3), np.eye(3), np.array([0.0, 0.0, -9.81]))
@@ -89,20 +92,20 @@ def observer_rows(repeats: int, calls: int) -> list[TimingRow]:
     ways: list[Callable[[], object]] = [lambda: cable_jacobian(RigidTransform(X_WP), cables)]
     ways += [sampler(kind) for kind in OBSERVERS]
     jacobian, *times = interleaved(
-        [lambda way=way: seconds_per_call(way, calls) for way in ways],  # type: ignore[misc]
+        [lambda way=way: processor_seconds(way, calls) for way in ways],  # type: ignore[misc]
         repeats,
     )
     return [
         TimingRow(
-            f"wrench observer, {kind}", 1e6 * time, "us/sample", "Jacobian of 8 cables",
-            1e6 * jacobian, jacobian / time, ratio_means="of its samples in that time",
+            f"wrench observer, {kind}", 1e6 * time, "us/sample", "Jacobian, 8 cables over pulleys",
+            1e6 * jacobian, jacobian / time, ratio_means="samples in the time of one Jacobian",
         )
         for kind, time in zip(OBSERVERS, times, strict=True)
     ]  # fmt: skip
 
 
 def break_rows(repeats: int, calls: int) -> list[TimingRow]:
-    """A look for a broken cable among eight against one of the momentum observer."""
+    """A look for a broken cable among eight against a sample of the momentum observer."""
     robot = load_robot("acrobot_large")
     cables, X_WP = robot.cable_set(), robot.home.transform()
     motion, rows, m = motion_of(X_WP), cables.packed(), cables.count
@@ -113,16 +116,16 @@ def break_rows(repeats: int, calls: int) -> list[TimingRow]:
     observer = WrenchObserver("momentum", body, 40.0, 1e-3)
     look, sample = interleaved(
         [
-            lambda: seconds_per_call(
+            lambda: processor_seconds(
                 lambda: break_step(motion, rows, lengths, tensions, silent, rule, memory), calls
             ),
-            lambda: seconds_per_call(lambda: observer.update(X_WP, wrench), calls),
+            lambda: processor_seconds(lambda: observer.update(X_WP, wrench), calls),
         ],
         repeats,
     )
     return [
         TimingRow(
-            "look for a broken cable", 1e6 * look, "us/look", "momentum observer",
-            1e6 * sample, sample / look, ratio_means="of its samples in that time",
+            "look for a broken cable", 1e6 * look, "us/look", "sample of the momentum observer",
+            1e6 * sample, sample / look, ratio_means="looks in the time of one sample",
         )
     ]  # fmt: skip

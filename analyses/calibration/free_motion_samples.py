@@ -154,7 +154,8 @@ def cut(
         words = f"{log.path}: stretch {start:g}:{end:g}"
         if not (time[0] <= start and end <= time[-1] and end - start >= SHORTEST):
             raise IdentificationError(
-                f"{words}: accepted: {SHORTEST:g} s or more within {time[0]:g} to {time[-1]:g} s"
+                f"{log.path}: stretch: found {start:g}:{end:g}; accepted: {SHORTEST:g} s or more "
+                f"within {time[0]:g} to {time[-1]:g} s"
             )
         inside = (time >= start) & (time <= end)
         if lengths is not None:

@@ -36,7 +36,7 @@ from cdpr_drake.analyses.calibration.columns import (
     read_header,
 )
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import CalibrationError
+from cdpr_drake.errors import CalibrationError, why_not_read
 from cdpr_drake.geometry.poses import rotation_from_angles, rotation_from_vector
 
 ROTATIONS = (QUATERNION, TAIT, TURN, RPY)
@@ -172,7 +172,7 @@ def split_cells(path: Path) -> tuple[list[list[str]], list[int]]:
             raise CalibrationError(f"{path}: found more than {MOST_BYTES:,} bytes; accepted: fewer")
         text = path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as problem:
-        raise CalibrationError(f"{path}: cannot be read: {problem}") from problem
+        raise CalibrationError(f"{path}: cannot be read: {why_not_read(problem)}") from problem
     kept = [
         (number, line)
         for number, line in enumerate(text.splitlines(), 1)

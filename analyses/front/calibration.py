@@ -118,11 +118,11 @@ def calibrate(
             freedom without a tracker, from where its sensors count.
         sigmas: Standard deviations of what was measured: `Sigmas`, or some of its fields by name.
         tags: What is known of tags by number, or a file of it.
-        tag_size: In the place of it: edge of all tags [m].
+        tag_size: Instead of it: edge of all tags [m].
         tracker_late: By how much the tracker's poses are late [s].
         folder: Where results.json, robot.yaml and figures are written; None: nowhere.
-        say: Told what is done now.
-        session: In the place of it: who follows the calibration.
+        say: Called with a line on what is done now.
+        session: Instead of it: who follows the calibration.
         options: Fields of `CalibrationTask`: `priors`, `mount`, `image_size`, `start`, `rest`,
             `outliers`, `zero`, `bounds`, `hold_out`. `propose`: also proposes so many poses that
             would tell most next.
@@ -177,9 +177,9 @@ def proposed_poses(
 
     Args:
         found: What was found so far.
-        count: So many; None: none.
+        count: Number of poses; None: none.
         folder: Where next_poses.csv goes; None: nowhere.
-        say: Told what is done now.
+        say: Called with a line on what is done now.
 
     Raises:
         CalibrationError: None are wanted, or the robot that was found rests at too few poses.
@@ -239,8 +239,8 @@ def identify(
         folder: Where identification.json, robot.yaml and figures are written; None: nowhere.
         overwrite: Whether results in the folder may be replaced.
         formats: Endings of the files of figures.
-        say: Told what is done now.
-        session: In the place of it: who follows the identification.
+        say: Called with a line on what is done now.
+        session: Instead of it: who follows the identification.
         options: Fields of `IdentificationTask`: `common`, `priors`, `bandwidth` [Hz],
             `sigma_lengths` [m], `pulleys`, `outliers`.
 

@@ -106,9 +106,9 @@ def calibrate_camera(
         board: The board as it was printed.
         model: Lens: brown_conrady, rational, fisheye or none.
         folder: Where camera.yaml, results.json and the figure are written; None: nowhere.
-        say: Told what is done now.
-        session: In the place of it: who follows the calibration.
-        options: `hold_out`: share of the images that are compared only. `keep_outliers`: whether
+        say: Called with a line on what is done now.
+        session: Instead of it: who follows the calibration.
+        options: `hold_out`: share of the images that are predicted only. `keep_outliers`: whether
             images that fit badly count. `name`, `rate`: of the camera's file. `overwrite`,
             `formats`: as for `calibrate`.
 

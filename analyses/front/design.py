@@ -75,8 +75,8 @@ def optimize_design(
             in .yaml; or a goal, a name of `GOALS`, or several: exit points move by `REACH` then.
         folder: Where the search, the robot file of the best design, results and figures are kept,
             and the search is continued from; None: nowhere.
-        generations: Of the search; None: as the settings say.
-        boxes: Boxes that prove a volume, at most, for each robot.
+        generations: Number of generations; None: as the settings say.
+        boxes: Largest number of boxes that prove a volume, for each robot.
         workers: Processes, where kernels use all processors in one, or the address of a Dask
             scheduler.
         formats: Endings of the files of figures.

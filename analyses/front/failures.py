@@ -44,7 +44,7 @@ class BreakReactions(Tabulated):
     Attributes:
         scenario: Name of the scenario.
         cable: Name of the cable that broke.
-        time: When [s].
+        time: Time of the break [s].
         rows: By reaction the outcome of its run, and what `after_break` says.
         failed: Of each picture that could not be written, the file and why.
     """
@@ -110,9 +110,9 @@ def compare_reactions(
     Args:
         scenario: Name or path of the scenario; its own failures and emergency are left out.
         cable: Number of the cable that breaks, from 0.
-        time: When [s].
+        time: Time of the break [s].
         reactions: Names of `REACTIONS`.
-        after: For how long runs go on after the break [s].
+        after: Time simulated after the break [s].
         overrides: Further items "key.subkey=value" that replace what the file says.
         session: Who follows the runs and may stop them; None: nobody.
         kept: `folder`: for `results.json` and the figure; None: nothing is written. `overwrite`:

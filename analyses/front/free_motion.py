@@ -20,7 +20,7 @@ from cdpr_drake.analyses.calibration.log_file import CalibrationLog, read_log
 from cdpr_drake.analyses.front.fitted_robots import FittedRobot, Keeping, kept_fit
 from cdpr_drake.analyses.front.session import Say, Session
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
-from cdpr_drake.errors import IdentificationError
+from cdpr_drake.errors import IdentificationError, accepted_names
 from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import as_pose
@@ -84,9 +84,9 @@ def identify_free_motion(
             mass is not told.
         unknown: Groups of `FREE_GROUPS` and `ASKED_GROUPS` of
             `analyses.calibration.free_motion_model`; None: of the first all that the log can tell.
-        stretches: That are fitted; none: the first half of the log.
-        held_out: That are predicted; none: the second half, where no stretches are given.
-        start: A pose near which the platform hangs; None: it is looked for.
+        stretches: Stretches to fit; none: the first half of the log.
+        held_out: Stretches to predict; none: the second half, where no stretches are given.
+        start: A pose near which the platform hangs; None: it is searched for.
         sigmas: Standard deviations: `FreeSigmas`, or some of its fields by name.
         priors: Standard deviations of what is known beforehand, as {"mass": 0.1} [kg]; groups of
             `analyses.calibration.free_motion_model.PRIOR_UNITS`. What is left out of `unknown` is
@@ -140,7 +140,7 @@ def _sigmas(given: FreeSigmas | Mapping[str, float] | None) -> FreeSigmas:
     known = [field.name for field in fields(FreeSigmas)]
     for name, value in (given or {}).items():
         if name not in known:
-            raise IdentificationError(f"{name!r} is unknown; {closest(name, known)}")
+            raise IdentificationError(f"sigmas: found {name!r}; {accepted_names(name, known)}")
         if not 0.0 < value < np.inf:
-            raise IdentificationError(f"sigma of {name}: found {value:g}; accepted: > 0")
+            raise IdentificationError(f"sigmas: {name}: found {value:g}; accepted: > 0")
     return replace(FreeSigmas(), **(given or {}))

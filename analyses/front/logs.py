@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cdpr_drake.analyses.logs.log_formats import AUTO, read_recorded
+from cdpr_drake.analyses.logs.log_formats import AUTO, read_recorded, unused
 from cdpr_drake.analyses.logs.log_replay import SUMMARY, LogReplay
 from cdpr_drake.analyses.logs.log_replay import replay_log as compare_log
 from cdpr_drake.analyses.logs.log_request import LogRequest
@@ -82,7 +82,7 @@ def import_log(
         beside_format: Its format.
         start: First instant that is kept [s].
         end: Last instant that is kept [s].
-        every: Of how many rows one is kept.
+        every: Keeps every n-th row.
 
     Returns:
         The log; `write` gives the file that `calibrate` and `identify` take.
@@ -93,7 +93,7 @@ def import_log(
     """
     asked = LogRequest() if request is None else request
     log = without_packets(read_recorded(Path(path), format, asked))
-    joined = None
+    joined, idle = None, unused(log, asked)
     if beside is not None:
         from cdpr_drake.analyses.logs.clock_pairs import join_logs  # which loads SciPy's signals
 
@@ -101,8 +101,12 @@ def import_log(
             cables=asked.cables, units=asked.units, body=asked.body, rate=asked.rate,
             R_WF=asked.R_WF,
         )  # fmt: skip
-        joined = join_logs(log, without_packets(read_recorded(Path(beside), beside_format, other)))
+        second = read_recorded(Path(beside), beside_format, other)
+        idle = tuple(words for words in idle if words in unused(second, other))
+        joined = join_logs(log, without_packets(second))
         log = joined.log
+    if idle:
+        log = replace(log, remarks=(*log.remarks, *(f"not used: {words}" for words in idle)))
     if start is not None or end is not None or every != 1:
         log = log.part(start, end, every)
     return ImportedLog(log, joined)

@@ -394,7 +394,7 @@ def solve_mechanism_tensions(
         joints: Positions of joints by name, before those of its home [rad, m].
         held: Joints that motors hold; None: those with actuators.
         limits: Smallest and largest tension [N]; None: those of the file.
-        reference: Wanted tensions, one for all cables or shape (m,) [N], for reference_program.
+        reference: Desired tensions, one for all cables or shape (m,) [N], for reference_program.
         length_scale: By which methods that relax divide moments [m]; None: root mean square of the
             cables' lever arms.
 

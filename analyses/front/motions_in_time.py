@@ -77,7 +77,7 @@ def plan_among_moving(
         least: length or time.
         arguments: What was asked, for JSON.
         begin: When the search for sets began, by `time.perf_counter` [s].
-        say: Told what is done now.
+        say: Called with a line on what is done now.
 
     Raises:
         WorkspaceError: As `find_timed_sets`.

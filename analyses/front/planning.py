@@ -143,7 +143,7 @@ def plan_path(
         resist: Wrenches on the platform about Po in W [N m, N], a polytope or a box, or their file:
             at every point of the path tensions must exist for the motion alone, and with each.
         track: Whether the simulated robot also tracks the plan.
-        say: Told what is done now.
+        say: Called with a line on what is done now.
 
     Raises:
         PlanningError: No motion keeps the limits, or something is not accepted; names the place
@@ -202,7 +202,7 @@ def plan_free_motion(
         limits: As of `plan_path`.
         pulleys: Whether the cables run over the robot's pulleys.
         track: Whether the simulated robot also tracks the motion.
-        say: Told what is done now.
+        say: Called with a line on what is done now.
         asked: Fields of `FreeSettings`: `least` (time, tension or energy), `duration` [s],
             `knots`, `clearance` [m], `obstacles` (`Obstacles`, rows of boxes or a file), `in_view`
             (3, p) [m], `camera`, `guess` (a path or motion, or motion.csv of another plan),

@@ -135,7 +135,7 @@ def plan_proven_motion(
         limits: As of `plan_path`.
         pulleys: Whether the cables run over the robot's pulleys.
         track: Whether the simulated robot also tracks the motion.
-        say: Told what is done now.
+        say: Called with a line on what is done now.
         asked: Fields of `ProvenSettings`.
 
     Raises:

@@ -72,7 +72,7 @@ def reconfigure(
         samples: Poses of a path.
         starts: From how many places the program starts.
         around: Boxes of poses round each that are proven.
-        say: Told what is done now.
+        say: Called with a line on what is done now.
 
     Raises:
         PlanningError: No position of the rails does it; names pose and wrench. Or something is not

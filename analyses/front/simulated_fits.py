@@ -111,9 +111,9 @@ def calibrate_in_simulation(
     Args:
         scenario: A visual servo with the camera on the platform and tags in the world, or its name
             or path.
-        poses: So many that are expected to tell most; or where to go: a file or poses, as
+        poses: Number of poses, those expected to tell most; or where to go: a file or poses, as
             `plan_path` takes them [m].
-        propose: Also proposes so many poses that would tell most next; None: none.
+        propose: Number of poses to propose that would tell most next; None: none.
         folder: Where results.json, the robot, the scenario that believes in it and figures are
             written; None: nowhere.
         overwrite: Whether results in the folder may be replaced.

@@ -147,7 +147,7 @@ def solve_static(
         robot: The robot, or its name or path.
         pose: X_WP as `as_pose` takes it [m], held by tensions of least 2-norm within the robot's
             bounds; None without lengths: the home pose.
-        lengths: In the place of a pose: unstrained lengths from A to B, shape (m,) [m]; the robot
+        lengths: Instead of a pose: unstrained lengths from A to B, shape (m,) [m]; the robot
             hangs at the lowest pose of rest.
         model: A name of `cables.CABLE_MODELS`.
         pulleys: Whether the cables run over the robot's pulleys.
@@ -185,11 +185,11 @@ def find_equilibria(
     Args:
         robot: The robot, or its name or path; of 1 to 8 cables.
         lengths: From A to B, of elastic cables unstrained ones, shape (m,) [m].
-        position: In the place of lengths: where Po is, in W, shape (3,) [m].
+        position: Instead of lengths: where Po is, in W, shape (3,) [m].
         taut: Names of the cables that hold it at the position, all others slack; None: all.
         model: inextensible: all poses, from fixed exit points; elastic: searched.
         pulleys: Whether elastic cables run over the robot's pulleys.
-        searches: Most searches, of elastic cables.
+        searches: Largest number of searches, of elastic cables.
         seed: Of their random starts.
         report: Called with work done and in all.
 

@@ -220,11 +220,11 @@ def solve_tensions(
     Args:
         robot: The robot, or its name or path.
         pose: X_WP as `as_pose` takes it [m]; None: the home pose.
-        wrench: On the platform about Po in W, beside its weight, shape (6,) [N m, N].
+        wrench: Wrench on the platform about Po in W, beside its weight, shape (6,) [N m, N].
         method: A name of `TENSION_METHODS`.
         limits: Smallest and largest tension [N]; None: the robot's.
-        mass: Of the platform [kg]; None: the robot's.
-        reference: Wanted tensions, one for all cables or shape (m,) [N], for reference_program.
+        mass: Mass of the platform [kg]; None: the robot's.
+        reference: Desired tensions, one for all cables or shape (m,) [N], for reference_program.
         length_scale: By which methods that relax divide moments [m]; None: the anchor points'
             root mean square distance from Po.
 

@@ -83,12 +83,12 @@ class ShapeRequest:
         hull: Centre from which rays see its hull, shape (3,) [m]; None: no hull is asked for.
         unbounded: Whether nothing bounds the hull; else it is `box` of `compute_workspace`, or the
             robot's frame, unless that was assumed when the robot was imported.
-        rays: Rays of the hull, at most.
+        rays: Largest number of rays of the hull.
         tolerance: How near to the border of the workspace they end [m].
         mesh: File for the hull's triangles, of an ending in `MESH_ENDINGS`; None: none.
         certify: Whether boxes of `box`, or of the robot's frame, are proven inside or outside: of
             all the kinds that are asked for.
-        boxes: Boxes that are judged, at most.
+        boxes: Largest number of boxes to judge.
         exit_error: Proven for exit points off by up to so much [m].
         anchor_error: The same of anchor points [m].
         boxes_mesh: File for the boxes as cells of VTK, of an ending in `GRID_ENDINGS`; None: none.
@@ -255,7 +255,7 @@ def default_box(
 
     Args:
         robot: The robot, or its name or path.
-        box: In the place of the robot's own.
+        box: Instead of the robot's own.
 
     Returns:
         Lower corner, upper corner and step, shape (3,) each [m].
@@ -359,7 +359,7 @@ def compute_workspace(
             default grid.
         measures: Names of `MEASURES` of the same module.
         orientations: Where kinds must hold: in all of the grid's orientations, or in any.
-        box: Lower and upper corner in W, shape (3,) each, in the place of the robot's frame [m]:
+        box: Lower and upper corner in W, shape (3,) each, instead of the robot's frame [m]:
             where the default grid and certified boxes lie, and the hull ends.
         folder: Where finished work, results, figures and page are kept, and work is continued
             from; None: nowhere.

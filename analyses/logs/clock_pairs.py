@@ -73,12 +73,14 @@ def join_logs(first: RecordedLog, second: RecordedLog) -> JoinedLogs:
     """
     if first.time is None or second.time is None:
         path = first.path if first.time is None else second.path
-        raise LogFileError(f"{path}: time: found none; accepted: times, to align two clocks")
+        raise LogFileError(
+            f"{path}: time: found no column of times; accepted: one, to align two clocks"
+        )
     both = [h for h in second.columns if h in first.columns and h != TIME]
     if both:
         raise LogFileError(
             f"{second.path}: found {', '.join(both[:4])}, which {first.path} has, too; accepted: "
-            "each once"
+            "each column in one of the two logs"
         )
     by_first, by_second = _moving(first, LENGTH), _moving(second, POSITION[0])
     alignment = align_clocks(

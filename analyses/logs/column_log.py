@@ -32,7 +32,7 @@ from cdpr_drake.analyses.calibration.columns import (
 )
 from cdpr_drake.analyses.logs import recorded_log as kept
 from cdpr_drake.analyses.logs.frames import axes_in_words, turned_columns
-from cdpr_drake.analyses.logs.log_request import SI_OF, ColumnMapping, LogRequest, even_times
+from cdpr_drake.analyses.logs.log_request import SI_OF, TOLD, ColumnMapping, LogRequest, even_times
 from cdpr_drake.analyses.logs.recorded_log import RecordedLog, settled
 from cdpr_drake.analyses.logs.text_tables import CellTable, cell_table, log_text, parsed
 from cdpr_drake.analyses.reporting.exported_logs import Columns
@@ -105,7 +105,7 @@ def columns_of_text(path: Path, text: str, asked: LogRequest) -> RecordedLog:
         if rate:
             times = even_times(path, len(table.rows) - headed, rate)
             columns = {kept.TIME: times, **columns}
-            units["time"] = f"{rate:g} rows/s, as told"
+            units["time"] = f"{rate:g} rows/s, {TOLD}"
     if asked.R_WF is not None:
         units["axes"] = axes_in_words(asked.R_WF)
     why = knows_columns(text[:20_000]) or f"columns as {mapping.path if mapping else path} says"

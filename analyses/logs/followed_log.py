@@ -66,12 +66,13 @@ def follow_log(replay: LogReplay) -> FollowedLog:
     if replay.log.time is None or len(rows) < 2:
         raise LogFileError(
             f"{replay.log.path}: found {len(rows)} rows with all lengths, and "
-            f"{'no' if replay.log.time is None else 'also'} times; accepted: two, with times"
+            f"{'no times' if replay.log.time is None else 'times'}; accepted: at least two, with "
+            "times"
         )
     at = np.where(np.isfinite(replay.poses[:, 4:5]), replay.poses, replay.poses_by_lengths)
     known = rows[np.isfinite(at[rows]).all(axis=1)]
     if not len(known):
-        raise LogFileError(f"{replay.log.path}: found no pose to start at; accepted: one")
+        raise LogFileError(f"{replay.log.path}: found no pose to start at; accepted: at least one")
     rows = rows[rows >= known[0]]
     time = replay.time[rows] - replay.time[rows[0]]
     block = CompiledCableRobot(robot)

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cdpr_drake.analyses.logs.log_request import LogRequest, even_times
+from cdpr_drake.analyses.logs.log_request import TOLD, LogRequest, even_times
 from cdpr_drake.analyses.logs.recorded_log import (
     COMMANDED,
     ESTIMATED,
@@ -85,7 +85,7 @@ def read_gtgraffiti(path: Path, asked: LogRequest) -> RecordedLog:
         columns[f"{COMMANDED}{axis}_m"] = wanted[:, k]
     columns["mode"] = table[:, 0]
     remarks.append("x and y of the log are x and z of W; a wanted position 0, 0 is none")
-    units = {"lengths, positions": "m by the format", "time": f"{asked.rate:g} rows/s, as told"}
+    units = {"lengths, positions": "m by the format", "time": f"{asked.rate:g} rows/s, {TOLD}"}
     return settled(RecordedLog(path, "gtgraffiti", why, columns, units, tuple(remarks)))
 
 

@@ -148,9 +148,12 @@ def _array(path: Path, text: str, name: str) -> Array | None:
         rows = ast.literal_eval(text[start : end + 1])
         table = np.array(rows, float)
     except (ValueError, SyntaxError, TypeError, MemoryError, RecursionError) as problem:
-        raise LogFileError(f"{path}: {name}: found what are no rows of numbers") from problem
+        raise LogFileError(
+            f"{path}: {name}: found no table of numbers; accepted: [[...], ...]"
+        ) from problem
     if table.size == 0:
         return None
     if table.ndim != 2 or not np.isfinite(table).all():
-        raise LogFileError(f"{path}: {name}: found shape {table.shape}; accepted: finite rows")
+        what = f"shape {table.shape}" if table.ndim != 2 else "numbers that are not finite"
+        raise LogFileError(f"{path}: {name}: found {what}; accepted: rows of finite numbers")
     return table

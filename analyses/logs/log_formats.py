@@ -11,11 +11,11 @@ from cdpr_drake.analyses.logs.column_log import knows_columns, read_columns
 from cdpr_drake.analyses.logs.grab_log import knows_grab, read_grab_log
 from cdpr_drake.analyses.logs.gtgraffiti_log import knows_gtgraffiti, read_gtgraffiti
 from cdpr_drake.analyses.logs.hangprinter_log import knows_hangprinter, read_hangprinter
-from cdpr_drake.analyses.logs.log_request import LogRequest
+from cdpr_drake.analyses.logs.log_request import TOLD, LogRequest
 from cdpr_drake.analyses.logs.mat_log import knows_mat, read_mat
 from cdpr_drake.analyses.logs.mcap_log import knows_mcap, read_mcap
 from cdpr_drake.analyses.logs.motive import knows_motive, read_motive
-from cdpr_drake.analyses.logs.recorded_log import RecordedLog
+from cdpr_drake.analyses.logs.recorded_log import COMMANDED, ESTIMATED, RecordedLog
 from cdpr_drake.errors import LogFileError, accepted_names
 
 AUTO = "auto"
@@ -41,6 +41,8 @@ class LogReader:
     of_bytes: Callable[[bytes], str] | None = None
 
 
+MOTIVE = "motive"
+
 LOG_READERS = {
     "hangprinter": LogReader(
         "a Hangprinter's series: motor_pos_samp, xyz_of_samp, force_samp", read_hangprinter,
@@ -50,7 +52,7 @@ LOG_READERS = {
     "gtgraffiti": LogReader(
         "GTGraffiti's controller: mode: x y - x y | ...", read_gtgraffiti, knows_gtgraffiti
     ),
-    "motive": LogReader("OptiTrack Motive's CSV", read_motive, knows_motive),
+    MOTIVE: LogReader("OptiTrack Motive's CSV", read_motive, knows_motive),
     "csv": LogReader("text with columns, with headers or a mapping", read_columns, knows_columns),
     "mat": LogReader(
         "GRAB's parsed .mat, or any with a mapping", read_mat, of_bytes=knows_mat
@@ -94,8 +96,8 @@ def detect_log(path: Path) -> Detected | None:
             found.append(Detected(name, why))
     if len(found) > 1:
         told = "; ".join(f"{each.format}, as {each.why}" for each in found)
-        raise LogFileError(f"{path}: found what several readers know: {told}; accepted: one of "
-                           "them by --log-format")  # fmt: skip
+        raise LogFileError(f"{path}: found a file that several readers recognise: {told}; "
+                           "accepted: one of them, named by --log-format")  # fmt: skip
     return found[0] if found else None
 
 
@@ -124,8 +126,9 @@ def read_recorded(path: Path, format: str = AUTO, asked: LogRequest | None = Non
             damaged; one line.
     """
     asked = LogRequest() if asked is None else asked
-    if not path.is_file():
-        raise LogFileError(f"{path}: found no such file; accepted: a log")
+    if not path.is_file() or not path.stat().st_size:
+        what = "a folder" if path.is_dir() else "an empty file" if path.exists() else "no such file"
+        raise LogFileError(f"{path}: found {what}; accepted: a log")
     if format != AUTO:
         if format not in LOG_READERS:
             raise LogFileError(
@@ -137,7 +140,29 @@ def read_recorded(path: Path, format: str = AUTO, asked: LogRequest | None = Non
         return read_columns(path, asked)
     if detected is None:
         raise LogFileError(
-            f"{path}: found what no reader of logs knows; accepted: {', '.join(LOG_READERS)} by "
-            "--log-format; columns of numbers without a header take --mapping"
+            f"{path}: found a file that no reader of logs recognises; accepted: "
+            f"{', '.join(LOG_READERS)}, named by --log-format; columns of numbers without a header "
+            "need --mapping"
         )
     return LOG_READERS[detected.format].read(path, asked)
+
+
+def unused(log: RecordedLog, asked: LogRequest) -> tuple[str, ...]:
+    """What was told beside a file and changed nothing, and why, in words.
+
+    Args:
+        log: What was read.
+        asked: What was told.
+    """
+    found = []
+    if asked.rate is not None and TOLD not in log.units.get("time", ""):
+        found.append(f"a rate of {asked.rate:g} 1/s, since the file has times")
+    if asked.body is not None and log.format != MOTIVE:
+        found.append(f"the rigid body {asked.body}, since only {MOTIVE} files have some")
+    if asked.cables and not any(
+        header.removeprefix(COMMANDED).removeprefix(ESTIMATED).startswith(f"{name}_")
+        for name in asked.cables
+        for header in log.columns
+    ):
+        found.append(f"the cables {', '.join(asked.cables)[:80]}, since no column is of one")
+    return tuple(found)

@@ -299,7 +299,7 @@ def _fitted_frame(
     middle_F, middle_W = p_F.mean(axis=0), p_W.mean(axis=0)
     U, s, Vt = np.linalg.svd((p_F - middle_F).T @ (p_W - middle_W))
     if s[1] < 1e-6 * s[0]:
-        raise LogFileError(f"{log.path}: found positions along a line; accepted: in a plane")
+        raise LogFileError(f"{log.path}: found positions along a line; accepted: some off a line")
     V = Vt.T
     R = V @ np.diag([1.0, 1.0, np.sign(np.linalg.det(V @ U.T))]) @ U.T
     return RigidTransform(RotationMatrix.ProjectToRotationMatrix(R), middle_W - R @ middle_F)

@@ -12,7 +12,7 @@ import yaml
 
 from cdpr_drake.analyses.calibration.columns import UNITS
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import LogFileError, accepted_names
+from cdpr_drake.errors import LogFileError, accepted_names, why_not_read
 
 DIMENSIONS = tuple(sorted({dimension for dimension, _ in UNITS.values()}))
 """Of what a unit may be told."""
@@ -23,6 +23,10 @@ MAPPING_KEYS = ("columns", "skip_rows", "separator", "rate_hz")
 
 MOST_MAPPING = 1_000_000
 """Bytes of a mapping file."""
+
+
+TOLD = "as told"
+"""Ends what is said of times that were counted by a given rate."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +80,7 @@ class LogRequest:
         if len(self.cables) != count:
             raise LogFileError(
                 f"{path}: cables: found {count} in the log and {len(self.cables)} names "
-                f"({', '.join(self.cables)[:80]}); accepted: as many"
+                f"({', '.join(self.cables)[:80]}); accepted: a name for each"
             )
         return list(self.cables)
 
@@ -138,7 +142,7 @@ def read_mapping(path: Path) -> ColumnMapping:
             raise LogFileError(f"{path}: found more than {MOST_MAPPING:,} bytes; accepted: fewer")
         content = yaml.safe_load(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, yaml.YAMLError, RecursionError) as problem:
-        words = " ".join(str(problem).split())
+        words = " ".join(why_not_read(problem).split())
         raise LogFileError(f"{path}: cannot be read: {words[:200]}") from problem
     if not isinstance(content, dict) or "columns" not in content:
         raise LogFileError(f"{path}: found no columns; accepted: YAML with the key columns")
@@ -150,12 +154,13 @@ def read_mapping(path: Path) -> ColumnMapping:
         raise LogFileError(f"{path}: skip_rows: found {skip!r}; accepted: a whole number from 0")
     if mark is not None and (not isinstance(mark, str) or len(mark) != 1 or mark in '"\n\r.'):
         raise LogFileError(f"{path}: separator: found {mark!r}; accepted: one sign, as ';'")
-    if rate is not None and not _is_rate(rate):
+    if rate is not None and not is_rate(rate):
         raise LogFileError(f"{path}: rate_hz: found {rate!r}; accepted: a number above 0")
     return ColumnMapping(path, _headers(path, content["columns"]), skip or 0, mark, rate)
 
 
-def _is_rate(value: Any) -> bool:
+def is_rate(value: Any) -> bool:
+    """Whether it is a finite number above 0 [1/s]."""
     kind = isinstance(value, (int, float)) and not isinstance(value, bool)
     return bool(kind and np.isfinite(value) and value > 0.0)
 
@@ -179,7 +184,9 @@ def even_times(path: Path, count: int, rate: float | None) -> Array:
         LogFileError: The rate is not known, or not above 0.
     """
     if rate is None:
-        raise LogFileError(f"{path}: time: found none; accepted: rows per second, --rate")
-    if not _is_rate(rate):
+        raise LogFileError(
+            f"{path}: time: found no column of times; accepted: one, or --rate [1/s]"
+        )
+    if not is_rate(rate):
         raise LogFileError(f"{path}: rate: found {rate!r}; accepted: above 0 [1/s]")
     return np.asarray(np.arange(count) / rate, float)

@@ -19,7 +19,7 @@ import numpy as np
 
 from cdpr_drake.analyses.calibration.columns import UNITS, read_header, split_unit
 from cdpr_drake.analyses.logs.frames import turned_columns
-from cdpr_drake.analyses.logs.log_request import LogRequest, even_times
+from cdpr_drake.analyses.logs.log_request import TOLD, LogRequest, even_times
 from cdpr_drake.analyses.logs.recorded_log import (
     ANGLES,
     COMMANDED,
@@ -120,13 +120,16 @@ def read_mat(path: Path, asked: LogRequest) -> RecordedLog:
                 raise LogFileError(f"{path}: {name}: found {header} twice; accepted: once")
             name_si, factor = _si(header)
             columns[name_si] = factor * column
-    if TIME not in columns and asked.rate is not None:
+    by_rate = TIME not in columns and asked.rate is not None
+    if by_rate:
         columns = {TIME: even_times(path, count, asked.rate), **columns}
     columns = {header: columns[header] for header in sorted(columns, key=lambda h: h != TIME)}
     said = "m, rad, N, s by the format"
     if any(headers[0].endswith("_deg") for headers in wanted.values()):
         said += "; epsilon_r in deg"
     units = {"variables": said if not asked.mapping else "by the mapping"}
+    if by_rate:
+        units["time"] = f"{asked.rate:g} rows/s, {TOLD}"
     log = RecordedLog(
         path, "mat", knows_mat(MAGIC), turned_columns(columns, asked.R_WF), units, tuple(remarks)
     )

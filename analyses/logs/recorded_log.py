@@ -175,15 +175,19 @@ class RecordedLog(Summarized):
         kept = np.ones(self.count, bool)
         if start is not None or end is not None:
             if self.time is None:
-                raise LogFileError(f"{self.path}: time: found none; accepted: times, for a part")
+                raise LogFileError(
+                    f"{self.path}: time: found no column of times; accepted: one, for a part"
+                )
             kept &= self.time >= (-np.inf if start is None else start)
             kept &= self.time <= (np.inf if end is None else end)
         rows = np.flatnonzero(kept)[::every]
         if not len(rows):
+            assert self.time is not None  # without, all rows are kept
+            since = "" if start is None else f" from {start:g} s"
+            until = "" if end is None else f" until {end:g} s"
             raise LogFileError(
-                f"{self.path}: found no rows from {start} to {end} s; accepted: a part of "
-                f"{self.time[0] if self.time is not None else 0:g} to "
-                f"{self.time[-1] if self.time is not None else 0:g} s"
+                f"{self.path}: found no rows{since}{until}; accepted: a part of "
+                f"{self.time[0]:g} to {self.time[-1]:g} s"
             )
         return replace(self, columns={h: v[rows] for h, v in self.columns.items()})
 

@@ -2,42 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from cdpr_drake.analyses.planning.plan_results import MotionRun
+from cdpr_drake.analyses.planning.runs_in_sets import RunInSets
 from cdpr_drake.planning.box_timing import BoxTiming
 from cdpr_drake.planning.path_in_sets import ProvenMotion
-from cdpr_drake.planning.path_task import MotionSamples, PathTask
-from cdpr_drake.trajectories.timed_path import TimedPath
+from cdpr_drake.planning.path_timing import PathPlan
 from cdpr_drake.workspaces.proven_sets import PoseSets
-
-SETS = "sets.yaml"
-"""The sets, in Drake's format of regions."""
 
 PLATFORM_KIND = "collision-free"
 """The kind that keeps the platform off obstacles."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class ProvenRun(MotionRun):
+class ProvenRun(RunInSets):
     """A motion of a robot in proven sets.
 
     Attributes:
         found: The motion.
-        sets_time: Time that the sets took [s].
-        judged: Samples of the motion, and of each kind at how many it fails by the exact checks of
-            poses.
     """
 
     found: ProvenMotion
-    sets_time: float
-    judged: tuple[int, Mapping[str, int]]
+
+    @property
+    def plan(self) -> PathPlan:
+        """The motion as one of the robot."""
+        return self.found.plan
 
     @property
     def sets(self) -> PoseSets:
@@ -50,16 +43,6 @@ class ProvenRun(MotionRun):
         return tuple(self.sets.about["kinds"])
 
     @property
-    def task(self) -> PathTask:
-        """The robot as it was planned with."""
-        return self.found.plan.task
-
-    @property
-    def motion(self) -> TimedPath:
-        """The motion."""
-        return self.found.plan.trajectory
-
-    @property
     def about(self) -> str:
         """What it is, in words for titles."""
         what = "motion" if self.motion_proven else "path" if self.path_proven else "cables only"
@@ -67,11 +50,6 @@ class ProvenRun(MotionRun):
             f"{self.robot.name}, proven {what}, least {self.found.cost}: "
             f"{self.found.path.path.length:.4g} m, {self.found.plan.duration:.4g} s"
         )
-
-    @cached_property
-    def samples(self) -> MotionSamples:
-        """The motion, as often as it is controlled."""
-        return self.found.plan.samples()
 
     @property
     def path_proven(self) -> bool:
@@ -154,11 +132,6 @@ class ProvenRun(MotionRun):
             "sets_time_s": self.sets_time,
             "planning_time_s": self.planning_time,
         }  # fmt: skip
-
-    def write(self, folder: Path) -> dict[str, Any]:
-        """Writes the sets, too."""
-        self.sets.save(folder / SETS)
-        return super().write(folder)
 
 
 def _moments_told(box: BoxTiming | None) -> dict[str, list[float]]:

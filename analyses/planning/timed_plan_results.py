@@ -2,62 +2,48 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from cdpr_drake.analyses.planning.plan_results import MotionRun
+from cdpr_drake.analyses.planning.runs_in_sets import RunInSets
 from cdpr_drake.arrays import Array
-from cdpr_drake.planning.path_task import MotionSamples, PathTask
+from cdpr_drake.planning.path_timing import PathPlan
 from cdpr_drake.planning.timed_motion import MotionInTime
-from cdpr_drake.trajectories.timed_path import TimedPath
 from cdpr_drake.workspaces.cable_interference import Surroundings
 from cdpr_drake.workspaces.moving_shapes import MovingObstacle
 from cdpr_drake.workspaces.timed_sets import TimedSets
-
-SETS = "sets.yaml"
-"""The sets, in Drake's format of regions; the last number is time."""
 
 RESTING, SHORTEST_WAIT = 2e-3, 0.2
 """Below this speed [m/s] for so long [s] a platform is said to wait."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class TimedRun(MotionRun):
+class TimedRun(RunInSets):
     """A motion of a robot in sets of poses and time.
 
     Attributes:
         found: The motion.
         things: What moves.
         around: The robot's cables and platform.
-        sets_time: Time that the sets took [s].
-        judged: Samples of the motion, and of each check at how many it fails.
     """
 
     found: MotionInTime
     things: Sequence[MovingObstacle]
     around: Surroundings
-    sets_time: float
-    judged: tuple[int, Mapping[str, int]]
+
+    @property
+    def plan(self) -> PathPlan:
+        """The motion as one of the robot."""
+        return self.found.plan
 
     @property
     def sets(self) -> TimedSets:
         """The sets."""
         return self.found.sets
-
-    @property
-    def task(self) -> PathTask:
-        """The robot as it was planned with."""
-        return self.found.plan.task
-
-    @property
-    def motion(self) -> TimedPath:
-        """The motion."""
-        return self.found.plan.trajectory
 
     @property
     def about(self) -> str:
@@ -66,11 +52,6 @@ class TimedRun(MotionRun):
             f"{self.robot.name}, proven motion among what moves, least {self.found.cost}: "
             f"{self.way:.4g} m, {self.found.plan.duration:.4g} s"
         )
-
-    @cached_property
-    def samples(self) -> MotionSamples:
-        """The motion, as often as it is controlled."""
-        return self.found.plan.samples()
 
     @cached_property
     def track(self) -> tuple[Array, Array]:
@@ -168,8 +149,3 @@ class TimedRun(MotionRun):
         """As the base class says."""
         waits = ", ".join(f"{a:.4g} to {b:.4g} s" for a, b in self.waits())
         return [("waits", waits or "nowhere")]
-
-    def write(self, folder: Path) -> dict[str, Any]:
-        """Writes the sets, too."""
-        self.sets.save(folder / SETS)
-        return super().write(folder)

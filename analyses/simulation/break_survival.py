@@ -67,6 +67,9 @@ RULES = {
 SETTLES = 0.3
 """For how long the platform stands before a break, so that tensions are those of the law [s]."""
 
+FASTEST = 100.0
+"""Largest component of a velocity that is accepted [m/s]: no platform on cables is so fast."""
+
 SETS_OUT = 0.4
 """For how long it flies at its speed, about, before it passes the pose [s]."""
 
@@ -120,9 +123,10 @@ class BreakRequest:
                 f"after: found {self.after:g}; accepted: a number above {CALM:g} [s]"
             )
         moving = np.asarray(self.velocity, float)
-        if moving.shape != (3,) or not np.all(np.isfinite(moving)):
+        if moving.shape != (3,) or not np.all(np.abs(moving) <= FASTEST):  # also NaN
             raise WorkspaceError(
-                f"moving: found {np.ravel(moving).tolist()}; accepted: three finite numbers [m/s]"
+                f"moving: found {np.ravel(moving).tolist()}; accepted: three finite numbers, of at "
+                f"most {FASTEST:g} m/s"
             )
         if self.scenario.winches.mode != TORQUE:
             raise WorkspaceError(

@@ -228,20 +228,18 @@ def robot_workspace(
     on_progress: Callable[[WorkProgress], None] | None = None,
     should_stop: Callable[[], bool] | None = None,
 ) -> WorkspaceRun:
-    """Computes a workspace; arguments as `sweeps.sweep.run_sweep`.
+    """Computes a workspace.
 
     Args:
         question: What to compute.
-        folder: Where finished chunks are kept and found, and the result; None: nowhere.
-        workers: Number of local processes, with one this process does it; None: one for each
-            processor.
-        scheduler: Address of a Dask scheduler, whose workers compute instead.
-        on_progress: Called after every chunk.
-        should_stop: Asked often; True ends the sweep once the chunks under way are finished.
+        folder: This and the further ones are those of `SweepOptions`.
+        workers: See folder.
+        scheduler: See folder.
+        on_progress: See folder.
+        should_stop: See folder.
 
     Raises:
-        OutputFolderError: The folder belongs to other arguments, or cannot be written.
-        SweepError: The scheduler does not answer or got lost, or a local process died.
+        OutputFolderError, SweepError: As `run_poses`.
     """
     arguments, shape = question.arguments(), question.grid.shape
 

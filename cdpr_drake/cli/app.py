@@ -8,6 +8,7 @@ import gc
 import keyword
 import logging
 import os
+import re
 import signal
 import sys
 from collections.abc import Callable, Sequence
@@ -145,7 +146,13 @@ def _show_version(wanted: bool) -> None:
 def _options(
     context: typer.Context,
     version: Annotated[
-        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Versions.")
+        bool,
+        typer.Option(
+            "--version",
+            callback=_show_version,
+            is_eager=True,
+            help="Print the versions of the package and of Drake.",
+        ),
     ] = False,
 ) -> None:
     """Cable-driven parallel robots in Drake."""
@@ -154,13 +161,39 @@ def _options(
         raise typer.Exit
 
 
+PARSED = {
+    "int_parsing": "a whole number", "int_from_float": "a whole number",
+    "int_parsing_size": "a whole number of fewer digits", "float_parsing": "a number",
+}  # fmt: skip
+"""What options take, by pydantic's names of what is wrong with a value."""
+
+BOUNDS = {
+    "greater_than_equal": ("ge", "at least"), "less_than_equal": ("le", "at most"),
+    "greater_than": ("gt", "above"), "less_than": ("lt", "below"),
+}  # fmt: skip
+"""The bound that a value misses, by the same: its key, and words."""
+
+
+def _accepted(refused: dict[str, Any]) -> str:
+    """What is accepted in the place of a value that pydantic refused; empty: it says so itself."""
+    if refused["type"] in BOUNDS:
+        key, words = BOUNDS[refused["type"]]
+        return f"{words} {refused['ctx'][key]:g}"
+    return PARSED.get(refused["type"], "")
+
+
 def _usage_words(problem: Exception) -> str:
     """What typer says about options in one line, with the value found and where there is help."""
     words = str(getattr(problem, "format_message", problem.__str__)()).rstrip(".")
     # Where pydantic refused a value, typer keeps it to itself.
-    refused: list[dict[str, object]] = getattr(problem.__cause__, "errors", list)()
+    refused: list[dict[str, Any]] = getattr(problem.__cause__, "errors", list)()
     if refused and "input" in refused[0]:
-        words += f"; found {refused[0]['input']!r}"
+        option = re.match(r"Invalid value for '?([^':]+)'?:", words)
+        accepted = _accepted(refused[0])
+        if option is not None and accepted:
+            words = f"{option[1]}: found {refused[0]['input']!r}; accepted: {accepted}"
+        else:
+            words += f"; found {refused[0]['input']!r}"
     context = getattr(problem, "ctx", None)
     command = "" if context is None or context.parent is None else f"{context.info_name} "
     return f"{words}; see cdpr {command}--help"

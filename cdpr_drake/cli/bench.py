@@ -26,13 +26,13 @@ def bench(
     group: Annotated[
         str | None,
         typer.Argument(
-            help="One group; without it, all.", autocompletion=words_among(BENCH_GROUPS)
+            help="Group of benchmarks; default: all.", autocompletion=words_among(BENCH_GROUPS)
         ),
     ] = None,
-    quick: Annotated[bool, typer.Option(help="Time less, and nothing rendered.")] = False,
+    quick: Annotated[bool, typer.Option(help="Fewer repetitions, and no rendering.")] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Times what matters, each against a baseline in the same run; needs a source checkout."""
+    """Times computations against baselines in the same run; needs a source checkout."""
     if not BENCH_GROUPS:
         raise CdprError("bench: found no benchmarks; accepted: an install from a source checkout")
     if group is not None and group not in BENCH_GROUPS:

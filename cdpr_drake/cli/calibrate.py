@@ -112,7 +112,7 @@ def calibrate(
     ] = None,
     start: Annotated[
         str | None,
-        typer.Option(help="Pose of the first row, about: x,y,z[,phi,theta,psi] [m, deg]."),
+        typer.Option(help="Approximate pose of the first row: x,y,z[,phi,theta,psi] [m, deg]."),
     ] = None,
     rest: Annotated[
         bool | None,
@@ -128,27 +128,29 @@ def calibrate(
     ] = None,
     bound: Annotated[
         str | None,
-        typer.Option(help="Most that parameters may change, as tracker.[xyz]=0.001 [m, rad, -]."),
+        typer.Option(help="Largest change of parameters, as tracker.[xyz]=0.001 [m, rad, -]."),
     ] = None,
     hold_out: Annotated[
         str | None,
         typer.Option(
-            help="Tracked rows that are not fitted but predicted: so many, rows as 100-160,200, or "
-            "each, which repeats the calibration without every one of them."
+            help="Tracked rows to predict and not to fit: a number of rows, rows as "
+            "100-160,200, or each, which repeats the calibration without each one of them."
         ),
     ] = None,
     keep_outliers: Annotated[bool, typer.Option(help="Count every measurement as it is.")] = False,
     campaign: Annotated[
         str | None,
         typer.Option(
-            help="Scenario, in the place of robot and log: its believed robot goes to the poses "
-            "that tell most, is calibrated from what is recorded there, and servoes again."
+            help="Scenario, instead of robot and log: its believed robot goes to the poses that "
+            "tell most, is calibrated from what is recorded there, and servoes again."
         ),
     ] = None,
     poses: Annotated[int, typer.Option(help="Poses of a campaign.", min=6, max=200)] = POSES,
     poses_from: Annotated[
         Path | None,
-        typer.Option(help="Poses of a campaign as of cdpr plan --path, such as next_poses.csv."),
+        typer.Option(
+            help="File of poses for a campaign, as of cdpr plan --path, such as next_poses.csv."
+        ),
     ] = None,
     next_count: Annotated[
         int | None,
@@ -181,7 +183,7 @@ def calibrate(
             )
         return tell_fit(simulated, session, as_json)
     if poses_from is not None:
-        raise CdprError("--poses-from: found without --campaign; accepted: with it")
+        raise CdprError("--poses-from: found without --campaign; accepted: with --campaign")
     name, file = robot_and_log("calibrate", robot, log)
     loaded = load_robot(name, "cdpr calibrate")
     folder = results_below_runs(out, f"calibrate-{loaded.name}")

@@ -47,10 +47,8 @@ def help_words() -> str:
 
 def calibrate_camera(
     images: Annotated[list[Path], typer.Argument(help="Images of the board, all of one size.")],
-    squares: Annotated[
-        str, typer.Option(help="Columns x rows of squares, of tags the tags, as 9x7.")
-    ],
-    size: Annotated[float, typer.Option(help="Edge of a square, of tags of a tag [m].")],
+    squares: Annotated[str, typer.Option(help="Columns x rows of squares, or of tags, as 9x7.")],
+    size: Annotated[float, typer.Option(help="Edge of a square, or of a tag [m].")],
     board: Annotated[
         str,
         typer.Option(
@@ -69,11 +67,11 @@ def calibrate_camera(
         str | None, typer.Option(help="Dictionary of the markers, as OpenCV names it: 4X4_250.")
     ] = None,
     hold_out: Annotated[
-        float, typer.Option(help="Share of the images that are compared only.")
+        float, typer.Option(help="Share of the images that are predicted and not fitted.")
     ] = HOLD_OUT,
     keep_outliers: Annotated[bool, typer.Option(help="Count every image as it is.")] = False,
     name: Annotated[str, typer.Option(help="Name of the camera.")] = "calibrated",
-    rate: Annotated[float, typer.Option(help="Images per second of the camera [Hz].")] = RATE,
+    rate: Annotated[float, typer.Option(help="Frame rate of the camera [Hz].")] = RATE,
     out: ResultsBelowRuns = None,
     as_json: ResultsAsJson = False,
     overwrite: Overwrite = False,

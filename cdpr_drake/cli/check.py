@@ -12,7 +12,7 @@ from cdpr_drake.analyses.front.logs import import_log
 from cdpr_drake.analyses.front.mechanisms import hang_mechanism
 from cdpr_drake.analyses.logs.log_formats import detect_log
 from cdpr_drake.cli.import_log import log_lines
-from cdpr_drake.cli.options import AsJson, save_plot
+from cdpr_drake.cli.options import AsJson, check_plots, save_plot
 from cdpr_drake.cli.terminal import print_json
 from cdpr_drake.errors import CdprError, meant_names
 from cdpr_drake.models.formats.file_kinds import is_foreign
@@ -111,7 +111,9 @@ def check(
         list[Path],
         typer.Argument(help="Robot or scenario files or names, files of other tools, or logs."),
     ],
-    plot: Annotated[Path | None, typer.Option(help="File of a figure of the one log.")] = None,
+    plot: Annotated[
+        Path | None, typer.Option(help="File for a figure of the log, where one log is checked.")
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Checks files of robots, mechanisms, scenarios; lists every problem; then exit code 2.
@@ -120,7 +122,8 @@ def check(
     the log does not state, cdpr import-log takes as options.
     """
     if plot is not None and (len(files) != 1 or not is_log(files[0])):
-        raise CdprError(f"--plot: found for {', '.join(map(str, files))}; accepted: for one log")
+        raise CdprError(f"--plot: found with {', '.join(map(str, files))}; accepted: with one log")
+    check_plots(plot)
     found = [checked(path) for path in files]
     if as_json:
         print_json(found)

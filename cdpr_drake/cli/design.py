@@ -51,7 +51,7 @@ def design(
     goal: Annotated[
         list[str] | None,
         typer.Option(
-            help="What is wanted, NAME or NAME=WEIGHT; may be repeated: " + ", ".join(GOALS) + ".",
+            help="Goal, NAME or NAME=WEIGHT; may be repeated: " + ", ".join(GOALS) + ".",
             autocompletion=words_among(GOALS),
         ),
     ] = None,
@@ -73,19 +73,23 @@ def design(
         ),
     ] = None,
     generations: Annotated[
-        int | None, typer.Option(help="Generations; more of them continue a search.", min=1)
+        int | None,
+        typer.Option(
+            help="Number of generations; a larger number continues a finished search.", min=1
+        ),
     ] = None,
     seed: Annotated[int | None, typer.Option(help="Of the search.", min=0)] = None,
     boxes: Annotated[
-        int, typer.Option(help="Boxes that prove a volume, at most, for each robot.", min=1)
+        int,
+        typer.Option(help="Largest number of boxes that prove a volume, for each robot.", min=1),
     ] = BOXES,
     quick: Annotated[bool, typer.Option(help="A short form, to see that it works.")] = False,
     out: Annotated[
         Path | None,
-        typer.Option(help="Results folder; without, one named by the arguments below design/."),
+        typer.Option(help="Results folder; default: one named by the arguments below design/."),
     ] = None,
     workers: Annotated[
-        int, typer.Option(help="Processes; kernels use all processors in one.", min=1)
+        int, typer.Option(help="Processes; the kernels of one process use all processors.", min=1)
     ] = 1,
     scheduler: Scheduler = None,
     figure_format: FigureFormats = "png",
@@ -117,7 +121,7 @@ def design(
         raise CdprError(f"--goal: found none; accepted: {', '.join(GOALS)}")
     names = [one.name for one in settings.goals]
     if len(set(names)) < len(names):
-        raise CdprError(f"--goal: found {', '.join(names)}; accepted: each once")
+        raise CdprError(f"--goal: found {', '.join(names)}; accepted: each goal once")
     loaded = load_robot(robot, "cdpr design")
     if parameters is None and loaded.is_planar():
         settings.exit_points.reach = np.array([REACH, REACH, 0.0])

@@ -22,17 +22,18 @@ if TYPE_CHECKING:
 
 def environments(
     name: Annotated[
-        str | None, typer.Argument(help="Reach, Track, VisualServo or PickAndPlace; without: all.")
+        str | None, typer.Argument(help="Reach, Track, VisualServo or PickAndPlace; default: all.")
     ] = None,
     robot: Annotated[
         str,
         typer.Option(help="Robot by name, or path of a robot file.", autocompletion=robot_words),
     ] = "acrobot_small",
     action: Annotated[
-        str, typer.Option(help="What actions command: rates, tensions or twist.")
+        str, typer.Option(help="What an action sets: rates, tensions or twist.")
     ] = "twist",
     picture: Annotated[
-        Path | None, typer.Option(help="Picture of one as it begins with seed 0, .png.")
+        Path | None,
+        typer.Option(help="Write a picture, .png, of the environment after a reset with seed 0."),
     ] = None,
     as_json: AsJson = False,
 ) -> None:

@@ -32,11 +32,13 @@ def equilibria(
         str | None, typer.Option(help="Cable lengths from A to B, l1,...,lm [m].")
     ] = None,
     position: Annotated[
-        str | None, typer.Option(help="Position of the platform, x,y,z [m], in place of lengths.")
+        str | None, typer.Option(help="Position of the platform, x,y,z [m], instead of --lengths.")
     ] = None,
     taut: Annotated[
         str | None,
-        typer.Option(help="Cables that hold it at --position, by name; all others are slack."),
+        typer.Option(
+            help="Cables that hold the platform at --position, by name; all others are slack."
+        ),
     ] = None,
     cable_model: Annotated[
         str,
@@ -48,8 +50,10 @@ def equilibria(
     pulleys: Annotated[
         bool, typer.Option(help="Elastic cables run over the robot's pulleys.")
     ] = True,
-    searches: Annotated[int, typer.Option(help="Most searches, elastic cables.")] = 1000,
-    seed: Annotated[int, typer.Option(help="Of the random starts, elastic cables.")] = 0,
+    searches: Annotated[
+        int, typer.Option(help="Largest number of searches, for elastic cables.")
+    ] = 1000,
+    seed: Annotated[int, typer.Option(help="Seed of the random starts, for elastic cables.")] = 0,
     as_json: AsJson = False,
 ) -> None:
     """Finds all poses of rest, stable or not, with any cables slack, for lengths or a position."""

@@ -37,7 +37,7 @@ def export(
             "--format", help=f"One of {', '.join(EXPORTS)}.", autocompletion=words_among(EXPORTS)
         ),
     ],
-    out: Annotated[Path, typer.Option(help="Folder of the files.")] = Path(),
+    out: Annotated[Path, typer.Option(help="Folder for the files.")] = Path(),
     overwrite: Annotated[bool, typer.Option(help="Replace files of these names.")] = False,
     as_json: AsJson = False,
 ) -> None:

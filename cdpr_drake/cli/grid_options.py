@@ -46,17 +46,19 @@ Orientations = Annotated[
 Out = Annotated[
     Path | None,
     typer.Option(
-        help="Results folder; without, one named by the arguments below a folder named as the "
+        help="Results folder; default: one named by the arguments below a folder named as the "
         "command."
     ),
 ]
 ForceToResist = Annotated[
-    float | None, typer.Option(help="Forces to resist, up to so much along each axis [N].")
+    float | None, typer.Option(help="Largest force to resist along each axis [N].")
 ]
 MomentToResist = Annotated[
-    float | None, typer.Option(help="Moments to resist, up to so much about each axis [N m].")
+    float | None, typer.Option(help="Largest moment to resist about each axis [N m].")
 ]
-Workers = Annotated[int | None, typer.Option(help="Local processes; all processors.")]
+Workers = Annotated[
+    int | None, typer.Option(help="Local processes; default: one for each processor.")
+]
 
 
 def check_workers(workers: int | None) -> None:

@@ -78,7 +78,7 @@ def identify(
     log: LogOrCampaign = None,
     validate: Annotated[
         Path | None,
-        typer.Option(help="Log of another motion, which is predicted and not fitted."),
+        typer.Option(help="Log of another motion, to predict and not to fit."),
     ] = None,
     unknown: Annotated[
         str | None,
@@ -88,7 +88,8 @@ def identify(
         ),
     ] = None,
     common: Annotated[
-        str, typer.Option(help="Groups that are one for all cables or winches, with commas.")
+        str,
+        typer.Option(help="Groups with one value for all cables or winches, separated by commas."),
     ] = "",
     prior: Annotated[
         str | None,
@@ -96,10 +97,14 @@ def identify(
     ] = None,
     bandwidth: Annotated[
         float | None,
-        typer.Option(help="Of the smoothing [Hz]; else 8, less for slow logs."),
+        typer.Option(help="Bandwidth of the smoothing [Hz]; default 8, less for slow logs."),
     ] = None,
     sigma_lengths: Annotated[
-        float, typer.Option(help="Of lengths that winches count, with geometry [m].")
+        float,
+        typer.Option(
+            help="Standard deviation of the lengths that winches count, errors "
+            "of the geometry included [m]."
+        ),
     ] = 5e-5,
     pulleys: Annotated[
         bool, typer.Option("--pulleys/--no-pulleys", help="Whether cables run over pulleys.")
@@ -108,28 +113,28 @@ def identify(
     campaign: Annotated[
         str | None,
         typer.Option(
-            help="Scenario of dynamic control, in the place of robot and log: its robot with an "
-            "unknown payload follows the excitation that tells most, is identified, and follows "
-            "the scenario's own motion again."
+            help="Scenario of dynamic control, instead of robot and log: its robot with an "
+            "unknown payload follows the excitation that tells most, is identified, and "
+            "follows the scenario's own motion again."
         ),
     ] = None,
     free: Annotated[
         str | None,
-        typer.Option(
-            help="Stretches of free motion that are fitted, as 44.6:49.2,32:36 [s], or halves."
-        ),
+        typer.Option(help="Stretches of free motion to fit, as 44.6:49.2,32:36 [s], or halves."),
     ] = None,
     hold_out: Annotated[
         str | None,
-        typer.Option(help="Stretches of free motion that are predicted, as 20:24 [s]."),
+        typer.Option(help="Stretches of free motion to predict and not to fit, as 20:24 [s]."),
     ] = None,
     start: Annotated[
         str | None,
-        typer.Option(help="Pose near which the platform swings; else it is looked for."),
+        typer.Option(help="Pose about which the platform swings; default: it is searched for."),
     ] = None,
     lead: Annotated[
         float,
-        typer.Option(help="Part of a held-out stretch that tells its first state [s]."),
+        typer.Option(
+            help="First part of a held-out stretch, from which its initial state is estimated [s]."
+        ),
     ] = 1.0,
     sigma: Annotated[
         str | None,
@@ -139,7 +144,10 @@ def identify(
         ),
     ] = None,
     tracker_frame: Annotated[
-        bool, typer.Option(help="Poses of a free motion are in a frame that is unknown.")
+        bool,
+        typer.Option(
+            help="With --free: poses are measured in an unknown frame, which is identified too."
+        ),
     ] = False,
     keep_outliers: Annotated[bool, typer.Option(help="Count every equation as it is.")] = False,
     out: ResultsBelowRuns = None,
@@ -202,6 +210,9 @@ def _spans(option: str, words: str | None) -> tuple[tuple[float, float], ...]:
         except ValueError:
             first = last = 0.0
         if not -1e12 < first < last < 1e12:
-            raise CdprError(f"{option}: found {item!r}; accepted: first:last, as 20:24.5 [s]")
+            raise CdprError(
+                f"{option}: found {item!r}; accepted: first:last, the first below the last, as "
+                "20:24.5 [s]"
+            )
         found.append((first, last))
     return tuple(found)

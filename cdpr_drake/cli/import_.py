@@ -25,19 +25,25 @@ def import_(
             "simulator's YAML; GRAB's JSON; SDFormat; URDF; MJCF."
         ),
     ],
-    out: Annotated[Path | None, typer.Option(help="Folder of the files; the robot's name.")] = None,
-    name: Annotated[str | None, typer.Option(help="Name of the robot; the file's.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for the files; default: the robot's name.")
+    ] = None,
+    name: Annotated[
+        str | None, typer.Option(help="Name of the robot; default: that in the file.")
+    ] = None,
     model: Annotated[
         str | None, typer.Option(help="Name of a model in a CASPR list, models_list.csv.")
     ] = None,
     cable_set: Annotated[
-        str | None, typer.Option(help="Set of cables of a CASPR model; its default one.")
+        str | None,
+        typer.Option(help="Set of cables of a CASPR model; default: the model's own default."),
     ] = None,
     repair_inertia: Annotated[
         bool,
         typer.Option(
-            help="Of links of CASPR: moments of inertia that no body can have, and those of rods "
-            "without thickness, become the nearest that a body can have; each is named."
+            help="For links of CASPR: replace moments of inertia that no body can have, and "
+            "those of rods without thickness, by the nearest that a body can have; each is "
+            "named."
         ),
     ] = False,
     overwrite: Annotated[bool, typer.Option(help="Replace files of these names.")] = False,
@@ -66,8 +72,8 @@ def import_(
         return
     if repair_inertia:
         raise RobotFileError(
-            f"--repair-inertia: found for {file}; accepted for CASPR's models of several links, or "
-            "of joints that no platform on cables has"
+            f"--repair-inertia: found with {file}; accepted: with a CASPR model of several links, "
+            "or of joints that no platform on cables has"
         )
     imported = import_robot(file, name=name, model=model, cable_set=cable_set)
     folder = out or Path(imported.robot.name)

@@ -14,10 +14,11 @@ from cdpr_drake.analyses.logs.log_request import (
     LogRequest,
     axes_rotation,
     checked_units,
+    is_rate,
     read_mapping,
 )
 from cdpr_drake.cli.completion import robot_words, words_among
-from cdpr_drake.cli.options import AsJson, save_plot
+from cdpr_drake.cli.options import AsJson, check_plots, save_plot
 from cdpr_drake.cli.terminal import print_json
 from cdpr_drake.errors import CdprError, OutputFolderError
 from cdpr_drake.models.robot_loader import load_robot
@@ -33,19 +34,19 @@ LogFormat = Annotated[
 ]
 LogRobot = Annotated[
     str | None,
-    typer.Option(help="Robot whose cables' names the log takes.", autocompletion=robot_words),
+    typer.Option(help="Robot whose cable names the columns take.", autocompletion=robot_words),
 ]
 Cables = Annotated[
     str | None, typer.Option(help="Names of the cables in the order of the log, as A,B,C,D.")
 ]
 Units = Annotated[
     str | None,
-    typer.Option("--unit", help="Units that the file does not say, as length=mm,force=N."),
+    typer.Option("--unit", help="Units that the file does not state, as length=mm,force=N."),
 ]
 Mapping = Annotated[
     Path | None,
     typer.Option(
-        help="YAML that says what columns are: columns: [time_s, C1_length_mm, ''], or name: "
+        help="YAML file of what columns are: columns: [time_s, C1_length_mm, ''], or name: "
         "header; skip_rows, separator, rate_hz."
     ),
 ]
@@ -71,7 +72,7 @@ def help_words() -> str:
 
 def import_log(
     file: Annotated[Path, typer.Argument(help="The log.")],
-    out: Annotated[Path | None, typer.Option(help="The log that is written, CSV.")] = None,
+    out: Annotated[Path | None, typer.Option(help="CSV file to write.")] = None,
     beside: Annotated[
         Path | None, typer.Option("--with", help="Log of the same motion by another recorder.")
     ] = None,
@@ -86,14 +87,18 @@ def import_log(
     axes: Axes = None,
     start: Annotated[float | None, typer.Option("--from", help="First instant [s].")] = None,
     until: Annotated[float | None, typer.Option(help="Last instant [s].")] = None,
-    every: Annotated[int, typer.Option(min=1, help="Keep one of so many rows.")] = 1,
-    plot: Annotated[Path | None, typer.Option(help="File of a figure of the log.")] = None,
+    every: Annotated[int, typer.Option(min=1, help="Keep every n-th row.")] = 1,
+    plot: Annotated[Path | None, typer.Option(help="File for a figure of the log.")] = None,
     overwrite: Annotated[bool, typer.Option(help="Replace the file.")] = False,
     as_json: AsJson = False,
 ) -> None:
     """Reads a log of a machine or tracker, and writes one that calibrate and identify take."""
+    for read in (file, beside):
+        if out is not None and read is not None and out.resolve() == read.resolve():
+            raise OutputFolderError(f"--out: found {out}, the log itself; accepted: another file")
     if out is not None and out.exists() and not overwrite:
         raise OutputFolderError(f"--out: found {out}; accepted: a new file, or --overwrite")
+    check_plots(plot)
     request = log_request(robot, cables, unit, mapping=mapping, rate=rate, body=body, axes=axes)
     found = read_logs(
         file, request, format=log_format, beside=beside, beside_format=with_format, start=start,
@@ -132,6 +137,8 @@ def log_request(
     """
     if robot is not None and cables is not None:
         raise CdprError("--cables: found beside --robot; accepted: one of them")
+    if rate is not None and not is_rate(rate):
+        raise CdprError(f"--rate: found {rate:g}; accepted: above 0 [1/s]")
     names = None
     if robot is not None:
         names = tuple(c.name for c in load_robot(robot, "cdpr import-log").cables)
@@ -143,7 +150,9 @@ def log_request(
     for item in [] if unit is None else unit.split(","):
         dimension, mark, word = item.strip().partition("=")
         if not mark:
-            raise CdprError(f"--unit: found {item.strip()!r}; accepted: length=mm and the like")
+            raise CdprError(
+                f"--unit: found {item.strip()!r}; accepted: DIMENSION=UNIT, as length=mm"
+            )
         units[dimension] = word
     return LogRequest(
         cables=names, units=checked_units(units), body=body, rate=rate,

@@ -31,7 +31,7 @@ TrackerLate = Annotated[
     float | None, typer.Option(help="By how much the tracker's poses are late [s].")
 ]
 ResultsBelowRuns = Annotated[
-    Path | None, typer.Option(help="Results folder; without it, a new one below runs/.")
+    Path | None, typer.Option(help="Results folder; default: a new one below runs/.")
 ]
 STOPPING = ""
 """Nothing is answered to Ctrl-C, which ends a fit at once."""

@@ -22,13 +22,13 @@ NONE = "none"
 Joint = Annotated[
     list[str] | None,
     typer.Option(
-        help="Of a mechanism: position of a joint, name=value or name=v1,v2 [rad, m]; repeatable."
+        help="For a mechanism: position of a joint, name=value or name=v1,v2 [rad, m]; repeatable."
     ),
 ]
 Held = Annotated[
     str | None,
     typer.Option(
-        help="Of a mechanism: joints that motors hold, a,b or none; without, those with actuators."
+        help="For a mechanism: joints held by motors, a,b or none; default: those with actuators."
     ),
 ]
 

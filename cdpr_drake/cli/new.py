@@ -41,15 +41,15 @@ def new(
         typer.Argument(help=f"One of {', '.join(KINDS)}.", autocompletion=words_among(KINDS)),
     ],
     name: Annotated[
-        str, typer.Argument(help="Its name; the file is NAME.yaml, or NAME.py and test_NAME.py.")
+        str, typer.Argument(help="Name; the file is NAME.yaml, or NAME.py and test_NAME.py.")
     ],
     source: Annotated[
         str | None,
         typer.Option(
-            "--from", help=f"Robot or scenario to begin as; {EXAMPLE} or {DEFAULT_SCENARIO}."
+            "--from", help=f"Robot or scenario to copy; default: {EXAMPLE} or {DEFAULT_SCENARIO}."
         ),
     ] = None,
-    out: Annotated[Path, typer.Option(help="Folder of the file.")] = Path(),
+    out: Annotated[Path, typer.Option(help="Folder for the file.")] = Path(),
     overwrite: Annotated[bool, typer.Option(help="Replace a file of that name.")] = False,
 ) -> None:
     """Writes a robot, scenario, controller, estimator or study to start from.
@@ -59,13 +59,14 @@ def new(
     """
     if not _NAME.fullmatch(name):
         raise CdprError(
-            f"name: found {name}; accepted: 1 to 64 letters, digits, _ . -, the first one no ."
+            f"name: found {name!r}; accepted: 1 to 64 letters, digits, '_', '.' or '-', not "
+            "beginning with '.'"
         )
     if kind not in KINDS:
         raise CdprError(f"kind of file {kind!r} is unknown; {closest(kind, KINDS)}")
     if kind in BLOCKS:
         if source is not None:
-            raise CdprError(f"--from: found {source} with {kind}; accepted with: robot, scenario")
+            raise CdprError(f"--from: found {source} with {kind}; accepted: with robot, scenario")
         for path in write_files(out, _block(kind, name), overwrite):
             print(path)
         return
@@ -88,7 +89,10 @@ def _block(kind: str, name: str) -> dict[str, str]:
         CdprError: It is no name of a module.
     """
     if not name.isidentifier() or keyword.iskeyword(name) or name.lower() != name:
-        raise CdprError(f"name: found {name}; accepted: a module's, small letters, digits and _")
+        raise CdprError(
+            f"name: found {name!r}; accepted: the name of a Python module, of small letters, "
+            "digits and _"
+        )
     title = "".join(part.capitalize() for part in name.split("_")) or "Block"
     files = {}
     for stem, new_name in ((f"mine_{kind}", name), (f"test_mine_{kind}", f"test_{name}")):

@@ -20,7 +20,7 @@ FOLDER = Path(__file__).parent.parent / "notebooks"
 
 def notebooks(
     folder: Annotated[
-        Path | None, typer.Argument(help="Folder to copy them to; without it, they are listed.")
+        Path | None, typer.Argument(help="Folder to copy them to; without it they are listed.")
     ] = None,
     as_json: AsJson = False,
 ) -> None:
@@ -69,8 +69,8 @@ def copy_new(contents: dict[str, bytes], folder: Path) -> list[str]:
     other = [name for name in found if not _holds(folder / name, contents[name])]
     if other:
         raise OutputFolderError(
-            f"{folder}: holds {', '.join(other)} with another content, which is never "
-            "overwritten; name another folder"
+            f"{folder}: found {', '.join(other)} with other content, which is never "
+            "overwritten; accepted: another folder"
         )
     written: list[str] = []
     try:

@@ -29,13 +29,15 @@ RobotName = Annotated[
 ]
 Wrench = Annotated[
     str | None,
-    typer.Option(help="Wrench beside the weight, about Po in W: mx,my,mz,fx,fy,fz [N m, N]."),
+    typer.Option(
+        help="Wrench on the platform beside its weight, about Po, in W: mx,my,mz,fx,fy,fz [N m, N]."
+    ),
 ]
 Limits = Annotated[
-    str | None, typer.Option(help="Tension limits lo,hi [N] in the place of the robot's.")
+    str | None, typer.Option(help="Tension limits lower,upper [N], instead of the robot's.")
 ]
 Mass = Annotated[float | None, typer.Option(help="Mass of the platform [kg].")]
-AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
 ResultsAsJson = Annotated[bool, typer.Option("--json", help="Print the results as JSON.")]
 FigureFormats = Annotated[
     str,
@@ -46,16 +48,18 @@ Overwrite = Annotated[bool, typer.Option(help="Replace results in the folder.")]
 Host = Annotated[
     str | None,
     typer.Option(
-        help="Name or address of this machine at which Meshcat listens, * for all; without, only "
-        "this machine sees it."
+        help="Name or address of this machine at which Meshcat listens, * for all; default: "
+        "only this machine can connect."
     ),
 ]
 Port = Annotated[
-    int | None, typer.Option(help="Port of Meshcat; without, a free one from 7000 to 7099.")
+    int | None, typer.Option(help="Port of Meshcat; default: a free one from 7000 to 7099.")
 ]
 Scheduler = Annotated[
     str | None,
-    typer.Option(help="Dask scheduler whose workers compute, tcp://host:port; without it, here."),
+    typer.Option(
+        help="Dask scheduler whose workers compute, tcp://host:port; default: this machine."
+    ),
 ]
 RunsFrom = Annotated[
     Path | None,
@@ -67,7 +71,7 @@ RunsFrom = Annotated[
 LISTENING = {"host": "--host", "port": "--port"}
 """Options by the arguments of what listens."""
 POSE = typer.Option(
-    help="Platform, x,y,z [m] or x,y,z,phi,theta,psi [m, deg]; without, the home pose."
+    help="Pose of the platform, x,y,z [m] or x,y,z,phi,theta,psi [m, deg]; default: its home."
 )
 
 
@@ -146,6 +150,38 @@ def parse_limits(words: str | None) -> tuple[float, float] | None:
         return None
     low, high = parse_numbers("--limits", words, (2,), "lo,hi [N]")
     return low, high
+
+
+PICTURES = (
+    ".png",
+    ".pdf",
+    ".svg",
+    ".jpg",
+    ".jpeg",
+    ".tif",
+    ".tiff",
+    ".webp",
+    ".eps",
+    ".ps",
+    ".pgf",
+)
+"""Endings of files that pictures of --plot are written as."""
+
+
+def check_plots(*paths: Path | None) -> None:
+    """Refuses files of --plot before anything is computed or written; None: none is asked for.
+
+    Raises:
+        OutputFolderError: The ending is no picture's, or there is no such folder.
+    """
+    for path in paths:
+        if path is None:
+            continue
+        if path.suffix.lower() not in PICTURES:
+            found = f"the ending {path.suffix}" if path.suffix else "no ending"
+            raise OutputFolderError(f"{path}: found {found}; accepted: {', '.join(PICTURES)}")
+        if not path.parent.is_dir():
+            raise OutputFolderError(f"{path}: cannot be written: there is no folder {path.parent}")
 
 
 def save_plot(figure: Figure, path: Path) -> None:

@@ -85,17 +85,22 @@ Corners = Annotated[
 Tolerance = Annotated[float, typer.Option(help="How far rounded corners may pass from a pose [m].")]
 CableSpeed = Annotated[
     float | None,
-    typer.Option(help="Largest cable speed; without, at the motors' rated one [m/s]."),
+    typer.Option(help="Largest cable speed [m/s]; default: at the motors' rated speed."),
 ]
 CableAcceleration = Annotated[
-    float | None, typer.Option(help="Largest cable acceleration; without, none [m/s^2].")
+    float | None, typer.Option(help="Largest cable acceleration [m/s^2]; default: no limit.")
 ]
-Speed = Annotated[float | None, typer.Option(help="Largest speed of Po; without, none [m/s].")]
-Reserve = Annotated[float, typer.Option(help="Share of all limits that is left to feedback.")]
+Speed = Annotated[float | None, typer.Option(help="Largest speed of Po [m/s]; default: no limit.")]
+Reserve = Annotated[
+    float, typer.Option(help="Share of every limit that is kept back for feedback.")
+]
 Feeds = Annotated[
-    bool, typer.Option("--feeds/--no-feeds", help="Feeds of G-code are largest speeds of Po.")
+    bool,
+    typer.Option("--feeds/--no-feeds", help="Take feed rates of G-code as largest speeds of Po."),
 ]
-Stations = Annotated[int, typer.Option(help="Points at which limits are asked.")]
+Stations = Annotated[
+    int, typer.Option(help="Number of points of the path at which limits are checked.")
+]
 Pulleys = Annotated[bool, typer.Option(help="Cables run over the robot's pulleys.")]
 Resist = Annotated[
     Path | None,
@@ -129,7 +134,7 @@ StreamModel = Annotated[
     ),
 ]
 Out = Annotated[
-    Path | None, typer.Option(help="Results folder; without, plans/ROBOT, or ROBOT-2, ...")
+    Path | None, typer.Option(help="Results folder; default: plans/ROBOT, or ROBOT-2, ...")
 ]
 Free = Annotated[
     bool, typer.Option("--free", help="The path is free: from one pose to another, no path given.")
@@ -187,7 +192,9 @@ Guess = Annotated[
         "--proven, from which the solver starts."
     ),
 ]
-Knots = Annotated[int | None, typer.Option(help="With --free: instants at which limits are asked.")]
+Knots = Annotated[
+    int | None, typer.Option(help="With --free: number of instants at which limits are checked.")
+]
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ import threading
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
+from itertools import pairwise
 from types import FrameType
 
 from cdpr_drake.kernel_cache.background import compile_in_background
@@ -117,7 +118,10 @@ COMPILED = "acrobot_pbvs, compiled engine"
 QUESTIONS = ("tension", "static", "workspace", "stability", "plan")
 """Commands with a group of their own, of the same name: what they need with their defaults."""
 
-GROUPS = (DEFAULT, COMPILED, *QUESTIONS)
+BROKEN = "workspace, dynamic-single-failure"
+"""What `cdpr workspace` needs for the kind that simulates broken cables."""
+
+GROUPS = (DEFAULT, COMPILED, *QUESTIONS, BROKEN)
 """All groups of the list."""
 
 SIMULATIONS = ("simulate", "serve", "studio")
@@ -165,9 +169,21 @@ def _groups(command: str, words: Sequence[str]) -> list[str]:
     """Groups of the kernels that a command line needs."""
     if any(word in QUIET for word in words):
         return []
+    if command == "workspace":
+        return _groups_of_kinds(words)
     if command in QUESTIONS:
         return [command]
     if command not in SIMULATIONS:
         return []
     compiled = "--seeds" in words or any(word.startswith("integration.") for word in words)
     return [DEFAULT, COMPILED] if compiled else [DEFAULT]
+
+
+def _groups_of_kinds(words: Sequence[str]) -> list[str]:
+    """Groups of a workspace: simulated breaks need other kernels than questions of statics do."""
+    joined = [word.removeprefix("--kind=") for word in words if word.startswith("--kind=")]
+    after = [word for before, word in pairwise(words) if before == "--kind"]
+    kinds = {kind.strip() for text in (*joined, *after) for kind in text.split(",")}
+    broken = BROKEN.rpartition(" ")[2]
+    others = kinds - {broken} or not kinds
+    return [*(["workspace"] if others else []), *([BROKEN] if broken in kinds else [])]

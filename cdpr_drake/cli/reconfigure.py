@@ -55,9 +55,12 @@ def reconfigure(
         typer.Option(help="Poses x,y,z or x,y,z,phi,theta,psi [m, deg], with ; between them."),
     ] = None,
     path: Annotated[
-        Path | None, typer.Option(help="A path instead, CSV or G-code as of cdpr plan --path.")
+        Path | None,
+        typer.Option(help="Path, instead of --poses: CSV or G-code, as of cdpr plan --path."),
     ] = None,
-    samples: Annotated[int, typer.Option(help="Poses of the path that are asked.")] = SAMPLES,
+    samples: Annotated[
+        int, typer.Option(help="Number of poses of the path that are checked.")
+    ] = SAMPLES,
     resist: Annotated[
         Path | None,
         typer.Option(help="Wrenches to resist at each pose, YAML as of cdpr plan --resist."),
@@ -70,16 +73,23 @@ def reconfigure(
         ),
     ] = MARGIN,
     limits: Limits = None,
-    starts: Annotated[int, typer.Option(help="From how many places it is solved.")] = STARTS,
+    starts: Annotated[
+        int, typer.Option(help="Number of starting points of the optimisation.")
+    ] = STARTS,
     around: Annotated[
-        float, typer.Option(help="Half width of the box of poses that is proven round each [m].")
+        float,
+        typer.Option(
+            help="Half width of the box of positions that is proven around each pose [m]."
+        ),
     ] = AROUND,
-    turn: Annotated[float, typer.Option(help="The same of its angles [deg].")] = TURN,
+    turn: Annotated[
+        float, typer.Option(help="Half width of the angles that are proven around each pose [deg].")
+    ] = TURN,
     boxes: Annotated[
-        int, typer.Option(help="Boxes that are judged for each pose, at most.")
+        int, typer.Option(help="Largest number of boxes to judge for each pose.")
     ] = BOXES,
     out: Annotated[
-        Path | None, typer.Option(help="Results folder; without, rails/ROBOT, or ROBOT-2, ...")
+        Path | None, typer.Option(help="Results folder; default: rails/ROBOT, or ROBOT-2, ...")
     ] = None,
     overwrite: Overwrite = False,
     figure_format: FigureFormats = "png",

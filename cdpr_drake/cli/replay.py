@@ -37,7 +37,7 @@ def replay(
     body: Body = None,
     axes: Axes = None,
     out: Annotated[
-        Path | None, typer.Option(help="Results folder; without it, a new one below runs/.")
+        Path | None, typer.Option(help="Results folder; default: a new one below runs/.")
     ] = None,
     overwrite: Overwrite = False,
     figure_format: FigureFormats = "png",

@@ -45,7 +45,7 @@ WRITING = "The report is being written, from what is there; Ctrl-C again ends th
 def reproduce(
     out: Annotated[
         Path | None,
-        typer.Option(help="Results folder; without it, reproduction or reproduction-quick."),
+        typer.Option(help="Results folder; default: reproduction or reproduction-quick."),
     ] = None,
     quick: Annotated[
         bool, typer.Option(help="Studies in their short forms, in a quarter of an hour.")
@@ -58,7 +58,7 @@ def reproduce(
         ),
     ] = None,
     workers: Annotated[
-        int | None, typer.Option(help="Processes; without it, one for each processor.", min=1)
+        int | None, typer.Option(help="Processes; default: one for each processor.", min=1)
     ] = None,
     figure_format: FigureFormats = "png",
     as_json: ResultsAsJson = False,

@@ -68,29 +68,29 @@ def mechanism_facts(mechanism: Mechanism) -> dict[str, Any]:
 
 def robots(
     motion: Annotated[
-        str | None, typer.Option(help="Only those of this motion type, such as 3R3T.")
+        str | None, typer.Option(help="Only robots of this motion type, such as 3R3T.")
     ] = None,
     cables: Annotated[
-        str | None, typer.Option(help="Only those with so many cables: 8, 6-8, 7- or -6.")
+        str | None, typer.Option(help="Only robots with this number of cables: 8, 6-8, 7- or -6.")
     ] = None,
     suspended: Annotated[
         bool | None,
         typer.Option(
-            "--suspended/--not-suspended", help="Only those all of whose cables pull upward."
+            "--suspended/--not-suspended", help="Only robots all of whose cables pull upward."
         ),
     ] = None,
     underactuated: Annotated[
         bool | None,
         typer.Option(
             "--underactuated/--not-underactuated",
-            help="Only those with fewer cables than degrees of freedom.",
+            help="Only robots with fewer cables than degrees of freedom.",
         ),
     ] = None,
     camera: Annotated[
-        bool | None, typer.Option("--camera/--no-camera", help="Only those that carry a camera.")
+        bool | None, typer.Option("--camera/--no-camera", help="Only robots that carry a camera.")
     ] = None,
     search: Annotated[
-        str | None, typer.Option(help="Only those with this word in name or title.")
+        str | None, typer.Option(help="Only robots with this word in name or title.")
     ] = None,
     gallery: Annotated[
         Path | None,

@@ -69,7 +69,7 @@ def serve(
         int, typer.Option(help="Port, 0 for a free one.", min=0, max=65535)
     ] = USUAL_PORT,
     out: Annotated[
-        Path | None, typer.Option(help="Results folder; without it, a new one below runs/.")
+        Path | None, typer.Option(help="Results folder; default: a new one below runs/.")
     ] = None,
     duration: Annotated[float | None, typer.Option(help="Longest simulated time [s].")] = None,
     settings: Annotated[

@@ -65,7 +65,7 @@ def simulate(
     ] = DEFAULT_SCENARIO,
     out: Annotated[
         Path | None,
-        typer.Option(help="Results folder; without it, a new one below runs/."),
+        typer.Option(help="Results folder; default: a new one below runs/."),
     ] = None,
     camera: Annotated[
         str | None,
@@ -81,7 +81,7 @@ def simulate(
     ] = None,
     workers: Annotated[
         int | None,
-        typer.Option(help="Processes for --seeds; without it, one for each processor.", min=1),
+        typer.Option(help="Processes for --seeds; default: one for each processor.", min=1),
     ] = None,
     scheduler: Scheduler = None,
     settings: Annotated[
@@ -93,13 +93,15 @@ def simulate(
     video: Annotated[bool, typer.Option(help="Render camera.mp4 too.")] = False,
     finish: Annotated[
         Path | None,
-        typer.Option(help="Makes log, summary and figures of what a killed run left in a folder."),
+        typer.Option(
+            help="Folder of a killed run: write log, summary and figures of what it left."
+        ),
     ] = None,
     resume: Annotated[
         Path | None,
         typer.Option(
             "--continue",
-            help="Goes on with a run that was killed, from its last checkpoint, in its folder.",
+            help="Folder of a killed run: continue it from its last checkpoint.",
         ),
     ] = None,
     log_rate: Annotated[
@@ -122,21 +124,24 @@ def simulate(
         int | None,
         typer.Option(
             "--compare-reactions",
-            help="Breaks this cable (numbered from 0) once for each reaction, and compares; takes "
-            "--set, --camera, --seed, --out and --json.",
+            help="Number of a cable, from 0: break it once for each reaction and compare the "
+            "runs; goes with --set, --camera, --seed, --out and --json.",
         ),
     ] = None,
     break_time: Annotated[
-        float | None, typer.Option(help="With --compare-reactions: when it breaks [s]; 1.")
+        float | None,
+        typer.Option(help="With --compare-reactions: time of the break [s]; default 1."),
     ] = None,
     after: Annotated[
         float | None,
-        typer.Option(help="With --compare-reactions: for how long runs go on after it [s]; 2."),
+        typer.Option(
+            help="With --compare-reactions: time simulated after the break [s]; default 2."
+        ),
     ] = None,
     reactions: Annotated[
         str | None,
         typer.Option(
-            help="With --compare-reactions: which, separated by commas; all: "
+            help="With --compare-reactions: one or several, separated by commas; default all: "
             + ", ".join(REACTIONS)
             + "."
         ),

@@ -126,10 +126,10 @@ def stability(
     ] = None,
     orientation: Orientations = None,
     draws: Annotated[
-        int, typer.Option(help="Random perturbations per pose; all verdicts.")
+        int, typer.Option(help="Random perturbations per pose, for all verdicts.")
     ] = VerdictOptions.draws,
     seed: Annotated[
-        int, typer.Option(help="Seed of the perturbations; all verdicts.")
+        int, typer.Option(help="Seed of the perturbations, for all verdicts.")
     ] = VerdictOptions.seed,
     searches: Annotated[
         int,

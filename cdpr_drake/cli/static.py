@@ -29,6 +29,7 @@ from cdpr_drake.cli.options import (
     POSE,
     AsJson,
     RobotName,
+    check_plots,
     parse_limits,
     parse_numbers,
     pose_or_home,
@@ -61,25 +62,26 @@ def static(
     yields: Annotated[
         str | None,
         typer.Option(
-            help="Of a mechanism: prestress, positions stay; pose, tensions get to the prestress.",
+            help="For a mechanism, what gives way: prestress (joints stay where they are) or "
+            "pose (joints move until tensions are the prestress).",
             autocompletion=words_among((PRESTRESS, YIELDING_POSE)),
         ),
     ] = None,
     prestress: Annotated[
         str | None,
-        typer.Option(help="Of a mechanism: wanted tensions, one for all or t1,...,tm [N]."),
+        typer.Option(help="For a mechanism: desired tensions, one for all or t1,...,tm [N]."),
     ] = None,
     free: Annotated[
         str | None,
         typer.Option(
-            help="Of a mechanism: joints that settle, a,b or none; without, those that neither "
-            "cables nor motors act on."
+            help="For a mechanism: joints that come to rest freely, a,b or none; default: those "
+            "on which neither cables nor motors act."
         ),
     ] = None,
     held: Held = None,
     limits: Annotated[
         str | None,
-        typer.Option(help="Of a mechanism: tension limits lo,hi [N] in the place of its own."),
+        typer.Option(help="For a mechanism: tension limits lower,upper [N], instead of its own."),
     ] = None,
     as_json: AsJson = False,
     plot: Annotated[Path | None, typer.Option(help="Draw cables, tensions, frequencies.")] = None,
@@ -94,6 +96,7 @@ def static(
 
     Tensions hold a mechanism at its home; with --lengths it comes to rest from there.
     """
+    check_plots(plot, plot_behaviour)
     own = {
         "joint": joint, "yields": yields, "prestress": prestress, "free": free, "held": held,
         "limits": limits,

@@ -64,7 +64,7 @@ def study(
         ),
     ],
     out: Annotated[
-        Path | None, typer.Option(help="Results folder; without it, a new one below studies/.")
+        Path | None, typer.Option(help="Results folder; default: a new one below studies/.")
     ] = None,
     quick: Annotated[bool, typer.Option(help="A short form, to see that it works.")] = False,
     seeds: Annotated[
@@ -74,7 +74,7 @@ def study(
         ),
     ] = None,
     workers: Annotated[
-        int | None, typer.Option(help="Processes; without it, one for each processor.", min=1)
+        int | None, typer.Option(help="Processes; default: one for each processor.", min=1)
     ] = None,
     as_json: ResultsAsJson = False,
     overwrite: Overwrite = False,

@@ -35,6 +35,7 @@ from cdpr_drake.cli.options import (
     Mass,
     RobotName,
     Wrench,
+    check_plots,
     parse_limits,
     parse_wrench,
     pose_or_home,
@@ -52,17 +53,20 @@ def tension(
     pose: Annotated[str | None, POSE] = None,
     method: Annotated[
         str,
-        typer.Option(help="Method by name, or all.", autocompletion=words_among([*METHODS, "all"])),
+        typer.Option(
+            help="Tension distribution method by name, or all.",
+            autocompletion=words_among([*METHODS, "all"]),
+        ),
     ] = "quadratic_program",
     wrench: Wrench = None,
     limits: Limits = None,
     mass: Mass = None,
     reference: Annotated[
-        float | None, typer.Option(help="Wanted tension of all cables [N], for reference_program.")
+        float | None, typer.Option(help="Desired tension of all cables [N], for reference_program.")
     ] = None,
     length_scale: Annotated[
         float | None,
-        typer.Option(help="By which slack_relaxed and log_barrier divide moments [m]."),
+        typer.Option(help="Length by which slack_relaxed and log_barrier divide moments [m]."),
     ] = None,
     joint: Joint = None,
     held: Held = None,
@@ -85,6 +89,7 @@ def tension(
     The exit code is 0 for every answer, also `infeasible` and `missed`: read `status` in the table
     or with --json. It is 2 if the input is not accepted.
     """
+    check_plots(plot, wrench_set_plot)
     if names_mechanism(robot):
         refuse_for_mechanisms({
             "pose": pose, "wrench": wrench, "mass": mass,

@@ -257,7 +257,11 @@ def workspace(
     grid: GridWords = None,
     orientation: Orientations = None,
     orientations: Annotated[
-        str, typer.Option(help="Where it must hold: in all (inclusion) or any (maximal) of them.")
+        str,
+        typer.Option(
+            help="Orientations in which a kind must hold: all (inclusion "
+            "workspace) or any (maximal workspace)."
+        ),
     ] = "all",
     wrench_set: Annotated[
         Path | None,
@@ -268,15 +272,19 @@ def workspace(
     acceleration: Annotated[
         str | None,
         typer.Option(
-            help="Accelerations to have along and about each axis, up to a,alpha [m/s^2, rad/s^2]."
+            help="Largest accelerations to give along and about each axis, a,alpha [m/s^2, "
+            "rad/s^2]."
         ),
     ] = None,
     velocity: Annotated[
         list[str] | None,
-        typer.Option(help="At which angular velocity wx,wy,wz [rad/s]; may be repeated; none."),
+        typer.Option(
+            help="Angular velocity wx,wy,wz of the platform [rad/s]; may be repeated; "
+            "default: none."
+        ),
     ] = None,
     clearance: Annotated[
-        float, typer.Option(help="How far cables and platform stay from others, at least [m].")
+        float, typer.Option(help="Least distance of cables and platform from everything else [m].")
     ] = 0.0,
     obstacles: Annotated[
         Path | None,
@@ -286,11 +294,16 @@ def workspace(
     ] = None,
     anchor_free: Annotated[
         float | None,
-        typer.Option(help="Length next to anchor points not compared with the platform [m]."),
+        typer.Option(
+            help="Length of cables next to anchor points that is not compared with the "
+            "platform [m]."
+        ),
     ] = None,
     exit_free: Annotated[
         float | None,
-        typer.Option(help="Length next to exit points not compared with the frame [m]."),
+        typer.Option(
+            help="Length of cables next to exit points that is not compared with the frame [m]."
+        ),
     ] = None,
     scenario: Annotated[
         str | None,
@@ -302,8 +315,8 @@ def workspace(
     hull: Annotated[
         str | None,
         typer.Option(
-            help="Also the hull seen from x,y,z [m], by rays that end at the frame at the latest; "
-            "a frame that was assumed when the robot was imported bounds nothing."
+            help="Also compute the hull seen from x,y,z [m], by rays that end at the frame at "
+            "the latest; a frame that was assumed at import does not end them."
         ),
     ] = None,
     box: Annotated[
@@ -314,15 +327,19 @@ def workspace(
         ),
     ] = None,
     unbounded: Annotated[
-        bool, typer.Option("--unbounded", help="Nothing bounds the hull.")
+        bool, typer.Option("--unbounded", help="Let nothing bound the hull.")
     ] = False,
     pulleys: Annotated[
-        bool, typer.Option(help="Cables run over the robot's pulleys; else from fixed points.")
+        bool,
+        typer.Option(
+            help="Cables run over the robot's pulleys; with --no-pulleys from fixed points."
+        ),
     ] = True,
     method: Annotated[
         str | None,
         typer.Option(
-            help="For static: the method whose tensions must hold the weight; else any tensions.",
+            help="For static: tension distribution method that must hold the weight; default: "
+            "any tensions.",
             autocompletion=words_among(list(METHODS)),
         ),
     ] = None,
@@ -336,25 +353,26 @@ def workspace(
     moving: Annotated[
         str | None,
         typer.Option(
-            help="For dynamic-single-failure: velocity x,y,z when a cable breaks [m/s]; at rest."
+            help="For dynamic-single-failure: velocity x,y,z of the platform when a cable "
+            "breaks [m/s]; default: at rest."
         ),
     ] = None,
     after: Annotated[
         float,
-        typer.Option(help="For dynamic-single-failure: how long runs go on after a break [s]."),
+        typer.Option(help="For dynamic-single-failure: time simulated after a break [s]."),
     ] = 2.0,
-    rays: Annotated[int, typer.Option(help="Rays of the hull, at most.")] = 10_000,
+    rays: Annotated[int, typer.Option(help="Largest number of rays of the hull.")] = 10_000,
     tolerance: Annotated[
-        float, typer.Option(help="How near to the border rays of the hull end [m].")
+        float, typer.Option(help="Distance from the border within which rays of the hull end [m].")
     ] = 1e-3,
     mesh: Annotated[
         Path | None,
         typer.Option(help=f"File for the hull's triangles: {', '.join(MESH_ENDINGS)}."),
     ] = None,
     certify: Annotated[
-        bool, typer.Option(help="Also boxes of the frame proven inside or outside all kinds.")
+        bool, typer.Option(help="Also prove boxes of poses to be inside or outside all kinds.")
     ] = False,
-    boxes: Annotated[int, typer.Option(help="Boxes that are judged, at most.")] = 200_000,
+    boxes: Annotated[int, typer.Option(help="Largest number of boxes to judge.")] = 200_000,
     boxes_mesh: Annotated[
         Path | None,
         typer.Option(help=f"File for the boxes as cells of VTK: {', '.join(GRID_ENDINGS)}."),
@@ -367,16 +385,23 @@ def workspace(
         ),
     ] = None,
     refine_reach: Annotated[
-        float, typer.Option(help="With --refine: how far Po may be off the way, by axis [m].")
+        float,
+        typer.Option(
+            help="With --refine: largest distance of Po from the way along each axis [m]."
+        ),
     ] = 0.05,
     refine_boxes: Annotated[
-        int, typer.Option(help="With --refine: boxes that are judged for it, at most.")
+        int, typer.Option(help="With --refine: largest number of boxes to judge for it.")
     ] = 100_000,
     exit_error: Annotated[
-        float, typer.Option(help="Proven for exit points off by up to so much [m].")
+        float,
+        typer.Option(help="With --certify: error of exit points up to which the proof holds [m]."),
     ] = 0.0,
     anchor_error: Annotated[
-        float, typer.Option(help="Proven for anchor points off by up to so much [m].")
+        float,
+        typer.Option(
+            help="With --certify: error of anchor points up to which the proof holds [m]."
+        ),
     ] = 0.0,
     limits: Limits = None,
     mass: Mass = None,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from typing import Any
 
 import numpy as np
@@ -131,54 +132,58 @@ class TensionBalance(PoseConstraint):
         return values / unit, slopes / unit, columns * (self._largest / unit)
 
 
-class LengthRates(PoseConstraint):
-    """Rates of the cables' lengths within a limit: rows dl/dt over it."""
+class _LengthChanges(PoseConstraint):
+    """A derivative of the cables' lengths by time within a limit: rows of it over that."""
 
-    description, order, highest = "cable speeds", 1, 1
     kept_within = USED
+    limited: tuple[str, str]
+    """What it is, and its unit, in the words of errors."""
 
     def __init__(self, cables: CableSet, coordinates: Coordinates, limit: float) -> None:
-        """With the largest rate [m/s].
+        """With the largest absolute value, in SI units.
 
         Raises:
             PlanningError: It is not above 0, or cables run over pulleys of the platform.
         """
         check_cables(cables)
-        _check_positive("rate", limit, "m/s")
+        _check_positive(self.limited[0], limit, self.limited[1])
         one = np.ones(cables.count)
         super().__init__(coordinates, -one, one, cable_names(cables.count))
         self._cables, self._limit = cables.packed(), limit
 
     def at_points(self, points: Array, extra: Array) -> tuple[Array, Array, Array | None]:
+        """As the base class says."""
+        values, slopes = self.changes(points)
+        return values / self._limit, slopes / self._limit, None
+
+    @abstractmethod
+    def changes(self, points: Array) -> tuple[Array, Array]:
+        """The derivative, shape (N, m), and its derivatives by the seeds, shape (N, m, 18)."""
+
+
+class LengthRates(_LengthChanges):
+    """Rates of the cables' lengths within a limit [m/s]: rows dl/dt over it."""
+
+    description, order, highest = "cable speeds", 1, 1
+    limited = "rate", "m/s"
+
+    def changes(self, points: Array) -> tuple[Array, Array]:
         """As the base class says."""
         shape = (len(points), len(self._cables))
         values, slopes = np.empty(shape), np.empty((*shape, SEEDS))
         length_rates(points, self._cables, values, slopes)
-        return values / self._limit, slopes / self._limit, None
+        return values, slopes
 
 
-class LengthAccelerations(PoseConstraint):
-    """Accelerations of the cables' lengths within a limit: rows d2l/dt2 over it."""
+class LengthAccelerations(_LengthChanges):
+    """Accelerations of the cables' lengths within a limit [m/s^2]: rows d2l/dt2 over it."""
 
     description, order, highest = "cable accelerations", 2, 2
-    kept_within = USED
+    limited = "acceleration", "m/s^2"
 
-    def __init__(self, cables: CableSet, coordinates: Coordinates, limit: float) -> None:
-        """With the largest acceleration [m/s^2].
-
-        Raises:
-            PlanningError: It is not above 0, or cables run over pulleys of the platform.
-        """
-        check_cables(cables)
-        _check_positive("acceleration", limit, "m/s^2")
-        one = np.ones(cables.count)
-        super().__init__(coordinates, -one, one, cable_names(cables.count))
-        self._cables, self._limit = cables.packed(), limit
-
-    def at_points(self, points: Array, extra: Array) -> tuple[Array, Array, Array | None]:
+    def changes(self, points: Array) -> tuple[Array, Array]:
         """As the base class says."""
-        values, slopes = accelerations_of(points, self._cables)
-        return values / self._limit, slopes / self._limit, None
+        return accelerations_of(points, self._cables)
 
 
 class MotorTorques(PoseConstraint):

@@ -17,7 +17,7 @@ from typing import Any, TypeVar
 
 import yaml
 
-from cdpr_drake.errors import DataFileError, Problems, meant_names
+from cdpr_drake.errors import DataFileError, Problems, meant_names, why_not_read
 from cdpr_drake.schema.fields import NAMED, FieldRule
 from cdpr_drake.schema.yaml_files import cached_yaml, other_kind, too_many_bytes, too_many_nodes
 
@@ -86,7 +86,7 @@ def load_typed(
             raise error(f"{path}: {large}")
         content = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as problem:
-        raise error(f"{path}: cannot be read: {problem}") from problem
+        raise error(f"{path}: cannot be read: {why_not_read(problem)}") from problem
     return parse_typed(schema, content, path, error=error, overrides=overrides)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -300,15 +301,18 @@ class ExpectedLength:
         return found, none, True
 
 
-@dataclass(frozen=True, eq=False)
-class ImageSlackRate:
+CERTAIN = 2.0
+"""Standard deviations that a seen surplus is taken to be smaller: what is not there is not wound
+in."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class SeenSlackRate:
     """As `ConstantThreshold`, and as fast as what is seen to hang through needs.
 
     Attributes:
         threshold: Tension below which a cable counts as slack, shape (m,) [N].
         gain: Velocity per missing tension, shape (m,) [m/(N s)], or one by length.
-        cables: The believed cables.
-        camera: The camera in W [m], its intrinsic parameters, its noise [px].
         allowance: Surplus that is left to the tension [m].
         time: In which the rest is wound in [s].
         fastest: Largest velocity of a correction [m/s].
@@ -316,21 +320,21 @@ class ImageSlackRate:
 
     threshold: Array
     gain: Array | LengthGain
-    cables: CableSet
-    camera: tuple[RigidTransform, Pinhole, float]
     allowance: float
     time: float
     fastest: float
     memory: int = 0
 
+    @abstractmethod
+    def surplus(self, readings: CorrectionReadings) -> Array | None:
+        """What hangs through, shape (m,) [m]; None where no cable can run at the believed pose."""
+
     def step(self, readings: CorrectionReadings, memory: Array) -> tuple[Array, Array, bool]:
         """As `CorrectionLaw`; where no cable can run at the believed pose, by tension alone."""
         gains = each_gain(self.gain, readings)
         alone = tension_correction(readings.tensions, self.threshold, gains)
-        pixels = readings.cable_points.reshape(self.cables.count, 2, -1)
-        try:
-            seen = slack_from_image(pixels, self.cables, readings.X_WP, *self.camera).surplus
-        except CableGeometryError:
+        seen = self.surplus(readings)
+        if seen is None:
             return alone, self.threshold, False
         found = slack_rates(
             alone, readings.tensions, self.threshold, seen,
@@ -339,37 +343,32 @@ class ImageSlackRate:
         return found, self.threshold, True
 
 
-@dataclass(frozen=True, eq=False)
-class DetectedSlackRate:
-    """As `ImageSlackRate`, of surplus lengths that were found in rendered images.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ImageSlackRate(SeenSlackRate):
+    """By points of the cables that a camera sees.
 
     Attributes:
-        threshold: Tension below which a cable counts as slack, shape (m,) [N].
-        gain: Velocity per missing tension, shape (m,) [m/(N s)], or one by length.
-        allowance: Surplus that is left to the tension [m].
-        time: In which the rest is wound in [s].
-        fastest: Largest velocity of a correction [m/s].
+        cables: The believed cables.
+        camera: The camera in W [m], its intrinsic parameters, its noise [px].
     """
 
-    threshold: Array
-    gain: Array | LengthGain
-    allowance: float
-    time: float
-    fastest: float
-    memory: int = 0
+    cables: CableSet
+    camera: tuple[RigidTransform, Pinhole, float]
 
-    def step(self, readings: CorrectionReadings, memory: Array) -> tuple[Array, Array, bool]:
-        """As `CorrectionLaw`; of a surplus only what is more than `CERTAIN` of its deviations."""
-        gains = each_gain(self.gain, readings)
-        alone = tension_correction(readings.tensions, self.threshold, gains)
+    def surplus(self, readings: CorrectionReadings) -> Array | None:
+        """As the base class says."""
+        pixels = readings.cable_points.reshape(self.cables.count, 2, -1)
+        try:
+            return slack_from_image(pixels, self.cables, readings.X_WP, *self.camera).surplus
+        except CableGeometryError:
+            return None
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class DetectedSlackRate(SeenSlackRate):
+    """By surplus lengths that were found in rendered images."""
+
+    def surplus(self, readings: CorrectionReadings) -> Array | None:
+        """Only what is more than `CERTAIN` of its deviations, shape (m,) [m]."""
         surplus, sigma = readings.cable_surplus.reshape(2, -1)
-        found = slack_rates(
-            alone, readings.tensions, self.threshold, surplus - CERTAIN * sigma,
-            allowance=self.allowance, time=self.time, fastest=self.fastest,
-        )  # fmt: skip
-        return found, self.threshold, True
-
-
-CERTAIN = 2.0
-"""Standard deviations that a seen surplus is taken to be smaller: what is not there is not wound
-in."""
+        return np.asarray(surplus - CERTAIN * sigma)

@@ -255,14 +255,15 @@ def correction_law(
         )  # fmt: skip
     if settings.kind == IMAGE and rendered:
         return DetectedSlackRate(
-            threshold, gain, settings.allowance, settings.closing_time, settings.fastest or fastest
-        )
+            threshold=threshold, gain=gain, allowance=settings.allowance,
+            time=settings.closing_time, fastest=settings.fastest or fastest,
+        )  # fmt: skip
     if settings.kind == IMAGE:
         mount = robot.camera_mount(settings.sight_mount)
         return ImageSlackRate(
-            threshold, gain, cables,
-            (mount.pose.transform(), _sight(robot, settings), settings.sight_noise),
-            settings.allowance, settings.closing_time, settings.fastest or fastest,
+            threshold=threshold, gain=gain, allowance=settings.allowance,
+            time=settings.closing_time, fastest=settings.fastest or fastest, cables=cables,
+            camera=(mount.pose.transform(), _sight(robot, settings), settings.sight_noise),
         )  # fmt: skip
     return ExpectedLength(cables, settings.allowance, settings.slowness)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -50,9 +50,9 @@ from cdpr_drake.cables.straight_kernel import floating_force, line_force, planar
 from cdpr_drake.errors import CableGeometryError, CableModelError
 from cdpr_drake.geometry.cable_paths import impossible_cable
 from cdpr_drake.geometry.cable_set import CableSet
-from cdpr_drake.geometry.platform_joint import PlatformJoint
 from cdpr_drake.models.robot_in_plant import RobotInPlant, pose_on_joint
 from cdpr_drake.systems.robots.failures import BROKEN
+from cdpr_drake.systems.robots.platform_place import PlatformPlace
 from cdpr_drake.systems.robots.templates import class_for_floats
 
 PULLS = ("tensions", "drum_tensions", "slack")
@@ -63,16 +63,6 @@ CREPT = "crept"
 
 PORTS = ("tensions", "drum_tensions", "lengths", "slack", "surplus_lengths", "sags")
 """Output ports with one number a cable, in the order of `model_outputs`' rows."""
-
-
-@dataclass(frozen=True)
-class _Place:
-    """Where the cables act: all that is needed of the robot in its plant."""
-
-    joint: PlatformJoint
-    start: int
-    num_velocities: int
-    num_states: int
 
 
 def simulated_cables(cables: CableSet, model: str) -> CableSet:
@@ -167,23 +157,22 @@ def CableForces_(T: Any) -> type[LeafSystem]:
                 CableModelError: The model cannot be simulated, or cannot describe the cables; or
                     other bodies move in the robot's model instance, whose state is read.
             """
-            robot, plant = in_plant.robot, in_plant.plant
             _check_alone(in_plant)
-            place = _Place(
-                robot.joint(),
-                in_plant.first_velocity(),
-                plant.num_velocities(),
-                plant.num_multibody_states(in_plant.model_instance),
-            )
-            cables = robot.cable_set().without_pulleys() if cables is None else cables
-            self._declare(place, simulated_cables(cables, model), model, breakable, converter)
+            cables = in_plant.robot.cable_set().without_pulleys() if cables is None else cables
+            whole = simulated_cables(cables, model)
+            self._declare(PlatformPlace.of(in_plant), whole, model, breakable, converter)
 
         def _construct_copy(self, other: Any, converter: Any = None) -> None:
             breakable = other._broken is not None
             Impl._declare(self, other._place, other._set, other._model, breakable, converter)
 
         def _declare(
-            self, place: _Place, cables: CableSet, model: str, breakable: bool, converter: Any
+            self,
+            place: PlatformPlace,
+            cables: CableSet,
+            model: str,
+            breakable: bool,
+            converter: Any,
         ) -> None:
             LeafSystem_[T].__init__(self, converter=converter)
             self._place, self._set, self._model = place, cables, model

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,23 +19,13 @@ from pydrake.systems.scalar_conversion import TemplateSystem
 from cdpr_drake.arrays import Array
 from cdpr_drake.dynamics.contact_hysteresis import ContactHysteresis, contact_rates
 from cdpr_drake.dynamics.contact_kernel import SLIP, pack_contacts, rub
-from cdpr_drake.geometry.platform_joint import PlatformJoint
 from cdpr_drake.models.robot_in_plant import RobotInPlant, pose_on_joint
 from cdpr_drake.systems.robots.cable_forces import with_derivatives
+from cdpr_drake.systems.robots.platform_place import PlatformPlace
 from cdpr_drake.systems.robots.templates import class_for_floats
 
 BENT = "bent"
 """Output port where a platform rubs: how far contacts are bent, shape (3,) in P or (1,) [rad]."""
-
-
-@dataclass(frozen=True)
-class _Place:
-    """Where the friction acts: all that is needed of the robot in its plant."""
-
-    joint: PlatformJoint
-    start: int
-    num_velocities: int
-    num_states: int
 
 
 # With its scope, since Drake would search the whole call stack for it.
@@ -71,19 +60,13 @@ def PlatformHysteresis_(T: Any) -> type[LeafSystem]:
                 contacts: The law.
                 converter: Of the template.
             """
-            plant = in_plant.plant
-            place = _Place(
-                in_plant.robot.joint(),
-                in_plant.first_velocity(),
-                plant.num_velocities(),
-                plant.num_multibody_states(in_plant.model_instance),
-            )
+            place = PlatformPlace.of(in_plant)
             self._declare(place, *pack_contacts(contacts, place.joint), converter)
 
         def _construct_copy(self, other: Any, converter: Any = None) -> None:
             Impl._declare(self, other._place, other._turns, other._law, converter)
 
-        def _declare(self, place: _Place, turns: int, law: Array, converter: Any) -> None:
+        def _declare(self, place: PlatformPlace, turns: int, law: Array, converter: Any) -> None:
             LeafSystem_[T].__init__(self, converter=converter)
             self._place, self._turns, self._law = place, turns, law
             self._force, self._rates = np.zeros(6), np.zeros(turns)

@@ -100,12 +100,50 @@ class _Cables:
         )
 
 
+class _CableOutputs:
+    """What both blocks tell of their cables: one output a row of `PORTS`, the routes, the model."""
+
+    _data: _Cables
+    _l0: Callable[[Context], Array]
+    _l0_dot: Callable[[Context], Array]
+    _ones: Array
+    _zeros: Array
+
+    def _outputs(self, context: Context, l0: Array, l0_dot: Array) -> tuple[Any, int]:
+        """Rows of `PORTS`, shape (6, m), and the number of a cable that cannot run, or -1."""
+        raise NotImplementedError
+
+    def _row_writer(self, row: int, needs: int) -> Callable[[Context, BasicVector], None]:
+        """Writes a row of the outputs from as many inputs as it needs."""
+
+        def write(context: Context, output: BasicVector) -> None:
+            l0 = self._l0(context) if needs > 1 else self._ones
+            l0_dot = self._l0_dot(context) if needs > 2 else self._zeros
+            table, bad = self._outputs(context, l0, l0_dot)
+            if bad >= 0:
+                raise self._data.problem(bad, context)
+            if isinstance(output, BasicVector):  # of floats
+                output.set_value(table[row])
+            else:
+                output.SetFromVector(with_derivatives(table[row]))
+
+        return write
+
+    def routes(self) -> CableRoutes:
+        """The cables as they are simulated."""
+        return self._data.routes
+
+    def model(self) -> str:
+        """The model of the cables."""
+        return self._data.model
+
+
 # With its scope, since Drake would search the whole call stack for it.
 @TemplateSystem.define("RouteForces_", T_list=(float, AutoDiffXd), scope=sys.modules[__name__])
 def RouteForces_(T: Any) -> type[LeafSystem]:
     """The class for scalars of type T, float or AutoDiffXd; `RouteForces` is the one for float."""
 
-    class Impl(LeafSystem_[T]):
+    class Impl(_CableOutputs, LeafSystem_[T]):
         """Cables that pull on the bodies of a plant, by a model of `cables.models`.
 
         ======================= ========== ===== ==============================================
@@ -217,36 +255,14 @@ def RouteForces_(T: Any) -> type[LeafSystem]:
             if bad >= 0:
                 raise self._data.problem(bad, context)
 
-        def _row_writer(self, row: int, needs: int) -> Callable[[Context, BasicVector], None]:
-            """Writes a row of the outputs from as many inputs as it needs."""
-
-            def write(context: Context, output: BasicVector) -> None:
-                state = self._state(context)
-                l0 = self._l0(context) if needs > 1 else self._ones
-                l0_dot = self._l0_dot(context) if needs > 2 else self._zeros
-                if T is float:
-                    table, (tree, *constants) = self._work, self._memory.arrays
-                    bad = self._calc(tree, state, l0, l0_dot, *constants, table)
-                else:
-                    table, bad = tree_outputs_array(
-                        self._tree.table, state, l0, l0_dot, self._data.packed, self._data.law
-                    )
-                if bad >= 0:
-                    raise self._data.problem(bad, context)
-                if T is float:
-                    output.set_value(table[row])
-                else:
-                    output.SetFromVector(with_derivatives(table[row]))
-
-            return write
-
-        def routes(self) -> CableRoutes:
-            """The cables as they are simulated."""
-            return self._data.routes
-
-        def model(self) -> str:
-            """The model of the cables."""
-            return self._data.model
+        def _outputs(self, context: Context, l0: Array, l0_dot: Array) -> tuple[Any, int]:
+            state = self._state(context)
+            if T is not float:
+                return tree_outputs_array(
+                    self._tree.table, state, l0, l0_dot, self._data.packed, self._data.law
+                )
+            table, (tree, *constants) = self._work, self._memory.arrays
+            return table, self._calc(tree, state, l0, l0_dot, *constants, table)
 
     return Impl
 
@@ -257,7 +273,7 @@ def RouteForces_(T: Any) -> type[LeafSystem]:
 def RouteSpatialForces_(T: Any) -> type[LeafSystem]:
     """The class for scalars of type T; `RouteSpatialForces` is the one for float."""
 
-    class Impl(LeafSystem_[T]):
+    class Impl(_CableOutputs, LeafSystem_[T]):
         """As `RouteForces`, for bodies on any joints.
 
         ======================= ========== ===== ==============================================
@@ -366,34 +382,12 @@ def RouteSpatialForces_(T: Any) -> type[LeafSystem]:
                 forces.append(force)
             output.set_value(forces)
 
-        def _row_writer(self, row: int, needs: int) -> Callable[[Context, BasicVector], None]:
-            def write(context: Context, output: BasicVector) -> None:
-                motion = self._moved(context, needs > 2)
-                l0 = self._l0(context) if needs > 1 else self._ones
-                l0_dot = self._l0_dot(context) if needs > 2 else self._zeros
-                if T is float:
-                    table = self._work
-                    bad = self._calc(motion, l0, l0_dot, *self._constants, table)
-                else:
-                    table, bad = route_outputs_array(
-                        motion, l0, l0_dot, self._data.packed, self._data.law
-                    )
-                if bad >= 0:
-                    raise self._data.problem(bad, context)
-                if T is float:
-                    output.set_value(table[row])
-                else:
-                    output.SetFromVector(with_derivatives(table[row]))
-
-            return write
-
-        def routes(self) -> CableRoutes:
-            """The cables as they are simulated."""
-            return self._data.routes
-
-        def model(self) -> str:
-            """The model of the cables."""
-            return self._data.model
+        def _outputs(self, context: Context, l0: Array, l0_dot: Array) -> tuple[Any, int]:
+            motion = self._moved(context, l0_dot is not self._zeros)
+            if T is not float:
+                return route_outputs_array(motion, l0, l0_dot, self._data.packed, self._data.law)
+            table = self._work
+            return table, self._calc(motion, l0, l0_dot, *self._constants, table)
 
     return Impl
 

@@ -13,10 +13,10 @@ from cdpr_drake.analyses.reporting.log_on_disk import CHECKPOINT, PARTS
 from cdpr_drake.analyses.simulation import log_keeper
 from cdpr_drake.analyses.simulation import run_loop as loop
 from cdpr_drake.analyses.simulation.scenario_kinds import SCENARIO_KINDS
-from cdpr_drake.analyses.simulation.session import RunSession
 from cdpr_drake.cli.app import main
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.scenarios.files import scenario_kind
+from tests.analyses.simulation.resumed_runs import assert_it_goes_on_to_the_same_bytes
 from tests.cli.test_cli import refuse, run
 
 RUN = ("simulate", "acrobot_mobile_robot", "--log-rate", "25")
@@ -115,10 +115,6 @@ def test_a_run_that_is_interrupted_goes_on_in_its_folder(
     same_files(undisturbed, tmp_path / "out")
 
 
-class EndedError(Exception):
-    """The program ends."""
-
-
 @pytest.mark.parametrize(
     ("scenario", "changes"),
     [
@@ -144,18 +140,7 @@ class EndedError(Exception):
 def test_other_runs_go_on_too(tmp_path, scenario, changes):
     kind = SCENARIO_KINDS[scenario_kind(scenario)]
     wanted = load_scenario(scenario, [*changes, "duration=0.5"])
-
-    def end(progress):
-        if progress.sim_time > 0.25:
-            raise EndedError
-
-    whole = kind.run(wanted)
-    with pytest.raises(EndedError):
-        kind.run(wanted, RunSession(end, log_folder=tmp_path / PARTS))
-    again = kind.run(wanted, RunSession(log_folder=tmp_path / PARTS, resume=True))
-    assert again.sim_time == whole.sim_time
-    for name, values in whole.log.items():
-        assert again.log[name].tobytes() == values.tobytes(), name
+    assert_it_goes_on_to_the_same_bytes(kind, wanted, tmp_path)
 
 
 def test_what_cannot_go_on_is_refused(capsys, tmp_path, monkeypatch):

@@ -48,8 +48,8 @@ def test_a_new_block_passes_its_own_test(kind, tmp_path, capsys, monkeypatch):
             ["controler", "x"],
             "'controler' is unknown; did you mean controller? known: robot, scenario",
         ),
-        (["controller", "My-Law"], "name: found My-Law; accepted: a module's"),
-        (["estimator", "class"], "name: found class; accepted: a module's"),
+        (["controller", "My-Law"], "name: found 'My-Law'; accepted: the name of a Python module"),
+        (["estimator", "class"], "name: found 'class'; accepted: the name of a Python module"),
         (["estimator", "x", "--from", "planar"], "--from: found planar with estimator"),
     ],
 )

@@ -7,6 +7,7 @@ from cdpr_drake.analyses.studies.framework.case_definition import PULLEYS, Confi
 from cdpr_drake.analyses.studies.framework.case_run import converged, outcomes
 from cdpr_drake.analyses.studies.framework.case_statements import same_accuracy
 from cdpr_drake.analyses.studies.framework.case_study import configuration_study
+from cdpr_drake.analyses.studies.framework.experiments import DIRECTIONS, DRAWN
 from cdpr_drake.analyses.studies.framework.runs import Runs
 from cdpr_drake.analyses.studies.framework.statement import SOURCE, Finding, statement
 
@@ -132,7 +133,7 @@ STUDY = configuration_study(
     Plan(
         name="case-2",
         title="PBVS on ACROBOT",
-        why="Directions of the perturbations are not printed and drawn for each run.",
+        why=DIRECTIONS,
         cause=SOURCE,
         scenario="acrobot_pbvs",
         changes=(*SETUP, MODEL, PULLEYS),
@@ -175,7 +176,7 @@ STUDY = configuration_study(
         "The tag lies on the ground below the printed desired pose; its size is 0.04 m, so that "
         "it is seen at both poses. Camera: the industrial one; with the webcam's field of view "
         "the tag would not be seen at the printed initial pose.",
-        "Directions of perturbations are not printed; each run draws its own from its seed.",
+        DRAWN,
         "Of the perturbations of the prototype, all simulations but one have those of the "
         "anchor points and of the pulleys; those of the first pose and of the auto-focus are in "
         "runs of their own.",

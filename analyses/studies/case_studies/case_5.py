@@ -5,6 +5,7 @@ from __future__ import annotations
 from cdpr_drake.analyses.studies.case_studies.case_4 import (
     ASSUMPTIONS,
     CAROCA_SERVO,
+    UNKNOWN,
     believed,
 )
 from cdpr_drake.analyses.studies.case_studies.path_figures import HYBRID_LAYOUTS
@@ -74,7 +75,7 @@ _accuracy = same_accuracy(("none", "within", "beyond"), "section 3.4.4")
 STUDY = configuration_study(
     Plan(
         name="case-5",
-        why="the directions of the errors are not printed, nor how high the ground is",
+        why=UNKNOWN,
         cause=SOURCE,
         title="2 1/2 D visual servoing on CAROCA",
         scenario="caroca_pbvs",

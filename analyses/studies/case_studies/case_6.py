@@ -12,7 +12,12 @@ from cdpr_drake.analyses.studies.framework.case_definition import PULLEYS, Confi
 from cdpr_drake.analyses.studies.framework.case_run import converged, outcomes
 from cdpr_drake.analyses.studies.framework.case_statements import same_accuracy
 from cdpr_drake.analyses.studies.framework.case_study import configuration_study
-from cdpr_drake.analyses.studies.framework.experiments import as_transform, pose_item
+from cdpr_drake.analyses.studies.framework.experiments import (
+    DIRECTIONS,
+    DRAWN,
+    as_transform,
+    pose_item,
+)
 from cdpr_drake.analyses.studies.framework.runs import Runs
 from cdpr_drake.analyses.studies.framework.statement import SOURCE, Finding, statement
 
@@ -45,7 +50,7 @@ ASSUMPTIONS = (
     "The printed poses of the platform and the printed features do not fit each other. The pattern "
     "lies on the ground where the initial features and the initial pose put its middle; that also "
     "gives its size, and with the desired features the desired distance.",
-    "Directions of perturbations are not printed; each run draws its own from its seed.",
+    DRAWN,
     "Stop rules and sigma are those of case study I.",
 )
 
@@ -65,7 +70,7 @@ def _shifted(name: str, distance: float, angle_deg: float, outcome: str) -> Conf
     "IBVS ends its task under the perturbations of E1 to E3.",
     "figures 3.41 to 3.44",
     cause=SOURCE,
-    why="Directions of the perturbations are not printed and drawn for each run.",
+    why=DIRECTIONS,
 )
 def _tolerates(runs: Runs) -> Finding:
     good = [converged(runs, name) for name in NAMES[:3]]
@@ -91,7 +96,7 @@ def _not_all(runs: Runs) -> Finding:
     "The larger the perturbation, the more the paths curve.",
     "figure 3.41",
     cause=SOURCE,
-    why="Directions of the perturbations are not printed and drawn for each run.",
+    why=DIRECTIONS,
 )
 def _curved(runs: Runs) -> Finding:
     image = runs.means("image_max_px", configuration=NAMES)
@@ -111,7 +116,7 @@ STUDY = configuration_study(
     Plan(
         name="case-6",
         title="IBVS on ACROBOT",
-        why="Directions of the perturbations are not printed and drawn for each run.",
+        why=DIRECTIONS,
         cause=SOURCE,
         scenario="acrobot_pbvs",
         changes=(*SETUP, PULLEYS),

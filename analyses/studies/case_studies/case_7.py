@@ -6,7 +6,13 @@ from cdpr_drake.analyses.studies.case_studies.path_figures import TRACKING_LAYOU
 from cdpr_drake.analyses.studies.framework.case_definition import PULLEYS, Configuration, Plan
 from cdpr_drake.analyses.studies.framework.case_statements import same_accuracy
 from cdpr_drake.analyses.studies.framework.case_study import configuration_study
-from cdpr_drake.analyses.studies.framework.experiments import SETS, SETUP, TIME, TRACKING
+from cdpr_drake.analyses.studies.framework.experiments import (
+    DIRECTIONS,
+    SETS,
+    SETUP,
+    TIME,
+    TRACKING,
+)
 from cdpr_drake.analyses.studies.framework.runs import Runs
 from cdpr_drake.analyses.studies.framework.statement import (
     HARDWARE,
@@ -191,7 +197,7 @@ STUDY = configuration_study(
     Plan(
         name="case-7",
         title="Trajectory planning and tracking on ACROBOT",
-        why="Directions of the perturbations are not printed and drawn for each run.",
+        why=DIRECTIONS,
         cause=SOURCE,
         scenario="acrobot_pbvs",
         changes=(*SETUP, PULLEYS),

@@ -11,12 +11,14 @@ from cdpr_drake.analyses.studies.framework.case_definition import PULLEYS, Confi
 from cdpr_drake.analyses.studies.framework.case_run import converged, outcomes
 from cdpr_drake.analyses.studies.framework.case_statements import same_accuracy
 from cdpr_drake.analyses.studies.framework.case_study import configuration_study
-from cdpr_drake.analyses.studies.framework.experiments import as_transform, camera_belief
+from cdpr_drake.analyses.studies.framework.experiments import X_PC, camera_belief
 from cdpr_drake.analyses.studies.framework.runs import Runs
 from cdpr_drake.analyses.studies.framework.statement import SOURCE, Finding, statement
 
-X_PC = as_transform(((-0.0631, 0.0, 0.01), (0.0, 180.0, 0.0)))
-"""True pose of the camera on the small platform."""
+POINTS = (
+    "Each point is wrong in a direction of its own, which is not printed and drawn for each run."
+)
+"""Why runs cannot be those that were published."""
 
 CAMERA = "camera"
 ANCHORS = "anchor points"
@@ -91,8 +93,7 @@ def _any_camera(runs: Runs) -> Finding:
     "Wrong anchor points matter more than a wrong camera position.",
     "section A.6.2",
     cause=SOURCE,
-    why="Each point is wrong in a direction of its own, which is not printed and drawn "
-    "for each run.",
+    why=POINTS,
 )
 def _anchors_more_than_camera(runs: Runs) -> Finding:
     anchor, camera = runs.means("image_max_px", configuration=("anchor_E3", "camera_E2"))
@@ -107,8 +108,7 @@ def _anchors_more_than_camera(runs: Runs) -> Finding:
     "Wrong anchor points matter more than wrong exit points.",
     "section A.6.3",
     cause=SOURCE,
-    why="Each point is wrong in a direction of its own, which is not printed and drawn "
-    "for each run.",
+    why=POINTS,
 )
 def _anchors_more_than_exits(runs: Runs) -> Finding:
     anchor, exits, near, far = runs.means(

@@ -41,6 +41,7 @@ from cdpr_drake.analyses.studies.control_stability.camera_targets import (
     SEEN_TARGET,
     CameraTarget,
 )
+from cdpr_drake.analyses.studies.control_stability.tables import MET, SAME_MEAN
 from cdpr_drake.analyses.studies.framework.runs import MissingRuns, Run, Runs
 from cdpr_drake.analyses.studies.framework.statement import (
     CHOICE,
@@ -56,12 +57,6 @@ from cdpr_drake.analyses.studies.published.recipe_variants import IN_USE
 from cdpr_drake.analyses.studies.published.stability_tables import BASELINE_VALUES
 from cdpr_drake.analyses.visualization.figure_style import few_ticks, line_style, new_figure
 from cdpr_drake.palette import PUBLISHED, nth_look
-
-MET = 5.0
-"""Rows whose mean absolute difference is not larger are met [points]."""
-
-SAME = 0.5
-"""Means that differ by less are the same [points]."""
 
 COARSER = 2.0
 """What a grid with every second column takes off a share, 1.2 at most in the rows in use
@@ -160,8 +155,8 @@ def camera_target_chosen(runs: Runs) -> Finding:
     "A.10 worse.",
     "shares that did not choose",
     source="tables A.9, A.10",
-    rule=f"mean absolute difference not larger by more than {SAME:g} points, each bound by itself; "
-    "without the baseline",
+    rule=f"mean absolute difference not larger by more than {SAME_MEAN:g} points, each bound by "
+    "itself; without the baseline",
     cause=SOURCE,
 )
 def camera_target_kept(runs: Runs) -> Finding:
@@ -175,7 +170,7 @@ def camera_target_kept(runs: Runs) -> Finding:
                 float(np.mean(apart(_kept(runs, name, target), (bound,), changed=True)))
                 for target in (IN_USE_TARGET, CHOSEN_TARGET)
             )
-            held.append(after <= before + SAME)
+            held.append(after <= before + SAME_MEAN)
             words.append(f"{name} {bound} {before:.1f}, {after:.1f}")
     return Finding(
         found=f"mean difference in points by the target in use and by the chosen one: "
@@ -228,8 +223,8 @@ def seen_turned_chosen(runs: Runs) -> Finding:
     "bounds of A.9 and A.10 worse.",
     "shares that did not choose",
     source="tables A.9, A.10",
-    rule=f"mean absolute difference not larger by more than {SAME:g} points, each table by itself; "
-    "without the baseline",
+    rule=f"mean absolute difference not larger by more than {SAME_MEAN:g} points, each table by "
+    "itself; without the baseline",
     cause=CHOICE,
 )
 def seen_turned_kept(runs: Runs) -> Finding:
@@ -241,7 +236,7 @@ def seen_turned_kept(runs: Runs) -> Finding:
             float(np.mean(apart(_kept(runs, name, target), others, changed=True)))
             for target in (IN_USE_TARGET, SEEN_TARGET)
         )
-        held.append(after <= before + SAME)
+        held.append(after <= before + SAME_MEAN)
         words.append(f"{name} {before:.1f} before, {after:.1f} after")
     return Finding(found=f"mean difference in points: {', '.join(words)}", held=held)
 

@@ -27,8 +27,8 @@ from cdpr_drake.analyses.studies.control_stability.printed_limits import (
     rising_rows,
 )
 from cdpr_drake.analyses.studies.control_stability.recipes import ARRANGED, ROW, RULES, difference
-from cdpr_drake.analyses.studies.control_stability.table_reasons import MET, by_mean, reasons_of
-from cdpr_drake.analyses.studies.control_stability.tables import published
+from cdpr_drake.analyses.studies.control_stability.table_reasons import by_mean, reasons_of
+from cdpr_drake.analyses.studies.control_stability.tables import MET, SAME_MEAN, published
 from cdpr_drake.analyses.studies.framework.runs import MissingRuns, Runs
 from cdpr_drake.analyses.studies.framework.statement import (
     FITTED,
@@ -50,9 +50,6 @@ from cdpr_drake.stability.perturbation_bounds import DIRECTIONS
 
 NEARLY_WHOLE = 90.0
 """An arrangement of anchor points that leaves more at the baseline may be that of A.11 [%]."""
-
-SAME = 0.5
-"""Means that differ by less are the same [points]."""
 
 SIZE = sum(table.size for table in TABLES)
 """Number of printed rows."""
@@ -163,7 +160,7 @@ def shifts(runs: Runs) -> Finding:
     "The camera above the platform, the view straight ahead and the other anchor points were "
     f"chosen with rows of {RECIPES[IN_USE.name].sight} in sight; the other tables confirm it.",
     "shares",
-    rule=f"no other table's mean difference gets worse by more than {SAME:g} points",
+    rule=f"no other table's mean difference gets worse by more than {SAME_MEAN:g} points",
     basis=OURS,
 )
 def unseen_rows(runs: Runs) -> Finding:
@@ -174,8 +171,8 @@ def unseen_rows(runs: Runs) -> Finding:
     return Finding(
         found="mean absolute difference in points before and after: "
         + ", ".join(f"{name} {before[name]:.1f} {after[name]:.1f}" for name in names),
-        held=[after[name] <= before[name] + SAME for name in names],
-        some=any(after[name] < before[name] - SAME for name in names),
+        held=[after[name] <= before[name] + SAME_MEAN for name in names],
+        some=any(after[name] < before[name] - SAME_MEAN for name in names),
     )
 
 
@@ -322,7 +319,7 @@ def anchor_points(runs: Runs) -> Finding:
     "Table 3.1 has two exit points of cables from above in each other's place, and the goal is "
     f"the centre: what the rows of {CHOOSING_BOUND} of A.11 choose, its other rows confirm.",
     f"{len(PAIRS) - 1} exchanges of two cables, and none",
-    rule=f"{exchange_name(*EXCHANGE)} is the best or as good, within {SAME:g} points, and the "
+    rule=f"{exchange_name(*EXCHANGE)} is the best or as good, within {SAME_MEAN:g} points, and the "
     f"other rows are off by at most {MET:g} points",
     basis=FITTED,
     cause=SOURCE,
@@ -332,7 +329,7 @@ def exchanged_cables(runs: Runs) -> Finding:
     rows = every_row(runs)
     means, used = exchange_means(runs(grid=FULL)), exchange_name(*EXCHANGE)
     rest = other_rows(rows[EXCHANGED_CABLES.name])
-    chosen = means[used] <= min(means.values()) + SAME
+    chosen = means[used] <= min(means.values()) + SAME_MEAN
     return Finding(
         found=f"mean difference over the rows of {CHOOSING_BOUND} in points: "
         f"{_listed(dict(list(means.items())[:4]))}; as printed {means[PRINTED]:.1f}. The "

@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from cdpr_drake.analyses.studies.control_stability.tables import (
+    MET,
     mean_difference,
     published,
     rows_of,
@@ -26,9 +27,6 @@ from cdpr_drake.analyses.studies.framework.statement import (
 from cdpr_drake.analyses.studies.framework.summary import FULL
 from cdpr_drake.analyses.studies.published.recipe_choices import chosen_on
 from cdpr_drake.analyses.studies.published.stability_tables import TABLES, PublishedTable
-
-MET = 5.0
-"""A table whose mean absolute difference is not larger counts as met [points]."""
 
 SAME = 5.0
 """Shares that differ by less are the same [points]."""

@@ -29,7 +29,7 @@ from cdpr_drake.analyses.studies.control_stability.recipes import (
     ROW,
     difference,
 )
-from cdpr_drake.analyses.studies.control_stability.tables import published
+from cdpr_drake.analyses.studies.control_stability.tables import MET, published
 from cdpr_drake.analyses.studies.framework.runs import Runs
 from cdpr_drake.analyses.studies.framework.summary import note_coarse
 from cdpr_drake.analyses.studies.published.recipe_variants import (
@@ -39,9 +39,6 @@ from cdpr_drake.analyses.studies.published.recipe_variants import (
     Recipe,
 )
 from cdpr_drake.analyses.studies.published.stability_tables import PublishedTable
-
-MET = 5.0
-"""A table whose mean absolute difference is not larger counts as met [points]."""
 
 
 @dataclass(frozen=True)

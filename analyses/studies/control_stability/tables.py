@@ -13,9 +13,14 @@ from cdpr_drake.analyses.studies.framework.summary import note_coarse
 from cdpr_drake.analyses.studies.published.stability_tables import TABLES, PublishedTable
 from cdpr_drake.stability.verdict import VERDICTS
 
+MET = 5.0
+"""A table, or rows of one, whose mean absolute difference is not larger counts as met [points]."""
+
+SAME_MEAN = 0.5
+"""Means that differ by less are the same [points]."""
+
 LARGE_CAMERA_TURN = 30.0
 """From this error of the camera's orientation on, no recipe meets the tables of PBVS [deg]."""
-
 
 SHARE = "share"
 """Stands for the name of a bound in rows of coverage, which take this part of the baseline."""

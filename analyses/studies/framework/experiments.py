@@ -73,6 +73,12 @@ def _number(value: float) -> str:
     return f"{mantissa}{dot}{exponent}{power}"
 
 
+DIRECTIONS = "Directions of the perturbations are not printed and drawn for each run."
+"""Why runs cannot be those that were published."""
+
+DRAWN = "Directions of perturbations are not printed; each run draws its own from its seed."
+"""What studies assume of these directions."""
+
 START = as_transform(((0.107, -0.026, 0.35), (20.0, -20.0, 0.0)))
 """Initial pose of the platform in W."""
 

@@ -223,7 +223,7 @@ def test_the_command(capsys, tmp_path, monkeypatch):
         ([], "--goal: found none"),
         (["--goal", "beauty"], "'beauty' is unknown"),
         (["--goal", "static=0"], "a weight above 0"),
-        (["--goal", "static", "--goal", "static"], "each once"),
+        (["--goal", "static", "--goal", "static"], "each goal once"),
         (["--goal", "wrench-feasible"], "--goal wrench-feasible: found no wrench to resist"),
         (["--goal", "static", "--search", "slopes"], "--search: found slopes for static"),
         (["--goal", "static", "--force", "-1"], "--force"),

@@ -1,5 +1,7 @@
 """Readings that came in packets are put back to when they were taken."""
 
+import re
+
 import numpy as np
 import pytest
 from scipy.io import savemat
@@ -71,11 +73,72 @@ def test_readings_that_came_one_by_one_stay():
     assert without_packets(bare) is bare
 
 
-def test_packets_without_an_even_clock_stay():
+def rows_of(log, kept):
+    return RecordedLog("made", "made", "", {h: v[kept] for h, v in log.columns.items()})
+
+
+def numbers(words):
+    """Those of a remark, in their order."""
+    return [float(found) for found in re.findall(r"\d+\.?\d*", words)]
+
+
+def test_packets_around_a_hole_stay_and_a_remark_says_where_it_is():
     log = packed()
-    kept = (log.time < 21.0) | (log.time > 21.5)  # the recorder missed half a second
-    holed = RecordedLog("made", "made", "", {h: v[kept] for h, v in log.columns.items()})
-    assert without_packets(holed) is holed
+    holed = rows_of(log, (log.time < 21.0) | (log.time > 21.5))  # nothing was recorded
+    same = without_packets(holed)
+    assert same.columns is holed.columns
+    (words,) = same.remarks
+    assert words.startswith("roll, pitch, yaw came in packets of 3 readings, and stay")
+    assert "a hole from" in words
+    packet, start, end, missing, readings = numbers(words)
+    assert packet == PACKET
+    assert missing == pytest.approx(0.5 / PERIOD, abs=PACKET)
+    assert readings == pytest.approx(3.5 / PERIOD, abs=PACKET)
+    assert 21.0 - PACKET * PERIOD <= start <= 21.0
+    assert 21.5 <= end <= 21.5 + PACKET * PERIOD
+
+
+def test_a_long_pause_neither_makes_packets_nor_hides_them():
+    single, log = packed(packet=1), packed()
+    for each in (single, log):
+        each.columns[TIME] = each.time + 100.0 * (each.time > 22.0)
+    assert without_packets(single) is single
+    (words,) = without_packets(log).remarks
+    assert "a hole from 22 to 122" in words
+
+
+def test_of_several_holes_the_longest_is_told_with_their_number():
+    log = packed()
+    one, other = (log.time < 21.0) | (log.time > 21.2), (log.time < 22.0) | (log.time > 22.6)
+    (words,) = without_packets(rows_of(log, one & other)).remarks
+    _, count, start, end, missing, _ = numbers(words)
+    assert (count, round(start, 1), round(end, 1)) == (2, 22.0, 22.6)
+    assert missing == pytest.approx(0.8 / PERIOD, abs=2 * PACKET)
+
+
+def test_a_clock_that_becomes_slower_is_told_with_how_many_readings_are_off():
+    log = packed()
+    time = log.time + 0.05 * (log.time - 20.0) ** 2  # 0.8 s late in the end, never a hole
+    slow = RecordedLog("made", "made", "", {**log.columns, TIME: time})
+    same = without_packets(slow)
+    assert same.columns is slow.columns
+    (words,) = same.remarks
+    assert "hole" not in words
+    clock = packet_clock(time, log.table(ANGLES))
+    _, off, count, allowed, farthest, at = numbers(words)
+    assert (off, count) == (clock.off, clock.readings)
+    assert 0 < off < count
+    assert farthest > allowed > 1e3 * PACKET * PERIOD  # [ms]
+    assert time[0] <= at <= time[-1]
+
+
+def test_rows_without_angles_are_told_where_readings_came_in_packets():
+    log = packed()
+    columns = {**log.columns, ANGLES[1]: log.columns[ANGLES[1]].copy()}
+    columns[ANGLES[1]][1500:1520] = np.nan
+    (words,) = without_packets(RecordedLog("made", "made", "", columns)).remarks
+    assert "20 rows have no reading, the first at 21.5 s" in words
+    assert "off an even clock" not in words
 
 
 def test_an_import_keeps_every_reading_where_rows_are_left_out(tmp_path):

@@ -198,7 +198,7 @@ REFUSED = [
         "found 'One' .1484 rows., 'Two' .1484 rows.; accepted: one of them by --body",
     ),
     ("take.csv", recorders.motive().replace("Quaternion", "XYZ"), TOLD, "Rotation Type: found XYZ"),
-    ("log.txt", recorders.gtgraffiti(), LogRequest(), "time: found none; accepted: rows per"),
+    ("log.txt", recorders.gtgraffiti(), LogRequest(), "time: found no column of times; accep"),
     ("log.txt", recorders.gtgraffiti().replace("2: 1.9", "2: oh", 1), TOLD, ":.*: found '2: oh"),
     ("raw.log", recorders.grab().replace("3,11.000,2", "3,11.000,1"), TOLD, "actuator 1 twice"),
     ("raw.log", recorders.grab().replace("5,12.000,", "5,12.000,nan,"), TOLD, "found 6 cells"),
@@ -208,7 +208,7 @@ REFUSED = [
     ("log.csv", recorders.columns().replace("50.000", "20.000"), TOLD, ":7: time: found 0.02 s"),
     ("log.csv", recorders.columns().replace("C2_length", "C1_length"), TOLD, "C1_length_m twice"),
     ("log.csv", recorders.columns().replace(",42.000", ",42.000,1"), TOLD, ":4: found 6 cells"),
-    ("s.py", recorders.hangprinter_script().replace("7431.3", "--1"), TOLD, "no rows of numbers"),
+    ("s.py", recorders.hangprinter_script().replace("7431.3", "--1"), TOLD, "found no table"),
     ("s.py", recorders.hangprinter_script() * 2, TOLD, "found 2 times"),
 ]  # fmt: skip
 

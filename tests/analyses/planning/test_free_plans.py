@@ -17,7 +17,7 @@ from cdpr_drake.errors import PlanningError, ScenarioError
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.trajectories.sampled_motion import read_motion
-from tests.messages import printed
+from tests.analyses.planning.plan_command import run
 
 ENDS = ["--from=-0.15,0,0.3", "--to=0.15,0,0.3"]
 LARGE = ["--from=-0.1,0,0.35", "--to=0.1,0,0.35"]
@@ -25,13 +25,6 @@ KNOTS = 6
 BETWEEN = 0.05  # of a limit: between knots a motion keeps it about, and reserve covers that
 BOX = "boxes: [{pose: {position: [0, 0, 0.2]}, size: [0.02, 0.02, 0.02]}]\n"
 MARK = "-0.063,0,0.02"
-
-
-def run(capsys, *words):
-    with pytest.raises(SystemExit) as end:
-        main(["plan", *words])
-    out, err = printed(capsys)
-    return end.value.code, out, err
 
 
 @pytest.fixture(scope="module")

@@ -14,11 +14,10 @@ from cdpr_drake.analyses.planning.robot_path_task import (
     path_task,
     robot_limits,
 )
-from cdpr_drake.cli.app import main
 from cdpr_drake.errors import CdprError, DataFileError, PlanningError
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.planning.path_timing import plan_along_path
-from tests.messages import printed
+from tests.analyses.planning.plan_command import run
 
 G_CODE = """%
 (a square) G21 G90
@@ -119,13 +118,6 @@ def test_robots_whose_winches_or_pulleys_are_not_known_to_plans_are_refused():
     pulleys = robot.cable_set().over_platform_pulleys(0.01, axes)
     with pytest.raises(PlanningError, match="pulleys at the platform"):
         path_task(robot, LimitSettings(), pulleys)
-
-
-def run(capsys, *words):
-    with pytest.raises(SystemExit) as end:
-        main(["plan", *words])
-    out, err = printed(capsys)
-    return end.value.code, out, err
 
 
 def test_the_command_plans_and_writes(tmp_path, capsys):

@@ -21,19 +21,12 @@ from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.workspaces.cable_interference import box_row
 from cdpr_drake.workspaces.demanded_wrenches import spatial_inertias
 from cdpr_drake.workspaces.proven_sets import PoseSets
-from tests.messages import printed
+from tests.analyses.planning.plan_command import run
 
 ENDS = ["--from=-0.15,0,0.25", "--to=0.15,0,0.25"]
 LOW = "boxes: [{pose: {position: [0, 0, 0.12]}, size: [0.04, 0.5, 0.24]}]\n"
 BOXES = 6000
 ROBOT = "acrobot_small"
-
-
-def run(capsys, *words):
-    with pytest.raises(SystemExit) as end:
-        main(["plan", *words])
-    out, err = printed(capsys)
-    return end.value.code, out, err
 
 
 @pytest.fixture(scope="module")

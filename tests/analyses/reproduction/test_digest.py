@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import multiprocessing
-import os
 import signal
-import sys
 from pathlib import Path
 
 import cv2
@@ -33,6 +30,7 @@ from cdpr_drake.analyses.studies.framework.statement import FITTED, OURS
 from cdpr_drake.analyses.studies.published.register import published_registers
 from cdpr_drake.errors import OutputFormatError
 from tests.analyses.reproduction.judged_rows import judged_rows, said
+from tests.analyses.reproduction.killed_processes import exit_code_of, kill_at_change
 
 
 @pytest.fixture
@@ -160,16 +158,7 @@ def put_digest(folder, story, killed_at=None):
 
     with continued_folder(folder):
         check_folder(folder, quick=False)
-        if killed_at is not None:
-            seen = []
-
-            def kill_at(event, arguments):
-                if event in CHANGES and str(folder) in os.fsdecode(str(arguments[0])):
-                    seen.append(event)
-                    if len(seen) > killed_at:
-                        os.kill(os.getpid(), signal.SIGKILL)
-
-            sys.addaudithook(kill_at)
+        kill_at_change(folder, CHANGES, killed_at)
         write_pictures(folder, {DIGEST: lambda path: write_digest(path, story)})
 
 
@@ -183,12 +172,7 @@ def test_whatever_instant_kills_it_the_digest_is_whole_or_the_older_one(tmp_path
     while ended == -signal.SIGKILL:
         folder = tmp_path / f"killed-{instant}"
         put_digest(folder, older)
-        process = multiprocessing.get_context("fork").Process(
-            target=put_digest, args=(folder, story, instant)
-        )
-        process.start()
-        process.join()
-        ended = process.exitcode
+        ended = exit_code_of(put_digest, folder, story, instant)
         assert (folder / DIGEST).read_bytes() in whole
         put_digest(folder, story)
         assert others_in(folder) == []

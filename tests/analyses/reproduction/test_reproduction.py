@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import json
-import multiprocessing
-import os
 import shutil
 import signal
-import sys
 from collections import Counter
 from dataclasses import dataclass, field, replace
 from itertools import combinations
@@ -37,6 +34,7 @@ from cdpr_drake.analyses.studies.framework.statement import FITTED, OURS
 from cdpr_drake.analyses.studies.published.register import published_registers, read_register
 from cdpr_drake.errors import OutputFolderError
 from tests.analyses.reproduction.judged_rows import judged_rows, said
+from tests.analyses.reproduction.killed_processes import exit_code_of, kill_at_change
 
 GREY = (0.299, 0.587, 0.114)
 """What red, green and blue weigh in grey print."""
@@ -211,16 +209,7 @@ def listed_study(quick, session):
 
 def reproduce(folder, killed_at=None):
     """Runs one study as `cdpr reproduce` does; a number kills the process before that change."""
-    if killed_at is not None:
-        seen = []
-
-        def kill_at(event, arguments):
-            if event in CHANGES and str(folder) in os.fsdecode(str(arguments[0])):
-                seen.append(event)
-                if len(seen) > killed_at:
-                    os.kill(os.getpid(), signal.SIGKILL)
-
-        sys.addaudithook(kill_at)
+    kill_at_change(folder, CHANGES, killed_at)
     with continued_folder(folder):
         check_folder(folder, quick=False)
         study = StudyEntry(listed_study)
@@ -244,12 +233,7 @@ def test_whatever_instant_kills_it_all_files_are_known_and_none_stays_over(tmp_p
         folder = tmp_path / f"killed-{instant}"
         if older:
             shutil.copytree(tmp_path / "whole", folder)
-        process = multiprocessing.get_context("fork").Process(
-            target=reproduce, args=(folder, instant)
-        )
-        process.start()
-        process.join()
-        ended = process.exitcode
+        ended = exit_code_of(reproduce, folder, instant)
         if (folder / MARKER).exists():
             assert others_in(folder) == [], f"killed before change {instant}"
         reproduce(folder)

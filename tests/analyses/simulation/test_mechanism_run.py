@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.reporting.log_on_disk import PARTS
 from cdpr_drake.analyses.simulation import log_keeper
 from cdpr_drake.analyses.simulation.mechanism_figures import mechanism_pictures
 from cdpr_drake.analyses.simulation.mechanism_run import (
@@ -23,6 +22,7 @@ from cdpr_drake.analyses.simulation.session import RunSession
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
 from cdpr_drake.systems.scenarios.files import scenario_names
+from tests.analyses.simulation.resumed_runs import assert_it_goes_on_to_the_same_bytes
 from tests.cli.test_cli import refuse, run
 
 RUN = "cdpr_drake.analyses.simulation.mechanism_run"
@@ -147,26 +147,11 @@ def test_a_run_that_is_stopped_keeps_what_it_has():
     assert summarize_mechanism_run(done)["outcome"] == "interrupted"
 
 
-class EndedError(Exception):
-    """The program ends."""
-
-
 @pytest.mark.parametrize("name", [ARM, BASES])
 def test_a_run_that_was_killed_goes_on_to_the_same_bytes(tmp_path, monkeypatch, name):
     monkeypatch.setattr(log_keeper, "CHECKPOINT_WAIT", 0.0)
     kind, wanted = SCENARIO_KINDS["mechanism"], load_scenario(name, ["duration=0.5"])
-
-    def end(progress):
-        if progress.sim_time > 0.25:
-            raise EndedError
-
-    whole = kind.run(wanted)
-    with pytest.raises(EndedError):
-        kind.run(wanted, RunSession(end, log_folder=tmp_path / PARTS))
-    again = kind.run(wanted, RunSession(log_folder=tmp_path / PARTS, resume=True))
-    assert again.sim_time == whole.sim_time
-    for quantity, values in whole.log.items():
-        assert again.log[quantity].tobytes() == values.tobytes(), quantity
+    assert_it_goes_on_to_the_same_bytes(kind, wanted, tmp_path)
 
 
 def test_the_command_goes_on_in_its_folder(capsys, tmp_path, monkeypatch):
