@@ -82,7 +82,7 @@ ITEMS = (
     Item(
         "pick_and_place", "Pick and place", "cdpr simulate acrobot_pick_and_place --out pick",
         "pick/replay.html",
-        "The robot looks for a box, takes it, and sets it down where a tag says.", moves=True,
+        "The robot finds a box, takes it, and puts it down at a tag.", moves=True,
     ),
     Item(
         "image_path", "What the camera sees", "cdpr simulate --out servo", "servo/image_path.png",
@@ -105,7 +105,7 @@ ITEMS = (
         "Poses at which tensions within the bounds hold the platform.",
     ),
     Item(
-        "boxes", "A workspace that is proven",
+        "boxes", "A proven workspace",
         "cdpr workspace acrobot_large --kind static --certify --out proven", "proven/boxes.png",
         "Interval analysis proves every pose of a box inside, or outside.",
     ),
@@ -125,7 +125,7 @@ ITEMS = (
         "Every robot, also one of your own, as a page that you can turn and send.",
     ),
     Item(
-        "robots", "Robots that come with it", "cdpr robots --gallery robots.html", "robots.html",
+        "robots", "Robots of the package", "cdpr robots --gallery robots.html", "robots.html",
         "Robots from papers and machines, drawn to scale.",
     ),
 )  # fmt: skip
@@ -233,7 +233,7 @@ def write(images: Sequence[Image.Image], path: Path) -> None:
 def page() -> str:
     """The page: each picture with the command that makes it."""
     out = [
-        "# Gallery\n\nEach picture stands above the command that makes it. "
+        "# Gallery\n\nEach picture is followed by the command that makes it. "
         "Colours of cables and limits are explained in [the command](guides/command.md).\n"
     ]
     for item in ITEMS:

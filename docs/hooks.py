@@ -41,6 +41,9 @@ ROOT_PAGES = {
 HIDDEN_ROOMS = ("cdpr_drake.cli", "cdpr_drake.notebooks")
 """Packages that are no rooms of functions."""
 
+SEARCH_DIALOG = 'data-md-component="search" role="dialog"'
+"""How the theme opens its search; `on_post_page` gives it a name."""
+
 _LOG = logging.getLogger("mkdocs.hooks.cdpr_drake")
 
 
@@ -76,6 +79,11 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         for uri, content in notebook_pages(path):
             add(uri, content)
     return files
+
+
+def on_post_page(output: str, **_: Any) -> str:
+    """Material's search is a dialog without a name, which a screen reader cannot announce."""
+    return output.replace(SEARCH_DIALOG, f'{SEARCH_DIALOG} aria-label="Search"')
 
 
 def math(source: str, display: str) -> str:
