@@ -12,7 +12,8 @@ from cdpr_drake.studio.workbench import live_workspace
 from cdpr_drake.studio.workbench.scene import WORKSPACE
 from cdpr_drake.studio.workbench.session import Workbench
 from cdpr_drake.studio.workbench.working_folder import WorkingFolder
-from cdpr_drake.studio.workbench.workspace_sketch import COARSE, FINE, SketchWork, sketch_grid
+from cdpr_drake.studio.workbench.live_workspace import COARSE, FINE
+from cdpr_drake.studio.workbench.workspace_sketch import SketchWork, sketch_grid
 from tests.studio.pages import field, opened_page, type_into, until
 
 THERE, FARTHER = np.array([-0.4, -0.5, 1.1]), np.array([-0.3, -0.5, 1.1])

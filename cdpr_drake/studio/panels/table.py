@@ -11,9 +11,7 @@ _ROOM = "cdpr_drake.studio.panels"
 PANELS = {
     panel.name: panel
     for panel in (
-        Panel(
-            "robot", "Robot", "precision_manufacturing", {}, f"{_ROOM}.robot", "robot_panel"
-        ),
+        Panel("robot", "Robot", "precision_manufacturing", {}, f"{_ROOM}.robot", "robot_panel"),
         Panel(
             "pose", "Pose", "open_with", {POSE_NUMBERS: "Numbers"}, f"{_ROOM}.pose", "pose_panel"
         ),
@@ -33,9 +31,7 @@ PANELS = {
             f"{_ROOM}.run",
             "run_panel",
         ),
-        Panel(
-            "logs", "Logs", "timeline", {LOG: "The comparison"}, f"{_ROOM}.logs", "logs_panel"
-        ),
+        Panel("logs", "Logs", "timeline", {LOG: "The comparison"}, f"{_ROOM}.logs", "logs_panel"),
         Panel(
             "studies", "Studies", "science", {STUDY: "Studies"}, f"{_ROOM}.studies", "studies_panel"
         ),
