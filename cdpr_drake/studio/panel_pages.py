@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import asyncio
 from concurrent.futures import Future
+from contextlib import suppress
 
 from nicegui import background_tasks, ui
 
@@ -54,8 +55,10 @@ class PanelPages:
     def _load(self) -> None:
         """Imports what panels need; in the calculator's thread."""
         for panel in PANELS.values():
-            panel.load()
-        _ = self._bench.commands
+            with suppress(Exception):  # said in its place, when it is built
+                panel.load()
+        with suppress(Exception):  # said by the panels that have forms of commands
+            _ = self._bench.commands
 
     async def _place_rest(self) -> None:
         for name in PANELS:

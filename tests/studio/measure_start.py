@@ -1,10 +1,11 @@
-"""Processor time from `cdpr studio` to its address, to its page, and to what is loaded behind it.
+"""Processor time from `cdpr studio` to its address, to its page, and to what comes behind it.
 
 `python -m tests.studio.measure_start`
 
-The page is asked for as a browser does, with the token, as soon as the address is printed; without
-a browser, whose own time is not the studio's. Counted is the processor time of the studio's
-process; what it starts in further threads is part of that. Printed as JSON, median and largest.
+Counted is the time of the studio's process with its threads, also that of Python's start. The page
+is asked for as a browser asks, as soon as the address is printed. Then, in Chromium, whose own time
+is not counted, until all panels have been loaded and the tensions at the pose are in the page.
+Printed as JSON, median and largest.
 """
 
 from __future__ import annotations
@@ -14,20 +15,19 @@ import json
 import os
 import statistics
 import tempfile
-import time
 from pathlib import Path
 from urllib.request import HTTPCookieProcessor, build_opener
 
+from tests.chromium import chromium, wait_for
 from tests.studio.served import served
 
-QUIET = 0.5
-"""Where the process took less than `IDLE` for so long, all is loaded [s]."""
-
-IDLE = 0.03
-"""Processor time that a server without a page takes in `QUIET` [s]."""
-
 LONGEST = 120.0
-"""Until all is loaded [s]."""
+"""Until the page is answered [s]."""
+
+TENSIONS = (
+    "(document.querySelector('.studio-live') || {innerText: ''}).innerText.includes('limits')"
+)
+"""The tensions are in the page; they are computed when all panels are loaded."""
 
 
 def processor_time(pid: int) -> float:
@@ -40,19 +40,15 @@ def start_times(folder: Path) -> dict[str, float]:
     """Of one start: processor time to each stage, and the page's size."""
     with served(folder) as (address, process):
         found = {"to_address_s": processor_time(process.pid)}
-        browser = build_opener(HTTPCookieProcessor())
-        browser.open(address, timeout=LONGEST).close()  # the cookie
-        with browser.open(address.partition("?")[0], timeout=LONGEST) as answer:
+        client = build_opener(HTTPCookieProcessor())
+        client.open(address, timeout=LONGEST).close()  # it gives the cookie
+        with client.open(address.partition("?")[0], timeout=LONGEST) as answer:
             found["page_kb"] = len(answer.read()) / 1e3
         found["to_page_s"] = processor_time(process.pid)
-        end, before = time.monotonic() + LONGEST, -1.0
-        while time.monotonic() < end:
-            now = processor_time(process.pid)
-            if now - before < IDLE:
-                break
-            before = now
-            time.sleep(QUIET)
-        found["to_rest_s"] = before
+        with tempfile.TemporaryDirectory() as profile, chromium(Path(profile)) as page:
+            page.get(address)
+            wait_for(page, TENSIONS)
+            found["to_tensions_s"] = processor_time(process.pid)
     return found
 
 
@@ -63,11 +59,10 @@ def main() -> None:
     asked = options.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         starts = [start_times(Path(folder)) for _ in range(asked.starts)]
-    told = {
-        name: {"median": statistics.median(values), "largest": max(values)}
-        for name in starts[0]
-        for values in [[one[name] for one in starts]]
-    }
+    told = {}
+    for name in starts[0]:
+        values = [one[name] for one in starts]
+        told[name] = {"median": statistics.median(values), "largest": max(values)}
     print(json.dumps({"starts": asked.starts} | told, indent=2))
 
 

@@ -9,10 +9,10 @@ import pytest
 from cdpr_drake.cli.app import main
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.studio.workbench import live_workspace
+from cdpr_drake.studio.workbench.live_workspace import COARSE, FINE
 from cdpr_drake.studio.workbench.scene import WORKSPACE
 from cdpr_drake.studio.workbench.session import Workbench
 from cdpr_drake.studio.workbench.working_folder import WorkingFolder
-from cdpr_drake.studio.workbench.live_workspace import COARSE, FINE
 from cdpr_drake.studio.workbench.workspace_sketch import SketchWork, sketch_grid
 from tests.studio.pages import field, opened_page, type_into, until
 

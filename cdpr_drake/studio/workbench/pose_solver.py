@@ -13,7 +13,6 @@ from cdpr_drake.analyses.front.tensions import solve_tensions
 from cdpr_drake.analyses.statics.tension_query import applicable_methods
 from cdpr_drake.analyses.workspaces.conditions import MEASURES, PoseConditions, Poses
 from cdpr_drake.analyses.workspaces.workspace_question import pose_conditions
-from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CdprError
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.models.robot_schema import Robot
