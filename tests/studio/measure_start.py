@@ -24,9 +24,7 @@ from tests.studio.served import served
 LONGEST = 120.0
 """Until the page is answered [s]."""
 
-TENSIONS = (
-    "(document.querySelector('.studio-live') || {innerText: ''}).innerText.includes('limits')"
-)
+TENSIONS = "(document.querySelector('.studio-live')?.innerText ?? '').includes('limits')"
 """The tensions are in the page; they are computed when all panels are loaded."""
 
 

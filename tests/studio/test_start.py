@@ -19,6 +19,9 @@ LATER = (
 )  # fmt: skip
 """What the page with its first panel needs none of, and takes long to import."""
 
+ONE_OF_EACH = ("undo", "coordinate-2", "start-workspace", "start", "log", "studies-results")
+"""Marks of an element of each panel."""
+
 IMPORTED = """
 import sys
 import cdpr_drake.studio.server
@@ -51,8 +54,7 @@ def test_all_panels_come_behind_the_page(tmp_path):
     async def run():
         async with opened_page(tmp_path) as (user, _, __):
             with user:
-                return [len(list(ElementFilter(marker=name))) for name in
-                        ("undo", "coordinate-2", "start-workspace", "log", "studies-results")]  # fmt: skip
+                return [len(list(ElementFilter(marker=name))) for name in ONE_OF_EACH]
 
     assert min(asyncio.run(run())) >= 1
 
