@@ -129,6 +129,7 @@ body.body--dark {{ --q-primary: {COLORS[4]} !important;
   --studio-line: #43484f; --studio-soft: #a9b0b8; --studio-problem: #ff7b72;
   --studio-track: #969ca3; }}
 body.body--dark .bg-primary .q-btn__content {{ color: #101418; }}
+.body--dark .studio-panels, .body--dark .q-menu, .body--dark .q-dialog {{ color-scheme: dark; }}
 .nicegui-content {{ padding: 0 !important; }}
 .studio-header {{ padding: 0 0.8rem; gap: 0.6rem; align-items: center; flex-wrap: nowrap;
   min-height: 2.8rem; background: #24476b !important; }}

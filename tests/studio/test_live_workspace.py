@@ -8,7 +8,7 @@ import pytest
 
 from cdpr_drake.cli.app import main
 from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.studio.workbench import live_workspace
+from cdpr_drake.studio.workbench import live_workspace, workspace_sketch
 from cdpr_drake.studio.workbench.live_workspace import COARSE, FINE
 from cdpr_drake.studio.workbench.scene import WORKSPACE
 from cdpr_drake.studio.workbench.session import Workbench
@@ -132,7 +132,7 @@ def test_of_many_robots_the_newest_is_computed_and_the_rest_dropped(tmp_path, mo
             computed.append((poses, robot.cables[0].exit_point[0]))
             super().__init__(robot, poses)
 
-    monkeypatch.setattr(live_workspace, "SketchWork", Counted)
+    monkeypatch.setattr(workspace_sketch, "SketchWork", Counted)
     monkeypatch.setattr(live_workspace, "REST", 0.05)
 
     async def act():
