@@ -49,7 +49,8 @@
     }
     return made;
   }
-  if (data.title) { note("div", "#cdpr-head").textContent = data.title; }
+  const head = data.title ? note("div", "#cdpr-head") : null;
+  if (head) { head.textContent = data.title; }
   const bar = note("details", "#cdpr-bar");
   bar.open = innerWidth > 820;
   add(bar, "summary", "", "colours");
@@ -83,6 +84,8 @@
   }
   function placeNames() {
     const width = pane.clientWidth, height = pane.clientHeight, taken = [];
+    const under = head ? head.offsetTop + head.offsetHeight + 2 : 0;
+    const beside = head ? head.offsetLeft + head.offsetWidth : 0;
     const moved = replay ? replay.places() : null;  // exit points of a mechanism may move
     names.forEach((name, k) => {
       const place = moved ? moved.subarray(3 * k, 3 * k + 3) : data.places[k];
@@ -93,9 +96,15 @@
       name.style.display = shown ? "block" : "none";
       if (shown) {
         const left = (v[0] / v[3] + 1) / 2 * width, wide = name.offsetWidth + 2;
-        let top = (1 - v[1] / v[3]) / 2 * height - 20;
-        while (taken.some((t) => Math.abs(t[0] - left) < Math.max(wide, t[2])
-            && Math.abs(t[1] - top) < 18)) { top -= 18; }
+        const own = (1 - v[1] / v[3]) / 2 * height - 20;
+        const isTaken = (top) => taken.some((t) => Math.abs(t[0] - left) < Math.max(wide, t[2])
+            && Math.abs(t[1] - top) < 18);
+        let top = own;
+        while (isTaken(top)) { top -= 18; }
+        if (top < under && left < beside) {  // it would lie under the title
+          top = Math.max(own, under);
+          while (isTaken(top)) { top += 18; }
+        }
         taken.push([left, top, wide]);
         name.style.left = left + "px";
         name.style.top = top + "px";

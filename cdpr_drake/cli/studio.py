@@ -6,16 +6,20 @@ import atexit
 import os
 import sys
 import webbrowser
+from collections.abc import Mapping
 from importlib.util import find_spec
 from pathlib import Path
 from tempfile import NamedTemporaryFile
 from threading import Thread
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from cdpr_drake.cli.completion import studio_words
 from cdpr_drake.errors import CdprError
+
+if TYPE_CHECKING:
+    from cdpr_drake.studio.workbench.command_form import CommandForm
 
 TOKEN_VARIABLE = "CDPR_STUDIO_TOKEN"
 """Of the environment: a token that is the same at each start."""
@@ -63,7 +67,6 @@ def studio(
     if find_spec("nicegui") is None:
         raise CdprError("cdpr studio needs NiceGUI; pip install 'cdpr_drake[studio]'")
     print("cdpr studio: starting, Drake and the page are loaded", file=sys.stderr, flush=True)
-    from cdpr_drake.cli.command_forms import command_forms
     from cdpr_drake.studio.server import StudioOptions, serve
 
     serve(
@@ -74,9 +77,16 @@ def studio(
             port=port,
             token=token,
             ready=_open_browser if browser else None,
-            commands=command_forms(),
+            commands=_command_forms,
         )
     )
+
+
+def _command_forms() -> Mapping[str, CommandForm]:
+    """The forms of commands, which import most of the package: not before the page is there."""
+    from cdpr_drake.cli.command_forms import command_forms
+
+    return command_forms()
 
 
 def _wanted_token(no_token: bool) -> str | None:

@@ -13,7 +13,8 @@ from nicegui import events, ui
 
 from cdpr_drake.palette import COLORS, SLACK
 from cdpr_drake.studio.guard import SESSION
-from cdpr_drake.studio.panels.panel import message, on_page, place_remarks, show_errors
+from cdpr_drake.studio.panel_pages import PanelPages
+from cdpr_drake.studio.panels.panel import message, on_page, show_errors
 from cdpr_drake.studio.panels.table import PANELS
 from cdpr_drake.studio.scene_relay import SCENE
 from cdpr_drake.studio.sessions import Sessions
@@ -49,8 +50,6 @@ def make_page(
 
 
 def _build(bench: Workbench) -> None:
-    bench.scene_address()
-    bench.ask()
     dark = ui.dark_mode(value=bench.dark)
     shown = bench.panel if bench.panel in PANELS else next(iter(PANELS))
     with ui.header().classes("studio-header"):
@@ -72,14 +71,7 @@ def _build(bench: Workbench) -> None:
     turn.on_click(lambda: show(not bench.dark))
     _undo_by_keys(bench)
     with ui.element("div").classes("studio-main"):
-        with ui.tab_panels(tabs, value=shown, animated=False) as pages:
-            pages.classes("studio-panels").on_value_change(
-                lambda event: setattr(bench, "panel", event.value)
-            )
-            for panel in PANELS.values():
-                with ui.tab_panel(panel.name), show_errors():
-                    place_remarks(bench, panel)
-                    panel.build(bench)
+        pages = PanelPages(bench, tabs, shown)
         # After the panels: keys get into the scene's own controls, which are many.
         with ui.element("section").classes("studio-scene").props('aria-label="Scene"'):
             ui.element("iframe").props(f'src="{SCENE}" title="The robot in space" id="scene"')
@@ -89,6 +81,7 @@ def _build(bench: Workbench) -> None:
             with suppress(TimeoutError):  # a browser that is gone already
                 show(bool(await ui.run_javascript(PREFERS_DARK, timeout=10.0)))
 
+    ui.context.client.on_connect(pages.begin)
     ui.context.client.on_connect(ask_for_dark)
 
 
@@ -136,6 +129,7 @@ body.body--dark {{ --q-primary: {COLORS[4]} !important;
   --studio-line: #43484f; --studio-soft: #a9b0b8; --studio-problem: #ff7b72;
   --studio-track: #969ca3; }}
 body.body--dark .bg-primary .q-btn__content {{ color: #101418; }}
+.body--dark .studio-panels, .body--dark .q-menu, .body--dark .q-dialog {{ color-scheme: dark; }}
 .nicegui-content {{ padding: 0 !important; }}
 .studio-header {{ padding: 0 0.8rem; gap: 0.6rem; align-items: center; flex-wrap: nowrap;
   min-height: 2.8rem; background: #24476b !important; }}

@@ -18,6 +18,30 @@ from cdpr_drake.studio.guard import SESSION
 from cdpr_drake.studio.workbench.session import Workbench
 
 SCENE = "/scene/"
+PAGE = "meshcat.html"
+"""Meshcat's page."""
+
+STYLE = b"""<style>
+  .dg.main > .close-button { position: static !important; float: right; height: 1.6rem;
+    width: auto !important; margin: 0.5rem; padding: 0 0.7rem; border: 0; border-radius: 0.8rem;
+    font: 0.75rem/1.6rem sans-serif; text-shadow: none; color: #24476b !important;
+    background: #ffffffc0 !important; }
+  .dg.main > .close-button:hover { background: #ffffff !important; }
+</style>
+"""
+"""Of the button that opens Meshcat's controls, else a black bar over the scene."""
+
+SCRIPT = b"""<script>
+  new ResizeObserver(([pane]) => {
+    const {width, height} = pane.contentRect;
+    viewer.camera.zoom = Math.min(1, width / Math.max(height, 1) / 1.25);
+    viewer.camera.updateProjectionMatrix();
+    viewer.set_dirty();
+  }).observe(document.getElementById('meshcat-pane'));
+</script>
+"""
+"""A narrow scene shows as much of the robot across as a wide one."""
+
 LARGEST_MESSAGE = 64_000_000
 """Of a scene [bytes]; meshes come in one message."""
 
@@ -35,12 +59,15 @@ def add_scene_relay(app: FastAPI, bench_of: BenchOf) -> None:
         bench = bench_of(request.scope.get(SESSION, ""))
         if bench is None:
             return Response("There is no session; reload the page.", status_code=404)
-        page = name or "meshcat.html"
+        page = name or PAGE
         async with (
             aiohttp.ClientSession() as session,
             session.get(f"{await _address(bench)}/{page}") as answer,
         ):
             body, found = await answer.read(), answer.status
+        if page == PAGE:
+            body = body.replace(b"</head>", STYLE + b"</head>", 1)
+            body = body.replace(b"</body>", SCRIPT + b"</body>", 1)
         ending = "." + page.rpartition(".")[2]
         return Response(
             body, status_code=found, media_type=TYPES.get(ending, "application/octet-stream")

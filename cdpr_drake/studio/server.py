@@ -27,9 +27,7 @@ from cdpr_drake.studio.workbench.command_form import CommandForm
 from cdpr_drake.studio.workbench.job_manager import JobManager
 from cdpr_drake.studio.workbench.session import USUAL_ROBOT, Workbench
 from cdpr_drake.studio.workbench.working_folder import WorkingFolder
-from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.remote.server_socket import is_loopback
-from cdpr_drake.systems.scenarios.files import check_moves_robot, scenario_names
 
 LOOPBACK = "127.0.0.1"
 USUAL_PORT = 8642
@@ -47,7 +45,7 @@ class StudioOptions:
         token: Who opens the page has to know it; None: a random one, that is printed; empty: nobody
             is asked, which is accepted where this machine alone reaches the page.
         ready: Called with the page's address, with the token, when the server starts.
-        commands: Forms of the commands that the page offers, by name.
+        commands: Makes the forms of the commands that the page offers, by name.
     """
 
     opened: str | None = None
@@ -56,7 +54,7 @@ class StudioOptions:
     port: int = USUAL_PORT
     token: str | None = None
     ready: Callable[[str], None] | None = None
-    commands: Mapping[str, CommandForm] = field(default_factory=dict)
+    commands: Callable[[], Mapping[str, CommandForm]] = dict
 
 
 LONGEST_ABSENCE = 30.0
@@ -158,9 +156,13 @@ def _opened(name: str | None) -> tuple[str, str]:
     Raises:
         CdprError: It is a scenario that is not accepted.
     """
-    if name is None:
-        return USUAL_ROBOT, ""
-    if name not in robot_names() and (name in scenario_names() or _is_scenario(Path(name))):
+    if name is None or name in robot_names():
+        return name or USUAL_ROBOT, ""
+    # A second of the start, which who opens a robot of the package need not wait for.
+    from cdpr_drake.systems.diagrams.load import load_scenario
+    from cdpr_drake.systems.scenarios.files import check_moves_robot, scenario_names
+
+    if name in scenario_names() or _is_scenario(Path(name)):
         check_moves_robot(name, "cdpr studio")
         return str(load_scenario(name).robot), name
     return name, ""

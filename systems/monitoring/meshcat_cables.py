@@ -143,6 +143,12 @@ class CableChains:
         return min(1 + int(last * tension / self._full_scale), last)
 
 
+def _drawn_radius(robot: Robot) -> float:
+    """Of all rods [m]: thinner ones than the least would vanish on the screen."""
+    size = float(np.linalg.norm(robot.frame.upper - robot.frame.lower))
+    return max(float(np.max(robot.diameters())) / 2.0, THIN * size)
+
+
 class CablePictures:
     """Draws the cables of a robot in Meshcat, also into a recording, by `CableChains`."""
 
@@ -168,12 +174,35 @@ class CablePictures:
             colors: Of each cable that is not slack, #rrggbb; None: by its tension.
         """
         settings = CableSettings() if settings is None else settings
+        self._settings, self._path, self._full_scale = settings, path, full_scale
         self._set, self._model = settings.cable_set(robot), settings.model
-        paths = [f"{path}/{cable.name}" for cable in robot.cables]
-        size = float(np.linalg.norm(robot.frame.upper - robot.frame.lower))
-        # Thinner than this would vanish on the screen.
-        self._radius = max(float(np.max(robot.diameters())) / 2.0, THIN * size)
-        self._chains = CableChains(meshcat, paths, self._radius, full_scale, colors)
+        self._radius = _drawn_radius(robot)
+        self._paths = self._paths_of(robot)
+        self._chains = CableChains(meshcat, self._paths, self._radius, full_scale, colors)
+
+    def _paths_of(self, robot: Robot) -> list[str]:
+        return [f"{self._path}/{cable.name}" for cable in robot.cables]
+
+    def move_to(self, robot: Robot, full_scale: float) -> bool:
+        """Draws the cables of a robot whose cables look the same, with the rods that are there.
+
+        Rods that are made anew take a browser longer than rods that move.
+
+        Args:
+            robot: The robot.
+            full_scale: Tension of its last colour [N].
+
+        Returns:
+            Whether that can be: names, thickness and colours have to be the same.
+        """
+        same = (
+            self._paths_of(robot) == self._paths
+            and _drawn_radius(robot) == self._radius
+            and full_scale == self._full_scale
+        )
+        if same:
+            self._set = self._settings.cable_set(robot)
+        return same
 
     def draw(
         self,

@@ -17,19 +17,25 @@ from cdpr_drake.studio.workbench.working_folder import WorkingFolder
 @asynccontextmanager
 async def opened_page(folder, robot="acrobot_large"):
     """A user who has opened the page, and their workbench."""
-    forms = command_forms()
     calculator = Calculator()
-    sessions = Sessions(lambda: _bench(folder, robot, calculator, forms))
+    sessions = Sessions(lambda: _bench(folder, robot, calculator))
     try:
         async with user_simulation(make_page(sessions, lambda _: "one")) as user:
             client = await user.open("/")
+            await until(lambda: not _loading(user))
             yield user, next(iter(sessions.benches())), client
     finally:
         calculator.close()
 
 
-def _bench(folder, robot, calculator, forms):
-    return Workbench(WorkingFolder(folder), robot, calculator=calculator, commands=forms)
+def _loading(user):
+    """Whether panels are still to come."""
+    with user:
+        return bool(list(ElementFilter(marker="panel-loading")))
+
+
+def _bench(folder, robot, calculator):
+    return Workbench(WorkingFolder(folder), robot, calculator=calculator, commands=command_forms)
 
 
 async def until(condition, seconds=300.0):

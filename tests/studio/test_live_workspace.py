@@ -8,11 +8,12 @@ import pytest
 
 from cdpr_drake.cli.app import main
 from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.studio.workbench import live_workspace
+from cdpr_drake.studio.workbench import live_workspace, workspace_sketch
+from cdpr_drake.studio.workbench.live_workspace import COARSE, FINE
 from cdpr_drake.studio.workbench.scene import WORKSPACE
 from cdpr_drake.studio.workbench.session import Workbench
 from cdpr_drake.studio.workbench.working_folder import WorkingFolder
-from cdpr_drake.studio.workbench.workspace_sketch import COARSE, FINE, SketchWork, sketch_grid
+from cdpr_drake.studio.workbench.workspace_sketch import SketchWork, sketch_grid
 from tests.studio.pages import field, opened_page, type_into, until
 
 THERE, FARTHER = np.array([-0.4, -0.5, 1.1]), np.array([-0.3, -0.5, 1.1])
@@ -131,7 +132,7 @@ def test_of_many_robots_the_newest_is_computed_and_the_rest_dropped(tmp_path, mo
             computed.append((poses, robot.cables[0].exit_point[0]))
             super().__init__(robot, poses)
 
-    monkeypatch.setattr(live_workspace, "SketchWork", Counted)
+    monkeypatch.setattr(workspace_sketch, "SketchWork", Counted)
     monkeypatch.setattr(live_workspace, "REST", 0.05)
 
     async def act():

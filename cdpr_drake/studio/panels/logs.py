@@ -16,6 +16,7 @@ from cdpr_drake.studio.panels.job_bar import JobBar
 from cdpr_drake.studio.panels.moving_plots import MovingPlots
 from cdpr_drake.studio.panels.numbers import fact_rows, fact_table, number_words, plain_table
 from cdpr_drake.studio.panels.panel import notify, robot_argument, show_errors
+from cdpr_drake.studio.panels.result_names import LOG
 from cdpr_drake.studio.workbench.command_board import CommandBoard
 from cdpr_drake.studio.workbench.command_form import FieldProblem
 from cdpr_drake.studio.workbench.job import JobState
@@ -36,9 +37,6 @@ TICK = 0.5
 
 FIRST = ("follow", "fit-frame", "unit", "log-format")
 """Options that are always shown."""
-
-LOG = "log"
-"""Name of the result."""
 
 EMPTY = (
     "No log is open. Put a log of a machine or tracker into the working folder, or simulate a run "

@@ -9,6 +9,7 @@ import logging
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from importlib import import_module
 
 from nicegui import ui
 
@@ -30,14 +31,24 @@ class Panel:
         results: The results that it shows by name, with words for a person. It tells
             `Workbench.results` what each is about, and the page says above the panel which are
             about something else than what is open.
-        build: Places its elements into the current slot, for a workbench.
+        module: The module that has it, imported when the panel is opened, or behind the page.
+        function: Its function that places the elements into the current slot, for a workbench.
     """
 
     name: str
     title: str
     icon: str
     results: Mapping[str, str]
-    build: Callable[[Workbench], None]
+    module: str
+    function: str
+
+    def load(self) -> None:
+        """Imports what the panel needs."""
+        import_module(self.module)
+
+    def build(self, bench: Workbench) -> None:
+        """Places its elements into the current slot."""
+        getattr(import_module(self.module), self.function)(bench)
 
 
 def place_remarks(bench: Workbench, panel: Panel) -> None:

@@ -22,7 +22,7 @@ SCRIPT = """
 (() => {
   if (window.studioDragging) return;
   window.studioDragging = true;
-  const NEAR = 14, PERIOD = 50;
+  const NEAR = 14, PERIOD = 50, SLOW = 40, COARSE = 0.5;
   const times = (M, v) => [0, 1, 2, 3].map(
     (i) => M[i] * v[0] + M[i + 4] * v[1] + M[i + 8] * v[2] + M[i + 12] * v[3]);
   const frame = () => document.getElementById('scene');
@@ -68,6 +68,24 @@ SCRIPT = """
     if (left <= 0) tell(x, y, false);
     else waiting = setTimeout(() => { if (held) tell(x, y, false); }, left);
   }
+  // Where a picture takes longer than SLOW, as without a graphics card, the scene is drawn with
+  // fewer pixels as long as a point is held.
+  function resolve(viewer, share) {
+    viewer.renderer.setPixelRatio(window.devicePixelRatio * share);
+    viewer.set_3d_pane_size();
+    viewer.set_dirty();
+  }
+  function watchPictures(viewer) {
+    let before = null, late = 0, isCoarse = false;
+    function picture(now) {
+      if (!held) { if (isCoarse) resolve(viewer, 1.0); return; }
+      late = before !== null && now - before > SLOW ? late + 1 : 0;
+      before = now;
+      if (late === 3 && !isCoarse) { isCoarse = true; resolve(viewer, COARSE); }
+      requestAnimationFrame(picture);
+    }
+    requestAnimationFrame(picture);
+  }
   function listen() {
     const w = frame() && frame().contentWindow;
     if (!w || !w.viewer || !w.viewer.renderer) { setTimeout(listen, 300); return; }
@@ -91,6 +109,7 @@ SCRIPT = """
       if (!held) return;
       event.stopImmediatePropagation();
       canvas.setPointerCapture(event.pointerId);
+      watchPictures(viewer);
     }, true);
     canvas.addEventListener('pointermove', (event) => {
       if (!held) { canvas.style.cursor = under(event) ? 'grab' : ''; return; }

@@ -18,6 +18,7 @@ from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.studio.panels.hand_bar import HandBar
 from cdpr_drake.studio.panels.live_bar import SteeringBar
 from cdpr_drake.studio.panels.panel import on_page, robot_argument, show_errors
+from cdpr_drake.studio.panels.result_names import COMPARED, RUN
 from cdpr_drake.studio.panels.run_watch import RUN_STYLE, RunWatch
 from cdpr_drake.studio.panels.scenario_form import ScenarioForm
 from cdpr_drake.studio.workbench.finished_run import zipped
@@ -46,9 +47,6 @@ EMPTY = (
     "No run is shown. Choose a scenario and press Start to simulate the open robot, or choose one "
     "of the runs in the working folder."
 )
-
-RUN, COMPARED = "run", "compared"
-"""Names of the results: the run that is shown, and the one behind it."""
 
 
 class SceneOfRuns:

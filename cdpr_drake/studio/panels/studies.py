@@ -14,6 +14,7 @@ from cdpr_drake.studio.panels.command_fields import CommandFields, Filled
 from cdpr_drake.studio.panels.job_bar import JobBar
 from cdpr_drake.studio.panels.numbers import fact_table
 from cdpr_drake.studio.panels.panel import notify, show_errors
+from cdpr_drake.studio.panels.result_names import STUDY
 from cdpr_drake.studio.workbench.command_board import CommandBoard
 from cdpr_drake.studio.workbench.command_form import FieldProblem
 from cdpr_drake.studio.workbench.finished_studies import (
@@ -43,9 +44,6 @@ EMPTY = (
 
 SHADES = {"confirmed": "#1b7f4f", "in part": "#a86200", "not confirmed": "#c01010"}
 """Behind the words of verdicts."""
-
-STUDY = "study"
-"""Name of the result."""
 
 
 class StudyView:

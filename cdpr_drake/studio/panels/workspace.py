@@ -16,6 +16,7 @@ from cdpr_drake.stability.verdict import VERDICTS
 from cdpr_drake.studio.panels.command_fields import Choices, CommandFields, Filled
 from cdpr_drake.studio.panels.job_bar import JobBar
 from cdpr_drake.studio.panels.panel import message, notify, on_page, robot_argument, show_errors
+from cdpr_drake.studio.panels.result_names import WORKSPACES
 from cdpr_drake.studio.workbench.calculator import Signal
 from cdpr_drake.studio.workbench.command_board import CommandBoard
 from cdpr_drake.studio.workbench.command_form import FieldProblem
@@ -46,9 +47,6 @@ FIRST = {
     "stability": ("scheme", "verdict", "grid", "orientation"),
 }
 """Options that are always shown."""
-
-WORKSPACES = "workspaces"
-"""Name of the result."""
 
 EMPTY = (
     "No workspace yet. Choose what the cables must hold (kind) or what is measured at each pose "

@@ -11,22 +11,39 @@ import asyncio
 from collections.abc import Callable
 from concurrent.futures import Future
 from contextlib import suppress
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.studio.workbench.calculator import Signal
-from cdpr_drake.studio.workbench.scene import RobotScene
-from cdpr_drake.studio.workbench.workspace_sketch import COARSE, FINE, SketchWork, WorkspaceSketch
+
+if TYPE_CHECKING:
+    from cdpr_drake.studio.workbench.scene import RobotScene
+    from cdpr_drake.studio.workbench.workspace_sketch import SketchWork, WorkspaceSketch
 
 REST = 0.5
 """Time without a change after which a workspace is refined [s]."""
+
+COARSE, FINE = 1_000, 20_000
+"""About so many poses while a point moves, and when it rests: a few and some tens of
+milliseconds."""
 
 PIECE = 4_000
 """Poses at a time, about 15 ms: so much longer waits who moves on."""
 
 Calculate = Callable[[Callable[[], Any], Callable[[Future[Any]], None]], None]
 """Does some work in the calculator's thread, and calls the second with its future."""
+
+
+def sketch_work(robot: Robot, poses: int) -> SketchWork:
+    """A sketch of about so many poses in the making; what computes is imported at the first one.
+
+    Raises:
+        CdprError: The robot has no static workspace.
+    """
+    from cdpr_drake.studio.workbench.workspace_sketch import SketchWork
+
+    return SketchWork(robot, poses)
 
 
 class LiveWorkspace:
@@ -73,7 +90,7 @@ class LiveWorkspace:
             self._found = None
         elif self._found is None or self._found[0] is not robot:
             try:
-                self._found = robot, SketchWork(robot, COARSE).go_on(2 * COARSE), ""
+                self._found = robot, sketch_work(robot, COARSE).go_on(2 * COARSE), ""
             except CdprError as problem:
                 self._found = robot, None, str(problem)
         sketch = None if self._found is None else self._found[1]
@@ -107,7 +124,7 @@ class LiveWorkspace:
             robot = scene().robot
             with suppress(CdprError):
                 if robot is not None:
-                    SketchWork(robot, COARSE).go_on(1)
+                    sketch_work(robot, COARSE).go_on(1)
 
         self._calculate(load, lambda _: None)
 
@@ -116,7 +133,7 @@ class LiveWorkspace:
         robot = self._robot
         if robot is None or self.sketch is None:
             return
-        work = SketchWork(robot, FINE)
+        work = sketch_work(robot, FINE)
 
         def piece() -> WorkspaceSketch | None:
             if robot is not self._robot or not self._wanted:

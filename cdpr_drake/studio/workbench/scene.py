@@ -57,6 +57,7 @@ class RobotScene:
         self._robot: Robot | None = None
         self._name, self._size = "", 0.0
         self._dark, self._solids = False, ""
+        self._points = (0, 0.0)  # how many there are, and the size that they are made for
         self._picture: RobotPicture | None = None
         self._workspace: Solid | None = None
 
@@ -83,25 +84,34 @@ class RobotScene:
         look = robot.name != self._name or abs(size - self._size) > 0.25 * size
         colors = [nth_look(k).color for k in range(len(robot.cables))]
         full_scale, solids = robot.tension_limits()[1], _solids(robot)
-        for path in ("cables", "studio"):
-            self.meshcat.Delete(path)
         if solids == self._solids and self._picture is not None and not look:
             # A diagram takes memory that Drake is slow to give back, and the same solids need none.
-            self._picture.cables = CablePictures(self.meshcat, robot, full_scale, colors=colors)
+            if not self._picture.cables.move_to(robot, full_scale):
+                self.meshcat.Delete("cables")
+                self._picture.cables = CablePictures(self.meshcat, robot, full_scale, colors=colors)
         else:
+            self.meshcat.Delete("cables")
             self.meshcat.Delete("visualizer")
             self._picture = RobotPicture(
                 robot, full_scale, meshcat=self.meshcat, colors=colors, look=look
             )
             self.set_dark(self._dark)
+            self._points = (0, 0.0)
         self._solids = solids
-        exits = robot.cable_set().p_WA
+        if self._points != (len(colors), size):
+            self._make_points(colors, size)
+        for k, p_WA in enumerate(robot.cable_set().p_WA.T):
+            self.meshcat.SetTransform(f"{EXITS}/{k}", RigidTransform(p_WA))
+        self._robot, self._name, self._size = robot, robot.name, size
+
+    def _make_points(self, colors: list[str], size: float) -> None:
+        """Makes the points that can be dragged, for a frame of a size [m]; they only move then."""
+        self.meshcat.Delete("studio")
         for k, color in enumerate(colors):
             for path in (EXITS, ANCHORS):
                 shape = Sphere(POINT_SIZE * size * (1.0 if path == EXITS else 0.6))
                 self.meshcat.SetObject(f"{path}/{k}", shape, Rgba(*rgb(color)))
-            self.meshcat.SetTransform(f"{EXITS}/{k}", RigidTransform(exits[:, k]))
-        self._robot, self._name, self._size = robot, robot.name, size
+        self._points = len(colors), size
 
     @property
     def robot(self) -> Robot | None:

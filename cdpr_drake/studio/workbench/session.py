@@ -6,8 +6,9 @@ import copy
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import replace
+from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -27,9 +28,11 @@ from cdpr_drake.studio.workbench.pose_answer import USUAL_METHOD, PoseAnswer, Ro
 from cdpr_drake.studio.workbench.pose_axes import axis_values, pose_at
 from cdpr_drake.studio.workbench.result_subject import Results, Subject, subject_of
 from cdpr_drake.studio.workbench.robot_files import OpenedRobot, RobotFiles
-from cdpr_drake.studio.workbench.scene import Draw, RobotScene
 from cdpr_drake.studio.workbench.working_folder import WorkingFolder
 from cdpr_drake.studio.workbench.yaml_edit import with_value
+
+if TYPE_CHECKING:  # it takes a second of the start
+    from cdpr_drake.studio.workbench.scene import Draw, RobotScene
 
 USUAL_ROBOT = "acrobot_large"
 
@@ -56,7 +59,6 @@ class Workbench:
         panel: Name of the panel that was shown last.
         dark: Whether the page is dark; None: as the browser likes it.
         jobs: Work in processes of its own, the same for all sessions of a server.
-        commands: Forms of the commands that there are, by name.
         results: What is shown of results, and what each is about.
         drawn: What the scene shows in the place of the robot; None: the robot.
         live: The static workspace that follows the robot while it is changed.
@@ -70,9 +72,11 @@ class Workbench:
         *,
         calculator: Calculator | None = None,
         jobs: JobManager | None = None,
-        commands: Mapping[str, CommandForm] | None = None,
+        commands: Callable[[], Mapping[str, CommandForm]] = dict,
     ) -> None:
         """With a robot of the package or the path of a file, and perhaps a scenario.
+
+        `commands` makes the forms of commands; it is asked at their first use.
 
         Raises:
             CdprError: There is no such robot, or it is not accepted.
@@ -98,7 +102,7 @@ class Workbench:
         self.panel = ""
         self.dark: bool | None = None
         self.jobs = JobManager() if jobs is None else jobs
-        self.commands = dict(commands or {})
+        self._make_commands = commands
         self.coordinates: list[float] = []
         self.X_WP: RigidTransform = self.robot.value.home.transform()
         self._questions = RobotQuestions(self.robot.value)
@@ -111,6 +115,11 @@ class Workbench:
         self.live = LiveWorkspace(self.calculator.run, self.scene)
         self.go_home()
         self.robot.changed.connect(self._robot_changed)
+
+    @cached_property
+    def commands(self) -> Mapping[str, CommandForm]:
+        """Forms of the commands that there are, by name."""
+        return self._make_commands()
 
     @property
     def file(self) -> str:
@@ -335,6 +344,8 @@ class Workbench:
     def scene(self) -> RobotScene:
         """The scene, made at the first call; for the calculator's thread only."""
         if self._scene is None:
+            from cdpr_drake.studio.workbench.scene import RobotScene
+
             self._scene = RobotScene()
         return self._scene
 

@@ -24,10 +24,6 @@ from cdpr_drake.workspaces.volume import (
     workspace_volume,
 )
 
-COARSE, FINE = 1_000, 20_000
-"""About so many poses while a point moves, and when it rests: a few and some tens of
-milliseconds."""
-
 IN_NO_FILE = ""
 """Name of a robot that is in no catalogue: its grid is in the box of its frame."""
 

@@ -182,3 +182,33 @@ def test_system_draws_while_a_simulation_runs(robot):
     block.set_at_equilibrium(block.GetMyMutableContextFromRoot(context), robot.home.transform())
     Simulator(diagram, context).AdvanceTo(0.02)
     assert meshcat.HasPath("cables/C1")
+
+
+def test_cables_of_a_robot_that_changes_move_with_the_rods_that_are_there():
+    robot, moved = load_robot("acrobot_small"), load_robot("acrobot_small")
+    home, tensions = robot.home.transform(), np.full(8, 5.0)
+    recorder, full_scale = Recorder(), 60.0
+    pictures = CablePictures(recorder, robot, full_scale)
+    pictures.draw(home, tensions)
+    made = len(recorder.colors)
+    moved.cables[1].exit_point = moved.cables[1].exit_point + np.array([0.1, 0.0, 0.0])
+    assert pictures.move_to(moved, full_scale)
+    pictures.draw(home, tensions)
+    assert len(recorder.colors) == made
+    start = recorder.points(moved.cables[1].name)[0, 0]
+    np.testing.assert_allclose(start, moved.cable_set().p_WA[:, 1], atol=ROUNDING)
+
+
+@pytest.mark.parametrize("change", ["name", "diameter", "count", "scale"])
+def test_cables_that_look_otherwise_are_made_anew(change):
+    robot, other = load_robot("acrobot_small"), load_robot("acrobot_small")
+    pictures, full_scale = CablePictures(Recorder(), robot, 60.0), 60.0
+    if change == "name":
+        other.cables[0].name = "other"
+    elif change == "diameter":
+        other.cable.diameter = 0.05
+    elif change == "count":
+        del other.cables[-1]
+    else:
+        full_scale = 30.0
+    assert not pictures.move_to(other, full_scale)

@@ -1,0 +1,74 @@
+"""The studio's page goes out before most of the package is imported; the rest comes behind it."""
+
+import asyncio
+import subprocess
+import sys
+from urllib.request import HTTPCookieProcessor, build_opener
+
+from nicegui import ElementFilter
+
+from cdpr_drake.studio.panels.panel import Panel
+from cdpr_drake.studio.panels.table import PANELS
+from tests.studio.pages import opened_page, until
+
+LATER = (
+    "matplotlib", "cv2", "scipy.optimize", "scipy.spatial", "pydrake.systems.analysis",
+    "cdpr_drake.cli.command_forms", "cdpr_drake.analyses.visualization",
+    "cdpr_drake.studio.panels.workspace", "cdpr_drake.studio.panels.run",
+    "cdpr_drake.studio.workbench.scene", "cdpr_drake.studio.workbench.pose_solver",
+)  # fmt: skip
+"""What the page with its first panel needs none of, and takes long to import."""
+
+ONE_OF_EACH = ("undo", "coordinate-2", "start-workspace", "start", "log", "studies-results")
+"""Marks of an element of each panel."""
+
+IMPORTED = """
+import sys
+import cdpr_drake.studio.server
+from cdpr_drake.studio.panels.table import PANELS
+PANELS["robot"].load()
+print(*sorted(sys.modules))
+"""
+
+
+def test_what_takes_long_is_not_imported_before_the_page():
+    done = subprocess.run(
+        [sys.executable, "-c", IMPORTED], capture_output=True, text=True, check=True
+    )
+    imported = set(done.stdout.split())
+    assert "nicegui" in imported
+    assert imported.intersection(LATER) == set()
+
+
+def test_the_page_has_the_panel_that_is_shown_and_no_other(studio):
+    client = build_opener(HTTPCookieProcessor())
+    client.open(studio[1]).close()
+    with client.open(studio[1].partition("?")[0]) as answer:
+        page = answer.read().decode()
+    assert "exit point" in page
+    waiting = [panel.title for panel in PANELS.values() if f"{panel.title}: loading" in page]
+    assert waiting == ["Pose", "Workspace", "Run", "Logs", "Studies"]
+
+
+def test_all_panels_come_behind_the_page(tmp_path):
+    async def run():
+        async with opened_page(tmp_path) as (user, _, __):
+            with user:
+                return [len(list(ElementFilter(marker=name))) for name in ONE_OF_EACH]
+
+    assert min(asyncio.run(run())) >= 1
+
+
+def test_a_panel_that_cannot_be_loaded_says_so_and_the_others_come(tmp_path, monkeypatch):
+    broken = Panel("pose", "Pose", "open_with", {}, "cdpr_drake.studio.panels.no_such", "none")
+    monkeypatch.setitem(PANELS, "pose", broken)
+
+    async def run():
+        async with opened_page(tmp_path) as (user, bench, _):
+            await until(lambda: bench.answer is not None)
+            with user:
+                assert list(ElementFilter(marker="start-workspace"))
+                return list(user.notify.messages)
+
+    said = asyncio.run(run())
+    assert any("no_such" in words for words in said), said
