@@ -150,6 +150,7 @@ def set_box(axes: Any, lower: Array, upper: Array) -> None:
     axes.yaxis.labelpad = 10.0
     axes.zaxis.labelpad = 14.0  # its numbers stand beside the axis, where its label would be
     axes.tick_params(labelsize=9)
+    axes.tick_params(axis="z", pad=5.0)
 
 
 def _draw_path(axes: Any, path: Path3D, phase: float) -> None:
