@@ -197,7 +197,7 @@ def residual_figure(runs: Runs) -> Figure:
     """Figure 5.15: residuals, and what the sensors' accuracy can make of them."""
     found = _ranges(runs)
     figure, axes = new_figure(
-        1, 1, (10.0, 6.0), f"What of the tensions balances no weight, readings +- {ACCURACY:g} N"
+        1, 1, (10.0, 6.0), f"Part of the tensions that balances no weight; readings ±{ACCURACY:g} N"
     )
     for place, (name, (here, least, most)) in enumerate(found.items()):
         first = place == 0
