@@ -24,7 +24,7 @@ COLORS = (
     "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#8c510a", "#e69f00", "#303030",
 )  # fmt: skip
 DASHES = (SOLID, DASHED, DASH_DOTTED, DOTTED)
-MARKERS = ("o", "s", "^", "D", "v", "x", "*", "<")
+MARKERS = ("o", "s", "^", "D", "v", "x", "*", "<", ">", "P", "d", "1", "p", "2", "X", "h")
 HATCHES = ("", "///", "...", "xxx", "\\\\\\", "+++", "ooo", "---")
 
 
@@ -46,15 +46,16 @@ class Look:
 
 
 def nth_look(number: int) -> Look:
-    """The look of the thing with this number, from 0; colour and marker together repeat after 64.
+    """The look of the thing with this number, from 0; colour and marker together repeat after 128.
 
-    Cables, configurations, methods: whatever comes as a list.
+    Cables, configurations, methods: whatever comes as a list. Markers repeat after 16, as grey
+    print has no colours to tell the ninth thing from the first.
     """
     shift = number // len(COLORS)
     return Look(
         COLORS[number % len(COLORS)],
         DASHES[(number + shift) % len(DASHES)],
-        MARKERS[(number + shift) % len(MARKERS)],
+        MARKERS[(number + number // len(MARKERS)) % len(MARKERS)],
         HATCHES[(number + shift) % len(HATCHES)],
     )
 

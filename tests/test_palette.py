@@ -33,6 +33,8 @@ def test_looks_differ_by_colour_and_in_grey():
         assert (a.dash, a.marker) != (b.dash, b.marker)
     for a, b in pairwise(looks[:8]):
         assert a.dash != b.dash
+    # Ten experiments and a few more: their markers are their own.
+    assert len({look.marker for look in looks[:16]}) == 16
 
 
 def test_lines_can_be_seen_on_white():

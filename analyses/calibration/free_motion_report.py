@@ -17,12 +17,12 @@ from cdpr_drake.analyses.calibration.log_fit import LogFit
 from cdpr_drake.analyses.reporting.log_files import finite
 from cdpr_drake.analyses.reporting.provenance import package_versions
 from cdpr_drake.analyses.reporting.statements import new_table
-from cdpr_drake.analyses.visualization.figure_style import line_style, new_figure
+from cdpr_drake.analyses.visualization.figure_style import few_ticks, line_style, new_figure
 from cdpr_drake.arrays import Array
 from cdpr_drake.identification.result import MISFIT, MISFIT_FACTOR
 from cdpr_drake.models.materials import BehaviourSettings, OwnMaterial
 from cdpr_drake.models.robot_schema import HysteresisSettings, Robot
-from cdpr_drake.palette import nth_look
+from cdpr_drake.palette import BOUND, nth_look
 
 RESULTS = "identification.json"
 """File of a results folder: all numbers."""
@@ -229,7 +229,11 @@ def _unexplained_figure(found: FreeMotion) -> Figure:
             rest.time[: len(means)] + 0.5 * PULL, np.linalg.norm(means, axis=1),
             label=f"mean over {PULL:g} s", **line_style(nth_look(1)),
         )  # fmt: skip
-        row[j].axhline(PULLED * weight, color="0.4", linestyle="--", linewidth=1.0)
+        row[j].axhline(
+            PULLED * weight, label=f"{100.0 * PULLED:g} % of the weight",
+            **line_style(BOUND) | {"linewidth": 1.0},
+        )  # fmt: skip
+        few_ticks(row[j].xaxis, 5)
         words = "fitted" if j < fitted else "held out"
         row[j].set(title=f"{words}, from {one.stretch.time[0]:.6g} s", xlabel="time [s]", ylim=0.0)
     row[0].set(ylabel="force [N]")

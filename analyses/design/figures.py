@@ -110,9 +110,9 @@ def _draw_points(axes: Any, search: DesignSearch) -> None:
     after = all_cables.robot(search.sets[search.best], search.coordinates[search.best])
     kept = list(all_cables.kept[search.sets[search.best]])
     old_set, new_set = before.cable_set(), after.cable_set()
-    for one, title, old, new in (
-        (axes[0], "exit points, from above", old_set.p_WA, new_set.p_WA),
-        (axes[1], "anchor points, from above", old_set.p_PB, new_set.p_PB),
+    for one, title, frame, old, new in (
+        (axes[0], "exit points, from above", "W", old_set.p_WA, new_set.p_WA),
+        (axes[1], "anchor points, from above", "P", old_set.p_PB, new_set.p_PB),
     ):
         one.plot(old[0], old[1], "o", markerfacecolor="none", color="black", label="robot as it is")
         one.plot(new[0], new[1], "s", color=nth_look(0).color, markersize=5, label="best design")
@@ -126,7 +126,9 @@ def _draw_points(axes: Any, search: DesignSearch) -> None:
             one.annotate(", ".join(cables), place, xytext=inward, textcoords="offset points",
                          ha="right" if place[0] > 0.0 else "left")  # fmt: skip
         few_ticks(one.xaxis)
-        one.set(xlabel="x [m]", ylabel="y [m]", title=title, aspect="equal")
+        one.set(
+            xlabel=f"x in {frame} [m]", ylabel=f"y in {frame} [m]", title=title, aspect="equal"
+        )  # fmt: skip
         one.legend(loc="center")
 
 

@@ -108,14 +108,14 @@ def world_figure(title: str, world: WorldSettings, log: Log) -> Figure:
     figure, panels = new_figure(2 + touching, 1, (10.0, 6.5 + 3.0 * touching), title)
     times = log["time"]
     for axes, quantity, label in (
-        (panels[0], "clearance", "clearance of the platform [m]"),
-        (panels[1], "cable_clearance", "clearance of the cables [m]"),
+        (panels[0], "clearance", "clearance of the platform [mm]"),
+        (panels[1], "cable_clearance", "clearance of the cables [mm]"),
     ):
         shown = [k for k in range(len(names)) if np.any(np.isfinite(log[quantity][:, k]))]
         for place, k in enumerate(shown):
             draw_curve(
                 axes, times, log[quantity][:, k], nth_look(k), names[k],
-                phase=phase_of(place, len(shown)),
+                scale=1e3, phase=phase_of(place, len(shown)),
             )  # fmt: skip
         axes.axhline(0.0, **line_style(BOUND))
         axes.set(xlabel="time [s]", ylabel=label)

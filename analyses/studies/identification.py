@@ -352,6 +352,7 @@ def _draw_noise(shares: Axes, bars: Axes, noise: Runs) -> None:
     bars.bar(places + 0.2, ratio, 0.4, label="bound, random poses", **bar_style(nth_look(2)))
     bars.axhline(1.0, **line_style(BOUND))
     bars.set_xticks(places, NAMES, rotation=60)
+    bars.margins(y=0.3)  # for the legend
 
 
 STUDY = Study(

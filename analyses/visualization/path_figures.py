@@ -144,10 +144,13 @@ def set_box(axes: Any, lower: Array, upper: Array) -> None:
     )
     axes.set_box_aspect(upper - lower, zoom=0.92)
     for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
-        axis.set_major_locator(MaxNLocator(4))
+        # The last number of one axis and the first of the next would stand in the same corner.
+        axis.set_major_locator(MaxNLocator(4, prune="both"))
         axis.labelpad = 7.0
-    axes.zaxis.labelpad = 12.0  # its numbers stand beside the axis, where its label would be
+    axes.yaxis.labelpad = 10.0
+    axes.zaxis.labelpad = 14.0  # its numbers stand beside the axis, where its label would be
     axes.tick_params(labelsize=9)
+    axes.tick_params(axis="z", pad=5.0)
 
 
 def _draw_path(axes: Any, path: Path3D, phase: float) -> None:

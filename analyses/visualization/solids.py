@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 VIEW = 22.0, -58.0
 """Elevation and azimuth from which solids are seen [deg]."""
 
+NO_CELL = "no cell of the grid has\nall its corners inside"
+"""In a frame without a solid: single poses may be inside."""
+
 
 def draw_solid(
     axes: Any, quads: Array, color: str, frame: tuple[Array, Array], exits: Array
@@ -41,6 +44,10 @@ def draw_solid(
     lower, upper = frame
     if len(quads):
         axes.add_collection3d(_shaded(quads, color))
+    else:
+        axes.text2D(
+            0.5, 0.5, NO_CELL, transform=axes.transAxes, ha="center", va="center", fontsize=9
+        )
     edge = _draw_frame(axes, lower, upper)
     handles = [*axes.plot(*exits, "k^", markersize=4, zorder=4, label="exit points of the cables")]
     axes.set(xlabel="x in W [m]", ylabel="y in W [m]", zlabel="z in W [m]")

@@ -54,6 +54,10 @@ ROOM = 0.04
 CONTOURS = 6
 """Contour lines of a measure, about."""
 
+LEAST_CONTOURED = 5
+"""Lines of equal measure are drawn over so many points in both directions; over fewer they are
+straight, and their numbers meet."""
+
 
 def workspace_pictures(
     workspace: RobotWorkspace,
@@ -131,7 +135,7 @@ def planes_figure(
     for number, (axes, k) in enumerate(zip(panels, chosen, strict=False)):
         plane = np.take(shown, k, normal).T
         mesh = axes.pcolormesh(*edges, plane, cmap=colors, vmin=limits[0], vmax=limits[1])
-        if measure is not None and min(plane.shape) > 1 and np.ptp(limits) > 0.0:
+        if measure is not None and min(plane.shape) >= LEAST_CONTOURED and np.ptp(limits) > 0.0:
             _contours(axes, [workspace.grid.axes[k] for k in (u, v)], plane, limits)
         if robot is not None:
             _draw_robot(axes, robot, (u, v), edges)
@@ -144,8 +148,8 @@ def planes_figure(
         plain_numbers(axes.yaxis)
         first, lowest = number % columns == 0, number + columns >= len(chosen)
         axes.tick_params(labelleft=first, labelbottom=lowest)
-        axes.set_ylabel(f"{'xyz'[v]} [m]" if first else "")
-        axes.set_xlabel(f"{'xyz'[u]} [m]" if lowest else "")
+        axes.set_ylabel(f"{'xyz'[v]} in W [m]" if first else "")
+        axes.set_xlabel(f"{'xyz'[u]} in W [m]" if lowest else "")
     for axes in panels[len(chosen) :]:
         axes.remove()
     lines, _ = panels[0].get_legend_handles_labels()

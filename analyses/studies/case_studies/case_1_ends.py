@@ -248,6 +248,7 @@ def accuracy_figure(runs: Runs) -> Figure:
             axes.text(place, high, f" {len(values[k])} {word}", ha="center", va="bottom")
         axes.set_xticks(range(len(errors)), list(errors))
         axes.set_ylabel(f"true error at the end, {label}")
+        axes.margins(y=0.12)  # for the words on the whiskers
         axes.grid(visible=False, axis="x")
     return figure
 

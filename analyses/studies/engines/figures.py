@@ -69,7 +69,7 @@ def _draw_scenarios(axes: Any, runs: Runs) -> None:
         axes.legend(  # bars fill the axes
             loc="upper center", bbox_to_anchor=(0.5, 0.0), borderaxespad=6.0, fontsize=8, ncols=2
         )
-    axes.set(xlabel="distance of the engines [um]", title="scenarios that ship")
+    axes.set(xlabel="distance of the engines [µm]", title="scenarios that ship")
 
 
 def _draw_impacts(axes: Any, runs: Runs) -> None:
@@ -80,7 +80,7 @@ def _draw_impacts(axes: Any, runs: Runs) -> None:
         for k, (what, label) in enumerate(whats):
             sizes = np.sort(1e6 * some[what])
             axes.semilogy(sizes, label=label, **line_style(nth_look(k)))
-    axes.set(xlabel="runs, sorted", ylabel="distance of the engines [um]",
+    axes.set(xlabel="runs, sorted", ylabel="distance of the engines [µm]",
              title="servo, cables paid out at random")  # fmt: skip
 
 

@@ -39,6 +39,7 @@ from cdpr_drake.analyses.visualization.figure_style import (
     line_style,
     new_figure,
 )
+from cdpr_drake.arrays import Array
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.palette import BOUND, LOST, nth_look
 
@@ -64,16 +65,20 @@ def layout_figure(plan: Plan, layout: Layout, runs: Runs) -> Figure:
 
 def shown_of(plan: Plan, runs: Runs, names: Sequence[str]) -> Shown:
     """Those of some configurations that were run, with their first run and the look that they have
-    in their experiment's figures."""
+    in their experiment's figures; looks by their order where two of them, of two experiments, have
+    the same."""
     looks = {
         c.name: (c, nth_look(number))
         for group in plan.groups().values()
         for number, c in enumerate(group)
     }
+    there = [name for name in names if runs.has(configuration=name)]
+    own = [looks[name][1] for name in there]
+    if len(set(own)) < len(own):
+        own = [nth_look(number) for number in range(len(there))]
     return [
-        (looks[name][0], runs(configuration=name).rows[0], looks[name][1])
-        for name in names
-        if runs.has(configuration=name)
+        (looks[name][0], runs(configuration=name).rows[0], look)
+        for name, look in zip(there, own, strict=True)
     ]
 
 
@@ -128,6 +133,9 @@ MULTIPLES = {
 NOT_MEASURED = "not measured in this run"
 """In a panel whose quantity a run has not, such as features without a camera."""
 
+FLAT = 0.2
+"""Panels have scales of their own where curves of one would fill less of a common one."""
+
 
 def image_figure(title: str, shown: Shown, runs: Runs) -> Figure:
     """Paths of the object's centre in the image, and their distance from the straight line."""
@@ -178,7 +186,8 @@ def small_multiples(title: str, shown: Shown, quantity: str, label: str, factor:
     size = (max(4.2 * columns + 1.5, 8.0), 3.0 * rows + 1.4)
     words = f"{label[0].upper()}{label[1:].partition(' [')[0]}"
     figure = bare_figure(size, f"{words}\n{title}")
-    grid = figure.subplots(rows, columns, squeeze=False, sharey=True)
+    same = _on_one_scale([run[quantity] for _, run, _ in shown])
+    grid = figure.subplots(rows, columns, squeeze=False, sharey=same)
     legend: dict[str, Any] = {}
     for axes, (configuration, run, _) in zip(grid.flat, shown, strict=False):
         values = run[quantity]
@@ -208,6 +217,12 @@ def small_multiples(title: str, shown: Shown, quantity: str, label: str, factor:
         axes.set_ylabel(label)
     figure.legend(legend.values(), legend.keys(), loc="outside right center")
     return figure
+
+
+def _on_one_scale(curves: Sequence[Array]) -> bool:
+    """Whether curves of all configurations can be read on one scale."""
+    found = [float(np.ptp(c[np.isfinite(c)])) for c in curves if np.any(np.isfinite(c))]
+    return not found or min(found) >= FLAT * max(found)
 
 
 def stability_multiples(title: str, shown: Shown) -> Figure:
@@ -253,6 +268,9 @@ BARS = {
 }
 """Figures with bars: metrics, labels, factors."""
 
+LEAST_BARS = 4
+"""There is room for so many bars, so that one alone does not fill its axes."""
+
 
 def bar_figure(
     title: str,
@@ -285,6 +303,9 @@ def bar_figure(
         axes.set_xticks(range(len(names)), names, rotation=30, ha="right", fontsize=9)
         axes.set_ylabel(label)
         axes.grid(visible=False, axis="x")
+        room = max(len(names), LEAST_BARS) / 2.0  # on both sides of the middle
+        middle = (len(names) - 1) / 2.0
+        axes.set_xlim(middle - room - 0.1, middle + room + 0.1)
     return figure
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
+from matplotlib.ticker import MaxNLocator
 
 from cdpr_drake.analyses.studies.framework.runs import MissingRuns, Run, Runs
 from cdpr_drake.analyses.visualization.curves import draw_curve, path_rows, phase_of
@@ -207,6 +208,7 @@ def draw_taut(axes: Any, scene: Scene) -> None:
                    phase=phase_of(number, len(scene.shown)), drawstyle="steps-post")  # fmt: skip
     axes.axhline(6.0, **line_style(BOUND), label="six hold the platform")
     axes.set(xlabel="time [s]", ylabel="cables that pull [-]", ylim=(None, 8.4))
+    axes.yaxis.set_major_locator(MaxNLocator(integer=True))
 
 
 def draw_stable(axes: Any, scene: Scene) -> None:

@@ -56,7 +56,8 @@ def choices_figure(runs: Runs) -> Figure:
     }
     if not set(there) - set(PUBLISHED):
         raise MissingRuns("other choices")
-    figure, axes = new_figure(2, 1, (10.0, 13.0), "What is not printed, three values")
+    title = "What the thesis does not print, at three values each"
+    figure, axes = new_figure(2, 1, (10.0, 13.0), title)
     by_lengths = [f"estimator {kind}" for kind in VARIED_ESTIMATORS]
     for one, names, title in (
         (axes[0], list(WORDS), "known tag each lap, control integration"),

@@ -44,7 +44,7 @@ from cdpr_drake.analyses.studies.proven_paths.statements import (
     SAMPLED,
     sampled_length,
 )
-from cdpr_drake.analyses.visualization.figure_style import line_style, new_figure
+from cdpr_drake.analyses.visualization.figure_style import few_ticks, line_style, new_figure
 from cdpr_drake.palette import BOUND, DISTANCE, IDEAL
 
 EFFORT = Effort(
@@ -208,6 +208,8 @@ def paths_figure(runs: Runs) -> Figure:
             )  # fmt: skip
         place.set(xlabel="x in W [m]", ylabel="y in W [m]", aspect="equal")
         place.set_title(f"{robot}, {scene}", fontsize=10)
+        few_ticks(place.xaxis, 3)  # paths may be much longer than wide
+        few_ticks(place.yaxis)
     for place in places[len(scenes) :]:
         place.set_axis_off()
     found = dict(zip(*places[0].get_legend_handles_labels()[::-1], strict=True))

@@ -88,7 +88,7 @@ def _draw_retreats(axis: Axes, runs: Runs) -> None:
         axis.semilogy(some["turn_deg"], retreat, label=scheme, **line_style(look),
                       marker=look.marker, markersize=4)  # fmt: skip
     axis.set(xlabel="turn about the optical axis [deg]",
-             ylabel=f"retreat [m]; {NOTHING:g} is none",
+             ylabel=f"retreat [m]; at $10^{{{np.log10(NOTHING):.0f}}}$: none",
              title="How much farther than start and goal the camera goes")  # fmt: skip
     if axis.get_legend_handles_labels()[0]:
         axis.legend()

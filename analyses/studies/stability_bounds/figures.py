@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
@@ -18,7 +20,12 @@ from cdpr_drake.analyses.studies.stability_bounds.questions import (
     SHARES,
     THESIS,
 )
-from cdpr_drake.analyses.visualization.figure_style import few_ticks, line_style, new_figure
+from cdpr_drake.analyses.visualization.figure_style import (
+    few_ticks,
+    line_style,
+    new_figure,
+    plain_numbers,
+)
 from cdpr_drake.arrays import Array
 from cdpr_drake.palette import VERDICTS, Look, nth_look
 
@@ -170,6 +177,27 @@ def tightness(runs: Runs, robot: str, method: str) -> float:
     return float(np.median(scales[withstood(runs, robot, method)][asked] / searched[asked]))
 
 
+LETTER_PLACES = 10.0, -10.0, 19.0, -19.0
+"""How far above its symbol a letter may stand, where it is wanted most first [pt]."""
+
+LETTER_APART = 1.08
+"""Quotient of the times of two symbols from which on their letters stand beside each other."""
+
+
+def _letters_above(points: Sequence[tuple[float, float, str]]) -> list[float]:
+    """How far above its symbol each letter stands, of times, shares and letters, so that letters
+    of symbols on one line do not meet [pt]."""
+    chosen: list[float] = []
+    for number, (x, y, _) in enumerate(points):
+        near = {
+            chosen[k]
+            for k, (u, v, _) in enumerate(points[:number])
+            if v == y and max(x / u, u / x) < LETTER_APART
+        }
+        chosen.append(next((place for place in LETTER_PLACES if place not in near), 0.0))
+    return chosen
+
+
 NOTHING = 1 / 128
 """Where the axis of tightness has its zero, below every quotient of two of the scales."""
 
@@ -180,7 +208,8 @@ def tightness_figure(runs: Runs) -> Figure:
         1, 1, (7.2, 4.8), "Tightness against processor time, under the bounds of the thesis"
     )
     robots = [robot for robot, _ in runs(experiment=COSTS).by("robot")]
-    for number, robot in enumerate(robots):
+    points: list[tuple[float, float, str]] = []
+    for robot in robots:
         run = runs(experiment=COSTS, robot=robot).one()
         for method in METHODS:
             look, share = LOOKS[method], tightness(runs, robot, method)
@@ -189,11 +218,14 @@ def tightness_figure(runs: Runs) -> Figure:
                 *place, look.marker, color=look.color, markersize=8, alpha=0.85,
                 markerfacecolor=look.color if share else "none",
             )  # fmt: skip
-            panel.annotate(
-                LETTERS[robot], place, (0, 7 if number % 2 == 0 else -14), ha="center",
-                textcoords="offset points", fontsize=8,
-            )  # fmt: skip
+            points.append((*place, LETTERS[robot]))
+    for (x, y, letter), above in zip(points, _letters_above(points), strict=True):
+        panel.annotate(
+            letter, (x, y), (0, above), ha="center", va="center",
+            textcoords="offset points", fontsize=8,
+        )  # fmt: skip
     panel.set_xscale("log")
+    plain_numbers(panel.xaxis)
     panel.set_yscale("log", base=2)
     ticks = 2.0 ** np.arange(-6, 2)
     panel.set_yticks([NOTHING, *ticks], ["none", *map(_words, ticks)])

@@ -234,7 +234,7 @@ def single_figure(runs: Runs) -> Figure:
     once = dict(zip(labels, handles, strict=True))
     axes.set_yticks(range(len(rows)), [_single_words(row) for row in rows])
     axes.set_ylim(len(rows) - 0.5, -0.5)
-    axes.set_xlabel("workspace [m^3]")
+    axes.set_xlabel("workspace [m³]")
     axes.set_xlim(0.0, 1.1 * FULL_VOLUME)
     order = [words for words, _ in names.values() if words in once]
     figure.legend([once[n] for n in order], order, loc="outside lower center", ncols=3)

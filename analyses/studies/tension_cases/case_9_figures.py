@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.optimize import lsq_linear
+from scipy.sparse.csgraph import connected_components
 
 from cdpr_drake.analyses.studies.framework.runs import Runs
 from cdpr_drake.analyses.studies.framework.statement import Finding, statement
@@ -32,6 +33,9 @@ ACCURACY = 0.3
 
 NEAR = 1.0
 """Names of points within this distance of each other would meet [N]."""
+
+PAIR = 2
+"""Names of so many points near each other have room on both sides."""
 
 PRINTED_RESIDUALS = {
     "E1": 1.21, "E2": 0.68, "E3": 0.99, "E4": 0.88, "E5": 1.54, "E6": 0.96, "E7": 1.09,
@@ -161,23 +165,39 @@ def polygon_figure(runs: Runs) -> Figure:
 
 
 def _name_points(axes: Axes, points: Array, names: Sequence[str]) -> None:
-    """Writes names beside points, shape (n, 2), on the sides where points near them are not."""
-    for point, name in zip(points, names, strict=True):
-        near = points[np.linalg.norm(points - point, axis=1) < NEAR]
-        on_right = near[:, 0] >= np.median(near[:, 0])
-        right = bool(point[0] >= np.median(near[:, 0]))
-        above = bool(point[1] >= np.median(near[on_right == right, 1]))
-        axes.annotate(
-            name, point, (5 if right else -5, 2 if above else -2), textcoords="offset points",
-            ha="left" if right else "right", va="bottom" if above else "top", fontsize=8,
-        )  # fmt: skip
+    """Writes names beside points, shape (n, 2): of two near each other on both sides, of more than
+    two in one line above them."""
+    for members in _clusters(points):
+        some = points[members]
+        if len(members) > PAIR:
+            words = ", ".join(names[k] for k in members)
+            above = some.mean(axis=0)[0], some.max(axis=0)[1]
+            axes.annotate(
+                words, above, (0, 7), textcoords="offset points", ha="center", fontsize=8
+            )  # fmt: skip
+            continue
+        for k in members:
+            right = bool(points[k, 0] >= np.max(some[:, 0]))
+            above_other = bool(points[k, 1] >= np.max(some[:, 1]))
+            axes.annotate(
+                names[k], points[k], (6 if right else -6, 2 if above_other else -2),
+                textcoords="offset points", ha="left" if right else "right",
+                va="bottom" if above_other else "top", fontsize=8,
+            )  # fmt: skip
+
+
+def _clusters(points: Array) -> list[list[int]]:
+    """Numbers of points that are near each other, or near one that is, in ascending order."""
+    near = np.linalg.norm(points[:, np.newaxis] - points, axis=2) < NEAR
+    count, labels = connected_components(near, directed=False)
+    return [np.flatnonzero(labels == one).tolist() for one in range(count)]
 
 
 def residual_figure(runs: Runs) -> Figure:
     """Figure 5.15: residuals, and what the sensors' accuracy can make of them."""
     found = _ranges(runs)
     figure, axes = new_figure(
-        1, 1, (10.0, 6.0), f"What of the tensions balances no weight, readings +- {ACCURACY:g} N"
+        1, 1, (10.0, 6.0), f"Part of the tensions that balances no weight; readings ±{ACCURACY:g} N"
     )
     for place, (name, (here, least, most)) in enumerate(found.items()):
         first = place == 0

@@ -53,7 +53,7 @@ def gains_figure(method: str, runs: Runs) -> Figure:
         place = gains.index(run["kp_per_s2"])
         words = f"6.{NUMBERS[method][place]}: Kp = Kd = {run['kp_per_s2']:g}"
         draw_curve(left, run["times_s"], 1e6 * run["errors_m"], nth_look(0))
-        left.set(ylabel="position error [um]", ylim=(0.0, None), title=words)
+        left.set(ylabel="position error [µm]", ylim=(0.0, None), title=words)
         robot = load_robot(run["robot"])
         for k, cable in enumerate(robot.cables):
             draw_curve(

@@ -127,7 +127,8 @@ def pairs_figure(runs: Runs) -> Figure:
             for b, second in enumerate(names[: a + 1]):
                 if first in together and second in together:
                     shares[a, b] = 100.0 * together[first][second]
-        image = axes.imshow(shares, cmap="Greens", vmin=0.0, vmax=100.0)
+        # Panels of a given aspect shrink after the layout, and names on the left were cut off.
+        image = axes.imshow(shares, cmap="Greens", vmin=0.0, vmax=100.0, aspect="auto")
         for (a, b), share in np.ndenumerate(shares):
             if np.isfinite(share):
                 color = "white" if share > DARK else "black"

@@ -5,7 +5,11 @@ from functools import partial
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.studies.framework.case_figures import shown_of
+from cdpr_drake.analyses.studies.framework.case_figures import (
+    bar_figure,
+    shown_of,
+    small_multiples,
+)
 from cdpr_drake.analyses.studies.framework.case_layouts import (
     CableLayout,
     Panel,
@@ -14,6 +18,7 @@ from cdpr_drake.analyses.studies.framework.case_layouts import (
 )
 from cdpr_drake.analyses.studies.framework.case_panels import bars, metric
 from cdpr_drake.analyses.studies.framework.runs import MissingRuns
+from cdpr_drake.palette import nth_look
 from tests.analyses.studies.made_runs import CASE_STUDIES, made_run, made_runs
 
 CASES = {study.name: study.cases for study in CASE_STUDIES}
@@ -79,3 +84,39 @@ def test_bars_are_means_over_all_runs_with_their_range(runs):
     assert [label.get_text()[:2] for label in axes.get_xticklabels()] == ["A:", "B:"]
     (segments,) = (one.get_segments() for one in axes.collections[:1])
     np.testing.assert_allclose(segments[0][:, 1], [3.0, 5.0])  # the range of two runs
+
+
+def test_looks_differ_where_configurations_of_two_experiments_are_in_one_figure():
+    case = CASES["case-a6"]
+    first_of_each = [group[0].name for group in case.groups().values()]
+    assert len(first_of_each) > 1
+    looks = [
+        look for _, _, look in shown_of(case, made_runs(map(run, first_of_each)), first_of_each)
+    ]
+    assert len(set(looks)) == len(looks)
+    # Alone, it has the look of its experiment's figures.
+    ((_, _, look),) = shown_of(case, made_runs([run(first_of_each[1])]), first_of_each[1:2])
+    assert look == nth_look(0)
+
+
+@pytest.mark.parametrize(("largest", "shared"), [(2.0, True), (20.0, False)])
+def test_curves_that_a_common_scale_would_press_flat_have_their_own(largest, shared):
+    names = [f"cable {k}" for k in range(2)]
+    curves = [np.linspace([-1.0, 0.0], [1.0, 0.5], 12), np.linspace([0.0, 0.0], [largest, 0.1], 12)]
+    made = made_runs(
+        made_run(one, summary={"robot": "planar"}, features=names,
+                 time=np.linspace(0.0, 2.0, 12), error=curve)
+        for one, curve in zip(("none", "within"), curves, strict=True)
+    )  # fmt: skip
+    axes = small_multiples(
+        "made up", shown_of(CASE, made, ("none", "within")), "error", "error [-]", 1.0
+    ).axes
+    assert (axes[0].get_ylim() == axes[1].get_ylim()) is shared
+
+
+def test_a_bar_alone_does_not_fill_its_axes(runs):
+    alone = [c for c in CASE.configurations if c.name == "none"]
+    figure = bar_figure("made up", alone, runs, [("image_max_px", "largest [px]", 1.0)])
+    (axes,) = figure.axes
+    (bar,) = axes.patches
+    assert bar.get_width() < 0.25 * np.ptp(axes.get_xlim())

@@ -1,0 +1,113 @@
+"""The guard sees faults that were there, and figures of the house have none."""
+
+import numpy as np
+import pytest
+
+from cdpr_drake.analyses.studies.framework.case_panels import draw_path, fit_box
+from cdpr_drake.analyses.studies.stability_bounds.figures import _letters_above
+from cdpr_drake.analyses.visualization.figure_style import bare_figure, new_figure, styled
+from cdpr_drake.analyses.visualization.solids import NO_CELL, draw_solid
+from cdpr_drake.palette import nth_look
+from tests.figure_faults import figure_faults
+
+
+def plain():
+    """A figure without a fault."""
+    figure, axes = new_figure(1, 1, (6.0, 4.0), "A line")
+    axes.plot([0.0, 1.0], [0.0, 1.0], label="line")
+    axes.set(xlabel="time [s]", ylabel="length [m]", ylim=(-0.1, 2.0))
+    return figure, axes
+
+
+def test_a_good_figure_has_no_faults():
+    figure, axes = plain()
+    axes.legend(loc="upper left")
+    assert figure_faults(figure) == []
+
+
+def cut(axes):
+    axes.figure.text(0.97, 0.5, "far to the right")  # for which the layout makes no room
+
+
+def on_words(axes):
+    axes.text(0.5, 1.5, "one")
+    axes.text(0.5, 1.5, "two")
+
+
+def turned(axes):
+    axes.text(0.5, 1.5, "along a line", rotation=40.0)
+    axes.text(0.5, 1.5, "across it", rotation=-40.0)
+
+
+def over_curve(axes):
+    axes.legend(loc="center right")
+
+
+def over_bars(axes):
+    axes.bar([0.5], [1.9], 0.9)
+    axes.legend(loc="upper center")
+
+
+def under_legend(axes):
+    axes.text(0.02, 1.9, "words", va="top")
+    axes.legend(loc="upper left")
+
+
+def offset(axes):
+    axes.plot([0.0, 1.0], [1e6, 1e6 + 1e-3])
+    axes.set_ylim(1e6, 1e6 + 1e-3)
+
+
+def small(axes):
+    axes.text(0.5, 1.5, "who reads this", fontsize=5.0)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "words"),
+    [
+        (cut, "cut off"), (on_words, "on each other"), (turned, "on each other"),
+        (over_curve, "legend over curve"), (over_bars, "legend over bars"),
+        (under_legend, "on a legend"), (offset, "offset"), (small, "letters of 5 pt"),
+    ],
+)  # fmt: skip
+def test_each_fault_is_seen(spoil, words):
+    figure, axes = plain()
+    with styled():
+        spoil(axes)
+    assert any(fault.startswith(words) for fault in figure_faults(figure))
+
+
+@pytest.mark.parametrize(
+    ("size", "columns", "ends"),
+    [
+        ((8.0, 6.6), 1, [[0.09, -0.1, 0.28], [0.18, -0.02, 0.46]]),
+        ((14.0, 7.0), 2, [[-0.12, -0.2, 0.3], [0.12, 0.1, 0.3]]),
+        ((14.0, 7.0), 2, [[-0.8, -1.2, 0.3], [0.4, 0.0, 1.8]]),
+    ],
+)
+def test_numbers_and_names_of_axes_in_space_do_not_meet(size, columns, ends):
+    figure = bare_figure(size, "Path of the camera, Co, in the world frame W")
+    with styled():
+        axes = figure.add_subplot(1, columns, 1, projection="3d")
+        draw_path(axes, np.linspace(*ends, 20), nth_look(0), "camera")
+        fit_box(axes, np.array(ends))
+        figure.legend(loc="outside lower center")
+    assert figure_faults(figure) == []
+
+
+def test_a_frame_without_a_solid_says_so():
+    figure = bare_figure((8.6, 5.4), "Nothing")
+    corners = np.array([-0.5, -0.5, 0.0]), np.array([0.5, 0.5, 1.1])
+    with styled():
+        axes = figure.add_subplot(projection="3d", computed_zorder=False)
+        draw_solid(axes, np.empty((0, 4, 3)), "#3f8f5f", corners, np.array(corners).T)
+    assert [text.get_text() for text in axes.texts] == [NO_CELL]
+
+
+def test_letters_of_symbols_on_one_line_do_not_meet():
+    # Of five robots, four take about as long.
+    points = [(1.9, 1.0, "P"), (1.91, 1.0, "S"), (1.92, 1.0, "F"), (1.93, 1.0, "C"),
+              (3.0, 1.0, "Q"), (1.9, 2.0, "R")]  # fmt: skip
+    above = _letters_above(points)
+    assert len(set(above[:4])) == 4
+    assert above[4] == above[5] == above[0]
