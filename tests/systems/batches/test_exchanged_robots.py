@@ -4,10 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from pydrake.math import RigidTransform
 
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.systems.batches.batch_member import BatchMember
 from cdpr_drake.systems.batches.batch_robots import BatchRobots
+from cdpr_drake.systems.robots.settings import CableRobotSettings
 
 COUNT = 3
 
@@ -62,3 +65,20 @@ def test_robots_of_another_structure_are_refused():
         batch.exchange(0, load_robot("planar"))
     with pytest.raises(CdprError, match="robots: found"):
         batch.exchange(2, load_robot("acrobot_small"))
+
+
+def test_what_was_made_of_a_robot_serves_several_rows_at_several_places():
+    """Its rest is sought once for each place, and is that of a robot made anew."""
+    robot = load_robot("acrobot_small")
+    other = heavier(robot)
+    member = BatchMember.of(other, CableRobotSettings(), False)
+    batch = BatchRobots(robot, COUNT, threads=1)
+    for row in (0, 2):
+        batch.exchange(row, member)
+    made = BatchRobots(robot, COUNT, parameters=[other, robot, heavier(robot)], threads=1)
+    home = robot.home.transform()
+    places = [home, home, RigidTransform(home.rotation(), home.translation() + [0.0, 0.0, 0.05])]
+    for X in (places, places[::-1], None):
+        assert batch.reset(None, X).tobytes() == made.reset(None, X).tobytes()
+        assert moved(batch).tobytes() == moved(made).tobytes()
+    assert batch.robots[0] is batch.robots[2] is other
