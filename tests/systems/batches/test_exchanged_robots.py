@@ -77,7 +77,11 @@ def test_what_was_made_of_a_robot_serves_several_rows_at_several_places():
         batch.exchange(row, member)
     made = BatchRobots(robot, COUNT, parameters=[other, robot, heavier(robot)], threads=1)
     home = robot.home.transform()
-    places = [home, home, RigidTransform(home.rotation(), home.translation() + [0.0, 0.0, 0.05])]
+    places = [
+        home,
+        home,
+        RigidTransform(home.rotation(), home.translation() + np.array([0.0, 0.0, 0.05])),
+    ]
     for X in (places, places[::-1], None):
         assert batch.reset(None, X).tobytes() == made.reset(None, X).tobytes()
         assert moved(batch).tobytes() == moved(made).tobytes()
