@@ -7,12 +7,15 @@ import pytest
 from pydrake.math import RigidTransform
 
 from cdpr_drake.errors import CdprError
+from cdpr_drake.geometry.poses import pose_row
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.batches.batch_member import BatchMember
 from cdpr_drake.systems.batches.batch_robots import BatchRobots
 from cdpr_drake.systems.robots.settings import CableRobotSettings
 
 COUNT = 3
+ROUNDING = 1e-9
+"""Of poses at which a search for rest ends [m]."""
 
 
 def heavier(robot, share=1.3):
@@ -84,5 +87,7 @@ def test_what_was_made_of_a_robot_serves_several_rows_at_several_places():
     ]
     for X in (places, places[::-1], None):
         assert batch.reset(None, X).tobytes() == made.reset(None, X).tobytes()
+        there = [pose_row(one) for one in X or [home] * COUNT]
+        np.testing.assert_allclose(batch.poses, there, atol=ROUNDING)
         assert moved(batch).tobytes() == moved(made).tobytes()
     assert batch.robots[0] is batch.robots[2] is other
