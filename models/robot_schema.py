@@ -320,7 +320,7 @@ class Robot(Summarized):
                 ]
             ),
             linear_weight=np.array([each.linear_density * self.gravity for each in materials]),
-            swivel_axis=np.array([axis / np.linalg.norm(axis) for axis in axes], float).T,
+            swivel_axis=_unit_columns(axes),
             breaking_load=np.array([np.inf if load is None else load for load in loads]),
             down=self.down(),
         ).over_platform_pulleys(
@@ -332,7 +332,7 @@ class Robot(Summarized):
                     for cable in self.cables
                 ]
             ),
-            np.array([axis / np.linalg.norm(axis) for axis in anchor_axes], float).T,
+            _unit_columns(anchor_axes),
         )
 
     def tension_limits(self, given: tuple[float, float] | None = None) -> tuple[float, float]:
@@ -461,3 +461,10 @@ class Robot(Summarized):
     def camera_mount(self, name: str) -> CameraMount:
         """The mounting of that name; the names are checked when a scenario is read."""
         return next(mount for mount in self.cameras if mount.name == name)
+
+
+def _unit_columns(axes: list[Array]) -> Array:
+    """Unit vectors along axes, shape (3, m); an axis of many cables is measured once."""
+    distinct = {id(axis): axis for axis in axes}
+    units = {key: axis / np.linalg.norm(axis) for key, axis in distinct.items()}
+    return np.array([units[id(axis)] for axis in axes], float).T

@@ -143,12 +143,17 @@ def template_steps() -> Iterator[Step]:
 class Player:
     """Runs steps with an environment, each page in a folder of its own."""
 
-    def __init__(self, prefix: Path, out: Path, patience: float = PATIENCE) -> None:
-        """With the environment at a prefix, below a folder, for so long a step at most [s]."""
+    def __init__(
+        self, prefix: Path, out: Path, patience: float = PATIENCE, cache: Path | None = None
+    ) -> None:
+        """With the environment at a prefix, below a folder, for so long a step at most [s].
+
+        Kernels are kept in a folder of its own, as a newcomer has none, or in a given one.
+        """
         self._bin, self._out, self._patience = prefix / "bin", out, patience
         self._variables = os.environ | {
             "MPLBACKEND": "Agg", "COLUMNS": "100", "BROWSER": "true",
-            "NUMBA_CACHE_DIR": str(out / "cache"),
+            "NUMBA_CACHE_DIR": str(cache or out / "cache"),
             "PATH": f"{self._bin}:{os.environ.get('PATH', '')}",
         }  # fmt: skip
 

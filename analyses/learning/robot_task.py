@@ -29,6 +29,7 @@ from cdpr_drake.models.robot_draws import ParameterCovariance, drawn_robots
 from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_parameters import parameter_names
 from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.systems.batches.batch_member import BatchMember
 from cdpr_drake.systems.batches.batch_robots import BatchRobots
 from cdpr_drake.systems.robots.cable_robot import automatic_step
 from cdpr_drake.systems.robots.compiled_step import StepRule
@@ -64,6 +65,10 @@ DISTANCE_SHARE, ANGLE = 0.25, 0.2
 
 NEAR_SHARE, NEAR_ANGLE = 0.05, math.radians(2.0)
 """Of the reach the distance, and the angle [rad], at which a task is a success."""
+
+MEMBERS_KEPT = 4
+"""Times as many drawn robots as a task moves are kept. Whoever compares policies gives them the
+same seeds: each robot is then made once, and its rest sought once."""
 
 MOST_STARTS = 100
 """Starts that are drawn for one episode, of which none is held, after which more are of no use."""
@@ -137,6 +142,7 @@ class RobotTask(ABC):
             by_tensions=by_tensions, threads=options.threads,
         )  # fmt: skip
         self._doubt = _doubt(robot, options.randomise)
+        self._of_a_robot, self._drawn_members = (settings, by_tensions), dict[int, BatchMember]()
         edges = 0.5 * (np.asarray(robot.frame.upper) - np.asarray(robot.frame.lower))
         self._lower, self._upper = np.array(robot.frame.lower), np.array(robot.frame.upper)
         speed = min(robot.winch.rated_cable_speed(), SPEED_SHARE * float(np.max(edges)))
@@ -235,8 +241,17 @@ class RobotTask(ABC):
     def _restore(self, row: int, random: np.random.Generator) -> None:
         """Gives a robot the parameters of a new episode."""
         if self._doubt is not None:
-            seed = int(random.integers(2**62))
-            self.batch.exchange(row, drawn_robots(self.robot, 1, self._doubt, seed)[0])
+            self.batch.exchange(row, self._drawn_member(self._doubt, int(random.integers(2**62))))
+
+    def _drawn_member(self, doubt: ParameterCovariance, seed: int) -> BatchMember:
+        """The robot of a seed."""
+        kept = self._drawn_members
+        if seed not in kept:
+            if len(kept) >= MEMBERS_KEPT * self.count:
+                del kept[next(iter(kept))]  # the oldest one
+            robot = drawn_robots(self.robot, 1, doubt, seed)[0]
+            kept[seed] = BatchMember.of(robot, *self._of_a_robot)
+        return kept[seed]
 
     def step(self, actions: Any, over: np.ndarray | None = None) -> None:
         """Moves all robots on by a period; then `observations`, `rewards` and `lost` are new.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, fields, replace
 from typing import Self
 
@@ -87,6 +88,29 @@ class CableSet:
                     f"{each.name}: found shape {value.shape}; accepted: {wanted} with m >= 1 cables"
                 )
             object.__setattr__(self, each.name, value)
+        if not self._is_accepted():
+            self._refuse()
+
+    def _is_accepted(self) -> bool:
+        """Whether all numbers are: at once, since models are made by the thousand.
+
+        It is a little stricter with unit vectors than `_refuse`, which then looks for itself.
+        """
+        axes = np.array([self.swivel_axis, self.anchor_swivel_axis])
+        numbers = np.array([
+            self.retardation, self.pulley_radius, self.linear_weight, self.anchor_pulley_radius,
+            self.stiffness,
+        ])  # fmt: skip
+        points = np.isfinite(self.p_WA).all() and np.isfinite(self.p_PB).all()
+        positive = (self.stiffness > 0.0).all() and (self.breaking_load > 0.0).all()
+        limits = np.isfinite(numbers).all() and (numbers >= 0.0).all()
+        lengths = np.abs(np.sqrt(np.einsum("kim,kim->km", axes, axes)) - 1.0)  # NaN is refused
+        down = abs(math.sqrt(float(self.down @ self.down)) - 1.0)
+        unit = (lengths <= 0.5 * UNIT_TOLERANCE).all() and down <= 0.5 * UNIT_TOLERANCE
+        return bool(points and positive and limits and unit)
+
+    def _refuse(self) -> None:
+        """Raises what is wrong with the first number that is, by name and cable, if any is."""
         for name in _VECTORS:
             self._require(name, np.all(np.isfinite(getattr(self, name)), axis=0), "finite")
         for name in ("stiffness",):

@@ -11,6 +11,7 @@ from pydrake.math import RollPitchYaw, RotationMatrix
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.models.formats.draft import RobotDraft
+from cdpr_drake.models.formats.home_search import farthest_pose
 from cdpr_drake.models.formats.point_mass import find_beam, to_a_point
 
 GRAVITY = 9.81
@@ -333,48 +334,39 @@ def _home(
         for x in np.linspace(0.2, 0.8, 5)
         for y in np.linspace(0.2, 0.8, 5)
     ]
-    margins = [_margin(draft, position, bounds, gravity) for position in grid]
-    best = int(np.argmax(margins))
-    if margins[best] < 0.0:
+    best, margin = _farthest(draft, grid, bounds, gravity)
+    if margin < 0.0:
         words = "the middle of the frame; no pose of a grid over it is held within the limits"
         return np.asarray(_assume(assumed, "home.position", middle, words))
     words = "of a grid over the frame the pose whose tensions are farthest from the limits"
     return np.asarray(_assume(assumed, "home.position", grid[best], words))
 
 
-def _margin(
-    draft: RobotDraft, position: Array, bounds: tuple[float, float], gravity: float
-) -> float:
-    """Largest distance of tensions that hold the platform upright there to their limits [N].
-
-    Negative where none do.
+def _farthest(
+    draft: RobotDraft, grid: list[Array], bounds: tuple[float, float], gravity: float
+) -> tuple[int, float]:
+    """Number and margin [N] of the place where tensions that hold the platform upright are farthest
+    from their limits; the margin is negative where it is held at none.
     """
-    from scipy.optimize import linprog  # heavy, and needed for files without a home pose only
-
     anchors, exits = draft.anchor_points(), draft.exit_points()
-    along = exits - position[:, np.newaxis] - anchors
-    lengths = np.linalg.norm(along, axis=0)
-    if np.any(lengths < 1e-9):
-        return -1.0
-    u = along / lengths
-    W = np.vstack([np.cross(anchors.T, u.T).T, u])
     com = np.zeros(3) if draft.center_of_mass is None else draft.center_of_mass
     force = (draft.mass or 0.0) * gravity * draft.down()
-    w = np.concatenate([np.cross(com, force), force])
     motion, upright = draft.motion_type(), np.eye(3)
-    W, w = motion.components(W, upright), motion.components(w, upright)
-    m = W.shape[1]
-    one = np.ones((m, 1))
-    result = linprog(
-        np.append(np.zeros(m), -1.0),
-        A_ub=np.block([[-np.eye(m), one], [np.eye(m), one]]),
-        b_ub=np.concatenate([np.full(m, -bounds[0]), np.full(m, bounds[1])]),
-        A_eq=np.column_stack([W, np.zeros(len(W))]),
-        b_eq=-w,
-        bounds=[(None, None)] * m + [(0.0, None)],
-        method="highs",
-    )
-    return float(result.x[-1]) if result.status == 0 else -1.0
+    w = motion.components(np.concatenate([np.cross(com, force), force]), upright)
+    numbers, matrices = [], []
+    for k, position in enumerate(grid):
+        along = exits - position[:, np.newaxis] - anchors
+        lengths = np.linalg.norm(along, axis=0)
+        if np.any(lengths < 1e-9):
+            continue
+        u = along / lengths
+        W = np.vstack([np.cross(anchors.T, u.T).T, u])
+        numbers.append(k)
+        matrices.append(motion.components(W, upright))
+    if not numbers:
+        return 0, -1.0
+    best, margin = farthest_pose(np.array(matrices), w, bounds)
+    return numbers[best], margin
 
 
 def _cable(cable: Any, draft: RobotDraft) -> dict[str, Any]:

@@ -155,7 +155,7 @@ class BatchRobots:
         self._table: Array | None = None
         boxes = [(one.box_center(), 0.5 * one.platform.size) for one in robots]
         self._boxes = np.array(boxes, float)
-        self._at_home: dict[int, tuple[Array, Array]] = {}
+        self._at_rest: dict[int, tuple[bytes, tuple[Array, Array]]] = {}
         self.reset()
 
     @classmethod
@@ -235,13 +235,15 @@ class BatchRobots:
     def _start(
         self, row: int, X_WP: RigidTransform | None, tensions: Array | None
     ) -> tuple[Array, Array]:
-        """State at rest and tensions; at home, where episodes mostly begin, they are kept."""
+        """State at rest and tensions; kept where nothing is commanded, as episodes mostly begin."""
         member = self._members[row]
-        if X_WP is not None or tensions is not None:
-            return member.at_rest(as_pose(member.robot, X_WP), tensions)
-        if id(member) not in self._at_home:
-            self._at_home[id(member)] = member.at_rest(as_pose(member.robot))
-        return self._at_home[id(member)]
+        X_WP = as_pose(member.robot, X_WP)
+        place = X_WP.GetAsMatrix4().tobytes()
+        if tensions is not None:
+            return member.at_rest(X_WP, tensions)
+        if id(member) not in self._at_rest or self._at_rest[id(member)][0] != place:
+            self._at_rest[id(member)] = place, member.at_rest(X_WP)
+        return self._at_rest[id(member)][1]
 
     def step(
         self,
@@ -365,21 +367,23 @@ class BatchRobots:
             break_cables(self._whole[row], self._broken[row], self._stack.cables[row])
         self._table = None
 
-    def exchange(self, row: int, robot: Robot) -> None:
+    def exchange(self, row: int, robot: Robot | BatchMember) -> None:
         """Gives a robot other parameters from now on, while it moves or before it is reset.
 
         Its state stays, that is platform and winches, and which cables are broken.
 
         Args:
             row: Number of the robot.
-            robot: Of the same structure, with parameters of its own.
+            robot: Of the same structure, with parameters of its own; or what was made of it.
 
         Raises:
             CdprError: There is no such row, or the robot is of another structure.
             CableModelError: As `BatchRobots`, and so on.
         """
         (row,) = robot_numbers(int(row), self.count)
-        member = BatchMember.of(robot, self._settings, self._by_tensions)
+        if isinstance(robot, Robot):
+            robot = BatchMember.of(robot, self._settings, self._by_tensions)
+        member, robot = robot, robot.robot
         _check_structure([self._members[0], member])
         self.robots[row], self._members[row] = robot, member
         applied = self._stack.body[row, APPLIED:].copy()
@@ -390,8 +394,8 @@ class BatchRobots:
         break_cables(self._whole[row], self._broken[row], self._stack.cables[row])
         self._rooms[row] = self._fresh_rooms[0][row]
         self._boxes[row] = robot.box_center(), 0.5 * robot.platform.size
-        self._at_home = {id(each): self._at_home[id(each)] for each in self._members
-                         if id(each) in self._at_home}  # fmt: skip
+        self._at_rest = {id(each): self._at_rest[id(each)] for each in self._members
+                         if id(each) in self._at_rest}  # fmt: skip
         self._table = None
 
     def set_twists(self, robots: object, twists: object) -> None:

@@ -9,12 +9,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cache
 
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.stability.perturbation_bounds import DIRECTIONS
 
 FULLY_CONSTRAINED = "acrobot_fully_constrained"
@@ -57,6 +59,12 @@ by `CAMERA_HEIGHTS`, and looking down."""
 CAMERA_HEIGHTS = {"acrobot": 0.08, "caroca": 0.2}
 """Height of the camera FACING_DOWN above the platform's origin, by the first word of the robot's
 name [m]."""
+
+
+@cache
+def shipped_robot(name: str) -> Robot:
+    """A robot that ships, read once for the hundreds of cases of a study; nobody changes it."""
+    return load_robot(name)
 
 
 @dataclass(frozen=True)
@@ -126,15 +134,15 @@ class Recipe:
         if self.camera == FACING_DOWN:
             height = CAMERA_HEIGHTS[robot.split("_")[0]]
             return RigidTransform(RotationMatrix.MakeXRotation(math.pi), np.array([0, 0, height]))
-        return load_robot(robot).cameras[0].pose.transform()
+        return shipped_robot(robot).cameras[0].pose.transform()
 
     def cables(self, robot: str) -> CableSet:
         """The cables of a robot, without pulleys."""
-        cables = load_robot(robot).cable_set().without_pulleys()
+        cables = shipped_robot(robot).cable_set().without_pulleys()
         if robot != FULLY_CONSTRAINED or self.anchors == AS_IN_FILE:
             return cables
         if self.anchors == KEPT_CABLES:
-            before = load_robot(SUSPENDED).cable_set()
+            before = shipped_robot(SUSPENDED).cable_set()
             away = np.linalg.norm(
                 cables.p_WA[:2, :, np.newaxis] - before.p_WA[:2, np.newaxis, :], axis=0
             )

@@ -45,11 +45,11 @@ from cdpr_drake.analyses.studies.published.recipe_variants import (
     IN_USE,
     OPPOSITE_CORNER,
     Recipe,
+    shipped_robot,
 )
 from cdpr_drake.analyses.studies.published.stability_tables import PublishedTable
 from cdpr_drake.analyses.workspaces.stability_defaults import workspace_defaults
 from cdpr_drake.errors import StabilityError
-from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.stability.desired_view import FixedPlace, OppositeCorner, ServoTarget
 from cdpr_drake.stability.perturbation_bounds import PerturbationBounds
 from cdpr_drake.stability.stability_case import StabilityCase
@@ -68,7 +68,7 @@ PLANAR_HALF_SIZE = 0.55
 
 def recipe_grid(robot_name: str, quick: bool = False) -> WorkspaceGrid:
     """Grid of the published tables; `quick`: every fourth point in a plane, every second plane."""
-    robot = load_robot(robot_name)
+    robot = shipped_robot(robot_name)
     known = workspace_defaults(robot, robot_name)
     grid = grid_by_step(known.lower, known.upper, known.step)
     if not quick:
@@ -80,7 +80,7 @@ def recipe_grid(robot_name: str, quick: bool = False) -> WorkspaceGrid:
 
 def recipe_case(robot_name: str, scheme: str, recipe: Recipe = IN_USE) -> StabilityCase:
     """The case of a table by a recipe."""
-    robot = load_robot(robot_name)
+    robot = shipped_robot(robot_name)
     known = workspace_defaults(robot, robot_name)
     planar = robot.motion_type().is_horizontal_body
     turn = np.array(recipe.seen.get(robot_name, recipe.turn))
@@ -108,7 +108,7 @@ def recipe_options(robot_name: str, pieces: int | None = None) -> VerdictOptions
         robot_name: Whose table.
         pieces: Pieces that a certificate looks at, at most; None: the usual number.
     """
-    planar = load_robot(robot_name).motion_type().is_horizontal_body
+    planar = shipped_robot(robot_name).motion_type().is_horizontal_body
     options = VerdictOptions(draws=PLANAR_DRAWS if planar else DRAWS, margins=False)
     return options if pieces is None else replace(options, pieces=pieces)
 
@@ -136,7 +136,7 @@ def recipe_bounds(
 @cache
 def _baseline(robot_name: str) -> PerturbationBounds:
     """Baseline bounds of a robot that ships; reading its file for every row takes half a minute."""
-    baseline = workspace_defaults(load_robot(robot_name), robot_name).bounds
+    baseline = workspace_defaults(shipped_robot(robot_name), robot_name).bounds
     return baseline.varied(exits="common", anchors="common")
 
 

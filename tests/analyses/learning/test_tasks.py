@@ -7,6 +7,7 @@ import pytest
 from pydrake.multibody.tree import SpatialInertia, UnitInertia
 
 from cdpr_drake.analyses.learning.loaded_platform import loaded_robot
+from cdpr_drake.analyses.learning.robot_task import MEMBERS_KEPT
 from cdpr_drake.analyses.learning.task_kernel import LENGTH, SPEED, write_turn
 from cdpr_drake.analyses.learning.task_table import make_task
 from cdpr_drake.geometry.poses import exponential, logarithm, pose_row
@@ -186,3 +187,19 @@ def test_a_heavy_robot_is_worth_less_by_the_same_tensions():
             task.step(np.full((1, 8), -0.8))
         ends.append(task.batch.poses[0, 6])
     assert ends[1] < ends[0]
+
+
+def test_robots_of_one_seed_are_made_once_and_few_are_kept():
+    """As for those who compare policies; bytes are those of each alone."""
+    doubt = {"mass": 0.1, "*.anchor_point.z": 1e-3}
+    task = make_task("Track", 3, threads=1, randomise=doubt)
+    for first in range(2 * MEMBERS_KEPT):
+        seeds = [first, first, 99]
+        task.begin(range(3), [np.random.default_rng(seed) for seed in seeds])
+        assert task.batch.robots[0] is task.batch.robots[1]
+        alone = make_task("Track", 1, threads=1, randomise=doubt)
+        for row in (1, 2):
+            alone.begin([0], [np.random.default_rng(seeds[row])])
+            assert task.observations()[row].tobytes() == alone.observations()[0].tobytes()
+            assert task.batch.robots[row].platform.mass == alone.batch.robots[0].platform.mass
+    assert len(task._drawn_members) <= 3 * MEMBERS_KEPT

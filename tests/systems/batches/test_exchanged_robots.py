@@ -4,12 +4,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from pydrake.math import RigidTransform
 
 from cdpr_drake.errors import CdprError
+from cdpr_drake.geometry.poses import pose_row
 from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.systems.batches.batch_member import BatchMember
 from cdpr_drake.systems.batches.batch_robots import BatchRobots
+from cdpr_drake.systems.robots.settings import CableRobotSettings
 
 COUNT = 3
+ROUNDING = 1e-9
+"""Of poses at which a search for rest ends [m]."""
 
 
 def heavier(robot, share=1.3):
@@ -62,3 +68,26 @@ def test_robots_of_another_structure_are_refused():
         batch.exchange(0, load_robot("planar"))
     with pytest.raises(CdprError, match="robots: found"):
         batch.exchange(2, load_robot("acrobot_small"))
+
+
+def test_what_was_made_of_a_robot_serves_several_rows_at_several_places():
+    """Its rest is sought once for each place, and is that of a robot made anew."""
+    robot = load_robot("acrobot_small")
+    other = heavier(robot)
+    member = BatchMember.of(other, CableRobotSettings(), False)
+    batch = BatchRobots(robot, COUNT, threads=1)
+    for row in (0, 2):
+        batch.exchange(row, member)
+    made = BatchRobots(robot, COUNT, parameters=[other, robot, heavier(robot)], threads=1)
+    home = robot.home.transform()
+    places = [
+        home,
+        home,
+        RigidTransform(home.rotation(), home.translation() + np.array([0.0, 0.0, 0.05])),
+    ]
+    for X in (places, places[::-1], None):
+        assert batch.reset(None, X).tobytes() == made.reset(None, X).tobytes()
+        there = [pose_row(one) for one in X or [home] * COUNT]
+        np.testing.assert_allclose(batch.poses, there, atol=ROUNDING)
+        assert moved(batch).tobytes() == moved(made).tobytes()
+    assert batch.robots[0] is batch.robots[2] is other
