@@ -88,7 +88,9 @@ def _hanging(
     H, V_A, good = solve_catenary(*shape, 0.0, 0.0)
     if not good:
         return None
-    V_B = sagging_cable(*shape, H, V_A, np.empty((SENSITIVITIES, 3)))[1]
+    V_B = V_A + w * l0  # all of it hangs; in a groove the weight of a part does not count
+    if radius > 0.0:
+        V_B = sagging_cable(*shape, H, V_A, np.empty((SENSITIVITIES, 3)))[1]
     start = A
     if radius > 0.0:
         tension = np.hypot(H, V_A)

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 from pydrake.math import RigidTransform
-from scipy.spatial import ConvexHull, QhullError
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CableGeometryError
@@ -100,6 +99,8 @@ class ConvexShape:
         Raises:
             CableGeometryError: They lie in a plane.
         """
+        from scipy.spatial import ConvexHull, QhullError  # simulations without meshes need none
+
         vertices = np.array(vertices, float).reshape(-1, 3)
         about = name or "mesh"
         if not np.all(np.isfinite(vertices)):

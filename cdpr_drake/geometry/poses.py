@@ -154,7 +154,9 @@ def adjoint(X_AB: RigidTransform) -> Array:
 
     Source: servoing thesis (1.37), there ordered (translation, rotation).
     """
-    return np.asarray(adjoint_of_arrays(X_AB.rotation().matrix(), X_AB.translation()))
+    # As kernels have them, so that it is compiled once.
+    R, p = np.ascontiguousarray(X_AB.rotation().matrix()), np.array(X_AB.translation())
+    return np.asarray(adjoint_of_arrays(R, p))
 
 
 @njit(cache=True)

@@ -57,9 +57,10 @@ def length_jacobian(X_WP: RigidTransform, p_WA: Array, p_PB: Array) -> Array:
 
     Source: servoing thesis (1.19), there with columns (v, w) and in the platform frame.
     """
-    R, p = X_WP.rotation().matrix(), X_WP.translation()
+    # As `CableSet` has them, so that it is compiled once.
+    exits, anchors = np.asarray(p_WA, float, order="F"), np.asarray(p_PB, float, order="F")
     J: Array = _length_jacobian(
-        np.ascontiguousarray(R), p, np.asarray(p_WA, float), np.asarray(p_PB, float)
+        np.ascontiguousarray(X_WP.rotation().matrix()), X_WP.translation(), exits, anchors
     )
     return J
 

@@ -137,7 +137,8 @@ def share_compilation() -> CompilationLocks | None:
     """Lets numba in this process compile and keep this package's kernels under the shared locks.
 
     Once, however often it is asked. Kernels of others, and those that are not kept, are compiled as
-    ever.
+    ever; ours without the second entry that numba makes for C, a twelfth of the work, since who
+    calls a kernel by its address takes the kernel's own (`numerics.kernel_calls`).
 
     Returns:
         The locks; None without any, or where numba is not imported: then nothing is changed.
@@ -156,6 +157,7 @@ def share_compilation() -> CompilationLocks | None:
         name = kernel_lock(self, sig)
         if name is None:
             return compile_here(self, sig)
+        self.targetoptions.setdefault("no_cfunc_wrapper", True)
         with lock, locks.held(name):  # numba's own first, which is that of threads
             return compile_here(self, sig)
 

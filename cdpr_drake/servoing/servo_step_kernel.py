@@ -86,21 +86,29 @@ def task_at(begins: Array, memory: Array, time: float) -> int:
     return number
 
 
+@shared(VECTOR(VECTOR, MATRIX, VECTOR, VECTOR, types.int64[::1]))
+@njit(cache=True)
+def _planar_twist(law: Array, L: Array, rate: Array, X_PC: Array, motions: np.ndarray) -> Array:
+    """U of a planar robot, shape (6,), with motions that it has alone."""
+    R_PC, p_PC = pose_parts(X_PC)
+    n = motions.shape[0]
+    R_CP = np.ascontiguousarray(R_PC.T)
+    Ad = adjoint_of_arrays(R_CP, -R_CP @ p_PC)
+    basis = np.empty((6, n))
+    for j in range(n):
+        for i in range(6):
+            basis[i, j] = law[SIGN] * Ad[i, motions[j]]
+    return basis @ least_squares(L @ basis, rate, L.shape[1])[0]
+
+
 @njit(cache=True, inline="always")
 def _wanted_twist(
     law: Array, rank: int, L: Array, rate: Array, X_PC: Array, R_WP: Array, motions: np.ndarray
 ) -> Array:
     """U, shape (6,); see the module. Of a planar robot, only with motions that it has."""
-    R_PC, p_PC = pose_parts(X_PC)
-    n = motions.shape[0]
-    if n < 6:
-        R_CP = np.ascontiguousarray(R_PC.T)
-        Ad = adjoint_of_arrays(R_CP, -R_CP @ p_PC)
-        basis = np.empty((6, n))
-        for j in range(n):
-            for i in range(6):
-                basis[i, j] = law[SIGN] * Ad[i, motions[j]]
-        return basis @ least_squares(L @ basis, rate, L.shape[1])[0]
+    if motions.shape[0] < 6:
+        return _planar_twist(law, L, rate, X_PC, motions)
+    R_PC, _ = pose_parts(X_PC)
     wanted, free = least_squares(L, rate, rank)
     if not math.isnan(law[YAW_GAIN]):
         # V_2 turns the platform about the vertical towards the wanted yaw.
@@ -147,20 +155,30 @@ def _asked_twist(
     return _wanted_twist(law, rank, L[first:end], rate, X_PC, R_WP, motions), gain
 
 
+@shared(VECTOR(VECTOR, VECTOR, VECTOR, MATRIX, VECTOR, MATRIX, VECTOR))
+@njit(cache=True)
+def _base_cable_rates(
+    law: Array, V_C: Array, X_PC: Array, R_WP: Array, p_WP: Array, cables: Array, V_P: Array
+) -> Array:
+    """`_cable_rates` by way of the base frame W."""
+    R_PC, p_PC = pose_parts(X_PC)
+    V_WP = law[SIGN] * (base_adjoint(R_WP, R_PC, p_PC) @ V_C)
+    for i in range(6):
+        V_P[i] = 0.0
+        for k in range(3):
+            V_P[i] += R_WP[k, i % 3] * V_WP[k + 3 * (i // 3)]
+    return cable_rates_from_base_twist(R_WP, p_WP, cables, V_WP)
+
+
 @njit(cache=True, inline="always")
 def _cable_rates(
     law: Array, V_C: Array, X_PC: Array, R_WP: Array, p_WP: Array, cables: Array,
     motions: np.ndarray, V_P: Array,
 ) -> Array:  # fmt: skip
     """Cable velocities [m/s] for the camera's twist in C; writes the platform's twist in P."""
-    R_PC, p_PC = pose_parts(X_PC)
     if law[IN_BASE_FRAME] != 0.0:
-        V_WP = law[SIGN] * (base_adjoint(R_WP, R_PC, p_PC) @ V_C)
-        for i in range(6):
-            V_P[i] = 0.0
-            for k in range(3):
-                V_P[i] += R_WP[k, i % 3] * V_WP[k + 3 * (i // 3)]
-        return cable_rates_from_base_twist(R_WP, p_WP, cables, V_WP)
+        return _base_cable_rates(law, V_C, X_PC, R_WP, p_WP, cables, V_P)
+    R_PC, p_PC = pose_parts(X_PC)
     moved = law[SIGN] * (adjoint_of_arrays(R_PC, p_PC) @ V_C)
     V_P[:] = 0.0
     for i in motions:

@@ -20,6 +20,7 @@ import math
 from numba import njit, types
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.numerics.kernel_calls import as_number
 from cdpr_drake.numerics.shared_kernels import MATRIX, VECTOR, shared
 from cdpr_drake.servoing.servo_law import (
     AHEAD,
@@ -51,11 +52,12 @@ def half_square(e: Array, first: int, end: int) -> float:
     return total
 
 
+@shared(types.void(VECTOR, VECTOR, types.float64, VECTOR))
 @njit(cache=True)
 def take_bounds(law: Array, e: Array, time: float, memory: Array) -> None:
     """Functions of now, and at the start of a task its bounds and mode; changes the memory."""
-    memory[OF_POSE] = half_square(e, 0, POSE_ROWS)
-    memory[OF_IMAGE] = half_square(e, POSE_ROWS, e.shape[0])
+    memory[OF_POSE] = half_square(e, as_number(0), as_number(POSE_ROWS))
+    memory[OF_IMAGE] = half_square(e, as_number(POSE_ROWS), e.shape[0])
     if memory[BEGUN] >= 0.0:
         return
     memory[MODE], memory[SWITCHED_AT] = law[FIRST_MODE], time - 2.0 * law[DWELL]  # may switch now
@@ -95,8 +97,8 @@ def has_to_switch(law: Array, e: Array, L: Array, V_C: Array, time: float, memor
     if time - memory[SWITCHED_AT] < law[DWELL]:
         return False
     k = e.shape[0]
-    pose = memory[OF_POSE] + law[AHEAD] * growth(e, L, V_C, 0, POSE_ROWS)
-    image = memory[OF_IMAGE] + law[AHEAD] * growth(e, L, V_C, POSE_ROWS, k)
+    pose = memory[OF_POSE] + law[AHEAD] * growth(e, L, V_C, as_number(0), as_number(POSE_ROWS))
+    image = memory[OF_IMAGE] + law[AHEAD] * growth(e, L, V_C, as_number(POSE_ROWS), k)
     # Products, since a bound may be zero.
     if memory[MODE] == POSE_MODE:
         other, bound, own, own_bound = image, memory[BOUND_OF_IMAGE], pose, memory[BOUND_OF_POSE]
@@ -107,6 +109,7 @@ def has_to_switch(law: Array, e: Array, L: Array, V_C: Array, time: float, memor
     return own < own_bound or other * own_bound > own * bound
 
 
+@shared(types.void(types.float64, VECTOR))
 @njit(cache=True)
 def switch_mode(time: float, memory: Array) -> None:
     """Lets the other controller act; changes the memory."""

@@ -17,7 +17,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from pydrake.math import RigidTransform
-from scipy.optimize import linprog, lsq_linear, minimize
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.cable_paths import cable_jacobian
@@ -118,6 +117,8 @@ def holding_tensions(
 ) -> Array | None:
     """Tensions of least sum that hold a pose, to `BALANCED` of the weight, shape (m,) [N]; None
     where there are none. Arguments as of `nearest_held_pose`."""
+    from scipy.optimize import linprog  # few runs come here, and each would wait for it
+
     scale = _scale(load, size)
     W = -cable_jacobian(X_WP, cables).T / scale[:, np.newaxis]
     w = load.wrench(X_WP) / scale
@@ -142,6 +143,8 @@ def _search(
     start: RigidTransform,
 ) -> RigidTransform:
     """Where a sequence of programs ends, held or not."""
+    from scipy.optimize import lsq_linear, minimize  # few runs come here
+
     scale = _scale(load, size)
     own = bounds[1] > bounds[0]
     fixed = np.where(own, 0.0, bounds[0])

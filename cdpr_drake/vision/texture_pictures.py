@@ -12,7 +12,6 @@ from functools import cache
 import cv2
 import numpy as np
 from pydrake.math import RigidTransform
-from scipy.spatial import cKDTree
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.vision.apriltags import tag_corners
@@ -83,6 +82,8 @@ def drawn_image(
 
 def _stones(random: np.random.Generator, size: int) -> Array:
     """Stones of all sizes with dark joints: cells round random points."""
+    from scipy.spatial import cKDTree  # every simulation imports this module, few draw by it
+
     seeds = random.uniform(0.0, size, (140, 2))
     v, u = np.mgrid[:size, :size] + 0.5
     places = np.column_stack([u.ravel(), v.ravel()])
@@ -96,6 +97,8 @@ def _stones(random: np.random.Generator, size: int) -> Array:
 
 def _map(random: np.random.Generator, size: int) -> Array:
     """A town map: fields of several grays, houses, a river, and roads across them."""
+    from scipy.spatial import cKDTree
+
     v, u = np.mgrid[:size, :size] / size
     fields = cKDTree(random.uniform(0.0, 1.0, (25, 2)))
     which = fields.query(np.column_stack([u.ravel(), v.ravel()]))[1].reshape(size, size)

@@ -134,6 +134,21 @@ def test_what_another_process_compiles_is_waited_for(small, compiled, monkeypatc
     assert compiled == ["third", "half", "quarter"]
 
 
+def test_kernels_are_compiled_without_an_entry_for_c(small):
+    """Which nobody calls; those of others have one."""
+    share_compilation()
+
+    @numba.njit
+    def other(number):
+        return 0.5 * number
+
+    for kernel, has_one in ((small.half, False), (other, True)):
+        assert kernel(3.0) == 1.5
+        compiled = kernel.get_compile_result(kernel.nopython_signatures[0])
+        entry = compiled.fndesc.llvm_cfunc_wrapper_name
+        assert (entry in compiled.library.get_llvm_str()) == has_one
+
+
 def test_kernels_of_others_are_left_alone(small, monkeypatch):
     assert kernel_lock(small.half, (numba.float64,))
     monkeypatch.setattr(small.half.py_func, "__module__", "somebody.else")

@@ -7,7 +7,6 @@ from functools import cache
 
 import numpy as np
 from pydrake.math import RigidTransform
-from scipy.stats import qmc
 
 from cdpr_drake.analyses.studies.framework.servo_cases import servo_case
 from cdpr_drake.analyses.studies.framework.servo_models import (
@@ -120,6 +119,8 @@ def start_poses(box: tuple[Array, Array], start: int, stop: int) -> list[RigidTr
 
     Source: Halton's sequence; J. H. Halton, Numerische Mathematik 2, 1960.
     """
+    from scipy.stats import qmc  # as much to import as all of numba, and only workers ask
+
     sequence = qmc.Halton(d=6, scramble=False)
     sequence.fast_forward(start + 1)  # the first point is a corner
     widest = np.radians([TILT_DEG, TILT_DEG, YAW_DEG])
