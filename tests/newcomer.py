@@ -3,7 +3,7 @@
 Takes the commands and programs of README, first pages, some guides, `cdpr` alone and the examples,
 and runs them one by one, each page in an empty folder, with an empty cache of kernels. `--fresh`
 begins where the README does: a clone, a new environment, `pip install`. Each step has a row with
-its processor time, that of its own processes included.
+its processor time, that of its own processes included. `said.txt` has all that steps print.
 """
 
 from __future__ import annotations
@@ -172,6 +172,8 @@ class Player:
         said = [path.read_text(encoding="utf-8", errors="replace") for path in streams]
         for path in streams:
             path.unlink()
+        with (self._out / "said.txt").open("a", encoding="utf-8") as transcript:
+            transcript.write("\n".join([f"\n$ {step.words}   [{step.page}]", *said]))
         return Played(
             page=step.page, words=step.words, processor=used, wall=time.monotonic() - began,
             problem=why or problem_of(step, code, *said),
