@@ -1,6 +1,7 @@
 """A process outside: it closes the loop of a run, here by a client in the same file.
 
 `cdpr serve acrobot_computed_torque --place trajectory` in another shell is the same server.
+`pip install 'cdpr_drake[bridge]'` brings what both need.
 """
 
 import subprocess
