@@ -16,7 +16,8 @@ SERVER = [
 WEIGHT = [0.0, 0.0, 0.0, 0.0, 0.0, 34.3]  # moment [N m] and force [N] that carry the platform
 
 with subprocess.Popen(SERVER) as server:
-    with RemoteClient("tcp://127.0.0.1:5791") as client:
+    # The longest wait [s]: the first run compiles before it answers.
+    with RemoteClient("tcp://127.0.0.1:5791", timeout=300.0) as client:
         end = client.run(lambda now: {"desired_wrench": WEIGHT})
     print(end)
     server.wait()
