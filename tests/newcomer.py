@@ -2,8 +2,9 @@
 
 Takes the commands and programs of README, first pages, some guides, `cdpr` alone and the examples,
 and runs them one by one, each page in an empty folder, with an empty cache of kernels. `--fresh`
-begins where the README does: a clone, a new environment, `pip install`. Each step has a row with
-its processor time, that of its own processes included.
+begins where the README does: a clone, a new environment, `pip install`. There a step that names an
+extra which it needs is played again with it. Each step has a row with its processor time, that of
+its own processes included. `said.txt` has all that steps print.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from cdpr_drake.cli.command_help import FIRST_STEPS
@@ -43,6 +44,9 @@ UNKNOWN = re.compile(r"unknown key|No such option|No such command|KeyError|is un
 
 LISTS = ("scenarios", "examples", "robots")
 """Commands that list how runs end, and run nothing."""
+
+EXTRA = re.compile(r"pip install 'cdpr_drake\[(\w+)\]'")
+"""How messages name the extra that is missing."""
 
 SERVERS = ("studio",)
 """Commands that go on until they are stopped; they are, once they have told their address."""
@@ -89,6 +93,7 @@ class Played:
         wall: Time that passed [s].
         problem: Why it failed, in a line; empty if it did not.
         left_out: Why it was not played; empty if it was.
+        extra: That it asked for and was given.
     """
 
     page: str
@@ -97,6 +102,7 @@ class Played:
     wall: float = 0.0
     problem: str = ""
     left_out: str = ""
+    extra: str = ""
 
 
 def page_steps(page: str, text: str) -> Iterator[Step]:
@@ -144,13 +150,21 @@ class Player:
     """Runs steps with an environment, each page in a folder of its own."""
 
     def __init__(
-        self, prefix: Path, out: Path, patience: float = PATIENCE, cache: Path | None = None
+        self,
+        prefix: Path,
+        out: Path,
+        patience: float = PATIENCE,
+        *,
+        cache: Path | None = None,
+        clone: Path | None = None,
     ) -> None:
         """With the environment at a prefix, below a folder, for so long a step at most [s].
 
-        Kernels are kept in a folder of its own, as a newcomer has none, or in a given one.
+        Kernels are kept in a folder of its own, as a newcomer has none, or in a given one. Extras
+        are installed from a clone; without one, a step that needs another extra fails.
         """
         self._bin, self._out, self._patience = prefix / "bin", out, patience
+        self._clone = clone
         self._variables = os.environ | {
             "MPLBACKEND": "Agg", "COLUMNS": "100", "BROWSER": "true",
             "NUMBA_CACHE_DIR": str(cache or out / "cache"),
@@ -158,10 +172,22 @@ class Player:
         }  # fmt: skip
 
     def play(self, step: Step) -> Played:
-        """Runs a step to its end."""
+        """Runs a step to its end; once more with the extra that it asks for."""
+        played, said = self._once(step)
+        wanted = EXTRA.search(said) if played.problem and self._clone is not None else None
+        if wanted is None:
+            return played
+        subprocess.run(
+            [self._bin / "python", "-m", "pip", "install", "-q", f"{self._clone}[{wanted[1]}]"],
+            env=self._variables, check=True,
+        )  # fmt: skip
+        return replace(self._once(step)[0], extra=wanted[1])
+
+    def _once(self, step: Step) -> tuple[Played, str]:
+        """What came of a step, and what it printed."""
         left_out = LONG.get(step.subcommand(), "")
         if left_out:
-            return Played(page=step.page, words=step.words, left_out=left_out)
+            return Played(page=step.page, words=step.words, left_out=left_out), ""
         folder = self._out / re.sub(r"\W", "_", step.page)
         folder.mkdir(parents=True, exist_ok=True)
         command = self._command(step, folder)
@@ -177,10 +203,13 @@ class Player:
         said = [path.read_text(encoding="utf-8", errors="replace") for path in streams]
         for path in streams:
             path.unlink()
-        return Played(
+        with (self._out / "said.txt").open("a", encoding="utf-8") as transcript:
+            transcript.write("\n".join([f"\n$ {step.words}   [{step.page}]", *said]))
+        played = Played(
             page=step.page, words=step.words, processor=used, wall=time.monotonic() - began,
             problem=why or problem_of(step, code, *said),
         )  # fmt: skip
+        return played, "\n".join(said)
 
     def _command(self, step: Step, folder: Path) -> list[str]:
         """What is started."""
@@ -264,6 +293,7 @@ def table(rows: Sequence[Played]) -> str:
     for row in rows:
         words, state = row.words.replace("|", "\\|"), row.problem and f"FAILS: {row.problem}"
         state = state or (f"not played: {row.left_out}" if row.left_out else "")
+        state += f" with the extra {row.extra}" if row.extra else ""
         lines.append(f"| {row.page} | `{words}` | {row.processor:.1f} | {state} |")
     total = sum(row.processor for row in rows)
     failed = sum(bool(row.problem) for row in rows)
@@ -294,7 +324,7 @@ def main(given: Sequence[str] | None = None) -> int:
     if options.fresh:
         prefix, installed = fresh_environment(out)
         rows.append(installed)
-    player = Player(prefix, out)
+    player = Player(prefix, out, clone=prefix.parent if options.fresh else None)
     for step in all_steps():
         if options.only in step.page and not (rows and rows[0].problem and options.fresh):
             rows.append(player.play(step))

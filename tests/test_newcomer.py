@@ -97,3 +97,22 @@ def test_what_takes_hours_is_named_and_not_played(tmp_path):
     assert isinstance(played, Played)
     assert "hours" in played.left_out
     assert "not played: a quarter of an hour" in table([played])
+
+
+def test_a_step_that_names_an_extra_is_played_again_with_it(tmp_path, monkeypatch):
+    missing = "raise SystemExit(\"no zmq; pip install 'cdpr_drake[bridge]'\")\n"
+    program = f"import os\nif not os.path.exists('has_it'):\n    {missing}"
+    step = Step(page="page", words="programs of page", program=program)
+    assert "no zmq" in Player(Path(sys.prefix), tmp_path / "as_it_is").play(step).problem
+    program = tmp_path / "bin" / "python"
+    program.parent.mkdir()
+    program.write_text(
+        "#!/bin/sh\n"
+        f'[ "$1" = -m ] || exec {sys.executable} "$@"\n'
+        f'touch "{tmp_path}/page/has_it" && echo "$@" > "{tmp_path}/said"\n'
+    )
+    program.chmod(0o755)
+    played = Player(tmp_path, tmp_path, clone=Path("clone")).play(step)
+    assert (played.problem, played.extra) == ("", "bridge")
+    assert (tmp_path / "said").read_text() == "-m pip install -q clone[bridge]\n"
+    assert "with the extra bridge" in table([played])

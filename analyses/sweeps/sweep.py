@@ -19,8 +19,8 @@ from cdpr_drake.analyses.sweeps.workers import SweepChunk, SweepTask, check_sche
 Arrays = dict[str, np.ndarray]
 Named = tuple[str, SweepChunk]
 
-STARTING = "starting; the first run on a machine compiles for a minute or two"
-"""What there is to say until the first chunk is finished."""
+STARTING = "starting"
+"""What there is to say until the first chunk is finished; whether it compiles, commands see."""
 
 
 @dataclass(frozen=True, eq=False)

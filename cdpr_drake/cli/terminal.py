@@ -143,8 +143,7 @@ def state_words(task: Task) -> str:
         note = "compiling, first use"
     if not note:
         return state
-    # The note says that it compiles, and so may the state, behind a semicolon.
-    return note if task.completed else f"{state.partition(';')[0]}, {note}"
+    return note if task.completed else f"{state}, {note}"
 
 
 class _StateColumn(ProgressColumn):

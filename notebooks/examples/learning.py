@@ -1,12 +1,13 @@
 """Gymnasium: a law that goes straight to the goal, on 32 robots at once that all differ.
 
-Replace `policy` by one that learns. `pip install 'cdpr_drake[gym]'` brings Gymnasium.
+Replace `policy` by one that learns. `pip install 'cdpr_drake[gym]'` brings Gymnasium. Once
+`cdpr_drake.gym` is imported, gymnasium.make_vec("cdpr/Reach-v0", COUNT, ...) makes the same.
 """
 
-import gymnasium
 import numpy as np
 
-import cdpr_drake.gym  # registers the environments
+import cdpr_drake as cdpr
+from cdpr_drake.gym import STEPS
 
 COUNT = 32
 DOUBT = {"*.exit_point.*": 0.002, "mass": 0.2}  # standard deviations [m, kg]
@@ -19,10 +20,10 @@ def policy(observation):
     return action
 
 
-envs = gymnasium.make_vec("cdpr/Reach-v0", COUNT, action="twist", randomise=DOUBT)
+envs = cdpr.make_environment("Reach", COUNT, action="twist", randomise=DOUBT)
 observation, _ = envs.reset(seed=0)
 total = np.zeros(COUNT)
-for _ in range(cdpr_drake.gym.STEPS["Reach"]):
+for _ in range(STEPS["Reach"]):
     observation, reward, lost, late, info = envs.step(policy(observation))
     total += reward
 print(f"return {total.mean():.1f} +- {total.std():.1f}")

@@ -82,7 +82,7 @@ class PoseEstimator(LeafSystem):
             self.DeclareVectorInputPort("known_tag_found", 1)
         self._upcoming = self.DeclareCacheEntry(
             "upcoming",
-            ValueProducer(allocate=lambda: Value[object](None), calc=self._calc_upcoming),
+            ValueProducer(allocate=lambda: Value[object](start.copy()), calc=self._calc_upcoming),
         )
         self.DeclareAbstractOutputPort("X_WP", lambda: Value(RigidTransform()), self._calc_pose)
 
