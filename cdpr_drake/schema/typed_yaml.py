@@ -112,6 +112,7 @@ def parse_typed(
         error: As `load_typed`.
     """
     known = cached_yaml(schema, content, edited=bool(overrides))
+    keys = rules_of(typing.cast(type, schema))
     try:
         root = known.nodes()
     except yaml.YAMLError as problem:
@@ -124,10 +125,8 @@ def parse_typed(
     except (ValueError, RecursionError) as problem:  # an escape beyond Unicode; too many brackets
         raise error(f"{path}: does not parse as YAML: {problem}") from problem
     if not isinstance(root, yaml.MappingNode):
-        raise error(
-            f"{path}: found no mapping at the top; accepted: the keys {', '.join(rules_of(schema))}"
-        )
-    elsewhere = other_kind([str(key.value) for key, _ in root.value], rules_of(schema))
+        raise error(f"{path}: found no mapping at the top; accepted: the keys {', '.join(keys)}")
+    elsewhere = other_kind([str(key.value) for key, _ in root.value], keys)
     if elsewhere:
         raise error(f"{path}: {elsewhere}")
     origins: dict[int, str] = {}
