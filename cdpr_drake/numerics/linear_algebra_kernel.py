@@ -18,6 +18,13 @@ SHIFT = 1e-7
 """How far below the eigenvalue the factor for its vector is shifted, relative to the largest
 element or 1: far above rounding, so that the factor exists."""
 
+LEAST_SHARE = 1e-9
+"""Singular values below this share of the largest count as zero."""
+
+SURELY = 0.5
+"""Part of the largest condition number up to which bounds of it decide; above they may be wrong by
+rounding, which at that condition is a millionth."""
+
 NEGLIGIBLE = 1e-280
 """A column whose squares sum to less is zero already; reflecting it would only lose digits."""
 
@@ -63,27 +70,83 @@ def substitute(A: Array, n: int, pivots: Array, x: Array) -> None:
         x[i] /= A[i, i]
 
 
+@njit(cache=True, error_model="numpy")
+def _by_reflections(L: Array, rate: Array, v: Array) -> bool:
+    """v of `least_squares` where all columns of L surely count, by Householder's reflections.
+
+    Frobenius' norms of the triangle and of its inverse bound the largest singular value from above
+    and the smallest from below. Source: Golub and Van Loan, 5.2 and 2.3.
+
+    Returns:
+        Whether they do; if not, or if a number is not finite, v is not what is sought.
+    """
+    n, k = L.shape
+    A, scale, inverse = np.empty((n, k + 1)), 0.0, 0.0
+    for i in range(n):
+        for j in range(k):
+            A[i, j] = L[i, j]
+            scale += L[i, j] * L[i, j]
+        A[i, k] = rate[i]
+    for c in range(k):
+        square = 0.0
+        for i in range(c, n):
+            square += A[i, c] * A[i, c]
+        size = np.sqrt(square) if A[c, c] <= 0.0 else -np.sqrt(square)
+        head = A[c, c] - size
+        half = -size * head  # a half of the square of what is reflected at
+        for j in range(c + 1, k + 1):
+            share = head * A[c, j]
+            for i in range(c + 1, n):
+                share += A[i, c] * A[i, j]
+            share /= half
+            A[c, j] -= share * head
+            for i in range(c + 1, n):
+                A[i, j] -= share * A[i, c]
+        A[c, c] = size
+    column = np.empty(k)
+    for c in range(k - 1, -1, -1):
+        v[c] = A[c, k]
+        for j in range(c + 1, k):
+            v[c] -= A[c, j] * v[j]
+        v[c] /= A[c, c]
+    for c in range(k):  # column c of the inverse
+        column[c] = 1.0 / A[c, c]
+        inverse += column[c] * column[c]
+        for i in range(c - 1, -1, -1):
+            column[i] = 0.0
+            for j in range(i + 1, c + 1):
+                column[i] -= A[i, j] * column[j]
+            column[i] /= A[i, i]
+            inverse += column[i] * column[i]
+    return bool(np.sqrt(scale) * np.sqrt(inverse) * LEAST_SHARE < SURELY)
+
+
 @njit(cache=True)
 def least_squares(L: Array, rate: Array, rank: int) -> tuple[Array, Array]:
     """v of least norm that brings L @ v nearest to a rate, and the projector on L's null space.
 
-    Allocates what it returns and what LAPACK needs.
+    Singular values by LAPACK decide what counts, but for matrices of which all surely does: those
+    are solved by reflections, in a tenth of the time. Allocates what it returns and what these
+    need.
 
     Args:
         L: Interaction matrix, shape (n, k).
         rate: Wanted rate of the features, shape (n,).
-        rank: Singular values beyond this many, or below 1e-9 of the largest, count as zero: where
-            features leave a motion free, image noise must not move it.
+        rank: Singular values beyond this many, or below `LEAST_SHARE` of the largest, count as
+            zero: where features leave a motion free, image noise must not move it.
 
     Returns:
         v, shape (k,), and 1 - L^+ L, shape (k, k).
     """
-    U, S, Vt = np.linalg.svd(L, full_matrices=False)
     n, k = L.shape
     v = np.zeros(k)
+    if rank >= k and n >= k and _by_reflections(L, rate, v):
+        return v, np.zeros((k, k))
+    v[:] = 0.0
+    U, S, Vt = np.linalg.svd(L, full_matrices=False)
     free = np.eye(k)
     for i in range(min(rank, S.shape[0])):
-        if S[i] <= 1e-9 * S[0]:
+        if S[i] <= LEAST_SHARE * S[0]:
             break
         share = 0.0
         for j in range(n):

@@ -61,6 +61,23 @@ def test_least_squares_are_the_pseudo_inverse_s(seed, features):
     np.testing.assert_allclose(free, np.eye(6) - inverse @ matrix, atol=PSEUDO_INVERSE)
 
 
+@pytest.mark.parametrize("features", [6, 8])
+@pytest.mark.parametrize("power", [2.0, 7.0, 8.5, 8.9, 9.1, 11.0])
+def test_what_counts_is_decided_by_singular_values(features, power):
+    random = np.random.default_rng(int(10.0 * power))
+    U = np.linalg.qr(random.normal(size=(features, 6)))[0]
+    V = np.linalg.qr(random.normal(size=(6, 6)))[0]
+    S = 10.0 ** -np.linspace(0.0, power, 6)
+    matrix, rate = np.ascontiguousarray(U * S @ V.T), random.normal(size=features)
+    counts = S > 1e-9
+    v, free = least_squares(matrix, rate, 6)
+    expected = V[:, counts] @ (U[:, counts].T @ rate / S[counts])
+    # Rounding of the matrix alone moves what is sought by the condition number times itself.
+    rounding = 1e-14 * S[0] / S[counts][-1]
+    assert np.linalg.norm(v - expected) <= 10.0 * rounding * np.linalg.norm(expected)
+    np.testing.assert_allclose(free, V[:, ~counts] @ V[:, ~counts].T, atol=1e-14 + rounding)
+
+
 def test_singular_values_beyond_the_rank_count_as_zero():
     """Where features hardly show a motion, the error in it does not move anything."""
     matrix = np.diag([3.0, 2.0, 1.0, 1e-7])
