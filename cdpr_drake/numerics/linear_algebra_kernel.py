@@ -132,8 +132,8 @@ def least_squares(L: Array, rate: Array, rank: int) -> tuple[Array, Array]:
     Args:
         L: Interaction matrix, shape (n, k).
         rate: Wanted rate of the features, shape (n,).
-        rank: Singular values beyond this many, or below `LEAST_SHARE` of the largest, are zero:
-            where features leave a motion free, image noise must not move it.
+        rank: Singular values beyond this many, or below `LEAST_SHARE` of the largest, count as
+            zero: where features leave a motion free, image noise must not move it.
 
     Returns:
         v, shape (k,), and 1 - L^+ L, shape (k, k).
