@@ -86,6 +86,15 @@ def pytest_xdist_make_scheduler(config, log):
     return WorkStealingScheduling(config, log)
 
 
+def pytest_terminal_summary(terminalreporter):
+    """What the session has cost: this process, and all that it has waited for, as its workers.
+
+    A machine that others use as well makes a session longer, but hardly dearer.
+    """
+    minutes, seconds = divmod(round(sum(os.times()[:4])), 60)
+    terminalreporter.write_line(f"processor time of all processes: {minutes} min {seconds:02} s")
+
+
 @pytest.hookimpl(wrapper=True)
 def pytest_collection():
     """What is collected stays to the end: the collector of garbage need not look at it, ever."""

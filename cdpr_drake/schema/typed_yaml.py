@@ -7,7 +7,6 @@ fields, so the YAML nodes are checked against the rules of `fields` first.
 from __future__ import annotations
 
 import dataclasses
-import functools
 import math
 import re
 import types
@@ -153,16 +152,20 @@ def parse_typed(
         raise
 
 
-@functools.cache
+_RULES: dict[type, dict[str, tuple[FieldRule, Any]]] = {}
+
+
 def rules_of(schema: type) -> dict[str, tuple[FieldRule, Any]]:
     """The fields of a schema, each with its rule and the type inside Optional and list.
 
     Found once for each schema, and not to be changed: what its types are called is looked up by
     `typing.get_type_hints`, which takes half of the time of a file that was read before.
     """
-    hints = typing.get_type_hints(schema)
-    fields = dataclasses.fields(schema)
-    return {f.name: (f.metadata["rule"], _bare_type(hints[f.name])) for f in fields}
+    if schema not in _RULES:
+        hints, fields = typing.get_type_hints(schema), dataclasses.fields(schema)
+        found = {f.name: (f.metadata["rule"], _bare_type(hints[f.name])) for f in fields}
+        _RULES[schema] = found
+    return _RULES[schema]
 
 
 def _bare_type(hint: Any) -> Any:
