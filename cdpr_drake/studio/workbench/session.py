@@ -24,10 +24,11 @@ from cdpr_drake.studio.workbench.command_form import CommandForm
 from cdpr_drake.studio.workbench.document import Document
 from cdpr_drake.studio.workbench.job_manager import JobManager
 from cdpr_drake.studio.workbench.live_workspace import LiveWorkspace
-from cdpr_drake.studio.workbench.pose_answer import USUAL_METHOD, PoseAnswer, RobotQuestions
+from cdpr_drake.studio.workbench.pose_answer import USUAL_METHOD, PoseAnswer
 from cdpr_drake.studio.workbench.pose_axes import axis_values, pose_at
 from cdpr_drake.studio.workbench.result_subject import Results, Subject, subject_of
 from cdpr_drake.studio.workbench.robot_files import OpenedRobot, RobotFiles
+from cdpr_drake.studio.workbench.robot_questions import RobotQuestions
 from cdpr_drake.studio.workbench.working_folder import WorkingFolder
 from cdpr_drake.studio.workbench.yaml_edit import with_value
 
