@@ -11,7 +11,8 @@ import numpy as np
 from cdpr_drake.analyses.logs.recorded_log import quantity
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.schema.typed_yaml import rules_of
-from cdpr_drake.studio.workbench.pose_answer import PoseAnswer, RobotQuestions
+from cdpr_drake.studio.workbench.pose_answer import PoseAnswer
+from cdpr_drake.studio.workbench.robot_questions import RobotQuestions
 
 Value = float | str | None
 
