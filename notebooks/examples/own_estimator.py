@@ -28,4 +28,4 @@ ESTIMATORS["homing"] = EstimatorKind("homing", lambda task: Homing(task.robot.X_
 changes = ["camera.kind=projected", "estimator.compare=[homing]"]
 run = cdpr.simulate("acrobot_pbvs", changes)
 print(run)
-print([name for name in run.log if "homing" in name])
+print("signals of its own:", [name for name in run.log if "homing" in name])

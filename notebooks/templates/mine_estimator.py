@@ -33,4 +33,4 @@ def errors(seconds=1.0):
 
 if __name__ == "__main__":
     distance, angle = errors()
-    print(f"at the end: {1e3 * distance[-1]:.2f} mm, {np.degrees(angle[-1]):.3f} deg")
+    print(f"estimate off at the end: {1e3 * distance[-1]:.2f} mm, {np.degrees(angle[-1]):.3f} deg")

@@ -54,4 +54,4 @@ STUDY = Study(
 if __name__ == "__main__":  # workers are new processes, which import this file
     found = cdpr.run_study(STUDY, f"{STUDY.name}_results")
     print(found)
-    print(found.result.runs["largest_n"])
+    print("largest tensions [N]:", found.result.runs["largest_n"])

@@ -71,7 +71,7 @@ def test_lines_come_while_the_work_says_nothing(capsys, monkeypatch):
     words = "Building: compiling, first use, 3 kernels so far"
     assert lines_while_silent(capsys, terminal.working(console, "Building")) == words
     bar = terminal.progress_bar(console)
-    bar.add_task("servo", total=4, state="starting; the first run compiles")
+    bar.add_task("servo", total=4, state="starting")
     words = "servo:   0 %, starting, compiling, first use, 3 kernels so far"
     assert lines_while_silent(capsys, bar) == words
 
