@@ -93,7 +93,8 @@ def import_log(
     """
     asked = LogRequest() if request is None else request
     log = without_packets(read_recorded(Path(path), format, asked))
-    joined, idle = None, unused(log, asked)
+    joined = None
+    idle = unused(log, asked)
     if beside is not None:
         from cdpr_drake.analyses.logs.clock_pairs import join_logs  # which loads SciPy's signals
 

@@ -52,10 +52,15 @@ def bench(
         for row in group_rows:
             table.add_row(
                 row.name,
-                f"{row.value:.3g} {row.unit}",
+                f"{_plain(row.value)} {row.unit}",
                 row.baseline,
-                f"{row.baseline_value:.3g} {row.unit}",
+                f"{_plain(row.baseline_value)} {row.unit}",
                 f"{row.ratio:.2f}",
                 row.ratio_means,
             )
         wide_console().print(table)
+
+
+def _plain(value: float) -> str:
+    """Three digits or more, and no power of ten where it is no small number."""
+    return f"{value:.0f}" if value >= 1000.0 else f"{value:.3g}"

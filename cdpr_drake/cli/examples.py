@@ -34,23 +34,28 @@ def examples(
             autocompletion=words_among((*example_names(), "all")),
         ),
     ] = None,
-    out: Annotated[Path, typer.Option(help="Folder to copy to.")] = Path(),
+    out: Annotated[
+        Path | None, typer.Option(help="Folder to copy to; default: the working folder.")
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Lists short programs to start from, or copies one; never overwrites a file."""
+    if out is not None and name is None:
+        raise CdprError(f"--out: found {out} without an example; accepted: with a name, or all")
+    folder = Path() if out is None else out
     titles = {each: _title(each) for each in example_names()}
     if name is not None:
         if name not in (*titles, "all"):
             raise CdprError(f"example {name!r} is unknown; {closest(name, [*titles, 'all'])}")
         chosen = list(titles) if name == "all" else [name]
         contents = {f"{each}.py": (EXAMPLES / f"{each}.py").read_bytes() for each in chosen}
-        copy_new(contents, out)
+        copy_new(contents, folder)
         titles = {each: titles[each] for each in chosen}
     if as_json:
         print_json([{"name": each, "title": words} for each, words in titles.items()])
     elif name is not None:
         for each in titles:
-            print(out / f"{each}.py")
+            print(folder / f"{each}.py")
     else:
         table = Table(title="Examples", box=SIMPLE_HEAD, padding=(0, 1), pad_edge=False)
         table.add_column("name", no_wrap=True)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import keyword
 import re
+import sys
+from importlib.metadata import packages_distributions
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -92,6 +94,11 @@ def _block(kind: str, name: str) -> dict[str, str]:
         raise CdprError(
             f"name: found {name!r}; accepted: the name of a Python module, of small letters, "
             "digits and _"
+        )
+    if name in sys.stdlib_module_names or name in packages_distributions():
+        raise CdprError(
+            f"name: found {name!r}, an installed module, which the file would hide; accepted: "
+            "another name"
         )
     title = "".join(part.capitalize() for part in name.split("_")) or "Block"
     files = {}

@@ -56,6 +56,9 @@ def test_they_are_listed_and_copied_and_nothing_is_overwritten(capsys, tmp_path)
     assert code == 2
     assert "never overwritten" in err
     assert sorted(path.name for path in tmp_path.iterdir()) == ["two_robots.py"]
+    code, (_, err) = run(capsys, "examples", "--out", str(tmp_path / "new"))
+    assert (code, (tmp_path / "new").exists()) == (2, False)
+    assert "without an example; accepted: with a name, or all" in err
     code, (_, err) = run(capsys, "examples", "two_robot")
     assert code == 2
     assert "two_robots" in err

@@ -49,6 +49,8 @@ def test_a_new_block_passes_its_own_test(kind, tmp_path, capsys, monkeypatch):
             "'controler' is unknown; did you mean controller? known: robot, scenario",
         ),
         (["controller", "My-Law"], "name: found 'My-Law'; accepted: the name of a Python module"),
+        (["controller", "numpy"], "name: found 'numpy', an installed module"),
+        (["estimator", "json"], "name: found 'json', an installed module"),
         (["estimator", "class"], "name: found 'class'; accepted: the name of a Python module"),
         (["estimator", "x", "--from", "planar"], "--from: found planar with estimator"),
     ],

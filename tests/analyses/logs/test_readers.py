@@ -145,7 +145,7 @@ def test_columns_in_any_country(separator, decimal, ending, write):
 
 def test_columns_without_a_header_need_a_mapping(write):
     path = write("real.csv", "1,2.5,3\n2,3.5,3\n3,4.5,4\n")
-    with pytest.raises(LogFileError, match="no reader of logs knows"):
+    with pytest.raises(LogFileError, match="no reader of logs recognises"):
         read_recorded(path)
     with pytest.raises(LogFileError, match="3 columns of numbers without a header"):
         read_recorded(path, "csv")
@@ -202,7 +202,7 @@ REFUSED = [
     ("log.txt", recorders.gtgraffiti().replace("2: 1.9", "2: oh", 1), TOLD, ":.*: found '2: oh"),
     ("raw.log", recorders.grab().replace("3,11.000,2", "3,11.000,1"), TOLD, "actuator 1 twice"),
     ("raw.log", recorders.grab().replace("5,12.000,", "5,12.000,nan,"), TOLD, "found 6 cells"),
-    ("raw.log", recorders.grab().replace(",55,", ",inf,", 1), TOLD, "knows|'inf'"),
+    ("raw.log", recorders.grab().replace(",55,", ",inf,", 1), TOLD, "recognises|'inf'"),
     ("log.csv", recorders.columns().replace("1003.500", "x"), TOLD, ":5: column 2: found 'x'"),
     ("log.csv", recorders.columns().replace("1003.500", "NaN"), TOLD, "column 2: found 'NaN'"),
     ("log.csv", recorders.columns().replace("50.000", "20.000"), TOLD, ":7: time: found 0.02 s"),
