@@ -85,6 +85,10 @@ def world_facts(summary: dict[str, Any]) -> list[tuple[str, str]]:
             nearest = min(gaps, key=lambda name: gaps[name])
             words.append(f"{label} {1e3 * gaps[nearest]:.1f} mm from {nearest}")
     facts = [("least clearance", ", ".join(words) or "nothing to measure it from")]
+    gaps = world["least_cable_clearance_m"]
+    run_through = [name for name, gap in gaps.items() if gap is not None and gap < 0.0]
+    if run_through:
+        facts.append(("cables", f"pass through {', '.join(run_through)}, without contact"))
     contact = world["contact"]
     if contact is not None:
         said = "none"

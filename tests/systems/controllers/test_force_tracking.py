@@ -74,6 +74,7 @@ def test_a_force_of_5_n_is_held_on_a_table_of_another_stiffness(wrong):
     assert np.all(result.log["contact_force"][-100:, 0] > 4.0)
     assert result.log["X_WP"][-1, 5] == pytest.approx(0.0, abs=2e-3)  # along the edge it follows
     assert np.max(np.abs(result.log["X_WP"][:, 1:4])) < 0.01  # and turns by less than a degree
+    assert np.min(result.log["cable_clearance"]) > 0.0  # the table is below the lower anchor points
     assert "forces.png" in tension_pictures(result, ("png",))
 
 

@@ -10,6 +10,7 @@ from pydrake.geometry import Role
 from cdpr_drake.analyses.simulation.scenario_kinds import SCENARIO_KINDS
 from cdpr_drake.analyses.simulation.tension_control_run import run_tension_scenario
 from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
+from cdpr_drake.analyses.simulation.worlds import world_facts
 from cdpr_drake.analyses.visualization.replay import RobotPicture
 from cdpr_drake.cli.schema import file_schema
 from cdpr_drake.errors import ScenarioError
@@ -357,3 +358,14 @@ def test_dynamic_control_meets_the_ground():
         load_scenario("acrobot_computed_torque", [low, *TENSION[1:], ground, "stop.contact=true"])
     )
     assert ends.outcome == Outcome.CONTACT
+
+
+@pytest.mark.parametrize(("gap", "passes"), [(-1e-3, True), (1e-3, False), (None, False)])
+def test_cables_that_pass_through_a_body_are_told(gap, passes):
+    """The table of acrobot_table_edge stood in the way of a cable, which one number told."""
+    world = {
+        "least_clearance_m": {"table": 0.0}, "least_cable_clearance_m": {"table": gap},
+        "contact": None,
+    }  # fmt: skip
+    facts = dict(world_facts({"world": world}))
+    assert (facts.get("cables") == "pass through table, without contact") == passes
