@@ -31,7 +31,7 @@ LEAST_IN_CELL, MOST_CELLS = 6, 24
 """Cells along x and y are as many as leave so many loops in one on average, at most so many."""
 
 HALF = 0.5
-"""Outlines go round cells of whose starts at least this share converges, or is found stable."""
+"""The outline goes round cells of whose starts at least this share converges."""
 
 LEAST_IN_BIN, MOST_BINS = 10, 20
 """Of turns in a bin, and of bins."""
@@ -42,8 +42,13 @@ LEVEL = np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
 LOOKS: dict[str, Look] = {CONVERGED: nth_look(7), **VERDICTS}
 """Of curves by what they count."""
 
-OUTLINES = {CONVERGED: replace(LOOKS[CONVERGED], dash="-"), CERTIFIED: LOOKS[CERTIFIED]}
-"""Of planes; solid and dotted, so that grey tells them apart."""
+OUTLINE = replace(LOOKS[CONVERGED], dash="-")
+"""Of cells whose loops converge."""
+
+EXCEPTIONS: dict[str, Any] = {
+    "color": VERDICTS["searched"].color, "marker": "x", "s": 14.0, "linewidths": 1.0, "zorder": 3,
+}  # fmt: skip
+"""Look of certified starts whose loop does not converge."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +67,7 @@ def _loops(runs: Runs) -> _Loops:
 
 
 def basin_figure(runs: Runs) -> Figure:
-    """Share of the loops that converge in cells of layers, with the certified region."""
+    """Share of certified starts in cells of layers, where loops converge, and the exceptions."""
     schemes = {scheme: _loops(some) for scheme, some in runs.by("scheme")}
     if not any(len(loops.poses) for loops in schemes.values()):
         raise NothingToDraw("no loop was run")
@@ -74,7 +79,7 @@ def basin_figure(runs: Runs) -> Figure:
     z = np.linspace(lower[2], upper[2], LAYERS + 1)
     figure, panels = new_figure(
         len(schemes), LAYERS, (2.6 * LAYERS + 1.0, 2.7 * len(schemes) + 1.6),
-        "From where loops converge: starts of all turns that are held and see the tag, from above",
+        "Certified starts of all turns that are held and see the tag, and where loops converge",
     )  # fmt: skip
     shades = colormaps.get_cmap("gray")
     for row, (scheme, loops) in zip(np.atleast_2d(panels), schemes.items(), strict=True):
@@ -83,14 +88,15 @@ def basin_figure(runs: Runs) -> Figure:
             within = (height >= z[k]) & ((height < z[k + 1]) | (k == LAYERS - 1))
             counts = _counts(loops.poses[within], x, y)
             shares = {
-                name: _share(loops.poses[within & mask], counts, x, y)
-                for name, mask in loops.holds.items()
+                name: _share(loops.poses[within & loops.holds[name]], counts, x, y)
+                for name in (CONVERGED, CERTIFIED)
             }
             panel.patch.set(facecolor=SHADED.color, hatch="///", edgecolor="0.5", linewidth=0.0)
-            drawn = np.ma.masked_invalid(shares[CONVERGED].T)
+            drawn = np.ma.masked_invalid(shares[CERTIFIED].T)
             panel.pcolormesh(x, y, drawn, cmap=shades, vmin=-0.5, vmax=1.0)
-            for name, look in OUTLINES.items():
-                _outline(panel, x, y, np.nan_to_num(shares[name]) >= HALF, look)
+            _outline(panel, x, y, np.nan_to_num(shares[CONVERGED]) >= HALF)
+            exceptions = within & loops.holds[CERTIFIED] & ~loops.holds[CONVERGED]
+            panel.scatter(*loops.poses[exceptions, 4:6].T, **EXCEPTIONS)
             panel.set_aspect("equal")
             panel.grid(visible=False)
             panel.tick_params(labelsize=8, labelleft=k == 0)
@@ -105,12 +111,15 @@ def basin_figure(runs: Runs) -> Figure:
         ScalarMappable(Normalize(-0.5, 1.0), shades), ax=panels, location="right", aspect=40,
         shrink=0.8, boundaries=np.linspace(0.0, 1.0, 101), ticks=np.linspace(0.0, 1.0, 6),
     )  # fmt: skip
-    bar.set_label("share of a cell's loops that converge [-]", fontsize=10)
-    words = {CONVERGED: "half of a cell's loops converge", CERTIFIED: "half are certified"}
+    bar.set_label("share of a cell's starts that are certified [-]", fontsize=10)
+    inside = f"inside: at least {100 * HALF:.0f} % of a cell's loops converge"
     handles = [
-        Line2D([], [], label=f"inside: at least {words[name]}", **_edge(look))
-        for name, look in OUTLINES.items()
-    ]
+        Line2D([], [], label=inside, **_edge(OUTLINE)),
+        Line2D(
+            [], [], label="certified start whose loop does not converge", linestyle="",
+            marker=EXCEPTIONS["marker"], color=EXCEPTIONS["color"],
+        ),
+    ]  # fmt: skip
     figure.legend(
         handles=handles, loc="outside lower center", ncols=2, fontsize=9, title_fontsize=9,
         title="hatched: no start there is held and sees the tag",
@@ -133,7 +142,7 @@ def _edge(look: Look) -> dict[str, Any]:
     return {"color": look.color, "linestyle": look.dash, "linewidth": 2.0}
 
 
-def _outline(panel: Axes, x: Array, y: Array, inside: np.ndarray, look: Look) -> None:
+def _outline(panel: Axes, x: Array, y: Array, inside: np.ndarray) -> None:
     """Draws round cells."""
     padded = np.pad(inside, 1)
     lines = [
@@ -146,7 +155,7 @@ def _outline(panel: Axes, x: Array, y: Array, inside: np.ndarray, look: Look) ->
         for i, j in np.argwhere(padded[:, 1:] != padded[:, :-1])
         if 0 < i <= len(x) - 1
     ]
-    style = _edge(look)
+    style = _edge(OUTLINE)
     panel.add_collection(
         LineCollection(
             lines, colors=[style["color"]], linestyles=[style["linestyle"]], linewidths=2.0,
