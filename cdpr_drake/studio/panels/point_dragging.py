@@ -145,7 +145,10 @@ def add_point_dragging(bench: Workbench) -> None:
                 notify(words)
 
     ui.on(MOVED, moved)
-    ui.context.client.on_connect(lambda: ui.run_javascript(SCRIPT))
+    client = ui.context.client
+    client.on_connect(lambda: ui.run_javascript(SCRIPT))
+    if client.has_socket_connection:  # the panel is placed after the page has come
+        ui.run_javascript(SCRIPT)
 
 
 def _read(found: Any, count: int) -> tuple[str, int, np.ndarray, bool] | None:
