@@ -7,6 +7,7 @@ from contextlib import asynccontextmanager
 
 import pytest
 
+from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.studio.panels.run import _boards, _scenes
 from cdpr_drake.studio.panels.table import PANELS
 from cdpr_drake.studio.panels.workspace import _views
@@ -81,10 +82,11 @@ def open_panel(user, name):
 
 @asynccontextmanager
 async def opened(folder):
+    about = {"robot": ROBOT, "digest": subject_of(load_robot(ROBOT)).digest}
+    for below in ("workspaces", "logs"):
+        (folder / below / ".small.about.json").write_text(json.dumps(about))
     async with opened_page(folder, ROBOT) as (user, bench, _):
-        about = {"robot": ROBOT, "digest": bench.subject.digest}
-        for below in ("workspaces", "logs"):
-            (folder / below / ".small.about.json").write_text(json.dumps(about))
+        assert bench.subject.digest == about["digest"]
         yield user, bench
 
 
@@ -209,8 +211,6 @@ def test_a_run_is_of_the_robot_that_is_open(folder):
 
     asyncio.run(look())
 
-
-def test_subjects_tell_every_change_of_a_robot(folder):
     from cdpr_drake.models.robot_loader import load_robot
 
     robot, other = load_robot(ROBOT), load_robot(ROBOT)
