@@ -211,8 +211,8 @@ def test_a_run_is_of_the_robot_that_is_open(folder):
 
     asyncio.run(look())
 
-    from cdpr_drake.models.robot_loader import load_robot
 
+def test_subjects_tell_every_change_of_a_robot(folder):
     robot, other = load_robot(ROBOT), load_robot(ROBOT)
     assert subject_of(robot) == subject_of(other)
     other.cables[3].anchor_point[1] += 1e-12
