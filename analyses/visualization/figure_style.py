@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from contextlib import AbstractContextManager
 from io import BytesIO
 from textwrap import fill
@@ -73,7 +74,9 @@ def lay_out(figure: Figure) -> LayoutEngine | None:
     if engine is not None:
         # Axes whose aspect is given shrink once they have a place, and titles move with them.
         fixed = any(axes.name != "3d" and axes.get_aspect() != "auto" for axes in figure.axes)
-        with mpl.rc_context({**STYLE, **NO_LAYOUT}):
+        with mpl.rc_context({**STYLE, **NO_LAYOUT}), warnings.catch_warnings():
+            # Matplotlib measures the time: on a busy machine it warns of any legend.
+            warnings.filterwarnings("ignore", 'Creating legend with loc="best"', UserWarning)
             for _ in range(FIXED_ASPECT_ROUNDS if fixed else 1):
                 engine.execute(figure)
             figure.set_layout_engine(None)

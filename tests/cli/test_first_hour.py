@@ -65,7 +65,7 @@ def test_notebooks_are_copied_and_nothing_is_overwritten(capsys, tmp_path):
 
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "tour.ipynb").write_text("my own")
-    assert "mine: holds tour.ipynb" in refuse(capsys, "notebooks", "mine")
+    assert "mine: found tour.ipynb with other content" in refuse(capsys, "notebooks", "mine")
     assert os.listdir(tmp_path / "mine") == ["tour.ipynb"]
     assert (tmp_path / "mine" / "tour.ipynb").read_text() == "my own"
     assert "found a file" in refuse(capsys, "notebooks", "mine/tour.ipynb")

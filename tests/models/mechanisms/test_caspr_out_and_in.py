@@ -346,7 +346,7 @@ def test_inertia_of_robots_with_one_platform_is_not_repaired(tmp_path, monkeypat
     monkeypatch.chdir(tmp_path)
     code, _, err = run(capsys, "import", str(files.caspr(tmp_path)), "--repair-inertia")
     assert code == 2
-    assert "--repair-inertia: found for" in err
+    assert "--repair-inertia: found with" in err
     assert not Path("toy").exists()
 
 

@@ -23,7 +23,7 @@ def test_what_it_prints(capsys):
 
 def test_helps(capsys):
     assert "Counts the cables of a robot." in run(capsys, "--help")[1]
-    assert "Print JSON." in run(capsys, "count-cables", "--help")[1]
+    assert "Print the result as JSON." in run(capsys, "count-cables", "--help")[1]
 
 
 def test_a_robot_that_is_none(capsys):
