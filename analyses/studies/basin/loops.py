@@ -78,6 +78,7 @@ def close_loop(setup: BasinSetup, X_WP: RigidTransform, perturbation: Perturbati
 
     Raises:
         InfeasibleTensionError: The cables do not hold the platform there.
+        CableGeometryError: The platform covers an exit point there.
     """
     servo = setup.servo
     loop = ServoLoop(perturbed_scenario(setup.scenario, X_WP, perturbation, servo.X_PC))
@@ -157,7 +158,8 @@ class BasinTask:
             drawn = draw_perturbations(rows[k], setup.bounds, setup.case.m, 1, SEED)[0]
             try:
                 end = close_loop(setup, poses[k], Perturbation.from_vector(drawn))
-            except InfeasibleTensionError:  # of elastic cables; `held` knows tensions alone
+            except (InfeasibleTensionError, CableGeometryError):
+                # Elastic cables do not hold it, or it covers an exit point: `held` knows neither.
                 held[k] = seen[k] = False
                 continue
             found["end"][k], found["taut"][k] = ENDS.index(why_it_ended(setup, end)), end.taut

@@ -195,6 +195,13 @@ def test_one_loop_that_ends_elsewhere_is_told(end, all_converge, have_names):
     assert [one["end"] for one in failures] == ([] if end == CONVERGED else [end])
 
 
+def test_a_start_whose_platform_covers_an_exit_point_is_not_held():
+    """Point 276,623 ended the full study, which had found 828,650 others by then."""
+    found = BasinTask("pbvs", 276_623)(0, 1)
+    assert not found["held"][0]
+    assert found["end"][0] == NO_RUN
+
+
 def test_a_certificate_that_promises_all_is_told():
     assert verdict(said.basin_is_larger, made_up()) == CONFIRMED
     assert verdict(said.basin_is_larger, made_up(certified=27)) == NOT_CONFIRMED
