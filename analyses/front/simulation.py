@@ -186,7 +186,7 @@ def simulate(
             finished is found there again.
         seeds: Repeats a visual servo with these; None: one run with the scenario's seed.
         workers: Processes for seeds, or the address of a Dask scheduler; None: one for each
-            processor.
+            processor, started where more than ten seconds of work are left.
         overwrite: Whether results in the folder may be replaced.
         formats: Endings of the files of figures.
         log_formats: The log also as "mat" or "parquet"; of one run.

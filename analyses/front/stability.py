@@ -139,7 +139,8 @@ def assess_stability(
         grid: Poses, as `compute_workspace` takes them.
         folder: Where finished work, results, figures and page are kept, and work is continued
             from; None: nowhere.
-        workers: Processes, or the address of a Dask scheduler; None: one for each processor.
+        workers: Processes, or the address of a Dask scheduler; None: one for each
+            processor, started where more than ten seconds of work are left.
         formats: Endings of the files of figures.
         session: Who follows it and may stop it; None: nobody.
         asked: What the cables have to hold: `limits` (2,) [N], `mass` [kg], `wrench` (6,)

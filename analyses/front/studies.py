@@ -211,7 +211,8 @@ def run_study(
         quick: A short form, to see that it works.
         seeds: Runs of each configuration, of studies that repeat; None: as the study does.
         recipe: Another recipe alone, of studies that have some; None: the study.
-        workers: Processes, or the address of a Dask scheduler; None: one for each processor.
+        workers: Processes, or the address of a Dask scheduler; None: one for each
+            processor, started where more than ten seconds of work are left.
         overwrite: Whether results in the folder may be replaced.
         formats: Endings of the files of figures.
         runs_from: Results folder of the same study by an earlier version of the code: runs of cases
@@ -316,7 +317,8 @@ def reproduce(
         folder: Where studies and report are written.
         quick: Studies in their short forms.
         only: Names of some studies alone; None: all.
-        workers: Processes; None: one for each processor.
+        workers: Processes; None: one for each
+            processor, started where more than ten seconds of work are left.
         overwrite: Whether other results in the folder may be replaced.
         formats: Endings of the files of figures; png, which the report shows, is always there.
         runs_from: Folder of a reproduction by an earlier version of the code: its runs are taken

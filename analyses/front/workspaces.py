@@ -363,7 +363,8 @@ def compute_workspace(
             where the default grid and certified boxes lie, and the hull ends.
         folder: Where finished work, results, figures and page are kept, and work is continued
             from; None: nowhere.
-        workers: Processes, or the address of a Dask scheduler; None: one for each processor.
+        workers: Processes, or the address of a Dask scheduler; None: one for each
+            processor, started where more than ten seconds of work are left.
         formats: Endings of the files of figures.
         session: Who follows it and may stop it; None: nobody.
         asked: What kinds shall be asked for: `limits` (2,) [N], `mass` [kg], `wrench` (6,)

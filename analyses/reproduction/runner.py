@@ -30,7 +30,6 @@ from cdpr_drake.analyses.reproduction.states import (
 )
 from cdpr_drake.analyses.studies.catalogue import StudyEntry, StudyResult, write_study
 from cdpr_drake.analyses.sweeps.earlier_runs import EarlierRuns, check_earlier
-from cdpr_drake.analyses.sweeps.worker_pool import default_workers
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
 from cdpr_drake.errors import OutputFolderError
 
@@ -164,11 +163,11 @@ def _into_folder(
     def told(progress: WorkProgress) -> None:
         settings.tell(name, 0, progress)
 
-    workers = settings.workers or default_workers()
     with continued_folder(path, overwrite=changed) as results:
         session = StudySession(
-            results.path, told, settings.should_stop, workers, earlier=_earlier(name, settings)
-        )
+            results.path, told, settings.should_stop, settings.workers,
+            earlier=_earlier(name, settings),
+        )  # fmt: skip
         result = entry.run(settings.quick, session)
         failed = write_study(result, results.path, settings.formats)
         results.unfinished = result.interrupted

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import os
 import signal
+import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
@@ -11,7 +13,7 @@ from concurrent.futures.process import BrokenProcessPool
 from multiprocessing.context import SpawnContext, SpawnProcess
 from typing import Any, Self, TypeVar
 
-from cdpr_drake.kernel_cache.locks import share_compilation
+from cdpr_drake.kernel_cache.locks import compilation_time, share_compilation
 from cdpr_drake.worker_process import become_worker, resident_memory
 
 Job = TypeVar("Job")
@@ -20,6 +22,11 @@ Result = TypeVar("Result")
 POLL = 0.2
 """Time between two looks at a request to stop, and at whether all processes live [s]."""
 
+WORTH_PROCESSES = 10.0
+"""Work that is left, in this process, for which others are started where nobody says how many [s].
+
+Each needs two to three seconds to start and to load Drake and kernels, on a processor of its own.
+"""
 
 MOST_GROWTH = 2**30
 """Memory that a process may keep after its first job, before others take the place of all [bytes].
@@ -49,13 +56,15 @@ def run_jobs(
     survive a fork. They ignore Ctrl-C and SIGTERM: it is for this process to ask them to stop;
     should it be killed, they end too. Any exception here, and who leaves the loop, ends them at
     once, in the middle of their jobs. With one worker the jobs are done in this process, in order.
+    Where nobody says how many, the first jobs are done here, too, until the shortest of them, times
+    the number of those that wait, is more than `WORTH_PROCESSES`; compilation does not count.
     Processes whose memory has grown by `MOST_GROWTH` are replaced between two jobs; of one worker,
     another process does the rest.
 
     Args:
         work: A function of a module, so that a process can find it by name.
         jobs: Its arguments; they and the results must pickle.
-        workers: Number of processes; None: one for each processor.
+        workers: Number of processes; None: one for each processor, once the work is worth it.
         should_stop: Asked all the time; after True no further job begins, and those under way are
             still yielded.
         on_lost: Called with the index of a job whose process died, for instance out of memory; the
@@ -75,13 +84,20 @@ def run_jobs(
         count = standing.count
     stop = should_stop or (lambda: False)
     waiting, suspects = deque(range(len(jobs))), deque[int]()
-    if count == 1:
-        before = resident_memory()
-        while waiting and resident_memory() - before <= MOST_GROWTH:
+    if count == 1 or (workers is None and standing is None):
+        before, shortest, others = resident_memory(), math.inf, False
+        while waiting and not others:
             if stop():
                 return
             index = waiting.popleft()
-            yield index, work(jobs[index])
+            began, compiled = time.perf_counter(), compilation_time()
+            result = work(jobs[index])
+            passed = time.perf_counter() - began - (compilation_time() - compiled)
+            shortest = min(shortest, passed)
+            yield index, result
+            others = resident_memory() - before > MOST_GROWTH or (
+                count > 1 and shortest * len(waiting) > WORTH_PROCESSES
+            )
         if not waiting:
             return
     pool = standing or PersistentPool(count)

@@ -57,7 +57,8 @@ MomentToResist = Annotated[
     float | None, typer.Option(help="Largest moment to resist about each axis [N m].")
 ]
 Workers = Annotated[
-    int | None, typer.Option(help="Local processes; default: one for each processor.")
+    int | None,
+    typer.Option(help="Local processes; default: one for each processor, for long work."),
 ]
 
 

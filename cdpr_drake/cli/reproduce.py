@@ -58,7 +58,8 @@ def reproduce(
         ),
     ] = None,
     workers: Annotated[
-        int | None, typer.Option(help="Processes; default: one for each processor.", min=1)
+        int | None,
+        typer.Option(help="Processes; default: one for each processor, for long work.", min=1),
     ] = None,
     figure_format: FigureFormats = "png",
     as_json: ResultsAsJson = False,

@@ -81,7 +81,9 @@ def simulate(
     ] = None,
     workers: Annotated[
         int | None,
-        typer.Option(help="Processes for --seeds; default: one for each processor.", min=1),
+        typer.Option(
+            help="Processes for --seeds; default: one for each processor, for long work.", min=1
+        ),
     ] = None,
     scheduler: Scheduler = None,
     settings: Annotated[

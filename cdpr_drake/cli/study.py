@@ -74,7 +74,8 @@ def study(
         ),
     ] = None,
     workers: Annotated[
-        int | None, typer.Option(help="Processes; default: one for each processor.", min=1)
+        int | None,
+        typer.Option(help="Processes; default: one for each processor, for long work.", min=1),
     ] = None,
     as_json: ResultsAsJson = False,
     overwrite: Overwrite = False,

@@ -117,6 +117,11 @@ _locks: CompilationLocks | None = None
 
 _is_shared = False
 
+_compiled_for = 0.0
+"""Wall time that the outermost compilations of this process have taken [s]."""
+
+_compiles = False
+
 
 def shared_locks() -> CompilationLocks | None:
     """The locks of the cache folder; None where it has none, or cannot be written."""
@@ -131,6 +136,26 @@ def shared_locks() -> CompilationLocks | None:
 def compilation_waits() -> bool:
     """Whether this process waits for another one that compiles a kernel."""
     return _locks is not None and _locks.waits
+
+
+def compilation_time() -> float:
+    """Wall time in which this process compiled shared kernels or waited for another one [s]."""
+    return _compiled_for
+
+
+@contextmanager
+def _timed() -> Iterator[None]:
+    """Adds to `compilation_time`, but for what is compiled within another kernel."""
+    global _compiled_for, _compiles
+    if _compiles:
+        yield
+        return
+    began, _compiles = time.perf_counter(), True
+    try:
+        yield
+    finally:
+        _compiles = False
+        _compiled_for += time.perf_counter() - began
 
 
 def share_compilation() -> CompilationLocks | None:
@@ -158,7 +183,7 @@ def share_compilation() -> CompilationLocks | None:
         if name is None:
             return compile_here(self, sig)
         self.targetoptions.setdefault("no_cfunc_wrapper", True)
-        with lock, locks.held(name):  # numba's own first, which is that of threads
+        with lock, _timed(), locks.held(name):  # numba's own first, which is that of threads
             return compile_here(self, sig)
 
     def save_overload(self: Any, sig: Any, data: Any) -> None:

@@ -18,6 +18,7 @@ from cdpr_drake.kernel_cache.kernel_list import ListedKernel, is_complete, note_
 from cdpr_drake.kernel_cache.locks import (
     LOCK_FILE,
     CompilationLocks,
+    compilation_time,
     kernel_lock,
     share_compilation,
     shared_locks,
@@ -137,6 +138,7 @@ def test_what_another_process_compiles_is_waited_for(small, compiled, monkeypatc
 def test_kernels_are_compiled_without_an_entry_for_c(small):
     """Which nobody calls; those of others have one."""
     share_compilation()
+    before = compilation_time()
 
     @numba.njit
     def other(number):
@@ -147,6 +149,10 @@ def test_kernels_are_compiled_without_an_entry_for_c(small):
         compiled = kernel.get_compile_result(kernel.nopython_signatures[0])
         entry = compiled.fndesc.llvm_cfunc_wrapper_name
         assert (entry in compiled.library.get_llvm_str()) == has_one
+    spent = compilation_time()
+    assert spent > before
+    assert small.half(4.0) == 2.0
+    assert compilation_time() == spent
 
 
 def test_kernels_of_others_are_left_alone(small, monkeypatch):

@@ -28,6 +28,22 @@ def test_two_workers_are_processes_of_their_own():
     assert [there for _, there in run_jobs(os.readlink, jobs, 1)] == [here, here]
 
 
+def test_unasked_processes_are_started_for_long_work_only(monkeypatch):
+    """Small maps paid two processes that each imported Drake: half of the command's time."""
+    here, jobs = str(os.getpid()), ["/proc/self"] * 4
+    monkeypatch.setattr(worker_pool, "default_workers", lambda: 2)
+    hosts = [there for _, there in sorted(run_jobs(os.readlink, jobs))]
+    assert hosts == [here] * 4
+    monkeypatch.setattr(worker_pool, "WORTH_PROCESSES", 0.0)
+    hosts = [there for _, there in sorted(run_jobs(os.readlink, jobs))]
+    assert hosts[0] == here
+    assert here not in hosts[1:]
+    compiled = lambda: 2.0 * time.perf_counter()  # noqa: E731, more than all
+    monkeypatch.setattr(worker_pool, "compilation_time", compiled)
+    hosts = [there for _, there in sorted(run_jobs(os.readlink, jobs))]
+    assert hosts == [here] * 4
+
+
 @pytest.mark.parametrize("workers", [1, 2])
 def test_a_request_to_stop_keeps_what_is_done(workers):
     done = []
