@@ -23,7 +23,7 @@ from cdpr_drake.numerics.linear_algebra_kernel import eliminate, substitute
 STEPS = 300
 """Largest number of steps; about five are needed, more where both minima are nearly one."""
 
-# Its parts are put into it as they are written: a kernel of kernels compiles all of them anew.
+# Only what each step does most is put into it as it is written: numba takes longer for the rest.
 
 SETTLED = 1e-13
 """Where less than this is left, as an angle [rad] or a share of the distance, a step is the last;
@@ -43,7 +43,7 @@ LARGEST_FALL = 10.0
 shrink by a tenth only, each a tenth of what is left, add up to so much."""
 
 
-@njit(error_model="numpy", inline="always")
+@njit(error_model="numpy")
 def _homography(xy: Array, image: Array, H: Array) -> None:
     """H with (u, v, 1)' ~ H (x, y, 1)' at unit focal length, its last number 1.
 
@@ -72,7 +72,7 @@ def _homography(xy: Array, image: Array, H: Array) -> None:
     H[2, 2] = 1.0
 
 
-@njit(error_model="numpy", inline="always")
+@njit(error_model="numpy")
 def _two_rotations(H: Array, R: Array) -> None:
     """The rotations that a homography allows at the plane's origin, shape (2, 3, 3)."""
     p, q = H[0, 2], H[1, 2]
@@ -109,7 +109,7 @@ def _two_rotations(H: Array, R: Array) -> None:
                 R[k, i, j] = V[i, 0] * T[0, j] + V[i, 1] * T[1, j] + V[i, 2] * T[2, j]
 
 
-@njit(error_model="numpy", inline="always")
+@njit(error_model="numpy")
 def _position(xy: Array, image: Array, R: Array, p: Array) -> None:
     """Position for a rotation, linear least squares at unit focal length."""
     A, pivots = np.zeros((3, 3)), np.empty(3)
@@ -130,7 +130,7 @@ def _position(xy: Array, image: Array, R: Array, p: Array) -> None:
     substitute(A, A.shape[0], pivots, p)
 
 
-@njit(error_model="numpy", inline="always")
+@njit(error_model="numpy")
 def _squares(xy: Array, uv: Array, camera: Array, R: Array, p: Array) -> float:
     """Sum of squares e'e of the reprojection [px^2]."""
     total = 0.0
@@ -209,7 +209,7 @@ def _normal_equations(
     return total
 
 
-@njit(error_model="numpy", inline="always")
+@njit(error_model="numpy")
 def _solve(N: Array, C: Array, damping: float, S: Array, x: Array) -> bool:
     """x with (N + C + damping diag N) x = column 6 of N, shape (6, 8), by Gauss; without C, and
     False, where that matrix is not positive definite."""
@@ -235,7 +235,7 @@ def _solve(N: Array, C: Array, damping: float, S: Array, x: Array) -> bool:
     return weight > 0.0
 
 
-@njit(error_model="numpy", inline="always")
+@njit(error_model="numpy")
 def _turned(R: Array, w: Array, out: Array) -> None:
     """exp([w]x) R, shape (3, 3)."""
     angle = np.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
