@@ -15,6 +15,7 @@ from .analyses.front.planning import plan_free_motion as plan_free_motion
 from .analyses.front.planning import plan_path as plan_path
 from .analyses.front.proven_motions import plan_proven_motion as plan_proven_motion
 from .analyses.front.reconfiguration import reconfigure as reconfigure
+from .analyses.front.reproduction import reproduce as reproduce
 from .analyses.front.session import Session as Session
 from .analyses.front.simulated_fits import calibrate_in_simulation as calibrate_in_simulation
 from .analyses.front.simulated_fits import identify_in_simulation as identify_in_simulation
@@ -25,7 +26,6 @@ from .analyses.front.stability import assess_stability as assess_stability
 from .analyses.front.statics import find_equilibria as find_equilibria
 from .analyses.front.statics import solve_forward_kinematics as solve_forward_kinematics
 from .analyses.front.statics import solve_static as solve_static
-from .analyses.front.studies import reproduce as reproduce
 from .analyses.front.studies import run_study as run_study
 from .analyses.front.studies import studies as studies
 from .analyses.front.tensions import TENSION_METHODS as TENSION_METHODS

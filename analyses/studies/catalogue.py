@@ -166,13 +166,12 @@ def _entry(name: str, place: str) -> StudyEntry:
 
 def entry_of(study: FramedStudy) -> StudyEntry:
     """The entry of a study, also of one that is in no module of this room."""
-    from cdpr_drake.analyses.studies.framework.case_definition import Plan
-
+    published = getattr(study.cases, "published", None)  # of a `Plan`, which is long to load
     return StudyEntry(
         study,
         repeats=study.seeds is not None,
         judges=study.names_of_checks(),
-        numbers=study.cases.published() if isinstance(study.cases, Plan) else (),
+        numbers=() if published is None else published(),
         figures=tuple(study.figures),
         recipes=study.recipes,
     )

@@ -11,8 +11,9 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from cdpr_drake.analyses.front.studies import Reproduction, StudyOfMany, chosen_studies
-from cdpr_drake.analyses.front.studies import reproduce as reproduce_all
+from cdpr_drake.analyses.front.reproduction import Reproduction, StudyOfMany
+from cdpr_drake.analyses.front.reproduction import reproduce as reproduce_all
+from cdpr_drake.analyses.front.studies import chosen_studies
 from cdpr_drake.analyses.reporting.output_folder import shown_path
 from cdpr_drake.analyses.reporting.statements import new_table
 from cdpr_drake.analyses.reproduction.digest_pdf import NO_REPORTLAB

@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from cdpr_drake.analyses.front import studies
+from cdpr_drake.analyses.front import reproduction
 from cdpr_drake.analyses.reporting.log_files import write_json
 from cdpr_drake.analyses.reproduction import digest_pdf
 from cdpr_drake.analyses.studies.catalogue import STUDIES, StudyEntry
@@ -125,7 +125,7 @@ def test_a_digest_that_fails_is_named_and_the_rest_is_there(capsys, monkeypatch,
     monkeypatch.setitem(STUDIES, "case-8", StudyEntry(nothing))
     asked = ("--only", "case-8", "--out", str(tmp_path / "r"))
     with monkeypatch.context() as patch:
-        patch.setattr(studies, "write_digest", full)
+        patch.setattr(reproduction, "write_digest", full)
         code, _, err = reproduce(capsys, *asked)
     assert code == 3
     assert "cdpr: digest.pdf was not written: [Errno 28] No space left on device" in err
@@ -135,6 +135,6 @@ def test_a_digest_that_fails_is_named_and_the_rest_is_there(capsys, monkeypatch,
     assert reproduce(capsys, *asked)[0] == 0
     assert (tmp_path / "r" / "digest.pdf").is_file()
     with monkeypatch.context() as patch:
-        patch.setattr(studies, "write_digest", full)
+        patch.setattr(reproduction, "write_digest", full)
         _, _, err = reproduce(capsys, *asked)
     assert "(the one that is there is of an earlier report)" in err

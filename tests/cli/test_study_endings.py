@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.front import studies as reproduce
+from cdpr_drake.analyses.front import reproduction
 from cdpr_drake.analyses.reporting.log_files import write_json
 from cdpr_drake.analyses.reporting.progress import WorkProgress
 from cdpr_drake.analyses.studies.catalogue import STUDIES, StudyEntry
@@ -295,8 +295,8 @@ def test_a_signal_while_the_report_is_written_does_not_cost_it(
     monkeypatch.setitem(DRAWN, "bad", good_figure)
     squares = Squares.__call__
     monkeypatch.setattr(Squares, "__call__", interrupting(number, before, squares))
-    write = reproduce.write_report
-    monkeypatch.setattr(reproduce, "write_report", interrupting(number, 1, write))
+    write = reproduction.write_report
+    monkeypatch.setattr(reproduction, "write_report", interrupting(number, 1, write))
     code, _, _ = run("reproduce", "--only", "toy", "--out", "r")
     assert code == 130 * before
     assert (">stopped<" if before else ">finished<") in report(tmp_path / "r")

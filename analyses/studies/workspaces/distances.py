@@ -20,7 +20,6 @@ from pydrake.geometry import (
     Shape,
 )
 from pydrake.math import RigidTransform, RotationMatrix
-from scipy.optimize import lsq_linear
 
 from cdpr_drake.analyses.workspaces.workspace_question import interference_bodies
 from cdpr_drake.arrays import Array
@@ -84,6 +83,8 @@ class DistanceTask:
 
 def least_squares_clearances(around: Surroundings, position: Array, rotation: Array) -> Array:
     """As `drake_clearances`, where nothing overlaps, by bounded least squares (SciPy's BVLS)."""
+    from scipy.optimize import lsq_linear
+
     anchors = position[:, np.newaxis] + rotation @ around.cables.p_PB
     starts, ends = around.cables.p_WA.T, anchors.T
     units = ends - starts

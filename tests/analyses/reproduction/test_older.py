@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from cdpr_drake.analyses.front.studies import Reproduction
+from cdpr_drake.analyses.front.reproduction import Reproduction
 from cdpr_drake.analyses.reporting.log_files import write_json
 from cdpr_drake.analyses.reproduction.digest_story import Grid, Words, digest_story
 from cdpr_drake.analyses.reproduction.older import SUMMARY, change_words, changed_facts, read_older
