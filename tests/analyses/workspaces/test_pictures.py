@@ -16,6 +16,7 @@ from cdpr_drake.analyses.workspaces.workspace_results import robot_workspace
 from cdpr_drake.analyses.workspaces.workspace_scene import workspace_page
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.workspaces.pose_grid import grid_by_count
+from tests.figure_faults import figure_faults
 
 
 def small_workspace(robot, counts=(3, 2, 2), **asked):
@@ -63,6 +64,7 @@ def test_planes_paint_the_grid_and_nothing_beside(measure, counts):
     """Cells of points on the border were painted half a step beyond the grid's box."""
     workspace = small_workspace("acrobot_large", counts)
     figure = planes_figure(workspace, measure)
+    assert figure_faults(figure) == []
     lower, upper = np.array([-0.3, -0.2, 0.2]), np.array([0.3, 0.2, 0.4])
     painted = [axes for axes in figure.axes if axes.get_title().partition(" ")[0] in tuple("xyz")]
     assert painted
@@ -88,6 +90,7 @@ def figure_v(painted):
 def test_planes_show_the_frame_the_exit_points_and_the_box_of_the_grid(measure):
     robot = load_robot("acrobot_large")
     figure = planes_figure(small_workspace("acrobot_large"), measure, robot)
+    assert figure_faults(figure) == []
     axes = figure.axes[0]
     drawn = {line.get_label(): np.array(line.get_data()) for line in axes.lines}
     np.testing.assert_array_equal(drawn["exit points of the cables"], robot.exit_points()[:2])
