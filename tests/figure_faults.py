@@ -31,11 +31,12 @@ LEAST_FONT = 7.0
 def figure_faults(figure):
     """Faults of a figure, a line each; none: an empty list."""
     lay_out(figure)
-    with styled():
+    with styled():  # how many ticks there are is asked of the style whenever they are
         FigureCanvasAgg(figure).draw()  # places what legends hold
-    words = [(text, corners(text)) for text in shown_words(figure)]
-    return [*cut_words(figure, words), *words_on_words(words), *words_on_legends(figure, words),
-            *covered_data(figure), *offsets(figure), *small_words(words)]  # fmt: skip
+        words = [(text, corners(text)) for text in shown_words(figure)]
+        return [*cut_words(figure, words), *words_on_words(words),
+                *words_on_legends(figure, words), *covered_data(figure), *offsets(figure),
+                *small_words(words)]  # fmt: skip
 
 
 def shown_words(figure):

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections import ChainMap
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -30,7 +32,7 @@ from cdpr_drake.analyses.studies.framework.case_panels import (
     legend_below,
     sorted_legend,
 )
-from cdpr_drake.analyses.studies.framework.runs import MissingRuns, Runs
+from cdpr_drake.analyses.studies.framework.runs import MissingRuns, Run, Runs
 from cdpr_drake.analyses.studies.framework.study import FigureMaker
 from cdpr_drake.analyses.visualization.curves import draw_curve, phase_of, shade
 from cdpr_drake.analyses.visualization.figure_style import (
@@ -101,6 +103,9 @@ def group_figure(plan: Plan, group: str, name: str, runs: Runs) -> Figure:
         raise MissingRuns(f"figure {name}")
     about = f"{plan.title} ({plan.name})"
     title = f"{about}\n{group}" if group else about
+    if group in plan.drawn_s and name in ("image_paths", "camera_paths", *MULTIPLES):
+        title += f", the first {plan.drawn_s[group]:g} s"
+        shown = [(c, begin_of(run, plan.drawn_s[group]), look) for c, run, look in shown]
     if name in ("image_paths", "camera_paths"):
         draw = image_figure if name == "image_paths" else camera_figure
         return draw(title, shown, runs)
@@ -121,6 +126,18 @@ def group_figure(plan: Plan, group: str, name: str, runs: Runs) -> Figure:
     if panels is None:
         raise MissingRuns(f"figure {name}")
     return panels
+
+
+def begin_of(run: Run, seconds: float) -> Run:
+    """The first seconds of a run, of the traces that figures of paths and `MULTIPLES` draw."""
+    cut = {}
+    for clock, names in (
+        ("time", ("camera_path", "camera_deviation", "error", "cable_velocities")),
+        ("image_time", ("image_path", "image_deviation")),
+    ):
+        rows = run[clock] <= seconds
+        cut |= {name: run[name][rows] for name in (clock, *names)}
+    return replace(run, measured=ChainMap(cut, run.measured))  # type: ignore[arg-type]
 
 
 MULTIPLES = {
