@@ -353,7 +353,7 @@ STUDY = configuration_study(
         title="Estimates of the platform's pose in PBVS",
         scenario="acrobot_pbvs",
         changes=(PULLEYS,),
-        drawn_s={MOVING: 2.0 * LAP},
+        laps_s={MOVING: LAP},
         configurations=(
             *_group(
                 OPEN_LOOP,

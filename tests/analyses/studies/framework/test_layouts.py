@@ -9,6 +9,7 @@ import pytest
 from cdpr_drake.analyses.studies.framework.case_figures import (
     bar_figure,
     group_figure,
+    largest_of_each,
     shown_of,
     small_multiples,
 )
@@ -133,7 +134,7 @@ LAPS = 15
 )
 def test_laps_behind_an_object_that_moves_are_no_dark_band(name):
     """Fifteen laps lay on each other, and the distance was one from a line that nobody follows."""
-    time = np.linspace(0.0, 16.0 * LAPS, 50 * LAPS)
+    time = np.linspace(0.0, 16.0 * LAPS, 50 * LAPS, endpoint=False)
     turn = 2.0 * np.pi * LAPS * time / time[-1]
     around = np.transpose([np.cos(turn), np.sin(turn), 0.0 * turn])
     goal = np.zeros((2, 3))
@@ -144,10 +145,10 @@ def test_laps_behind_an_object_that_moves_are_no_dark_band(name):
         image_deviation=np.abs(around[:, 0]), camera_path=around, camera_line=goal,
         camera_deviation=np.abs(around[:, 0]), error=around,
         cable_velocities=np.hstack([around, around[:, :1]]),
-        estimate_distance=time, estimate_angle=time,
+        estimate_distance=time * (turn % 0.7), estimate_angle=time,
     )  # fmt: skip
     plan = CASES["case-1"]
-    (group,) = plan.drawn_s
+    ((group, lap),) = plan.laps_s.items()
     assert group in plan.groups()
     figure = group_figure(plan, group, name, made_runs([made]))
     assert figure_faults(figure) == []
@@ -155,8 +156,10 @@ def test_laps_behind_an_object_that_moves_are_no_dark_band(name):
     whole = name == "pose_estimates"  # what accumulates is seen over all laps
     for axes in over_time:
         last = max(float(np.max(line.get_xdata())) for line in axes.lines)
-        assert last == pytest.approx(time[-1] if whole else plan.drawn_s[group], abs=time[1])
+        assert last == pytest.approx(time[-1] - 0.5 * lap if whole else 2.0 * lap, abs=time[1])
+        assert not whole or len(axes.lines[0].get_ydata()) == LAPS
     assert ("the first 32 s" in figure.get_suptitle()) is not whole
+    assert ("in each lap of 16 s" in figure.get_suptitle()) is whole
     if name in ("image_paths", "camera_paths"):
         (axes,) = over_time
         assert axes.get_ylabel().startswith("distance from the desired point")
@@ -164,5 +167,14 @@ def test_laps_behind_an_object_that_moves_are_no_dark_band(name):
         words = [text.get_text() for text in figure.legends[0].get_texts()]
         assert "straight line" not in words
     # A plan that says nothing shows all.
-    every = group_figure(replace(plan, drawn_s={}), group, name, made_runs([made]))
+    every = group_figure(replace(plan, laps_s={}), group, name, made_runs([made]))
     assert "the first" not in every.get_suptitle()
+    assert "in each lap" not in every.get_suptitle()
+
+
+def test_the_largest_of_each_lap():
+    times, largest = largest_of_each(
+        np.array([0.0, 1.0, 2.0, 2.9, 3.0, 4.0]), np.array([1.0, 5.0, 2.0, 3.0, 4.0, 0.0]), 2.0
+    )
+    np.testing.assert_allclose(times, [0.5, 2.5, 4.0])
+    np.testing.assert_array_equal(largest, [5.0, 4.0, 0.0])
