@@ -2,12 +2,14 @@
 
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from matplotlib.colors import to_rgba
 
 from cdpr_drake.analyses.visualization.replay import robot_picture
-from cdpr_drake.analyses.workspaces.workspace_figures import planes_figure
+from cdpr_drake.analyses.workspaces.workspace_figures import OUTSIDE, planes_figure
 from cdpr_drake.analyses.workspaces.workspace_question import (
     WorkspaceRequest,
     make_workspace_question,
@@ -102,3 +104,19 @@ def test_planes_show_the_frame_the_exit_points_and_the_box_of_the_grid(measure):
         assert np.all(high > points.T)
     told = [text.get_text() for text in figure.legends[0].get_texts()]
     assert {*drawn} <= {*told}
+
+
+def test_planes_of_a_measure_say_where_there_is_no_number():
+    """A plane without a pose inside was an empty panel."""
+    workspace = small_workspace("acrobot_large")
+    held = workspace.inside("static").copy()
+    assert held.any(axis=(0, 1, 2))[1]
+    held[..., 0] = False
+    workspace = replace(workspace, holds={"static": held})
+    figure = planes_figure(workspace, "capacity-margin")
+    assert figure_faults(figure) == []
+    assert "outside" in [text.get_text() for text in figure.legends[0].get_texts()]
+    (mesh,) = [one for one in figure.axes[0].collections if hasattr(one, "get_coordinates")]
+    assert np.all(np.ma.getmaskarray(mesh.get_array()))
+    painted = mesh.to_rgba(mesh.get_array())
+    np.testing.assert_allclose(painted.reshape(-1, 4)[0], to_rgba(OUTSIDE))
