@@ -135,7 +135,7 @@ DRAWN_LAPS = 2
 
 def begin_of(run: Run, seconds: float) -> Run:
     """The first seconds of a run, of the traces that figures of paths and `MULTIPLES` draw."""
-    cut = {}
+    cut: dict[str, Any] = {}
     for clock, names in (
         ("time", ("camera_path", "camera_deviation", "error", "cable_velocities")),
         ("image_time", ("image_path", "image_deviation")),
