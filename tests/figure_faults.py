@@ -13,6 +13,8 @@ from matplotlib.legend import Legend
 from matplotlib.patches import Rectangle
 from matplotlib.text import Text
 from matplotlib.transforms import Bbox
+from mpl_toolkits.mplot3d import proj3d
+from mpl_toolkits.mplot3d.art3d import Text3D
 
 from cdpr_drake.analyses.visualization.figure_style import lay_out, styled
 
@@ -29,11 +31,12 @@ LEAST_FONT = 7.0
 def figure_faults(figure):
     """Faults of a figure, a line each; none: an empty list."""
     lay_out(figure)
-    with styled():
+    with styled():  # how many ticks there are is asked of the style whenever they are
         FigureCanvasAgg(figure).draw()  # places what legends hold
-    words = [(text, corners(text)) for text in shown_words(figure)]
-    return [*cut_words(figure, words), *words_on_words(words), *words_on_legends(figure, words),
-            *covered_data(figure), *offsets(figure), *small_words(words)]  # fmt: skip
+        words = [(text, corners(text)) for text in shown_words(figure)]
+        return [*cut_words(figure, words), *words_on_words(words),
+                *words_on_legends(figure, words), *covered_data(figure), *offsets(figure),
+                *small_words(words)]  # fmt: skip
 
 
 def shown_words(figure):
@@ -68,7 +71,7 @@ def hidden_ticks(figure):
 
 def corners(text):
     """Corners of the box of words, turned as they are, shape (4, 2) [px]."""
-    turned = text.get_window_extent()
+    turned = extent(text)
     middle = np.array([turned.x0 + turned.x1, turned.y0 + turned.y1]) / 2.0
     angle = text.get_rotation()
     if angle % 90.0 == 0.0:
@@ -76,12 +79,23 @@ def corners(text):
         angle = 0.0
     else:
         text.set_rotation(0.0)
-        flat = text.get_window_extent()
+        flat = extent(text)
         text.set_rotation(angle)
         half = np.array([flat.width, flat.height]) / 2.0
     c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
     signs = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
     return middle + (signs * half) @ np.array([[c, s], [-s, c]])
+
+
+def extent(text):
+    """Box of words [px]; of words at a point in space where they are drawn."""
+    if not isinstance(text, Text3D):
+        return text.get_window_extent()
+    point = text.get_position_3d()
+    Text.set_position(text, proj3d.proj_transform(*point, text.axes.get_proj())[:2])
+    box = text.get_window_extent()
+    Text.set_position(text, point[:2])
+    return box
 
 
 def cut_words(figure, words):

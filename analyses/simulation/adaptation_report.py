@@ -160,6 +160,10 @@ def doubts(log: Log, cables: list[str]) -> list[str]:
     return told
 
 
+LEGEND_ROOM = 1.5
+"""Upper end of the axis of numbers, of the largest one: above the curves is the legend."""
+
+
 def adaptation_figure(title: str, log: Log, robot: Robot) -> Figure:
     """Errors of points over time with their bands, and what the servo was offered.
 
@@ -196,6 +200,7 @@ def adaptation_figure(title: str, log: Log, robot: Robot) -> Figure:
         ("stations", "-"), ("excited", "--"), ("models_believed", ":"), ("models_rejected", "-."),
     ):  # fmt: skip
         panel.plot(time, parts[name], style, color="0.1", label=name.replace("_", " "))
-    panel.set(xlabel="time [s]", ylabel="number")
-    panel.legend(loc="best")
+    most = max(float(np.max(line.get_ydata())) for line in panel.lines)
+    panel.set(xlabel="time [s]", ylabel="number [-]", ylim=(None, LEGEND_ROOM * max(most, 1.0)))
+    panel.legend(loc="upper left", ncols=2, fontsize=9)
     return figure

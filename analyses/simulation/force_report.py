@@ -13,7 +13,7 @@ from cdpr_drake.analyses.visualization.figure_style import line_style, new_figur
 from cdpr_drake.arrays import Array
 from cdpr_drake.control.force_laws import port_energy
 from cdpr_drake.geometry.poses import rotation_from_angles
-from cdpr_drake.palette import DESIRED, ESTIMATED, IDEAL
+from cdpr_drake.palette import DESIRED, ESTIMATED, PLATFORM
 from cdpr_drake.systems.controllers.force_tracking import HYBRID, ForceControl
 from cdpr_drake.systems.robots.platform_wrench import APPLIED_WRENCH
 
@@ -83,7 +83,7 @@ def force_figure(title: str, settings: ForceControl | None, log: Log) -> Figure:
         pressed = R @ (settings.force * settings.pressed()[3:])
     for k, axis in enumerate("xyz"):
         force, place = panels[0, k], panels[1, k]
-        force.plot(time, true[:, k], **line_style(IDEAL), label="on the platform")
+        force.plot(time, true[:, k], **line_style(PLATFORM), label="on the platform")
         if ESTIMATE in log:
             estimate = np.asarray(log[ESTIMATE])[:, 3 + k]
             force.plot(time, estimate, **line_style(ESTIMATED), label="estimated")
@@ -92,8 +92,8 @@ def force_figure(title: str, settings: ForceControl | None, log: Log) -> Figure:
         force.set(ylabel=f"force along {axis} [N]")
         widen(force, 0.1)
         where, wanted = (np.asarray(log[name])[:, 4 + k] for name in ("X_WP", "X_WP_desired"))
+        place.plot(time, 1e3 * where, **line_style(PLATFORM), label="platform")
         place.plot(time, 1e3 * wanted, **line_style(DESIRED), label="trajectory")
-        place.plot(time, 1e3 * where, **line_style(ESTIMATED), label="platform")
         place.set(xlabel="time [s]", ylabel=f"{axis} [mm]")
         widen(place, 1.0)
     panels[0, int(np.argmax(np.abs(pressed))) if np.any(pressed) else 2].legend(loc="best")

@@ -18,6 +18,7 @@ from cdpr_drake.analyses.reporting.log_files import finite, write_json
 from cdpr_drake.analyses.reporting.provenance import package_versions, write_run_inputs
 from cdpr_drake.analyses.reporting.written_files import whole_file
 from cdpr_drake.analyses.simulation.monte_carlo import ManyRuns
+from cdpr_drake.analyses.simulation.monte_carlo_store import RunRecord
 from cdpr_drake.analyses.visualization.curves import draw_curve, path_rows
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS, figure_writers
 from cdpr_drake.analyses.visualization.figure_style import line_style, new_figure
@@ -179,11 +180,13 @@ def repetition_figure(scenario: Scenario, runs: ManyRuns) -> Figure:
                 *traces["image_line"].T, **line_style(IDEAL), linewidth=1.0,
                 label="straight line" if number == 0 else None,
             )  # fmt: skip
-            plain = Look(look.color, look.dash)
-            draw_curve(deviation, traces["image_time"], traces["image_deviation"], plain, **faint)
         image.invert_yaxis()
         image.set(xlabel="u [px of an image 1600 px wide]", ylabel="v [px]", aspect="equal")
         image.legend(loc="best")
+        for outcome in dict.fromkeys(str(record.summary["outcome"]) for record in seen):
+            some = [record for record in seen if record.summary["outcome"] == outcome]
+            _draw_deviations(deviation, some, _look(outcome), outcome.replace("_", " "))
+        deviation.legend(loc="best")
         deviation.set(
             xlabel="time [s]", ylabel="distance from the straight line [px]", ylim=(0.0, None)
         )
@@ -207,6 +210,20 @@ def repetition_figure(scenario: Scenario, runs: ManyRuns) -> Figure:
     ends.margins(0.15)
     ends.legend(loc="best")
     return figure
+
+
+def _draw_deviations(axes: Any, records: Sequence[RunRecord], look: Look, words: str) -> None:
+    """Median over runs of the distance from their straight lines over time, in their range."""
+    traces = [(r.traces["image_time"], r.traces["image_deviation"]) for r in records]
+    times = max((time for time, _ in traces), key=lambda time: float(time[-1]))
+    values = np.array([np.interp(times, t, d, np.nan, np.nan) for t, d in traces])
+    low, high = np.nanmin(values, axis=0), np.nanmax(values, axis=0)
+    axes.fill_between(
+        times, low, high, color=look.color, alpha=0.25, linewidth=0.0, label=f"{words}, range"
+    )
+    draw_curve(
+        axes, times, np.nanmedian(values, axis=0), Look(look.color, look.dash), f"{words}, median"
+    )
 
 
 def _look(outcome: str) -> Look:

@@ -163,6 +163,8 @@ def error_figure(result: RunResult) -> Figure:
     """Errors of the features and of the pose estimate over time; no panel without a curve."""
     log, features = result.log, result.servo.controller.tasks[-1].features
     time, gain = log["time"], log["gain"][:, 0]
+    camera = result.servo.scenario.camera
+    unseen = (gain <= 0.0) & (time > camera.latency_frames / camera.rate)
     units = features.units()
     shown = [unit for unit in _UNITS if unit in units]
     # No gain, no error: the target was not seen, or nobody looked.
@@ -186,7 +188,7 @@ def error_figure(result: RunResult) -> Figure:
                 axes, time, error, nth_look(k), name,
                 scale=factor, phase=phase_of(place, len(mine)),
             )  # fmt: skip
-        shade(axes, time, gain <= 0.0, "target not seen")
+        shade(axes, time, unseen, "target not seen")
         axes.set(ylabel=label)
         axes.legend(loc="best", ncols=1 + len(mine) // 6)
     if looked and len(shown) == 1:

@@ -22,7 +22,7 @@ from cdpr_drake.analyses.visualization.figure_style import (
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.curves import cable_curves
 from cdpr_drake.errors import TensionProblemError
-from cdpr_drake.palette import BOUND, DOTTED, OUTLINE, PLATFORM, SOLID, look_of, nth_look
+from cdpr_drake.palette import BOUND, DOTTED, MARKERS, OUTLINE, PLATFORM, SOLID, look_of, nth_look
 from cdpr_drake.tensions.methods import METHODS, feasible_polygon, solution_space
 from cdpr_drake.tensions.problem import TensionProblem, TensionSolution, TensionStatus
 
@@ -82,7 +82,7 @@ def static_figure(report: StaticReport, title: str) -> Figure:
     place = axes["modes"]
     places = np.arange(len(report.frequencies)) + 1
     place.bar(places, report.frequencies, color=PLATFORM.color)
-    place.set(xlabel="mode", ylabel="natural frequency [Hz]", xticks=places)
+    place.set(xlabel="mode [-]", ylabel="natural frequency [Hz]", xticks=places)
     return figure
 
 
@@ -124,12 +124,16 @@ def polygon_figure(problem: TensionProblem, title: str) -> Figure:
     axes.plot(*closed, color=PLATFORM.color, linestyle=SOLID)
     solutions = [s for s in solve_all(problem) if np.all(np.isfinite(s.tensions))]
     extent = float(np.max(np.ptp(vertices, axis=1)))
+    free = list(MARKERS)
     for eta, labels, filled in _places(solutions, N, extent):
-        # A method keeps its look in all polygons; where several meet, it is that of the first.
+        # A method keeps its look in all polygons; where several meet, it is that of the first. In
+        # grey print two of more methods than symbols would be one.
         look = look_of(labels[0].partition(" ")[0], list(METHODS))
+        marker = look.marker if look.marker in free or not free else free[0]
+        free = [one for one in free if one != marker]
         axes.plot(
             *eta,
-            look.marker,
+            marker,
             color=look.color,
             markersize=9,
             fillstyle="full" if filled else "none",

@@ -329,10 +329,10 @@ def figure(runs: Runs) -> Figure:
         for k, who in enumerate(WHO):
             axes[2].plot(place[:, k], marker="osv"[k], label=who, **line_style(nth_look(k)))
         axes[2].set_yscale("log")
-    axes[0].set(xlabel="errors over covariance, squared [-]", ylabel="share of seeds",
+    axes[0].set(xlabel="errors over covariance, squared [-]", ylabel="share of seeds [-]",
                 title="covariance")  # fmt: skip
     axes[1].set(ylabel="over the bound of the designed motion [-]", title="Cramer-Rao")
-    axes[2].set(xlabel="seed", ylabel="mean distance [mm]", title="tracking by belief")
+    axes[2].set(xlabel="seed [-]", ylabel="mean distance [mm]", title="tracking by belief")
     for one in axes:
         if one.get_legend_handles_labels()[0]:
             one.legend()

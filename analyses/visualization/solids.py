@@ -46,8 +46,9 @@ def draw_solid(
         axes.add_collection3d(_shaded(quads, color))
     else:
         axes.text2D(
-            0.5, 0.5, NO_CELL, transform=axes.transAxes, ha="center", va="center", fontsize=9
-        )
+            0.5, 0.3, NO_CELL, transform=axes.transAxes, ha="center", va="center", fontsize=9,
+            zorder=6, bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.5, "alpha": 0.85},
+        )  # fmt: skip
     edge = _draw_frame(axes, lower, upper)
     handles = [*axes.plot(*exits, "k^", markersize=4, zorder=4, label="exit points of the cables")]
     axes.set(xlabel="x in W [m]", ylabel="y in W [m]", zlabel="z in W [m]")

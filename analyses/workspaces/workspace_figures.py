@@ -7,9 +7,11 @@ from functools import partial
 from textwrap import wrap
 
 import numpy as np
+from matplotlib import colormaps
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
-from matplotlib.colors import ListedColormap
+from matplotlib.colors import Colormap, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
@@ -123,14 +125,15 @@ def planes_figure(
         cells = np.sum(kinds, axis=0) > 0
         shown: Array = np.where(inside, 2.0, np.where(cells, 1.0, 0.0))
         limits = (-0.5, 2.5)
-        colors = ListedColormap([OUTSIDE, SOME, INSIDE])
+        colors: Colormap = ListedColormap([OUTSIDE, SOME, INSIDE])
     else:
         held = workspace.inside()
         # With no pose inside there is nothing else to see; the title says so.
         shown = _least(workspace.values[measure], held if held.any() else np.ones_like(held))
         known = shown[np.isfinite(shown)]
         limits = (float(np.min(known)), float(np.max(known))) if len(known) else (0.0, 1.0)
-        colors = None
+        # A plane without a number would be an empty panel.
+        colors = colormaps["viridis"].with_extremes(bad=OUTSIDE)
     mesh = None
     for number, (axes, k) in enumerate(zip(panels, chosen, strict=False)):
         plane = np.take(shown, k, normal).T
@@ -170,8 +173,12 @@ def planes_figure(
     elif mesh is not None:
         about = MEASURES[measure]
         figure.colorbar(mesh, ax=panels[: len(chosen)], label=f"{about.title} [{about.unit}]")
-        if lines:
-            figure.legend(handles=lines, loc="outside lower center", ncols=3)
+        handles: list[Artist] = [*lines]
+        if np.any(np.isnan(np.take(shown, chosen, normal))):
+            words = "outside" if workspace.inside().any() else "no number"
+            handles.insert(0, Patch(facecolor=OUTSIDE, label=words))
+        if handles:
+            figure.legend(handles=handles, loc="outside lower center", ncols=4)
     return figure
 
 

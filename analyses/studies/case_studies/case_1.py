@@ -353,6 +353,7 @@ STUDY = configuration_study(
         title="Estimates of the platform's pose in PBVS",
         scenario="acrobot_pbvs",
         changes=(PULLEYS,),
+        laps_s={MOVING: LAP},
         configurations=(
             *_group(
                 OPEN_LOOP,

@@ -104,6 +104,9 @@ class Plan:
         quick: Names of configurations of the quick form; all, if there are none.
         own: Metrics of this study alone, by name.
         layouts: Published figures that are drawn in their own layout, by the name of the file.
+        laps_s: Of experiments behind an object that runs in laps, the time of a lap [s]. Curves
+            over all of them would be one dark band: figures show the first two, or the largest
+            value of each.
         stability: Tension from which a cable counts in the stability criterion along the run [N];
             None: the traces do not have it.
         why: Why numbers of configurations may differ that say nothing themselves.
@@ -122,6 +125,7 @@ class Plan:
     quick: tuple[str, ...] = ()
     own: Mapping[str, OwnMetric] = field(default_factory=dict)
     layouts: Mapping[str, Layout] = field(default_factory=dict)
+    laps_s: Mapping[str, float] = field(default_factory=dict)
     stability: float | None = None
     why: str = ""
     cause: str = ""

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections import ChainMap
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -30,7 +32,7 @@ from cdpr_drake.analyses.studies.framework.case_panels import (
     legend_below,
     sorted_legend,
 )
-from cdpr_drake.analyses.studies.framework.runs import MissingRuns, Runs
+from cdpr_drake.analyses.studies.framework.runs import MissingRuns, Run, Runs
 from cdpr_drake.analyses.studies.framework.study import FigureMaker
 from cdpr_drake.analyses.visualization.curves import draw_curve, phase_of, shade
 from cdpr_drake.analyses.visualization.figure_style import (
@@ -101,11 +103,15 @@ def group_figure(plan: Plan, group: str, name: str, runs: Runs) -> Figure:
         raise MissingRuns(f"figure {name}")
     about = f"{plan.title} ({plan.name})"
     title = f"{about}\n{group}" if group else about
+    lap = plan.laps_s.get(group)
+    if lap is not None and name in ("image_paths", "camera_paths", *MULTIPLES):
+        title += f", the first {DRAWN_LAPS * lap:g} s"
+        shown = [(c, begin_of(run, DRAWN_LAPS * lap), look) for c, run, look in shown]
     if name in ("image_paths", "camera_paths"):
         draw = image_figure if name == "image_paths" else camera_figure
         return draw(title, shown, runs)
     if name == "pose_estimates":
-        return estimate_figure(title, shown)
+        return estimate_figure(title, shown, lap)
     if name in MULTIPLES:
         return small_multiples(title, shown, *MULTIPLES[name])
     if name == "stability":
@@ -121,6 +127,22 @@ def group_figure(plan: Plan, group: str, name: str, runs: Runs) -> Figure:
     if panels is None:
         raise MissingRuns(f"figure {name}")
     return panels
+
+
+DRAWN_LAPS = 2
+"""So many laps are drawn of runs behind an object that runs in laps."""
+
+
+def begin_of(run: Run, seconds: float) -> Run:
+    """The first seconds of a run, of the traces that figures of paths and `MULTIPLES` draw."""
+    cut: dict[str, Any] = {}
+    for clock, names in (
+        ("time", ("camera_path", "camera_deviation", "error", "cable_velocities")),
+        ("image_time", ("image_path", "image_deviation")),
+    ):
+        rows = run[clock] <= seconds
+        cut |= {name: run[name][rows] for name in (clock, *names)}
+    return replace(run, measured=ChainMap(cut, run.measured))  # type: ignore[arg-type]
 
 
 MULTIPLES = {
@@ -161,22 +183,39 @@ def camera_figure(title: str, shown: Shown, runs: Runs) -> Figure:
     return figure
 
 
-def estimate_figure(title: str, shown: Shown) -> Figure:
-    """Errors of the platform's pose estimate over time."""
-    figure, (distance, angle) = new_figure(
-        1, 2, (14.0, 6.0), f"Estimated pose of the platform against the true one\n{title}"
-    )
+def estimate_figure(title: str, shown: Shown, lap: float | None = None) -> Figure:
+    """Errors of the platform's pose estimate over time; with the time of a lap [s] the largest of
+    each."""
+    words = "Estimated pose of the platform against the true one"
+    if lap is not None:
+        words += f", largest error in each lap of {lap:g} s"
+    figure, (distance, angle) = new_figure(1, 2, (14.0, 6.0), f"{words}\n{title}")
     for number, (configuration, run, look) in enumerate(shown):
         phase = phase_of(number, len(shown))
         for axes, name, scale, label in (
             (distance, "estimate_distance", 1e3, configuration.label),
             (angle, "estimate_angle", 180.0 / np.pi, None),
         ):
-            draw_curve(axes, run["time"], run[name], look, label, scale=scale, phase=phase)
+            times, values = run["time"], run[name]
+            if lap is not None:
+                times, values = largest_of_each(times, values, lap)
+            draw_curve(axes, times, values, look, label, scale=scale, phase=phase)
     distance.set(xlabel="time [s]", ylabel="distance [mm]", ylim=(0, None))
     angle.set(xlabel="time [s]", ylabel="angle [deg]", ylim=(0, None))
     legend_below(figure, *distance.get_legend_handles_labels())
     return figure
+
+
+def largest_of_each(times: Array, values: Array, lap: float) -> tuple[Array, Array]:
+    """Middle of each lap [s] and the largest value in it, shape (k,); times, values: (n,)."""
+    laps = np.floor((times - times[0]) / lap + LAP_ROUNDING).astype(int)
+    starts = np.flatnonzero(np.diff(laps, prepend=-1))
+    ends = np.append(starts[1:], len(times)) - 1
+    return (times[starts] + times[ends]) / 2.0, np.maximum.reduceat(values, starts)
+
+
+LAP_ROUNDING = 1e-6
+"""Share of a lap that sums of time steps may be short of it."""
 
 
 def small_multiples(title: str, shown: Shown, quantity: str, label: str, factor: float) -> Figure:

@@ -103,13 +103,14 @@ def corners_at(time: float) -> Draw:
 
 
 def draw_image_deviation(axes: Any, scene: Scene) -> None:
-    """Distances of the object's centre from its straight line in the image over time."""
+    """Distances of the object's centre from its straight line in the image over time; where it
+    moves, from the desired point."""
     for number, (one, run, look) in enumerate(scene.shown):
         draw_curve(
-            axes, run["image_time"], run["image_deviation"], look, one.label,
+            axes, run["image_time"], _off(run, "image"), look, one.label,
             phase=phase_of(number, len(scene.shown)),
         )  # fmt: skip
-    axes.set(xlabel="time [s]", ylabel="distance from the straight line [px]", ylim=(0, None))
+    axes.set(xlabel="time [s]", ylabel=f"distance from {_goal(scene)} [px]", ylim=(0, None))
 
 
 def draw_camera_paths(axes: Any, scene: Scene) -> None:
@@ -118,7 +119,8 @@ def draw_camera_paths(axes: Any, scene: Scene) -> None:
     for number, (one, run, look) in enumerate(scene.shown):
         draw_path(axes, run["camera_path"], look, one.label)
         line = line_style(IDEAL) | {"linewidth": 1.0}
-        axes.plot(*run["camera_line"].T, **line, label=_once(number, "straight line"))
+        if _has_line(run):
+            axes.plot(*run["camera_line"].T, **line, label=_once(number, "straight line"))
         axes.plot(
             *run["camera_line"][1:].T, DESIRED.marker, color=DESIRED.color, markersize=10,
             label=_once(number, "desired"),
@@ -128,9 +130,31 @@ def draw_camera_paths(axes: Any, scene: Scene) -> None:
 
 
 def draw_camera_deviation(axes: Any, scene: Scene) -> None:
-    """Distances of the camera from its straight line in space over time."""
-    _over_time(axes, scene, "camera_deviation", 1e3)
-    axes.set(xlabel="time [s]", ylabel="distance from the straight line [mm]", ylim=(0, None))
+    """Distances of the camera from its straight line in space over time; behind an object that
+    moves, from the desired point."""
+    for number, (one, run, look) in enumerate(scene.shown):
+        draw_curve(
+            axes, run["time"], _off(run, "camera"), look, one.label,
+            scale=1e3, phase=phase_of(number, len(scene.shown)),
+        )  # fmt: skip
+    axes.set(xlabel="time [s]", ylabel=f"distance from {_goal(scene)} [mm]", ylim=(0, None))
+
+
+def _has_line(run: Run) -> bool:
+    """Whether a run has straight lines to follow: not behind an object that moves."""
+    return run["image_max_px"] is not None
+
+
+def _off(run: Run, of: str) -> Array:
+    """How far "image" or "camera" is off its straight line over time, or off the desired point."""
+    if _has_line(run):
+        return np.asarray(run[f"{of}_deviation"])
+    return np.asarray(np.linalg.norm(run[f"{of}_path"] - run[f"{of}_line"][1], axis=1))
+
+
+def _goal(scene: Scene) -> str:
+    """What `_off` is from, in words."""
+    return f"the {'straight line' if _has_line(scene.shown[0][1]) else 'desired point'}"
 
 
 def draw_platform_paths(axes: Any, scene: Scene) -> None:
@@ -346,8 +370,9 @@ def legend_below(figure: Any, handles: list[Any], labels: list[str]) -> None:
 
 
 def _image_line(axes: Any, run: Run, first: bool) -> None:
-    line = line_style(IDEAL) | {"linewidth": 1.0, "zorder": 0}
-    axes.plot(*run["image_line"].T, **line, label="straight line" if first else None)
+    if _has_line(run):
+        line = line_style(IDEAL) | {"linewidth": 1.0, "zorder": 0}
+        axes.plot(*run["image_line"].T, **line, label="straight line" if first else None)
     axes.plot(
         *run["image_line"][1], DESIRED.marker, color=DESIRED.color, markersize=12, zorder=5,
         label="desired" if first else None,

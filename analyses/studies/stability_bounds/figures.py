@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
@@ -177,25 +175,28 @@ def tightness(runs: Runs, robot: str, method: str) -> float:
     return float(np.median(scales[withstood(runs, robot, method)][asked] / searched[asked]))
 
 
-LETTER_PLACES = 10.0, -10.0, 19.0, -19.0
+LETTER_PLACES = 10.0, -10.0, 19.0, -19.0, 28.0, -28.0
 """How far above its symbol a letter may stand, where it is wanted most first [pt]."""
 
-LETTER_APART = 1.08
-"""Quotient of the times of two symbols from which on their letters stand beside each other."""
+LETTER_APART = np.array([7.5, 8.5])
+"""Across and up, so far are letters from each other and from symbols of others [pt]."""
 
 
-def _letters_above(points: Sequence[tuple[float, float, str]]) -> list[float]:
-    """How far above its symbol each letter stands, of times, shares and letters, so that letters
-    of symbols on one line do not meet [pt]."""
-    chosen: list[float] = []
-    for number, (x, y, _) in enumerate(points):
-        near = {
-            chosen[k]
-            for k, (u, v, _) in enumerate(points[:number])
-            if v == y and max(x / u, u / x) < LETTER_APART
-        }
-        chosen.append(next((place for place in LETTER_PLACES if place not in near), 0.0))
-    return chosen
+def _letters_above(symbols: Array) -> list[float]:
+    """How far above its symbol each letter stands, so that letters meet neither each other nor
+    other symbols where there is room [pt]; symbols of shape (n, 2) [pt]."""
+    letters: list[Array] = []
+    for number, symbol in enumerate(symbols):
+        others = np.delete(symbols, number, axis=0)
+        others = others[np.any(others != symbol, axis=1)]  # one symbol may have many letters
+
+        def met(above: float, symbol: Array = symbol, others: Array = others) -> int:
+            away = np.abs(np.vstack([*letters, others]) - symbol - [0.0, above])
+            near = np.all(away < LETTER_APART, axis=1)
+            return int(10 * np.sum(near[: len(letters)]) + np.sum(near[len(letters) :]))
+
+        letters.append(symbol + np.array([0.0, min(LETTER_PLACES, key=met)]))
+    return [float(letter[1] - symbol[1]) for letter, symbol in zip(letters, symbols, strict=True)]
 
 
 NOTHING = 1 / 128
@@ -219,11 +220,6 @@ def tightness_figure(runs: Runs) -> Figure:
                 markerfacecolor=look.color if share else "none",
             )  # fmt: skip
             points.append((*place, LETTERS[robot]))
-    for (x, y, letter), above in zip(points, _letters_above(points), strict=True):
-        panel.annotate(
-            letter, (x, y), (0, above), ha="center", va="center",
-            textcoords="offset points", fontsize=8,
-        )  # fmt: skip
     panel.set_xscale("log")
     plain_numbers(panel.xaxis)
     panel.set_yscale("log", base=2)
@@ -242,6 +238,13 @@ def tightness_figure(runs: Runs) -> Figure:
     letters = ", ".join(f"{LETTERS[robot]} {ROBOT_LABELS[robot]}" for robot in robots)
     figure.legend(handles=handles, loc="outside lower center", ncols=6, title=letters,
                   fontsize=9, title_fontsize=9)  # fmt: skip
+    figure.draw_without_rendering()  # lays it out: letters need to know how far symbols are apart
+    places = panel.transData.transform([(x, y) for x, y, _ in points]) * 72.0 / figure.dpi
+    for (x, y, letter), above in zip(points, _letters_above(places), strict=True):
+        panel.annotate(
+            letter, (x, y), (0, above), ha="center", va="center",
+            textcoords="offset points", fontsize=8,
+        )  # fmt: skip
     return figure
 
 

@@ -12,6 +12,7 @@ from cdpr_drake.analyses.reporting.deferred_figures import write_pictures
 from cdpr_drake.analyses.simulation.monte_carlo import ManyRuns, run_many, with_seeds
 from cdpr_drake.analyses.simulation.monte_carlo_report import (
     METRICS,
+    repetition_figure,
     repetition_pictures,
     repetition_summary,
     repetition_table,
@@ -23,6 +24,7 @@ from cdpr_drake.errors import InfeasibleTensionError, OutputFormatError
 from cdpr_drake.geometry.poses import pose_from_angles, pose_row
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.diagrams.load import load_scenario
+from tests.figure_faults import figure_faults
 
 SHORT = [
     "camera.kind=projected",
@@ -178,3 +180,21 @@ def test_a_table_as_parquet(runs, tmp_path):
     found = parquet.read_table(tmp_path / "runs.parquet")
     assert found["outcome"].to_pylist() == ["timeout"] * 3
     assert found["seed"].to_pylist() == runs.table()["seed"].tolist()
+
+
+def test_distances_of_many_runs_are_a_median_in_their_range(scenario, runs):
+    """Curves of twenty runs were one dark band."""
+    short = runs.records[0]
+    cut = {name: short.traces[name][:9] for name in ("image_time", "image_path", "image_deviation")}
+    some = [replace(short, traces={**short.traces, **cut}), *runs.records[1:]]
+    figure = repetition_figure(scenario, replace(runs, records=some))
+    assert figure_faults(figure) == []
+    deviation = figure.axes[1]
+    (median,) = deviation.lines
+    assert median.get_xdata()[-1] == some[1].traces["image_time"][-1]
+    both = np.mean([record.traces["image_deviation"][-1] for record in some[1:]])
+    assert median.get_ydata()[-1] == pytest.approx(both)
+    (band,) = deviation.collections
+    assert band.get_datalim(deviation.transData).y1 == pytest.approx(
+        max(np.max(record.traces["image_deviation"]) for record in some)
+    )

@@ -8,6 +8,7 @@ import pytest
 from cdpr_drake.analyses.simulation import run_figures
 from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
 from cdpr_drake.systems.diagrams.load import load_scenario
+from tests.figure_faults import figure_faults
 
 
 @pytest.fixture(scope="module")
@@ -28,6 +29,7 @@ def result():
 )
 def test_axes_have_units(result, draw):
     figure = draw(result)
+    assert figure_faults(figure) == []
     title = figure.get_suptitle()
     assert "planar_pbvs" in title
     assert result.servo.scenario.title in title.replace("\n", " ")
@@ -51,6 +53,7 @@ def test_no_panel_is_empty_where_nobody_looked(result):
     """An open loop has no feature error; its panels once were empty."""
     blind = replace(result, log={**result.log, "gain": np.zeros_like(result.log["gain"])})
     figure = run_figures.error_figure(blind)
+    assert figure_faults(figure) == []
     assert len(figure.axes) == 2
     assert all(len(axes.lines) == 1 for axes in figure.axes)
     assert "no feature was controlled" in figure.get_suptitle()
@@ -59,6 +62,7 @@ def test_no_panel_is_empty_where_nobody_looked(result):
 def test_a_target_that_was_never_found_leaves_no_empty_panel(result):
     unseen = replace(result, log={**result.log, "found": np.zeros_like(result.log["found"])})
     figure = run_figures.image_path_figure(unseen)
+    assert figure_faults(figure) == []
     (image,) = figure.axes
     assert [text.get_text() for text in image.get_legend().get_texts()] == ["desired"]
     assert "never found" in figure.get_suptitle()
@@ -68,8 +72,22 @@ def test_times_without_the_target_are_shaded_and_said(result):
     gain = result.log["gain"].copy()
     gain[5:9] = 0.0
     figure = run_figures.error_figure(replace(result, log={**result.log, "gain": gain}))
+    assert figure_faults(figure) == []
     words = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
     assert "target not seen" in words
+
+
+def test_before_the_first_image_nothing_is_shaded(result):
+    """Of every run 0.02 s were shaded, too narrow to be seen, and the legend named them."""
+    axes = run_figures.error_figure(result).axes[0]
+    assert "target not seen" not in [text.get_text() for text in axes.get_legend().get_texts()]
+    assert not axes.patches
+    gain = result.log["gain"].copy()
+    gain[:9] = 0.0
+    axes = run_figures.error_figure(replace(result, log={**result.log, "gain": gain})).axes[0]
+    (shade,) = axes.patches
+    assert shade.get_x() == pytest.approx(0.02)
+    assert shade.get_width() == pytest.approx(8 * 0.02)
 
 
 def test_every_run_has_its_figures_in_the_formats_asked_for(result):

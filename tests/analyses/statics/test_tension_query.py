@@ -17,6 +17,7 @@ from cdpr_drake.geometry.poses import pose_from_angles
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_statics import tension_problem
 from cdpr_drake.tensions.methods import METHODS
+from tests.figure_faults import figure_faults
 from tests.messages import printed
 
 PRINTED = [2.08, 2.08, 2.43, 2.58, 3.74, 4.30, 12.76, 13.31]
@@ -58,7 +59,11 @@ def test_polygon_corners_balance_the_wrench(problem):
 
 
 def test_picture_names_every_method_once(problem):
-    (axes,) = polygon_figure(problem, "title").axes
+    figure = polygon_figure(problem, "title")
+    assert figure_faults(figure) == []
+    (axes,) = figure.axes
+    markers = [line.get_marker() for line in axes.lines if line.get_linestyle() == "None"]
+    assert len(set(markers)) == len(markers) > 5  # grey print has no colours
     words = " ".join(text.get_text() for text in axes.get_legend().get_texts()).split()
     names = [word for word in words if word in METHODS]
     assert sorted(names) == sorted(applicable_methods(problem))

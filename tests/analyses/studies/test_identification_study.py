@@ -9,6 +9,7 @@ from cdpr_drake.analyses.reporting.progress import StudySession
 from cdpr_drake.analyses.studies import identification
 from cdpr_drake.analyses.studies.framework.study import Form
 from cdpr_drake.analyses.studies.identification import CAMPAIGN, NAMES, NOISE, STUDY, noise_trial
+from tests.figure_faults import figure_faults
 
 
 @pytest.fixture(scope="module")
@@ -66,6 +67,9 @@ def test_it_judges_tables_and_writes(quick, tmp_path):
     )
     assert found.runs.counts("kind") == {NOISE: 3, CAMPAIGN: 1 if quick else 3}
     assert len(found.tables()) == 2
+    drawn = identification.figure(found.runs)
+    assert figure_faults(drawn) == []
+    assert all("[" in axes.get_ylabel() for axes in drawn.axes)
     assert found.write(tmp_path) == {}
     assert (tmp_path / "identification.png").exists()
 

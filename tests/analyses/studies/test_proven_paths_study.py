@@ -26,7 +26,8 @@ from cdpr_drake.analyses.studies.proven_paths.sampled_planners import (
     shortcut,
 )
 from cdpr_drake.analyses.studies.proven_paths.statements import FREE, PROBLEM, SAMPLED
-from cdpr_drake.analyses.studies.proven_paths.study import STUDY, measure
+from cdpr_drake.analyses.studies.proven_paths.study import STUDY, measure, paths_figure
+from tests.figure_faults import figure_faults
 
 LOCAL = StudySession(workers=1)
 LINE = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
@@ -68,6 +69,7 @@ def test_it_judges_tables_and_draws(tmp_path):
     assert [one.of for one in found.statements] == [20, 20, 20, 20, 20, 5]
     problems, free, _ = found.tables()
     assert (problems.row_count, free.row_count) == (20, 5)
+    assert figure_faults(paths_figure(found.runs)) == []
     assert found.write(tmp_path) == {}
     told = json.loads((tmp_path / "results.json").read_text())
     assert told["parameters"]["effort"]["samples"] == 100_000

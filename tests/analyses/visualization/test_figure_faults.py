@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from cdpr_drake.analyses.studies.framework.case_panels import draw_path, fit_box
-from cdpr_drake.analyses.studies.stability_bounds.figures import _letters_above
+from cdpr_drake.analyses.studies.stability_bounds.figures import LETTER_APART, _letters_above
 from cdpr_drake.analyses.visualization.figure_style import bare_figure, new_figure, styled
 from cdpr_drake.analyses.visualization.solids import NO_CELL, draw_solid
 from cdpr_drake.palette import nth_look
@@ -95,6 +95,21 @@ def test_numbers_and_names_of_axes_in_space_do_not_meet(size, columns, ends):
     assert figure_faults(figure) == []
 
 
+def test_words_in_space_are_where_they_are_drawn():
+    """Their first two coordinates were taken for a place in the picture."""
+    figure = bare_figure((6.0, 5.0), "A point far from the origin")
+    with styled():
+        axes = figure.add_subplot(projection="3d")
+        fit_box(axes, np.array([[2.0, 2.0, 0.0], [3.0, 3.0, 1.0]]))
+        axes.text(2.5, 2.5, 0.5, "within")
+    assert figure_faults(figure) == []
+    with styled():
+        axes.text(2.5, 2.5, 0.5, "there too")
+        axes.text(2.5, 2.5, 9.0, "outside")
+    faults = figure_faults(figure)
+    assert faults == ["cut off: 'outside'", "on each other: 'within' and 'there too'"]
+
+
 def test_a_frame_without_a_solid_says_so():
     figure = bare_figure((8.6, 5.4), "Nothing")
     corners = np.array([-0.5, -0.5, 0.0]), np.array([0.5, 0.5, 1.1])
@@ -105,9 +120,13 @@ def test_a_frame_without_a_solid_says_so():
 
 
 def test_letters_of_symbols_on_one_line_do_not_meet():
-    # Of five robots, four take about as long.
-    points = [(1.9, 1.0, "P"), (1.91, 1.0, "S"), (1.92, 1.0, "F"), (1.93, 1.0, "C"),
-              (3.0, 1.0, "Q"), (1.9, 2.0, "R")]  # fmt: skip
-    above = _letters_above(points)
+    # Of six robots, four take about as long, one of them on a line above.
+    symbols = np.array([[90.0, 100.0], [91.0, 100.0], [91.0, 100.0], [93.0, 100.0],
+                        [200.0, 100.0], [90.0, 127.0]])  # fmt: skip
+    above = _letters_above(symbols)
     assert len(set(above[:4])) == 4
-    assert above[4] == above[5] == above[0]
+    assert above[4] == above[0]
+    letters = symbols + np.transpose([np.zeros(6), above])
+    for number, letter in enumerate(letters):
+        away = np.abs(np.delete(letters, number, axis=0) - letter)
+        assert not np.any(np.all(away < LETTER_APART, axis=1))

@@ -2,12 +2,14 @@
 
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from matplotlib.colors import to_rgba
 
 from cdpr_drake.analyses.visualization.replay import robot_picture
-from cdpr_drake.analyses.workspaces.workspace_figures import planes_figure
+from cdpr_drake.analyses.workspaces.workspace_figures import OUTSIDE, planes_figure
 from cdpr_drake.analyses.workspaces.workspace_question import (
     WorkspaceRequest,
     make_workspace_question,
@@ -16,6 +18,7 @@ from cdpr_drake.analyses.workspaces.workspace_results import robot_workspace
 from cdpr_drake.analyses.workspaces.workspace_scene import workspace_page
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.workspaces.pose_grid import grid_by_count
+from tests.figure_faults import figure_faults
 
 
 def small_workspace(robot, counts=(3, 2, 2), **asked):
@@ -63,6 +66,7 @@ def test_planes_paint_the_grid_and_nothing_beside(measure, counts):
     """Cells of points on the border were painted half a step beyond the grid's box."""
     workspace = small_workspace("acrobot_large", counts)
     figure = planes_figure(workspace, measure)
+    assert figure_faults(figure) == []
     lower, upper = np.array([-0.3, -0.2, 0.2]), np.array([0.3, 0.2, 0.4])
     painted = [axes for axes in figure.axes if axes.get_title().partition(" ")[0] in tuple("xyz")]
     assert painted
@@ -88,6 +92,7 @@ def figure_v(painted):
 def test_planes_show_the_frame_the_exit_points_and_the_box_of_the_grid(measure):
     robot = load_robot("acrobot_large")
     figure = planes_figure(small_workspace("acrobot_large"), measure, robot)
+    assert figure_faults(figure) == []
     axes = figure.axes[0]
     drawn = {line.get_label(): np.array(line.get_data()) for line in axes.lines}
     np.testing.assert_array_equal(drawn["exit points of the cables"], robot.exit_points()[:2])
@@ -99,3 +104,19 @@ def test_planes_show_the_frame_the_exit_points_and_the_box_of_the_grid(measure):
         assert np.all(high > points.T)
     told = [text.get_text() for text in figure.legends[0].get_texts()]
     assert {*drawn} <= {*told}
+
+
+def test_planes_of_a_measure_say_where_there_is_no_number():
+    """A plane without a pose inside was an empty panel."""
+    workspace = small_workspace("acrobot_large")
+    held = workspace.inside("static").copy()
+    assert held.any(axis=(0, 1, 2))[1]
+    held[..., 0] = False
+    workspace = replace(workspace, holds={"static": held})
+    figure = planes_figure(workspace, "capacity-margin")
+    assert figure_faults(figure) == []
+    assert "outside" in [text.get_text() for text in figure.legends[0].get_texts()]
+    (mesh,) = [one for one in figure.axes[0].collections if hasattr(one, "get_coordinates")]
+    assert np.all(np.ma.getmaskarray(mesh.get_array()))
+    painted = mesh.to_rgba(mesh.get_array())
+    np.testing.assert_allclose(painted.reshape(-1, 4)[0], to_rgba(OUTSIDE))

@@ -22,6 +22,7 @@ from cdpr_drake.analyses.workspaces.stability_results import StabilityWorkspaces
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.stability.verdict import VERDICTS
 from cdpr_drake.workspaces.pose_grid import grid_by_count
+from tests.figure_faults import figure_faults
 
 
 def workspaces(counts, stable=True, feasible=True, values=()):
@@ -65,6 +66,7 @@ def meshes(figure):
 )
 def test_planes_show_every_point_as_a_cell(counts, across, up, panels):
     figure = planes_figure(workspaces(counts))
+    assert figure_faults(figure) == []
     found = meshes(figure)
     assert len(found) == panels
     size = dict(zip("xyz", counts, strict=True))
@@ -94,18 +96,23 @@ def test_planes_are_evenly_spaced_and_a_selection_is_said():
     figure = planes_figure(workspaces((3, 3, 16)))
     assert len(meshes(figure)) == 16
     assert "planes" not in figure.get_suptitle()
+    assert figure_faults(figure) == []
     figure = planes_figure(workspaces((3, 3, 25)))
+    assert figure_faults(figure) == []
     assert f"{len(meshes(figure))} of 25 planes" in figure.get_suptitle()
 
 
 def test_ticks_of_a_square_plane_are_alike():
-    panel = planes_figure(workspaces((9, 7, 4))).axes[0]
+    figure = planes_figure(workspaces((9, 7, 4)))
+    assert figure_faults(figure) == []
+    panel = figure.axes[0]
     np.testing.assert_allclose(panel.get_xticks(), [-0.5, 0.0, 0.5], atol=1e-12)
     np.testing.assert_allclose(panel.get_yticks(), panel.get_xticks(), atol=1e-12)
 
 
 def test_exit_points_are_over_the_solids_and_in_the_legend():
     figure = solids_figure(workspaces((4, 4, 4)), load_robot("acrobot_large"))
+    assert figure_faults(figure) == []
     for axes in figure.axes:
         assert not axes.computed_zorder  # else matplotlib sorts by depth, solids last
         (solid,) = (c for c in axes.collections if isinstance(c, Poly3DCollection))
@@ -118,6 +125,7 @@ def test_exit_points_are_over_the_solids_and_in_the_legend():
 
 def test_curves_that_lie_on_each_other_can_both_be_seen():
     figure = curves_figure(workspaces((3, 3, 3), values=(0.01, 0.02)))
+    assert figure_faults(figure) == []
     (axes,) = figure.axes
     assert axes.get_xlabel() == "r_A [m]"
     lines = {line.get_label(): line for line in axes.lines}
@@ -142,6 +150,7 @@ def test_tables_tell_verdicts_apart_and_say_that_a_grid_is_coarse(quick):
         for bound, value in (("r_bp", 0.05), ("r_A", 0.01), ("r_A", 0.03))
     ]  # fmt: skip
     figure = table_figure(Runs(rows), table)
+    assert figure_faults(figure) == []
     assert ("not to be compared" in figure.get_suptitle()) == quick
     assert "3 of 44 printed rows" in figure.get_suptitle()
     for axes in figure.axes:

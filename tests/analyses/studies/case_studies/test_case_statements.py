@@ -18,6 +18,7 @@ from cdpr_drake.analyses.studies.framework.case_statements import same_accuracy
 from cdpr_drake.analyses.studies.framework.runs import MissingRuns
 from cdpr_drake.analyses.studies.tension_cases.case_9_statements import least
 from tests.analyses.studies.made_runs import made_run, made_runs
+from tests.figure_faults import figure_faults
 
 
 def run(name, outcome="converged", end=None, **metrics):
@@ -165,7 +166,9 @@ def test_how_many_times_better_a_servo_is(far, near, expected):
     said = servo_pays.judge(runs)
     assert said.verdict == expected
     assert f"{far / near:.1f} and {far / near:.1f} times" in said.found
-    assert len(accuracy_figure(runs).axes) == 2
+    figure = accuracy_figure(runs)
+    assert figure_faults(figure) == []
+    assert len(figure.axes) == 2
 
 
 @pytest.mark.parametrize(

@@ -34,6 +34,7 @@ from cdpr_drake.analyses.studies.stability_bounds.questions import (
 from cdpr_drake.analyses.studies.stability_bounds.study import STUDY, costs_table, shares_table
 from cdpr_drake.stability.perturbation_bounds import PerturbationBounds
 from cdpr_drake.stability.verdict import judge_stability
+from tests.figure_faults import figure_faults
 
 QUICK = {case.name: case for case in cases(Form(quick=True))}
 
@@ -176,6 +177,7 @@ def test_rows_have_shares_of_cells() -> None:
 
 def test_maps_have_a_panel_for_every_robot_and_method() -> None:
     figure = maps_figure(made_up())
+    assert figure_faults(figure) == []
     titles = [axes.get_title() for axes in figure.axes if axes.get_title()]
     assert len(titles) == len(ROBOTS) * len(METHODS)
     assert titles[0] == "sampled\n100.0 %, 1 ms"
@@ -189,6 +191,7 @@ def test_tightness_is_a_quotient_of_bounds() -> None:
     assert tightness(runs, "caroca", "certified") == 1.0
     assert tightness(runs, "caroca", "lipschitz") == 0.25
     figure = tightness_figure(runs)
+    assert figure_faults(figure) == []
     (panel,) = figure.axes
     drawn = sorted({float(line.get_ydata()[0]) for line in panel.lines})
     assert drawn == [0.25, 1.0]
@@ -199,7 +202,9 @@ def test_no_quotient_of_two_scales_is_drawn_as_none() -> None:
 
 
 def test_shares_are_drawn_against_bounds() -> None:
-    panels = shares_figure(made_up()).axes
+    figure = shares_figure(made_up())
+    assert figure_faults(figure) == []
+    panels = figure.axes
     assert len(panels) == len(ROBOTS)
     lines = {line.get_label(): line for line in panels[0].lines}
     assert list(lines["Lipschitz"].get_ydata()) == [100.0, 0.0]

@@ -34,6 +34,7 @@ from cdpr_drake.analyses.studies.stability_shapes.items import (
     shape_row,
 )
 from cdpr_drake.analyses.studies.stability_shapes.study import STUDY
+from tests.figure_faults import figure_faults
 
 CASES = {(one.keys["figure"], one.keys["panel"]): one for one in STUDY.plan(Form(quick=True))}
 
@@ -72,6 +73,7 @@ def full():
 def test_nested_workspaces_lie_over_the_baseline_a_panel_for_each_bound():
     half = [shape("3.8", name, lambda x, y, z: x > 0.0) for name in ("r_bp=0.1", "r_s=0.5")]
     figure = nested_figure(Runs([shape("3.8", BASELINE, everywhere), *half]), "3.8")
+    assert figure_faults(figure) == []
     assert [axes.get_title() for axes in figure.axes] == ["(a) r_bp", "(b) r_s"]
     for axes, one in zip(figure.axes, half, strict=True):
         whole, part = axes.lines
@@ -84,7 +86,9 @@ def test_nested_workspaces_lie_over_the_baseline_a_panel_for_each_bound():
 
 def test_start_and_goal_are_drawn_where_they_are_printed():
     runs = Runs([shape("3.32", "d_theta_pc=55 deg alone", everywhere)])
-    (axes,) = solids_figure(runs, "3.32").axes
+    figure = solids_figure(runs, "3.32")
+    assert figure_faults(figure) == []
+    (axes,) = figure.axes
     assert "published 50.7" in axes.get_title()
     starts = [line for line in axes.lines if line.get_marker() == "o"]
     assert len(starts) == 1
