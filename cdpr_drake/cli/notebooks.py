@@ -11,8 +11,8 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from cdpr_drake.cli.options import AsJson
-from cdpr_drake.cli.terminal import print_json, wide_console
 from cdpr_drake.cli.robot_folder import check_no_file
+from cdpr_drake.cli.terminal import print_json, wide_console
 from cdpr_drake.errors import OutputFolderError
 
 FOLDER = Path(__file__).parent.parent / "notebooks"
