@@ -100,15 +100,8 @@ class SweepFolder(KeptChunks):
                     + (f"; and {more} more" if more > 0 else "")
                     + "; name another folder"
                 )
-        elif self.folder.exists():
-            if not self.folder.is_dir():
-                raise OutputFolderError(f"{self.folder}: found a file; accepted: a folder")
-            foreign = (path for path in self.folder.iterdir() if not OWN_PART.fullmatch(path.name))
-            own = (MARKER, JOURNAL, part_of(self.folder / MARKER).name)
-            if any(path.name not in own for path in foreign):
-                raise OutputFolderError(
-                    f"{self.folder}: holds files already, not those of a sweep; name another folder"
-                )
+        else:
+            check_sweep_folder(self.folder)
         self.folder.mkdir(parents=True, exist_ok=True)
         mark(self.folder)
         for path in self.folder.iterdir():
@@ -160,6 +153,28 @@ class SweepFolder(KeptChunks):
                 if OWN_CHUNK.fullmatch(path.name):
                     path.unlink()
             chunks.rmdir()
+
+
+def check_sweep_folder(folder: Path) -> None:
+    """Refuses what can be no folder of a sweep, whatever its arguments are.
+
+    Raises:
+        OutputFolderError: It holds other files, is a file, or cannot be read.
+    """
+    folder = folder.absolute()
+    try:
+        if not folder.exists() or (folder / ARGUMENTS).is_file():
+            return
+        if not folder.is_dir():
+            raise OutputFolderError(f"{folder}: found a file; accepted: a folder")
+        foreign = (path for path in folder.iterdir() if not OWN_PART.fullmatch(path.name))
+        own = (MARKER, JOURNAL, part_of(folder / MARKER).name)
+        if any(path.name not in own for path in foreign):
+            raise OutputFolderError(
+                f"{folder}: holds files already, not those of a sweep; name another folder"
+            )
+    except OSError as problem:
+        raise OutputFolderError(f"{folder}: cannot be read: {problem.strerror}") from problem
 
 
 def load_arrays(path: Path) -> dict[str, np.ndarray] | None:

@@ -10,7 +10,7 @@ from typing import Any, Generic, Protocol, TypeVar
 import numpy as np
 
 from cdpr_drake.analyses.reporting.progress import WorkProgress
-from cdpr_drake.analyses.sweeps.folder import SweepFolder
+from cdpr_drake.analyses.sweeps.folder import SweepFolder, check_sweep_folder
 from cdpr_drake.analyses.sweeps.sweep import run_sweep
 from cdpr_drake.analyses.sweeps.workers import check_scheduler
 
@@ -86,6 +86,8 @@ def run_poses(
         OutputFolderError: The folder belongs to other arguments, or cannot be written.
         SweepError: The scheduler does not answer or got lost, or a local process died.
     """
+    if how.folder is not None:
+        check_sweep_folder(how.folder)  # before anything is compiled
     for task, _ in tasks.values():
         task(0, 1)  # what is not accepted shows before a folder is made
     if how.scheduler is not None:

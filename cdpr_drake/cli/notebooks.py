@@ -11,6 +11,7 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from cdpr_drake.cli.options import AsJson
+from cdpr_drake.cli.robot_folder import check_no_file
 from cdpr_drake.cli.terminal import print_json, wide_console
 from cdpr_drake.errors import OutputFolderError
 
@@ -63,8 +64,7 @@ def copy_new(contents: dict[str, bytes], folder: Path) -> list[str]:
         OutputFolderError: A file of that name is there with another content, and nothing was
             written; or one cannot be written, and none is left.
     """
-    if folder.exists() and not folder.is_dir():
-        raise OutputFolderError(f"{folder}: found a file; accepted: a folder")
+    check_no_file(folder)
     found = [name for name in contents if (folder / name).exists() or (folder / name).is_symlink()]
     other = [name for name in found if not _holds(folder / name, contents[name])]
     if other:

@@ -17,8 +17,10 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from itertools import pairwise
+from pathlib import Path
 from types import FrameType
 
+from cdpr_drake.analyses.reporting.written_files import MARKER
 from cdpr_drake.kernel_cache.background import compile_in_background
 from cdpr_drake.kernel_cache.kernel_list import missing_kernels, needed_kernels
 
@@ -124,6 +126,9 @@ BROKEN = "workspace, dynamic-single-failure"
 GROUPS = (DEFAULT, COMPILED, *QUESTIONS, BROKEN)
 """All groups of the list."""
 
+ROBOTS = Path(__file__).parents[1] / "models" / "robots"
+"""A folder for each robot and mechanism that comes with the package."""
+
 SIMULATIONS = ("simulate", "serve", "studio")
 
 PROGRESS = "progress: "
@@ -150,7 +155,7 @@ def compile_ahead(words: Sequence[str]) -> int:
     global _expected
     command = next((word for word in words if not word.startswith("-")), "")
     groups = _groups(command, words)
-    if not groups:
+    if not groups or _will_be_refused(command, words):
         return 0
     _expected = missing = missing_kernels(groups)
     if 2 * missing > len(needed_kernels(groups)):
@@ -177,6 +182,30 @@ def _groups(command: str, words: Sequence[str]) -> list[str]:
         return []
     compiled = "--seeds" in words or any(word.startswith("integration.") for word in words)
     return [DEFAULT, COMPILED] if compiled else [DEFAULT]
+
+
+def _will_be_refused(command: str, words: Sequence[str]) -> bool:
+    """Whether a command line names no robot, or for its results what is no folder of this program.
+
+    Only what can be seen at once; the command itself says what is wrong.
+    """
+    after = words[words.index(command) + 1 :]
+    if command in QUESTIONS and after and not after[0].startswith("-"):
+        name = after[0].partition("@")[0]
+        if not (ROBOTS / name).is_dir() and not os.path.exists(name):
+            return True
+    given = [word.removeprefix("--out=") for word in words if word.startswith("--out=")]
+    given += [word for before, word in pairwise(words) if before == "--out"]
+    return any(_is_foreign(Path(word)) for word in given)
+
+
+def _is_foreign(folder: Path) -> bool:
+    """Whether it is a file, or a folder that holds something and was not made by this program."""
+    with suppress(OSError):
+        if folder.is_dir():
+            return any(folder.iterdir()) and not (folder / MARKER).is_file()
+        return folder.exists()
+    return False
 
 
 def _groups_of_kinds(words: Sequence[str]) -> list[str]:

@@ -9,6 +9,16 @@ from tempfile import NamedTemporaryFile
 from cdpr_drake.errors import OutputFolderError
 
 
+def check_no_file(folder: Path) -> None:
+    """Refuses a file where a folder is wanted.
+
+    Raises:
+        OutputFolderError: It is a file.
+    """
+    if folder.exists() and not folder.is_dir():
+        raise OutputFolderError(f"{folder}: found a file; accepted: a folder")
+
+
 def write_files(folder: Path, files: dict[str, str], overwrite: bool) -> list[Path]:
     """Writes files, each at once; returns their paths.
 
@@ -18,8 +28,9 @@ def write_files(folder: Path, files: dict[str, str], overwrite: bool) -> list[Pa
         overwrite: Whether files of these names are replaced; others stay in any case.
 
     Raises:
-        OutputFolderError: A file is there already, or the folder cannot be written to.
+        OutputFolderError: A file is there already, the folder is a file or cannot be written to.
     """
+    check_no_file(folder)
     paths = [folder / name for name in files]
     there = [str(path) for path in paths if path.exists()]
     if there and not overwrite:

@@ -165,6 +165,7 @@ body.body--dark .bg-primary .q-btn__content {{ color: #101418; }}
 .studio-panels .q-tab-panel {{ padding: 0.6rem 0.8rem; gap: 0.35rem; }}
 .studio-group .q-item {{ padding: 0.2rem 0.2rem; }}
 .studio-form .q-field__suffix, .studio-number .q-field__suffix {{ padding: 0; line-height: 2rem; }}
+.q-field__messages {{ line-height: 1.3; }}
 .studio-stale {{ color: var(--studio-problem); font-size: 0.86rem; min-height: 1.3rem; }}
 .studio-stale:empty:not(.studio-kept) {{ display: none; }}
 .studio-soft {{ color: var(--studio-soft); }}

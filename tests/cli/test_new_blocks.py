@@ -62,6 +62,16 @@ def test_what_is_no_block_is_refused_in_one_line(words, said, tmp_path, capsys):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize("words", [["controller", "law"], ["robot", "law"]])
+def test_a_file_in_the_place_of_the_folder_is_named(words, tmp_path, capsys):
+    file = tmp_path / "taken"
+    file.write_text("mine")
+    code, (_, err) = new(capsys, *words, "--out", str(file), "--overwrite")
+    assert code == 2
+    assert err == f"cdpr: {file}: found a file; accepted: a folder\n"
+    assert file.read_text() == "mine"
+
+
 def test_nothing_is_overwritten_unless_asked(tmp_path, capsys):
     (tmp_path / "law.py").write_text("mine")
     code, (_, err) = new(capsys, "controller", "law", "--out", str(tmp_path))

@@ -1,6 +1,7 @@
 """What is wrong with a built site: `python -m tests.docs.built_site FOLDER`; exit code 1, if so.
 
-Pages are read as they stand on the disk, and searched in Chromium as they open from it.
+Pages are read as they stand on the disk, and searched in Chromium as they open from it. Some that
+stand for all are asked axe about, light and dark.
 """
 
 from __future__ import annotations
@@ -8,7 +9,7 @@ from __future__ import annotations
 import re
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ from fontTools.ttLib import TTFont
 
 from tests.chromium import LONGEST_WAIT, chromium, wait_for
 from tests.docs.make_equations_font import FONT
+from tests.studio.axe import grave
 
 UNREAD = ("code", "pre", "script", "style", "math", "textarea", "svg", "noscript")
 """Elements whose text is no prose."""
@@ -41,6 +43,11 @@ FETCHED = {"script": "src", "img": "src", "iframe": "src", "source": "src", "lin
 SEARCHED = {"tension": 3, "calibration": 1, "wrench": 1}
 """Words that the search finds, on at least so many pages."""
 
+ASKED = (
+    "index.html", "gallery.html", "guides/studio.html", "theory/tensions.html",
+    "notebooks/tour.html", "reference/commands.html",
+)  # fmt: skip
+"""Pages that axe looks at: pictures, tables, code, equations, signatures."""
 
 ANSWERED = (
     "(e => e !== null && /\\d|No match/.test(e.innerText))"
@@ -153,12 +160,24 @@ def search_problems(
             yield f"search for {word!r} from a disk: found {found} pages; accepted: {least} or more"
 
 
+def axe_problems(site: Path, browser: Any, asked: Sequence[str]) -> Iterator[str]:
+    """What axe finds that is serious or critical in pages, light and dark."""
+    for scheme in ("light", "dark"):
+        liking = [{"name": "prefers-color-scheme", "value": scheme}]
+        browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": liking})
+        for name in asked:
+            browser.get((site.resolve() / name).as_uri())
+            yield from (f"{name}, {scheme}: {found}" for found in grave(browser))
+    browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})
+
+
 def main(site: Path) -> int:
     """Prints what is wrong with a site; 1 if anything is."""
     problems = list(page_problems(site))
     with tempfile.TemporaryDirectory() as profile, chromium(Path(profile)) as browser:
         problems += search_problems(site, browser, SEARCHED)
-    print("\n".join(problems) or "site: no raw markup, no dead link; its search answers")
+        problems += axe_problems(site, browser, ASKED)
+    print("\n".join(problems) or "site: no raw markup, no dead link; search and axe are content")
     return 1 if problems else 0
 
 

@@ -8,7 +8,7 @@ import re
 import pytest
 
 from tests.chromium import cleared
-from tests.docs.built_site import page_problems, search_problems
+from tests.docs.built_site import axe_problems, page_problems, search_problems
 from tests.docs.test_pages import PAGES
 
 GOOD = (
@@ -26,6 +26,14 @@ document.querySelector("ul").innerHTML =
 document.querySelector("div").innerText = ANSWER;
 </script>
 """
+
+
+SCHEMES = """<!doctype html><html lang="en"><title>a</title><style>
+:root {color-scheme: light dark} h1 {background: #fff; color: #000}
+@media (prefers-color-scheme: dark) {h1 {background: #111; color: DARK}}
+</style><main><h1>Tensions</h1></main></html>
+"""
+"""A page in two schemes."""
 
 
 def site(folder, text):
@@ -83,6 +91,16 @@ def test_the_search_is_asked(started_browser, tmp_path, answer, patience, words)
     assert len(problems) == (words is not None)
     assert all(words in problem for problem in problems)
     assert len(more) == 1
+
+
+def test_axe_is_asked_about_both_schemes(started_browser, tmp_path):
+    with cleared(started_browser) as browser:
+        for dark in ("#ddd", "#333"):
+            (tmp_path / "a.html").write_text(SCHEMES.replace("DARK", dark))
+            problems = list(axe_problems(tmp_path, browser, ["a.html"]))
+            assert [words.partition(": h1")[0] for words in problems] == (
+                [] if dark == "#ddd" else ["a.html, dark: color-contrast"]
+            )
 
 
 @pytest.mark.parametrize("page", PAGES, ids=[page.stem for page in PAGES])

@@ -6,6 +6,7 @@ from io import StringIO
 import pytest
 
 from cdpr_drake.analyses.installation import compilation_steps
+from cdpr_drake.analyses.reporting.written_files import MARKER
 from cdpr_drake.cli import process as first_use
 from cdpr_drake.cli.app import SUBCOMMANDS
 from cdpr_drake.kernel_cache.kernel_list import group_names, missing_kernels, needed_kernels
@@ -63,6 +64,13 @@ def test_a_question_about_stability_compiles_nothing_of_moved_objects():
         ("workspace acrobot_large", ["workspace"]),
         ("stability", ["stability"]),
         ("plan mine.yaml --path way.csv", ["plan"]),
+        ("tension planar@C1=0.3 --out new", ["tension"]),
+        ("tension no_such_robot", None),
+        ("plan mine.yml --limits 1,60", None),
+        ("workspace planar --out others", None),
+        ("workspace planar --out=others/file", None),
+        ("workspace planar --out ours", ["workspace"]),
+        ("simulate --out others", None),
         ("plan --help", None),
         ("simulate --help", None),
         ("doctor", None),
@@ -70,7 +78,11 @@ def test_a_question_about_stability_compiles_nothing_of_moved_objects():
         ("", None),
     ],
 )
-def test_a_command_asks_for_what_it_needs(line, groups, monkeypatch):
+def test_a_command_asks_for_what_it_needs(line, groups, monkeypatch, tmp_path):
+    for name in ("others/file", "mine.yaml", f"ours/{MARKER}"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).touch()
+    monkeypatch.chdir(tmp_path)
     asked = [None]
     monkeypatch.setattr(
         first_use, "compile_in_background", lambda *given: asked.append(list(given[0]))

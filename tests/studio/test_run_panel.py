@@ -98,7 +98,14 @@ def test_a_finished_run_is_looked_at_compared_and_downloaded(bench, alone, tmp_p
         slider = one(user, "cursor")
         slider.value = 0.1
         assert one(user, "camera").props["src"].startswith("data:image/jpeg;base64,")
+        assert list(one(user, "compare").options) == ["none", "folder second"]
         one(user, "compare").value = "folder second"
+        one(user, "run").value = "folder second"  # which is not compared with itself
+        await until(lambda: list(one(user, "compare").options) == ["none", "folder first"])
+        assert one(user, "compare").value == "none"
+        one(user, "compare").value = "folder first"
+        one(user, "run").value = "folder first"
+        await until(lambda: list(one(user, "compare").options) == ["none", "folder second"])
         user.find(marker="download").click()
         data = await user.download.next(timeout=LONGEST)
         with zipfile.ZipFile(io.BytesIO(data.content)) as archive:

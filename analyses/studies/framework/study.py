@@ -50,6 +50,7 @@ from cdpr_drake.analyses.studies.framework.statement import (
 )
 from cdpr_drake.analyses.studies.framework.summary import COARSE, FULL
 from cdpr_drake.analyses.sweeps.earlier_runs import EarlierRuns
+from cdpr_drake.analyses.sweeps.folder import check_sweep_folder
 from cdpr_drake.analyses.sweeps.sweep import run_study_sweep
 from cdpr_drake.analyses.sweeps.workers import SweepTask
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS, write_figures
@@ -211,6 +212,8 @@ class Study:
             SweepError: The scheduler does not answer or got lost, or a local process died.
         """
         form = Form(quick, session.seeds)
+        if session.folder is not None:
+            check_sweep_folder(session.folder)  # before its parameters are computed
         if self.before:
             session.tell(WorkProgress(self.before, 0, 1, 0.0, rate=f"{self.unit}/s"))
         cases = self.plan(form)

@@ -44,7 +44,7 @@ class HandBar:
                 self._break.props('no-caps outline title="The cable pulls nothing from now on"')
                 self._break.mark("break")
                 self._direction = ui.select(list(DIRECTIONS), value="+x", label="direction in W")
-                self._direction.props("dense outlined").mark("push-direction")
+                self._direction.props("dense outlined").classes("w-32").mark("push-direction")
                 self._force = ui.number("force", value=USUAL_FORCE, min=0.0)
                 self._force.props('dense outlined suffix="N"').classes("w-24").mark("push-force")
                 self._time = ui.number("for", value=USUAL_TIME, min=0.0, step=0.1)

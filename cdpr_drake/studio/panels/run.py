@@ -314,6 +314,19 @@ class RunPanel:
             robot = None if shown is None else await run.io_bound(_robot_of, shown)
             self._bench.results.show(name, None if robot is None else subject_of(robot))
 
+    def _offer_others(self, choices: Mapping[str, RunEntry]) -> None:
+        """Offers all finished runs to be compared with, but the one that is looked at."""
+        board = self._board
+        if board.compared == board.shown:
+            board.compared = ""
+        offered = {NOTHING: NOTHING} | {
+            key: shown.folder.name for key, shown in choices.items()
+            if key != board.shown and (shown.job is None or shown.job.state == JobState.FINISHED)
+        }  # fmt: skip
+        if offered != self._compare.options:
+            kept = self._compare.value if self._compare.value in offered else NOTHING
+            self._compare.set_options(offered, value=kept)
+
     def _refresh_runs(self) -> None:
         """Offers the runs that there are, and looks at the one that the session looks at."""
         board = self._board
@@ -323,12 +336,7 @@ class RunPanel:
         if names != self._names:
             self._names = names
             self._run.set_options(names, value=board.shown or None)
-            over = {
-                key: shown.folder.name for key, shown in choices.items()
-                if shown.job is None or shown.job.state == JobState.FINISHED
-            }  # fmt: skip
-            kept = self._compare.value if self._compare.value in over else NOTHING
-            self._compare.set_options({NOTHING: NOTHING, **over}, value=kept)
+        self._offer_others(choices)
         if board.shown != self._key:
             self._key = board.shown
             self._run.value = board.shown or None

@@ -8,15 +8,19 @@ import subprocess
 import sys
 import time
 from contextlib import suppress
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from cdpr_drake.analyses.reporting.progress import StudySession
 from cdpr_drake.analyses.reporting.written_files import MARKER, mark, part_of
 from cdpr_drake.analyses.simulation.monte_carlo import run_many, with_seeds
+from cdpr_drake.analyses.studies.framework.study import Study
 from cdpr_drake.analyses.sweeps import workers as sweep_workers
 from cdpr_drake.analyses.sweeps.folder import SweepFolder, differences
 from cdpr_drake.analyses.sweeps.sweep import run_sweep
+from cdpr_drake.analyses.workspaces.grid_runs import SweepOptions, run_poses
 from cdpr_drake.analyses.workspaces.static_feasible import StaticTask, static_case
 from cdpr_drake.errors import OutputFolderError, SweepError
 from cdpr_drake.models.robot_loader import load_robot
@@ -169,6 +173,20 @@ def test_other_folders_are_refused_and_left_alone(tmp_path):
     (tmp_path / "mine" / "arguments.json").write_text("{")
     with pytest.raises(OutputFolderError, match="no JSON"):
         SweepFolder(tmp_path / "mine", ARGUMENTS)
+
+
+def test_other_folders_are_refused_before_anything_is_computed(tmp_path):
+    (tmp_path / "thesis.txt").write_text("x")
+
+    def computed(*_):
+        raise AssertionError("it was computed first")
+
+    study = Study(name="other", title="Other", cases=lambda _: [], parameters=computed)
+    with pytest.raises(OutputFolderError, match="holds files already"):
+        study(session=StudySession(folder=tmp_path))
+    with pytest.raises(OutputFolderError, match="holds files already"):
+        run_poses(ARGUMENTS, {"a": (computed, 1)}, 1, dict, Path, SweepOptions(tmp_path))
+    assert os.listdir(tmp_path) == ["thesis.txt"]
 
 
 def test_differences_are_named_wherever_they_are():
