@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -30,6 +29,7 @@ from pydrake.systems.framework import Context
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import RobotFileError
 from cdpr_drake.geometry.platform_joint import PlatformJoint
+from cdpr_drake.geometry.poses import euclidean_length
 from cdpr_drake.models.mechanism_files import single_platform
 from cdpr_drake.models.mechanism_schema import Mechanism
 from cdpr_drake.models.robot_schema import SHAPE_INERTIA, Robot
@@ -125,7 +125,7 @@ def pose_on_joint(joint: PlatformJoint, state: Any) -> Any:
     if not joint.is_floating:
         return joint.pose_at(state)
     q = state[:4]
-    return RigidTransform(quaternion=Quaternion(q / math.sqrt(q.dot(q))), p=state[4:7])
+    return RigidTransform(quaternion=Quaternion(q / euclidean_length(q)), p=state[4:7])
 
 
 def _pose_of_any(joint: PlatformJoint, state: Any) -> Any:

@@ -2,8 +2,8 @@
 
 A compiled loop cannot ask Drake, and has to give the numbers of a loop that does. So each kernel
 adds in the order in which Drake and Eigen add, and rounds where they round. Processors without
-fused multiplication and addition round elsewhere in Drake and in NumPy's products; `agrees` tells
-whether the kernels are Drake's here.
+fused multiplication and addition round elsewhere in Drake; `agrees` tells whether the kernels are
+Drake's here.
 
 A pose is its matrix (3, 4) column by column, shape (12,) [-, m], as `servoing.columns` makes it.
 
@@ -24,6 +24,7 @@ from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.geometry.poses import euclidean_length
 
 _TINY, _PRECISION = float(np.finfo(float).tiny), 2.0 * float(np.finfo(float).eps)
 _TRIALS = 64
@@ -42,11 +43,11 @@ def fused(typing: Any, a: Any, b: Any, c: Any) -> Any:
 
 @njit(cache=True)
 def square_sum(values: Array, first: int, past: int) -> float:
-    """Sum of squares as NumPy's `dot` of few numbers has it."""
-    total = values[first] * values[first]
-    for k in range(first + 1, past):
-        total = fused(values[k], values[k], total)
-    return float(total)
+    """Sum of squares, added as `poses.euclidean_length` does."""
+    total = 0.0
+    for k in range(first, past):
+        total += values[k] * values[k]
+    return total
 
 
 @njit(cache=True)
@@ -201,7 +202,7 @@ def unpack_rows(packed: Array, first: int, out: Array) -> None:
 @njit(cache=True)
 def _results(state: Array, other: Array, rough: Array) -> Array:
     """What the kernels give, in the order of `_drake_results`."""
-    out, X, Y, Z = np.empty((5, 12)), np.empty(12), np.empty(12), np.zeros(12)
+    out, X, Y, Z = np.empty((4, 12)), np.empty(12), np.empty(12), np.zeros(12)
     pose_of_floating(state, X)
     pose_of_floating(other, Y)
     out[0] = X
@@ -211,19 +212,19 @@ def _results(state: Array, other: Array, rough: Array) -> Array:
     out[2] = Z
     project(rough, 0, True, Z)
     out[3] = Z
-    out[4] = square_sum(state, 4, 7)
     return out
 
 
 def _drake_results(state: Array, other: Array, rough: Array) -> Array:
-    q, p = state[:4] / math.sqrt(state[:4].dot(state[:4])), state[4:]
-    X = RigidTransform(Quaternion(q), p)
-    Y = RigidTransform(Quaternion(other[:4] / math.sqrt(other[:4].dot(other[:4]))), other[4:])
+    X, Y = (
+        RigidTransform(Quaternion(each[:4] / euclidean_length(each[:4])), each[4:])
+        for each in (state, other)
+    )
     R = RotationMatrix.ProjectToRotationMatrix(rough.reshape(3, 3))
     inverse = X.inverse()
     poses = [X, X @ Y, inverse, RigidTransform(R, inverse.translation())]
     rows = [np.asarray(each.GetAsMatrix34().ravel("F")) for each in poses]
-    return np.array([*rows, np.full(12, p.dot(p))])
+    return np.array(rows)
 
 
 @cache

@@ -172,16 +172,27 @@ def adjoint_of_arrays(R: Array, p: Array) -> Array:
     return Ad
 
 
+def euclidean_length(vector: Array) -> float:
+    """2-norm of a few numbers, shape (n,), their squares added from the first to the last.
+
+    NumPy's `dot` adds in an order that is another one on another processor.
+    """
+    total = 0.0
+    for value in vector.tolist():
+        total += value * value
+    return math.sqrt(total)
+
+
 def pose_error(X_AB: RigidTransform, X_AC: RigidTransform) -> tuple[float, float]:
     """Distance [m] and angle [rad] between two poses given in the same frame A."""
     turn = rotation_vector(X_AB.rotation().inverse() @ X_AC.rotation())
-    return place_error(X_AB, X_AC), math.sqrt(turn.dot(turn))
+    return place_error(X_AB, X_AC), euclidean_length(turn)
 
 
 def place_error(X_AB: RigidTransform, X_AC: RigidTransform) -> float:
     """Distance alone between two poses given in the same frame A [m]."""
     apart = X_AB.translation() - X_AC.translation()
-    return math.sqrt(apart.dot(apart))
+    return euclidean_length(apart)
 
 
 def pose_row(X: RigidTransform) -> Array:

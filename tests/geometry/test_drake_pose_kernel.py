@@ -17,6 +17,7 @@ from cdpr_drake.geometry.drake_pose_kernel import (
     square_sum,
     unpack_rows,
 )
+from cdpr_drake.geometry.poses import euclidean_length
 
 COUNT = 500
 
@@ -31,7 +32,7 @@ def columns(X):
 
 def poses(random):
     for state in random.standard_normal((COUNT, 7)):
-        q = state[:4] / math.sqrt(state[:4].dot(state[:4]))
+        q = state[:4] / euclidean_length(state[:4])
         yield state, RigidTransform(quaternion=Quaternion(q), p=state[4:])
 
 
@@ -45,7 +46,7 @@ def test_poses_of_states_products_and_inverses():
         np.testing.assert_array_equal(out, columns(before @ X))
         invert(columns(X), out)
         np.testing.assert_array_equal(out, columns(X.inverse()))
-        assert square_sum(state, 4, 7) == state[4:].dot(state[4:])
+        assert math.sqrt(square_sum(state, 4, 7)) == euclidean_length(state[4:])
         before = X
 
 
