@@ -59,7 +59,7 @@ class DrawnStability(StabilityWorkspaces):
         """Planes of the grid, coloured by what holds under bounds of a name; None: the first."""
         from cdpr_drake.analyses.workspaces.stability_figures import planes_figure
 
-        return planes_figure(self, bounds)
+        return planes_figure(self, bounds, self.robot)
 
     def write(
         self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS, say: Say | None = None

@@ -28,7 +28,7 @@ from cdpr_drake.analyses.visualization.solids import draw_solid
 from cdpr_drake.analyses.workspaces.stability_results import KINDS, StabilityWorkspaces
 from cdpr_drake.arrays import Array
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.palette import IDEAL, WORKSPACES, look_of
+from cdpr_drake.palette import IDEAL, OUTLINE, WORKSPACES, look_of
 from cdpr_drake.stability.perturbation_bounds import BOUNDS
 from cdpr_drake.workspaces.volume import surface_quads
 
@@ -54,6 +54,11 @@ BORDERED_CELLS = 32
 ONE_CELL = 0.1
 """Size of the cell of a grid of a single point [m]."""
 
+ROOM = 0.04
+"""Round frame and exit points in a plane, as a share of its larger side."""
+
+CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.0, 0.0]])
+
 LINES: dict[str, dict[str, Any]] = {
     "Z": COVERED_LINE,
     "SZ": {"linestyle": "--", "linewidth": 1.4, "marker": "s", "markersize": 4},
@@ -65,7 +70,9 @@ def stability_pictures(
     workspaces: StabilityWorkspaces, robot: Robot, formats: Sequence[str] = DEFAULT_FORMATS
 ) -> Pictures:
     """What draws the figures that a result suffices for, by the names of their files."""
-    drawn: dict[str, Callable[[], Figure]] = {"planes": partial(planes_figure, workspaces)}
+    drawn: dict[str, Callable[[], Figure]] = {
+        "planes": partial(planes_figure, workspaces, robot=robot)
+    }
     if min(workspaces.grid.shape[1:]) > 1:
         drawn["solids"] = partial(solids_figure, workspaces, robot)
     if curves(workspaces):
@@ -73,7 +80,9 @@ def stability_pictures(
     return dict(figure_writers(drawn, formats))
 
 
-def planes_figure(workspaces: StabilityWorkspaces, bounds: str | None = None) -> Figure:
+def planes_figure(
+    workspaces: StabilityWorkspaces, bounds: str | None = None, robot: Robot | None = None
+) -> Figure:
     """Planes of a grid, coloured by what holds there in every orientation.
 
     Planes are horizontal, but where the grid has one point along x or y and several along z.
@@ -81,15 +90,19 @@ def planes_figure(workspaces: StabilityWorkspaces, bounds: str | None = None) ->
     Args:
         workspaces: The result.
         bounds: Name of the perturbation bounds; None: the first.
+        robot: Whose frame and exit points are drawn; None: nothing but the grid is.
     """
     normal, u, v = plane_axes(workspaces.grid.shape[1:])
     places = workspaces.grid.axes[normal]
     chosen = even_choice(len(places), MOST_PLANES)
     edges = cell_edges(workspaces.grid.axes, (u, v))
-    extents = [float(np.ptp(e)) for e in edges]
+    lower, upper = np.array([[e[0], e[-1]] for e in edges]).T
+    if robot is not None:
+        lower, upper = around_robot(robot, (u, v), lower, upper)
+    extents = upper - lower
     rows = -(-len(chosen) // COLUMNS)
     columns = -(-len(chosen) // rows)
-    width, height = np.array(extents) * (3.0 if columns > 1 else 5.7) / max(extents)
+    width, height = extents * (3.0 if columns > 1 else 5.7) / max(extents)
     some = "" if len(chosen) == len(places) else f"\n{len(chosen)} of {len(places)} planes"
     figure, grid = new_figure(
         rows,
@@ -114,14 +127,17 @@ def planes_figure(workspaces: StabilityWorkspaces, bounds: str | None = None) ->
             edgecolors="white" if max(cells.shape) <= BORDERED_CELLS else "none",
             linewidth=0.5,
         )
+        if robot is not None:
+            draw_robot(axes, robot, (u, v), edges)
+            axes.set(xlim=(lower[0], upper[0]), ylim=(lower[1], upper[1]))
         axes.set_aspect("equal")
         axes.grid(False)
         axes.set_title(f"{'xyz'[normal]} = {places[k]:.3g} m", fontsize=11)
         axes.tick_params(labelsize=10)
         for side, along, extent in ((axes.xaxis, u, extents[0]), (axes.yaxis, v, extents[1])):
-            side.set_ticks(
-                _ticks(workspaces.grid.axes[along], extent, max(extents), 4 if columns > 1 else 8)
-            )
+            if robot is None:
+                points, most = workspaces.grid.axes[along], 4 if columns > 1 else 8
+                side.set_ticks(_ticks(points, extent, max(extents), most))
             plain_numbers(side)
         first, lowest = number % columns == 0, number + columns >= len(chosen)
         axes.tick_params(labelleft=first, labelbottom=lowest)
@@ -129,8 +145,10 @@ def planes_figure(workspaces: StabilityWorkspaces, bounds: str | None = None) ->
         axes.set_xlabel(f"{'xyz'[u]} in W [m]" if lowest else "")
     for axes in panels[len(chosen) :]:
         axes.remove()
+    lines, _ = panels[0].get_legend_handles_labels()
+    patches = [Patch(facecolor=color, label=LABELS[key]) for key, color in COLORS.items()]
     figure.legend(
-        handles=[Patch(facecolor=color, label=LABELS[key]) for key, color in COLORS.items()],
+        handles=[*patches, *lines],
         loc="outside lower center",
         ncols=4 if columns > 2 else 2,
         title="Each point of the grid colours the cell around it.",
@@ -178,6 +196,35 @@ def cell_edges(axes: Sequence[Array], which: Sequence[int]) -> list[Array]:
             edges[[0, -1]] = axes[k][[0, -1]]
         found.append(edges)
     return found
+
+
+def around_robot(
+    robot: Robot, plane: tuple[int, int], lower: Array, upper: Array
+) -> tuple[Array, Array]:
+    """Corners, shape (2,) each [m], of what holds a grid, the frame and the exit points."""
+    across = list(plane)
+    points = np.column_stack([robot.frame.lower, robot.frame.upper, robot.cable_set().p_WA])[across]
+    lower = np.minimum(lower, points.min(axis=1))
+    upper = np.maximum(upper, points.max(axis=1))
+    room = ROOM * np.max(upper - lower)
+    return lower - room, upper + room
+
+
+def draw_robot(axes: Axes, robot: Robot, plane: tuple[int, int], edges: Sequence[Array]) -> None:
+    """The grid's box, the frame, and the exit points of the cables, as they are seen in a plane."""
+    u, v = plane
+    boxes = (
+        ("box of the grid", (edges[0][0], edges[1][0]), (edges[0][-1], edges[1][-1]), ":"),
+        ("frame", robot.frame.lower[list(plane)], robot.frame.upper[list(plane)], "-"),
+    )
+    for label, low, high, dash in boxes:
+        corners = np.asarray(low) + CORNERS * np.subtract(high, low)
+        axes.plot(*corners.T, color=OUTLINE.color, linestyle=dash, linewidth=1.2, label=label)
+    points = robot.cable_set().p_WA
+    axes.plot(
+        points[u], points[v], "^", color=OUTLINE.color, markersize=6, clip_on=False,
+        label="exit points of the cables",
+    )  # fmt: skip
 
 
 def solids_figure(

@@ -22,12 +22,18 @@ from cdpr_drake.analyses.visualization.figure_style import line_style, new_figur
 from cdpr_drake.analyses.workspaces.break_figures import breaks_figure
 from cdpr_drake.analyses.workspaces.break_tasks import NUMBERED, SURVIVES
 from cdpr_drake.analyses.workspaces.conditions import MEASURES
-from cdpr_drake.analyses.workspaces.stability_figures import cell_edges, even_choice, plane_axes
+from cdpr_drake.analyses.workspaces.stability_figures import (
+    around_robot,
+    cell_edges,
+    draw_robot,
+    even_choice,
+    plane_axes,
+)
 from cdpr_drake.analyses.workspaces.workspace_question import RULES
 from cdpr_drake.analyses.workspaces.workspace_results import ALL, RobotWorkspace
 from cdpr_drake.arrays import Array
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.palette import OUTLINE, nth_look
+from cdpr_drake.palette import nth_look
 from cdpr_drake.workspaces import box_expansion_kernel
 from cdpr_drake.workspaces.available_wrenches import AvailableWrenches
 from cdpr_drake.workspaces.certified_boxes import CertifiedBoxes
@@ -49,9 +55,6 @@ COLUMNS = 4
 
 LINE = 60
 """Characters in a line of a title."""
-
-ROOM = 0.04
-"""Round frame and exit points in a plane, as a share of its larger side."""
 
 CONTOURS = 6
 """Contour lines of a measure, about."""
@@ -109,7 +112,7 @@ def planes_figure(
     columns = -(-len(chosen) // rows)
     lower, upper = np.array([[e[0], e[-1]] for e in edges]).T
     if robot is not None:
-        lower, upper = _around(robot, (u, v), lower, upper)
+        lower, upper = around_robot(robot, (u, v), lower, upper)
     extents = upper - lower
     width, height = extents * (3.0 if columns > 1 else 5.5) / np.max(extents)
     figure, grid = new_figure(
@@ -141,7 +144,7 @@ def planes_figure(
         if measure is not None and min(plane.shape) >= LEAST_CONTOURED and np.ptp(limits) > 0.0:
             _contours(axes, [workspace.grid.axes[k] for k in (u, v)], plane, limits)
         if robot is not None:
-            _draw_robot(axes, robot, (u, v), edges)
+            draw_robot(axes, robot, (u, v), edges)
             axes.set(xlim=(lower[0], upper[0]), ylim=(lower[1], upper[1]))
         axes.set_aspect("equal")
         axes.grid(False)
@@ -180,35 +183,6 @@ def planes_figure(
         if handles:
             figure.legend(handles=handles, loc="outside lower center", ncols=4)
     return figure
-
-
-def _around(
-    robot: Robot, plane: tuple[int, int], lower: Array, upper: Array
-) -> tuple[Array, Array]:
-    """Corners, shape (2,) each [m], of what holds a grid, the frame and the exit points."""
-    across = list(plane)
-    points = np.column_stack([robot.frame.lower, robot.frame.upper, robot.cable_set().p_WA])[across]
-    lower = np.minimum(lower, points.min(axis=1))
-    upper = np.maximum(upper, points.max(axis=1))
-    room = ROOM * np.max(upper - lower)
-    return lower - room, upper + room
-
-
-def _draw_robot(axes: Axes, robot: Robot, plane: tuple[int, int], edges: Sequence[Array]) -> None:
-    """The grid's box, the frame, and the exit points of the cables, as they are seen in a plane."""
-    u, v = plane
-    boxes = (
-        ("box of the grid", (edges[0][0], edges[1][0]), (edges[0][-1], edges[1][-1]), ":"),
-        ("frame", robot.frame.lower[list(plane)], robot.frame.upper[list(plane)], "-"),
-    )
-    for label, low, high, dash in boxes:
-        corners = np.asarray(low) + SQUARE[[*range(4), 0]] * np.subtract(high, low)
-        axes.plot(*corners.T, color=OUTLINE.color, linestyle=dash, linewidth=1.2, label=label)
-    points = robot.cable_set().p_WA
-    axes.plot(
-        points[u], points[v], "^", color=OUTLINE.color, markersize=6, clip_on=False,
-        label="exit points of the cables",
-    )  # fmt: skip
 
 
 def boxes_figure(found: CertifiedBoxes, robot: str, cables: str = "") -> Figure:

@@ -52,6 +52,23 @@ def meshes(figure):
     return [c for axes in figure.axes for c in axes.collections if isinstance(c, QuadMesh)]
 
 
+def test_planes_show_frame_exit_points_and_the_box_of_the_grid():
+    """A grid whose points are all alike was a plain square, with one number at its ticks."""
+    robot = load_robot("acrobot_large")
+    figure = planes_figure(workspaces((5, 5, 3)), robot=robot)
+    assert not figure_faults(figure)
+    for axes in figure.axes:
+        box, frame, exits = axes.lines
+        assert np.ptp(box.get_xdata()) == 1.0
+        assert np.ptp(frame.get_xdata()) == np.ptp([robot.frame.lower[0], robot.frame.upper[0]])
+        np.testing.assert_array_equal(exits.get_xydata().T, robot.cable_set().p_WA[:2])
+        low, high = axes.get_xlim()
+        assert low < min(exits.get_xdata()) < max(exits.get_xdata()) < high
+        assert sum(low <= tick <= high for tick in axes.get_xticks()) >= 2
+    shown = {text.get_text() for text in figure.legends[0].get_texts()}
+    assert {"frame", "exit points of the cables", "box of the grid"} <= shown
+
+
 @pytest.mark.parametrize(
     ("counts", "across", "up", "panels"),
     [
