@@ -20,7 +20,6 @@ from itertools import pairwise
 from pathlib import Path
 from types import FrameType
 
-from cdpr_drake.analyses.reporting.written_files import MARKER
 from cdpr_drake.kernel_cache.background import compile_in_background
 from cdpr_drake.kernel_cache.kernel_list import missing_kernels, needed_kernels
 
@@ -201,6 +200,8 @@ def _will_be_refused(command: str, words: Sequence[str]) -> bool:
 
 def _is_foreign(folder: Path) -> bool:
     """Whether it is a file, or a folder that holds something and was not made by this program."""
+    from cdpr_drake.analyses.reporting.written_files import MARKER
+
     with suppress(OSError):
         if folder.is_dir():
             return any(folder.iterdir()) and not (folder / MARKER).is_file()
