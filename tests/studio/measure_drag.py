@@ -5,11 +5,12 @@
 An exit point is dragged by real events of the mouse, without waiting for what is drawn. Each place
 that the page tells the server is remembered with the browser's time at the event. The messages of
 Meshcat are read as they come to the scene: the exit point's place says of which event the workspace
-is that follows it. Its time is that of the second picture after it. Places that no workspace was
-drawn for were overtaken by newer ones. Chromium draws by the processor here; a graphics card takes
-the drawing off it. Printed as JSON: `behind_ms` from the event of the pointer to the picture; by
-how much a whole drag is behind at each moment (`still_ms`: the age of what the scene shows, once in
-each picture); and from the letting go of the hand to the refined workspace.
+is that follows it. Its time is that of the second picture of the page after the scene was drawn
+with it: by then it is seen. Places that no workspace was drawn for were overtaken by newer ones.
+Chromium draws by the processor here; a graphics card takes the drawing off it. Printed as JSON:
+`behind_ms` from the event of the pointer to the picture; by how much a whole drag is behind at each
+moment (`still_ms`: the age of what the scene shows, once in each picture); and from the letting go
+of the hand to the refined workspace.
 """
 
 from __future__ import annotations
@@ -44,16 +45,22 @@ window.emitEvent = (name, ...rest) => {
   if (name === 'studio_point') told.push({t: performance.now(), moved, at: rest[0].at});
   emit(name, ...rest);
 };
-let place = null;
+let place = null, waiting = [];
+const render = viewer.render.bind(viewer);
+viewer.render = (...rest) => {
+  render(...rest);
+  const shown = waiting;
+  waiting = [];
+  requestAnimationFrame(() => requestAnimationFrame(
+    () => shown.forEach((one) => drawn.push({t: performance.now(), ...one}))));
+};
 const handle = viewer.handle_command.bind(viewer);
 viewer.handle_command = (command) => {
   handle(command);
   if (command.type === 'set_transform' && command.path === exit)
     place = [...command.matrix].slice(12, 15);
   if (command.type === 'set_object' && command.path === '/drake/studio_workspace') {
-    const at = place, came = performance.now();
-    requestAnimationFrame(() => requestAnimationFrame(
-      () => drawn.push({t: performance.now(), came, at})));
+    if (place) waiting.push({came: performance.now(), at: place});
   }
 };
 """

@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import threading
 
 import numpy as np
 import pytest
@@ -9,9 +10,10 @@ import pytest
 from cdpr_drake.cli.app import main
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.studio.workbench import live_workspace, workspace_sketch
-from cdpr_drake.studio.workbench.live_workspace import COARSE, FINE
-from cdpr_drake.studio.workbench.scene import WORKSPACE
-from cdpr_drake.studio.workbench.session import Workbench
+from cdpr_drake.studio.workbench import session as sessions
+from cdpr_drake.studio.workbench.live_workspace import COARSE, FINE, REST
+from cdpr_drake.studio.workbench.scene import SHADER, WORKSPACE, RobotScene
+from cdpr_drake.studio.workbench.session import POSE_NUMBERS, Workbench
 from cdpr_drake.studio.workbench.working_folder import WorkingFolder
 from cdpr_drake.studio.workbench.workspace_sketch import SketchWork, sketch_grid
 from tests.studio.pages import field, opened_page, type_into, until
@@ -31,8 +33,8 @@ def bench(tmp_path):
     made.calculator.close()
 
 
-def in_scene(bench):
-    return bench.calculator.submit(lambda: bench.scene().meshcat.HasPath(WORKSPACE)).result()
+def in_scene(bench, path=WORKSPACE):
+    return bench.calculator.submit(lambda: bench.scene().meshcat.HasPath(path)).result()
 
 
 def whole(robot, poses=COARSE):
@@ -156,3 +158,68 @@ def test_of_many_robots_the_newest_is_computed_and_the_rest_dropped(tmp_path, mo
             await until(lambda: "refined" in field(user, "live-size").text)
 
     asyncio.run(act())
+
+
+def test_while_a_point_is_dragged_the_scene_comes_before_the_page(bench, monkeypatch):
+    order, show_workspace = [], RobotScene.show_workspace
+
+    def shown(scene, solid):
+        show_workspace(scene, solid)
+        order.append("scene")
+
+    monkeypatch.setattr(RobotScene, "show_workspace", shown)
+    bench.answered.connect(lambda: order.append("numbers"))
+    bench.live.changed.connect(lambda: order.append("size"))
+    bench.drag_point("exit", 0, THERE, done=False)
+    assert order == ["scene", "size", "numbers"]
+    order.clear()
+    bench.drag_point("exit", 0, FARTHER, done=True)
+    assert order[0] == "numbers"
+
+
+def test_numbers_are_called_old_only_when_the_new_ones_are_late(tmp_path, monkeypatch):
+    async def look(late):
+        monkeypatch.setattr(sessions, "LATE", late)
+        async with opened_page(tmp_path) as (_, bench, _):
+            await until(lambda: bench.answer is not None)
+            said = []
+            bench.results.changed.connect(lambda: said.append(bench.results.differs(POSE_NUMBERS)))
+            held = threading.Event()
+            bench.calculator.submit(held.wait)  # as while a kernel is compiled
+            before = bench.answer
+            bench.drag_point("exit", 0, THERE, done=False)
+            if late < 1.0:
+                await until(lambda: any("before" in words for words in said))
+            held.set()
+            await until(lambda: bench.answer is not before)
+            await until(lambda: not bench.results.differs(POSE_NUMBERS))
+            assert any(said) == (late < 1.0)
+
+    asyncio.run(look(0.01))
+    asyncio.run(look(1e3))
+
+
+def test_who_moves_a_point_seldom_is_not_resting(bench, monkeypatch):
+    clock, waits = [0.0], []
+    monkeypatch.setattr(live_workspace.time, "monotonic", lambda: clock[0])
+
+    class Loop:
+        def call_later(self, wait, _):
+            waits.append(wait)
+
+    for between in (10.0, 0.1, 0.8, 5.0):
+        clock[0] += between
+        bench.live.follow(bench.robot.value)
+        bench.live.compute()
+        bench.live.sketch = None
+        with monkeypatch.context() as patch:
+            patch.setattr(live_workspace.asyncio, "get_running_loop", Loop)
+            bench.live.take()
+    assert waits == [REST, REST, pytest.approx(1.6), REST]
+
+
+def test_the_shader_of_workspaces_stays_compiled(bench):
+    bench.drag_point("exit", 0, THERE, done=False)
+    assert in_scene(bench, SHADER)
+    bench.live.want(False)
+    assert in_scene(bench, SHADER)

@@ -22,7 +22,7 @@ SCRIPT = """
 (() => {
   if (window.studioDragging) return;
   window.studioDragging = true;
-  const NEAR = 14, PERIOD = 50, SLOW = 40, COARSE = 0.5;
+  const NEAR = 14, PERIOD = 50, SLOW = 40, COARSE = 0.5, FORGIVEN = 0.02, BURST = 8;
   const times = (M, v) => [0, 1, 2, 3].map(
     (i) => M[i] * v[0] + M[i + 4] * v[1] + M[i + 8] * v[2] + M[i + 12] * v[3]);
   const frame = () => document.getElementById('scene');
@@ -68,20 +68,34 @@ SCRIPT = """
     if (left <= 0) tell(x, y, false);
     else waiting = setTimeout(() => { if (held) tell(x, y, false); }, left);
   }
-  // Where a picture takes longer than SLOW, as without a graphics card, the scene is drawn with
-  // fewer pixels as long as a point is held.
+  // Where pictures take longer than SLOW, as without a graphics card, the scene is drawn with fewer
+  // pixels as long as a point is held. Most of what a screen shows is no new picture: FORGIVEN.
   function resolve(viewer, share) {
     viewer.renderer.setPixelRatio(window.devicePixelRatio * share);
     viewer.set_3d_pane_size();
     viewer.set_dirty();
   }
+  // What moves one point are some tens of messages: one picture for all of them, not one between.
+  function drawInBursts(viewer) {
+    let soon = 0;
+    viewer.set_dirty = () => {
+      clearTimeout(soon);
+      soon = setTimeout(() => { viewer.needs_render = true; }, BURST);
+    };
+  }
   function watchPictures(viewer) {
     let before = null, late = 0, isCoarse = false;
+    drawInBursts(viewer);
     function picture(now) {
-      if (!held) { if (isCoarse) resolve(viewer, 1.0); return; }
-      late = before !== null && now - before > SLOW ? late + 1 : 0;
+      if (!held) {
+        delete viewer.set_dirty;
+        viewer.set_dirty();
+        if (isCoarse) resolve(viewer, 1.0);
+        return;
+      }
+      late = before !== null && now - before > SLOW ? late + 1 : Math.max(0, late - FORGIVEN);
       before = now;
-      if (late === 3 && !isCoarse) { isCoarse = true; resolve(viewer, COARSE); }
+      if (late > 2 && !isCoarse) { isCoarse = true; resolve(viewer, COARSE); }
       requestAnimationFrame(picture);
     }
     requestAnimationFrame(picture);

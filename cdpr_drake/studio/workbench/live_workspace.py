@@ -8,6 +8,7 @@ whoever goes on is not kept waiting.
 from __future__ import annotations
 
 import asyncio
+import time
 from collections.abc import Callable
 from concurrent.futures import Future
 from contextlib import suppress
@@ -21,8 +22,10 @@ if TYPE_CHECKING:
     from cdpr_drake.studio.workbench.scene import RobotScene
     from cdpr_drake.studio.workbench.workspace_sketch import SketchWork, WorkspaceSketch
 
-REST = 0.5
-"""Time without a change after which a workspace is refined [s]."""
+REST, LONGEST_REST = 0.5, 2.0
+"""Time without a change after which a workspace is refined [s]: twice as long as between the last
+two changes, but in these bounds. A slow browser tells of the hand that moves twice a second only.
+"""
 
 COARSE, FINE = 1_000, 20_000
 """About so many poses while a point moves, and when it rests: a few and some tens of
@@ -66,6 +69,7 @@ class LiveWorkspace:
         self._robot: Robot | None = None
         self._found: tuple[Robot, WorkspaceSketch | None, str] | None = None
         self._rest: asyncio.TimerHandle | None = None
+        self._followed, self._between = 0.0, 0.0  # when, and how long after the one before [s]
 
     @property
     def is_wanted(self) -> bool:
@@ -81,10 +85,12 @@ class LiveWorkspace:
         """Is about a robot from now on, at the next `draw`; None: about none."""
         if self._rest is not None:
             self._rest.cancel()
+        now = time.monotonic()
+        self._followed, self._between = now, now - self._followed
         self._robot = robot
 
-    def draw(self, scene: RobotScene) -> None:
-        """Draws the coarse workspace of the newest robot; in the calculator's thread."""
+    def compute(self) -> None:
+        """Computes the coarse workspace of the newest robot; in the calculator's thread."""
         robot = self._robot if self._wanted else None
         if robot is None:
             self._found = None
@@ -93,6 +99,10 @@ class LiveWorkspace:
                 self._found = robot, sketch_work(robot, COARSE).go_on(2 * COARSE), ""
             except CdprError as problem:
                 self._found = robot, None, str(problem)
+
+    def draw(self, scene: RobotScene) -> None:
+        """Draws the coarse workspace of the newest robot; in the calculator's thread."""
+        self.compute()
         sketch = None if self._found is None else self._found[1]
         scene.show_workspace(None if sketch is None else sketch.solid)
 
@@ -113,7 +123,8 @@ class LiveWorkspace:
             loop = asyncio.get_running_loop()
         except RuntimeError:
             return  # who has no event loop asks for it
-        self._rest = loop.call_later(REST, self.refine)
+        twice = 2.0 * self._between
+        self._rest = loop.call_later(twice if REST < twice < LONGEST_REST else REST, self.refine)
 
     def _warm(self) -> None:
         """Has kernels loaded, or compiled at the first use, before somebody drags."""

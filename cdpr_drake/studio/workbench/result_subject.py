@@ -81,6 +81,17 @@ class Results:
         """Of a workbench; `now` says what is open there."""
         self._now, self.changed = now, Signal()
         self._shown: dict[str, Subject] = {}
+        self._awaited: set[str] = set()
+
+    def wait_for(self, name: str) -> None:
+        """Says nothing of a result that is about something else: the next one comes at once."""
+        self._awaited.add(name)
+
+    def end_wait(self, name: str) -> None:
+        """Says again what a result is about: the next one has come, or does not come soon."""
+        if name in self._awaited:
+            self._awaited.remove(name)
+            self.changed.emit()
 
     def show(self, name: str, subject: Subject | None) -> None:
         """Says what the result of a name is about from now on; None: there is none any more."""
@@ -97,9 +108,12 @@ class Results:
         return self._shown.get(name)
 
     def differs(self, name: str) -> str:
-        """By what a result is about something else than what is open; empty: it is not."""
+        """By what a result is about something else than what is open; empty: it is not.
+
+        Empty, too, as long as the next result is waited for.
+        """
         subject = self._shown.get(name)
-        return "" if subject is None else subject.differs(self._now())
+        return "" if subject is None or name in self._awaited else subject.differs(self._now())
 
     def is_another(self, name: str) -> bool:
         """Whether a result is known to be about another robot than the one that is open."""

@@ -31,6 +31,11 @@ EXITS, ANCHORS = "studio/exit", "studio/anchor"
 WORKSPACE = "studio_workspace"
 """Path of the workspace that follows; not below that of the points, which a change deletes."""
 
+SHADER = "studio_shader"
+"""Path of a triangle without area that is drawn like the workspace. A browser compiles its shader
+anew for each workspace that replaces the only one, which takes it longer than to draw.
+"""
+
 WORKSPACE_COLOR = Rgba(0.94, 0.76, 0.48, 0.45)
 """Its colour; those that were computed by a command are green and blue."""
 
@@ -60,6 +65,7 @@ class RobotScene:
         self._points = (0, 0.0)  # how many there are, and the size that they are made for
         self._picture: RobotPicture | None = None
         self._workspace: Solid | None = None
+        self._keeps_shader = False
 
     def show(self, robot: Robot, X_WP: RigidTransform, tensions: Array) -> None:
         """Draws a robot at a pose.
@@ -126,6 +132,10 @@ class RobotScene:
         if solid is None:
             self.meshcat.Delete(WORKSPACE)
         else:
+            if not self._keeps_shader:
+                inside = np.tile(solid[0].mean(axis=0), (3, 1))
+                add_solid(self.meshcat, SHADER, inside, np.array([[0, 1, 2]]), WORKSPACE_COLOR)
+                self._keeps_shader = True
             add_solid(self.meshcat, WORKSPACE, *solid, WORKSPACE_COLOR)
 
     def set_dark(self, dark: bool) -> None:

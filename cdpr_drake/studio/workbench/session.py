@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import asyncio
 import copy
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
+from contextlib import suppress
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
@@ -39,6 +41,15 @@ USUAL_ROBOT = "acrobot_large"
 
 POSE_NUMBERS = "pose-numbers"
 """Name of the result that is what is known at the pose."""
+
+LATE = 0.5
+"""Time after which numbers that are of the pose before, or the robot before, are called so [s]."""
+
+
+TELL = 0.1
+"""Time by which the numbers are behind the scene while a point is dragged [s]: a browser builds
+the page anew for each change of it, and would draw the scene only after that.
+"""
 
 
 class Workbench:
@@ -110,7 +121,9 @@ class Workbench:
         self._about = subject_of(self.robot.value)
         self.results = Results(lambda: self.subject)
         self.drawn: Subject | None = None
-        self._busy = self._wanted = False
+        self._busy = self._wanted = self._dragged = False
+        self._late: asyncio.TimerHandle | None = None
+        self._telling: asyncio.TimerHandle | None = None
         self._scene: RobotScene | None = None
         self._opened: Future[str] | None = None
         self.live = LiveWorkspace(self.calculator.run, self.scene)
@@ -232,6 +245,7 @@ class Workbench:
 
     def ask(self) -> None:
         """Asks what there is to know; `answered` tells. Of several questions the last counts."""
+        self.results.wait_for(POSE_NUMBERS)
         self.results.changed.emit()
         if self._busy:
             self._wanted = True
@@ -240,7 +254,9 @@ class Workbench:
         questions, X_WP, method, reference = (
             self._questions, self.X_WP, self.method, self.reference
         )  # fmt: skip
-
+        with suppress(RuntimeError):  # without an event loop the answer is there before
+            loop = asyncio.get_running_loop()
+            self._late = loop.call_later(LATE, self.results.end_wait, POSE_NUMBERS)
         self._calculate(lambda: questions.at(X_WP, method, reference), self._take)
 
     def _calculate(self, work: Callable[[], Any], done: Callable[[Future[Any]], None]) -> None:
@@ -252,7 +268,7 @@ class Workbench:
             raise
 
     def _take(self, future: Future[PoseAnswer]) -> None:
-        """Tells the numbers first, and draws then: the browser takes longer for the scene."""
+        """Tells the numbers first and draws then; of what is dragged it draws first."""
         self.problem = future.exception()
         if self.problem is not None:  # the robot is drawn all the same, with grey cables
             robot, X_WP = self._questions.robot, self.X_WP
@@ -261,26 +277,47 @@ class Workbench:
             return
         answer = self.answer = future.result()
         self.results.show(POSE_NUMBERS, subject_of(answer.robot, answer.X_WP))
-        self.answered.emit()
+        if not self._dragged:
+            self.answered.emit()
         X_WP, tensions = answer.X_WP, answer.tensions
         self._calculate(lambda: self._show(answer.robot, X_WP, tensions), self._drawn)
 
     def _show(self, robot: Robot, X_WP: RigidTransform, tensions: Array) -> None:
-        """Draws a robot, then its workspace; in the calculator's thread."""
+        """Draws a robot and its workspace; in the calculator's thread.
+
+        All is computed before: what comes to the browser at once is one picture there, not two.
+        """
+        self.live.compute()
         self.scene().show(robot, X_WP, tensions)
         self.live.draw(self.scene())
 
     def _drawn(self, future: Future[Any]) -> None:
         self.problem = future.exception()
-        self.live.take()
+        if not self._dragged:
+            self.live.take()
+        elif self._telling is None:
+            try:
+                self._telling = asyncio.get_running_loop().call_later(TELL, self._tell)
+            except RuntimeError:  # who has no event loop waits for nothing
+                self._tell()
         self._end(self.problem is not None)
+
+    def _tell(self) -> None:
+        """Tells what there is to know about what is dragged."""
+        self._telling = None
+        self.live.take()
+        self.answered.emit()
 
     def _end(self, tell: bool = True) -> None:
         self._busy = False
+        if self._late is not None:
+            self._late.cancel()
         if tell:
             self.answered.emit()
         if self._wanted:
             self.ask()
+        else:
+            self.results.end_wait(POSE_NUMBERS)
 
     def drag_point(self, kind: str, number: int, p_W: Array, done: bool) -> str:
         """Moves a point of a cable: for the numbers only, or in the document when it is let go.
@@ -294,6 +331,7 @@ class Workbench:
         Returns:
             Why it cannot be there, once it is let go; empty: it can.
         """
+        self._dragged = not done
         robot = copy.deepcopy(self.robot.value)
         cable = robot.cables[number]
         p = p_W if kind == "exit" else self.X_WP.inverse().multiply(p_W)
