@@ -116,7 +116,8 @@ ITEMS = (
     ),
     Item(
         "path", "The fastest motion along a path",
-        'cdpr plan acrobot_large --waypoints "0,0,0.2; 0.1,-0.1,0.3" --limits 1,60 --out plan',
+        'cdpr plan acrobot_large --waypoints "-0.2,-0.1,0.2; 0,0.15,0.4; 0.2,-0.1,0.2"'
+        " --limits 1,60 --out plan",
         "plan/path.png",
         "The plan keeps the limits of tensions and winches, and the simulated robot follows it.",
     ),
