@@ -212,6 +212,19 @@ def test_a_run_is_of_the_robot_that_is_open(folder):
     asyncio.run(look())
 
 
+def test_a_robot_that_is_in_no_file_is_not_replaced_by_that_of_the_scenario(folder):
+    async def look():
+        async with opened(folder) as (user, bench):
+            open_panel(user, "run")
+            await until(lambda: _boards[bench].draft is not None)
+            bench.robot.change(with_value(bench.robot.text, ("platform", "mass"), 5.25))
+            user.find(marker="start").click()
+            await until(lambda: bench.jobs.jobs or any("save it" in x for x in problems(user)))
+            assert bench.jobs.jobs == []
+
+    asyncio.run(look())
+
+
 def test_subjects_tell_every_change_of_a_robot(folder):
     robot, other = load_robot(ROBOT), load_robot(ROBOT)
     assert subject_of(robot) == subject_of(other)

@@ -129,6 +129,7 @@ class RunPanel:
         self._bench, self._board, self._scene = bench, board, scene
         self._form: ScenarioForm | None = None
         self._key = self._other = ""
+        self._refused: CdprError | None = None
         self._names: dict[str, str] = {}
         self._told: dict[str, str] = {}
         ui.add_css(RUN_STYLE)
@@ -223,7 +224,7 @@ class RunPanel:
         draft, now = self._board.draft, self._bench.subject
         if draft is None:
             return
-        own = draft.own_robot
+        own, self._refused = draft.own_robot, None
         with suppress(CdprError, OSError):  # a robot that cannot be read is another one
             if not subject_of(load_robot(own)).is_another(now):
                 draft.change(ROBOT, own)
@@ -233,6 +234,7 @@ class RunPanel:
         try:
             draft.change(ROBOT, robot_argument(self._bench))
         except CdprError as problem:
+            self._refused = problem
             words = f"Nothing can be started: {problem}."
         self._say_robot(words, own)
 
@@ -250,8 +252,8 @@ class RunPanel:
             return
         with show_errors():
             self._take_robot()
-            if self._board.draft is not None and ROBOT in self._board.draft.changes:
-                robot_argument(self._bench)  # says why there is none
+            if self._refused is not None:
+                raise self._refused
             paused, by_hand = bool(self._paused.value), bool(self._by_hand.value)
             await run.io_bound(lambda: self._board.start(paused=paused, by_hand=by_hand))
             self._refresh_runs()
