@@ -1,4 +1,7 @@
-"""What the site makes of the code: pages of commands, of rooms, of notebooks; equations."""
+"""What the site makes of the code: pages of commands, of rooms, of notebooks; equations.
+
+Griffe, which reads docstrings for mkdocstrings, takes its extension from here, too.
+"""
 
 from __future__ import annotations
 
@@ -6,19 +9,23 @@ import ast
 import base64
 import hashlib
 import html
+import inspect
 import json
 import logging
 import os
 import re
 from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+import griffe
 import latex2mathml.converter
 import nbformat
 import typer
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
+from mkdocs.structure.pages import Page
 
 ROOT = Path(__file__).resolve().parent.parent
 NOTEBOOKS = ROOT / "notebooks"
@@ -38,11 +45,16 @@ ROOT_PAGES = {
 }
 """Pages that stand at the root of the project."""
 
+NOTEBOOKS_PAGE = "notebooks/index.md"
+
 HIDDEN_ROOMS = ("cdpr_drake.cli", "cdpr_drake.notebooks")
 """Packages that are no rooms of functions."""
 
 SEARCH_DIALOG = 'data-md-component="search" role="dialog"'
 """How the theme opens its search; `on_post_page` gives it a name."""
+
+RULE = re.compile(r"^\s*=+( +=+)+\s*$")
+"""First, second and last line of a simple table of reStructuredText; its columns are below them."""
 
 _LOG = logging.getLogger("mkdocs.hooks.cdpr_drake")
 
@@ -56,7 +68,7 @@ def on_config(config: MkDocsConfig) -> MkDocsConfig:
     for item in config.nav or []:
         for title, pages in item.items():
             if title == "Reference":
-                pages.append({"Rooms": [{room: room_page(room)} for room in rooms()]})
+                pages += room_menu()
             if title == "Notebooks":
                 pages += [{heading(path): f"notebooks/{path.stem}.md"} for path in notebooks()]
     return config
@@ -79,6 +91,30 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         for uri, content in notebook_pages(path):
             add(uri, content)
     return files
+
+
+def on_page_markdown(markdown: str, page: Page, **_: Any) -> str:
+    """In code of a table's row GitHub wants a bar with a backslash, which this site would show.
+
+    The page of all notebooks lists them.
+    """
+    if page.file.src_uri == NOTEBOOKS_PAGE:
+        markdown += "\n" + "".join(notebook_rows())
+    lines = markdown.split("\n")
+    for k, line in enumerate(lines):
+        if line.startswith("|"):
+            lines[k] = re.sub(r"`[^`]*`", lambda code: code[0].replace("\\|", "|"), line)
+    return "\n".join(lines)
+
+
+def on_page_content(content: str, **_: Any) -> str:
+    """A picture that is no link shows itself: on a telephone a figure can be enlarged so."""
+    parts = re.split(r"(<a\b.*?</a>)", content, flags=re.DOTALL)
+    parts[::2] = [
+        re.sub(r'<img\b[^>]*?\bsrc="([^"]+)"[^>]*>', r'<a href="\1">\g<0></a>', part)
+        for part in parts[::2]
+    ]
+    return "".join(parts)
 
 
 def on_post_page(output: str, **_: Any) -> str:
@@ -112,6 +148,18 @@ def rooms() -> list[str]:
     return ["cdpr_drake", *sorted({*found} - {*HIDDEN_ROOMS})]
 
 
+def room_menu() -> list[dict[str, Any]]:
+    """The rooms by the folder that they are in, by the part of their names that differs."""
+    groups: dict[str, list[dict[str, str]]] = {}
+    for room in rooms():
+        name = room.removeprefix("cdpr_drake.")
+        found = re.match(r"(analyses\.studies|models|systems|analyses)(\.|$)", name)
+        group = found[1].rpartition(".")[2] if found else "library"
+        title = name[found.end() :] if found else name
+        groups.setdefault(group, []).append({title or name: room_page(room)})
+    return [{group.capitalize(): pages} for group, pages in groups.items()]
+
+
 def room_text(room: str) -> str:
     """A room's docstring, then its public names; what a room below it explains is a link."""
     below = {
@@ -133,8 +181,16 @@ def room_text(room: str) -> str:
                 "      show_root_full_path: false\n      show_root_toc_entry: true\n"
             )
         else:
-            out.append(f"\n## {name}\n\nIn `{module}`.\n")
+            out.append(f"\n## {name}\n\n{_words_of(module, name)}\n\nIn `{module}`.\n")
     return "".join(out)
+
+
+def _words_of(module: str, name: str) -> str:
+    """What a name stands for that no statement of its own binds: its value, or its docstring."""
+    value = getattr(import_module(module), name)
+    if isinstance(value, str):
+        return f"`{value!r}`"
+    return with_tables(inspect.getdoc(value) or "").replace("Args:\n", "Arguments:\n\n")
 
 
 def public_names(room: str) -> dict[str, str]:
@@ -184,7 +240,9 @@ def commands_page() -> str:
         out.append(f"\n## cdpr {name}\n\n{command.help or ''}\n")
         rows = [row for parameter in command.params for row in _parameter_row(parameter)]
         if rows:
-            out.append("\n| argument or option | |\n| --- | --- |\n" + "\n".join(rows) + "\n")
+            out.append(
+                "\n| argument or option | meaning |\n| --- | --- |\n" + "\n".join(rows) + "\n"
+            )
         lines = "\n".join(COMMANDS[name][1:])
         out.append(f"\n```text\n{lines}\n```\n")
     return "".join(out)
@@ -224,6 +282,17 @@ def notebooks() -> list[Path]:
     return sorted(NOTEBOOKS.glob("*.ipynb"), key=lambda path: (path.stem != "tour", path.stem))
 
 
+def notebook_rows() -> Iterator[str]:
+    """A list of all notebooks, each with what it says first."""
+    for path in notebooks():
+        cells = nbformat.read(path, as_version=4).cells
+        words = next(cell.source for cell in cells if cell.cell_type == "markdown")
+        first = next(part for part in words.split("\n\n") if not part.startswith("#"))
+        sentence = re.split(r"(?<=[.?:])\s", " ".join(first.split()))[0].rstrip(":")
+        sentence += "" if sentence.endswith((".", "?")) else "."
+        yield f"- [{heading(path)}]({path.stem}.md): {with_math(sentence)}\n"
+
+
 def heading(path: Path) -> str:
     """First heading of a notebook."""
     for cell in nbformat.read(path, as_version=4).cells:
@@ -256,6 +325,17 @@ def with_math(text: str) -> str:
     return re.sub(r"\$(\S|\S[^$\n]*\S)\$", r"`#!math \1`", text)
 
 
+def _joined(outputs: list[Any]) -> Iterator[Any]:
+    """Outputs of a cell; what was printed in several pieces is one."""
+    printed: list[Any] = []
+    for output in outputs:
+        if printed and output.get("output_type") == "stream" == printed[-1].get("output_type"):
+            printed[-1]["text"] += output["text"]
+        else:
+            printed.append(output)
+    yield from printed
+
+
 def notebook_pages(path: Path) -> Iterator[tuple[str, str | bytes]]:
     """A notebook as a page and its pictures."""
     words, number = [], 0
@@ -265,7 +345,7 @@ def notebook_pages(path: Path) -> Iterator[tuple[str, str | bytes]]:
         if cell.cell_type != "code":
             continue
         words.append(f"```python\n{cell.source}\n```")
-        for output in cell.get("outputs", []):
+        for output in _joined(cell.get("outputs", [])):
             data = output.get("data", {})
             if "image/png" in data:
                 name = f"{path.stem}_{number}.png"
@@ -283,6 +363,86 @@ def notebook_pages(path: Path) -> Iterator[tuple[str, str | bytes]]:
         f"\n*`cdpr notebooks DIR` copies this notebook, {path.name}, to a folder of yours.*"
     )
     yield f"notebooks/{path.stem}.md", "\n\n".join(words) + "\n"
+
+
+class Docstrings(griffe.Extension):
+    """Rewrites the docstrings that it is shown."""
+
+    def on_object(self, *, obj: griffe.Object, **_: Any) -> None:
+        """Of every module, class and function."""
+        if obj.is_class:
+            rows = field_rows(obj)  # type: ignore[arg-type]
+            if rows:
+                words = "" if obj.docstring is None else obj.docstring.value
+                obj.docstring = griffe.Docstring(f"{words}\n\n{rows}", parent=obj)
+        if obj.docstring is not None:
+            obj.docstring.value = with_tables(obj.docstring.value)
+
+
+def with_tables(text: str) -> str:
+    """Simple tables of reStructuredText as tables of Markdown."""
+    if "=====" not in text:
+        return text
+    out, lines = [], text.splitlines()
+    while lines:
+        line = lines.pop(0)
+        if not RULE.match(line):
+            out.append(line)
+            continue
+        rules = [k for k, one in enumerate(lines) if RULE.match(one)]
+        starts = [match.start() for match in re.finditer("=+", line)]
+        rows = [_cells(one, starts) for one in lines[: rules[1]] if not RULE.match(one)]
+        out += ["", *_table(rows), ""]
+        del lines[: rules[1] + 1]
+    return "\n".join(out)
+
+
+def _cells(line: str, starts: list[int]) -> list[str]:
+    return [line[a:b].strip() for a, b in zip(starts, [*starts[1:], None], strict=True)]
+
+
+def _table(rows: list[list[str]]) -> list[str]:
+    """The first row is the head; a row that begins empty goes on with the one before."""
+    whole: list[list[str]] = []
+    for row in rows:
+        if row[0] or not whole:
+            whole.append(row)
+        elif any(row):
+            whole[-1] = [f"{a} {b}".strip() for a, b in zip(whole[-1], row, strict=True)]
+    lines = ["| " + " | ".join(_quoted(cell) for cell in row) + " |" for row in whole]
+    return [lines[0], "|" + " --- |" * len(whole[0]), *lines[1:]]
+
+
+def _quoted(cell: str) -> str:
+    """Words of a cell, of which only backticks mean something."""
+    parts = re.split(r"(`[^`]*`)", cell)
+    parts[::2] = [re.sub(r"([\\*_|<\[])", r"\\\1", part) for part in parts[::2]]
+    return "".join(parts)
+
+
+def field_rows(schema: griffe.Class) -> str:
+    """A table of the fields of a schema's section: name, unit, meaning; empty: it is none."""
+    rows = []
+    for name, member in schema.members.items():
+        value = getattr(member, "value", None)
+        if member.is_alias or value is None or name.startswith("_"):
+            continue
+        call = ast.parse(str(value).strip(), mode="eval").body
+        if not isinstance(call, ast.Call) or not call.args:
+            continue
+        first = call.args[0]
+        if isinstance(first, ast.Constant) and isinstance(first.value, str):
+            rows.append(f"| `{name}` | {_unit(call)} | {_quoted(first.value)} |")
+    return "" if not rows else "| field | unit | meaning |\n| --- | --- | --- |\n" + "\n".join(rows)
+
+
+def _unit(call: ast.Call) -> str:
+    """The unit that a field of a schema is given, as its second argument or by name."""
+    named = {one.arg: one.value for one in call.keywords}
+    if getattr(call.func, "id", "") in ("number", "array", "named_numbers"):
+        named.setdefault("unit", call.args[1] if len(call.args) > 1 else ast.Constant(""))
+    unit = named.get("unit")
+    return _quoted(str(unit.value)) if isinstance(unit, ast.Constant) else ""
 
 
 if __name__ == "__main__":

@@ -143,7 +143,8 @@ class Learnt:
     """What is known now.
 
     Attributes:
-        p_WA, p_PB: Exit and anchor points, shape (3, m) [m].
+        p_WA: Exit points, shape (3, m) [m].
+        p_PB: Anchor points, shape (3, m) [m].
         offsets: Length of each cable where counting began beyond that of the model that was
             believed then, shape (m,) [m].
         mean: All of it as differences from that model: exit points cable by cable, anchor points,

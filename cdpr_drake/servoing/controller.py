@@ -53,10 +53,10 @@ class ServoController:
     begins as `fresh_memory()`.
 
     With a time constant T of the law's `smoothing` and steps of dt, e below is filtered: it begins
-    as s - s* and goes from step to step by the share 1 - exp(-dt / T) of the way to it.
+    as `s - s*` and goes from step to step by the share 1 - exp(-dt / T) of the way to it.
 
-    With features s, their interaction matrix L, s*(t) from the task's plan, the estimated drift b
-    of s by the object's motion, and e = s - s*, the camera's twist against the object is
+    With features s, their interaction matrix L, `s*(t)` from the task's plan, the estimated drift b
+    of s by the object's motion, and `e = s - s*`, the camera's twist against the object is
 
         V_C = U + (V_0 - lambda U_0 / lambda_0) exp(-sigma t),
         U = L^+ (-lambda e + ds*/dt - b) + (1 - L^+ L) V_2,

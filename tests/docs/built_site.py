@@ -33,7 +33,7 @@ RAW = {
     "a link": re.compile(r"\]\([^)\s]*\)"),
     "a reference": re.compile(r"\]\[[\w.-]+\]|::: \w"),
     "bold face": re.compile(r"\*\*\w"),
-    "a table": re.compile(r"\|\s*:?-{3,}"),
+    "a table": re.compile(r"\|\s*:?-{3,}|={5,}"),
 }
 """Markup that a reader should not see, by what it is."""
 

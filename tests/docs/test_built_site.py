@@ -58,6 +58,7 @@ def test_a_good_site_has_no_problem(tmp_path):
         ("<p>::: cdpr_drake.cables</p>", "a reference"),
         ("<p>a **word**</p>", "bold face"),
         ("<p>| a | | --- |</p>", "a table"),
+        ("<p>===== ======= port unit</p>", "a table"),
         ('<a href="c.html">c</a>', "which is not there"),
         ('<a href=".">all</a>', "which is not there"),
         ('<img src="c.png">', "which is not there"),
