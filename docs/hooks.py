@@ -168,7 +168,8 @@ def room_text(room: str) -> str:
         if room in ("cdpr_drake", "cdpr_drake.systems") and other.startswith(f"{room}.")
         for name in public_names(other).items()
     }
-    out = [f"# {room}\n\n::: {room}\n    options:\n      members: false\n"]
+    title = re.sub(r"[._](?=\w)", r"\g<0><wbr>", room)  # a telephone breaks it there
+    out = [f"# {title}\n\n::: {room}\n    options:\n      members: false\n"]
     for name, module in sorted(public_names(room).items()):
         if (name, module) in below:
             other = below[name, module]
