@@ -21,9 +21,10 @@ request                                         reply
                                                 "meaning"}}, "outputs": the same}
 {"do": "start", "outputs": [names]}             the first instant; without "outputs", all
 {"do": "step", "inputs": {name: [numbers]}}     the next instant, or the end
-{"do": "distribute", "pose": [7],               {"ok": true, "feasible", "status", "tensions"}:
-"wrench": [6], "limits": [2], "method": name}   tensions that put the wrench F_P_W about Po on the
-                                                platform; without wrench, that hold it at rest
+{"do": "distribute", "pose": [7]}               {"ok": true, "feasible", "status", "tensions"}:
+                                                tensions that hold the platform at rest; with
+                                                "wrench": [6], that put F_P_W about Po on it. Also
+                                                "limits": [2] and "method": name
 {"do": "stop"}                                  the end
 =============================================== ================================================
 
