@@ -9,6 +9,7 @@ solver, how the cost is shared, and what no longer holds.
 
 from __future__ import annotations
 
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -104,6 +105,11 @@ class ProgramValues:
         )  # fmt: skip
 
 
+def in_words(status: str) -> str:
+    """How a solver ended, as Drake's SolutionResult has it, in words: `solution found`."""
+    return re.sub(r"(?<!^)(?=[A-Z])", " ", status.removeprefix("k")).lower()
+
+
 @dataclass(frozen=True)
 class ProgramReport:
     """How a program with terms of one's own was solved.
@@ -128,7 +134,7 @@ class ProgramReport:
         """A label and words a row, as results show themselves."""
         costs = [f"{name} {value:.4g}" for name, value in self.own_costs.items()]
         found = [
-            ("program", f"{self.status} by {self.solver}"),
+            ("program", f"{in_words(self.status)} by {self.solver}"),
             ("cost", ", ".join([f"goal {self.cost:.4g}", *costs])),
         ]
         if self.own_constraints:

@@ -1,4 +1,4 @@
-"""Scenario section `tensions`: what takes up slack beside a visual servo.
+"""Scenario section `tension_management`: what takes up slack beside a visual servo.
 
 Drake's YAML loader reads the annotations themselves, so they are not postponed here.
 """

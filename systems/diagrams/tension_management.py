@@ -1,4 +1,4 @@
-"""Checks the section `tensions` and puts its block between a servo and the winches."""
+"""Checks the section `tension_management` and puts its block between a servo and the winches."""
 
 from __future__ import annotations
 

@@ -42,8 +42,8 @@ class Instant(NamedTuple):
 class RemoteClient:
     """Drives a run of `cdpr serve`, or asks it for tensions.
 
-    with RemoteClient() as client:
-        client.run(lambda now: {"tensions": my_tensions(now.time, now.outputs["X_WP"])})
+        with RemoteClient() as client:
+            client.run(lambda now: {"tensions": my_tensions(now.time, now.outputs["X_WP"])})
 
     Each call sends one message and waits for its reply. Messages: see `cdpr_drake.systems.remote`.
     """
