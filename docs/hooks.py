@@ -17,6 +17,7 @@ import re
 from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
+from textwrap import indent
 from typing import Any
 
 import griffe
@@ -345,7 +346,10 @@ def notebook_pages(path: Path) -> Iterator[tuple[str, str | bytes]]:
             words.append(with_math(re.sub(r"\(([\w/]+)\.ipynb\)", r"(\1.md)", cell.source)))
         if cell.cell_type != "code":
             continue
-        words.append(f"```python\n{cell.source}\n```")
+        code = f"```python\n{cell.source}\n```"
+        if cell.metadata.get("jupyter", {}).get("source_hidden"):
+            code = '??? example "The cell"\n\n' + indent(code, "    ")
+        words.append(code)
         for output in _joined(cell.get("outputs", [])):
             data = output.get("data", {})
             if "image/png" in data:

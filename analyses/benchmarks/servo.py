@@ -51,7 +51,7 @@ CORRECTIONS = {
     "distribution": "{kind: distribution, integral: 0.01}",
     "length": "{kind: length}",
 }
-"""Sections `tensions` of which a step is timed."""
+"""Sections `tension_management` of which a step is timed."""
 
 
 def servo_rows(quick: bool) -> list[TimingRow]:

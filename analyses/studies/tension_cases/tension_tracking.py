@@ -49,7 +49,7 @@ VARIANTS: dict[str, tuple[str, str]] = {
         f"{{kind: polygon, threshold: [{BOUND:g}], margin: 20, gain: 0.02, rate: {RATE}}}",
     ),
 }
-"""Ways to manage tensions: words, and what to set `tensions` to."""
+"""Ways to manage tensions: words, and what to set `tension_management` to."""
 
 DISTURBED = tuple(name for name in SETS if name != "none")
 """The sets d1 to d4."""
