@@ -87,10 +87,13 @@ class ShownFigure(Figure):
     """A figure that shows itself at the end of a notebook cell, without a plotting backend."""
 
     def _repr_png_(self) -> bytes:
-        buffer, engine = BytesIO(), lay_out(self)
+        buffer, dpi = BytesIO(), self.dpi
+        self.set_dpi(NOTEBOOK_DPI)  # coarse letters are wider: they are laid out as they are drawn
+        engine = lay_out(self)
         with mpl.rc_context({**STYLE, **NO_LAYOUT}):
             self.savefig(buffer, format="png", dpi=NOTEBOOK_DPI)
             self.set_layout_engine(engine)  # for what is drawn into it later
+        self.set_dpi(dpi)
         return buffer.getvalue()
 
 
