@@ -118,6 +118,13 @@ def new_figure(
         return figure, figure.subplots(rows, columns)
 
 
+def spread(figure: Figure, room: float) -> None:
+    """Keeps room round all panels of a figure, so that labels of neighbours are apart [inch]."""
+    engine = figure.get_layout_engine()
+    if engine is not None:
+        engine.set(w_pad=room)
+
+
 def line_style(look: Look) -> dict[str, Any]:
     """Arguments of `plot` for a curve with this look, without its marker."""
     return {"color": look.color, "linestyle": look.dash}
