@@ -18,12 +18,18 @@ from matplotlib.ticker import FuncFormatter, MaxNLocator
 from cdpr_drake import palette
 from cdpr_drake.palette import Look
 
+CYCLE = (
+    *palette.DASHES, (0.0, (7.0, 2.0, 1.0, 2.0, 1.0, 2.0)), (0.0, (10.0, 3.0)), (0.0, (3.0, 1.0)),
+    (0.0, (1.0, 4.0)),
+)  # fmt: skip
+"""Dashes of curves that nobody chose a look for: none of two of the palette's colours is alike."""
+
 STYLE: Any = {
     "font.size": 12,
     # Where nobody chooses a look, curves take those of the palette one after the other.
     "axes.prop_cycle": cycler(
         color=[palette.nth_look(k).color for k in range(len(palette.COLORS))],
-        linestyle=[palette.nth_look(k).dash for k in range(len(palette.COLORS))],
+        linestyle=CYCLE,
     ),
     "hatch.linewidth": 0.6,
     "axes.grid": True,

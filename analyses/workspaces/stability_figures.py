@@ -29,7 +29,6 @@ from cdpr_drake.analyses.workspaces.stability_results import KINDS, StabilityWor
 from cdpr_drake.arrays import Array
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.palette import IDEAL, OUTLINE, WORKSPACES, look_of
-from cdpr_drake.stability.perturbation_bounds import BOUNDS
 from cdpr_drake.workspaces.volume import surface_quads
 
 COLORS = WORKSPACES
@@ -294,7 +293,7 @@ def curves_figure(workspaces: StabilityWorkspaces) -> Figure:
     for axes, (unit, parameters) in zip(np.ravel(grid), groups.items(), strict=True):
         for parameter in parameters:
             values = [value for value, _ in found[parameter]]
-            look = look_of(parameter, BOUNDS)
+            look = look_of(parameter, list(found))  # few bounds have colours far from each other
             for kind, line in LINES.items():
                 shares = [
                     100.0 * workspaces.volume(kind, "corners", name).share

@@ -1,3 +1,5 @@
+from itertools import pairwise
+
 import numpy as np
 
 from cdpr_drake.analyses.simulation import adaptation_report
@@ -29,6 +31,6 @@ def test_no_legend_hides_numbers_that_rise_early_and_labels_are_as_long_as_axes(
     for row in np.reshape(figure.axes, (2, 3)):
         for axes in row:
             assert axes.yaxis.label.get_window_extent().height < axes.bbox.height
-        for left, right in zip(row, row[1:], strict=False):
+        for left, right in pairwise(row):
             begin = right.yaxis.label.get_window_extent().x0
             assert begin - left.bbox.x1 > APART * figure.dpi
