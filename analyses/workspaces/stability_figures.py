@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
@@ -349,7 +350,9 @@ def _about(workspaces: StabilityWorkspaces, words: str, more: str = "") -> str:
     a, matrix = workspaces.arguments, workspaces.interaction_matrix
     scheme = SCHEME_WORDS.get(a["scheme"], a["scheme"])
     lines = [words, f"{a['robot']}, {scheme}, {a['verdict']} perturbations{more}"]
-    return "\n".join([*lines, matrix] if matrix else lines)
+    # A terminal has no formulas, of which these are the letters.
+    written = re.sub(r"\[(\w)_t\]x", r"$[\1_t]_\\times$", matrix).replace("L_s", "$L_s$")
+    return "\n".join([*lines, written] if matrix else lines)
 
 
 def _title(workspaces: StabilityWorkspaces, words: str, bounds: str | None) -> str:

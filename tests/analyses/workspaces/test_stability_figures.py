@@ -157,6 +157,11 @@ def test_curves_that_lie_on_each_other_can_both_be_seen():
     assert len(labels) <= 7
 
 
+def test_titles_have_formulas_in_the_place_of_what_a_terminal_prints():
+    title = planes_figure(workspaces((5, 5, 3))).get_suptitle()
+    assert "$L_s$ with $[e_t]_\\times$" in " ".join(title.split())
+
+
 def test_curves_of_two_bounds_have_colours_that_are_far_from_each_other():
     """Vermillion and orange, the bounds' places in their list, were one colour to readers."""
     made = workspaces((3, 3, 3), values=(0.01,))
