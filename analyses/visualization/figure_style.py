@@ -12,7 +12,7 @@ import matplotlib as mpl
 from cycler import cycler
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
-from matplotlib.layout_engine import LayoutEngine
+from matplotlib.layout_engine import ConstrainedLayoutEngine, LayoutEngine
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from cdpr_drake import palette
@@ -127,7 +127,7 @@ def new_figure(
 def spread(figure: Figure, room: float) -> None:
     """Keeps room round all panels of a figure, so that labels of neighbours are apart [inch]."""
     engine = figure.get_layout_engine()
-    if engine is not None:
+    if isinstance(engine, ConstrainedLayoutEngine):
         engine.set(w_pad=room)
 
 
