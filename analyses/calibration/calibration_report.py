@@ -238,7 +238,8 @@ def _fit_figure(calibration: Calibration) -> Figure:
     """Residuals over sigma by kind, and changes beside standard deviations."""
     result = calibration.result
     name = f"Calibration of {calibration.task.robot.name}"
-    title = f"{name}: does not fit what was measured" if calibration.misfit else name
+    title = "\n".join([f"{name}: does not fit what was measured", *calibration.misfit[:1]])
+    title = title if calibration.misfit else name
     figure, axes = new_figure(1, 2, (13.0, 5.0), title)
     kinds = [kind for kind, fit in result.residuals.items() if fit.count + fit.dropped]
     places = np.arange(len(kinds))

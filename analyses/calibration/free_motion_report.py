@@ -184,7 +184,7 @@ def _figure(found: FreeMotion, which: str) -> Figure:
     ones = found.held_out if which == "held_out" else found.fitted
     words = "held out: predicted behind the dashed line" if which == "held_out" else "fitted"
     figure, axes = new_figure(
-        3, len(ones), (max(7.0, 5.0 * len(ones)), 8.0),
+        3, len(ones), (max(9.0, 5.0 * len(ones)), 8.4),
         f"Free motion of {found.task.robot.name} ({words})",
     )  # fmt: skip
     grid = np.array(axes, dtype=object).reshape(3, len(ones))
@@ -204,7 +204,7 @@ def _figure(found: FreeMotion, which: str) -> Figure:
                 ax.set(ylabel=f"turn about {axis} [deg]")
         grid[0, j].set(title=f"from {one.stretch.time[0]:.6g} s")
         grid[2, j].set(xlabel="time [s]")
-    grid[0, 0].legend()
+    _legend_below(figure, grid[0, 0])
     return figure
 
 
@@ -216,7 +216,7 @@ def _unexplained_figure(found: FreeMotion) -> Figure:
         np.linalg.norm(found.task.robot.gravity_vector())
     )
     figure, axes = new_figure(
-        1, len(ones), (max(7.0, 4.0 * len(ones)), 4.0),
+        1, len(ones), (max(9.0, 4.0 * len(ones)), 4.4),
         f"Free motion of {found.task.robot.name}: what neither cables nor weight explain",
     )  # fmt: skip
     row = np.array(axes, dtype=object).reshape(len(ones))
@@ -237,8 +237,13 @@ def _unexplained_figure(found: FreeMotion) -> Figure:
         words = "fitted" if j < fitted else "held out"
         row[j].set(title=f"{words}, from {one.stretch.time[0]:.6g} s", xlabel="time [s]", ylim=0.0)
     row[0].set(ylabel="force [N]")
-    row[0].legend()
+    _legend_below(figure, row[0])
     return figure
+
+
+def _legend_below(figure: Figure, axes: Any) -> None:
+    """Says below all panels what the curves of one are, where it hides none."""
+    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=3)
 
 
 def freely_moved_robot(found: FreeMotion) -> Robot:

@@ -24,6 +24,9 @@ from cdpr_drake.palette import BOUND, nth_look
 RESULTS = "identification.json"
 """File of a results folder: all numbers."""
 
+NO_TRUTH = "no true value"
+"""Stands in the row of a parameter that has none to be compared to."""
+
 AXES = (
     "moment x [N m]", "moment y [N m]", "moment z [N m]", "force x [N]", "force y [N]",
     "force z [N]",
@@ -202,8 +205,9 @@ def _parameter_figure(identification: Identification, truth: DynamicModel | None
     true = {} if truth is None else true_values(identification, truth)
     count = len(result.names)
     parameters, ax = new_figure(
-        1, 1, (9.0, max(4.0, 0.28 * count + 1.5)), "Identified parameters over their standard error"
-    )
+        1, 1, (10.5, max(4.0, 0.28 * count + 1.5)),
+        "Identified parameters over their standard error",
+    )  # fmt: skip
     places, std = np.arange(count)[::-1], np.maximum(result.std, 1e-300)
     if true:
         known = [k for k, name in enumerate(result.names) if name in true]
@@ -212,6 +216,11 @@ def _parameter_figure(identification: Identification, truth: DynamicModel | None
         for x in (-2.0, 2.0):
             ax.axvline(x, **line_style(BOUND))
         ax.set(xlabel="error over its standard error [-]; dashed: 2")
+        for k in set(range(count)) - set(known):
+            ax.annotate(
+                NO_TRUTH, (0.0, places[k]), (4.0, 0.0), textcoords="offset points", va="center",
+                fontsize=8, color="0.35",
+            )  # fmt: skip
     else:
         changed = (result.values - result.before) / std
         ax.barh(places, changed, 0.7, label="found less before", **bar_style(nth_look(1)))
@@ -225,7 +234,7 @@ def _parameter_figure(identification: Identification, truth: DynamicModel | None
     ]
     ax.set_yticks(places, labels, fontsize=8)
     ax.set_ylim(-1.0, count)
-    ax.legend()
+    parameters.legend(loc="outside lower right")
     return parameters
 
 

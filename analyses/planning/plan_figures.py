@@ -14,7 +14,12 @@ from cdpr_drake.analyses.reporting.deferred_figures import Pictures
 from cdpr_drake.analyses.visualization.cable_figures import cable_figure, draw_cables
 from cdpr_drake.analyses.visualization.curves import draw_bars
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS, figure_writers
-from cdpr_drake.analyses.visualization.figure_style import bare_figure, line_style, styled
+from cdpr_drake.analyses.visualization.figure_style import (
+    COVERED_LINE,
+    bare_figure,
+    line_style,
+    styled,
+)
 from cdpr_drake.analyses.visualization.path_figures import Path3D, path_figure
 from cdpr_drake.arrays import Array
 from cdpr_drake.models.robot_schema import Robot
@@ -69,13 +74,12 @@ def phase_figure(run: PlanRun) -> Figure:
     with styled():
         axes, bars = figure.subplots(2, 1, sharex=True, height_ratios=(4.6, height))
         top = np.sqrt(plan.largest)
-        axes.plot(stations, top, label="largest at this point by itself", **line_style(BOUND))
         axes.plot(
-            stations,
-            np.sqrt(plan.reachable[:, 1]),
+            stations, np.sqrt(plan.reachable[:, 1]),
             label="largest from which the end can be reached",
-            **line_style(IDEAL),
-        )
+            **COVERED_LINE | {"color": DESIRED.color, "marker": ""},
+        )  # fmt: skip
+        axes.plot(stations, top, label="largest at this point by itself", **line_style(BOUND))
         axes.plot(samples.parameters, samples.speeds, label="plan", **line_style(DISTANCE))
         most = float(np.max(samples.speeds))
         axes.set_ylim(0.0, min(float(np.nanmax(top, initial=most)), 2.5 * most) * 1.05)

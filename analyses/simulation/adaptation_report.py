@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from cdpr_drake.analyses.reporting.log_on_disk import Log
-from cdpr_drake.analyses.visualization.figure_style import line_style, new_figure
+from cdpr_drake.analyses.visualization.figure_style import line_style, new_figure, spread
 from cdpr_drake.arrays import Array
 from cdpr_drake.calibration.identifiability import FRAMES
 from cdpr_drake.geometry.cable_paths import cable_paths
@@ -160,8 +160,8 @@ def doubts(log: Log, cables: list[str]) -> list[str]:
     return told
 
 
-LEGEND_ROOM = 1.5
-"""Upper end of the axis of numbers, of the largest one: above the curves is the legend."""
+ROOM = 0.12
+"""Round panels, so that labels of neighbours are apart [inch]."""
 
 
 def adaptation_figure(title: str, log: Log, robot: Robot) -> Figure:
@@ -174,7 +174,8 @@ def adaptation_figure(title: str, log: Log, robot: Robot) -> Figure:
     found, sigma = np.asarray(log[LEARNT]), np.asarray(log[LEARNT_SIGMA])
     wrong = found[:, : 6 * m] - true_points(robot)
     names = names_of(robot)
-    figure, panels = new_figure(2, 3, (12.5, 7.0), title)
+    figure, panels = new_figure(2, 3, (13.0, 7.8), title)
+    spread(figure, ROOM)
     for row, words in enumerate(("exit point", "anchor point")):
         best = np.argsort(sigma[-1, 3 * m * row : 3 * m * (row + 1)])[:2] + 3 * m * row
         for panel, k in zip(panels[row, :2], best, strict=True):
@@ -193,14 +194,14 @@ def adaptation_figure(title: str, log: Log, robot: Robot) -> Figure:
     for (words, part), style in zip(ranges.items(), ("-", "--"), strict=True):
         off = 1e3 * np.sqrt(np.mean(wrong[:, part] ** 2, axis=1))
         panels[0, 2].plot(time, off, style, color="0.1", label=words)
-    panels[0, 2].set(xlabel="time [s]", ylabel="rms error of coordinates [mm]", ylim=(0, None))
+    panels[0, 2].set(xlabel="time [s]", ylabel="rms error [mm]", ylim=(0, None))
+    panels[0, 2].set_title("all coordinates", fontsize=10)
     panels[0, 2].legend(loc="best")
     panel = panels[1, 2]
     for name, style in (
         ("stations", "-"), ("excited", "--"), ("models_believed", ":"), ("models_rejected", "-."),
     ):  # fmt: skip
         panel.plot(time, parts[name], style, color="0.1", label=name.replace("_", " "))
-    most = max(float(np.max(line.get_ydata())) for line in panel.lines)
-    panel.set(xlabel="time [s]", ylabel="number [-]", ylim=(None, LEGEND_ROOM * max(most, 1.0)))
-    panel.legend(loc="upper left", ncols=2, fontsize=9)
+    panel.set(xlabel="time [s]", ylabel="number [-]")
+    panel.legend(loc="upper center", bbox_to_anchor=(0.5, -0.22), ncols=2)
     return figure

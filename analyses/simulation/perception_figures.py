@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from cdpr_drake.analyses.reporting.log_on_disk import Log
 from cdpr_drake.analyses.visualization.curves import draw_curve, path_rows, phase_of
-from cdpr_drake.analyses.visualization.figure_style import line_style, new_figure
+from cdpr_drake.analyses.visualization.figure_style import line_style, new_figure, spread
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.poses import pose_row, pose_rows_distance
 from cdpr_drake.palette import DISTANCE, ESTIMATED, TARGET, nth_look
@@ -23,6 +23,9 @@ MOST_ROWS = 600
 
 INSTANT = 1e-3
 """Width of a picture of one row [s]."""
+
+ROOM = 0.2
+"""Round panels, so that a scale of colours is not read with the panel beside it [inch]."""
 
 COLORS = "cividis"
 """Of distances: dark near, bright far, also in grey."""
@@ -95,6 +98,7 @@ def scan_figure(title: str, log: Log, name: str, angles: Array) -> Figure:
         axes.set(xlabel="time [s]", ylabel="range [m]")
         return figure
     figure, axes = new_figure(1, 2, (13.0, 5.6), title)
+    spread(figure, ROOM)
     _over_time(figure, axes[0], times, angles, scans)
     axes[0].set(ylabel="angle from the front [deg]")
     there = np.isfinite(scans[-1])
@@ -134,6 +138,7 @@ def depth_figure(title: str, log: Log, image: Array | None) -> Figure:
     rows = _shown(log)
     depth = log["depth_row"][rows]
     figure, panels = new_figure(1, 1 + (image is not None), (13.0, 5.2), title)
+    spread(figure, ROOM)
     first = np.atleast_1d(panels)[0]
     _over_time(figure, first, log["time"][rows], np.array([0.0, depth.shape[1]]), depth)
     first.set(ylabel="u in the middle row [px]")

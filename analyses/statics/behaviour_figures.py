@@ -62,10 +62,14 @@ def behaviour_figure(robot: Robot, report: StaticReport) -> Figure:
             "platform.hysteresis in its file"
         )
     title = f"{robot.name}: what cables and contacts do, by its file"
-    figure, panels = new_figure(1, len(drawn), (5.2 * len(drawn) + 0.6, 4.8), title)
-    for axes, draw in zip(np.atleast_1d(panels), drawn, strict=True):
+    rows, columns = -(-len(drawn) // 2), min(len(drawn), 2)
+    figure, panels = new_figure(rows, columns, (5.2 * columns + 0.6, 4.6 * rows + 0.2), title)
+    places = np.atleast_1d(panels).ravel()
+    for axes, draw in zip(places, drawn, strict=False):
         draw(axes)
-        axes.legend(loc="best", fontsize="small")
+        axes.legend(loc="best")
+    for axes in places[len(drawn) :]:
+        axes.remove()
     return figure
 
 

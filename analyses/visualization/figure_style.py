@@ -12,18 +12,24 @@ import matplotlib as mpl
 from cycler import cycler
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
-from matplotlib.layout_engine import LayoutEngine
+from matplotlib.layout_engine import ConstrainedLayoutEngine, LayoutEngine
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from cdpr_drake import palette
 from cdpr_drake.palette import Look
+
+CYCLE = (
+    *palette.DASHES, (0.0, (7.0, 2.0, 1.0, 2.0, 1.0, 2.0)), (0.0, (10.0, 3.0)), (0.0, (3.0, 1.0)),
+    (0.0, (1.0, 4.0)),
+)  # fmt: skip
+"""Dashes of curves that nobody chose a look for: none of two of the palette's colours is alike."""
 
 STYLE: Any = {
     "font.size": 12,
     # Where nobody chooses a look, curves take those of the palette one after the other.
     "axes.prop_cycle": cycler(
         color=[palette.nth_look(k).color for k in range(len(palette.COLORS))],
-        linestyle=[palette.nth_look(k).dash for k in range(len(palette.COLORS))],
+        linestyle=CYCLE,
     ),
     "hatch.linewidth": 0.6,
     "axes.grid": True,
@@ -87,10 +93,13 @@ class ShownFigure(Figure):
     """A figure that shows itself at the end of a notebook cell, without a plotting backend."""
 
     def _repr_png_(self) -> bytes:
-        buffer, engine = BytesIO(), lay_out(self)
+        buffer, dpi = BytesIO(), self.dpi
+        self.set_dpi(NOTEBOOK_DPI)  # coarse letters are wider: they are laid out as they are drawn
+        engine = lay_out(self)
         with mpl.rc_context({**STYLE, **NO_LAYOUT}):
             self.savefig(buffer, format="png", dpi=NOTEBOOK_DPI)
             self.set_layout_engine(engine)  # for what is drawn into it later
+        self.set_dpi(dpi)
         return buffer.getvalue()
 
 
@@ -113,6 +122,13 @@ def new_figure(
     figure = bare_figure(size, title)
     with mpl.rc_context(STYLE):
         return figure, figure.subplots(rows, columns)
+
+
+def spread(figure: Figure, room: float) -> None:
+    """Keeps room round all panels of a figure, so that labels of neighbours are apart [inch]."""
+    engine = figure.get_layout_engine()
+    if isinstance(engine, ConstrainedLayoutEngine):
+        engine.set(w_pad=room)
 
 
 def line_style(look: Look) -> dict[str, Any]:

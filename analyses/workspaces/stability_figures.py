@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
@@ -29,7 +30,6 @@ from cdpr_drake.analyses.workspaces.stability_results import KINDS, StabilityWor
 from cdpr_drake.arrays import Array
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.palette import IDEAL, OUTLINE, WORKSPACES, look_of
-from cdpr_drake.stability.perturbation_bounds import BOUNDS
 from cdpr_drake.workspaces.volume import surface_quads
 
 COLORS = WORKSPACES
@@ -294,7 +294,7 @@ def curves_figure(workspaces: StabilityWorkspaces) -> Figure:
     for axes, (unit, parameters) in zip(np.ravel(grid), groups.items(), strict=True):
         for parameter in parameters:
             values = [value for value, _ in found[parameter]]
-            look = look_of(parameter, BOUNDS)
+            look = look_of(parameter, list(found))  # few bounds have colours far from each other
             for kind, line in LINES.items():
                 shares = [
                     100.0 * workspaces.volume(kind, "corners", name).share
@@ -350,7 +350,9 @@ def _about(workspaces: StabilityWorkspaces, words: str, more: str = "") -> str:
     a, matrix = workspaces.arguments, workspaces.interaction_matrix
     scheme = SCHEME_WORDS.get(a["scheme"], a["scheme"])
     lines = [words, f"{a['robot']}, {scheme}, {a['verdict']} perturbations{more}"]
-    return "\n".join([*lines, matrix] if matrix else lines)
+    # A terminal has no formulas, of which these are the letters.
+    written = re.sub(r"\[(\w)_t\]x", r"$[\1_t]_\\times$", matrix).replace("L_s", "$L_s$")
+    return "\n".join([*lines, written] if matrix else lines)
 
 
 def _title(workspaces: StabilityWorkspaces, words: str, bounds: str | None) -> str:

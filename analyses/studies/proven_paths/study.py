@@ -47,6 +47,9 @@ from cdpr_drake.analyses.studies.proven_paths.statements import (
 from cdpr_drake.analyses.visualization.figure_style import few_ticks, line_style, new_figure
 from cdpr_drake.palette import BOUND, DISTANCE, IDEAL
 
+NO_PATH = "no proven path"
+"""Stands in the panel of a scene in which none was found."""
+
 EFFORT = Effort(
     boxes=150_000, cells=2**18, more_boxes=1_000_000, more_cells=2**21, samples=100_000,
     vertices=200, looks=10_000,
@@ -208,6 +211,11 @@ def paths_figure(runs: Runs) -> Figure:
             )  # fmt: skip
         place.set(xlabel="x in W [m]", ylabel="y in W [m]", aspect="equal")
         place.set_title(f"{robot}, {scene}", fontsize=10)
+        if not any(len(run["path_m"]) for run in some):
+            place.text(
+                0.5, 0.5, NO_PATH, transform=place.transAxes, ha="center", va="center", fontsize=9,
+                bbox={"facecolor": "white", "edgecolor": "0.6", "alpha": 0.9},
+            )  # fmt: skip
         few_ticks(place.xaxis, 3)  # paths may be much longer than wide
         few_ticks(place.yaxis)
     for place in places[len(scenes) :]:

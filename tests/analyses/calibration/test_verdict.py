@@ -1,11 +1,16 @@
 """From where on a result is no fit, a sensor is bad, and outliers are many."""
 
 from dataclasses import fields
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
+from cdpr_drake.analyses.calibration.calibration_report import calibration_drawings
 from cdpr_drake.analyses.calibration.fit_verdict import bad_sensors, doubts, misfits
 from cdpr_drake.calibration.result import CalibrationResult, Fit, Outlier
+from cdpr_drake.models.robot_loader import load_robot
+from tests.figure_faults import figure_faults
 
 
 def outlier(number, what="length of cable 2"):
@@ -70,3 +75,20 @@ def test_outliers_beyond_a_tenth_are_many(outliers, degrees, many):
         assert alone[0].startswith(f"{outliers} outliers beside {degrees} degrees of freedom")
         assert "minima" not in alone[0]
         assert several[0].endswith("; starts ended in 2 minima, of which this is the best")
+
+
+@pytest.mark.parametrize("spread", [1.0, 4.0])
+def test_the_figure_says_why_it_is_no_fit(spread):
+    kinds = {"lengths": Fit(40, spread, 9.0), "tag corners": Fit(20, spread, 9.0, 2)}
+    of = result(
+        chi_square=spread**2 * 40, degrees=40, residuals=kinds, names=("C1.exit_point.x",),
+        units=("m",), values=np.array([0.01]), std=np.array([0.001]),
+    )  # fmt: skip
+    task = SimpleNamespace(robot=load_robot("planar"))
+    calibration = SimpleNamespace(result=of, misfit=misfits(of), task=task, held=None)
+    figure = calibration_drawings(calibration)["calibration"]()
+    assert figure_faults(figure) == []
+    title = " ".join(figure.get_suptitle().split())
+    fits = spread < 3.0
+    assert ("does not fit" in title) is not fits
+    assert ("residuals are 4 sigmas, root mean square; accepted: at most 3" in title) is not fits

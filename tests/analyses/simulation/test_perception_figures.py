@@ -16,6 +16,10 @@ from cdpr_drake.systems.sensors.sensor_settings import (
     SensorSuite,
 )
 from cdpr_drake.trajectories.pose_trajectory import SteadyMotion
+from tests.figure_faults import figure_faults
+
+APART = 0.2
+"""Between a label and the next one that belongs to another panel [inch]."""
 
 SUITE = SensorSuite(
     range_sensors=[
@@ -54,3 +58,15 @@ def test_all_are_drawn_whatever_is_read(rows, value):
     for name, draw in drawn.items():
         if rows == 1 or name.startswith(("scan", "depth")):  # which have gaps
             draw().savefig(io.BytesIO(), dpi=20)
+
+
+def test_the_scale_of_colours_is_apart_from_the_panel_beside_it():
+    """And so are their labels, as they are drawn into a file."""
+    motion = SteadyMotion(RigidTransform(), np.zeros(3), np.zeros(3))
+    drawn = looking_figures(str, SUITE, log_of(20, 1.5), motion, np.full((240, 320), 1.5))
+    for name in ("depth", "scan_fan"):
+        figure = drawn[name]()
+        assert figure_faults(figure) == []
+        scale = next(axes for axes in figure.axes if axes.get_ylabel() == "distance [m]")
+        end, begin = (axes.yaxis.label.get_window_extent() for axes in (scale, figure.axes[1]))
+        assert begin.x0 - end.x1 > APART * figure.dpi, name

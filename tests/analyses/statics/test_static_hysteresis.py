@@ -17,8 +17,12 @@ from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.poses import rotation_from_angles
 from cdpr_drake.models.materials import BehaviourSettings
 from cdpr_drake.models.robot_schema import HysteresisSettings
+from tests.figure_faults import figure_faults
 from tests.messages import printed
 from tests.motion.small_robots import content, small_robot
+
+WIDEST = 12.0
+"""Of a figure whose letters are read where it is shown 690 px wide [inch]."""
 
 CONTACTS = {"tilt": 0.3, "turn": 0.5, "slip": 0.02}
 
@@ -108,7 +112,9 @@ def test_the_picture_has_what_the_file_has():
     robot = rubbing(replace(robot, cable=replace(robot.cable, behaviour=behaviour)))
     report = cdpr.solve_static(robot)
     figure = report.plot_behaviour(robot)
+    assert figure_faults(figure) == []
     cables, drums, contacts = figure.axes
+    assert figure.get_figwidth() < WIDEST
     for axes in figure.axes:
         assert "[" in axes.get_xlabel()
         assert "[N" in axes.get_ylabel()

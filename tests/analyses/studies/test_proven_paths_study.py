@@ -54,12 +54,28 @@ def made_up(
         "boxes_m": np.array([[0.5, 0.5, 0.5, 0.1, 0.1, 0.1]]),
         "length_m": 1.01 if found else np.nan, "curve_m": 1.02, "bound_m": bound,
         "duration_s": 9.0, "path_s": 0.4, "judge_s": 1.0, "infeasible": infeasible,
-        "samples": 100 if found else 0, "path_m": LINE,
+        "samples": 100 if found else 0, "path_m": LINE if found else np.empty((0, 3)),
     }  # fmt: skip
 
 
 def study(quick=False, session=LOCAL, **found):
     return replace(STUDY, measure=partial(made_up, **found))(quick, session)
+
+
+def panels_without_path(found):
+    """Titles of panels that say that there is no proven path."""
+    figure = paths_figure(found.runs)
+    assert figure_faults(figure) == []
+    return [
+        axes.get_title() for axes in figure.axes
+        if any(text.get_text() == "no proven path" for text in axes.texts)
+    ]  # fmt: skip
+
+
+def test_scenes_in_which_no_path_is_proven_say_so():
+    found = study(status="not connected", sampled=np.nan)
+    scenes = [axes for axes in paths_figure(found.runs).axes if axes.get_title()]
+    assert len(panels_without_path(found)) == len(scenes) > 0
 
 
 def test_it_judges_tables_and_draws(tmp_path):
@@ -70,6 +86,7 @@ def test_it_judges_tables_and_draws(tmp_path):
     problems, free, _ = found.tables()
     assert (problems.row_count, free.row_count) == (20, 5)
     assert figure_faults(paths_figure(found.runs)) == []
+    assert not panels_without_path(found)
     assert found.write(tmp_path) == {}
     told = json.loads((tmp_path / "results.json").read_text())
     assert told["parameters"]["effort"]["samples"] == 100_000

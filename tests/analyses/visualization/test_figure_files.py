@@ -141,3 +141,11 @@ def test_a_figure_can_be_shown_again_with_more_in_it():
     assert figure.get_layout_engine() is engine
     figure.axes[0].set_ylabel("many\nlines\nof words")
     assert figure._repr_png_() != first
+
+
+def test_curves_without_a_look_of_their_own_can_be_told_apart_without_colours():
+    """The first and the fifth were both solid and blue."""
+    _, axes = new_figure(1, 1, (6.0, 3.0), "Some words")
+    curves = [axes.plot([0.0, 1.0])[0] for _ in range(8)]
+    assert len({line.get_color() for line in curves}) == 8
+    assert len({str(line._unscaled_dash_pattern) for line in curves}) == 8

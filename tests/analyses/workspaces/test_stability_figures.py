@@ -1,5 +1,7 @@
 """Figures of stability workspaces show what there is: every cell, every curve, every exit point."""
 
+from dataclasses import replace
+
 import matplotlib.colors
 import numpy as np
 import pytest
@@ -153,6 +155,27 @@ def test_curves_that_lie_on_each_other_can_both_be_seen():
     labels = [text.get_text() for text in axes.get_xticklabels()]
     assert "0.01" in labels
     assert len(labels) <= 7
+
+
+def test_titles_have_formulas_in_the_place_of_what_a_terminal_prints():
+    title = planes_figure(workspaces((5, 5, 3))).get_suptitle()
+    assert "$L_s$ with $[e_t]_\\times$" in " ".join(title.split())
+
+
+def test_curves_of_two_bounds_have_colours_that_are_far_from_each_other():
+    """Vermillion and orange, the bounds' places in their list, were one colour to readers."""
+    made = workspaces((3, 3, 3), values=(0.01,))
+    bounds = {"baseline": {"r_A": 0.005, "r_bp": 0.03}, "r_A=0.01": {"r_A": 0.01, "r_bp": 0.03},
+              "r_bp=0.05": {"r_A": 0.005, "r_bp": 0.05}}  # fmt: skip
+    stable = np.broadcast_to(True, (3, *made.grid.shape))
+    made = replace(
+        made, arguments=made.arguments | {"bounds": bounds}, names=tuple(bounds), stable=stable,
+        margin=np.zeros(stable.shape),
+    )  # fmt: skip
+    (axes,) = curves_figure(made).axes
+    lines = {line.get_label(): line.get_color() for line in axes.lines}
+    one, other = (matplotlib.colors.to_rgb(lines[f"SZ, {name} [m]"]) for name in ("r_A", "r_bp"))
+    assert np.linalg.norm(np.subtract(one, other)) > 0.5
 
 
 @pytest.mark.parametrize("quick", [True, False])
