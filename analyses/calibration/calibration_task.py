@@ -36,9 +36,9 @@ from cdpr_drake.analyses.calibration.tracker import (
 )
 from cdpr_drake.analyses.calibration.turned_sensors import (
     far_outside,
+    flipped,
     turned_sensors,
     turned_where_lost,
-    upside_down,
 )
 from cdpr_drake.calibration.result import CalibrationResult
 from cdpr_drake.errors import CalibrationError
@@ -104,12 +104,8 @@ def calibrate(
     result = found.result
     misfit = misfits(result)
     up = prepared.first.rotation().matrix()[:, 2]
-    flipped = upside_down(result, up)
-    if flipped.any():
-        misfit = (
-            f"the platform is upside down against its home, or its start, in {np.sum(flipped)} of "
-            f"{len(flipped)} rows: sign or zero of a sensor?", *misfit,
-        )  # fmt: skip
+    over, undecided = flipped(result, up)
+    misfit = (*over, *misfit)
     outside = far_outside(task.robot, result)
     if outside.any():
         misfit = (
@@ -128,7 +124,7 @@ def calibrate(
             f"residuals are {result.spread():.3g} times what sigmas say; standard deviations are "
             "as much too small, or something that was not asked for is off"
         )
-    remarks += [*bad_sensors(result), *doubts(result, found.minima)]
+    remarks += [*bad_sensors(result), *doubts(result, found.minima), *undecided]
     remarks += [
         f"{name} is held at its bound, {value:.6g}; standard deviations are those of the others "
         "while it stays there"

@@ -137,3 +137,22 @@ def far_outside(robot: Robot, result: CalibrationResult) -> npt.NDArray[np.bool_
 def upside_down(result: CalibrationResult, up: Array) -> npt.NDArray[np.bool_]:
     """Which poses have the platform's z axis against that of a pose known upright, shape (k,)."""
     return np.asarray(result.stations.R[:, :, 2] @ up < 0.0)
+
+
+def flipped(result: CalibrationResult, up: Array) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """That poses were found upside down: why that is no fit, and what is only to be remarked.
+
+    A pose with no more readings than unknown coordinates may be found in several places, by chance
+    in one upside down. It tells nothing of the robot, and its sensors are not to blame.
+    """
+    over, alone = upside_down(result, up), result.surplus <= 0
+    wrong, remarks = int(np.sum(over & ~alone)), np.flatnonzero(over & alone) + 1
+    return tuple(
+        f"the platform is upside down against its home, or its start, in {wrong} of "
+        f"{len(over)} rows: sign or zero of a sensor?"
+        for _ in range(min(wrong, 1))
+    ), tuple(
+        f"row {row}: the pose found is upside down; it has no more readings than unknown "
+        "coordinates, so that several poses fit, and it tells nothing of the robot"
+        for row in remarks
+    )

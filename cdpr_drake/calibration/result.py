@@ -117,6 +117,8 @@ class CalibrationResult:
             are not among the unknown ones.
         by_row: Root mean square of residuals over sigma at each pose that counted, shape (k,), by
             kind; NaN where none did.
+        surplus: By how many the numbers that counted at each pose are more than its unknown
+            coordinates and tensions, shape (k,); a pose without any tells nothing of the robot.
     """
 
     status: str
@@ -147,6 +149,7 @@ class CalibrationResult:
     program: ProgramReport | None = None
     at_bounds: Mapping[str, float] = field(default_factory=dict)
     by_row: Mapping[str, Array] = field(default_factory=dict)
+    surplus: Array = field(default_factory=lambda: np.zeros(0, int))
 
     @property
     def correlation(self) -> Array:
@@ -222,10 +225,12 @@ def make_result(
     fits, rows, squares = {}, 0, 0.0
     by_row: dict[str, Array] = {}
     readings: dict[str, int] = {}
+    surplus = np.full(at.stations.count, -problem.freedom.count(at.stations.width))
     for k, term in enumerate(problem.terms):
         counts = used_rows(problem, k)
         whole = np.where(counts, term.evaluate(at)[0], np.nan)
         number = np.sum(counts, axis=1)
+        surplus += number
         by_row[term.kind] = np.sqrt(np.nansum(whole**2, axis=1) / np.where(number, number, np.nan))
         r = whole[counts]
         fits[term.kind] = _fit(r, int(np.sum(term.measured() & ~counts)))
@@ -250,7 +255,7 @@ def make_result(
         largest=tuple(find_outliers(problem, at, 0.0)[:MOST_LARGEST]),
         robust_cost=robust_cost(problem, at),
         chi_square=squares + float(prior @ prior), degrees=rows + known - unknown,
-        steps=found.steps, seconds=seconds, by_row=by_row,
+        steps=found.steps, seconds=seconds, by_row=by_row, surplus=surplus,
     )  # fmt: skip
 
 

@@ -13,7 +13,7 @@ from cdpr_drake.analyses.calibration.calibrated_robots import calibration_model
 from cdpr_drake.analyses.calibration.calibration_request import HOMING, default_unknown
 from cdpr_drake.analyses.calibration.fit_starts import upright_minima
 from cdpr_drake.analyses.calibration.log_file import CalibrationLog
-from cdpr_drake.analyses.calibration.turned_sensors import upside_down
+from cdpr_drake.analyses.calibration.turned_sensors import flipped, upside_down
 from cdpr_drake.calibration.stations import Point, Stations
 from cdpr_drake.geometry.poses import pose_error, pose_from_angles
 from cdpr_drake.models.robot_statics import rigid_platform
@@ -96,6 +96,19 @@ def test_poses_upside_down_are_told_from_upright_ones():
     result = SimpleNamespace(stations=stations(*turns))
     found = upside_down(result, np.array([0.0, 0.0, 1.0]))
     assert found.tolist() == [False, False, True, True, False]
+
+
+def test_a_pose_without_a_reading_to_spare_is_no_reason_to_blame_a_sensor():
+    turns = (0.0, 0.0, 0.0), (np.pi, 0.0, 0.0), (0.0, 2.0, 0.0)
+    up = np.array([0.0, 0.0, 1.0])
+    spare = SimpleNamespace(stations=stations(*turns), surplus=np.array([9, 0, 2]))
+    misfit, remarks = flipped(spare, up)
+    assert [words.split(" in ")[1] for words in misfit] == [
+        "1 of 3 rows: sign or zero of a sensor?"
+    ]
+    assert [words.split(":")[0] for words in remarks] == ["row 2"]
+    upright = SimpleNamespace(stations=stations(turns[0]), surplus=np.array([0]))
+    assert flipped(upright, up) == ((), ())
 
 
 def test_an_upright_minimum_goes_before_one_upside_down_that_costs_less():
