@@ -32,7 +32,7 @@ LARGEST = 400_000
 WIDTH = 960
 """Widest picture [px]."""
 
-WINDOW = (1280, 720)
+WINDOW = (1280, 860)
 """Of the browser that shows pages [px]."""
 
 MENU = "document.querySelectorAll('.dg')"
