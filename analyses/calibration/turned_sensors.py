@@ -143,9 +143,11 @@ def flipped(result: CalibrationResult, up: Array) -> tuple[tuple[str, ...], tupl
     """That poses were found upside down: why that is no fit, and what is only to be remarked.
 
     A pose with no more readings than unknown coordinates may be found in several places, by chance
-    in one upside down. It tells nothing of the robot, and its sensors are not to blame.
+    in one upside down. It tells nothing of the robot, and its sensors are not to blame, unless most
+    poses are upside down.
     """
-    over, alone = upside_down(result, up), result.surplus <= 0
+    over = upside_down(result, up)
+    alone = (result.surplus <= 0) & (np.mean(over) <= 0.5)
     wrong, remarks = int(np.sum(over & ~alone)), np.flatnonzero(over & alone) + 1
     return tuple(
         f"the platform is upside down against its home, or its start, in {wrong} of "

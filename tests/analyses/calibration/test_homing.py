@@ -99,16 +99,20 @@ def test_poses_upside_down_are_told_from_upright_ones():
 
 
 def test_a_pose_without_a_reading_to_spare_is_no_reason_to_blame_a_sensor():
-    turns = (0.0, 0.0, 0.0), (np.pi, 0.0, 0.0), (0.0, 2.0, 0.0)
+    turns = (0.0, 0.0, 0.0), (np.pi, 0.0, 0.0), (0.0, 2.0, 0.0), (0.0, 0.1, 0.0)
     up = np.array([0.0, 0.0, 1.0])
-    spare = SimpleNamespace(stations=stations(*turns), surplus=np.array([9, 0, 2]))
+    spare = SimpleNamespace(stations=stations(*turns), surplus=np.array([9, 0, 2, 0]))
     misfit, remarks = flipped(spare, up)
     assert [words.split(" in ")[1] for words in misfit] == [
-        "1 of 3 rows: sign or zero of a sensor?"
+        "1 of 4 rows: sign or zero of a sensor?"
     ]
     assert [words.split(":")[0] for words in remarks] == ["row 2"]
     upright = SimpleNamespace(stations=stations(turns[0]), surplus=np.array([0]))
     assert flipped(upright, up) == ((), ())
+    most = SimpleNamespace(stations=stations(*turns[1:]), surplus=np.zeros(3, int))
+    misfit, remarks = flipped(most, up)
+    assert "in 2 of 3 rows" in misfit[0]
+    assert remarks == ()
 
 
 def test_an_upright_minimum_goes_before_one_upside_down_that_costs_less():
