@@ -145,16 +145,21 @@ def flipped(result: CalibrationResult, up: Array) -> tuple[tuple[str, ...], tupl
     A pose with no more readings than unknown coordinates may be found in several places, by chance
     in one upside down. It tells nothing of the robot, and its sensors are not to blame, unless most
     poses are upside down.
+
+    Args:
+        result: What was found.
+        up: The platform's z axis in W at a pose known upright, shape (3,).
     """
     over = upside_down(result, up)
     alone = (result.surplus <= 0) & (np.mean(over) <= 0.5)
-    wrong, remarks = int(np.sum(over & ~alone)), np.flatnonzero(over & alone) + 1
-    return tuple(
-        f"the platform is upside down against its home, or its start, in {wrong} of "
-        f"{len(over)} rows: sign or zero of a sensor?"
-        for _ in range(min(wrong, 1))
-    ), tuple(
-        f"row {row}: the pose found is upside down; it has no more readings than unknown "
-        "coordinates, so that several poses fit, and it tells nothing of the robot"
-        for row in remarks
+    wrong = int(np.sum(over & ~alone))
+    misfit = (
+        f"the platform is upside down against its home, or its start, in {wrong} of {len(over)} "
+        "rows: sign or zero of a sensor?"
     )
+    remarks = tuple(
+        f"row {row + 1}: the pose found is upside down; it has no more readings than unknown "
+        "coordinates, so that several poses fit, and it tells nothing of the robot"
+        for row in np.flatnonzero(over & alone)
+    )
+    return (misfit,) if wrong else (), remarks

@@ -239,6 +239,7 @@ class Workbench:
 
     def move_to(self, coordinates: Sequence[float]) -> None:
         """Moves the platform to coordinates as `pose_axes` has them, and asks about that pose."""
+        self._dragged = False  # also where a browser went away with a point in its hand
         self.coordinates = [float(value) for value in coordinates]
         self.X_WP = pose_at(self.robot.value, self.coordinates)
         self.ask()
