@@ -2,6 +2,7 @@
 
 import json
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from tests.golden import making
 from tests.golden.comparison import MADE_BY
 from tests.golden.making import Item
 from tests.golden.problems import BATCH, COUNT, problem
+from tests.golden.questions import QUESTIONS, words_of, write_inputs
 from tests.golden.stripped import digest, read_results, strip
 
 RESULT = {
@@ -32,7 +34,7 @@ def kept(tmp_path, monkeypatch):
     """A folder of two golden files, and what makes them; `now` is what is made next."""
     now = {"studies/a": json.loads(json.dumps(RESULT)), "studies/b": {"x": 1}}
     items = [Item(f"{n}.json", lambda work, n=n: strip(now[n])) for n in now]
-    monkeypatch.setattr(golden, "all_items", lambda: items)
+    monkeypatch.setattr(golden, "all_items", lambda inputs: items)
     monkeypatch.setattr(golden, "code_state", lambda: "first")
 
     def run(*words):
@@ -113,7 +115,7 @@ def test_what_fails_is_told_and_leaves_nothing(kept, monkeypatch, capsys):
     def fail(work):
         raise RuntimeError("exit code 3: no space left")
 
-    monkeypatch.setattr(golden, "all_items", lambda: [Item("studies/c.json", fail)])
+    monkeypatch.setattr(golden, "all_items", lambda inputs: [Item("studies/c.json", fail)])
     assert run("make", str(folder)) == 1
     assert "studies/c.json: FAILED: exit code 3: no space left" in capsys.readouterr().out
     assert not list(folder.rglob("c.json"))
@@ -155,6 +157,17 @@ def test_a_text_among_arrays_is_read_without_versions(tmp_path):
 def test_every_study_has_a_golden_file():
     """Also those with a point in their name."""
     assert making.study_names() == list(STUDIES)
+
+
+def test_questions_on_files_have_their_inputs(tmp_path):
+    write_inputs(tmp_path)
+    files = {path.name for path in tmp_path.iterdir()}
+    named = {
+        word for text in QUESTIONS.values() for word in text.split()
+        if Path(word).suffix in (".csv", ".yaml", ".txt", ".log", ".py", ".png", ".gcode")
+    }  # fmt: skip
+    assert named == files
+    assert words_of("replay/lengths", tmp_path)[1] == str(tmp_path / "replay.csv")
 
 
 def test_a_refused_scenario_is_a_failure(tmp_path):

@@ -17,6 +17,7 @@ from pathlib import Path
 
 from tests.golden.comparison import Difference, compare_files, largest_relative
 from tests.golden.making import Item, all_items, answer_batch, code_state, made_by, make_item
+from tests.golden.questions import INPUTS
 
 MOST_SHOWN = 40
 """Differences of one file that are printed, unless --all."""
@@ -97,7 +98,7 @@ def main() -> int:
         parser.error(f"{folder}: there is no such folder; accepted: one that make wrote")
     now = folder if given.task == "make" else (given.now or folder / "now").absolute()
     now.mkdir(parents=True, exist_ok=True)
-    items = chosen(all_items(), given.only)
+    items = chosen(all_items(folder / INPUTS), given.only)
     failed = make(items, now, given.again, only_this_code=given.task == "compare")
     print(f"{len(items)} golden files, {failed} failed")
     if given.task == "make":
@@ -105,7 +106,9 @@ def main() -> int:
     names = [item.file for item in items]
     if given.only is None:  # what the present code does not know any more
         kept = [
-            p for part in ("problems", "scenarios", "studies") for p in folder.glob(f"{part}/*")
+            p
+            for part in sorted({item.file.split("/")[0] for item in items})
+            for p in folder.glob(f"{part}/*")
         ]
         names += sorted({str(p.relative_to(folder)) for p in kept} - set(names))
     return 1 if compare(names, folder, now, given.all) or failed else 0

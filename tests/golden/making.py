@@ -20,6 +20,7 @@ from typing import Any
 
 from tests.golden.comparison import MADE_BY
 from tests.golden.problems import BATCH, COUNT, problem, read_robots, write_files
+from tests.golden.questions import QUESTIONS, words_of
 from tests.golden.stripped import read_results, strip
 
 ROOT = Path(__file__).parents[2]
@@ -29,8 +30,19 @@ LONGEST_RUN = 10.0
 RENDERED_RUN = 1.0
 """Simulated time of a scenario with rendered images [s]."""
 
-ACCEPTED_CODES = (0, 2)
-"""Exit codes of an answer; 2 is a refusal, whose words are kept."""
+ACCEPTED_CODES = (0, 2, 6)
+"""Exit codes of an answer: 2 refuses, 6 tells that measurements contradict the model."""
+
+
+_WRITE_INPUTS = """
+import sys
+from pathlib import Path
+from tests.golden.questions import write_inputs
+part = Path(sys.argv[1] + ".part")
+part.mkdir(exist_ok=True)
+write_inputs(part)
+part.rename(sys.argv[1])
+"""
 
 
 @dataclass(frozen=True)
@@ -77,8 +89,12 @@ def scenario_facts() -> list[dict[str, Any]]:
     return facts
 
 
-def all_items() -> list[Item]:
-    """Every golden file."""
+def all_items(inputs: Path) -> list[Item]:
+    """Every golden file.
+
+    Args:
+        inputs: Folder with the input files of `QUESTIONS`, made when the first of them is asked.
+    """
     robots = read_robots(command("robots", "--json"))
     batches = [
         Item(f"problems/{first:04d}.json", lambda work, n=first: _batch(work, n, robots))
@@ -89,7 +105,29 @@ def all_items() -> list[Item]:
         Item(f"studies/{name}.json", lambda work, n=name: _written(work, "study", n, "--quick"))
         for name in study_names()
     ]
-    return [*batches, *scenarios, *studies]
+    questions = [
+        Item(f"{name}.json", lambda work, n=name: _question(work, n, inputs)) for name in QUESTIONS
+    ]
+    return [*batches, *scenarios, *studies, *questions]
+
+
+def _question(work: Path, name: str, inputs: Path) -> dict[str, Any]:
+    """Results of a command on input files, what it writes and what it prints, or its refusal."""
+    if not inputs.is_dir():
+        subprocess.run(
+            [sys.executable, "-c", _WRITE_INPUTS, str(inputs)], cwd=ROOT, check=True,
+        )  # fmt: skip
+    words = [_program(), *words_of(name, inputs), "--json"]
+    words += ["--out", "out.csv" if name.startswith("import-log") else "out"]
+    done = subprocess.run(
+        words, cwd=work, capture_output=True, text=True, check=False, env=_wide()
+    )  # fmt: skip
+    answer = _answer(done.returncode, done.stderr, work / "out")
+    if (work / "out.csv").is_file():
+        answer["rows"] = (work / "out.csv").read_text(encoding="utf-8").splitlines()
+    if done.returncode != 2:
+        answer["printed"] = strip(json.loads(done.stdout))
+    return answer
 
 
 def _scenario_items(facts: dict[str, Any]) -> list[Item]:
