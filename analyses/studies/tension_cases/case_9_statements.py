@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
+from scipy.linalg import null_space
 
 from cdpr_drake.analyses.studies.framework.runs import MissingRuns, Run, Runs
 from cdpr_drake.analyses.studies.framework.statement import (
@@ -29,7 +30,7 @@ from cdpr_drake.analyses.studies.tension_cases.slack_experiments import (
 from cdpr_drake.analyses.studies.tension_cases.slack_metrics import SETTLED
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.cable_paths import cable_jacobian
-from cdpr_drake.geometry.poses import pose_from_row
+from cdpr_drake.geometry.poses import pose_from_angles, pose_from_row
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_statics import tension_problem
 from cdpr_drake.tensions.methods import solution_space
@@ -45,6 +46,18 @@ PUBLISHED_TENSIONS = {
     9: (7.4, 4.8, 7.6, 9.3, 0.0, 0.0, 8.8, 9.5), 10: (8.3, 5.9, 5.2, 7.0, 1.8, 2.1, 6.8, 7.6),
 }  # fmt: skip
 """Tensions at the end of E1 to E10, servoing thesis table 5.1 [N]."""
+
+PUBLISHED_ETAS = {
+    1: (0.27, 0.32), 2: (-0.69, 0.07), 3: (7.77, 3.92), 4: (1.14, 1.44), 5: (7.75, 3.61),
+    6: (1.62, 1.82), 7: (7.83, 3.81), 8: (2.92, 2.68), 9: (8.11, 3.47), 10: (3.11, 1.88),
+}  # fmt: skip
+"""Coordinates eta of these tensions in the null space of W, servoing thesis table 5.1 [N]."""
+
+FINAL_POSE = pose_from_angles(np.array([-0.11, -0.20, 0.366]), np.radians([13.0, -20.0, 33.0]))
+"""Desired pose of the platform as it was measured, servoing thesis 5.3.1 [m, rad]."""
+
+ROUNDING = 0.05 * np.sqrt(8.0) + 0.005 * np.sqrt(2.0)
+"""Largest change of |N't| - |eta| by the printed digits of eight tensions and two etas [N]."""
 
 PUBLISHED_TIMES = {2: 0.4, 4: 0.8, 8: 1.6}
 """Time after which slack [cm] is gone with correction, section 5.3.1 [s]."""
@@ -318,7 +331,31 @@ def table(runs: Runs) -> Finding:
     )
 
 
+@statement(
+    "The values of eta that belong to the ten final sets of tensions.",
+    "table 5.1",
+    rule="Arithmetic alone: |N't| of the printed tensions at the printed pose, which no choice of "
+    f"the basis N changes, agrees with the printed |eta| within {ROUNDING:.2f} N, by which the "
+    "printed digits can change it. Each experiment is a part",
+)
+def eta(runs: Runs) -> Finding:
+    """Norms of the null-space coordinates of the printed tensions."""
+    J = cable_jacobian(FINAL_POSE, load_robot("acrobot_large").cable_set().without_pulleys())
+    N = null_space(J.T)
+    norms = {
+        number: (float(np.linalg.norm(N.T @ tensions)), float(np.linalg.norm(printed)))
+        for (number, tensions), printed in zip(
+            PUBLISHED_TENSIONS.items(), PUBLISHED_ETAS.values(), strict=True
+        )
+    }
+    words = ", ".join(f"E{n} {ours:.2f} ({theirs:.2f})" for n, (ours, theirs) in norms.items())
+    return Finding(
+        found=f"|N't|, in brackets the printed |eta| [N]: {words}",
+        held=[abs(ours - theirs) <= ROUNDING for ours, theirs in norms.values()],
+    )
+
+
 STATEMENTS: Sequence[Check] = (
-    gone, moves, underactuated, rank_kept, stable, estimate, image, polygon, table,
+    gone, moves, underactuated, rank_kept, stable, estimate, image, polygon, table, eta,
 )  # fmt: skip
 """What is judged of E1 to E10."""

@@ -162,7 +162,7 @@ NOT_MADE = {
         "worse_and_worse", "corners", "noticed_early", "first_laps", "underactuated", "takes_part",
         "same_tensions", "only_the_first",
     },
-    "case-9": {"polygon", "outward", "residuals", "sensor_accuracy", "stable"},
+    "case-9": {"eta", "polygon", "outward", "residuals", "sensor_accuracy", "stable"},
     "tension-methods": {"closed_form_steady", "unstable"},
     "stability-recipes": {"rising"},
 }  # fmt: skip

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.studies.framework.runs import MissingRuns
+from cdpr_drake.analyses.studies.framework.runs import MissingRuns, Runs
 from cdpr_drake.analyses.studies.tension_cases import case_9_statements as case_9
 from cdpr_drake.analyses.studies.tension_cases import case_10_statements as case_10
 from cdpr_drake.analyses.studies.tension_cases.case_9 import STUDY as CASE_9
@@ -106,6 +106,14 @@ def test_tensions_that_hold_the_platform_have_no_residual_and_others_do():
     slack = held.copy()
     slack[4] = 0.0
     assert not in_polygon(pose_row(X_WP), slack)[0]
+
+
+def test_printed_etas_belong_to_the_printed_tensions(monkeypatch):
+    """Their norms do at the printed pose; with two cables exchanged most do not."""
+    assert case_9.eta.judge(Runs([], list)).verdict_words == "confirmed"
+    exchanged = {n: (t[2], t[1], t[0], *t[3:]) for n, t in case_9.PUBLISHED_TENSIONS.items()}
+    monkeypatch.setattr(case_9, "PUBLISHED_TENSIONS", exchanged)
+    assert case_9.eta.judge(Runs([], list)).held < 5
 
 
 def run(name, outcome="timeout", seed=0, traces=None, case=CASE_9, **metrics):
