@@ -335,9 +335,13 @@ PRINTED_OPEN_LOOP = {
 """Section 2.3.1, figure 2.2b."""
 
 PRINTED_ACROBOT = {
-    **{key: {"image_max_px": "15"} for key in LENGTHS},
-    **{key: {"image_max_px": "10"} for key in IMAGE},
-    "1": {"image_max_px": "10", "estimate_max_m": "9", "estimate_max_rad": "2"},
+    **{key: {"image_max_px": "at most 15"} for key in LENGTHS},
+    **{key: {"image_max_px": "at most 10"} for key in IMAGE},
+    "1": {
+        "image_max_px": "at most 10",
+        "estimate_max_m": "at most 9",
+        "estimate_max_rad": "at most 2",
+    },
 }
 """Section 2.3.2, figure 2.4: bounds that the values stay below."""
 
@@ -383,8 +387,8 @@ STUDY = configuration_study(
                     "1": {"estimate_max_m": "70"},
                     "2": {"image_max_px": "35", "estimate_max_m": "> 100"},
                     "3": {"image_max_px": "35", "estimate_max_m": "> 100"},
-                    "6": {"estimate_max_m": "40"},
-                    "7": {"estimate_max_m": "40"},
+                    "6": {"estimate_max_m": "at most 40"},
+                    "7": {"estimate_max_m": "at most 40"},
                 },
                 "caroca_pbvs",
                 why=EXACT,

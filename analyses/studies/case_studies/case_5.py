@@ -85,7 +85,7 @@ STUDY = configuration_study(
                 "none",
                 "no perturbation",
                 HYBRID,
-                published={"outcome": "converged", "camera_max_m": "70"},
+                published={"outcome": "converged", "camera_max_m": "at most 70"},
             ),
             Configuration(
                 "within",

@@ -41,7 +41,9 @@ def _pairs() -> tuple[Configuration, ...]:
     made = []
     for name, changes in SETS.items():
         words = "no perturbation" if name == "none" else name
-        clean = {"image_max_px": "10", "camera_max_m": "10"} if name == "none" else {}
+        clean = (
+            {"image_max_px": "at most 10", "camera_max_m": "at most 10"} if name == "none" else {}
+        )
         shown = {} if name == "none" else {"image_max_px": "18 or less"}
         made += [
             Configuration(f"{name}_servo", f"{words}, 2 1/2 D", changes, published=clean),

@@ -150,14 +150,12 @@ STUDY = configuration_study(
         scenario="caroca_pbvs",
         changes=(*CAROCA_SERVO, *HYBRID, *CAROCA_RUN),
         configurations=(
-            Configuration(
-                "servo", "2 1/2 D", published={"image_max_px": "25", "camera_max_m": "70"}
-            ),
+            Configuration("servo", "2 1/2 D", published={"camera_max_m": "below 70"}),
             Configuration(
                 "tracking",
                 "tracking",
                 TRACKING,
-                published={"image_max_px": "5", "camera_max_m": "15"},
+                published={"image_max_px": "below 5", "camera_max_m": "at most 15"},
             ),
             *(
                 Configuration(
