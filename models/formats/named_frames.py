@@ -124,7 +124,7 @@ def read_named_frames(path: Path) -> RobotDraft:
 
 _PRESENTATION = {
     "visual", "material", "light", "scene", "gui", "@name", "@version", "@xmlns", "@canonical_link",
-    "sdf", "author", "description",
+    "author", "description",
 }  # fmt: skip
 """What only says how things look or are called."""
 
@@ -154,7 +154,7 @@ def _mark_used(seen: ET.Element, carried: CarriedBodies, draft: RobotDraft) -> N
     fixed = {joint.name() for joint in carried.fixed}
     left = {*chains, *others}
     for item in seen.iter():
-        tag, name = str(item.tag), item.get("name", "")
+        tag, name = str(item.tag), item.attrib.get("name", "")
         if tag in _STRUCTURE or tag in ("robot", "sdf", "model", "include"):
             mark(item)
         elif tag == "link" and name in left:
@@ -169,9 +169,10 @@ def _mark_used(seen: ET.Element, carried: CarriedBodies, draft: RobotDraft) -> N
         elif tag == "joint" and item.find("parent") is not None:
             ends = {end.get("link") or end.findtext(".", "") for end in item
                     if end.tag in ("parent", "child")}  # fmt: skip
-            if ends & left or name in fixed or item.get("type") in ("fixed", "ball"):
+            kind = item.attrib.get("type")
+            if ends & left or name in fixed or kind in ("fixed", "ball"):
                 mark_below(item)
-            elif item.get("type") == "floating" or name in carrying:
+            elif kind == "floating" or name in carrying:
                 mark(item)
                 for axis in item.iter("axis"):
                     mark(axis, "xyz", TEXT)
@@ -181,7 +182,7 @@ def _mark_used(seen: ET.Element, carried: CarriedBodies, draft: RobotDraft) -> N
             mark(item)
         elif tag == "transmission":
             actuated = item.find("joint")
-            if actuated is not None and actuated.get("name") in cables:
+            if actuated is not None and actuated.attrib.get("name") in cables:
                 mark_below(item)
         elif tag.endswith("ball_constraint") and chains:
             mark_below(item)
@@ -239,7 +240,7 @@ _Points = dict[str, Frame]
 
 
 def _points(plant: MultibodyPlant) -> tuple[_Points, _Points]:
-    """Frames of exit and anchor points by the cable's name; a link is one if it is fixed to another."""
+    """Frames of exit and anchor points by the cable's name; no link is one that is alone."""
     exits: _Points = {}
     anchors: _Points = {}
     joints = {
@@ -252,7 +253,8 @@ def _points(plant: MultibodyPlant) -> tuple[_Points, _Points]:
     for k in range(plant.num_frames()):
         frame = plant.get_frame(FrameIndex(k))
         if frame.is_body_frame():
-            if len(plant.GetBodiesWeldedTo(frame.body())) == 1:
+            alone = len(plant.GetBodiesWeldedTo(frame.body())) == 1
+            if alone and frame.body().is_floating_base_body():
                 continue
         elif FrameIndex(k) in joints:
             continue

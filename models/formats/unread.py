@@ -8,7 +8,6 @@ Drake or MuJoCo, the reader says what that took (`mark`).
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
-from collections import Counter
 from collections.abc import Collection, Iterator
 from typing import Any
 
@@ -17,6 +16,9 @@ TEXT = "text()"
 
 MOST_NAMED = 40
 """Parts of a file that a remark names; of more it says how many."""
+
+MOST_OWNERS = 4
+"""Elements whose parts they are that a remark names for each."""
 
 
 class WatchedElement(ET.Element):
@@ -118,13 +120,25 @@ def not_kept(document: Any, presentation: Collection[str] = ()) -> list[str]:
         presentation: Tags, keys and `TAG@ATTRIBUTE` that say only how things look or are called.
     """
     if isinstance(document, WatchedElement):
-        found = Counter(_left_of_element(document, "", presentation))
+        left = _left_of_element(document, "", "", presentation)
     else:
-        found = Counter(_left_of_mapping(document, "", presentation))
-    words = [name if count == 1 else f"{name} ({count} times)" for name, count in found.items()]
+        left = _left_of_mapping(document, "", presentation)
+    found: dict[str, list[str]] = {}
+    for where, name in left:
+        found.setdefault(where, []).append(name)
+    words = [where + _of(names) for where, names in found.items()]
     if len(words) > MOST_NAMED:
         words = [*words[:MOST_NAMED], f"{len(words) - MOST_NAMED} more"]
     return [f"Not kept: {', '.join(words)}."] if words else []
+
+
+def _of(names: list[str]) -> str:
+    """Whose parts they are, or how many."""
+    some = [name for name in dict.fromkeys(names) if name]
+    if not some:
+        return "" if len(names) == 1 else f" ({len(names)} times)"
+    more = [] if len(some) <= MOST_OWNERS else [f"{len(some) - MOST_OWNERS} more"]
+    return f" of {', '.join([*some[:MOST_OWNERS], *more])}"
 
 
 def _hidden(name: str, attribute: str, presentation: Collection[str]) -> bool:
@@ -132,32 +146,29 @@ def _hidden(name: str, attribute: str, presentation: Collection[str]) -> bool:
 
 
 def _left_of_element(
-    element: WatchedElement, path: str, presentation: Collection[str]
-) -> Iterator[str]:
-    tag = str(element.tag).rpartition("}")[2]
-    if not isinstance(element.tag, str) or tag in presentation:  # comments have a function
+    element: WatchedElement, path: str, owner: str, presentation: Collection[str]
+) -> Iterator[tuple[str, str]]:
+    if not isinstance(element.tag, str):  # of comments it is a function
+        return
+    tag = element.tag.rpartition("}")[2]
+    if tag in presentation:
         return
     here = f"{path}/{tag}" if path else tag
+    owner = dict(element.attrib).get("name") or owner
     if not any(item.used for item in element.iter() if isinstance(item, WatchedElement)):
-        yield _called(element, here)
+        yield here, owner
         return
-    left = sorted(
-        part
-        for part in element.parts() - element.used
-        if not _hidden(tag, part.rpartition("}")[2], presentation)
-    )
-    yield from (here if part == TEXT else f"{here}@{part}" for part in left)
+    for part in sorted(element.parts() - element.used):
+        if not _hidden(tag, part.rpartition("}")[2], presentation):
+            yield (here if part == TEXT else f"{here}@{part}"), owner
     for child in element:
         assert isinstance(child, WatchedElement)
-        yield from _left_of_element(child, here, presentation)
+        yield from _left_of_element(child, here, owner, presentation)
 
 
-def _called(element: WatchedElement, here: str) -> str:
-    name = dict(element.attrib).get("name")
-    return here if name is None else f"{here} {name}"
-
-
-def _left_of_mapping(content: Any, path: str, presentation: Collection[str]) -> Iterator[str]:
+def _left_of_mapping(
+    content: Any, path: str, presentation: Collection[str]
+) -> Iterator[tuple[str, str]]:
     if isinstance(content, list):
         for item in content:
             yield from _left_of_mapping(item, f"{path}[]", presentation)
@@ -168,6 +179,6 @@ def _left_of_mapping(content: Any, path: str, presentation: Collection[str]) -> 
         if here in presentation:
             continue
         if key not in content.used:
-            yield here
+            yield here, ""
         else:
             yield from _left_of_mapping(value, here, presentation)
