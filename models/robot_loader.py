@@ -442,7 +442,7 @@ def _check_sizes(robot: Robot, fail: Callable[[str, object, str], None]) -> None
     smallest = float(np.min(upper - lower))
     if robot.frame.beam is not None and robot.frame.beam > smallest:
         fail("frame.beam", f"{robot.frame.beam:g}", f"at most {smallest:g} [m], the frame's width")
-    home = robot.home.position
+    home, (lower, upper) = robot.home.position, robot.frame.bounds()
     if np.any(home < lower) or np.any(home > upper):
         fail("home.position", _words(home), f"within the frame, {_words(lower)} to {_words(upper)}")
 

@@ -216,11 +216,13 @@ def as_pose(robot: Robot, pose: object = None) -> RigidTransform:
 def check_pose(robot: Robot, X_WP: RigidTransform) -> None:
     """Checks that the platform is within the robot's frame, and on its line or in its plane.
 
+    A frame that was assumed refuses no pose.
+
     Raises:
-        TensionProblemError: Po lies outside of it, or the robot cannot have this pose.
+        TensionProblemError: Po lies outside the frame, or the robot cannot have this pose.
     """
     p = X_WP.translation()
-    lower, upper = robot.frame.lower, robot.frame.upper
+    lower, upper = robot.frame.bounds()
     if np.any(p < lower) or np.any(p > upper):
         raise TensionProblemError(
             f"pose: found {_words(p)}, outside the frame of {robot.name}; "

@@ -223,7 +223,7 @@ BEAM_SHARE = 1.0 / 30.0
 
 @dataclass(kw_only=True)
 class Frame:
-    """The robot's frame, a box of beams that the platform must stay in."""
+    """The robot's frame, a box of beams that the platform must stay in unless it was assumed."""
 
     lower: np.ndarray = array("Lower corner in W.", "m", (3,))
     upper: np.ndarray = array("Upper corner in W.", "m", (3,))
@@ -237,10 +237,16 @@ class Frame:
         "Its beams, in the place of those on the edges of the box.", required=False
     )
     assumed: bool = switch(
-        "Whether its corners were assumed, since the file that the robot came from has no frame; "
-        "such a frame bounds no hull of a workspace.",
+        "True if its corners were assumed, as the robot's source gives none. Such a frame bounds "
+        "default grids; it refuses no pose and limits no workspace hull.",
         False,
     )
+
+    def bounds(self) -> tuple[Array, Array]:
+        """Corners that Po must lie within, shape (3,) each [m]; infinite where it was assumed."""
+        if self.assumed:
+            return np.full(3, -np.inf), np.full(3, np.inf)
+        return np.asarray(self.lower, float), np.asarray(self.upper, float)
 
     def beam_width(self) -> float:
         """Thickness of the beams that are drawn [m]."""

@@ -115,7 +115,8 @@ def goal_context(robot: Robot | str, poses: PosesSettings, settings: DesignSetti
     upper = defaults.upper if poses.upper is None else poses.upper
     if np.any(lower > upper):
         raise DesignError("poses: found lower above upper; accepted: lower <= upper [m]")
-    if np.any(lower < robot.frame.lower) or np.any(upper > robot.frame.upper):
+    lowest, highest = robot.frame.bounds()
+    if np.any(lower < lowest) or np.any(upper > highest):
         raise DesignError(
             f"poses: found a box that leaves the frame of {robot.name}; accepted: one in it"
         )

@@ -144,7 +144,7 @@ class RobotTask(ABC):
         self._doubt = _doubt(robot, options.randomise)
         self._of_a_robot, self._drawn_members = (settings, by_tensions), dict[int, BatchMember]()
         edges = 0.5 * (np.asarray(robot.frame.upper) - np.asarray(robot.frame.lower))
-        self._lower, self._upper = np.array(robot.frame.lower), np.array(robot.frame.upper)
+        self._lower, self._upper = robot.frame.bounds()
         speed = min(robot.winch.rated_cable_speed(), SPEED_SHARE * float(np.max(edges)))
         basis = robot.motion_type().basis(robot.home.transform().rotation().matrix())
         room = np.min(np.abs(basis[3:]).T @ edges, initial=np.inf, where=np.any(basis[3:], axis=0))

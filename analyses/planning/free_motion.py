@@ -287,7 +287,9 @@ def place_constraints(
 ) -> list[PoseConstraint]:
     """What is asked of poses alone: the frame, cables apart, obstacles, the view."""
     cables, names = task.cables, [task.name(i) for i in range(task.cables.count)]
-    found: list[PoseConstraint] = [PlaceWithin(coordinates, robot.frame.lower, robot.frame.upper)]
+    found: list[PoseConstraint] = []
+    if not robot.frame.assumed:
+        found.append(PlaceWithin(coordinates, *robot.frame.bounds()))
     if asked.clearance is not None:
         radius = 0.5 * float(np.max(robot.diameters()))
         apart = asked.clearance + 2.0 * radius

@@ -103,7 +103,7 @@ def speeds(X_WP: Array, times: Array) -> tuple[Array, Array]:
 def leaves(robot: Robot, X_WP: Array) -> np.ndarray:
     """Whether an anchor point is outside the frame or in the ground, of rows of poses."""
     p_PB = robot.cable_set().p_PB
-    low, high = robot.frame.lower, robot.frame.upper
+    low, high = robot.frame.bounds()
     found = []
     for row in X_WP:
         p_WB = pose_from_row(row) @ p_PB

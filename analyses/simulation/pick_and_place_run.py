@@ -94,8 +94,9 @@ def run_pick_and_place(
 
 
 def _outcome(built: PickAndPlace, context: Context) -> Outcome:
-    p, frame = built.platform_pose(context).translation(), built.robot.frame
-    if np.any(p < frame.lower) or np.any(p > frame.upper):
+    p = built.platform_pose(context).translation()
+    lower, upper = built.robot.frame.bounds()
+    if np.any(p < lower) or np.any(p > upper):
         return Outcome.DIVERGED
     phase = built.machine.state(built.machine.GetMyContextFromRoot(context)).phase
     if phase in (Phase.DONE, Phase.FAILED):

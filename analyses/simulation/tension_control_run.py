@@ -217,9 +217,9 @@ def _outcome(
     stop = None if control.meters is None else control.meters.stop
     if status is not None and stop is not None and status.system() is stop:
         return Outcome.CONTACT
-    p, frame = X_WP.translation(), control.robot.frame
+    p, (lower, upper) = X_WP.translation(), control.robot.frame.bounds()
     below = 0.0 if scenario.world is None else scenario.world.room_below()
-    if np.any(p < frame.lower - [0.0, 0.0, below]) or np.any(p > frame.upper):
+    if np.any(p < lower - [0.0, 0.0, below]) or np.any(p > upper):
         return Outcome.DIVERGED
     done = time >= scenario.duration * (1.0 - 1e-12)
     return Outcome.COMPLETED if done else Outcome.RUNNING

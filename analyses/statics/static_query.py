@@ -303,8 +303,8 @@ def _cables(robot: Robot, pulleys: bool) -> CableSet:
 
 
 def _inside(robot: Robot, X_WP: RigidTransform) -> bool:
-    p = X_WP.translation()
-    return bool(np.all(p >= robot.frame.lower) and np.all(p <= robot.frame.upper))
+    p, (lower, upper) = X_WP.translation(), robot.frame.bounds()
+    return bool(np.all(p >= lower) and np.all(p <= upper))
 
 
 def _strength(cables: CableSet) -> Array:

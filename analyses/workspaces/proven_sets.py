@@ -143,11 +143,17 @@ class ProvenSets(PoseSets):
             limits=settings.limits, required=required, clearance=settings.clearance, around=around,
             pulleys=settings.pulleys,
         )  # fmt: skip
+        named = must if isinstance(must, Mapping) else {f"must[{k}]": p for k, p in enumerate(must)}
         low, high = loaded.reach()
+        if loaded.frame.assumed:  # which refuses no pose
+            places = np.array([low, high, *(pose[:3] for pose in named.values())])
+            free = low < high
+            low = np.where(free, places.min(axis=0), low)
+            high = np.where(free, places.max(axis=0), high)
         axes = tuple(np.unique([a, b]) for a, b in zip(low, high, strict=True))
         grid = WorkspaceGrid((axes[0], axes[1], axes[2]), np.unique(turned, axis=0))
         question = make_workspace_question(loaded, chosen, grid, asked=asked)
-        search = box_search(question, loaded)
+        search = box_search(question, loaded, region=(low, high))
         draft = ProvenSets(
             np.zeros((1, 6)),
             np.zeros((1, 6)),
@@ -158,7 +164,6 @@ class ProvenSets(PoseSets):
             about=_about(loaded, chosen, turned, obstacles, box, settings)
             | _turning_told(angular, moments),
         )
-        named = must if isinstance(must, Mapping) else {f"must[{k}]": p for k, p in enumerate(must)}
         return _prove(loaded, search.box, draft, (cover, dict(named), settings), say)
 
     def judge(self, positions: Array, rotations: Array) -> dict[str, np.ndarray]:

@@ -34,6 +34,7 @@ from cdpr_drake.models.formats.reading import (
     read_xml,
     robot_name,
 )
+from cdpr_drake.models.formats.unread import mark_below, not_kept, watched
 
 TOOL = "CASPR XML"
 
@@ -52,6 +53,9 @@ MOTIONS = {
     "P_Z": "1T",
 }
 """Joints of one body that cables move as a whole, and the motion that each gives."""
+
+_PRESENTATION = {"@num", "@id", "@name", "num", "@view_angle", "@display_range"}
+"""What only names or counts things, or says how they are drawn: a frame comes first."""
 
 _COORDINATES = {"SPATIAL_EULER_XYZ": 6, "SPATIAL_QUATERNION": 7}
 """Numbers of the joints that are no translations along axes with a turn about the third."""
@@ -99,7 +103,7 @@ def read_caspr(path: Path, model: str | None = None, cable_set: str | None = Non
         RobotFileError: The files do not describe a cable robot; says where.
     """
     bodies, cables, name = model_files(path, model)
-    root = read_xml(bodies)
+    root = watched(read_xml(bodies))
     link, joint = _only_link(bodies, root)
     kind = joint[0]
     if kind not in MOTIONS:
@@ -115,6 +119,7 @@ def read_caspr(path: Path, model: str | None = None, cable_set: str | None = Non
     system = root if root.tag == "links" else root.find("links")
     _display_range(bodies, system, draft)
     _cables(cables, cable_set, draft)
+    draft.remarks += not_kept(root, _PRESENTATION)
     return draft
 
 
@@ -255,8 +260,10 @@ def _coordinates(
     draft.R_WP = R.matrix()
     if given is not None:
         draft.home_position = offset + position
+    if count < 3:
+        return
     low, high = joint.get("q_min"), joint.get("q_max")
-    if low is None or high is None or count < 3:
+    if low is None or high is None:
         return
     n = len(moved)
     lower = numbers(path, "joint.q_min", low, count)[:n]
@@ -298,7 +305,7 @@ def _display_range(path: Path, system: ET.Element | None, draft: RobotDraft) -> 
 
 
 def _cables(path: Path, wanted: str | None, draft: RobotDraft) -> None:
-    root = read_xml(path)
+    root = watched(read_xml(path))
     sets = {item.get("id", ""): item for item in root.iter("cable_set")}
     if not sets:
         raise fail(path, "cable_set", "none", "at least one")
@@ -308,12 +315,15 @@ def _cables(path: Path, wanted: str | None, draft: RobotDraft) -> None:
     others = [other for other in sets if other != name]
     if others:
         draft.remarks.append(f"Cables of the set {name}; the file also has {', '.join(others)}.")
+        for other in others:
+            mark_below(sets[other])
     kinds: set[str] = set()
     for item in sets[name]:
         if not item.tag.startswith("cable_"):
             continue
         if "passive" in item.tag:
             draft.remarks.append(f"{item.get('name', 'a spring')}, a passive spring, was left out.")
+            mark_below(item)
             continue
         kinds.add(item.tag)
         draft.cables.append(_cable(path, item, draft))
@@ -323,6 +333,7 @@ def _cables(path: Path, wanted: str | None, draft: RobotDraft) -> None:
         draft.remarks.append(
             f"Cables are of the kind {', '.join(sorted(kinds))}; their stiffness was not kept."
         )
+    draft.remarks += not_kept(root, _PRESENTATION)
 
 
 def _cable(path: Path, item: ET.Element, draft: RobotDraft) -> DraftCable:

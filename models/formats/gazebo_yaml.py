@@ -29,8 +29,16 @@ from cdpr_drake.models.formats.reading import (
     read_yaml,
     robot_name,
 )
+from cdpr_drake.models.formats.unread import mark_below, not_kept, watched
 
 TOOL = "Gazebo cable robot YAML"
+
+_PRESENTATION = {
+    f"{model}{key}"
+    for model in ("", "model.")
+    for key in ("frame.color", "frame.type", "platform.color", "platform.type", "platform.visual")
+}
+"""Keys that only say how things look, and that they are boxes."""
 
 _OUTSIDE = 1.5
 """Anchor points farther from the middle than this many half edges are not on the platform."""
@@ -42,7 +50,7 @@ def read_gazebo_yaml(path: Path) -> RobotDraft:
     Raises:
         RobotFileError: The file does not describe one; says where.
     """
-    content = read_yaml(path)
+    content = watched(read_yaml(path))
     if not is_gazebo_yaml(content):
         found = kind_of(content, YAML_WORDS)
         raise fail(path, "top", found, "a mapping with points and platform")
@@ -81,6 +89,7 @@ def read_gazebo_yaml(path: Path) -> RobotDraft:
         )
     _anchors_in_platform(draft)
     _remarks(content, body, draft)
+    draft.remarks += not_kept(content, _PRESENTATION)
     return draft
 
 
@@ -173,13 +182,14 @@ def _off_the_box(draft: RobotDraft, points: Array) -> bool:
 
 def _remarks(content: dict[str, Any], body: dict[str, Any], draft: RobotDraft) -> None:
     cable = body.get("cable", {})
-    if isinstance(cable, dict) and "mass" in cable:
+    if isinstance(cable, dict) and cable.get("mass") is not None:
         draft.remarks.append(
             f"cable.mass, {cable['mass']}, is that of a link of the simulator and was not kept."
         )
-    if "sim_cables" in body:
+    if body.get("sim_cables") is not None:
         draft.remarks.append("sim_cables chooses how that simulator draws cables; not kept.")
-    if "controllers" in content:
+    if content.get("controllers") is not None:
+        mark_below(content["controllers"])
         draft.remarks.append("Controllers were not kept; scenarios have their own.")
 
 

@@ -31,6 +31,11 @@ _MAGIC = b"MATLAB 5.0 MAT-file"
 
 _PARTS = ("EndEffector", "Trasmission")
 
+_READ = {
+    *_PARTS, "Platform", "m", "PtoG", "InertialMatrix", "points", "Pulley", "r",
+    "CableEnterPosition", "FixedFrame",
+}  # fmt: skip
+
 
 def is_grab_mat(path: Path) -> bool:
     """Whether a file is a robot of these tools."""
@@ -112,7 +117,18 @@ def read_grab_mat(path: Path) -> RobotDraft:
         draft.remarks.append(
             f"{len(draft.cables)} cables for 6 degrees of freedom: an underactuated robot."
         )
+    rest = sorted(_fields(robot) - _READ)
+    if rest:
+        draft.remarks.append(f"Fields that were not kept: {', '.join(rest)}.")
     return draft
+
+
+def _fields(value: Any) -> set[str]:
+    """Names of all fields of a structure and of those in it."""
+    if isinstance(value, np.ndarray) and value.dtype == object:
+        return set().union(*map(_fields, value.ravel()))
+    names = set(getattr(value, "_fieldnames", ()))
+    return names.union(*(_fields(getattr(value, name)) for name in names))
 
 
 def _axis(path: Path, where: str, pulley: Any) -> Array:

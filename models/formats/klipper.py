@@ -2,7 +2,8 @@
 
 Each section [stepper_a], [stepper_b], ... has the anchor of a cable, `anchor_x`, `anchor_y`,
 `anchor_z` [mm]; `rotation_distance` is the cable of one turn of the drum [mm], behind `gear_ratio`
-as 57:11, 2:1. Cables end in one point, and lengths count from where that is at the origin.
+as 57:11, 2:1. Cables end in one point, and lengths count from where that is at the origin. Of
+firmware that compensates for flex, [winch] has `mover_weight`, the mass of what moves [kg].
 
 Source: klipper3d.org, Config_Reference, cable winch kinematics; config/example-winch.cfg.
 """
@@ -82,9 +83,33 @@ def read_klipper(path: Path) -> RobotDraft:
     if speed is not None:
         draft.cable_speed = MM * number(path, "printer.max_velocity", speed)
         draft.remarks.append("max_velocity, that of the tool, was taken as that of the cables.")
+    weight = parser.get("winch", "mover_weight", fallback=None)
+    if weight is not None:
+        draft.mass = number(path, "winch.mover_weight", weight)
+        if draft.mass <= 0.0:
+            raise fail(path, "winch.mover_weight", weight, "above 0 [kg]")
     if unread:
         draft.remarks.append(f"Keys of steppers that were not kept: {', '.join(sorted(unread))}.")
+    _other_sections(parser, len(draft.cables), draft)
     return draft
+
+
+def _other_sections(parser: configparser.RawConfigParser, count: int, draft: RobotDraft) -> None:
+    """Remarks on sections and keys that a robot has no place for, and on files that are included."""
+    steppers = {f"stepper_{letter.lower()}" for letter in LETTERS[:count]}
+    read = {"printer": {"kinematics", "max_velocity"}, "winch": {"mover_weight"}}
+    left, included = [], []
+    for section in parser.sections():
+        if section.startswith("include "):
+            included.append(section.removeprefix("include ").strip())
+        elif section not in steppers:
+            keys = set(parser[section]) - read.get(section, set())
+            whole = section not in read
+            left += [section] if whole else [f"{section}.{key}" for key in sorted(keys)]
+    if included:
+        draft.remarks.append(f"Included files were not read: {', '.join(included)}.")
+    if left:
+        draft.remarks.append(f"Not kept: {', '.join(left)}.")
 
 
 def _drum(path: Path, section: str, given: configparser.SectionProxy) -> tuple[float, float]:

@@ -80,7 +80,24 @@ def read_maslow(path: Path) -> RobotDraft:
         scale = content.get(f"Maslow_{name}", 1.0)
         if number(path, f"Maslow_{name}", scale) != 1.0:
             draft.remarks.append(f"Maslow_{name}, {scale}, was not kept.")
+    _others(content, draft)
     return draft
+
+
+def _others(content: dict[str, Any], draft: RobotDraft) -> None:
+    """Remarks on what a robot has no place for: the machine's electronics, axes, retraction."""
+    read = {f"{corner}{axis}" for corner in MASLOW_CORNERS for axis in "XYZ"} | set(_EXTRA)
+    kinematics = content.get("kinematics")
+    left = []
+    for key, value in content.items():
+        if key == "kinematics" and isinstance(kinematics, dict):
+            own = kinematics.get(MASLOW_SECTION)
+            left += [f"{key}.{other}" for other in kinematics if other != MASLOW_SECTION]
+            left += [f"{key}.{MASLOW_SECTION}.{k}" for k in own or {} if str(k) not in read]
+        elif str(key).removeprefix("Maslow_") not in read | {"vertical", "Scale_X", "Scale_Y"}:
+            left.append(str(key))
+    if left:
+        draft.remarks.append(f"Not kept: {', '.join(left)}.")
 
 
 def _anchor(path: Path, settings: dict[str, Any], corner: str) -> Array:

@@ -1,7 +1,8 @@
 """Robots in MuJoCo's MJCF: a body and spatial tendons, each from a site of the world to one of it.
 
 MuJoCo itself compiles the file, so defaults, includes, degrees and Euler sequences mean what they
-mean there.
+mean there. The platform is the body that moves and what is fixed to it; bodies that it carries on
+joints are fixed where they stand. A keyframe `home`, or the only one, has the home pose.
 
 Source: MuJoCo's XML reference, `tendon/spatial`.
 """
@@ -10,7 +11,7 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from pydrake.math import RotationMatrix
@@ -18,13 +19,18 @@ from pydrake.math import RotationMatrix
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import RobotFileError
 from cdpr_drake.models.formats.draft import DraftCable, RobotDraft
-from cdpr_drake.models.formats.reading import fail, read_xml, robot_name
+from cdpr_drake.models.formats.mjcf_parts import (
+    SMALLEST,
+    Compiled,
+    compiled_model,
+    home_key,
+    mark_used,
+)
+from cdpr_drake.models.formats.platform_motion import moved_by_joints, set_motion
+from cdpr_drake.models.formats.reading import fail, robot_name
+from cdpr_drake.models.formats.unread import not_kept
 
 TOOL = "MJCF"
-
-SMALLEST = "smallest_tension"
-"""The custom number that has the robot's smallest tension [N]: a motor with a smallest pull above 0
-would pull when nothing is commanded."""
 
 _STIFFEST = 1e13
 """Young's modulus [Pa] above which springs are no cables of the width that is drawn."""
@@ -32,16 +38,8 @@ _STIFFEST = 1e13
 _SAME = 1e-9
 """Share by which moduli that follow from stiffness, length and width are alike."""
 
-_ACROSS = 1e-6
-"""How far axes of joints may be off each other, or off an axis of W."""
-
-
-class _Compiled(NamedTuple):
-    """MuJoCo, a compiled model, and its data at the initial pose."""
-
-    mujoco: Any
-    model: Any
-    data: Any
+_LEVEL = 1e-9
+"""How far a box may be turned against P."""
 
 
 def read_mjcf(path: Path) -> RobotDraft:
@@ -51,42 +49,71 @@ def read_mjcf(path: Path) -> RobotDraft:
         RobotFileError: MuJoCo is not installed or cannot read the file, or its tendons do not
             hold one body.
     """
-    read_xml(path)  # for its message where it is not well-formed
-    try:
-        import mujoco
-    except ImportError as problem:
-        raise RobotFileError(
-            f"{path}: MJCF is read by MuJoCo, which is not installed; pip install cdpr_drake[mjcf]"
-        ) from problem
-    try:
-        model = mujoco.MjModel.from_xml_path(str(path))
-    except ValueError as problem:
-        words = " ".join(str(problem).split())
-        raise RobotFileError(f"{path}: MuJoCo cannot read it: {words[:300]}") from problem
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
+    compiled, document, missing = compiled_model(path)
+    mujoco, model, data = compiled
     draft = RobotDraft(name=robot_name(path.stem), tool=TOOL, title=f"from {path.name}")
+    draft.remarks += missing
+    key = home_key(model)
+    if key is not None:
+        mujoco.mj_resetDataKeyframe(model, data, key)
+        draft.remarks.append(f"Home is the keyframe {model.key(key).name or key}.")
+    mujoco.mj_forward(model, data)
     gravity = np.array(model.opt.gravity)
     draft.gravity = float(np.linalg.norm(gravity))
     if np.any(np.abs(gravity[:2]) > 1e-9) or gravity[2] > 0.0:
         draft.gravity_direction = gravity
-    bodies: set[int] = set()
-    compiled = _Compiled(mujoco, model, data)
+    anchors: dict[str, int] = {}
     for index in range(model.ntendon):
-        _tendon(path, compiled, index, draft, bodies)
+        _tendon(path, compiled, index, draft, anchors)
     if not draft.cables:
         raise fail(path, "tendon", "no spatial tendon", "one for each cable")
-    if len(bodies) != 1:
-        names = ", ".join(model.body(body).name or str(body) for body in sorted(bodies))
-        raise fail(path, "tendon", f"tendons to {names}", "tendons to one body, the platform")
-    _platform(path, compiled, bodies.pop(), draft)
+    body = _root(path, compiled, anchors)
+    composite = _composite(model, body)
+    _anchor_points(compiled, body, anchors, draft)
+    _motion(path, compiled, body, draft)
+    _inertia(compiled, body, composite, draft)
+    _box(compiled, body, composite, draft)
+    mark_used(document, compiled, body, composite, key, draft)
+    draft.remarks += not_kept(document, PRESENTATION)
     return draft
 
 
+PRESENTATION = {
+    "visual", "statistic", "asset", "light", "size", "mesh", "material", "texture", "@name",
+    "@class", "@rgba", "@material", "@group", "@model", "@user", "@childclass", "site@size",
+    "site@type", "@color",
+}  # fmt: skip
+"""What only says how things look or are called."""
+
+
+def _joints(compiled: Compiled, body: int) -> list[tuple[str, str]]:
+    """Kinds and names of the joints of a body."""
+    mujoco, model, _ = compiled
+    words = {
+        int(mujoco.mjtJoint.mjJNT_FREE): "free",
+        int(mujoco.mjtJoint.mjJNT_BALL): "ball",
+        int(mujoco.mjtJoint.mjJNT_SLIDE): "slide",
+        int(mujoco.mjtJoint.mjJNT_HINGE): "hinge",
+    }
+    first, count = int(model.body_jntadr[body]), int(model.body_jntnum[body])
+    return [
+        (words[int(model.jnt_type[k])], model.joint(k).name or str(k))
+        for k in range(first, first + count)
+    ]
+
+
+def _joint_words(compiled: Compiled, body: int) -> str:
+    return ", ".join(f"{kind} joint {name}" for kind, name in _joints(compiled, body))
+
+
+def _name(model: Any, body: int) -> str:
+    return str(model.body(body).name or body)
+
+
 def _tendon(
-    path: Path, compiled: _Compiled, index: int, draft: RobotDraft, bodies: set[int]
+    path: Path, compiled: Compiled, index: int, draft: RobotDraft, anchors: dict[str, int]
 ) -> None:
-    """Adds the cable of a tendon, and its body to the bodies."""
+    """Adds the cable of a tendon, and its site on the platform to the anchors."""
     mujoco, model, data = compiled
     tendon = model.tendon(index)
     name = tendon.name or f"C{index + 1}"
@@ -95,30 +122,77 @@ def _tendon(
     if np.any(kinds == mujoco.mjtWrap.mjWRAP_JOINT):
         draft.remarks.append(f"Tendon {name} couples joints and is no cable; left out.")
         return
-    if np.any(kinds != mujoco.mjtWrap.mjWRAP_SITE):
-        raise fail(path, f"tendon {name}", "pulleys or wrapping geometry", "sites only")
+    for k in range(start, start + count):
+        kind, thing = model.wrap_type[k], int(model.wrap_objid[k])
+        if kind == mujoco.mjtWrap.mjWRAP_PULLEY:
+            raise fail(path, f"tendon {name}", f"a pulley of divisor {model.wrap_prm[k]:g}",
+                       "sites only, without branches")  # fmt: skip
+        if kind != mujoco.mjtWrap.mjWRAP_SITE:
+            geom = model.geom(thing).name or thing
+            raise fail(path, f"tendon {name}", f"a wrap round the geom {geom}",
+                       "sites only; a pulley is given as the radius of an exit point")  # fmt: skip
     sites = [int(site) for site in model.wrap_objid[start : start + count]]
     fixed = [int(model.body_weldid[model.site_bodyid[site]]) == 0 for site in sites]
     if fixed[0] is False:
         sites, fixed = sites[::-1], fixed[::-1]
     moving = [site for site, still in zip(sites, fixed, strict=True) if not still]
+    if not moving:
+        body = int(model.site_bodyid[sites[-1]])
+        raise fail(path, f"tendon {name}", f"body {_name(model, body)} without a joint",
+                   "a platform that can move")  # fmt: skip
     if len(moving) != 1 or fixed != sorted(fixed, reverse=True) or len(sites) < 2:
-        raise fail(path, f"tendon {name}", f"{len(moving)} sites on moving bodies",
-                   "sites of the world, then one of the platform")  # fmt: skip
+        roots = dict.fromkeys(int(model.body_weldid[model.site_bodyid[site]]) for site in moving)
+        words = [f"{_name(model, root)} ({_joint_words(compiled, root)})" for root in roots]
+        raise moved_by_joints(
+            path, f"tendon {name}", f"{len(moving)} sites on moving bodies, {', '.join(words)}"
+        )
     if len(sites) > 2:
         draft.remarks.append(f"{name} runs over {len(sites) - 1} sites of the world; it leaves "
                              "from the last one.")  # fmt: skip
-    body = int(model.site_bodyid[moving[0]])
-    bodies.add(body)
-    R_WB = np.array(data.xmat[body]).reshape(3, 3)
-    anchor = R_WB.T @ (data.site_xpos[moving[0]] - data.xpos[body])
+    anchors[name] = moving[0]
     lower, upper = _forces(mujoco, model, index)
     draft.cables.append(
         DraftCable(
-            name=name, exit_point=np.array(data.site_xpos[sites[-2]]), anchor_point=anchor,
+            name=name, exit_point=np.array(data.site_xpos[sites[-2]]), anchor_point=np.zeros(3),
             lower=lower, upper=upper, material=_material(model, index, draft),
         )
     )  # fmt: skip
+
+
+def _root(path: Path, compiled: Compiled, anchors: dict[str, int]) -> int:
+    """The body that carries all anchors, which are on it or on bodies fixed to it."""
+    _, model, _ = compiled
+    roots = dict.fromkeys(int(model.body_weldid[model.site_bodyid[s]]) for s in anchors.values())
+    if len(roots) > 1:
+        words = [f"{_name(model, body)} ({_joint_words(compiled, body)})" for body in roots]
+        raise moved_by_joints(path, "tendon", f"tendons to {', '.join(words)}")
+    body = next(iter(roots))
+    parent = int(model.body_weldid[model.body_parentid[body]])
+    if parent != 0:
+        raise fail(
+            path, f"body {_name(model, body)}",
+            f"on {_name(model, parent)} ({_joint_words(compiled, parent)})",
+            "a body that moves against the world; a mechanism file takes bodies on moving ones",
+        )  # fmt: skip
+    return body
+
+
+def _composite(model: Any, body: int) -> list[int]:
+    """A body and all that it carries; ids of MuJoCo grow from parents to children."""
+    found = [body]
+    for other in range(body + 1, model.nbody):
+        if int(model.body_parentid[other]) in found:
+            found.append(other)
+    return found
+
+
+def _anchor_points(
+    compiled: Compiled, body: int, anchors: dict[str, int], draft: RobotDraft
+) -> None:
+    data = compiled.data
+    R_WB = np.array(data.xmat[body]).reshape(3, 3)
+    for cable, site in zip(draft.cables, anchors.values(), strict=True):
+        cable.anchor_point = R_WB.T @ (data.site_xpos[site] - data.xpos[body])
 
 
 def _material(model: Any, tendon: int, draft: RobotDraft) -> dict[str, float]:
@@ -149,7 +223,8 @@ def _forces(mujoco: Any, model: Any, tendon: int) -> tuple[float | None, float |
             continue
         if int(model.actuator_trnid[k, 0]) != tendon or not model.actuator_forcelimited[k]:
             continue
-        low, high = -model.actuator_forcerange[k, 1], -model.actuator_forcerange[k, 0]
+        forces = -model.actuator_gear[k, 0] * model.actuator_forcerange[k]
+        low, high = float(np.min(forces)), float(np.max(forces))
         if named >= 0:
             low = model.numeric_data[model.numeric_adr[named]]
         if high > 0.0:
@@ -157,69 +232,69 @@ def _forces(mujoco: Any, model: Any, tendon: int) -> tuple[float | None, float |
     return None, None
 
 
-def _platform(path: Path, compiled: _Compiled, body: int, draft: RobotDraft) -> None:
-    mujoco, model, data = compiled
-    if int(model.body_parentid[body]) != 0:
-        raise fail(path, f"body {model.body(body).name}", "a parent that moves", "a free body")
-    first, count = int(model.body_jntadr[body]), int(model.body_jntnum[body])
-    kinds = [int(kind) for kind in model.jnt_type[first : first + count]]
-    axes = np.array(data.xaxis[first : first + count]).reshape(-1, 3)
-    free, slide, hinge = (
-        int(mujoco.mjtJoint.mjJNT_FREE),
-        int(mujoco.mjtJoint.mjJNT_SLIDE),
-        int(mujoco.mjtJoint.mjJNT_HINGE),
-    )
-    along = [axis for kind, axis in zip(kinds, axes, strict=True) if kind == slide]
-    about = [axis for kind, axis in zip(kinds, axes, strict=True) if kind == hinge]
-    motion = None if len(along) + len(about) < count else _motion_of(along, about)
-    if kinds == [free]:
+def _motion(path: Path, compiled: Compiled, body: int, draft: RobotDraft) -> None:
+    """Motion type and home pose."""
+    _, model, data = compiled
+    joints = _joints(compiled, body)
+    first = int(model.body_jntadr[body])
+    axes = np.array(data.xaxis[first : first + len(joints)]).reshape(-1, 3)
+    kinds = [kind for kind, _ in joints]
+    if kinds == ["free"]:
         draft.motion = "3R3T"
-    elif motion is None:
-        raise fail(path, f"body {model.body(body).name}", f"{count} joints of its kinds",
-                   "a free joint, slides across each other, or two of them and a hinge about what "
-                   "is across both")  # fmt: skip
     else:
-        draft.motion, draft.axis, draft.origin = *motion, np.array(data.xpos[body])
-        if draft.is_level():
-            draft.plane_height = float(data.xpos[body][2])
+        known = set(kinds) <= {"slide", "hinge"}
+        set_motion(
+            path, draft, _joint_words(compiled, body),
+            [axis for kind, axis in zip(kinds, axes, strict=True) if kind == "slide" and known],
+            [axis for kind, axis in zip(kinds, axes, strict=True) if kind == "hinge"],
+            np.array(data.xpos[body]),
+        )  # fmt: skip
     draft.home_position = np.array(data.xpos[body])
     draft.R_WP = np.array(data.xmat[body]).reshape(3, 3)
-    draft.mass = float(model.body_mass[body])
-    draft.center_of_mass = np.array(model.body_ipos[body])
-    R = np.zeros(9)
-    mujoco.mju_quat2Mat(R, model.body_iquat[body])
-    about_com = R.reshape(3, 3) @ np.diag(model.body_inertia[body]) @ R.reshape(3, 3).T
-    draft.inertia = about_com[(0, 1, 2, 0, 0, 1), (0, 1, 2, 1, 2, 2)]
-    for geom in range(model.ngeom):
-        same = int(model.geom_bodyid[geom]) == body
-        if same and model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_BOX:
+
+
+def _inertia(compiled: Compiled, body: int, composite: list[int], draft: RobotDraft) -> None:
+    """Mass, centre of mass and inertia of all bodies that move as one, by parallel axes."""
+    _, model, data = compiled
+    R_PW = np.array(data.xmat[body]).reshape(3, 3).T
+    masses = np.array(model.body_mass)[composite]
+    points = (np.array(data.xipos)[composite] - data.xpos[body]) @ R_PW.T
+    draft.mass = float(np.sum(masses))
+    draft.center_of_mass = com = masses @ points / draft.mass
+    inertia = np.zeros((3, 3))
+    for k, part in enumerate(composite):
+        R, d = R_PW @ np.array(data.ximat[part]).reshape(3, 3), points[k] - com
+        inertia += R @ np.diag(model.body_inertia[part]) @ R.T
+        inertia += masses[k] * (float(d @ d) * np.eye(3) - np.outer(d, d))
+    draft.inertia = inertia[(0, 1, 2, 0, 0, 1), (0, 1, 2, 1, 2, 2)]
+    parts = [part for part, mass in zip(composite, masses, strict=True) if mass > 0.0]
+    if len(parts) > 1:
+        words = ", ".join(f"{_name(model, k)} {model.body_mass[k]:g} kg" for k in parts)
+        draft.remarks.append(f"The platform is the sum of bodies fixed to each other: {words}.")
+    for part in composite[1:]:
+        if int(model.body_jntnum[part]):
+            draft.remarks.append(
+                f"Body {_name(model, part)}, on {_joint_words(compiled, part)}, was fixed where it "
+                "stands; it counts as part of the platform."
+            )
+
+
+def _box(compiled: Compiled, body: int, composite: list[int], draft: RobotDraft) -> None:
+    """The first box along axes of P; a remark on shapes that are none."""
+    mujoco, model, data = compiled
+    R_PW = np.array(data.xmat[body]).reshape(3, 3).T
+    others = 0
+    for geom in (g for part in composite for g in range(model.ngeom) if model.geom_bodyid[g] == part):
+        R = R_PW @ np.array(data.geom_xmat[geom]).reshape(3, 3)
+        is_box = model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_BOX
+        if draft.box_size is None and is_box and np.max(np.abs(R - np.eye(3))) < _LEVEL:
             draft.box_size = 2.0 * np.array(model.geom_size[geom])
-            draft.box_center = np.array(model.geom_pos[geom])
-            return
-
-
-def _motion_of(along: list[Array], about: list[Array]) -> tuple[str, Array | None] | None:
-    """Motion type and its axis from axes of slides and hinges in W; None where there is none."""
-    if len(about) > 1 or not along:
-        return None
-    A = np.array(along)
-    if len(along) > 3 or np.max(np.abs(A @ A.T - np.eye(len(along)))) > _ACROSS:
-        return None
-    if len(along) == 3:
-        return None if about else ("3T", None)
-    if len(along) == 1:
-        return None if about else ("1T", _positive(A[0]))
-    normal = _positive(np.cross(A[0], A[1]))
-    if not about:
-        return "2T", normal
-    return ("2T1R", normal) if abs(abs(normal @ about[0]) - 1.0) < _ACROSS else None
-
-
-def _positive(axis: Array) -> Array:
-    """An axis or its opposite, the largest component above 0, exact where it is one of W."""
-    axis = axis * np.sign(axis[np.argmax(np.abs(axis))])
-    near = np.round(axis)
-    return near if np.allclose(axis, near, atol=_ACROSS) else axis
+            draft.box_center = R_PW @ (data.geom_xpos[geom] - data.xpos[body])
+        else:
+            others += 1
+    if others:
+        draft.remarks.append(f"Shapes of the platform that are not its box count for its mass "
+                             f"alone: {others}.")  # fmt: skip
 
 
 def write_mjcf(draft: RobotDraft, stiffness: Array, lengths: Array) -> str:

@@ -21,12 +21,21 @@ from pydrake.geometry import Box, Cylinder, Role, SceneGraph
 from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import FrameIndex, PrismaticJoint, RigidBody
+from pydrake.multibody.tree import Frame, FrameIndex, PrismaticJoint
+from pydrake.systems.framework import Context
 
+from cdpr_drake.arrays import Array
 from cdpr_drake.errors import RobotFileError
+from cdpr_drake.models.formats.carried_bodies import (
+    CarriedBodies,
+    find_carried,
+    set_carried_motion,
+    set_composite_inertia,
+)
 from cdpr_drake.models.formats.draft import DraftCable, RobotDraft
 from cdpr_drake.models.formats.file_kinds import is_sdformat
 from cdpr_drake.models.formats.reading import fail, numbers, read_xml, robot_name
+from cdpr_drake.models.formats.unread import TEXT, mark, mark_below, not_kept, watched
 
 SDF_TOOL = "SDFormat"
 URDF_TOOL = "URDF"
@@ -43,12 +52,13 @@ def read_named_frames(path: Path) -> RobotDraft:
         RobotFileError: Drake cannot read the file, or its frames do not make a cable robot.
     """
     root = read_xml(path)
+    seen = watched(root)
     tool = SDF_TOOL if is_sdformat(root) else URDF_TOOL
     model = root.find("model") if is_sdformat(root) else root
     if is_sdformat(root) and model is not None and _chains(model):
-        return _read_chains(path, model)
+        return _read_chains(path, seen)
     words = path.stem if model is None else model.get("name") or path.stem
-    draft = RobotDraft(name=robot_name(words), tool=tool, title=words, motion="3R3T")
+    draft = RobotDraft(name=robot_name(words), tool=tool, title=words)
     scene_graph = SceneGraph()
     plant = MultibodyPlant(0.0)
     plant.RegisterAsSourceForSceneGraph(scene_graph)
@@ -79,31 +89,118 @@ def read_named_frames(path: Path) -> RobotDraft:
     lonely = sorted(set(exits) ^ set(anchors))
     if lonely:
         draft.remarks.append("No cable was made of frames without a partner: " + ", ".join(lonely))
-    body = _platform(path, [anchors[name][0] for name in names])
+    carried = find_carried(
+        path, plant, {name: exits[name].body() for name in names},
+        {name: anchors[name].body() for name in names},
+    )  # fmt: skip
+    draft.remarks += carried.remarks
     context = plant.CreateDefaultContext()
-    X_WP = plant.EvalBodyPoseInWorld(context, body)
+    _place_floating(path, root, plant, context)
+    X_WP = plant.EvalBodyPoseInWorld(context, carried.platform)
+    draft.home_position, draft.R_WP = X_WP.translation(), X_WP.rotation().matrix()
     for name in names:
-        other, X_OA = exits[name]
-        X_WA = plant.EvalBodyPoseInWorld(context, other).multiply(X_OA)
+        p_WB = anchors[name].CalcPoseInWorld(context).translation()
         draft.cables.append(
             DraftCable(
                 name=name,
-                exit_point=X_WA.translation(),
-                anchor_point=anchors[name][1].translation(),
+                exit_point=exits[name].CalcPoseInWorld(context).translation(),
+                anchor_point=X_WP.inverse().multiply(p_WB),
             )
         )
+    set_carried_motion(path, plant, context, carried, draft)
+    set_composite_inertia(plant, context, carried, draft)
     _limits(plant, draft)
-    _body(plant, body, draft)
-    _box(plant, scene_graph, body, draft)
-    _frame(plant, scene_graph, draft)
+    _box(plant, scene_graph, context, carried, draft)
+    _frame(plant, scene_graph, context, draft)
     _diameters(plant, scene_graph, draft)
-    X_WP = _floating(path, root, body.name()) or X_WP
-    draft.home_position, draft.R_WP = X_WP.translation(), X_WP.rotation().matrix()
-    gravity = plant.gravity_field().gravity_vector()
+    gravity = _gravity(path, root, np.array(plant.gravity_field().gravity_vector()))
     draft.gravity = float(np.linalg.norm(gravity))
     if np.any(gravity[:2] != 0.0) or gravity[2] > 0.0:
-        draft.gravity_direction = np.array(gravity)
+        draft.gravity_direction = gravity
+    _mark_used(seen, carried, draft)
+    draft.remarks += not_kept(seen, _PRESENTATION)
     return draft
+
+
+_PRESENTATION = {
+    "visual", "material", "light", "scene", "gui", "@name", "@version", "@xmlns", "@canonical_link",
+    "author", "description",
+}  # fmt: skip
+"""What only says how things look or are called."""
+
+_STRUCTURE = {"parent", "child", "origin", "pose", "frame", "placement_frame", "static", "uri"}
+"""Elements that say where things are, which Drake uses."""
+
+
+def _gravity(path: Path, root: ET.Element, plain: Array) -> Array:
+    """Acceleration of a falling body in W; of a world of SDFormat as that says, else Drake's."""
+    words = root.findtext("world/gravity")
+    return plain if words is None else numbers(path, "world, gravity", words, 3)
+
+
+def _mark_used(seen: ET.Element, carried: CarriedBodies, draft: RobotDraft) -> None:
+    """Counts as used what Drake and this reader took; names bodies and joints that were not."""
+    cables = {cable.name for cable in draft.cables}
+    stand_ins = {f"{word}_{name}" for name in cables for word in ("guide", "rod", "turn", "hold")}
+    chains = {body.name() for body in carried.others} & stand_ins
+    others = [body.name() for body in carried.others if body.name() not in chains]
+    if chains:
+        draft.remarks.append("Chains of links in the place of cables became cables; what the "
+                             "links weigh was not kept.")  # fmt: skip
+    if others:
+        draft.remarks.append(f"Links that no cable holds were not kept: {', '.join(others)}.")
+    composite = {body.name() for body in carried.composite}
+    carrying = {joint.name() for joint in carried.carrying}
+    fixed = {joint.name() for joint in carried.fixed}
+    left = {*chains, *others}
+    for item in seen.iter():
+        tag, name = str(item.tag), item.attrib.get("name", "")
+        if tag in _STRUCTURE or tag in ("robot", "sdf", "model", "include"):
+            mark(item)
+        elif tag == "link" and name in left:
+            mark_below(item)
+        elif tag == "link":
+            mark(item)
+            for part in item.findall("inertial") if name in composite else ():
+                mark_below(part)
+            for part in item.findall("collision") if name in composite else ():
+                if _is_box(part, draft):
+                    mark_below(part)
+        elif tag == "joint" and item.find("parent") is not None:
+            ends = {end.get("link") or end.findtext(".", "") for end in item
+                    if end.tag in ("parent", "child")}  # fmt: skip
+            kind = item.attrib.get("type")
+            if ends & left or name in fixed or kind in ("fixed", "ball"):
+                mark_below(item)
+            elif kind == "floating" or name in carrying:
+                mark(item)
+                for axis in item.iter("axis"):
+                    mark(axis, "xyz", TEXT)
+                for xyz in item.iter("xyz"):
+                    mark(xyz)
+        elif tag == "gravity" and seen.find("world/gravity") is item:
+            mark(item)
+        elif tag == "transmission":
+            actuated = item.find("joint")
+            if actuated is not None and actuated.attrib.get("name") in cables:
+                mark_below(item)
+        elif tag.endswith("ball_constraint") and chains:
+            mark_below(item)
+    for item in seen.iter():
+        if isinstance(item.tag, str) and item.tag == "world" and item.find("model") is not None:
+            mark(item)
+
+
+def _is_box(collision: ET.Element, draft: RobotDraft) -> bool:
+    """Whether a collision shape is the box that the platform got."""
+    box = collision.find("geometry/box")
+    if box is None or draft.box_size is None:
+        return False
+    words = box.get("size") or box.findtext("size", "")
+    try:
+        return np.array_equal(np.array(words.split(), float), draft.box_size)
+    except ValueError:
+        return False
 
 
 def _without_balls(root: ET.Element) -> int:
@@ -117,24 +214,33 @@ def _without_balls(root: ET.Element) -> int:
     return found
 
 
-def _floating(path: Path, root: ET.Element, platform: str) -> RigidTransform | None:
-    """Where a floating joint of URDF has the platform; Drake reads no such joints."""
+def _place_floating(
+    path: Path, root: ET.Element, plant: MultibodyPlant, context: Context
+) -> None:
+    """Puts bodies where floating joints of URDF have them; Drake leaves such bodies free."""
+    found: dict[str, tuple[str, RigidTransform]] = {}
     for joint in root.findall("joint"):
-        child, origin = joint.find("child"), joint.find("origin")
-        if joint.get("type") != "floating" or child is None or origin is None:
+        parent, child, origin = joint.find("parent"), joint.find("child"), joint.find("origin")
+        if joint.get("type") != "floating" or parent is None or child is None or origin is None:
             continue
-        if child.get("link") == platform:
-            xyz = numbers(path, "floating joint, xyz", origin.get("xyz", "0 0 0"), 3)
-            rpy = numbers(path, "floating joint, rpy", origin.get("rpy", "0 0 0"), 3)
-            return RigidTransform(RollPitchYaw(rpy), xyz)
-    return None
+        xyz = numbers(path, "floating joint, xyz", origin.get("xyz", "0 0 0"), 3)
+        rpy = numbers(path, "floating joint, rpy", origin.get("rpy", "0 0 0"), 3)
+        ends = parent.get("link", ""), child.get("link", "")
+        if all(plant.NumBodiesWithName(name) == 1 for name in ends):
+            found[ends[1]] = ends[0], RigidTransform(RollPitchYaw(rpy), xyz)
+    for _ in found:  # a parent may stand on another one's joint
+        for child_name, (parent_name, X) in found.items():
+            body = plant.GetBodyByName(child_name)
+            if body.is_floating_base_body():
+                X_WF = plant.EvalBodyPoseInWorld(context, plant.GetBodyByName(parent_name))
+                plant.SetFreeBodyPose(context, body, X_WF.multiply(X))
 
 
-_Points = dict[str, tuple[RigidBody, RigidTransform]]
+_Points = dict[str, Frame]
 
 
 def _points(plant: MultibodyPlant) -> tuple[_Points, _Points]:
-    """Exit and anchor points by the cable's name: the body that has them, and the pose in it."""
+    """Frames of exit and anchor points by the cable's name; no link is one that is alone."""
     exits: _Points = {}
     anchors: _Points = {}
     joints = {
@@ -144,37 +250,19 @@ def _points(plant: MultibodyPlant) -> tuple[_Points, _Points]:
             plant.get_joint(index).frame_on_parent(), plant.get_joint(index).frame_on_child()
         )
     }  # fmt: skip
-    candidates = [
-        plant.get_frame(FrameIndex(k))
-        for k in range(plant.num_frames())
-        if FrameIndex(k) not in joints or plant.get_frame(FrameIndex(k)).is_body_frame()
-    ]
-    context = plant.CreateDefaultContext()
-    for frame in candidates:
-        body, X_BF = frame.body(), frame.GetFixedPoseInBodyFrame()
-        if frame.is_body_frame():  # what it is fixed to, if it is a point
-            welded = [b for b in plant.GetBodiesWeldedTo(body) if b.index() != body.index()]
-            heavy = [b for b in welded if b.default_mass() > 0.0] or welded
-            if not heavy:
+    for k in range(plant.num_frames()):
+        frame = plant.get_frame(FrameIndex(k))
+        if frame.is_body_frame():
+            alone = len(plant.GetBodiesWeldedTo(frame.body())) == 1
+            if alone and frame.body().is_floating_base_body():
                 continue
-            X_BF = (
-                plant.EvalBodyPoseInWorld(context, heavy[0])
-                .inverse()
-                .multiply(plant.EvalBodyPoseInWorld(context, body))
-            )
-            body = heavy[0]
+        elif FrameIndex(k) in joints:
+            continue
         for pattern, found in ((_EXIT, exits), (_ANCHOR, anchors)):
             match = pattern.match(frame.name())
             if match:
-                found[match["cable"]] = (body, X_BF)
+                found[match["cable"]] = frame
     return exits, anchors
-
-
-def _platform(path: Path, bodies: list[RigidBody]) -> RigidBody:
-    names = sorted({body.name() for body in bodies})
-    if len(names) > 1:
-        raise fail(path, "anchor points", "on " + ", ".join(names), "all on one link, the platform")
-    return bodies[0]
 
 
 def is_frame_name(cable: str) -> bool:
@@ -213,13 +301,15 @@ def _cylinders(
     return [(X, shape) for X, shape in found if isinstance(shape, Cylinder)]
 
 
-def _frame(plant: MultibodyPlant, scene_graph: SceneGraph, draft: RobotDraft) -> None:
+def _frame(
+    plant: MultibodyPlant, scene_graph: SceneGraph, context: Context, draft: RobotDraft
+) -> None:
     """The frame from twelve beams on the edges of a box, on a link of that name."""
     beams = _cylinders(plant, scene_graph, "frame")
     if len(beams) != 12:
         return
     body = plant.GetBodyByName("frame")
-    X_WF = plant.EvalBodyPoseInWorld(plant.CreateDefaultContext(), body)
+    X_WF = plant.EvalBodyPoseInWorld(context, body)
     ends = np.array(
         [
             X_WF.multiply(X.multiply(np.array([0.0, 0.0, sign * shape.length() / 2.0])))
@@ -242,27 +332,25 @@ def _diameters(plant: MultibodyPlant, scene_graph: SceneGraph, draft: RobotDraft
                 cable.material["diameter"] = diameter
 
 
-def _body(plant: MultibodyPlant, body: RigidBody, draft: RobotDraft) -> None:
-    inertia = body.default_spatial_inertia()
-    draft.mass = float(inertia.get_mass())
-    com = np.asarray(inertia.get_com())
-    draft.center_of_mass = com
-    about = inertia.Shift(com).CalcRotationalInertia()
-    moments, products = about.get_moments(), about.get_products()
-    draft.inertia = np.array([*moments, *products])
-
-
 def _box(
-    plant: MultibodyPlant, scene_graph: SceneGraph, body: RigidBody, draft: RobotDraft
+    plant: MultibodyPlant,
+    scene_graph: SceneGraph,
+    context: Context,
+    carried: CarriedBodies,
+    draft: RobotDraft,
 ) -> None:
+    """The platform's box: the first one along axes of P, of P's own link if that has one."""
     inspector = scene_graph.model_inspector()
-    frame = plant.GetBodyFrameIdOrThrow(body.index())
-    for role in (Role.kIllustration, Role.kProximity):
-        for geometry in inspector.GetGeometries(frame, role):
-            shape = inspector.GetShape(geometry)
-            if isinstance(shape, Box):
-                X_PG = inspector.GetPoseInFrame(geometry)
-                if np.allclose(X_PG.rotation().matrix(), np.eye(3), atol=1e-9):
+    X_PW = plant.EvalBodyPoseInWorld(context, carried.platform).inverse()
+    bodies = sorted(carried.composite, key=lambda body: body.index() != carried.platform.index())
+    for body in bodies:
+        X_PB = X_PW.multiply(plant.EvalBodyPoseInWorld(context, body))
+        frame = plant.GetBodyFrameIdOrThrow(body.index())
+        for role in (Role.kIllustration, Role.kProximity):
+            for geometry in inspector.GetGeometries(frame, role):
+                shape = inspector.GetShape(geometry)
+                X_PG = X_PB.multiply(inspector.GetPoseInFrame(geometry))
+                if isinstance(shape, Box) and X_PG.rotation().IsNearlyIdentity(1e-9):
                     draft.box_size = np.array(shape.size(), float)
                     draft.box_center = X_PG.translation()
                     return
@@ -282,7 +370,9 @@ def _pose(path: Path, link: ET.Element) -> RigidTransform:
     return RigidTransform(RollPitchYaw(values[3:]), values[:3])
 
 
-def _read_chains(path: Path, model: ET.Element) -> RobotDraft:
+def _read_chains(path: Path, root: ET.Element) -> RobotDraft:
+    model = root.find("model")
+    assert model is not None
     words = Path(model.get("name") or path.stem).stem
     draft = RobotDraft(name=robot_name(words), tool=SDF_TOOL, title=words, motion="3R3T")
     links = {link.get("name", ""): link for link in model.iter("link")}
@@ -319,8 +409,17 @@ def _read_chains(path: Path, model: ET.Element) -> RobotDraft:
     size = platform.findtext(".//box/size")
     if size is not None:
         draft.box_size, draft.box_center = numbers(path, "platform box", size, 3), np.zeros(3)
-    draft.remarks.append("Chains of joints in the place of cables became cables.")
+    draft.remarks.append("Chains of joints in the place of cables became cables; what their links "
+                         "weigh was not kept.")  # fmt: skip
     _chain_cables(path, model, draft)
+    parts = {name for name in links if name.startswith(("virt_", "cable"))}
+    for item in model:
+        ends = {item.findtext("parent", ""), item.findtext("child", "")}
+        if item.get("name") in parts or (item.tag == "joint" and ends & parts):
+            mark_below(item)
+    for item in (root, model):
+        mark(item)
+    draft.remarks += not_kept(root, _PRESENTATION)
     return draft
 
 

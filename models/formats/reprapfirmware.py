@@ -51,12 +51,15 @@ def read_reprapfirmware(path: Path) -> RobotDraft:
     """
     geometry: dict[str, list[float]] = {}
     spools: dict[str, list[float]] = {}
+    others: list[str] = []
     for line in read_text(path).splitlines():
         words = line.partition(";")[0].strip().upper()
         found = re.match(r"(?:N\d+\s+)?M(666|669)\b", words)
         if found:
             here = geometry if found[1] == "669" else spools
             here |= _parameters(path, f"M{found[1]}", words[found.end() :])
+        elif words:
+            others.append(words.split()[0])
     if not any(letter in geometry for letter in LETTERS):
         raise fail(path, "M669", None, "a line M669 K6 A0:-2000:-100 B... with anchors")
     if geometry.get(KIND, [6.0]) != [6.0]:
@@ -80,6 +83,11 @@ def read_reprapfirmware(path: Path) -> RobotDraft:
             DraftCable(name=name, exit_point=MM * np.array(point), anchor_point=np.zeros(3))
         )
     _spools(path, spools, draft)
+    rest = sorted(set(geometry) - {KIND, "N", *names})
+    if rest:
+        draft.remarks.append(f"Parameters of M669 that were not kept: {', '.join(rest)}.")
+    if others:
+        draft.remarks.append(f"Commands that were not read: {', '.join(dict.fromkeys(others))}.")
     return draft
 
 

@@ -17,11 +17,15 @@ import numpy as np
 from cdpr_drake.arrays import Array
 from cdpr_drake.models.formats.draft import DraftCable, RobotDraft
 from cdpr_drake.models.formats.reading import fail, number, read_xml, robot_name
+from cdpr_drake.models.formats.unread import mark, mark_below, not_kept, watched
 
 TOOL = "WireX wcrfx"
 
 _UNIT = 1e-3
 """By how much columns of a matrix may differ from unit length."""
+
+_PRESENTATION = {"@id", "@generator", "@version", "@description", "@name", "@nr_cables", "@author"}
+"""What only names things, or says who wrote the file."""
 
 _MOTIONS = {"3R3T": "3R3T", "1R2T": "2T1R", "2T1R": "2T1R", "3T": "3T", "2T": "2T", "1T": "1T",
             "2R3T": "2R3T"}  # fmt: skip
@@ -33,7 +37,7 @@ def read_wirex(path: Path) -> RobotDraft:
     Raises:
         RobotFileError: The file does not describe one; says where.
     """
-    root = read_xml(path)
+    root = watched(read_xml(path))
     robots = [root] if root.tag == "robot" else root.findall("robot")
     if len(robots) != 1:
         names = ", ".join(robot.get("name", "?") for robot in robots) or "none"
@@ -63,6 +67,9 @@ def read_wirex(path: Path) -> RobotDraft:
     else:
         draft.remarks.append(f"Chains have winches of {len(types)} types; their motors were not "
                              "kept, since a robot here has one type.")  # fmt: skip
+        for name in types:
+            mark_below(winches[name])
+    draft.remarks += not_kept(root, _PRESENTATION)
     return draft
 
 
@@ -87,6 +94,9 @@ def _chain(path: Path, chain: ET.Element, index: int, winch: ET.Element | None) 
     base, platform = chain.find("base"), chain.find("platform")
     if base is None or platform is None:
         raise fail(path, where, "no base or no platform", "elements <base> and <platform>")
+    for end in (base, platform):  # whose x and y axes are where swivel angles count from
+        mark(end, *(f"a{row}{column}" for row in (1, 2, 3) for column in (1, 2)))
+    mark(platform, "a13", "a23", "a33")
     axis = None
     if base.get("a33") is not None:  # the third column: a13, a23, a33
         axis = np.array([_value(path, base, f"a{k}3", where) for k in (1, 2, 3)])
@@ -164,9 +174,8 @@ def _winch(path: Path, winch: ET.Element, draft: RobotDraft) -> None:
     draft.gear_ratio = _optional(path, motor, "gear_ratio", "winch.motor")
     draft.motor_inertia = _optional(path, motor, "inertia", "winch.motor")
     draft.motor_speed_rpm = _optional(path, motor, "angular_velocity", "winch.motor")
-    speed = _optional(path, cable, "max_velocity", "winch.cable")
     if draft.motor_speed_rpm is None:
-        draft.cable_speed = speed
+        draft.cable_speed = _optional(path, cable, "max_velocity", "winch.cable")
     else:
         draft.remarks.append("motor.angular_velocity was taken for turns per minute.")
 

@@ -194,7 +194,8 @@ def _check_poses(scenario: Scenario, robot: Robot, path: Path) -> None:
         poses[f"open_loop.waypoints[{k}].pose"] = point.pose
     problems = Problems(ScenarioError)
     below = 0.0 if scenario.world is None else scenario.world.room_below()
-    lower, upper = robot.frame.lower - [0.0, 0.0, below], robot.frame.upper
+    lower, upper = robot.frame.bounds()
+    lower = lower - [0.0, 0.0, below]
     for key, pose in poses.items():
         if np.any(pose.position < lower) or np.any(pose.position > upper):
             problems.add(

@@ -84,14 +84,14 @@ def add_servo_watches(
 
 def make_monitor(scenario: Scenario, model: ServoModel) -> RunMonitor:
     """What ends the run."""
-    stop, frame, plan = scenario.stop, model.robot.frame, model.plan
+    stop, plan, (lower, upper) = scenario.stop, model.plan, model.robot.frame.bounds()
     rules = StopRules(
         stop.position,
         float(np.radians(stop.rotation_deg)),
         stop.hold,
         stop.target_lost,
-        frame.lower - [0.0, 0.0, 0.0 if scenario.world is None else scenario.world.room_below()],
-        frame.upper,
+        lower - [0.0, 0.0, 0.0 if scenario.world is None else scenario.world.room_below()],
+        upper,
     )
     return RunMonitor(
         rules,

@@ -164,7 +164,7 @@ def _problems(scenario: PickAndPlaceScenario, robot: Robot) -> Iterator[str]:
                 "the box lies flat"
             )
     poses = {"initial_pose": scenario.initial_pose, **flat}
-    lower, upper = robot.frame.lower, robot.frame.upper
+    lower, upper = robot.frame.bounds()
     for key, pose in poses.items():
         if np.any(pose.position < lower) or np.any(pose.position > upper):
             yield (

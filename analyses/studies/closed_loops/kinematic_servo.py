@@ -49,7 +49,7 @@ def kinematic_path(servo: PerturbedServo, X_WP: RigidTransform) -> KinematicPath
     """
     settings = servo.scenario.camera
     pinhole = servo_pinhole(settings, servo.robot)
-    frame = servo.robot.frame
+    lower, upper = servo.robot.frame.bounds()
     local = servo.scenario.controller.scheme == "ibvs"
     poses, errors = [], []
     outcome = Outcome.TIMEOUT
@@ -58,7 +58,7 @@ def kinematic_path(servo: PerturbedServo, X_WP: RigidTransform) -> KinematicPath
             outcome = Outcome.TARGET_LOST
             break
         p = X_WP.translation()
-        if np.any(p < frame.lower) or np.any(p > frame.upper):
+        if np.any(p < lower) or np.any(p > upper):
             outcome = Outcome.DIVERGED
             break
         e, L = servo.error(X_WP)

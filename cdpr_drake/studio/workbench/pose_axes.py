@@ -40,7 +40,8 @@ def pose_axes(robot: Robot) -> list[PoseAxis]:
     Of a body in space position and angles, R = Rx(φ) Ry(θ) Rz(ψ); of a platform in a plane or on a
     line, the coordinates of its joint, along the plane's axes.
     """
-    lower, upper = np.asarray(robot.frame.lower), np.asarray(robot.frame.upper)
+    home = robot.home.position  # may lie outside a frame that was assumed
+    lower, upper = np.minimum(robot.frame.lower, home), np.maximum(robot.frame.upper, home)
     joint, motion = robot.joint(), robot.motion_type()
     if joint.is_floating:
         axes = [

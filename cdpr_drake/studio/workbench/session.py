@@ -369,11 +369,11 @@ class Workbench:
 
     def _is_outside(self) -> bool:
         """Whether the platform is where the robot as it is now cannot be."""
-        frame, p = self.robot.value.frame, self.X_WP.translation()
+        p, (lower, upper) = self.X_WP.translation(), self.robot.value.frame.bounds()
         near = self.robot.value.joint().nearest(self.X_WP)
         return bool(
-            np.any(p < frame.lower)
-            or np.any(p > frame.upper)
+            np.any(p < lower)
+            or np.any(p > upper)
             or not near.IsNearlyEqualTo(self.X_WP, 1e-6)
         )
 
