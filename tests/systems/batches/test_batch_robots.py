@@ -11,7 +11,7 @@ from cdpr_drake.analyses.benchmarks.batches import TendonRollout
 from cdpr_drake.errors import CdprError, TensionProblemError
 from cdpr_drake.geometry.poses import pose_row
 from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.systems.batches.batch_robots import DEFAULT_RULE, BatchRobots
+from cdpr_drake.systems.batches.batch_robots import BatchRobots
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.loops.robot_motion import RobotMotion
 from cdpr_drake.systems.robots.compiled_step import StepRule
@@ -128,7 +128,7 @@ def test_a_thousand_robots_are_a_thousand_single_ones():
         batch.step(command, PERIOD)
     different = []
     for k, robot in enumerate(robots):
-        one = RobotMotion(robot, ELASTIC, DEFAULT_RULE)
+        one = RobotMotion(robot, ELASTIC, batch.rule)
         one.begin(starts[k])
         for way, command in enumerate(commands):
             one.command(command[k])
