@@ -61,7 +61,7 @@ def test_each_moves_as_alone_by_velocities_and_wrenches(case):
     for command, wrench in zip(commands, wrenches, strict=True):
         assert batch.step(command, PERIOD, wrenches=wrench).all()
     for k, robot in enumerate(robots):
-        state, tensions = alone(robot, how, commands[:, k], wrenches[:, k])
+        state, tensions = alone(robot, how, commands[:, k], wrenches[:, k], rule=batch.rule)
         assert np.array_equal(batch.states[k], state)
         assert np.array_equal(batch.tensions[k], tensions)
     assert len(np.unique(batch.states[:, 0])) == 5 or not robots[0].joint().is_floating
@@ -73,7 +73,7 @@ def test_each_moves_as_alone_on_cables_that_stiffen_and_rub():
     for command in commands:
         batch.step(command, PERIOD)
     for k, robot in enumerate(robots):
-        state, tensions = alone(robot, ELASTIC, commands[:, k])
+        state, tensions = alone(robot, ELASTIC, commands[:, k], rule=batch.rule)
         assert np.array_equal(batch.states[k], state)
         assert np.array_equal(batch.tensions[k], tensions)
 
@@ -101,7 +101,7 @@ def test_each_moves_as_alone_by_motors(mode):
     for command in commands:
         batch.step(command, PERIOD)
     for k, robot in enumerate(robots):
-        assert np.array_equal(batch.states[k], alone(robot, how, commands[:, k])[0])
+        assert np.array_equal(batch.states[k], alone(robot, how, commands[:, k], rule=batch.rule)[0])
 
 
 def test_each_moves_as_alone_by_tensions():
