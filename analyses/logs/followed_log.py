@@ -14,6 +14,8 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.errors import LogFileError
 from cdpr_drake.geometry.poses import pose_from_row, pose_row
 from cdpr_drake.systems.robots.compiled_cable_robot import CompiledCableRobot
+from cdpr_drake.systems.robots.compiled_motion import HELD
+from cdpr_drake.systems.robots.compiled_step import StepRule
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +77,7 @@ def follow_log(replay: LogReplay) -> FollowedLog:
         raise LogFileError(f"{replay.log.path}: found no pose to start at; accepted: at least one")
     rows = rows[rows >= known[0]]
     time = replay.time[rows] - replay.time[rows[0]]
-    block = CompiledCableRobot(robot)
+    block = CompiledCableRobot(robot, rule=StepRule(), command_period=HELD)
     simulator = Simulator(block)
     context = simulator.get_mutable_context()
     start = pose_from_row(at[rows[0]])

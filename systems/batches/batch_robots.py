@@ -36,11 +36,9 @@ from cdpr_drake.models.robot_statics import as_pose
 from cdpr_drake.numerics.kernel_calls import over_rows
 from cdpr_drake.systems.batches.batch_inputs import as_poses, per_robot, robot_numbers
 from cdpr_drake.systems.batches.batch_member import BatchMember
+from cdpr_drake.systems.robots.cable_robot import default_rule
 from cdpr_drake.systems.robots.compiled_step import StepRule, motion_problem, packed_rule
 from cdpr_drake.systems.robots.settings import CableRobotSettings
-
-DEFAULT_RULE = StepRule(method="runge_kutta3", max_step=1e-3)
-"""Steps of a millisecond, which eight elastic cables of the robots that ship take."""
 
 
 @dataclass(frozen=True)
@@ -68,8 +66,9 @@ class BatchRollout:
 class BatchRobots:
     """Many cable robots of one structure, each with its own parameters and state.
 
-    Each moves as it does alone in `CompiledCableRobot` or `motion_by_tensions`, to the last bit,
-    also by any number of threads: what moves it is the same machine code. Commands, wrenches and
+    Each moves as it does alone in `CompiledCableRobot` or `motion_by_tensions` with
+    `command_period=HELD`, to the last bit, also by any number of threads: what moves it is the same
+    machine code. Commands, wrenches and
     what is read are arrays with a row for each robot.
 
     A robot that fails, since a cable cannot run or numbers are not finite any more, stops in its
@@ -91,7 +90,7 @@ class BatchRobots:
         count: int,
         *,
         settings: CableRobotSettings | None = None,
-        rule: StepRule = DEFAULT_RULE,
+        rule: StepRule | None = None,
         parameters: Sequence[Robot] | None = None,
         by_tensions: bool = False,
         threads: int | None = None,
@@ -103,7 +102,8 @@ class BatchRobots:
             count: Number of robots.
             settings: Cables, winches and damping, as sections of a scenario have them; the
                 defaults where None.
-            rule: How they are integrated.
+            rule: How they are integrated; `default_rule` of `robot`, as `CompiledCableRobot` has,
+                if None.
             parameters: The robot of each row, of the same structure, with parameters of its own;
                 None: all are as `robot`.
             by_tensions: Tensions are commanded, of massless cables, instead of winches.
@@ -123,6 +123,7 @@ class BatchRobots:
             raise CdprError(f"count: found {count}; accepted: 1 or more")
         robots = [robot] * count if parameters is None else list(parameters)
         _check(settings, robots, count, by_tensions)
+        rule = default_rule(robot, settings, by_tensions) if rule is None else rule
         self.robot, self.robots, self.count = robot, robots, count
         self.rule, self.threads = rule, threads
         self._settings, self._by_tensions = settings, by_tensions

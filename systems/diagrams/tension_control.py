@@ -27,7 +27,7 @@ from cdpr_drake.systems.remote.remote_place import DISTRIBUTOR, TRAJECTORY, Remo
 from cdpr_drake.systems.remote.remote_tensions import RemoteDistributor, RemoteTracking
 from cdpr_drake.systems.robots.assembly import add_hysteresis, apply_force
 from cdpr_drake.systems.robots.compiled_cable_robot import motion_by_tensions
-from cdpr_drake.systems.robots.compiled_motion import MEMORY, CompiledMotion
+from cdpr_drake.systems.robots.compiled_motion import HELD, MEMORY, CompiledMotion
 from cdpr_drake.systems.robots.compiled_step import StepRule
 from cdpr_drake.systems.robots.disturbances import Disturbances, DisturbanceSettings
 from cdpr_drake.systems.robots.platform_wrench import APPLIED_WRENCH, PlatformWrench
@@ -266,7 +266,9 @@ def add_tension_control(
         state = in_plant.plant.get_state_output_port(in_plant.model_instance)
         systems["cables"] = driven
     else:
-        driven = motion_by_tensions(in_plant.robot, real, push=settings.push, rule=settings.rule)
+        driven = motion_by_tensions(
+            in_plant.robot, real, push=settings.push, rule=settings.rule, command_period=HELD
+        )
         builder.AddNamedSystem(prefix + "motion", driven)
         state = _split_state(builder, driven, prefix)
     for block, system in systems.items():

@@ -32,6 +32,7 @@ from cdpr_drake.systems.remote.remote_place import Remote
 from cdpr_drake.systems.remote.remote_servo import RemoteServo
 from cdpr_drake.systems.robots.cable_robot import STEP_SHARE, CableRobot, automatic_step
 from cdpr_drake.systems.robots.compiled_cable_robot import CompiledCableRobot
+from cdpr_drake.systems.robots.compiled_motion import HELD
 from cdpr_drake.systems.robots.compiled_step import StepRule
 from cdpr_drake.systems.robots.failures import LATE
 from cdpr_drake.systems.robots.settings import COMPILED
@@ -236,7 +237,7 @@ def _make_robot(
         scenario,
         add_to_scene=add_to_scene,
         floor=floor,
-        command_period=WATCH_PERIOD if watched else None,
+        command_period=WATCH_PERIOD if watched else HELD,
     )
 
 

@@ -30,6 +30,7 @@ from cdpr_drake.systems.robots.assembly import (
     set_robot_at_equilibrium,
 )
 from cdpr_drake.systems.robots.cable_forces import CableForces
+from cdpr_drake.systems.robots.compiled_step import StepRule
 from cdpr_drake.systems.robots.settings import CableRobotSettings
 from cdpr_drake.tensions.methods import exact_tensions
 from cdpr_drake.winches.failed_winches import HOLD
@@ -41,6 +42,9 @@ STEP_SHARE = 0.8
 SEMI_IMPLICIT = "semi_implicit"
 SEMI_IMPLICIT_STEP = 1e-3
 """Automatic step of the semi-implicit method [s], which no stiffness limits."""
+
+DEFAULT_STEP = 1e-3
+"""Largest step of `default_rule` [s]."""
 
 
 class CableRobot(Diagram):
@@ -249,3 +253,22 @@ def automatic_step(
     retardation = 0.0 if cables.model == ELASTIC else float(np.max(simulated.retardation))
     eigenvalues = vibration_eigenvalues(M, K, retardation)
     return STEP_SHARE * largest_stable_step(np.concatenate([eigenvalues, poles]), integrator)
+
+
+def default_rule(
+    robot: Robot, settings: CableRobotSettings | None = None, by_tensions: bool = False
+) -> StepRule:
+    """Default integration rule of `CompiledCableRobot`, `motion_by_tensions` and `BatchRobots`.
+
+    Runge-Kutta of third order with fixed steps: `DEFAULT_STEP`, or `automatic_step` at the home
+    pose where that is shorter.
+
+    Args:
+        robot: The robot.
+        settings: Cables, winches and damping; the defaults if None.
+        by_tensions: Tensions are commanded, so that no stiffness limits the step.
+    """
+    step = DEFAULT_STEP
+    if not by_tensions:
+        step = min(step, automatic_step(robot, robot.home.transform(), "runge_kutta3", settings))
+    return StepRule(method="runge_kutta3", max_step=step)

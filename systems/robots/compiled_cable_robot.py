@@ -16,6 +16,7 @@ from cdpr_drake.models.robot_in_plant import RobotInPlant
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.systems.robots.assembly import SceneAdder, equilibrium_start, fill_scene
 from cdpr_drake.systems.robots.cable_forces import simulated_cables
+from cdpr_drake.systems.robots.cable_robot import default_rule
 from cdpr_drake.systems.robots.compiled_motion import MEMORY, CompiledMotion
 from cdpr_drake.systems.robots.compiled_step import CompiledBodies, StepRule
 from cdpr_drake.systems.robots.failures import BROKEN, FAULTS
@@ -27,7 +28,11 @@ class CompiledCableRobot(Diagram):
     """As `CableRobot`, with the same ports, but moved by `CompiledMotion` in place of a plant.
 
     Its further outputs are step_errors and steps, a further input, which may stay open,
-    commanded_length_rates; `CompiledMotion` explains them, and how commands are sampled.
+    commanded_length_rates; `CompiledMotion` explains them.
+
+    Commands may be continuous: they are sampled at every step of the rule, and taken as linear in
+    between, see `CompiledMotion`. Where all commands are held between events of the diagram, as
+    those of sampled controllers are, `command_period=HELD` goes from event to event and is faster.
 
     Subsystems: motion, scene_graph, bodies. The plant that `plant` names is no part of the
     diagram and never moves: it says which frames and shapes the scene graph has. The platform must
@@ -49,10 +54,11 @@ class CompiledCableRobot(Diagram):
         Args:
             robot: The robot.
             settings: Cables, winches and damping.
-            rule: How it is integrated; `integrate_by` changes it.
+            rule: How it is integrated; `default_rule` if None. `integrate_by` changes it.
             add_to_scene: As for `CableRobot`; bodies that move by themselves are refused.
             floor: As for `CableRobot`.
-            command_period: See `CompiledMotion`.
+            command_period: Longest time between two samples of the commands [s], see
+                `CompiledMotion`; None: the step of `rule`.
 
         Raises:
             CdprError: Something beside the platform moves in the plant.
@@ -79,11 +85,11 @@ class CompiledCableRobot(Diagram):
         motion = CompiledMotion(
             robot, cables, settings.cables.model, winch_drive(robot, settings.winches),
             damping=(damping.translation, damping.rotation),
+            rule=default_rule(robot, settings) if rule is None else rule,
             frame=plant.GetBodyFrameIdOrThrow(in_plant.body_index),
             command_period=command_period,
             may_fail=failures is not None,
         )  # fmt: skip
-        motion.rule = rule or motion.rule
         builder.AddNamedSystem("motion", motion)
         builder.Connect(
             motion.GetOutputPort("geometry_pose"), scene_graph.get_source_pose_port(source)
@@ -182,6 +188,7 @@ def motion_by_tensions(
     *,
     push: bool = False,
     rule: StepRule | None = None,
+    command_period: float | None = None,
 ) -> CompiledMotion:
     """A robot on massless, inextensible cables of commanded tensions, as `TensionDrivenCables`.
 
@@ -189,9 +196,10 @@ def motion_by_tensions(
         robot: The robot.
         cables: The cables.
         push: Whether a command below zero pushes.
-        rule: How it is integrated.
+        rule: How it is integrated; `default_rule` if None.
+        command_period: As for `CompiledMotion`.
     """
-    drive = Drive(kind=TENSIONS, push=push)
-    motion = CompiledMotion(robot, cables, KELVIN_VOIGT, drive)
-    motion.rule = rule or motion.rule
-    return motion
+    drive, rule = Drive(kind=TENSIONS, push=push), rule or default_rule(robot, by_tensions=True)
+    return CompiledMotion(
+        robot, cables, KELVIN_VOIGT, drive, rule=rule, command_period=command_period
+    )

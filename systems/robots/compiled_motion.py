@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -15,6 +16,8 @@ from pydrake.systems.framework import (
     DiscreteValues,
     LeafSystem,
     ValueProducer,
+    WitnessFunction,
+    WitnessFunctionDirection,
 )
 
 from cdpr_drake.arrays import Array
@@ -36,6 +39,7 @@ from cdpr_drake.dynamics.robot_arrays import (
     pack_robot,
 )
 from cdpr_drake.dynamics.robot_kernel import INTEGRATION_OK, ideal_rates
+from cdpr_drake.errors import CdprError
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.models.robot_in_plant import pose_on_joint
@@ -43,7 +47,6 @@ from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import rigid_platform
 from cdpr_drake.systems.robots.cable_forces import CREPT, PORTS
 from cdpr_drake.systems.robots.compiled_step import (
-    PackedRule,
     StepRule,
     motion_problem,
     packed_rule,
@@ -60,12 +63,15 @@ from cdpr_drake.winches.motor_kernel import winch_torques
 MEMORY = "motion_memory"
 """Name of the port from which blocks without Python can read, see `CompiledMotion.parts`."""
 
+HELD = math.inf
+"""A `command_period`: commands are constant between the events of the diagram, which is checked."""
+
 
 class CompiledMotion(LeafSystem):
     """Platform, cables and winches of a robot as one block.
 
     Ports are those of `CableRobot` without scene graph, or of `TensionDrivenCables` where tensions
-    are commanded, and these; the wrench that is applied is taken as constant like commands:
+    are commanded, and these:
 
     ====================== =============== ======== =============================================
     port                   type            unit     meaning
@@ -89,10 +95,16 @@ class CompiledMotion(LeafSystem):
 
     The state is discrete: that of the platform and the winches at the last event, and its time. At
     each step of the simulator, which goes from event to event, it is brought up to date; between
-    events, outputs are what the motion has come to by then. Commands are taken as constant from
-    event to event, as those of sampled controllers are, but for commanded lengths whose rates are
-    given. Commands that change continuously must be sampled: see `command_period`. A simulator
-    that is initialized after the time was set back begins with the state of the last event.
+    events, outputs are the state of the motion at their own time.
+
+    Commands and the applied wrench may be of any kind. The block samples them every
+    `command_period` at the latest, by an event of its own, and at all other events of the diagram:
+    at the beginning of each step, after all updates, and at its end. A command that is the same at
+    both is constant in between, as those of sampled controllers are. A command that is not is taken
+    as linear in between, and a wrench as its mean, so that errors are of second order in the period
+    and do not depend on which other blocks have events. Commanded lengths whose rates are given
+    change by these. A simulator that is initialized after the time was set back begins with the
+    state of the last event.
 
     Raises CableGeometryError in a simulation where a cable cannot run, DivergedError where numbers
     are not finite any more.
@@ -106,6 +118,7 @@ class CompiledMotion(LeafSystem):
         drive: Drive,
         *,
         damping: tuple[float, float] = (0.0, 0.0),
+        rule: StepRule | None = None,
         frame: FrameId | None = None,
         command_period: float | None = None,
         may_fail: bool = False,
@@ -118,12 +131,22 @@ class CompiledMotion(LeafSystem):
             model: A name of `cables.CABLE_MODELS` but inextensible.
             drive: What drives the cables.
             damping: Of the platform, [N s/m] and [N m s/rad].
+            rule: How it is integrated; `StepRule()` if None.
             frame: The platform's frame in a scene graph.
-            command_period: Longest time between two looks at the commands; None: at events only.
+            command_period: Longest time between two samples of the commands [s]; None: the step of
+                `rule`. `HELD`, infinite: only at events of the diagram, for commands that are held
+                from event to event; a command that is not is refused as the simulation meets it.
             may_fail: Whether it has inputs for what fails; they count like commands. Not for
                 tensions that are commanded.
+
+        Raises:
+            CdprError: The period is not positive.
         """
         super().__init__()
+        rule = StepRule() if rule is None else rule
+        period = rule.max_step if command_period is None else command_period
+        if not period > 0.0:
+            raise CdprError(f"command_period: found {period:g} s; accepted: more than 0")
         self._robot, self._set, self._model, self._drive = robot, cables, model, drive
         m = self._m = cables.count
         self._home = cable_paths(robot.home.transform(), cables).lengths
@@ -141,7 +164,7 @@ class CompiledMotion(LeafSystem):
         self._n = joint.num_states
         self._size = size = self._arrays.work.shape[1]
         self._where = robot_addresses(self._arrays)
-        self._packed = PackedRule(StepRule())
+        self._packed, self._held = packed_rule(rule, drive), not math.isfinite(period)
         # Where what was reached has all its values, the state, and the report.
         k = size + 1 + REPORTED
         self._values, self._own = slice(k, 2 * k), slice(k, k + size)
@@ -151,6 +174,16 @@ class CompiledMotion(LeafSystem):
         self._room, self._outputs = make_room(m, law, self._height), outputs_kernel(law)
         self._frame = frame
         self._declare_inputs()
+        # Depends on the state alone, which is a new one at the beginning of each step: so it is
+        # kept until the step ends.
+        self._begun = self.DeclareCacheEntry(
+            "commands_at_begin",
+            ValueProducer(lambda: Value(np.zeros(m + 6)), self._calc_begun),
+            {self.xd_ticket()},
+        ).Eval
+        self._witness = self.MakeWitnessFunction(
+            "commands_at_begin", WitnessFunctionDirection.kNone, self._see_begin
+        )
         start = np.concatenate([self._state_at(robot.home.transform(), self._home, self._still),
                                 np.zeros(1 + REPORTED)])  # fmt: skip
         self.DeclareDiscreteState(start)
@@ -170,8 +203,8 @@ class CompiledMotion(LeafSystem):
         self.DeclareInitializationDiscreteUpdateEvent(self._begin_anew)
         self.DeclarePerStepPublishEvent(self._look)
         self.DeclarePerStepDiscreteUpdateEvent(self._take)
-        if command_period is not None:
-            self.DeclarePeriodicPublishEvent(command_period, 0.0, self._look)
+        if not self._held:
+            self.DeclarePeriodicPublishEvent(period, 0.0, self._look)
 
     @property
     def rule(self) -> StepRule:
@@ -196,7 +229,7 @@ class CompiledMotion(LeafSystem):
                 self._brakes = self.DeclareVectorInputPort("brakes", k)
             if drive.mode == "position":
                 self._rates = self.DeclareVectorInputPort("commanded_length_rates", k)
-        self._plain = self._rates is None and self._brakes is None and k == m
+        self._plain = self._brakes is None and k == m
         self._wrench = self.DeclareVectorInputPort(APPLIED_WRENCH, 6)
         self._faults = {}
         if self._may_fail:
@@ -319,16 +352,65 @@ class CompiledMotion(LeafSystem):
 
         self.DeclareVectorOutputPort(name, size, calc, needs)
 
+    def DoGetWitnessFunctions(self, context: Context) -> list[WitnessFunction]:
+        """One that never triggers: Drake evaluates it where a step begins, after all updates."""
+        return [self._witness]
+
+    def _see_begin(self, context: Context) -> float:
+        self._begun(context)
+        return 1.0
+
+    def _calc_begun(self, context: Context, value: AbstractValue) -> None:
+        """Command and wrench where the step begins, shape (m + 6,)."""
+        begun: Array = value.get_mutable_value()
+        begun[: self._m] = self._command.Eval(context)[self._of_cable]
+        if self._wrench.HasValue(context):
+            begun[self._m :] = self._wrench.Eval(context)
+
     def _inputs(self, context: Context) -> tuple[Array, Array]:
         """Command at the time of the context, shape (m,), its rate and the brakes, (2, m)."""
-        others = np.zeros((2, self._m))
-        for row, port in enumerate((self._rates, self._brakes)):
-            if port is not None and (row == 1 or port.HasValue(context)):
-                others[row] = port.Eval(context)[self._of_cable]
-        command = self._command.Eval(context)[self._of_cable]
+        command, others = self._command.Eval(context), self._calm
+        if not self._plain:
+            command, others = command[self._of_cable], np.zeros((2, self._m))
+            if self._brakes is not None:
+                others[1] = self._brakes.Eval(context)[self._of_cable]
+        if self._rates is not None and self._rates.HasValue(context):
+            others = np.stack([self._rates.Eval(context)[self._of_cable], others[1]])
+        else:
+            begun = self._begun(context)[: self._m]
+            if not np.array_equal(begun, command):
+                others = np.stack([self._change(context, begun, command), others[1]])
         if self._may_fail:
             command = self._fail(context, command, others)
         return command, others
+
+    def _change(self, context: Context, begun: Array, command: Array) -> Array:
+        """Rates of a command that is another one at the end of a step than where it began."""
+        start, time = context.get_discrete_state_vector().value()[self._size], context.get_time()
+        if self._held or time <= start:
+            return self._still
+        return np.asarray((command - begun) / (time - start))
+
+    def _check_held(self, context: Context) -> None:
+        """Checks that the command did not change in the step that ends now."""
+        start, time = context.get_discrete_state_vector().value()[self._size], context.get_time()
+        if time <= start or (self._rates is not None and self._rates.HasValue(context)):
+            return
+        command = self._command.Eval(context)[self._of_cable]
+        if not np.array_equal(command, self._begun(context)[: self._m]):
+            raise CdprError(
+                f"{self._command.get_name()} of {self._robot.name}: found a command that changes "
+                f"between {start:g} s and {time:g} s, where nothing samples it; accepted: one that "
+                "is held from event to event, or a command_period [s]"
+            )
+
+    def _pushed(self, context: Context) -> Array | None:
+        """The applied wrench, mean of a step's beginning and its end; None where there is none."""
+        if not self._wrench.HasValue(context):
+            return None
+        wrench: Array = self._wrench.Eval(context)
+        begun = self._begun(context)[self._m :]
+        return wrench if self._held or np.array_equal(begun, wrench) else 0.5 * (begun + wrench)
 
     def _fail(self, context: Context, command: Array, others: Array) -> Array:
         """Has what failed act: on cables, winches and their brakes; returns their command."""
@@ -343,6 +425,7 @@ class CompiledMotion(LeafSystem):
                 self._whole_winch, others[1], flags[JAMMED], flags[POWERLESS], self._arrays.winch
             )
             return command
+        others[0] = np.where(flags[JAMMED] != 0.0, 0.0, others[0])
         return np.where(flags[JAMMED] != 0.0, 0.0, command)
 
     def _calc_reached(self, context: Context, output: BasicVector) -> None:
@@ -356,12 +439,8 @@ class CompiledMotion(LeafSystem):
         begin, time = context.get_discrete_state_vector().value().copy(), context.get_time()
         command, others = self._still, self._calm
         if time != begin[self._size]:  # else they may follow from the state at once
-            if self._plain:
-                command = self._command.Eval(context)
-            else:
-                command, others = self._inputs(context)
-            pushed = self._wrench.HasValue(context)
-            apply_wrench(self._arrays, self._joint, self._wrench.Eval(context) if pushed else None)
+            command, others = self._inputs(context)
+            apply_wrench(self._arrays, self._joint, self._pushed(context))
         packed = self._packed
         bad = packed.reach(self._where, packed.numbers, begin, command, others, time, memory)
         if bad == BACKWARD:
@@ -403,6 +482,8 @@ class CompiledMotion(LeafSystem):
 
     def _look(self, context: Context) -> None:
         """Computes what is reached at the end of a step, with the inputs that led there."""
+        if self._held:
+            self._check_held(context)
         self._reached(context)
 
     def _take(self, context: Context, discrete_state: DiscreteValues) -> None:

@@ -32,6 +32,7 @@ from cdpr_drake.systems.robots.compiled_step import StepRule
 from cdpr_drake.systems.robots.settings import CableRobotSettings, CableSettings
 from cdpr_drake.tensions.methods import exact_tensions
 from tests.models.robots import content_of, robot_of
+from tests.systems.robots.engines import made
 
 POSE = RigidTransform(rotation_from_vector(np.array([0.1, -0.05, 0.15])), [0.05, -0.06, 0.3])
 HOW = CableRobotSettings(cables=CableSettings(pulleys=True))
@@ -147,7 +148,7 @@ def test_both_engines_move_it_alike():
     ends = []
     command = 0.02 * np.cos(np.arange(8.0))
     for kind in (CableRobot, CompiledCableRobot):
-        block = kind(ROBOT, HOW)
+        block = made(kind, ROBOT, HOW)
         simulator = Simulator(block)
         context = simulator.get_mutable_context()
         block.set_at_equilibrium(context, POSE)

@@ -26,6 +26,7 @@ from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
 from cdpr_drake.systems.robots.cable_robot import SEMI_IMPLICIT, CableRobot, automatic_step
 from cdpr_drake.systems.robots.compiled_cable_robot import CompiledCableRobot
+from cdpr_drake.systems.robots.compiled_motion import HELD
 from cdpr_drake.systems.robots.compiled_step import StepRule
 from cdpr_drake.systems.robots.settings import COMPILED, PLANT, CableRobotSettings, CableSettings
 from cdpr_drake.systems.scenarios.files import TENSION_CONTROL, scenario_kind
@@ -104,7 +105,8 @@ def commanded_path(
         State of the platform after each period, shape (k, 13 or 6), unstrained lengths then, shape
         (k, m) [m], and tensions, shape (k, m) [N].
     """
-    block = kind(robot, settings)
+    compiled = kind is CompiledCableRobot
+    block = kind(robot, settings, **({"command_period": HELD} if compiled else {}))
     simulator = Simulator(block)
     context = simulator.get_mutable_context()
     block.set_at_equilibrium(context, X_WP, slack)

@@ -11,7 +11,7 @@ from cdpr_drake.analyses.benchmarks.batches import TendonRollout
 from cdpr_drake.errors import CdprError, TensionProblemError
 from cdpr_drake.geometry.poses import pose_row
 from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.systems.batches.batch_robots import DEFAULT_RULE, BatchRobots
+from cdpr_drake.systems.batches.batch_robots import BatchRobots
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.loops.robot_motion import RobotMotion
 from cdpr_drake.systems.robots.compiled_step import StepRule
@@ -61,7 +61,7 @@ def test_each_moves_as_alone_by_velocities_and_wrenches(case):
     for command, wrench in zip(commands, wrenches, strict=True):
         assert batch.step(command, PERIOD, wrenches=wrench).all()
     for k, robot in enumerate(robots):
-        state, tensions = alone(robot, how, commands[:, k], wrenches[:, k])
+        state, tensions = alone(robot, how, commands[:, k], wrenches[:, k], rule=batch.rule)
         assert np.array_equal(batch.states[k], state)
         assert np.array_equal(batch.tensions[k], tensions)
     assert len(np.unique(batch.states[:, 0])) == 5 or not robots[0].joint().is_floating
@@ -73,7 +73,7 @@ def test_each_moves_as_alone_on_cables_that_stiffen_and_rub():
     for command in commands:
         batch.step(command, PERIOD)
     for k, robot in enumerate(robots):
-        state, tensions = alone(robot, ELASTIC, commands[:, k])
+        state, tensions = alone(robot, ELASTIC, commands[:, k], rule=batch.rule)
         assert np.array_equal(batch.states[k], state)
         assert np.array_equal(batch.tensions[k], tensions)
 
@@ -101,7 +101,7 @@ def test_each_moves_as_alone_by_motors(mode):
     for command in commands:
         batch.step(command, PERIOD)
     for k, robot in enumerate(robots):
-        assert np.array_equal(batch.states[k], alone(robot, how, commands[:, k])[0])
+        assert np.array_equal(batch.states[k], alone(robot, how, commands[:, k], rule=batch.rule)[0])
 
 
 def test_each_moves_as_alone_by_tensions():
@@ -128,7 +128,7 @@ def test_a_thousand_robots_are_a_thousand_single_ones():
         batch.step(command, PERIOD)
     different = []
     for k, robot in enumerate(robots):
-        one = RobotMotion(robot, ELASTIC, DEFAULT_RULE)
+        one = RobotMotion(robot, ELASTIC, batch.rule)
         one.begin(starts[k])
         for way, command in enumerate(commands):
             one.command(command[k])

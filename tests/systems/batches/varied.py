@@ -6,8 +6,8 @@ from pydrake.systems.analysis import Simulator
 from cdpr_drake.models.materials import BehaviourSettings
 from cdpr_drake.models.robot_draws import ParameterCovariance, drawn_robots
 from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.systems.batches.batch_robots import DEFAULT_RULE
 from cdpr_drake.systems.robots.compiled_cable_robot import CompiledCableRobot, motion_by_tensions
+from cdpr_drake.systems.robots.compiled_motion import HELD
 from cdpr_drake.systems.robots.settings import CableRobotSettings, CableSettings, WinchSettings
 
 PERIOD = 0.01
@@ -38,9 +38,9 @@ def varied(robot, count, seed=0):
     return drawn_robots(robot, count, ParameterCovariance.independent(deviations), seed)
 
 
-def alone(robot, how, commands, wrenches=None, rule=DEFAULT_RULE, **inputs):
+def alone(robot, how, commands, wrenches=None, rule=None, **inputs):
     """State at the end, and tensions, of a robot that moves by itself in a diagram."""
-    block = CompiledCableRobot(robot, how, rule=rule, floor=False)
+    block = CompiledCableRobot(robot, how, rule=rule, floor=False, command_period=HELD)
     simulator = Simulator(block)
     context = simulator.get_mutable_context()
     block.set_at_equilibrium(context, robot.home.transform())
@@ -59,7 +59,7 @@ def alone(robot, how, commands, wrenches=None, rule=DEFAULT_RULE, **inputs):
 
 def alone_by_tensions(robot, how, start, commands):
     """State at the end of a robot whose tensions are commanded."""
-    block = motion_by_tensions(robot, how.cables.cable_set(robot), rule=DEFAULT_RULE)
+    block = motion_by_tensions(robot, how.cables.cable_set(robot), command_period=HELD)
     simulator = Simulator(block)
     context = simulator.get_mutable_context()
     block.set_state(context, start)

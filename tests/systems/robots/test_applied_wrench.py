@@ -17,6 +17,7 @@ from cdpr_drake.systems.robots.settings import (
     CableSettings,
     DampingSettings,
 )
+from tests.systems.robots.engines import made
 
 WRENCH = np.array([0.3, -0.2, 0.5, 4.0, -3.0, 2.0])
 
@@ -29,7 +30,7 @@ SAME_STEPS = 1e-9
 
 
 def at_home(kind, robot, settings=None):
-    block = kind(robot, settings)
+    block = made(kind, robot, settings)
     simulator = Simulator(block)
     context = simulator.get_mutable_context()
     block.set_at_equilibrium(context, robot.home.transform())

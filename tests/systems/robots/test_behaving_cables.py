@@ -30,6 +30,7 @@ from cdpr_drake.systems.robots.compiled_cable_robot import CompiledCableRobot
 from cdpr_drake.systems.robots.compiled_step import StepRule
 from cdpr_drake.systems.robots.settings import CableRobotSettings, CableSettings, WinchSettings
 from tests.motion.small_robots import small_robot
+from tests.systems.robots.engines import made
 
 ENGINES = [CompiledCableRobot, CableRobot]
 
@@ -51,7 +52,7 @@ def behaving(robot, **behaviour):
 
 def started(kind, robot, how, step, *, commands=0.0, X_WP=None, method="runge_kutta3"):
     """A simulator of the block at rest, by fixed steps, its commands constant."""
-    block = kind(robot, how)
+    block = made(kind, robot, how)
     simulator = Simulator(block)
     context = simulator.get_mutable_context()
     block.set_at_equilibrium(context, robot.home.transform() if X_WP is None else X_WP)

@@ -18,6 +18,7 @@ from cdpr_drake.systems.robots.settings import (
     CableSettings,
     WinchSettings,
 )
+from tests.systems.robots.engines import made
 
 STEP, BREAK, END = 1e-4, 0.02, 0.06
 
@@ -45,7 +46,7 @@ def breaking(cable, time=BREAK):
 
 def started(kind, robot, how, command, *, method="runge_kutta3", step=STEP):
     """The block and its simulator, at rest at home, with commands that hold."""
-    block = kind(robot, how)
+    block = made(kind, robot, how)
     simulator = Simulator(block)
     context = simulator.get_mutable_context()
     if kind is CableRobot:

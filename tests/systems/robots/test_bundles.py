@@ -25,6 +25,7 @@ from cdpr_drake.winches.motor import MODES
 from cdpr_drake.winches.motor_kernel import pack_winch, winch_rates
 from cdpr_drake.workspaces.pose_grid import WorkspaceGrid
 from tests.models.robots import content_of, robot_of
+from tests.systems.robots.engines import made
 
 SAME_STEPS = 1e-8
 """Of states after the same steps by both engines: rounding, times what motors make of it."""
@@ -67,7 +68,7 @@ def settings(mode=None, damping=20.0):
 
 
 def moved(kind, how, command, duration, step):
-    block = kind(ROBOT, how)
+    block = made(kind, ROBOT, how)
     simulator = Simulator(block)
     context = simulator.get_mutable_context()
     block.set_at_equilibrium(context, HOME)

@@ -10,6 +10,7 @@ from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.robots.cable_robot import CableRobot
 from cdpr_drake.systems.robots.compiled_cable_robot import CompiledCableRobot
 from cdpr_drake.systems.robots.compiled_step import StepRule
+from tests.systems.robots.engines import made
 
 STEP = 1e-3
 """Of the integration [s]; fixed, since an integrator that chooses steps remembers the last one."""
@@ -20,7 +21,7 @@ SAME_STEPS = 1e-9
 
 def environment(kind, reset_handler):
     robot = load_robot("acrobot_small")
-    block = kind(robot)
+    block = made(kind, robot)
     simulator = Simulator(block)
     if kind is CableRobot:
         ResetIntegratorFromFlags(simulator, "runge_kutta3", STEP).set_fixed_step_mode(True)

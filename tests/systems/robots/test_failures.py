@@ -30,6 +30,7 @@ from cdpr_drake.systems.robots.failures import (
 )
 from cdpr_drake.systems.robots.settings import CableRobotSettings, WinchSettings
 from cdpr_drake.systems.sensors.tension_sensor import TensionSensor
+from tests.systems.robots.engines import made
 
 ROBOT = load_robot("acrobot_small")
 M = len(ROBOT.cables)
@@ -45,7 +46,7 @@ def run(kind, mode, events, *, end=END, command=None, robot=ROBOT):
     """A robot whose winches are told to move, and its context at the end."""
     winches = WinchSettings() if mode == "ideal" else WinchSettings(kind="motor", mode=mode)
     how = CableRobotSettings(winches=winches, failures=FailureSettings(events=events))
-    block = kind(robot, how)
+    block = made(kind, robot, how)
     simulator = Simulator(block)
     context = simulator.get_mutable_context()
     step = 1e-4

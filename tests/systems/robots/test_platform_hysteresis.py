@@ -23,6 +23,7 @@ from cdpr_drake.systems.robots.compiled_step import StepRule
 from cdpr_drake.systems.robots.platform_hysteresis import BENT
 from cdpr_drake.systems.robots.settings import CableRobotSettings, WinchSettings
 from tests.motion.small_robots import content, small_robot
+from tests.systems.robots.engines import made
 
 ENGINES = [CompiledCableRobot, CableRobot]
 
@@ -57,7 +58,7 @@ def ball(**contacts):
 
 def spinning(kind, robot, step, w, X_WP=None, method="runge_kutta3"):
     """A simulator of the robot on slack cables, its platform turning at w."""
-    block = kind(robot)
+    block = made(kind, robot)
     simulator, X_WP = Simulator(block), X_WP or robot.home.transform()
     context, m = simulator.get_mutable_context(), len(robot.cables)
     still, speeds = np.zeros(m), np.zeros(robot.joint().num_velocities)
@@ -200,7 +201,7 @@ def test_both_engines_move_alike(name, mode, creeps):
     step = 0.2 / np.ceil(0.2 / min(step, 2e-3))  # plants leave quaternions longer than 1
     names = ["platform_state", "unstrained_lengths", BENT, *(["crept"] if creeps else [])]
     for kind in ENGINES:
-        block = kind(robot, how)
+        block = made(kind, robot, how)
         simulator = Simulator(block)
         context = simulator.get_mutable_context()
         block.set_at_equilibrium(context, robot.home.transform())

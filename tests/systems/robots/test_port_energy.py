@@ -15,6 +15,7 @@ from cdpr_drake.systems.robots.compiled_cable_robot import CompiledCableRobot
 from cdpr_drake.systems.robots.compiled_step import StepRule
 from cdpr_drake.systems.robots.disturbances import Disturbances, DisturbanceSettings, Push
 from cdpr_drake.systems.robots.settings import CableRobotSettings, CableSettings, DampingSettings
+from tests.systems.robots.engines import made
 
 ROBOT = load_robot("acrobot_large")
 HOW = CableRobotSettings(
@@ -52,7 +53,7 @@ def pushes(count, seed):
 def pushed(kind, count, seed):
     """Rows of a run of so many pushes: times, wrenches that held before, and the robot's state."""
     builder = DiagramBuilder()
-    block = builder.AddSystem(kind(ROBOT, HOW))
+    block = builder.AddSystem(made(kind, ROBOT, HOW))
     settings = DisturbanceSettings(pushes=pushes(count, seed), rate=1.0 / HELD)
     source = builder.AddSystem(Disturbances(settings, ROBOT.gravity_vector()))
     builder.Connect(source.GetOutputPort("wrench"), block.GetInputPort("applied_wrench"))
