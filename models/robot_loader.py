@@ -18,7 +18,7 @@ from pydrake.common.yaml import yaml_dump_typed
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.cable_behaviour import behaving_cables
-from cdpr_drake.cables.models import check_model
+from cdpr_drake.cables.models import CABLE_MODELS, check_model
 from cdpr_drake.errors import CableModelError, Problems, RobotFileError, why_not_read
 from cdpr_drake.geometry.motion_type import across
 from cdpr_drake.geometry.straight_cables import cable_lengths
@@ -306,7 +306,9 @@ def _check(robot: Robot, path: Path) -> None:
         )  # fmt: skip
     problems.raise_any()
     if robot.cable_model is not None:
-        cables = behaving_cables(robot.cable_set(), robot.cable_behaviour())
+        cables = robot.cable_set()
+        if CABLE_MODELS[robot.cable_model].sags:
+            cables = behaving_cables(cables, robot.cable_behaviour())
         try:
             check_model(robot.cable_model, cables)
         except CableModelError as problem:
