@@ -17,7 +17,9 @@ import numpy as np
 from pydrake.common.yaml import yaml_dump_typed
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import Problems, RobotFileError, why_not_read
+from cdpr_drake.cables.cable_behaviour import behaving_cables
+from cdpr_drake.cables.models import CABLE_MODELS, check_model
+from cdpr_drake.errors import CableModelError, Problems, RobotFileError, why_not_read
 from cdpr_drake.geometry.motion_type import across
 from cdpr_drake.geometry.straight_cables import cable_lengths
 from cdpr_drake.models.camera_files import CAMERA_SUFFIXES, camera_names, resolved_camera
@@ -303,6 +305,14 @@ def _check(robot: Robot, path: Path) -> None:
             mass=platform.mass if platform.inertia_of == SHAPE_INERTIA else None,
         )  # fmt: skip
     problems.raise_any()
+    if robot.cable_model is not None:
+        cables = robot.cable_set()
+        if CABLE_MODELS[robot.cable_model].sags:
+            cables = behaving_cables(cables, robot.cable_behaviour())
+        try:
+            check_model(robot.cable_model, cables)
+        except CableModelError as problem:
+            raise RobotFileError(f"{path}: cable_model: {problem}") from problem
 
 
 def _check_exits(robot: Robot, fail: Callable[[str, object, str], None]) -> None:

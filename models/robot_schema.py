@@ -12,6 +12,7 @@ from pydrake.math import RigidTransform
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.cable_behaviour import CableBehaviour
 from cdpr_drake.cables.elastic_law import axial_stiffness
+from cdpr_drake.cables.models import CABLE_MODELS
 from cdpr_drake.errors import RobotFileError
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.geometry.motion_type import MOTION_TYPES, MotionType
@@ -115,6 +116,14 @@ class Platform:
 
 
 @dataclass(kw_only=True)
+class PlatformDamping:
+    """Viscous damping of the platform's motion about Po, by air, pulleys and joints."""
+
+    translation: float = number("Force per velocity of Po.", "N s/m", 0.0, at_least=0.0)
+    rotation: float = number("Moment per angular velocity.", "N m s/rad", 0.0, at_least=0.0)
+
+
+@dataclass(kw_only=True)
 class TensionBounds:
     """Tensions that the robot may hold."""
 
@@ -214,6 +223,18 @@ class Robot(Summarized):
     platform: Platform = section("The moving platform.", Platform)
     cable: CableMaterial = section(
         "Material of the cables; the key `material` of a cable goes before it.", CableMaterial
+    )
+    cable_model: str | None = text(
+        "How a cable answers to its length, in simulations and at rest; scenarios and options "
+        "override it. Default: straight cables without weight.",
+        None,
+        choices=tuple(name for name, model in CABLE_MODELS.items() if model.extensible),
+    )
+    damping: PlatformDamping = section(
+        "Viscous damping of the platform in simulations, in addition to its cables; scenarios "
+        "override it.",
+        PlatformDamping,
+        required=False,
     )
     pulley: Pulley = section("Pulleys.", Pulley)
     platform_pulley: PlatformPulley | None = optional_section(

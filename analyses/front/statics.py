@@ -19,7 +19,7 @@ from cdpr_drake.analyses.statics.equilibria_query import (
 )
 from cdpr_drake.analyses.statics.static_query import StaticReport, static_at_lengths, static_at_pose
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables.models import CABLE_MODELS
+from cdpr_drake.cables.models import CABLE_MODELS, ELASTIC
 from cdpr_drake.errors import EquilibriumError
 from cdpr_drake.geometry.poses import angles_from_rotation
 from cdpr_drake.models.robot_loader import as_robot
@@ -138,7 +138,7 @@ def solve_static(
     robot: Robot | str | Path,
     pose: object = None,
     lengths: Array | Sequence[float] | None = None,
-    model: str = "elastic",
+    model: str | None = None,
     pulleys: bool = True,
 ) -> RobotAtRest:
     """A robot at rest: lengths, tensions, stiffness, vibrations and sag.
@@ -149,7 +149,8 @@ def solve_static(
             bounds; None without lengths: the home pose.
         lengths: Instead of a pose: unstrained lengths from A to B, shape (m,) [m]; the robot
             hangs at the lowest pose of rest.
-        model: A name of `cables.CABLE_MODELS`.
+        model: A name of `cables.CABLE_MODELS`. Default: the robot file's `cable_model`, or elastic
+            where it gives none.
         pulleys: Whether the cables run over the robot's pulleys.
 
     Raises:
@@ -159,8 +160,9 @@ def solve_static(
     """
     if pose is not None and lengths is not None:
         raise EquilibriumError("pose, lengths: found both; accepted: one of them")
-    _check_model(model, CABLE_MODELS)
     loaded = as_robot(robot, "solve_static")
+    model = model or loaded.cable_model or ELASTIC
+    _check_model(model, CABLE_MODELS)
     if lengths is None:
         found = static_at_pose(loaded, as_pose(loaded, pose), model, pulleys)
     else:

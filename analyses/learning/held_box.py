@@ -39,7 +39,7 @@ class HeldBox:
         Raises:
             CdprError: Hardly any box is held.
         """
-        self.robot, self._model = robot, settings.cables.model
+        self.robot, self._model = robot, settings.cables.model_of(robot)
         self._cables = simulated_cables(settings.cables.cable_set(robot), self._model)
         joint = robot.joint()
         self.home = joint.nearest(robot.home.transform())

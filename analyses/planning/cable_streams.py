@@ -154,19 +154,22 @@ class CableStream:
         return told
 
 
-def cable_stream(run: MotionRun, rate: float, model: str = ELASTIC) -> CableStream:
+def cable_stream(run: MotionRun, rate: float, model: str | None = None) -> CableStream:
     """A planned motion as unstrained lengths and motor angles, and whether cables stay taut.
 
     Args:
         run: The plan.
         rate: Points a second [Hz].
-        model: A name of `MODELS`.
+        model: A name of `MODELS`. Default: catenary if the robot file's cables sag, else elastic.
 
     Raises:
         PlanningError: The rate or the model is not accepted, the plan's tensions are none that a
             cable can have, or winches hold several cables.
     """
     robot = run.robot
+    if model is None:
+        sags = robot.cable_model is not None and CABLE_MODELS[robot.cable_model].sags
+        model = CATENARY if sags else ELASTIC
     if model not in MODELS:
         raise PlanningError(f"stream: model: found {model!r}; {accepted_names(model, MODELS)}")
     if not RATES[0] <= rate <= RATES[1]:

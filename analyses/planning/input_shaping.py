@@ -32,7 +32,7 @@ from cdpr_drake.statics.static_tensions import find_static_tensions
 from cdpr_drake.statics.stiffness import natural_modes, platform_stiffness
 from cdpr_drake.systems.robots.compiled_cable_robot import CompiledCableRobot
 from cdpr_drake.systems.robots.compiled_step import StepRule
-from cdpr_drake.systems.robots.settings import CableRobotSettings, CableSettings
+from cdpr_drake.systems.robots.settings import CableRobotSettings, CableSettings, DampingSettings
 from cdpr_drake.trajectories.pose_path import straight_path
 
 PERIOD = 1e-3
@@ -152,14 +152,16 @@ def plan_shaped_rest(
     settings = cables or CableSettings()
     l0 = _lengths(robot, settings, (start, goal), robot.tension_limits(bounds))
     real, platform = settings.cable_set(robot), rigid_platform(robot)
+    model, (push, turn) = settings.model_of(robot), DampingSettings().of(robot)
+    D = np.diag([turn] * 3 + [push] * 3)
     poses = straight_path([start, goal], 1.0)
     rests, frequencies, shaper = [], [], NO_SHAPER
     dampings = []
     for s in (0.0, 0.5, 1.0):
         rest = equilibrium_near(
-            real, settings.model, platform, l0(s), poses.pose(s * poses.length), soften=s == 0.0
+            real, model, platform, l0(s), poses.pose(s * poses.length), soften=s == 0.0
         )
-        K = platform_stiffness(real, settings.model, platform, rest.X_WP, l0(s))
+        K = platform_stiffness(real, model, platform, rest.X_WP, l0(s))
         modes = natural_modes(K.total, platform, rest.X_WP)
         if not np.all(modes.frequencies > 0.0):
             raise PlanningError(
@@ -171,8 +173,10 @@ def plan_shaped_rest(
         w = 2.0 * np.pi * modes.frequencies
         elastic = np.zeros((6, 6)) if K.elastic is None else K.elastic
         stretch = np.einsum("in,ij,jn->n", modes.shapes, elastic, modes.shapes)
-        # Kelvin and Voigt damp what stretches: 2 zeta w = T s' K_elastic s, with s' M s = 1.
-        dampings.append(float(np.mean(real.retardation)) * stretch / (2.0 * w))
+        # Kelvin and Voigt damp what stretches, D damps the platform:
+        # 2 zeta w = T s' K_elastic s + s' D s, with s' M s = 1.
+        braked = np.einsum("in,ij,jn->n", modes.shapes, D, modes.shapes)
+        dampings.append((float(np.mean(real.retardation)) * stretch + braked) / (2.0 * w))
     if kind is not None:
         shaper = _shaper(kind, np.mean(frequencies, axis=0), np.mean(dampings, axis=0), duration)
     motion = ShapedRest(
@@ -248,7 +252,7 @@ def rests_on(motion: ShapedRest, cables: CableSettings) -> tuple[Equilibrium, Eq
     """
     real, platform = cables.cable_set(motion.robot), rigid_platform(motion.robot)
     start, goal = (
-        equilibrium_near(real, cables.model, platform, motion.lengths(s), one.X_WP)
+        equilibrium_near(real, cables.model_of(motion.robot), platform, motion.lengths(s), one.X_WP)
         for s, one in ((0.0, motion.start), (1.0, motion.goal))
     )
     return start, goal
@@ -273,6 +277,7 @@ def _lengths(
 ) -> CubicSpline:
     """Unstrained lengths by s from 0 to 1."""
     cables, platform = settings.cable_set(robot), rigid_platform(robot)
+    model = settings.model_of(robot)
     path = straight_path(ends, 1.0)
     if cables.count < platform.motion.freedom:  # nothing to choose: they hang as long as they are
         l0 = np.array([cable_paths(X, cables).lengths for X in ends])
@@ -280,9 +285,8 @@ def _lengths(
     knots, found = np.linspace(0.0, 1.0, KNOTS), []
     for s in knots:
         X_WP = path.pose(s * path.length)
-        held = find_static_tensions(
-            cables, settings.model, X_WP, platform.weight_wrench(X_WP), bounds, platform.motion
-        )
+        wrench = platform.weight_wrench(X_WP)
+        held = find_static_tensions(cables, model, X_WP, wrench, bounds, platform.motion)
         if held is None:
             raise InfeasibleTensionError(
                 f"{robot.name} cannot hold the platform at {X_WP.translation().round(4)} m: no "

@@ -152,7 +152,7 @@ def _lengths(
         RotationMatrix.MakeZRotation(place[2]), [place[0], place[1], robot.plane_height]
     )
     found = find_static_tensions(
-        settings.cable_set(robot), settings.model, X_WP, np.zeros(6), bounds, LEVEL
+        settings.cable_set(robot), settings.model_of(robot), X_WP, np.zeros(6), bounds, LEVEL
     )
     if found is None:
         raise InfeasibleTensionError(

@@ -14,6 +14,7 @@ from cdpr_drake.geometry.poses import pose_error, pose_from_row
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
 from cdpr_drake.systems.pick_and_place.gripper import HOLDING
 from cdpr_drake.systems.pick_and_place.pick_and_place_task import Phase
+from cdpr_drake.systems.robots.settings import model_words, simulated_model
 
 NEEDED = {
     Phase.APPROACH: "found_object",
@@ -67,6 +68,7 @@ def summarize_pick_and_place(run: PickAndPlaceRun) -> dict[str, Any]:
         "scenario": scenario.name,
         "kind": scenario.kind,
         "robot": built.robot.name,
+        "simulated": simulated_model(built.robot, scenario.cables, scenario.damping),
         "camera": scenario.camera.kind,
         "seed": scenario.seed,
         **run.ending(),
@@ -128,6 +130,7 @@ def pick_and_place_facts(summary: dict[str, Any]) -> list[tuple[str, str]]:
         seen += f"; a tag was hidden for {views['hidden_s']:.2f} s"
     low, high = summary["tension_n"]["min"], summary["tension_n"]["max"]
     return [
+        ("simulated", model_words(summary["simulated"])),
         ("set down", words),
         ("phases [s]", times),
         ("view", seen),

@@ -61,7 +61,8 @@ def run_criterion(servo: VisualServo | LoopServo) -> ServoCriterion:
     """The stability criterion of a run's servo."""
     if isinstance(servo, LoopServo):
         scenario = servo.scenario
-        cables = simulated_cables(scenario.cables.cable_set(servo.robot), scenario.cables.model)
+        model = scenario.cables.model_of(servo.robot)
+        cables = simulated_cables(scenario.cables.cable_set(servo.robot), model)
         return servo_criterion(servo, cables, scenario.controller.pulleys)
     return criterion_of(servo, servo.scenario.controller.pulleys)
 

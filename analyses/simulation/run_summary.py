@@ -28,6 +28,7 @@ from cdpr_drake.systems.diagrams.visual_servo import VisualServo
 from cdpr_drake.systems.estimators.geometry_learner import LEARNT
 from cdpr_drake.systems.robots.failures import FailureSettings
 from cdpr_drake.systems.robots.platform_wrench import APPLIED_WRENCH
+from cdpr_drake.systems.robots.settings import simulated_model
 from cdpr_drake.systems.scenarios.run_settings import engine_of
 
 ROWS_AT_ONCE = 20_000
@@ -162,6 +163,7 @@ def summarize(result: RunResult) -> dict[str, Any]:
         "least_jacobian_rank": None if along is None else int(np.min(along.rank)),
         "unstable_s": None if along is None else along.unstable_time(),
         "torque_control": _torque_control(result),
+        "simulated": simulated_model(servo.robot, scenario.cables, scenario.damping),
         "world": world_summary(scenario, log),
         "surplus_over_chord_m": spread(log["surplus_lengths"].ravel()),
         "engine": engine_of(scenario),

@@ -50,6 +50,7 @@ from cdpr_drake.analyses.visualization.figure_style import new_figure
 from cdpr_drake.analyses.visualization.path_figures import Path3D, path_figure
 from cdpr_drake.analyses.visualization.replay import write_replay
 from cdpr_drake.analyses.visualization.shown_things import Surroundings
+from cdpr_drake.cables.models import ELASTIC
 from cdpr_drake.errors import CableGeometryError, DivergedError, ScenarioError
 from cdpr_drake.geometry.poses import pose_rows_distance
 from cdpr_drake.models.robot_loader import load_robot
@@ -64,7 +65,7 @@ from cdpr_drake.systems.diagrams.tension_control import (
 from cdpr_drake.systems.diagrams.tension_loop import TensionLoop, can_be_compiled
 from cdpr_drake.systems.loops.remote_tension_loop import RemoteTensionLoop, can_be_stepped
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
-from cdpr_drake.systems.robots.settings import CableSettings
+from cdpr_drake.systems.robots.settings import CableSettings, simulated_model
 from cdpr_drake.systems.scenarios.files import TENSION_CONTROL
 from cdpr_drake.systems.scenarios.run_settings import engine_of
 from cdpr_drake.systems.scenarios.tension_control_scenario import TensionScenario
@@ -127,6 +128,7 @@ def make_control(scenario: TensionScenario) -> TensionControl:
             force=scenario.force_control,
             disturbances=scenario.disturbances,
             seed=scenario.seed,
+            damping=scenario.damping,
         ),
         log_rate=scenario.log_rate,
     )
@@ -258,6 +260,7 @@ def summarize_tension_run(run: TensionRun) -> dict[str, Any]:
             "max": float(np.max(tensions, initial=-np.inf)),
         },
         "infeasible_steps": int(log["failures"][-1, 0]),
+        "simulated": simulated_model(run.control.robot, None, scenario.damping),
         "engine": engine_of(scenario),
         "loop": run.loop,
         "integration_step_s": scenario.integration.max_step,
@@ -325,7 +328,7 @@ def tension_log_names(run: TensionRun) -> LogNames:
 def tension_pictures(run: TensionRun, formats: Sequence[str] = DEFAULT_FORMATS) -> Pictures:
     """What draws figures and replay of a run, by the names of their files."""
     robot, log = run.control.robot, run.log
-    cables = CableSettings(pulleys=run.scenario.cables.pulleys)
+    cables = CableSettings(model=ELASTIC, pulleys=run.scenario.cables.pulleys)
     drawn = {
         "error": lambda: error_figure(run),
         "tensions": lambda: tension_figure(run),

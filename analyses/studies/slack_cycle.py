@@ -68,10 +68,10 @@ from cdpr_drake.systems.monitoring.run_monitor import Outcome
 SCENARIO = "caroca_pbvs"
 
 CABLES: dict[str, str] = {
-    "stiff": "cables={pulleys: true}",
-    "soft": "cables={pulleys: true, stiffness_ratio: 0.05}",
+    "stiff": "cables={model: kelvin_voigt, pulleys: true}",
+    "soft": "cables={model: kelvin_voigt, pulleys: true, stiffness_ratio: 0.05}",
     "sagging": "cables={pulleys: true, model: catenary}",
-    "matched": "cables={pulleys: false}",
+    "matched": "cables={model: kelvin_voigt, pulleys: false}",
 }
 """The simulated cables by name: massless of steel, massless of a twentieth of its stiffness, heavy
 ones that sag; and massless of steel without the pulleys that the controller does not know."""
@@ -249,7 +249,8 @@ def loop_of(cables: str) -> LinearLoop:
     start = scenario.initial_pose.transform()
     goal = servo_model(scenario, robot).desired_platform_pose()
     simulated = scenario.cables.cable_set(robot)
-    return linear_loop(rest_at_goal(robot, simulated, scenario.cables.model, start, goal))
+    model = scenario.cables.model_of(robot)
+    return linear_loop(rest_at_goal(robot, simulated, model, start, goal))
 
 
 def overrides(cables: str, damping: float, gain: float) -> list[str]:

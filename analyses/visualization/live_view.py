@@ -14,6 +14,7 @@ from pydrake.systems.framework import Context, Diagram, EventStatus
 from cdpr_drake.analyses.visualization.replay import REPLAY_RATE, RobotPicture
 from cdpr_drake.analyses.visualization.shown_things import ShownThing, ShownView
 from cdpr_drake.arrays import Array
+from cdpr_drake.cables.models import ELASTIC
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import Robot
@@ -97,7 +98,7 @@ def live_servo(scenario: Scenario, meshcat: Meshcat) -> Prepare:
 def live_tension_control(scenario: TensionScenario, meshcat: Meshcat) -> Prepare:
     """What lets Meshcat follow dynamic control by commanded tensions."""
     start = scenario.trajectory.trajectory().pose(0.0)
-    cables = CableSettings(pulleys=scenario.cables.pulleys)
+    cables = CableSettings(model=ELASTIC, pulleys=scenario.cables.pulleys)
     robot = load_robot(scenario.robot)
     return _follow(LiveView(meshcat, robot, start, cables=cables, world=scenario.world))
 

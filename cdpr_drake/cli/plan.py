@@ -34,7 +34,6 @@ from cdpr_drake.analyses.planning.timed_plan_results import TimedRun
 from cdpr_drake.analyses.reporting.deferred_figures import Pictures, write_pictures
 from cdpr_drake.analyses.reporting.folder_lock import free_folder
 from cdpr_drake.analyses.reporting.output_folder import results_folder, shown_path
-from cdpr_drake.cables.models import ELASTIC
 from cdpr_drake.cli.completion import words_among
 from cdpr_drake.cli.options import (
     FigureFormats,
@@ -126,10 +125,10 @@ Stream = Annotated[
     ),
 ]
 StreamModel = Annotated[
-    str,
+    str | None,
     typer.Option(
         help="Cables of the stream: elastic, stretched by their tension, or catenary, which sag, "
-        "too.",
+        "too. Default: catenary if the robot file's cables sag.",
         autocompletion=words_among(MODELS),
     ),
 ]
@@ -312,7 +311,7 @@ def plan(
     method: Method = None,
     track: Track = None,
     stream: Stream = None,
-    stream_model: StreamModel = ELASTIC,
+    stream_model: StreamModel = None,
     out: Out = None,
     overwrite: Overwrite = False,
     figure_format: FigureFormats = "png",

@@ -14,7 +14,7 @@ from cdpr_drake.analyses.front.mechanisms import hang_mechanism
 from cdpr_drake.analyses.front.statics import solve_static
 from cdpr_drake.analyses.statics.static_query import StaticReport
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables.models import CABLE_MODELS
+from cdpr_drake.cables.models import CABLE_MODELS, ELASTIC
 from cdpr_drake.cli.completion import words_among
 from cdpr_drake.cli.mechanism_options import (
     Held,
@@ -51,12 +51,13 @@ def static(
         str | None, typer.Option(help="Unstrained cable lengths from A to B, l1,...,lm [m].")
     ] = None,
     cable_model: Annotated[
-        str,
+        str | None,
         typer.Option(
-            help="Cable model: " + ", ".join(CABLE_MODELS) + ".",
+            help="Cable model: " + ", ".join(CABLE_MODELS) + ". Default: the robot file's, or "
+            "elastic.",
             autocompletion=words_among(CABLE_MODELS),
         ),
-    ] = "elastic",
+    ] = None,
     pulleys: Annotated[bool, typer.Option(help="Cables run over the robot's pulleys.")] = True,
     joint: Joint = None,
     yields: Annotated[
@@ -112,7 +113,7 @@ def static(
                 if lengths is not None
                 else None,
                 joints=parse_joints(joint),
-                model=cable_model,
+                model=cable_model or ELASTIC,
                 pulleys=pulleys,
                 yields=yields or PRESTRESS,
                 free=parse_names(free),

@@ -59,12 +59,12 @@ class BatchMember:
         if by_tensions:
             model, drive = KELVIN_VOIGT, Drive(kind=TENSIONS)
         else:
-            model = settings.cables.model
+            model = settings.cables.model_of(robot)
             cables, drive = simulated_cables(cables, model), winch_drive(robot, settings.winches)
         home, joint, damping = (
             cable_paths(robot.home.transform(), cables).lengths,
             robot.joint(),
-            (settings.damping.translation, settings.damping.rotation),
+            settings.damping.of(robot),
         )
         arrays = pack_robot(
             rigid_platform(robot), cables, model, drive, home=home, joint=joint, damping=damping

@@ -74,8 +74,8 @@ def _obstacles(scenario: Scenario, robot: Robot) -> list[tuple[str, str]]:
          if robot.cable_set().has_platform_pulleys() else "", "pulleys at the frame alone"),
         (f"several cables on a winch of {robot.name}"
          if robot.winch_groups().are_shared() else "", "a winch for each cable"),
-        (f"cables.model {scenario.cables.model}"
-         if CABLE_MODELS[scenario.cables.model].sags else "", "cables that do not sag"),
+        (f"cables.model {scenario.cables.model_of(robot)}"
+         if CABLE_MODELS[scenario.cables.model_of(robot)].sags else "", "cables that do not sag"),
         ("" if target.kind == "tag" else f"target.kind {target.kind}", "tag"),
         ("" if scenario.target_rests() else "a target that moves", "one that rests in the world"),
         (f"estimators {', '.join(counting)}, which would go by the points of the start"

@@ -292,7 +292,7 @@ def _by_winches(scenario: MechanismScenario, mechanism: Mechanism) -> MechanismF
     settings: CableSettings = scenario.cables
     given = added.routes()
     routes = given.with_cables(settings.applied(given.ends))
-    cables = PlantCables(plant, routes, settings.model)
+    cables = PlantCables(plant, routes, settings.model_of())
     low, high = scenario.limits(mechanism)
     try:
         rest = hang(
@@ -310,7 +310,7 @@ def _by_winches(scenario: MechanismScenario, mechanism: Mechanism) -> MechanismF
     period, engine, ports = 1.0 / control.rate, None, None
     if compiled:
         engine = CompiledMechanism(
-            plant, routes, settings.model, period=period,
+            plant, routes, settings.model_of(), period=period,
             max_step=scenario.integration.max_step,
         )  # fmt: skip
         block: CompiledMechanism | CablePorts = builder.AddNamedSystem("mechanism", engine)

@@ -319,7 +319,7 @@ def _check_cables(scenario: Scenario, robot: Robot, path: Path) -> None:
         )
     try:
         cables = settings.cable_set(robot)
-        simulated_cables(cables, settings.model)
+        simulated_cables(cables, settings.model_of(robot))
         check_pulleys(robot, scenario.initial_pose.transform(), cables)
     except (CableModelError, CableGeometryError) as problem:
         raise ScenarioError(f"{path}: cables: {problem}") from problem

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -31,6 +31,7 @@ from cdpr_drake.systems.robots.compiled_motion import HELD, MEMORY, CompiledMoti
 from cdpr_drake.systems.robots.compiled_step import StepRule
 from cdpr_drake.systems.robots.disturbances import Disturbances, DisturbanceSettings
 from cdpr_drake.systems.robots.platform_wrench import APPLIED_WRENCH, PlatformWrench
+from cdpr_drake.systems.robots.settings import DampingSettings
 from cdpr_drake.systems.robots.tension_driven_cables import TensionDrivenCables
 from cdpr_drake.systems.worlds.adding import (
     CLEARANCES,
@@ -184,6 +185,8 @@ class TensionControlSettings:
         force: How the platform answers forces; None: as computed torque does. Needs the plant.
         disturbances: What pushes the platform; None: nothing. Needs the plant.
         seed: Of their random numbers.
+        damping: Of the simulated platform; by default the robot file's. The controller does not
+            know it.
     """
 
     trajectory: PoseTrajectory
@@ -205,6 +208,7 @@ class TensionControlSettings:
     force: ForceControl | None = None
     disturbances: DisturbanceSettings | None = None
     seed: int = 0
+    damping: DampingSettings = field(default_factory=DampingSettings)
 
 
 @dataclass(frozen=True)
@@ -267,7 +271,12 @@ def add_tension_control(
         systems["cables"] = driven
     else:
         driven = motion_by_tensions(
-            in_plant.robot, real, push=settings.push, rule=settings.rule, command_period=HELD
+            in_plant.robot,
+            real,
+            push=settings.push,
+            rule=settings.rule,
+            command_period=HELD,
+            damping=settings.damping,
         )
         builder.AddNamedSystem(prefix + "motion", driven)
         state = _split_state(builder, driven, prefix)
@@ -286,6 +295,11 @@ def add_tension_control(
             builder.Connect(driven.GetOutputPort("lengths"), block.GetInputPort("lengths"))
     if isinstance(driven, TensionDrivenCables):
         apply_force(builder, in_plant.plant, driven.GetOutputPort("generalized_force"), name=name)
+        brake = settings.damping.block(in_plant)
+        if brake is not None:
+            builder.AddNamedSystem(prefix + "damping", brake)
+            builder.Connect(state, brake.get_input_port())
+            apply_force(builder, in_plant.plant, brake.get_output_port(), name=prefix + "braked")
         friction = add_hysteresis(builder, in_plant, name=name)
         if friction is not None:
             rubbing = friction.GetOutputPort("generalized_force")

@@ -36,7 +36,7 @@ def check_wrench_estimation(scenario: Scenario, robot: Robot, path: Path) -> Non
             f"{path}: wrench_estimation: found a section for {robot.name}, {robot.motion} with "
             f"{len(robot.cables)} cables; accepted: 3R3T with at least 6"
         )
-    model = scenario.cables.model
+    model = scenario.cables.model_of(robot)
     if CABLE_MODELS[model].sags:
         raise ScenarioError(
             f"{path}: wrench_estimation: found a section with cables.model {model}; accepted: "

@@ -101,7 +101,7 @@ class RobotMotion:
                 describe.
         """
         self.robot, self.rule, self._packed = robot, rule, PackedRule(rule)
-        self._model = settings.cables.model
+        self._model = settings.cables.model_of(robot)
         if like is None:
             self._set = simulated_cables(settings.cables.cable_set(robot), self._model)
             self._drive = winch_drive(robot, settings.winches)
@@ -111,10 +111,9 @@ class RobotMotion:
             self._set, self._drive, self._home = like._set, like._drive, like._home
             self._joint, self._body = like._joint, like._body
         joint = self._joint
-        damping = settings.damping
         self._arrays = pack_robot(
             self._body, self._set, self._model, self._drive,
-            home=self._home, joint=joint, damping=(damping.translation, damping.rotation),
+            home=self._home, joint=joint, damping=settings.damping.of(robot),
             contacts=robot.contact_hysteresis(),
         )  # fmt: skip
         law = cable_law(self._model, self._set)

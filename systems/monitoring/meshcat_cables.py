@@ -175,7 +175,7 @@ class CablePictures:
         """
         settings = CableSettings() if settings is None else settings
         self._settings, self._path, self._full_scale = settings, path, full_scale
-        self._set, self._model = settings.cable_set(robot), settings.model
+        self._set, self._model = settings.cable_set(robot), settings.model_of(robot)
         self._radius = _drawn_radius(robot)
         self._paths = self._paths_of(robot)
         self._chains = CableChains(meshcat, self._paths, self._radius, full_scale, colors)

@@ -214,7 +214,7 @@ def add_cable_robot(
     failures = settings.failure_block(robot)
     may_fail = failures is not None
     forces = builder.AddNamedSystem(
-        prefix + "cables", CableForces(in_plant, cables, settings.cables.model, may_fail)
+        prefix + "cables", CableForces(in_plant, cables, settings.cables.model_of(robot), may_fail)
     )
     home = cable_paths(robot.home.transform(), cables).lengths
     winch = builder.AddNamedSystem(
@@ -230,8 +230,9 @@ def add_cable_robot(
         both = builder.AddNamedSystem(prefix + "force_and_drums", Demultiplexer(sizes))
         builder.Connect(forces.GetOutputPort("force_and_drums"), both.get_input_port())
         applied, drums = both.get_output_port(0), both.get_output_port(1)
-    if settings.damping.is_there():
-        brake = builder.AddNamedSystem(prefix + "damping", settings.damping.block(in_plant))
+    brake = settings.damping.block(in_plant)
+    if brake is not None:
+        builder.AddNamedSystem(prefix + "damping", brake)
         builder.Connect(state, brake.get_input_port())
         applied = _sum(builder, prefix + "applied_force", applied, brake.get_output_port())
     friction = add_hysteresis(builder, in_plant, name=name)

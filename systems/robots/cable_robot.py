@@ -250,7 +250,7 @@ def automatic_step(
         whole[:3, :3] = contacts.stiffness_in_world(X_WP.rotation().matrix())
         own = whole if motion.is_free else motion.part(whole, X_WP.rotation().matrix())
         K[: len(own), : len(own)] += own
-    retardation = 0.0 if cables.model == ELASTIC else float(np.max(simulated.retardation))
+    retardation = 0.0 if cables.model_of(robot) == ELASTIC else float(np.max(simulated.retardation))
     eigenvalues = vibration_eigenvalues(M, K, retardation)
     return STEP_SHARE * largest_stable_step(np.concatenate([eigenvalues, poles]), integrator)
 

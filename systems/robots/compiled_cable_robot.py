@@ -21,7 +21,7 @@ from cdpr_drake.systems.robots.compiled_motion import MEMORY, CompiledMotion
 from cdpr_drake.systems.robots.compiled_step import CompiledBodies, StepRule
 from cdpr_drake.systems.robots.failures import BROKEN, FAULTS
 from cdpr_drake.systems.robots.platform_wrench import APPLIED_WRENCH
-from cdpr_drake.systems.robots.settings import CableRobotSettings, WinchSettings
+from cdpr_drake.systems.robots.settings import CableRobotSettings, DampingSettings, WinchSettings
 
 
 class CompiledCableRobot(Diagram):
@@ -80,11 +80,11 @@ class CompiledCableRobot(Diagram):
                 f"{plant.num_velocities()} velocities in its scene; accepted: the platform alone "
                 f"with its {own}; other bodies need the engine plant"
             )
-        cables = simulated_cables(settings.cables.cable_set(robot), settings.cables.model)
-        damping, failures = settings.damping, settings.failure_block(robot)
+        model, failures = settings.cables.model_of(robot), settings.failure_block(robot)
+        cables = simulated_cables(settings.cables.cable_set(robot), model)
         motion = CompiledMotion(
-            robot, cables, settings.cables.model, winch_drive(robot, settings.winches),
-            damping=(damping.translation, damping.rotation),
+            robot, cables, model, winch_drive(robot, settings.winches),
+            damping=settings.damping.of(robot),
             rule=default_rule(robot, settings) if rule is None else rule,
             frame=plant.GetBodyFrameIdOrThrow(in_plant.body_index),
             command_period=command_period,
@@ -96,9 +96,7 @@ class CompiledCableRobot(Diagram):
         )
         bodies = builder.AddNamedSystem(
             "bodies",
-            CompiledBodies(
-                motion.arrays(), cable_law(settings.cables.model, cables), robot.joint()
-            ),
+            CompiledBodies(motion.arrays(), cable_law(model, cables), robot.joint()),
         )
         disturbances = settings.disturbance_block(robot)
         pushed = [system.GetInputPort(APPLIED_WRENCH) for system in (motion, bodies)]
@@ -189,6 +187,7 @@ def motion_by_tensions(
     push: bool = False,
     rule: StepRule | None = None,
     command_period: float | None = None,
+    damping: DampingSettings | None = None,
 ) -> CompiledMotion:
     """A robot on massless, inextensible cables of commanded tensions, as `TensionDrivenCables`.
 
@@ -198,8 +197,10 @@ def motion_by_tensions(
         push: Whether a command below zero pushes.
         rule: How it is integrated; `default_rule` if None.
         command_period: As for `CompiledMotion`.
+        damping: Of the platform. Default: the robot file's.
     """
     drive, rule = Drive(kind=TENSIONS, push=push), rule or default_rule(robot, by_tensions=True)
     return CompiledMotion(
-        robot, cables, KELVIN_VOIGT, drive, rule=rule, command_period=command_period
-    )
+        robot, cables, KELVIN_VOIGT, drive, damping=(damping or DampingSettings()).of(robot),
+        rule=rule, command_period=command_period,
+    )  # fmt: skip

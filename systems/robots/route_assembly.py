@@ -113,13 +113,13 @@ def add_cables(
         raise CableModelError(f"method: found {method!r}; {accepted_names(method, METHODS)}")
     settings, prefix = settings or CableSettings(), f"{name}_" if name else ""
     routes = routes.with_cables(settings.applied(routes.ends))
-    cables = PlantCables(plant, routes, settings.model)
+    cables = PlantCables(plant, routes, settings.model_of())
     why = unknown_joint(plant, routes.touched_bodies())
     if why and method == JOINTS:
         raise CableModelError(why)
     chosen = BODIES if why or method == BODIES else JOINTS
     kind = RouteForces if chosen == JOINTS else RouteSpatialForces
-    forces = builder.AddNamedSystem(prefix + "cables", kind(plant, routes, settings.model))
+    forces = builder.AddNamedSystem(prefix + "cables", kind(plant, routes, settings.model_of()))
     if winches is None:
         home, _ = cables.lengths_and_jacobian(plant.CreateDefaultContext())
         winches = VelocityWinch(home, rated_speed)

@@ -4,6 +4,7 @@ Drake's YAML loader reads the annotations themselves, so they are not postponed 
 """
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from pydrake.systems.primitives import MatrixGain
@@ -27,9 +28,10 @@ class CableSettings:
     tensions are not determined. Stiff Kelvin-Voigt cables are what comes nearest.
     """
 
-    model: str = text(
-        "How a cable answers to its length.",
-        KELVIN_VOIGT,
+    model: str | None = text(
+        "How a cable answers to its length. Default: the robot file's `cable_model`, or "
+        f"{KELVIN_VOIGT} where it gives none.",
+        None,
         choices=tuple(name for name, model in CABLE_MODELS.items() if model.extensible),
     )
     pulleys: bool = switch("Whether the cables run over the robot's pulleys.", False)
@@ -48,6 +50,14 @@ class CableSettings:
         None,
         at_least=0.0,
     )
+
+    def model_of(self, robot: Robot | None = None) -> str:
+        """Name of the simulated cables' model: these settings', or that of the robot's file.
+
+        Args:
+            robot: The robot; None for cables between bodies of a plant, which have no robot file.
+        """
+        return self.model or (robot and robot.cable_model) or KELVIN_VOIGT
 
     def cable_set(self, robot: Robot) -> CableSet:
         """The cables of a robot, over its pulleys or from fixed exit points.
@@ -98,27 +108,89 @@ class DampingSettings:
     """Viscous damping of the platform's motion about Po: air, and friction at pulleys and joints.
 
     A platform that hangs on fewer cables than it has degrees of freedom swings, and nothing in
-    the cables damps that.
+    the cables damps that. What is not given here, the robot's file says.
     """
 
-    translation: float = number("Force per velocity of Po.", "N s/m", 0.0, at_least=0.0)
-    rotation: float = number("Moment per angular velocity.", "N m s/rad", 0.0, at_least=0.0)
+    translation: float | None = number(
+        "Force per velocity of Po. Default: the robot file's.", "N s/m", None, at_least=0.0
+    )
+    rotation: float | None = number(
+        "Moment per angular velocity. Default: the robot file's.", "N m s/rad", None, at_least=0.0
+    )
 
-    def is_there(self) -> bool:
-        """Whether there is any damping."""
-        return self.translation > 0.0 or self.rotation > 0.0
+    def of(self, robot: Robot) -> tuple[float, float]:
+        """Damping of a robot's simulated platform [N s/m, N m s/rad]."""
+        t, r, own = self.translation, self.rotation, robot.damping
+        return own.translation if t is None else t, own.rotation if r is None else r
 
-    def block(self, in_plant: RobotInPlant) -> MatrixGain:
-        """Generalized forces on the plant, shape (nv,), from the platform's state."""
+    def block(self, in_plant: RobotInPlant) -> MatrixGain | None:
+        """Generalized forces on the plant, shape (nv,), from the platform's state; None without
+        damping."""
         plant = in_plant.plant
         joint = in_plant.robot.joint()
-        t, r = self.translation, self.rotation
+        t, r = self.of(in_plant.robot)
+        if t == r == 0.0:
+            return None
         damping = np.array([r, r, r, t, t, t] if joint.is_floating else [t, t, r])
         damping = damping[: joint.num_velocities]
         D = np.zeros((plant.num_velocities(), plant.num_multibody_states(in_plant.model_instance)))
         for k, value in enumerate(damping):
             D[in_plant.first_velocity() + k, D.shape[1] - len(damping) + k] = -value
         return MatrixGain(D)
+
+
+def simulated_model(
+    robot: Robot, cables: CableSettings | None, damping: DampingSettings
+) -> dict[str, Any]:
+    """What a robot is simulated as, for the summary of a run.
+
+    Args:
+        robot: The robot.
+        cables: Settings of its cables; None: they have commanded tensions, and no model.
+        damping: Settings of its damping.
+
+    Returns:
+        cable_model, pulleys, damping_n_s_per_m, damping_n_m_s_per_rad; and overrides: settings that
+        differ from what the robot's file says, in words.
+    """
+    t, r = damping.of(robot)
+    told: dict[str, Any] = {"damping_n_s_per_m": t, "damping_n_m_s_per_rad": r}
+    pairs: list[tuple[str, Any, Any]] = [
+        ("damping.translation", t, robot.damping.translation),
+        ("damping.rotation", r, robot.damping.rotation),
+    ]
+    if cables is not None:
+        model = cables.model_of(robot)
+        pulleys = cables.pulleys and robot.cable_set().has_pulleys()
+        told |= {"cable_model": model, "pulleys": pulleys}
+        if robot.cable_model is not None:
+            pairs.insert(0, ("cables.model", model, robot.cable_model))
+        if cables.stiffness_ratio != 1.0:
+            pairs.append(("cables.stiffness_ratio", cables.stiffness_ratio, 1))
+        if cables.retardation_time is not None:
+            own = robot.cable.retardation_time
+            pairs.append(("cables.retardation_time", cables.retardation_time, own))
+    told["overrides"] = [
+        f"{key} {_plain(value)}, not {_plain(own)}" for key, value, own in pairs if value != own
+    ]
+    return told
+
+
+def model_words(told: dict[str, Any]) -> str:
+    """What `simulated_model` tells, in one line."""
+    words = []
+    if "cable_model" in told:
+        where = "over pulleys" if told["pulleys"] else "from fixed exit points"
+        words.append(f"{told['cable_model']} cables {where}")
+    t, r = told["damping_n_s_per_m"], told["damping_n_m_s_per_rad"]
+    words.append(f"damping {t:g} N s/m, {r:g} N m s/rad" if t or r else "platform undamped")
+    if told["overrides"]:
+        words.append(f"overrides the robot file: {'; '.join(told['overrides'])}")
+    return ", ".join(words)
+
+
+def _plain(value: Any) -> str:
+    return value if isinstance(value, str) else f"{value:g}"
 
 
 @dataclass(kw_only=True)
@@ -128,7 +200,7 @@ class CableRobotSettings:
     cables: CableSettings = section("The simulated cables.", CableSettings, required=False)
     winches: WinchSettings = section("The winches.", WinchSettings, required=False)
     damping: DampingSettings = section(
-        "What brakes the platform beside its cables.", DampingSettings, required=False
+        "Additional damping of the platform.", DampingSettings, required=False
     )
     disturbances: DisturbanceSettings | None = optional_section(
         "What pushes the platform beside its cables; null: nothing."

@@ -34,7 +34,7 @@ from cdpr_drake.systems.controllers.force_tracking import ForceControl
 from cdpr_drake.systems.remote.settings import RemoteSettings
 from cdpr_drake.systems.robots.compiled_step import StepRule
 from cdpr_drake.systems.robots.disturbances import DisturbanceSettings
-from cdpr_drake.systems.robots.settings import AUTOMATIC, COMPILED, ENGINES
+from cdpr_drake.systems.robots.settings import AUTOMATIC, COMPILED, ENGINES, DampingSettings
 from cdpr_drake.systems.scenarios.files import TENSION_CONTROL
 from cdpr_drake.systems.scenarios.run_settings import ScenarioHeader
 from cdpr_drake.tensions.methods import METHODS
@@ -197,6 +197,10 @@ class TensionScenario(ScenarioHeader):
     cables: DrivenCableSettings = section(
         "The simulated cables.", DrivenCableSettings, required=False
     )
+    damping: DampingSettings = section(
+        "Additional damping of the simulated platform, which the controller does not know.",
+        DampingSettings, required=False,
+    )  # fmt: skip
     trajectory: TrajectorySettings = section("Desired motion.", TrajectorySettings)
     controller: TorqueSettings = section("Computed torque.", TorqueSettings)
     distribution: DistributionSettings = section(

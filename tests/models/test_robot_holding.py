@@ -73,7 +73,9 @@ PAID_OUT = np.array([0.0, 0.05, 0.0, 0.0, 0.0, 0.0, 0.05, 0.0])
 @pytest.mark.parametrize("kind", [CableRobot, CompiledCableRobot])
 def test_a_platform_with_slack_cables_can_start_at_rest(kind):
     robot = load_robot("caroca")
-    block = kind(robot, CableRobotSettings(cables=CableSettings(stiffness_ratio=0.1)))
+    block = kind(
+        robot, CableRobotSettings(cables=CableSettings(model="kelvin_voigt", stiffness_ratio=0.1))
+    )
     simulator = Simulator(block)
     context = simulator.get_mutable_context()
     block.GetInputPort("cable_velocities").FixValue(context, np.zeros(8))

@@ -368,3 +368,27 @@ def test_what_is_only_drawn_or_shown_may_be_left_out(tmp_path):
     robot = load_robot(str(write(tmp_path, content)))
     assert robot.title == ""
     assert robot.frame.beam_width() == 2.0 / 30.0
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (
+            {"cable_model": "inextensible"},
+            "cable_model: found inextensible; accepted: one of",
+        ),
+        ({"damping": {"translation": -1.0}}, "damping.translation: found -1.0; accepted: a number"),
+        (
+            {"cable_model": "catenary", "pulley": {"radius": 0.01, "swivel_axis": [1, 0, 1]}},
+            "cable_model: swivel_axis of cable 1",
+        ),
+        (
+            {"cable_model": "catenary", "gravity_direction": [1, 0, 0]},
+            "cable_model: .*gravity",
+        ),
+    ],
+)
+def test_a_model_that_cannot_be_is_refused_by_its_key(tmp_path, change, words):
+    path = write(tmp_path, {**yaml.safe_load(ROBOT), **change})
+    with pytest.raises(RobotFileError, match=rf"robot.yaml[:0-9]*: {words}"):
+        load_robot(path)

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cdpr_drake.analyses.studies.framework.caroca_cables import CAROCA_ASSUMPTION, CAROCA_CABLES
-from cdpr_drake.analyses.studies.framework.case_definition import Configuration, Plan
+from cdpr_drake.analyses.studies.framework.caroca_cables import CAROCA_ASSUMPTION
+from cdpr_drake.analyses.studies.framework.case_definition import PULLEYS, Configuration, Plan
 from cdpr_drake.analyses.studies.framework.case_study import configuration_study
 from cdpr_drake.analyses.studies.framework.statement import SOURCE
 from cdpr_drake.analyses.studies.tension_cases.case_10_estimates import ESTIMATES
@@ -41,7 +41,7 @@ SOFTNESS = ("0.02", "0.1")
 """Stiffness of the cables as mounted, of that by the modulus of steel, beside all of it."""
 
 MASSLESS = (
-    "cables={stiffness_ratio: 0.05, retardation_time: 0.006}",
+    "cables={model: kelvin_voigt, stiffness_ratio: 0.05, retardation_time: 0.006}",
     "damping={translation: 0, rotation: 0}",
 )
 """Cables that were once fitted to E3 to E10: straight, without weight or pulleys, a twentieth of
@@ -115,7 +115,7 @@ STUDY = configuration_study(
         title="Slack cables on CAROCA, with and without tension correction",
         scenario="caroca_slack_start",
         changes=(
-            *CAROCA_CABLES,
+            PULLEYS,
             "perturbations.initial_pose_shift={distance: 0.02, angle_deg: 1.5}",
             "perturbations.exit_points=0.005",
             "perturbations.anchor_points=0.002",

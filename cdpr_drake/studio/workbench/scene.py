@@ -16,6 +16,7 @@ from cdpr_drake.analyses.visualization.meshcat_window import open_meshcat
 from cdpr_drake.analyses.visualization.replay import RobotPicture
 from cdpr_drake.analyses.visualization.solids import add_solid
 from cdpr_drake.arrays import Array
+from cdpr_drake.cables.models import ELASTIC
 from cdpr_drake.geometry.poses import pose_from_row
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import Robot
@@ -181,7 +182,10 @@ class RunScene:
         if isinstance(scenario, Scenario):
             servo = scenario
         else:
-            cables, world = CableSettings(pulleys=scenario.cables.pulleys), scenario.world
+            cables, world = (
+                CableSettings(model=ELASTIC, pulleys=scenario.cables.pulleys),
+                scenario.world,
+            )
         self._picture = RobotPicture(
             robot, robot.tension_limits()[1], servo, cables, meshcat=meshcat, world=world,
             colors=[nth_look(k).color for k in range(len(robot.cables))],

@@ -31,6 +31,7 @@ def robot_with_everything(**changes: object) -> Robot:
         "name": "Every.thing", "title": 'All of "it" – Größe <1> & more', "gravity": 3.71,
         "slack_readings": [0.1 * k for k in range(8)], "assumptions": "None: it is made up.",
         "tension_bounds": {"lower": 3.25, "upper": 611.0},
+        "cable_model": "elastic", "damping": {"translation": 12.5, "rotation": 0.7},
         "pulley": {"radius": 0.031, "swivel_axis": [0.1, 0.2, 1.0]},
         "platform_pulley": {"radius": 0.004, "swivel_axis": [0.3, 0.0, 1.0]},
         "cable": {"youngs_modulus": 7.7e10, "diameter": 0.0023, "linear_density": 0.021,

@@ -17,8 +17,8 @@ PROJECTED = ("camera.kind=projected", "duration=0.2")
 
 def test_default_is_straight_without_pulleys():
     scenario = load_scenario("acrobot_pbvs")
-    assert (scenario.cables.model, scenario.cables.pulleys) == ("kelvin_voigt", False)
     robot = load_robot("acrobot_small")
+    assert (scenario.cables.model_of(robot), scenario.cables.pulleys) == ("kelvin_voigt", False)
     assert not scenario.cables.cable_set(robot).has_pulleys()
 
 
