@@ -10,9 +10,10 @@ from pydrake.multibody.parsing import PackageMap
 from pydrake.multibody.plant import MultibodyPlant
 
 from cdpr_drake.errors import CdprError, Problems, RobotFileError
+from cdpr_drake.models.drake_parsing import drake_line
 from cdpr_drake.models.materials import check_materials
 from cdpr_drake.models.mechanism_files import is_mechanism
-from cdpr_drake.models.mechanism_in_plant import MODEL_SUFFIXES, add_mechanism, drake_line
+from cdpr_drake.models.mechanism_in_plant import MODEL_SUFFIXES, add_mechanism
 from cdpr_drake.models.mechanism_schema import Mechanism
 from cdpr_drake.models.plant_cables import PlantCables
 from cdpr_drake.models.robot_loader import LARGEST_LENGTH, load_robot, robot_file

@@ -11,7 +11,6 @@ Source: SDFormat 1.12; Gazebo thesis 5.4 and the simulator's files for the chain
 
 from __future__ import annotations
 
-import logging
 import re
 import xml.etree.ElementTree as ET
 from pathlib import Path
@@ -23,7 +22,7 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import FrameIndex, PrismaticJoint, RigidBody
 
-from cdpr_drake.errors import RobotFileError
+from cdpr_drake.models.drake_parsing import drake_refusals, parse_models
 from cdpr_drake.models.formats.draft import DraftCable, RobotDraft
 from cdpr_drake.models.formats.file_kinds import is_sdformat
 from cdpr_drake.models.formats.reading import fail, numbers, read_xml, robot_name
@@ -42,6 +41,11 @@ def read_named_frames(path: Path) -> RobotDraft:
     Raises:
         RobotFileError: Drake cannot read the file, or its frames do not make a cable robot.
     """
+    with drake_refusals(f"{path}: Drake cannot read it"):
+        return _read_draft(path)
+
+
+def _read_draft(path: Path) -> RobotDraft:
     root = read_xml(path)
     tool = SDF_TOOL if is_sdformat(root) else URDF_TOOL
     model = root.find("model") if is_sdformat(root) else root
@@ -54,21 +58,9 @@ def read_named_frames(path: Path) -> RobotDraft:
     plant.RegisterAsSourceForSceneGraph(scene_graph)
     parser = Parser(plant)
     parser.SetAutoRenaming(True)
-    log = logging.getLogger("drake")
-    level = log.level
-    log.setLevel(logging.CRITICAL + 1)  # what matters comes as an exception
-    try:
-        balls = _without_balls(root)
-        if balls:
-            parser.AddModelsFromString(ET.tostring(root, encoding="unicode"), "sdf")
-        else:
-            parser.AddModels(str(path.absolute()))
-        plant.Finalize()
-    except RuntimeError as problem:
-        first = next((line for line in str(problem).splitlines() if line.strip()), "no reason")
-        raise RobotFileError(f"{path}: Drake cannot read it: {first[:300]}") from problem
-    finally:
-        log.setLevel(level)
+    balls = _without_balls(root)
+    parse_models(parser, path, ET.tostring(root, encoding="unicode") if balls else None, "sdf")
+    plant.Finalize()
     exits, anchors = _points(plant)
     names = [name for name in exits if name in anchors]
     if not names:
