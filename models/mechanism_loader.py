@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from pydrake.geometry import SceneGraph
 from pydrake.multibody.parsing import PackageMap
 from pydrake.multibody.plant import MultibodyPlant
 
@@ -210,7 +211,8 @@ def _find_model(mechanism: Mechanism, path: Path, fail: Callable[[str, object, s
 
 def _check_in_plant(mechanism: Mechanism, path: Path) -> None:
     """Builds it once, so that all that Drake refuses is said with the file."""
-    plant = MultibodyPlant(0.0)
+    plant, scene_graph = MultibodyPlant(0.0), SceneGraph()
+    plant.RegisterAsSourceForSceneGraph(scene_graph)  # so that shapes are looked at, too
     try:
         added = add_mechanism(plant, mechanism)
         added.finalize()

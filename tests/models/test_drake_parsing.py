@@ -30,12 +30,13 @@ def urdf(shape, origin=""):
 
 
 MECHANISM = """\
-title: t
+name: two
+title: two
 mechanism: {file}
-cable: {{youngs_modulus: 1.0e+9, diameter: 0.002}}
+cable: {{youngs_modulus: 1.0e+9, diameter: 0.002, linear_density: 0.01, retardation_time: 0.0}}
 tension_bounds: {{lower: 1.0, upper: 100.0}}
 cables:
-- {{name: a, exit_point: [0, 0, 1], anchor_frame: b, anchor_point: [0, 0, 0]}}
+- {{name: a, exit_point: [0, 0, 1], anchor_frame: platform, anchor_point: [0, 0, 0]}}
 """
 
 
