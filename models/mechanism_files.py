@@ -7,7 +7,7 @@ from pathlib import Path
 import yaml
 
 from cdpr_drake.errors import RobotFileError
-from cdpr_drake.schema.yaml_files import MOST_BYTES
+from cdpr_drake.schema.yaml_files import MOST_BYTES, YamlTextError, compose_yaml
 
 MECHANISM_FILE = "mechanism.yaml"
 """Name of the file in a folder that holds a mechanism."""
@@ -42,8 +42,8 @@ def is_mechanism_text(content: str) -> bool:
     if MECHANISM_KEY not in content or len(content) > MOST_BYTES:
         return False
     try:
-        root = yaml.compose(content, Loader=yaml.SafeLoader)
-    except (ValueError, RecursionError, yaml.YAMLError):
+        root = compose_yaml(content)
+    except YamlTextError:
         return False
     keys = {key.value for key, _ in root.value} if isinstance(root, yaml.MappingNode) else set()
     return MECHANISM_KEY in keys and SCENARIO_KEY not in keys

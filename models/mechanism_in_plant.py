@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import logging
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -18,7 +15,9 @@ from pydrake.multibody.tree import BodyIndex, FrameIndex, JointIndex
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import Problems, RobotFileError
 from cdpr_drake.geometry.cable_routes import CableRoute, CableRoutes
+from cdpr_drake.models.drake_parsing import drake_refusals, parse_models
 from cdpr_drake.models.mechanism_schema import WORLD, EndPulley, Mechanism, MechanismCable
+from cdpr_drake.schema.yaml_files import compose_yaml
 
 DIRECTIVES = (".dmd.yaml", ".dmd.yml")
 MODEL_SUFFIXES = (".dmd.yaml", ".dmd.yml", ".urdf", ".sdf", ".xml")
@@ -28,34 +27,6 @@ MOST_NAMES = 40
 """So many names that exist are said after a wrong one."""
 
 _WORLD_INSTANCE = "WorldModelInstance::"
-
-
-def drake_line(problem: BaseException) -> str:
-    """What Drake says, in one line of at most 300 characters."""
-    words = " ".join(str(problem).split())
-    return words if len(words) <= 300 else words[:297] + "..."
-
-
-@contextmanager
-def drake_refusals(words: str) -> Iterator[None]:
-    """Raises what Drake refuses as one line behind these words.
-
-    An assertion of Drake arrives in Python as a SystemExit with words. What Drake logs meanwhile is
-    left out, since what matters comes as an exception.
-    """
-    log = logging.getLogger("drake")
-    level = log.level
-    log.setLevel(logging.CRITICAL + 1)
-    try:
-        yield
-    except SystemExit as problem:
-        if not isinstance(problem.code, str):
-            raise
-        raise RobotFileError(f"{words}: {drake_line(problem)}") from problem
-    except (RuntimeError, ValueError, OSError, yaml.YAMLError) as problem:
-        raise RobotFileError(f"{words}: {drake_line(problem)}") from problem
-    finally:
-        log.setLevel(level)
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,14 +134,10 @@ def add_mechanism(plant: MultibodyPlant, mechanism: Mechanism, name: str = "") -
     before = plant.num_frames(), set(map(int, plant.GetJointIndices())), plant.num_bodies()
     file = Path(mechanism.mechanism)
     with drake_refusals(f"mechanism: found {file.name}, which Drake refuses"):
-        parser = Parser(plant, name)
-        for package, folder in mechanism.packages.items():
-            if not parser.package_map().Contains(package):
-                parser.package_map().Add(package, folder)
+        parser, text, kind = Parser(plant, name), None, ""
         if file.name.lower().endswith(DIRECTIVES):
-            parser.AddModelsFromString(absolute_directives(file), DIRECTIVES[0].lstrip("."))
-        else:
-            parser.AddModels(str(file))
+            text, kind = absolute_directives(file), DIRECTIVES[0].lstrip(".")
+        parse_models(parser, file, text, kind, mechanism.packages)
         plant.mutable_gravity_field().set_gravity_vector(mechanism.gravity_vector())
         frames = {WORLD: int(plant.world_frame().index())}
         for index in range(before[0], plant.num_frames()):
@@ -186,8 +153,12 @@ def absolute_directives(file: Path) -> str:
     """Model directives with URIs in the place of paths relative to their file.
 
     Drake takes URIs alone there; what else is wrong it says itself.
+
+    Raises:
+        YamlTextError: It is no YAML.
+        OSError: It cannot be read.
     """
-    root = yaml.compose(file.read_text(encoding="utf-8"), Loader=yaml.SafeLoader)
+    root = compose_yaml(file.read_text(encoding="utf-8"))
     for key, items in root.value if isinstance(root, yaml.MappingNode) else ():
         for item in items.value if key.value == "directives" else ():
             for kind, content in item.value if isinstance(item, yaml.MappingNode) else ():

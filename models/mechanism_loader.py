@@ -6,13 +6,15 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from pydrake.geometry import SceneGraph
 from pydrake.multibody.parsing import PackageMap
 from pydrake.multibody.plant import MultibodyPlant
 
 from cdpr_drake.errors import CdprError, Problems, RobotFileError
+from cdpr_drake.models.drake_parsing import drake_line
 from cdpr_drake.models.materials import check_materials
 from cdpr_drake.models.mechanism_files import is_mechanism
-from cdpr_drake.models.mechanism_in_plant import MODEL_SUFFIXES, add_mechanism, drake_line
+from cdpr_drake.models.mechanism_in_plant import MODEL_SUFFIXES, add_mechanism
 from cdpr_drake.models.mechanism_schema import Mechanism
 from cdpr_drake.models.plant_cables import PlantCables
 from cdpr_drake.models.robot_loader import LARGEST_LENGTH, load_robot, robot_file
@@ -209,7 +211,8 @@ def _find_model(mechanism: Mechanism, path: Path, fail: Callable[[str, object, s
 
 def _check_in_plant(mechanism: Mechanism, path: Path) -> None:
     """Builds it once, so that all that Drake refuses is said with the file."""
-    plant = MultibodyPlant(0.0)
+    plant, scene_graph = MultibodyPlant(0.0), SceneGraph()
+    plant.RegisterAsSourceForSceneGraph(scene_graph)  # so that shapes are looked at, too
     try:
         added = add_mechanism(plant, mechanism)
         added.finalize()

@@ -19,6 +19,7 @@ from cdpr_drake.models.robot_parameters import (
     impossible_parameter,
 )
 from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.schema.json_text import load_json
 
 FILES = ("results.json", "identification.json")
 """Files with a covariance in folders of `cdpr calibrate` and `cdpr identify`."""
@@ -167,7 +168,7 @@ def _read(path: Path) -> ParameterCovariance:
     files = [path / name for name in FILES] if path.is_dir() else [path]
     for file in filter(Path.is_file, files):
         try:
-            content: Any = json.loads(file.read_text(encoding="utf-8"))
+            content: Any = load_json(file.read_text(encoding="utf-8"))
         except (UnicodeDecodeError, json.JSONDecodeError) as problem:
             raise DataFileError(f"{file}: found no JSON: {problem}") from None
         try:

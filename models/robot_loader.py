@@ -74,14 +74,14 @@ def robot_file(name: str) -> Path:
     path = Path(name)
     # One look at the folder and not into each robot's: repeated runs ask again and again.
     is_ours = name in os.listdir(_FOLDER) and (_FOLDER / name / "robot.yaml").is_file()
-    if not is_ours and path.is_dir():
+    if not is_ours and os.path.isdir(path):  # also of a name that is too long
         for own in (path / "robot.yaml", path / MECHANISM_FILE):
             if own.is_file():
                 return own
         if any("bod" in child.name.lower() for child in path.glob("*.[xX][mM][lL]")):
             return path
     if name.lower().endswith(SUFFIXES):
-        if not path.is_file():
+        if not os.path.isfile(path):
             raise RobotFileError(f"{path}: there is no such robot file")
         return path
     if not is_ours:

@@ -6,7 +6,6 @@ file says of shapes against the platform's box and the file's folder.
 Drake's YAML loader reads the annotations themselves, so they are not postponed here.
 """
 
-import json
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -19,7 +18,9 @@ from pydrake.multibody.tree import CalcSpatialInertia, SpatialInertia
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import Problems, RobotFileError
 from cdpr_drake.geometry.poses import pose_from_angles
+from cdpr_drake.models.drake_parsing import drake_refusals, try_mesh
 from cdpr_drake.schema.fields import array, number, sections, switch, text
+from cdpr_drake.schema.json_text import load_json
 
 BOX, SPHERE, CYLINDER, MESH = "box", "sphere", "cylinder", "mesh"
 
@@ -87,13 +88,10 @@ class PlatformShape:
         X_PS, size = self.pose(middle), np.zeros(3)
         R = X_PS.rotation().matrix()
         if self.kind == MESH:
-            shape = self.shape()
-            assert isinstance(shape, Mesh)
-            try:
-                hull = shape.GetConvexHull()
-            except RuntimeError as problem:
-                words = " ".join(str(problem).split())[:200]
-                raise RobotFileError(f"{self.file}: cannot be read as a mesh: {words}") from problem
+            assert self.file is not None
+            with drake_refusals(f"{self.file}: cannot be read as a mesh"):
+                try_mesh(Path(self.file))
+                hull = Mesh(self.file, self.scale).GetConvexHull()
             corners = np.array([hull.vertex(i) for i in range(hull.num_vertices())]).T
             points = R @ corners + X_PS.translation()[:, np.newaxis]
             return points.min(axis=1), points.max(axis=1)
@@ -163,23 +161,29 @@ def _mesh_inertia(file: str, scale: float, changed: int) -> SpatialInertia:
     Raises:
         RobotFileError: It encloses no volume.
     """
-    _check_closed(file)
-    try:
+    with drake_refusals(f"{file}: {_NO_INERTIA}"):
+        _check_closed(file)
         return CalcSpatialInertia(Mesh(file, scale), 1.0)
-    except (RuntimeError, ValueError) as problem:
-        raise RobotFileError(f"{file}: {_NO_INERTIA}") from problem
 
 
 def mesh_files(file: Path) -> list[Path]:
-    """A mesh and the files beside it that it names: materials of an OBJ, parts of a glTF."""
+    """A mesh and the files beside it that it names: materials of an OBJ, parts of a glTF.
+
+    Raises:
+        RobotFileError: A glTF is no JSON, or its buffers and images are no lists of objects.
+    """
     words = file.read_text(encoding="utf-8", errors="replace")
     if file.suffix.lower() == ".obj":
         named = [line.split(maxsplit=1)[1].strip() for line in words.splitlines()
                  if line.startswith("mtllib ")]  # fmt: skip
     else:
-        content = json.loads(words)
-        items = [*content.get("buffers", []), *content.get("images", [])]
-        named = [item["uri"] for item in items if not item.get("uri", "data:").startswith("data:")]
+        try:
+            content = load_json(words)
+            uris = [item.get("uri", "data:") for key in ("buffers", "images")
+                    for item in content.get(key, [])]  # fmt: skip
+            named = [uri for uri in uris if not uri.startswith("data:")]
+        except (AttributeError, TypeError, ValueError) as problem:
+            raise RobotFileError(f"{file}: is no glTF: {problem}") from problem
     return [file, *(file.parent / name for name in named if (file.parent / name).is_file())]
 
 

@@ -9,7 +9,6 @@ Source: mcap.dev/spec.
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
@@ -21,6 +20,7 @@ from cdpr_drake.analyses.logs.recorded_log import POSITION, QUATERNION, TIME, Re
 from cdpr_drake.analyses.logs.text_tables import MOST_BYTES
 from cdpr_drake.analyses.reporting.mcap_log import MAGIC, TIME_KEY
 from cdpr_drake.errors import LogFileError
+from cdpr_drake.schema.json_text import load_json
 
 TRANSFORM = "foxglove.FrameTransform"
 """Schema of poses."""
@@ -95,7 +95,7 @@ def _messages(path: Path) -> tuple[dict[str, _Rows], dict[str, _Rows], set[str]]
                 if channel.message_encoding != "json":
                     other.add(channel.topic)
                     continue
-                told = json.loads(message.data)
+                told = load_json(message.data)
                 time = 1e-9 * message.log_time
                 if schema is not None and schema.name == TRANSFORM:
                     name = f"{channel.topic} of {told['child_frame_id']}"

@@ -76,7 +76,7 @@ def read_motive(path: Path, asked: LogRequest) -> RecordedLog:
             f"{path}:{table.lines[0]}: found {len(table.rows[0])} cells; accepted: {width}"
         )
     factor, unit = _unit(path, settings, asked)
-    groups = _groups(types, names, what, axes)
+    groups = _groups(path, types, names, what, axes)
     body = _body(path, groups, table.rows, asked)
     wanted: dict[str, tuple[int, float]] = {TIME: (1, 1.0)}
     if body:
@@ -132,16 +132,35 @@ def _unit(path: Path, settings: dict[str, str], asked: LogRequest) -> tuple[floa
     return float(told or 1.0), f"{asked.units['length']}, as told"
 
 
+_POSITION = tuple(("Position", axis) for axis in "XYZ")
+_COLUMNS = {
+    "Rigid Body": (*_POSITION, *(("Rotation", axis) for axis in "XYZW")),
+    "Marker": _POSITION,
+    "Rigid Body Marker": _POSITION,
+}
+"""Columns that a body or marker has, by its type."""
+
+
 def _groups(
-    types: list[str], names: list[str], what: list[str], axes: list[str]
+    path: Path, types: list[str], names: list[str], what: list[str], axes: list[str]
 ) -> dict[tuple[str, str], dict[tuple[str, str], int]]:
-    """Columns by type and name of their body, and there by Rotation or Position and axis."""
+    """Columns by type and name of their body, and there by Rotation or Position and axis.
+
+    Raises:
+        LogFileError: A body or a marker has some of its columns only.
+    """
     found: dict[tuple[str, str], dict[tuple[str, str], int]] = {}
     for j, (kind, name, part, axis) in enumerate(zip(types, names, what, axes, strict=True)):
-        if j > 1 and kind in ("Rigid Body", "Marker", "Rigid Body Marker") and axis in "XYZW":
+        if j > 1 and (part, axis) in _COLUMNS.get(kind, ()):
             found.setdefault((kind, name), {}).setdefault((part, axis), j)
-    whole = {"Rigid Body": 7, "Marker": 3, "Rigid Body Marker": 3}
-    return {key: parts for key, parts in found.items() if len(parts) >= whole[key[0]]}
+    for (kind, name), parts in found.items():
+        missing = [f"{part} {axis}" for part, axis in _COLUMNS[kind] if (part, axis) not in parts]
+        if missing:
+            whole = ", ".join(f"{part} {axis}" for part, axis in _COLUMNS[kind])
+            raise LogFileError(
+                f"{path}: {kind} {name!r}: found no column {', '.join(missing)}; accepted: {whole}"
+            )
+    return found
 
 
 def _is_used(rows: list[list[str]], column: int) -> bool:

@@ -13,6 +13,7 @@ import numpy as np
 from cdpr_drake.analyses.reporting.written_files import claim
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import OutputFolderError
+from cdpr_drake.schema.json_text import load_json
 
 Log: TypeAlias = Mapping[str, Array]
 """Times "time", shape (n,) [s], and quantities by name, shape (n, size)."""
@@ -71,7 +72,7 @@ class LogOnDisk(Mapping[str, Array]):
             OutputFolderError: There is none, or it holds no whole row.
         """
         try:
-            sizes = json.loads((folder / LAYOUT).read_text(encoding="utf-8"))
+            sizes = load_json((folder / LAYOUT).read_text(encoding="utf-8"))
             rows = min(
                 _file_of(folder, name).stat().st_size // (_NUMBER.itemsize * (size or 1))
                 for name, size in sizes.items()

@@ -16,6 +16,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path, PurePosixPath
 from typing import Any
 
+from cdpr_drake.schema.json_text import load_json
 from cdpr_drake.version import __version__
 
 MARKER = ".cdpr_drake.json"
@@ -250,7 +251,7 @@ def _certain(folder: Path) -> set[str]:
     with suppress(OSError):
         for line in (folder / JOURNAL).read_text(encoding="utf-8").splitlines():
             with suppress(ValueError):  # the last one of who was killed
-                names.add(str(json.loads(line)))
+                names.add(str(load_json(line)))
     marker = _read_marker(folder)
     listed = [] if marker is None else marker.get(FILES)
     if not isinstance(listed, list):
@@ -290,7 +291,7 @@ def _inside(folder: Path, name: str) -> Path | None:
 def _read_marker(folder: Path) -> dict[str, Any] | None:
     """What the marker says; None without one that can be read."""
     try:
-        content = json.loads((folder / MARKER).read_text(encoding="utf-8"))
+        content = load_json((folder / MARKER).read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return None
     return content if isinstance(content, dict) else None

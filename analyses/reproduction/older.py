@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,6 +10,7 @@ from cdpr_drake.analyses.reproduction.overview import PlacedFact, first_rows
 from cdpr_drake.analyses.reproduction.rows import ReportRow
 from cdpr_drake.analyses.reproduction.scorecard import VERDICTS, Scorecard, facts_by_place
 from cdpr_drake.errors import OutputFolderError
+from cdpr_drake.schema.json_text import load_json
 
 SUMMARY = "summary.json"
 """All rows and counts of a report, beside its page."""
@@ -67,7 +67,7 @@ def read_older(path: Path) -> OlderReport:
     """
     file = path / SUMMARY if path.is_dir() else path
     try:
-        content = json.loads(file.read_text(encoding="utf-8"))
+        content = load_json(file.read_text(encoding="utf-8"))
         facts = [fact for item in content["items"] for fact in item.get("facts", ())]
         return OlderReport(
             code=str(content["code"]),

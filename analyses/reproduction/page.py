@@ -4,7 +4,6 @@
 is seen (`embedded`).
 """
 
-import json
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -39,6 +38,7 @@ from cdpr_drake.analyses.reproduction.states import StudyState, study_folder
 from cdpr_drake.analyses.studies.framework.statement import MET_CONSTRUCTION, MET_FITTED
 from cdpr_drake.analyses.studies.published.recipe_choices import CHOICES
 from cdpr_drake.analyses.studies.published.register import Register
+from cdpr_drake.schema.json_text import load_json
 
 REPORT = "report.html"
 
@@ -531,7 +531,7 @@ def _details(folder: Path, states: Mapping[str, StudyState]) -> str:
 
 def _results(folder: Path, study: str) -> dict[str, Any]:
     path = study_folder(folder, study) / "results.json"
-    return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
+    return load_json(path.read_text(encoding="utf-8")) if path.is_file() else {}
 
 
 def _words(table: Mapping[str, Any]) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -11,6 +10,7 @@ from cdpr_drake.analyses.reporting.log_files import finite, write_json
 from cdpr_drake.analyses.reporting.written_files import JOURNAL, MARKER, claim, mark, part_of
 from cdpr_drake.analyses.studies.catalogue import RESULTS
 from cdpr_drake.errors import OutputFolderError
+from cdpr_drake.schema.json_text import load_json
 
 STUDIES, STATES, ABOUT = "studies", "states", "reproduction.json"
 """Folders of the studies' results and states, and file of what the reproduction is."""
@@ -77,7 +77,7 @@ def read_state(folder: Path, study: str) -> StudyState | None:
     """The state of a study; None where there is none that can be read."""
     path = folder / STATES / f"{study}.json"
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = load_json(path.read_text(encoding="utf-8"))
         return StudyState(**{**content, "tables": tuple(content["tables"]), "taken_over": False})
     except (OSError, ValueError, KeyError, TypeError):
         return None
@@ -87,7 +87,7 @@ def read_results(folder: Path, study: str) -> dict[str, Any] | None:
     """A study's numbers; None where there are none that can be read."""
     path = study_folder(folder, study) / RESULTS
     try:
-        content: Any = json.loads(path.read_text(encoding="utf-8"))
+        content: Any = load_json(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return None
     return content if isinstance(content, dict) else None
@@ -107,7 +107,7 @@ def check_reproduction(folder: Path, quick: bool) -> None:
     if not about.is_file():
         raise OutputFolderError(f"{folder}: found no reproduction; accepted: one of cdpr reproduce")
     try:
-        before = bool(json.loads(about.read_text(encoding="utf-8"))["quick"])
+        before = bool(load_json(about.read_text(encoding="utf-8"))["quick"])
     except (ValueError, KeyError, TypeError) as problem:
         raise OutputFolderError(f"{about}: found no JSON of a reproduction") from problem
     if before != quick:

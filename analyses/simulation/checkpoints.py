@@ -22,6 +22,7 @@ from cdpr_drake.analyses.sweeps.folder import differences
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CheckpointError
 from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.schema.json_text import load_json
 
 _ABOUT, _STATE = "about", "state."
 NAMED = 3
@@ -102,7 +103,7 @@ def read_checkpoint(folder: Path, asked: dict[str, Any]) -> Checkpoint:
         )
     try:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
-            about = json.loads(stored[_ABOUT].tobytes())
+            about = load_json(stored[_ABOUT].tobytes())
             found = Checkpoint(
                 asked=about["asked"],
                 state={

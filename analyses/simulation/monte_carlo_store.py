@@ -20,6 +20,7 @@ from cdpr_drake.analyses.reporting.provenance import code_version
 from cdpr_drake.analyses.sweeps.folder import SweepFolder
 from cdpr_drake.arrays import Array
 from cdpr_drake.models.robot_loader import robot_text
+from cdpr_drake.schema.json_text import load_json
 from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
 
 CONVERGED = "converged"
@@ -81,7 +82,7 @@ class StoredRuns:
         return RunRecord(
             index=index,
             seed=seed,
-            summary=json.loads(arrays[_SUMMARY].tobytes()),
+            summary=load_json(arrays[_SUMMARY].tobytes()),
             end=arrays[_END][0],
             traces={
                 name.removeprefix(_TRACE): values[0]

@@ -26,6 +26,7 @@ from cdpr_drake.analyses.sweeps.folder import (
 )
 from cdpr_drake.analyses.sweeps.workers import SweepTask
 from cdpr_drake.errors import OutputFolderError
+from cdpr_drake.schema.json_text import load_json
 
 EARLIER = "earlier_runs.json"
 """Which tasks of a folder were taken over, by the code that computed them."""
@@ -69,7 +70,7 @@ class EarlierRuns:
 def read_taken(folder: Path, of: int) -> EarlierRuns:
     """What was taken over into a folder by this or an earlier session, of so many tasks."""
     try:
-        content = json.loads((folder / EARLIER).read_text(encoding="utf-8"))
+        content = load_json((folder / EARLIER).read_text(encoding="utf-8"))
         return EarlierRuns({str(task): str(code) for task, code in content.items()}, of)
     except (OSError, ValueError, AttributeError):
         return EarlierRuns()

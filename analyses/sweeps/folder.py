@@ -16,6 +16,7 @@ import numpy as np
 from cdpr_drake.analyses.reporting.log_files import write_whole
 from cdpr_drake.analyses.reporting.written_files import JOURNAL, MARKER, mark, part_of, whole_file
 from cdpr_drake.errors import OutputFolderError
+from cdpr_drake.schema.json_text import load_json
 
 ARGUMENTS = "arguments.json"
 """What the sweep was asked for; another sweep may not use the folder."""
@@ -91,7 +92,7 @@ class SweepFolder(KeptChunks):
     def _open(self, words: str) -> None:
         stored = self.folder / ARGUMENTS
         if stored.is_file():
-            different = list(differences(read_arguments(stored), json.loads(words)))
+            different = list(differences(read_arguments(stored), load_json(words)))
             if different:
                 more = len(different) - NAMED_DIFFERENCES
                 raise OutputFolderError(
@@ -220,7 +221,7 @@ def read_arguments(path: Path) -> Any:
         OSError: It cannot be read.
     """
     try:
-        return json.loads(path.read_text(encoding="utf-8"))
+        return load_json(path.read_text(encoding="utf-8"))
     except ValueError as problem:
         raise OutputFolderError(
             f"{path}: found no JSON; remove the folder or name another"

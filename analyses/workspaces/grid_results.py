@@ -14,6 +14,7 @@ from cdpr_drake.analyses.sweeps.folder import store_arrays
 from cdpr_drake.analyses.workspaces.grid_runs import ARRAYS
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import DataFileError
+from cdpr_drake.schema.json_text import load_json
 from cdpr_drake.workspaces.pose_grid import WorkspaceGrid
 from cdpr_drake.workspaces.volume import VolumeRule, workspace_volume
 
@@ -77,7 +78,7 @@ def load_grid(
     try:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
             arrays = {key: stored[key] for key in stored.files}
-        about = json.loads(str(arrays.pop("about")))
+        about = load_json(str(arrays.pop("about")))
         x, y, z, angles = (arrays.pop(name) for name in ("x", "y", "z", "angles"))
         if not any(name.startswith(needed) for name in arrays):
             raise KeyError(needed)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -14,6 +13,7 @@ from cdpr_drake.cli.options import AsJson
 from cdpr_drake.cli.robot_folder import check_no_file
 from cdpr_drake.cli.terminal import print_json, wide_console
 from cdpr_drake.errors import OutputFolderError
+from cdpr_drake.schema.json_text import load_json
 
 FOLDER = Path(__file__).parent.parent / "notebooks"
 """Where they are in the package; in its sources, a link."""
@@ -49,7 +49,7 @@ def title_of(name: str, content: bytes) -> str:
     """The heading that a notebook begins with, or the first line of a program."""
     if name.endswith(".py"):
         return content.decode().splitlines()[0].strip('"')
-    first: dict[str, Any] = json.loads(content)["cells"][0]
+    first: dict[str, Any] = load_json(content)["cells"][0]
     return "".join(first["source"]).splitlines()[0].lstrip("# ")
 
 

@@ -19,7 +19,14 @@ import yaml
 
 from cdpr_drake.errors import DataFileError, Problems, meant_names, why_not_read
 from cdpr_drake.schema.fields import NAMED, FieldRule
-from cdpr_drake.schema.yaml_files import cached_yaml, other_kind, too_many_bytes, too_many_nodes
+from cdpr_drake.schema.yaml_files import (
+    YamlTextError,
+    cached_yaml,
+    compose_yaml,
+    other_kind,
+    too_many_bytes,
+    too_many_nodes,
+)
 
 
 def printable(words: str) -> str:
@@ -114,15 +121,8 @@ def parse_typed(
     keys = rules_of(typing.cast(type, schema))
     try:
         root = known.nodes()
-    except yaml.YAMLError as problem:
-        mark = getattr(problem, "problem_mark", None)
-        line = f":{mark.line + 1}" if mark is not None else ""
-        if isinstance(problem, yaml.reader.ReaderError):
-            line = f":{content.count(chr(10), 0, problem.position) + 1}"
-        what = getattr(problem, "problem", None) or str(problem).splitlines()[0]
-        raise error(f"{path}{line}: does not parse as YAML: {what}") from problem
-    except (ValueError, RecursionError) as problem:  # an escape beyond Unicode; too many brackets
-        raise error(f"{path}: does not parse as YAML: {problem}") from problem
+    except YamlTextError as problem:
+        raise error(problem.at(path)) from problem
     if not isinstance(root, yaml.MappingNode):
         raise error(f"{path}: found no mapping at the top; accepted: the keys {', '.join(keys)}")
     elsewhere = other_kind([str(key.value) for key, _ in root.value], keys)
@@ -131,9 +131,6 @@ def parse_typed(
     origins: dict[int, str] = {}
     problems = Problems(error)
     try:
-        large = too_many_nodes(root)
-        if large:
-            raise error(f"{path}: {large}")
         for item in overrides:
             try:
                 origin, node = _override(schema, root, item, error)
@@ -212,12 +209,12 @@ def _override(
         node, here = child, bare
     _known_rule(here, names, len(names) - 1, error)
     try:
-        new = yaml.compose(value, Loader=yaml.SafeLoader)
-    except (yaml.YAMLError, ValueError, RecursionError) as problem:
-        raise error(f"overrides {key}: found {value!r}, which is not YAML") from problem
-    large = too_many_nodes(new)
-    if large:
-        raise error(f"overrides {key}: {large}")
+        new = compose_yaml(value)
+    except YamlTextError as problem:
+        words = repr(value) if len(value) <= 60 else f"{value[:57]!r}..."
+        known = problem.line is not None  # where it stops to be YAML
+        what = f"found {words}, which is not YAML" if known else str(problem)
+        raise error(f"overrides {key}: {what}") from problem
     if new is None:
         new = yaml.ScalarNode(_NULL_TAG, "null")
     _put(node, names[-1], new)

@@ -1,8 +1,9 @@
-"""What a YAML file is before a schema looks at it: its kind, its size, and whether it is known.
+"""Reads YAML, whoever wrote it: `compose_yaml` gives its nodes, `load_yaml` what they say.
 
+All YAML goes through these two. They refuse what is large, nested deeply, or large once its
+aliases are expanded: files of robots and scenarios are small, and a bomb is told at once.
 `other_kind` tells a file that was given to the wrong loader, from the keys at its top.
-`too_many_bytes` and `too_many_nodes` refuse large files: those of this package are small, and a
-bomb is told at once. `cached_yaml` keeps what was parsed before.
+`cached_yaml` keeps what was parsed before.
 """
 
 from __future__ import annotations
@@ -38,8 +39,100 @@ MOST_BYTES = 262_144
 MOST_NODES = 100_000
 """Keys and values of a file, those that an alias repeats counted again."""
 
+MOST_DEPTH = 100
+"""Levels of brackets or indentation; PyYAML needs three calls for each."""
+
+MOST_DIGITS = 300
+"""Of a whole number; more have no place among floating-point numbers."""
+
 SMALL, MOST = 20_000, 32
 """Letters of files that are kept, and how many of them."""
+
+
+class YamlTextError(ValueError):
+    """Text that is not YAML, or more of it than is read; in words that follow a file's name."""
+
+    def __init__(self, words: str, line: int | None = None) -> None:
+        """With the line of the text where it is known, from 1."""
+        super().__init__(words)
+        self.line = line
+
+    def at(self, path: object) -> str:
+        """The words behind a file's name and the line."""
+        return f"{path}{'' if self.line is None else f':{self.line}'}: {self}"
+
+
+class _Reader(yaml.SafeLoader):
+    """PyYAML's safe loader with a bound on depth and on whole numbers."""
+
+    depth = 0
+
+    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
+        self.depth += 1
+        if self.depth > MOST_DEPTH:
+            words, mark = f"nested more than {MOST_DEPTH} deep", self.peek_event().start_mark
+            raise yaml.composer.ComposerError(None, None, words, mark)
+        node: yaml.Node | None = super().compose_node(parent, index)
+        self.depth -= 1
+        return node
+
+    def construct_yaml_int(self, node: yaml.ScalarNode) -> int:
+        if len(node.value) > MOST_DIGITS:
+            words = f"a whole number of more than {MOST_DIGITS} digits"
+            raise yaml.constructor.ConstructorError(None, None, words, node.start_mark)
+        return int(super().construct_yaml_int(node))
+
+
+_Reader.add_constructor("tag:yaml.org,2002:int", _Reader.construct_yaml_int)
+
+
+def compose_yaml(content: str) -> yaml.Node | None:
+    """The nodes of a YAML text; None: it is empty.
+
+    Raises:
+        YamlTextError: It is none, is larger than `MOST_BYTES`, is nested deeper than `MOST_DEPTH`,
+            or has more than `MOST_NODES` keys and values.
+    """
+    return _read(content, construct=False)
+
+
+def load_yaml(content: str) -> Any:
+    """What a YAML text says: mappings, lists, words and numbers.
+
+    Raises:
+        YamlTextError: As `compose_yaml`, or a value is not what its tag says.
+    """
+    return _read(content, construct=True)
+
+
+def _read(content: str, construct: bool) -> Any:
+    if len(content) > MOST_BYTES:
+        raise YamlTextError(_too_large(len(content.encode("utf-8", "replace"))))
+    try:
+        loader = _Reader(content)
+        root = loader.get_single_node()
+        large = too_many_nodes(root)
+        if large:
+            raise YamlTextError(large)
+        if not construct:
+            return root
+        return None if root is None else loader.construct_document(root)
+    except yaml.YAMLError as problem:
+        mark = getattr(problem, "problem_mark", None)
+        line = None if mark is None else mark.line + 1
+        if isinstance(problem, yaml.reader.ReaderError):
+            line = content.count("\n", 0, problem.position) + 1
+        what = getattr(problem, "problem", None) or str(problem).splitlines()[0]
+        raise YamlTextError(f"does not parse as YAML: {what}", line) from problem
+    except YamlTextError:
+        raise
+    except (ArithmeticError, AttributeError, LookupError, RecursionError, TypeError,
+            ValueError) as problem:  # fmt: skip  # an escape beyond Unicode; `!!int` without digits
+        raise YamlTextError(f"does not parse as YAML: {problem}") from problem
+
+
+def _too_large(size: int) -> str:
+    return f"found {size:,} bytes; accepted: at most {MOST_BYTES:,}"
 
 
 def other_kind(keys: Collection[str], accepted: Collection[str]) -> str:
@@ -60,7 +153,7 @@ def too_many_bytes(path: Path) -> str:
     size = path.stat().st_size
     if size <= MOST_BYTES:
         return ""
-    return f"found {size:,} bytes; accepted: at most {MOST_BYTES:,}"
+    return _too_large(size)
 
 
 def too_many_nodes(root: yaml.Node | None) -> str:
@@ -106,9 +199,9 @@ class CachedYaml:
         self._made: Any = None
 
     def nodes(self) -> yaml.Node | None:
-        """Its nodes; raises what PyYAML does."""
+        """Its nodes; raises YamlTextError as `compose_yaml` does."""
         if self._root is None:
-            self._root = yaml.compose(self._content, Loader=yaml.SafeLoader)
+            self._root = compose_yaml(self._content)
         return self._root
 
     def instance(self) -> Any:

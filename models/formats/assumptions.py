@@ -13,6 +13,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.models.formats.draft import RobotDraft
 from cdpr_drake.models.formats.home_search import farthest_pose
 from cdpr_drake.models.formats.point_mass import find_beam, to_a_point
+from cdpr_drake.schema.fields import LARGEST
 
 GRAVITY = 9.81
 MASS = 1.0
@@ -183,6 +184,8 @@ def _platform(
 
 
 def _possible(inertia: Array) -> bool:
+    if not np.all(np.abs(inertia) <= LARGEST):
+        return False
     xx, yy, zz, xy, xz, yz = inertia
     moments = np.linalg.eigvalsh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
     return bool(moments[0] > 0.0 and moments[0] + moments[1] >= moments[2] * (1.0 - _TRIANGLE))

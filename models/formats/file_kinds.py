@@ -10,11 +10,9 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from cdpr_drake.errors import RobotFileError
 from cdpr_drake.models.formats.reading import read_text
-from cdpr_drake.schema.yaml_files import too_many_bytes
+from cdpr_drake.schema.yaml_files import YamlTextError, load_yaml, too_many_bytes
 
 YAML_SUFFIXES = (".yaml", ".yml")
 XML_SUFFIXES = (".xml", ".wcrfx", ".sdf", ".world", ".urdf", ".mjcf", ".model")
@@ -44,9 +42,9 @@ def is_foreign(path: Path) -> bool:
 @lru_cache(32)  # the same robots are read again and again
 def _is_foreign_yaml(text: str) -> bool:
     try:
-        content = yaml.safe_load(text)
+        content = load_yaml(text)
         return is_gazebo_yaml(content) or is_maslow(content)
-    except (yaml.YAMLError, ValueError, RecursionError):
+    except YamlTextError:
         return False
 
 

@@ -11,7 +11,6 @@ Source: SDFormat 1.12; Gazebo thesis 5.4 and the simulator's files for the chain
 
 from __future__ import annotations
 
-import logging
 import re
 import xml.etree.ElementTree as ET
 from pathlib import Path
@@ -25,7 +24,7 @@ from pydrake.multibody.tree import Frame, FrameIndex, PrismaticJoint
 from pydrake.systems.framework import Context
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import RobotFileError
+from cdpr_drake.models.drake_parsing import drake_refusals, parse_models
 from cdpr_drake.models.formats.carried_bodies import (
     CarriedBodies,
     find_carried,
@@ -51,6 +50,11 @@ def read_named_frames(path: Path) -> RobotDraft:
     Raises:
         RobotFileError: Drake cannot read the file, or its frames do not make a cable robot.
     """
+    with drake_refusals(f"{path}: Drake cannot read it"):
+        return _read_draft(path)
+
+
+def _read_draft(path: Path) -> RobotDraft:
     root = read_xml(path)
     seen = watched(root)
     tool = SDF_TOOL if is_sdformat(root) else URDF_TOOL
@@ -64,21 +68,9 @@ def read_named_frames(path: Path) -> RobotDraft:
     plant.RegisterAsSourceForSceneGraph(scene_graph)
     parser = Parser(plant)
     parser.SetAutoRenaming(True)
-    log = logging.getLogger("drake")
-    level = log.level
-    log.setLevel(logging.CRITICAL + 1)  # what matters comes as an exception
-    try:
-        balls = _without_balls(root)
-        if balls:
-            parser.AddModelsFromString(ET.tostring(root, encoding="unicode"), "sdf")
-        else:
-            parser.AddModels(str(path.absolute()))
-        plant.Finalize()
-    except RuntimeError as problem:
-        first = next((line for line in str(problem).splitlines() if line.strip()), "no reason")
-        raise RobotFileError(f"{path}: Drake cannot read it: {first[:300]}") from problem
-    finally:
-        log.setLevel(level)
+    balls = _without_balls(root)
+    parse_models(parser, path, ET.tostring(root, encoding="unicode") if balls else None, "sdf")
+    plant.Finalize()
     exits, anchors = _points(plant)
     names = [name for name in exits if name in anchors]
     if not names:

@@ -10,10 +10,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import RobotFileError
+from cdpr_drake.schema.fields import LARGEST
+from cdpr_drake.schema.json_text import load_json
+from cdpr_drake.schema.yaml_files import YamlTextError, load_yaml
 
 MOST_BYTES = 4_194_304
 """Of a file of another tool; the largest that is known has 60 kB."""
@@ -87,13 +89,11 @@ def read_json(path: Path) -> tuple[Any, list[str]]:
         return f"{sign}{whole or 0}.{after or 0}{power}"
 
     try:
-        content = json.loads(_TOKEN.sub(strict, text))
+        content = load_json(_TOKEN.sub(strict, text))
     except json.JSONDecodeError as problem:
         raise RobotFileError(
             f"{path}:{problem.lineno}: does not parse as JSON: {problem.msg}"
         ) from problem
-    except RecursionError as problem:
-        raise RobotFileError(f"{path}: does not parse as JSON: nested too deeply") from problem
 
     def line(place: int) -> int:
         return text.count("\n", 0, place) + 1
@@ -120,14 +120,9 @@ def read_yaml(path: Path) -> Any:
         RobotFileError: The file cannot be read or does not parse; names the line.
     """
     try:
-        return yaml.safe_load(read_text(path))
-    except yaml.YAMLError as problem:
-        mark = getattr(problem, "problem_mark", None)
-        line = f":{mark.line + 1}" if mark is not None else ""
-        what = getattr(problem, "problem", None) or str(problem).splitlines()[0]
-        raise RobotFileError(f"{path}{line}: does not parse as YAML: {what}") from problem
-    except (ValueError, RecursionError) as problem:
-        raise RobotFileError(f"{path}: does not parse as YAML: {problem}") from problem
+        return load_yaml(read_text(path))
+    except YamlTextError as problem:
+        raise RobotFileError(problem.at(path)) from problem
 
 
 JSON_WORDS = {
@@ -167,17 +162,19 @@ def fail(path: Path, where: str, found: object, accepted: str) -> RobotFileError
 
 
 def number(path: Path, where: str, value: object) -> float:
-    """A finite number, from text or a number.
+    """A number of a size that has sense, from text or a number.
 
     Raises:
-        RobotFileError: It is none, such as a placeholder.
+        RobotFileError: It is none, such as a placeholder, or is beyond `LARGEST`.
     """
     try:
         result = float(value)  # type: ignore[arg-type]
-    except (TypeError, ValueError):
+    except (OverflowError, TypeError, ValueError):
         result = np.nan
     if isinstance(value, bool) or not np.isfinite(result):
         raise fail(path, where, value, "a finite number")
+    if abs(result) > LARGEST:
+        raise fail(path, where, value, f"a number of at most {LARGEST:g}")
     return result
 
 

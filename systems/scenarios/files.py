@@ -19,7 +19,7 @@ from cdpr_drake.models.mechanism_schema import Mechanism
 from cdpr_drake.models.robot_loader import load_robot, robot_file
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.schema.typed_yaml import closest, load_typed
-from cdpr_drake.schema.yaml_files import too_many_bytes
+from cdpr_drake.schema.yaml_files import compose_yaml, too_many_bytes
 from cdpr_drake.systems.worlds.settings import WorldSettings
 
 _FOLDER = Path(__file__).parent
@@ -129,8 +129,8 @@ def _scalar(path: Path, key: str) -> yaml.ScalarNode | None:
     try:
         if too_many_bytes(path):
             return None
-        root = yaml.compose(path.read_text(encoding="utf-8"), Loader=yaml.SafeLoader)
-    except (OSError, ValueError, RecursionError, yaml.YAMLError):
+        root = compose_yaml(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
         return None
     for name, value in root.value if isinstance(root, yaml.MappingNode) else ():
         if name.value == key and isinstance(value, yaml.ScalarNode):

@@ -14,6 +14,7 @@ from pydrake.systems.framework import DiagramBuilder
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import WorldError
+from cdpr_drake.models.drake_parsing import drake_refusals, parse_models, try_mesh
 
 MESH_SUFFIXES = (".obj", ".gltf")
 MODEL_SUFFIXES = (".sdf", ".urdf")
@@ -50,11 +51,10 @@ def mesh_parts(file: str, scale: float, color: Array) -> tuple[Part, ...]:
         WorldError: It cannot be read.
     """
     _check_file(file, MESH_SUFFIXES)
-    try:
+    with drake_refusals(f"{file}: is no mesh that can be read", WorldError):
+        try_mesh(Path(file))
         mesh = Mesh(file, scale)
         mesh.GetConvexHull()
-    except RuntimeError as problem:
-        raise WorldError(f"{file}: is no mesh that can be read: {_line(problem)}") from problem
     coloured = file.lower().endswith(".gltf") or b"mtllib" in Path(file).read_bytes()
     return (Part(mesh, RigidTransform(), None if coloured else color),)
 
@@ -72,11 +72,9 @@ def model_parts(file: str, color: Array) -> tuple[Part, ...]:
     _check_file(file, MODEL_SUFFIXES)
     builder = DiagramBuilder()
     plant, scene_graph = AddMultibodyPlantSceneGraph(builder, 0.0)
-    try:
-        instances = Parser(plant).AddModels(file)
+    with drake_refusals(f"{file}: is no model that can be read", WorldError):
+        instances = parse_models(Parser(plant), Path(file))
         plant.Finalize()
-    except RuntimeError as problem:
-        raise WorldError(f"{file}: is no model that can be read: {_line(problem)}") from problem
     if len(instances) != 1:
         raise WorldError(f"{file}: found {len(instances)} models; accepted: one")
     context = builder.Build().CreateDefaultContext()
@@ -118,8 +116,3 @@ def _check_file(file: str, suffixes: tuple[str, ...]) -> None:
         raise WorldError(f"found {file}; accepted: a file {' or '.join(suffixes)}")
     if not Path(file).is_file():
         raise WorldError(f"{file}: there is no such file")
-
-
-def _line(problem: RuntimeError) -> str:
-    words = " ".join(str(problem).split())
-    return words if len(words) <= 300 else words[:297] + "..."

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-import yaml
 
 from cdpr_drake.errors import RobotFileError
 from cdpr_drake.models.robot_loader import load_robot, robot_file
@@ -18,13 +17,13 @@ def nothing_is_kept(monkeypatch):
 @pytest.fixture
 def parsed(monkeypatch):
     """Texts in the order in which PyYAML takes them apart."""
-    texts, compose = [], yaml.compose
+    texts, compose = [], yaml_files.compose_yaml
 
-    def counted(content, **options):
+    def counted(content):
         texts.append(content)
-        return compose(content, **options)
+        return compose(content)
 
-    monkeypatch.setattr(yaml, "compose", counted)
+    monkeypatch.setattr(yaml_files, "compose_yaml", counted)
     return texts
 
 

@@ -21,6 +21,7 @@ import numpy.typing as npt
 
 from cdpr_drake.analyses.reporting.log_files import write_whole
 from cdpr_drake.arrays import Array
+from cdpr_drake.schema.json_text import load_json
 from cdpr_drake.schema.typed_yaml import closest
 
 UNITS = {
@@ -332,7 +333,7 @@ def pack_row(row: Row) -> dict[str, np.ndarray]:
 
 def unpack_row(arrays: Mapping[str, np.ndarray]) -> dict[str, Any]:
     """The row that `pack_row` packed."""
-    row: dict[str, Any] = json.loads(str(arrays[RECORD][0]))
+    row: dict[str, Any] = load_json(str(arrays[RECORD][0]))
     return row | {name: array[0] for name, array in arrays.items() if name != RECORD}
 
 

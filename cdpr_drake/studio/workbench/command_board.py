@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from cdpr_drake.models.robot_loader import robot_names
+from cdpr_drake.schema.json_text import load_json
 from cdpr_drake.studio.workbench.command_form import CommandForm
 from cdpr_drake.studio.workbench.command_job import CommandJob
 from cdpr_drake.studio.workbench.job_manager import JobManager
@@ -197,6 +198,6 @@ def _told(path: Path) -> Any:
     try:
         if path.is_symlink() or path.stat().st_size > LARGEST_ASKED:
             return None
-        return json.loads(path.read_text(encoding="utf-8"))
+        return load_json(path.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError):
         return None

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import threading
 from collections import deque
 from collections.abc import Sequence
@@ -10,6 +9,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from cdpr_drake.schema.json_text import load_json
 from cdpr_drake.studio.workbench.job import Event, Job, JobState
 from cdpr_drake.studio.workbench.job_process import COMMAND, Child, progress_of, reason
 
@@ -74,7 +74,7 @@ class CommandJob(Job):
     def result(self) -> Any:
         """What it printed as JSON; None where that was none."""
         try:
-            return json.loads(self._output)
+            return load_json(self._output)
         except ValueError:
             return None
 

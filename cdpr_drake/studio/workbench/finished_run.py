@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import zipfile
 import zlib
 from pathlib import Path
@@ -16,6 +15,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.errors import OutputFolderError
 from cdpr_drake.geometry.poses import pose_from_row, pose_rows_distance
 from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.schema.json_text import load_json
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.diagrams.servo_models import ServoModel, servo_model
 from cdpr_drake.systems.scenarios.files import check_moves_robot
@@ -66,7 +66,7 @@ class FinishedRun:
             self._model = servo_model(self.scenario, robot)
             self._picture = MarksPicture(self._model)
         try:
-            summary: dict[str, Any] = json.loads((folder / SUMMARY).read_text(encoding="utf-8"))
+            summary: dict[str, Any] = load_json((folder / SUMMARY).read_text(encoding="utf-8"))
             with np.load(folder / LOG, allow_pickle=False) as log:
                 count = len(log["time"])
                 rows = np.unique(np.linspace(0, count - 1, min(count, MOST_ROWS)).astype(int))

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from cdpr_drake.errors import CdprError
+from cdpr_drake.schema.json_text import load_json
 
 STUDY_RESULTS = "studies"
 """Folder of results in the working folder, as that of `cdpr study`."""
@@ -67,7 +67,7 @@ def study_folder(folder: Path) -> StudyFolder:
     try:
         if path.stat().st_size > LARGEST_RESULTS:
             raise CdprError(f"{folder.name}: results.json is larger than {LARGEST_RESULTS} bytes")
-        told = json.loads(path.read_text(encoding="utf-8"))
+        told = load_json(path.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as problem:
         raise CdprError(f"{folder.name}: results.json cannot be read: {problem}") from problem
     if not isinstance(told, dict):

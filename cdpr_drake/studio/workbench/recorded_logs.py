@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import csv
 import io
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,6 +27,7 @@ from cdpr_drake.analyses.logs.recorded_log import (
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import OutputFolderError
 from cdpr_drake.palette import DASHED, Look, nth_look
+from cdpr_drake.schema.json_text import load_json
 from cdpr_drake.studio.workbench.plot_rows import Chart
 from cdpr_drake.studio.workbench.working_folder import MOST_FILES, WorkingFolder
 
@@ -136,7 +136,7 @@ def read_comparison(folder: Path) -> Comparison:
         OutputFolderError: There is none, or it cannot be read.
     """
     try:
-        summary = json.loads((folder / SUMMARY).read_text(encoding="utf-8"))
+        summary = load_json((folder / SUMMARY).read_text(encoding="utf-8"))
         with (folder / TABLE).open(encoding="utf-8", newline="") as file:
             heads, *lines = csv.reader(file)
         kept = np.unique(np.linspace(0, len(lines) - 1, min(len(lines), MOST_ROWS)).astype(int))

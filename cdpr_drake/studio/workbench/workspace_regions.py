@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,6 +20,7 @@ from cdpr_drake.analyses.workspaces.workspace_scene import box_solids, hull_soli
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CdprError
 from cdpr_drake.palette import TENSIONS, rgb
+from cdpr_drake.schema.json_text import load_json
 from cdpr_drake.workspaces.volume import WorkspaceVolume
 
 REGIONS = "workspaces"
@@ -112,7 +112,7 @@ def read_regions(folder: Path) -> Regions:
         CdprError: There are none that can be read.
     """
     try:
-        told = json.loads((folder / RESULTS).read_text(encoding="utf-8"))
+        told = load_json((folder / RESULTS).read_text(encoding="utf-8"))
         of_stability = isinstance(told["workspaces"], list)
     except (OSError, ValueError, KeyError, TypeError) as problem:
         raise CdprError(f"{folder.name}: {RESULTS} cannot be read: {problem}") from problem

@@ -1,0 +1,70 @@
+"""YAML and JSON that would stop a reader are refused by one kind of error, with its line."""
+
+import json
+
+import pytest
+
+from cdpr_drake.schema.json_text import load_json
+from cdpr_drake.schema.yaml_files import MOST_DEPTH, YamlTextError, compose_yaml, load_yaml
+
+BOMB = "a0: &a0 [x, x]\n" + "".join(
+    f"a{k}: &a{k} [{', '.join([f'*a{k - 1}'] * 10)}]\n" for k in range(1, 10)
+)
+
+LONG = "9" * 5000
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (BOMB, "more than 100,000 keys and values"),
+        ("a: &a {<<: *a}", "more than|found undefined alias"),
+        ("a: &a [*a]", "more than"),
+        ("[" * 200 + "]" * 200, f"nested more than {MOST_DEPTH} deep"),
+        ("- " * 200 + "1", f"nested more than {MOST_DEPTH} deep"),
+        ("x" * 300_000, "found 300,000 bytes"),
+    ],
+    ids=["bomb", "merged into itself", "holds itself", "brackets", "dashes", "long"],
+)
+def test_yaml_that_grows_is_refused_before_it_does(text, words):
+    for read in (compose_yaml, load_yaml):
+        with pytest.raises(YamlTextError, match=words):
+            read(text)
+
+
+@pytest.mark.parametrize(
+    "value",
+    ["!!int ''", "!!float ''", "!!bool maybe", "!!timestamp never", "!!binary \u00e9", "2001-99-99",
+     LONG, "1" + ":1" * 400, "1" + ":1" * 400 + ".5", "!!python/object:os.system {}", "{[1]: 2}",
+     "!!set [1]", "!!omap {a: 1}", '"\\UFFFFFFFF"'],
+)  # fmt: skip
+def test_a_value_that_its_tag_does_not_take_is_refused(value):
+    with pytest.raises(YamlTextError, match="does not parse as YAML: ") as caught:
+        load_yaml(f"a: 1\nb: {value}\n")
+    assert caught.value.line in (None, 2)
+
+
+def test_yaml_says_what_it_said():
+    text = "a: &a [1, 0x10, 1.5, yes, ~]\nb: *a\n? c\n: {<<: {d: 2}}\n"
+    assert load_yaml(text) == {"a": [1, 16, 1.5, True, None], "b": [1, 16, 1.5, True, None],
+                               "c": {"d": 2}}  # fmt: skip
+    assert load_yaml("") is None
+    assert compose_yaml("# nothing\n") is None
+
+
+@pytest.mark.parametrize(
+    "text",
+    [f'{{"a": {LONG}}}', f"[-{LONG}]", "[" * 200 + "]" * 200, "[" * 100_000, "{", b"\xff\xff{}", ""],
+    ids=["number", "negative", "deep", "deeper", "open", "bytes", "empty"],
+)
+def test_json_that_is_none_is_one_error(text):
+    with pytest.raises(json.JSONDecodeError):
+        load_json(text)
+
+
+def test_json_is_read_as_before():
+    text = '{"a": [1, 2.5, 1e300, null], "b": NaN, "b": Infinity}'
+    found = load_json(text.encode())
+    assert found == {"a": [1, 2.5, 1e300, None], "b": float("inf")}
+    with pytest.raises(ValueError, match="Infinity"):
+        load_json(text, lambda word: (_ for _ in ()).throw(ValueError("Infinity")))
