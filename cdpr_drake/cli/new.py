@@ -72,8 +72,9 @@ def new(
     """Writes a robot, scenario, controller, estimator or study to start from.
 
     A robot or scenario file has every key with its meaning, unit and range; keys with a default
-    are comments. A scenario for a robot, `--robot`, has the keys that it needs, and `cdpr schema
-    scenario` lists all. A controller, estimator or study is a program that runs, with a test for pytest.
+    are comments. A scenario for a robot, `--robot`, has the keys that it needs; `cdpr schema
+    scenario` lists all. A controller, estimator or study is a program that runs, with a test for
+    pytest.
     """
     if not _NAME.fullmatch(name):
         raise CdprError(

@@ -1,8 +1,9 @@
-"""A first scenario for a robot: poses that its cables hold taut, and a target that its camera sees."""
+"""A first scenario for a robot: poses that its cables hold taut, a target that its camera sees."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
@@ -15,10 +16,12 @@ from cdpr_drake.geometry.poses import angles_from_rotation
 from cdpr_drake.models.camera_catalogue import load_camera
 from cdpr_drake.models.robot_holding import hold_robot
 from cdpr_drake.models.robot_schema import Pose, Robot
+from cdpr_drake.models.robot_statics import tension_problem
 from cdpr_drake.systems.cameras.camera_settings import CameraSettings, servo_pinhole
 from cdpr_drake.systems.cameras.targets import TargetSettings
 from cdpr_drake.systems.diagrams.load import check_robot_motion
 from cdpr_drake.systems.scenarios.files import TENSION_CONTROL
+from cdpr_drake.tensions.methods import exact_tensions
 
 FACING = np.array([180.0, 0.0, 180.0])
 """Desired angles of the target in the camera: face on [deg]."""
@@ -36,11 +39,14 @@ SIDEWAYS = np.array([0.5, 0.35, -0.35])
 TURN_DEG = np.array([4.0, -3.0, 8.0])
 """Rotation of the start against the goal [deg]."""
 
-STRETCHES = (1.0, 0.7, 0.5, 0.3, 0.15)
+STRETCHES = (1.0, 0.7, 0.5, 0.3, 0.15, 0.05)
 """Shares of that displacement and rotation that are tried, the largest first."""
 
-TAUT_SHARE = 0.02
-"""Least tension of a taut cable, as a share of the platform's weight."""
+RESERVE_SHARE = 0.1
+"""Force that a pose must hold besides the weight, as a share of it."""
+
+TAUT_SHARE = 0.05
+"""Least tension of a taut cable above the robot's lower bound, as a share of the weight."""
 
 ACCELERATION = 0.5
 """Acceleration of a trajectory [m/s^2], so that its inertial forces stay below a tenth of g."""
@@ -62,8 +68,9 @@ def first_scenario(robot: Robot, name: str, reference: str) -> tuple[dict[str, A
             hold the platform at no pose that was tried.
     """
     check_robot_motion(robot, "a scenario")
-    taut = max(robot.tension_limits()[0], TAUT_SHARE * robot.platform.mass * robot.gravity)
-    taut = float(f"{taut:.2g}") if taut > robot.tension_limits()[0] else taut
+    reserve = TAUT_SHARE * robot.platform.mass * robot.gravity
+    low, high = robot.tension_limits()
+    taut = min(max(low, _digits(low + reserve)), 0.5 * (low + high))
     goal = _goal(robot, taut)
     mounts = [mount for mount in robot.cameras if mount.parent == "platform"]
     head: dict[str, Any] = {"name": name, "robot": reference}
@@ -75,32 +82,44 @@ def first_scenario(robot: Robot, name: str, reference: str) -> tuple[dict[str, A
         "computed torque; a visual servo needs the section cameras in the robot's file (cdpr "
         "schema robot describes it)"
     )
-    return {"kind": TENSION_CONTROL} | head | _tracking(robot, goal), [words]
+    return {"kind": TENSION_CONTROL} | head | _tracking(robot, goal, taut), [words]
 
 
-def _least_tension(robot: Robot, X_WP: RigidTransform) -> float:
-    """Least of the tensions that a run begins with [N]; -inf where none hold the platform."""
+REFUSED, HELD, RESERVE, TIGHTENED, TAUT = range(5)
+"""How well cables hold a pose: not at all; at rest; also against a force of `RESERVE_SHARE` of the
+weight along each axis of W; with all cables taut, if they are tightened; as a run begins."""
+
+
+def _held(robot: Robot, X_WP: RigidTransform, taut: float) -> int:
+    cables = robot.cable_set()
     try:
-        return float(np.min(hold_robot(robot, X_WP, robot.cable_set(), "elastic").tensions))
+        at_start = hold_robot(robot, X_WP, cables, "elastic").tensions
     except CdprError:
-        return -np.inf
+        return REFUSED
+    force = RESERVE_SHARE * robot.platform.mass * robot.gravity
+    low, high = robot.tension_limits()
+    best = HELD
+    for level, limits in ((RESERVE, (low, high)), (TIGHTENED, (taut, high))):
+        for push in np.vstack([np.zeros(3), force * np.eye(3), -force * np.eye(3)]):
+            wrench = np.concatenate([np.zeros(3), push])
+            problem = tension_problem(robot, X_WP, wrench, limits=limits, cables=cables)
+            if exact_tensions(problem) is None:
+                return best
+        best = level
+    return TAUT if np.min(at_start) >= taut else best
 
 
 def _goal(robot: Robot, taut: float) -> RigidTransform:
-    """The home pose, or if that is not taut, the pose of a coarse grid with the tautest cables."""
+    """The home pose, or a pose of a coarse grid that the cables hold better."""
     home = robot.home.transform()
-    best, most = home, _least_tension(robot, home)
-    if most >= taut:
-        return best
+    best, most = home, _held(robot, home, taut)
     low, high = robot.reach()
-    for shares in product((0.5, 0.35, 0.65), repeat=3):
+    for shares in product((0.5, 0.35, 0.65), repeat=3) if most < TIGHTENED else ():
         X_WP = RigidTransform(home.rotation(), np.round(low + shares * (high - low), 3))
-        tension = _least_tension(robot, X_WP)
-        if tension > most:
-            best, most = X_WP, tension
-        if most >= taut:
-            break
-    if not np.isfinite(most):
+        level = _held(robot, X_WP, taut)
+        if level > most:
+            best, most = X_WP, level
+    if most == REFUSED:
         raise ScenarioError(
             f"{robot.name}: found no pose, at home or on a grid through its frame, at which "
             f"tensions within {_bounds(robot)} N hold the platform; accepted: a robot that holds "
@@ -109,14 +128,45 @@ def _goal(robot: Robot, taut: float) -> RigidTransform:
     return best
 
 
-def _starts(robot: Robot, goal: RigidTransform, R_WC: Array, depth: float) -> Iterator[Pose]:
-    """Poses displaced from the goal, far ones first, that the platform can have."""
-    for share in STRETCHES:
-        for x, y in product((1.0, -1.0), repeat=2):
-            p = goal.translation() + R_WC @ (share * depth * SIDEWAYS * [x, y, 1.0])
-            turn = Pose(position=np.zeros(3), angles_deg=share * TURN_DEG).transform().rotation()
-            X_WP = robot.joint().nearest(RigidTransform(turn @ goal.rotation(), p))
-            yield _rounded(X_WP)
+@dataclass(frozen=True)
+class _Start:
+    """A pose beside the goal, and the one halfway to it."""
+
+    pose: Pose
+    halfway: Pose
+
+
+def _starts(robot: Robot, goal: RigidTransform, R_WC: Array, depth: float) -> list[_Start]:
+    """Poses displaced from the goal that the platform can have, far and turned ones first."""
+
+    def beside(shift: Array, turn_deg: Array) -> Pose:
+        turn = Pose(position=np.zeros(3), angles_deg=turn_deg).transform().rotation()
+        X_WP = RigidTransform(turn @ goal.rotation(), goal.translation() + R_WC @ shift)
+        return _rounded(robot.joint().nearest(X_WP))
+
+    found = []
+    for share, turned, x, y in product(STRETCHES, (1.0, 0.0), (1.0, -1.0), (1.0, -1.0)):
+        shift, turn = share * depth * SIDEWAYS * [x, y, 1.0], share * turned * TURN_DEG
+        found.append(_Start(beside(shift, turn), beside(0.5 * shift, 0.5 * turn)))
+    return found
+
+
+def _best_start(robot: Robot, starts: Sequence[_Start], taut: float) -> tuple[Pose, int]:
+    """The first start from which the way to the goal is held best, and how well."""
+    best, most = None, REFUSED
+    for start in starts:
+        level = min(_held(robot, each.transform(), taut) for each in (start.pose, start.halfway))
+        if level > most:
+            best, most = start.pose, level
+        if most == TAUT:
+            break
+    if best is None:
+        raise ScenarioError(
+            f"{robot.name}: found no pose beside the goal at which tensions within "
+            f"{_bounds(robot)} N hold the platform; accepted: a robot that holds its platform in a "
+            "part of its frame, not at single poses"
+        )
+    return best, most
 
 
 def _visual_servo(
@@ -126,40 +176,40 @@ def _visual_servo(
     camera = load_camera(mount.model)
     X_WC = goal @ mount.pose.transform()
     depth = _depth(robot, X_WC)
-    size = _digits(IMAGE_SHARE * 2.0 * depth * np.tan(0.5 * np.radians(camera.view_angle_vertical_deg)))
+    size = _digits(
+        IMAGE_SHARE * 2.0 * depth * np.tan(0.5 * np.radians(camera.view_angle_vertical_deg))
+    )
     desired = Pose(position=np.array([0.0, 0.0, depth]), angles_deg=FACING)
     tag = _rounded(X_WC @ desired.transform())
     target = TargetSettings(size=size, pose=tag).target()
     pinhole = servo_pinhole(CameraSettings(mount=mount.name), robot)
     seen = [
-        pose
-        for pose in _starts(robot, goal, X_WC.rotation().matrix(), depth)
+        start
+        for start in _starts(robot, goal, X_WC.rotation().matrix(), depth)
         if target.in_view(
-            (pose.transform() @ mount.pose.transform()).inverse() @ tag.transform(), pinhole
+            (start.pose.transform() @ mount.pose.transform()).inverse() @ tag.transform(), pinhole
         )
     ]
-    tensions = [_least_tension(robot, pose.transform()) for pose in seen]
-    held = [k for k, tension in enumerate(tensions) if tension >= taut]
-    if not seen or not np.isfinite(max(tensions)):
+    if not seen:
         raise ScenarioError(
-            f"{robot.name}: cameras: found {mount.name}, which sees a target at {depth:g} m from no "
-            "pose beside the goal that the cables hold; accepted: a camera that looks away from "
-            "the platform"
+            f"{robot.name}: cameras: found {mount.name}, which sees a target at {depth:g} m from "
+            "no pose beside the goal; accepted: a camera that looks away from the platform"
         )
-    best = held[0] if held else int(np.argmax(tensions))
+    start, level = _best_start(robot, seen, taut)
     remarks = []
-    if not held:
+    if level < TAUT:
         remarks.append(
-            f"{robot.name}: at the start the least tension is {tensions[best]:.3g} N, below the "
-            f"{taut:g} N of tension_management.threshold: cables may be slack; initial_pose is the "
-            "tautest of the poses that were tried"
+            f"{robot.name}: cables may be slack at the start, below the {taut:g} N of "
+            "tension_management.threshold, which then tightens them; a run starts with the least "
+            f"tensions within the robot's tension_bounds, {_bounds(robot)} N: a higher lower bound "
+            "in its file starts it taut"
         )
     rate = min(25.0, camera.rate_hz)
     pulleys = {"pulleys": True} if robot.cable_set().has_pulleys() else {}
     return {
         "duration": 60.0,
         "expected": {"outcome": "converged"},
-        "initial_pose": _keys(seen[best]),
+        "initial_pose": _keys(start),
         "desired": _keys(desired),
         "target": {"tag_id": 0, "size": size, "pose": _keys(tag)},
         "camera": {"kind": "rendered", "mount": mount.name, "rate": rate},
@@ -177,19 +227,11 @@ def _visual_servo(
     }, remarks  # fmt: skip
 
 
-def _tracking(robot: Robot, goal: RigidTransform) -> dict[str, Any]:
+def _tracking(robot: Robot, goal: RigidTransform, taut: float) -> dict[str, Any]:
     """Computed torque from a pose beside the goal to the goal and back."""
     low, high = robot.reach()
     reach = DEPTH_SHARE * float(np.min((high - low)[:2]))
-    starts = list(_starts(robot, goal, np.eye(3), reach))
-    tensions = [_least_tension(robot, pose.transform()) for pose in starts]
-    if not np.isfinite(max(tensions)):
-        raise ScenarioError(
-            f"{robot.name}: found no pose beside {goal.translation().round(3).tolist()} m at which "
-            f"tensions within {_bounds(robot)} N hold the platform; accepted: a robot that holds "
-            "its platform in a part of its frame"
-        )
-    start = starts[next(k for k, tension in enumerate(tensions) if np.isfinite(tension))]
+    start, _ = _best_start(robot, _starts(robot, goal, np.eye(3), reach), taut)
     distance = float(np.linalg.norm(start.transform().translation() - goal.translation()))
     seconds = max(2.0, float(np.ceil(np.sqrt(6.0 * distance / ACCELERATION))))
     cables = {"cables": {"pulleys": True}} if robot.cable_set().has_pulleys() else {}
@@ -231,7 +273,9 @@ def _digits(value: float) -> float:
 def _rounded(X_WP: RigidTransform) -> Pose:
     """A pose as one writes it: to 0.1 mm and 0.01 degrees."""
     angles = np.degrees(angles_from_rotation(X_WP.rotation()))
-    return Pose(position=np.round(X_WP.translation(), 4) + 0.0, angles_deg=np.round(angles, 2) + 0.0)
+    return Pose(
+        position=np.round(X_WP.translation(), 4) + 0.0, angles_deg=np.round(angles, 2) + 0.0
+    )
 
 
 def _keys(pose: Pose) -> dict[str, list[float]]:
