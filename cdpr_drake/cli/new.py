@@ -12,16 +12,23 @@ from typing import Annotated, Any
 import typer
 import yaml
 
-from cdpr_drake.cli.completion import words_among
+from cdpr_drake.cli.completion import robot_words, words_among
 from cdpr_drake.cli.notebooks import FOLDER as NOTEBOOKS
 from cdpr_drake.cli.robot_folder import write_files
+from cdpr_drake.cli.terminal import message_console
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models.robot_loader import load_robot, robot_text
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.schema.templates import commented_yaml
 from cdpr_drake.schema.typed_yaml import closest
+from cdpr_drake.systems.diagrams.first_scenario import first_scenario
 from cdpr_drake.systems.diagrams.load import SCENARIO_SCHEMAS, load_scenario
-from cdpr_drake.systems.scenarios.files import resolve_robot_path, scenario_file, scenario_kind
+from cdpr_drake.systems.scenarios.files import (
+    VISUAL_SERVO,
+    resolve_robot_path,
+    scenario_file,
+    scenario_kind,
+)
 from cdpr_drake.systems.scenarios.visual_servo_scenario import DEFAULT_SCENARIO
 from cdpr_drake.systems.worlds.settings import found_file
 
@@ -51,13 +58,23 @@ def new(
             "--from", help=f"Robot or scenario to copy; default: {EXAMPLE} or {DEFAULT_SCENARIO}."
         ),
     ] = None,
+    robot: Annotated[
+        str | None,
+        typer.Option(
+            help="With scenario: a robot by name or file, for which poses, target and limits are "
+            "chosen.",
+            autocompletion=robot_words,
+        ),
+    ] = None,
     out: Annotated[Path, typer.Option(help="Folder for the file.")] = Path(),
     overwrite: Annotated[bool, typer.Option(help="Replace a file of that name.")] = False,
 ) -> None:
     """Writes a robot, scenario, controller, estimator or study to start from.
 
     A robot or scenario file has every key with its meaning, unit and range; keys with a default
-    are comments. A controller, estimator or study is a program that runs, with a test for pytest.
+    are comments. A scenario for a robot, `--robot`, has the keys that it needs; `cdpr schema
+    scenario` lists all. A controller, estimator or study is a program that runs, with a test for
+    pytest.
     """
     if not _NAME.fullmatch(name):
         raise CdprError(
@@ -66,21 +83,32 @@ def new(
         )
     if kind not in KINDS:
         raise CdprError(f"kind of file {kind!r} is unknown; {closest(kind, KINDS)}")
+    if robot is not None and (kind != SCENARIO or source is not None):
+        found = kind if source is None else f"--from {source}"
+        raise CdprError(f"--robot: found {robot} with {found}; accepted: with scenario, alone")
     if kind in BLOCKS:
         if source is not None:
             raise CdprError(f"--from: found {source} with {kind}; accepted: with robot, scenario")
         for path in write_files(out, _block(kind, name), overwrite):
             print(path)
         return
-    of_robot = kind == ROBOT
-    schema, content = (
-        _robot(source or EXAMPLE) if of_robot else _scenario(source or DEFAULT_SCENARIO)
-    )
-    content["name"] = name
+    of_robot, remarks = kind == ROBOT, []
     head = f"# Check it with `cdpr check {name}.yaml`.\n"
-    text = head + commented_yaml(schema, content)
+    if robot is not None:
+        loaded = load_robot(robot, "cdpr new scenario")
+        content, remarks = first_scenario(loaded, name, _reference(robot, out))
+        schema = SCENARIO_SCHEMAS[content.get("kind", VISUAL_SERVO)][0]
+        head += f"# Made for {loaded.name}. All other keys: `cdpr schema scenario`.\n"
+    else:
+        schema, content = (
+            _robot(source or EXAMPLE) if of_robot else _scenario(source or DEFAULT_SCENARIO)
+        )
+        content["name"] = name
+    text = head + commented_yaml(schema, content, every=robot is None)
     (path,) = write_files(out, {f"{name}.yaml": text}, overwrite)
     (load_robot if of_robot else load_scenario)(str(path))
+    for words in remarks:
+        message_console().print(words, soft_wrap=True, markup=False, highlight=False)
     print(path)
 
 
@@ -112,6 +140,14 @@ def _block(kind: str, name: str) -> dict[str, str]:
 def _robot(source: str) -> tuple[type, dict[str, Any]]:
     load_robot(source, "cdpr new")  # for its message, where there is none
     return Robot, yaml.safe_load(robot_text(source))
+
+
+def _reference(robot: str, out: Path) -> str:
+    """How a scenario in a folder names a robot: from there where the robot is there, else whole."""
+    whole = Path(resolve_robot_path(Path("scenario.yaml"), robot))
+    folder = out.absolute()
+    beside = whole.is_absolute() and whole.is_relative_to(folder) and whole != folder
+    return str(whole.relative_to(folder) if beside else whole)
 
 
 def _scenario(source: str) -> tuple[type, dict[str, Any]]:

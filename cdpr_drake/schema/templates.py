@@ -15,34 +15,37 @@ from cdpr_drake.schema.typed_yaml import rules_of
 _WIDTH = 100
 
 
-def commented_yaml(schema: type, content: Mapping[str, Any]) -> str:
+def commented_yaml(schema: type, content: Mapping[str, Any], every: bool = True) -> str:
     """Content of a file with a comment on each of its keys, and the keys that it lacks as comments.
 
     Args:
         schema: Dataclass whose fields were made by `fields`.
         content: Keys of the file, as YAML gives them.
+        every: False to leave out the keys that the content lacks.
     """
-    return "\n".join(_section(schema, content, 0)) + "\n"
+    return "\n".join(_section(schema, content, 0, every)) + "\n"
 
 
-def _section(schema: type, content: Mapping[str, Any], depth: int) -> Iterator[str]:
+def _section(schema: type, content: Mapping[str, Any], depth: int, every: bool) -> Iterator[str]:
     pad = "  " * depth
     defaults = {field.name: field for field in dataclasses.fields(schema)}
     for name, (rule, bare) in rules_of(schema).items():
+        if not every and name not in content:
+            continue
         yield from _comment(rule, pad)
         value = content.get(name)
         if value is None and rule.kind == "section":
             yield f"{pad}# {name}:"
-            yield from _section(bare, {}, depth + 1)
+            yield from _section(bare, {}, depth + 1, every)
         elif name not in content:
             yield f"{pad}# {name}: {_shown(rule, defaults[name])}"
         elif rule.kind == "section":
             yield f"{pad}{name}:"
-            yield from _section(bare, value or {}, depth + 1)
+            yield from _section(bare, value or {}, depth + 1, every)
         elif rule.kind == "sections" and value:
             yield f"{pad}{name}:"
             for number, item in enumerate(value):
-                if number == 0:
+                if number == 0 and every:
                     yield from (f"{pad}  # {line}" for line in _keys(bare))
                 yield f"{pad}  - {_flow(item)}"
         else:

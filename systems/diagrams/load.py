@@ -179,16 +179,25 @@ def _why_not_held(X_WP: RigidTransform, scenario: TensionScenario, robot: Robot)
     )
 
 
-def _check_motion(robot: Robot, path: Path) -> None:
-    """Refuses robots that neither servos nor computed torque know."""
+def check_robot_motion(robot: Robot, where: Path | str) -> None:
+    """Refuses robots that neither servos nor computed torque know.
+
+    Args:
+        robot: The robot.
+        where: The scenario, for the message.
+
+    Raises:
+        ScenarioError: Names the robot and its degrees of freedom.
+    """
     try:
         rows = robot.servo_rows("scenarios")
     except RobotFileError as problem:
-        raise ScenarioError(f"{path}: {problem}") from problem
+        raise ScenarioError(f"{where}: {problem}") from problem
     if len(robot.cables) < len(rows):
         raise ScenarioError(
-            f"{path}: robot: found {robot.name} with {len(robot.cables)} cables for {len(rows)} "
-            f"degrees of freedom; accepted in scenarios: at least {len(rows)} cables"
+            f"{where}: robot: found {robot.name} with {len(robot.cables)} cables for {len(rows)} "
+            f"degrees of freedom; accepted in scenarios: at least {len(rows)} cables, "
+            "since with fewer no tensions control the whole pose"
         )
 
 
@@ -234,6 +243,6 @@ def load_scenario(
         check(scenario, mechanism, path)
         return scenario
     scenario, robot, path = load_with_robot(schema or of_kind, name, overrides)
-    _check_motion(robot, path)
+    check_robot_motion(robot, path)
     check(scenario, robot, path)
     return scenario
