@@ -14,7 +14,12 @@ from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.geometry.straight_cables import cable_lengths, gravity_wrench
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.models.robot_statics import check_pose, rigid_platform, wrench_balance
+from cdpr_drake.models.robot_statics import (
+    check_pose,
+    rigid_platform,
+    tension_problem,
+    wrench_balance,
+)
 from cdpr_drake.statics.controlled_wrenches import combination_words
 from cdpr_drake.statics.equilibrium import equilibrium_near
 from cdpr_drake.statics.static_tensions import (
@@ -22,6 +27,7 @@ from cdpr_drake.statics.static_tensions import (
     StaticTensions,
     find_static_tensions,
 )
+from cdpr_drake.tensions.shortfall import shortfall
 
 TRIMMED = 0.01
 """By how much of its length a cable is trimmed against the others on its winch at the start."""
@@ -60,10 +66,18 @@ def hold_robot(robot: Robot, X_WP: RigidTransform, cables: CableSet, model: str)
             raise InfeasibleTensionError(_underactuated(robot, X_WP, cables))
         raise InfeasibleTensionError(
             f"{robot.name} cannot hold the platform at ({position}) m: no tensions within "
-            f"{bounds[0]:g}..{bounds[1]:g} N balance its weight{own_weight}"
+            f"{bounds[0]:g}..{bounds[1]:g} N balance its weight"
+            f"{own_weight or _by(robot, X_WP, cables)}"
         )
     check_breaking(cables, holding.tensions, holding.unstrained_lengths)
     return holding
+
+
+def _by(robot: Robot, X_WP: RigidTransform, cables: CableSet) -> str:
+    """By how much tensions of straight cables miss the platform's weight, in words."""
+    missed = shortfall(tension_problem(robot, X_WP, cables=cables))
+    names = [cable.name for cable in robot.cables]
+    return f"; {missed.words(names, robot.motion_type().words())}"
 
 
 def lengths_at_home(robot: Robot) -> tuple[Array, str]:

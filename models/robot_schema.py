@@ -313,10 +313,12 @@ class Robot(Summarized):
         """Whether the file says of any cable when it breaks."""
         return any(material.breaking_load is not None for material in self.materials())
 
-    def cable_set(self) -> CableSet:
-        """The cables with all their constants, over the robot's pulleys.
+    def cable_set(self, pulleys: bool = True) -> CableSet:
+        """The cables with all their constants.
 
-        `robot.cable_set().without_pulleys()` are the same cables from fixed exit points.
+        Args:
+            pulleys: True: over the robot's pulleys. False: pulleys are ignored, and cables run
+                from fixed exit points to fixed anchor points.
         """
         axes = [
             self.pulley.swivel_axis if cable.swivel_axis is None else cable.swivel_axis
@@ -329,7 +331,7 @@ class Robot(Summarized):
         ]
         materials = self.materials()
         loads = [material.breaking_load for material in materials]
-        return CableSet.make(
+        cables = CableSet.make(
             self.exit_points(),
             self.anchor_points(),
             self.stiffness(),
@@ -355,6 +357,15 @@ class Robot(Summarized):
             ),
             _unit_columns(anchor_axes),
         )
+        return cables if pulleys else cables.without_pulleys()
+
+    def geometry_words(self, pulleys: bool = True) -> str:
+        """Geometry of a result in words: "with pulleys of 20 mm", "pulleys ignored", ...
+
+        Args:
+            pulleys: False if the result was computed with `cable_set(pulleys=False)`.
+        """
+        return self.cable_set().geometry_words(pulleys)
 
     def tension_limits(self, given: tuple[float, float] | None = None) -> tuple[float, float]:
         """Smallest and largest tension [N]: the given ones, or those that the robot may hold."""

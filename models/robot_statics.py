@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -73,7 +74,7 @@ def tension_problem(
         reference: Wanted tensions, shape (m,) [N].
         length_scale: By which methods that relax divide moments to compare them with forces [m];
             None: root mean square of the anchor points' distances from Po.
-        cables: The cables; None: the robot's, from fixed exit points.
+        cables: The cables; None: the robot's, pulleys included.
 
     Raises:
         CableGeometryError: A cable cannot run.
@@ -142,7 +143,7 @@ def wrench_balance(
         )
     if length_scale is not None and not (np.isfinite(length_scale) and length_scale > 0.0):
         raise TensionProblemError(f"length_scale: found {length_scale:g}; accepted: above 0 [m]")
-    cables = robot.cable_set().without_pulleys() if cables is None else cables
+    cables = robot.cable_set() if cables is None else cables
     W = -cable_jacobian(X_WP, cables).T
     weight = robot.platform.mass if mass is None else mass
     total = gravity_wrench(X_WP, weight, robot.center_of_mass(), robot.gravity_vector())
@@ -169,6 +170,49 @@ def _row_scale(robot: Robot, length_scale: float | None = None) -> Array:
         length_scale = float(np.sqrt(np.mean(squares))) or 1.0  # all in Po: no moments at all
     motion = robot.motion_type()
     return np.array([*[length_scale] * motion.num_turns, *[1.0] * motion.num_moves])
+
+
+def as_wrench(
+    wrench: Sequence[float] | Array | None = None,
+    force: Sequence[float] | Array | None = None,
+    moment: Sequence[float] | Array | None = None,
+) -> Array | None:
+    """A wrench on the platform about Po in W, moments first.
+
+    Args:
+        wrench: (m_x, m_y, m_z, f_x, f_y, f_z), shape (6,) [N m, N].
+        force: Instead of the wrench: (f_x, f_y, f_z), shape (3,) [N].
+        moment: Instead of the wrench, with or without a force: (m_x, m_y, m_z), shape (3,) [N m].
+
+    Returns:
+        Shape (6,) (moment, force) [N m, N]; None if none of them is given.
+
+    Raises:
+        TensionProblemError: Both ways are given, or a shape or number is not accepted.
+    """
+    parts = {"moment": (moment, 3, "[N m]"), "force": (force, 3, "[N]")}
+    if wrench is None and force is None and moment is None:
+        return None
+    if wrench is not None:
+        if force is not None or moment is not None:
+            raise TensionProblemError(
+                "wrench: found force or moment too; accepted: wrench, or force and moment"
+            )
+        parts = {"wrench": (wrench, 6, "(moment [N m], force [N])")}
+    numbers = []
+    for name, (given, size, unit) in parts.items():
+        try:
+            part = np.zeros(size) if given is None else np.asarray(given, float)
+        except (TypeError, ValueError):
+            part = np.empty(0)
+        if part.shape != (size,):
+            raise TensionProblemError(
+                f"{name}: found {np.size(np.array(given, object))} numbers; accepted: {size} {unit}"
+            )
+        if not np.all(np.isfinite(part)):
+            raise TensionProblemError(f"{name}: found {_words(part)}; accepted: finite {unit}")
+        numbers.append(part)
+    return np.concatenate(numbers)
 
 
 def as_pose(robot: Robot, pose: object = None) -> RigidTransform:

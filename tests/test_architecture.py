@@ -17,7 +17,7 @@ TOP = ("cdpr_drake", "models", "systems", "analyses")
 MOST_LINES = 600
 """A longer file holds more than one concept."""
 
-MOST_POSITIONAL, MOST_ARGUMENTS = 6, 10
+MOST_POSITIONAL, MOST_ARGUMENTS = 6, 11
 
 WITH_CODE = {
     "cdpr_drake",  # where kernels are kept is told before numba is imported

@@ -96,7 +96,10 @@ def bridge_rate(count: int) -> float:
     period = 1.0 / scenario.controller.rate
     socket = ServerSocket("127.0.0.1", 0, lambda: False)
     service = tension_service(
-        control.robot, limits=scenario.limits(), method=scenario.distribution.method
+        control.robot,
+        limits=scenario.limits(),
+        method=scenario.distribution.method,
+        cables=scenario.believed_cables(control.robot),
     )
 
     driver = Driver(

@@ -70,7 +70,10 @@ def tendon_loop() -> TendonLoop:
     scenario = dynamic_scenario(PLANT)
     robot = load_robot(scenario.robot)
     start = scenario.trajectory.trajectory().pose(0.0)
-    return TendonLoop(scenario, robot, tension_problem(robot, start, limits=scenario.limits()))
+    problem = tension_problem(
+        robot, start, limits=scenario.limits(), cables=scenario.believed_cables(robot)
+    )
+    return TendonLoop(scenario, robot, problem)
 
 
 def _advancers() -> dict[str, Callable[[float], None]]:

@@ -9,6 +9,7 @@ from cdpr_drake.analyses.benchmarks.moving_obstacles import timed_cells_row
 from cdpr_drake.analyses.planning.cable_streams import cable_stream
 from cdpr_drake.analyses.planning.plan_results import PlanRun
 from cdpr_drake.analyses.planning.robot_path_task import (
+    RESERVE,
     LimitSettings,
     make_path,
     path_task,
@@ -61,7 +62,7 @@ def path_row(repeats: int) -> TimingRow:
     that the tensions admit at the station. The plan solves three at each, over two stations.
     """
     robot = load_robot(ROBOT)
-    task = path_task(robot, LimitSettings(tensions=TENSIONS))
+    task = path_task(robot, LimitSettings(tensions=TENSIONS, reserve=RESERVE))
     path = make_path(robot, POSES, "smooth")
     plan = plan_along_path(task, path, STATIONS)
     programs = station_programs(task, path, plan.trajectory.stations)
@@ -85,7 +86,8 @@ def resistance_row(repeats: int) -> TimingRow:
     robot = load_robot(ROBOT)
     box = SpatialSet(box=np.array([0.02, 0.02, 0.02, 2.0, 2.0, 1.0]))
     alone, resisting = (
-        path_task(robot, LimitSettings(tensions=TENSIONS), resist=some) for some in (None, box)
+        path_task(robot, LimitSettings(tensions=TENSIONS, reserve=RESERVE), resist=some)
+        for some in (None, box)
     )
     path = make_path(robot, POSES, "smooth")
 
@@ -107,7 +109,7 @@ def stream_row(repeats: int) -> TimingRow:
     """Motor angles of a router at 100 Hz, with the check between points, against the plan."""
     places = ([2.0, 1.5, 0.0], [2.2, 1.7, 0.0], [2.4, 1.4, 0.0])
     poses = [pose_from_angles(np.array(place), np.zeros(3)) for place in places]
-    robot, given = load_robot(STREAMED), LimitSettings(cable_speed=0.05)
+    robot, given = load_robot(STREAMED), LimitSettings(cable_speed=0.05, reserve=RESERVE)
     task, path = path_task(robot, given), make_path(robot, poses, "smooth")
     run = PlanRun(
         robot=robot, limits=robot_limits(robot, given), arguments={}, planning_time=0.0,
@@ -135,7 +137,7 @@ def rails_row(repeats: int) -> TimingRow:
         pose_from_angles(np.array([x, y, robot.plane_height]), np.zeros(3))
         for x, y in ((0.15, 0.1), (-0.1, -0.15))
     ]
-    task = RailTask(static_case(robot, TENSIONS), rails, poses)
+    task = RailTask(static_case(robot, TENSIONS, pulleys=False), rails, poses)
     places = [
         np.array([a, b]) for a in np.linspace(-0.2, 0.2, 9) for b in np.linspace(-0.2, 0.2, 9)
     ]

@@ -178,7 +178,7 @@ def plant_simulator(
     m = len(robot.cables)
     straight = robot.cable_set().without_pulleys()
     lengths = cable_lengths(X_WP, straight.p_WA, straight.p_PB)
-    l0 = unstrained_lengths(lengths, holding_tensions(robot, X_WP), robot.stiffness())
+    l0 = unstrained_lengths(lengths, holding_tensions(robot, X_WP, straight), robot.stiffness())
     winches = builder.AddSystem(VelocityWinch(l0, robot.winch.rated_cable_speed()))
     state = plant.get_state_output_port(in_plant.model_instance)
     if cables.HasInputPort("platform_state"):

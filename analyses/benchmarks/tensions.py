@@ -57,7 +57,7 @@ def random_problems(count: int) -> list[TensionProblem]:
     while len(problems) < count:
         position = random.uniform([-0.35, -0.35, 0.1], [0.35, 0.35, 0.8])
         X_WP = pose_from_angles(position, random.uniform(-0.2, 0.2, 3))
-        problem = tension_problem(robot, X_WP)
+        problem = tension_problem(robot, X_WP, cables=robot.cable_set(pulleys=False))
         if distribute(problem).status == "feasible":
             problems.append(problem)
     return problems
@@ -191,8 +191,11 @@ def program_rows(count: int) -> list[TimingRow]:
     robot, rows = load_robot(ROBOT), []
     angles = np.linspace(0.0, 2.0 * np.pi, count)
     places = np.column_stack([0.2 * np.cos(angles), 0.2 * np.sin(angles), np.full(count, 0.35)])
+    cables = robot.cable_set(pulleys=False)
     steps = [
-        tension_problem(robot, pose_from_angles(place, np.zeros(3)), limits=(1.0, 60.0))
+        tension_problem(
+            robot, pose_from_angles(place, np.zeros(3)), limits=(1.0, 60.0), cables=cables
+        )
         for place in places
     ]
     kernel = Distributor(steps[0])

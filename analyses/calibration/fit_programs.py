@@ -154,7 +154,8 @@ def guessed_tensions(prepared: Prepared, poses: Sequence[RigidTransform]) -> Arr
 def _held(prepared: Prepared, X_WP: RigidTransform) -> Array | None:
     """Tensions that hold the platform; None outside of the frame, or where it is singular."""
     try:
-        problem = tension_problem(prepared.task.robot, X_WP)
+        robot = prepared.task.robot  # where a search begins: straight cables are near enough
+        problem = tension_problem(robot, X_WP, cables=robot.cable_set(pulleys=False))
         found = distribute(problem, "quadratic_program").tensions
     except CdprError:
         return None

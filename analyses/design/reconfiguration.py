@@ -317,7 +317,7 @@ def reconfigured(
             "accepted: above 0, at least 0, at least 1"
         )
     rails, names = rails_of(robot, groups)
-    task = RailTask(static_case(robot, limits), rails, list(poses), required)
+    task = RailTask(static_case(robot, limits, pulleys=False), rails, list(poses), required)
     tell(f"Moving exit points of {robot.name}")
     program = ReconfigurationProgram(task)
     program.AddLargestMargin()
@@ -335,7 +335,7 @@ def reconfigured(
             f"rails: {found.solver}: {found.status}; accepted: other rails or poses"
         )
     after = _moved(robot, names, found.coordinates)
-    case = static_case(after, limits)
+    case = static_case(after, limits, pulleys=False)
     tell("Proving what is round the poses")
     return Reconfiguration(
         before=robot, after=after, task=task, goal=goal, names=names, solution=found,
@@ -374,7 +374,7 @@ def _moved(robot: Robot, names: list[str], coordinates: Array) -> Robot:
 
 
 def _over_pulleys(task: RailTask, robot: Robot, limits: tuple[float, float] | None) -> Array:
-    case = static_case(robot, limits, pulleys=True)
+    case = static_case(robot, limits)
     R = np.array([X.rotation().matrix() for X in task.poses])
     p = np.array([X.translation() for X in task.poses])
     W = wrench_matrices(p, R, case.cables)[:, list(case.rows)]

@@ -46,6 +46,7 @@ class BreakReactions(Tabulated):
         cable: Name of the cable that broke.
         time: Time of the break [s].
         rows: By reaction the outcome of its run, and what `after_break` says.
+        geometry: Geometry of the simulated cables, as `Robot.geometry_words`.
         failed: Of each picture that could not be written, the file and why.
     """
 
@@ -53,11 +54,15 @@ class BreakReactions(Tabulated):
     cable: str
     time: float
     rows: dict[str, dict[str, Any]]
+    geometry: str = ""
     failed: Mapping[str, str] = field(default_factory=dict)
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON; keys end in units."""
-        told = {"scenario": self.scenario, "cable": self.cable, "time_s": self.time}
+        told = {
+            "scenario": self.scenario, "cable": self.cable, "time_s": self.time,
+            "geometry": self.geometry,
+        }  # fmt: skip
         return {**told, "reactions": self.rows}
 
     def columns(self) -> dict[str, Any]:
@@ -70,7 +75,7 @@ class BreakReactions(Tabulated):
         """How far the platform went and how fast it was at most."""
         from cdpr_drake.analyses.visualization.figure_style import new_figure
 
-        title = f"{self.cable} breaks at {self.time:g} s"
+        title = f"{self.cable} breaks at {self.time:g} s, {self.geometry}"
         drawn, axes = new_figure(1, 2, (10.0, 4.0), title)
         for axis, name, factor, label in (
             (axes[0], "excursion_m", 1e3, "largest excursion [mm]"),
@@ -91,7 +96,7 @@ class BreakReactions(Tabulated):
                 f"tension {row['tension_n']:.1f} N"
             )
             rows.append((reaction, words + (", leaves the frame" if row["leaves"] else "")))
-        return f"{self.cable} breaks at {self.time:g} s in {self.scenario}", rows
+        return (f"{self.cable} breaks at {self.time:g} s in {self.scenario}, {self.geometry}", rows)
 
 
 def compare_reactions(
@@ -154,9 +159,10 @@ def compare_reactions(
                 raise ScenarioError(
                     f"time: found {time:g}; accepted: before the run of {loaded} ends, {end:g} s"
                 )
-            told_of = after_break(run.log, robot, cable, time)
+            told_of = after_break(run.log, robot, cable, time, scene.cables.pulleys)
             rows[reaction] = {"outcome": Outcome(run.outcome).name.lower(), **told_of}
-        found = BreakReactions(loaded, name, time, rows)
+        words = robot.geometry_words(scene.cables.pulleys)
+        found = BreakReactions(loaded, name, time, rows, words)
         if results is None:
             return found
         write_json(results.path / RESULTS, found.as_dict())

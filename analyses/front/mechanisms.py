@@ -57,11 +57,13 @@ class PlacedMechanism:
         mechanism: The mechanism.
         cables: Its cables.
         context: Of the plant, at the positions that were asked for.
+        geometry: Geometry of the cables, as `CableSet.geometry_words`.
     """
 
     mechanism: Mechanism
     cables: PlantCables
     context: Context
+    geometry: str
 
     @property
     def plant(self) -> MultibodyPlant:
@@ -161,7 +163,8 @@ def place_mechanism(
     added.finalize()
     routes = added.routes()
     cables = PlantCables(plant, routes if pulleys else routes.without_pulleys(), model)
-    return PlacedMechanism(loaded, cables, plant.CreateDefaultContext())
+    words = routes.ends.geometry_words(pulleys)
+    return PlacedMechanism(loaded, cables, plant.CreateDefaultContext(), words)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -206,6 +209,7 @@ class MechanismAtRest(Summarized):
         return {
             "mechanism": self.placed.mechanism.name,
             "model": self.placed.cables.model,
+            "geometry": self.placed.geometry,
             "stability": rest.stability,
             "positions": self.placed.positions(rest.positions),
             "cables": list(self.names),
@@ -220,7 +224,8 @@ class MechanismAtRest(Summarized):
 
     def plot(self) -> Figure:
         """Tensions with the file's bounds."""
-        title = f"{self.placed.mechanism.name} at rest: {self.rest.stability}"
+        name, geometry = self.placed.mechanism.name, self.placed.geometry
+        title = f"{name} at rest, {geometry}: {self.rest.stability}"
         return self.placed.tension_figure({"at rest": self.rest.tensions}, title)
 
     def summary(self) -> tuple[str, list[tuple[str, str]]]:
@@ -229,6 +234,7 @@ class MechanismAtRest(Summarized):
         held = [f"{name} {numbers(force)}" for name, force in self.held().items()]
         slowest = "unstable" if np.any(np.isnan(frequencies)) else numbers(frequencies[:3])
         return f"{self.placed.mechanism.name} at rest: {rest.stability}", [
+            ("geometry", self.placed.geometry),
             ("tensions [N]", numbers(rest.tensions)),
             ("unstrained [m]", numbers(rest.unstrained_lengths)),
             ("held", "; ".join(held) or "nothing"),
@@ -336,6 +342,7 @@ class MechanismTensions(Summarized):
         m, n = self.placed.cables.routes.count, len(self.rows)
         found = {
             "mechanism": self.placed.mechanism.name,
+            "geometry": self.placed.geometry,
             "cables": list(self.placed.cables.routes.names),
             "redundancy": m - n,
             "rows": list(self.rows),
@@ -356,21 +363,24 @@ class MechanismTensions(Summarized):
     def plot(self) -> Figure:
         """Tensions by each method, with the file's bounds."""
         found = {one.method: one.tensions for one in self.solutions}
-        title = f"Tensions of {self.placed.mechanism.name}: {self.status}"
+        name, geometry = self.placed.mechanism.name, self.placed.geometry
+        title = f"Tensions of {name}, {geometry}: {self.status}"
         return self.placed.tension_figure(found or {UNDERACTUATED: self.tensions}, title)
 
     def summary(self) -> tuple[str, list[tuple[str, str]]]:
         """What it shows of itself."""
         name = self.placed.mechanism.name
         if self.control is None:
-            return f"Tensions of {name} [N]", [
+            return f"Tensions of {name} [N], {self.placed.geometry}", [
                 (one.method, f"{one.status}: {numbers(one.tensions)}") for one in self.solutions
             ]
         title = (
             f"{name}: cables control {self.control.rank} of {len(self.rows)} rows: {self.status}"
         )
         rows = [("not controlled", words) for words, _ in self.uncontrolled()]
-        return title, [("tensions [N]", numbers(self.tensions)), *rows]
+        return title, [
+            ("geometry", self.placed.geometry), ("tensions [N]", numbers(self.tensions)), *rows,
+        ]  # fmt: skip
 
 
 def solve_mechanism_tensions(
@@ -378,6 +388,7 @@ def solve_mechanism_tensions(
     method: str = UNDERACTUATED,
     *,
     joints: Mapping[str, float | Sequence[float]] | None = None,
+    pulleys: bool = True,
     held: str | Iterable[str] | None = None,
     limits: tuple[float, float] | None = None,
     reference: Array | float | None = None,
@@ -386,12 +397,13 @@ def solve_mechanism_tensions(
     """Tensions that hold a mechanism at its home, or a proof that there are none.
 
     W t + w = 0 on the rows that no motor holds, W = -J_l' with the length Jacobian J_l, w the
-    generalized force of gravity and of the plant's springs. Cables run without pulleys.
+    generalized force of gravity and of the plant's springs.
 
     Args:
         mechanism: The mechanism, or its name or path.
         method: A name of `TENSION_METHODS`, or all.
         joints: Positions of joints by name, before those of its home [rad, m].
+        pulleys: True: cables run over the mechanism's pulleys. False: pulleys are ignored.
         held: Joints that motors hold; None: those with actuators.
         limits: Smallest and largest tension [N]; None: those of the file.
         reference: Desired tensions, one for all cables or shape (m,) [N], for reference_program.
@@ -408,7 +420,7 @@ def solve_mechanism_tensions(
         EquilibriumError: There is no such joint.
         CdprError: The file is not accepted, or a cable cannot run.
     """
-    placed = place_mechanism(mechanism, joints, pulleys=False)
+    placed = place_mechanism(mechanism, joints, pulleys=pulleys)
     cables, context = placed.cables, placed.context
     words, turns = placed.rows()
     rows = np.flatnonzero(~placed.held_rows(held))

@@ -17,6 +17,7 @@ from cdpr_drake.analyses.planning.path_files import read_path
 from cdpr_drake.analyses.planning.plan_results import PlanRun
 from cdpr_drake.analyses.planning.plan_tracking import TrackedPlan, track_plan
 from cdpr_drake.analyses.planning.robot_path_task import (
+    RESERVE,
     TOLERANCE,
     LimitSettings,
     make_path,
@@ -264,14 +265,14 @@ def tracked_by(
 
 
 def chosen_limits(limits: Limits) -> LimitSettings:
-    """Settings of limits by name; raises PlanningError for unknown names."""
-    if isinstance(limits, LimitSettings):
-        return limits
-    known = [field.name for field in fields(LimitSettings)]
-    for name in limits or {}:
-        if name not in known:
-            raise PlanningError(f"limits: {name!r} is unknown; {closest(name, known)}")
-    return LimitSettings(**(limits or {}))
+    """Settings of limits by name, with a plan's reserve; raises PlanningError for unknown names."""
+    if not isinstance(limits, LimitSettings):
+        known = [field.name for field in fields(LimitSettings)]
+        for name in limits or {}:
+            if name not in known:
+                raise PlanningError(f"limits: {name!r} is unknown; {closest(name, known)}")
+        limits = LimitSettings(**(limits or {}))
+    return replace(limits, reserve=RESERVE) if limits.reserve is None else limits
 
 
 def planned_for(
@@ -281,8 +282,7 @@ def planned_for(
     resist: SpatialSet | Path | str | None = None,
 ) -> PathTask:
     """The robot as it is planned with; `resist` is a set of wrenches, or its file."""
-    cables = robot.cable_set()
-    cables = cables if pulleys else cables.without_pulleys()
+    cables = robot.cable_set(pulleys)
     if not isinstance(resist, str | Path):
         return path_task(robot, given, cables, resist)
     wrenches = load_wrench_set(Path(resist))

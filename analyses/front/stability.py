@@ -28,6 +28,7 @@ from cdpr_drake.analyses.workspaces.static_feasible import static_case
 from cdpr_drake.errors import StabilityError
 from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.models.robot_statics import as_wrench
 from cdpr_drake.schema.typed_yaml import closest
 from cdpr_drake.stability.perturbation_bounds import PerturbationBounds
 from cdpr_drake.stability.verdict import VerdictOptions
@@ -37,7 +38,7 @@ from cdpr_drake.workspaces.pose_grid import WorkspaceGrid
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-HELD = ("limits", "mass", "wrench")
+HELD = ("limits", "mass", "wrench", "force", "moment", "pulleys")
 """What cables have to hold in `assess_stability`, by name."""
 
 
@@ -104,11 +105,14 @@ def stability_question(
             raise StabilityError(
                 f"{name!r} is unknown; {closest(name, (*HELD, 'scenario', 'options'))}"
             )
+    load = [held.pop(name, None) for name in ("wrench", "force", "moment")]
     return make_question(
         robot, scheme=scheme, verdict=verdict,
         bounds=load_bounds(Path(bounds)) if isinstance(bounds, str | Path) else bounds,
         vary=vary, grid=pose_grid(robot, grid), options=_options(options),
-        statics=static_case(as_robot(robot, "assess_stability"), **held),
+        statics=static_case(
+            as_robot(robot, "assess_stability"), wrench=as_wrench(*load), **held
+        ),
         task=None if scenario is None else scenario_task(robot, scenario),
     )  # fmt: skip
 
@@ -143,10 +147,12 @@ def assess_stability(
             processor, started where more than ten seconds of work are left.
         formats: Endings of the files of figures.
         session: Who follows it and may stop it; None: nobody.
-        asked: What the cables have to hold: `limits` (2,) [N], `mass` [kg], `wrench` (6,)
-            [N m, N]; `scenario` whose object, desired view and camera count, in the place of those
-            of the servoing thesis; `options`, how hard to look: `VerdictOptions`, or some of its
-            fields by name.
+        asked: What the cables have to hold: `limits` (2,) [N], `mass` [kg], `wrench` about Po in W,
+            moments first, (6,) [N m, N], or `force` (3,) [N] and `moment` (3,) [N m]; `pulleys`,
+            False to ignore the robot's pulleys there too (the criterion of stability always
+            ignores them); `scenario`, whose object, desired view and camera replace those of the
+            servoing thesis; `options`, how hard to look: `VerdictOptions`, or some of its fields
+            by name.
 
     Raises:
         StoppedError: The session stopped it before it was finished.

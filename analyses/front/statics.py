@@ -43,7 +43,7 @@ class RobotAtRest(StaticReport):
         """The robot with its tensions, sags and natural frequencies."""
         from cdpr_drake.analyses.statics.static_figures import static_figure
 
-        return static_figure(self, f"{self.robot} at rest, {self.model} cables")
+        return static_figure(self, f"{self.robot} at rest, {self.model} cables, {self.geometry}")
 
     def plot_behaviour(self, robot: Robot | str | Path) -> Figure:
         """What the robot's file says that cables and contacts do: force over elongation, tensions

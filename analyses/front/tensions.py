@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -20,10 +20,17 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.errors import TensionProblemError
 from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.models.robot_statics import WrenchBalance, as_pose, tension_problem, wrench_balance
+from cdpr_drake.models.robot_statics import (
+    WrenchBalance,
+    as_pose,
+    as_wrench,
+    tension_problem,
+    wrench_balance,
+)
 from cdpr_drake.summaries import Summarized, numbers
 from cdpr_drake.tensions.methods import METHODS, TensionMethod, distribute, feasible_polygon
-from cdpr_drake.tensions.problem import TensionProblem, TensionSolution
+from cdpr_drake.tensions.problem import TensionProblem, TensionSolution, TensionStatus
+from cdpr_drake.tensions.shortfall import Shortfall, shortfall
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -45,12 +52,34 @@ class TensionsAtPose(Summarized):
         X_WP: Pose of the platform [m].
         problem: What was asked.
         solutions: The answer of each method that was asked.
+        pulleys: False if the robot's pulleys were ignored.
     """
 
     robot: Robot
     X_WP: RigidTransform
     problem: TensionProblem
     solutions: tuple[TensionSolution, ...]
+    pulleys: bool = True
+
+    @property
+    def geometry(self) -> str:
+        """Geometry of the cables in words, as `Robot.geometry_words`."""
+        return self.robot.geometry_words(self.pulleys)
+
+    @cached_property
+    def shortfall(self) -> Shortfall | None:
+        """By how much tensions miss the wrench; None where there are some that balance it."""
+        none = any(one.status == TensionStatus.INFEASIBLE for one in self.solutions)
+        return shortfall(self.problem) if none else None
+
+    def _cables(self) -> list[str]:
+        return [cable.name for cable in self.robot.cables]
+
+    def shortfall_rows(self) -> list[tuple[str, str]]:
+        """`shortfall` in words; empty where there is none."""
+        if self.shortfall is None:
+            return []
+        return self.shortfall.rows(self._cables(), self.robot.motion_type().words())
 
     def numbers(self) -> dict[str, Any]:
         """The answers alone for JSON."""
@@ -59,7 +88,13 @@ class TensionsAtPose(Summarized):
     def as_dict(self) -> dict[str, Any]:
         """For JSON; with two cables more than needed also the corners of the feasible polygon."""
         found = {
-            "robot": self.robot.name, "redundancy": self.problem.redundancy, **self.numbers(),
+            "robot": self.robot.name, "geometry": self.geometry,
+            "redundancy": self.problem.redundancy, **self.numbers(),
+            "rows": list(self.robot.motion_type().words()),
+            "wrench_n_m_n": self.problem.wrench.tolist(),
+            "infeasible_by": None
+            if self.shortfall is None
+            else self.shortfall.as_dict(self._cables()),
         }  # fmt: skip
         if self.problem.redundancy == 2:
             found["polygon_vertices_n"] = polygon_tensions(self.problem)
@@ -68,9 +103,9 @@ class TensionsAtPose(Summarized):
     def summary(self) -> tuple[str, list[tuple[str, str]]]:
         """What it shows of itself: each method with its tensions [N]."""
         title = f"Tensions of {self.robot.name} at ({numbers(self.X_WP.translation())}) m [N]"
-        return title, [
+        return title, [("geometry", self.geometry)] + [
             (one.method, f"{one.status}: {numbers(one.tensions)}") for one in self.solutions
-        ]
+        ] + self.shortfall_rows()
 
     def plot(self, title: str | None = None) -> Figure:
         """With two cables more than needed and a feasible polygon that with a point for each
@@ -84,9 +119,8 @@ class TensionsAtPose(Summarized):
             return self.plot_polygon(title)
         from cdpr_drake.analyses.statics.static_figures import tension_figure
 
-        names = [cable.name for cable in self.robot.cables]
         found = {one.method: one.tensions for one in self.solutions}
-        return tension_figure(names, found, (asked.lower, asked.upper), title)
+        return tension_figure(self._cables(), found, (asked.lower, asked.upper), title)
 
     def plot_polygon(self, title: str | None = None) -> Figure:
         """The feasible polygon with a point for each method; `title` as of `plot`.
@@ -109,7 +143,7 @@ class TensionsAtPose(Summarized):
         return wrench_set_figure(found, -asked.wrench, title)
 
     def _where(self) -> str:
-        return f"{self.robot.name} at ({numbers(self.X_WP.translation())})"
+        return f"{self.robot.name} at ({numbers(self.X_WP.translation())}) m, {self.geometry}"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -144,7 +178,8 @@ class RobotTensions(TensionsAtPose):
         """What it shows of itself; tensions on a bound have a star."""
         title, rows = self.solution.summary()
         low, high = self.problem.lower[0], self.problem.upper[0]
-        return f"{self._where()} m: {title.lower()}", [*rows, ("bounds", f"{low:g} to {high:g} N")]
+        rows += [("bounds", f"{low:g} to {high:g} N"), *self.shortfall_rows()]
+        return f"{self._where()}: {title.lower()}", rows
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -155,15 +190,28 @@ class UnderactuatedTensions(Summarized):
         robot: The robot.
         X_WP: Pose of the platform [m].
         balance: What was asked.
+        pulleys: False if the robot's pulleys were ignored.
     """
 
     robot: Robot
     X_WP: RigidTransform
     balance: WrenchBalance
+    pulleys: bool = True
+
+    @property
+    def geometry(self) -> str:
+        """Geometry of the cables in words, as `Robot.geometry_words`."""
+        return self.robot.geometry_words(self.pulleys)
 
     @cached_property
     def _answer(self) -> dict[str, Any]:
-        return underactuated_answer(self.robot, self.balance)
+        return underactuated_answer(self.robot, self.balance) | {"geometry": self.geometry}
+
+    def shortfall_rows(self) -> list[tuple[str, str]]:
+        """How far tensions miss what the cables control, in words; empty where some balance it."""
+        short = self.balance.control().shortfall()
+        cables = [cable.name for cable in self.robot.cables]
+        return [] if short is None else short.rows(cables, self.robot.motion_type().words())
 
     @property
     def status(self) -> str:
@@ -187,7 +235,8 @@ class UnderactuatedTensions(Summarized):
         names = [cable.name for cable in self.robot.cables]
         lower, upper = self.robot.tension_limits()
         bounds = np.full(len(names), lower), np.full(len(names), upper)
-        title = f"{self.robot.name} at ({numbers(self.X_WP.translation())}): {self.status}"
+        place = f"({numbers(self.X_WP.translation())}) m"
+        title = f"{self.robot.name} at {place}, {self.geometry}: {self.status}"
         return tension_figure(names, {UNDERACTUATED: self.tensions}, bounds, title)
 
     def summary(self) -> tuple[str, list[tuple[str, str]]]:
@@ -197,16 +246,28 @@ class UnderactuatedTensions(Summarized):
             f"{answer['robot']}: {len(self.robot.cables)} cables for "
             f"{answer['degrees_of_freedom']} degrees of freedom: {answer['status']}"
         )
-        rows = [("not controlled", one["combination"]) for one in answer["uncontrolled"]]
-        return title, [("tensions [N]", numbers(self.tensions)), *rows]
+        rows = [
+            (
+                "not controlled",
+                f"{one['combination']}, {abs(one['unbalanced']):.3g} unbalanced",
+            )
+            for one in answer["uncontrolled"]
+        ]
+        rows += self.shortfall_rows()
+        return title, [
+            ("geometry", self.geometry), ("tensions [N]", numbers(self.tensions)), *rows,
+        ]  # fmt: skip
 
 
 def solve_tensions(
     robot: Robot | str | Path,
     pose: object = None,
-    wrench: Array | None = None,
+    wrench: Sequence[float] | Array | None = None,
     method: str = "quadratic_program",
     *,
+    force: Sequence[float] | Array | None = None,
+    moment: Sequence[float] | Array | None = None,
+    pulleys: bool = True,
     limits: tuple[float, float] | None = None,
     mass: float | None = None,
     reference: Array | float | None = None,
@@ -214,14 +275,18 @@ def solve_tensions(
 ) -> RobotTensions | UnderactuatedTensions:
     """Tensions that hold the platform at rest at a pose, or a proof that there are none.
 
-    W t + w = 0 with lower <= t <= upper, w the weight and the wrench that is given. Cables run from
-    fixed exit points.
+    W t + w = 0 with lower <= t <= upper, w the weight and the wrench that is given.
 
     Args:
         robot: The robot, or its name or path.
         pose: X_WP as `as_pose` takes it [m]; None: the home pose.
-        wrench: Wrench on the platform about Po in W, beside its weight, shape (6,) [N m, N].
+        wrench: Wrench on the platform about Po in W, in addition to its weight, moments first:
+            (m_x, m_y, m_z, f_x, f_y, f_z), shape (6,) [N m, N].
         method: A name of `TENSION_METHODS`.
+        force: Instead of `wrench`: force on the platform in Po, in W, shape (3,) [N].
+        moment: Instead of `wrench`: moment on the platform in W, shape (3,) [N m].
+        pulleys: True: cables run over the robot's pulleys. False: pulleys are ignored, and cables
+            run from fixed exit points.
         limits: Smallest and largest tension [N]; None: the robot's.
         mass: Mass of the platform [kg]; None: the robot's.
         reference: Desired tensions, one for all cables or shape (m,) [N], for reference_program.
@@ -229,8 +294,8 @@ def solve_tensions(
             root mean square distance from Po.
 
     Returns:
-        The tensions and the verdict on them; with fewer cables than degrees of freedom also what
-        no tensions change.
+        The tensions and the verdict on them; if there are none, by how much they miss the wrench;
+        with fewer cables than degrees of freedom also what no tensions change.
 
     Raises:
         TensionProblemError: The pose is outside the frame, or a number or the method is not
@@ -239,6 +304,7 @@ def solve_tensions(
     Source: servoing thesis 1.2.2, (1.27); Gazebo thesis 6.2.
     """
     loaded, X_WP = _at(robot, pose)
+    wrench, cables = as_wrench(wrench, force, moment), loaded.cable_set(pulleys)
     if loaded.is_underactuated():
         if method != UNDERACTUATED:
             raise TensionProblemError(
@@ -246,21 +312,25 @@ def solve_tensions(
                 f"{loaded.name}; accepted: {UNDERACTUATED}"
             )
         balance = wrench_balance(
-            loaded, X_WP, wrench, limits=limits, mass=mass, length_scale=length_scale
-        )
-        return UnderactuatedTensions(loaded, X_WP, balance)
+            loaded, X_WP, wrench, limits=limits, mass=mass, length_scale=length_scale,
+            cables=cables,
+        )  # fmt: skip
+        return UnderactuatedTensions(loaded, X_WP, balance, pulleys)
     problem = tension_problem(
         loaded, X_WP, wrench, limits=limits, mass=mass, reference=_wanted(loaded, reference),
-        length_scale=length_scale,
+        length_scale=length_scale, cables=cables,
     )  # fmt: skip
-    return RobotTensions(loaded, X_WP, problem, (distribute(problem, method),))
+    return RobotTensions(loaded, X_WP, problem, (distribute(problem, method),), pulleys)
 
 
 def compare_tensions(
     robot: Robot | str | Path,
     pose: object = None,
-    wrench: Array | None = None,
+    wrench: Sequence[float] | Array | None = None,
     *,
+    force: Sequence[float] | Array | None = None,
+    moment: Sequence[float] | Array | None = None,
+    pulleys: bool = True,
     limits: tuple[float, float] | None = None,
     mass: float | None = None,
     reference: Array | float | None = None,
@@ -273,10 +343,11 @@ def compare_tensions(
     """
     loaded, X_WP = _at(robot, pose)
     problem = tension_problem(
-        loaded, X_WP, wrench, limits=limits, mass=mass, reference=_wanted(loaded, reference),
-        length_scale=length_scale,
+        loaded, X_WP, as_wrench(wrench, force, moment), limits=limits, mass=mass,
+        reference=_wanted(loaded, reference), length_scale=length_scale,
+        cables=loaded.cable_set(pulleys),
     )  # fmt: skip
-    return TensionsAtPose(loaded, X_WP, problem, tuple(solve_all(problem)))
+    return TensionsAtPose(loaded, X_WP, problem, tuple(solve_all(problem)), pulleys)
 
 
 def _at(robot: Robot | str | Path, pose: object) -> tuple[Robot, RigidTransform]:

@@ -50,7 +50,8 @@ class FreeRun(MotionRun):
     def about(self) -> str:
         """What it is, in words for titles."""
         took = self.solution.duration
-        return f"{self.robot.name}, free path, least {self.asked.least}: {took:.4g} s"
+        name = f"{self.robot.name}, {self.geometry}"
+        return f"{name}: free path, least {self.asked.least}, {took:.4g} s"
 
     @cached_property
     def samples(self) -> MotionSamples:

@@ -74,6 +74,11 @@ class MotionRun(Tabulated):
     def about(self) -> str:
         """What it is, in words for titles."""
 
+    @property
+    def geometry(self) -> str:
+        """Geometry of the planned robot's cables in words, as `Robot.geometry_words`."""
+        return self.robot.geometry_words(self.task.cables.has_pulleys())
+
     @abstractmethod
     def details(self) -> dict[str, Any]:
         """What is its own in `as_dict`."""
@@ -87,6 +92,7 @@ class MotionRun(Tabulated):
         told: dict[str, Any] = finite(
             {
                 "robot": self.robot.name,
+                "geometry": self.geometry,
                 "arguments": self.arguments,
                 **self.details(),
                 **limits_told(self),
@@ -157,7 +163,8 @@ class PlanRun(MotionRun):
     @property
     def about(self) -> str:
         """What it is, in words for titles."""
-        return f"{self.robot.name}, time-optimal along {self.source}: {self.plan.duration:.4g} s"
+        name, source = f"{self.robot.name}, {self.geometry}", self.source
+        return f"{name}: time-optimal along {source}, {self.plan.duration:.4g} s"
 
     def more_rows(self) -> list[tuple[str, str]]:
         """As the base class says."""

@@ -47,7 +47,7 @@ class ProvenRun(RunInSets):
         """What it is, in words for titles."""
         what = "motion" if self.motion_proven else "path" if self.path_proven else "cables only"
         return (
-            f"{self.robot.name}, proven {what}, least {self.found.cost}: "
+            f"{self.robot.name}, {self.geometry}, proven {what}, least {self.found.cost}: "
             f"{self.found.path.path.length:.4g} m, {self.found.plan.duration:.4g} s"
         )
 

@@ -35,7 +35,7 @@ CORNERS = ("smooth", "blend", "rest")
 straight lines with a rest in each corner."""
 
 RESERVE = 0.05
-"""Share of the limits that a plan leaves to the feedback that tracks it."""
+"""Share of the limits that a plan leaves to the feedback that tracks it, unless told otherwise."""
 
 TOLERANCE = 5e-3
 """How far rounded corners may pass from a pose, where nobody says [m]."""
@@ -54,7 +54,9 @@ class LimitSettings:
         cable_speed: Largest speed of a cable; None: at the motor's rated speed [m/s].
         cable_acceleration: Largest acceleration of a cable [m/s^2].
         speed: Largest speed of Po [m/s].
-        reserve: Share of all limits that the plan leaves to feedback, see `MotionLimits.within`.
+        reserve: Share of all limits that is left to feedback, see `MotionLimits.within`. None:
+            `RESERVE` in plans, such as those of `plan_path`; nothing in a task for constraints of
+            one's own, `path_task`.
         feeds: Whether feeds of a file of G-code are kept, as largest speeds of Po.
     """
 
@@ -62,7 +64,7 @@ class LimitSettings:
     cable_speed: float | None = None
     cable_acceleration: float | None = None
     speed: float | None = None
-    reserve: float = RESERVE
+    reserve: float | None = None
     feeds: bool = True
 
 
@@ -109,7 +111,7 @@ def path_task(
     cables: CableSet | None = None,
     resist: SpatialSet | None = None,
 ) -> PathTask:
-    """A robot for planning, with its limits less the reserve.
+    """A robot for planning, with its limits less the reserve if one is given.
 
     Args:
         robot: The robot.
@@ -125,7 +127,7 @@ def path_task(
     dynamics = moved_dynamics(robot)
     lifts = UPWARDS in dynamics.motions
     weight = robot.platform.mass * robot.gravity if lifts else 0.0
-    limits = robot_limits(robot, given).within(given.reserve, weight)
+    limits = robot_limits(robot, given).within(given.reserve or 0.0, weight)
     cables = robot.cable_set() if cables is None else cables
     names = [cable.name for cable in robot.cables]
     if resist is None:

@@ -49,7 +49,8 @@ class TimedRun(RunInSets):
     def about(self) -> str:
         """What it is, in words for titles."""
         return (
-            f"{self.robot.name}, proven motion among what moves, least {self.found.cost}: "
+            f"{self.robot.name}, {self.geometry}, proven motion among what moves, "
+            f"least {self.found.cost}: "
             f"{self.way:.4g} m, {self.found.plan.duration:.4g} s"
         )
 

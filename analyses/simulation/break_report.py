@@ -54,7 +54,9 @@ RESTS = (0.005, 0.05)
 """Speeds below which the platform is at rest [m/s, rad/s]."""
 
 
-def after_break(log: Log, robot: Robot, cable: int, time: float) -> dict[str, Any]:
+def after_break(
+    log: Log, robot: Robot, cable: int, time: float, pulleys: bool = True
+) -> dict[str, Any]:
     """What a run did after a break.
 
     Args:
@@ -62,6 +64,7 @@ def after_break(log: Log, robot: Robot, cable: int, time: float) -> dict[str, An
         robot: Its robot.
         cable: Which broke.
         time: When [s].
+        pulleys: Whether the cables of the run were over the robot's pulleys.
 
     Returns:
         speed_m_s, that of the platform when the cable broke; excursion_m and turn_rad, the largest
@@ -88,7 +91,7 @@ def after_break(log: Log, robot: Robot, cable: int, time: float) -> dict[str, An
         "tension_n": float(np.max(log["tensions"][since])),
         "slack_s": float(np.sum(slack[:-1] * np.diff(times)[:, np.newaxis])),
         "rest_s": rest_time(times - times[0], speed, turning),
-        "holds": holds_without(robot, X_WP[0], cable),
+        "holds": holds_without(robot, X_WP[0], cable, pulleys),
     }
 
 
@@ -118,9 +121,9 @@ def rest_time(times: Array, speed: Array, turning: Array) -> float:
     return float(times[min(last, len(times) - 1)])
 
 
-def holds_without(robot: Robot, row: Array, cable: int) -> bool:
+def holds_without(robot: Robot, row: Array, cable: int, pulleys: bool = True) -> bool:
     """Whether tensions from zero to the upper limit hold a pose without a cable."""
-    balance = wrench_balance(robot, pose_from_row(row))
+    balance = wrench_balance(robot, pose_from_row(row), cables=robot.cable_set(pulleys))
     lower, upper = np.zeros_like(balance.upper), balance.upper.copy()
     upper[cable] = 0.0
     problem = TensionProblem(balance.W, balance.wrench, lower, upper, None, balance.row_scale)

@@ -61,7 +61,7 @@ def goal_warnings(servo: VisualServo | LoopServo) -> list[str]:
     if not servo.free_rotation:
         X_WPd = servo.desired_platform_pose()
         try:
-            holding_tensions(servo.robot, X_WPd)
+            holding_tensions(servo.robot, X_WPd, scenario.cables.cable_set(servo.robot))
         except (InfeasibleTensionError, TensionProblemError) as problem:
             warnings.append(f"{scenario.name}: desired: outside the static workspace: {problem}")
     return warnings

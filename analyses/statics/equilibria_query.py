@@ -36,6 +36,7 @@ class EquilibriaReport(Summarized):
         names: Names of the cables.
         model: `inextensible` or `elastic`.
         pulleys: Whether the cables run over pulleys.
+        geometry: Geometry of the cables, as `Robot.geometry_words`, and why.
         lengths: Given lengths, shape (m,) [m]; None where a position was given.
         rests: The poses, the lowest energy first.
         needed: Lengths of the cables at each, shape (m,) [m]; of slack ones the straight path.
@@ -47,6 +48,7 @@ class EquilibriaReport(Summarized):
     names: list[str]
     model: str
     pulleys: bool
+    geometry: str
     lengths: Array | None
     rests: list[EquilibriumPose]
     needed: list[Array]
@@ -59,6 +61,7 @@ class EquilibriaReport(Summarized):
             "robot": self.robot,
             "cable_model": self.model,
             "pulleys": self.pulleys,
+            "geometry": self.geometry,
             "lengths_m": None if self.lengths is None else self.lengths.tolist(),
             "evidence": self.evidence,
             "equilibria": [
@@ -77,7 +80,9 @@ class EquilibriaReport(Summarized):
         ]
         if count > SHOWN:
             rows.append(("...", f"{count - SHOWN} more"))
-        return title, [("cables", self.model), ("evidence", self.words), *rows]
+        return title, [
+            ("cables", self.model), ("geometry", self.geometry), ("evidence", self.words), *rows,
+        ]  # fmt: skip
 
 
 def hanging_platform(robot: Robot, *, pulleys: bool) -> HangingPlatform:
@@ -86,9 +91,9 @@ def hanging_platform(robot: Robot, *, pulleys: bool) -> HangingPlatform:
     Raises:
         EquilibriumError: The platform is a beam, whose turn about itself does not count.
     """
-    cables, motion, home = robot.cable_set(), robot.motion_type(), robot.home.transform()
+    motion, home = robot.motion_type(), robot.home.transform()
     return HangingPlatform(
-        cables=cables if pulleys else cables.without_pulleys(),
+        cables=robot.cable_set(pulleys),
         weight_W=robot.platform.mass * robot.gravity_vector(),
         p_PCo=robot.center_of_mass(),
         num_turns=motion.num_turns,
@@ -210,10 +215,12 @@ def _report(
     evidence: dict[str, Any],
     words: str,
 ) -> EquilibriaReport:
+    over = platform.cables.has_pulleys()
+    geometry = robot.geometry_words(over)
     needed = [cable_paths(one.X_WP, platform.cables).lengths for one in rests]
     return EquilibriaReport(
         robot=robot.name, names=[cable.name for cable in robot.cables], model="inextensible",
-        pulleys=platform.cables.has_pulleys(), lengths=lengths, rests=rests, needed=needed,
+        pulleys=over, geometry=geometry, lengths=lengths, rests=rests, needed=needed,
         evidence=evidence, words=words,
     )  # fmt: skip
 

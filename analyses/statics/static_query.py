@@ -63,6 +63,7 @@ class StaticReport(Summarized):
         robot: Its name.
         model: Name of the cable model.
         cables: The cables, without pulleys if that was asked for.
+        geometry: Geometry of the cables, as `Robot.geometry_words`.
         names: Names of the cables.
         X_WP: Pose of the platform.
         l0: Unstrained lengths from A to B, shape (m,) [m].
@@ -91,6 +92,7 @@ class StaticReport(Summarized):
     robot: str
     model: str
     cables: CableSet
+    geometry: str
     names: list[str]
     X_WP: RigidTransform
     l0: Array
@@ -125,6 +127,7 @@ class StaticReport(Summarized):
             "robot": self.robot,
             "cable_model": self.model,
             "pulleys": self.cables.has_pulleys(),
+            "geometry": self.geometry,
             "pose": _pose(self.X_WP),
             "unstrained_lengths_m": self.l0.tolist(),
             "lengths_m": self.lengths.tolist(),
@@ -151,6 +154,7 @@ class StaticReport(Summarized):
         if self.frequencies is not None:
             slowest = f"{self.frequencies[0]:.4g} Hz"
         return f"{self.robot} at rest, {self.model} cables: {self.stability}", [
+            ("geometry", self.geometry),
             ("pose", f"({numbers(self.X_WP.translation())}) m, ({numbers(angles)}) deg"),
             ("tensions", f"{np.min(self.tensions):.4g} to {np.max(self.tensions):.4g} N"),
             ("slack", ", ".join(slack) or "none"),
@@ -167,7 +171,7 @@ def static_at_pose(robot: Robot, X_WP: RigidTransform, model: str, pulleys: bool
     Raises:
         CdprError: The pose is outside the frame, or cannot be held; says why.
     """
-    cables, behaviour = _cables(robot, pulleys), _behaviour(robot, model, pulleys)
+    cables, behaviour = robot.cable_set(pulleys), _behaviour(robot, model, pulleys)
     held = hold_robot(robot, X_WP, cables, model)
     l0 = held.unstrained_lengths
     if behaviour.changes_lengths():
@@ -198,7 +202,7 @@ def static_at_lengths(
     Raises:
         CdprError: No pose in the frame has these lengths without breaking a cable; by how much.
     """
-    cables, behaviour = _cables(robot, pulleys), _behaviour(robot, model, pulleys)
+    cables, behaviour = robot.cable_set(pulleys), _behaviour(robot, model, pulleys)
     if behaviour.changes_lengths():
         return _touching(robot, l0, model, pulleys, seed)
     return _at_lengths(robot, cables, l0, model, seed)
@@ -207,7 +211,7 @@ def static_at_lengths(
 def _touching(robot: Robot, counted: Array, model: str, pulleys: bool, seed: int) -> StaticReport:
     """As `static_at_lengths` of cables that stiffen or are warm: by elastic ones that touch their
     law at the tensions, which is Newton's method."""
-    cables, behaviour = _cables(robot, pulleys), robot.cable_behaviour()
+    cables, behaviour = robot.cable_set(pulleys), robot.cable_behaviour()
     tensions = np.zeros(cables.count)
     for _ in range(MOST_TOUCHES):
         linear, l0 = tangent_cables(cables, counted, tensions, behaviour)
@@ -298,10 +302,6 @@ def _drums(robot: Robot, cables: CableSet, X_WP: RigidTransform, tensions: Array
     return np.array([drum_tensions(tensions, wraps, friction, s * ones) for s in (1.0, -1.0)])
 
 
-def _cables(robot: Robot, pulleys: bool) -> CableSet:
-    return robot.cable_set() if pulleys else robot.cable_set().without_pulleys()
-
-
 def _inside(robot: Robot, X_WP: RigidTransform) -> bool:
     p, (lower, upper) = X_WP.translation(), robot.frame.bounds()
     return bool(np.all(p >= lower) and np.all(p <= upper))
@@ -386,6 +386,7 @@ def _report(
         robot=robot.name,
         model=model,
         cables=cables,
+        geometry=robot.geometry_words(cables.has_pulleys()),
         names=[cable.name for cable in robot.cables],
         X_WP=X_WP,
         l0=np.asarray(l0, float),

@@ -38,12 +38,14 @@ def underactuated_answer(robot: Robot, balance: WrenchBalance) -> dict[str, Any]
 
     `uncontrolled` has, for each twist that changes no length, its components, the combination of
     the wrench's components that no tensions change in words, and what of it nothing balances, in
-    N, or N m where it names moments.
+    N, or N m where it names moments. `infeasible_by` is about the rest of the wrench: how far
+    tensions must leave their bounds to balance what the cables do control.
     """
     from cdpr_drake.statics.controlled_wrenches import combination_words
 
     control, words = balance.control(), robot.motion_type().words()
-    free = control.free.T
+    free, short = control.free.T, control.shortfall()
+    cables = [cable.name for cable in robot.cables]
     return {
         "robot": robot.name,
         "method": "quadratic_program",
@@ -54,6 +56,9 @@ def underactuated_answer(robot: Robot, balance: WrenchBalance) -> dict[str, Any]
             TensionStatus.INFEASIBLE if control.tensions is None else TensionStatus.FEASIBLE
         ),
         "tensions_n": None if control.tensions is None else control.tensions.tolist(),
+        "rows": list(words),
+        "wrench_n_m_n": balance.wrench.tolist(),
+        "infeasible_by": None if short is None else short.as_dict(cables),
         "uncontrolled": [
             {
                 "combination": combination_words(twist, words),

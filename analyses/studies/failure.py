@@ -113,7 +113,10 @@ def measure(case: Case, _seed: int) -> dict[str, Any]:
     """
     scenario = load_scenario(SCENARIO, overrides(case.keys))
     run = run_scenario(scenario)
-    told = after_break(run.log, load_robot(scenario.robot), case.keys["cable"], case.keys["time_s"])
+    told = after_break(
+        run.log, load_robot(scenario.robot), case.keys["cable"], case.keys["time_s"],
+        scenario.cables.pulleys,
+    )  # fmt: skip
     return {"outcome": Outcome(run.outcome).name.lower(), **told}
 
 

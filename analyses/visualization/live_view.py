@@ -45,7 +45,9 @@ class LiveView:
     ) -> None:
         """Shows the robot at the pose X_WP [m] where the run begins; else as `RobotPicture`."""
         try:
-            full_scale = 2.0 * float(np.max(holding_tensions(robot, X_WP)))
+            full_scale = 2.0 * float(
+                np.max(holding_tensions(robot, X_WP, (cables or CableSettings()).cable_set(robot)))
+            )
         except CdprError:  # the run may begin where cables are slack
             full_scale = robot.tension_limits()[1]
         self._picture = RobotPicture(

@@ -246,8 +246,7 @@ def robot_picture(robot: Robot, meshcat: Meshcat | None = None) -> RobotPicture:
     X_WP, problem = robot.home.transform(), ""
     try:
         if robot.is_underactuated():
-            cables = robot.cable_set().without_pulleys()
-            X_WP, holding = rest_as_long(robot, X_WP, cables, ELASTIC)
+            X_WP, holding = rest_as_long(robot, X_WP, robot.cable_set(), ELASTIC)
             tensions = holding.tensions
         else:
             tensions = holding_tensions(robot, X_WP)
@@ -260,7 +259,8 @@ def robot_picture(robot: Robot, meshcat: Meshcat | None = None) -> RobotPicture:
         tensions, problem = np.full(len(robot.cables), np.nan), str(found)
     # Twice the largest tension, so that colours also tell the home pose from full load.
     full_scale = robot.tension_limits()[1] if problem else 2.0 * float(np.max(tensions))
-    picture = RobotPicture(robot, full_scale, meshcat=meshcat)
+    picture = RobotPicture(robot, full_scale, cables=CableSettings(pulleys=True), meshcat=meshcat)
+    picture.title = f"{robot.name}, {robot.geometry_words()}"
     picture.draw(X_WP, tensions)
     picture.problem = problem
     return picture

@@ -120,7 +120,8 @@ def _title(workspace: RobotWorkspace) -> str:
     words = "at rest" if speed == 0.0 else f"at {speed:.3g} m/s"
     share = float(np.mean(workspace.holds[SURVIVES]))
     several = f", first of {turns} orientations" if turns > 1 else ""
+    geometry = workspace.geometry
     return (
-        f"{workspace.arguments['robot']}: any one cable breaks {words}{several}\n"
+        f"{workspace.arguments['robot']}, {geometry}: any one cable breaks {words}{several}\n"
         f"survived at {share:.0%} of the poses"
     )

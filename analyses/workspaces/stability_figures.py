@@ -350,6 +350,7 @@ def _about(workspaces: StabilityWorkspaces, words: str, more: str = "") -> str:
     a, matrix = workspaces.arguments, workspaces.interaction_matrix
     scheme = SCHEME_WORDS.get(a["scheme"], a["scheme"])
     lines = [words, f"{a['robot']}, {scheme}, {a['verdict']} perturbations{more}"]
+    lines.append(workspaces.geometry)
     # A terminal has no formulas, of which these are the letters.
     written = re.sub(r"\[(\w)_t\]x", r"$[\1_t]_\\times$", matrix).replace("L_s", "$L_s$")
     return "\n".join([*lines, written] if matrix else lines)

@@ -35,6 +35,9 @@ from cdpr_drake.workspaces.static_feasibility import StaticCase
 BASE = "baseline"
 """Name of the servoing thesis' bounds, where the others are variations of them."""
 
+STRAIGHT = "criterion of stability: pulleys ignored, since it is one of straight cables"
+"""Part of the geometry of a result with Z, for a robot with pulleys."""
+
 GIVEN = "given"
 """Name of bounds that were given, in the place of `BASE`."""
 
@@ -84,6 +87,8 @@ class StabilityQuestion:
         bounds: Perturbation bounds by name, the first is what the others vary.
         verdict: How stability is judged.
         options: How hard to look.
+        geometry: Geometry of the cables in words: where the platform can be held, and where the
+            servo is judged.
     """
 
     robot: str
@@ -93,6 +98,7 @@ class StabilityQuestion:
     bounds: Mapping[str, PerturbationBounds]
     verdict: str
     options: VerdictOptions
+    geometry: str
 
     def task(self, name: str) -> StabilityTask:
         """The sweep task of the bounds of one name."""
@@ -104,6 +110,7 @@ class StabilityQuestion:
             {
                 "cdpr_drake": code_version(),
                 "robot": self.robot,
+                "geometry": self.geometry,
                 "scheme": self.case.scheme,
                 "verdict": self.verdict,
                 "options": {
@@ -200,14 +207,17 @@ def make_question(
                     f"{parameter}: found values that agree to six digits, {value!r} among them; "
                     "accepted: values further apart"
                 )
+    statics = statics or static_case(robot)
+    over = statics.cables.has_pulleys()
     return StabilityQuestion(
         robot.name,
         stability_case(robot, scheme, grid, task),
-        statics or static_case(robot),
+        statics,
         grid,
         named,
         verdict,
         options or VerdictOptions(),
+        robot.geometry_words(over) + (f"; {STRAIGHT}" if over else ""),
     )
 
 

@@ -67,6 +67,11 @@ class StabilityWorkspaces(Tabulated):
     feasible: np.ndarray
     versions: dict[str, str]
 
+    @property
+    def geometry(self) -> str:
+        """Geometry of the cables in words, as `Robot.geometry_words`."""
+        return str(self.arguments.get("geometry", "geometry not recorded"))
+
     def inside(self, kind: str, bounds: str | None = None) -> np.ndarray:
         """Which poses belong to a workspace, shape (k, nx, ny, nz).
 
@@ -116,6 +121,7 @@ class StabilityWorkspaces(Tabulated):
         rows = [
             ("grid", " x ".join(map(str, counts)) + (f", {k} orientations" if k > 1 else "")),
             ("evidence", about["verdict"]),
+            ("geometry", self.geometry),
         ]
         for name in self.names[:SHOWN]:
             found = {kind: self.volume(kind, bounds=name) for kind in KINDS}

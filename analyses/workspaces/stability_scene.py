@@ -56,7 +56,10 @@ def home_tensions(about: Mapping[str, Any], robot: Robot) -> tuple[Array, str]:
     mass = about["weight"] / robot.gravity if robot.gravity > 0.0 else None
     limits = (about["lower"][0], about["upper"][0])
     try:
-        problem = tension_problem(robot, X_WP, np.array(about["wrench"]), limits=limits, mass=mass)
+        problem = tension_problem(
+            robot, X_WP, np.array(about["wrench"]), limits=limits, mass=mass,
+            cables=robot.cable_set(pulleys="pulley_radius" in about["cables"]),
+        )  # fmt: skip
         tensions = exact_tensions(problem)
         if tensions is None:
             place = ", ".join(f"{x:g}" for x in X_WP.translation())
@@ -71,6 +74,7 @@ def home_tensions(about: Mapping[str, Any], robot: Robot) -> tuple[Array, str]:
 
 def _page(workspaces: StabilityWorkspaces, robot: Robot, tensions: Array) -> str:
     picture = held_picture(robot, tensions)
+    picture.title = f"{robot.name}: stability of the servo, {workspaces.geometry}"
     for name, kind, solid, color in stability_solids(workspaces):
         if not len(solid[1]):
             continue

@@ -31,7 +31,7 @@ def static_case(
     limits: tuple[float, float] | None = None,
     mass: float | None = None,
     wrench: Array | None = None,
-    pulleys: bool = False,
+    pulleys: bool = True,
 ) -> StaticCase:
     """A robot's platform on its cables.
 
@@ -41,8 +41,7 @@ def static_case(
         mass: Mass of the platform [kg]; None: the robot's.
         wrench: External wrench on the platform about Po in W, beside its weight, shape (6,)
             (moment, force) [N m, N].
-        pulleys: Whether they run over the robot's pulleys; else from fixed exit points, as the
-            criterion of stability has them.
+        pulleys: True: cables run over the robot's pulleys. False: pulleys are ignored.
 
     Raises:
         TensionProblemError: Too few cables, or a number makes no sense.
@@ -65,7 +64,7 @@ def static_case(
             "accepted for workspaces: motions along axes of W, and not 2R3T"
         )
     return StaticCase(
-        robot.cable_set() if pulleys else robot.cable_set().without_pulleys(),
+        robot.cable_set(pulleys),
         np.full(m, low),
         np.full(m, high),
         (robot.platform.mass if mass is None else mass) * robot.gravity,

@@ -86,7 +86,7 @@ def workspace_pictures(
         drawn["breaks"] = partial(breaks_figure, workspace)
     if boxes is not None:
         about = workspace.arguments
-        drawn["open_share"] = partial(boxes_figure, boxes, about["robot"], about["cables"])
+        drawn["open_share"] = partial(boxes_figure, boxes, about["robot"], workspace.geometry)
         drawn["boxes"] = partial(box_planes_figure, boxes, about["robot"], list(about["kinds"]))
     return dict(figure_writers(drawn, formats))
 
@@ -285,7 +285,7 @@ def _title(workspace: RobotWorkspace, measure: str | None) -> str:
     share = f"cells inside: {100.0 * volume.share:.1f} % of the grid's box"
     if measure is not None and not workspace.inside().any():
         share = "no pose inside: numbers of all poses"
-    words = wrap(f"{about['robot']}: {what}; cables {about['cables']}", LINE)
+    words = wrap(f"{about['robot']}: {what}; {workspace.geometry}", LINE)
     return "\n".join(words) + f"\n{share}{rule}"
 
 

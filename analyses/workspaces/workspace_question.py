@@ -19,7 +19,11 @@ from cdpr_drake.analyses.workspaces.conditions import (
     PoseConditions,
 )
 from cdpr_drake.analyses.workspaces.pose_grid import check_grid, grid_arguments, plain
-from cdpr_drake.analyses.workspaces.stability_question import make_question, scenario_task
+from cdpr_drake.analyses.workspaces.stability_question import (
+    STRAIGHT,
+    make_question,
+    scenario_task,
+)
 from cdpr_drake.analyses.workspaces.static_feasible import static_case
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import WorkspaceError
@@ -55,6 +59,7 @@ class WorkspaceQuestion:
         about: What the kinds need.
         scenario: Name of the scenario with the camera's target; empty: none.
         cables: Whether cables run over pulleys, in words.
+        geometry: The same as every result names it, as `Robot.geometry_words`.
     """
 
     robot: str
@@ -65,6 +70,7 @@ class WorkspaceQuestion:
     about: PoseConditions
     scenario: str
     cables: str
+    geometry: str
 
     def task(self) -> ConditionsTask:
         """The sweep task."""
@@ -77,6 +83,7 @@ class WorkspaceQuestion:
         found: dict[str, Any] = plain(
             {
                 "cables": self.cables,
+                "geometry": self.geometry,
                 "cdpr_drake": code_version(),
                 "robot": self.robot,
                 "kinds": self.kinds,
@@ -115,7 +122,7 @@ def interference_bodies(
     obstacles: Array | Obstacles | None = None,
     exit_free: float | None = None,
     anchor_free: float | None = None,
-    pulleys: bool = False,
+    pulleys: bool = True,
 ) -> Surroundings:
     """What a robot's cables and platform may meet: the platform's box, beams and obstacles.
 
@@ -126,7 +133,7 @@ def interference_bodies(
             thickness of the beams.
         anchor_free: Length next to anchor points that is not compared with the platform [m]; None:
             as `ANCHOR_DIAMETERS` says.
-        pulleys: Whether cables run over the robot's pulleys; else from fixed exit points.
+        pulleys: True: cables run over the robot's pulleys. False: pulleys are ignored.
 
     Raises:
         WorkspaceError: A length is negative.
@@ -136,12 +143,11 @@ def interference_bodies(
         inside = body[12:, np.newaxis] - np.abs(robot.cable_set().p_PB - body[9:12, np.newaxis])
         deepest = float(np.max(np.min(inside, axis=0)))
         anchor_free = max(deepest, 0.0) + ANCHOR_DIAMETERS * float(np.max(robot.diameters()))
-    cables = robot.cable_set()
     there = Obstacles() if obstacles is None else obstacles
     if not isinstance(there, Obstacles):
         there = Obstacles(there)
     return Surroundings(
-        cables if pulleys else cables.without_pulleys(),
+        robot.cable_set(pulleys),
         robot.diameters() / 2.0,
         body[np.newaxis],
         _fixtures(robot),
@@ -178,7 +184,7 @@ class WorkspaceRequest:
         clearance: Least clearance [m].
         around: What cables and platform may meet.
         scenario: Whose camera shall see its target.
-        pulleys: Whether cables run over the robot's pulleys; else from fixed exit points.
+        pulleys: True: cables run over the robot's pulleys. False: pulleys are ignored.
         method: Name of the method whose tensions must hold the weight, of `tensions.METHODS`, for
             the kind `static`; None: any tensions.
         reactions: For the kind `dynamic-single-failure`, names of `break_report.SAVING`; None:
@@ -197,7 +203,7 @@ class WorkspaceRequest:
     clearance: float = 0.0
     around: Surroundings | None = None
     scenario: str | None = None
-    pulleys: bool = False
+    pulleys: bool = True
     method: str | None = None
     reactions: Sequence[str] | None = None
     moving: Array | Sequence[float] | None = None
@@ -300,6 +306,7 @@ def make_workspace_question(
         about,
         asked.scenario or "",
         _cable_words(robot, about.case.cables.has_pulleys(), "stable" in kinds),
+        _geometry_words(robot, about, "stable" in kinds),
     )
 
 
@@ -349,6 +356,16 @@ def _cable_words(robot: Robot, pulleys: bool, stable: bool) -> str:
     if not pulleys:
         return "without pulleys: from fixed exit points"
     return "over pulleys" + (", but for the kind stable: from fixed exit points" * stable)
+
+
+def _geometry_words(robot: Robot, about: PoseConditions, stable: bool) -> str:
+    """`Robot.geometry_words`, and where parts of the result have another geometry."""
+    over = about.case.cables.has_pulleys()
+    words = robot.geometry_words(over)
+    if about.breaks is not None:
+        simulated = robot.geometry_words(about.breaks.asked.scenario.cables.pulleys)
+        words += "" if simulated == words else f"; simulated breaks: {simulated}"
+    return words + (f"; {STRAIGHT}" if stable and over else "")
 
 
 def pose_conditions(robot: Robot, asked: WorkspaceRequest = DEFAULT_REQUEST) -> PoseConditions:

@@ -64,6 +64,11 @@ class RobotWorkspace(Tabulated):
     values: dict[str, np.ndarray]
     versions: dict[str, str]
 
+    @property
+    def geometry(self) -> str:
+        """Geometry of the cables in words, as `Robot.geometry_words`."""
+        return str(self.arguments.get("geometry", "geometry not recorded"))
+
     def inside(self, kind: str = ALL) -> np.ndarray:
         """Which poses belong to a kind, or to all of them, shape (k, nx, ny, nz)."""
         if kind == ALL:
@@ -179,7 +184,7 @@ class RobotWorkspace(Tabulated):
             least, most = one["least"], one["largest"]
             words = "none" if least is None else f"{least:.4g} to {most:.4g} {one['unit']}"
             rows.append((name, words))
-        return f"Workspaces of {told['robot']}, cables {told['cables']}", rows
+        return f"Workspaces of {told['robot']}, {self.geometry}", rows
 
     def columns(self) -> dict[str, np.ndarray]:
         """A row a pose: where it is, which kinds hold, and the measures in their units."""

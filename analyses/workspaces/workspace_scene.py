@@ -63,7 +63,7 @@ def workspace_page(
     except CdprError as there:
         return {}, f"{PAGE} is left out, the robot cannot be drawn at home: {there}"
     about = workspace.arguments
-    picture.title = f"{about['robot']}: workspaces, cables {about['cables']}"
+    picture.title = f"{about['robot']}: workspaces, {workspace.geometry}"
     for number, (name, solid, color) in enumerate(workspace_solids(workspace)):
         if len(solid[1]):
             path = f"workspaces/{name}"

@@ -89,7 +89,7 @@ def print_rest(found: MechanismAtRest) -> None:
     """Prints a mechanism at rest."""
     console, rest, told = wide_console(120), found.rest, found.as_dict()
     console.print(f"{told['mechanism']} at rest: {rest.stability}")
-    table = Table(box=SIMPLE_HEAD, title=f"Cables, {told['model']}")
+    table = Table(box=SIMPLE_HEAD, title=f"Cables, {told['model']}, {told['geometry']}")
     for heading in ("cable", "length [m]", "unstrained [m]", "tension [N]"):
         table.add_column(heading, justify="right")
     for k, name in enumerate(found.names):
@@ -114,7 +114,8 @@ def print_tensions(found: MechanismTensions) -> None:
     """Prints tensions of a mechanism."""
     console, told = wide_console(160), found.as_dict()
     if found.control is None:
-        table = Table(box=SIMPLE_HEAD, pad_edge=False, collapse_padding=True, title="Tensions [N]")
+        title = f"Tensions [N], {told['geometry']}"
+        table = Table(box=SIMPLE_HEAD, pad_edge=False, collapse_padding=True, title=title)
         for heading in ("method", "status"):
             table.add_column(heading, no_wrap=True)
         for name in told["cables"]:
@@ -126,7 +127,8 @@ def print_tensions(found: MechanismTensions) -> None:
         return
     console.print(
         f"{told['mechanism']}: {len(told['cables'])} cables for {len(found.rows)} rows that no "
-        f"motor holds, of which they control {told['rank']} here: {found.status}"
+        f"motor holds, of which they control {told['rank']} here: {found.status}; "
+        f"{told['geometry']}"
     )
     if told["tensions_n"] is not None:
         pairs: Any = zip(told["cables"], told["tensions_n"], strict=True)

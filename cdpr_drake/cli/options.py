@@ -30,11 +30,16 @@ RobotName = Annotated[
 Wrench = Annotated[
     str | None,
     typer.Option(
-        help="Wrench on the platform beside its weight, about Po, in W: mx,my,mz,fx,fy,fz [N m, N]."
+        help="Wrench on the platform in addition to its weight, about Po, in W, moments first: "
+        "mx,my,mz,fx,fy,fz [N m, N]."
     ),
 ]
 Limits = Annotated[
     str | None, typer.Option(help="Tension limits lower,upper [N], instead of the robot's.")
+]
+Pulleys = Annotated[
+    bool,
+    typer.Option(help="Take the robot's pulleys into account; --no-pulleys ignores them."),
 ]
 Mass = Annotated[float | None, typer.Option(help="Mass of the platform [kg].")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]

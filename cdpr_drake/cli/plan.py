@@ -39,6 +39,7 @@ from cdpr_drake.cli.options import (
     FigureFormats,
     Limits,
     Overwrite,
+    Pulleys,
     ResultsAsJson,
     RobotName,
     parse_formats,
@@ -100,7 +101,6 @@ Feeds = Annotated[
 Stations = Annotated[
     int, typer.Option(help="Number of points of the path at which limits are checked.")
 ]
-Pulleys = Annotated[bool, typer.Option(help="Cables run over the robot's pulleys.")]
 Resist = Annotated[
     Path | None,
     typer.Option(
@@ -467,6 +467,7 @@ def _poses(robot: Robot, path: Path | None, waypoints: str | None) -> PathPoses:
 
 
 def _print(console: Console, told: dict[str, Any], folder: Path) -> None:
+    console.print(f"cables: {told['geometry']}")
     if "proven" in told:
         print_proven(console, told)
     elif "knots" in told:

@@ -36,6 +36,7 @@ from cdpr_drake.cli.options import (
     FigureFormats,
     Limits,
     Mass,
+    Pulleys,
     ResultsAsJson,
     Scheduler,
     Wrench,
@@ -147,6 +148,7 @@ def stability(
     limits: Limits = None,
     mass: Mass = None,
     wrench: Wrench = None,
+    pulleys: Pulleys = True,
     out: Out = None,
     workers: Workers = None,
     scheduler: Scheduler = None,
@@ -183,7 +185,7 @@ def stability(
             "scheme": scheme, "verdict": verdict, "bounds": bounds, "vary": parse_vary(vary or []),
             "grid": parse_grid(grid, parse_turns(orientation or []), *default_box(robot)),
             "scenario": scenario, "limits": parse_limits(limits), "mass": mass,
-            "wrench": parse_wrench(wrench),
+            "wrench": parse_wrench(wrench), "pulleys": pulleys,
             "options": VerdictOptions(draws=draws, seed=seed, searches=searches, pieces=pieces),
         }  # fmt: skip
         question = stability_question(robot, **asked)
@@ -261,6 +263,7 @@ def _print_table(found: StabilityWorkspaces, folder: Path) -> None:
     printer.print(table)
     for kind, words in KINDS.items():
         printer.print(f"{kind}: {words}", highlight=False)
+    printer.print(f"cables: {found.geometry}", markup=False)
     if found.interaction_matrix:
         printer.print(f"interaction matrix: {found.interaction_matrix}", markup=False)
     printer.print(f"results: {folder}", soft_wrap=True, highlight=False)

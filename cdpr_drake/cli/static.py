@@ -28,6 +28,7 @@ from cdpr_drake.cli.mechanism_options import (
 from cdpr_drake.cli.options import (
     POSE,
     AsJson,
+    Pulleys,
     RobotName,
     check_plots,
     parse_limits,
@@ -58,7 +59,7 @@ def static(
             autocompletion=words_among(CABLE_MODELS),
         ),
     ] = None,
-    pulleys: Annotated[bool, typer.Option(help="Cables run over the robot's pulleys.")] = True,
+    pulleys: Pulleys = True,
     joint: Joint = None,
     yields: Annotated[
         str | None,
@@ -170,8 +171,7 @@ def _print(report: StaticReport) -> None:
     console.print(
         f"{report.robot} at ({_words(p, 5)}) m, ({_words(angles, 4)}) deg: {report.stability}"
     )
-    pulleys = "over pulleys" if report.cables.has_pulleys() else "from fixed exit points"
-    table = Table(box=SIMPLE_HEAD, title=f"Cables, {report.model}, {pulleys}")
+    table = Table(box=SIMPLE_HEAD, title=f"Cables, {report.model}, {report.geometry}")
     for heading in ("cable", "length [m]", "unstrained [m]", "tension [N]", "sag [mm]"):
         table.add_column(heading, justify="right")
     table.add_column("surplus [mm]", justify="right")

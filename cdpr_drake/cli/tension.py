@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -33,10 +32,12 @@ from cdpr_drake.cli.options import (
     AsJson,
     Limits,
     Mass,
+    Pulleys,
     RobotName,
     Wrench,
     check_plots,
     parse_limits,
+    parse_numbers,
     parse_wrench,
     pose_or_home,
     save_plot,
@@ -45,7 +46,6 @@ from cdpr_drake.cli.terminal import message_console, print_json, wide_console, w
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models.robot_loader import load_robot, names_mechanism
 from cdpr_drake.tensions.methods import METHODS
-from cdpr_drake.tensions.problem import TensionSolution
 
 
 def tension(
@@ -59,6 +59,15 @@ def tension(
         ),
     ] = "quadratic_program",
     wrench: Wrench = None,
+    force: Annotated[
+        str | None,
+        typer.Option(help="Instead of --wrench: force on the platform in Po, in W: fx,fy,fz [N]."),
+    ] = None,
+    moment: Annotated[
+        str | None,
+        typer.Option(help="Instead of --wrench: moment on the platform in W: mx,my,mz [N m]."),
+    ] = None,
+    pulleys: Pulleys = True,
     limits: Limits = None,
     mass: Mass = None,
     reference: Annotated[
@@ -92,7 +101,7 @@ def tension(
     check_plots(plot, wrench_set_plot)
     if names_mechanism(robot):
         refuse_for_mechanisms({
-            "pose": pose, "wrench": wrench, "mass": mass,
+            "pose": pose, "wrench": wrench, "mass": mass, "force": force, "moment": moment,
             "wrench-set-plot": wrench_set_plot,
         })  # fmt: skip
         from cdpr_drake.analyses.front.mechanisms import solve_mechanism_tensions
@@ -102,7 +111,8 @@ def tension(
         with working(message_console(), f"Distributing tensions of {mechanism.name}"):
             tensions = solve_mechanism_tensions(
                 mechanism, method, joints=parse_joints(joint), held=parse_names(held),
-                limits=parse_limits(limits), reference=reference, length_scale=length_scale,
+                pulleys=pulleys, limits=parse_limits(limits), reference=reference,
+                length_scale=length_scale,
             )  # fmt: skip
         if plot is not None:
             save_plot(tensions.plot(), plot)
@@ -114,6 +124,17 @@ def tension(
     refuse_for_robots({"joint": joint, "held": held})
     loaded = load_robot(robot)
     X_WP, external, bounds = pose_or_home(pose, loaded), parse_wrench(wrench), parse_limits(limits)
+    if external is not None and (force is not None or moment is not None):
+        other = "--moment" if force is None else "--force"
+        raise CdprError(f"--wrench: found {other} too; accepted: --wrench, or --force and --moment")
+    asked: dict[str, Any] = {
+        "force": None if force is None else parse_numbers("--force", force, (3,), "fx,fy,fz [N]"),
+        "moment": None
+        if moment is None
+        else parse_numbers("--moment", moment, (3,), "mx,my,mz [N m]"),
+        "pulleys": pulleys, "limits": bounds, "mass": mass, "reference": reference,
+        "length_scale": length_scale,
+    }  # fmt: skip
     cables = [cable.name for cable in loaded.cables]
     place = "home" if pose is None else f"({pose})"
     every = method == "all"
@@ -128,32 +149,29 @@ def tension(
     found: TensionsAtPose | UnderactuatedTensions
     with working(message_console(), f"Distributing tensions of {loaded.name}"):
         if every:
-            found = compare_tensions(
-                loaded, X_WP, external, limits=bounds, mass=mass, reference=reference,
-                length_scale=length_scale,
-            )  # fmt: skip
+            found = compare_tensions(loaded, X_WP, external, **asked)
         else:
-            found = solve_tensions(
-                loaded, X_WP, external, method, limits=bounds, mass=mass, reference=reference,
-                length_scale=length_scale,
-            )  # fmt: skip
+            found = solve_tensions(loaded, X_WP, external, method, **asked)
     if plot is not None and isinstance(found, TensionsAtPose):
-        save_plot(found.plot_polygon(f"{loaded.name} at {place}"), plot)
+        save_plot(found.plot_polygon(f"{loaded.name} at {place}, {found.geometry}"), plot)
     if wrench_set_plot is not None and isinstance(found, TensionsAtPose):
-        save_plot(found.plot_wrenches(f"{loaded.name} at {place}"), wrench_set_plot)
+        save_plot(
+            found.plot_wrenches(f"{loaded.name} at {place}, {found.geometry}"), wrench_set_plot
+        )
     if as_json:
         print_json(found.as_dict())
     elif isinstance(found, TensionsAtPose):
-        _print_table(cables, found.solutions)
+        _print_table(cables, found)
     else:
-        _print_underactuated(cables, found.as_dict())
+        _print_underactuated(cables, found)
 
 
-def _print_underactuated(cables: list[str], answer: dict[str, Any]) -> None:
-    console = wide_console(120)
+def _print_underactuated(cables: list[str], found: UnderactuatedTensions) -> None:
+    console, answer = wide_console(120), found.as_dict()
     console.print(
         f"{answer['robot']}: {len(cables)} cables for {answer['degrees_of_freedom']} degrees of "
-        f"freedom, which control {answer['rank']} of them here: {answer['status']}"
+        f"freedom, which control {answer['rank']} of them here: {answer['status']}; "
+        f"{found.geometry}"
     )
     if answer["tensions_n"] is not None:
         pairs = zip(cables, answer["tensions_n"], strict=True)
@@ -161,15 +179,26 @@ def _print_underactuated(cables: list[str], answer: dict[str, Any]) -> None:
     console.print("no tensions change, and at rest all of these are zero:")
     for one in answer["uncontrolled"]:
         console.print(f"  {one['combination']}: {one['unbalanced']:.4g}")
+    for label, words in found.shortfall_rows():
+        console.print(f"{label}: {words}")
 
 
-def _print_table(cables: list[str], solutions: Sequence[TensionSolution]) -> None:
-    table = Table(box=SIMPLE_HEAD, pad_edge=False, collapse_padding=True, title="Tensions [N]")
+def _print_table(cables: list[str], found: TensionsAtPose) -> None:
+    title = f"Tensions [N], {found.geometry}"
+    table = Table(box=SIMPLE_HEAD, pad_edge=False, collapse_padding=True, title=title)
     table.add_column("method", no_wrap=True)
     table.add_column("status", no_wrap=True)
     for cable in cables:
         table.add_column(cable, justify="right", no_wrap=True)
-    for solution in solutions:
+    for solution in found.solutions:
         numbers = [f"{t:.2f}" if np.isfinite(t) else "-" for t in solution.tensions]
         table.add_row(solution.method, str(solution.status), *numbers)
-    wide_console(160).print(table)
+    console = wide_console(160)
+    console.print(table)
+    rows, wrench = found.robot.motion_type().words(), found.problem.wrench
+    load = ", ".join(
+        f"{name} {value:.4g}" for name, value in zip(rows, wrench, strict=True) if value != 0.0
+    )
+    console.print(f"wrench to balance, about Po in W [N m, N]: {load or 'none'}")
+    for label, words in found.shortfall_rows():
+        console.print(f"{label}: {words}")

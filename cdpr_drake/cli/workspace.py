@@ -44,6 +44,7 @@ from cdpr_drake.cli.options import (
     FigureFormats,
     Limits,
     Mass,
+    Pulleys,
     ResultsAsJson,
     RobotName,
     Scheduler,
@@ -125,7 +126,7 @@ def print_workspace(found: RobotWorkspace, told: dict[str, Any], folder: Path) -
     """Prints tables of kinds and measures, and lines on hull and boxes."""
     unit = found.volume().unit
     by = "" if told["method"] is None else f", tensions by {told['method']}"
-    title = f"{told['robot']}: workspaces, cables {told['cables']}{by}"
+    title = f"{told['robot']}: workspaces, {told['geometry']}{by}"
     table = Table(title=title, box=SIMPLE_HEAD, pad_edge=False)
     table.add_column("kind", no_wrap=True)
     for heading in ("poses [%]", "cells inside [%]", f"volume [{unit}]"):
@@ -192,14 +193,14 @@ def print_workspace(found: RobotWorkspace, told: dict[str, Any], folder: Path) -
 
 
 def say_what_was_asked(console: Console, told: dict[str, Any], assumed: bool) -> None:
-    """Says in the log how cables run, and where boxes of an assumed frame are no result.
+    """Prints the geometry of the cables, and where boxes of an assumed frame are no result.
 
     Args:
         console: Of messages.
         told: The results for JSON.
         assumed: Whether an assumed frame is where the default grid and boxes lie.
     """
-    lines = [f"{told['robot']}: cables {told['cables']}"]
+    lines = [f"{told['robot']}: {told['geometry']}"]
     if assumed:
         lines.append(
             "note: the robot's frame was assumed when it was imported; the default grid and the "
@@ -329,12 +330,7 @@ def workspace(
     unbounded: Annotated[
         bool, typer.Option("--unbounded", help="Let nothing bound the hull.")
     ] = False,
-    pulleys: Annotated[
-        bool,
-        typer.Option(
-            help="Cables run over the robot's pulleys; with --no-pulleys from fixed points."
-        ),
-    ] = True,
+    pulleys: Pulleys = True,
     method: Annotated[
         str | None,
         typer.Option(

@@ -215,6 +215,29 @@ class CableSet:
         """Whether any cable runs over a pulley at the platform."""
         return bool(np.any(self.anchor_pulley_radius > 0.0))
 
+    def geometry_words(self, pulleys: bool = True) -> str:
+        """Geometry of these cables in words, as every result names it.
+
+        Args:
+            pulleys: False if the result was computed with `without_pulleys`.
+
+        Returns:
+            Such as "with pulleys of 20 mm"; "pulleys ignored"; or "no pulleys in the robot".
+        """
+        words = []
+        for radii, where in (
+            (self.pulley_radius, ""), (self.anchor_pulley_radius, " at the platform")
+        ):  # fmt: skip
+            over = radii[radii > 0.0]
+            if len(over):
+                least, largest = (f"{1e3 * radius:.4g}" for radius in (np.min(over), np.max(over)))
+                size = least if least == largest else f"{least} to {largest}"
+                some = "" if len(over) == self.count else f" on {len(over)} of {self.count} cables"
+                words.append(f"pulleys of {size} mm{where}{some}")
+        if not words:
+            return "no pulleys in the robot"
+        return f"with {' and '.join(words)}" if pulleys else "pulleys ignored"
+
     def packed(self) -> Array:
         """One contiguous array for the kernels, shape (m, 17 + k).
 

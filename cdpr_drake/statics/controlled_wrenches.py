@@ -10,13 +10,14 @@ IEEE T-RO 29(1), 2013.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.tensions.methods import exact_tensions
 from cdpr_drake.tensions.problem import TensionProblem
+from cdpr_drake.tensions.shortfall import Shortfall, shortfall
 
 RANK_TOLERANCE = 1e-10
 """Singular values of W below this share of the largest are none."""
@@ -41,6 +42,8 @@ class WrenchControl:
         balances: Whether they are zero, up to rounding.
         tensions: Tensions that balance w within the bounds, of least 2-norm, shape (m,) [N]; None
             where there are none.
+        problem: The part of W t + w = 0 that the cables control, in `rank` combinations of rows.
+        combinations: These combinations as columns, shape (n, rank) [N m, N].
     """
 
     rank: int
@@ -48,6 +51,15 @@ class WrenchControl:
     unbalanced: Array
     balances: bool
     tensions: Array | None
+    problem: TensionProblem
+    combinations: Array
+
+    def shortfall(self) -> Shortfall | None:
+        """How far tensions miss what the cables control; None where some balance that part."""
+        if exact_tensions(self.problem) is not None:
+            return None
+        found = shortfall(self.problem)
+        return replace(found, missing=self.combinations @ found.missing)
 
 
 def wrench_control(
@@ -78,7 +90,8 @@ def wrench_control(
         part = column[:turns] if np.any(column[:turns]) else column
         column /= part[np.argmax(np.abs(part))]
     unbalanced = np.asarray(free.T @ wrench, float)
-    return WrenchControl(rank, free, unbalanced, balances, tensions)
+    combinations = kept * row_scale[:, np.newaxis]
+    return WrenchControl(rank, free, unbalanced, balances, tensions, problem, combinations)
 
 
 def _legible(N: Array) -> Array:

@@ -36,6 +36,7 @@ from numba import njit
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.tensions.closed_form_kernel import NOT_FOUND
+from cdpr_drake.tensions.null_space_kernel import balance as nearest_balanced
 from cdpr_drake.tensions.null_space_kernel import factor
 from cdpr_drake.tensions.problem import RESIDUAL_TOLERANCE, balance
 from cdpr_drake.tensions.quadratic_program_kernel import FEASIBLE, SINGULAR, nearest_tensions_in
@@ -98,10 +99,18 @@ def log_barrier(
         if not lower[i] <= t[i] <= upper[i]:
             return SINGULAR  # NaN
     _, residual = balance(W, w, lower, upper, t)
-    if converged and residual <= RESIDUAL_TOLERANCE:
-        return FEASIBLE
-    code = nearest_tensions_in(work, W, w, lower, upper, lower, work[-1][:m])
-    return NOT_FOUND if code == FEASIBLE else code
+    balanced = converged and residual <= RESIDUAL_TOLERANCE
+    other = work[-1][:m]
+    if balanced and factor(W, work[:n]):
+        # The error that is left does not count if the nearest balanced tensions are within bounds.
+        nearest_balanced(work[:n], w, t, W, other)
+        inside = True
+        for i in range(m):
+            inside = inside and lower[i] <= other[i] <= upper[i]
+        if inside:
+            return FEASIBLE
+    code = nearest_tensions_in(work, W, w, lower, upper, lower, other)
+    return NOT_FOUND if code == FEASIBLE and not balanced else code
 
 
 @njit(cache=True)

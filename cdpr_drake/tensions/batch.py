@@ -52,8 +52,8 @@ def distribute_batch(
 
     Returns:
         Tensions, shape (k, m) [N], NaN where there are none, and codes, shape (k,): 1 feasible,
-        0 missed by this method, -1 infeasible, -2 singular W. What a method that
-        relaxes answers to an infeasible problem is there, within the bounds and off balance.
+        0 missed by this method, -1 infeasible, -2 singular W. What a method that `answers`
+        gives for an infeasible problem is there, within the bounds and off balance.
 
     Raises:
         TensionProblemError: Unknown method, sizes that do not fit, numbers that make no sense, a
@@ -98,5 +98,5 @@ def distribute_batch(
     t, codes = np.empty((count, m)), np.empty(count, np.int8)
     solver = chosen.compiled(m - n)
     over_rows(_many, count, threads, solver, W, wrenches, *given.values(), t, codes)
-    t[codes == SINGULAR if chosen.relaxes else codes < 0] = np.nan
+    t[codes == SINGULAR if chosen.answers else codes < 0] = np.nan
     return t, codes

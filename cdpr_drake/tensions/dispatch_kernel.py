@@ -54,7 +54,7 @@ def check(
 
     Args:
         code: What a method came to, as `TensionMethod.kernel` returns it.
-        relaxes: Whether tensions count where the method found the problem infeasible.
+        relaxes: Whether the residual of tensions is asked where the problem is infeasible.
         W: Wrench matrix, shape (n, m); with the following three as `TensionMethod.kernel`.
         w: Wrench, shape (n,) [N m, N].
         lower: Smallest tensions, shape (m,) [N].
@@ -62,15 +62,16 @@ def check(
         t: Tensions, shape (m,) [N]; by rounding out of bounds they are put on them.
 
     Returns:
-        1 where they are within the bounds and balance the wrench; else the code, and 0 for 1. And
-        their `TensionProblem.residual`, NaN where they do not count.
+        1 where they are within the bounds and balance the wrench, unless the problem is proven to
+        be infeasible: off by less than shows is off; else the code, and 0 for 1. And their
+        `TensionProblem.residual`, NaN where they do not count.
     """
     if code == SINGULAR or (code == INFEASIBLE and not relaxes):
         return code, np.nan
     inside, residual = balance(W, w, lower, upper, t)
-    if inside and residual <= RESIDUAL_TOLERANCE:
-        return FEASIBLE, residual
-    return (code if code == INFEASIBLE else NOT_FOUND), residual
+    if code == INFEASIBLE:
+        return INFEASIBLE, residual
+    return (FEASIBLE if inside and residual <= RESIDUAL_TOLERANCE else NOT_FOUND), residual
 
 
 @njit(cache=True, inline="always")

@@ -35,6 +35,7 @@ from cdpr_drake.tensions.problem import (
     TensionSolution,
     TensionStatus,
     refuse,
+    writable,
 )
 from cdpr_drake.tensions.quadratic_program_kernel import (
     FEASIBLE,
@@ -70,7 +71,10 @@ class TensionMethod:
         exact: Whether it finds tensions wherever there are some. Where its kernel misses, the
             exact program answers.
         needs_reference: Whether the problem must have a reference.
-        relaxes: Whether its tensions count where there is no solution, or it misses them.
+        relaxes: Whether its tensions count in loops of control where there is no solution, or it
+            misses them.
+        answers: Whether `distribute` gives its tensions where there is no solution, too.
+        central: Whether it aims between the bounds, so that it needs upper ones.
         starts: Whether its kernel starts at the reference, where that is within the bounds; with
             what it gave a step before it is faster, and gives the same.
         program: What it adds to a program of Drake, see `make_program`; None: there is none.
@@ -83,7 +87,9 @@ class TensionMethod:
     exact: bool = False
     needs_reference: bool = False
     relaxes: bool = False
+    answers: bool = False
     starts: bool = False
+    central: bool = False
     program: Addition | None = None
     asked: ProgramKernel | None = None
 
@@ -147,11 +153,11 @@ class TensionMethod:
 
 METHODS: dict[str, TensionMethod] = {
     "pseudo_inverse": TensionMethod("least 2-norm, bounds unknown", pseudo_inverse),
-    "closed_form": TensionMethod("nearest to the middle of the bounds", closed_form),
+    "closed_form": TensionMethod("nearest to the middle of the bounds", closed_form, central=True),
     "improved_closed_form": TensionMethod(
-        "closed form, cables out of bounds put on them", improved_closed_form
+        "closed form, cables out of bounds put on them", improved_closed_form, central=True
     ),
-    "kernel": TensionMethod("middle of the null line", kernel_line, (1,), exact=True),
+    "kernel": TensionMethod("middle of the null line", kernel_line, (1,), exact=True, central=True),
     "linear_program": TensionMethod(
         "least 1-norm", linear_program, exact=True, program=objectives.one_norm
     ),
@@ -165,31 +171,34 @@ METHODS: dict[str, TensionMethod] = {
         "nearest to the reference", None, exact=True, needs_reference=True,
         program=objectives.nearest_reference,
     ),
-    "barycenter": TensionMethod("centre of the feasible polygon", barycenter, (2,), exact=True),
+    "barycenter": TensionMethod(
+        "centre of the feasible polygon", barycenter, (2,), exact=True, central=True
+    ),
     "polygon_1_norm": TensionMethod("corner of least sum", polygon_1_norm, (2,), exact=True),
     "polygon_2_norm": TensionMethod(
         "point of the polygon of least 2-norm", None, (2,), exact=True
     ),
-    "puncture": TensionMethod("from the closed form to low tensions", puncture),
-    "dykstra": TensionMethod("alternating projections", dykstra),
+    "puncture": TensionMethod("from the closed form to low tensions", puncture, central=True),
+    "dykstra": TensionMethod("alternating projections", dykstra, central=True),
     "weighted_vertices": TensionMethod(
-        "vertices weighted by exterior angles", weighted_vertices, (0, 1, 2), exact=True
+        "vertices weighted by exterior angles", weighted_vertices, (0, 1, 2), exact=True,
+        central=True,
     ),
     "optimally_safe": TensionMethod(
-        "largest margin to the bounds", optimally_safe, exact=True,
+        "largest margin to the bounds", optimally_safe, exact=True, central=True,
         program=objectives.largest_margin,
     ),
     "slack_relaxed": TensionMethod(
         "least unbalanced wrench, always answers", slack_relaxed, exact=True, relaxes=True,
-        program=objectives.least_slack,
+        answers=True, program=objectives.least_slack,
     ),
     "median": TensionMethod(
-        "nearest to the middle of the bounds within them", median, exact=True,
+        "nearest to the middle of the bounds within them", median, exact=True, central=True,
         program=objectives.nearest_middle,
     ),
     "log_barrier": TensionMethod(
         "least 4-norm with barriers at the bounds, continuous rates", log_barrier, relaxes=True,
-        starts=True,
+        starts=True, central=True,
     ),
 }  # fmt: skip
 """All methods by name, in the order of tables. A new one is a kernel and a row."""
@@ -228,7 +237,7 @@ def distribute(problem: TensionProblem, method: str = "quadratic_program") -> Te
         TensionProblemError: There is no such method, or it needs another redundancy or a
             reference; or W is singular to rounding.
     """
-    return Distributor(problem, method)._solution(problem.W, problem.wrench)
+    return Distributor(problem, method)._solution(writable(problem.W), writable(problem.wrench))
 
 
 class Distributor:
@@ -247,10 +256,17 @@ class Distributor:
         """
         n, m = problem.W.shape
         chosen = method_for(method, m - n, problem.reference is not None)
+        if chosen.central and np.any(np.isposinf(problem.upper)):
+            raise TensionProblemError(
+                f"{method}: found an infinite upper tension, and it aims between the bounds; "
+                "accepted: finite ones [N], or quadratic_program"
+            )
         chosen.prepare(problem)
         wanted = problem.reference if chosen.needs_reference else None
         self._problem, self._method, self._chosen = problem, method, chosen
-        self._wanted = problem.nothing_wanted if wanted is None else wanted
+        self._wanted = writable(problem.nothing_wanted if wanted is None else wanted)
+        self._bounds = writable(problem.lower), problem.finite_upper()
+        self._scale = writable(problem.scale_of_rows)
         self._compiled = chosen.compiled(m - n)
         self._shape, self._size, self._count = (n, m), (n,), m
         self._work_shape = _workspace_shape(n, m)
@@ -289,8 +305,8 @@ class Distributor:
         problem, t, slack = self._problem, np.empty(self._count), np.empty(self._size)
         active = np.empty(self._count, np.int64)
         code, residual = solution_of(
-            self._compiled, np.empty(self._work_shape), W, wrench, problem.lower, problem.upper,
-            self._wanted if start is None else start, problem.scale_of_rows, t, active, slack,
+            self._compiled, np.empty(self._work_shape), W, wrench, *self._bounds,
+            self._wanted if start is None else start, self._scale, t, active, slack,
         )  # fmt: skip
         if code == FEASIBLE:
             return TensionSolution(self._method, TensionStatus.FEASIBLE, t, residual, active, slack)
@@ -303,7 +319,7 @@ class Distributor:
                 "W, wrench: found a wrench matrix that is singular to rounding, or numbers that "
                 "overflow; accepted: full rank"
             )
-        if code == INFEASIBLE and not self._chosen.relaxes:
+        if code == INFEASIBLE and not self._chosen.answers:
             return refuse(problem, self._method)
         status = TensionStatus.NOT_FOUND if code == NOT_FOUND else TensionStatus.INFEASIBLE
         return TensionSolution(self._method, status, t, residual, active, slack)
@@ -314,9 +330,8 @@ def exact_tensions(problem: TensionProblem, reference: Array | None = None) -> A
     n, m = problem.W.shape
     t, work = np.empty(m), np.empty(_workspace_shape(n, m))
     wanted = np.zeros(m) if reference is None else reference
-    code = nearest_tensions_in(
-        work, problem.W, problem.wrench, problem.lower, problem.upper, wanted, t
-    )
+    arrays = [writable(array) for array in (problem.W, problem.wrench, problem.lower)]
+    code = nearest_tensions_in(work, *arrays, problem.finite_upper(), wanted, t)
     return t if code == FEASIBLE else None
 
 
@@ -324,7 +339,7 @@ def solution_space(problem: TensionProblem) -> tuple[Array, Array]:
     """Least-norm solution t, shape (m,) [N], and orthonormal null space N, shape (m, r), of W."""
     n, m = problem.W.shape
     t, N = np.empty(m), np.empty((m - n, m))
-    null_space(problem.W, problem.wrench, t, N)
+    null_space(writable(problem.W), writable(problem.wrench), t, N)
     return t, np.ascontiguousarray(N.T)
 
 
@@ -342,4 +357,4 @@ def feasible_polygon(problem: TensionProblem) -> Array:
         )
     t, N = solution_space(problem)
     rows = np.ascontiguousarray(N.T)
-    return np.asarray(polygon_vertices(t, rows, problem.lower, problem.upper))
+    return np.asarray(polygon_vertices(t, rows, writable(problem.lower), problem.finite_upper()))

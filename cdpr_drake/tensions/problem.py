@@ -28,8 +28,23 @@ LEAST_FORCE_SHARE = 1e-6
 """Forces below this, relative to what the cables can do, are not what a residual is relative to:
 where all tensions are zero, rounding is all there is."""
 
+ENDLESS = 1e4
+"""Tensions without an upper limit are looked for up to so many times a scale of the problem."""
+
 NUMBERS = ("W", "wrench", "lower", "upper", "reference", "row_scale")
 """The arrays of a problem."""
+
+
+def read_only(array: Array) -> Array:
+    """A view of an array that cannot be written to."""
+    view = array.view()
+    view.flags.writeable = False
+    return view
+
+
+def writable(array: Array) -> Array:
+    """The array behind a `read_only` one, as compiled kernels take it; or the array itself."""
+    return array if array.flags.writeable else np.asarray(array.base)
 
 
 class TensionStatus(StrEnum):
@@ -48,11 +63,14 @@ class TensionStatus(StrEnum):
 class TensionProblem:
     """Which tensions t balance the wrench w, W t + w = 0, with lower <= t <= upper?
 
+    The arrays are read-only copies of those that are given.
+
     Attributes:
         W: Wrench matrix, shape (n, m), n <= m, full rank; rows (moment [m], force [-]).
         wrench: External wrench w on the platform about Po, shape (n,) [N m, N].
         lower: Smallest tensions, shape (m,), not negative [N].
-        upper: Largest tensions, shape (m,) [N].
+        upper: Largest tensions, shape (m,) [N]; infinite where there is no limit, which methods
+            that aim at the middle of the bounds do not take.
         reference: Wanted tensions, shape (m,) [N]; None where a method needs none.
         row_scale: What an unbalanced wrench is divided by, row by row, to say how large it is,
             above 0, shape (n,): a length [m] for moments, 1 for forces; None: ones. Only methods
@@ -61,8 +79,9 @@ class TensionProblem:
         scale_of_rows: `row_scale`, or ones, shape (n,).
 
     Raises:
-        TensionProblemError: Sizes that do not fit, numbers that are not finite, negative or crossed
-            bounds, fewer cables than degrees of freedom, or a singular W.
+        TensionProblemError: Sizes that do not fit, numbers that are complex or not finite (`upper`
+            may be infinite), negative or crossed bounds, fewer cables than degrees of freedom, or a
+            singular W.
     """
 
     W: Array
@@ -75,20 +94,20 @@ class TensionProblem:
     scale_of_rows: Array = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        """Converts to contiguous arrays and checks them."""
+        """Copies all arrays, which are read-only from then on, and checks them."""
         for name in NUMBERS:
             value = getattr(self, name)
             if value is None:
                 continue
             try:
-                converted = np.ascontiguousarray(value, dtype=float)
+                if np.iscomplexobj(value) and np.any(np.imag(value)):
+                    raise TensionProblemError(f"{name}: found complex numbers; accepted: real ones")
+                converted = np.array(np.real(value), dtype=float, order="C", ndmin=1)
             except (TypeError, ValueError) as problem:
                 raise TensionProblemError(
                     f"{name}: found no array of numbers; accepted: one"
                 ) from problem
-            if not converted.flags.writeable:  # kernels at an address take nothing read-only
-                converted = converted.copy()
-            object.__setattr__(self, name, converted)
+            object.__setattr__(self, name, read_only(converted))
         if self.W.ndim != 2:
             raise TensionProblemError(f"W: found shape {self.W.shape}; accepted: (n, m)")
         n, m = self.W.shape
@@ -98,6 +117,8 @@ class TensionProblem:
                 raise TensionProblemError(f"{name}: found shape {value.shape}; accepted: ({size},)")
         for name in NUMBERS:
             value = getattr(self, name)
+            if value is not None and name == "upper":  # infinite: no limit
+                value = np.where(np.isposinf(value), 0.0, value)
             if value is not None and not np.all(np.isfinite(value)):
                 raise TensionProblemError(
                     f"{name}: found {_words(value)}; accepted: finite numbers"
@@ -121,8 +142,8 @@ class TensionProblem:
         rank = int(np.sum(singular > RANK_TOLERANCE * max(singular[0], 1e-300))) if n else 0
         if rank < n:
             raise TensionProblemError(f"W: found rank {rank}; accepted: {n}, full rank")
-        object.__setattr__(self, "nothing_wanted", np.zeros(m))
-        scale = np.ones(n) if self.row_scale is None else self.row_scale
+        object.__setattr__(self, "nothing_wanted", read_only(np.zeros(m)))
+        scale = read_only(np.ones(n)) if self.row_scale is None else self.row_scale
         object.__setattr__(self, "scale_of_rows", scale)
 
     @property
@@ -130,12 +151,28 @@ class TensionProblem:
         """r = m - n, cables more than degrees of freedom."""
         return int(self.W.shape[1] - self.W.shape[0])
 
+    def finite_upper(self) -> Array:
+        """`upper`, with a number far above what balances the wrench where there is no limit.
+
+        That is `lower` plus `ENDLESS` times the load, |w| plus what the other bounds pull, over the
+        smallest singular value of W with its rows divided by `scale_of_rows`, shape (m,) [N].
+        """
+        endless = np.isposinf(self.upper)
+        if not np.any(endless):
+            return writable(self.upper)
+        held = np.where(endless, self.lower, self.upper)
+        scale = self.scale_of_rows
+        W, w = self.W / scale[:, np.newaxis], self.wrench / scale
+        singular = np.linalg.svd(W, compute_uv=False)[-1]
+        load = float(np.linalg.norm(w) + np.linalg.norm(W) * np.linalg.norm(held))
+        return np.where(endless, held + ENDLESS * max(load / singular, 1.0), self.upper)
+
     def residual(self, tensions: Array) -> float:
         """|W t + w| relative to |w| plus the forces of the cables, shape (m,) [N] in, [-] out."""
         # With w = 0 (a planar robot, a hovering point) the cables' own forces are the measure.
         share = np.abs(self.W)
         own = float(np.linalg.norm(share @ np.abs(tensions)))
-        able = float(np.linalg.norm(share @ self.upper))
+        able = float(np.linalg.norm(share @ self.finite_upper()))
         scale = max(float(np.linalg.norm(self.wrench)) + own, LEAST_FORCE_SHARE * able)
         return float(np.linalg.norm(self.W @ tensions + self.wrench)) / max(scale, 1e-300)
 

@@ -40,6 +40,7 @@ from cdpr_drake.tensions.problem import (
     balance,
     describe,
     refuse,
+    writable,
 )
 from cdpr_drake.tensions.quadratic_program_kernel import (
     FEASIBLE,
@@ -140,8 +141,8 @@ class TensionProgram(OwnTerms):
             TensionProblemError: Unknown goal, one that needs a reference and finds none, or another
                 number of names.
         """
-        # `update` writes into these.
-        problem = replace(problem, W=problem.W.copy(), wrench=problem.wrench.copy())
+        # `update` writes into the matrix and the wrench of a copy.
+        problem = replace(problem)
         self.problem, self.goal = problem, goal
         self._prog, self._t, self.scale = make_program(problem, goal)
         self._relaxes = METHODS[goal].relaxes
@@ -188,7 +189,7 @@ class TensionProgram(OwnTerms):
         They must be finite, of the sizes of before; the bounds and the scale stay.
         """
         problem = self.problem
-        problem.W[:], problem.wrench[:] = W, wrench
+        writable(problem.W)[:], writable(problem.wrench)[:] = W, wrench
         rows = np.hstack([W, -np.diag(problem.scale_of_rows)]) if self._relaxes else W
         self._balance.UpdateCoefficients(rows, -wrench / self.scale)
 
@@ -241,11 +242,13 @@ class TensionProgram(OwnTerms):
             gone = refuse(problem, self.goal)
             report = ProgramReport(solver, said, float("nan"), {}, tuple(names), (words,))
             return replace(gone, status=TensionStatus.NOT_FOUND, program=report)
-        inside, residual = balance(problem.W, problem.wrench, problem.lower, problem.upper, t)
+        arrays = [writable(a) for a in (problem.W, problem.wrench, problem.lower, problem.upper)]
+        inside, residual = balance(*arrays, t)
         good = inside and residual <= RESIDUAL_TOLERANCE
         active, slack = np.empty(len(t), np.int64), np.empty(n)
-        describe(problem.W, problem.wrench, problem.lower, problem.upper, t, active, slack)
-        status = TensionStatus.FEASIBLE if good else TensionStatus.INFEASIBLE
+        describe(*arrays, t, active, slack)
+        feasible = good and plain.status != TensionStatus.INFEASIBLE
+        status = TensionStatus.FEASIBLE if feasible else TensionStatus.INFEASIBLE
         lost = () if self._relaxes else (MOVED,)
         report = self._report(self._with(z, t), solver, said, lost)
         return TensionSolution(self.goal, status, t, residual, active, slack, report)
@@ -278,9 +281,8 @@ class TensionProgram(OwnTerms):
         if self._relaxes:
             return np.clip(near, problem.lower, problem.upper)
         t = np.empty(len(near))
-        code = nearest_tensions_in(
-            self._work, problem.W, problem.wrench, problem.lower, problem.upper, near, t
-        )
+        arrays = [writable(a) for a in (problem.W, problem.wrench, problem.lower, problem.upper)]
+        code = nearest_tensions_in(self._work, *arrays, near, t)
         if code != FEASIBLE or np.max(np.abs(t - near)) > MISSED * self.scale * len(t):
             return None
         return np.clip(t, problem.lower, problem.upper)

@@ -18,7 +18,7 @@ from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import tension_problem
 from cdpr_drake.tensions.methods import distribute
-from cdpr_drake.tensions.problem import TensionProblem, TensionStatus
+from cdpr_drake.tensions.problem import TensionProblem, TensionStatus, writable
 from cdpr_drake.tensions.slack_correction import (
     TensionFollower,
     adaptive_gains,
@@ -248,11 +248,11 @@ class InsidePolygon:
         if problem is None or middle is None:
             return np.zeros(m), np.full(m, self.lower), False
         missing, least = polygon_target(
-            readings.tensions, middle, problem.W,
-            lower=problem.lower, upper=problem.upper, margin=self.margin,
+            readings.tensions, middle, writable(problem.W),
+            lower=writable(problem.lower), upper=writable(problem.upper), margin=self.margin,
         )  # fmt: skip
         found = polygon_correction(
-            readings.tensions, missing, least, problem.W, readings.lengths,
+            readings.tensions, missing, least, writable(problem.W), readings.lengths,
             np.full(m, self._gain(readings.lengths)),
         )  # fmt: skip
         largest = float(np.max(np.abs(found)))

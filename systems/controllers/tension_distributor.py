@@ -61,7 +61,7 @@ class TensionDistributor(LeafSystem):
             limits: Smallest and largest tension [N]; None: the robot's.
             rate: Updates per second [Hz].
             reference: Wanted tensions, shape (m,) [N], for `reference_program`.
-            cables: What it believes of the cables; None: the robot's, from fixed exit points.
+            cables: What it believes of the cables; None: the robot's, pulleys included.
             balance: What tensions balance, a name of `force_balance.BALANCES`.
 
         Raises:
@@ -70,7 +70,10 @@ class TensionDistributor(LeafSystem):
         """
         super().__init__()
         robot, plant = in_plant.robot, in_plant.plant
-        home = tension_problem(robot, robot.home.transform(), limits=limits, reference=reference)
+        cables = robot.cable_set() if cables is None else cables
+        home = tension_problem(
+            robot, robot.home.transform(), limits=limits, reference=reference, cables=cables
+        )
         motions = robot.servo_rows("tension distribution in a simulation")
         self._rows = list(balanced_rows(motions, balance))
         if balance == FORCE:
@@ -82,13 +85,12 @@ class TensionDistributor(LeafSystem):
         self._method, self._chosen = method, chosen
         wanted = reference if chosen.needs_reference else None
         bounds = np.vstack([home.lower, home.upper, np.zeros(m) if wanted is None else wanted])
-        cables = robot.cable_set().without_pulleys() if cables is None else cables
         self._step = TensionStep(
             chosen.compiled(m - n),
             cables.packed(),
             float(robot.plane_height or 0.0),
             bounds,
-            home.scale_of_rows,
+            home.scale_of_rows.copy(),
             room=workspace_shape(n, m),
             starts=chosen.starts,
         )

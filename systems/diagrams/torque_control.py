@@ -174,7 +174,7 @@ def torque_law(
     base = robot if file is None else load_robot(file)
     if not servo.controller.pulleys:
         cables = cables.without_pulleys()
-    at_home = tension_problem(robot, robot.home.transform())
+    at_home = tension_problem(robot, robot.home.transform(), cables=cables)
     radii = winch.drum.radii(cables.count)
     low, high = wanted_limits(settings, robot)
     bounds = np.repeat([[low], [high]], cables.count, axis=1)
@@ -185,7 +185,7 @@ def torque_law(
         wrench=settings.servo_wrench(servo.controller.rate),
         loop=settings.tension_controller(float(np.mean(radii)), base.winch_law().friction, low),
         period=1.0 / settings.rate,
-        row_scale=at_home.scale_of_rows,
+        row_scale=at_home.scale_of_rows.copy(),
         method=settings.method,
         height=float(robot.plane_height or 0.0),
         drums=np.array([radii, 1.0 / robot.winch_groups().sizes()]),

@@ -37,7 +37,7 @@ def tension_service(
         robot: The robot.
         limits: Smallest and largest tension where the request has none [N]; None: the robot's.
         method: Method where the request has none.
-        cables: The cables; None: the robot's, from fixed exit points.
+        cables: The cables; None: the robot's, pulleys included.
 
     Returns:
         A function of a request, that gives "feasible", "status" and "tensions", shape (m,) [N]. It

@@ -18,6 +18,7 @@ from cdpr_drake.cables.elastic_law import cable_stiffness_matrix
 from cdpr_drake.cables.models import ELASTIC
 from cdpr_drake.errors import InfeasibleTensionError
 from cdpr_drake.geometry.cable_paths import cable_paths
+from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.models.robot_in_plant import RobotInPlant, platform_inertia
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import tension_problem
@@ -184,14 +185,19 @@ class CableRobot(Diagram):
         )
 
 
-def holding_tensions(robot: Robot, X_WP: RigidTransform) -> Array:
+def holding_tensions(robot: Robot, X_WP: RigidTransform, cables: CableSet | None = None) -> Array:
     """Tensions of least 2-norm within the robot's bounds that hold the platform, shape (m,) [N].
+
+    Args:
+        robot: The robot.
+        X_WP: Pose of the platform [m].
+        cables: The cables; None: the robot's, pulleys included.
 
     Raises:
         InfeasibleTensionError: There are none; names the robot and the pose.
         TensionProblemError: The pose lies outside the frame, or W is singular there.
     """
-    tensions = exact_tensions(tension_problem(robot, X_WP))
+    tensions = exact_tensions(tension_problem(robot, X_WP, cables=cables))
     if tensions is None:
         position = ", ".join(f"{x:g}" for x in X_WP.translation())
         low, high = robot.tension_limits()

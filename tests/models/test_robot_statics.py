@@ -17,7 +17,7 @@ from tests.models.representative_robots import REPRESENTATIVE_ROBOTS
 def test_problem_is_that_of_the_weight(name):
     robot = load_robot(name)
     X_WP = robot.home.transform()
-    problem = tension_problem(robot, X_WP)
+    problem = tension_problem(robot, X_WP, cables=robot.cable_set(pulleys=False))
     rows = list(PLANAR_ROWS) if robot.is_planar() else list(range(6))
     W = wrench_matrix(X_WP, robot.exit_points(), robot.anchor_points())
     np.testing.assert_array_equal(problem.W, W[rows])

@@ -69,7 +69,9 @@ REFUSALS = {
     ),
     "NaN in wrench": ({"wrench": [NAN, 0.0]}, r"wrench: found \[nan .*; accepted: finite"),
     "NaN in lower": ({"lower": [0.0, NAN, 0.0, 0.0]}, r"lower: found .*nan.*; accepted: finite"),
-    "infinite upper": ({"upper": [9, 9, 9, INFINITY]}, r"upper: found .*inf.*; accepted: finite"),
+    "NaN in upper": ({"upper": [9, 9, 9, NAN]}, r"upper: found .*nan.*; accepted: finite"),
+    "endless down": ({"upper": [9, 9, 9, -INFINITY]}, r"upper: found .*inf.*; accepted: finite"),
+    "complex wrench": ({"wrench": [1.0, 2.0j]}, r"wrench: found complex numbers; accepted: real"),
     "NaN in reference": ({"reference": [NAN] * 4}, r"reference: found .*nan.*; accepted: finite"),
     "negative lower": ({"lower": [0, -1, 0, 0]}, r"lower: found \[ 0\. -1\. .*; accepted: >= 0"),
     "crossed bounds": (
@@ -167,11 +169,12 @@ def test_the_verdict_is_what_numpy_finds(seed):
     np.testing.assert_allclose(solution.residual, residual, rtol=0.0, atol=1e-15)
 
 
-def test_good_tensions_are_feasible_whatever_is_believed():
+def test_good_tensions_are_feasible_unless_it_is_proven_that_there_are_none():
     problem, t = balanced()
     for exists in (True, False):
         solution = checked(problem, t, exists)
-        assert solution.status == TensionStatus.FEASIBLE
+        wanted = TensionStatus.FEASIBLE if exists else TensionStatus.INFEASIBLE
+        assert solution.status == wanted
         np.testing.assert_array_equal(solution.tensions, t)
         np.testing.assert_array_equal(solution.active, 0)
         np.testing.assert_allclose(solution.slack, 0.0, atol=1e-14)

@@ -1,5 +1,6 @@
 """Margins, closure, payload and the available wrenches against Qhull and linear programs."""
 
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -25,6 +26,7 @@ from cdpr_drake.workspaces.wrench_capacity import (
     capacity_margins,
     closure_margins,
     largest_payloads,
+    margin_slopes,
     scaled_matrices,
 )
 from cdpr_drake.workspaces.wrench_facets_kernel import many_closures, many_margins, wedge_terms
@@ -334,3 +336,37 @@ def test_a_demand_is_plain_data():
     assert SpatialSet().is_zero()
     assert not SpatialSet(box=np.ones(6)).is_zero()
     assert set(Demand.__dataclass_fields__) == {"points", "spread"}
+
+
+SLOPE = 2e-5  # relative to the largest slope; central differences over 1e-5 m of exact margins
+
+
+@pytest.mark.parametrize("name", ["acrobot_large", "ipanema_1"])
+def test_slopes_of_the_margin_are_its_differences(name):
+    """Under a polytope, a box and an ellipsoid of moments and forces, by every point of a cable."""
+    robot, case = robot_case(name)
+    # Off the middle, where one facet alone is the nearest.
+    p = robot.home.position[np.newaxis] + np.array([0.03, -0.05, 0.02])
+    R = rotation_from_angles(np.array([0.04, -0.03, 0.05])).matrix()[np.newaxis]
+    weight = robot.platform.mass * robot.gravity
+    required = SpatialSet(
+        vertices=weight * np.array([[0.02, 0.0, 0.01, 0.1, 0.0, 0.0], [0, 0.01, 0, 0, 0.2, 0.1]]),
+        box=weight * np.array([0.01, 0.0, 0.02, 0.0, 0.05, 0.0]),
+        ellipsoid=weight * np.array([0.02, 0.03, 0.01, 0.2, 0.1, 0.1]),
+    )
+
+    def margin(cables):
+        changed = replace(case, cables=cables)
+        return capacity_margins(changed, p, R, resisting(changed, required, R)).margins[0]
+
+    slopes = margin_slopes(case, p, R, resisting(case, required, R))
+    for points, found in (("p_WA", slopes.exits[0]), ("p_PB", slopes.anchors[0])):
+        wanted = np.empty_like(found)
+        for axis, cable in np.ndindex(found.shape):
+            ends = []
+            for step in (1e-5, -1e-5):
+                moved = getattr(case.cables, points).copy()
+                moved[axis, cable] += step
+                ends.append(margin(replace(case.cables, **{points: moved})))
+            wanted[axis, cable] = (ends[0] - ends[1]) / 2e-5
+        np.testing.assert_allclose(found, wanted, atol=SLOPE * np.max(np.abs(wanted)))

@@ -106,7 +106,7 @@ def basin_setup(scheme: str) -> BasinSetup:
         servo=common.servo,
         pinhole=servo_pinhole(scenario.camera, robot),
         case=common.case,
-        statics=static_case(robot),
+        statics=static_case(robot, pulleys=False),
         bounds=common.bounds,
         box=box,
     )

@@ -238,7 +238,7 @@ def stable_starts(scheme: str, count: int) -> Starts:
     """
     setup = loop_setup(scheme)
     servo, case, bounds = setup.servo, setup.case, setup.bounds
-    statics = static_case(servo.robot)
+    statics = static_case(servo.robot, pulleys=False)
     goal = desired_platform(servo)
     goal_held = statically_feasible(
         statics, goal.translation()[None], goal.rotation().matrix()[None]

@@ -10,6 +10,7 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.planning.plan_tracking import track_plan
 from cdpr_drake.analyses.planning.robot_path_task import (
+    RESERVE,
     LimitSettings,
     make_path,
     path_task,
@@ -106,7 +107,9 @@ def run_path(spec: PathSpec, stations: int, intervals: int) -> dict[str, Any]:
         PlanningError: The path cannot be followed, or the convex program was not solved.
     """
     robot = load_robot(spec.robot)
-    given = LimitSettings(tensions=spec.tensions, cable_acceleration=spec.cable_acceleration)
+    given = LimitSettings(
+        tensions=spec.tensions, cable_acceleration=spec.cable_acceleration, reserve=RESERVE
+    )
     task = path_task(robot, given)
     plan = plan_along_path(task, make_path(robot, spec.poses(), spec.corners), stations)
     uses = np.max(plan.samples().uses, axis=1)

@@ -14,7 +14,7 @@ from itertools import product
 
 import numpy as np
 
-from cdpr_drake.analyses.planning.robot_path_task import LimitSettings, path_task
+from cdpr_drake.analyses.planning.robot_path_task import RESERVE, LimitSettings, path_task
 from cdpr_drake.analyses.workspaces.proven_sets import ProofSettings, ProvenSets
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CdprError, PlanningError
@@ -140,7 +140,7 @@ def scene_of(robot: str, scene: str) -> Scene:
         PlanningError: Fewer problems than `PROBLEMS` says were found.
     """
     loaded = load_robot(robot)
-    task = path_task(loaded, LimitSettings())
+    task = path_task(loaded, LimitSettings(reserve=RESERVE))
     boxes, place = scene_boxes(loaded, scene), SCENES.index(scene)
     judges = ProvenSets.find(
         loaded, None, None, boxes, ROBOTS[robot],

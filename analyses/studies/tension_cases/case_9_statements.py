@@ -94,7 +94,10 @@ def in_polygon(X_WP_row: Array, tensions: Array) -> tuple[bool, Array, float]:
     Source: servoing thesis (1.27), table 5.1.
     """
     robot = load_robot("acrobot_large")
-    problem = tension_problem(robot, pose_from_row(X_WP_row), limits=(THRESHOLD, 60.0))
+    problem = tension_problem(
+        robot, pose_from_row(X_WP_row), limits=(THRESHOLD, 60.0),
+        cables=robot.cable_set(pulleys=False),
+    )  # fmt: skip
     particular, N = solution_space(problem)
     eta = N.T @ (tensions - particular)
     on_plane = particular + N @ eta

@@ -127,7 +127,10 @@ def from_middle(X_WP_row: Array, tensions: Array) -> float:
     """Distance in eta of tensions from the barycenter of their feasible polygon [N]."""
     _, eta, _ = in_polygon(X_WP_row, tensions)
     robot = load_robot("acrobot_large")
-    problem = tension_problem(robot, pose_from_row(X_WP_row), limits=(THRESHOLD, 60.0))
+    problem = tension_problem(
+        robot, pose_from_row(X_WP_row), limits=(THRESHOLD, 60.0),
+        cables=robot.cable_set(pulleys=False),
+    )  # fmt: skip
     particular, N = solution_space(problem)
     middle = N.T @ (distribute(problem, "barycenter").tensions - particular)
     return float(np.linalg.norm(eta - middle))

@@ -44,7 +44,7 @@ def grid_problems(robot_name: str, counts: tuple[int, int, int]) -> list[Tension
         low + (np.arange(count) + 0.5) * (high - low) / count
         for low, high, count in zip(robot.frame.lower, robot.frame.upper, counts, strict=True)
     ]
-    turns = np.radians(TURNS_DEG)
+    turns, cables = np.radians(TURNS_DEG), robot.cable_set(pulleys=False)
     if robot.is_planar():
         axes[2] = robot.home.transform().translation()[2:]
         turns[:, :2] = 0.0
@@ -52,7 +52,8 @@ def grid_problems(robot_name: str, counts: tuple[int, int, int]) -> list[Tension
     for turn in turns:
         for place in np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 3):
             try:
-                problems.append(tension_problem(robot, pose_from_angles(place, turn)))
+                X_WP = pose_from_angles(place, turn)
+                problems.append(tension_problem(robot, X_WP, cables=cables))
             except TensionProblemError:  # W is singular
                 continue
     return problems

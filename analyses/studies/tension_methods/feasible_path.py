@@ -44,7 +44,8 @@ class HeldPath:
 def can_hold(robot: Robot, position: Array, limits: tuple[float, float] | None = None) -> bool:
     """Whether tensions hold the unturned platform at rest with Po at a position [m]; exact."""
     X_WP = pose_from_angles(position, np.zeros(3))
-    return exact_tensions(tension_problem(robot, X_WP, limits=limits)) is not None
+    cables = robot.cable_set(pulleys=False)  # as in the theses
+    return exact_tensions(tension_problem(robot, X_WP, limits=limits, cables=cables)) is not None
 
 
 def held_path(

@@ -163,7 +163,8 @@ class StartTrial:
         """What acts between, shape (m,) [N]: nothing, or what holds the weight at home."""
         if self.between != STATIC:
             return np.zeros(len(robot.cables))
-        problem = tension_problem(robot, robot.home.transform())
+        cables = robot.cable_set(pulleys=False)  # those of the simulated robot
+        problem = tension_problem(robot, robot.home.transform(), cables=cables)
         if self.balance == FORCE:
             problem = force_problem(problem, robot.motion_type().num_turns)
         found = exact_tensions(problem)

@@ -188,7 +188,10 @@ def polygon_row(name: str) -> Row:
 
 def _problem(robot: Robot, place: Array) -> TensionProblem:
     limits = (LEAST, robot.tension_limits()[1])
-    return tension_problem(robot, pose_from_angles(place, np.zeros(3)), limits=limits)
+    cables = robot.cable_set(pulleys=False)
+    return tension_problem(
+        robot, pose_from_angles(place, np.zeros(3)), limits=limits, cables=cables
+    )
 
 
 def held_problems(counts: tuple[int, int, int]) -> list[TensionProblem]:
