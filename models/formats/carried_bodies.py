@@ -200,7 +200,8 @@ def set_composite_inertia(
     about = inertia.Shift(com).CalcRotationalInertia()
     draft.center_of_mass = com
     draft.inertia = np.array([*about.get_moments(), *about.get_products()])
-    parts = [body for body in found.composite if body.default_mass() > 0.0]
+    parts = sorted((body for body in found.composite if body.default_mass() > 0.0),
+                   key=lambda body: body.index() != found.platform.index())  # fmt: skip
     if len(parts) > 1:
         words = ", ".join(f"{body.name()} {body.default_mass():g} kg" for body in parts)
         draft.remarks.append(f"The platform is the sum of links fixed to each other: {words}.")

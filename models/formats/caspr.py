@@ -54,7 +54,7 @@ MOTIONS = {
 }
 """Joints of one body that cables move as a whole, and the motion that each gives."""
 
-_PRESENTATION = {"@num", "@id", "@name", "num", "@view_angle", "@display_range"}
+_PRESENTATION = {"@num", "@id", "@name", "@view_angle", "@display_range"}
 """What only names or counts things, or says how they are drawn: a frame comes first."""
 
 _COORDINATES = {"SPATIAL_EULER_XYZ": 6, "SPATIAL_QUATERNION": 7}
@@ -219,6 +219,9 @@ def _body(path: Path, link: ET.Element, draft: RobotDraft) -> Array:
             draft.remarks.append(f"Inertia is given about {reference}; turned to that about the "
                                  "centre of mass.")  # fmt: skip
         draft.inertia = values
+    parent = (link.findtext("parent/num") or "0").strip()
+    if parent != "0":
+        raise fail(path, "parent.num", parent, "0, the world")
     location = link.findtext("parent/location") or "0 0 0"
     return numbers(path, "parent.location", location, 3)
 

@@ -63,10 +63,16 @@ def read_mjcf(path: Path) -> RobotDraft:
     if np.any(np.abs(gravity[:2]) > 1e-9) or gravity[2] > 0.0:
         draft.gravity_direction = gravity
     anchors: dict[str, int] = {}
+    springless = {model.tendon(k).name or f"C{k + 1}" for k in range(model.ntendon)
+                  if model.tendon_stiffness[k] == 0.0}  # fmt: skip
     for index in range(model.ntendon):
         _tendon(path, compiled, index, draft, anchors)
     if not draft.cables:
         raise fail(path, "tendon", "no spatial tendon", "one for each cable")
+    limp = [name for name in anchors if name in springless]
+    if draft.youngs_modulus is not None and limp:
+        draft.remarks.append(f"Tendons without stiffness got that of the first one that has some: "
+                             f"{', '.join(limp)}.")  # fmt: skip
     body = _root(path, compiled, anchors)
     composite = _composite(model, body)
     _anchor_points(compiled, body, anchors, draft)

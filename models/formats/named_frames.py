@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import re
 import xml.etree.ElementTree as ET
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -162,7 +163,7 @@ def _mark_used(seen: ET.Element, carried: CarriedBodies, draft: RobotDraft) -> N
             ends = {end.get("link") or end.findtext(".", "") for end in item
                     if end.tag in ("parent", "child")}  # fmt: skip
             kind = item.attrib.get("type")
-            if ends & left or name in fixed or kind in ("fixed", "ball"):
+            if ends & left or name in fixed or kind == "fixed":
                 mark_below(item)
             elif kind == "floating" or name in carrying:
                 mark(item)
@@ -196,11 +197,15 @@ def _is_box(collision: ET.Element, draft: RobotDraft) -> bool:
 
 
 def _without_balls(root: ET.Element) -> int:
-    """Takes ball joints out, which close loops that Drake has not; returns how many."""
+    """Takes ball joints out that close loops, which Drake has not; returns how many.
+
+    Such a joint is not the only one of its child.
+    """
+    children = Counter(joint.findtext("child", "") for joint in root.iter("joint"))
     found = 0
     for parent in list(root.iter()):
         for joint in parent.findall("joint"):
-            if joint.get("type") == "ball":
+            if joint.get("type") == "ball" and children[joint.findtext("child", "")] > 1:
                 parent.remove(joint)
                 found += 1
     return found

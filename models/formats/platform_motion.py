@@ -9,7 +9,6 @@ import numpy as np
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import RobotFileError
 from cdpr_drake.models.formats.draft import RobotDraft
-from cdpr_drake.models.formats.reading import fail
 
 ACROSS = 1e-6
 """How far axes of joints may be off each other, or off an axis of W."""
@@ -39,7 +38,9 @@ def set_motion(
     """
     motion = _motion_of(along, about)
     if motion is None:
-        raise fail(path, "joints of the platform", joints, ACCEPTED)
+        raise RobotFileError(
+            f"{path}: joints of the platform: found {joints}; accepted: {ACCEPTED}"
+        )
     draft.motion, draft.axis = motion
     draft.origin = np.array(p, float)
     if draft.is_level():
