@@ -58,3 +58,33 @@ def largest_stable_step(eigenvalues: Array, integrator: str) -> float:
     steps = np.linspace(0.02, 4.0, 400) / fastest
     unstable = [h for h in steps if not stable(float(h))]
     return float(unstable[0] - (steps[1] - steps[0])) if unstable else float(steps[-1])
+
+
+def largest_discrete_step(M: Array, K: Array, D: Array) -> float:
+    """Largest stable time step of a discrete plant with explicit springs and dampers [s].
+
+    The plant steps by symplectic Euler, v+ = v - h M^-1 (D v + K x), x+ = x + h v+, as Drake's
+    discrete MultibodyPlant does with forces on its input ports. A vibration becomes unstable where
+    its multiplier is -1, that is at h = 2 / s with the largest real root s of
+
+        det(s^2 M - s D - K) = 0;
+
+    a single mass with D = T K has h = -T + sqrt(T^2 + 4 m / k). Directions in which the system
+    itself moves away from its rest do not count.
+
+    Args:
+        M: Mass matrix, shape (n, n), positive definite.
+        K: Stiffness matrix, shape (n, n).
+        D: Damping matrix, shape (n, n).
+
+    Returns:
+        The step; infinite where nothing is stiff or damped.
+    """
+    n = len(M)
+    inverse = scipy.linalg.inv(M)
+    companion = np.block([[np.zeros((n, n)), np.eye(n)], [inverse @ K, inverse @ D]])
+    roots = scipy.linalg.eigvals(companion)
+    scale = float(np.max(np.abs(roots), initial=0.0))
+    real = roots.real[np.abs(roots.imag) <= 1e-6 * scale]
+    largest = float(np.max(real, initial=0.0))
+    return 2.0 / largest if largest > 0.0 else np.inf

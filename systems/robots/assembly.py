@@ -10,7 +10,7 @@ from pydrake.geometry import SceneGraph
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context, DiagramBuilder, InputPort, OutputPort
-from pydrake.systems.primitives import Adder, Demultiplexer
+from pydrake.systems.primitives import Adder, Demultiplexer, MatrixGain
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CableModelError
@@ -23,6 +23,7 @@ from cdpr_drake.models.scene import add_frame, add_ground
 from cdpr_drake.statics.static_tensions import StaticTensions
 from cdpr_drake.systems.robots.cable_forces import CREPT, PORTS, CableForces
 from cdpr_drake.systems.robots.failures import BROKEN, FAULTS
+from cdpr_drake.systems.robots.plant_step import TAUT, check_platform_step
 from cdpr_drake.systems.robots.platform_hysteresis import BENT, PlatformHysteresis
 from cdpr_drake.systems.robots.platform_pose import PlatformPose
 from cdpr_drake.systems.robots.platform_wrench import APPLIED_WRENCH, PlatformWrench
@@ -123,6 +124,7 @@ class CableRobotPorts(NamedPorts):
         scene_graph: The scene graph, where there is one, for cameras.
         forces: The cables, `CableForces`.
         winches: The winches, `VelocityWinch` or `MotorWinch`.
+        damping: What brakes the platform beside its cables; None: nothing.
     """
 
     robot: Robot
@@ -131,6 +133,7 @@ class CableRobotPorts(NamedPorts):
     scene_graph: SceneGraph | None
     forces: CableForces
     winches: Any
+    damping: MatrixGain | None = None
 
     def set_at_equilibrium(
         self,
@@ -139,7 +142,12 @@ class CableRobotPorts(NamedPorts):
         slack: Array | None = None,
         at_rest: bool = False,
     ) -> Array:
-        """As `CableRobot.set_at_equilibrium`, from the root context of the built diagram."""
+        """As `CableRobot.set_at_equilibrium`, from the root context of the built diagram.
+
+        Raises:
+            CableModelError: The plant is discrete, and its time step longer than its cables bear
+                there; names the largest one.
+        """
         plant_context = self.plant.GetMyMutableContextFromRoot(context)
         winch_context = self.winches.GetMyMutableContextFromRoot(context)
         cables, model = self.forces.cable_set(), self.forces.model()
@@ -148,7 +156,10 @@ class CableRobotPorts(NamedPorts):
         )
         cable_context = self.forces.GetMyMutableContextFromRoot(context)
         self.forces.relax(cable_context, X_WP, holding.unstrained_lengths)
-        return set_robot_at_equilibrium(self, plant_context, winch_context, X_WP, holding)
+        tensions = set_robot_at_equilibrium(self, plant_context, winch_context, X_WP, holding)
+        lengths = holding.unstrained_lengths
+        check_platform_step(self.in_plant, plant_context, self.forces, lengths, self.damping)
+        return tensions
 
 
 def fill_scene(
@@ -204,9 +215,14 @@ def add_cable_robot(
         Handles and ports.
 
     Raises:
-        CableModelError: The cables' model cannot describe the robot's cables.
+        CableModelError: The cables' model cannot describe the robot's cables, or the plant is
+            discrete and its time step longer than the cables bear; names the largest one, which
+            `stable_plant_step` finds from stiffness, damping and inertia at the default positions.
         CableGeometryError: At the home pose a cable cannot run over its pulley.
         RobotFileError: Winches with motors are asked for that the robot's file does not describe.
+
+    Warns:
+        PlantStepWarning: The plant is discrete, and its time step near the largest stable one.
     """
     settings = settings or CableRobotSettings()
     robot, plant, prefix = in_plant.robot, in_plant.plant, f"{name}_" if name else ""
@@ -235,6 +251,9 @@ def add_cable_robot(
         builder.AddNamedSystem(prefix + "damping", brake)
         builder.Connect(state, brake.get_input_port())
         applied = _sum(builder, prefix + "applied_force", applied, brake.get_output_port())
+    defaults = plant.CreateDefaultContext()
+    taut = (1.0 - TAUT) * cable_paths(in_plant.pose(defaults), cables).lengths
+    check_platform_step(in_plant, defaults, forces, taut, brake)
     friction = add_hysteresis(builder, in_plant, name=name)
     if friction is not None:
         rubbing = friction.GetOutputPort("generalized_force")
@@ -281,7 +300,7 @@ def add_cable_robot(
         outputs["query_object"] = scene_graph.get_query_output_port()
     return CableRobotPorts(
         inputs, outputs, robot=robot, in_plant=in_plant, plant=plant, scene_graph=scene_graph,
-        forces=forces, winches=winch,
+        forces=forces, winches=winch, damping=brake,
     )  # fmt: skip
 
 

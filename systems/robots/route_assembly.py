@@ -9,6 +9,7 @@ import numpy as np
 from pydrake.multibody.plant import ExternallyAppliedSpatialForceMultiplexer, MultibodyPlant
 from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
 
+from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CableModelError, accepted_names
 from cdpr_drake.geometry.cable_routes import CableRoutes
 from cdpr_drake.models.plant_cables import PlantCables
@@ -16,6 +17,7 @@ from cdpr_drake.models.plant_rest import Rest, hang
 from cdpr_drake.models.plant_tree import unknown_joint
 from cdpr_drake.systems.robots.assembly import NamedPorts, apply_force
 from cdpr_drake.systems.robots.cable_forces import PORTS
+from cdpr_drake.systems.robots.plant_step import TAUT, check_plant_step
 from cdpr_drake.systems.robots.route_forces import RouteForces, RouteSpatialForces
 from cdpr_drake.systems.robots.settings import CableSettings
 from cdpr_drake.systems.robots.winches import VelocityWinch
@@ -46,7 +48,8 @@ class CablePorts(NamedPorts):
 
     def cables(self) -> PlantCables:
         """The cables as they are simulated, for statics."""
-        return PlantCables(self.plant, self.forces.routes(), self.forces.model())
+        cables: PlantCables = self.forces.cables_of_plant
+        return cables
 
     def hang(self, context: Context, **wishes: Any) -> Rest:
         """Puts the plant at rest on its cables: positions, no velocities, and lengths.
@@ -67,12 +70,24 @@ class CablePorts(NamedPorts):
         return rest
 
     def put(self, context: Context, rest: Rest) -> None:
-        """Puts plant and winches at a rest, in the root context of the built diagram."""
+        """Puts plant and winches at a rest, in the root context of the built diagram.
+
+        Raises:
+            CableModelError: The plant is discrete, and its time step longer than its cables bear
+                there; names the largest one.
+        """
         plant_context = self.plant.GetMyMutableContextFromRoot(context)
         winch_context = self.winches.GetMyMutableContextFromRoot(context)
         self.plant.SetPositions(plant_context, rest.positions)
         self.plant.SetVelocities(plant_context, np.zeros(self.plant.num_velocities()))
         self.winches.hold(winch_context, rest.unstrained_lengths, rest.tensions)
+        cables, lengths = self.cables(), rest.unstrained_lengths
+        check_plant_step(
+            self.plant,
+            plant_context,
+            lambda own: cables.generalized_force(own, lengths),
+            ", ".join(cables.routes.names),
+        )
 
 
 def add_cables(
@@ -106,7 +121,8 @@ def add_cables(
 
     Raises:
         CableModelError: The model cannot describe the cables, the method is not known, or `joints`
-            is asked for and a joint is not known to it.
+            is asked for and a joint is not known to it; or the plant is discrete and its time step
+            longer than the cables bear, these and those added before: names the largest one.
         CableGeometryError: At the plant's default positions a cable cannot run.
     """
     if method not in METHODS:
@@ -119,7 +135,10 @@ def add_cables(
         raise CableModelError(why)
     chosen = BODIES if why or method == BODIES else JOINTS
     kind = RouteForces if chosen == JOINTS else RouteSpatialForces
-    forces = builder.AddNamedSystem(prefix + "cables", kind(plant, routes, settings.model_of()))
+    model = settings.model_of()
+    forces = builder.AddNamedSystem(prefix + "cables", kind(plant, routes, model))
+    forces.cables_of_plant = PlantCables(plant, forces.routes(), model)
+    _check_step(builder, forces.cables_of_plant)
     if winches is None:
         home, _ = cables.lengths_and_jacobian(plant.CreateDefaultContext())
         winches = VelocityWinch(home, rated_speed)
@@ -144,6 +163,25 @@ def add_cables(
     return CablePorts(
         inputs, outputs, plant=plant, forces=forces, winches=winch, method=chosen, why=why
     )
+
+
+def _check_step(builder: DiagramBuilder, cables: PlantCables) -> None:
+    """Checks the step of a discrete plant, with its cables that are in the builder already."""
+    plant = cables.plant
+    if plant.time_step() == 0.0:
+        return
+    defaults, every = plant.CreateDefaultContext(), list[PlantCables]()
+    for system in builder.GetSystems():
+        if getattr(system, "cables_of_plant", None) is not None:
+            before: PlantCables = system.cables_of_plant
+            every += [before] if before.plant is plant else []
+    taut = [(1.0 - TAUT) * each.lengths_and_jacobian(defaults)[0] for each in every]
+
+    def pull(context: Context) -> Array:
+        forces = zip(every, taut, strict=True)
+        return np.sum([each.generalized_force(context, l0) for each, l0 in forces], axis=0)
+
+    check_plant_step(plant, defaults, pull, ", ".join(cables.routes.names))
 
 
 def connect_cables(

@@ -101,7 +101,9 @@ def test_each_moves_as_alone_by_motors(mode):
     for command in commands:
         batch.step(command, PERIOD)
     for k, robot in enumerate(robots):
-        assert np.array_equal(batch.states[k], alone(robot, how, commands[:, k], rule=batch.rule)[0])
+        assert np.array_equal(
+            batch.states[k], alone(robot, how, commands[:, k], rule=batch.rule)[0]
+        )
 
 
 def test_each_moves_as_alone_by_tensions():
