@@ -103,6 +103,7 @@ def identification_dict(
         "degrees_of_freedom": result.degrees,
         "residuals_over_sigma": finite(result.spread),
         "misfit_factor": MISFIT_FACTOR,
+        "pose_error_m": result.pose_error,
         "largest_residuals": [
             {
                 "time_s": one.time, "equation": one.equation, "value": one.value,

@@ -181,7 +181,13 @@ def _misfit_words(found: IdentificationResult) -> str:
     """That residuals are larger than noise, and where most."""
     words = (
         f"residuals are {found.spread:.3g} times what noise says: something that was not asked "
-        "for is off; standard errors are as much larger"
+        "for is off; "
+        + (
+            f"equations are weighted as if poses were off by {found.pose_error:.2g} m, and "
+            "standard errors include that"
+            if found.pose_error
+            else "standard errors are as much larger"
+        )
     )
     if found.status != MISFIT:
         return words

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from scipy.optimize import brentq
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.identification.correlated_noise import CorrelatedNoise, correlated, once_a_vector
@@ -23,6 +24,13 @@ ROUNDS = 12
 SETTLED = 1e-3
 """Corrections end where weighted residuals change by less [sigma], over the largest where that is
 more than one."""
+
+BOUNDED = 4.0
+"""Residuals count as no more than so many sigmas where the error of poses is estimated, so that
+few outliers do not pass for an error of all poses."""
+
+LEAST_OFF, MOST_OFF, OFF_WITHIN = 1e-7, 1.0, 0.05
+"""Errors of poses that are looked for [m], and how exactly, as a share of them."""
 
 EQUATIONS = (
     ("moment about x", "N m"), ("moment about y", "N m"), ("moment about z", "N m"),
@@ -62,8 +70,17 @@ class MotionTerm:
     tension is are met by a body without mass. So the most likely true poses and tensions are
     found along with the body, and equations stand at those.
 
+    S_x is what poses jitter about their splines. An error that smoothing passes, of geometry, of a
+    tracker's frame, of a slow filter, is not in it, and weights that call such poses exact rest the
+    estimate on that error. So poses are also off by `off` in each coordinate, and by `off` over
+    `size` about each axis, independently at each sample, which adds G_0 D^2 G_0' with the part G_0
+    of G that goes with the poses themselves. `off` is the variance component with which residuals
+    are as large as weights say: chi-square equal to the number of equations, each residual bounded
+    (Huber's proposal 2).
+
     Source: Fuller, Measurement error models, 1987, chapter 3; Boggs, Byrd, Schnabel, A stable and
-    efficient algorithm for nonlinear orthogonal distance regression, 1987.
+    efficient algorithm for nonlinear orthogonal distance regression, 1987; Paule, Mandel, Consensus
+    values and weighting factors, 1982; Huber, Robust estimation of a location parameter, 1964.
     """
 
     samples: LoggedMotion
@@ -71,18 +88,26 @@ class MotionTerm:
     Y: Array
     slopes: Array
     noise: tuple[tuple[Array, Array], ...]
+    size: float
+    off: float = 0.0
     rounds: int = ROUNDS
     name: str = "platform wrench"
 
     @staticmethod
-    def make(samples: LoggedMotion, gravity: Array) -> MotionTerm:
-        """With the regressor, its derivatives, and the noise that smoothing leaves."""
+    def make(samples: LoggedMotion, gravity: Array, size: float) -> MotionTerm:
+        """With the regressor, its derivatives, and the noise that smoothing leaves.
+
+        Args:
+            samples: The motion.
+            gravity: Acceleration of a falling body in W, shape (3,) [m/s^2].
+            size: Of the platform: so far from Po a turn moves what it is attached to [m].
+        """
         s, (X, t) = samples, samples.smoothed
         g = np.asarray(gravity, float)
         Y = inertia_regressor(s.R_WP, s.V_WP, s.A_WP, g)
         slopes = regressor_slopes(s.R_WP, s.V_WP, s.A_WP, g) * s.pose_spread
         noise = tuple((t.noise(s.time[b]), X.noise(s.time[b], 0, 1, 2)) for b in s.blocks())
-        return MotionTerm(samples, g, Y, slopes, noise)
+        return MotionTerm(samples, g, Y, slopes, noise, size)
 
     def rows(self, theta: Array) -> Rows:
         """See `Term`."""
@@ -95,6 +120,26 @@ class MotionTerm:
             A[6 * block.start : 6 * block.stop, :SIZE] = both[:, :-1]
             b.append(both[:, -1])
         return Rows(A, np.concatenate(b))
+
+    def with_errors_of_poses(self, theta: Array, bounded: bool) -> MotionTerm:
+        """The same with the error of poses that explains what a vector, shape (n,), leaves.
+
+        Args:
+            theta: The unknown vector.
+            bounded: Whether residuals count as no more than `BOUNDED` sigmas.
+        """
+        most = BOUNDED if bounded else np.inf
+
+        def excess(log_off: float) -> float:
+            A, b = replace(self, off=float(np.exp(log_off))).rows(theta)
+            return float(np.log(np.mean(np.minimum(np.abs(A @ theta - b), most) ** 2)))
+
+        low, high = np.log([LEAST_OFF, MOST_OFF])
+        if excess(low) <= 0.0:
+            return replace(self, off=0.0)
+        if excess(high) >= 0.0:
+            return replace(self, off=MOST_OFF)
+        return replace(self, off=float(np.exp(brentq(excess, low, high, xtol=OFF_WITHIN))))
 
     def told(self) -> MotionTerm:
         """The same with velocities and accelerations that may be noise alone taken for none.
@@ -132,6 +177,11 @@ class MotionTerm:
         time, which = np.repeat(s.time, 6), np.tile(np.arange(6), s.count)
         return largest_residuals(time, which, value.ravel(), np.concatenate(off), EQUATIONS)
 
+    @property
+    def _offs(self) -> Array:
+        """Errors of poses over what they jitter, shape (6,)."""
+        return self.off * np.array([1.0 / self.size] * 3 + [1.0] * 3) / self.samples.pose_spread
+
     @once_a_vector
     def _settled(self, pi: Array) -> tuple[_Corrected, list[CorrelatedNoise]]:
         """Equations at the most likely poses and tensions for a body, and their noise."""
@@ -160,6 +210,7 @@ class MotionTerm:
                 pulls[b] = C_t @ np.einsum("aim,ai->am", at.W[b], v) * s.sigma_tensions**2
                 felt = np.einsum("aioq,ai->oaq", at.G[b], v).reshape(-1, 6)
                 poses[b] = np.swapaxes((C_x @ felt).reshape(3, -1, 6), 0, 1)
+                poses[b, 0] += self._offs**2 * felt.reshape(3, -1, 6)[0]
         return at, noises
 
     def _corrected(self, pi: Array, poses: Array, pulls: Array) -> _Corrected:
@@ -179,6 +230,7 @@ class MotionTerm:
         C_t, C_x = self.noise[number]
         G, count = at.G[block], block.stop - block.start
         K = correlated(C_t, at.W[block] * self.samples.sigma_tensions)
+        K += correlated(np.eye(count), G[:, :, 0] * self._offs)
         by_row = np.swapaxes(C_x.reshape(3, count, 3 * count), 0, 1)
         half = np.swapaxes(G, 2, 3).reshape(count, 36, 3) @ by_row
         half = half.reshape(count, 6, 6, 3, count).transpose(4, 0, 1, 3, 2)

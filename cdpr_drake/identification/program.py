@@ -15,7 +15,7 @@ from scipy.linalg import null_space
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import IdentificationError, accepted_names
 from cdpr_drake.identification.identifiability import unidentifiable_words
-from cdpr_drake.identification.motion_term import MotionTerm
+from cdpr_drake.identification.motion_term import OFF_WITHIN, MotionTerm
 from cdpr_drake.identification.parameters import GROUPS, DynamicModel, Layout, offsets_needed
 from cdpr_drake.identification.physical_bounds import make_program, smooth_program, violated
 from cdpr_drake.identification.result import (
@@ -44,6 +44,9 @@ CLOSE, SETTLED = 1e-9, 1e-5
 ROUGHLY_SETTLED = 1e-2
 """The same where a solver of nonlinear programs takes the steps."""
 
+MOST_WEIGHINGS = 6
+"""Times that the error of poses is estimated, each from the last parameters."""
+
 MOST_HALVINGS = 8
 NOTHING = 1.0
 """Chi-square by which a vector may be worse than another and no data would tell, of residuals that
@@ -64,6 +67,10 @@ class _Fit:
     limits: list[float]
     steps: int
     last_step: float
+
+    def pairs(self) -> list[tuple[Rows, Array]]:
+        """Rows and weights of each term, and of priors."""
+        return list(zip(self.rows, self.weights, strict=True))
 
 
 class IdentificationProgram(OwnTerms):
@@ -118,13 +125,14 @@ class IdentificationProgram(OwnTerms):
         self.layout = Layout(model, groups, tuple(common), offsets_needed(groups), size)
         self.gravity = np.asarray(gravity, float)
         self.terms: list[Term] = []
+        self._weighed = self.terms
         self._priors: list[Prior] = []
         self._prog: MathematicalProgram | None = None
 
     def AddMotion(self, samples: LoggedMotion) -> MotionTerm:
         """The wrench that the cables put on the platform, and the motion that it made."""
         self._still_grows("AddMotion")
-        term = MotionTerm.make(samples, self.gravity)
+        term = MotionTerm.make(samples, self.gravity, self.layout.size)
         self.terms.append(term)
         return term
 
@@ -195,7 +203,7 @@ class IdentificationProgram(OwnTerms):
         """
         theta = self.layout.model.vector()
         Z = self._directions(self._scaled(theta)[0])
-        H = Z.T @ self._information(self._rows(theta), []) @ Z
+        H = Z.T @ self._information(self._rows(theta, self.terms), []) @ Z
         J = self.layout.jacobian(theta, self.layout.typical[:, None] * Z)
         return np.asarray(J @ np.linalg.solve(H, J.T))
 
@@ -219,7 +227,7 @@ class IdentificationProgram(OwnTerms):
                 f"unknown: {'; '.join(untold[:2])}{more}; accepted: fewer unknowns, a prior for "
                 "them, or a log of a motion that excites them"
             )
-        fit = self._least_squares(outliers)
+        fit = self._weighed_fit(outliers)
         if self.has_own_terms:
             return self._with_own_terms(fit, began)
         status, solver, active = OPTIMAL, "least squares", violated(self.layout, fit.theta)
@@ -412,7 +420,7 @@ class IdentificationProgram(OwnTerms):
     def _rows(self, theta: Array, terms: Sequence[Term] | None = None) -> list[Rows]:
         """Of all terms, or some others, and priors, by the vector over its typical sizes."""
         typical = self.layout.typical
-        found = [term.rows(theta) for term in (self.terms if terms is None else terms)]
+        found = [term.rows(theta) for term in (self._weighed if terms is None else terms)]
         found = [Rows(r.A * typical, r.b) for r in found]
         A, b = np.zeros((len(self._priors), len(typical))), np.zeros(len(self._priors))
         for r, (entries, value, std) in enumerate(self._priors):
@@ -435,16 +443,34 @@ class IdentificationProgram(OwnTerms):
             c += float(r.b @ (w * r.b))
         return g, c
 
-    def _least_squares(self, outliers: bool) -> _Fit:
+    def _weighed_fit(self, outliers: bool) -> _Fit:
+        """With the error of poses where they are off by more than they jitter."""
+        self._weighed = self.terms
+        fit = self._least_squares(outliers)
+        for _ in range(MOST_WEIGHINGS):
+            found = [
+                t.with_errors_of_poses(fit.theta, outliers) if isinstance(t, MotionTerm) else t
+                for t in self._weighed
+            ]
+            offs = _offs(self._weighed), _offs(found)
+            if np.allclose(*offs, rtol=OFF_WITHIN, atol=0.0):
+                break
+            self._weighed = found
+            fit = self._least_squares(outliers, fit.theta)
+        return fit
+
+    def _least_squares(self, outliers: bool, start: Array | None = None) -> _Fit:
         """Without inequalities, until weights and what is not quite linear do not change.
 
-        Steps are those of Gauss and Newton, halved while the cost grows.
+        Steps are those of Gauss and Newton, halved while the cost grows. They begin at the belief,
+        or at another vector, shape (n,).
         """
-        typical = self.layout.typical
-        theta = self.layout.model.vector()
-        rows = self._rows(theta)
+        typical, believed = self.layout.typical, self.layout.model.vector()
+        theta = believed if start is None else start
+        rows = self._rows(believed)
         limits = [np.inf] * len(rows)
-        first = [r.A @ (theta / typical) - r.b for r in rows]
+        first = [r.A @ (believed / typical) - r.b for r in rows]
+        rows = rows if start is None else self._rows(theta)
         for step in range(1, MOST_STEPS + 1):
             rests = [r.A @ (theta / typical) - r.b for r in rows]
             if outliers and step > 1:
@@ -452,11 +478,11 @@ class IdentificationProgram(OwnTerms):
             weights = [huber_weights(*each) for each in zip(rests, limits, strict=True)]
             E, e = self._scaled(theta)
             Z = self._directions(E)
-            start = np.linalg.lstsq(E, e, rcond=None)[0] if len(e) else np.zeros(len(typical))
+            known = np.linalg.lstsq(E, e, rcond=None)[0] if len(e) else np.zeros(len(typical))
             A = np.vstack([np.sqrt(w)[:, None] * r.A for r, w in zip(rows, weights, strict=True)])
             b = np.concatenate([np.sqrt(w) * r.b for r, w in zip(rows, weights, strict=True)])
-            y = np.linalg.lstsq(A @ Z, b - A @ start, rcond=None)[0]
-            way = (start + Z @ y) * typical - theta
+            y = np.linalg.lstsq(A @ Z, b - A @ known, rcond=None)[0]
+            way = (known + Z @ y) * typical - theta
             moved = float(np.max(np.abs(way / typical)))
             said = float(np.linalg.norm(A @ (way / typical)))
             before, share = _cost(rests, limits), 1.0
@@ -491,26 +517,60 @@ class IdentificationProgram(OwnTerms):
                 "its start, as with fewer unknowns, priors or another belief"
             )
 
+    def _between_blocks(self, fit: _Fit, x: Array) -> float:
+        """By how much estimates scatter more, in variance, than independent residuals make them.
+
+        Errors of poses last longer than a sample. With gradients g_b = A_b' r_b of the blocks b,
+        B of them and p unknowns, it is B / (B - 1) sum g_b' H^-1 g_b / p: the mean, over
+        directions, of the ratio of the variance that groups of rows tell to that of single rows.
+
+        Source: Liang, Zeger, Longitudinal data analysis using generalized linear models, 1986.
+        """
+        total, count = 0.0, 0
+        for term, (r, w) in zip(self.terms, fit.pairs(), strict=False):
+            if isinstance(term, MotionTerm):
+                A = np.sqrt(w)[:, None] * (r.A @ fit.Z)
+                rest = np.sqrt(w) * (r.A @ x - r.b)
+                for block in term.samples.blocks():
+                    rows = slice(6 * block.start, 6 * block.stop)
+                    g = A[rows].T @ rest[rows]
+                    total, count = total + float(g @ np.linalg.solve(fit.H, g)), count + 1
+        return total / len(fit.H) * count / max(count - 1, 1)
+
     def _result(
         self, fit: _Fit, theta: Array, how: tuple[str, str, tuple[str, ...]], wall: float
     ) -> IdentificationResult:
         layout = self.layout
         x = theta / layout.typical
-        fits, chi, count, off = {}, 0.0, 0, 0
-        for term, r, w in zip(self.terms, fit.rows[:-1], fit.weights[:-1], strict=True):
+        offs = _offs(self._weighed)
+        fitted = sum(float(np.sum(w * (r.A @ x - r.b) ** 2)) for r, w in fit.pairs())
+        off = sum(int(np.sum(w < 1.0)) for w in fit.weights[:-1])
+        known, weights = fit.rows, fit.weights
+        if any(offs):  # as sensors are: weights are not those of the fit
+            known = self._rows(theta, self.terms)
+            rests = [r.A @ x - r.b for r in known]
+            limited = np.isfinite(fit.limits)
+            limits = [
+                huber_limit(r) if at else np.inf for r, at in zip(rests, limited, strict=True)
+            ]
+            weights = [huber_weights(*each) for each in zip(rests, limits, strict=True)]
+        fits, chi, count = {}, 0.0, 0
+        for term, r, w in zip(self.terms, known[:-1], weights[:-1], strict=True):
             rest = np.sqrt(w) * (r.A @ x - r.b)
-            off += int(np.sum(w < 1.0))
             fits[term.name] = TermFit(
                 len(r.b), float(np.sqrt(np.mean(rest**2))) if len(rest) else 0.0,
                 term.misfit(theta),
             )  # fmt: skip
             chi, count = chi + float(rest @ rest), count + len(rest)
-        prior = fit.rows[-1].A @ x - fit.rows[-1].b
+        prior = known[-1].A @ x - known[-1].b
         chi, count = chi + float(prior @ prior), count + len(prior)
         degrees = max(count - fit.Z.shape[1], 1)
         J = layout.jacobian(theta, layout.typical[:, None] * fit.Z)
         covariance = J @ np.linalg.solve(fit.H, J.T)
         spread = float(np.sqrt(chi / degrees))
+        larger = fitted / degrees
+        if any(offs):
+            larger *= max(self._between_blocks(fit, x), 1.0)
         status = MISFIT if spread > MISFIT_FACTOR else how[0]
         largest = [one for term in self.terms for one in term.largest(theta)]
         parameters = layout.parameters()
@@ -518,12 +578,17 @@ class IdentificationProgram(OwnTerms):
             status=status, solver=how[1], model=layout.model.moved(theta), believed=layout.model,
             names=tuple(p[0] for p in parameters), units=tuple(p[2] for p in parameters),
             values=layout.values(theta), before=layout.values(layout.model.vector()),
-            covariance=covariance * max(spread, 1.0) ** 2,
+            covariance=covariance * max(larger, 1.0),
             condition=float(np.sqrt(np.linalg.cond(fit.H))), terms=fits, chi_square=chi,
             degrees=degrees, spread=spread, active=how[2], outliers=off,
             largest=tuple(sorted(largest, key=lambda one: -one.sigmas)), steps=fit.steps,
-            last_step=fit.last_step, wall_time=wall,
+            last_step=fit.last_step, wall_time=wall, pose_error=max(offs, default=0.0),
         )  # fmt: skip
+
+
+def _offs(terms: Sequence[Term]) -> list[float]:
+    """Errors of poses that motions are weighed with [m]."""
+    return [term.off for term in terms if isinstance(term, MotionTerm)]
 
 
 def _cost(rests: list[Array], limits: list[float]) -> float:

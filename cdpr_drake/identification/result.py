@@ -68,11 +68,14 @@ class IdentificationResult:
         units: Theirs.
         values: Shape (f,).
         before: As they were believed, shape (f,).
-        covariance: Shape (f, f); multiplied by `spread` squared where that is above 1. Where a
-            bound is active, that of the problem without it.
+        covariance: Shape (f, f). Where residuals are larger than noise it is that of the noise
+            and `pose_error` that were found, multiplied by what is left of chi-square over
+            degrees, and by how much more estimates scatter between stretches of the log than
+            independent residuals make them. Where a bound is active, that of the problem without
+            it.
         condition: Condition number of the weighted equations in typical sizes.
         terms: How measurements fit, by kind.
-        chi_square: Of all residuals.
+        chi_square: Of all residuals, over the noise that the log has by itself.
         degrees: Equations less unknowns.
         spread: Root of chi-square over degrees: 1 where sigmas are right.
         active: Bounds that the data alone would pass, in words.
@@ -81,6 +84,9 @@ class IdentificationResult:
         steps: Times that it was solved.
         last_step: How far the last of them would have gone, in standard errors.
         wall_time: [s].
+        pose_error: By how much poses are off beyond their noise, as residuals tell [m]; of
+            rotations over the size of the platform [rad]. Equations are weighted with it; 0: the
+            noise explains the residuals.
         program: With own terms, how the program was solved; None: without.
     """
 
@@ -104,6 +110,7 @@ class IdentificationResult:
     steps: int
     last_step: float
     wall_time: float
+    pose_error: float = 0.0
     program: ProgramReport | None = None
 
     @property

@@ -64,12 +64,17 @@ def test_errors_with_few_cables_are_as_large_as_the_covariance_says():
 def swaying(poses, time, size):
     """Poses that are off by slow waves of a size [m], and of twice as much [rad]."""
     wave = size * np.sin(np.outer(time, [0.5, 0.8, 1.1]) + np.arange(3))
-    q, v, e = poses[:, :1], poses[:, 1:4], 2.0 * wave
+    return moved(poses, 2.0 * wave, wave[:, ::-1])
+
+
+def moved(poses, e, d):
+    """Poses turned by e [rad] and moved by d [m] in W, shape (k, 3) each."""
+    q, v = poses[:, :1], poses[:, 1:4]
     turned = np.hstack([
         q - 0.5 * np.sum(e * v, axis=1, keepdims=True), v + 0.5 * (q * e + np.cross(e, v)),
     ])  # fmt: skip
     turned /= np.linalg.norm(turned, axis=1, keepdims=True)
-    return np.hstack([turned, poses[:, 4:] + wave[:, ::-1]])
+    return np.hstack([turned, poses[:, 4:] + d])
 
 
 @pytest.fixture(scope="module")
@@ -90,6 +95,71 @@ def test_poses_that_are_off_do_not_take_the_mass_away(off, unknown):
     assert most.sigmas == max(one.sigmas for one in found.largest) > MISFIT_FACTOR
     assert most.equation.partition(" ")[0] in ("force", "moment")
     assert most.unit == ("N" if most.equation.startswith("force") else "N m")
+
+
+NO_WORSE = 1.2
+"""Times the error of equal weights, root mean square over logs, that chance may make of weights
+that are as good."""
+
+
+def with_equal_weights(samples, case):
+    """Mass and mass times centre by least squares of the wrenches as they are, shape (4,)."""
+    Y = inertia_regressor(samples.R_WP, samples.V_WP, samples.A_WP, G)
+    rest = samples.wrench - Y[:, :, 4:] @ body(case).inertial()[4:]
+    return np.linalg.lstsq(Y[:, :, :4].reshape(-1, 4), rest.ravel(), rcond=None)[0]
+
+
+def badly_tracked(poses, time, kind, seed):
+    """Poses that are off by as much as real ones, some mm and half a degree."""
+    random = np.random.default_rng([seed, 11])
+    e = np.zeros((len(time), 6))
+    if kind == "constant":
+        e += random.standard_normal(6)
+    elif kind == "stretches":
+        for first in (400, 1100, 1600):
+            e[first : first + 75] = 5.0 * random.standard_normal(6)
+    else:
+        low, high = {"slow": (0.03, 0.3), "quicker": (0.3, 1.0)}[kind]
+        f, phase = random.uniform(low, high, (4, 6)), random.uniform(0.0, 2.0 * np.pi, (4, 6))
+        e = 0.7 * np.sum(np.sin(2.0 * np.pi * f * time[:, None, None] + phase), axis=1)
+    return moved(poses, 0.01 * e[:, :3], 0.005 * e[:, 3:])
+
+
+@pytest.mark.parametrize("kind", ["slow", "quicker", "constant", "stretches"])
+@pytest.mark.parametrize(("case", "mass"), [(4, 12.992), (6, 3.0), (8, 12.992)])
+def test_weights_are_no_worse_than_equal_ones_where_poses_are_off(case, mass, kind):
+    errors = []
+    for seed in (0, 1):
+        time, poses, tensions = log(case, seed, **{**NOISE, "place": 2e-5, "angle": 4e-5})
+        poses = badly_tracked(poses, time, kind, seed)
+        true = replace(body(case), mass=mass, inertia=body(case).inertia * mass / 13.0)
+        samples = sample_motion(time, poses, tensions * mass / 13.0, cables(case), BANDWIDTH)
+        believed = replace(true, mass=0.8 * mass)
+        made = IdentificationProgram(believed, ("mass", "center_of_mass"), gravity=G, size=0.3)
+        made.AddMotion(samples)
+        errors.append([made.Solve().model.mass - mass, with_equal_weights(samples, case)[0] - mass])
+    weighted, equal = np.sqrt(np.mean(np.square(errors), axis=0))
+    assert weighted < NO_WORSE * equal
+
+
+def test_tensions_of_the_tracked_poses_tell_the_mass_that_they_were_made_with():
+    """By least squares, as four cables cannot balance the body at poses that are off."""
+    time, poses, tensions = log(4, **{**NOISE, "place": 2e-5, "angle": 4e-5})
+    poses = badly_tracked(poses, time, "slow", 0)
+    samples = sample_motion(time, poses, tensions, cables(4), BANDWIDTH)
+    wrench = inertia_regressor(samples.R_WP, samples.V_WP, samples.A_WP, G) @ body(4).inertial()
+    fitted = np.array(
+        [np.linalg.lstsq(*each, rcond=None)[0] for each in zip(samples.W, wrench, strict=True)]
+    )
+    made = IdentificationProgram(
+        believed(4, center_of_mass=body(4).center_of_mass), ("mass",), gravity=G, size=0.3
+    )
+    made.AddMotion(replace(samples, tensions=fitted))
+    found = made.Solve()
+    equal = with_equal_weights(replace(samples, tensions=fitted), 4)[0]
+    assert abs(found.model.mass - 13.0) < abs(equal - 13.0) + found.std[0]
+    assert found.std[0] < 0.001 * found.model.mass
+    assert found.pose_error == pytest.approx(0.005, rel=0.7)
 
 
 def test_the_residual_that_is_off_is_named():
@@ -113,8 +183,8 @@ def test_an_end_that_is_worse_than_its_start_is_refused(monkeypatch):
     made = program(log(4, **NOISE), 4, believed(4), ("mass",))
     ended = IdentificationProgram._least_squares
 
-    def light(self, outliers):
-        fit = ended(self, outliers)
+    def light(self, *how):
+        fit = ended(self, *how)
         return replace(fit, theta=1e-3 * fit.theta)
 
     monkeypatch.setattr(IdentificationProgram, "_least_squares", light)
