@@ -268,7 +268,26 @@ class Robot(Summarized):
             ("cables", f"diameter {1e3 * self.cable.diameter:g} mm, "
              f"E {1e-9 * self.cable.youngs_modulus:g} GPa"),
             ("cameras", ", ".join(mount.name for mount in self.cameras) or "none"),
+            ("not in its file", "; ".join(f"{k}: {v}" for k, v in self.filled_in().items())
+             or "nothing"),
         ]  # fmt: skip
+
+    def filled_in(self) -> dict[str, str]:
+        """Values that simulations depend on and the file does not give, by key, in words."""
+        platform, found = self.platform, dict[str, str]()
+        shape, point = platform.inertia_of == SHAPE_INERTIA, self.motion_type().is_point
+        if platform.center_of_mass is None:
+            where = "that of its shape" if shape else "Po" if point else "the middle of its box"
+            found["platform.center_of_mass"] = f"{where}, ({numbers(self.center_of_mass())}) m"
+        if platform.inertia is None and not point:
+            found["platform.inertia"] = f"that of {'its shape' if shape else 'a solid box'}"
+        if self.cable_model is None:
+            found["cable_model"] = "straight, without weight"
+        if self.damping == PlatformDamping():
+            found["damping"] = "none"
+        if self.winch.inertia is not None and self.winch.friction is None:
+            found["winch.friction"] = "none"
+        return found
 
     def exit_points(self) -> Array:
         """p_WA where rails stand as the file says, shape (3, m) [m]."""

@@ -56,18 +56,22 @@ AS_PRINTED = (
     pose_item("initial_pose", lowered(START, LIFT)),
     f"target.pose.position=[-0.689, -1.374, {-LIFT:g}]",
 )
-"""The same with the printed heights, the tag below our ground: an experiment, by projected images
-only, on what raising them does."""
+"""The same with the printed heights, the tag below our ground: by projected images only."""
 
-ASSUMPTIONS = (
-    "Both printed pairs of poses put the tag 0.133 m below the ground; all heights are raised by "
-    "as much.",
+_COMMON = (
     "Only the size of the perturbations is printed. Their directions are those of section 2.3.5: "
     "from the printed initial pose to the printed assumed one, scaled.",
     CAROCA_ASSUMPTION,
     "The simulated robot has the pulleys and the elastic cables of the prototype; the controller's "
     "model has neither.",
 )
+
+ASSUMPTIONS = (
+    "Both printed pairs of poses put the tag 0.133 m below the ground; all heights are raised by "
+    "as much.",
+    *_COMMON,
+)
+"""Of cases that run raised."""
 
 
 _accuracy = same_accuracy(("none", "within", "beyond"), "section 3.4.3")
@@ -83,15 +87,15 @@ _accuracy = same_accuracy(("none", "within", "beyond"), "section 3.4.3")
 def slower(runs: Runs) -> Finding:
     """Section 3.4.3: how long perturbed runs take to converge."""
     times = [runs.mean("time_s", configuration=name) for name in ("none", "within", "beyond")]
-    as_printed = runs.mean("time_s", configuration="beyond_as_printed")
+    raised = runs.mean("time_s", configuration="beyond_raised")
     arrives = converged(runs, "none") and converged(runs, "beyond")
     return Finding(
         found=", ".join(f"{time:.1f}" for time in times) + " s",
         held=[arrives and times[2] > 1.25 * times[0]],
         some=arrives and times[2] > times[0],
         why=f"Within: {times[1] - times[0]:+.1f} s; beyond: {times[2] / times[0]:.2f} times, "
-        f"{outcomes(runs, 'beyond')}; with the printed heights {as_printed:.1f} s, "
-        f"{outcomes(runs, 'beyond_as_printed')}. The directions of the errors are not printed.",
+        f"{outcomes(runs, 'beyond')}; raised, so that the tag lies on the ground, {raised:.1f} s, "
+        f"{outcomes(runs, 'beyond_raised')}. The directions of the errors are not printed.",
     )
 
 
@@ -104,32 +108,40 @@ STUDY = configuration_study(
         scenario="caroca_pbvs",
         changes=(*CAROCA_SERVO, *CAROCA_RUN),
         configurations=(
-            Configuration("none", "no perturbation", (), published={"outcome": "converged"}),
+            Configuration(
+                "none", "no perturbation", AS_PRINTED, published={"outcome": "converged"}
+            ),
             Configuration(
                 "within",
                 "0.2 m, 4 deg (within bounds)",
-                (believed(0.2, 4.0),),
+                (*AS_PRINTED, believed(0.2, 4.0, lift=0.0)),
                 published={"outcome": "converged, 2 s later"},
             ),
             Configuration(
                 "beyond",
                 "0.4 m, 8 deg (beyond bounds)",
-                (believed(0.4, 8.0),),
+                (*AS_PRINTED, believed(0.4, 8.0, lift=0.0)),
                 published={"outcome": "converged", "time_s": "46"},
                 why="the direction of the error is not printed; along that of section 2.3.5 the "
                 "tag may leave the image on the way",
             ),
-            Configuration(
-                "beyond_as_printed",
-                "0.4 m, 8 deg, heights as printed",
-                (*AS_PRINTED, believed(0.4, 8.0, lift=0.0)),
-                group="heights as printed",
+            *(
+                Configuration(f"{name}_raised", f"{words}, raised", changes, group="raised")
+                for name, words, changes in (
+                    ("none", "no perturbation", ()),
+                    ("within", "0.2 m, 4 deg", (believed(0.2, 4.0),)),
+                    ("beyond", "0.4 m, 8 deg", (believed(0.4, 8.0),)),
+                )
             ),
         ),
-        rendered=("none",),
+        rendered=("none_raised",),
         layouts=three_layouts(36, "CAROCA"),
     ),
     source="servoing thesis 3.4.3, figures 3.36 to 3.38",
-    assumptions=ASSUMPTIONS,
+    assumptions=(
+        "Both printed pairs of poses put the tag 0.133 m below the ground. The heights are kept as "
+        "printed; raised by as much, so that the tag lies on the ground, in the experiment beside.",
+        *_COMMON,
+    ),
     checks=(_accuracy, slower),
 )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 from cdpr_drake.analyses.studies.framework.case_layouts import Layout
 from cdpr_drake.analyses.studies.framework.case_run import METRICS, Metric, OwnMetric, Recipe
@@ -40,6 +41,7 @@ class Configuration:
         repetitions: Runs of it in the full form; None: as many as of the others.
         why: Why its numbers may differ from the published ones.
         cause: Of what kind that is, see `framework.statement`; empty: nobody knows.
+        platform: Arrays of the section `platform` that replace those of the robot's file.
 
     Raises:
         ValueError: The cause is unknown.
@@ -54,6 +56,7 @@ class Configuration:
     repetitions: int | None = None
     why: str = ""
     cause: str = ""
+    platform: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Checks the cause."""
@@ -150,7 +153,10 @@ class Plan:
                   "camera": camera},
             label=configuration.label,
             changes=(*self.changes, *configuration.changes, f"camera.kind={camera}"),
-            data=Recipe(configuration.scenario or self.scenario, self.own, self.stability),
+            data=Recipe(
+                configuration.scenario or self.scenario, self.own, self.stability,
+                configuration.platform,
+            ),
             seeds=configuration.repetitions,
             most=1 if rendered else None,
             rendered=rendered,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from cdpr_drake.analyses.simulation.visual_servo_run import RunResult, run_scena
 from cdpr_drake.analyses.studies.framework.runs import Runs
 from cdpr_drake.analyses.studies.framework.study import Case
 from cdpr_drake.arrays import Array
+from cdpr_drake.models.robot_loader import load_robot, robot_reference
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.loops.loop_choice import choose_compiled_loop
 
@@ -64,15 +65,18 @@ class Recipe:
         own: A study's own metrics by name.
         stability: Tension from which a cable counts in the criterion along the run [N], see
             `stability_traces`; None: the traces do not have it.
+        platform: Arrays of the section `platform` that replace those of the robot's file.
     """
 
     scenario: str
     own: Mapping[str, OwnMetric] = field(default_factory=dict)
     stability: float | None = None
+    platform: Mapping[str, Any] = field(default_factory=dict)
 
     def arguments(self) -> dict[str, Any]:
         """What the numbers of a run depend on, for JSON."""
-        return {"scenario": self.scenario, "own": list(self.own), "stability": self.stability}
+        told = {"scenario": self.scenario, "own": list(self.own), "stability": self.stability}
+        return told | ({"platform": dict(self.platform)} if self.platform else {})
 
 
 LEFT_OUT = ("wall_time_s", "realtime_factor", "versions")
@@ -89,8 +93,14 @@ def measure_run(case: Case, seed: int) -> dict[str, Any]:
         counts as converged; the arrays of `run_traces` and of `stability_traces`.
     """
     recipe: Recipe = case.data
-    scenario = load_scenario(recipe.scenario, [*case.changes, f"seed={seed}"])
-    result = run_scenario(choose_compiled_loop(scenario))
+    items = [*case.changes, f"seed={seed}"]
+    scenario = load_scenario(recipe.scenario, items)
+    robot = load_robot(scenario.robot)
+    given = {key: np.asarray(value) for key, value in recipe.platform.items()}
+    robot.platform = replace(robot.platform, **given)
+    with robot_reference(robot if recipe.platform else scenario.robot) as name:
+        scenario = load_scenario(recipe.scenario, [*items, f"robot={name}"])
+        result = run_scenario(choose_compiled_loop(scenario))
     traces = run_traces(result)
     if recipe.stability is not None:
         traces |= stability_traces(result, recipe.stability)

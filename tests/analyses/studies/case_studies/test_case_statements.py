@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.studies.case_studies import case_5, case_a6
+from cdpr_drake.analyses.studies.case_studies import case_1, case_4, case_5, case_a6
 from cdpr_drake.analyses.studies.case_studies.case_1 import MOVING_TIME, moving
 from cdpr_drake.analyses.studies.case_studies.case_1_ends import (
     GOAL_KEYS,
@@ -16,7 +16,9 @@ from cdpr_drake.analyses.studies.case_studies.case_1_ends import (
 from cdpr_drake.analyses.studies.case_studies.case_4 import slower
 from cdpr_drake.analyses.studies.framework.case_statements import same_accuracy
 from cdpr_drake.analyses.studies.framework.runs import MissingRuns
+from cdpr_drake.analyses.studies.framework.study import Form
 from cdpr_drake.analyses.studies.tension_cases.case_9_statements import least
+from cdpr_drake.systems.diagrams.load import load_scenario
 from tests.analyses.studies.made_runs import made_run, made_runs
 from tests.figure_faults import figure_faults
 
@@ -54,7 +56,7 @@ def test_one_configuration_that_converges_has_nothing_to_compare():
 def test_a_run_that_loses_its_target_does_not_converge_later(outcome, time, expected):
     runs = [
         run("none", time_s=31.0), run("within", time_s=33.0), run("beyond", outcome, time_s=time),
-        run("beyond_as_printed", time_s=40.0),
+        run("beyond_raised", time_s=40.0),
     ]  # fmt: skip
     assert slower.judge(made_runs(runs)).verdict == expected
 
@@ -224,3 +226,18 @@ def test_a_camera_that_is_believed_elsewhere_has_a_small_effect(curved, outcome,
     ]
     (check,) = [one for one in case_a6.STUDY.checks if one.name == "any_camera"]
     assert check.judge(made_runs(runs)).verdict == expected
+
+
+def test_cases_1_and_4_are_judged_with_the_printed_heights_and_show_raised_ones():
+    """Section 2.3.5: from 1.899 m up to a believed 2.202 m."""
+    for study, judged, raised in (
+        (case_1.STUDY, "cp_1", "cr_1"), (case_4.STUDY, "beyond", "beyond_raised"),
+    ):  # fmt: skip
+        cases = {case.name: case for case in study.cases(Form())}
+        heights = [
+            load_scenario("caroca_pbvs", cases[name].changes).initial_pose.position[2]
+            for name in (judged, raised)
+        ]
+        np.testing.assert_allclose(heights, [1.899, 1.899 + case_4.LIFT], atol=1e-9)
+    believed = load_scenario("caroca_pbvs", cases["beyond"].changes).perturbations.initial_pose
+    assert believed.position[2] < 2.3
