@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from cdpr_drake.schema.input_files import input_there
+
 CAMERA_FOLDER = Path(__file__).parent / "cameras"
 """Of the catalogue."""
 
@@ -22,4 +24,4 @@ def resolved_camera(name: str, folder: Path) -> str:
     if not name.lower().endswith(CAMERA_SUFFIXES):
         return name
     beside = folder / name
-    return str((beside if beside.exists() else Path(name)).absolute())
+    return str((beside if input_there(beside) else Path(name)).absolute())

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import json
 import logging
+import os
+import re
 import signal
 import subprocess
 import sys
@@ -20,6 +22,7 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.tree import ModelInstanceIndex
 
 from cdpr_drake.errors import CdprError, RobotFileError
+from cdpr_drake.schema.input_files import input_bytes, input_there
 
 LONGEST_PARSING = 60
 """Time of a processor after which a file counts as one that is never read to its end [s]."""
@@ -129,6 +132,23 @@ def parse_models(
     if text is None:
         return list(parser.AddModels(str(file.absolute())))
     return list(parser.AddModelsFromString(text, kind))
+
+
+_NAMED = re.compile(r"""(?:filename|file|uri)\s*=\s*["']([^"']+)|<uri>\s*([^<]+?)\s*</uri>""")
+
+
+def named_files(file: Path) -> list[Path]:
+    """Files that a model names by a path from its own folder, and what these name in turn."""
+    found: dict[Path, None] = {}
+    waiting = [file]
+    while waiting:
+        one = waiting.pop()
+        for match in _NAMED.finditer(input_bytes(one).decode("utf-8", "replace")):
+            other = Path(os.path.normpath(one.parent / (match[1] or match[2])))
+            if other not in found and other != file and input_there(other):
+                found[other] = None
+                waiting.append(other)
+    return list(found)
 
 
 def try_mesh(file: Path) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 import yaml
 
 from cdpr_drake.errors import RobotFileError
+from cdpr_drake.schema.input_files import input_size, input_text, input_there
 from cdpr_drake.schema.yaml_files import MOST_BYTES, YamlTextError, compose_yaml
 
 MECHANISM_FILE = "mechanism.yaml"
@@ -52,9 +53,9 @@ def is_mechanism_text(content: str) -> bool:
 def is_mechanism(path: Path) -> bool:
     """Whether a file is that of a mechanism; what cannot be read is not."""
     try:
-        if not path.is_file() or path.stat().st_size > MOST_BYTES:
+        if not input_there(path) or input_size(path) > MOST_BYTES:
             return False
-        return is_mechanism_text(path.read_text(encoding="utf-8"))
+        return is_mechanism_text(input_text(path))
     except (OSError, UnicodeDecodeError):
         return False
 

@@ -36,6 +36,13 @@ from cdpr_drake.models.mechanism_files import (
 from cdpr_drake.models.mechanism_schema import Mechanism
 from cdpr_drake.models.robot_schema import SHAPE_INERTIA, Robot
 from cdpr_drake.models.shapes import check_shapes
+from cdpr_drake.schema.input_files import (
+    input_bytes,
+    input_text,
+    input_there,
+    inputs_held,
+    made_of_input,
+)
 from cdpr_drake.schema.typed_yaml import closest, load_typed, parse_typed
 
 _FOLDER = Path(__file__).parent / "robots"
@@ -74,6 +81,9 @@ def robot_file(name: str) -> Path:
     path = Path(name)
     # One look at the folder and not into each robot's: repeated runs ask again and again.
     is_ours = name in os.listdir(_FOLDER) and (_FOLDER / name / "robot.yaml").is_file()
+    held = inputs_held()
+    if not is_ours and held is not None and held.knows(path):  # a folder's file, read before
+        return path
     if not is_ours and os.path.isdir(path):  # also of a name that is too long
         for own in (path / "robot.yaml", path / MECHANISM_FILE):
             if own.is_file():
@@ -81,7 +91,7 @@ def robot_file(name: str) -> Path:
         if any("bod" in child.name.lower() for child in path.glob("*.[xX][mM][lL]")):
             return path
     if name.lower().endswith(SUFFIXES):
-        if not os.path.isfile(path):
+        if not input_there(path):
             raise RobotFileError(f"{path}: there is no such robot file")
         return path
     if not is_ours:
@@ -110,7 +120,7 @@ def robot_text(name: str, asks: str = "robot_text") -> str:
         content = _foreign_content(path)
     else:
         try:
-            content = path.read_text(encoding="utf-8")
+            content = input_text(path)
         except (OSError, UnicodeDecodeError) as problem:
             raise RobotFileError(f"{path}: cannot be read: {why_not_read(problem)}") from problem
         if is_mechanism_text(content):
@@ -127,7 +137,7 @@ def _foreign_content(path: Path) -> str:
     from cdpr_drake.models.formats.assumptions import complete_draft
     from cdpr_drake.models.formats.detection import read_foreign
 
-    return complete_draft(read_foreign(path)).yaml()
+    return made_of_input(path, lambda: complete_draft(read_foreign(path)).yaml())
 
 
 def load_robot(name: str | Path, asks: str = "load_robot") -> Robot:
@@ -204,6 +214,7 @@ def robot_reference(robot: Robot | str | Path, asks: str = "load_robot") -> Iter
     with TemporaryDirectory() as folder:
         path = Path(folder) / "robot.yaml"
         path.write_text(yaml_dump_typed(robot), encoding="utf-8")
+        input_bytes(path)  # what other processes are sent
         yield str(path)
 
 

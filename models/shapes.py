@@ -20,6 +20,7 @@ from cdpr_drake.errors import Problems, RobotFileError
 from cdpr_drake.geometry.poses import pose_from_angles
 from cdpr_drake.models.drake_parsing import drake_refusals, try_mesh
 from cdpr_drake.schema.fields import array, number, sections, switch, text
+from cdpr_drake.schema.input_files import input_bytes, input_path, input_there, inputs_held
 from cdpr_drake.schema.json_text import load_json
 
 BOX, SPHERE, CYLINDER, MESH = "box", "sphere", "cylinder", "mesh"
@@ -72,7 +73,7 @@ class PlatformShape:
             return Box(*(float(edge) for edge in self.size))
         if self.kind == MESH:
             assert self.file is not None
-            return Mesh(self.file, self.scale)
+            return Mesh(str(mesh_in_place(Path(self.file))), self.scale)
         assert self.radius is not None
         if self.kind == SPHERE:
             return Sphere(self.radius)
@@ -90,8 +91,9 @@ class PlatformShape:
         if self.kind == MESH:
             assert self.file is not None
             with drake_refusals(f"{self.file}: cannot be read as a mesh"):
-                try_mesh(Path(self.file))
-                hull = Mesh(self.file, self.scale).GetConvexHull()
+                file = mesh_in_place(Path(self.file))
+                try_mesh(file)
+                hull = Mesh(str(file), self.scale).GetConvexHull()
             corners = np.array([hull.vertex(i) for i in range(hull.num_vertices())]).T
             points = R @ corners + X_PS.translation()[:, np.newaxis]
             return points.min(axis=1), points.max(axis=1)
@@ -115,9 +117,8 @@ class PlatformShape:
         """
         X_PS = self.pose(middle)
         if self.kind == MESH:
-            unit = _mesh_inertia(
-                str(self.file), self.scale, Path(str(self.file)).stat().st_mtime_ns
-            )
+            file = mesh_in_place(Path(str(self.file)))
+            unit = _mesh_inertia(str(file), self.scale, file.stat().st_mtime_ns)
         else:
             unit = CalcSpatialInertia(self.shape(), 1.0)
         whole = SpatialInertia(mass, unit.get_com(), unit.get_unit_inertia())
@@ -172,7 +173,7 @@ def mesh_files(file: Path) -> list[Path]:
     Raises:
         RobotFileError: A glTF is no JSON, or its buffers and images are no lists of objects.
     """
-    words = file.read_text(encoding="utf-8", errors="replace")
+    words = input_bytes(file).decode("utf-8", "replace")
     if file.suffix.lower() == ".obj":
         named = [line.split(maxsplit=1)[1].strip() for line in words.splitlines()
                  if line.startswith("mtllib ")]  # fmt: skip
@@ -184,13 +185,18 @@ def mesh_files(file: Path) -> list[Path]:
             named = [uri for uri in uris if not uri.startswith("data:")]
         except (AttributeError, TypeError, ValueError) as problem:
             raise RobotFileError(f"{file}: is no glTF: {problem}") from problem
-    return [file, *(file.parent / name for name in named if (file.parent / name).is_file())]
+    return [file, *(file.parent / name for name in named if input_there(file.parent / name))]
+
+
+def mesh_in_place(file: Path) -> Path:
+    """Where Drake reads a mesh: the file itself, or a copy of what was read before."""
+    return file if inputs_held() is None else input_path(file, mesh_files(file))
 
 
 def mesh_path(file: str, folder: Path) -> Path | None:
     """Where the file of a mesh is; None: it is not there, or no file that Drake reads."""
     path = (folder / file).resolve()
-    return path if path.is_file() and path.suffix.lower() in MESH_SUFFIXES else None
+    return path if input_there(path) and path.suffix.lower() in MESH_SUFFIXES else None
 
 
 @dataclass(kw_only=True)

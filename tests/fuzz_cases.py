@@ -6,21 +6,29 @@ random numbers, so that a case is known by its seed and its number.
 
 from __future__ import annotations
 
+import base64
+import json
 import os
 import random
+import struct
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 
 import yaml
 
+from cdpr_drake.models.robot_exchange import export_robot
+from tests.analyses.logs import recorders
 from tests.fuzz_damage import (
     CATALOGUES,
     ROBOT_SCENARIOS,
     ROBOTS,
+    ROOT,
     SCENARIOS,
     change,
     change_bytes,
+    change_text,
     change_tree,
 )
 
@@ -31,7 +39,9 @@ WORDS = [
     "-x", "../..", "/", ".", "/proc/x", "all", "none", "true", "robot.yaml", "1:2",
     "0:0", "5:1", "a=b", "=", "duration=", "duration=nan", "stop=null", "seed=1e300", "cables=[]",
     "controller.lambda_0=1.5=2", "x.y.z=1", "robot=robot.yaml", "\u0661", "½", "\udcff", "2.5d",
-    "camera.kind=[projected]", "target={}", "r_A=0.01", "r_A=nan", "r_A=1e300", "d_theta_bp=9",
+    "seed=" + "9" * 5000, "target=" + "[" * 500, "seed=!!int ''", "n" * 300 + ".yaml",
+    "\x1b[31mred", "camera.kind=[projected]", "target={}", "r_A=0.01",
+    "r_A=nan", "r_A=1e300", "d_theta_bp=9",
     "1,1,1", "0,0,0", "1e9,1e9,1e9", "-0.1:0.1:1e-12,1,1", "0:0.2:0.1,1,1", "0.1:-0.1:1,1,1",
 ]  # fmt: skip
 """What may stand where an option's value belongs."""
@@ -174,6 +184,112 @@ def bounds_file(rng: random.Random) -> Case:
     return case
 
 
+# Files of other tools, logs, bodies and meshes
+
+FOREIGN = (
+    ("acrobot_small", "sdf", ".sdf"), ("acrobot_small", "sdf-drake", ".sdf"),
+    ("acrobot_small", "urdf", ".urdf"), ("acrobot_small", "mjcf", ".xml"),
+    ("acrobot_small", "wcrfx", ".wcrfx"), ("acrobot_small", "gazebo-yaml", ".yaml"),
+    ("hangprinter", "klipper", ".cfg"), ("hangprinter", "reprapfirmware", ".g"),
+    ("maslow_4", "maslow", ".yaml"),
+)  # fmt: skip
+"""Robots in other tools' formats: the robot, the format, the ending."""
+
+
+@lru_cache
+def _foreign(robot: str, written: str) -> bytes:
+    return next(iter(export_robot(robot, written).values())).encode()
+
+
+@lru_cache
+def _folder_of(written: str) -> dict[str, bytes]:
+    return {name: text.encode() for name, text in export_robot("acrobot_small", written).items()}
+
+
+def foreign_file(rng: random.Random) -> Case:
+    """A robot of another tool."""
+    command = rng.choice([["check"], ["import"], ["tension"]])
+    more = ["--out", "new"] if command == ["import"] else []
+    if rng.random() < 0.1:
+        files = dict(_folder_of("caspr"))
+        name = rng.choice(sorted(files))
+        files[name], words = change_text(rng, files[name], ".xml")
+        bodies = next(one for one in sorted(files) if "bod" in one)
+        return Case([*command, bodies, *more], files, words=f"{name}: {words}")
+    if rng.random() < 0.15:
+        content, words = change_text(rng, json.dumps(GRAB).encode(), ".json")
+        return Case([*command, "robot.json", *more], {"robot.json": content}, words=words)
+    robot, written, ending = rng.choice(FOREIGN)
+    content, words = change_text(rng, _foreign(robot, written), ending)
+    name = f"bad{ending}"
+    return Case([*command, name, *more], {name: content}, words=f"{written}: {words}")
+
+
+GRAB = {
+    "platform": {"mass": 2.0, "inertia_matrix": [[0.1, 0, 0], [0, 0.1, 0], [0, 0, 0.1]]},
+    "actuators": [{"active": True, "cable": {"L0": 1.0}, "winch": {"drum_diameter": 0.1},
+                   "pulley": {"pos_OD_glob": [x, y, 2.0], "pos_PA_loc": [x / 9, y / 9, 0.0]}}
+                  for x, y in ((1, 1), (1, -1), (-1, 1), (-1, -1))],
+}  # fmt: skip
+
+LOGS = {
+    "motive": lambda: recorders.motive(40, units="Millimeters"),
+    "gtgraffiti": lambda: recorders.gtgraffiti(600),
+    "grab": recorders.grab,
+    "hangprinter script": recorders.hangprinter_script,
+    "hangprinter columns": recorders.hangprinter_columns,
+    "columns": recorders.columns,
+    "tabs": lambda: recorders.columns("\t", ","),
+}
+"""Logs of recorders."""
+
+
+def log_file(rng: random.Random) -> Case:
+    """A log of a machine or tracker."""
+    kind = rng.choice(list(LOGS))
+    content, words = change_text(rng, LOGS[kind]().encode(), ".csv")
+    more = ["--rate", "100"] if kind == "gtgraffiti" else []
+    out = rng.choice([[], ["--out", "new.csv"]])
+    return Case(["import-log", "log.csv", *more, *out], {"log.csv": content},
+                words=f"{kind}: {words}")  # fmt: skip
+
+
+MECHANISMS = sorted((ROOT / "models" / "robots").glob("*/mechanism.yaml"))
+
+OBJ = b"v -0.05 -0.05 -0.04\nv 0.1 0 0\nv 0 0.1 0\nv 0 0 0.04\n" + (
+    b"f 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
+)
+
+GLTF = json.dumps({
+    "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+    "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+    "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}],
+    "bufferViews": [{"buffer": 0, "byteLength": 36}],
+    "buffers": [{"byteLength": 36, "uri": "data:application/octet-stream;base64,"
+                 + base64.b64encode(struct.pack("9f", 0, 0, 0, 0.1, 0, 0, 0, 0.1, 0)).decode()}],
+}).encode()  # fmt: skip
+
+
+def body_file(rng: random.Random) -> Case:
+    """A mechanism's bodies, or its own file."""
+    folder = rng.choice(MECHANISMS).parent
+    files = {str(file.relative_to(folder)): file.read_bytes() for file in folder.rglob("*")
+             if file.is_file() and file.suffix in (".yaml", ".urdf", ".sdf", ".xml")}  # fmt: skip
+    name = rng.choice(sorted(files))
+    files[name], words = change_text(rng, files[name], Path(name).suffix)
+    return Case(["check", "mechanism.yaml"], files, words=f"{folder.name}/{name}: {words}")
+
+
+def mesh_file(rng: random.Random) -> Case:
+    """A mesh of a platform."""
+    name, data = rng.choice([("body.obj", OBJ), ("body.gltf", GLTF)])
+    content, words = change_text(rng, data, ".json" if name.endswith("gltf") else ".obj")
+    tree = yaml.safe_load(ROBOTS[2].read_text(encoding="utf-8"))
+    tree["platform"]["shape"] = {"kind": "mesh", "file": name}
+    files = {"robot.yaml": yaml.safe_dump(tree).encode(), name: content}
+    return Case(["check", "robot.yaml"], files, words=f"{name}: {words}")
+
+
 # Options
 
 POSE = ["--pose", "0,0,0.2"]
@@ -265,7 +381,8 @@ def written_file(rng: random.Random) -> Case:
 
 KINDS: list[Callable[[random.Random], Case]] = [
     *[robot_file] * 5, *[scenario_file] * 6, *[scenario_of_robot] * 2, catalogue_file, bounds_file,
-    *[options] * 5, *[output_folder] * 2, written_file,
+    *[options] * 5, *[output_folder] * 2, written_file, *[foreign_file] * 5, *[log_file] * 2,
+    body_file, mesh_file,
 ]  # fmt: skip
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -142,6 +143,56 @@ def change_bytes(rng: random.Random, data: bytes) -> tuple[bytes, str]:
     }  # fmt: skip
     name = rng.choice(list(changes))
     return changes[name](), name
+
+
+LONG_NUMBER = b"9" * 5000
+
+BOMB = b"a0: &a0 [lol, lol]\n" + b"".join(
+    b"a%d: &a%d [%s]\n" % (k, k, b", ".join([b"*a%d" % (k - 1)] * 10)) for k in range(1, 10)
+)
+
+ENTITIES = b"<!DOCTYPE z [<!ENTITY a0 'lol'>" + b"".join(
+    b"<!ENTITY a%d '%s'>" % (k, b"&a%d;" % (k - 1) * 10) for k in range(1, 10)
+) + b"]><robot><link>&a9;</link></robot>"  # fmt: skip
+
+SIZES = [
+    b"0", b"-1", b"1e300", b"-1e300", b"1e-300", b"nan", b"inf", b"", b"1 1", b"x", b"1e999",
+    LONG_NUMBER, b"1" * 400, b"0x10", b"\xc2\xbd", b"null", b"[]", b"{}", b"true", b"2147483648",
+]  # fmt: skip
+"""What may stand where a number belongs in any text: degenerate, huge, long, and none."""
+
+_NUMBER = re.compile(rb"(?<![\w.+-])[+-]?\d+(?:\.\d*)?(?:[eE][+-]?\d+)?(?![\w.])")
+_CELL = re.compile(rb"[^,;\t\n|]+")
+_WORD = re.compile(rb"[A-Za-z_][\w-]*")
+
+
+def change_text(rng: random.Random, data: bytes, ending: str) -> tuple[bytes, str]:
+    """Changes a text of any format: its numbers, heads, names and bytes; and what was done."""
+    kind = rng.choice(["number"] * 6 + ["cell", "cell", "name", "word gone", "bytes", "bomb"])
+    if kind == "bytes":
+        try:
+            return change_bytes(rng, data)
+        except UnicodeDecodeError:
+            return data[: len(data) // 2], "half"
+    if kind == "bomb":
+        whole = {
+            ".yaml": BOMB + b"points: *a9\nplatform: *a9\nkinematics: *a9\n",
+            ".json": rng.choice([b'{"a": %s}' % LONG_NUMBER, b"[" * 9999, b"[" * 500 + b"]" * 500]),
+        }.get(ending)  # fmt: skip
+        return whole or rng.choice([ENTITIES, b"<a>" * 9999, data * 3]), kind
+    pattern = {"number": _NUMBER, "cell": _CELL, "name": _WORD, "word gone": _WORD}[kind]
+    places = list(pattern.finditer(data))
+    if kind == "cell":
+        places = places[: max(60, len(places) // 50)]  # heads stand at the top
+    if not places:
+        return data[: len(data) // 2], "half"
+    new = {"name": rng.choice([b"n" * 300, b"\x1b[31mred", b"../../x", b"a,b", b"a\nb"]),
+           "word gone": b"", "cell": rng.choice([b"", b"W", b"X", *SIZES])}.get(kind)  # fmt: skip
+    for place in sorted(rng.sample(places, min(len(places), rng.choice([1, 1, 2, 9]))),
+                        key=lambda found: -found.start()):  # fmt: skip
+        put = rng.choice(SIZES) if new is None else new
+        data = data[: place.start()] + put + data[place.end() :]
+    return data, kind
 
 
 def change(rng: random.Random, path: Path, edit: dict[str, Any] | None = None) -> tuple[bytes, str]:

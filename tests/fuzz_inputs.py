@@ -183,7 +183,9 @@ def judge(case: Case, status: int | None, out: str, err: str, before: dict[str, 
         said = messages(err).strip()
         helped = not case.arguments or ("Usage" in out and not said)
         lines = said.split("\n")
-        if not helped and not all(line.startswith("cdpr: ") for line in lines):
+        if case.arguments[:1] == ["check"] and not said:
+            lines = out.strip().split("\n")
+        elif not helped and not all(line.startswith("cdpr: ") for line in lines):
             yield f"lines: {len(lines)}: {err[:300]!r}"
         if max(map(len, lines)) > LONGEST_LINE:
             yield f"long: {max(map(len, lines))} characters: {err[:200]!r}"

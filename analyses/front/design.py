@@ -26,6 +26,7 @@ from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
 from cdpr_drake.errors import DesignError
 from cdpr_drake.models.robot_loader import load_robot, robot_reference
 from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.schema.input_files import inputs_read_once
 from cdpr_drake.schema.typed_yaml import closest
 
 REACH = 0.1
@@ -53,6 +54,7 @@ def plain_design(robot: Robot, goals: str | Sequence[str]) -> DesignSettings:
     return settings
 
 
+@inputs_read_once()
 def optimize_design(
     robot: Robot | str | Path,
     settings: DesignSettings | Path | str | Sequence[str],

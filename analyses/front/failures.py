@@ -19,6 +19,7 @@ from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS, figure_writers
 from cdpr_drake.errors import ScenarioError, StoppedError
 from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.schema.input_files import inputs_read_once
 from cdpr_drake.schema.typed_yaml import closest
 from cdpr_drake.summaries import Tabulated
 from cdpr_drake.systems.diagrams.load import load_scenario
@@ -99,6 +100,7 @@ class BreakReactions(Tabulated):
         return (f"{self.cable} breaks at {self.time:g} s in {self.scenario}, {self.geometry}", rows)
 
 
+@inputs_read_once()
 def compare_reactions(
     scenario: str | Path = "acrobot_broken_redistributed",
     cable: int = 2,

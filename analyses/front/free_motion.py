@@ -24,6 +24,7 @@ from cdpr_drake.errors import IdentificationError, accepted_names
 from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import as_pose
+from cdpr_drake.schema.input_files import inputs_read_once
 from cdpr_drake.schema.typed_yaml import closest
 from cdpr_drake.summaries import as_kind
 
@@ -62,6 +63,7 @@ KEPT = ("folder", "overwrite", "formats", "say", "session")
 """Arguments on what is written, and who follows."""
 
 
+@inputs_read_once()
 def identify_free_motion(
     robot: Robot | str | Path,
     log: CalibrationLog | Path | str,

@@ -35,6 +35,7 @@ from cdpr_drake.planning.free_path_solution import FreePathSolution
 from cdpr_drake.planning.limits import MotionLimits
 from cdpr_drake.planning.path_task import PathTask
 from cdpr_drake.planning.path_timing import STATIONS, PathPlan, plan_along_path
+from cdpr_drake.schema.input_files import inputs_read_once
 from cdpr_drake.schema.typed_yaml import closest
 from cdpr_drake.trajectories.curved_path import Move
 from cdpr_drake.trajectories.sampled_motion import read_motion
@@ -116,6 +117,7 @@ def path_poses(robot: Robot, path: PathPoses | Path | str | Sequence[object]) ->
 TRACKING = "computed torque, which --track asks for"
 
 
+@inputs_read_once()
 def plan_path(
     robot: Robot | str | Path,
     path: PathPoses | Path | str | Sequence[object],
@@ -183,6 +185,7 @@ def plan_path(
     )  # fmt: skip
 
 
+@inputs_read_once()
 def plan_free_motion(
     robot: Robot | str | Path,
     start: object,

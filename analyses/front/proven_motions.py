@@ -44,6 +44,7 @@ from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import as_pose
 from cdpr_drake.planning.path_in_sets import SEQUENCES, proven_motion
 from cdpr_drake.planning.path_timing import STATIONS, PathPlan
+from cdpr_drake.schema.input_files import inputs_read_once
 from cdpr_drake.workspaces.moving_shapes import MovingObstacle
 from cdpr_drake.workspaces.proven_cells import CELLS
 from cdpr_drake.workspaces.proven_sets import COVER
@@ -110,6 +111,7 @@ class DrawnProvenPlan(ProvenRun):
         return sets_figure(self)
 
 
+@inputs_read_once()
 def plan_proven_motion(
     robot: Robot | str | Path,
     start: object,

@@ -26,6 +26,7 @@ from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import as_pose
 from cdpr_drake.planning.reconfiguration import STARTS
+from cdpr_drake.schema.input_files import inputs_read_once
 from cdpr_drake.workspaces.demanded_wrenches import SpatialSet
 
 if TYPE_CHECKING:
@@ -45,6 +46,7 @@ class DrawnReconfiguration(Reconfiguration):
         return rails_figure(self)
 
 
+@inputs_read_once()
 def reconfigure(
     robot: Robot | str | Path,
     rails: Path | str | Sequence[RailSettings] | None,

@@ -34,6 +34,7 @@ from cdpr_drake.analyses.sweeps.workers import check_scheduler
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.schema.input_files import inputs_read_once
 from cdpr_drake.summaries import Tabulated
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.loops.loop_choice import set_loop
@@ -164,6 +165,7 @@ class RepeatedRuns(Tabulated):
         return f"{len(told['seeds'])} of {told['wanted']} runs of {told['scenario']}", rows
 
 
+@inputs_read_once()
 def simulate(
     scenario: RunHeader | str | Path,
     overrides: Sequence[str] = (),
@@ -232,6 +234,7 @@ def simulate(
         return _run_into(results, kind, loaded, wanted, told)
 
 
+@inputs_read_once()
 def continue_run(
     folder: Path | str,
     *,
@@ -260,6 +263,7 @@ def continue_run(
         return _run_into(results, kind, scenario, wanted, session or Session(), resume=True)
 
 
+@inputs_read_once()
 def finish_run(
     folder: Path | str,
     *,

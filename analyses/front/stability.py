@@ -29,6 +29,7 @@ from cdpr_drake.errors import StabilityError
 from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import as_wrench
+from cdpr_drake.schema.input_files import inputs_read_once
 from cdpr_drake.schema.typed_yaml import closest
 from cdpr_drake.stability.perturbation_bounds import PerturbationBounds
 from cdpr_drake.stability.verdict import VerdictOptions
@@ -117,6 +118,7 @@ def stability_question(
     )  # fmt: skip
 
 
+@inputs_read_once()
 def assess_stability(
     robot: Robot | str | Path,
     scheme: str = "pbvs",

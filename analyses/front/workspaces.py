@@ -51,6 +51,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.errors import StoppedError, WorkspaceError, WorkspaceGridError
 from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.schema.input_files import inputs_read_once
 from cdpr_drake.schema.typed_yaml import closest
 from cdpr_drake.summaries import as_kind
 from cdpr_drake.workspaces.box_grid_agreement import BoxAgreement
@@ -335,6 +336,7 @@ def workspace_question(
     )  # fmt: skip
 
 
+@inputs_read_once()
 def compute_workspace(
     robot: Robot | str | Path,
     kinds: str | Sequence[str] = "static",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import json
 import os
 import secrets
 import shutil
@@ -29,9 +30,11 @@ from cdpr_drake.analyses.reporting.written_files import (
     list_all,
     mark,
     others_in,
+    whole_file,
     writing,
 )
 from cdpr_drake.errors import OutputFolderError
+from cdpr_drake.schema.input_files import inputs_held
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 """What fails when a file is written that was opened before, and then has no name."""
@@ -83,6 +86,7 @@ class ResultsFolder:
             return self.path
         try:
             self.path.chmod(0o755)
+            _tell_inputs(self.path)
             list_all(self.path)
             before = None
             if self._final.exists():
@@ -284,6 +288,7 @@ def continued_folder(folder: Path, overwrite: bool = False) -> Iterator[ResultsF
                 except BaseException as problem:
                     _say_kept(problem, final, before)
                     raise
+                _tell_inputs(final)
                 if before is not None and not results.unfinished:
                     results.replace(before)
     except OSError as problem:
@@ -378,3 +383,16 @@ def _remove_empty(folders: list[Path]) -> None:
     for folder in folders:
         if folder.is_dir() and not any(folder.iterdir()):
             folder.rmdir()
+
+
+INPUTS = "inputs.json"
+"""Which files of users the results follow from, with their SHA-256 and sizes [byte]."""
+
+
+def _tell_inputs(folder: Path) -> None:
+    """Writes `INPUTS`, where files of users were read."""
+    held = inputs_held()
+    hashes = {} if held is None else held.hashes()
+    if hashes and folder.is_dir():
+        with whole_file(folder / INPUTS) as part:
+            part.write_text(json.dumps(hashes, indent=2) + "\n", encoding="utf-8")

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import hashlib
 import platform
-import shutil
 from dataclasses import replace
 from functools import cache
 from importlib import import_module
@@ -28,6 +27,7 @@ from cdpr_drake.models.mechanism_loader import load_mechanism
 from cdpr_drake.models.robot_copies import portable_robot
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.schema.input_files import input_bytes
 from cdpr_drake.version import __version__
 
 PACKAGES = ("cdpr_drake", "cdpr_drake.models", "cdpr_drake.systems", "cdpr_drake.analyses")
@@ -157,4 +157,4 @@ def _write(path: Path, robot: Robot) -> str:
 def _copy(file: Path, path: Path) -> None:
     """Copies a file, whole or not at all."""
     with whole_file(path) as part:
-        shutil.copy(file, part)
+        part.write_bytes(input_bytes(file))

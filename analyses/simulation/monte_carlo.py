@@ -22,6 +22,8 @@ from cdpr_drake.analyses.sweeps.workers import run_jobs_on
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.pose_accuracy import Repeatability, repeatability
 from cdpr_drake.geometry.poses import pose_from_row, pose_row
+from cdpr_drake.schema.input_files import inputs_read_once
+from cdpr_drake.systems.diagrams.load import read_inputs
 from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
 
 
@@ -93,6 +95,7 @@ class _Job:
     keep_traces: bool
 
 
+@inputs_read_once()
 def run_many(
     scenarios: Sequence[Scenario],
     workers: int | None = None,
@@ -105,6 +108,7 @@ def run_many(
 ) -> ManyRuns:
     """Simulates scenarios, each until its outcome is known or its duration is over.
 
+    Files that a scenario names are read once, before the first run, and sent to all processes.
     A run's noise and random model errors depend on its scenario's seed only, and its result not on
     how many workers there are, nor on which one does it.
 
@@ -125,6 +129,8 @@ def run_many(
         SweepError: The scheduler does not answer or got lost.
         OutputFolderError: A finished run cannot be written.
     """
+    for scenario in {scenario.robot: scenario for scenario in scenarios}.values():
+        read_inputs(scenario)
     jobs = [_Job(index, scenario, keep_traces) for index, scenario in enumerate(scenarios)]
     began = time.perf_counter()
     there = [None if kept is None else kept.load(job.index, job.scenario.seed) for job in jobs]

@@ -14,6 +14,7 @@ from multiprocessing.context import SpawnContext, SpawnProcess
 from typing import Any, Self, TypeVar
 
 from cdpr_drake.kernel_cache.locks import compilation_time, share_compilation
+from cdpr_drake.schema.input_files import SentInputs, inputs_held
 from cdpr_drake.worker_process import become_worker, resident_memory
 
 Job = TypeVar("Job")
@@ -121,7 +122,9 @@ def run_jobs(
                     break
                 index = queue.popleft()
                 try:
-                    future = pool.there.submit(_work_in_turns, work, jobs[index], MOST_GROWTH)
+                    future = pool.there.submit(
+                        _work_in_turns, with_inputs(work), jobs[index], MOST_GROWTH
+                    )
                     running[future] = index
                 except BrokenProcessPool:  # one died since the last look
                     queue.appendleft(index)
@@ -158,6 +161,12 @@ def run_jobs(
     finally:
         if standing is None:
             pool.end()
+
+
+def with_inputs(work: Callable[[Job], Result]) -> Callable[[Job], Result]:
+    """What does a job elsewhere with the files that were read here."""
+    held = inputs_held()
+    return work if held is None else SentInputs(work, held)
 
 
 def _work_in_turns(

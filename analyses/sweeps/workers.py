@@ -13,7 +13,7 @@ import numba
 import numpy as np
 
 from cdpr_drake.analyses.reporting.provenance import code_version
-from cdpr_drake.analyses.sweeps.worker_pool import PersistentPool, run_jobs
+from cdpr_drake.analyses.sweeps.worker_pool import PersistentPool, run_jobs, with_inputs
 from cdpr_drake.errors import SweepError
 from cdpr_drake.kernel_cache.locks import share_compilation
 
@@ -252,7 +252,9 @@ def _dask(address: str) -> Iterator[tuple[Submit, int]]:
         try:
             version = code_version()
             yield (
-                lambda work, job: client.submit(do_by_same_code, work, job, version, pure=False),
+                lambda work, job: client.submit(
+                    do_by_same_code, with_inputs(work), job, version, pure=False
+                ),
                 threads,
             )
         except Exception as problem:

@@ -12,7 +12,7 @@ import re
 import signal
 import sys
 from collections.abc import Callable, Sequence
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -28,6 +28,7 @@ from cdpr_drake.cli.option_names import SHARED_OPTIONS, with_options
 from cdpr_drake.cli.process import INTERRUPTED, SIGNALS, compile_ahead, exit_with_parent
 from cdpr_drake.errors import CdprError
 from cdpr_drake.kernel_cache.locks import share_compilation
+from cdpr_drake.schema.input_files import inputs_read_once
 from cdpr_drake.version import __version__
 
 TRACEBACK = "CDPR_TRACEBACK"
@@ -35,6 +36,9 @@ TRACEBACK = "CDPR_TRACEBACK"
 
 LONGEST_LINE = 490
 """Characters of a message behind `cdpr: `; longer ones lose their middle."""
+
+LIVING = "studio"
+"""The subcommand that goes on while files change; any other reads each file once."""
 
 BAD_INPUT = 2
 """Exit code when the user's input is not accepted."""
@@ -291,7 +295,8 @@ def _main(given: Sequence[str], imported: Callable[[], None] = lambda: None) -> 
         app = make_app(given)  # which imports Drake and numba if the subcommand does
         share_compilation()
         imported()
-        code = app(args=given, prog_name=PROGRAM, standalone_mode=False)
+        with nullcontext() if LIVING in given else inputs_read_once():
+            code = app(args=given, prog_name=PROGRAM, standalone_mode=False)
     except OSError as problem:  # such as a full disk, or a folder that vanished
         where = f"{problem.filename}: " if problem.filename else ""
         _refuse(f"{where}{problem.strerror or problem}{_notes(problem)}")

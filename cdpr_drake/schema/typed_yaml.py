@@ -19,6 +19,7 @@ import yaml
 
 from cdpr_drake.errors import DataFileError, Problems, meant_names, why_not_read
 from cdpr_drake.schema.fields import NAMED, FieldRule
+from cdpr_drake.schema.input_files import input_text
 from cdpr_drake.schema.yaml_files import (
     YamlTextError,
     cached_yaml,
@@ -91,7 +92,7 @@ def load_typed(
         large = too_many_bytes(path)
         if large:
             raise error(f"{path}: {large}")
-        content = path.read_text(encoding="utf-8")
+        content = input_text(path)
     except (OSError, UnicodeDecodeError) as problem:
         raise error(f"{path}: cannot be read: {why_not_read(problem)}") from problem
     return parse_typed(schema, content, path, error=error, overrides=overrides)

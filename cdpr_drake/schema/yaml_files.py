@@ -18,6 +18,8 @@ from typing import Any
 import yaml
 from pydrake.common.yaml import yaml_load_typed
 
+from cdpr_drake.schema.input_files import input_size
+
 FILE_KINDS: dict[str, tuple[frozenset[str], str]] = {
     "a robot": (frozenset({"platform", "winch", "tension_bounds"}), "cdpr_drake.models.load_robot"),
     "a mechanism": (frozenset({"mechanism"}), "cdpr_drake.models.load_mechanism"),
@@ -150,7 +152,7 @@ def other_kind(keys: Collection[str], accepted: Collection[str]) -> str:
 
 def too_many_bytes(path: Path) -> str:
     """Words for a file that is too large to be read, or empty ones; raises OSError."""
-    size = path.stat().st_size
+    size = input_size(path)
     if size <= MOST_BYTES:
         return ""
     return _too_large(size)

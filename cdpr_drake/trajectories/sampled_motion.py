@@ -9,6 +9,7 @@ import numpy as np
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import TrajectoryError
+from cdpr_drake.schema.input_files import input_bytes
 from cdpr_drake.trajectories.pose_path import PIECE_NUMBERS, PosePath, hermite
 from cdpr_drake.trajectories.pose_trajectory import MOTION_SIZE
 from cdpr_drake.trajectories.timed_path import TimedPath
@@ -86,7 +87,7 @@ def read_motion(path: Path, later: float = 0.0) -> TimedPath:
         TrajectoryError: The file cannot be read, or a line is not accepted; names file and line.
     """
     try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
+        lines = input_bytes(path).decode("utf-8-sig").splitlines()
     except FileNotFoundError as problem:
         raise TrajectoryError(f"{path}: there is no such file of a motion") from problem
     except (OSError, UnicodeDecodeError) as problem:

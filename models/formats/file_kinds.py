@@ -12,6 +12,7 @@ from typing import Any
 
 from cdpr_drake.errors import RobotFileError
 from cdpr_drake.models.formats.reading import read_text
+from cdpr_drake.schema.input_files import input_there
 from cdpr_drake.schema.yaml_files import YamlTextError, load_yaml, too_many_bytes
 
 YAML_SUFFIXES = (".yaml", ".yml")
@@ -28,15 +29,13 @@ MASLOW_CORNERS = ("tl", "tr", "bl", "br")
 
 def is_foreign(path: Path) -> bool:
     """Whether a path is of another tool's format rather than a robot file of this package."""
-    if path.is_dir():
-        return not (path / "robot.yaml").is_file()
     if path.suffix.lower() in YAML_SUFFIXES:
         try:
             # One that is too large is refused by the other reader, before it is parsed.
             return not too_many_bytes(path) and _is_foreign_yaml(read_text(path))
         except (OSError, RobotFileError):
             return False  # whose reader says what is wrong with it
-    return True
+    return input_there(path) or not (path / "robot.yaml").is_file()
 
 
 @lru_cache(32)  # the same robots are read again and again

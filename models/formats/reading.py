@@ -14,6 +14,7 @@ import numpy as np
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import RobotFileError
 from cdpr_drake.schema.fields import LARGEST
+from cdpr_drake.schema.input_files import input_bytes, input_size
 from cdpr_drake.schema.json_text import load_json
 from cdpr_drake.schema.yaml_files import YamlTextError, load_yaml
 
@@ -30,10 +31,10 @@ def read_text(path: Path) -> str:
         RobotFileError: It cannot be read, or is larger than `MOST_BYTES`.
     """
     try:
-        size = path.stat().st_size
+        size = input_size(path)
         if size > MOST_BYTES:
             raise RobotFileError(f"{path}: found {size:,} bytes; accepted: at most {MOST_BYTES:,}")
-        content = path.read_bytes()
+        content = input_bytes(path)
     except OSError as problem:
         raise RobotFileError(f"{path}: cannot be read: {problem.strerror}") from problem
     try:

@@ -19,7 +19,9 @@ from cdpr_drake.errors import (
     TensionProblemError,
     TrajectoryError,
 )
+from cdpr_drake.models.camera_catalogue import load_camera
 from cdpr_drake.models.robot_holding import check_pulleys
+from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import check_pose, tension_problem
 from cdpr_drake.systems.controllers.force_tracking import check_force_control
@@ -48,10 +50,29 @@ from cdpr_drake.systems.scenarios.run_settings import ScenarioHeader
 from cdpr_drake.systems.scenarios.tension_control_scenario import TensionScenario
 from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
 from cdpr_drake.systems.worlds.checks import check_world
+from cdpr_drake.systems.worlds.world import make_world
 from cdpr_drake.tensions.methods import distribute
 
 FILE_LOOKS = 101
 """Instants at which the poses of a motion from a file are looked at."""
+
+
+def read_inputs(scenario: Scenario) -> None:
+    """Reads the files of users that a visual servo's run reads, so that `inputs_read_once` has
+    them: robot and believed robot, cameras, and the obstacles' meshes and models.
+
+    Raises:
+        CdprError: One cannot be read.
+    """
+    robot = load_robot(scenario.robot)
+    believed, asked = scenario.perturbations.believed_robot, scenario.camera
+    robots = [robot] if believed is None else [robot, load_robot(believed)]
+    models = {mount.model for each in robots for mount in each.cameras}
+    models |= {asked.model, scenario.perturbations.camera_model} - {None}
+    for model in sorted(models):
+        load_camera(model)
+    if scenario.world is not None:
+        make_world(scenario.world, robot)
 
 
 def _check_tension_scenario(scenario: TensionScenario, robot: Robot, path: Path) -> None:

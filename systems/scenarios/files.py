@@ -18,6 +18,7 @@ from cdpr_drake.models.mechanism_loader import load_mechanism
 from cdpr_drake.models.mechanism_schema import Mechanism
 from cdpr_drake.models.robot_loader import load_robot, robot_file
 from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.schema.input_files import input_text, input_there
 from cdpr_drake.schema.typed_yaml import closest, load_typed
 from cdpr_drake.schema.yaml_files import compose_yaml, too_many_bytes
 from cdpr_drake.systems.worlds.settings import WorldSettings
@@ -129,7 +130,7 @@ def _scalar(path: Path, key: str) -> yaml.ScalarNode | None:
     try:
         if too_many_bytes(path):
             return None
-        root = compose_yaml(path.read_text(encoding="utf-8"))
+        root = compose_yaml(input_text(path))
     except (OSError, ValueError):
         return None
     for name, value in root.value if isinstance(root, yaml.MappingNode) else ():
@@ -162,7 +163,7 @@ def resolve_robot_path(scenario_path: Path, robot: str) -> str:
 def resolve_file_path(scenario_path: Path, file: str) -> str:
     """The absolute path of a file that a scenario names, found as by `resolve_robot_path`."""
     beside = scenario_path.parent / file
-    return str((beside if beside.exists() else Path(file)).absolute())
+    return str((beside if input_there(beside) else Path(file)).absolute())
 
 
 def _resolve(scenario_path: Path, robot: str) -> str:

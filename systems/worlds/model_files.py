@@ -14,7 +14,9 @@ from pydrake.systems.framework import DiagramBuilder
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import WorldError
-from cdpr_drake.models.drake_parsing import drake_refusals, parse_models, try_mesh
+from cdpr_drake.models.drake_parsing import drake_refusals, named_files, parse_models, try_mesh
+from cdpr_drake.models.shapes import mesh_in_place
+from cdpr_drake.schema.input_files import input_bytes, input_path, input_there
 
 MESH_SUFFIXES = (".obj", ".gltf")
 MODEL_SUFFIXES = (".sdf", ".urdf")
@@ -52,10 +54,11 @@ def mesh_parts(file: str, scale: float, color: Array) -> tuple[Part, ...]:
     """
     _check_file(file, MESH_SUFFIXES)
     with drake_refusals(f"{file}: is no mesh that can be read", WorldError):
-        try_mesh(Path(file))
-        mesh = Mesh(file, scale)
+        place = mesh_in_place(Path(file))
+        try_mesh(place)
+        mesh = Mesh(str(place), scale)
         mesh.GetConvexHull()
-    coloured = file.lower().endswith(".gltf") or b"mtllib" in Path(file).read_bytes()
+    coloured = file.lower().endswith(".gltf") or b"mtllib" in input_bytes(Path(file))
     return (Part(mesh, RigidTransform(), None if coloured else color),)
 
 
@@ -73,7 +76,7 @@ def model_parts(file: str, color: Array) -> tuple[Part, ...]:
     builder = DiagramBuilder()
     plant, scene_graph = AddMultibodyPlantSceneGraph(builder, 0.0)
     with drake_refusals(f"{file}: is no model that can be read", WorldError):
-        instances = parse_models(Parser(plant), Path(file))
+        instances = parse_models(Parser(plant), input_path(Path(file), named_files(Path(file))))
         plant.Finalize()
     if len(instances) != 1:
         raise WorldError(f"{file}: found {len(instances)} models; accepted: one")
@@ -114,5 +117,5 @@ def _shown(
 def _check_file(file: str, suffixes: tuple[str, ...]) -> None:
     if not file.lower().endswith(suffixes):
         raise WorldError(f"found {file}; accepted: a file {' or '.join(suffixes)}")
-    if not Path(file).is_file():
+    if not input_there(Path(file)):
         raise WorldError(f"{file}: there is no such file")

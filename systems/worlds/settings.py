@@ -20,6 +20,7 @@ from cdpr_drake.schema.fields import (
     switch,
     text,
 )
+from cdpr_drake.schema.input_files import input_there
 from cdpr_drake.systems.worlds.motions import BodyMotion, JointedBody, PathBody, SteadyBody
 from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
 
@@ -211,7 +212,7 @@ class ContactSettings:
 def found_file(file: str, folder: Path) -> str:
     """A file's absolute path: in a folder, if it is there, else in that of work."""
     beside = folder / file
-    return str((beside if beside.is_file() else Path(file)).absolute())
+    return str((beside if input_there(beside) else Path(file)).absolute())
 
 
 @dataclass(kw_only=True)

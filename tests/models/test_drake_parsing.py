@@ -137,8 +137,9 @@ def test_what_includes_itself_is_refused(name, tmp_path, monkeypatch):
 
 
 def test_an_assertion_within_a_block_is_an_error_and_an_end_is_an_end():
-    with pytest.raises(RobotFileError, match="some: Failure at"), drake_parsing.drake_refusals(
-        "some"
+    with (
+        pytest.raises(RobotFileError, match="some: Failure at"),
+        drake_parsing.drake_refusals("some"),
     ):
         raise SystemExit("Failure at")
     with pytest.raises(SystemExit), drake_parsing.drake_refusals("some"):

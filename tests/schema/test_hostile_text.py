@@ -54,7 +54,15 @@ def test_yaml_says_what_it_said():
 
 @pytest.mark.parametrize(
     "text",
-    [f'{{"a": {LONG}}}', f"[-{LONG}]", "[" * 200 + "]" * 200, "[" * 100_000, "{", b"\xff\xff{}", ""],
+    [
+        f'{{"a": {LONG}}}',
+        f"[-{LONG}]",
+        "[" * 200 + "]" * 200,
+        "[" * 100_000,
+        "{",
+        b"\xff\xff{}",
+        "",
+    ],
     ids=["number", "negative", "deep", "deeper", "open", "bytes", "empty"],
 )
 def test_json_that_is_none_is_one_error(text):

@@ -1,0 +1,145 @@
+"""A result of many runs is of one robot: files that are changed on the way change nothing."""
+
+import hashlib
+import json
+import pickle
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import cdpr_drake as cdpr
+from cdpr_drake.analyses.simulation.monte_carlo import run_many, with_seeds
+from cdpr_drake.analyses.sweeps.worker_pool import with_inputs
+from cdpr_drake.models.camera_catalogue import load_camera
+from cdpr_drake.models.robot_loader import load_robot, robot_file
+from cdpr_drake.schema.input_files import (
+    InputFiles,
+    SentInputs,
+    input_path,
+    inputs_held,
+    inputs_read_once,
+)
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.worlds.model_files import mesh_parts
+from tests.models.formats.foreign_files import caspr
+
+SHORT = ["camera.kind=projected", "duration=0.1"]
+
+OBJ = "v -0.05 -0.05 -0.04\nv {x} 0 0\nv 0 0.1 0\nv 0 0 0.04\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
+
+
+def write_robot(file, mass=1.5):
+    text = robot_file("acrobot_small").read_text()
+    assert "  mass: 1.5\n" in text
+    file.write_text(text.replace("  mass: 1.5\n", f"  mass: {mass}\n"))
+    return file
+
+
+def tensions(runs):
+    return [record.summary["tension_n"] for record in runs.records]
+
+
+@pytest.fixture(scope="module")
+def light(tmp_path_factory):
+    """Tensions of two seeds with the light robot."""
+    file = write_robot(tmp_path_factory.mktemp("robot") / "mine.yaml")
+    return tensions(run_many(with_seeds(scenario(file), [1, 2]), 1))
+
+
+def scenario(file):
+    return load_scenario("acrobot_pbvs", [*SHORT, f"robot={file}"])
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_robot_that_is_edited_while_seeds_run_changes_nothing(workers, light, tmp_path):
+    file = write_robot(tmp_path / "mine.yaml")
+    asked = with_seeds(scenario(file), [1, 2])
+    runs = run_many(asked, workers, lambda progress: write_robot(file, 1.95))
+    assert tensions(runs) == light
+    heavy = tensions(run_many(asked, 1))
+    assert heavy != light  # so that the edit would have been seen
+
+
+def test_a_worker_with_another_file_there_computes_with_ours(light, tmp_path):
+    file = write_robot(tmp_path / "mine.yaml")
+    with inputs_read_once():
+        load_robot(file)
+        sent = pickle.dumps(with_inputs(load_robot))
+    write_robot(file, 1.95)
+    assert pickle.loads(sent)(file).platform.mass == 1.5
+    file.unlink()
+    assert pickle.loads(sent)(str(file)).platform.mass == 1.5
+    assert inputs_held() is None
+
+
+def corners(parts):
+    hull = parts[0].shape.GetConvexHull()
+    return np.array([hull.vertex(k) for k in range(hull.num_vertices())])
+
+
+def test_meshes_cameras_and_other_tools_files_are_read_once(tmp_path):
+    mesh, camera = tmp_path / "stone.obj", tmp_path / "lens.yaml"
+    mesh.write_text(OBJ.format(x=0.1))
+    shutil.copy(Path(cdpr.__file__).parent / "models" / "cameras" / "astra.yaml", camera)
+    folder = tmp_path / "toy"
+    folder.mkdir()
+    caspr(folder)
+
+    def read():
+        return (
+            corners(mesh_parts(str(mesh), 1.0, [1, 1, 1, 1])).max(),
+            load_camera(str(camera)).width,
+            load_robot(folder).platform.mass,
+            load_robot(folder / "toy_bodies.xml").platform.mass,
+        )
+
+    with inputs_read_once():
+        first = read()
+        sent = pickle.dumps(inputs_held())
+        mesh.write_text(OBJ.format(x=0.9))
+        camera.write_text(camera.read_text().replace("width: ", "width: 1", 1))
+        shutil.rmtree(folder)
+        assert read() == first
+    with inputs_read_once(pickle.loads(sent)):
+        assert read() == first
+    assert corners(mesh_parts(str(mesh), 1.0, [1, 1, 1, 1])).max() == 0.9
+
+
+def test_platform_meshes_are_those_that_were_read(tmp_path):
+    mesh = tmp_path / "body.obj"
+    mesh.write_text(OBJ.format(x=0.04))
+    file = write_robot(tmp_path / "mine.yaml")
+    shape = "  shape: {kind: mesh, file: body.obj, scale: 0.5, position: [0, 0, 0.035]}\n"
+    file.write_text(file.read_text().replace("  mass: 1.5\n", f"  mass: 1.5\n{shape}", 1))
+    with inputs_read_once():
+        shape = load_robot(file).platform.shape
+        first = shape.extent(np.zeros(3))[1]
+        mesh.write_text(OBJ.format(x=0.02))
+        again = load_robot(file).platform.shape.extent(np.zeros(3))[1]
+        assert shape.file == str(mesh)
+    np.testing.assert_array_equal(first, again)
+    assert load_robot(file).platform.shape.extent(np.zeros(3))[1][0] < first[0]
+
+
+def test_results_have_the_hash_of_what_was_read(tmp_path):
+    file = write_robot(tmp_path / "mine.yaml")
+    wanted = hashlib.sha256(file.read_bytes()).hexdigest()
+    cdpr.simulate("acrobot_pbvs", [*SHORT, f"robot={file}"], folder=tmp_path / "run")
+    told = json.loads((tmp_path / "run" / "inputs.json").read_text())
+    assert told == {"mine.yaml": {"sha256": wanted, "bytes": file.stat().st_size}}
+    cdpr.simulate("acrobot_pbvs", SHORT, folder=tmp_path / "ours")
+    assert not (tmp_path / "ours" / "inputs.json").exists()  # the code's version says those
+
+
+def test_files_of_the_package_are_read_where_they_are():
+    with inputs_read_once():
+        load_robot("acrobot_small")
+        assert inputs_held().hashes() == {}
+        assert input_path(robot_file("acrobot_small")) == robot_file("acrobot_small")
+
+
+def test_a_job_is_done_with_what_it_was_sent():
+    files = InputFiles()
+    assert SentInputs(lambda job: (job, inputs_held() is files), files)(3) == (3, True)
