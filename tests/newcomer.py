@@ -4,7 +4,9 @@ Takes the commands and programs of README, first pages, some guides, `cdpr` alon
 and runs them one by one, each page in an empty folder, with an empty cache of kernels. `--fresh`
 begins where the README does: a clone, a new environment, `pip install`. There a step that names an
 extra which it needs is played again with it. Each step has a row with its processor time, that of
-its own processes included. `said.txt` has all that steps print.
+its own processes included. `said.txt` has all that steps print. `--robot FILE` plays the first steps
+with a robot of one's own instead: from `cdpr new` to a rendered servo that arrives, without a word
+about other robots.
 """
 
 from __future__ import annotations
@@ -139,6 +141,47 @@ def example_steps(folder: Path) -> Iterator[Step]:
         yield Step(page="examples", words=f"python {path.name}", program=text)
 
 
+OWN_ROBOT = ROOT / "tests" / "own_robot.yaml"
+"""A robot that does not ship."""
+
+SHIPPED_SCENARIOS_OF = ("acrobot", "caroca")
+"""Robots of the scenarios that ship; who has another robot must not read of them."""
+
+
+def robot_steps(robot: Path) -> Iterator[Step]:
+    """What the owner of a robot does first: from `cdpr new` to a rendered servo."""
+    own, page = "mine.yaml", "own robot"
+    program = (
+        "import cdpr_drake as cdpr\n"
+        f'robot = cdpr.load_robot("{own}")\n'
+        'scenario = cdpr.load_scenario("approach.yaml")\n'
+        "pose = getattr(scenario, 'initial_pose', None) or scenario.trajectory.start\n"
+        "lengths = cdpr.solve_inverse_kinematics(robot, pose).lengths\n"
+        "print(cdpr.solve_forward_kinematics(robot, lengths, guess=pose))\n"
+        "print(robot.wrench_matrix(pose).shape)\n"
+        "print(cdpr.solve_tensions(robot, pose))\n"
+        "cdpr.plot(robot).savefig('robot.png')\n"
+    )
+    words = f"cdpr new robot mine --from {shlex.quote(str(robot))}"
+    yield Step(page=page, words=words)
+    for words in (f"check {own}", f"static {own}", f"tension {own}"):
+        yield Step(page=page, words=f"cdpr {words}")
+    yield Step(page=page, words=f"cdpr workspace {own} --kind static --out where")
+    yield Step(page=page, words=f"cdpr new scenario approach --robot {own}")
+    yield Step(page=page, words=f"programs of {page}", program=program)
+    yield Step(page=page, words="cdpr check approach.yaml")
+    yield Step(page=page, words="cdpr simulate approach.yaml --out run")
+
+
+def misleading(robot: Path, said: str) -> str:
+    """A shipped robot that is named although the robot is another one; empty: none is."""
+    own = robot.read_text(encoding="utf-8", errors="replace").lower() if robot.is_file() else ""
+    for name in SHIPPED_SCENARIOS_OF:
+        if name in said.lower() and name not in own:
+            return f"names {name}, another robot"
+    return ""
+
+
 def template_steps() -> Iterator[Step]:
     """Templates: written, then run."""
     for kind in ("controller", "estimator", "study"):
@@ -157,14 +200,16 @@ class Player:
         *,
         cache: Path | None = None,
         clone: Path | None = None,
+        robot: Path | None = None,
     ) -> None:
         """With the environment at a prefix, below a folder, for so long a step at most [s].
 
         Kernels are kept in a folder of its own, as a newcomer has none, or in a given one. Extras
-        are installed from a clone; without one, a step that needs another extra fails.
+        are installed from a clone; without one, a step that needs another extra fails. With a robot
+        of one's own, a step that names a robot that ships fails.
         """
         self._bin, self._out, self._patience = prefix / "bin", out, patience
-        self._clone = clone
+        self._clone, self._robot = clone, robot
         self._variables = os.environ | {
             "MPLBACKEND": "Agg", "COLUMNS": "100", "BROWSER": "true",
             "NUMBA_CACHE_DIR": str(cache or out / "cache"),
@@ -205,9 +250,12 @@ class Player:
             path.unlink()
         with (self._out / "said.txt").open("a", encoding="utf-8") as transcript:
             transcript.write("\n".join([f"\n$ {step.words}   [{step.page}]", *said]))
+        why = why or problem_of(step, code, *said)
+        if self._robot is not None:
+            why = why or misleading(self._robot, "\n".join(said))
         played = Played(
             page=step.page, words=step.words, processor=used, wall=time.monotonic() - began,
-            problem=why or problem_of(step, code, *said),
+            problem=why,
         )  # fmt: skip
         return played, "\n".join(said)
 
@@ -315,6 +363,9 @@ def main(given: Sequence[str] | None = None) -> int:
     parser.add_argument("--out", type=Path, required=True, help="an empty or new folder")
     parser.add_argument("--fresh", action="store_true", help="clone and install first")
     parser.add_argument("--only", default="", help="pages whose name has these letters")
+    parser.add_argument(
+        "--robot", type=Path, help="play the first steps with this robot's file instead of pages"
+    )
     options = parser.parse_args(given)
     out = options.out.resolve()
     if out.exists() and any(out.iterdir()):
@@ -324,8 +375,9 @@ def main(given: Sequence[str] | None = None) -> int:
     if options.fresh:
         prefix, installed = fresh_environment(out)
         rows.append(installed)
-    player = Player(prefix, out, clone=prefix.parent if options.fresh else None)
-    for step in all_steps():
+    robot = None if options.robot is None else options.robot.resolve()
+    player = Player(prefix, out, clone=prefix.parent if options.fresh else None, robot=robot)
+    for step in all_steps() if robot is None else robot_steps(robot):
         if options.only in step.page and not (rows and rows[0].problem and options.fresh):
             rows.append(player.play(step))
             state = "FAILS" if rows[-1].problem else "     "

@@ -13,6 +13,7 @@ from cdpr_drake.analyses.reporting.provenance import package_versions
 from cdpr_drake.analyses.simulation.adaptation_report import adaptation_summary
 from cdpr_drake.analyses.simulation.pan_tilt_report import pan_tilt_summary
 from cdpr_drake.analyses.simulation.run_stability import stability_of_run
+from cdpr_drake.analyses.simulation.unexpected_end import servo_message
 from cdpr_drake.analyses.simulation.visual_servo_run import RunResult
 from cdpr_drake.analyses.simulation.worlds import world_summary
 from cdpr_drake.analyses.simulation.wrench_report import wrench_summary
@@ -140,6 +141,8 @@ def summarize(result: RunResult) -> dict[str, Any]:
         "images": _images(result),
         "seed": scenario.seed,
         **result.ending(),
+        "message": result.message
+        or servo_message(servo, scenario, log, result.outcome, (position_error, rotation_error)),
         "final_position_error_m": position_error,
         "final_rotation_error_rad": rotation_error,
         "final_pose_estimate_error_m": float(estimate_distance[-1]),

@@ -37,6 +37,7 @@ from cdpr_drake.analyses.simulation.session import (
     check_connected,
     resting,
 )
+from cdpr_drake.analyses.simulation.unexpected_end import tension_control_message
 from cdpr_drake.analyses.simulation.worlds import (
     world_columns,
     world_figure,
@@ -253,6 +254,10 @@ def summarize_tension_run(run: TensionRun) -> dict[str, Any]:
         "method": scenario.distribution.method,
         "seed": scenario.seed,
         **run.ending(),
+        "message": run.message
+        or tension_control_message(
+            scenario, run.outcome, tension_end_error(run), int(log["failures"][-1, 0])
+        ),
         "position_error_m": spread(distance) | {"final": float(distance[-1])},
         "rotation_error_rad": spread(angle) | {"final": float(angle[-1])},
         "tension_n": {

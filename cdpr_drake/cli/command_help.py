@@ -18,7 +18,7 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
     "scenarios": ("Robots and scenarios", "cdpr scenarios", "cdpr scenarios --json"),
     "new": (
         "Robots and scenarios",
-        "cdpr new scenario mine --from caroca_ibvs",
+        "cdpr new scenario mine --robot caroca",
         "cdpr new controller mine",
     ),
     "check": (

@@ -107,7 +107,7 @@ def measure_run(case: Case, seed: int) -> dict[str, Any]:
     summary = summarize(result)
     return {
         "outcome": summary["outcome"],
-        "message": summary["message"],
+        "message": result.message,
         **_metrics(summary, traces),
         **{name: metric.of(traces) for name, metric in recipe.own.items()},
         "summary": {name: value for name, value in summary.items() if name not in LEFT_OUT},
