@@ -106,6 +106,7 @@ class Run(Tabulated):
         rows = [("simulated", f"{told['sim_time_s']:.2f} s of {moved}")]
         if "engine" in told:
             rows.append(("engine, loop", f"{told['engine']}, {told['loop']}"))
+        rows.append(("cables", told["geometry"]))
         rows += self.facts()[:6]
         rows.append(("folder", "none" if self.folder is None else str(self.folder)))
         return f"Run of {told['scenario']}: {told['outcome']}", rows

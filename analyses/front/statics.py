@@ -76,7 +76,8 @@ class RobotEquilibria(EquilibriaReport):
 
         some = self.rests[:SHOWN]
         poses = {f"{k + 1}: {one.stability}": one.X_WP for k, one in enumerate(some)}
-        title = f"{self.robot}: {len(self.rests)} poses of rest, {self.model} cables"
+        what = f"{len(self.rests)} poses of rest, {self.model} cables, {self.geometry}"
+        title = f"{self.robot}: {what}"
         slack = [np.asarray(one.tensions) <= 0.0 for one in some]
         return poses_figure(title, self.loaded, poses, slack)
 
@@ -89,11 +90,13 @@ class PoseFromLengths(Summarized):
         robot: The robot.
         lengths: What was given, shape (m,) [m].
         fit: The pose with its residuals, Jacobian, `covariance` and `condition`.
+        geometry: Geometry of the cables, as `Robot.geometry_words`.
     """
 
     robot: Robot
     lengths: Array
     fit: PoseFit
+    geometry: str
 
     @property
     def X_WP(self) -> RigidTransform:
@@ -109,6 +112,7 @@ class PoseFromLengths(Summarized):
         """For JSON; keys end in units."""
         return {
             "robot": self.robot.name,
+            "geometry": self.geometry,
             "lengths_m": self.lengths.tolist(),
             "position_m": self.X_WP.translation().tolist(),
             "angles_deg": np.degrees(angles_from_rotation(self.X_WP.rotation())).tolist(),
@@ -120,7 +124,7 @@ class PoseFromLengths(Summarized):
         """The robot at the pose."""
         from cdpr_drake.analyses.visualization.path_figures import poses_figure
 
-        title = f"{self.robot.name}: pose from cable lengths"
+        title = f"{self.robot.name}: pose from cable lengths, {self.geometry}"
         return poses_figure(title, self.robot, {"platform": self.X_WP})
 
     def summary(self) -> tuple[str, list[tuple[str, str]]]:
@@ -128,6 +132,7 @@ class PoseFromLengths(Summarized):
         angles = np.degrees(angles_from_rotation(self.X_WP.rotation()))
         worst = float(np.max(np.abs(self.residuals)))
         return f"Pose of {self.robot.name} from its cable lengths", [
+            ("geometry", self.geometry),
             ("position [m]", numbers(self.X_WP.translation(), 5)),
             ("angles [deg]", numbers(angles)),
             ("residuals", f"at most {1e3 * worst:.2g} mm, in {self.fit.steps} steps"),
@@ -190,7 +195,8 @@ def find_equilibria(
         position: Instead of lengths: where Po is, in W, shape (3,) [m].
         taut: Names of the cables that hold it at the position, all others slack; None: all.
         model: inextensible: all poses, from fixed exit points; elastic: searched.
-        pulleys: Whether elastic cables run over the robot's pulleys.
+        pulleys: True: elastic cables run over the robot's pulleys. False: pulleys are ignored, as
+            always for inextensible cables; the result names its geometry.
         searches: Largest number of searches, of elastic cables.
         seed: Of their random starts.
         report: Called with work done and in all.
@@ -249,11 +255,11 @@ def solve_forward_kinematics(
     Source: servoing thesis, section 2.2.3.
     """
     loaded = as_robot(robot, "solve_forward_kinematics")
-    cables = loaded.cable_set() if pulleys else loaded.cable_set().without_pulleys()
+    cables, words = loaded.cable_set(pulleys), loaded.geometry_words(pulleys)
     start: RigidTransform = as_pose(loaded, guess)
     solver = ForwardKinematics(cables, loaded.motion_type())
     given = _checked_lengths(loaded, lengths)
-    return PoseFromLengths(loaded, given, solver.pose(given, start))
+    return PoseFromLengths(loaded, given, solver.pose(given, start), words)
 
 
 def _check_model(model: str, models: Collection[str]) -> None:

@@ -13,7 +13,11 @@ from pydrake.math import RotationMatrix
 from pydrake.multibody.tree import QuaternionFloatingJoint
 
 from cdpr_drake.analyses.reporting.deferred_figures import Pictures
-from cdpr_drake.analyses.simulation.mechanism_run import MechanismRun, first_commanded
+from cdpr_drake.analyses.simulation.mechanism_run import (
+    MechanismRun,
+    first_commanded,
+    mechanism_geometry,
+)
 from cdpr_drake.analyses.visualization.cable_figures import cable_figure
 from cdpr_drake.analyses.visualization.curves import by_pieces, draw_curve, phase_of, shade
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS, figure_writers
@@ -36,7 +40,7 @@ def _title(run: MechanismRun, words: str) -> str:
     how = "on winches"
     if control.kind == COMPUTED_TORQUE:
         how = f"computed torque, tensions by the {control.method.replace('_', ' ')}"
-    lines = words, scenario.title, f"({scenario.name}, {how})"
+    lines = words, scenario.title, f"({scenario.name}, {mechanism_geometry(run)}, {how})"
     return "\n".join(line for line in lines if line)
 
 

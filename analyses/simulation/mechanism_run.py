@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.analysis import Simulator
 
 from cdpr_drake.analyses.reporting.log_files import (
@@ -33,6 +34,7 @@ from cdpr_drake.analyses.simulation.start_checks import check_length
 from cdpr_drake.analyses.visualization.curves import by_pieces
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CableGeometryError
+from cdpr_drake.models.mechanism_in_plant import add_mechanism
 from cdpr_drake.systems.diagrams.mechanism_control import (
     MechanismFollower,
     build_mechanism_follower,
@@ -154,6 +156,14 @@ def mechanism_end_error(run: MechanismRun) -> tuple[float, float]:
     return float(max(e[0] for e in errors)), float(max(e[1] for e in errors))
 
 
+def mechanism_geometry(run: MechanismRun) -> str:
+    """Geometry of the cables in words, as `CableSet.geometry_words`."""
+    plant = MultibodyPlant(0.0)
+    added = add_mechanism(plant, run.follower.mechanism)
+    added.finalize()
+    return added.routes().ends.geometry_words(run.scenario.cables.pulleys)
+
+
 def summarize_mechanism_run(run: MechanismRun) -> dict[str, Any]:
     """The summary of a run, for `summary.json`."""
     scenario, follower, log = run.scenario, run.follower, run.log
@@ -167,6 +177,7 @@ def summarize_mechanism_run(run: MechanismRun) -> dict[str, Any]:
         "scenario": scenario.name,
         "kind": scenario.kind,
         "mechanism": follower.mechanism.name,
+        "geometry": mechanism_geometry(run),
         "control": control.kind,
         "method": control.method if rest is None else None,
         **run.ending(),

@@ -108,7 +108,8 @@ def live_view(scenario: PickAndPlaceScenario, meshcat: Meshcat) -> Prepare:
 
 def _title(run: PickAndPlaceRun, words: str) -> str:
     scenario = run.scenario
-    seen = f"{scenario.camera.kind} cameras, seed {scenario.seed}"
+    geometry = scenario.cables.geometry_words(run.built.robot)
+    seen = f"{geometry}, {scenario.camera.kind} cameras, seed {scenario.seed}"
     return f"{words}\n{scenario.title}\n({scenario.name}, {seen}, {run.outcome.name.lower()})"
 
 

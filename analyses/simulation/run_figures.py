@@ -110,7 +110,8 @@ def run_figures(result: RunResult, formats: Sequence[str] = DEFAULT_FORMATS) -> 
 def _title(result: RunResult, words: str) -> str:
     """What the figure shows, and below what the run was."""
     scenario = result.servo.scenario
-    run = f"{scenario.name}, {scenario.camera.kind} camera, seed {scenario.seed}"
+    geometry = scenario.cables.geometry_words(result.servo.robot)
+    run = f"{scenario.name}, {geometry}, {scenario.camera.kind} camera, seed {scenario.seed}"
     return f"{words}\n{scenario.title}\n({run})"
 
 

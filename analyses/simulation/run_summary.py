@@ -134,6 +134,7 @@ def summarize(result: RunResult) -> dict[str, Any]:
     summary: dict[str, Any] = {
         "scenario": scenario.name,
         "robot": servo.robot.name,
+        "geometry": scenario.cables.geometry_words(servo.robot, scenario.controller.pulleys),
         "controller": scenario.controller.scheme if scenario.open_loop is None else "open_loop",
         "servo_switches": int(log["servo_mode"][-1, 1]) if "servo_mode" in log else None,
         "estimator": scenario.estimator.kind,

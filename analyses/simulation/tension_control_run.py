@@ -241,6 +241,13 @@ def make_simulator(control: TensionControl, scenario: TensionScenario) -> Simula
     )
 
 
+def geometry_words(run: TensionRun) -> str:
+    """Geometry of the cables, as `Robot.geometry_words`, and of those of the distribution."""
+    scenario = run.scenario
+    settings = CableSettings(pulleys=scenario.cables.pulleys)
+    return settings.geometry_words(run.control.robot, scenario.distribution.pulleys)
+
+
 def summarize_tension_run(run: TensionRun) -> dict[str, Any]:
     """The summary of a run, for `summary.json`."""
     log, scenario = run.log, run.scenario
@@ -250,6 +257,7 @@ def summarize_tension_run(run: TensionRun) -> dict[str, Any]:
         "scenario": scenario.name,
         "kind": scenario.kind,
         "robot": run.control.robot.name,
+        "geometry": geometry_words(run),
         "controller": "computed_torque" if scenario.predictive is None else "predictive",
         "method": scenario.distribution.method,
         "seed": scenario.seed,
@@ -294,7 +302,8 @@ def _title(run: TensionRun, words: str) -> str:
     """What the figure shows, and below what the run was."""
     scenario = run.scenario
     method = scenario.distribution.method.replace("_", " ")
-    return f"{words}\n{scenario.title}\n({scenario.name}, tensions by the {method})"
+    how = f"{scenario.name}, tensions by the {method}, {geometry_words(run)}"
+    return f"{words}\n{scenario.title}\n({how})"
 
 
 def error_figure(run: TensionRun) -> Figure:

@@ -21,6 +21,9 @@ from cdpr_drake.statics.inextensible_problem import EquilibriumPose, HangingPlat
 from cdpr_drake.statics.real_solutions import PathCount
 from cdpr_drake.summaries import Summarized, numbers
 
+FIXED = "pulleys ignored: all poses are found for cables from fixed exit points only"
+"""Geometry of poses that are enumerated, for a robot with pulleys."""
+
 Report = Callable[[int, int], object]
 
 SHOWN = 6
@@ -165,7 +168,7 @@ def elastic_equilibria(
     if not found.stopped:
         words += "; the stopping rule asks for more searches"
     given = np.asarray(l0, float)
-    return replace(_report(robot, platform, found.rests, given, evidence, words), model="elastic")
+    return _report(robot, platform, found.rests, given, evidence, words, "elastic")
 
 
 def equilibria_with_position(robot: Robot, p_WP: Array, taut: list[int]) -> EquilibriaReport:
@@ -214,12 +217,15 @@ def _report(
     lengths: Array | None,
     evidence: dict[str, Any],
     words: str,
+    model: str = "inextensible",
 ) -> EquilibriaReport:
     over = platform.cables.has_pulleys()
     geometry = robot.geometry_words(over)
+    if robot.cable_set().has_pulleys() and not over and model == "inextensible":
+        geometry = FIXED
     needed = [cable_paths(one.X_WP, platform.cables).lengths for one in rests]
     return EquilibriaReport(
-        robot=robot.name, names=[cable.name for cable in robot.cables], model="inextensible",
+        robot=robot.name, names=[cable.name for cable in robot.cables], model=model,
         pulleys=over, geometry=geometry, lengths=lengths, rests=rests, needed=needed,
         evidence=evidence, words=words,
     )  # fmt: skip

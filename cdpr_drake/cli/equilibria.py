@@ -48,7 +48,11 @@ def equilibria(
         ),
     ] = "inextensible",
     pulleys: Annotated[
-        bool, typer.Option(help="Elastic cables run over the robot's pulleys.")
+        bool,
+        typer.Option(
+            help="Take the robot's pulleys into account, for elastic cables; --no-pulleys ignores "
+            "them, as inextensible cables always do."
+        ),
     ] = True,
     searches: Annotated[
         int, typer.Option(help="Largest number of searches, for elastic cables.")
@@ -87,10 +91,10 @@ def equilibria(
 
 def _print(report: EquilibriaReport) -> None:
     console = wide_console(150)
-    kind = "over pulleys" if report.pulleys else "from fixed exit points"
     count = len(report.rests)
     console.print(
-        f"{report.robot}: {count} pose{'s' * (count != 1)} of rest, {report.model} cables {kind}"
+        f"{report.robot}: {count} pose{'s' * (count != 1)} of rest, {report.model} cables, "
+        f"{report.geometry}"
     )
     table = Table(box=SIMPLE_HEAD)
     for heading in ("position [m]", "angles [deg]", "stability", "energy [J]"):

@@ -368,6 +368,7 @@ def _print_summary(found: Run, folder: Path, as_json: bool) -> None:
     table = Table(title=f"{summary['scenario']}: {summary['outcome']}", show_header=False)
     factor = summary["realtime_factor"] or 0.0
     table.add_row("simulated", f"{summary['sim_time_s']:.2f} s, {factor:.1f} x real time")
+    table.add_row("cables", summary["geometry"])
     for label, words in found.facts():
         table.add_row(label, words)
     table.add_row("results", str(folder))

@@ -101,6 +101,8 @@ def sample_equilibria(
     give = 1.0 / platform.cables.stiffness * elastic
     for start in starts or []:
         reached = cable_paths(start, platform.cables).lengths >= l0 - JUST_TAUT
+        if not np.any(reached):  # all hang loose: the platform is below, on any of them
+            reached[:] = True
         one = _search(platform, l0, start, reached, give)
         if one is not None and not _known(one, found):
             found.append(one)

@@ -59,6 +59,19 @@ class CableSettings:
         """
         return self.model or (robot and robot.cable_model) or KELVIN_VOIGT
 
+    def geometry_words(self, robot: Robot, believed: bool | None = None) -> str:
+        """Geometry of a run in words, as every result names it, see `Robot.geometry_words`.
+
+        Args:
+            robot: The robot.
+            believed: Whether the controller's model has the robot's pulleys; None: as the
+                simulated cables.
+        """
+        words = robot.geometry_words(self.pulleys)
+        if believed is None or robot.geometry_words(believed) == words:
+            return words
+        return f"{words}; in the controller's model {robot.geometry_words(believed)}"
+
     def cable_set(self, robot: Robot) -> CableSet:
         """The cables of a robot, over its pulleys or from fixed exit points.
 

@@ -24,6 +24,7 @@ class PoseAnswer:
     Attributes:
         robot: The robot.
         X_WP: The pose.
+        geometry: Geometry of the cables, as `Robot.geometry_words`.
         method: Which distributed the tensions.
         methods: Names of those that take this robot.
         status: Of the tensions, in words.
@@ -41,6 +42,7 @@ class PoseAnswer:
 
     robot: Robot
     X_WP: RigidTransform
+    geometry: str
     method: str
     methods: list[str]
     status: str
