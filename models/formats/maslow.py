@@ -89,7 +89,7 @@ def _others(content: dict[str, Any], draft: RobotDraft) -> None:
     read = {f"{corner}{axis}" for corner in MASLOW_CORNERS for axis in "XYZ"} | set(_EXTRA)
     kinematics = content.get("kinematics")
     left = []
-    for key, value in content.items():
+    for key in content:
         if key == "kinematics" and isinstance(kinematics, dict):
             own = kinematics.get(MASLOW_SECTION)
             left += [f"{key}.{other}" for other in kinematics if other != MASLOW_SECTION]

@@ -219,9 +219,7 @@ def _without_balls(root: ET.Element) -> int:
     return found
 
 
-def _place_floating(
-    path: Path, root: ET.Element, plant: MultibodyPlant, context: Context
-) -> None:
+def _place_floating(path: Path, root: ET.Element, plant: MultibodyPlant, context: Context) -> None:
     """Puts bodies where floating joints of URDF have them; Drake leaves such bodies free."""
     found: dict[str, tuple[str, RigidTransform]] = {}
     for joint in root.findall("joint"):

@@ -14,6 +14,7 @@ import yaml
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import RobotFileError
+from cdpr_drake.schema.fields import NAME
 
 MOST_BYTES = 4_194_304
 """Of a file of another tool; the largest that is known has 60 kB."""
@@ -216,6 +217,14 @@ def robot_name(words: str) -> str:
     """A name that a folder can have, from any words."""
     name = re.sub(r"[^A-Za-z0-9]+", "_", words).strip("_").lower()
     return name or "robot"
+
+
+def cable_name(words: str, place: int) -> str:
+    """A name that a cable can have here, from any words; C and its place where none is left."""
+    if re.fullmatch(NAME, words):
+        return words
+    name = re.sub(r"[^A-Za-z0-9_.-]+", "_", words).strip("_.-")[:64]
+    return name or f"C{place}"
 
 
 def near_file(path: Path) -> Path | None:
