@@ -450,14 +450,10 @@ def _check_sizes(robot: Robot, fail: Callable[[str, object, str], None]) -> None
 def point_notes(robot: Robot) -> list[str]:
     """Remarks on exit points outside a given frame, and anchor points outside the platform's box."""
     half, center = np.asarray(robot.platform.size, float) / 2.0, robot.box_center()
+    low, high = center - half, center + half
     boxes = {
         "exit points": (robot.exit_points(), *robot.frame.bounds(), "the frame"),
-        "anchor points": (
-            robot.anchor_points(),
-            center - half,
-            center + half,
-            "the platform's box",
-        ),
+        "anchor points": (robot.anchor_points(), low, high, "the platform's box"),
     }
     notes = []
     for what, (points, lower, upper, where) in boxes.items():
