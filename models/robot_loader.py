@@ -448,7 +448,7 @@ def _check_sizes(robot: Robot, fail: Callable[[str, object, str], None]) -> None
 
 
 def point_notes(robot: Robot) -> list[str]:
-    """Remarks on exit points outside a given frame, and anchor points outside the platform's box."""
+    """Remarks on exit points outside a given frame, anchor points outside the platform's box."""
     half, center = np.asarray(robot.platform.size, float) / 2.0, robot.box_center()
     low, high = center - half, center + half
     boxes = {
