@@ -14,6 +14,9 @@ from typing import Any
 TEXT = "text()"
 """Stands for the text of an element among its attributes."""
 
+_PLAIN: Any = vars(ET.Element)["text"]
+"""The text of an element as the standard library has it."""
+
 MOST_NAMED = 40
 """Parts of a file that a remark names; of more it says how many."""
 
@@ -29,18 +32,19 @@ class WatchedElement(ET.Element):
         self.used: set[str] = set()
 
     @property
-    def text(self) -> str | None:  # type: ignore[override]
+    def text(self) -> str | None:
         """Its text, which counts as used from then on."""
         self.used.add(TEXT)
         return self.bare_text()
 
     @text.setter
     def text(self, value: str | None) -> None:
-        ET.Element.text.__set__(self, value)  # type: ignore[attr-defined]
+        _PLAIN.__set__(self, value)
 
     def bare_text(self) -> str | None:
         """Its text, not counted as used."""
-        return ET.Element.text.__get__(self)  # type: ignore[attr-defined, no-any-return]
+        found: str | None = _PLAIN.__get__(self)
+        return found
 
     def get(self, key: str, default: Any = None) -> Any:
         """An attribute, which counts as used from then on."""
