@@ -59,7 +59,7 @@ class EndPulley:
 class MechanismCable:
     """One cable, from a point in a frame, through eyelets, to a point in a frame."""
 
-    name: str = text("Name, once in a mechanism.")
+    name: str = file_name("Name, once in a mechanism.")
     exit_point: np.ndarray = array("Exit point in `exit_frame`.", "m", (3,))
     exit_frame: str = text(
         "Frame or body of the exit point, as model::frame, or as frame where that is one.", WORLD

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,6 +23,7 @@ from pydrake.multibody.tree import (
     RigidBody,
     RotationalInertia,
     SpatialInertia,
+    UniformGravityFieldElement,
     UnitInertia,
 )
 from pydrake.systems.framework import Context
@@ -33,6 +35,8 @@ from cdpr_drake.geometry.poses import euclidean_length
 from cdpr_drake.models.mechanism_files import single_platform
 from cdpr_drake.models.mechanism_schema import Mechanism
 from cdpr_drake.models.robot_schema import SHAPE_INERTIA, Robot
+
+_LOG = logging.getLogger(__name__)
 
 _PLATFORM_COLOR = np.array([0.25, 0.45, 0.75, 1.0])
 
@@ -189,7 +193,8 @@ def add_robot(plant: MultibodyPlant, robot: Robot, name: str | None = None) -> R
     point mass on a line a prismatic one named "line", in the frames of `PlatformJoint`. Without
     collision geometry: the platform passes through what it meets, unless `systems.add_contact` is
     called. The cables are a system of their own, `systems.CableForces`. The plant's gravity is set
-    to the robot's; the default pose is the robot's home pose.
+    to the robot's, with a warning in the log if that changes it for other bodies, or from a value
+    that was set before; the default pose is the robot's home pose.
 
     Args:
         plant: Continuous MultibodyPlant; registered with a SceneGraph, it also shows the platform.
@@ -206,7 +211,7 @@ def add_robot(plant: MultibodyPlant, robot: Robot, name: str | None = None) -> R
         raise single_platform(robot.name, "add_robot")
     instance = plant.AddModelInstance(name or robot.name)
     body = plant.AddRigidBody("platform", instance, platform_inertia(robot))
-    plant.mutable_gravity_field().set_gravity_vector(robot.gravity_vector())
+    _set_gravity(plant, robot)
     moves = robot.joint()
     if moves.is_floating:
         plant.SetDefaultFloatingBaseBodyPose(body, robot.home.transform())
@@ -216,6 +221,20 @@ def add_robot(plant: MultibodyPlant, robot: Robot, name: str | None = None) -> R
         X_PShape, shape = platform_shape(robot)
         plant.RegisterVisualGeometry(body, X_PShape, shape, "platform", _PLATFORM_COLOR)
     return RobotInPlant(robot, plant, instance, body.index())
+
+
+def _set_gravity(plant: MultibodyPlant, robot: Robot) -> None:
+    """Gives a plant a robot's gravity; warns where that was another one for a reason."""
+    before = np.array(plant.gravity_field().gravity_vector())
+    usual = np.array([0.0, 0.0, -UniformGravityFieldElement.kDefaultStrength])
+    others = plant.num_bodies() > 2  # besides the world and this platform
+    after = robot.gravity_vector()
+    if not np.array_equal(before, after) and (others or not np.array_equal(before, usual)):
+        _LOG.warning(
+            "gravity of the whole plant: was (%g, %g, %g), is now that of %s, (%g, %g, %g) m/s^2",
+            *before, robot.name, *after,
+        )  # fmt: skip
+    plant.mutable_gravity_field().set_gravity_vector(after)
 
 
 def find_robot(plant: MultibodyPlant, robot: Robot, name: str | None = None) -> RobotInPlant:

@@ -35,7 +35,7 @@ from cdpr_drake.models.mechanism_files import (
 )
 from cdpr_drake.models.mechanism_schema import Mechanism
 from cdpr_drake.models.robot_schema import SHAPE_INERTIA, Robot
-from cdpr_drake.models.shapes import check_shapes
+from cdpr_drake.models.shapes import FITS, check_shapes
 from cdpr_drake.schema.input_files import (
     input_bytes,
     input_text,
@@ -466,6 +466,27 @@ def _check_sizes(robot: Robot, fail: Callable[[str, object, str], None]) -> None
     home, (lower, upper) = robot.home.position, robot.frame.bounds()
     if np.any(home < lower) or np.any(home > upper):
         fail("home.position", _words(home), f"within the frame, {_words(lower)} to {_words(upper)}")
+
+
+def point_notes(robot: Robot) -> list[str]:
+    """Remarks on exit points outside a given frame, anchor points outside the platform's box."""
+    half, center = np.asarray(robot.platform.size, float) / 2.0, robot.box_center()
+    low, high = center - half, center + half
+    boxes = {
+        "exit points": (robot.exit_points(), *robot.frame.bounds(), "the frame"),
+        "anchor points": (robot.anchor_points(), low, high, "the platform's box"),
+    }
+    notes = []
+    for what, (points, lower, upper, where) in boxes.items():
+        off = np.maximum(lower[:, np.newaxis] - points, points - upper[:, np.newaxis]).max(axis=0)
+        slack = FITS * float(np.max(robot.frame.upper - robot.frame.lower))
+        names = [cable.name for cable, d in zip(robot.cables, off, strict=True) if d > slack]
+        if names:
+            notes.append(
+                f"{what} of {', '.join(names)}: up to {off.max():.3g} m outside {where}, "
+                f"{_words(lower)} to {_words(upper)} m"
+            )
+    return notes
 
 
 def _check_winches(robot: Robot, fail: Callable[[str, object, str], None]) -> None:

@@ -135,7 +135,7 @@ class TensionBounds:
 class Cable:
     """One cable: where it leaves the frame and where it holds the platform."""
 
-    name: str = text("Name, once in a robot.")
+    name: str = file_name("Name, once in a robot.")
     exit_point: np.ndarray = array("Exit point A in W.", "m", (3,))
     anchor_point: np.ndarray = array("Anchor point B in P.", "m", (3,))
     swivel_axis: np.ndarray | None = array(

@@ -21,7 +21,13 @@ from cdpr_drake.models.mechanism_files import MECHANISM_KEY, SCENARIO_KEY
 from cdpr_drake.models.mechanism_loader import load_mechanism
 from cdpr_drake.models.robot_exchange import import_robot
 from cdpr_drake.models.robot_holding import hold_robot
-from cdpr_drake.models.robot_loader import load_robot, names_mechanism, robot_file, robot_names
+from cdpr_drake.models.robot_loader import (
+    load_robot,
+    names_mechanism,
+    point_notes,
+    robot_file,
+    robot_names,
+)
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.scenarios.files import scenario_file, scenario_names
 
@@ -49,19 +55,20 @@ def _read(path: Path) -> tuple[str, list[str]]:
     if is_foreign(path):
         imported = import_robot(path)
         assumed = [f"assumed {key}: {words}" for key, words in imported.completed.assumed.items()]
-        return f"robot, {imported.tool}", assumed + list(imported.completed.remarks)
+        told = [*assumed, *imported.completed.remarks, *point_notes(imported.robot)]
+        return f"robot, {imported.tool}", told
     if _is_scenario(path):
         load_scenario(str(path))
         return "scenario", []
     if names_mechanism(path):
         return "mechanism", _mechanism_notes(path)
     robot = load_robot(str(path))
-    cables = robot.cable_set()
+    notes = point_notes(robot)
     try:
-        hold_robot(robot, robot.home.transform(), cables, "elastic")
+        hold_robot(robot, robot.home.transform(), robot.cable_set(), "elastic")
     except CdprError as problem:
-        return "robot", [f"the home pose: {problem}"]
-    return "robot", []
+        notes.append(f"the home pose: {problem}")
+    return "robot", notes
 
 
 def _file_of(path: Path) -> Path:

@@ -38,7 +38,14 @@ from cdpr_drake.models.formats.caspr_pulleys import (
     short_name,
     triple,
 )
-from cdpr_drake.models.formats.reading import child_text, fail, number, numbers, read_xml
+from cdpr_drake.models.formats.reading import (
+    cable_name,
+    child_text,
+    fail,
+    number,
+    numbers,
+    read_xml,
+)
 
 GRAVITY = 9.81
 """Of CASPR, along -z [m/s^2]."""
@@ -472,9 +479,12 @@ def _told_apart(cables: list[CasprCable], remarks: list[str]) -> tuple[CasprCabl
     known: set[str] = set()
     found = []
     for place, cable in enumerate(cables, 1):
-        name = short_name(cable.name)
+        short = short_name(cable.name)
+        name = cable_name(short, place)
+        if name != short:
+            remarks.append(f"Cable {cable.name!r} became {name}.")
         if name in known:
-            name = f"{name} {place}"
+            name = f"{name}_{place}"
             remarks.append(f"Cable {place} is the second {cable.name!r}; it is called {name!r}.")
         known.add(name)
         found.append(replace(cable, name=name))

@@ -8,6 +8,7 @@ import numpy as np
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.motion_type import MotionType
+from cdpr_drake.models.formats.reading import cable_name
 
 
 @dataclass(kw_only=True)
@@ -124,8 +125,14 @@ class RobotDraft:
         return MotionType(self.motion or "3R3T", (float(x), float(y), float(z)))
 
     def tell_cables_apart(self) -> list[str]:
-        """Gives a later cable of a name that is taken one by its place; remarks on that."""
-        taken, said = {cable.name for cable in self.cables}, []
+        """Gives cables names that they can have here, each once; remarks on those that change."""
+        said = []
+        for place, cable in enumerate(self.cables, start=1):
+            name = cable_name(cable.name, place)
+            if name != cable.name:
+                said.append(f"Cable {cable.name!r} became {name}.")
+                cable.name = name
+        taken = {cable.name for cable in self.cables}
         seen: set[str] = set()
         for place, cable in enumerate(self.cables, start=1):
             if cable.name in seen:

@@ -50,10 +50,11 @@ def read_gazebo_yaml(path: Path) -> RobotDraft:
     Raises:
         RobotFileError: The file does not describe one; says where.
     """
-    content = watched(read_yaml(path))
-    if not is_gazebo_yaml(content):
-        found = kind_of(content, YAML_WORDS)
+    document = read_yaml(path)
+    if not is_gazebo_yaml(document):
+        found = kind_of(document, YAML_WORDS)
         raise fail(path, "top", found, "a mapping with points and platform")
+    content = watched(document)
     body = content.get("model", content)
     platform = _section(path, body, "platform")
     draft = RobotDraft(name=robot_name(path.stem), tool=TOOL, title=f"from {path.name}")

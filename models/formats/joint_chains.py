@@ -185,7 +185,8 @@ def write_urdf(draft: RobotDraft) -> str:
     """The platform as URDF, with a link of a name for each exit and anchor point.
 
     It holds points, box, mass, inertia, centre of mass, home pose and frame; no cables: URDF has no
-    loops.
+    loops. The platform is a free body without a joint, since Drake has no floating ones; the home
+    pose is in an element `home`, which other programs pass over.
     """
     assert draft.inertia is not None
     assert draft.center_of_mass is not None
@@ -212,7 +213,8 @@ def write_urdf(draft: RobotDraft) -> str:
         ET.SubElement(shape, "origin", xyz=_words(draft.box_center), rpy="0 0 0")
         ET.SubElement(ET.SubElement(shape, "geometry"), "box", size=_words(draft.box_size))
     X_WP = _home(draft)
-    _urdf_joint(robot, "home", "floating", ("frame", "platform"), X_WP)
+    home = ET.SubElement(robot, "home", link="platform")
+    ET.SubElement(home, "origin", _origin(X_WP))
     for cable in draft.cables:
         for word, parent, point in (
             ("exit", "frame", cable.exit_point),

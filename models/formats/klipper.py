@@ -95,7 +95,7 @@ def read_klipper(path: Path) -> RobotDraft:
 
 
 def _other_sections(parser: configparser.RawConfigParser, count: int, draft: RobotDraft) -> None:
-    """Remarks on sections and keys that a robot has no place for, and on files that are included."""
+    """Remarks on sections and keys that a robot has no place for, and on included files."""
     steppers = {f"stepper_{letter.lower()}" for letter in LETTERS[:count]}
     read = {"printer": {"kinematics", "max_velocity"}, "winch": {"mover_weight"}}
     left, included = [], []

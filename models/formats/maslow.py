@@ -2,12 +2,16 @@
 
 `kinematics: MaslowKinematics:` has the anchors [mm] tlX, tlY, tlZ, trX, ... of top left, top right,
 bottom left and bottom right; older firmware has Maslow_tlX, ... at the top. A belt leaves the sled
-z above its anchor. All belts point to the middle of the sled, beltEndExtension + armLength past
+z above its anchor. All belts point to the middle of the sled, a = beltEndExtension + armLength past
 their end, so that it moves as a point in a plane. `Maslow_vertical` says that the plane is upright:
 x and y of the file are x and z of W then, and out of the board is -y.
 
-Source: github.com/MaslowCNC/Maslow_4, firmware/FluidNC/data/maslow.yaml, and its web page's words
-on the settings.
+At a distance d across z the firmware has belts of hypot(d - a, z) since October 2024: arms stay
+level and only the belt is inclined. Before that it had hypot(d, z) - a, a straight line to the
+middle, which is the geometry here.
+
+Source: github.com/MaslowCNC/Maslow_4, firmware/FluidNC/data/maslow.yaml, its web page's words on the
+settings, and pull request 157, MaslowKinematics::compute.
 """
 
 from __future__ import annotations
@@ -37,6 +41,9 @@ from cdpr_drake.models.formats.reading import (
 TOOL = "Maslow YAML"
 
 MM = 1e-3
+
+NEAR = 0.5
+"""Length of belt for which a remark says what level arms change [m]."""
 
 _EXTRA = ("beltEndExtension", "armLength")
 
@@ -73,8 +80,12 @@ def read_maslow(path: Path) -> RobotDraft:
     draft.remarks.append("home is the middle of the anchors.")
     extra = [number(path, name, settings[name]) for name in _EXTRA if name in settings]
     if any(extra):
+        near, middle_off = _level_arms(points, MM * sum(extra), middle)
         draft.remarks.append(
-            f"Belts end {sum(extra):g} mm before the middle of the sled, to which lengths go here."
+            f"Belts end {sum(extra):g} mm before the middle of the sled, to which lengths go here, "
+            "in a straight line. Firmware since October 2024 keeps arms level: its belts are "
+            f"longer than that, by up to {1e3 * near:.2g} mm where {NEAR:g} m of belt are out, and "
+            f"{1e3 * middle_off:.2g} mm in the middle of the anchors."
         )
     for name in ("Scale_X", "Scale_Y"):
         scale = content.get(f"Maslow_{name}", 1.0)
@@ -84,12 +95,24 @@ def read_maslow(path: Path) -> RobotDraft:
     return draft
 
 
+def _level_arms(points: Array, arm: float, middle: Array) -> tuple[float, float]:
+    """By how much belts of level arms are longer than straight ones, at most [m].
+
+    Where `NEAR` of each belt is out, and in the middle of the anchors.
+    """
+    z = points[:, 2]
+    far = np.linalg.norm((points - middle)[:, :2], axis=1)
+    near = np.full(len(points), arm + NEAR)
+    off = [np.hypot(d - arm, z) - (np.hypot(d, z) - arm) for d in (near, far)]
+    return float(np.max(off[0])), float(np.max(off[1]))
+
+
 def _others(content: dict[str, Any], draft: RobotDraft) -> None:
     """Remarks on what a robot has no place for: the machine's electronics, axes, retraction."""
     read = {f"{corner}{axis}" for corner in MASLOW_CORNERS for axis in "XYZ"} | set(_EXTRA)
     kinematics = content.get("kinematics")
     left = []
-    for key, value in content.items():
+    for key in content:
         if key == "kinematics" and isinstance(kinematics, dict):
             own = kinematics.get(MASLOW_SECTION)
             left += [f"{key}.{other}" for other in kinematics if other != MASLOW_SECTION]

@@ -17,7 +17,6 @@ import numpy as np
 from pydrake.math import RotationMatrix
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import RobotFileError
 from cdpr_drake.models.formats.draft import DraftCable, RobotDraft
 from cdpr_drake.models.formats.mjcf_parts import (
     SMALLEST,
@@ -290,7 +289,9 @@ def _box(compiled: Compiled, body: int, composite: list[int], draft: RobotDraft)
     mujoco, model, data = compiled
     R_PW = np.array(data.xmat[body]).reshape(3, 3).T
     others = 0
-    for geom in (g for part in composite for g in range(model.ngeom) if model.geom_bodyid[g] == part):
+    for geom in (
+        g for part in composite for g in range(model.ngeom) if model.geom_bodyid[g] == part
+    ):
         R = R_PW @ np.array(data.geom_xmat[geom]).reshape(3, 3)
         is_box = model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_BOX
         if draft.box_size is None and is_box and np.max(np.abs(R - np.eye(3))) < _LEVEL:

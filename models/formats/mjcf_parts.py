@@ -96,7 +96,11 @@ def _without_missing_files(path: Path, spec: Any) -> list[str]:
     remarks = []
     for mesh in list(spec.meshes):
         file = path.parent / spec.meshdir / mesh.file
-        if not mesh.file or file.is_file() or Path(mesh.file).is_absolute() and Path(mesh.file).is_file():
+        if (
+            not mesh.file
+            or file.is_file()
+            or (Path(mesh.file).is_absolute() and Path(mesh.file).is_file())
+        ):
             continue
         name = mesh.name or Path(mesh.file).stem
         unknown = False
@@ -111,8 +115,8 @@ def _without_missing_files(path: Path, spec: Any) -> list[str]:
         spec.delete(mesh)
         counts = "; it counts for no mass, as it has none of its own" if unknown else ""
         remarks.append(f"Mesh {name} was left out, there is no file {mesh.file}{counts}.")
-    missing = [texture.file for texture in spec.textures
-               if texture.file and not (path.parent / spec.texturedir / texture.file).is_file()]  # fmt: skip
+    folder = path.parent / spec.texturedir
+    missing = [one.file for one in spec.textures if one.file and not (folder / one.file).is_file()]
     if missing:
         for geom in spec.geoms:
             geom.material = ""
@@ -221,6 +225,4 @@ def _bodies(document: ET.Element, model: Any) -> dict[int, ET.Element]:
     if len(items) == model.nbody - 1:
         return dict(enumerate(items, start=1))
     names = {model.body(body).name: body for body in range(1, model.nbody)}
-    return {
-        names[item.attrib["name"]]: item for item in items if item.attrib.get("name") in names
-    }
+    return {names[item.attrib["name"]]: item for item in items if item.attrib.get("name") in names}

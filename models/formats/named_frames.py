@@ -121,7 +121,17 @@ _PRESENTATION = {
 }  # fmt: skip
 """What only says how things look or are called."""
 
-_STRUCTURE = {"parent", "child", "origin", "pose", "frame", "placement_frame", "static", "uri"}
+_STRUCTURE = {
+    "parent",
+    "child",
+    "origin",
+    "home",
+    "pose",
+    "frame",
+    "placement_frame",
+    "static",
+    "uri",
+}
 """Elements that say where things are, which Drake uses."""
 
 
@@ -211,26 +221,36 @@ def _without_balls(root: ET.Element) -> int:
     return found
 
 
-def _place_floating(
-    path: Path, root: ET.Element, plant: MultibodyPlant, context: Context
-) -> None:
-    """Puts bodies where floating joints of URDF have them; Drake leaves such bodies free."""
+def _place_floating(path: Path, root: ET.Element, plant: MultibodyPlant, context: Context) -> None:
+    """Puts bodies where floating joints of URDF, or our element `home`, have them.
+
+    Drake leaves such bodies free.
+    """
     found: dict[str, tuple[str, RigidTransform]] = {}
+    for home in root.findall("home"):
+        name, origin = home.get("link", ""), home.find("origin")
+        if origin is not None and plant.NumBodiesWithName(name) == 1:
+            found[name] = plant.world_body().name(), _origin(path, "home", origin)
     for joint in root.findall("joint"):
         parent, child, origin = joint.find("parent"), joint.find("child"), joint.find("origin")
         if joint.get("type") != "floating" or parent is None or child is None or origin is None:
             continue
-        xyz = numbers(path, "floating joint, xyz", origin.get("xyz", "0 0 0"), 3)
-        rpy = numbers(path, "floating joint, rpy", origin.get("rpy", "0 0 0"), 3)
         ends = parent.get("link", ""), child.get("link", "")
         if all(plant.NumBodiesWithName(name) == 1 for name in ends):
-            found[ends[1]] = ends[0], RigidTransform(RollPitchYaw(rpy), xyz)
+            found[ends[1]] = ends[0], _origin(path, "floating joint", origin)
     for _ in found:  # a parent may stand on another one's joint
         for child_name, (parent_name, X) in found.items():
             body = plant.GetBodyByName(child_name)
             if body.is_floating_base_body():
                 X_WF = plant.EvalBodyPoseInWorld(context, plant.GetBodyByName(parent_name))
                 plant.SetFreeBodyPose(context, body, X_WF.multiply(X))
+
+
+def _origin(path: Path, where: str, origin: ET.Element) -> RigidTransform:
+    """A pose as URDF has it."""
+    xyz = numbers(path, f"{where}, xyz", origin.get("xyz", "0 0 0"), 3)
+    rpy = numbers(path, f"{where}, rpy", origin.get("rpy", "0 0 0"), 3)
+    return RigidTransform(RollPitchYaw(rpy), xyz)
 
 
 _Points = dict[str, Frame]

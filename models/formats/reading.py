@@ -13,7 +13,7 @@ import numpy as np
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import RobotFileError
-from cdpr_drake.schema.fields import LARGEST
+from cdpr_drake.schema.fields import LARGEST, NAME
 from cdpr_drake.schema.input_files import input_bytes, input_size
 from cdpr_drake.schema.json_text import load_json
 from cdpr_drake.schema.yaml_files import YamlTextError, load_yaml
@@ -214,6 +214,14 @@ def robot_name(words: str) -> str:
     """A name that a folder can have, from any words."""
     name = re.sub(r"[^A-Za-z0-9]+", "_", words).strip("_").lower()
     return name or "robot"
+
+
+def cable_name(words: str, place: int) -> str:
+    """A name that a cable can have here, from any words; C and its place where none is left."""
+    if re.fullmatch(NAME, words):
+        return words
+    name = re.sub(r"[^A-Za-z0-9_.-]+", "_", words).strip("_.-")[:64]
+    return name or f"C{place}"
 
 
 def near_file(path: Path) -> Path | None:

@@ -14,6 +14,9 @@ from typing import Any
 TEXT = "text()"
 """Stands for the text of an element among its attributes."""
 
+_PLAIN: Any = vars(ET.Element)["text"]
+"""The text of an element as the standard library has it."""
+
 MOST_NAMED = 40
 """Parts of a file that a remark names; of more it says how many."""
 
@@ -29,18 +32,19 @@ class WatchedElement(ET.Element):
         self.used: set[str] = set()
 
     @property
-    def text(self) -> str | None:  # type: ignore[override]
+    def text(self) -> str | None:
         """Its text, which counts as used from then on."""
         self.used.add(TEXT)
         return self.bare_text()
 
     @text.setter
     def text(self, value: str | None) -> None:
-        ET.Element.text.__set__(self, value)  # type: ignore[attr-defined]
+        _PLAIN.__set__(self, value)
 
     def bare_text(self) -> str | None:
         """Its text, not counted as used."""
-        return ET.Element.text.__get__(self)  # type: ignore[attr-defined, no-any-return]
+        found: str | None = _PLAIN.__get__(self)
+        return found
 
     def get(self, key: str, default: Any = None) -> Any:
         """An attribute, which counts as used from then on."""
@@ -62,8 +66,8 @@ class WatchedElement(ET.Element):
 class WatchedMapping(dict[Any, Any]):
     """A mapping of a document that records which keys were asked for."""
 
-    def __init__(self, content: dict[Any, Any]) -> None:
-        super().__init__({key: watched(value) for key, value in content.items()})
+    def __init__(self) -> None:
+        super().__init__()
         self.used: set[Any] = set()
 
     def __getitem__(self, key: Any) -> Any:
@@ -77,18 +81,39 @@ class WatchedMapping(dict[Any, Any]):
         return super().get(key, default)
 
 
-def watched(document: Any) -> Any:
-    """A copy of a parsed document, XML, JSON or YAML, that records what is read of it."""
+def watched(document: Any, copies: dict[int, Any] | None = None) -> Any:
+    """A copy of a parsed document, XML, JSON or YAML, that records what is read of it.
+
+    Args:
+        document: The document; YAML may have a part in several places, also in itself.
+        copies: Copies of its parts by their identity; for the function itself.
+    """
+    copies = {} if copies is None else copies
+    if id(document) in copies:
+        return copies[id(document)]
     if isinstance(document, ET.Element):
-        copy = WatchedElement(document.tag, dict(document.attrib))
-        copy.text = document.text
-        copy.extend([watched(child) for child in document])
-        return copy
+        return _watched_element(document)
     if isinstance(document, dict):
-        return WatchedMapping(document)
+        mapping = copies[id(document)] = WatchedMapping()
+        mapping.update({key: watched(value, copies) for key, value in document.items()})
+        return mapping
     if isinstance(document, list):
-        return [watched(item) for item in document]
+        items: list[Any] = []
+        copies[id(document)] = items
+        items += [watched(item, copies) for item in document]
+        return items
     return document
+
+
+def _watched_element(root: ET.Element) -> WatchedElement:
+    """Files may be nested more deeply than functions."""
+    copies: dict[ET.Element, WatchedElement] = {}
+    for item in root.iter():
+        copies[item] = WatchedElement(item.tag, dict(item.attrib))
+        copies[item].text = item.text
+    for item, copy in copies.items():
+        copy.extend([copies[child] for child in item])
+    return copies[root]
 
 
 def mark(element: ET.Element, *attributes: str) -> None:
@@ -103,13 +128,23 @@ def mark_below(part: Any) -> None:
         for item in part.iter():
             if isinstance(item.tag, str):
                 mark(item)
+    for _, mapping in _mappings(part, "", set()):
+        mapping.used.update(mapping)
+
+
+def _mappings(part: Any, path: str, seen: set[int]) -> Iterator[tuple[str, WatchedMapping]]:
+    """All mappings of a document with their paths, each once."""
+    if id(part) in seen:
+        return
+    if isinstance(part, (WatchedMapping, list)):
+        seen.add(id(part))
     if isinstance(part, WatchedMapping):
-        part.used.update(part)
-        for value in part.values():
-            mark_below(value)
+        yield path, part
+        for key, value in part.items():
+            yield from _mappings(value, f"{path}.{key}" if path else f"{key}", seen)
     if isinstance(part, list):
-        for value in part:
-            mark_below(value)
+        for item in part:
+            yield from _mappings(item, f"{path}[]", seen)
 
 
 def not_kept(document: Any, presentation: Collection[str] = ()) -> list[str]:
@@ -120,9 +155,9 @@ def not_kept(document: Any, presentation: Collection[str] = ()) -> list[str]:
         presentation: Tags, keys and `TAG@ATTRIBUTE` that say only how things look or are called.
     """
     if isinstance(document, WatchedElement):
-        left = _left_of_element(document, "", "", presentation)
+        left = _left_of_element(document, presentation)
     else:
-        left = _left_of_mapping(document, "", presentation)
+        left = _left_of_mapping(document, presentation)
     found: dict[str, list[str]] = {}
     for where, name in left:
         found.setdefault(where, []).append(name)
@@ -141,44 +176,40 @@ def _of(names: list[str]) -> str:
     return f" of {', '.join([*some[:MOST_OWNERS], *more])}"
 
 
-def _hidden(name: str, attribute: str, presentation: Collection[str]) -> bool:
-    return f"{name}@{attribute}" in presentation or f"@{attribute}" in presentation
-
-
 def _left_of_element(
-    element: WatchedElement, path: str, owner: str, presentation: Collection[str]
+    root: WatchedElement, presentation: Collection[str]
 ) -> Iterator[tuple[str, str]]:
-    if not isinstance(element.tag, str):  # of comments it is a function
-        return
-    tag = element.tag.rpartition("}")[2]
-    if tag in presentation:
-        return
-    here = f"{path}/{tag}" if path else tag
-    owner = dict(element.attrib).get("name") or owner
-    if not any(item.used for item in element.iter() if isinstance(item, WatchedElement)):
-        yield here, owner
-        return
-    for part in sorted(element.parts() - element.used):
-        if not _hidden(tag, part.rpartition("}")[2], presentation):
-            yield (here if part == TEXT else f"{here}@{part}"), owner
-    for child in element:
-        assert isinstance(child, WatchedElement)
-        yield from _left_of_element(child, here, owner, presentation)
-
-
-def _left_of_mapping(
-    content: Any, path: str, presentation: Collection[str]
-) -> Iterator[tuple[str, str]]:
-    if isinstance(content, list):
-        for item in content:
-            yield from _left_of_mapping(item, f"{path}[]", presentation)
-    if not isinstance(content, WatchedMapping):
-        return
-    for key, value in content.items():
-        here = f"{path}.{key}" if path else f"{key}"
-        if here in presentation:
+    items = [item for item in root.iter() if isinstance(item, WatchedElement)]
+    parents = {child: parent for parent in items for child in parent}
+    used = {item: bool(item.used) for item in items}
+    for item in reversed(items):
+        if item is not root and used[item]:
+            used[parents[item]] = True
+    places: dict[ET.Element | None, tuple[str, str]] = {None: ("", "")}
+    for item in items:
+        above = places.get(parents.get(item))
+        tag = str(item.tag).rpartition("}")[2]  # of comments it is a function
+        if above is None or tag in presentation or not isinstance(item.tag, str):
             continue
-        if key not in content.used:
-            yield here, ""
-        else:
-            yield from _left_of_mapping(value, here, presentation)
+        path, owner = above
+        path = f"{path}/{tag}" if path else tag
+        owner = item.attrib.get("name") or owner
+        if not used[item]:
+            yield path, owner
+            continue
+        places[item] = path, owner
+        for part in sorted(item.parts() - item.used):
+            if not {f"{tag}@{part}", f"@{part.rpartition('}')[2]}"} & set(presentation):
+                yield (path if part == TEXT else f"{path}@{part}"), owner
+
+
+def _left_of_mapping(content: Any, presentation: Collection[str]) -> Iterator[tuple[str, str]]:
+    below: list[str] = []
+    for path, mapping in _mappings(content, "", set()):
+        if path in presentation or any(f"{path}.".startswith((f"{p}.", f"{p}[")) for p in below):
+            continue
+        for key in mapping:
+            here = f"{path}.{key}" if path else f"{key}"
+            if here not in presentation and key not in mapping.used:
+                below.append(here)
+                yield here, ""

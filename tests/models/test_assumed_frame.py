@@ -37,7 +37,7 @@ STRETCH = 1e-4
 """Share by which elastic ropes change the frequency of a pendulum of rigid ones."""
 
 SAG = 1e-5
-"""By how much the ropes stretch, and the box hangs lower, at most [m]: 2.45 N 3 m / 1.26 MN = 6 um."""
+"""By how much the box hangs lower as its ropes stretch, at most [m]: 2.45 N 3 m / 1.26 MN."""
 
 BELOW = RigidTransform([0.0, 0.0, 1.5])
 """A pose under the assumed frame, on ropes of 3 m."""

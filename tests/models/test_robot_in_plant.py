@@ -221,3 +221,26 @@ def test_forces_reach_only_the_platform_among_other_bodies(name, size):
     np.testing.assert_array_equal(among_others[start : start + size], of_itself)
     assert np.count_nonzero(among_others) == size
     assert alone.num_velocities() == size
+
+
+@pytest.mark.parametrize(
+    ("gravity", "others", "warned"),
+    [(-9.81, False, False), (-9.81, True, True), (-1.62, False, True), (-9.80665, True, False)],
+)
+def test_another_gravity_of_the_plant_is_not_changed_without_a_word(
+    gravity, others, warned, caplog
+):
+    robot = load_robot("grab_four")
+    assert robot.gravity == 9.80665
+    plant = MultibodyPlant(0.0)
+    plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, gravity])
+    if others:
+        ball = SpatialInertia.SolidSphereWithMass(1.0, 0.1)
+        plant.AddRigidBody("ball", default_model_instance(), ball)
+    add_robot(plant, robot)
+    np.testing.assert_array_equal(plant.gravity_field().gravity_vector(), robot.gravity_vector())
+    told = [
+        f"gravity of the whole plant: was (0, 0, {gravity:g}), is now that of grab_four, "
+        "(0, 0, -9.80665) m/s^2"
+    ]
+    assert caplog.messages == (told if warned else [])

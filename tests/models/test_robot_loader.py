@@ -10,10 +10,11 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
+from cdpr_drake.cli.check import checked
 from cdpr_drake.errors import RobotFileError
 from cdpr_drake.models.camera_catalogue import load_camera
 from cdpr_drake.models.robot_in_plant import platform_inertia
-from cdpr_drake.models.robot_loader import load_robot, robot_file, robot_names
+from cdpr_drake.models.robot_loader import load_robot, point_notes, robot_file, robot_names
 
 ROBOT = """\
 name: crate
@@ -392,3 +393,46 @@ def test_a_model_that_cannot_be_is_refused_by_its_key(tmp_path, change, words):
     path = write(tmp_path, {**yaml.safe_load(ROBOT), **change})
     with pytest.raises(RobotFileError, match=rf"robot.yaml[:0-9]*: {words}"):
         load_robot(path)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "a,b",
+        "a\nb",
+        "=1+1",
+        "+C1",
+        "@C1",
+        "a;b",
+        'a"b',
+        "a\tb",
+        "\x1b[31m",
+        "",
+        " C1",
+        "C" * 65,
+        ".C",
+    ],
+)
+def test_names_of_cables_are_checked_as_those_of_robots(name, tmp_path):
+    """They are columns of logs, which other programs read."""
+    for key in (("name",), ("cables", 1, "name")):
+        with pytest.raises(RobotFileError) as caught:
+            load_robot(write(tmp_path, changed(*key, to=name)))
+        assert "accepted: 1 to 64 letters, digits, _ . -" in str(caught.value)
+        assert "\n" not in str(caught.value)
+    assert load_robot(write(tmp_path, changed("cables", 1, "name", to="C-1_a.b"))).cables[1].name
+
+
+def test_points_outside_frame_and_platform_are_remarked(tmp_path):
+    content = yaml.safe_load(ROBOT)
+    assert point_notes(load_robot(write(tmp_path, content))) == []
+    content["cables"][0]["exit_point"] = [-1.25, 0.0, 2.0]
+    content["cables"][2]["anchor_point"] = [0.0, 0.19, 0.1]
+    outside, off = point_notes(load_robot(write(tmp_path, content)))
+    assert outside == (
+        "exit points of left: up to 0.25 m outside the frame, (-1, -1, 0) to (1, 1, 2) m"
+    )
+    assert off.startswith("anchor points of back: up to 0.04 m outside the platform's box, (-0.1,")
+    assert checked(tmp_path / "robot.yaml")["notes"][:2] == [outside, off]
+    content["frame"]["assumed"] = True
+    assert point_notes(load_robot(write(tmp_path, content))) == [off]

@@ -372,9 +372,7 @@ class Workbench:
         p, (lower, upper) = self.X_WP.translation(), self.robot.value.frame.bounds()
         near = self.robot.value.joint().nearest(self.X_WP)
         return bool(
-            np.any(p < lower)
-            or np.any(p > upper)
-            or not near.IsNearlyEqualTo(self.X_WP, 1e-6)
+            np.any(p < lower) or np.any(p > upper) or not near.IsNearlyEqualTo(self.X_WP, 1e-6)
         )
 
     def draw(self, draw: Draw, done: Callable[[Future[Any]], Any] | None = None) -> None:

@@ -371,9 +371,9 @@ def test_sets_of_cables_and_their_names(tmp_path):
     model.cables.append(Cable([(0, "1 0 1"), (1, "0 0 0.1")], name="Cable 2"))
     files = _pair(model, tmp_path)
     tree = read_tree(*files, "toy")
-    assert [cable.name for cable in tree.cables] == ["C1", "C2", "C2 3"]
+    assert [cable.name for cable in tree.cables] == ["C1", "C2", "C2_3"]
     assert "Cables of the set basic; the file also has other." in tree.remarks
-    assert any("is called 'C2 3'" in words for words in tree.remarks)
+    assert any("is called 'C2_3'" in words for words in tree.remarks)
     assert [cable.name for cable in read_tree(*files, "toy", "other").cables] == ["C7"]
     with pytest.raises(RobotFileError, match=r"cable_set empty: found no cable; .* basic, other"):
         read_tree(*files, "toy", "empty")

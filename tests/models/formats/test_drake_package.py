@@ -95,3 +95,15 @@ def test_what_is_no_such_robot_is_said(tmp_path):
     loose.Finalize()
     with pytest.raises(RobotFileError, match="found 12 velocities"):
         find_robot(loose, robot)
+
+
+@pytest.mark.parametrize("format", ["urdf", "drake", "sdf-drake"])
+def test_drake_reads_exports_without_a_warning(format, tmp_path, caplog):
+    for name, text in export_robot(load_robot(ROBOT), format).items():
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    first = next(path for path in tmp_path.iterdir() if path.suffix in (".urdf", ".sdf"))
+    plant = MultibodyPlant(0.0)
+    with caplog.at_level("WARNING"):
+        Parser(plant).AddModels(str(first))
+    assert caplog.messages == []
+    assert "floating" not in first.read_text(encoding="utf-8")

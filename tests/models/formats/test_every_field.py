@@ -161,7 +161,7 @@ def test_the_comparison_sees_what_differs():
 
 
 @pytest.mark.parametrize("format", ["sdf", "sdf-drake", "urdf", "mjcf", "caspr"])
-def test_names_with_blanks_quotes_and_other_letters_come_back(format, tmp_path):
+def test_unusual_names_come_back(format, tmp_path):
     if format not in formats():
         pytest.skip("without MuJoCo")
     robot = robot_with_everything()

@@ -8,7 +8,7 @@ from scipy.io import savemat
 
 from cdpr_drake.errors import RobotFileError
 from cdpr_drake.models.formats.grab_mat import is_grab_mat
-from cdpr_drake.models.robot_exchange import export_robot
+from cdpr_drake.models.robot_exchange import export_robot, import_robot
 from cdpr_drake.models.robot_loader import load_robot
 
 KLIPPER = """[printer]
@@ -140,6 +140,26 @@ def test_a_maslow_on_a_wall_and_on_the_floor(load):
         f"Maslow_{line.strip()}\n" for line in MASLOW.splitlines()[3:15] if "bl" not in line
     ))  # fmt: skip
     np.testing.assert_allclose(old.exit_points()[:, (0, 1, 3)], floor.exit_points()[:, (0, 1, 3)])
+
+
+def test_maslow_says_what_level_arms_would_change(tmp_path):
+    """By the firmware's formula, hypot(d - a, z), against hypot(d, z) - a, a = 153.4 mm."""
+    path = tmp_path / "sled.yaml"
+    path.write_text(
+        "kinematics: {MaslowKinematics: {tlX: 0, tlY: 2000, tlZ: 100, trX: 3000, trY: 2000, trZ: 56, "
+        "blX: 0, blY: 0, blZ: 34, brX: 3000, brY: 0, brZ: 78, beltEndExtension: 30, "
+        "armLength: 123.4}}"
+    )
+    (told,) = [words for words in import_robot(path).completed.remarks if "level" in words]
+    assert np.hypot(500.0, 100.0) - np.hypot(653.4, 100.0) + 153.4 == pytest.approx(2.29, abs=0.01)
+    assert "longer than that, by up to 2.3 mm where 0.5 m of belt are out" in told
+    far = np.hypot(1500.0, 1000.0)
+    off = np.hypot(far - 153.4, 100.0) - np.hypot(far, 100.0) + 153.4
+    assert f"and {off:.2g} mm in the middle" in told
+
+
+def test_maslow_s_belt_is_as_stiff_as_its_makers_say():
+    assert load_robot("maslow_4").stiffness() == pytest.approx([178.9e3] * 4, rel=1e-5)
 
 
 @pytest.mark.parametrize(

@@ -26,7 +26,6 @@ HIDDEN = {
 """Elements and attributes that only say how things look or are called, by ending."""
 
 
-
 def told(path):
     """A draft as text without its remarks, and its remarks; a refusal as text alone."""
     try:
@@ -39,6 +38,7 @@ def told(path):
 
 def parts_of(root):
     """Each attribute, text and empty element of a document: its element's tags, and its own."""
+
     def walk(item, path):
         here = [*path, item]
         for key in item.attrib:
@@ -84,8 +84,9 @@ def is_named(place, key, remarks):
         return True
     for item in place:
         name, said = item.get("name") or item.get("id"), WHOLE.get(str(item.tag))
-        if name and said and any(said in line and name in line.replace(",", " ").replace(".", " ").split()
-                                 for line in remarks):  # fmt: skip
+        lines = [line.replace(",", " ").replace(".", " ").split() for line in remarks
+                 if said and said in line]  # fmt: skip
+        if any(name in line for line in lines):
             return True
     return False
 
@@ -127,8 +128,8 @@ def test_elements_that_no_reader_knows_are_named(write, tmp_path):
     """Wherever they stand, with an attribute or a text."""
     path = write(tmp_path)
     text = path.read_text()
-    head, start, body = text.partition("<models" if "<models" in text else
-                                       "<cables " if "<cables " in text else "<bodies_system")  # fmt: skip
+    starts = ("<models", "<cables ", "<bodies_system")
+    head, start, body = text.partition(next(start for start in starts if start in text))
     root = ET.fromstring(start + body)
     parents = {child: parent for parent in root.iter() for child in parent}
     for number, item in enumerate(root.iter()):
@@ -144,6 +145,7 @@ def test_elements_that_no_reader_knows_are_named(write, tmp_path):
 
 def odd_mappings(content):
     """The document with one key more, in each of its mappings in turn."""
+
     def mappings(value):
         if isinstance(value, dict):
             yield value

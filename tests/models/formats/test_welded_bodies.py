@@ -172,7 +172,9 @@ def test_a_body_of_its_own_weight_between_two_slides_is_refused(tmp_path):
 @pytest.mark.parametrize(("end", "joint"), [("exit_C0", "e0"), ("anchor_C0", "a0")])
 def test_points_on_bodies_that_joints_move_are_refused(end, joint, tmp_path):
     path = urdf(tmp_path, joined("floating"))
-    text = path.read_text().replace(f'name="{joint}" type="fixed"', f'name="{joint}" type="continuous"')
+    text = path.read_text().replace(
+        f'name="{joint}" type="fixed"', f'name="{joint}" type="continuous"'
+    )
     path.write_text(text)
     with pytest.raises(RobotFileError, match=f"{end}.* revolute joint {joint}.* mechanism file"):
         read_foreign(path)
@@ -218,7 +220,9 @@ def mjcf(folder, **more):
 def test_what_the_platform_carries_hangs_on_the_ropes(joint, tmp_path):
     """Closed form: cosine of the ropes' slope, 0.95 over the length, and a quarter of 2.3 kg."""
     pytest.importorskip("mujoco")
-    carried = f'<body name="g" pos="0 0 -0.1">{joint}<geom type="sphere" size="0.02" mass="0.3"/></body>'
+    carried = (
+        f'<body name="g" pos="0 0 -0.1">{joint}<geom type="sphere" size="0.02" mass="0.3"/></body>'
+    )
     path = mjcf(tmp_path, inner=hung()[1] + carried)
     length = np.sqrt(0.9**2 + 0.9**2 + 0.95**2)
     expected = 2.3 * 9.81 / 4.0 * length / 0.95
@@ -294,7 +298,7 @@ def test_a_mesh_that_is_only_drawn_may_be_missing(geom, words, tmp_path):
 def test_what_a_tendon_or_a_joint_cannot_be_is_named(old, new, words, tmp_path):
     pytest.importorskip("mujoco")
     roll = '<geom name="roll" type="cylinder" size="0.05 0.1" pos="0 0 3"/>'
-    free = ('<body name="q"><joint name="pin" type="free"/><geom size="0.1"/><site name="z"/></body>'
+    free = ('<body name="q"><joint name="pin" type="free"/><geom size="1"/><site name="z"/></body>'
             if 'site="z"' in new else "")  # fmt: skip
     path = tmp_path / "hung.xml"
     text = hung(world=roll)[0]

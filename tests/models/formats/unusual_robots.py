@@ -10,14 +10,14 @@ from cdpr_drake.models.robot_schema import Robot
 from tests.models.robots import robot_of
 
 NAMES = [
-    "left winch",
-    'the "long" one',
-    "Größe Ä, <Süd> & Ost",
-    "cable  7",
+    "left-winch",
+    "the.long_one",
+    "C" * 64,
+    "cable__7",
     "7",
     "platform",
-    "it's 50% / top::left",
-    "turn_left winch",
+    "-50.top",
+    "turn_left",
 ]
 """Of cables: blanks, quotes, letters of other alphabets, words that formats use themselves."""
 
