@@ -92,6 +92,22 @@ class RobotInPlant:
         nv = plant.num_velocities(self.model_instance)
         plant.SetVelocities(plant_context, self.model_instance, np.zeros(nv))
 
+    def set_default_pose(self, X_WP: RigidTransform) -> None:
+        """Puts the platform of default contexts at X_WP [m]; what its joint cannot do is left out.
+
+        Drake's `plant.SetDefaultFreeBodyPose` does the same for a body in space.
+        """
+        moves = self.robot.joint()
+        if moves.is_floating:
+            self.plant.SetDefaultFloatingBaseBodyPose(self.body, X_WP)
+            return
+        q, joint = moves.coordinates(X_WP), self._joint()
+        if isinstance(joint, PlanarJoint):
+            joint.set_default_translation(q[:2])
+            joint.set_default_rotation(float(q[2]))
+        else:
+            joint.set_default_translation(float(q[0]))
+
     def pose(self, plant_context: Context) -> RigidTransform:
         """X_WP of the platform [m]."""
         return self.plant.EvalBodyPoseInWorld(plant_context, self.body)

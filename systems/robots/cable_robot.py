@@ -31,6 +31,7 @@ from cdpr_drake.systems.robots.assembly import (
 )
 from cdpr_drake.systems.robots.cable_forces import CableForces
 from cdpr_drake.systems.robots.compiled_step import StepRule
+from cdpr_drake.systems.robots.random_pose import RandomPose
 from cdpr_drake.systems.robots.settings import CableRobotSettings
 from cdpr_drake.tensions.methods import exact_tensions
 from cdpr_drake.winches.failed_winches import HOLD
@@ -89,8 +90,9 @@ class CableRobot(Diagram):
 
     Subsystems: plant, scene_graph, cables, winches, platform_pose, platform_wrench. With motors on
     the winches, the block has the inputs and further outputs of `MotorWinch`, tensions connected. A
-    default context has the platform at the robot's home pose with cables that are just not taut;
-    see `set_at_equilibrium`.
+    default context has the platform at rest at the robot's home pose, as `set_at_equilibrium` puts
+    it there, so that `Simulator.reset_context` and `SetRandomContext` start at rest, too; where
+    nothing holds it, `not_at_rest` says why, and cables are just not taut.
     """
 
     def __init__(
@@ -100,6 +102,7 @@ class CableRobot(Diagram):
         *,
         add_to_scene: SceneAdder | None = None,
         floor: bool = True,
+        random_pose: RandomPose | None = None,
     ) -> None:
         """Builds the robot.
 
@@ -111,6 +114,7 @@ class CableRobot(Diagram):
                 by themselves to the scene graph, and systems and ports to this block; what it
                 returns, if anything, is called once the plant is finalized.
             floor: Whether there is a visible floor below the frame.
+            random_pose: Poses of random contexts about the home pose; None: the home pose.
 
         Raises:
             CableModelError: The cables' model cannot describe the robot's cables.
@@ -126,7 +130,9 @@ class CableRobot(Diagram):
         in_plant = fill_scene(
             builder, robot, plant, scene_graph, add_to_scene=add_to_scene, floor=floor
         )
-        blocks = add_cable_robot(builder, in_plant, settings, scene_graph=scene_graph)
+        blocks = add_cable_robot(
+            builder, in_plant, settings, scene_graph=scene_graph, random_pose=random_pose
+        )
         for name, port in blocks.inputs.items():
             builder.ExportInput(port, name)
         for name, port in blocks.outputs.items():
@@ -138,6 +144,7 @@ class CableRobot(Diagram):
         self.scene_graph: SceneGraph = scene_graph
         self.winches: Any = blocks.winches
         self.forces: CableForces = blocks.forces
+        self.not_at_rest: str = blocks.not_at_rest
 
     def set_at_equilibrium(
         self,

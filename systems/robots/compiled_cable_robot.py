@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import numpy as np
+from pydrake.common import RandomDistribution
 from pydrake.geometry import SceneGraph
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
+from pydrake.systems.primitives import RandomSource
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.models import KELVIN_VOIGT, cable_law
@@ -21,7 +24,11 @@ from cdpr_drake.systems.robots.compiled_motion import MEMORY, CompiledMotion
 from cdpr_drake.systems.robots.compiled_step import CompiledBodies, StepRule
 from cdpr_drake.systems.robots.failures import BROKEN, FAULTS
 from cdpr_drake.systems.robots.platform_wrench import APPLIED_WRENCH
+from cdpr_drake.systems.robots.random_pose import RANDOM_NUMBERS, RandomPose
 from cdpr_drake.systems.robots.settings import CableRobotSettings, WinchSettings
+
+ONCE = 1e12
+"""Period of what is drawn once [s]: longer than any run."""
 
 
 class CompiledCableRobot(Diagram):
@@ -48,6 +55,7 @@ class CompiledCableRobot(Diagram):
         add_to_scene: SceneAdder | None = None,
         floor: bool = True,
         command_period: float | None = None,
+        random_pose: RandomPose | None = None,
     ) -> None:
         """Builds the robot; arguments and errors as those of `CableRobot`, and these.
 
@@ -59,6 +67,7 @@ class CompiledCableRobot(Diagram):
             floor: As for `CableRobot`.
             command_period: Longest time between two samples of the commands [s], see
                 `CompiledMotion`; None: the step of `rule`.
+            random_pose: As for `CableRobot`.
 
         Raises:
             CdprError: Something beside the platform moves in the plant.
@@ -89,6 +98,7 @@ class CompiledCableRobot(Diagram):
             frame=plant.GetBodyFrameIdOrThrow(in_plant.body_index),
             command_period=command_period,
             may_fail=failures is not None,
+            random_pose=random_pose,
         )  # fmt: skip
         builder.AddNamedSystem("motion", motion)
         builder.Connect(
@@ -104,7 +114,13 @@ class CompiledCableRobot(Diagram):
         pushed = [system.GetInputPort(APPLIED_WRENCH) for system in (motion, bodies)]
         for index in range(motion.num_input_ports()):
             port = motion.get_input_port(index)
-            if port.get_name() not in (APPLIED_WRENCH, *FAULTS):
+            if port.get_name() == RANDOM_NUMBERS:
+                numbers = RandomSource(RandomDistribution.kUniform, port.size(), ONCE)
+                builder.AddNamedSystem("random_numbers", numbers)
+                builder.Connect(numbers.get_output_port(), port)
+                drawn = numbers.get_output_port().Eval(numbers.CreateDefaultContext())
+                motion.default_numbers = np.array(drawn)
+            elif port.get_name() not in (APPLIED_WRENCH, *FAULTS):
                 builder.ExportInput(port, port.get_name())
         for index in range(bodies.num_input_ports()):
             port = bodies.get_input_port(index)
@@ -143,6 +159,7 @@ class CompiledCableRobot(Diagram):
         self.motion: CompiledMotion = motion
         self.forces: CompiledMotion = motion
         self.winches: CompiledMotion = motion
+        self.not_at_rest: str = motion.not_at_rest
 
     def integrate_by(self, rule: StepRule) -> None:
         """Changes how the robot is integrated from now on, in all contexts."""

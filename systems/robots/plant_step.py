@@ -27,7 +27,7 @@ CablePull = Callable[[Context], Array]
 """Generalized force of cables and dampers, shape (nv,), at a context of the plant."""
 
 NEAR = 0.8
-"""Share of the largest stable step above which a step is warned of; stiffness changes on the way."""
+"""Share of the largest stable step from which on a step is warned of."""
 
 TAUT = 1e-4
 """Strain of cables whose stiffness is asked for before anything is known of their tensions."""
