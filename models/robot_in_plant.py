@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -30,8 +31,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.errors import RobotFileError
 from cdpr_drake.geometry.platform_joint import PlatformJoint
 from cdpr_drake.geometry.poses import euclidean_length
-from cdpr_drake.models.mechanism_files import single_platform
-from cdpr_drake.models.mechanism_schema import Mechanism
+from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import SHAPE_INERTIA, Robot
 
 _PLATFORM_COLOR = np.array([0.25, 0.45, 0.75, 1.0])
@@ -197,7 +197,9 @@ def platform_shape(robot: Robot) -> tuple[RigidTransform, Shape]:
     return own.pose(robot.box_center()), own.shape()
 
 
-def add_robot(plant: MultibodyPlant, robot: Robot, name: str | None = None) -> RobotInPlant:
+def add_robot(
+    plant: MultibodyPlant, robot: Robot | str | Path, name: str | None = None
+) -> RobotInPlant:
     """Adds the moving platform of `robot` to a plant that is not finalized.
 
     A body in space gets a floating body with quaternion, as do a point mass in space and a beam,
@@ -209,17 +211,17 @@ def add_robot(plant: MultibodyPlant, robot: Robot, name: str | None = None) -> R
 
     Args:
         plant: Continuous MultibodyPlant; registered with a SceneGraph, it also shows the platform.
-        robot: The robot.
+        robot: The robot, by name, path, or itself.
         name: Name of the model instance; the robot's where None.
 
     Returns:
         Handles to the platform in the plant.
 
     Raises:
-        RobotFileError: It is a Mechanism, which `add_mechanism` takes.
+        RobotFileError: It is a Mechanism, which `add_mechanism` takes, or there is none of that
+            name.
     """
-    if isinstance(robot, Mechanism):
-        raise single_platform(robot.name, "add_robot")
+    robot = as_robot(robot, "add_robot")
     instance = plant.AddModelInstance(name or robot.name)
     body = plant.AddRigidBody("platform", instance, platform_inertia(robot))
     plant.mutable_gravity_field().set_gravity_vector(robot.gravity_vector())
@@ -234,12 +236,14 @@ def add_robot(plant: MultibodyPlant, robot: Robot, name: str | None = None) -> R
     return RobotInPlant(robot, plant, instance, body.index())
 
 
-def find_robot(plant: MultibodyPlant, robot: Robot, name: str | None = None) -> RobotInPlant:
+def find_robot(
+    plant: MultibodyPlant, robot: Robot | str | Path, name: str | None = None
+) -> RobotInPlant:
     """The platform of a robot that something else put into a plant, as model directives do.
 
     Args:
         plant: The plant, finalized.
-        robot: The robot, a body in space (3R3T).
+        robot: The robot, a body in space (3R3T), by name, path, or itself.
         name: Name of its model instance; the robot's where None.
 
     Returns:
@@ -249,6 +253,7 @@ def find_robot(plant: MultibodyPlant, robot: Robot, name: str | None = None) -> 
         RobotFileError: There is no such model instance, no free body `platform` in it, its
             mass is another one, or further bodies of the instance move, too.
     """
+    robot = as_robot(robot, "find_robot")
     name = name or robot.name
     if not plant.HasModelInstanceNamed(name):
         raise RobotFileError(f"robot {robot.name}: found no model instance {name} in the plant")

@@ -10,13 +10,13 @@ import numpy as np
 from pydrake.geometry import SceneGraph
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.systems.framework import Context, DiagramBuilder, InputPort, OutputPort
+from pydrake.systems.framework import Context, Diagram, DiagramBuilder, InputPort, OutputPort
 from pydrake.systems.primitives import Adder, Demultiplexer, MatrixGain
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.cable_behaviour import behaviour_of
 from cdpr_drake.cables.models import crept_at_rest
-from cdpr_drake.errors import CableModelError, CdprError
+from cdpr_drake.errors import CableModelError, CdprError, accepted_names
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.models.robot_holding import check_bundles, hold_robot, rest_as_long, rest_with_slack
@@ -94,6 +94,12 @@ class RobotBlock(Protocol):
         """The output of that name, as `CableRobot` names it."""
 
 
+def _named(ports: dict[str, Any], name: str, what: str) -> Any:
+    if name not in ports:
+        raise CdprError(f"{what}: found {name!r}; {accepted_names(name, sorted(ports))}")
+    return ports[name]
+
+
 @dataclass(frozen=True, eq=False)
 class NamedPorts:
     """Ports of blocks in a builder, by the names that `CableRobot` has.
@@ -115,12 +121,20 @@ class NamedPorts:
         return port_name in self.outputs
 
     def GetInputPort(self, port_name: str) -> InputPort:
-        """The input of that name."""
-        return self.inputs[port_name]
+        """The input of that name.
+
+        Raises:
+            CdprError: There is none; names those that there are.
+        """
+        return _named(self.inputs, port_name, "input port")
 
     def GetOutputPort(self, port_name: str) -> OutputPort:
-        """The output of that name."""
-        return self.outputs[port_name]
+        """The output of that name.
+
+        Raises:
+            CdprError: There is none; names those that there are.
+        """
+        return _named(self.outputs, port_name, "output port")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -151,7 +165,7 @@ class CableRobotPorts(NamedPorts):
         self,
         context: Context,
         X_WP: RigidTransform,
-        slack: Array | None = None,
+        slack_lengths: Array | None = None,
         at_rest: bool = False,
     ) -> Array:
         """As `CableRobot.set_at_equilibrium`, from the root context of the built diagram.
@@ -164,7 +178,7 @@ class CableRobotPorts(NamedPorts):
         winch_context = self.winches.GetMyMutableContextFromRoot(context)
         cables, model = self.forces.cable_set(), self.forces.model()
         X_WP, holding = equilibrium_start(
-            self.robot, cables, model, X_WP, slack=slack, at_rest=at_rest
+            self.robot, cables, model, X_WP, slack=slack_lengths, at_rest=at_rest
         )
         cable_context = self.forces.GetMyMutableContextFromRoot(context)
         self.forces.relax(cable_context, X_WP, holding.unstrained_lengths)
@@ -172,6 +186,14 @@ class CableRobotPorts(NamedPorts):
         lengths = holding.unstrained_lengths
         check_platform_step(self.in_plant, plant_context, self.forces, lengths, self.damping)
         return tensions
+
+
+def own_context(block: Diagram, context: Context) -> Context:
+    """A block's own context in the root context of the diagram around it, or that which it is."""
+    try:
+        return block.GetMyMutableContextFromRoot(context)
+    except RuntimeError:  # it is no root context
+        return context
 
 
 def fill_scene(
@@ -215,7 +237,9 @@ def add_cable_robot(
 ) -> CableRobotPorts:
     """Adds cables, winches and platform pose to a robot in a finalized plant of the builder.
 
-    The plant may hold further robots and bodies: forces of several robots add up.
+    The plant may hold further robots and bodies: forces of several robots add up. Other generalized
+    forces on the plant are connected before, or by `apply_force`: the plant's input port is taken
+    afterwards, and Drake ends the process of who connects a port twice.
 
     Default contexts, and so `Simulator.reset_context` and `SetRandomContext`, have the platform at
     the plant's default pose of now, which `SetDefaultFreeBodyPose` sets and which is else the
@@ -239,10 +263,14 @@ def add_cable_robot(
             `stable_plant_step` finds from stiffness, damping and inertia at the default positions.
         CableGeometryError: At the home pose a cable cannot run over its pulley.
         RobotFileError: Winches with motors are asked for that the robot's file does not describe.
-
-    Warns:
-        PlantStepWarning: The plant is discrete, and its time step near the largest stable one.
     """
+    for value, kind, what in ((builder, DiagramBuilder, "builder"), (in_plant, RobotInPlant,
+                              "in_plant")):  # fmt: skip
+        if not isinstance(value, kind):
+            raise CdprError(
+                f"add_cable_robot: {what}: found a {type(value).__name__}; accepted: a "
+                f"{kind.__name__}, as in add_cable_robot(builder, add_robot(plant, robot))"
+            )
     settings = settings or CableRobotSettings()
     robot, plant, prefix = in_plant.robot, in_plant.plant, f"{name}_" if name else ""
     cables, model = settings.cables.cable_set(robot), settings.cables.model

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from cdpr_drake.cables.models import ELASTIC
 from cdpr_drake.errors import InfeasibleTensionError
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.models.robot_in_plant import RobotInPlant, platform_inertia
+from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import tension_problem
 from cdpr_drake.numerics.explicit_integration import largest_stable_step, vibration_eigenvalues
@@ -27,6 +29,7 @@ from cdpr_drake.systems.robots.assembly import (
     add_cable_robot,
     equilibrium_start,
     fill_scene,
+    own_context,
     set_robot_at_equilibrium,
 )
 from cdpr_drake.systems.robots.cable_forces import CableForces
@@ -97,7 +100,7 @@ class CableRobot(Diagram):
 
     def __init__(
         self,
-        robot: Robot,
+        robot: Robot | str | Path,
         settings: CableRobotSettings | None = None,
         *,
         add_to_scene: SceneAdder | None = None,
@@ -107,7 +110,7 @@ class CableRobot(Diagram):
         """Builds the robot.
 
         Args:
-            robot: The robot.
+            robot: The robot, by name, path, or itself.
             settings: Cables, winches and damping; straight cables without pulleys, by Kelvin and
                 Voigt, on ideal winches, if None.
             add_to_scene: May add bodies and tags to the plant before Finalize, objects that move
@@ -123,6 +126,7 @@ class CableRobot(Diagram):
                 describe.
         """
         super().__init__()
+        robot = as_robot(robot, "CableRobot")
         builder = DiagramBuilder()
         plant, scene_graph = AddMultibodyPlantSceneGraph(builder, time_step=0.0)
         plant.set_name("plant")
@@ -150,7 +154,7 @@ class CableRobot(Diagram):
         self,
         context: Context,
         X_WP: RigidTransform,
-        slack: Array | None = None,
+        slack_lengths: Array | None = None,
         at_rest: bool = False,
     ) -> Array:
         """Puts the platform at rest at a pose and sets lengths that hold it there.
@@ -159,9 +163,9 @@ class CableRobot(Diagram):
         as their paths at the pose, see `models.rest_as_long`.
 
         Args:
-            context: This diagram's own context.
+            context: Root context of the diagram that this block is in, or the block's own.
             X_WP: Pose of the platform [m].
-            slack: Lengths to pay out beyond that, shape (m,) [m]; none if None.
+            slack_lengths: Lengths to pay out beyond that, shape (m,) [m]; none if None.
             at_rest: Whether the platform starts where it comes to rest with them; else it starts
                 at the pose, and falls.
 
@@ -176,9 +180,10 @@ class CableRobot(Diagram):
             TensionProblemError: The pose lies outside the frame, or the cables hold nothing there.
             EquilibriumError: The platform does not come to rest with that slack.
         """
+        context = own_context(self, context)
         cables, model = self.forces.cable_set(), self.forces.model()
         X_WP, holding = equilibrium_start(
-            self.robot, cables, model, X_WP, slack=slack, at_rest=at_rest
+            self.robot, cables, model, X_WP, slack=slack_lengths, at_rest=at_rest
         )
         cable_context = self.GetMutableSubsystemContext(self.forces, context)
         self.forces.relax(cable_context, X_WP, holding.unstrained_lengths)
@@ -191,13 +196,14 @@ class CableRobot(Diagram):
         )
 
 
-def holding_tensions(robot: Robot, X_WP: RigidTransform) -> Array:
+def holding_tensions(robot: Robot | str | Path, X_WP: RigidTransform) -> Array:
     """Tensions of least 2-norm within the robot's bounds that hold the platform, shape (m,) [N].
 
     Raises:
         InfeasibleTensionError: There are none; names the robot and the pose.
         TensionProblemError: The pose lies outside the frame, or W is singular there.
     """
+    robot = as_robot(robot, "holding_tensions")
     tensions = exact_tensions(tension_problem(robot, X_WP))
     if tensions is None:
         position = ", ".join(f"{x:g}" for x in X_WP.translation())
@@ -210,7 +216,7 @@ def holding_tensions(robot: Robot, X_WP: RigidTransform) -> Array:
 
 
 def automatic_step(
-    robot: Robot,
+    robot: Robot | str | Path,
     X_WP: RigidTransform,
     integrator: str,
     settings: CableRobotSettings | None = None,
@@ -222,7 +228,7 @@ def automatic_step(
     """
     if integrator == SEMI_IMPLICIT:
         return SEMI_IMPLICIT_STEP
-    settings = settings or CableRobotSettings()
+    robot, settings = as_robot(robot, "automatic_step"), settings or CableRobotSettings()
     cables, winches = settings.cables, settings.winches
     simulated = cables.cable_set(robot)
     paths = cable_paths(X_WP, simulated)
@@ -263,7 +269,9 @@ def automatic_step(
 
 
 def default_rule(
-    robot: Robot, settings: CableRobotSettings | None = None, by_tensions: bool = False
+    robot: Robot | str | Path,
+    settings: CableRobotSettings | None = None,
+    by_tensions: bool = False,
 ) -> StepRule:
     """Default integration rule of `CompiledCableRobot`, `motion_by_tensions` and `BatchRobots`.
 
@@ -275,7 +283,7 @@ def default_rule(
         settings: Cables, winches and damping; the defaults if None.
         by_tensions: Tensions are commanded, so that no stiffness limits the step.
     """
-    step = DEFAULT_STEP
+    robot, step = as_robot(robot, "default_rule"), DEFAULT_STEP
     if not by_tensions:
         step = min(step, automatic_step(robot, robot.home.transform(), "runge_kutta3", settings))
     return StepRule(method="runge_kutta3", max_step=step)

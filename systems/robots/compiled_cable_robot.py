@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 from pydrake.common import RandomDistribution
 from pydrake.geometry import SceneGraph
@@ -16,8 +18,14 @@ from cdpr_drake.dynamics.robot_arrays import IDEAL, MOTORS, TENSIONS, Drive
 from cdpr_drake.errors import CdprError
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.models.robot_in_plant import RobotInPlant
+from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.systems.robots.assembly import SceneAdder, equilibrium_start, fill_scene
+from cdpr_drake.systems.robots.assembly import (
+    SceneAdder,
+    equilibrium_start,
+    fill_scene,
+    own_context,
+)
 from cdpr_drake.systems.robots.cable_forces import simulated_cables
 from cdpr_drake.systems.robots.cable_robot import default_rule
 from cdpr_drake.systems.robots.compiled_motion import MEMORY, CompiledMotion
@@ -48,7 +56,7 @@ class CompiledCableRobot(Diagram):
 
     def __init__(
         self,
-        robot: Robot,
+        robot: Robot | str | Path,
         settings: CableRobotSettings | None = None,
         *,
         rule: StepRule | None = None,
@@ -60,7 +68,7 @@ class CompiledCableRobot(Diagram):
         """Builds the robot; arguments and errors as those of `CableRobot`, and these.
 
         Args:
-            robot: The robot.
+            robot: The robot, by name, path, or itself.
             settings: Cables, winches and damping.
             rule: How it is integrated; `default_rule` if None. `integrate_by` changes it.
             add_to_scene: As for `CableRobot`; bodies that move by themselves are refused.
@@ -73,6 +81,7 @@ class CompiledCableRobot(Diagram):
             CdprError: Something beside the platform moves in the plant.
         """
         super().__init__()
+        robot = as_robot(robot, "CompiledCableRobot")
         settings = settings or CableRobotSettings()
         builder = DiagramBuilder()
         scene_graph = builder.AddNamedSystem("scene_graph", SceneGraph())
@@ -169,16 +178,17 @@ class CompiledCableRobot(Diagram):
         self,
         context: Context,
         X_WP: RigidTransform,
-        slack: Array | None = None,
+        slack_lengths: Array | None = None,
         at_rest: bool = False,
     ) -> Array:
         """Puts the platform at rest at a pose and sets lengths that hold it.
 
         As `CableRobot.set_at_equilibrium`; the state is that of the context's time.
         """
+        context = own_context(self, context)
         cables, model = self.forces.cable_set(), self.forces.model()
         X_WP, holding = equilibrium_start(
-            self.robot, cables, model, X_WP, slack=slack, at_rest=at_rest
+            self.robot, cables, model, X_WP, slack=slack_lengths, at_rest=at_rest
         )
         own = self.GetMutableSubsystemContext(self.motion, context)
         self.motion.hold(own, X_WP, holding.unstrained_lengths, holding.drum_tensions)
@@ -200,7 +210,7 @@ def winch_drive(robot: Robot, settings: WinchSettings) -> Drive:
 
 
 def motion_by_tensions(
-    robot: Robot,
+    robot: Robot | str | Path,
     cables: CableSet,
     *,
     push: bool = False,
@@ -216,6 +226,7 @@ def motion_by_tensions(
         rule: How it is integrated; `default_rule` if None.
         command_period: As for `CompiledMotion`.
     """
+    robot = as_robot(robot, "motion_by_tensions")
     drive, rule = Drive(kind=TENSIONS, push=push), rule or default_rule(robot, by_tensions=True)
     return CompiledMotion(
         robot, cables, KELVIN_VOIGT, drive, rule=rule, command_period=command_period

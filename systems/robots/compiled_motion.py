@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 from pydrake.common.value import AbstractValue, Value
@@ -43,6 +44,7 @@ from cdpr_drake.errors import CdprError
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.models.robot_in_plant import pose_on_joint
+from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import rigid_platform
 from cdpr_drake.systems.robots.assembly import equilibrium_start, resting_start
@@ -114,7 +116,7 @@ class CompiledMotion(LeafSystem):
 
     def __init__(
         self,
-        robot: Robot,
+        robot: Robot | str | Path,
         cables: CableSet,
         model: str,
         drive: Drive,
@@ -148,6 +150,7 @@ class CompiledMotion(LeafSystem):
             CdprError: The period is not positive.
         """
         super().__init__()
+        robot = as_robot(robot, "CompiledMotion")
         rule = StepRule() if rule is None else rule
         period = rule.max_step if command_period is None else command_period
         if not period > 0.0:
