@@ -33,6 +33,7 @@ from .analyses.front.tensions import compare_tensions as compare_tensions
 from .analyses.front.tensions import solve_tensions as solve_tensions
 from .analyses.front.workspaces import compute_workspace as compute_workspace
 from .analyses.logs.log_request import LogRequest as LogRequest
+from .control.task_space import TaskGains as TaskGains
 from .errors import CdprError as CdprError
 from .errors import StoppedError as StoppedError
 from .geometry.cable_set import CableSet as CableSet
@@ -48,6 +49,8 @@ from .models.robot_loader import load_robot as load_robot
 from .models.robot_loader import robot_names as robot_names
 from .models.robot_schema import Pose as Pose
 from .models.robot_schema import Robot as Robot
+from .servoing.servo_law import ServoLaw as ServoLaw
+from .servoing.servo_task import BelievedRobot as BelievedRobot
 from .systems.batches.batch_robots import BatchRobots as BatchRobots
 from .systems.diagrams.camera import add_camera as add_camera
 from .systems.diagrams.camera import add_target as add_target
@@ -56,15 +59,20 @@ from .systems.diagrams.load import load_scenario as load_scenario
 from .systems.diagrams.servo_blocks import add_visual_servo as add_visual_servo
 from .systems.diagrams.tension_control import add_tension_control as add_tension_control
 from .systems.diagrams.visual_servo import build_visual_servo as build_visual_servo
+from .systems.estimators.pose_estimator import Read as Read
 from .systems.remote.remote_client import RemoteClient as RemoteClient
+from .systems.robots.assembly import RobotBlock as RobotBlock
 from .systems.robots.assembly import add_cable_robot as add_cable_robot
+from .systems.robots.assembly import apply_force as apply_force
 from .systems.robots.cable_robot import CableRobot as CableRobot
 from .systems.robots.compiled_cable_robot import CompiledCableRobot as CompiledCableRobot
 from .systems.robots.compiled_step import StepRule as StepRule
+from .systems.robots.random_pose import RandomPose as RandomPose
 from .systems.robots.settings import CableRobotSettings as CableRobotSettings
 from .systems.scenarios.files import scenario_names as scenario_names
 from .systems.scenarios.visual_servo_scenario import Scenario as Scenario
 from .systems.scenarios.visual_servo_scenario import VisualServoSettings as VisualServoSettings
+from .systems.sensors.inertial_sensor import InertialSensor as InertialSensor
 from .tensions.methods import distribute as distribute
 from .tensions.problem import TensionProblem as TensionProblem
 from .tensions.problem import TensionSolution as TensionSolution

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -32,8 +33,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.errors import RobotFileError
 from cdpr_drake.geometry.platform_joint import PlatformJoint
 from cdpr_drake.geometry.poses import euclidean_length
-from cdpr_drake.models.mechanism_files import single_platform
-from cdpr_drake.models.mechanism_schema import Mechanism
+from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import SHAPE_INERTIA, Robot
 
 _LOG = logging.getLogger(__name__)
@@ -95,6 +95,22 @@ class RobotInPlant:
                 joint.set_translation(plant_context, float(q[0]))
         nv = plant.num_velocities(self.model_instance)
         plant.SetVelocities(plant_context, self.model_instance, np.zeros(nv))
+
+    def set_default_pose(self, X_WP: RigidTransform) -> None:
+        """Puts the platform of default contexts at X_WP [m]; what its joint cannot do is left out.
+
+        Drake's `plant.SetDefaultFreeBodyPose` does the same for a body in space.
+        """
+        moves = self.robot.joint()
+        if moves.is_floating:
+            self.plant.SetDefaultFloatingBaseBodyPose(self.body, X_WP)
+            return
+        q, joint = moves.coordinates(X_WP), self._joint()
+        if isinstance(joint, PlanarJoint):
+            joint.set_default_translation(q[:2])
+            joint.set_default_rotation(float(q[2]))
+        else:
+            joint.set_default_translation(float(q[0]))
 
     def pose(self, plant_context: Context) -> RigidTransform:
         """X_WP of the platform [m]."""
@@ -185,7 +201,9 @@ def platform_shape(robot: Robot) -> tuple[RigidTransform, Shape]:
     return own.pose(robot.box_center()), own.shape()
 
 
-def add_robot(plant: MultibodyPlant, robot: Robot, name: str | None = None) -> RobotInPlant:
+def add_robot(
+    plant: MultibodyPlant, robot: Robot | str | Path, name: str | None = None
+) -> RobotInPlant:
     """Adds the moving platform of `robot` to a plant that is not finalized.
 
     A body in space gets a floating body with quaternion, as do a point mass in space and a beam,
@@ -198,17 +216,17 @@ def add_robot(plant: MultibodyPlant, robot: Robot, name: str | None = None) -> R
 
     Args:
         plant: Continuous MultibodyPlant; registered with a SceneGraph, it also shows the platform.
-        robot: The robot.
+        robot: The robot, by name, path, or itself.
         name: Name of the model instance; the robot's where None.
 
     Returns:
         Handles to the platform in the plant.
 
     Raises:
-        RobotFileError: It is a Mechanism, which `add_mechanism` takes.
+        RobotFileError: It is a Mechanism, which `add_mechanism` takes, or there is none of that
+            name.
     """
-    if isinstance(robot, Mechanism):
-        raise single_platform(robot.name, "add_robot")
+    robot = as_robot(robot, "add_robot")
     instance = plant.AddModelInstance(name or robot.name)
     body = plant.AddRigidBody("platform", instance, platform_inertia(robot))
     _set_gravity(plant, robot)
@@ -237,12 +255,14 @@ def _set_gravity(plant: MultibodyPlant, robot: Robot) -> None:
     plant.mutable_gravity_field().set_gravity_vector(after)
 
 
-def find_robot(plant: MultibodyPlant, robot: Robot, name: str | None = None) -> RobotInPlant:
+def find_robot(
+    plant: MultibodyPlant, robot: Robot | str | Path, name: str | None = None
+) -> RobotInPlant:
     """The platform of a robot that something else put into a plant, as model directives do.
 
     Args:
         plant: The plant, finalized.
-        robot: The robot, a body in space (3R3T).
+        robot: The robot, a body in space (3R3T), by name, path, or itself.
         name: Name of its model instance; the robot's where None.
 
     Returns:
@@ -252,6 +272,7 @@ def find_robot(plant: MultibodyPlant, robot: Robot, name: str | None = None) -> 
         RobotFileError: There is no such model instance, no free body `platform` in it, its
             mass is another one, or further bodies of the instance move, too.
     """
+    robot = as_robot(robot, "find_robot")
     name = name or robot.name
     if not plant.HasModelInstanceNamed(name):
         raise RobotFileError(f"robot {robot.name}: found no model instance {name} in the plant")

@@ -40,6 +40,7 @@ from .estimators.length_estimator import EncoderLengths as EncoderLengths
 from .estimators.length_estimator import LengthEstimator as LengthEstimator
 from .estimators.pose_estimator import KnownTag as KnownTag
 from .estimators.pose_estimator import PoseEstimator as PoseEstimator
+from .estimators.pose_estimator import Read as Read
 from .estimators.pose_fusion import PoseFusion as PoseFusion
 from .estimators.tuning import FusionSettings as FusionSettings
 from .monitoring.log_row import LogRow as LogRow
@@ -50,7 +51,9 @@ from .monitoring.run_monitor import Outcome as Outcome
 from .monitoring.run_monitor import RunMonitor as RunMonitor
 from .monitoring.run_monitor import StopRules as StopRules
 from .robots.assembly import CableRobotPorts as CableRobotPorts
+from .robots.assembly import RobotBlock as RobotBlock
 from .robots.assembly import add_cable_robot as add_cable_robot
+from .robots.assembly import apply_force as apply_force
 from .robots.cable_forces import CableForces as CableForces
 from .robots.cable_forces import CableForces_ as CableForces_
 from .robots.cable_robot import CableRobot as CableRobot
@@ -59,6 +62,7 @@ from .robots.cable_robot import holding_tensions as holding_tensions
 from .robots.motor_winch import MotorWinch as MotorWinch
 from .robots.platform_pose import PlatformPose as PlatformPose
 from .robots.platform_pose import PlatformPose_ as PlatformPose_
+from .robots.random_pose import RandomPose as RandomPose
 from .robots.settings import CableRobotSettings as CableRobotSettings
 from .robots.settings import CableSettings as CableSettings
 from .robots.settings import DampingSettings as DampingSettings
@@ -71,6 +75,7 @@ from .scenarios.files import scenario_names as scenario_names
 from .scenarios.tension_control_scenario import TensionScenario as TensionScenario
 from .scenarios.visual_servo_scenario import Scenario as Scenario
 from .scenarios.visual_servo_scenario import VisualServoSettings as VisualServoSettings
+from .sensors.inertial_sensor import InertialSensor as InertialSensor
 from .sensors.motor_encoders import MotorEncoders as MotorEncoders
 from .sensors.pose_sensor import PoseSensor as PoseSensor
 from .sensors.sensor_kinds import SENSORS as SENSORS

@@ -1,5 +1,7 @@
 from .controller import ServoController as ServoController
 from .servo_law import GOALS as GOALS
+from .servo_law import ServoLaw as ServoLaw
+from .servo_task import BelievedRobot as BelievedRobot
 from .target_motion import KINDS as KINDS
 from .turned_view import centring_rates as centring_rates
 from .turned_view import steady_view as steady_view

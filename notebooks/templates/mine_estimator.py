@@ -12,8 +12,8 @@ NAME = "mine"
 class Mine(PoseEstimator):
     """The pose believed at the start, for ever.
 
-    An estimator that declares an input `lengths` gets the measured lengths, one with `X_CO` the
-    seen pose of the target, and so on: inputs are connected by name.
+    An estimator that declares an input `measured_lengths` gets the lengths that the encoders
+    count, one with `X_CO` the seen pose of the target, and so on: inputs are connected by name.
     """
 
     def advance(self, read, X_WP, extra, elapsed):

@@ -136,9 +136,8 @@ class BatchRobots:
         _check_structure(self._members)
         first = self._members[0]
         drive = self._drive = first.drive
-        self._packed = packed_rule(rule, drive)
         self._stack = stacked_robots([each.arrays for each in self._members])
-        self._tables = robot_tables(self._stack)
+        self._reach()
         m = self.cables = first.cables.count
         self._of_cable = drive.winch_of_cable(m)
         self.commands_per_robot = max(self._of_cable) + 1
@@ -146,7 +145,7 @@ class BatchRobots:
         self._size = self._n + m * drive.states_per_cable()
         law = cable_law(first.model, first.cables)
         rooms = [make_room(m, law, each.joint.height) for each in self._members]
-        self._rooms, self._outputs = np.array(rooms), outputs_kernel(law)
+        self._rooms = np.array(rooms)
         self._fresh_rooms = self._rooms.copy(), self._stack.room.copy()
         self._whole, self._broken = self._stack.cables.copy(), np.zeros((count, m))
         self._present = np.zeros((count, self._size + 1 + REPORTED))
@@ -158,6 +157,24 @@ class BatchRobots:
         self._boxes = np.array(boxes, float)
         self._at_rest: dict[int, tuple[bytes, tuple[Array, Array]]] = {}
         self.reset()
+
+    def _reach(self) -> None:
+        """Finds the kernels, and where the arrays are for them."""
+        first = self._members[0]
+        self._packed = packed_rule(self.rule, self._drive)
+        self._outputs = outputs_kernel(cable_law(first.model, first.cables))
+        self._tables = robot_tables(self._stack)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """All but kernels, addresses of arrays, and what is kept by the identity of members."""
+        left = {"_packed", "_outputs", "_tables"}
+        state = {name: value for name, value in self.__dict__.items() if name not in left}
+        return state | {"_at_rest": {}}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """A copy goes on as the original would, to the last bit, on arrays of its own."""
+        self.__dict__.update(state)
+        self._reach()
 
     @classmethod
     def drawn(

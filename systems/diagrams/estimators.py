@@ -9,6 +9,7 @@ from pydrake.common.value import Value
 from pydrake.systems.framework import DiagramBuilder, OutputPort, System
 from pydrake.systems.primitives import ConstantValueSource
 
+from cdpr_drake.errors import CdprError, accepted_names
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.servoing.servo_task import CameraMounting
 from cdpr_drake.systems.cameras.camera_settings import PROJECTED, REGION
@@ -83,13 +84,26 @@ class EstimatorInputs:
         }
 
     def connect(self, estimator: System) -> None:
-        """Connects every input of an estimator that was added to the builder."""
+        """Connects every input of an estimator that was added to the builder.
+
+        Raises:
+            CdprError: An input has a name that nothing offers; names what there is.
+        """
         for index in range(estimator.num_input_ports()):
             port = estimator.get_input_port(index)
             self._builder.Connect(self.port(port.get_name()), port)
 
     def port(self, name: str) -> OutputPort:
-        """The port of that name."""
+        """The port of that name.
+
+        Raises:
+            CdprError: Nothing of that name is offered; names what is.
+        """
+        if name not in self._ports and name not in self._makers:
+            offered = sorted({*self._ports, *self._makers})
+            raise CdprError(
+                f"input port of an estimator: found {name!r}; {accepted_names(name, offered)}"
+            )
         if name not in self._ports:
             self._ports[name] = self._makers[name]()
         return self._ports[name]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -18,6 +19,7 @@ from cdpr_drake.control.task_space import PlatformDynamics, TaskGains
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.geometry.poses import pose_error, pose_from_row, pose_row
 from cdpr_drake.models.robot_in_plant import RobotInPlant, add_robot, pose_on_joint
+from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.systems.controllers.computed_torque import PoseTracking
 from cdpr_drake.systems.controllers.force_tracking import ForceControl, ForceTracking
@@ -358,7 +360,7 @@ def _split_state(builder: DiagramBuilder, motion: CompiledMotion, prefix: str) -
 
 
 def build_tension_control(
-    robot: Robot, settings: TensionControlSettings, *, log_rate: float | None = None
+    robot: Robot | str | Path, settings: TensionControlSettings, *, log_rate: float | None = None
 ) -> TensionControl:
     """Builds a plant with the robot and `add_tension_control` on it.
 
@@ -370,7 +372,7 @@ def build_tension_control(
     Raises:
         TensionProblemError: The method or the limits do not fit the robot.
     """
-    builder = DiagramBuilder()
+    builder, robot = DiagramBuilder(), as_robot(robot, "build_tension_control")
     in_plant, world = _add_plant(builder, robot, settings)
     blocks = add_tension_control(builder, in_plant, settings)
     meters = None

@@ -4,5 +4,6 @@ from .estimator_kinds import EstimatorTask as EstimatorTask
 from .geometry_learner import Adaptation as Adaptation
 from .geometry_learner import GeometryLearner as GeometryLearner
 from .pose_estimator import PoseEstimator as PoseEstimator
+from .pose_estimator import Read as Read
 from .wrench_estimator import WrenchEstimation as WrenchEstimation
 from .wrench_estimator import WrenchEstimator as WrenchEstimator

@@ -1,12 +1,17 @@
+from .assembly import RobotBlock as RobotBlock
 from .assembly import add_cable_robot as add_cable_robot
+from .assembly import apply_force as apply_force
 from .cable_forces import CableForces as CableForces
 from .cable_robot import CableRobot as CableRobot
+from .cable_robot import default_rule as default_rule
 from .compiled_cable_robot import CompiledCableRobot as CompiledCableRobot
 from .compiled_mechanism import CompiledMechanism as CompiledMechanism
+from .compiled_motion import HELD as HELD
 from .compiled_motion import CompiledMotion as CompiledMotion
 from .compiled_step import StepRule as StepRule
 from .motor_winch import MotorWinch as MotorWinch
 from .platform_pose import PlatformPose as PlatformPose
+from .random_pose import RandomPose as RandomPose
 from .route_assembly import CablePorts as CablePorts
 from .route_assembly import add_cables as add_cables
 from .route_assembly import apply_spatial_forces as apply_spatial_forces

@@ -12,6 +12,7 @@ from pydrake.autodiffutils import AutoDiffXd
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import (
     BasicVector,
+    BasicVector_,
     Context,
     ContinuousState,
     InputPortIndex,
@@ -142,6 +143,7 @@ def CableForces_(T: Any) -> type[LeafSystem]:
             cables: CableSet | None = None,
             model: str = KELVIN_VOIGT,
             breakable: bool = False,
+            crept: Array | None = None,
             converter: Any = None,
         ) -> None:
             """For a robot whose plant is finalized; see `cdpr_drake.models.add_robot`.
@@ -151,6 +153,8 @@ def CableForces_(T: Any) -> type[LeafSystem]:
                 cables: The cables as they really are; None: the robot's, from fixed exit points.
                 model: A name of `cables.CABLE_MODELS` but inextensible.
                 breakable: Whether cables may break, by an input.
+                crept: Strains that have crept in default contexts, shape (m,), of cables that
+                    creep; None: none.
                 converter: Of the template.
 
             Raises:
@@ -160,11 +164,14 @@ def CableForces_(T: Any) -> type[LeafSystem]:
             _check_alone(in_plant)
             cables = in_plant.robot.cable_set().without_pulleys() if cables is None else cables
             whole = simulated_cables(cables, model)
-            self._declare(PlatformPlace.of(in_plant), whole, model, breakable, converter)
+            crept = np.zeros(whole.count) if crept is None or not len(crept) else crept
+            self._declare(PlatformPlace.of(in_plant), whole, model, breakable, crept, converter)
 
         def _construct_copy(self, other: Any, converter: Any = None) -> None:
             breakable = other._broken is not None
-            Impl._declare(self, other._place, other._set, other._model, breakable, converter)
+            Impl._declare(
+                self, other._place, other._set, other._model, breakable, other._start, converter
+            )
 
         def _declare(
             self,
@@ -172,9 +179,11 @@ def CableForces_(T: Any) -> type[LeafSystem]:
             cables: CableSet,
             model: str,
             breakable: bool,
+            start: Array,
             converter: Any,
         ) -> None:
             LeafSystem_[T].__init__(self, converter=converter)
+            self._start = start
             self._place, self._set, self._model = place, cables, model
             joint = place.joint
             check_model(model, joint.turned(cables))
@@ -204,7 +213,7 @@ def CableForces_(T: Any) -> type[LeafSystem]:
             extra = set()
             self._creeps = behaviour_of(cables).creep_stiffness > 0.0
             if self._creeps:
-                self.DeclareContinuousState(m)
+                self.DeclareContinuousState(BasicVector_[T](start))
                 extra = {self.xc_ticket()}
                 pull |= extra
             if breakable:  # which pulleys a cable runs over changes, too
@@ -418,6 +427,7 @@ if TYPE_CHECKING:  # what an editor cannot see in a template
             cables: CableSet | None = None,
             model: str = KELVIN_VOIGT,
             breakable: bool = False,
+            crept: Array | None = None,
         ) -> None: ...
         def cables(self) -> Array: ...  # noqa: D102
         def cable_set(self) -> CableSet: ...  # noqa: D102

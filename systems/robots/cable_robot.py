@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from cdpr_drake.errors import InfeasibleTensionError
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.models.robot_in_plant import RobotInPlant, platform_inertia
+from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import tension_problem
 from cdpr_drake.numerics.explicit_integration import largest_stable_step, vibration_eigenvalues
@@ -28,10 +30,12 @@ from cdpr_drake.systems.robots.assembly import (
     add_cable_robot,
     equilibrium_start,
     fill_scene,
+    own_context,
     set_robot_at_equilibrium,
 )
 from cdpr_drake.systems.robots.cable_forces import CableForces
 from cdpr_drake.systems.robots.compiled_step import StepRule
+from cdpr_drake.systems.robots.random_pose import RandomPose
 from cdpr_drake.systems.robots.settings import CableRobotSettings
 from cdpr_drake.tensions.methods import exact_tensions
 from cdpr_drake.winches.failed_winches import HOLD
@@ -90,28 +94,31 @@ class CableRobot(Diagram):
 
     Subsystems: plant, scene_graph, cables, winches, platform_pose, platform_wrench. With motors on
     the winches, the block has the inputs and further outputs of `MotorWinch`, tensions connected. A
-    default context has the platform at the robot's home pose with cables that are just not taut;
-    see `set_at_equilibrium`.
+    default context has the platform at rest at the robot's home pose, as `set_at_equilibrium` puts
+    it there, so that `Simulator.reset_context` and `SetRandomContext` start at rest, too; where
+    nothing holds it, `not_at_rest` says why, and cables are just not taut.
     """
 
     def __init__(
         self,
-        robot: Robot,
+        robot: Robot | str | Path,
         settings: CableRobotSettings | None = None,
         *,
         add_to_scene: SceneAdder | None = None,
         floor: bool = True,
+        random_pose: RandomPose | None = None,
     ) -> None:
         """Builds the robot.
 
         Args:
-            robot: The robot.
+            robot: The robot, by name, path, or itself.
             settings: Cables, winches and damping; straight cables without pulleys, by Kelvin and
                 Voigt, on ideal winches, if None.
             add_to_scene: May add bodies and tags to the plant before Finalize, objects that move
                 by themselves to the scene graph, and systems and ports to this block; what it
                 returns, if anything, is called once the plant is finalized.
             floor: Whether there is a visible floor below the frame.
+            random_pose: Poses of random contexts about the home pose; None: the home pose.
 
         Raises:
             CableModelError: The cables' model cannot describe the robot's cables.
@@ -120,6 +127,7 @@ class CableRobot(Diagram):
                 describe.
         """
         super().__init__()
+        robot = as_robot(robot, "CableRobot")
         builder = DiagramBuilder()
         plant, scene_graph = AddMultibodyPlantSceneGraph(builder, time_step=0.0)
         plant.set_name("plant")
@@ -127,7 +135,9 @@ class CableRobot(Diagram):
         in_plant = fill_scene(
             builder, robot, plant, scene_graph, add_to_scene=add_to_scene, floor=floor
         )
-        blocks = add_cable_robot(builder, in_plant, settings, scene_graph=scene_graph)
+        blocks = add_cable_robot(
+            builder, in_plant, settings, scene_graph=scene_graph, random_pose=random_pose
+        )
         for name, port in blocks.inputs.items():
             builder.ExportInput(port, name)
         for name, port in blocks.outputs.items():
@@ -139,12 +149,13 @@ class CableRobot(Diagram):
         self.scene_graph: SceneGraph = scene_graph
         self.winches: Any = blocks.winches
         self.forces: CableForces = blocks.forces
+        self.not_at_rest: str = blocks.not_at_rest
 
     def set_at_equilibrium(
         self,
         context: Context,
         X_WP: RigidTransform,
-        slack: Array | None = None,
+        slack_lengths: Array | None = None,
         at_rest: bool = False,
     ) -> Array:
         """Puts the platform at rest at a pose and sets lengths that hold it there.
@@ -153,9 +164,9 @@ class CableRobot(Diagram):
         as their paths at the pose, see `models.rest_as_long`.
 
         Args:
-            context: This diagram's own context.
+            context: Root context of the diagram that this block is in, or the block's own.
             X_WP: Pose of the platform [m].
-            slack: Lengths to pay out beyond that, shape (m,) [m]; none if None.
+            slack_lengths: Lengths to pay out beyond that, shape (m,) [m]; none if None.
             at_rest: Whether the platform starts where it comes to rest with them; else it starts
                 at the pose, and falls.
 
@@ -170,9 +181,10 @@ class CableRobot(Diagram):
             TensionProblemError: The pose lies outside the frame, or the cables hold nothing there.
             EquilibriumError: The platform does not come to rest with that slack.
         """
+        context = own_context(self, context)
         cables, model = self.forces.cable_set(), self.forces.model()
         X_WP, holding = equilibrium_start(
-            self.robot, cables, model, X_WP, slack=slack, at_rest=at_rest
+            self.robot, cables, model, X_WP, slack=slack_lengths, at_rest=at_rest
         )
         cable_context = self.GetMutableSubsystemContext(self.forces, context)
         self.forces.relax(cable_context, X_WP, holding.unstrained_lengths)
@@ -185,7 +197,9 @@ class CableRobot(Diagram):
         )
 
 
-def holding_tensions(robot: Robot, X_WP: RigidTransform, cables: CableSet | None = None) -> Array:
+def holding_tensions(
+    robot: Robot | str | Path, X_WP: RigidTransform, cables: CableSet | None = None
+) -> Array:
     """Tensions of least 2-norm within the robot's bounds that hold the platform, shape (m,) [N].
 
     Args:
@@ -197,6 +211,7 @@ def holding_tensions(robot: Robot, X_WP: RigidTransform, cables: CableSet | None
         InfeasibleTensionError: There are none; names the robot and the pose.
         TensionProblemError: The pose lies outside the frame, or W is singular there.
     """
+    robot = as_robot(robot, "holding_tensions")
     tensions = exact_tensions(tension_problem(robot, X_WP, cables=cables))
     if tensions is None:
         position = ", ".join(f"{x:g}" for x in X_WP.translation())
@@ -209,7 +224,7 @@ def holding_tensions(robot: Robot, X_WP: RigidTransform, cables: CableSet | None
 
 
 def automatic_step(
-    robot: Robot,
+    robot: Robot | str | Path,
     X_WP: RigidTransform,
     integrator: str,
     settings: CableRobotSettings | None = None,
@@ -221,7 +236,7 @@ def automatic_step(
     """
     if integrator == SEMI_IMPLICIT:
         return SEMI_IMPLICIT_STEP
-    settings = settings or CableRobotSettings()
+    robot, settings = as_robot(robot, "automatic_step"), settings or CableRobotSettings()
     cables, winches = settings.cables, settings.winches
     simulated = cables.cable_set(robot)
     paths = cable_paths(X_WP, simulated)
@@ -262,7 +277,9 @@ def automatic_step(
 
 
 def default_rule(
-    robot: Robot, settings: CableRobotSettings | None = None, by_tensions: bool = False
+    robot: Robot | str | Path,
+    settings: CableRobotSettings | None = None,
+    by_tensions: bool = False,
 ) -> StepRule:
     """Default integration rule of `CompiledCableRobot`, `motion_by_tensions` and `BatchRobots`.
 
@@ -274,7 +291,7 @@ def default_rule(
         settings: Cables, winches and damping; the defaults if None.
         by_tensions: Tensions are commanded, so that no stiffness limits the step.
     """
-    step = DEFAULT_STEP
+    robot, step = as_robot(robot, "default_rule"), DEFAULT_STEP
     if not by_tensions:
         step = min(step, automatic_step(robot, robot.home.transform(), "runge_kutta3", settings))
     return StepRule(method="runge_kutta3", max_step=step)

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
+import numpy as np
+from pydrake.common import RandomDistribution
 from pydrake.geometry import SceneGraph
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
+from pydrake.systems.primitives import RandomSource
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.models import KELVIN_VOIGT, cable_law
@@ -13,15 +18,25 @@ from cdpr_drake.dynamics.robot_arrays import IDEAL, MOTORS, TENSIONS, Drive
 from cdpr_drake.errors import CdprError
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.models.robot_in_plant import RobotInPlant
+from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.systems.robots.assembly import SceneAdder, equilibrium_start, fill_scene
+from cdpr_drake.systems.robots.assembly import (
+    SceneAdder,
+    equilibrium_start,
+    fill_scene,
+    own_context,
+)
 from cdpr_drake.systems.robots.cable_forces import simulated_cables
 from cdpr_drake.systems.robots.cable_robot import default_rule
 from cdpr_drake.systems.robots.compiled_motion import MEMORY, CompiledMotion
 from cdpr_drake.systems.robots.compiled_step import CompiledBodies, StepRule
 from cdpr_drake.systems.robots.failures import BROKEN, FAULTS
 from cdpr_drake.systems.robots.platform_wrench import APPLIED_WRENCH
+from cdpr_drake.systems.robots.random_pose import RANDOM_NUMBERS, RandomPose
 from cdpr_drake.systems.robots.settings import CableRobotSettings, DampingSettings, WinchSettings
+
+ONCE = 1e12
+"""Period of what is drawn once [s]: longer than any run."""
 
 
 class CompiledCableRobot(Diagram):
@@ -41,29 +56,32 @@ class CompiledCableRobot(Diagram):
 
     def __init__(
         self,
-        robot: Robot,
+        robot: Robot | str | Path,
         settings: CableRobotSettings | None = None,
         *,
         rule: StepRule | None = None,
         add_to_scene: SceneAdder | None = None,
         floor: bool = True,
         command_period: float | None = None,
+        random_pose: RandomPose | None = None,
     ) -> None:
         """Builds the robot; arguments and errors as those of `CableRobot`, and these.
 
         Args:
-            robot: The robot.
+            robot: The robot, by name, path, or itself.
             settings: Cables, winches and damping.
             rule: How it is integrated; `default_rule` if None. `integrate_by` changes it.
             add_to_scene: As for `CableRobot`; bodies that move by themselves are refused.
             floor: As for `CableRobot`.
             command_period: Longest time between two samples of the commands [s], see
                 `CompiledMotion`; None: the step of `rule`.
+            random_pose: As for `CableRobot`.
 
         Raises:
             CdprError: Something beside the platform moves in the plant.
         """
         super().__init__()
+        robot = as_robot(robot, "CompiledCableRobot")
         settings = settings or CableRobotSettings()
         builder = DiagramBuilder()
         scene_graph = builder.AddNamedSystem("scene_graph", SceneGraph())
@@ -89,6 +107,7 @@ class CompiledCableRobot(Diagram):
             frame=plant.GetBodyFrameIdOrThrow(in_plant.body_index),
             command_period=command_period,
             may_fail=failures is not None,
+            random_pose=random_pose,
         )  # fmt: skip
         builder.AddNamedSystem("motion", motion)
         builder.Connect(
@@ -102,7 +121,13 @@ class CompiledCableRobot(Diagram):
         pushed = [system.GetInputPort(APPLIED_WRENCH) for system in (motion, bodies)]
         for index in range(motion.num_input_ports()):
             port = motion.get_input_port(index)
-            if port.get_name() not in (APPLIED_WRENCH, *FAULTS):
+            if port.get_name() == RANDOM_NUMBERS:
+                numbers = RandomSource(RandomDistribution.kUniform, port.size(), ONCE)
+                builder.AddNamedSystem("random_numbers", numbers)
+                builder.Connect(numbers.get_output_port(), port)
+                drawn = numbers.get_output_port().Eval(numbers.CreateDefaultContext())
+                motion.default_numbers = np.array(drawn)
+            elif port.get_name() not in (APPLIED_WRENCH, *FAULTS):
                 builder.ExportInput(port, port.get_name())
         for index in range(bodies.num_input_ports()):
             port = bodies.get_input_port(index)
@@ -141,6 +166,7 @@ class CompiledCableRobot(Diagram):
         self.motion: CompiledMotion = motion
         self.forces: CompiledMotion = motion
         self.winches: CompiledMotion = motion
+        self.not_at_rest: str = motion.not_at_rest
 
     def integrate_by(self, rule: StepRule) -> None:
         """Changes how the robot is integrated from now on, in all contexts."""
@@ -150,16 +176,17 @@ class CompiledCableRobot(Diagram):
         self,
         context: Context,
         X_WP: RigidTransform,
-        slack: Array | None = None,
+        slack_lengths: Array | None = None,
         at_rest: bool = False,
     ) -> Array:
         """Puts the platform at rest at a pose and sets lengths that hold it.
 
         As `CableRobot.set_at_equilibrium`; the state is that of the context's time.
         """
+        context = own_context(self, context)
         cables, model = self.forces.cable_set(), self.forces.model()
         X_WP, holding = equilibrium_start(
-            self.robot, cables, model, X_WP, slack=slack, at_rest=at_rest
+            self.robot, cables, model, X_WP, slack=slack_lengths, at_rest=at_rest
         )
         own = self.GetMutableSubsystemContext(self.motion, context)
         self.motion.hold(own, X_WP, holding.unstrained_lengths, holding.drum_tensions)
@@ -181,7 +208,7 @@ def winch_drive(robot: Robot, settings: WinchSettings) -> Drive:
 
 
 def motion_by_tensions(
-    robot: Robot,
+    robot: Robot | str | Path,
     cables: CableSet,
     *,
     push: bool = False,
@@ -199,6 +226,7 @@ def motion_by_tensions(
         command_period: As for `CompiledMotion`.
         damping: Of the platform. Default: the robot file's.
     """
+    robot = as_robot(robot, "motion_by_tensions")
     drive, rule = Drive(kind=TENSIONS, push=push), rule or default_rule(robot, by_tensions=True)
     return CompiledMotion(
         robot, cables, KELVIN_VOIGT, drive, damping=(damping or DampingSettings()).of(robot),

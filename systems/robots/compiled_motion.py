@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 from pydrake.common.value import AbstractValue, Value
@@ -43,8 +44,10 @@ from cdpr_drake.errors import CdprError
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.models.robot_in_plant import pose_on_joint
+from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import rigid_platform
+from cdpr_drake.systems.robots.assembly import equilibrium_start, resting_start
 from cdpr_drake.systems.robots.cable_forces import CREPT, PORTS
 from cdpr_drake.systems.robots.compiled_step import (
     StepRule,
@@ -56,6 +59,7 @@ from cdpr_drake.systems.robots.failures import BROKEN, JAMMED, POWERLESS
 from cdpr_drake.systems.robots.motor_winch import COMMAND_PORTS
 from cdpr_drake.systems.robots.platform_hysteresis import BENT
 from cdpr_drake.systems.robots.platform_wrench import APPLIED_WRENCH
+from cdpr_drake.systems.robots.random_pose import NUMBERS, RANDOM_NUMBERS, RandomPose
 from cdpr_drake.winches.failed_winches import fail_winches, pack_failing_winches
 from cdpr_drake.winches.motor import MODES
 from cdpr_drake.winches.motor_kernel import winch_torques
@@ -112,7 +116,7 @@ class CompiledMotion(LeafSystem):
 
     def __init__(
         self,
-        robot: Robot,
+        robot: Robot | str | Path,
         cables: CableSet,
         model: str,
         drive: Drive,
@@ -122,6 +126,7 @@ class CompiledMotion(LeafSystem):
         frame: FrameId | None = None,
         command_period: float | None = None,
         may_fail: bool = False,
+        random_pose: RandomPose | None = None,
     ) -> None:
         """Declares ports and state.
 
@@ -138,11 +143,14 @@ class CompiledMotion(LeafSystem):
                 from event to event; a command that is not is refused as the simulation meets it.
             may_fail: Whether it has inputs for what fails; they count like commands. Not for
                 tensions that are commanded.
+            random_pose: Poses of random contexts, by an input random_numbers, shape (6,), uniform
+                in 0..1; `default_numbers` there stand for the home pose. None: the home pose.
 
         Raises:
             CdprError: The period is not positive.
         """
         super().__init__()
+        robot = as_robot(robot, "CompiledMotion")
         rule = StepRule() if rule is None else rule
         period = rule.max_step if command_period is None else command_period
         if not period > 0.0:
@@ -173,6 +181,7 @@ class CompiledMotion(LeafSystem):
         law = cable_law(model, cables)
         self._room, self._outputs = make_room(m, law, self._height), outputs_kernel(law)
         self._frame = frame
+        self.not_at_rest = ""
         self._declare_inputs()
         # Depends on the state alone, which is a new one at the beginning of each step: so it is
         # kept until the step ends.
@@ -184,9 +193,18 @@ class CompiledMotion(LeafSystem):
         self._witness = self.MakeWitnessFunction(
             "commands_at_begin", WitnessFunctionDirection.kNone, self._see_begin
         )
-        start = np.concatenate([self._state_at(robot.home.transform(), self._home, self._still),
-                                np.zeros(1 + REPORTED)])  # fmt: skip
-        self.DeclareDiscreteState(start)
+        X_home = robot.home.transform()
+        state = self._state_at(X_home, self._home, self._still)
+        if drive.kind != TENSIONS:
+            begin = resting_start(robot, X_home, cables, model)
+            state, self.not_at_rest = (
+                self._state_at(begin.X_WP, begin.lengths, begin.drum_tensions), begin.problem,
+            )  # fmt: skip
+        self._begin = np.concatenate([state, np.zeros(1 + REPORTED)])
+        self.DeclareDiscreteState(self._begin)
+        self._random, self._numbers, self.default_numbers = random_pose, None, np.zeros(NUMBERS)
+        if random_pose is not None:
+            self._numbers = self.DeclareVectorInputPort(RANDOM_NUMBERS, NUMBERS)
         everything = {self.time_ticket(), self.xd_ticket(), self.all_input_ports_ticket()}
         port = self.DeclareVectorOutputPort(
             MEMORY, BasicVector(fresh_memory(size, m)), self._calc_reached, everything
@@ -475,10 +493,29 @@ class CompiledMotion(LeafSystem):
         return out
 
     def _begin_anew(self, context: Context, discrete_state: DiscreteValues) -> None:
-        """Takes the state as that of now where the time was set back, as a plant does."""
+        """Takes the state as that of now where the time was set back, as a plant does.
+
+        A default state becomes that of rest at the pose which was drawn, if one was.
+        """
+        if self._numbers is not None:
+            numbers = self._numbers.Eval(context)
+            own = context.get_discrete_state_vector().value()
+            drawn = not np.array_equal(numbers, self.default_numbers)
+            if drawn and np.array_equal(own, self._begin):
+                discrete_state.set_value(self._standing(context, self._drawn(numbers)))
+                return
         if context.get_time() < context.get_discrete_state_vector().value()[self._size]:
             state = context.get_discrete_state_vector().value()[: self._size]
             discrete_state.set_value(self._standing(context, state))
+
+    def _drawn(self, numbers: Array) -> Array:
+        """State at rest at the pose of random numbers, shape (n,)."""
+        assert self._random is not None
+        X_WP = self._random.pose(self._joint, self._robot.home.transform(), numbers)
+        X_WP, held = equilibrium_start(
+            self._robot, self._set, self._model, X_WP, slack=None, at_rest=False
+        )
+        return self._state_at(X_WP, held.unstrained_lengths, held.drum_tensions)
 
     def _look(self, context: Context) -> None:
         """Computes what is reached at the end of a step, with the inputs that led there."""

@@ -9,6 +9,7 @@ import numpy as np
 from pydrake.autodiffutils import AutoDiffXd
 from pydrake.systems.framework import (
     BasicVector,
+    BasicVector_,
     Context,
     ContinuousState,
     ContinuousStateIndex,
@@ -22,6 +23,7 @@ from pydrake.systems.scalar_conversion import TemplateSystem
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.systems.robots.failures import JAMMED, POWERLESS
+from cdpr_drake.systems.robots.random_pose import Following
 from cdpr_drake.systems.robots.templates import class_for_floats
 from cdpr_drake.winches.failed_winches import fail_winches, failed_law, pack_failing_winches
 from cdpr_drake.winches.groups import WinchGroups
@@ -74,7 +76,15 @@ class MotorWinch(Diagram):
     `winches.motor` has the equations.
     """
 
-    def __init__(self, law: WinchLaw, mode: str, home: Array, may_fail: bool = False) -> None:
+    def __init__(
+        self,
+        law: WinchLaw,
+        mode: str,
+        home: Array,
+        may_fail: bool = False,
+        start: tuple[Array, Array] | None = None,
+        following: Following | None = None,
+    ) -> None:
         """Builds the winches.
 
         Args:
@@ -82,12 +92,16 @@ class MotorWinch(Diagram):
             mode: A name of `MODES`.
             home: Unstrained lengths at angle zero, shape (m,) [m].
             may_fail: Whether they have inputs for what fails.
+            start: Of default contexts, unstrained lengths and the tensions at the drums that the
+                motors hold, shape (m,) each [m, N]; None: `home`, without tension.
+            following: How lengths follow a random pose, with an input platform_state; None: they
+                do not.
         """
         super().__init__()
         m = len(home)
         builder = DiagramBuilder()
         motors = self._motors = builder.AddNamedSystem(
-            "motors", WinchMotors(law, mode, home, may_fail)
+            "motors", WinchMotors(law, mode, home, may_fail, start, following)
         )
         parts = builder.AddNamedSystem("parts", Demultiplexer([m] * motors.num_groups()))
         builder.Connect(motors.GetOutputPort("state"), parts.get_input_port())
@@ -140,6 +154,8 @@ def WinchMotors_(T: Any) -> type[LeafSystem]:
             mode: str,
             home: Array,
             may_fail: bool = False,
+            start: tuple[Array, Array] | None = None,
+            following: Following | None = None,
             converter: Any = None,
         ) -> None:
             LeafSystem_[T].__init__(self, converter=converter)
@@ -155,7 +171,9 @@ def WinchMotors_(T: Any) -> type[LeafSystem]:
             num_z = 0 if self._mode == TORQUE else m
             self._work = np.zeros(2 * m + num_z)
             self._pairs = np.zeros((2, m))
-            index = self.DeclareContinuousState(num_q=m, num_v=m, num_z=num_z)
+            self._start = (self._home, np.zeros(m)) if start is None else start
+            begin = BasicVector_[T](self.holding_state(*self._start))
+            index = self.DeclareContinuousState(begin, num_q=m, num_v=m, num_z=num_z)
             # Looked up once: these are called several thousand times per simulated second.
             self._command = self.DeclareVectorInputPort(COMMAND_PORTS[mode], k).Eval
             self._tensions = self.DeclareVectorInputPort("tensions", m).Eval
@@ -165,6 +183,9 @@ def WinchMotors_(T: Any) -> type[LeafSystem]:
             self._faults = [
                 self.DeclareVectorInputPort(name, k) for name in (JAMMED, POWERLESS) if may_fail
             ]
+            self._following = following
+            if following is not None:
+                following.declare(self, self.holding_state(*self._start))
             # Written by Drake itself, which is quicker than a port of this class.
             self.DeclareStateOutputPort("state", ContinuousStateIndex(index))
             angles = {self.q_ticket()}
@@ -180,8 +201,9 @@ def WinchMotors_(T: Any) -> type[LeafSystem]:
         def _construct_copy(self, other: Any, converter: Any = None) -> None:
             may_fail = bool(other._faults)
             Impl._construct(
-                self, other._law, other._mode_name, other._home, may_fail, converter=converter
-            )
+                self, other._law, other._mode_name, other._home, may_fail, other._start,
+                other._following, converter=converter,
+            )  # fmt: skip
 
         def num_groups(self) -> int:
             """How many vectors of m the state has."""
@@ -273,7 +295,13 @@ if TYPE_CHECKING:  # what an editor cannot see in a template
         """`WinchMotors_` for float."""
 
         def __init__(
-            self, law: WinchLaw, mode: str, home: Array, may_fail: bool = False
+            self,
+            law: WinchLaw,
+            mode: str,
+            home: Array,
+            may_fail: bool = False,
+            start: tuple[Array, Array] | None = None,
+            following: Following | None = None,
         ) -> None: ...
         def num_groups(self) -> int: ...  # noqa: D102
         def holding_state(self, lengths: Array, tensions: Array) -> Array: ...  # noqa: D102

@@ -6,8 +6,8 @@ step's beginning: a step that is long against the vibrations on the cables throw
 
 from __future__ import annotations
 
+import logging
 import math
-import warnings
 from collections.abc import Callable
 from typing import Any
 
@@ -27,7 +27,7 @@ CablePull = Callable[[Context], Array]
 """Generalized force of cables and dampers, shape (nv,), at a context of the plant."""
 
 NEAR = 0.8
-"""Share of the largest stable step above which a step is warned of; stiffness changes on the way."""
+"""Share of the largest stable step from which on a step is warned of."""
 
 TAUT = 1e-4
 """Strain of cables whose stiffness is asked for before anything is known of their tensions."""
@@ -37,8 +37,7 @@ _MOVE = 1e-7
 stretch, and far more than rounding."""
 
 
-class PlantStepWarning(UserWarning):
-    """A discrete plant has a time step near the largest one that its cables bear."""
+_LOG = logging.getLogger(__name__)
 
 
 def stable_plant_step(plant: MultibodyPlant, context: Context, pull: CablePull) -> float:
@@ -74,6 +73,8 @@ def stable_plant_step(plant: MultibodyPlant, context: Context, pull: CablePull) 
 def check_plant_step(plant: MultibodyPlant, context: Context, pull: CablePull, what: str) -> None:
     """Checks that a plant's time step is one with which it rests on its cables.
 
+    A step above `NEAR` of the largest one is a warning in the log.
+
     Args:
         plant: The plant, finalized; a continuous one is not asked.
         context: As for `stable_plant_step`.
@@ -98,12 +99,11 @@ def check_plant_step(plant: MultibodyPlant, context: Context, pull: CablePull, w
             found + f"accepted: up to {largest:g} s, above which the vibrations on its cables grow "
             "from step to step, or 0, a continuous plant"
         )
-    warnings.warn(
-        found + f"the vibrations on its cables grow from {largest:g} s on, or before that where "
-        f"cables get shorter; up to {NEAR * largest:.3g} s are safe",
-        PlantStepWarning,
-        stacklevel=4,
-    )
+    _LOG.warning(
+        "%sthe vibrations on its cables grow from %g s on, or from less where cables get shorter; "
+        "up to %.3g s are safe",
+        found, largest, NEAR * largest,
+    )  # fmt: skip
 
 
 def platform_pull(

@@ -100,6 +100,7 @@ def add_cables(
     rated_speed: float = np.inf,
     method: str = AUTOMATIC,
     name: str = "",
+    rest: Rest | None = None,
 ) -> CablePorts:
     """Adds cables between bodies of a finalized plant of the builder, and winches.
 
@@ -115,6 +116,9 @@ def add_cables(
         rated_speed: Largest cable speed of ideal winches [m/s].
         method: One of `METHODS`.
         name: Put before the names of the blocks.
+        rest: Rest of the plant in default contexts, from `models.hang` on these cables: it becomes
+            the plant's default positions and the default lengths of ideal winches. None: default
+            positions stay, with cables that are just not taut.
 
     Returns:
         Handles and ports; `why` says it where `automatic` did not take compiled joints.
@@ -140,7 +144,11 @@ def add_cables(
     forces.cables_of_plant = PlantCables(plant, forces.routes(), model)
     _check_step(builder, forces.cables_of_plant)
     if winches is None:
-        home, _ = cables.lengths_and_jacobian(plant.CreateDefaultContext())
+        if rest is None:
+            home, _ = cables.lengths_and_jacobian(plant.CreateDefaultContext())
+        else:
+            home = rest.unstrained_lengths
+            plant.SetDefaultPositions(rest.positions)
         winches = VelocityWinch(home, rated_speed)
     winch = builder.AddNamedSystem(prefix + "winches", winches)
     connect_cables(builder, plant, forces, name=name)

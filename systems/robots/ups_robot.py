@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
@@ -9,6 +11,7 @@ from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 from pydrake.systems.primitives import MatrixGain
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.ups_robot import UpsInPlant, add_ups_robot
 from cdpr_drake.systems.robots.platform_pose import PlatformPose
@@ -27,13 +30,14 @@ class UpsRobot(Diagram):
     The plant is discrete; its solver closes the loops.
     """
 
-    def __init__(self, robot: Robot, masses: Array, time_step: float) -> None:
+    def __init__(self, robot: Robot | str | Path, masses: Array, time_step: float) -> None:
         """With masses of the rods, shape (m,) [kg], and the plant's time step [s].
 
         Raises:
             RobotFileError: The robot is planar.
         """
         super().__init__()
+        robot = as_robot(robot, "UpsRobot")
         builder = DiagramBuilder()
         plant = builder.AddNamedSystem("plant", MultibodyPlant(time_step))
         self.ups: UpsInPlant = add_ups_robot(plant, robot, masses)

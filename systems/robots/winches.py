@@ -3,16 +3,26 @@
 `make_winches` makes the winches that settings ask for, ideal ones or such with motors.
 """
 
+from functools import partial
 from typing import Any
 
 import numpy as np
-from pydrake.systems.framework import BasicVector, Context, Diagram, DiagramBuilder, LeafSystem
+from pydrake.systems.framework import (
+    BasicVector,
+    Context,
+    ContinuousState,
+    ContinuousStateIndex,
+    Diagram,
+    DiagramBuilder,
+    LeafSystem,
+)
 from pydrake.systems.primitives import Integrator, MatrixGain, Saturation
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.systems.robots.failures import JAMMED
 from cdpr_drake.systems.robots.motor_winch import MotorWinch
+from cdpr_drake.systems.robots.random_pose import Following
 from cdpr_drake.systems.robots.settings import WinchSettings
 from cdpr_drake.winches.groups import WinchGroups
 
@@ -39,14 +49,20 @@ class VelocityWinch(Diagram):
         rated_speed: float,
         groups: WinchGroups | None = None,
         may_fail: bool = False,
+        following: Following | None = None,
     ) -> None:
-        """With unstrained lengths at time 0, shape (m,) [m], and a largest cable speed [m/s]."""
+        """With unstrained lengths at time 0, shape (m,) [m], and a largest cable speed [m/s].
+
+        With `following` there is an input platform_state, from which lengths follow as a simulator
+        is initialized.
+        """
         super().__init__()
         shared = groups is not None and groups.are_shared()
         limit = np.full(groups.count if shared and groups else len(initial_lengths), rated_speed)
         builder = DiagramBuilder()
         speed = builder.AddNamedSystem("rated_speed", Saturation(-limit, limit))
-        self._drums = builder.AddNamedSystem("drums", Integrator(initial_lengths))
+        drums = Integrator if following is None else partial(FollowingDrums, following=following)
+        self._drums = builder.AddNamedSystem("drums", drums(initial_lengths))
         rates = speed.get_output_port()
         if may_fail:
             held = builder.AddNamedSystem("held", HeldSpeeds(len(limit)))
@@ -57,7 +73,9 @@ class VelocityWinch(Diagram):
             bundles = builder.AddNamedSystem("bundles", MatrixGain(groups.to_cables()))
             builder.Connect(rates, bundles.get_input_port())
             rates = bundles.get_output_port()
-        builder.Connect(rates, self._drums.get_input_port())
+        builder.Connect(rates, self._drums.get_input_port(0))
+        if following is not None:
+            builder.ExportInput(self._drums.get_input_port(1), "platform_state")
         builder.ExportInput(speed.get_input_port(), "cable_velocities")
         builder.ExportOutput(self._drums.get_output_port(), "unstrained_lengths")
         builder.ExportOutput(rates, "unstrained_length_rates")
@@ -65,13 +83,37 @@ class VelocityWinch(Diagram):
 
     def set_unstrained_lengths(self, context: Context, lengths: Array) -> None:
         """Sets the lengths, shape (m,) [m], in this diagram's own context."""
-        self._drums.set_integral_value(
-            self.GetMutableSubsystemContext(self._drums, context), lengths
-        )
+        self.GetMutableSubsystemContext(self._drums, context).SetContinuousState(lengths)
 
     def hold(self, context: Context, lengths: Array, tensions: Array) -> None:
         """Sets the lengths, shape (m,) [m]; an ideal winch holds any tensions, shape (m,) [N]."""
         self.set_unstrained_lengths(context, lengths)
+
+
+class FollowingDrums(LeafSystem):
+    """Lengths from their rates, which begin where they hold a platform; see `Following`.
+
+    ============== ========= ==== ======================================
+    port           type      unit meaning
+    ============== ========= ==== ======================================
+    rates          vector(m) m/s  in
+    platform_state vector    m    in, as `CableForces` takes it
+    lengths        vector(m) m    out
+    ============== ========= ==== ======================================
+    """
+
+    def __init__(self, initial_lengths: Array, following: Following) -> None:
+        """With lengths of default contexts, shape (m,) [m]."""
+        super().__init__()
+        m = len(initial_lengths)
+        index = self.DeclareContinuousState(BasicVector(initial_lengths))
+        self._rates = self.DeclareVectorInputPort("rates", m).Eval
+        following.declare(self, initial_lengths)
+        self.DeclareStateOutputPort("lengths", ContinuousStateIndex(index))
+
+    def DoCalcTimeDerivatives(self, context: Context, derivatives: ContinuousState) -> None:
+        """The rates."""
+        derivatives.get_mutable_vector().SetFromVector(self._rates(context))
 
 
 class HeldSpeeds(LeafSystem):
@@ -100,7 +142,14 @@ class HeldSpeeds(LeafSystem):
         output.SetFromVector(speeds)
 
 
-def make_winches(robot: Robot, settings: WinchSettings, home: Array, may_fail: bool = False) -> Any:
+def make_winches(
+    robot: Robot,
+    settings: WinchSettings,
+    home: Array,
+    may_fail: bool = False,
+    start: Any = None,
+    following: Following | None = None,
+) -> Any:
     """The winches of a robot, `VelocityWinch` or `MotorWinch`.
 
     Args:
@@ -108,11 +157,16 @@ def make_winches(robot: Robot, settings: WinchSettings, home: Array, may_fail: b
         settings: Which ones.
         home: Unstrained lengths at the home pose, shape (m,) [m].
         may_fail: Whether they have inputs for what fails.
+        start: `assembly.DefaultStart` of default contexts; None: `home` without tension.
+        following: How lengths follow a random pose; None: they do not.
 
     Raises:
         RobotFileError: The winches have motors, of which the robot's file does not say enough.
     """
+    lengths, drums = (home, 0.0 * home) if start is None else (start.lengths, start.drum_tensions)
     if settings.has_motors():
-        return MotorWinch(robot.winch_law(), settings.mode, home, may_fail)
+        return MotorWinch(
+            robot.winch_law(), settings.mode, home, may_fail, (lengths, drums), following
+        )
     rated = robot.winch.rated_cable_speed()
-    return VelocityWinch(home, rated, robot.winch_groups(), may_fail)
+    return VelocityWinch(lengths, rated, robot.winch_groups(), may_fail, following)

@@ -1,3 +1,4 @@
+from .inertial_sensor import InertialSensor as InertialSensor
 from .perception_sensors import add_perception_sensors as add_perception_sensors
 from .sampled_sensor import SampledSensor as SampledSensor
 from .scene_shapes import SceneShapes as SceneShapes

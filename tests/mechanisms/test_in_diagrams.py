@@ -2,20 +2,25 @@
 
 import numpy as np
 import pytest
+from pydrake.common import RandomGenerator
 from pydrake.geometry import Box, HalfSpace
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, CoulombFriction, MultibodyPlant
 from pydrake.multibody.tree import ScrewJoint, SpatialInertia
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.primitives import ConstantVectorSource
 
 from cdpr_drake.geometry.cable_routes import CableRoute, CableRoutes
+from cdpr_drake.models.plant_cables import PlantCables
+from cdpr_drake.models.plant_rest import hang
 from cdpr_drake.models.robot_in_plant import add_robot
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.robots.assembly import add_cable_robot
 from cdpr_drake.systems.robots.route_assembly import add_cables
 from cdpr_drake.systems.robots.settings import CableRobotSettings, CableSettings
 from tests.mechanisms.cabled import METHODS, Cabled
+from tests.mechanisms.machines import machine
 
 AT_REST = 1e-9
 """How far a machine moves in 0.1 s that starts at rest [m, rad]; found 3e-15."""
@@ -209,3 +214,24 @@ def test_joints_that_are_not_compiled_take_forces_on_bodies_and_say_so():
 def test_bodies_asked_for_need_no_reason():
     assert Cabled("hanging_arm", "bodies").ports.why == ""
     assert Cabled("hanging_arm", "automatic").ports.method == "joints"
+
+
+@pytest.mark.parametrize("name", ["two_platforms", "acrobot_arm"])
+def test_a_rest_that_is_given_is_that_of_default_and_random_contexts(name):
+    it = machine(name)
+    rest = hang(PlantCables(it.plant, it.routes), it.home(), lower=1.0, upper=60.0)
+    builder = DiagramBuilder()
+    it = machine(name, builder)
+    ports = add_cables(builder, it.plant, it.routes, rest=rest)
+    still = builder.AddSystem(ConstantVectorSource(np.zeros(it.routes.count)))
+    builder.Connect(still.get_output_port(), ports.GetInputPort("cable_velocities"))
+    if it.plant.num_actuators():
+        torques = it.plant.MakeActuationMatrix().T @ rest.held
+        motors = builder.AddSystem(ConstantVectorSource(torques))
+        builder.Connect(motors.get_output_port(), it.plant.get_actuation_input_port())
+    diagram = builder.Build()
+    context = diagram.CreateDefaultContext()
+    diagram.SetRandomContext(context, RandomGenerator(2))
+    Simulator(diagram, context).AdvanceTo(0.05)
+    q = it.plant.GetPositions(it.plant.GetMyContextFromRoot(context))
+    assert np.max(np.abs(q - rest.positions)) < 1e-7

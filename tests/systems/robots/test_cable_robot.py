@@ -7,7 +7,6 @@ from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
 from cdpr_drake.errors import InfeasibleTensionError, RobotFileError
 from cdpr_drake.geometry.poses import pose_error
-from cdpr_drake.geometry.straight_cables import cable_lengths
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.robots.cable_robot import CableRobot, automatic_step, holding_tensions
 from cdpr_drake.systems.robots.settings import CableRobotSettings, WinchSettings
@@ -41,9 +40,10 @@ def test_default_context_is_the_home_pose_and_simulates(name):
     block.GetInputPort("cable_velocities").FixValue(context, np.zeros(len(robot.cables)))
     X_WP = block.GetOutputPort("X_WP").Eval(context)
     assert X_WP.IsNearlyEqualTo(robot.home.transform(), 1e-12)
-    l0 = block.GetOutputPort("unstrained_lengths").Eval(context)
-    home = cable_lengths(X_WP, robot.exit_points(), robot.anchor_points())
-    np.testing.assert_allclose(l0, home, rtol=1e-12)
+    l0 = block.GetOutputPort("unstrained_lengths").Eval(context).copy()
+    tensions = block.GetOutputPort("tensions").Eval(context).copy()
+    np.testing.assert_allclose(block.set_at_equilibrium(context, X_WP), tensions, rtol=1e-6)
+    np.testing.assert_array_equal(block.GetOutputPort("unstrained_lengths").Eval(context), l0)
     Simulator(block, context).AdvanceTo(0.01)
 
 
