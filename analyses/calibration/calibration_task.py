@@ -35,11 +35,13 @@ from cdpr_drake.analyses.calibration.tracker import (
     with_turned_tracker,
 )
 from cdpr_drake.analyses.calibration.turned_sensors import (
+    Refit,
     far_outside,
     flipped,
     turned_sensors,
     turned_where_lost,
 )
+from cdpr_drake.calibration.fit_groups import GroupFault, group_faults
 from cdpr_drake.calibration.result import CalibrationResult
 from cdpr_drake.errors import CalibrationError
 
@@ -63,6 +65,7 @@ class Calibration:
         misfit: Why it is no fit, in words; empty where it is one.
         ties: Poses that fit as well elsewhere.
         held: Rows that were not fitted but predicted; None: all were fitted.
+        groups: Groups of measurements that do not agree with the others.
     """
 
     task: CalibrationTask
@@ -73,6 +76,7 @@ class Calibration:
     misfit: tuple[str, ...] = ()
     ties: tuple[Tie, ...] = ()
     held: HeldOut | None = None
+    groups: tuple[GroupFault, ...] = ()
 
 
 def calibrate(
@@ -97,12 +101,13 @@ def calibrate(
     except CalibrationError as problem:
         if str(problem).startswith(LOST):
             say("Looking for signs that are turned")
-            turned = turned_where_lost(task, log, lambda t, g: _fitted(t, g, _quiet)[1].result)
+            turned = turned_where_lost(task, log, _refitted)
             if turned:
                 raise CalibrationError(f"{problem}; {turned[0]}") from problem
         raise
     result = found.result
-    misfit = misfits(result)
+    groups = group_faults(found.problem, result)
+    misfit = misfits(result, groups)
     up = prepared.first.rotation().matrix()[:, 2]
     over, undecided = flipped(result, up)
     misfit = (*over, *misfit)
@@ -114,7 +119,7 @@ def calibrate(
         )  # fmt: skip
     if misfit:
         say("Looking for signs that are turned")
-        turned = turned_sensors(task, log, result, lambda t, g: _fitted(t, g, _quiet)[1].result)
+        turned = turned_sensors(task, log, result, groups, _refitted)
         misfit = (*turned, *misfit)
     if misfit:
         result = replace(result, status=MISFIT)
@@ -137,17 +142,23 @@ def calibrate(
         )
     if found.ties:
         remarks.append(_tied(found.ties))
-    return Calibration(task, log, result, prepared.mount, tuple(remarks), misfit, found.ties)
+    return Calibration(task, log, result, prepared.mount, tuple(remarks), misfit, found.ties, None, groups)
 
 
 def _quiet(words: str) -> None:
     """Says nothing."""
 
 
+def _refitted(task: CalibrationTask, log: CalibrationLog) -> Refit:
+    """What one start finds, to try what may be wrong of a log; and groups that do not agree."""
+    found = _fitted(task, log, _quiet, others=False)[1]
+    return Refit(found.result, group_faults(found.problem, found.result))
+
+
 def _fitted(
-    task: CalibrationTask, log: CalibrationLog, say: Callable[[str], None]
+    task: CalibrationTask, log: CalibrationLog, say: Callable[[str], None], others: bool = True
 ) -> tuple[Prepared, MultiStartFit]:
-    """The log and task, checked, and the best of all starts."""
+    """The log and task, checked, and the best of all starts, or of the believed one alone."""
     say("Looking for where the poses were")
     prepared = prepare(task, log)
     if log.poses is not None and prepared.tracked is None:
@@ -155,7 +166,7 @@ def _fitted(
     elif log.points is not None and prepared.freedom.motion.is_point and prepared.tracked is None:
         prepared = with_turned_tracker(prepared, start_points(prepared, [prepared.first])[0].poses)
     check_clock(prepared)
-    return prepared, best_of_starts(prepared, say)
+    return prepared, best_of_starts(prepared, say, others)
 
 
 def _held_out(

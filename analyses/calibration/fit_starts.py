@@ -21,6 +21,7 @@ from cdpr_drake.analyses.calibration.fit_programs import program_from, start_poi
 from cdpr_drake.analyses.calibration.motion_start import on_motion
 from cdpr_drake.analyses.calibration.turned_sensors import upside_down
 from cdpr_drake.arrays import Array
+from cdpr_drake.calibration.elimination import LeastSquares
 from cdpr_drake.calibration.pose_search import (
     HUBER,
     FoundPoses,
@@ -89,6 +90,7 @@ class MultiStartFit:
         ties: Poses of other minima that fit as well, by rows.
         starts: How many starts were tried.
         minima: How many minima they ended in.
+        problem: What was solved for it.
         flipped_costs_less: By how much the best minimum with the platform upside down costs less
             than this one [-]; 0 where there is none that does.
     """
@@ -97,6 +99,7 @@ class MultiStartFit:
     ties: tuple[Tie, ...]
     starts: int
     minima: int
+    problem: LeastSquares
     flipped_costs_less: float = 0.0
 
 
@@ -106,17 +109,24 @@ class _Minimum(NamedTuple):
     cost: float
 
 
-def best_of_starts(prepared: Prepared, say: Callable[[str], None]) -> MultiStartFit:
+def best_of_starts(
+    prepared: Prepared, say: Callable[[str], None], others: bool = True
+) -> MultiStartFit:
     """The best minimum of all starts.
+
+    Args:
+        prepared: The log.
+        say: Told what is done now.
+        others: Whether further first poses are tried beside the believed one.
 
     Raises:
         CalibrationError: No start leads anywhere; says why the last one does not.
     """
-    firsts = [prepared.first, *_other_starts(prepared)]
+    firsts = [prepared.first, *(_other_starts(prepared) if others else ())]
     programs = [program_from(prepared, one) for one in start_points(prepared, firsts)]
     known: list[_Minimum] = []
     pool: list[Stations] = []
-    problem: CalibrationError | None = None
+    failure: CalibrationError | None = None
     for number, program in enumerate(programs):
         say(f"Calibrating, start {number + 1} of {len(programs)}")
         try:
@@ -129,10 +139,10 @@ def best_of_starts(prepared: Prepared, say: Callable[[str], None]) -> MultiStart
             one = _solved(prepared, program, at, straight=False)
             known.append(_improved(prepared, one, []))
         except CalibrationError as why:
-            problem = why
+            failure = why
     if not known:
-        assert problem is not None
-        raise problem
+        assert failure is not None
+        raise failure
     say("Comparing starts")
     best = min(upright_minima(prepared, known), key=lambda one: one.cost)
     if len(programs) > 1:
@@ -145,7 +155,8 @@ def best_of_starts(prepared: Prepared, say: Callable[[str], None]) -> MultiStart
                 _add_tie(ties, best.result, (k, Y), one.cost - best.cost)
     ties.sort(key=lambda tie: (tie.pose, tie.more))
     less = max(0.0, best.cost - min(one.cost for one in known))
-    return MultiStartFit(best.result, tuple(ties), len(programs), len(known), less)
+    problem = best.program.SolvedProblem(best.result, prepared.task.outliers)
+    return MultiStartFit(best.result, tuple(ties), len(programs), len(known), problem, less)
 
 
 def upright_minima(prepared: Prepared, known: Sequence[_Minimum]) -> Sequence[_Minimum]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 
 from cdpr_drake.analyses.calibration.calibration_request import Prepared
 from cdpr_drake.analyses.calibration.columns import (
@@ -15,6 +16,7 @@ from cdpr_drake.analyses.calibration.columns import (
     TORQUES,
     TURN,
 )
+from cdpr_drake.calibration.fit_groups import GroupFault
 from cdpr_drake.calibration.result import CalibrationResult, Fit
 
 MISFIT = "misfit"
@@ -52,9 +54,14 @@ HINTS = {
 """What to look at first where measurements of a kind do not fit."""
 
 
-def misfits(result: CalibrationResult) -> tuple[str, ...]:
-    """Why a result does not fit what was measured, in words; empty where it does."""
-    why = []
+def misfits(result: CalibrationResult, groups: Sequence[GroupFault] = ()) -> tuple[str, ...]:
+    """Why a result does not fit what was measured, in words; empty where it does.
+
+    Args:
+        result: What was found.
+        groups: Groups of its measurements that do not agree.
+    """
+    why = [group.words for group in groups if group.counts]
     if result.degrees > 0 and result.spread() > MISFIT_FACTOR:
         why.append(
             f"residuals are {result.spread():.3g} sigmas, root mean square; accepted: at most "

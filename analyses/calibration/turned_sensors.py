@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
+from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -12,6 +14,7 @@ from cdpr_drake.analyses.calibration.calibration_request import CalibrationTask
 from cdpr_drake.analyses.calibration.fit_verdict import is_thrown_out, misfits
 from cdpr_drake.analyses.calibration.log_file import CalibrationLog
 from cdpr_drake.arrays import Array
+from cdpr_drake.calibration.fit_groups import GroupFault
 from cdpr_drake.calibration.result import CalibrationResult
 from cdpr_drake.errors import CalibrationError
 from cdpr_drake.models.robot_schema import Robot
@@ -28,28 +31,65 @@ TRIED = {
 BY_CABLE = ("swivels", "lengths", "angles", "tensions")
 """Fields with a column a cable, each of which may be turned by itself."""
 
-Refit = Callable[[CalibrationTask, CalibrationLog], CalibrationResult]
+CLEAR = ("rows", "split", "row factors")
+"""Tests of groups that say by themselves what is wrong: rows, and no sensor's sign."""
+
+TILTS = ("roll", "pitch", "yaw")
+
+
+class Refit(NamedTuple):
+    """What was found of a log that was changed.
+
+    Attributes:
+        result: It.
+        groups: Groups of measurements that do not agree.
+    """
+
+    result: CalibrationResult
+    groups: tuple[GroupFault, ...]
+
+    @property
+    def fits(self) -> bool:
+        """Whether it fits what was measured."""
+        return not misfits(self.result, self.groups)
+
+
+Refitted = Callable[[CalibrationTask, CalibrationLog], Refit]
 
 
 def turned_sensors(
-    task: CalibrationTask, log: CalibrationLog, result: CalibrationResult, refit: Refit
+    task: CalibrationTask,
+    log: CalibrationLog,
+    result: CalibrationResult,
+    groups: Sequence[GroupFault],
+    refitted: Refitted,
 ) -> tuple[str, ...]:
-    """What would fit otherwise, in words: kinds of which much was thrown out, else all, tried anew.
+    """What would fit otherwise, in words: sensors of which much was thrown out, tried anew.
 
-    A sign is the wrong one where, with it turned, the fit throws out no third of the kind and the
-    whole costs less; where only one cable's is, the whole must fit then. A tilt is tried from other
-    zeros, too. The first that fits is told.
+    Single sensors come first: with the sign turned, or two of them exchanged. Then come kinds of
+    measurement of which much was thrown out, or all of them, and each cable of these. A sign is the
+    wrong one where, with it turned, the fit throws out no third of the kind and the whole costs
+    less; where only one sensor's is, the whole must fit then. A tilt is tried from other zeros,
+    too. The first that fits is told. Where rows do not agree no sensor is to blame.
 
     Args:
         task: What was asked.
         log: What was measured.
         result: What was found, which is no fit.
-        refit: Calibrates anew.
+        groups: Groups of its measurements that do not agree.
+        refitted: Calibrates anew, from one start.
     """
+    lost = [group.quantity for group in groups if group.test == "dropped"]
     suspects = [kind for kind, fit in result.residuals.items() if is_thrown_out(fit)]
+    if not lost and not suspects and any(g.counts and g.test in CLEAR for g in groups):
+        return ()
+    single = _first_that_fits(task, _single_sensors(task, log, lost), refitted)
+    if single:
+        return single
+    tried = suspects or ([] if lost else list(result.residuals))
     for kind, field in TRIED.items():
         values = getattr(log, field)
-        if kind not in (suspects or result.residuals) or values is None:
+        if kind not in tried or values is None:
             continue
         trials = [("with the sign turned", task, replace(log, **{field: -values}))]
         if kind == "inclination" and "tilt_zeros" not in task.unknown:
@@ -57,7 +97,7 @@ def turned_sensors(
             trials.append(("from other zeros, see tilt_zeros", replace(task, unknown=unknown), log))
         for how, other_task, other_log in trials:
             try:
-                found = refit(other_task, other_log)
+                found = refitted(other_task, other_log).result
             except CalibrationError:
                 continue
             again = found.residuals[kind]
@@ -65,65 +105,99 @@ def turned_sensors(
             if better and not is_thrown_out(again):
                 whole = again.count + again.dropped
                 return (f"{again.count} of {whole} {kind} fit {how}",)
-    return _one_cable(task, log, suspects or list(result.residuals), refit)
+    if lost:
+        return ()
+    return _first_that_fits(task, _turned_cables(task, log, tried), refitted)
 
 
-def turned_where_lost(task: CalibrationTask, log: CalibrationLog, refit: Refit) -> tuple[str, ...]:
+def turned_where_lost(
+    task: CalibrationTask, log: CalibrationLog, refitted: Refitted
+) -> tuple[str, ...]:
     """As `turned_sensors`, where no start leads anywhere.
 
     Args:
         task: What was asked.
         log: What was measured.
-        refit: Calibrates anew.
+        refitted: Calibrates anew, from one start.
     """
     for kind, field in TRIED.items():
         values = getattr(log, field)
         if values is None:
             continue
         try:
-            found = refit(task, replace(log, **{field: -values}))
+            found = refitted(task, replace(log, **{field: -values}))
         except CalibrationError:
             continue
-        fit = found.residuals.get(kind)
-        if fit is not None and not misfits(found):
+        fit = found.result.residuals.get(kind)
+        if fit is not None and found.fits:
             return (f"{fit.count} of {fit.count + fit.dropped} {kind} fit with the sign turned",)
-    return _one_cable(task, log, list(TRIED), refit)
+    return _first_that_fits(task, _turned_cables(task, log, list(TRIED)), refitted)
 
 
-def _one_cable(
-    task: CalibrationTask, log: CalibrationLog, kinds: list[str], refit: Refit
+Trial = tuple[str, CalibrationLog]
+"""What fits with it, in words, and a log that was changed."""
+
+
+def _first_that_fits(
+    task: CalibrationTask, trials: Iterable[Trial], refitted: Refitted
 ) -> tuple[str, ...]:
-    """In words the one cable with whose sign turned all fits.
-
-    Args:
-        task: What was asked.
-        log: What was measured.
-        kinds: Kinds of measurement that may be turned.
-        refit: Calibrates anew.
-    """
-    for kind, name, other in _turned_cables(task, log, kinds):
+    """In words the first changed log that fits as a whole."""
+    for words, other in trials:
         try:
-            found = refit(task, other)
+            found = refitted(task, other)
         except CalibrationError:
             continue
-        if kind in found.residuals and not misfits(found):
-            return (f"all fits with the sign of the {kind} of {name} turned",)
+        if found.fits:
+            return (f"all fits with {words}",)
     return ()
+
+
+def _single_sensors(
+    task: CalibrationTask, log: CalibrationLog, lost: Sequence[str]
+) -> Iterator[Trial]:
+    """Sensors by their names in words, as "roll" or "length of C1": turned, two exchanged."""
+    columns: dict[str, tuple[str, str, int]] = {}
+    for kind, field in TRIED.items():
+        names = TILTS if field == "tilts" else [cable.name for cable in task.robot.cables]
+        for k, name in enumerate(names):
+            what = name if field == "tilts" else f"{kind.removesuffix('s')} of {name}"
+            columns[what] = (kind, field, k)
+    known = [what for what in lost if what in columns]
+    for what in known:
+        kind, field, k = columns[what]
+        name = what if field == "tilts" else what.rpartition(" of ")[2]
+        words = f"the sign of {what}" if field == "tilts" else f"the sign of the {kind} of {name}"
+        yield f"{words} turned", _with_column(log, field, k, -1.0)
+    for what, other in combinations(known[:MOST_EXCHANGED], 2):
+        (kind, field, k), (other_kind, _, n) = columns[what], columns[other]
+        values = getattr(log, field)
+        if kind == other_kind and values is not None and field != "tilts":
+            values = values.copy()
+            values[:, [k, n]] = values[:, [n, k]]
+            yield f"{what} and {other} exchanged", replace(log, **{field: values})
+
+
+MOST_EXCHANGED = 4
+"""Sensors that are exchanged in pairs."""
+
+
+def _with_column(log: CalibrationLog, field: str, k: int, factor: float) -> CalibrationLog:
+    """A log with one column of a field times a factor."""
+    values = getattr(log, field).copy()
+    values[:, k] *= factor
+    return replace(log, **{field: values})
 
 
 def _turned_cables(
     task: CalibrationTask, log: CalibrationLog, kinds: list[str]
-) -> Iterator[tuple[str, str, CalibrationLog]]:
-    """Kind, cable, and the log with its sign turned."""
+) -> Iterator[Trial]:
+    """Each cable's sensor of some kinds with its sign turned."""
     for kind in kinds:
         field = TRIED.get(kind, "")
-        values = getattr(log, field, None) if field in BY_CABLE else None
-        if values is None:
-            continue
-        for k, cable in enumerate(task.robot.cables):
-            turned = values.copy()
-            turned[:, k] *= -1.0
-            yield kind, cable.name, replace(log, **{field: turned})
+        if field in BY_CABLE and getattr(log, field, None) is not None:
+            for k, cable in enumerate(task.robot.cables):
+                words = f"the sign of the {kind} of {cable.name} turned"
+                yield words, _with_column(log, field, k, -1.0)
 
 
 def far_outside(robot: Robot, result: CalibrationResult) -> npt.NDArray[np.bool_]:

@@ -152,6 +152,10 @@ class Tilts(Term):
         """As the base class says."""
         return np.tile([self.sigma_tilt, self.sigma_tilt, self.sigma_yaw], (len(self.angles), 1))
 
+    def values(self, at: Point) -> Array:
+        """As the base class says."""
+        return self.angles
+
     def row_name(self, row: int, names: tuple[str, ...]) -> str:
         """As the base class says."""
         return ("roll", "pitch", "yaw")[row]

@@ -101,6 +101,11 @@ class TrackedPoints(Term):
         """As the base class says."""
         return np.full(self.points.shape, self.sigma)
 
+    def values(self, at: Point) -> Array:
+        """As the base class says, along the axes of W."""
+        R_WK = at.model.X_WK.rotation().matrix()
+        return np.asarray(self.points @ R_WK.T @ self._whitening.T)
+
     def row_name(self, row: int, names: tuple[str, ...]) -> str:
         """As the base class says."""
         return f"tracker, place {'xyz'[row]}"

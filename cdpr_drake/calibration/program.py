@@ -109,6 +109,19 @@ class CalibrationProgram(MeasuredCalibration):
         )  # fmt: skip
         return replace(found, at_bounds={self.layout.names[k]: v for k, v in held.items()})
 
+    def SolvedProblem(self, result: CalibrationResult, outliers: bool = True) -> LeastSquares:
+        """The problem of which a result is the minimum, without what it dropped.
+
+        Args:
+            result: Of `Solve`; parameters that it holds at bounds are not unknown in it.
+            outliers: Whether outliers were sought.
+        """
+        unknown = set(result.names)
+        free = np.array([name in unknown for name in self.layout.names])
+        at = Point(result.model, result.stations, self.layout)
+        problem = replace(self.least_squares(), free=free)
+        return replace(problem, dropped=outlying_rows(problem, at)) if outliers else problem
+
     def _solve(
         self, free: npt.NDArray[np.bool_], at: Point, outliers: bool, straight: bool
     ) -> tuple[CalibrationResult, LeastSquares]:

@@ -66,6 +66,13 @@ class Term(ABC):
     def only(self, which: npt.NDArray[np.generic] | slice) -> Term:
         """The measurements at some of the poses."""
 
+    def values(self, at: Point) -> Array:
+        """What was measured, in the units, shape (k, rows): what a wrong factor multiplies.
+
+        Zero where a factor means nothing, as of forces that should be in balance.
+        """
+        return np.zeros(self.measured().shape)
+
     def counted_by(self, models: Sequence[CalibrationModel], base: CalibrationModel) -> Term:
         """What has the same residuals by `base`, which counts from nothing, as this by a model of
         each pose; these differ from `base` in what readings count from alone."""
@@ -131,6 +138,10 @@ class Lengths(Term):
         """As the base class says."""
         return self.sigma
 
+    def values(self, at: Point) -> Array:
+        """As the base class says."""
+        return self.readings
+
     def row_name(self, row: int, names: tuple[str, ...]) -> str:
         """As the base class says."""
         return f"length of {names[row]}"
@@ -182,6 +193,10 @@ class Swivels(Term):
     def sigmas(self) -> Array:
         """As the base class says."""
         return np.full(self.readings.shape, self.sigma)
+
+    def values(self, at: Point) -> Array:
+        """As the base class says."""
+        return self.readings
 
     def row_name(self, row: int, names: tuple[str, ...]) -> str:
         """As the base class says."""
@@ -249,6 +264,13 @@ class TrackedPoses(Term):
         """As the base class says."""
         return np.tile([self.sigma_turn] * 3 + [self.sigma_place] * 3, (len(self.p), 1))
 
+    def values(self, at: Point) -> Array:
+        """As the base class says; along the axes of W."""
+        seen = self.measured()
+        turns = turn_vectors(np.where(seen[:, :1, None], self.R, np.eye(3)))
+        R_WK = at.model.X_WK.rotation().matrix()
+        return np.hstack([turns @ R_WK.T, self.p @ R_WK.T])
+
     def row_name(self, row: int, names: tuple[str, ...]) -> str:
         """As the base class says."""
         return f"tracker, {('turn', 'place')[row // 3]} {'xyz'[row % 3]}"
@@ -287,6 +309,10 @@ class Tensions(Term):
     def sigmas(self) -> Array:
         """As the base class says."""
         return self.sigma
+
+    def values(self, at: Point) -> Array:
+        """As the base class says."""
+        return self.readings
 
     def row_name(self, row: int, names: tuple[str, ...]) -> str:
         """As the base class says."""

@@ -105,6 +105,10 @@ class ZeroedCables(Term):
         """As the base class says."""
         return self.sigma
 
+    def values(self, at: Point) -> Array:
+        """As the base class says: cable that was paid out [m]."""
+        return at.model.length_scale * self.paid_out(at.model)[0]
+
     def row_name(self, row: int, names: tuple[str, ...]) -> str:
         """As the base class says."""
         return f"{'length' if self.drum is None else 'motor angle'} of {names[row]}"

@@ -1,0 +1,336 @@
+"""Logs with systematic errors, and clean ones: what a calibration says of each.
+
+`python -m tests.analyses.calibration.attack` prints a table of attacks; `--clean 200` calibrates so
+many clean logs, and counts false alarms; `--robot ROBOT --log LOG` attacks a log of one's own, whose
+clean fit is the truth then. An attack is met where the verdict is a misfit, or a refusal, with its
+reason, or where poses stay within their stated deviations.
+"""
+
+import argparse
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from pydrake.math import RigidTransform, RollPitchYaw
+
+import cdpr_drake as cdpr
+from cdpr_drake.analyses.calibration.calibrated_robots import calibration_model
+from cdpr_drake.analyses.calibration.calibration_request import Sigmas
+from cdpr_drake.analyses.calibration.log_file import CalibrationLog, read_log
+from cdpr_drake.calibration.measurements import simulated_poses
+from cdpr_drake.calibration.stations import Point, Stations
+from cdpr_drake.errors import CdprError
+from cdpr_drake.geometry.poses import pose_error, pose_from_angles
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.models.robot_statics import rigid_platform
+from cdpr_drake.statics.equilibrium import equilibrium_near
+
+WITHIN = 3.0
+"""Poses are right where their errors are, root mean square, at most so many of their deviations."""
+
+FACTOR = 1.05
+"""By which readings are too large."""
+
+NOISE = Sigmas(
+    lengths=5e-4, place=5e-4, turn=1e-3, swivels=2e-3, tilt=2e-3, yaw=4e-3, tensions=0.5
+)
+"""Of simulated sensors."""
+
+SHARES = (0.1, 0.3, 0.5, 0.7, 0.9)
+"""Shares of rows that are off."""
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A robot, what was measured of it, and what is asked.
+
+    Attributes:
+        robot, log: The robot as it is believed, and the log.
+        poses: Where the platform was, X_WP.
+        options: Arguments of `calibrate`.
+    """
+
+    robot: Robot
+    log: CalibrationLog
+    poses: list[RigidTransform]
+    options: dict
+
+
+def _some_cables(count: int) -> Robot:
+    robot = load_robot("acrobot_small")
+    return replace(robot, cables=robot.cables[:count])
+
+
+def _free_poses(count: int, random: np.random.Generator) -> list[RigidTransform]:
+    """Poses in the middle of ACROBOT's frame, in random order."""
+    return [
+        pose_from_angles(
+            np.append(random.uniform(-0.2, 0.2, 2), random.uniform(0.2, 0.6)),
+            random.uniform(-0.3, 0.3, 3),
+        )
+        for _ in range(count)
+    ]
+
+
+@cache
+def _resting(count: int, seed: int) -> tuple[list[RigidTransform], np.ndarray]:
+    """Poses at which the weight holds IRMA4U, and tensions there."""
+    robot, random = load_robot("irma4u"), np.random.default_rng(seed)
+    platform, cables = rigid_platform(robot), robot.cable_set()
+    model = calibration_model(robot)
+    poses, tensions = [], []
+    while len(poses) < count:
+        place = np.append(random.uniform(-0.4, 0.4, 2), random.uniform(0.4, 1.2))
+        X_WP = pose_from_angles(place, random.uniform(-0.2, 0.2, 3))
+        lengths = Point(model, Stations.at([X_WP])).numbers[0, :, 0]
+        rest = equilibrium_near(cables, "elastic", platform, lengths, X_WP)
+        if 3.0 < np.min(rest.tensions) and np.max(rest.tensions) < 300.0:
+            poses.append(rest.X_WP)
+            tensions.append(rest.tensions)
+    return poses, np.array(tensions)
+
+
+def scene(
+    name: str, count: int = 27, seed: int = 0, noise: Sigmas = NOISE, **options: object
+) -> Scene:
+    """A simulated log: "tracked" or "blind", and the number of cables."""
+    kind, cables = name[:-1], int(name[-1])
+    random = np.random.default_rng([seed, cables, len(kind)])
+    tensions = None
+    if cables == 4:
+        robot = load_robot("irma4u")
+        poses, tensions = _resting(count, seed)
+    else:
+        robot, poses = _some_cables(cables), _free_poses(count, random)
+    numbers = Point(calibration_model(robot), Stations.at(poses)).numbers
+    strain = 0.0 if tensions is None else tensions / robot.stiffness()
+
+    def noisy(values: np.ndarray, sigma: float) -> np.ndarray:
+        return values + sigma * random.standard_normal(values.shape)
+
+    lengths = noisy(numbers[:, :, 0] / (1.0 + strain), noise.lengths)
+    log = CalibrationLog(Path(name), count, lengths=lengths)
+    if tensions is not None:
+        log = replace(log, tensions=noisy(tensions, noise.tensions))
+    if kind == "tracked":
+        seen = simulated_poses(poses, noise.turn, noise.place, random)
+        asked = {"unknown": ("exit_points", "length_offsets"), "priors": {"exit_points": 0.01}}
+        return Scene(robot, replace(log, poses=list(seen)), poses, {**asked, **options})
+    tilts = np.array([RollPitchYaw(X.rotation()).vector() for X in poses])
+    tilts = tilts + random.standard_normal(tilts.shape) * [
+        noise.tilt, noise.tilt, noise.yaw
+    ]
+    log = replace(log, swivels=noisy(numbers[:, :, 2], noise.swivels), tilts=tilts)
+    asked = {} if cables == 4 else {"unknown": ("length_offsets",), "rest": False}
+    return Scene(robot, log, poses, {"start": poses[0], **asked, **options})
+
+
+Attack = tuple[str, Callable[[CalibrationLog], CalibrationLog]]
+
+
+def _scaled(field: str, which: Callable[[np.ndarray], object], factor: float) -> Callable:
+    def spoil(log: CalibrationLog) -> CalibrationLog:
+        values = getattr(log, field).copy()
+        values[which(values)] *= factor
+        return replace(log, **{field: values})
+
+    return spoil
+
+
+def _shared_rows(share: float, *, mixed: bool) -> Callable[[np.ndarray], object]:
+    def which(values: np.ndarray) -> np.ndarray:
+        count = max(1, round(share * len(values)))
+        order = np.random.default_rng(1).permutation(len(values)) if mixed else np.arange(count)
+        return order[:count]
+
+    return which
+
+
+def _swapped(field: str) -> Callable[[CalibrationLog], CalibrationLog]:
+    def spoil(log: CalibrationLog) -> CalibrationLog:
+        values = getattr(log, field).copy()
+        values[:, [0, 1]] = values[:, [1, 0]]
+        return replace(log, **{field: values})
+
+    return spoil
+
+
+def _late(field: str, rows: int) -> Callable[[CalibrationLog], CalibrationLog]:
+    def spoil(log: CalibrationLog) -> CalibrationLog:
+        values = getattr(log, field).copy()
+        values[rows:, 0] = values[:-rows, 0]
+        return replace(log, **{field: values})
+
+    return spoil
+
+
+def _turned_angles(axis: int) -> Callable[[CalibrationLog], CalibrationLog]:
+    """Roll, pitch or yaw of a tracker with the other sign."""
+
+    def spoil(log: CalibrationLog) -> CalibrationLog:
+        poses = []
+        for X in log.poses:
+            angles = RollPitchYaw(X.rotation()).vector()
+            angles[axis] *= -1.0
+            poses.append(RigidTransform(RollPitchYaw(angles), X.translation()))
+        return replace(log, poses=poses)
+
+    return spoil
+
+
+def attacks(log: CalibrationLog) -> Iterator[Attack]:
+    """Errors that its measurements may have."""
+    field = "lengths" if log.lengths is not None else "angles"
+    for axis, name in enumerate(("roll", "pitch", "yaw")):
+        if log.tilts is not None:
+            yield f"-{name}", _scaled("tilts", lambda v, a=axis: np.s_[:, a], -1.0)
+        if log.poses is not None:
+            yield f"-{name} of tracker", _turned_angles(axis)
+    if log.swivels is not None:
+        yield "-swivel of cable 1", _scaled("swivels", lambda v: np.s_[:, 0], -1.0)
+        yield "swivels of cables 1, 2 swapped", _swapped("swivels")
+    if log.tensions is not None:
+        yield "-tension of cable 1", _scaled("tensions", lambda v: np.s_[:, 0], -1.0)
+    for share in SHARES:
+        for mixed in (False, True):
+            name = f"{100 * share:.0f} % of rows, {'mixed' if mixed else 'the first'}, x 1.05"
+            yield name, _scaled(field, _shared_rows(share, mixed=mixed), FACTOR)
+    half = np.random.default_rng(2)
+    yield (
+        "half of all lengths x 1.05",
+        _scaled(field, lambda v: half.uniform(size=v.shape) < 0.5, FACTOR),
+    )
+    yield "cable 1 x 1.05", _scaled(field, lambda v: np.s_[:, 0], FACTOR)
+    yield "all cables x 1.05", _scaled(field, lambda v: np.s_[:, :], FACTOR)
+    yield "cables 1, 2 swapped", _swapped(field)
+    for rows in (1, 3):
+        yield f"cable 1 late by {rows}", _late(field, rows)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a calibration said.
+
+    Attributes:
+        status: "converged", "misfit", "not_converged" or "refused".
+        off: Errors of poses over their deviations, root mean square.
+        millimetres: Largest error of a position.
+        seconds: Processor time.
+        words: Reasons, or remarks.
+    """
+
+    status: str
+    off: float
+    millimetres: float
+    seconds: float
+    words: str
+
+    @property
+    def is_met(self) -> bool:
+        """Whether the error was found, or did no harm."""
+        return self.status != "converged" or self.off <= WITHIN
+
+
+def outcome(of: Scene, spoil: Callable[[CalibrationLog], CalibrationLog] | None = None) -> Outcome:
+    """Calibrates from a log, spoilt or clean."""
+    log, began = of.log if spoil is None else spoil(of.log), time.process_time()
+    try:
+        found = cdpr.calibrate(of.robot, log, **of.options)
+    except CdprError as problem:
+        return Outcome("refused", np.nan, np.nan, time.process_time() - began, str(problem))
+    took, result = time.process_time() - began, found.result
+    errors = [pose_error(X, Y) for X, Y in zip(of.poses, result.stations.poses(), strict=True)]
+    off = np.array(errors)[:, ::-1] / np.where(result.pose_std > 0.0, result.pose_std, np.inf)
+    words = found.misfit or tuple(w for w in found.remarks if "not used" not in w)
+    return Outcome(
+        result.status, float(np.sqrt(np.mean(np.max(off, axis=1) ** 2))),
+        1e3 * max(distance for distance, _ in errors), took, "; ".join(words[:2]),
+    )  # fmt: skip
+
+
+HANGPRINTER = Path(__file__).parent / "hangprinter4" / "samples.csv"
+
+
+def recorded(robot: Robot, path: Path, **options: object) -> Scene:
+    """A recorded log; its own calibration is the truth."""
+    log = read_log(path, [cable.name for cable in robot.cables])
+    found = cdpr.calibrate(robot, log, **options)
+    return Scene(robot, log, found.result.stations.poses(), dict(options))
+
+
+def hangprinter() -> Scene:
+    """The recorded series of a Hangprinter 4."""
+    return recorded(
+        load_robot("hangprinter_4"), HANGPRINTER, zero=RigidTransform(), sigmas={"place": 1e-6},
+        unknown=("exit_points", "common_drum_radius", "D.drum_radius", "tracker.[xyz]"),
+    )  # fmt: skip
+
+
+SIMULATED = ("tracked4", "tracked6", "tracked8", "blind4", "blind6", "blind8")
+
+
+def clean(number: int) -> tuple[str, Scene]:
+    """A clean log: sigmas off by up to a factor of 2, few and many rows, single outliers."""
+    random = np.random.default_rng([number, 99])
+    name = SIMULATED[number % len(SIMULATED)]
+    count = int(random.choice([8, 12, 20, 40]))
+    factors = {key: 2.0 ** random.uniform(-1, 2) for key in vars(NOISE)}
+    stated = {
+        key: value * factors[key]
+        for key, value in vars(NOISE).items()
+        if value is not None and key not in ("lengths_share", "tensions_share", "off_plane")
+    }
+    one = scene(name, count, seed=number % 7, sigmas=stated)
+    log, hit = one.log, int(random.integers(0, 3))
+    lengths = log.lengths.copy()
+    for _ in range(hit):
+        row, cable = int(random.integers(1, count)), int(random.integers(lengths.shape[1]))
+        lengths[row, cable] += random.choice([-1, 1]) * random.uniform(0.005, 0.1)
+    words = f"{name}, {count} rows, {hit} outliers"
+    return words, replace(one, log=replace(log, lengths=lengths))
+
+
+def main() -> None:
+    """Prints the tables."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--clean", type=int, default=0)
+    parser.add_argument("--only", default="")
+    parser.add_argument("--robot")
+    parser.add_argument("--log", type=Path)
+    asked = parser.parse_args()
+    if asked.clean:
+        alarms = 0
+        for number in range(asked.clean):
+            words, one = clean(number)
+            said = outcome(one)
+            alarms += said.status != "converged"
+            if said.status != "converged" or said.off > WITHIN:
+                print(f"{number}: {words}: {said.status}, {said.off:.2f}: {said.words}", flush=True)
+        print(f"{alarms} false alarms in {asked.clean} clean logs")
+        return
+    scenes = {name: lambda name=name: scene(name) for name in SIMULATED}
+    scenes["hangprinter_4"] = hangprinter
+    if asked.log:
+        scenes = {asked.log.stem: lambda: recorded(load_robot(asked.robot), asked.log)}
+    missed = 0
+    for name, made in scenes.items():
+        if asked.only and asked.only not in name:
+            continue
+        one = made()
+        for words, spoil in [("clean", None), *attacks(one.log)]:
+            said = outcome(one, spoil)
+            missed += not said.is_met
+            print(
+                f"{name:13} {words:36} {said.status:10} {said.off:6.1f} {said.millimetres:7.1f} mm "
+                f"{said.seconds:5.1f} s  {'' if said.is_met else 'MISSED '}{said.words[:110]}",
+                flush=True,
+            )
+    print(f"{missed} attacks missed")
+
+
+if __name__ == "__main__":
+    main()
