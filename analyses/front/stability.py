@@ -40,6 +40,9 @@ if TYPE_CHECKING:
 HELD = ("limits", "mass", "wrench")
 """What cables have to hold in `assess_stability`, by name."""
 
+ASKED = ("scenario", "printed_matrix", "options")
+"""What else it may be asked for, by name."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class DrawnStability(StabilityWorkspaces):
@@ -95,21 +98,21 @@ def stability_question(
     vary: Mapping[str, Sequence[float]] | None = None,
     grid: WorkspaceGrid | Sequence[int] | None = None,
     scenario: str | None = None,
+    printed_matrix: bool = False,
     options: VerdictOptions | Mapping[str, Any] | None = None,
     **held: Any,
 ) -> StabilityQuestion:
     """What `assess_stability` computes; arguments as there."""
     for name in held:
         if name not in HELD:
-            raise StabilityError(
-                f"{name!r} is unknown; {closest(name, (*HELD, 'scenario', 'options'))}"
-            )
+            raise StabilityError(f"{name!r} is unknown; {closest(name, (*HELD, *ASKED))}")
     return make_question(
         robot, scheme=scheme, verdict=verdict,
         bounds=load_bounds(Path(bounds)) if isinstance(bounds, str | Path) else bounds,
         vary=vary, grid=pose_grid(robot, grid), options=_options(options),
         statics=static_case(as_robot(robot, "assess_stability"), **held),
         task=None if scenario is None else scenario_task(robot, scenario),
+        printed_matrix=printed_matrix,
     )  # fmt: skip
 
 
@@ -145,8 +148,9 @@ def assess_stability(
         session: Who follows it and may stop it; None: nobody.
         asked: What the cables have to hold: `limits` (2,) [N], `mass` [kg], `wrench` (6,)
             [N m, N]; `scenario` whose object, desired view and camera count, in the place of those
-            of the servoing thesis; `options`, how hard to look: `VerdictOptions`, or some of its
-            fields by name.
+            of the servoing thesis; `printed_matrix=True`: pbvs with the interaction matrix of the
+            thesis' tables instead of the exact one, which `simulate` uses; `options`, how hard to
+            look: `VerdictOptions`, or some of its fields by name.
 
     Raises:
         StoppedError: The session stopped it before it was finished.
