@@ -42,6 +42,9 @@ if TYPE_CHECKING:
 HELD = ("limits", "mass", "wrench", "force", "moment", "pulleys")
 """What cables have to hold in `assess_stability`, by name."""
 
+ASKED = ("scenario", "printed_matrix", "options")
+"""What else it may be asked for, by name."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class DrawnStability(StabilityWorkspaces):
@@ -97,15 +100,14 @@ def stability_question(
     vary: Mapping[str, Sequence[float]] | None = None,
     grid: WorkspaceGrid | Sequence[int] | None = None,
     scenario: str | None = None,
+    printed_matrix: bool = False,
     options: VerdictOptions | Mapping[str, Any] | None = None,
     **held: Any,
 ) -> StabilityQuestion:
     """What `assess_stability` computes; arguments as there."""
     for name in held:
         if name not in HELD:
-            raise StabilityError(
-                f"{name!r} is unknown; {closest(name, (*HELD, 'scenario', 'options'))}"
-            )
+            raise StabilityError(f"{name!r} is unknown; {closest(name, (*HELD, *ASKED))}")
     load = [held.pop(name, None) for name in ("wrench", "force", "moment")]
     return make_question(
         robot, scheme=scheme, verdict=verdict,
@@ -115,6 +117,7 @@ def stability_question(
             as_robot(robot, "assess_stability"), wrench=as_wrench(*load), **held
         ),
         task=None if scenario is None else scenario_task(robot, scenario),
+        printed_matrix=printed_matrix,
     )  # fmt: skip
 
 
@@ -153,8 +156,9 @@ def assess_stability(
             moments first, (6,) [N m, N], or `force` (3,) [N] and `moment` (3,) [N m]; `pulleys`,
             False to ignore the robot's pulleys there too (the criterion of stability always
             ignores them); `scenario`, whose object, desired view and camera replace those of the
-            servoing thesis; `options`, how hard to look: `VerdictOptions`, or some of its fields
-            by name.
+            servoing thesis; `printed_matrix=True`: pbvs with the interaction matrix of the
+            thesis' tables instead of the exact one, which `simulate` uses; `options`, how hard to
+            look: `VerdictOptions`, or some of its fields by name.
 
     Raises:
         StoppedError: The session stopped it before it was finished.

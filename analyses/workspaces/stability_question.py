@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +27,7 @@ from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.schema.typed_yaml import closest
 from cdpr_drake.stability.desired_view import FixedObject, OppositeCorner, ServoTarget
 from cdpr_drake.stability.perturbation_bounds import BOUNDS, PerturbationBounds
-from cdpr_drake.stability.stability_case import StabilityCase
+from cdpr_drake.stability.stability_case import OBJECT_POSE_MODELS, StabilityCase
 from cdpr_drake.stability.verdict import VERDICTS, VerdictOptions
 from cdpr_drake.workspaces.pose_grid import WorkspaceGrid, grid_by_step
 from cdpr_drake.workspaces.static_feasibility import StaticCase
@@ -53,6 +53,9 @@ USED_OPTIONS = {
 }  # fmt: skip
 """For each verdict the fields of `VerdictOptions` that its numbers depend on."""
 
+PRINTED, EXACT = OBJECT_POSE_MODELS
+"""Interaction matrix of PBVS in the printed tables, and in a servo."""
+
 OBJECT_DISTANCE = 0.5
 """Where a scheme needs the place of the object and none is given, it is so far straight ahead of
 the camera [m]."""
@@ -60,19 +63,20 @@ the camera [m]."""
 
 @dataclass(frozen=True, eq=False)
 class CameraTask:
-    """What a servo's camera sees and shall see; by default as the servoing thesis has it.
+    """What a servo's camera sees and shall see; by default the servoing thesis' longest way.
 
     Attributes:
         target: What gives error and object at a pose; None: the way to the opposite corner of the
-            grid's box, the longest there is, with half a turn about z; for 2.5d without a turn and
-            with the object `OBJECT_DISTANCE` ahead.
+            grid's box, the longest there is, with half a turn about z, for 2.5d without a turn;
+            of pbvs and 2.5d with the object `OBJECT_DISTANCE` ahead.
         X_PC: Camera on the platform; aligned with it, at Po.
-        lever: One of `stability.stability_case.OBJECT_POSE_MODELS`.
+        lever: One of `stability.stability_case.OBJECT_POSE_MODELS`, for pbvs: the exact matrix,
+            which the simulated servo uses, or that of the printed tables.
     """
 
     target: ServoTarget | None = None
     X_PC: RigidTransform = field(default_factory=RigidTransform)
-    lever: str = "error"
+    lever: str = EXACT
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,15 +153,17 @@ def stability_case(
             "each cable, as the criterion has them"
         )
     task = task or CameraTask()
-    target = task.target
+    target, lever = task.target, task.lever if scheme == "pbvs" else PRINTED
+    ahead = np.array([0.0, 0.0, OBJECT_DISTANCE])
     if target is None and scheme == "2.5d":
-        ahead = np.array([0.0, 0.0, OBJECT_DISTANCE])
         target = OppositeCorner(grid.lower, grid.upper, np.zeros(3), ahead, np.eye(3))
+    elif target is None and lever == EXACT:
+        target = OppositeCorner(grid.lower, grid.upper, p_CO=ahead, R_CO=np.eye(3))
     elif target is None:
         target = OppositeCorner(grid.lower, grid.upper)
     cables = robot.cable_set().without_pulleys()
     planar = robot.servo_rows("stability") == PLANAR_ROWS
-    return StabilityCase(cables, scheme, planar, task.X_PC, target, lever=task.lever)
+    return StabilityCase(cables, scheme, planar, task.X_PC, target, lever=lever)
 
 
 def make_question(
@@ -171,6 +177,7 @@ def make_question(
     options: VerdictOptions | None = None,
     statics: StaticCase | None = None,
     task: CameraTask | None = None,
+    printed_matrix: bool = False,
 ) -> StabilityQuestion:
     """The question for a robot, filled up with the servoing thesis' grid and bounds.
 
@@ -185,10 +192,17 @@ def make_question(
         options: How hard to look.
         statics: What the cables have to hold; None: `static_case` of the robot.
         task: What the camera sees and shall see; None: as in the servoing thesis.
+        printed_matrix: Whether pbvs is judged with the interaction matrix of the thesis' tables
+            instead of the exact one, which the simulated servo uses.
 
     Raises:
         CdprError: Something is unknown, out of range, or not possible for the robot.
     """
+    if printed_matrix and scheme != "pbvs":
+        raise StabilityError(f"printed matrix: found with {scheme}; accepted with: pbvs")
+    task = task or CameraTask()
+    if printed_matrix:
+        task = replace(task, lever=PRINTED)
     if verdict not in VERDICTS:
         raise StabilityError(f"verdict {verdict!r} is unknown; {closest(verdict, VERDICTS)}")
     name = robot.name if isinstance(robot, Robot) else str(robot)
@@ -276,5 +290,4 @@ def scenario_task(robot: Robot | str | Path, scenario: str) -> CameraTask:
     return CameraTask(
         FixedObject(loaded.target.pose.transform(), loaded.desired.transform()),
         as_robot(robot, "stability").camera_mount(loaded.camera.mount).pose.transform(),
-        "object",
     )

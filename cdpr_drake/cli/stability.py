@@ -119,12 +119,18 @@ def stability(
         str | None,
         typer.Option(
             help="Scenario whose object, desired view and camera count; without, the task of the "
-            "published workspaces: the opposite corner of the grid, half a turn away. Under pbvs "
-            "it also takes the exact interaction matrix, which the servo uses, in the place of "
-            "the printed one.",
+            "published workspaces: the opposite corner of the grid, half a turn away.",
             autocompletion=scenario_words,
         ),
     ] = None,
+    printed_matrix: Annotated[
+        bool,
+        typer.Option(
+            "--printed-matrix",
+            help="Judge pbvs with the interaction matrix of the thesis' tables, instead of the "
+            "exact one of the servo that cdpr simulate runs.",
+        ),
+    ] = False,
     orientation: Orientations = None,
     draws: Annotated[
         int, typer.Option(help="Random perturbations per pose, for all verdicts.")
@@ -184,7 +190,8 @@ def stability(
         asked: dict[str, Any] = {
             "scheme": scheme, "verdict": verdict, "bounds": bounds, "vary": parse_vary(vary or []),
             "grid": parse_grid(grid, parse_turns(orientation or []), *default_box(robot)),
-            "scenario": scenario, "limits": parse_limits(limits), "mass": mass,
+            "scenario": scenario, "printed_matrix": printed_matrix,
+            "limits": parse_limits(limits), "mass": mass,
             "wrench": parse_wrench(wrench), "pulleys": pulleys,
             "options": VerdictOptions(draws=draws, seed=seed, searches=searches, pieces=pieces),
         }  # fmt: skip

@@ -73,7 +73,8 @@ def test_pictures_that_fail_cost_nothing_else(capsys, tmp_path):
 @pytest.mark.parametrize(
     ("more", "words"),
     [
-        ([], "L_s with [e_t]x, as (1.47) of the servoing thesis prints it"),
+        ([], "L_s with [s_t]x, exact"),
+        (["--printed-matrix"], "L_s with [e_t]x, as (1.47) of the servoing thesis prints it"),
         (["--scenario", "acrobot_pbvs"], "L_s with [s_t]x, exact"),
         (["--scheme", "ibvs"], None),
     ],

@@ -49,6 +49,7 @@ from cdpr_drake.analyses.studies.published.recipe_variants import (
 )
 from cdpr_drake.analyses.studies.published.stability_tables import PublishedTable
 from cdpr_drake.analyses.workspaces.stability_defaults import workspace_defaults
+from cdpr_drake.analyses.workspaces.stability_question import PRINTED
 from cdpr_drake.errors import StabilityError
 from cdpr_drake.stability.desired_view import FixedPlace, OppositeCorner, ServoTarget
 from cdpr_drake.stability.perturbation_bounds import PerturbationBounds
@@ -98,7 +99,7 @@ def recipe_case(robot_name: str, scheme: str, recipe: Recipe = IN_USE) -> Stabil
         elif goal == CENTRE:
             target = FixedPlace((known.lower + known.upper) / 2.0, turn)
     X_PC = RigidTransform() if planar else recipe.mounting(robot_name)
-    return StabilityCase(recipe.cables(robot_name), scheme, planar, X_PC, target)
+    return StabilityCase(recipe.cables(robot_name), scheme, planar, X_PC, target, lever=PRINTED)
 
 
 def recipe_options(robot_name: str, pieces: int | None = None) -> VerdictOptions:

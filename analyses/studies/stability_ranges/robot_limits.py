@@ -12,6 +12,7 @@ import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.analyses.studies.stability_ranges.question import bisected
+from cdpr_drake.analyses.workspaces.stability_question import PRINTED
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.poses import pose_from_angles, pose_rows
 from cdpr_drake.models.robot_loader import load_robot
@@ -182,6 +183,7 @@ class LimitedRobot:
             planar=self.planar,
             X_PC=self.X_PC,
             target=GivenErrors(errors),
+            lever=PRINTED,
         )
 
 

@@ -22,6 +22,7 @@ from cdpr_drake.analyses.studies.published.stability_recipe import (
     single_bounds,
 )
 from cdpr_drake.analyses.studies.stability_ranges.question import SINGLE, Answer, question
+from cdpr_drake.analyses.workspaces.stability_question import PRINTED
 from cdpr_drake.stability.desired_view import OppositeCorner, ServoTarget
 from cdpr_drake.stability.perturbation_bounds import PerturbationBounds
 from cdpr_drake.stability.stability_case import StabilityCase
@@ -88,7 +89,7 @@ def single_volume(name: str, value: float, quick: bool) -> Answer:
     def volumes(
         bounds: PerturbationBounds, target: ServoTarget, verdicts: tuple[str, ...] = ("sampled",)
     ) -> Answer:
-        case = StabilityCase(robot.cables, target=target)
+        case = StabilityCase(robot.cables, target=target, lever=PRINTED)
         poses = grid.pose_rows()
         if verdicts == VERDICTS:
             chunks = judge_all_verdicts(case, bounds, poses, options)

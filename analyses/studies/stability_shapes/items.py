@@ -23,6 +23,7 @@ from cdpr_drake.analyses.studies.published.stability_tables import (
     TABLES,
     PublishedTable,
 )
+from cdpr_drake.analyses.workspaces.stability_question import PRINTED
 from cdpr_drake.analyses.workspaces.stability_tasks import SampledTask
 from cdpr_drake.arrays import Array
 from cdpr_drake.stability.desired_view import OppositeCorner, ServoTarget
@@ -139,7 +140,7 @@ def shape_case(
     """
     known = recipe_case(robot, scheme)
     if target is not None:  # with it goes the camera's place of section 3.4.2, see there
-        known = StabilityCase(known.cables, scheme, target=target)
+        known = StabilityCase(known.cables, scheme, target=target, lever=PRINTED)
     grid = WorkspaceGrid(recipe_grid(robot, quick).axes, angles)
     return Case(
         name=f"{figure} {name}",

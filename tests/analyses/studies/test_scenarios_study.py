@@ -2,13 +2,16 @@
 
 import json
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from pydrake.common.yaml import yaml_dump_typed
 
 from cdpr_drake.analyses.reporting.progress import StudySession
+from cdpr_drake.analyses.simulation.scenario_kinds import SCENARIO_KINDS
 from cdpr_drake.analyses.studies import scenarios
 from cdpr_drake.analyses.studies.framework.runs import Run, Runs
 from cdpr_drake.analyses.studies.framework.study import Case
@@ -26,7 +29,8 @@ from cdpr_drake.analyses.studies.scenarios import (
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
-from cdpr_drake.systems.scenarios.files import scenario_file, scenario_names
+from cdpr_drake.systems.scenarios.files import scenario_file, scenario_kind, scenario_names
+from tests.analyses.studies.scenario_titles import TITLES
 
 LOST = "acrobot_partitioned"
 
@@ -49,10 +53,49 @@ def made_up(case, seed):
     return ended(row, wanted, shipped.duration)
 
 
+@cache
+def ran(name):
+    """The study's row of a scenario, and the run that it made: two tests ask for the same."""
+    known, kept = SCENARIO_KINDS[scenario_kind(name)], []
+
+    def run(scenario, session):
+        result = known.run(scenario, session)
+        kept.append(told(known, scenario, result))
+        return result
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(SCENARIO_KINDS, scenario_kind(name), replace(known, run=run))
+        return measure(case_of(name), 0), kept
+
+
+def told(kind, scenario, result):
+    """What the checks of `TITLES` read of a run."""
+    log = {key: np.array(rows) for key, rows in getattr(result, "log", {}).items()}
+    return SimpleNamespace(
+        summary=kind.numbers(result), log=log, end=kind.end_error(result),
+        desired=getattr(getattr(scenario, "desired", None), "position", None),
+        scheme=getattr(getattr(scenario, "controller", None), "scheme", None),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("name", scenario_names())
+def test_what_the_title_names_happens(name):
+    title = TITLES[name]
+    if title.items:
+        items = [*quick_overrides(name), *title.items]
+        scenario = load_scenario(name, items)
+        kind = SCENARIO_KINDS[scenario.kind]
+        run = told(kind, scenario, kind.run(scenario))
+    else:
+        (run,) = ran(name)[1]
+    for check in title.checks:
+        assert check(run), (name, check.__name__, run.summary["outcome"])
+
+
 @pytest.mark.parametrize("name", scenario_names())
 def test_every_scenario_ends_as_its_file_says(name):
     """With projected targets; what only a diagram can do is cut after a second."""
-    row = measure(case_of(name), 0)
+    row, _ = ran(name)
     assert row["expected"] is not None
     assert row["as_expected"], (row["outcome"], row["message"])
     assert row["close_enough"] is not False, (row["distance_share"], row["angle_share"])
