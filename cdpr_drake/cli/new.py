@@ -15,7 +15,7 @@ import yaml
 from cdpr_drake.cli.completion import words_among
 from cdpr_drake.cli.notebooks import FOLDER as NOTEBOOKS
 from cdpr_drake.cli.robot_folder import write_files
-from cdpr_drake.errors import CdprError
+from cdpr_drake.errors import CdprError, plain_words
 from cdpr_drake.models.robot_loader import load_robot, robot_text
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.schema.templates import commented_yaml
@@ -70,7 +70,7 @@ def new(
         if source is not None:
             raise CdprError(f"--from: found {source} with {kind}; accepted: with robot, scenario")
         for path in write_files(out, _block(kind, name), overwrite):
-            print(path)
+            print(plain_words(str(path)))
         return
     of_robot = kind == ROBOT
     schema, content = (
@@ -81,7 +81,7 @@ def new(
     text = head + commented_yaml(schema, content)
     (path,) = write_files(out, {f"{name}.yaml": text}, overwrite)
     (load_robot if of_robot else load_scenario)(str(path))
-    print(path)
+    print(plain_words(str(path)))
 
 
 def _block(kind: str, name: str) -> dict[str, str]:
