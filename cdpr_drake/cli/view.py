@@ -46,7 +46,7 @@ def view(
     if html is not None and not html.absolute().parent.is_dir():
         raise OutputFolderError(f"{html}: found no folder to write to; accepted: one that exists")
     with named_options(LISTENING):
-        meshcat = open_meshcat(host or LOCAL, port)
+        meshcat = open_meshcat(host or LOCAL, port) if html is None else open_meshcat()
     with working(message_console(), f"Drawing {loaded.name}"):
         if isinstance(loaded, Mechanism):
             picture: RobotPicture | MechanismPicture = mechanism_picture(loaded, meshcat)
