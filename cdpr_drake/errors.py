@@ -6,6 +6,7 @@ A message is one line; of a file that has several problems, one line for each.
 from __future__ import annotations
 
 import difflib
+import unicodedata
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 
@@ -19,6 +20,22 @@ MOST_PROBLEMS = 20
 def meant_names(found: object, known: Iterable[object]) -> list[str]:
     """The known name that was probably meant by one that is unknown; none where none is close."""
     return difflib.get_close_matches(str(found), [str(name) for name in known], 1, LEAST_ALIKE)
+
+
+def plain_words(words: str) -> str:
+    """Words for a terminal: what would control it, as in the name of a file, is escaped.
+
+    Ends of lines and tabs stay.
+    """
+    if words.isprintable():
+        return words
+    return "".join(
+        repr(c)[1:-1] if unicodedata.category(c) in _CONTROLS and c not in "\n\t" else c
+        for c in words
+    )
+
+
+_CONTROLS = ("Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp")
 
 
 def why_not_read(problem: Exception) -> str:

@@ -190,7 +190,7 @@ FOREIGN = (
     ("acrobot_small", "sdf", ".sdf"), ("acrobot_small", "sdf-drake", ".sdf"),
     ("acrobot_small", "urdf", ".urdf"), ("acrobot_small", "mjcf", ".xml"),
     ("acrobot_small", "wcrfx", ".wcrfx"), ("acrobot_small", "gazebo-yaml", ".yaml"),
-    ("hangprinter", "klipper", ".cfg"), ("hangprinter", "reprapfirmware", ".g"),
+    ("hangprinter_4", "klipper", ".cfg"), ("hangprinter_4", "reprapfirmware", ".g"),
     ("maslow_4", "maslow", ".yaml"),
 )  # fmt: skip
 """Robots in other tools' formats: the robot, the format, the ending."""

@@ -167,6 +167,8 @@ def judge(case: Case, status: int | None, out: str, err: str, before: dict[str, 
         yield f"traceback: {(err.strip() or '?').splitlines()[-1][:200]}"
     elif code is not None and code not in CODES.get("".join(case.arguments[:1]), ANY_CODES):
         yield f"code: {code}: {err[:200]}"
+    if "\x1b" in out + err:
+        yield f"escape: {(out + err)[:300]!r}"
     if "Warning: " in err:
         yield f"warning: {err.strip()[:300]}"
     changed = [p for p, kind in before.items() if after.get(p) != kind and not p.startswith(MINE)]

@@ -62,7 +62,7 @@ BROKEN = {
 def test_a_file_that_is_not_whole_is_seen(tmp_path, name):
     (tmp_path / name).write_bytes(BROKEN[name])
     assert [words.split(" ")[0] for words in broken_files(tmp_path)] == [name]
-    (tmp_path / name).rename(tmp_path / f".part-{name}")  # no final name
+    (tmp_path / name).rename(tmp_path / f".part-abcdefgh-{name}")  # no final name
     assert list(broken_files(tmp_path)) == []
 
 

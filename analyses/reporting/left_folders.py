@@ -14,8 +14,8 @@ from cdpr_drake.analyses.reporting.written_files import (
     WORK,
     list_all,
     others_in,
-    part_of,
     remove_written,
+    whole_name,
 )
 
 BEFORE = "-before-"
@@ -69,7 +69,7 @@ def hidden_folders(final: Path) -> list[Path]:
 
 def _just_made(folder: Path) -> bool:
     """Whether a folder holds nothing but a marker in the making."""
-    return all(path.name == part_of(Path(MARKER)).name for path in folder.iterdir())
+    return all(whole_name(path.name) == MARKER for path in folder.iterdir())
 
 
 def clear_hidden(final: Path) -> tuple[list[Path], list[KeptFiles]]:

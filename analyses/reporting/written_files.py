@@ -9,9 +9,11 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import stat
-from collections.abc import Iterable, Iterator
+import tempfile
+from collections.abc import Container, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -38,9 +40,47 @@ def mark(folder: Path) -> None:
         _write_marker(folder, ())
 
 
-def part_of(path: Path) -> Path:
-    """Where a file is written before it has its name; with its ending, which tells the format."""
-    return path.with_name(f".part-{path.name}")
+_PART = re.compile(r"\.part-[a-z0-9_]{8}-(.+)", re.DOTALL)
+
+
+def new_part(path: Path) -> Path:
+    """A new file in which another is written before it has its name, with its ending, which tells
+    the format.
+
+    Nobody can foresee its name, and it is no link: a folder may be open to others.
+
+    Raises:
+        OSError: It cannot be made.
+    """
+    handle, name = tempfile.mkstemp(prefix=".part-", suffix=f"-{path.name}", dir=path.parent)
+    try:
+        os.fchmod(handle, 0o666 & ~_UMASK)
+    finally:
+        os.close(handle)
+    return Path(name)
+
+
+def _umask() -> int:
+    """What files are made without; the system tells it only who changes it."""
+    mask = os.umask(0o022)
+    os.umask(mask)
+    return mask
+
+
+_UMASK = _umask()
+
+
+def whole_name(name: str) -> str | None:
+    """The name that a file in the making gets; None: it is none."""
+    found = _PART.fullmatch(name)
+    return None if found is None else found[1]
+
+
+def left_parts(folder: Path, names: Container[str]) -> list[Path]:
+    """Files in the making of these names in a folder, of a program that was killed."""
+    with suppress(OSError):
+        return [path for path in folder.iterdir() if whole_name(path.name) in names]
+    return []
 
 
 @contextmanager
@@ -53,7 +93,7 @@ def whole_file(path: Path) -> Iterator[Path]:
         OSError: It cannot be written, for instance on a full disk; nothing is left behind.
     """
     claim(path)
-    part = part_of(path)
+    part = new_part(path)
     try:
         yield part
         part.replace(path)
@@ -97,10 +137,8 @@ class WritingFolder:
 
     def begin(self) -> None:
         """Removes what a killed program left of files in the making."""
-        for name in _certain(self.folder):
-            path = _inside(self.folder, name)
-            if path is not None and not name.endswith("/"):
-                part_of(path).unlink(missing_ok=True)
+        for path in _parts_of(self.folder, _certain(self.folder)):
+            path.unlink(missing_ok=True)
 
     def end(self) -> None:
         """Makes the marker's list of all that is this program's by now."""
@@ -204,21 +242,23 @@ def remove_written(folder: Path) -> None:
     """
     listed = _certain(folder)
     folders = {folder}
+    for part in [*_parts_of(folder, listed), *left_parts(folder, (MARKER,))]:
+        with suppress(OSError):
+            part.unlink()
     for name in listed:
         path = _inside(folder, name)
         if path is None:
             continue
         if not name.endswith("/"):
-            for each in (path, part_of(path)):
-                with suppress(OSError):  # it is gone, or a folder by now
-                    each.unlink()
+            with suppress(OSError):  # it is gone, or a folder by now
+                path.unlink()
         elif _is_work(path):
             shutil.rmtree(path, ignore_errors=True)
         elif path.is_dir():
             remove_written(path)
         while (path := path.parent) != folder:
             folders.add(path)
-    for own in (MARKER, JOURNAL, part_of(folder / MARKER).name):
+    for own in (MARKER, JOURNAL):
         (folder / own).unlink(missing_ok=True)
     for each in sorted(folders, key=lambda path: len(path.parts), reverse=True):
         with suppress(OSError):  # somebody else's are in it
@@ -239,10 +279,20 @@ def _is_own(name: str, path: str, listed: set[str]) -> bool:
     """Whether a file is the marker, or what is left of one in the making."""
     if name in (MARKER, JOURNAL):
         return True
-    return name.startswith(".part-") and (
-        str(PurePosixPath(path).with_name(name.removeprefix(".part-"))) in listed
-        or name == part_of(Path(MARKER)).name
+    whole = whole_name(name)
+    return whole is not None and (
+        whole == MARKER or str(PurePosixPath(path).with_name(whole)) in listed
     )
+
+
+def _parts_of(folder: Path, names: set[str]) -> list[Path]:
+    """Files in the making of names in a list of a folder."""
+    below: dict[Path, set[str]] = {}
+    for name in names:
+        path = None if name.endswith("/") else _inside(folder, name)
+        if path is not None:
+            below.setdefault(path.parent, set()).add(path.name)
+    return [part for place, wanted in below.items() for part in left_parts(place, wanted)]
 
 
 def _certain(folder: Path) -> set[str]:
@@ -298,9 +348,14 @@ def _read_marker(folder: Path) -> dict[str, Any] | None:
 
 
 def _write_marker(folder: Path, names: Iterable[str]) -> None:
-    own = (MARKER, JOURNAL, part_of(folder / MARKER).name)
-    listed = sorted(name for name in names if name not in own)
+    listed = sorted(
+        name for name in names if name not in (MARKER, JOURNAL) and whole_name(name) != MARKER
+    )
     words = json.dumps({"program": "cdpr_drake", "version": __version__, FILES: listed}, indent=1)
-    part = part_of(folder / MARKER)
-    part.write_text(words + "\n", encoding="utf-8")
-    part.replace(folder / MARKER)
+    part = new_part(folder / MARKER)
+    try:
+        part.write_text(words + "\n", encoding="utf-8")
+        part.replace(folder / MARKER)
+    except BaseException:
+        part.unlink(missing_ok=True)
+        raise

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from cdpr_drake.analyses.reporting.log_files import finite, write_json
-from cdpr_drake.analyses.reporting.written_files import JOURNAL, MARKER, claim, mark, part_of
+from cdpr_drake.analyses.reporting.written_files import JOURNAL, MARKER, claim, mark, whole_name
 from cdpr_drake.analyses.studies.catalogue import RESULTS
 from cdpr_drake.errors import OutputFolderError
 from cdpr_drake.schema.json_text import load_json
@@ -135,8 +135,9 @@ def check_folder(folder: Path, quick: bool) -> None:
         check_reproduction(folder, quick)
         return
     # By who was killed at once.
-    begun = (MARKER, JOURNAL, *(part_of(folder / name).name for name in (MARKER, ABOUT)))
-    if folder.exists() and any(path.name not in begun for path in folder.iterdir()):
+    begun = [path.name for path in folder.iterdir()] if folder.is_dir() else []
+    own = (MARKER, ABOUT)
+    if any(name not in (MARKER, JOURNAL) and whole_name(name) not in own for name in begun):
         raise OutputFolderError(
             f"{folder}: holds files that cdpr reproduce did not write; name another folder"
         )

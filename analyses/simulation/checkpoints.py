@@ -78,7 +78,8 @@ def write_checkpoint(folder: Path, checkpoint: Checkpoint) -> None:
     final = folder / CHECKPOINT
     part = folder / UNWRITTEN_CHECKPOINT
     claim(final, part)
-    with part.open("wb") as file:
+    part.unlink(missing_ok=True)
+    with part.open("xb") as file:  # which follows no link
         np.savez(file, allow_pickle=False, **arrays)
         file.flush()
         os.fsync(file.fileno())

@@ -14,7 +14,13 @@ from typing import Any
 import numpy as np
 
 from cdpr_drake.analyses.reporting.log_files import write_whole
-from cdpr_drake.analyses.reporting.written_files import JOURNAL, MARKER, mark, part_of, whole_file
+from cdpr_drake.analyses.reporting.written_files import (
+    JOURNAL,
+    MARKER,
+    mark,
+    whole_file,
+    whole_name,
+)
 from cdpr_drake.errors import OutputFolderError
 from cdpr_drake.schema.json_text import load_json
 
@@ -27,11 +33,11 @@ CHUNKS = "chunks"
 PARTS = "parts.npz"
 """All arrays of a sweep that was finished, `task/name` each; the chunks are gone then."""
 
-OWN_PART = re.compile(r"\.part-(arguments\.json|[a-z_]+\.npz)")
-"""Names of files in the making that a killed process left in the folder."""
+OWN_FILE = re.compile(r"arguments\.json|[a-z_]+\.npz")
+"""Names of files of which a killed process may have left one in the making in the folder."""
 
-OWN_CHUNK = re.compile(r"(\.part-)?.+-\d{7,}-\d{7,}\.npz")
-"""Names of chunks, and of what a killed process left of one."""
+OWN_CHUNK = re.compile(r".+-\d{7,}-\d{7,}\.npz")
+"""Names of chunks."""
 
 NAMED_DIFFERENCES = 3
 """So many differences between arguments are named in an error."""
@@ -106,7 +112,7 @@ class SweepFolder(KeptChunks):
         self.folder.mkdir(parents=True, exist_ok=True)
         mark(self.folder)
         for path in self.folder.iterdir():
-            if OWN_PART.fullmatch(path.name):
+            if OWN_FILE.fullmatch(whole_name(path.name) or ""):
                 path.unlink()
         if not stored.is_file():
             write_whole(stored, words + "\n")
@@ -151,7 +157,7 @@ class SweepFolder(KeptChunks):
         chunks = self.folder / CHUNKS
         with suppress(OSError):
             for path in chunks.iterdir():
-                if OWN_CHUNK.fullmatch(path.name):
+                if OWN_CHUNK.fullmatch(whole_name(path.name) or path.name):
                     path.unlink()
             chunks.rmdir()
 
@@ -168,14 +174,19 @@ def check_sweep_folder(folder: Path) -> None:
             return
         if not folder.is_dir():
             raise OutputFolderError(f"{folder}: found a file; accepted: a folder")
-        foreign = (path for path in folder.iterdir() if not OWN_PART.fullmatch(path.name))
-        own = (MARKER, JOURNAL, part_of(folder / MARKER).name)
-        if any(path.name not in own for path in foreign):
+        foreign = [path.name for path in folder.iterdir() if not _in_the_making(path.name)]
+        if any(name not in (MARKER, JOURNAL) for name in foreign):
             raise OutputFolderError(
                 f"{folder}: holds files already, not those of a sweep; name another folder"
             )
     except OSError as problem:
         raise OutputFolderError(f"{folder}: cannot be read: {problem.strerror}") from problem
+
+
+def _in_the_making(name: str) -> bool:
+    """Whether a file is what a killed process left of one of a sweep's, or of the marker."""
+    whole = whole_name(name) or ""
+    return whole == MARKER or OWN_FILE.fullmatch(whole) is not None
 
 
 def load_arrays(path: Path) -> dict[str, np.ndarray] | None:

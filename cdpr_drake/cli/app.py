@@ -26,7 +26,7 @@ from cdpr_drake.cli.command_help import COMMANDS, examples_of, first_steps, grou
 from cdpr_drake.cli.completion import PROGRAM, asked_words, stand_in
 from cdpr_drake.cli.option_names import SHARED_OPTIONS, with_options
 from cdpr_drake.cli.process import INTERRUPTED, SIGNALS, compile_ahead, exit_with_parent
-from cdpr_drake.errors import CdprError
+from cdpr_drake.errors import CdprError, plain_words
 from cdpr_drake.kernel_cache.locks import share_compilation
 from cdpr_drake.schema.input_files import inputs_read_once
 from cdpr_drake.version import __version__
@@ -217,7 +217,7 @@ def _notes(problem: BaseException) -> str:
 def _refuse(words: str) -> NoReturn:
     """Says a line of at most `LONGEST_LINE` characters for each problem, and ends."""
     for problem in words.splitlines() or [""]:
-        line = "".join(c if c.isprintable() else repr(c)[1:-1] for c in problem)
+        line = plain_words(problem).replace("\t", r"\t")
         if len(line) > LONGEST_LINE:
             line = f"{line[: LONGEST_LINE * 3 // 4]} ... {line[-LONGEST_LINE // 5 :]}"
         print(f"cdpr: {line}", file=sys.stderr)
@@ -306,7 +306,7 @@ def _main(given: Sequence[str], imported: Callable[[], None] = lambda: None) -> 
         _refuse(_usage_words(problem))
     except (MemoryError, ArithmeticError, RuntimeError, ImportError) as problem:
         if _was_interrupted(problem):
-            print(f"cdpr: stopped{_notes(problem)}", file=sys.stderr)
+            print(f"cdpr: stopped{plain_words(_notes(problem))}", file=sys.stderr)
             sys.exit(INTERRUPTED)
         if isinstance(problem, ImportError):
             raise
@@ -318,6 +318,6 @@ def _main(given: Sequence[str], imported: Callable[[], None] = lambda: None) -> 
         why = f"{words or 'nothing more is known'}; {TRACEBACK}=1 shows where"
         _refuse(f"{kind}: {why}{_notes(problem)}")
     except (typer.Abort, KeyboardInterrupt, _Interrupted) as problem:
-        print(f"cdpr: stopped{_notes(problem)}", file=sys.stderr)
+        print(f"cdpr: stopped{plain_words(_notes(problem))}", file=sys.stderr)
         sys.exit(INTERRUPTED)
     sys.exit(code if isinstance(code, int) else 0)

@@ -13,7 +13,7 @@ from cdpr_drake.analyses.front.mechanisms import hang_mechanism
 from cdpr_drake.analyses.logs.log_formats import detect_log
 from cdpr_drake.cli.import_log import log_lines
 from cdpr_drake.cli.options import AsJson, check_plots, save_plot
-from cdpr_drake.cli.terminal import print_json
+from cdpr_drake.cli.terminal import print_json, print_words
 from cdpr_drake.errors import CdprError, meant_names
 from cdpr_drake.models.formats.file_kinds import is_foreign
 from cdpr_drake.models.formats.grab_mat import is_grab_mat
@@ -137,11 +137,11 @@ def check(
     else:
         for item in found:
             for problem in item["problems"]:
-                print(problem)
+                print_words(problem)
             if not item["problems"]:
-                print(f"{item['file']}: {item['kind']}: nothing wrong")
+                print_words(f"{item['file']}: {item['kind']}: nothing wrong")
             for note in item["notes"]:
-                print(f"  note: {note}")
+                print_words(f"  note: {note}")
     if plot is not None and not found[0]["problems"]:
         save_plot(import_log(files[0]).plot(), plot)
     if any(item["problems"] for item in found):

@@ -13,7 +13,7 @@ from rich.table import Table
 from cdpr_drake.cli.completion import words_among
 from cdpr_drake.cli.notebooks import FOLDER, copy_new
 from cdpr_drake.cli.options import AsJson
-from cdpr_drake.cli.terminal import print_json, wide_console
+from cdpr_drake.cli.terminal import print_json, print_words, wide_console
 from cdpr_drake.errors import CdprError
 from cdpr_drake.schema.typed_yaml import closest
 
@@ -55,7 +55,7 @@ def examples(
         print_json([{"name": each, "title": words} for each, words in titles.items()])
     elif name is not None:
         for each in titles:
-            print(folder / f"{each}.py")
+            print_words(folder / f"{each}.py")
     else:
         table = Table(title="Examples", box=SIMPLE_HEAD, padding=(0, 1), pad_edge=False)
         table.add_column("name", no_wrap=True)

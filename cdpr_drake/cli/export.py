@@ -10,7 +10,7 @@ import typer
 from cdpr_drake.cli.completion import words_among
 from cdpr_drake.cli.options import AsJson, RobotName
 from cdpr_drake.cli.robot_folder import write_files
-from cdpr_drake.cli.terminal import print_json
+from cdpr_drake.cli.terminal import print_json, print_words
 from cdpr_drake.models.mechanism_exchange import export_mechanism
 from cdpr_drake.models.mechanism_loader import load_mechanism
 from cdpr_drake.models.robot_exchange import export_robot
@@ -51,7 +51,7 @@ def export(
     for words in omission_words(lost):
         typer.echo(words, err=True)
     for path in paths:
-        print(path)
+        print_words(path)
 
 
 def _exported(name: str, format: str) -> tuple[str, str, dict[str, str], dict[str, str]]:

@@ -10,7 +10,7 @@ import typer
 from cdpr_drake.analyses.front.exchange import import_robot
 from cdpr_drake.cli.options import AsJson
 from cdpr_drake.cli.robot_folder import write_files
-from cdpr_drake.cli.terminal import print_json
+from cdpr_drake.cli.terminal import print_json, print_words
 from cdpr_drake.errors import RobotFileError
 from cdpr_drake.models.formats.assumptions import CompletedDraft
 from cdpr_drake.models.formats.caspr import TOOL
@@ -64,7 +64,7 @@ def import_(
             _print_json(mechanism.as_dict(), "mechanism", paths)
             return
         tree = mechanism.tree
-        print(
+        print_words(
             f"{mechanism.name}: {len(tree.links)} links, {tree.coordinates} coordinates, "
             f"{len(tree.cables)} cables, from {TOOL}"
         )
@@ -83,7 +83,7 @@ def import_(
         _print_json(imported.as_dict(), "robot", paths)
         return
     robot = imported.robot
-    print(f"{robot.name}: {robot.motion}, {len(robot.cables)} cables, from {imported.tool}")
+    print_words(f"{robot.name}: {robot.motion}, {len(robot.cables)} cables, from {imported.tool}")
     _print_told(imported.completed, paths)
 
 
@@ -94,8 +94,8 @@ def _print_json(told: dict[str, Any], kind: str, paths: list[Path]) -> None:
 
 def _print_told(completed: CompletedDraft, paths: list[Path]) -> None:
     for key, words in completed.assumed.items():
-        print(f"  assumed {key}: {words}")
+        print_words(f"  assumed {key}: {words}")
     for words in completed.remarks:
-        print(f"  note: {words}")
+        print_words(f"  note: {words}")
     for path in paths:
-        print(path)
+        print_words(path)

@@ -19,7 +19,7 @@ from cdpr_drake.analyses.logs.log_request import (
 )
 from cdpr_drake.cli.completion import robot_words, words_among
 from cdpr_drake.cli.options import AsJson, check_plots, save_plot
-from cdpr_drake.cli.terminal import print_json
+from cdpr_drake.cli.terminal import print_json, print_words
 from cdpr_drake.errors import CdprError, OutputFolderError
 from cdpr_drake.models.robot_loader import load_robot
 
@@ -115,9 +115,9 @@ def import_log(
         print_json({**found.as_dict(), "written": None if out is None else str(out)})
         return
     for line in log_lines(found):
-        print(line)
+        print_words(line)
     if out is not None:
-        print(out)
+        print_words(out)
 
 
 def log_request(

@@ -16,7 +16,7 @@ from cdpr_drake.cli.completion import robot_words, words_among
 from cdpr_drake.cli.notebooks import FOLDER as NOTEBOOKS
 from cdpr_drake.cli.robot_folder import write_files
 from cdpr_drake.cli.terminal import message_console
-from cdpr_drake.errors import CdprError
+from cdpr_drake.errors import CdprError, plain_words
 from cdpr_drake.models.robot_loader import load_robot, robot_text
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.schema.templates import commented_yaml
@@ -90,9 +90,10 @@ def new(
         if source is not None:
             raise CdprError(f"--from: found {source} with {kind}; accepted: with robot, scenario")
         for path in write_files(out, _block(kind, name), overwrite):
-            print(path)
+            print(plain_words(str(path)))
         return
-    of_robot, remarks = kind == ROBOT, []
+    of_robot = kind == ROBOT
+    remarks: list[str] = []
     head = f"# Check it with `cdpr check {name}.yaml`.\n"
     if robot is not None:
         loaded = load_robot(robot, "cdpr new scenario")
@@ -109,7 +110,7 @@ def new(
     (load_robot if of_robot else load_scenario)(str(path))
     for words in remarks:
         message_console().print(words, soft_wrap=True, markup=False, highlight=False)
-    print(path)
+    print(plain_words(str(path)))
 
 
 def _block(kind: str, name: str) -> dict[str, str]:

@@ -11,7 +11,7 @@ from rich.table import Table
 
 from cdpr_drake.cli.options import AsJson
 from cdpr_drake.cli.robot_folder import check_no_file
-from cdpr_drake.cli.terminal import print_json, wide_console
+from cdpr_drake.cli.terminal import print_json, print_words, wide_console
 from cdpr_drake.errors import OutputFolderError
 from cdpr_drake.schema.json_text import load_json
 
@@ -42,7 +42,7 @@ def notebooks(
         wide_console().print(table)
     else:
         there = len(contents) - len(copied)
-        print(f"{folder}: {len(copied)} copied, {there} were there; begin with tour.ipynb")
+        print_words(f"{folder}: {len(copied)} copied, {there} were there; begin with tour.ipynb")
 
 
 def title_of(name: str, content: bytes) -> str:

@@ -57,7 +57,7 @@ from cdpr_drake.cli.proven_options import (
     print_proven,
 )
 from cdpr_drake.cli.run_endings import report_failures, report_kept_files, report_recovered
-from cdpr_drake.cli.terminal import message_console, print_json, wide_console, working
+from cdpr_drake.cli.terminal import message_console, print_json, print_words, wide_console, working
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import Robot
@@ -430,7 +430,7 @@ def _run(robot: Robot, planner: Planner, folder: Path, ending: _Ending) -> int:
     else:
         _print(wide_console(), told, folder)
         if streamed is not None:
-            print(streamed.words())
+            print_words(streamed.words())
     return report_failures(console, failed, folder, None)
 
 

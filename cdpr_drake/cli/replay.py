@@ -13,7 +13,7 @@ from cdpr_drake.analyses.reporting.folder_lock import free_folder
 from cdpr_drake.cli.completion import robot_words
 from cdpr_drake.cli.import_log import Axes, Body, LogFormat, Mapping, Rate, Units, log_request
 from cdpr_drake.cli.options import FigureFormats, Overwrite, ResultsAsJson, parse_formats
-from cdpr_drake.cli.terminal import print_json
+from cdpr_drake.cli.terminal import print_json, print_words
 
 
 def replay(
@@ -60,5 +60,5 @@ def replay(
     if as_json:
         print_json(found.as_dict())
         return
-    print(found)
-    print(f"results: {folder}")
+    print_words(found)
+    print_words(f"results: {folder}")

@@ -14,7 +14,7 @@ from rich.table import Table
 
 from cdpr_drake.cli.options import AsJson
 from cdpr_drake.cli.robot_folder import write_files
-from cdpr_drake.cli.terminal import print_json, wide_console
+from cdpr_drake.cli.terminal import print_json, print_words, wide_console
 from cdpr_drake.errors import CdprError, OutputFolderError, accepted_names
 from cdpr_drake.models.mechanism_files import mechanism_names
 from cdpr_drake.models.mechanism_loader import load_mechanism
@@ -128,7 +128,7 @@ def robots(
         print_json([robot_facts(robot) for robot in loaded])
         return
     if gallery is not None:
-        print(gallery)
+        print_words(gallery)
         return
     _print_table([robot_facts(robot) for robot in loaded])
 

@@ -19,6 +19,7 @@ from rich.text import Text
 
 from cdpr_drake.cli.compiling import FIRST_USE, compiling
 from cdpr_drake.cli.process import PROGRESS
+from cdpr_drake.errors import plain_words
 
 PROGRESS_PERIOD = "CDPR_PROGRESS_PERIOD"
 """Environment variable of the time between lines of progress [s], for programs that read them."""
@@ -41,6 +42,11 @@ LOOK_PERIOD = 0.5
 """Time between looks whether a line is due [s]."""
 
 
+def print_words(*words: object) -> None:
+    """Prints words on stdout, in which names of files control no terminal."""
+    print(plain_words(" ".join(map(str, words))))
+
+
 def print_json(found: Any) -> None:
     """Prints results for other programs."""
     print(json.dumps(found, indent=2))
@@ -48,7 +54,7 @@ def print_json(found: Any) -> None:
 
 def message_console() -> Console:
     """Where is said how far something is and what went wrong; paths are words, and never markup."""
-    return Console(stderr=True, markup=False, highlight=False, soft_wrap=True)
+    return _Plain(stderr=True, markup=False, highlight=False, soft_wrap=True)
 
 
 def wide_console(pipe_width: int = 120) -> Console:
@@ -58,11 +64,19 @@ def wide_console(pipe_width: int = 120) -> Console:
     up to `WIDEST` characters. What users write and units such as [m] are words, and never markup.
     """
     if sys.stdout.isatty():
-        return Console(markup=False)
+        return _Plain(markup=False)
     return _Pipe(width=pipe_width, markup=False)
 
 
-class _Pipe(Console):
+class _Plain(Console):
+    """A console that words do not control, also those in the cells of tables."""
+
+    def render_str(self, text: str, **options: Any) -> Text:
+        """The words, escaped where they would control the terminal."""
+        return super().render_str(plain_words(text), **options)
+
+
+class _Pipe(_Plain):
     """A console that is as wide as its tables need."""
 
     def print(self, *objects: Any, **options: Any) -> None:
@@ -116,7 +130,7 @@ class _Live:
         self._words = words
 
     def __rich__(self) -> Text:
-        return Text(self._words())
+        return Text(plain_words(self._words()))
 
 
 def progress_bar(console: Console) -> Progress:
@@ -148,7 +162,7 @@ def state_words(task: Task) -> str:
 
 class _StateColumn(ProgressColumn):
     def render(self, task: Task) -> Text:
-        return Text(state_words(task))
+        return Text(plain_words(state_words(task)))
 
 
 class _Lines:
@@ -186,7 +200,7 @@ class _Lines:
                 self._said = now
                 words = self._words()
                 if words:  # as one piece, for other threads write there, too
-                    sys.stderr.write(f"{PROGRESS}{words}\n")
+                    sys.stderr.write(f"{PROGRESS}{plain_words(words)}\n")
                     sys.stderr.flush()
 
 

@@ -17,8 +17,8 @@ from cdpr_drake.analyses.visualization.meshcat_window import LOCAL, open_meshcat
 from cdpr_drake.analyses.visualization.replay import RobotPicture, robot_picture
 from cdpr_drake.cli.options import LISTENING, Host, Port, RobotName, named_options
 from cdpr_drake.cli.robot_folder import write_files
-from cdpr_drake.cli.terminal import message_console, working
-from cdpr_drake.errors import CdprError, OutputFolderError
+from cdpr_drake.cli.terminal import message_console, print_words, working
+from cdpr_drake.errors import CdprError, OutputFolderError, plain_words
 from cdpr_drake.models.mechanism_loader import load_robot_or_mechanism
 from cdpr_drake.models.mechanism_schema import Mechanism
 
@@ -46,7 +46,7 @@ def view(
     if html is not None and not html.absolute().parent.is_dir():
         raise OutputFolderError(f"{html}: found no folder to write to; accepted: one that exists")
     with named_options(LISTENING):
-        meshcat = open_meshcat(host or LOCAL, port)
+        meshcat = open_meshcat(host or LOCAL, port) if html is None else open_meshcat()
     with working(message_console(), f"Drawing {loaded.name}"):
         if isinstance(loaded, Mechanism):
             picture: RobotPicture | MechanismPicture = mechanism_picture(loaded, meshcat)
@@ -56,10 +56,10 @@ def view(
         print(f"warning: the cables are grey: {picture.problem}", file=sys.stderr)
     if html is not None:
         write_files(html.parent, {html.name: picture.html()}, overwrite=True)
-        print(html)
+        print_words(html)
         return
     where = page_address(picture.meshcat, host or LOCAL)
-    print(f"{loaded.name} at {where}; Ctrl-C ends", flush=True)
+    print(plain_words(f"{loaded.name} at {where}; Ctrl-C ends"), flush=True)
     try:
         while True:
             time.sleep(1.0)

@@ -1,8 +1,9 @@
 """Relays Drake's Meshcat to the page: same address, same port, same guard as all else.
 
-Meshcat listens at a port of its own, to this machine only; it knows neither tokens nor sessions.
-The page's browser, perhaps on another machine, asks for `/scene/` and gets the scene of its own
-session.
+Meshcat knows neither tokens nor sessions, so that nobody but this relay reaches it: the scene is
+behind a socket of the file system, for this user alone. The page's browser, perhaps on another
+machine, asks for `/scene/` and gets the scene of its own session; what it says back is dropped
+there, since Drake ends the process at a message that it cannot read.
 """
 
 from __future__ import annotations
@@ -61,8 +62,8 @@ def add_scene_relay(app: FastAPI, bench_of: BenchOf) -> None:
             return Response("There is no session; reload the page.", status_code=404)
         page = name or PAGE
         async with (
-            aiohttp.ClientSession() as session,
-            session.get(f"{await _address(bench)}/{page}") as answer,
+            await _scene(bench) as session,
+            session.get(f"http://scene/{page}") as answer,
         ):
             body, found = await answer.read(), answer.status
         if page == PAGE:
@@ -80,19 +81,20 @@ def add_scene_relay(app: FastAPI, bench_of: BenchOf) -> None:
             await socket.close(1008)
             return
         await socket.accept()
-        address = (await _address(bench)).replace("http", "ws", 1)
         with suppress(aiohttp.ClientError, WebSocketDisconnect, RuntimeError):
             async with (
-                aiohttp.ClientSession() as session,
-                session.ws_connect(address, max_msg_size=LARGEST_MESSAGE) as meshcat,
+                await _scene(bench) as session,
+                session.ws_connect("http://scene/", max_msg_size=LARGEST_MESSAGE) as meshcat,
             ):
                 await _relay(socket, meshcat)
         with suppress(RuntimeError, WebSocketDisconnect):  # the browser has gone already
             await socket.close()
 
 
-async def _address(bench: Workbench) -> str:
-    return await asyncio.wrap_future(bench.scene_address())
+async def _scene(bench: Workbench) -> aiohttp.ClientSession:
+    """What asks the scene of a workbench."""
+    door = await asyncio.wrap_future(bench.scene_address())
+    return aiohttp.ClientSession(connector=aiohttp.UnixConnector(door))
 
 
 async def _relay(socket: WebSocket, meshcat: aiohttp.ClientWebSocketResponse) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 from pydrake.geometry import Meshcat, Rgba, Sphere
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.visualization.meshcat_window import open_meshcat
+from cdpr_drake.analyses.visualization.meshcat_window import open_meshcat, private_door
 from cdpr_drake.analyses.visualization.replay import RobotPicture
 from cdpr_drake.analyses.visualization.solids import add_solid
 from cdpr_drake.arrays import Array
@@ -57,9 +57,9 @@ class RobotScene:
     """A robot in a Meshcat of its own; all of it belongs to the thread of the calculator."""
 
     def __init__(self) -> None:
-        """Opens Meshcat on a port of this machine."""
+        """Opens Meshcat, which only the server's relay reaches."""
         self.meshcat: Meshcat = open_meshcat()
-        self.address = str(self.meshcat.web_url())
+        self.door = str(private_door(self.meshcat))
         self._robot: Robot | None = None
         self._name, self._size = "", 0.0
         self._dark, self._solids = False, ""

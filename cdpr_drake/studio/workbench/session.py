@@ -388,7 +388,7 @@ class Workbench:
         return self._scene
 
     def scene_address(self) -> Future[str]:
-        """Where Meshcat listens on this machine; the server relays it to the page.
+        """Path of the socket behind which the scene is; the server relays it to the page.
 
         The robot is drawn there first, with grey cables: what is known of it may have to wait for
         kernels that are compiled.
@@ -399,7 +399,7 @@ class Workbench:
             def open_scene() -> str:
                 scene = self.scene()
                 scene.show(robot, X_WP, np.full(len(robot.cables), np.nan))
-                return scene.address
+                return scene.door
 
             self._opened = self.calculator.submit(open_scene)
         return self._opened

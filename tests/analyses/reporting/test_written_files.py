@@ -18,6 +18,7 @@ from cdpr_drake.analyses.reporting.written_files import (
     others_in,
     remove_written,
     whole_file,
+    whole_name,
 )
 from cdpr_drake.errors import OutputFolderError
 
@@ -126,7 +127,11 @@ def killed(target):
 def test_what_a_killed_program_wrote_is_known(tmp_path):
     target = tmp_path / "out"
     killed(target)
-    assert tree(target) == [JOURNAL, ".part-second.csv", "first.csv"]
+    assert [whole_name(name) or name for name in tree(target)] == [
+        JOURNAL,
+        "second.csv",
+        "first.csv",
+    ]
     (target / "notes.txt").write_text("years")
     assert others_in(target) == ["notes.txt"]
     # The next one goes on, without the half file.
@@ -257,3 +262,33 @@ def test_a_journal_is_no_way_to_write_elsewhere(tmp_path):
     with pytest.raises(OutputFolderError, match="cannot be written"), continued_folder(target):
         write_whole(target / "new.csv", "1")
     assert (tmp_path / "thesis.tex").read_text() == "years"
+
+
+@pytest.mark.parametrize("name", ["summary.json", MARKER])
+def test_a_file_in_the_making_follows_no_link(name, tmp_path):
+    """Links in a folder that others may write to, by all names that could be foreseen."""
+    victim = tmp_path / "victim"
+    victim.write_text("years of work")
+    folder = tmp_path / "out"
+    folder.mkdir()
+    for link in (f".part-{name}", f".part-abcdefgh-{name}", f".{name}.part"):
+        (folder / link).symlink_to(victim)
+    names = set()
+    for _ in range(3):
+        if name == MARKER:
+            mark(folder)
+            (folder / name).unlink()
+        else:
+            with whole_file(folder / name) as part:
+                names.add(part.name)
+                assert part.stat().st_size == 0
+                assert whole_name(part.name) == name
+                part.write_text("new")
+    assert victim.read_text() == "years of work"
+    assert name == MARKER or len(names) == 3
+
+
+def test_files_get_the_rights_that_others_get(tmp_path):
+    write_whole(tmp_path / "a.csv", "1")
+    (tmp_path / "b.csv").write_text("1")
+    assert (tmp_path / "a.csv").stat().st_mode == (tmp_path / "b.csv").stat().st_mode

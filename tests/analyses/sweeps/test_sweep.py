@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from cdpr_drake.analyses.reporting.progress import StudySession
-from cdpr_drake.analyses.reporting.written_files import MARKER, mark, part_of
+from cdpr_drake.analyses.reporting.written_files import MARKER, mark, new_part
 from cdpr_drake.analyses.simulation.monte_carlo import run_many, with_seeds
 from cdpr_drake.analyses.studies.framework.study import Study
 from cdpr_drake.analyses.sweeps import workers as sweep_workers
@@ -124,7 +124,7 @@ def test_what_others_put_beside_the_chunks_stays(tasks, tmp_path):
     (chunks / "notes.txt").write_text("mine")
     (chunks / "mine.npz").write_text("mine")
     own = next(path for path in chunks.iterdir() if path.name.endswith("500.npz"))
-    part_of(own).touch()  # of who was killed
+    new_part(own)  # of who was killed
     folder.finish(arrays)
     assert sorted(os.listdir(chunks)) == ["mine.npz", "notes.txt"]
 
@@ -132,9 +132,9 @@ def test_what_others_put_beside_the_chunks_stays(tasks, tmp_path):
 def test_who_is_killed_at_the_start_leaves_a_folder_that_can_be_used(tasks, tmp_path):
     (tmp_path / "s").mkdir()
     mark(tmp_path / "s")
-    part_of(tmp_path / "s" / "arguments.json").write_text("{")
+    new_part(tmp_path / "s" / "arguments.json").write_text("{")
     folder = SweepFolder(tmp_path / "s", ARGUMENTS)
-    part_of(tmp_path / "s" / "parts.npz").touch()  # and another one at the end
+    new_part(tmp_path / "s" / "parts.npz")  # and another one at the end
     folder = SweepFolder(tmp_path / "s", ARGUMENTS)
     folder.finish(run_sweep(tasks, 500, folder).arrays)
     assert sorted(os.listdir(tmp_path / "s")) == [MARKER, "arguments.json", "parts.npz"]

@@ -1,0 +1,124 @@
+"""Meshcat's own port answers nobody; other sites' pages see nothing, and no message ends it."""
+
+import asyncio
+import socket
+import sys
+
+import aiohttp
+import msgpack
+import numpy as np
+import pytest
+from pydrake.geometry import Rgba, Sphere
+from pydrake.math import RigidTransform
+
+from cdpr_drake.analyses.visualization.meshcat_window import (
+    open_meshcat,
+    page_address,
+    private_door,
+)
+
+WAIT = 1.0
+"""Time after which what was not answered counts as not answered [s]."""
+
+NAN_CAMERA = msgpack.packb(
+    {"type": "camera_pose", "camera_pose": [float("nan")] * 16, "is_perspective": True}
+)
+"""At which Drake ends the process that holds the scene."""
+
+
+@pytest.fixture(scope="module")
+def scene():
+    """A scene with a ball, and where browsers look."""
+    meshcat = open_meshcat("localhost")
+    meshcat.SetObject("ball", Sphere(0.5), Rgba(1.0, 0.0, 0.0))
+    return meshcat, page_address(meshcat)
+
+
+async def listened(address, origin=None, said=(), **session):
+    """What a browser of an origin hears, in bytes, after it has said something."""
+    async with (
+        aiohttp.ClientSession(**session) as one,
+        one.ws_connect(address, origin=origin) as web,
+    ):
+        for words in said:
+            await web.send_bytes(words)
+        heard = 0
+        try:
+            while True:
+                message = await asyncio.wait_for(web.receive(), WAIT)
+                if message.type != aiohttp.WSMsgType.BINARY:
+                    return heard
+                heard += len(message.data)
+        except TimeoutError:
+            return heard
+
+
+def hear(*arguments, **more):
+    return asyncio.run(listened(*arguments, **more))
+
+
+def status(address, **headers):
+    async def asked():
+        async with aiohttp.ClientSession() as one, one.get(address, headers=headers) as answer:
+            return answer.status, len(await answer.read())
+
+    return asyncio.run(asked())
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux filters who reaches a socket")
+def test_the_port_of_meshcat_itself_answers_nobody(scene):
+    for _ in range(2):  # also after a browser was let in
+        with socket.socket() as web:
+            web.settimeout(WAIT)
+            with pytest.raises(TimeoutError):
+                web.connect(("127.0.0.1", scene[0].port()))
+        assert hear(scene[1]) > 100
+
+
+def test_browsers_get_page_and_scene_again_and_again(scene):
+    address = scene[1]
+    for _ in range(3):
+        assert status(f"{address}/meshcat.html")[1] > 10_000
+        assert status(address) == status(f"{address}/meshcat.html")
+        assert hear(address) > 100
+
+
+def test_a_page_of_another_site_sees_nothing(scene):
+    address = scene[1]
+    for origin in ("http://evil.example", "null", address.replace("http", "https")):
+        with pytest.raises(aiohttp.WSServerHandshakeError, match="403"):
+            hear(address, origin)
+    assert hear(address, address) > 100
+    assert status(address, Host="evil.example")[0] == 403  # a name that leads here
+
+
+def test_no_message_ends_the_process(scene):
+    bad = (
+        NAN_CAMERA,
+        b"",
+        b"\xff" * 100,
+        msgpack.packb({"type": "button", "name": 5}),
+        b"x" * 99_999,
+    )
+    assert hear(scene[1], said=bad) > 100
+    assert hear(scene[1], said=bad * 5) > 100
+    scene[0].SetTransform("ball", RigidTransform(np.ones(3)))
+    assert hear(scene[1]) > 100
+
+
+def test_the_private_door_is_a_socket_of_this_user(scene):
+    path = private_door(scene[0])
+    assert path.parent.stat().st_mode & 0o077 == 0
+
+    async def behind():
+        return await listened(
+            "http://scene/", said=(NAN_CAMERA,), connector=aiohttp.UnixConnector(str(path))
+        )
+
+    assert asyncio.run(behind()) > 100
+
+
+def test_a_scene_that_nobody_looks_at_has_no_page():
+    meshcat = open_meshcat()
+    with pytest.raises(KeyError):
+        page_address(meshcat)
