@@ -33,4 +33,22 @@ from cdpr_drake.kernel_cache.folder import use_kernel_cache
 
 use_kernel_cache()
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+_lazy, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+
+
+def __getattr__(name: str) -> object:
+    """Loads a public name.
+
+    Raises:
+        AttributeError: There is no such name; says the nearest ones.
+    """
+    try:
+        return _lazy(name)
+    except AttributeError as problem:
+        from difflib import get_close_matches
+
+        near = get_close_matches(name, __all__, 3) if name not in __all__ else []
+        if not near or name.startswith("__"):
+            raise
+        words = f"module 'cdpr_drake' has no attribute {name!r}; did you mean {' or '.join(near)}?"
+        raise AttributeError(words, name=name) from problem

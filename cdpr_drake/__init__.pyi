@@ -24,7 +24,9 @@ from .analyses.front.simulation import finish_run as finish_run
 from .analyses.front.simulation import simulate as simulate
 from .analyses.front.stability import assess_stability as assess_stability
 from .analyses.front.statics import find_equilibria as find_equilibria
+from .analyses.front.statics import plot as plot
 from .analyses.front.statics import solve_forward_kinematics as solve_forward_kinematics
+from .analyses.front.statics import solve_inverse_kinematics as solve_inverse_kinematics
 from .analyses.front.statics import solve_static as solve_static
 from .analyses.front.studies import run_study as run_study
 from .analyses.front.studies import studies as studies

@@ -7,13 +7,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from pydrake.math import RigidTransform
+from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.cable_behaviour import CableBehaviour
 from cdpr_drake.cables.elastic_law import axial_stiffness
 from cdpr_drake.cables.models import CABLE_MODELS
-from cdpr_drake.errors import RobotFileError
+from cdpr_drake.errors import RobotFileError, TensionProblemError
+from cdpr_drake.geometry.cable_paths import cable_jacobian
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.geometry.motion_type import MOTION_TYPES, MotionType
 from cdpr_drake.geometry.platform_joint import PlatformJoint
@@ -509,6 +510,31 @@ class Robot(Summarized):
         """Acceleration of a falling body in W, shape (3,) [m/s^2]."""
         return self.gravity * np.array(self.down())
 
+    def wrench_matrix(self, pose: object = None, pulleys: bool = True) -> Array:
+        """Wrench matrix W at a pose: tensions t load the platform with W t.
+
+        W = -J^T with the Jacobian J of the cables' lengths, l_dot = J V_WP.
+
+        Args:
+            pose: X_WP as `pose_of` takes it [m]; None: the home pose.
+            pulleys: False for cables that run straight from their exit points.
+
+        Returns:
+            Shape (n, m): rows of moments about Po [m] first, then of forces [-], in W; columns in
+            the order of the cables. A robot with n < 6 degrees of freedom has the rows that
+            `MotionType.components` says: in a horizontal plane the moment about z, f_x and f_y.
+
+        Raises:
+            TensionProblemError: It is no pose.
+            CableGeometryError: A cable cannot run there.
+
+        Source: servoing thesis (1.15) to (1.20).
+        """
+        X_WP, cables = pose_of(self.home, pose), self.cable_set()
+        J = cable_jacobian(X_WP, cables if pulleys else cables.without_pulleys())
+        W: Array = self.motion_type().components(-J.T, X_WP.rotation().matrix())
+        return W
+
     def camera_mount(self, name: str) -> CameraMount:
         """The mounting of that name; the names are checked when a scenario is read."""
         return next(mount for mount in self.cameras if mount.name == name)
@@ -519,3 +545,60 @@ def _unit_columns(axes: list[Array]) -> Array:
     distinct = {id(axis): axis for axis in axes}
     units = {key: axis / np.linalg.norm(axis) for key, axis in distinct.items()}
     return np.array([units[id(axis)] for axis in axes], float).T
+
+
+ROTATION_TOLERANCE = 1e-6
+"""How far a rotation that is given by numbers may be off an orthonormal one [-]."""
+
+EXACT_ROTATION = 1e-14
+"""A rotation that is off by less is taken as it is, else the nearest one [-]."""
+
+
+def pose_of(home: Pose, pose: object = None) -> RigidTransform:
+    """X_WP of a pose that is given in one of several ways.
+
+    Args:
+        home: The home pose.
+        pose: X_WP as 3 numbers, position [m] at angles of zero; as 6 numbers, position [m] and
+            angles (phi, theta, psi) [deg], as a `Pose` has them; as `Pose`, RigidTransform or
+            matrix of shape (4, 4) [m]; None: the home pose.
+
+    Raises:
+        TensionProblemError: It is none of these, or no pose.
+    """
+    if pose is None:
+        return home.transform()
+    if isinstance(pose, RigidTransform):
+        return pose
+    if isinstance(pose, Pose):
+        return pose.transform()
+    accepted = (
+        "x, y, z [m], or x, y, z, phi, theta, psi [m, deg], a Pose, a RigidTransform, a matrix of "
+        "shape (4, 4), or None for the home pose"
+    )
+    try:
+        matrix = np.asarray(pose, float)
+    except (TypeError, ValueError):
+        matrix = np.empty(0)
+    if matrix.shape in ((3,), (6,)) and np.all(np.isfinite(matrix)):
+        angles = matrix[3:] if matrix.size == 6 else np.zeros(3)
+        return pose_from_angles(matrix[:3], np.radians(angles))
+    if matrix.shape != (4, 4):
+        shape = f" of shape {matrix.shape}" if matrix.size else ""
+        raise TensionProblemError(
+            f"pose: found a {type(pose).__name__}{shape}; accepted: {accepted}"
+        )
+    R = matrix[:3, :3]
+    off = float(np.max(np.abs(R @ R.T - np.eye(3))))
+    if (
+        not off <= ROTATION_TOLERANCE
+        or np.linalg.det(R) < 0.0
+        or not np.array_equal(matrix[3], (0.0, 0.0, 0.0, 1.0))
+    ):
+        raise TensionProblemError(
+            "pose: found a matrix that is no pose; accepted: a rotation, a position [m], and the "
+            "last row 0 0 0 1"
+        )
+    if off > EXACT_ROTATION:
+        R = RotationMatrix.ProjectToRotationMatrix(R).matrix()
+    return RigidTransform(RotationMatrix(R), matrix[:3, 3])

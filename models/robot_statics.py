@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import TensionProblemError
@@ -15,7 +15,7 @@ from cdpr_drake.geometry.cable_paths import cable_jacobian
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.geometry.poses import angles_from_rotation, pose_error
 from cdpr_drake.geometry.straight_cables import gravity_wrench
-from cdpr_drake.models.robot_schema import Pose, Robot
+from cdpr_drake.models.robot_schema import Robot, pose_of
 from cdpr_drake.tensions.problem import TensionProblem
 
 if TYPE_CHECKING:
@@ -24,14 +24,6 @@ if TYPE_CHECKING:
 
 OFF_JOINT = 1e-6
 """How far a pose may be off what the motion type lets the platform have [m, rad]."""
-
-
-ROTATION_TOLERANCE = 1e-6
-"""How far a rotation that is given by numbers may be off an orthonormal one [-]."""
-
-
-EXACT_ROTATION = 1e-14
-"""A rotation that is off by less is taken as it is, else the nearest one [-]."""
 
 
 def rigid_platform(robot: Robot) -> RigidPlatform:
@@ -220,41 +212,12 @@ def as_pose(robot: Robot, pose: object = None) -> RigidTransform:
 
     Args:
         robot: The robot.
-        pose: X_WP as RigidTransform, `Pose` or matrix of shape (4, 4) [m]; None: the home pose.
+        pose: X_WP as `robot_schema.pose_of` takes it; None: the home pose.
 
     Raises:
         TensionProblemError: It is none of these, or no pose.
     """
-    if pose is None:
-        return robot.home.transform()
-    if isinstance(pose, RigidTransform):
-        return pose
-    if isinstance(pose, Pose):
-        return pose.transform()
-    accepted = "a RigidTransform, a Pose, a matrix of shape (4, 4), or None for the home pose"
-    try:
-        matrix = np.asarray(pose, float)
-    except (TypeError, ValueError):
-        matrix = np.empty(0)
-    if matrix.shape != (4, 4):
-        shape = f" of shape {matrix.shape}" if matrix.size else ""
-        raise TensionProblemError(
-            f"pose: found a {type(pose).__name__}{shape}; accepted: {accepted}"
-        )
-    R = matrix[:3, :3]
-    off = float(np.max(np.abs(R @ R.T - np.eye(3))))
-    if (
-        not off <= ROTATION_TOLERANCE
-        or np.linalg.det(R) < 0.0
-        or not np.array_equal(matrix[3], (0.0, 0.0, 0.0, 1.0))
-    ):
-        raise TensionProblemError(
-            "pose: found a matrix that is no pose; accepted: a rotation, a position [m], and the "
-            "last row 0 0 0 1"
-        )
-    if off > EXACT_ROTATION:
-        R = RotationMatrix.ProjectToRotationMatrix(R).matrix()
-    return RigidTransform(RotationMatrix(R), matrix[:3, 3])
+    return pose_of(robot.home, pose)
 
 
 def check_pose(robot: Robot, X_WP: RigidTransform) -> None:

@@ -4,9 +4,9 @@ Takes the commands and programs of README, first pages, some guides, `cdpr` alon
 and runs them one by one, each page in an empty folder, with an empty cache of kernels. `--fresh`
 begins where the README does: a clone, a new environment, `pip install`. There a step that names an
 extra which it needs is played again with it. Each step has a row with its processor time, that of
-its own processes included. `said.txt` has all that steps print. `--robot FILE` plays the first steps
-with a robot of one's own instead: from `cdpr new` to a rendered servo that arrives, without a word
-about other robots.
+its own processes included. `said.txt` has all that steps print. `--robot FILE` plays the first
+steps with a robot of one's own instead: from `cdpr new` to a rendered servo that arrives, without a
+word about other robots.
 """
 
 from __future__ import annotations

@@ -20,20 +20,25 @@ from cdpr_drake.analyses.statics.equilibria_query import (
 from cdpr_drake.analyses.statics.static_query import StaticReport, static_at_lengths, static_at_pose
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.models import CABLE_MODELS, ELASTIC
-from cdpr_drake.errors import EquilibriumError
+from cdpr_drake.errors import EquilibriumError, TensionProblemError
+from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.poses import angles_from_rotation
 from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.models.robot_statics import as_pose
+from cdpr_drake.models.robot_statics import as_pose, check_pose
 from cdpr_drake.schema.typed_yaml import closest
 from cdpr_drake.statics.forward_kinematics import ForwardKinematics, PoseFit
-from cdpr_drake.summaries import Summarized, as_kind, numbers
+from cdpr_drake.summaries import Summarized, Tabulated, as_kind, numbers
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 EQUILIBRIA_MODELS = ("inextensible", "elastic")
 """Cable models of `find_equilibria`."""
+
+DOUBTFUL = 0.005
+"""Share of the mean length beyond which a residual is remarked: cables and drums of a machine that
+is measured are off by less."""
 
 
 class RobotAtRest(StaticReport):
@@ -108,8 +113,18 @@ class PoseFromLengths(Summarized):
         """Lengths at the pose less those given, shape (m,) [m]."""
         return self.fit.residuals
 
+    def deviations(self) -> tuple[float, float] | None:
+        """Standard deviations of the position [m] and of the rotation [rad], root sums of squares
+        over the axes, from the scatter of the lengths; None without redundant cables."""
+        scatter = self.fit.scatter()
+        if scatter is None:
+            return None
+        variances, turns = np.diag(self.fit.covariance(scatter)), self.fit.turns
+        return float(np.sqrt(variances[turns:].sum())), float(np.sqrt(variances[:turns].sum()))
+
     def as_dict(self) -> dict[str, Any]:
         """For JSON; keys end in units."""
+        deviations = self.deviations()
         return {
             "robot": self.robot.name,
             "geometry": self.geometry,
@@ -117,8 +132,27 @@ class PoseFromLengths(Summarized):
             "position_m": self.X_WP.translation().tolist(),
             "angles_deg": np.degrees(angles_from_rotation(self.X_WP.rotation())).tolist(),
             "residuals_m": self.residuals.tolist(),
+            "length_scatter_m": self.fit.scatter(),
+            "position_deviation_m": None if deviations is None else deviations[0],
+            "rotation_deviation_deg": None if deviations is None else np.degrees(deviations[1]),
             "steps": self.fit.steps,
+            "remarks": self.remarks(),
         }
+
+    def remarks(self) -> list[str]:
+        """What speaks against the lengths or the pose; empty for nothing."""
+        found, worst = [], int(np.argmax(np.abs(self.residuals)))
+        residual = abs(float(self.residuals[worst]))
+        if residual > DOUBTFUL * float(np.mean(self.lengths)):
+            found.append(
+                f"the lengths belong to no pose: the best fit misses that of "
+                f"{self.robot.cables[worst].name} by {1e3 * residual:.3g} mm"
+            )
+        try:
+            check_pose(self.robot, self.X_WP)
+        except TensionProblemError as problem:
+            found.append(str(problem).removeprefix("pose: found "))
+        return found
 
     def plot(self) -> Figure:
         """The robot at the pose."""
@@ -131,11 +165,69 @@ class PoseFromLengths(Summarized):
         """What it shows of itself."""
         angles = np.degrees(angles_from_rotation(self.X_WP.rotation()))
         worst = float(np.max(np.abs(self.residuals)))
-        return f"Pose of {self.robot.name} from its cable lengths", [
+        rows = [
             ("geometry", self.geometry),
             ("position [m]", numbers(self.X_WP.translation(), 5)),
             ("angles [deg]", numbers(angles)),
             ("residuals", f"at most {1e3 * worst:.2g} mm, in {self.fit.steps} steps"),
+        ]
+        deviations = self.deviations()
+        if deviations is not None:
+            distance, angle = 1e3 * deviations[0], np.degrees(deviations[1])
+            rows.append(("standard deviation", f"{distance:.2g} mm, {angle:.2g} deg"))
+        rows += [("remark", words) for words in self.remarks()]
+        return f"Pose of {self.robot.name} from its cable lengths", rows
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CableLengths(Tabulated):
+    """Lengths and directions of a robot's cables at a pose.
+
+    Attributes:
+        robot: The robot.
+        X_WP: The pose [m].
+        geometry: Geometry of the cables, as `Robot.geometry_words`.
+        lengths: From A along the groove of the pulley and straight to B, shape (m,) [m].
+        directions: Unit vectors u in W along the free parts, from where a cable leaves its pulley,
+            A without one, to B, shape (3, m) [-]. A tension t pulls the platform with -t u.
+    """
+
+    robot: Robot
+    X_WP: RigidTransform
+    geometry: str
+    lengths: Array
+    directions: Array
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON; keys end in units."""
+        return {
+            "robot": self.robot.name,
+            "position_m": self.X_WP.translation().tolist(),
+            "angles_deg": np.degrees(angles_from_rotation(self.X_WP.rotation())).tolist(),
+            "geometry": self.geometry,
+            "lengths_m": self.lengths.tolist(),
+            "directions": self.directions.T.tolist(),
+        }
+
+    def columns(self) -> dict[str, Any]:
+        """A row a cable: name, length [m], direction."""
+        directions = dict(zip(("u_x", "u_y", "u_z"), self.directions, strict=True))
+        names = [cable.name for cable in self.robot.cables]
+        return {"cable": names, "length_m": self.lengths, **directions}
+
+    def plot(self) -> Figure:
+        """The robot at the pose."""
+        return plot(self.robot, self.X_WP)
+
+    def summary(self) -> tuple[str, list[tuple[str, str]]]:
+        """What it shows of itself."""
+        title = f"Cables of {self.robot.name} at ({numbers(self.X_WP.translation())}) m, {self.geometry}"
+        return title, [
+            ("lengths [m]", numbers(self.lengths, 5)),
+            *(
+                (f"u_{axis}", numbers(row))
+                for axis, row in zip("xyz", self.directions, strict=True)
+            ),
         ]
 
 
@@ -234,23 +326,68 @@ def find_equilibria(
     return as_kind(RobotEquilibria, rests, loaded=loaded)
 
 
+def solve_inverse_kinematics(
+    robot: Robot | str | Path, pose: object = None, pulleys: bool = True
+) -> CableLengths:
+    """Lengths and directions of the cables at a pose.
+
+    Args:
+        robot: The robot, or its name or path.
+        pose: X_WP as `as_pose` takes it [m]; None: the home pose.
+        pulleys: False for cables that run straight from their exit points.
+
+    Raises:
+        CableGeometryError: A cable cannot run there.
+        TensionProblemError: It is no pose, the pose is outside the frame, or the robot cannot have
+            it.
+
+    Source: servoing thesis (1.5), (1.15) to (1.17).
+    """
+    loaded = as_robot(robot, "solve_inverse_kinematics")
+    X_WP = as_pose(loaded, pose)
+    check_pose(loaded, X_WP)
+    paths = cable_paths(X_WP, loaded.cable_set(pulleys))
+    return CableLengths(loaded, X_WP, loaded.geometry_words(pulleys), paths.lengths, paths.u_W)
+
+
+def plot(robot: Robot | str | Path, pose: object = None) -> Figure:
+    """A robot with its frame, cables and platform at a pose, in 3D.
+
+    Args:
+        robot: The robot, or its name or path.
+        pose: X_WP as `as_pose` takes it [m]; None: the home pose.
+
+    Raises:
+        TensionProblemError: It is no pose.
+    """
+    from cdpr_drake.analyses.visualization.path_figures import poses_figure
+
+    loaded = as_robot(robot, "plot")
+    return poses_figure(loaded.title or loaded.name, loaded, {"platform": as_pose(loaded, pose)})
+
+
 def solve_forward_kinematics(
     robot: Robot | str | Path,
     lengths: Array | Sequence[float],
     guess: object = None,
     pulleys: bool = True,
 ) -> PoseFromLengths:
-    """The pose near a guess at which the cables have given lengths.
+    """The pose near a guess at which the cables have given lengths, by least squares.
+
+    Measured lengths of more cables than degrees of freedom contradict each other by their errors:
+    the pose minimises the sum of squared residuals, and the result has the residuals, and the
+    deviations of the pose that follow from their scatter. Read them: lengths that belong to no pose
+    show there.
 
     Args:
         robot: The robot, or its name or path; with at least as many cables as degrees of freedom.
-        lengths: Of the cables, stretched if they are elastic, shape (m,) [m].
+        lengths: Of the cables from A to B, stretched if they are elastic, shape (m,) [m].
         guess: X_WP as `as_pose` takes it [m]; None: the home pose.
-        pulleys: Whether the cables run over the robot's pulleys.
+        pulleys: False for cables that run straight from their exit points.
 
     Raises:
-        ForwardKinematicsError: No pose near the guess has these lengths, or they do not determine
-            one.
+        ForwardKinematicsError: A residual is above a tenth of the mean length; without redundant
+            cables, no pose near the guess has these lengths; or they do not determine one.
 
     Source: servoing thesis, section 2.2.3.
     """
@@ -259,7 +396,7 @@ def solve_forward_kinematics(
     start: RigidTransform = as_pose(loaded, guess)
     solver = ForwardKinematics(cables, loaded.motion_type())
     given = _checked_lengths(loaded, lengths)
-    return PoseFromLengths(loaded, given, solver.pose(given, start), words)
+    return PoseFromLengths(loaded, given, solver.best_pose(given, start), words)
 
 
 def _check_model(model: str, models: Collection[str]) -> None:

@@ -55,8 +55,8 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
     ),
     "equilibria": (
         "Analyse",
-        "cdpr equilibria grab_four --position 0,0,0.5",
-        "cdpr equilibria acrobot_large --position 0,0,0.3 --taut 1,2,3,4,5,6",
+        "cdpr equilibria grab_three --position 0.6,1.16,-1.5",
+        "cdpr equilibria grab_four --position 0.6,1.16,-1.5 --taut C1,C2,C3",
     ),
     "workspace": (
         "Analyse",
@@ -90,7 +90,7 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
     ),
     "calibrate": (
         "Real machines",
-        "cdpr calibrate acrobot_large --campaign acrobot_sensors",
+        "cdpr calibrate --campaign acrobot_sensors",
         "cdpr calibrate hangprinter_4 series.csv",
     ),
     "calibrate-camera": (
@@ -100,7 +100,7 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
     ),
     "identify": (
         "Real machines",
-        "cdpr identify acrobot_large --campaign acrobot_computed_torque",
+        "cdpr identify --campaign acrobot_computed_torque",
         "cdpr identify mine.yaml motion.csv --validate other_motion.csv",
     ),
     "replay": (
@@ -113,7 +113,7 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
     "notebooks": ("Tools", "cdpr notebooks", "cdpr notebooks my_notebooks"),
     "examples": ("Tools", "cdpr examples", "cdpr examples own_controller --out here"),
     "doctor": ("Tools", "cdpr doctor", "cdpr doctor --compile"),
-    "bench": ("Tools", "cdpr bench", "cdpr bench tensions"),
+    "bench": ("Tools", "cdpr bench", "cdpr bench tension"),
 }
 """Subcommands in the order of the help: group, and two lines to try or to change."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -12,7 +13,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.errors import ForwardKinematicsError
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.geometry.motion_type import FREE, MotionType
-from cdpr_drake.geometry.poses import pose_row
+from cdpr_drake.geometry.poses import pose_row, rotation_from_vector
 from cdpr_drake.numerics.kernel_calls import over_rows
 from cdpr_drake.statics.pose_fit_kernel import (
     BAD_INDEX,
@@ -29,11 +30,18 @@ from cdpr_drake.statics.pose_fit_kernel import (
 TOLERANCE = 1e-6
 """Largest residual of a pose that is said to have the lengths [m], unless another is asked for."""
 
+SCATTER = 0.1
+"""Share of the mean length by which a measured one may be off the best pose: more is no error of a
+measurement but another robot, unit or order of the cables."""
+
+TURNED = (0.25, 0.6)
+"""Angles by which guesses are turned, where measured lengths are fitted [rad]."""
+
 _project = RotationMatrix.ProjectToRotationMatrix
 
 
 class PoseFit(NamedTuple):
-    """A pose that has the given cable lengths.
+    """A pose that has the given cable lengths, or fits them best.
 
     Attributes:
         X_WP: The pose.
@@ -56,6 +64,11 @@ class PoseFit(NamedTuple):
         For independent errors of the lengths; of the rotation vector and translation in W.
         """
         return np.asarray(sigma**2 * np.linalg.inv(self.J.T @ self.J), float)
+
+    def scatter(self) -> float | None:
+        """Standard deviation of the lengths by their residuals [m]; None without redundant ones."""
+        spare = len(self.residuals) - self.J.shape[1]
+        return float(np.sqrt(self.residuals @ self.residuals / spare)) if spare > 0 else None
 
     def condition(self, length: float) -> float:
         """Condition number of J with rotations times a length [m], for example the anchors'."""
@@ -161,6 +174,46 @@ class ForwardKinematics:
             J = self._motion.columns(J, X_WP.rotation().matrix())
         return PoseFit(X_WP, residuals, steps, J, self._motion.num_turns)
 
+    def best_pose(self, lengths: Array, guess: RigidTransform) -> PoseFit:
+        """The pose near a guess with the least sum of squared residuals, for measured lengths.
+
+        As `pose` where the lengths fit one exactly. Else the best of the minima that the search
+        from the guess and from guesses turned by `TURNED` about each axis end at.
+
+        Args:
+            lengths: Lengths of all cables, stretched if they are elastic, shape (m,) [m].
+            guess: Pose to start from.
+
+        Raises:
+            ForwardKinematicsError: The best fit misses a length by more than `SCATTER` of the mean
+                length, or there are no more cables than degrees of freedom and no pose has the
+                lengths; the lengths do not determine a pose; or numbers make no sense.
+        """
+        try:
+            return self.pose(lengths, guess)
+        except ForwardKinematicsError as problem:
+            if len(self._all) == self.num_unknowns:
+                raise
+            first = problem
+        axes = np.eye(3) if self._motion.num_turns == 3 else np.array([self._motion.axis])
+        turns = [np.zeros(3)]
+        if self._motion.num_turns > 0:
+            turns += [angle * axis for angle in TURNED for axis in np.vstack([axes, -axes])]
+        fits = []
+        for turn in turns:
+            R = rotation_from_vector(turn) @ guess.rotation()
+            with suppress(ForwardKinematicsError):
+                start = RigidTransform(R, guess.translation())
+                fits.append(self.pose(lengths, start, tolerance=np.inf))
+        if not fits:
+            raise first
+        best = min(fits, key=lambda fit: float(fit.residuals @ fit.residuals))
+        scatter = SCATTER * float(np.mean(lengths))
+        if np.max(np.abs(best.residuals)) > scatter:
+            p, every = best.X_WP.translation(), self._all
+            raise ForwardKinematicsError(_why(MISFIT, p, best.residuals, every, scatter))
+        return best
+
     def poses(
         self,
         lengths: Array,
@@ -254,15 +307,16 @@ def tautest_cables(tensions: Array, count: int) -> np.ndarray:
 
 def _why(code: int, p: Array, residuals: Array, used: np.ndarray, tolerance: float) -> str:
     point = ", ".join(f"{x:.4g}" for x in p)
+    worst = int(np.argmax(np.abs(residuals)))
+    misses = f"misses cable {used[worst] + 1} by {1e3 * abs(residuals[worst]):.4g} mm"
     if code == UNSETTLED:
         return (
-            f"lengths: the search from the guess at ({point}) m did not settle in {MAX_STEPS} steps"
+            f"lengths: the search from the guess at ({point}) m did not settle in {MAX_STEPS} "
+            f"steps; its last pose {misses}"
         )
     if code == MISFIT:
-        worst = int(np.argmax(np.abs(residuals)))
         return (
-            f"lengths: no pose near ({point}) m has them; the best fit misses cable "
-            f"{used[worst] + 1} by {1e3 * abs(residuals[worst]):.4g} mm; "
+            f"lengths: no pose near ({point}) m has them; the best fit {misses}; "
             f"accepted: up to {1e3 * tolerance:.4g} mm"
         )
     return (

@@ -1,4 +1,4 @@
-"""A run that does not end as expected says which limit it missed, what was slack, what to change."""
+"""A run that does not end as expected says which limit it missed, and what to change."""
 
 import json
 from dataclasses import replace

@@ -35,6 +35,7 @@ def shows_itself(result):
 def verbs():
     """Functions of the front door that answer, by name."""
     homes = {name: home for name, home in HOMES.items() if home.startswith("analyses.front.")}
+    homes.pop("plot")  # it draws, and answers nothing
     return {n: getattr(cdpr, n) for n in homes if inspect.isfunction(getattr(cdpr, n))}
 
 

@@ -42,6 +42,8 @@ PROMISED = {
     "solve_static",
     "find_equilibria",
     "solve_forward_kinematics",
+    "solve_inverse_kinematics",
+    "plot",
     "compute_workspace",
     "assess_stability",
     "plan_path",

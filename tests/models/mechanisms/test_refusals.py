@@ -29,6 +29,8 @@ ASKED: dict[str, Callable[[Any], object]] = {
     "compare_tensions": cdpr.compare_tensions,
     "find_equilibria": lambda robot: cdpr.find_equilibria(robot, LENGTHS),
     "solve_forward_kinematics": lambda robot: cdpr.solve_forward_kinematics(robot, LENGTHS),
+    "solve_inverse_kinematics": cdpr.solve_inverse_kinematics,
+    "plot": cdpr.plot,
     "compute_workspace": cdpr.compute_workspace,
     "workspace of two kinds": lambda robot: cdpr.compute_workspace(robot, ["static", "force"]),
     "assess_stability": cdpr.assess_stability,

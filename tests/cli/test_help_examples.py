@@ -1,0 +1,176 @@
+"""Every example of every command's help is accepted by the command.
+
+Each is called in a folder that has the files which it names. Long work is cut off where it begins,
+when all that was asked is read and accepted; short work is done.
+"""
+
+import shlex
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+import cdpr_drake as cdpr
+from cdpr_drake.cli.app import main
+from cdpr_drake.cli.command_help import COMMANDS, FIRST_STEPS
+from tests.analyses.logs.recorders import hangprinter_script, motive
+from tests.newcomer import OWN_ROBOT
+
+EXAMPLES = sorted({line for _, *lines in COMMANDS.values() for line in lines})
+EXAMPLES += sorted({line for line, _ in FIRST_STEPS} - set(EXAMPLES))
+
+SESSION = "cdpr_drake.cli.command_session.CommandSession.computing"
+LONG_WORK = {
+    "simulate": [SESSION],
+    "serve": ["cdpr_drake.cli.serve.Driver.wait"],
+    "view": ["cdpr_drake.cli.view.open_meshcat"],
+    "studio": ["cdpr_drake.studio.server.serve"],
+    "workspace": [SESSION],
+    "stability": [SESSION],
+    "plan": [
+        "cdpr_drake.analyses.front.planning.solve_free_motion",
+        "cdpr_drake.analyses.front.proven_motions.ProvenSets.find",
+    ],
+    "reconfigure": ["cdpr_drake.analyses.front.reconfiguration.reconfigured"],
+    "design": [SESSION],
+    "calibrate": [
+        "cdpr_drake.analyses.front.calibration.calibrate_log",
+        "cdpr_drake.analyses.front.simulated_fits.run_campaign",
+    ],
+    "calibrate-camera": ["cdpr_drake.analyses.front.camera_calibration.find_boards"],
+    "identify": [
+        "cdpr_drake.analyses.front.calibration.identify_log",
+        "cdpr_drake.analyses.front.simulated_fits.run_dynamic_campaign",
+    ],
+    "study": [SESSION],
+    "reproduce": [SESSION],
+    "doctor": ["cdpr_drake.cli.doctor.examine", "cdpr_drake.cli.doctor.run_jobs"],
+    "bench": ["cdpr_drake.cli.bench.BENCH_GROUPS"],
+}
+"""Where the long work of a command begins: all its arguments are read and accepted there."""
+
+
+class Accepted(BaseException):
+    """Long work begins; no error, so that nothing takes it for one."""
+
+
+def begin(*_, **__):
+    raise Accepted
+
+
+class AcceptedGroups(dict):
+    """Groups of benchmarks, none of which runs."""
+
+    def __getitem__(self, name):
+        assert name in self
+        return begin
+
+
+def lengths_log(robot):
+    """A log of cable lengths on a small circle round the home pose."""
+    home = robot.home.transform().translation()
+    times, rows = np.linspace(0.0, 2.0, 21), []
+    free = robot.motion_type().basis(np.eye(3))[3:].any(axis=1)
+    for t in times:
+        shift = 0.05 * free * [np.sin(3.0 * t), np.cos(3.0 * t), np.sin(2.0 * t)]
+        pose = np.concatenate([home + shift, robot.home.angles_deg])
+        lengths = cdpr.solve_inverse_kinematics(robot, pose).lengths
+        rows.append([t, *lengths, *pose[:3]])
+    names = [f"{cable.name}_length_m" for cable in robot.cables]
+    lines = [",".join(["time_s", *names, "x_m", "y_m", "z_m"])]
+    return "\n".join(lines + [",".join(f"{x:.9g}" for x in row) for row in rows]) + "\n"
+
+
+def named_robot(words, folder):
+    """The robot of a command that takes a log: its option --robot, or its first argument."""
+    name = words[words.index("--robot") + 1] if "--robot" in words else words[2]
+    return cdpr.load_robot(folder / name if name.endswith(".yaml") else name)
+
+
+def prepare(words, folder):
+    """Writes the files that a command names."""
+    for name in {"mine.yaml", "robot.yaml"} & {*words}:
+        (folder / name).write_text(OWN_ROBOT.read_text())
+    for word in words[2:]:
+        path = folder / word
+        if word.endswith(".csv") and words[1] in ("calibrate", "identify", "replay"):
+            path.write_text(lengths_log(named_robot(words, folder)))
+    files = {
+        "series.txt": hangprinter_script,
+        "take.csv": lambda: motive(count=40, units="Meters"),
+        "poses.csv": lambda: "0,0,1\n0.2,0,1.2\n",
+        "robot.urdf": lambda: next(iter(cdpr.export_robot("acrobot_small", "urdf").values())),
+        "rails.yaml": lambda: rails(cdpr.load_robot(words[2])),
+    }
+    for name, text in files.items():
+        if name in words:
+            (folder / name).write_text(text())
+    if "scenario.yaml" in words:
+        ended(["new", "scenario", "scenario", "--robot", "robot.yaml"])
+    if "IPAnema_1_bodies.xml" in words:
+        for name, text in cdpr.export_robot("ipanema_1", "caspr").items():
+            (folder / name.replace("ipanema_1", "IPAnema_1")).write_text(text)
+    if any(word.startswith("images/") for word in words):
+        (folder / "images").mkdir()
+        (folder / "images" / "1.png").touch()
+
+
+def rails(robot):
+    """A rail for the first cable."""
+    cable = robot.cables[0]
+    rail = {
+        "cables": [cable.name], "axis": [0.0, 0.0, 1.0], "lower": -0.1, "upper": 0.1,
+    }  # fmt: skip
+    return yaml.safe_dump({"rails": [rail]})
+
+
+def ended(arguments):
+    """The exit code of a command, or "accepted"."""
+    try:
+        main(arguments)
+    except SystemExit as end:
+        return end.code
+    except Accepted:
+        return "accepted"
+    raise AssertionError(f"{arguments}: the command returned")
+
+
+@pytest.mark.parametrize("line", EXAMPLES)
+def test_an_example_is_accepted(line, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    program, command, *arguments = words = shlex.split(line)
+    assert program == "cdpr"
+    prepare(words, tmp_path)
+    arguments = [
+        str(path)
+        for word in arguments
+        for path in (sorted(Path().glob(word)) if "*" in word else [word])
+    ]
+    for target in LONG_WORK.get(command, ()):
+        if target.endswith("BENCH_GROUPS"):
+            import cdpr_drake.cli.bench as bench
+
+            monkeypatch.setattr(bench, "BENCH_GROUPS", AcceptedGroups(bench.BENCH_GROUPS))
+        else:
+            monkeypatch.setattr(target, begin)
+    found = ended([command, *arguments])
+    said = capsys.readouterr().err
+    assert found == ("accepted" if command in LONG_WORK else 0), said
+
+
+def test_every_command_has_examples_of_itself():
+    for name, (_, *lines) in COMMANDS.items():
+        assert len(lines) >= 2
+        assert all(shlex.split(line)[:2] == ["cdpr", name] for line in lines)
+
+
+def test_what_is_refused_is_no_example(capsys, tmp_path, monkeypatch):
+    """The lines that stood in the help once."""
+    monkeypatch.chdir(tmp_path)
+    for line in (
+        "calibrate acrobot_large --campaign acrobot_sensors",
+        "equilibria grab_four --position 0,0,0.5",
+    ):
+        assert ended(shlex.split(line)) == 2
+    capsys.readouterr()
