@@ -67,14 +67,14 @@ def hold_robot(robot: Robot, X_WP: RigidTransform, cables: CableSet, model: str)
         raise InfeasibleTensionError(
             f"{robot.name} cannot hold the platform at ({position}) m: no tensions within "
             f"{bounds[0]:g}..{bounds[1]:g} N balance its weight"
-            f"{own_weight or _by(robot, X_WP, cables)}"
+            f"{own_weight or missed_by(robot, X_WP, cables)}"
         )
     check_breaking(cables, holding.tensions, holding.unstrained_lengths)
     return holding
 
 
-def _by(robot: Robot, X_WP: RigidTransform, cables: CableSet) -> str:
-    """By how much tensions of straight cables miss the platform's weight, in words."""
+def missed_by(robot: Robot, X_WP: RigidTransform, cables: CableSet | None) -> str:
+    """By how much tensions of straight cables miss the platform's weight, as a clause."""
     missed = shortfall(tension_problem(robot, X_WP, cables=cables))
     names = [cable.name for cable in robot.cables]
     return f"; {missed.words(names, robot.motion_type().words())}"
@@ -100,6 +100,9 @@ def _underactuated(robot: Robot, X_WP: RigidTransform, cables: CableSet) -> str:
     control = wrench_balance(robot, X_WP, cables=cables).control()
     low, high = robot.tension_limits()
     why = f"no tensions within {low:g}..{high:g} N balance its weight"
+    if (short := control.shortfall()) is not None:
+        names = [cable.name for cable in robot.cables]
+        why += f"; {short.words(names, robot.motion_type().words())}"
     if not control.balances:
         worst = int(np.argmax(np.abs(control.unbalanced)))
         what = combination_words(control.free[:, worst], robot.motion_type().words())

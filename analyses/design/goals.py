@@ -128,7 +128,7 @@ def _control_stability(robot: Robot, judging: GoalContext) -> float:
 def _accuracy(robot: Robot, judging: GoalContext) -> float:
     """Root mean square, over poses that can be held, of how far Po is off; infinite without one."""
     grid, platform = judging.grid, rigid_platform(robot)
-    cables = robot.cable_set().without_pulleys()
+    cables = robot.cable_set()
     chosen = np.unique(np.linspace(0, grid.size - 1, ACCURACY_POSES).astype(int))
     squares = []
     for k in chosen:

@@ -27,6 +27,7 @@ def rails_figure(found: Reconfiguration) -> Figure:
     after = rails.exit_points(found.solution.coordinates)
     ends = rails.exit_points(rails.lower), rails.exit_points(rails.upper)
     title = f"{found.before.name}: exit points on rails, before and after, and margins"
+    title += f"\n{found.geometry}"
     figure = bare_figure((11.0, 6.0), title)
     with styled():
         # A column between them: labels of axes in space are outside what a layout counts.

@@ -208,6 +208,14 @@ class Reconfiguration(Summarized):
     around: Around
 
     @property
+    def geometry(self) -> str:
+        """Geometry of the cables in words: program and proof are for fixed exit points."""
+        words = self.before.geometry_words(pulleys=False)
+        if not self.before.cable_set().has_pulleys():
+            return words
+        return f"{words} by program and proof; margins also {self.before.geometry_words()}"
+
+    @property
     def proven(self) -> bool:
         """Whether the boxes round all poses are proven."""
         return all(proof.proven for proof in self.proofs)
@@ -217,6 +225,7 @@ class Reconfiguration(Summarized):
         rails = self.task.rails
         told: dict[str, Any] = finite({
             "robot": self.before.name,
+            "geometry": self.geometry,
             "goal": self.goal,
             "rails": [
                 {"cables": name, "from_m": a, "to_m": b, "lower_m": low, "upper_m": high}
@@ -262,6 +271,7 @@ class Reconfiguration(Summarized):
         return f"{self.before.name}, exit points moved along rails", [
             ("rails", "; ".join(moved)),
             ("margin", f"{before:.4f} before, {now:.4f} now, of half the range"),
+            ("geometry", self.geometry),
             ("over pulleys", f"{np.min(self.over_pulleys):.4f}"),
             ("largest tension", f"{np.max(self.tensions):.4g} N"),
             ("proven", "all" if self.proven else f"{inside:.1%} round the worst pose"),

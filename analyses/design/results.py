@@ -40,6 +40,7 @@ class DesignResult(Summarized):
         robot: Name of the robot as it was.
         search: The search.
         confirmed: Volumes proven of the robot and of the design.
+        geometry: Geometry of the cables in words, as `Robot.geometry_words`.
         folder: Where it was written; None: nowhere.
         file: The robot file of the best design there; None: there is none.
         failed: Of each figure that could not be written, the file and why.
@@ -48,6 +49,7 @@ class DesignResult(Summarized):
     robot: str
     search: DesignSearch
     confirmed: tuple[Confirmation, ...]
+    geometry: str = ""
     folder: Path | None = None
     file: Path | None = None
     failed: Mapping[str, str] = field(default_factory=dict)
@@ -62,6 +64,7 @@ class DesignResult(Summarized):
         search, best = self.search, self.search.best
         found: dict[str, Any] = {
             "robot": self.robot,
+            "geometry": self.geometry,
             "interrupted": self.interrupted,
             "designs_judged": len(search.values),
             "refused": int(np.sum(~np.all(np.isfinite(search.values), axis=1))),
@@ -100,7 +103,10 @@ class DesignResult(Summarized):
     def summary(self) -> tuple[str, list[tuple[str, str]]]:
         """What it shows of itself: goals of the robot and of the best design."""
         search, best = self.search, self.search.best
-        rows = [("designs", f"{len(search.values)} judged, {search.candidates.size} coordinates")]
+        rows = [
+            ("geometry", self.geometry),
+            ("designs", f"{len(search.values)} judged, {search.candidates.size} coordinates"),
+        ]
         for k, name in enumerate(search.names[:4]):
             sign = -1.0 if GOALS[name].smaller else 1.0
             after = "-" if best is None else f"{sign * search.values[best, k]:.5g}"
@@ -117,7 +123,8 @@ class DesignResult(Summarized):
         search, best = self.search, self.search.best
         goals = Table(
             box=SIMPLE_HEAD,
-            title=f"{self.robot}: goals on the search's grid, {len(search.values)} designs",
+            title=f"{self.robot}, {self.geometry}: goals on the search's grid, "
+            f"{len(search.values)} designs",
         )
         for heading in ("goal", "unit", "robot", "best design"):
             goals.add_column(heading)

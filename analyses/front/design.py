@@ -114,7 +114,7 @@ def optimize_design(
                         should_stop=told.stop,
                     )  # fmt: skip
                     confirmed += [] if one is None else [one]
-        found = DesignResult(loaded.name, search, tuple(confirmed))
+        found = DesignResult(loaded.name, search, tuple(confirmed), loaded.geometry_words())
         if folder is None:
             return found
         with told.doing("Writing results"):

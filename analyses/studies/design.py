@@ -29,6 +29,7 @@ from cdpr_drake.analyses.studies.framework.study import Case, Form, Study, Study
 from cdpr_drake.analyses.sweeps.folder import SweepFolder
 from cdpr_drake.analyses.sweeps.sweep import STARTING
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
+from cdpr_drake.models.robot_loader import load_robot
 
 REACH = 0.1
 """How far exit points move at most, either way along each axis [m]."""
@@ -225,7 +226,9 @@ def _searched(quick: bool, session: StudySession) -> tuple[tuple[DesignResult, .
         stop = session.should_stop
         if search.best is not None and not search.interrupted and not (stop and stop()):
             proven = _proven(item, search, QUICK_BOXES if quick else BOXES, session)
-        results.append(DesignResult(item.robot, search, proven))
+        results.append(
+            DesignResult(item.robot, search, proven, load_robot(item.robot).geometry_words())
+        )
         if search.interrupted or (stop is not None and stop()):
             break
     return tuple(results), last

@@ -172,7 +172,7 @@ def mechanism_picture(mechanism: Mechanism, meshcat: Meshcat) -> MechanismPictur
     low, high = mechanism.tension_limits()
     problem = ""
     try:
-        cables = PlantCables(scene.plant, scene.routes.without_pulleys(), ELASTIC)
+        cables = PlantCables(scene.plant, scene.routes, ELASTIC)
         rest = hang(cables, scene.plant_context, lower=low if low > 0.0 else None, upper=high)
         scene.plant.SetPositions(scene.plant_context, rest.positions)
         tensions = rest.tensions

@@ -142,6 +142,7 @@ def _print(console: Console, told: dict[str, Any], folder: Path) -> None:
             f"{rail['lower_m']:g} to {rail['upper_m']:g}",
         )  # fmt: skip
     console.print(table)
+    console.print(f"cables: {told['geometry']}")
     console.print(
         f"least margin of {len(told['poses'])} poses under {told['wrenches']} wrenches: "
         f"{told['least_margin_before']:.4f} before, {told['least_margin']:.4f} now, "

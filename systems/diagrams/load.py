@@ -52,6 +52,7 @@ from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
 from cdpr_drake.systems.worlds.checks import check_world
 from cdpr_drake.systems.worlds.world import make_world
 from cdpr_drake.tensions.methods import distribute
+from cdpr_drake.tensions.shortfall import shortfall
 
 FILE_LOOKS = 101
 """Instants at which the poses of a motion from a file are looked at."""
@@ -196,7 +197,8 @@ def _why_not_held(X_WP: RigidTransform, scenario: TensionScenario, robot: Robot)
     low, high = problem_there.lower[0], problem_there.upper[0]
     return (
         f"found {X_WP.translation().tolist()} m, where no tensions within {low:g}..{high:g} N hold "
-        "the platform; accepted: a pose that can be held"
+        f"the platform, bounds missed by {shortfall(problem_there).beyond:.3g} N; accepted: a pose "
+        "that can be held"
     )
 
 

@@ -20,6 +20,7 @@ from cdpr_drake.cables.models import ELASTIC
 from cdpr_drake.errors import InfeasibleTensionError
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.models.robot_holding import missed_by
 from cdpr_drake.models.robot_in_plant import RobotInPlant, platform_inertia
 from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
@@ -218,7 +219,7 @@ def holding_tensions(
         low, high = robot.tension_limits()
         raise InfeasibleTensionError(
             f"{robot.name} cannot hold the platform at ({position}) m: no tensions within "
-            f"{low:g}..{high:g} N balance its weight"
+            f"{low:g}..{high:g} N balance its weight{missed_by(robot, X_WP, cables)}"
         )
     return tensions
 

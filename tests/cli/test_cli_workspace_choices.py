@@ -33,13 +33,16 @@ def test_pulleys_are_in_grid_and_proof_and_said_first(tmp_path, capsys):
         found = json.loads(said.out)
         told[more], holds[more] = found, load_robot_workspace(out).holds["static"]
         assert next(iter(found)) == "cables"
-        assert f"caroca: cables {found['cables']}" in said.err
+        assert f"caroca: {found['geometry']}" in said.err
         assert found["agreement"]["grid"]["contradictions"] == 0
         assert found["agreement"]["grid"]["in_boxes_proven_inside"] > 0
         page = (out / "workspace.html").read_text()
-        assert f"caroca: workspaces, cables {found['cables']}" in page
+        assert f"caroca: workspaces, {found['geometry']}" in page
     assert [one["cables"] for one in told.values()] == [
         "over pulleys", "without pulleys: from fixed exit points",
+    ]  # fmt: skip
+    assert [one["geometry"] for one in told.values()] == [
+        "with pulleys of 75 mm", "pulleys ignored",
     ]  # fmt: skip
     assert [one["certified"]["cables"] for one in told.values()] == [
         "over pulleys", "from fixed exit points",

@@ -21,8 +21,14 @@ from cdpr_drake.control.task_space import (
 from cdpr_drake.errors import PlanningError
 from cdpr_drake.geometry.cable_paths import cable_jacobian, cable_paths
 from cdpr_drake.geometry.convex_shapes import ConvexShape
-from cdpr_drake.geometry.poses import pose_from_angles, pose_from_row, pose_row
+from cdpr_drake.geometry.poses import (
+    angles_from_rotation,
+    pose_from_angles,
+    pose_from_row,
+    pose_row,
+)
 from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_statics import tension_problem
 from cdpr_drake.planning.path_task import PathTask
 from cdpr_drake.planning.place_constraints import (
     CableClearance,
@@ -226,6 +232,41 @@ def test_the_margin_is_that_of_a_linear_program_and_its_tensions_have_it():
         assert value == pytest.approx(found.x[8], abs=1e-7)
         np.testing.assert_allclose(-J.T @ t, weight, atol=1e-8)
         assert min(np.min(t - low), np.min(high - t)) == pytest.approx(value, abs=1e-8)
+
+
+@pytest.mark.parametrize("margin", [0.0, 3.0])
+def test_a_margin_of_tensions_is_the_one_that_is_asked_for(margin):
+    """From the given limits, by the linear program; no reserve beside it that nobody stated."""
+    robot = load_robot("acrobot_large")
+    given = (1.0, 60.0)
+    task = path_task(robot, LimitSettings(tensions=given))
+    assert (task.limits.lower, task.limits.upper) == given
+    kept = path_task(robot, LimitSettings(tensions=given, reserve=0.05))
+    assert kept.limits.lower == pytest.approx(1.0 + 0.05 * robot.platform.mass * robot.gravity)
+    feasible = TensionFeasible(task, PlaceAndAngles(), margin=margin)
+    inside = 0
+    places = [[x, y, z] for x, y in ((0.3, 0.2), (0.45, 0.4)) for z in np.linspace(0.2, 0.8, 6)]
+    for place in places:
+        X = RigidTransform(START.rotation(), place)
+        room = margin_of(robot, X, *given)
+        x = np.concatenate([X.translation(), angles_from_rotation(X.rotation())])[np.newaxis]
+        values = feasible.evaluate(x)[0]
+        assert values[0, 0] == pytest.approx(room, abs=1e-7)
+        assert (feasible.missed(values)[0, 0] <= 0.0) == (room >= margin)
+        inside += room >= margin
+    assert 0 < inside < len(places)
+
+
+def margin_of(robot, X_WP, low, high):
+    """The largest s with low + s <= t <= high - s for tensions t that hold the platform [N]."""
+    problem = tension_problem(robot, X_WP)
+    one, m = np.ones((8, 1)), 8
+    found = linprog(
+        [*np.zeros(m), -1.0], A_eq=np.hstack([problem.W, np.zeros((6, 1))]), b_eq=-problem.wrench,
+        A_ub=np.vstack([np.hstack([-np.eye(m), one]), np.hstack([np.eye(m), one])]),
+        b_ub=[*np.full(m, -low), *np.full(m, high)], bounds=(None, None),
+    )  # fmt: skip
+    return found.x[m]
 
 
 def test_at_a_kink_the_margin_has_the_slope_of_one_side():

@@ -85,7 +85,7 @@ def of_robot(name, pulleys=False, at=(0.1, 0.05, 0.1), turn=(0.0, 0.0, 0.05)):
     cables = robot.cable_set() if pulleys else robot.cable_set().without_pulleys()
     l0 = unstrained_lengths(
         ForwardKinematics(cables, robot.motion_type()).lengths(X),
-        holding_tensions(robot, X),
+        holding_tensions(robot, X, cables.without_pulleys()),
         cables.stiffness,
     )
     return robot, cables, rigid_platform(robot), l0, X
@@ -98,7 +98,7 @@ def test_unstrained_lengths_that_hold_a_pose_lead_back_to_it(name):
     guess = RigidTransform(X.rotation(), X.translation() + np.array([0.01, -0.01, 0.0]))
     rest = equilibrium_near(cables, "elastic", platform, l0, guess)
     assert pose_error(rest.X_WP, X) < (SETTLED, SETTLED)
-    np.testing.assert_allclose(rest.tensions, holding_tensions(robot, X), atol=1e-3)
+    np.testing.assert_allclose(rest.tensions, holding_tensions(robot, X, cables), atol=1e-3)
     assert rest.stability == Stability.STABLE
     assert len(rest.stiffnesses) == (3 if name == "planar" else 6)
 

@@ -238,6 +238,18 @@ def test_a_position_gives_back_the_turn_and_the_lengths():
     assert placed.rests[best].stability == one.stability
 
 
+def test_a_start_above_all_cables_leads_down_to_the_rest():
+    """There all hang loose, and none of them is a start for the search."""
+    platform = hanging(THREE, [(0, 0, 0)] * 3, (0, 0, 0), num_turns=0)
+    l0 = np.full(3, LENGTH)
+    (only,) = sample_equilibria(platform, l0, most=200).rests
+    above = RigidTransform(only.X_WP.translation() + np.array([0.0, 0.0, 0.5]))
+    paths = cable_lengths(above, platform.cables.p_WA, platform.cables.p_PB)
+    assert np.all(paths < LENGTH)
+    found = sample_equilibria(platform, l0, most=1, starts=[above])
+    assert pose_error(found.rests[0].X_WP, only.X_WP)[0] < 1e-9
+
+
 def test_elastic_cables_stretch_by_their_tensions():
     platform = hanging(THREE, [(0, 0, 0)] * 3, (0, 0, 0), num_turns=0)
     found = sample_equilibria(platform, np.full(3, LENGTH), most=200)

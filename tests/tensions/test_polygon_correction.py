@@ -26,7 +26,9 @@ X_WP = pose_from_angles([0.1, -0.15, 0.4], [0.05, 0.0, 0.1])
 
 @pytest.fixture(scope="module")
 def problem():
-    return tension_problem(load_robot("acrobot_large"), X_WP, limits=(1.0, 60.0))
+    robot = load_robot("acrobot_large")
+    cables = robot.cable_set(pulleys=False)
+    return tension_problem(robot, X_WP, limits=(1.0, 60.0), cables=cables)
 
 
 @pytest.fixture(scope="module")

@@ -11,13 +11,14 @@ from scipy.spatial import KDTree
 
 from cdpr_drake.errors import WorkspaceError
 from cdpr_drake.geometry.cable_paths import cable_paths
+from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.workspaces.cable_distance_kernel import (
     boxes_distance,
     segment_box_distance,
     segments_distance,
 )
 from cdpr_drake.workspaces.cable_interference import Surroundings, beams, box_row, clearances
-from tests.workspaces.workspace_cases import random_poses, robot_case
+from tests.workspaces.workspace_cases import random_poses
 
 ROUNDING = 1e-12
 
@@ -155,8 +156,8 @@ def test_segments_and_a_box_of_every_kind(ends, distance):
 
 
 def acrobot(pulleys=False):
-    robot, case = robot_case("acrobot_large")
-    cables = robot.cable_set() if pulleys else case.cables
+    robot = load_robot("acrobot_large")
+    cables = robot.cable_set(pulleys)
     size = robot.platform.size
     return robot, Surroundings(
         cables, np.full(8, 0.001), box_row([0, 0, size[2] / 2], size)[None],

@@ -193,11 +193,14 @@ def _each(values: Any, count: int, form: str) -> list[str]:
 
 def _facts(answer: PoseAnswer, name: str) -> dict[str, str]:
     rest = answer.rest
-    facts = {"tensions": answer.why_no_tensions or f"{answer.status}, by {answer.method}"}
+    facts = {
+        "cables": answer.geometry,
+        "tensions": answer.why_no_tensions or f"{answer.status}, by {answer.method}",
+    }
     if rest is None:
         facts["at rest"] = answer.why_no_rest
     else:
-        facts["at rest"] = f"{rest.stability}, elastic cables over pulleys"
+        facts["at rest"] = f"{rest.stability}, elastic cables"
         facts[f"stiffness [N/m], turns times {rest.arm:.3g} m"] = _list(rest.principal)
         if rest.frequencies is not None:
             facts["natural frequencies [Hz]"] = _list(rest.frequencies)

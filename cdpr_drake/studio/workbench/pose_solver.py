@@ -63,8 +63,9 @@ class PoseSolver:
         with np.errstate(invalid="ignore"):
             slack = tensions <= 0.0  # straight cables pull or are slack
         return PoseAnswer(
-            robot=robot, X_WP=X_WP, geometry=robot.geometry_words(), method=method, tensions=tensions, slack=slack, lengths=lengths,
-            rest=rest, why_no_rest=why_no_rest, **found, **self._measures(X_WP),
+            robot=robot, X_WP=X_WP, method=method, tensions=tensions, slack=slack, lengths=lengths,
+            rest=rest, why_no_rest=why_no_rest, geometry=robot.geometry_words(), **found,
+            **self._measures(X_WP),
         )  # fmt: skip
 
     def _tensions(

@@ -38,7 +38,8 @@ REASONS = {
     "shared winch": r"several cables on a winch|several cables on one winch",
     "kind of motion": r"accepted by a plan|robot .*: motion: found|accepted for workspaces: motions"
     r"|motion: found .* accepted",
-    "fewer cables": r"for \d degrees of freedom; accepted: at least",
+    "fewer cables": r"for \d degrees of freedom; accepted: at least|fewer cannot follow",
+    "more than 8 cables": r"accepted: 1 to 8 cables",
     "exit point in platform": r"reaches into the platform",
 }
 """Why a call answers otherwise, or not at all, by the words that its result or refusal has."""

@@ -78,7 +78,7 @@ def test_a_workspace_as_hull_and_boxes_in_a_folder(tmp_path, monkeypatch, capsys
         "--certify", "--boxes", "600", "--exit-error", "1e-4", "--boxes-mesh", "c.vtu",
         "--format", "svg", "--workers", "1", "--json", "--out",
     ]  # fmt: skip
-    for folder, words in (("call", "complete already"), ("command", "cables over")):
+    for folder, words in (("call", "complete already"), ("command", "with pulleys of")):
         with pytest.raises(SystemExit) as end:
             main([*command, folder])
         assert end.value.code == 0

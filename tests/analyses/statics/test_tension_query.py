@@ -50,7 +50,7 @@ def test_json_of_a_solution_has_no_nan(hopeless):
         found = solution.as_dict()
         assert found["status"] == "infeasible"
         json.dumps(found, allow_nan=False)
-        assert (found["tensions_n"] is None) == (not METHODS[solution.method].relaxes)
+        assert (found["tensions_n"] is None) == (not METHODS[solution.method].answers)
 
 
 def test_polygon_corners_balance_the_wrench(problem):
@@ -83,10 +83,11 @@ def command(capsys, *arguments):
 
 
 def test_command_prints_the_published_tensions(capsys, tmp_path):
+    """The thesis has fixed exit points; over the pulleys of 4.5 mm they are up to 0.1 N off."""
     plot = tmp_path / "polygon.png"
     code, out, _ = command(
         capsys, "acrobot_large", "--pose", "0.35,-0.27,0.45", "--method", "barycenter",
-        "--limits", "0,60", "--json", "--plot", str(plot),
+        "--limits", "0,60", "--no-pulleys", "--json", "--plot", str(plot),
     )  # fmt: skip
     assert code == 0
     found = json.loads(out)

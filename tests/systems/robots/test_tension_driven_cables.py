@@ -67,7 +67,7 @@ class Bench:
 
 def home_tensions(name):
     robot = load_robot(name)
-    return holding_tensions(robot, robot.home.transform())
+    return holding_tensions(robot, robot.home.transform(), robot.cable_set(pulleys=False))
 
 
 @pytest.mark.parametrize(("name", "m", "states", "nv"), [("caroca", 8, 13, 6), ("planar", 4, 6, 3)])
