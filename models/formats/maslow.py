@@ -10,8 +10,8 @@ At a distance d across z the firmware has belts of hypot(d - a, z) since October
 level and only the belt is inclined. Before that it had hypot(d, z) - a, a straight line to the
 middle, which is the geometry here.
 
-Source: github.com/MaslowCNC/Maslow_4, firmware/FluidNC/data/maslow.yaml, its web page's words on the
-settings, and pull request 157, MaslowKinematics::compute.
+Source: github.com/MaslowCNC/Maslow_4, firmware/FluidNC/data/maslow.yaml, its web page's words on
+the settings, and pull request 157, MaslowKinematics::compute.
 """
 
 from __future__ import annotations

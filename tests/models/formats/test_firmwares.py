@@ -146,8 +146,8 @@ def test_maslow_says_what_level_arms_would_change(tmp_path):
     """By the firmware's formula, hypot(d - a, z), against hypot(d, z) - a, a = 153.4 mm."""
     path = tmp_path / "sled.yaml"
     path.write_text(
-        "kinematics: {MaslowKinematics: {tlX: 0, tlY: 2000, tlZ: 100, trX: 3000, trY: 2000, trZ: 56, "
-        "blX: 0, blY: 0, blZ: 34, brX: 3000, brY: 0, brZ: 78, beltEndExtension: 30, "
+        "kinematics: {MaslowKinematics: {tlX: 0, tlY: 2000, tlZ: 100, trX: 3000, trY: 2000, trZ: "
+        "56, blX: 0, blY: 0, blZ: 34, brX: 3000, brY: 0, brZ: 78, beltEndExtension: 30, "
         "armLength: 123.4}}"
     )
     (told,) = [words for words in import_robot(path).completed.remarks if "level" in words]
