@@ -92,6 +92,14 @@ class Pulley:
         (3,),
         (0.0, 0.0, 1.0),
     )
+    arm: float = number(
+        "Length of arms in the place of pulleys, across the swivel axis, about which they swivel: "
+        "cables begin at their ends. Of a platform that does not turn, arms at its anchor points "
+        "are the same.",
+        "m",
+        0.0,
+        at_least=0.0,
+    )
 
 
 @dataclass(kw_only=True)

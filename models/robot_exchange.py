@@ -138,6 +138,7 @@ def draft_robot(robot: Robot) -> RobotDraft:
         frame_upper=robot.frame.upper, beam=robot.frame.beam_width(),
         diameter=robot.cable.diameter, youngs_modulus=robot.cable.youngs_modulus,
         linear_density=robot.cable.linear_density, breaking_load=robot.cable.breaking_load,
+        arm=robot.pulley.arm or None,
         drum_radius=robot.winch.drum_radius, gear_ratio=robot.winch.gear_ratio,
         layers=_layers(robot),
         motor_speed_rpm=robot.winch.motor_speed_rpm,

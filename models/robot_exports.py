@@ -75,7 +75,7 @@ HELD: dict[str, set[str]] = {
     "reprapfirmware": _ANCHORS | _LIMITS | {"platform.mass", "winch.drum_radius",
                                             "winch.gear_ratio", "cables[].drum_radius",
                                             "cables[].mechanical_advantage"},
-    "maslow": _ANCHORS | {"axis"},
+    "maslow": _ANCHORS | {"axis", "pulley.arm"},
 }  # fmt: skip
 """Keys of the schema that each format of `EXPORTS` holds, as its reader gets them back."""
 

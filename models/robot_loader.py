@@ -382,6 +382,9 @@ def _check_motion(robot: Robot, fail: Callable[[str, object, str], None]) -> Non
     common = robot.platform_pulley
     radii = [0.0 if common is None else common.radius]
     radii += [cable.anchor_pulley_radius or 0.0 for cable in robot.cables]
+    own = [cable.pulley_radius or 0.0 for cable in robot.cables]
+    if robot.pulley.arm > 0.0 and max(*radii, robot.pulley.radius, *own) > 0.0:
+        fail("pulley.arm", f"{robot.pulley.arm:g} with pulleys", "0, or no pulleys at either end")
     if max(radii) > 0.0 and (motion.is_point or robot.motion == "2R3T"):
         fail("platform_pulley", f"pulleys at the platform of {robot.motion}",
              "none there, since a cable over one pulls beside Po or the beam")  # fmt: skip

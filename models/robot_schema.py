@@ -364,6 +364,7 @@ class Robot(Summarized):
             ),
             linear_weight=np.array([each.linear_density * self.gravity for each in materials]),
             swivel_axis=_unit_columns(axes),
+            arm=self.pulley.arm,
             breaking_load=np.array([np.inf if load is None else load for load in loads]),
             down=self.down(),
         ).over_platform_pulleys(

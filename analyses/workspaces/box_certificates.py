@@ -104,6 +104,11 @@ def box_search(
     if question.rule != "all":
         raise WorkspaceError(f"certify: found orientations {question.rule}; accepted: all")
     about = question.about
+    if np.any(about.case.cables.arm > 0.0):
+        raise WorkspaceError(
+            f"certify: found {robot.name} with arms, pulley.arm {robot.pulley.arm:g}; accepted: "
+            "cables from points or over pulleys"
+        )
     if about.method is not None:
         raise WorkspaceError(
             f"certify: found method {about.method}; accepted: no method, for it is proven that "

@@ -38,7 +38,11 @@ def plain(value: Any) -> Any:
     if isinstance(value, np.generic):
         return value.item()
     if isinstance(value, CableSet):  # what neither Jacobian nor statics depend on is left out
-        names = ["p_WA", "p_PB", *(["pulley_radius", "swivel_axis"] if value.has_pulleys() else [])]
+        names = [
+            "p_WA",
+            "p_PB",
+            *(["pulley_radius", "swivel_axis", "arm"] if value.has_pulleys() else []),
+        ]
         if value.has_platform_pulleys():
             names += ["anchor_pulley_radius", "anchor_swivel_axis"]
         return {"kind": "CableSet", **{name: plain(getattr(value, name)) for name in names}}

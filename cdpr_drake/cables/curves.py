@@ -63,6 +63,8 @@ def cable_curves(
             curve = np.column_stack([T, B])
         elif _sag(curve) < least_sag:
             curve = curve[:, [0, -1]]
+        if cables.arm[i] > 0.0:
+            curve = np.column_stack([A, curve])
         if cables.pulley_radius[i] > 0.0:
             axis, r = cables.swivel_axis[:, i], cables.pulley_radius[i]
             curve = np.hstack([_groove(A, curve[:, 0], axis, r), curve])

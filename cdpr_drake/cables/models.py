@@ -152,6 +152,12 @@ def check_model(model: str, cables: CableSet) -> None:
                 "accepted for the catenary: 0 [m], since a cable that sags is solved with a pulley "
                 "at its exit point only"
             )
+        if np.any(cables.arm > 0.0):
+            raise CableModelError(
+                f"arm of cable {int(np.argmax(cables.arm)) + 1}: found {np.max(cables.arm):g}; "
+                "accepted for the catenary: 0 [m], since a cable that sags is solved from a point "
+                "or a pulley"
+            )
         if cables.down[2] > -1.0 + 1e-12 and np.any(cables.linear_weight > 0.0):
             raise CableModelError(
                 f"cable model: found {model} with gravity along {np.round(cables.down, 6)} of the "

@@ -68,7 +68,7 @@ def cable_terms(
             if upright and h != 0.0:
                 L, sine, cosine = abs(h), 0.0, -np.sign(h)
             alpha = np.arctan2(sine, cosine)
-            numbers[k, i, LENGTH] = L + r * (np.pi - alpha)
+            numbers[k, i, LENGTH] = L + max(r, 0.0) * (np.pi - alpha)
             numbers[k, i, RADIUS_SLOPE] = np.pi - alpha - sine
             numbers[k, i, SWIVEL_ANGLE] = swivel_angle(e, n)
             turn = -(1.0 + cosine) / L

@@ -63,7 +63,7 @@ def lay_out_cables(robot: RobotArrays) -> bool:
     if robot.kinds[RUBBING] > 0:
         return False
     for i in range(robot.cables.shape[0]):
-        if robot.cables[i, PULLEY_RADIUS] > 0.0 or robot.cables[i, ANCHOR_RADIUS] > 0.0:
+        if robot.cables[i, PULLEY_RADIUS] != 0.0 or robot.cables[i, ANCHOR_RADIUS] > 0.0:
             return False
     if robot.kinds[LAW] != STRAIGHT:
         return False

@@ -106,6 +106,12 @@ def impossible_cable(X_WP: RigidTransform, cables: CableSet) -> str:
             "neither end lies in the groove or on the swivel axis of the other"
         )
     A, B, r = cables.p_WA[:, i], X_WP.multiply(cables.p_PB[:, i]), cables.pulley_radius[i]
+    if cables.arm[i] > 0.0:
+        return (
+            f"cable {i + 1}: its anchor point {_words(B)} m lies within the length "
+            f"{cables.arm[i]:g} m of its arm at {_words(A)} m; accepted: a pose farther from the "
+            "swivel axis"
+        )
     where = "in the groove or on the swivel axis of its pulley" if r > 0.0 else "on its exit point"
     return (
         f"cable {i + 1}: its anchor point {_words(B)} m lies {where} of radius {r:g} m at "

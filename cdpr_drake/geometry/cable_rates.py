@@ -41,7 +41,7 @@ def cable_rates_from_platform_twist(R_WP: Array, p_WP: Array, cables: Array, V_P
     rates = np.empty(m)
     wx, wy, wz, vx, vy, vz = V_P
     for k in range(m):
-        if cables[k, PULLEY_RADIUS] > 0.0 or cables[k, ANCHOR_RADIUS] > 0.0:
+        if cables[k, PULLEY_RADIUS] != 0.0 or cables[k, ANCHOR_RADIUS] > 0.0:
             w, v = R_WP @ np.ascontiguousarray(V_P[:3]), R_WP @ np.ascontiguousarray(V_P[3:])
             rates[k] = _rate_over_pulley(R_WP, p_WP, cables[k], w, v)
             continue
@@ -70,7 +70,7 @@ def cable_rates_from_base_twist(R_WP: Array, p_WP: Array, cables: Array, V_WP: A
     rates = np.empty(m)
     wx, wy, wz, vx, vy, vz = V_WP
     for k in range(m):
-        if cables[k, PULLEY_RADIUS] > 0.0 or cables[k, ANCHOR_RADIUS] > 0.0:
+        if cables[k, PULLEY_RADIUS] != 0.0 or cables[k, ANCHOR_RADIUS] > 0.0:
             rates[k] = _rate_over_pulley(R_WP, p_WP, cables[k], V_WP[:3], V_WP[3:])
             continue
         b = R_WP @ cables[k, 3:6]

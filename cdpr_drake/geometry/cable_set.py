@@ -50,6 +50,8 @@ class CableSet:
         anchor_swivel_axis: Unit vectors in the platform frame: the axis through B about which a
             pulley at the platform swivels, in the direction in which the cable arrives at B from
             where it is fixed, shape (3, m).
+        arm: Length of an arm that swivels about `swivel_axis`, across it, in the place of a pulley:
+            the cable begins at its end; 0: none, shape (m,) [m].
         down: Direction of gravity in W, a unit vector, shape (3,).
         beyond: Constants of what all cables do beside the elastic law, see
             `cables.cable_behaviour.behaving_cables`, shape (k,); empty: nothing.
@@ -65,6 +67,7 @@ class CableSet:
     breaking_load: Array
     anchor_pulley_radius: Array
     anchor_swivel_axis: Array
+    arm: Array = field(default_factory=lambda: np.zeros(0))
     down: Array = field(default_factory=lambda: np.array([0.0, 0.0, -1.0]))
     beyond: Array = field(default_factory=lambda: np.zeros(0))
 
@@ -77,6 +80,8 @@ class CableSet:
         m = np.shape(self.p_WA)[-1] if np.ndim(self.p_WA) == 2 else 0
         for each in fields(self):
             value = np.array(getattr(self, each.name), dtype=float)
+            if each.name == "arm" and value.size == 0:
+                value = np.zeros(m)
             if each.name == "beyond":
                 object.__setattr__(self, each.name, value)
                 continue
@@ -99,7 +104,7 @@ class CableSet:
         axes = np.array([self.swivel_axis, self.anchor_swivel_axis])
         numbers = np.array([
             self.retardation, self.pulley_radius, self.linear_weight, self.anchor_pulley_radius,
-            self.stiffness,
+            self.stiffness, self.arm,
         ])  # fmt: skip
         points = np.isfinite(self.p_WA).all() and np.isfinite(self.p_PB).all()
         positive = (self.stiffness > 0.0).all() and (self.breaking_load > 0.0).all()
@@ -107,7 +112,8 @@ class CableSet:
         lengths = np.abs(np.sqrt(np.einsum("kim,kim->km", axes, axes)) - 1.0)  # NaN is refused
         down = abs(math.sqrt(float(self.down @ self.down)) - 1.0)
         unit = (lengths <= 0.5 * UNIT_TOLERANCE).all() and down <= 0.5 * UNIT_TOLERANCE
-        return bool(points and positive and limits and unit)
+        both = ((self.arm > 0.0) & (self.pulley_radius + self.anchor_pulley_radius > 0.0)).any()
+        return bool(points and positive and limits and unit and not both)
 
     def _refuse(self) -> None:
         """Raises what is wrong with the first number that is, by name and cable, if any is."""
@@ -116,9 +122,17 @@ class CableSet:
         for name in ("stiffness",):
             value = getattr(self, name)
             self._require(name, np.isfinite(value) & (value > 0.0), "a finite number > 0")
-        for name in ("retardation", "pulley_radius", "linear_weight", "anchor_pulley_radius"):
+        for name in (
+            "retardation",
+            "pulley_radius",
+            "linear_weight",
+            "anchor_pulley_radius",
+            "arm",
+        ):
             value = getattr(self, name)
             self._require(name, np.isfinite(value) & (value >= 0.0), "a finite number >= 0")
+        alone = self.pulley_radius + self.anchor_pulley_radius == 0.0
+        self._require("arm", (self.arm == 0.0) | alone, "0 with pulleys")
         self._require("breaking_load", self.breaking_load > 0.0, "> 0")
         if not abs(np.linalg.norm(self.down) - 1.0) <= UNIT_TOLERANCE:
             raise CableModelError(f"down: found {self.down}; accepted: a unit vector")
@@ -143,6 +157,7 @@ class CableSet:
         linear_weight: Array | float = 0.0,
         swivel_axis: Array | tuple[float, float, float] = (0.0, 0.0, 1.0),
         breaking_load: Array | float = np.inf,
+        arm: Array | float = 0.0,
         down: Array | tuple[float, float, float] = (0.0, 0.0, -1.0),
     ) -> CableSet:
         """A set in which one number or one axis may stand for all cables, fixed to the platform.
@@ -164,7 +179,7 @@ class CableSet:
             pulley_radius=each(pulley_radius), linear_weight=each(linear_weight),
             swivel_axis=axes(swivel_axis), breaking_load=each(breaking_load),
             anchor_pulley_radius=np.zeros(m), anchor_swivel_axis=axes((0.0, 0.0, 1.0)),
-            down=np.asarray(down, float),
+            arm=each(arm), down=np.asarray(down, float),
         )  # fmt: skip
 
     @property
@@ -203,13 +218,13 @@ class CableSet:
         return replace(self, anchor_pulley_radius=radii, anchor_swivel_axis=axes)
 
     def without_pulleys(self) -> Self:
-        """The same cables from fixed exit points A to fixed anchor points B."""
+        """The same cables from fixed exit points A to fixed anchor points B, also without arms."""
         none = np.zeros(self.count)
-        return replace(self, pulley_radius=none, anchor_pulley_radius=none)
+        return replace(self, pulley_radius=none, anchor_pulley_radius=none, arm=none)
 
     def has_pulleys(self) -> bool:
-        """Whether any cable runs over a pulley of its own radius, at either end."""
-        return self.has_platform_pulleys() or bool(np.any(self.pulley_radius > 0.0))
+        """Whether any cable runs over a pulley of its own radius, at either end, or has an arm."""
+        return self.has_platform_pulleys() or bool(np.any(self.pulley_radius + self.arm > 0.0))
 
     def has_platform_pulleys(self) -> bool:
         """Whether any cable runs over a pulley at the platform."""
@@ -241,7 +256,8 @@ class CableSet:
     def packed(self) -> Array:
         """One contiguous array for the kernels, shape (m, 17 + k).
 
-        Columns: exit point (3), anchor point (3), E S [N], T [s], radius of the groove [m], weight
+        Columns: exit point (3), anchor point (3), E S [N], T [s], radius of the groove, of an arm
+        minus its length [m], weight
         per length [N/m], swivel axis (3), and of a pulley at the platform radius [m] and axis in P
         (3). Kernels of straight cables take the first eight, or
         these rows, and see cables without pulleys. Behind them stands `beyond`, k = 0 of elastic
@@ -250,7 +266,8 @@ class CableSet:
         rows = np.empty((self.count, CABLE_SET_COLUMNS + len(self.beyond)))
         rows[:, 0:3], rows[:, 3:6] = self.p_WA.T, self.p_PB.T
         rows[:, 6], rows[:, 7] = self.stiffness, self.retardation
-        rows[:, PULLEY_RADIUS], rows[:, LINEAR_WEIGHT] = self.pulley_radius, self.linear_weight
+        rows[:, PULLEY_RADIUS] = self.pulley_radius - self.arm
+        rows[:, LINEAR_WEIGHT] = self.linear_weight
         rows[:, SWIVEL_AXIS : SWIVEL_AXIS + 3] = self.swivel_axis.T
         rows[:, ANCHOR_RADIUS] = self.anchor_pulley_radius
         rows[:, ANCHOR_AXIS : ANCHOR_AXIS + 3] = self.anchor_swivel_axis.T

@@ -13,6 +13,13 @@ The length changes with B as if the cable left a fixed A': its rate is u' v_B wi
 of the free part, which is what makes (1.20) the Jacobian. A radius of 0 is a cable from a point,
 computed by `motion_kernel.cable_line`.
 
+An arm in the place of a pulley swivels about n as well, across it, and has no groove: the cable
+begins at its end, a away from A, so that with mx = rho - a
+
+    L = sqrt(mx^2 + h^2) = length,    u = (mx e + h n) / L.
+
+Its rate is u' v_B, too. Kernels take it as a radius of -a.
+
 Where B lies in the groove's circle or, for r > 0, on the swivel axis, no cable runs, and all
 numbers but the arm are NaN; `straight_cables` and the systems make an error of that.
 
@@ -36,8 +43,8 @@ from cdpr_drake.geometry.two_pulleys_kernel import (
 
 PULLEY_RADIUS, LINEAR_WEIGHT, SWIVEL_AXIS = 8, 9, 10
 """Columns of `CableSet.packed()` behind the eight of `motion_kernel.pack_cables`: radius of the
-groove [m], weight per unstrained length [N/m], swivel axis n in W (3). Behind them those of
-`two_pulleys_kernel`."""
+groove, or minus the length of an arm [m], weight per unstrained length [N/m], swivel axis n in W
+(3). Behind them those of `two_pulleys_kernel`."""
 
 CABLE_SET_COLUMNS = 17
 """Columns of `CableSet.packed()`."""
@@ -70,7 +77,16 @@ def pulley_plane(X: Motion, cable: Array) -> Any:
 
 @njit(cache=True, error_model="numpy")
 def tangent(rho: float, h: float, r: float) -> Any:
-    """Free length L [m] and sine, cosine of alpha; NaN where no cable runs. For r > 0."""
+    """Free length L [m] and sine, cosine of alpha; NaN where no cable runs. For r != 0.
+
+    Of an arm, r < 0, sine and cosine are those with which u = sine e - cosine n.
+    """
+    if r < 0.0:
+        across = rho + r
+        if not across > 0.0:
+            return np.nan, np.nan, np.nan
+        far = np.sqrt(across * across + h * h)
+        return far, across / far, -h / far
     square = rho * rho + h * h - 2.0 * r * rho
     if not (square > 0.0 and rho > 0.0):
         return np.nan, np.nan, np.nan
@@ -103,7 +119,9 @@ def pulley_line(X: Motion, cable: Array) -> Any:
         return cable_line(pose, cable)
     rho, h, ex, ey, ez, rx, ry, rz = pulley_plane(pose, cable)
     L, sine, cosine = tangent(rho, h, r)
-    length = L + r * (np.pi - np.arctan2(sine, cosine))
+    length = L
+    if r > 0.0:
+        length = L + r * (np.pi - np.arctan2(sine, cosine))
     nx, ny, nz = cable[10], cable[11], cable[12]
     return (
         length,
@@ -134,9 +152,11 @@ def pulley_geometry(X: Motion, cable: Array) -> Any:
     rho, h, ex, ey, ez, rx, ry, rz = pulley_plane(X, cable)
     L, sine, cosine = tangent(rho, h, r)
     nx, ny, nz = cable[10], cable[11], cable[12]
-    out, up = r * (1.0 + cosine), r * sine
+    out, up, arc = r * (1.0 + cosine), r * sine, r * (np.pi - np.arctan2(sine, cosine))
+    if r < 0.0:
+        out, up, arc = -r, 0.0, 0.0
     return (
-        L, r * (np.pi - np.arctan2(sine, cosine)),
+        L, arc,
         cable[0] + out * ex + up * nx, cable[1] + out * ey + up * ny, cable[2] + out * ez + up * nz,
         sine * ex - cosine * nx, sine * ey - cosine * ny, sine * ez - cosine * nz,
         rx, ry, rz,

@@ -6,7 +6,8 @@ anchor point gives
 
     dalpha = c' dB / L,    de = y (y' dB) / rho,    dL = u' dB + r dalpha,    drho = e' dB,
 
-from which all of this follows; a radius of 0 is a cable from a point. All of it is exact.
+from which all of this follows; a radius of 0 is a cable from a point. Of an arm, whose end A' is a
+away from the axis, dA' = a de and dL = u' dB. All of it is exact.
 """
 
 from __future__ import annotations
@@ -64,6 +65,9 @@ def exit_derivative(X: Motion, cable: Array, out: Array) -> None:
     for i in range(3):
         back = -sine * e[i] + cosine * n[i]
         for j in range(3):
+            if r < 0.0:
+                out[i, j] = -r / rho * y[i] * y[j]
+                continue
             c = cosine * e[j] + sine * n[j]
             out[i, j] = r * (back * c / L + (1.0 + cosine) / rho * y[i] * y[j])
 
@@ -102,7 +106,7 @@ def bend_gradient(X: Motion, cable: Array, v: Any, out: Array) -> float:
     value = cv * cv / L + sine / rho * yv * yv
     for k in range(3):
         dalpha = (cosine * e[k] + sine * n[k]) / L
-        dL = sine * e[k] - cosine * n[k] + r * dalpha
+        dL = sine * e[k] - cosine * n[k] + max(r, 0.0) * dalpha
         side = y[k] / rho
         dcv = -uv * dalpha + cosine * yv * side
         dyv = -ev * side

@@ -113,7 +113,7 @@ def wrench_matrices(positions: Array, rotations: Array, cables: CableSet) -> Arr
     u = p_AB_W / np.where(length > CABLE_FREE, length, np.nan)
     J = np.concatenate([np.cross(p_PB_W, u), u], axis=-1)
     if cables.has_pulleys():
-        over = (cables.pulley_radius > 0.0) | (cables.anchor_pulley_radius > 0.0)
+        over = cables.pulley_radius + cables.anchor_pulley_radius + cables.arm > 0.0
         J[:, over] = _over_pulleys(positions, rotations, cables.packed()[over])
     return -J.transpose(0, 2, 1)
 

@@ -94,6 +94,8 @@ def complete_draft(draft: RobotDraft) -> CompletedDraft:
     lower, upper = _tensions(draft, gravity, assumed, remarks)
     content["cable"] = _material(draft, upper, assumed)
     content["pulley"] = {"radius": _pulley(draft, assumed)}
+    if draft.arm is not None:
+        content["pulley"]["arm"] = _float(draft.arm)
     content["winch"] = _winch(draft, assumed)
     content["tension_bounds"] = {"lower": _float(lower), "upper": _float(upper)}
     corners = _frame(draft, assumed, remarks, planar)
@@ -137,7 +139,8 @@ def _given(draft: RobotDraft) -> tuple[str, ...]:
         "winch.motor_speed_rpm": draft.motor_speed_rpm, "winch.inertia": draft.motor_inertia,
         "tension_bounds.lower": draft.cables[0].lower,
         "tension_bounds.upper": draft.cables[0].upper,
-        "pulley.radius": draft.cables[0].pulley_radius, "gravity": draft.gravity,
+        "pulley.radius": draft.cables[0].pulley_radius, "pulley.arm": draft.arm,
+        "gravity": draft.gravity,
         "gravity_direction": draft.gravity_direction,
         "cables[].exit_point": draft.cables, "cables[].anchor_point": draft.cables,
         "cables[].swivel_axis": draft.cables[0].swivel_axis,

@@ -77,6 +77,7 @@ class RobotDraft:
         linear_density: Of the cables [kg/m].
         breaking_load: Of the cables [N].
         drum_radius: Of the winches [m].
+        arm: Length of arms that swivel about exit points, across the swivel axes [m].
         gear_ratio: Motor turns per drum turn.
         layers: Of line on the drums, by the keys of a robot file's `winch.layers`.
         motor_speed_rpm: Rated speed of the motors [1/min].
@@ -110,6 +111,7 @@ class RobotDraft:
     linear_density: float | None = None
     breaking_load: float | None = None
     drum_radius: float | None = None
+    arm: float | None = None
     gear_ratio: float | None = None
     layers: dict[str, float] | None = None
     motor_speed_rpm: float | None = None

@@ -7,11 +7,12 @@ their end, so that it moves as a point in a plane. `Maslow_vertical` says that t
 x and y of the file are x and z of W then, and out of the board is -y.
 
 At a distance d across z the firmware has belts of hypot(d - a, z) since October 2024: arms stay
-level and only the belt is inclined. Before that it had hypot(d, z) - a, a straight line to the
-middle, which is the geometry here.
+level and only the belt is inclined. They are arms that swivel about the exit points here, which is
+the same, since the sled does not turn. Before that, in files with the settings at the top, belts
+had hypot(d, z) - a, a straight line to the middle.
 
-Source: github.com/MaslowCNC/Maslow_4, firmware/FluidNC/data/maslow.yaml, its web page's words on the
-settings, and pull request 157, MaslowKinematics::compute.
+Source: github.com/MaslowCNC/Maslow_4, firmware/FluidNC/data/maslow.yaml, its web page's words on
+the settings, and pull request 157, MaslowKinematics::compute.
 """
 
 from __future__ import annotations
@@ -41,9 +42,6 @@ from cdpr_drake.models.formats.reading import (
 TOOL = "Maslow YAML"
 
 MM = 1e-3
-
-NEAR = 0.5
-"""Length of belt for which a remark says what level arms change [m]."""
 
 _EXTRA = ("beltEndExtension", "armLength")
 
@@ -78,15 +76,7 @@ def read_maslow(path: Path) -> RobotDraft:
     if not upright:
         draft.plane_height = 0.0
     draft.remarks.append("home is the middle of the anchors.")
-    extra = [number(path, name, settings[name]) for name in _EXTRA if name in settings]
-    if any(extra):
-        near, middle_off = _level_arms(points, MM * sum(extra), middle)
-        draft.remarks.append(
-            f"Belts end {sum(extra):g} mm before the middle of the sled, to which lengths go here, "
-            "in a straight line. Firmware since October 2024 keeps arms level: its belts are "
-            f"longer than that, by up to {1e3 * near:.2g} mm where {NEAR:g} m of belt are out, and "
-            f"{1e3 * middle_off:.2g} mm in the middle of the anchors."
-        )
+    _arms(path, settings, content, R, draft)
     for name in ("Scale_X", "Scale_Y"):
         scale = content.get(f"Maslow_{name}", 1.0)
         if number(path, f"Maslow_{name}", scale) != 1.0:
@@ -95,16 +85,23 @@ def read_maslow(path: Path) -> RobotDraft:
     return draft
 
 
-def _level_arms(points: Array, arm: float, middle: Array) -> tuple[float, float]:
-    """By how much belts of level arms are longer than straight ones, at most [m].
-
-    Where `NEAR` of each belt is out, and in the middle of the anchors.
-    """
-    z = points[:, 2]
-    far = np.linalg.norm((points - middle)[:, :2], axis=1)
-    near = np.full(len(points), arm + NEAR)
-    off = [np.hypot(d - arm, z) - (np.hypot(d, z) - arm) for d in (near, far)]
-    return float(np.max(off[0])), float(np.max(off[1]))
+def _arms(
+    path: Path, settings: dict[str, Any], content: dict[str, Any], R: Array, draft: RobotDraft
+) -> None:
+    """What is between belts and the middle of the sled."""
+    arm = sum(number(path, name, settings[name]) for name in _EXTRA if name in settings)
+    if arm == 0.0:
+        return
+    if "kinematics" not in content:
+        draft.remarks.append(
+            f"Belts end {arm:g} mm before the middle of the sled, to which lengths go here."
+        )
+        return
+    if arm < 0.0:
+        raise fail(path, " + ".join(_EXTRA), f"{arm:g}", "at least 0 [mm]")
+    draft.arm = MM * arm
+    for cable in draft.cables:
+        cable.swivel_axis = R[:, 2] if R[2, 2] == 1.0 else -R[:, 2]
 
 
 def _others(content: dict[str, Any], draft: RobotDraft) -> None:
@@ -136,7 +133,7 @@ def _anchor(path: Path, settings: dict[str, Any], corner: str) -> Array:
 def write_maslow(draft: RobotDraft) -> str:
     """Anchors and whether the plane is upright; all else is the machine's own.
 
-    It holds exit points, from the corner of the board.
+    It holds exit points, from the corner of the board, and arms, whose ends belts have none of.
     """
     upright = draft.axis is not None and abs(float(draft.axis[1])) == 1.0
     R = _R_UPRIGHT if upright else np.eye(3)
@@ -147,5 +144,7 @@ def write_maslow(draft: RobotDraft) -> str:
             point[2] -= (draft.plane_height or 0.0) / MM
         point[2] *= -1.0
         anchors |= {f"{corner}{k}": float(x) + 0.0 for k, x in zip("XYZ", point, strict=True)}
+    if draft.arm is not None:
+        anchors |= {"beltEndExtension": 0.0, "armLength": draft.arm / MM}
     content = {"Maslow_vertical": upright, "kinematics": {MASLOW_SECTION: anchors}}
     return yaml.safe_dump(content, sort_keys=False)

@@ -55,6 +55,7 @@ _WHOLE: dict[str, Callable[[Robot], Any]] = {
     "platform.inertia": _inertia,
     "platform.inertia_of": _inertia,
     "home.angles_deg": lambda robot: robot.home.transform().rotation().matrix(),
+    "pulley.arm": lambda robot: robot.pulley.arm,
     "frame.beam": lambda robot: robot.frame.beam_width(),
     "cables[].exit_point": lambda robot: robot.exit_points().T,
 }

@@ -4,9 +4,11 @@ import re
 
 import numpy as np
 import pytest
+from pydrake.math import RigidTransform
 from scipy.io import savemat
 
 from cdpr_drake.errors import RobotFileError
+from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.models.formats.grab_mat import is_grab_mat
 from cdpr_drake.models.robot_exchange import export_robot, import_robot
 from cdpr_drake.models.robot_loader import load_robot
@@ -142,20 +144,35 @@ def test_a_maslow_on_a_wall_and_on_the_floor(load):
     np.testing.assert_allclose(old.exit_points()[:, (0, 1, 3)], floor.exit_points()[:, (0, 1, 3)])
 
 
-def test_maslow_says_what_level_arms_would_change(tmp_path):
-    """By the firmware's formula, hypot(d - a, z), against hypot(d, z) - a, a = 153.4 mm."""
-    path = tmp_path / "sled.yaml"
-    path.write_text(
-        "kinematics: {MaslowKinematics: {tlX: 0, tlY: 2000, tlZ: 100, trX: 3000, trY: 2000, trZ: 56, "
-        "blX: 0, blY: 0, blZ: 34, brX: 3000, brY: 0, brZ: 78, beltEndExtension: 30, "
-        "armLength: 123.4}}"
-    )
-    (told,) = [words for words in import_robot(path).completed.remarks if "level" in words]
-    assert np.hypot(500.0, 100.0) - np.hypot(653.4, 100.0) + 153.4 == pytest.approx(2.29, abs=0.01)
-    assert "longer than that, by up to 2.3 mm where 0.5 m of belt are out" in told
-    far = np.hypot(1500.0, 1000.0)
-    off = np.hypot(far - 153.4, 100.0) - np.hypot(far, 100.0) + 153.4
-    assert f"and {off:.2g} mm in the middle" in told
+SLED = """kinematics: {MaslowKinematics: {tlX: 0, tlY: 2000, tlZ: 100, trX: 3000, trY: 2000,
+  trZ: 56, blX: 0, blY: 0, blZ: 34, brX: 3000, brY: 0, brZ: 78, beltEndExtension: 30,
+  armLength: 123.4}}
+"""
+
+
+@pytest.mark.parametrize("upright", [False, True])
+def test_maslow_s_arms_stay_level(upright, load):
+    """By the firmware's formula: the distance in the board, less the arms, and the height."""
+    sled = load("sled.yaml", SLED + f"Maslow_vertical: {str(upright).lower()}\n")
+    assert sled.pulley.arm == pytest.approx(0.1534)
+    far, heights = np.hypot([0.5, 2.5, 0.5, 2.5], [0.4, 0.4, 1.6, 1.6]), [0.1, 0.056, 0.034, 0.078]
+    X_WP = RigidTransform([0.5, 0.0, 1.6] if upright else [0.5, 1.6, 0.0])
+    lengths = cable_paths(X_WP, sled.cable_set()).lengths
+    np.testing.assert_allclose(lengths, np.hypot(far - 0.1534, heights), rtol=1e-12)
+    assert 1e3 * lengths[0] == pytest.approx(497.08, abs=0.005)
+    ((name, text),) = export_robot(sled, "maslow").items()
+    again = load(f"again_{name}", text)
+    np.testing.assert_allclose(cable_paths(X_WP, again.cable_set()).lengths, lengths, rtol=1e-12)
+
+
+def test_older_maslow_belts_go_straight_to_the_middle(tmp_path):
+    path = tmp_path / "old.yaml"
+    given = {"tlX": 0, "tlY": 2000, "trX": 3000, "trY": 2000, "brX": 3000, "brY": 0, "blY": 0}
+    given["armLength"] = 120
+    path.write_text("".join(f"Maslow_{key}: {value}\n" for key, value in given.items()))
+    imported = import_robot(path)
+    assert imported.robot.pulley.arm == 0.0
+    assert any("120 mm before the middle" in words for words in imported.completed.remarks)
 
 
 def test_maslow_s_belt_is_as_stiff_as_its_makers_say():

@@ -114,10 +114,20 @@ def tilted_robot() -> Robot:
     return robot
 
 
+def robot_with_arms() -> Robot:
+    """A point in a plane on arms of a length of its own."""
+    made = yaml.safe_load(robot_text("maslow_4"))
+    made |= {"name": "arms", "title": "Arms"}
+    made["pulley"]["arm"] = 0.1234
+    made["cable"]["retardation_time"] = 0.0007
+    return robot_of(made)
+
+
 UNUSUAL = {
     "everything": robot_with_everything,
     "outside": slack_robot,
     "flat": planar_robot,
     "tilted": tilted_robot,
+    "arms": robot_with_arms,
 }
 """What makes each robot."""
