@@ -6,8 +6,8 @@ from .cable_robot import CableRobot as CableRobot
 from .cable_robot import default_rule as default_rule
 from .compiled_cable_robot import CompiledCableRobot as CompiledCableRobot
 from .compiled_mechanism import CompiledMechanism as CompiledMechanism
-from .compiled_motion import CompiledMotion as CompiledMotion
 from .compiled_motion import HELD as HELD
+from .compiled_motion import CompiledMotion as CompiledMotion
 from .compiled_step import StepRule as StepRule
 from .motor_winch import MotorWinch as MotorWinch
 from .platform_pose import PlatformPose as PlatformPose
