@@ -82,6 +82,7 @@ from cdpr_drake.systems.diagrams.visual_servo import VisualServo, build_visual_s
 from cdpr_drake.systems.loops.loop_choice import check_loop, uses_compiled_loop
 from cdpr_drake.systems.loops.servo_loop import ServoLoop
 from cdpr_drake.systems.pick_and_place.pick_and_place import build_pick_and_place
+from cdpr_drake.systems.remote.remote_place import DISTRIBUTOR
 from cdpr_drake.systems.robots.settings import model_words
 from cdpr_drake.systems.scenarios.files import (
     MECHANISM,
@@ -222,14 +223,15 @@ def _servo_facts(summary: dict[str, Any]) -> list[tuple[str, str]]:
 
 def _tension_facts(summary: dict[str, Any]) -> list[tuple[str, str]]:
     position, rotation = summary["position_error_m"], summary["rotation_error_rad"]
-    tension = summary["tension_n"]
+    tension, remote = summary["tension_n"], summary.get("remote")
+    by = "the client" if remote and remote["place"] == DISTRIBUTOR else summary["method"]
     return [
         ("simulated", model_words(summary["simulated"])),
         (
             "largest error",
             f"{1e3 * position['max']:.4f} mm, {np.degrees(rotation['max']):.5f} deg",
         ),
-        ("tensions", f"{tension['min']:.2f} to {tension['max']:.2f} N by {summary['method']}"),
+        ("tensions", f"{tension['min']:.2f} to {tension['max']:.2f} N by {by}"),
         ("infeasible steps", str(summary["infeasible_steps"])),
         *world_facts(summary),
     ]

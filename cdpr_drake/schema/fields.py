@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import KW_ONLY, dataclass, field
+from dataclasses import KW_ONLY, Field, dataclass, field
 from typing import Any
 
 import numpy as np
@@ -119,14 +119,34 @@ class _Required:
 REQUIRED = _Required()
 
 
+FIELDS_HEAD = "Attributes:"
+"""What stands above the fields in the docstring of a class with a schema."""
+
+
+class _DocumentedField(Field):  # type: ignore[type-arg]
+    """A field that adds its words, unit and range to the docstring of its class, for `help`."""
+
+    __slots__ = ()
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        super().__set_name__(owner, name)  # type: ignore[misc]
+        rule: FieldRule = self.metadata["rule"]
+        known = (owner.__doc__ or f"{owner.__name__}.").rstrip()
+        head = "" if FIELDS_HEAD in known else f"\n\n    {FIELDS_HEAD}"
+        owner.__doc__ = f"{known}{head}\n        {name}: {rule.doc} Accepted: {rule.accepts()}."
+
+
 def _make(rule: dict[str, Any], default: Any, placeholder: Any) -> Any:
     required = isinstance(default, _Required)
     made = FieldRule(required=required, nullable=default is None, **rule)
     value = placeholder if required else default
     if isinstance(value, (np.ndarray, list)) or callable(value):
         factory = value if callable(value) else lambda: value.copy()
-        return field(default_factory=factory, metadata={"rule": made})
-    return field(default=value, metadata={"rule": made})
+        new = field(default_factory=factory, metadata={"rule": made})
+    else:
+        new = field(default=value, metadata={"rule": made})
+    new.__class__ = _DocumentedField
+    return new
 
 
 def number(doc: str, unit: str, default: Any = REQUIRED, **bounds: float) -> Any:

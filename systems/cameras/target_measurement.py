@@ -15,6 +15,7 @@ from pydrake.systems.framework import BasicVector, Context, LeafSystem, State
 from pydrake.systems.sensors import ImageRgba8U
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.errors import CdprError
 from cdpr_drake.servoing.circle_features import ELLIPSE_SIZE
 from cdpr_drake.vision.lens_picture import StraightPicture
 from cdpr_drake.vision.mark_reading import found_marks, moved_marks, read_marks
@@ -69,6 +70,7 @@ class TargetMeasurement(LeafSystem):
         self._frame_size = 13 + target.size + len(target.quality)
         self._oldest = latency_frames * self._frame_size
         self._frames = self.DeclareDiscreteState(self.no_frames())
+        self.DeclareInitializationPublishEvent(self._check_inputs)
         self.DeclarePeriodicUnrestrictedUpdateEvent(1.0 / rate, 0.0, self._take_image)
         ticket = {self.discrete_state_ticket(self._frames)}
         self.DeclareVectorOutputPort(target.mark, target.size, self._calc_marks, ticket)
@@ -78,6 +80,16 @@ class TargetMeasurement(LeafSystem):
         self.DeclareVectorOutputPort("found", 1, self._calc_found, ticket)
         if target.quality:
             self.DeclareVectorOutputPort("quality", len(target.quality), self._calc_quality, ticket)
+
+    def _check_inputs(self, context: Context) -> None:
+        """Checks that no input is open, before the first image."""
+        ports = [self.get_input_port(k) for k in range(self.num_input_ports())]
+        open_ports = [port.get_name() for port in ports if not port.HasValue(context)]
+        if open_ports:
+            raise CdprError(
+                f"camera {self.get_name()}: found nothing at its input {', '.join(open_ports)}; "
+                f"accepted: all of {', '.join(port.get_name() for port in ports)} connected"
+            )
 
     @abstractmethod
     def find_marks(self, context: Context) -> Array | None:

@@ -19,7 +19,7 @@ NOW = 1e-9
 """Times that differ by less are the same instant [s]."""
 
 Read = Callable[[str], Any]
-"""Gives what stands at an input, by the name of the port."""
+"""Reads an input port by its name; what `PoseEstimator.advance` gets as `read`."""
 
 _UPDATED, _DUE, _RESET = 0, 1, 2
 _POSE = slice(3, 15)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from pydrake.geometry import SceneGraph
@@ -54,6 +54,7 @@ class SimulatedCables(Protocol):
         """The model of the cables."""
 
 
+@runtime_checkable
 class RobotBlock(Protocol):
     """A cable robot in a diagram: `CableRobot`, `CompiledCableRobot`, or from `add_cable_robot`."""
 
@@ -80,6 +81,19 @@ class RobotBlock(Protocol):
     @property
     def winches(self) -> Any:
         """The winches, `VelocityWinch` or `MotorWinch`."""
+
+    @property
+    def not_at_rest(self) -> str:
+        """Why the platform is not at rest in default contexts; empty: it is."""
+
+    def set_at_equilibrium(
+        self,
+        context: Context,
+        X_WP: RigidTransform,
+        slack_lengths: Array | None = None,
+        at_rest: bool = False,
+    ) -> Array:
+        """Puts the platform at rest at a pose, as `CableRobot` says; tensions, shape (m,) [N]."""
 
     def HasInputPort(self, port_name: str) -> bool:
         """Whether there is such an input."""

@@ -410,16 +410,22 @@ class CompiledMotion(LeafSystem):
         return np.asarray((command - begun) / (time - start))
 
     def _check_held(self, context: Context) -> None:
-        """Checks that the command did not change in the step that ends now."""
+        """Checks that command and wrench did not change in the step that ends now."""
         start, time = context.get_discrete_state_vector().value()[self._size], context.get_time()
-        if time <= start or (self._rates is not None and self._rates.HasValue(context)):
+        if time <= start:
             return
-        command = self._command.Eval(context)[self._of_cable]
-        if not np.array_equal(command, self._begun(context)[: self._m]):
+        begun, ports = self._begun(context), []
+        if self._rates is None or not self._rates.HasValue(context):
+            command = self._command.Eval(context)[self._of_cable]
+            ports += [] if np.array_equal(command, begun[: self._m]) else [self._command]
+        if self._wrench.HasValue(context):
+            wrench = self._wrench.Eval(context)
+            ports += [] if np.array_equal(wrench, begun[self._m :]) else [self._wrench]
+        for port in ports:
             raise CdprError(
-                f"{self._command.get_name()} of {self._robot.name}: found a command that changes "
-                f"between {start:g} s and {time:g} s, where nothing samples it; accepted: one that "
-                "is held from event to event, or a command_period [s]"
+                f"{port.get_name()} of {self._robot.name}: found a value that changes between "
+                f"{start:g} s and {time:g} s, where nothing samples it; accepted: one that is held "
+                "from event to event, or a command_period [s]"
             )
 
     def _pushed(self, context: Context) -> Array | None:
@@ -428,7 +434,7 @@ class CompiledMotion(LeafSystem):
             return None
         wrench: Array = self._wrench.Eval(context)
         begun = self._begun(context)[self._m :]
-        return wrench if self._held or np.array_equal(begun, wrench) else 0.5 * (begun + wrench)
+        return wrench if np.array_equal(begun, wrench) else 0.5 * (begun + wrench)
 
     def _fail(self, context: Context, command: Array, others: Array) -> Array:
         """Has what failed act: on cables, winches and their brakes; returns their command."""

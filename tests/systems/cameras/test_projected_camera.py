@@ -9,7 +9,7 @@ from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder, LeafSystem, PortDataType
 
-from cdpr_drake.errors import ScenarioError
+from cdpr_drake.errors import CdprError, ScenarioError
 from cdpr_drake.geometry.poses import pose_error, pose_from_angles
 from cdpr_drake.models.camera_catalogue import CameraFault
 from cdpr_drake.servoing.servo_task import CameraMounting
@@ -274,3 +274,11 @@ def test_a_knocked_camera_sees_as_one_that_is_mounted_so():
             for one in (camera(fault=knock), other)
         )
         np.testing.assert_allclose(seen, expected, atol=ROUND_OFF)
+
+
+def test_a_target_that_is_left_open_is_named_before_the_first_image():
+    block = camera()
+    context = block.CreateDefaultContext()
+    block.GetInputPort("X_WP").FixValue(context, Value(X_WO))
+    with pytest.raises(CdprError, match=r"found nothing at its input X_WO; accepted: all of X_WP"):
+        Simulator(block, context).Initialize()

@@ -162,9 +162,10 @@ def test_a_held_command_may_be_sampled_at_events_only():
 
 
 def test_a_continuous_command_that_nothing_samples_is_refused_by_name():
-    sources = {"cable_velocities": lambda size: ramp(size, 0.02)}
-    with pytest.raises(CdprError, match=r"cable_velocities of acrobot_small: .* command_period"):
-        end_of(CompiledCableRobot, sources, command_period=math.inf)
+    for port in ("cable_velocities", "applied_wrench"):
+        sources = {port: lambda size: ramp(size, 0.02)}
+        with pytest.raises(CdprError, match=rf"{port} of acrobot_small: .* or a command_period"):
+            end_of(CompiledCableRobot, sources, command_period=math.inf)
     with pytest.raises(CdprError, match=r"command_period: found 0 s; accepted: more than 0"):
         CompiledCableRobot(ROBOT, command_period=0.0)
 

@@ -1,0 +1,42 @@
+"""Classes with a schema: `help` has the words, units and ranges of all their fields."""
+
+from dataclasses import dataclass, fields
+
+import pytest
+
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.schema.fields import number, section, text
+from cdpr_drake.systems.robots.settings import CableSettings, DampingSettings
+from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
+
+
+@dataclass(kw_only=True)
+class Spring:
+    """A spring.
+
+    It is straight.
+    """
+
+    stiffness: float = number("How stiff.", "N/m", above=0.0)
+    kind: str = text("Which.", "soft", choices=("soft", "hard"))
+
+
+@dataclass(kw_only=True)
+class Suspension(Spring):
+    inner: Spring = section("Another one.", Spring, required=False)
+
+
+def test_words_units_and_ranges_stand_behind_the_class_s_own_words():
+    assert Spring.__doc__ == (
+        "A spring.\n\n    It is straight.\n\n    Attributes:\n"
+        "        stiffness: How stiff. Accepted: a number > 0 [N/m].\n"
+        "        kind: Which. Accepted: one of soft, hard."
+    )
+    assert Suspension.__doc__.startswith("Suspension.\n\n    Attributes:\n        inner: Another")
+
+
+@pytest.mark.parametrize("schema", [Robot, Scenario, CableSettings, DampingSettings])
+def test_no_field_of_a_schema_is_without_words(schema):
+    known = "".join(each.__doc__ or "" for each in schema.__mro__)
+    for field in fields(schema):
+        assert f"        {field.name}: {field.metadata['rule'].doc} Accepted: " in known
