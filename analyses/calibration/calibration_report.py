@@ -19,6 +19,7 @@ from cdpr_drake.analyses.reporting.log_files import finite
 from cdpr_drake.analyses.reporting.provenance import package_versions
 from cdpr_drake.analyses.reporting.statements import new_table
 from cdpr_drake.analyses.visualization.figure_style import bar_style, new_figure
+from cdpr_drake.calibration.fit_groups import GroupFault
 from cdpr_drake.calibration.parameters import GROUPS
 from cdpr_drake.calibration.result import Outlier
 from cdpr_drake.geometry.poses import pose_row
@@ -47,6 +48,7 @@ def calibration_dict(
         "status": result.status,
         "misfit": list(calibration.misfit),
         "misfit_factor": MISFIT_FACTOR,
+        "groups": [_group_row(group) for group in calibration.groups],
         "robust_cost": finite(result.robust_cost),
         "largest_residuals": [residual_row(one) for one in result.largest],
         "ties": [
@@ -129,6 +131,17 @@ def _new_keys(calibration: Calibration) -> dict[str, Any]:
     if calibration.held is not None:
         added["held_out"] = calibration.held.as_dict()
     return added
+
+
+def _group_row(group: GroupFault) -> dict[str, Any]:
+    """A group of measurements that does not agree, for JSON; rows count from 1."""
+    return {
+        "test": group.test, "measurement": group.quantity,
+        "rows": [row + 1 for row in group.rows], "size": finite(group.size),
+        "std": finite(group.std), "probability": group.probability,
+        "poses_move_deviations": finite(group.moves), "misfit": group.counts,
+        "words": group.words,
+    }  # fmt: skip
 
 
 def residual_row(one: Outlier) -> dict[str, Any]:

@@ -18,7 +18,9 @@ from cdpr_drake.analyses.calibration.fit_verdict import (
     MISFIT,
     bad_sensors,
     doubts,
+    likely_scales,
     misfits,
+    remarked_groups,
     unused_columns,
 )
 from cdpr_drake.analyses.calibration.held_out import (
@@ -129,6 +131,7 @@ def calibrate(
             f"residuals are {result.spread():.3g} times what sigmas say; standard deviations are "
             "as much too small, or something that was not asked for is off"
         )
+    remarks += [*remarked_groups(groups), *likely_scales(result, prepared, groups)]
     remarks += [*bad_sensors(result), *doubts(result, found.minima), *undecided]
     remarks += [
         f"{name} is held at its bound, {value:.6g}; standard deviations are those of the others "
@@ -142,7 +145,9 @@ def calibrate(
         )
     if found.ties:
         remarks.append(_tied(found.ties))
-    return Calibration(task, log, result, prepared.mount, tuple(remarks), misfit, found.ties, None, groups)
+    return Calibration(
+        task, log, result, prepared.mount, tuple(remarks), misfit, found.ties, None, groups
+    )
 
 
 def _quiet(words: str) -> None:

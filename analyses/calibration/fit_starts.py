@@ -17,11 +17,15 @@ import numpy.typing as npt
 from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.calibration.calibration_request import Prepared
-from cdpr_drake.analyses.calibration.fit_programs import program_from, start_points
+from cdpr_drake.analyses.calibration.fit_programs import (
+    StartPoint,
+    program_from,
+    start_points,
+)
 from cdpr_drake.analyses.calibration.motion_start import on_motion
 from cdpr_drake.analyses.calibration.turned_sensors import upside_down
 from cdpr_drake.arrays import Array
-from cdpr_drake.calibration.elimination import LeastSquares
+from cdpr_drake.calibration.elimination import MOST_STEPS, LeastSquares
 from cdpr_drake.calibration.pose_search import (
     HUBER,
     FoundPoses,
@@ -123,7 +127,8 @@ def best_of_starts(
         CalibrationError: No start leads anywhere; says why the last one does not.
     """
     firsts = [prepared.first, *(_other_starts(prepared) if others else ())]
-    programs = [program_from(prepared, one) for one in start_points(prepared, firsts)]
+    begun = start_points(prepared, firsts)
+    programs = [program_from(prepared, one) for one in begun]
     known: list[_Minimum] = []
     pool: list[Stations] = []
     failure: CalibrationError | None = None
@@ -140,6 +145,9 @@ def best_of_starts(
             known.append(_improved(prepared, one, []))
         except CalibrationError as why:
             failure = why
+            if number == 0:
+                together = _from_one_pose(prepared, begun[0])
+                known += [] if together is None else [together]
     if not known:
         assert failure is not None
         raise failure
@@ -157,6 +165,22 @@ def best_of_starts(
     less = max(0.0, best.cost - min(one.cost for one in known))
     problem = best.program.SolvedProblem(best.result, prepared.task.outliers)
     return MultiStartFit(best.result, tuple(ties), len(programs), len(known), problem, less)
+
+
+def _from_one_pose(prepared: Prepared, begun: StartPoint) -> _Minimum | None:
+    """The minimum from all poses where the first one is; None where that leads nowhere.
+
+    By a robot that is far off, poses that are sought one by one may end where cables are parallel,
+    which no step with the others leaves.
+    """
+    alike = StartPoint(begun.model, [prepared.first] * prepared.log.count)
+    try:
+        end = program_from(prepared, alike).Approach(MOST_STEPS).at
+        there = StartPoint(begun.model, end.stations.poses())
+        found = _solved(prepared, program_from(prepared, there), end, straight=False)
+        return _improved(prepared, found, [])
+    except CalibrationError:
+        return None
 
 
 def upright_minima(prepared: Prepared, known: Sequence[_Minimum]) -> Sequence[_Minimum]:

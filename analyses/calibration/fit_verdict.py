@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 
+import numpy as np
+
 from cdpr_drake.analyses.calibration.calibration_request import Prepared
 from cdpr_drake.analyses.calibration.columns import (
     ANGLES,
@@ -40,6 +42,9 @@ MOST_OF_ONE, FEWEST_OF_ONE = 0.5, 4
 MOST_OUTLYING = 0.1
 """Outliers are many where they are a larger share of what was measured beyond what is unknown."""
 
+LEAST_SHARE, MOST_SHARE = 0.03, 0.25
+"""Offsets over lengths between which they are more likely factors."""
+
 HINTS = {
     "lengths": "sign, unit or zero?",
     "swivel angles": "sign or zero?",
@@ -61,7 +66,7 @@ def misfits(result: CalibrationResult, groups: Sequence[GroupFault] = ()) -> tup
         result: What was found.
         groups: Groups of its measurements that do not agree.
     """
-    why = [group.words for group in groups if group.counts]
+    why = [_reason(group) for group in groups if group.counts]
     if result.degrees > 0 and result.spread() > MISFIT_FACTOR:
         why.append(
             f"residuals are {result.spread():.3g} sigmas, root mean square; accepted: at most "
@@ -84,6 +89,54 @@ def misfits(result: CalibrationResult, groups: Sequence[GroupFault] = ()) -> tup
             f"{worst.unit}, {abs(worst.sigmas):.3g} sigmas"
         )
     return tuple(why)
+
+
+def _reason(group: GroupFault) -> str:
+    """Why a group is no fit, in words; with what to look at first where readings were lost."""
+    if group.test != "dropped":
+        return group.words
+    return f"{group.words}: {HINTS.get(group.kind, '')}"
+
+
+def remarked_groups(groups: Sequence[GroupFault]) -> tuple[str, ...]:
+    """Groups that do not agree with the others and yet make no misfit, in words."""
+    return tuple(
+        f"{group.words}; poses would move by {group.moves:.2g} of their deviations without that"
+        if np.isfinite(group.moves)
+        else group.words
+        for group in groups
+        if not group.counts
+    )
+
+
+def likely_scales(
+    result: CalibrationResult, prepared: Prepared, groups: Sequence[GroupFault]
+) -> tuple[str, ...]:
+    """That offsets of lengths are more likely factors, in words.
+
+    Lengths of a cable that change less than they are long tell an offset from a factor hardly, and
+    drums' radii are known worse than zeros: an offset of 3 % of a cable is remarked. Counts that
+    begin at another length than the cable has, as those from zero, have offsets of that kind and
+    are left out.
+    """
+    lengths, names = prepared.lengths, result.names
+    if lengths is None or prepared.is_zeroed():
+        return ()
+    told = []
+    for k, cable in enumerate(prepared.task.robot.cables):
+        offset, mean = float(result.model.length_offset[k]), float(np.nanmean(lengths[:, k]))
+        unknown = f"{cable.name}.length_offset" in names
+        other = f"{cable.name}.length_scale" in names
+        if unknown and not other and LEAST_SHARE < abs(offset) / max(mean, 1e-9) < MOST_SHARE:
+            told.append(
+                f"{cable.name} {1e3 * offset:.0f} mm, as a factor of {1 + offset / mean:.3f}"
+            )
+    if not told:
+        return ()
+    return (
+        f"length offsets are {100 * LEAST_SHARE:.0f} % of the lengths or more, and more likely "
+        f"scales, from a drum's radius or a unit: {'; '.join(told)}; see length_scales",
+    )
 
 
 def is_thrown_out(fit: Fit) -> bool:

@@ -79,7 +79,7 @@ def turned_sensors(
         groups: Groups of its measurements that do not agree.
         refitted: Calibrates anew, from one start.
     """
-    lost = [group.quantity for group in groups if group.test == "dropped"]
+    lost = [g.quantity.removeprefix("readings of ") for g in groups if g.test == "dropped"]
     suspects = [kind for kind, fit in result.residuals.items() if is_thrown_out(fit)]
     if not lost and not suspects and any(g.counts and g.test in CLEAR for g in groups):
         return ()
@@ -188,9 +188,7 @@ def _with_column(log: CalibrationLog, field: str, k: int, factor: float) -> Cali
     return replace(log, **{field: values})
 
 
-def _turned_cables(
-    task: CalibrationTask, log: CalibrationLog, kinds: list[str]
-) -> Iterator[Trial]:
+def _turned_cables(task: CalibrationTask, log: CalibrationLog, kinds: list[str]) -> Iterator[Trial]:
     """Each cable's sensor of some kinds with its sign turned."""
     for kind in kinds:
         field = TRIED.get(kind, "")

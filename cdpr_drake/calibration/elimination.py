@@ -145,6 +145,20 @@ class LeastSquares:
         total += 0.5 * float(prior @ prior)
         return total if np.isfinite(total) else np.inf
 
+    def _undetermined(self, pose: int) -> str:
+        """That nothing determines a pose, in words; or nothing that fits."""
+        gone = sum(int(np.sum(rows[pose])) for rows in self.dropped or ())
+        if not gone:
+            return (
+                f"pose {pose + 1}: what was measured there does not determine where the platform "
+                "is; accepted: more measurements at it, or none of it"
+            )
+        whole = sum(int(np.sum(term.measured()[pose])) for term in self.terms)
+        return (
+            f"pose {pose + 1}: {gone} of {whole} readings there do not fit, and the others do not "
+            "determine where the platform is; accepted: readings that agree, or another start"
+        )
+
     def normal_equations(self, at: Point, damping: float, robust: bool = True) -> NormalEquations:
         """Eliminates the poses.
 
@@ -163,10 +177,7 @@ class LeastSquares:
             spread = np.linalg.eigvalsh(H)
             bad = spread[:, 0] <= SINGULAR * spread[:, -1]
             if bad.any():
-                raise CalibrationError(
-                    f"pose {int(np.argmax(bad)) + 1}: what was measured there does not determine "
-                    "where the platform is; accepted: more measurements at it, or none of it"
-                )
+                raise CalibrationError(self._undetermined(int(np.argmax(bad))))
         damped = H + damping * np.eye(H.shape[1])
         solved = np.linalg.solve(damped, np.concatenate([C, g], axis=2))
         back, alone = solved[:, :, :-1], solved[:, :, -1]

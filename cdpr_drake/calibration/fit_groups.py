@@ -2,7 +2,7 @@
 
 At a minimum the residuals over sigma are r = M e, with e the noise and M the projector off all that
 parameters and poses can follow. A systematic error c d, such as all lengths of a cable being a
-share c too long (d: these readings over sigma, else 0), leaves c M d in them, so that
+share c too long (d: minus these lengths over sigma, else 0), leaves c M d in them, so that
 
     c = d' r / d' M d,    t = d' r / sqrt(sum over kinds g of s_g^2 |(M d)_g|^2)
 
@@ -11,8 +11,11 @@ of the residuals themselves once c d is taken out: sigmas that are too large or 
 factor change no test, and an error does not hide behind the scatter that it makes. t has Student's
 distribution, with degrees of freedom by Satterthwaite's rule.
 
-An error counts as a misfit where it is certain (`FALSE_ALARM` over the number of tests), larger than
-the scatter itself, and moves poses or parameters by more than their stated deviations.
+An error makes a misfit where it is certain (`FALSE_ALARM` over the number of tests, with an
+allowance for errors of the model, `MODEL_ERROR`), larger than the scatter itself, and where it
+moves poses by more than their stated deviations (`MATERIAL`). Errors that are large beside the
+stated sigma are thrown out of the fit instead: there the shares of a sensor, a kind and a row are
+limited (`MOST_DROPPED`), and one factor that explains several such rows is sought.
 
 Source: Lagrange-multiplier test of omitted variables: Cook and Weisberg, Residuals and influence in
 regression, 1982, 2.2; Baarda, A testing procedure for use in geodetic networks, 1968, for tests of
@@ -24,6 +27,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
@@ -36,6 +40,7 @@ from cdpr_drake.calibration.elimination import UNTOLD, LeastSquares
 from cdpr_drake.calibration.pose_search import OUTLIER
 from cdpr_drake.calibration.result import CalibrationResult, used_rows
 from cdpr_drake.calibration.stations import POSE, Point
+from cdpr_drake.calibration.terms import Term
 
 FALSE_ALARM = 1e-4
 """Probability that noise alone makes a log a misfit; of 200 logs, 2 % have a false alarm. Each of n
@@ -43,6 +48,9 @@ tests has this over n (Bonferroni)."""
 
 MOST_DROPPED = 1.0 / 3.0
 """Share of a quantity's readings that may be thrown out."""
+
+MOST_OF_KIND = 0.1
+"""Share of the readings of a kind, over all sensors, that may be thrown out."""
 
 DROPPED_BY_NOISE = 0.05
 """Share that noise of twice the stated sigma throws out: P(|x| > 4 / 2) = 0.0455."""
@@ -61,11 +69,18 @@ public log of IRMA4U, at rest and between, errors that are there stay below 2.4 
 MATERIAL = 1.5
 """An error moves poses by more of their stated deviations than this, root mean square."""
 
+FAR = 5.0
+"""An error that moves poses by more of their deviations is none of a model: it has to be certain
+beside scatter alone."""
+
+LEAST_FACTOR = 0.01
+"""Factors nearer to 1 are remarked: stretch of cables, or a drum's radius, makes as much."""
+
 ABOVE_SCATTER = 1.5
 """An error is this many times the scatter of readings, root mean square, where it acts."""
 
-MOST_SPLITS, END_ROWS = 30, 3
-"""Instants at which a log is split in two, and rows on each side at least."""
+MOST_SPLITS, MOST_JUMPS, END_ROWS = 100, 30, 3
+"""Instants at which a log is split in two, and a sensor may jump; rows on each side at least."""
 
 MOST_ROW_TESTS = 200
 """Rows whose own factors are compared, spread over the log."""
@@ -80,6 +95,7 @@ class GroupFault:
 
     Attributes:
         test: "dropped", "rows", "factor", "late", "jump", "split" or "row factors".
+        kind: Kind of measurement.
         quantity: What was measured, in words.
         rows: Rows it is about, from 0; empty: all.
         size: Factor, delay in rows, jump in the unit, or number of readings.
@@ -91,6 +107,7 @@ class GroupFault:
     """
 
     test: str
+    kind: str
     quantity: str
     rows: tuple[int, ...]
     size: float
@@ -122,23 +139,30 @@ def group_faults(problem: LeastSquares, result: CalibrationResult) -> tuple[Grou
 def _dropped_quantities(
     problem: LeastSquares, at: Point, used: Sequence[npt.NDArray[np.bool_]]
 ) -> list[GroupFault]:
-    """Single sensors, such as roll or the length of a cable, of which too much was thrown out."""
-    faults = []
-    count = sum(term.measured().any(axis=0).sum() for term in problem.terms)
+    """Single sensors, such as roll or the length of a cable, of which too much was thrown out; and
+    kinds of measurement of which too much was, though each sensor lost little."""
+    faults: list[GroupFault] = []
+    count = sum(1 + term.measured().any(axis=0).sum() for term in problem.terms)
+
+    def look(kind: str, what: str, lost: npt.NDArray[np.bool_], whole: int, most: float) -> bool:
+        gone = int(lost.sum())
+        chance = float(binom.sf(gone - 1, whole, DROPPED_BY_NOISE)) if gone else 1.0
+        if gone <= most * whole or chance >= FALSE_ALARM / count:
+            return False
+        rows = tuple(np.flatnonzero(lost.reshape(len(lost), -1).any(axis=1)).tolist())
+        words = f"{gone} of {whole} {what} do not fit"
+        faults.append(GroupFault("dropped", kind, what, rows, gone, 0.0, chance, np.inf, words))
+        return True
+
     for term, counted in zip(problem.terms, used, strict=True):
         measured = term.measured()
-        lost = measured & ~counted
+        lost, named = measured & ~counted, False
         for column in np.flatnonzero(lost.any(axis=0)).tolist():
-            whole, gone = int(measured[:, column].sum()), int(lost[:, column].sum())
-            chance = float(binom.sf(gone - 1, whole, DROPPED_BY_NOISE))
-            if gone > MOST_DROPPED * whole and chance < FALSE_ALARM / count:
-                what = term.row_name(column, at.model.names)
-                faults.append(
-                    GroupFault(
-                        "dropped", what, tuple(np.flatnonzero(lost[:, column]).tolist()), gone, 0.0,
-                        chance, np.inf, f"{gone} of {whole} readings of {what} do not fit",
-                    )
-                )  # fmt: skip
+            what = f"readings of {term.row_name(column, at.model.names)}"
+            whole = int(measured[:, column].sum())
+            named |= look(term.kind, what, lost[:, column], whole, MOST_DROPPED)
+        if not named:
+            look(term.kind, term.kind, lost, int(measured.sum()), MOST_OF_KIND)
     return faults
 
 
@@ -159,7 +183,7 @@ def _dropped_rows(
         many = len(rows) > max(1.0, MOST_ROWS * len(whole))
         faults.append(
             GroupFault(
-                "rows", term.kind, tuple(rows.tolist()), len(rows), 0.0, 0.0, np.inf,
+                "rows", term.kind, term.kind, tuple(rows.tolist()), len(rows), 0.0, 0.0, np.inf,
                 f"{_row_words(rows)} of {len(whole)} lost half of their {term.kind}, or more",
                 bool(many or (spare[rows] <= 0).any()),
             )
@@ -179,14 +203,14 @@ def _explained_rows(
     rows = np.flatnonzero(np.any(np.concatenate(lost, axis=1), axis=1))
     if len(rows) < FEWEST_EXPLAINED:
         return []
-    r, _, B = whole.evaluate(at)
-    r, B = r[rows], B[rows]
+    evaluated, _, B = whole.evaluate(at)
+    r, B = evaluated[rows], B[rows]
     hat = B @ np.linalg.solve(np.swapaxes(B, 1, 2) @ B, np.swapaxes(B, 1, 2))
     faults, begin = [], 0
     for term in problem.terms:
         inside = slice(begin, begin + term.measured().shape[1])
         begin = inside.stop
-        values = np.where(term.measured(), term.values(at) / term.sigmas(), 0.0)[rows]
+        values = _expected(term, evaluated[:, inside], at)[rows]
         if np.sum(np.any(values != 0.0, axis=0)) < 2:
             continue
         d = np.zeros(r.shape)
@@ -196,17 +220,18 @@ def _explained_rows(
         told = size > LEAST_ROW_SEEN * np.sum(d**2, axis=1)
         c = np.where(told, np.sum(d * off, axis=1) / np.where(told, size, 1.0), 0.0)
         before, after = (np.max(np.abs(x), axis=1) for x in (off, off - c[:, None] * seen))
-        clear = told & (before > OUTLIER) & (after < np.maximum(OUTLIER, LEFT_OVER * before))
+        clear = told & (before > GROSS * OUTLIER) & (np.abs(c) > LEAST_FACTOR)
+        clear &= after < np.maximum(OUTLIER, LEFT_OVER * before)
         if not clear.any():
             continue
         middle = float(np.median(c[clear]))
         agree = clear & (np.abs(c - middle) < AGREEING * abs(middle))
         if agree.sum() < FEWEST_EXPLAINED:
             continue
-        factor = 1.0 / (1.0 - middle)
+        factor = 1.0 + middle
         faults.append(
             GroupFault(
-                "row factors", term.kind, tuple(rows[agree].tolist()), factor,
+                "row factors", term.kind, term.kind, tuple(rows[agree].tolist()), factor,
                 float(np.std(c[agree])), 0.0, np.inf,
                 f"{term.kind} of {_row_words(rows[agree])} are {factor:.4g} times what fits the "
                 "other rows; with that, nothing of these rows is thrown out",
@@ -217,6 +242,9 @@ def _explained_rows(
 
 FEWEST_EXPLAINED = 2
 """Rows that one factor explains."""
+
+GROSS = 2.0
+"""So many times the limit of outliers are off in them: noise of twice its sigma is no error."""
 
 LEFT_OVER, AGREEING = 0.1, 0.2
 """Share of the largest residual of a row that its factor leaves, since poses turn with it; and
@@ -253,12 +281,10 @@ class _Residuals:
         r, A, B = problem.evaluate(at)
         self.r, self._A, self._B = np.where(self.used, r, 0.0), A, B
         H = np.swapaxes(B, 1, 2) @ B
-        self._H = H
         self._Bt = np.linalg.solve(H, np.swapaxes(B, 1, 2))  # (k, q, R)
         self.A = A - B @ (self._Bt @ A)
         typical = at.layout.typical[problem.free]
-        prior, P = problem.prior.evaluate(at, problem.free)
-        self._prior = P * typical
+        self._prior = problem.prior.evaluate(at, problem.free)[1] * typical
         flat = self.A.reshape(self.r.size, A.shape[2])
         self._inverse = _told_inverse(flat.T @ flat + self._prior.T @ self._prior)
         self._components()
@@ -295,7 +321,7 @@ class _Residuals:
         return D - self.A @ along, -self._prior @ along
 
     def moves(self, error: Array) -> float:
-        """By how many stated deviations poses (root mean square) or a parameter move by an error.
+        """By how many stated deviations poses move by an error, root mean square.
 
         Args:
             error: Of residuals over sigma, shape (k, R).
@@ -311,8 +337,6 @@ class _Residuals:
         )
         with np.errstate(invalid="ignore", divide="ignore"):
             ratios = np.where(self.pose_std > 0.0, sizes / self.pose_std, 0.0)
-        deviations = np.sqrt(np.maximum(np.diag(self._inverse), 1e-30))
-        parameters = np.abs(theta) / deviations
         return float(np.max(np.sqrt(np.mean(ratios**2, axis=0))))
 
 
@@ -367,9 +391,25 @@ def _systematic(residuals: _Residuals) -> list[GroupFault]:
     return faults
 
 
+def _expected(term: Term, r: Array, at: Point) -> Array:
+    """What the fit expects a term to have measured, over sigma, shape (k, rows).
+
+    Measured values would not do in its place: the noise in them fits itself with a factor of 0.
+    """
+    values = term.values(at) / term.sigmas()
+    valued = np.any(np.nan_to_num(values) != 0.0, axis=0)
+    return np.where(term.measured() & valued, values + r, 0.0)
+
+
 def _values(residuals: _Residuals) -> Array:
-    """What was measured over sigma, shape (k, R); zero where a factor means nothing."""
-    parts = [term.values(residuals.at) / term.sigmas() for term in residuals.problem.terms]
+    """What the fit expects over sigma, shape (k, R); zero where a factor means nothing."""
+    ends = np.cumsum([term.measured().shape[1] for term in residuals.problem.terms])[:-1]
+    parts = [
+        _expected(term, r, residuals.at)
+        for term, r in zip(
+            residuals.problem.terms, np.split(residuals.r, ends, axis=1), strict=True
+        )
+    ]
     return np.where(residuals.used, np.concatenate(parts, axis=1), 0.0)
 
 
@@ -381,8 +421,7 @@ def _valued_kinds(residuals: _Residuals) -> list[int]:
 def _directions(residuals: _Residuals) -> list[_Direction]:
     values, used, terms = _values(residuals), residuals.used, residuals.problem.terms
     count = len(values)
-    steps = np.linspace(END_ROWS, count - END_ROWS, MOST_SPLITS) if count >= 2 * END_ROWS else []
-    splits = sorted({round(float(step)) for step in steps})
+    splits, jumps = _instants(count, MOST_SPLITS), _instants(count, MOST_JUMPS)
     directions = []
     begin = 0
     for g, term in enumerate(terms):
@@ -395,12 +434,7 @@ def _directions(residuals: _Residuals) -> list[_Direction]:
         names = [term.row_name(int(c), residuals.at.model.names) for c in range(width)]
         units = [term.row_unit(int(c)) for c in range(width)]
 
-        def put(test: str, name: str, unit: str, rows: Sequence[int], columns, error) -> None:
-            whole = np.zeros(used.shape)
-            whole[:, columns] = error
-            whole[~used] = 0.0
-            directions.append(_Direction(test, name, g, unit, tuple(rows), whole))
-
+        put = partial(_put, directions, used, g)
         sigma = term.sigmas()
         for c in valued.tolist():
             at, v = begin - width + c, values[:, begin - width + c]
@@ -410,7 +444,7 @@ def _directions(residuals: _Residuals) -> list[_Direction]:
             put("late", names[c], "rows", (), at, ahead)
             behind = np.append(0.0, np.where(both, np.diff(v), 0.0))
             put("late", names[c], "rows", (), at, behind)
-            for split in splits:
+            for split in jumps:
                 late = np.arange(count) >= split
                 put("jump", names[c], units[c], range(split, count), at, -(late / sigma[:, c]))
         if len(valued) > 1:
@@ -419,6 +453,25 @@ def _directions(residuals: _Residuals) -> list[_Direction]:
                 late = (np.arange(count) >= split)[:, None]
                 put("split", term.kind, "-", range(split, count), inside, -values[:, inside] * late)
     return directions
+
+
+def _instants(count: int, most: int) -> list[int]:
+    """Rows at which a log is split, at most so many, with rows enough on each side."""
+    if count < 2 * END_ROWS:
+        return []
+    steps = np.linspace(END_ROWS, count - END_ROWS, min(most, count - 2 * END_ROWS + 1))
+    return sorted({round(float(step)) for step in steps})
+
+
+def _put(
+    directions: list[_Direction], used: npt.NDArray[np.bool_], kind: int,
+    test: str, name: str, unit: str, rows: Sequence[int], columns: int | slice, error: Array,
+) -> None:  # fmt: skip
+    """Adds an error of some columns, where they count."""
+    whole = np.zeros(used.shape)
+    whole[:, columns] = error
+    whole[~used] = 0.0
+    directions.append(_Direction(test, name, kind, unit, tuple(rows), whole))
 
 
 def _tested(
@@ -444,10 +497,14 @@ def _tested(
         if freedom < 1.0 or variance <= 0.0:
             continue
         std = float(np.sqrt(variance)) / size[n]
-        chance = float(2.0 * t.sf(abs(c) / (MODEL_ERROR * std), freedom))
-        if chance >= level:
+        plain, chance = 2.0 * t.sf(abs(c) / std / np.array([1.0, MODEL_ERROR]), freedom)
+        if plain >= level:
             continue
-        faults.append(_fault(residuals, direction, float(c), std, chance, scatter[direction.kind]))
+        fault = _fault(residuals, direction, float(c), std, float(chance), scatter[direction.kind])
+        if chance >= level and fault.moves > FAR:
+            fault = replace(fault, probability=float(plain))
+        if fault.probability < level:
+            faults.append(fault)
     return faults
 
 
@@ -486,21 +543,20 @@ def _fault(
     above = float(np.sqrt(np.mean(error[acts] ** 2))) / max(scatter, 1e-30)
     moves = residuals.moves(error)
     size, what, rows = c, direction.quantity, direction.rows
+    large = direction.test not in ("factor", "split") or abs(c) > LEAST_FACTOR
     if direction.test in ("factor", "split"):
-        size = 1.0 / (1.0 - c) if abs(1.0 - c) > 1e-3 else np.inf
-        std = std * size**2
+        size = 1.0 + c
         where = "" if direction.test == "factor" else f"from row {rows[0] + 1} on "
         verb = "are" if what.startswith("all ") or where else "is"
         words = f"{what} {where}{verb} {size:.4g} +- {std:.2g} times what fits"
     elif direction.test == "late":
         words = f"{what} is {abs(size):.3g} +- {std:.2g} rows {'late' if size > 0 else 'early'}"
     else:
-        words = (
-            f"{what} jumps at row {rows[0] + 1} by {size:.4g} +- {std:.2g} {direction.unit}"
-        )
+        words = f"{what} jumps at row {rows[0] + 1} by {size:.4g} +- {std:.2g} {direction.unit}"
+    kind = residuals.problem.terms[direction.kind].kind
     return GroupFault(
-        direction.test, what, rows, size, std, chance, moves, words,
-        above > ABOVE_SCATTER and moves > MATERIAL,
+        direction.test, kind, what, rows, size, std, chance, moves, words,
+        large and above > ABOVE_SCATTER and moves > MATERIAL,
     )  # fmt: skip
 
 
@@ -521,7 +577,7 @@ def _row_factors(residuals: _Residuals, kind: int, level: float) -> list[GroupFa
     aV = a @ V
     size = np.diag(np.sum(rest**2, axis=1)) - aV @ a.T
     along = np.sum(residuals.r[rows] * d, axis=1)
-    c = np.linalg.pinv(size, rcond=1e-9, hermitian=True) @ along
+    c = np.linalg.pinv(size, rcond=1e-8, hermitian=True) @ along
     error = np.zeros(values.shape)
     error[rows] = c[:, None] * d
     projected, _ = residuals.projected(error[:, :, None])
@@ -557,13 +613,13 @@ def _row_factors(residuals: _Residuals, kind: int, level: float) -> list[GroupFa
     above = float(np.sqrt(np.mean(error[error != 0.0] ** 2))) / max(scatter[kind], 1e-30)
     moves = residuals.moves(error)
     name = residuals.problem.terms[kind].kind
-    factor = 1.0 / (1.0 - (np.mean(c[off]) - np.mean(c[~off])))
+    factor = 1.0 + np.mean(c[off]) - np.mean(c[~off])
     return [
         GroupFault(
-            "row factors", name, tuple(rows[off].tolist()), float(factor),
+            "row factors", name, name, tuple(rows[off].tolist()), float(factor),
             float(np.std(c[off])), chance, moves,
             f"{name} of {_row_words(rows[off])} are {factor:.4g} times what fits the other rows",
-            above > ABOVE_SCATTER and moves > MATERIAL,
+            abs(factor - 1.0) > LEAST_FACTOR and above > ABOVE_SCATTER and moves > MATERIAL,
         )
     ]  # fmt: skip
 

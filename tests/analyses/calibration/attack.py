@@ -1,9 +1,9 @@
 """Logs with systematic errors, and clean ones: what a calibration says of each.
 
-`python -m tests.analyses.calibration.attack` prints a table of attacks; `--clean 200` calibrates so
-many clean logs, and counts false alarms; `--robot ROBOT --log LOG` attacks a log of one's own, whose
-clean fit is the truth then. An attack is met where the verdict is a misfit, or a refusal, with its
-reason, or where poses stay within their stated deviations.
+`python -m tests.analyses.calibration.attack` prints a table of attacks. `--clean 200` calibrates so
+many clean logs and counts false alarms. `--robot ROBOT --log LOG` attacks another log, whose clean
+fit is the truth then. An attack is met where the verdict is a misfit, or a refusal, with its reason,
+or where poses stay within their stated deviations.
 """
 
 import argparse
@@ -29,15 +29,14 @@ from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import rigid_platform
 from cdpr_drake.statics.equilibrium import equilibrium_near
 
-WITHIN = 3.0
-"""Poses are right where their errors are, root mean square, at most so many of their deviations."""
+WITHIN = 4.0
+"""Poses are right where their errors are, root mean square, at most so many of their deviations: as
+many as make an outlier."""
 
 FACTOR = 1.05
 """By which readings are too large."""
 
-NOISE = Sigmas(
-    lengths=5e-4, place=5e-4, turn=1e-3, swivels=2e-3, tilt=2e-3, yaw=4e-3, tensions=0.5
-)
+NOISE = Sigmas(lengths=5e-4, place=5e-4, turn=1e-3, swivels=2e-3, tilt=2e-3, yaw=4e-3, tensions=0.5)
 """Of simulated sensors."""
 
 SHARES = (0.1, 0.3, 0.5, 0.7, 0.9)
@@ -88,7 +87,7 @@ def _resting(count: int, seed: int) -> tuple[list[RigidTransform], np.ndarray]:
         X_WP = pose_from_angles(place, random.uniform(-0.2, 0.2, 3))
         lengths = Point(model, Stations.at([X_WP])).numbers[0, :, 0]
         rest = equilibrium_near(cables, "elastic", platform, lengths, X_WP)
-        if 3.0 < np.min(rest.tensions) and np.max(rest.tensions) < 300.0:
+        if np.min(rest.tensions) > 3.0 and np.max(rest.tensions) < 300.0:
             poses.append(rest.X_WP)
             tensions.append(rest.tensions)
     return poses, np.array(tensions)
@@ -121,9 +120,7 @@ def scene(
         asked = {"unknown": ("exit_points", "length_offsets"), "priors": {"exit_points": 0.01}}
         return Scene(robot, replace(log, poses=list(seen)), poses, {**asked, **options})
     tilts = np.array([RollPitchYaw(X.rotation()).vector() for X in poses])
-    tilts = tilts + random.standard_normal(tilts.shape) * [
-        noise.tilt, noise.tilt, noise.yaw
-    ]
+    tilts = tilts + random.standard_normal(tilts.shape) * [noise.tilt, noise.tilt, noise.yaw]
     log = replace(log, swivels=noisy(numbers[:, :, 2], noise.swivels), tilts=tilts)
     asked = {} if cables == 4 else {"unknown": ("length_offsets",), "rest": False}
     return Scene(robot, log, poses, {"start": poses[0], **asked, **options})
