@@ -14,7 +14,7 @@ from cdpr_drake.analyses.reporting.statements import new_table
 from cdpr_drake.analyses.visualization.figure_style import bar_style, new_figure
 from cdpr_drake.models.camera_catalogue import Camera, Distortion, fold_problem
 from cdpr_drake.palette import nth_look
-from cdpr_drake.vision.camera_fit import CELLS, LEAST_OUTLIER, OUTLIER, CameraFit
+from cdpr_drake.vision.camera_fit import CELLS, CORNER_OUTLIER, LEAST_OUTLIER, OUTLIER, CameraFit
 from cdpr_drake.vision.lens_distortion import COEFFICIENTS
 
 ROLES = ("fitted", "held out", "outlier")
@@ -68,6 +68,11 @@ def camera_remarks(fit: CameraFit, unseen: list[str]) -> list[str]:
     bad = [f"{view.name} ({view.rms:.2f} px)" for view in fit.views if view.role == "outlier"]
     if bad:
         said.append("left out, since they fit far worse than the others: " + ", ".join(bad))
+    if fit.left_out:
+        said.append(
+            f"{fit.left_out} corners were left out, since they are off by more than "
+            f"{CORNER_OUTLIER:g} standard deviations of all"
+        )
     own = fit.rms("fitted")
     far = [
         f"{view.name} ({view.rms:.2f} px)"
@@ -115,6 +120,7 @@ def camera_numbers(fit: CameraFit, remarks: list[str], camera: Camera) -> dict[s
         "held_out_rms_px": finite(fit.rms("held out")),
         "coverage": fit.coverage,
         "reach": fit.reach,
+        "corners_left_out": fit.left_out,
         "largest_tilt_deg": float(np.degrees(fit.tilt)),
         "images": [
             {

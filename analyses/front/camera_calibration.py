@@ -181,7 +181,7 @@ def find_boards(
         if found is None:
             unseen.append(name)
         else:
-            views.append(View(name, *found))
+            views.append(View(name, *found, board.together))
     if size is None:
         raise CameraCalibrationError("images: found none; accepted: files of images")
     return views, unseen, size

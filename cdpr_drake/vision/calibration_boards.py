@@ -34,8 +34,30 @@ DICTIONARIES = {CHARUCO: "4X4_250", TAGS: "APRILTAG_36h11"}
 FEWEST_CORNERS = 8
 """Of a board that counts as found: a pose and a homography have eight numbers from four."""
 
-REFINED = 5
-"""Half the edge of the window in which a corner is refined, at most [px]."""
+LEAST_WINDOW, MOST_WINDOW = 2, 11
+"""Half the edge of the window in which a corner is refined [px]."""
+
+WINDOW_SHARES = {CHESSBOARD: (0.3,), CHARUCO: (0.3, 0.16), TAGS: (1.0 / 16.0,)}
+"""The same per distance of neighbouring corners, one refinement after the other. What is around a
+corner of a chessboard is the same when turned by half a turn, and so are the errors that blur
+makes, which cancel. Corners of a ChArUco board are first found among the dark rims of its markers,
+then between them. The window keeps to half a cell of a tag, which has eight."""
+
+SHARPEST, BLURRED = 3, (5, 53, 12)
+"""How much darker than its surroundings a marker is, of 255, and the least, largest and step of
+the edges of these surroundings [px]: dim, flat and blurred pictures lose markers with OpenCV's 7
+and 3 to 23."""
+
+FINDERS = (
+    lambda gray, inner: cv2.findChessboardCorners(gray, inner, flags=cv2.CALIB_CB_ADAPTIVE_THRESH),
+    lambda gray, inner: cv2.findChessboardCornersSB(gray, inner, flags=cv2.CALIB_CB_ACCURACY),
+    lambda gray, inner: cv2.findChessboardCornersSB(gray, inner, flags=cv2.CALIB_CB_EXHAUSTIVE),
+    lambda gray, inner: cv2.findChessboardCornersSB(
+        gray, inner, flags=cv2.CALIB_CB_NORMALIZE_IMAGE + cv2.CALIB_CB_EXHAUSTIVE
+    ),
+)
+"""OpenCV's finders of chessboards, one after the other until one finds it. The last one makes the
+histogram even (`CALIB_CB_NORMALIZE_IMAGE`), which melts board and wall together in many pictures."""
 
 
 @dataclass(frozen=True)
@@ -98,6 +120,11 @@ class CalibrationBoard:
                     f"markers: found {found!r}; {accepted_names(found, sorted(known))}"
                 )
 
+    @property
+    def together(self) -> int:
+        """Corners that follow each other in what `find` gives and are of one tag; else 1."""
+        return 4 if self.kind == TAGS else 1
+
     @cached_property
     def drawing(self) -> cv2.aruco.Board:
         """The board of OpenCV, which can draw it; not of chessboards."""
@@ -113,13 +140,20 @@ class CalibrationBoard:
 
     @cached_property
     def _detector(self) -> cv2.aruco.CharucoDetector | cv2.aruco.ArucoDetector:
-        if self.kind == CHARUCO:
-            return cv2.aruco.CharucoDetector(self.drawing)
+        parameters = cv2.aruco.DetectorParameters()
         # Subpixel refinement looks at the corner alone; lines along edges would be off where a lens
         # bends them.
-        parameters = cv2.aruco.DetectorParameters()
         parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_NONE
-        return cv2.aruco.ArucoDetector(self.drawing.getDictionary(), parameters)
+        parameters.adaptiveThreshConstant = SHARPEST
+        least, most, step = BLURRED
+        parameters.adaptiveThreshWinSizeMin = least
+        parameters.adaptiveThreshWinSizeMax = most
+        parameters.adaptiveThreshWinSizeStep = step
+        if self.kind == TAGS:
+            return cv2.aruco.ArucoDetector(self.drawing.getDictionary(), parameters)
+        charuco = cv2.aruco.CharucoParameters()
+        charuco.minMarkers, charuco.tryRefineMarkers = 1, True
+        return cv2.aruco.CharucoDetector(self.drawing, charuco, parameters)
 
     def find(self, gray: np.ndarray) -> tuple[Array, Array] | None:
         """Corners of the board in an image, or None where too few are seen.
@@ -141,21 +175,20 @@ class CalibrationBoard:
 
     def _find_chessboard(self, gray: np.ndarray) -> tuple[Array, Array] | None:
         inner = (self.columns - 1, self.rows - 1)
-        there, uv = cv2.findChessboardCornersSB(
-            gray, inner, flags=cv2.CALIB_CB_NORMALIZE_IMAGE + cv2.CALIB_CB_ACCURACY
-        )
-        if not there:
-            return None
         y, x = np.mgrid[: inner[1], : inner[0]]
         points = self.size * np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
-        return points, uv.reshape(-1, 2)
+        for finder in FINDERS:
+            there, uv = finder(gray, inner)
+            if there:
+                return points, self._refined(gray, points, uv.reshape(-1, 2))
+        return None
 
     def _find_charuco(self, gray: np.ndarray) -> tuple[Array, Array] | None:
         uv, ids, _, _ = self._detector.detectBoard(gray)
         if ids is None or len(ids) < FEWEST_CORNERS:
             return None
         points = np.asarray(self.drawing.getChessboardCorners())[np.ravel(ids)]
-        return points, uv.reshape(-1, 2)
+        return points, self._refined(gray, points, uv.reshape(-1, 2))
 
     def _find_tags(self, gray: np.ndarray) -> tuple[Array, Array] | None:
         corners, ids, _ = self._detector.detectMarkers(gray)
@@ -164,14 +197,28 @@ class CalibrationBoard:
         points, uv = self.drawing.matchImagePoints(corners, ids)
         if points is None or len(points) < FEWEST_CORNERS:
             return None
-        uv = uv.reshape(-1, 2)
-        # No wider than a cell of a small tag, which has eight along its edge.
-        sides = np.linalg.norm(
-            uv.reshape(-1, 4, 2) - np.roll(uv.reshape(-1, 4, 2), 1, axis=1), axis=2
-        )
-        half = int(np.clip(np.min(sides) / 16.0, 2, REFINED))
+        points = points.reshape(-1, 3)
+        return points, self._refined(gray, points, uv.reshape(-1, 2))
+
+    def _refined(self, gray: np.ndarray, points: Array, uv: Array) -> Array:
+        """Corners where gradients around them say, in windows as wide as the board lets them be.
+
+        Args:
+            gray: As for `find`.
+            points: Corners on the board, shape (n, 3) [m].
+            uv: The same about where they are in the image, shape (n, 2) [px].
+
+        Source: OpenCV, cornerSubPix; Foerstner, Guelch, A fast operator for detection and precise
+        location of distinct points, corners and centres of circular features, 1987.
+        """
+        apart = np.linalg.norm(points[:, np.newaxis] - points, axis=2)
+        near = (apart > 0.0) & (apart < 1.01 * self.size)
+        if not near.any():
+            return uv
+        least = float(np.min(np.linalg.norm(uv[:, np.newaxis] - uv, axis=2)[near]))
         criteria = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 60, 1e-3)
-        refined = cv2.cornerSubPix(
-            gray, np.ascontiguousarray(uv, np.float32), (half, half), (-1, -1), criteria
-        )
-        return points.reshape(-1, 3), refined.reshape(-1, 2)
+        found = np.array(uv, np.float32, order="C")
+        for share in WINDOW_SHARES[self.kind]:
+            half = int(np.clip(share * least, LEAST_WINDOW, MOST_WINDOW))
+            found = np.asarray(cv2.cornerSubPix(gray, found, (half, half), (-1, -1), criteria))
+        return found

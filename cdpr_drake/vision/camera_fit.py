@@ -5,9 +5,11 @@ was found, says what it is worth beyond the images that it was fitted to. Images
 than the others are named and, unless they shall stay, left out of a second fit.
 
 Standard deviations are those of linear least squares at the solution, with the noise that the
-residuals have: what a lens model cannot show is not in them.
+residuals have: what a lens model cannot show is not in them. Corners of one tag are off together,
+outwards or inwards by what blur makes of its edges: their residuals are added up before squares.
 
-Source: Zhang, IEEE TPAMI 22(11), 2000; OpenCV, modules calib3d and fisheye.
+Source: Zhang, IEEE TPAMI 22(11), 2000; OpenCV, modules calib3d and fisheye; Liang, Zeger,
+Longitudinal data analysis using generalized linear models, 1986, for corners that go together.
 """
 
 from __future__ import annotations
@@ -40,6 +42,10 @@ OUTLIER = 3.0
 LEAST_OUTLIER = 0.3
 """And no image below this rms [px]: detection does not do much better."""
 
+CORNER_OUTLIER, MOST_CORNERS, MOST_CLEANINGS = 4.0, 0.2, 4
+"""A corner that is so many standard deviations of all corners off is left out, where no more than
+this share of its image is; and how often the rest is fitted again."""
+
 LEAST_TILT = 12.0
 """Angle between two boards of a fit, at least [deg]: of parallel ones the distance and the focal
 length are one."""
@@ -59,11 +65,25 @@ _FREE = {"brown_conrady": 5, RATIONAL: 8, "fisheye": 4, NO_LENS: 0}
 
 class View(NamedTuple):
     """A board in an image: its name, corners on the board, (n, 3) [m], and in the image, (n, 2)
-    [px]."""
+    [px]; how many that follow each other are off together, as those of one tag."""
 
     name: str
     points: Array
     uv: Array
+    together: int = 1
+
+    def without(self, residuals: Array, most: float) -> View:
+        """The view without corners that are off by more than `most` [px]; itself where many are.
+
+        Args:
+            residuals: Of its corners, shape (n, 2) [px].
+            most: As above.
+        """
+        off = np.linalg.norm(residuals, axis=1).reshape(-1, self.together).max(axis=1) > most
+        if not off.any() or np.mean(off) > MOST_CORNERS:
+            return self
+        keep = np.repeat(~off, self.together)
+        return self._replace(points=self.points[keep], uv=self.uv[keep])
 
 
 @dataclass(frozen=True)
@@ -99,6 +119,7 @@ class CameraFit:
         coverage: Share of the cells of the image in which fitted corners lie [-].
         reach: Distance of the farthest fitted corner from the middle, per half diagonal [-].
         tilt: Largest angle between two fitted boards [rad].
+        left_out: Corners that are in no view's residuals, since they are off by far more.
     """
 
     camera: Pinhole
@@ -110,6 +131,7 @@ class CameraFit:
     coverage: float
     reach: float
     tilt: float
+    left_out: int = 0
 
     def rms(self, role: str) -> float:
         """Of all corners of views of a role [px]; NaN where there are none."""
@@ -145,7 +167,7 @@ def fit_camera(
         size: Width and height of the images [px].
         model: One of `MODELS`.
         hold_out: Share of the images that are compared only.
-        keep_outliers: Whether images that fit badly count.
+        keep_outliers: Whether images and corners that fit badly count.
 
     Raises:
         CameraCalibrationError: There are too few views, or they do not tell the camera; names why.
@@ -162,7 +184,19 @@ def fit_camera(
     # Evenly among the images, which often come in the order of the board's ways.
     held = set(np.linspace(0, len(views) - 1, count + 2)[1:-1].round().astype(int)) if count else ()
     used = [k for k in range(len(views)) if k not in held]
+    every, views = sum(len(view.uv) for view in views), list(views)
     fit = _fit([views[k] for k in used], size, model)
+    most = np.inf
+    for _ in range(0 if keep_outliers else MOST_CLEANINGS):
+        most = CORNER_OUTLIER * 1.4826 * float(np.median(np.abs(np.concatenate(fit.residuals))))
+        before = sum(len(one) for one in fit.residuals)
+        for k, residuals in zip(used, fit.residuals, strict=True):
+            views[k] = views[k].without(residuals, most)
+        if sum(len(views[k].uv) for k in used) == before:
+            break
+        fit = _fit([views[k] for k in used], size, model)
+    for k in held:
+        views[k] = views[k].without(_residuals_at_best(views[k], fit), most)
     worst = max(OUTLIER * float(np.median(fit.rms)), LEAST_OUTLIER)
     good = [k for k, rms in zip(used, fit.rms, strict=True) if rms <= worst or keep_outliers]
     if len(good) < len(used):
@@ -193,6 +227,7 @@ def fit_camera(
     return CameraFit(
         camera, model, names, fit.values, fit.deviations, tuple(told),
         len({tuple(cell) for cell in cells}) / (CELLS[0] * CELLS[1]), float(reach), fit.tilt,
+        every - sum(len(view.uv) for view in views),
     )  # fmt: skip
 
 
@@ -247,7 +282,8 @@ def _fit(views: Sequence[View], size: tuple[int, int], model: str) -> _Fit:
             "which distance and focal length are one; accepted: boards tilted by "
             f"{LEAST_TILT:g} deg and more against each other"
         )
-    return _Fit(model, values, _deviations(J, extrinsic, residuals), residuals, tilt)
+    together = [view.together for view in views]
+    return _Fit(model, values, _deviations(J, extrinsic, residuals, together), residuals, tilt)
 
 
 def _brown_conrady(
@@ -299,19 +335,29 @@ def _project(
     return uv.reshape(-1, 2), J[:, 6 : 10 + free], J[:, :6]
 
 
-def _deviations(J: list[Array], extrinsic: list[Array], residuals: list[Array]) -> Array:
+def _deviations(
+    J: list[Array], extrinsic: list[Array], residuals: list[Array], together: list[int]
+) -> Array:
     """Standard deviations of the parameters of the camera, poses of boards left free.
 
-    As those of `cv2.calibrateCameraExtended`, which OpenCV does not give of a fisheye.
+    As those of `cv2.calibrateCameraExtended`, which OpenCV does not give of a fisheye. Where
+    corners go together their gradients g are summed first, and the covariance is
+    N^-1 sum(g g') N^-1.
     """
-    N = np.zeros((J[0].shape[1],) * 2)
-    for mine, pose in zip(J, extrinsic, strict=True):
-        mixed = mine.T @ pose
-        N += mine.T @ mine - mixed @ np.linalg.solve(pose.T @ pose, mixed.T)
+    size = J[0].shape[1]
+    N, M, squares = np.zeros((size, size)), np.zeros((size, size)), 0.0
+    for mine, pose, one, group in zip(J, extrinsic, residuals, together, strict=True):
+        free = mine - pose @ np.linalg.solve(pose.T @ pose, pose.T @ mine)
+        N += free.T @ free
+        g = (free * one.reshape(-1, 1)).reshape(-1, 2 * group, size).sum(axis=1)
+        M += g.T @ g if group > 1 else 0.0
+        squares += float(np.sum(one**2))
     count = 2 * sum(len(one) for one in residuals)
-    free = count - len(N) - 6 * len(J)
-    variance = sum(float(np.sum(one**2)) for one in residuals) / max(free, 1)
-    return np.sqrt(variance * np.diag(np.linalg.pinv(N, hermitian=True)))
+    larger = count / max(count - size - 6 * len(J), 1)
+    if max(together) == 1:
+        M = squares / count * N
+    back = np.linalg.pinv(N, hermitian=True)
+    return np.sqrt(larger * np.diag(back @ M @ back))
 
 
 def _refuse_loose(fit: _Fit) -> None:

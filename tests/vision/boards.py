@@ -33,7 +33,16 @@ def board_picture(board):
     return picture, scale, np.array([rim, rim])
 
 
-def board_image(board, K, lens, size, pose, fisheye=False):
+def lit(image, light, seed):
+    """An image in another light: grey of black, of white, and noise; blurred [px]."""
+    black, white, noise, blur = light
+    shown = black + (white - black) * image.astype(np.float32) / 255.0
+    shown = cv2.GaussianBlur(shown, (0, 0), blur) if blur else shown
+    shown = shown + noise * np.random.default_rng(seed).standard_normal(image.shape)
+    return np.clip(np.round(shown), 0, 255).astype(np.uint8)
+
+
+def board_image(board, K, lens, size, pose, fisheye=False, wall=170):
     """An image, shape (height, width), 8 bits, of a board at a pose (R, p) in the camera."""
     picture, scale, corner = board_picture(board)
     width, height = size
@@ -48,7 +57,7 @@ def board_image(board, K, lens, size, pose, fisheye=False):
     drawn = cv2.remap(
         picture, where[0].reshape(shape).astype(np.float32),
         where[1].reshape(shape).astype(np.float32), cv2.INTER_LINEAR,
-        borderMode=cv2.BORDER_CONSTANT, borderValue=170,
+        borderMode=cv2.BORDER_CONSTANT, borderValue=wall,
     )  # fmt: skip
     return cv2.resize(drawn, size, interpolation=cv2.INTER_AREA)
 

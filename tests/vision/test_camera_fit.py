@@ -7,7 +7,7 @@ import pytest
 from cdpr_drake.errors import CameraCalibrationError
 from cdpr_drake.vision.calibration_boards import CalibrationBoard
 from cdpr_drake.vision.camera_fit import View, fit_camera
-from tests.vision.boards import board_image, board_poses, make_board
+from tests.vision.boards import board_image, board_poses, lit, make_board
 
 SIGMAS = 3.5
 """Errors over their standard deviations, the largest of nine: 3 is passed by one in forty such
@@ -134,6 +134,63 @@ def test_drawn_images_give_the_camera_that_drew_them(kind):
     fit = fit_camera(views, SIZE, hold_out=0.0)
     np.testing.assert_allclose(fit.values[:2], np.diag(K)[:2], rtol=IMAGE_FOCAL)
     np.testing.assert_allclose(fit.values[2:4], K[:2, 2], rtol=0.0, atol=IMAGE_CENTRE)
+
+
+LIGHTS = {
+    "bright": ((20, 235, 1.5, 0.0), 170), "dark wall": ((40, 140, 1.5, 0.7), 0),
+    "dim": ((10, 50, 0.7, 0.7), 60), "glare": ((110, 255, 1.5, 1.2), 255),
+    "flat": ((100, 150, 1.0, 0.0), 100),
+}  # fmt: skip
+"""Greys of black and white, noise and blur, and the wall behind the board beside them."""
+
+HONEST, LARGEST = (0.8, 1.3), 4.0
+"""Root mean square, and the largest, of errors over their standard deviations."""
+
+
+def test_boards_are_found_in_any_light_and_deviations_are_the_real_ones():
+    off, plain = [], np.zeros(5)
+    for kind in ("chessboard", "charuco", "tags"):
+        board = make_board(kind)
+        for number, (light, wall) in enumerate(LIGHTS.values()):
+            poses = board_poses(board, 8, 0.55, seed=number, spread=0.2)
+            images = [board_image(board, K, plain, SIZE, pose, wall=wall) for pose in poses]
+            views = []
+            for k, image in enumerate(images):
+                found = board.find(lit(image, light, [number, k]))
+                assert found is not None, (kind, number, k)
+                views.append(View(str(k), *found, board.together))
+            fit = fit_camera(views, SIZE, "none", hold_out=0.0)
+            off.append((fit.values - truth("none")) / fit.deviations)
+    rms = float(np.sqrt(np.mean(np.square(off))))
+    assert HONEST[0] < rms < HONEST[1]
+    assert np.max(np.abs(off)) < LARGEST
+
+
+def test_a_corner_that_is_off_is_left_out_and_counted():
+    views = projected("brown_conrady")
+    held = {view.name for view in fit_camera(views, SIZE).views if view.role == "held out"}
+    bad = next(k for k, view in enumerate(views) if view.name not in held)
+    views[bad].uv[3] += 2.0
+    fit = fit_camera(views, SIZE)
+    assert fit.left_out >= 1
+    assert len(next(v for v in fit.views if v.name == views[bad].name).uv) < len(views[bad].uv)
+    assert np.max(np.abs((fit.values - truth("brown_conrady")) / fit.deviations)) < SIGMAS
+    assert fit_camera(views, SIZE, keep_outliers=True).left_out == 0
+
+
+def test_deviations_of_corners_that_are_off_together_are_those_of_many_fits():
+    """Each four that follow each other have one error, which the single corners' scatter hides."""
+    fits = []
+    for seed in range(12):
+        random, views = np.random.default_rng(seed), []
+        for view in projected("none", count=10, noise=0.0):
+            n = len(view.uv) // 4 * 4
+            shared = np.repeat(0.1 * random.standard_normal((n // 4, 2)), 4, axis=0)
+            views.append(View(view.name, view.points[:n], view.uv[:n] + shared, 4))
+        fits.append(fit_camera(views, SIZE, "none", hold_out=0.0))
+    spread = np.std([fit.values for fit in fits], axis=0, ddof=1)
+    told = np.mean([fit.deviations for fit in fits], axis=0)
+    assert np.all((spread / told > 0.5) & (spread / told < 1.7))
 
 
 @pytest.mark.parametrize(
