@@ -10,8 +10,8 @@ import sys
 import zmq
 
 MASS, GRAVITY, KP, KD = 3.5, 9.81, 100.0, 20.0
-INERTIA = (0.0099, 0.0109, 0.0179)  # of a box of 0.18 x 0.17 x 0.07 m about its middle [kg m^2],
-HEIGHT = 0.035  # which is that high above Po [m]
+INERTIA = (0.0099, 0.0109, 0.0179)  # of a box of 0.18 x 0.17 x 0.07 m about its middle [kg m^2]
+HEIGHT = 0.005  # of the centre of mass above Po, along z of P [m]
 
 
 def wrench(goal: list[float], state: list[float]) -> list[float]:
@@ -25,8 +25,11 @@ def wrench(goal: list[float], state: list[float]) -> list[float]:
     rate = [goal[k] - state[k] for k in range(7, 13)]
     wanted = [goal[13 + k] + KP * way[k] + KD * rate[k] for k in range(6)]
     fx, fy, fz = MASS * wanted[3], MASS * wanted[4], MASS * (wanted[5] + GRAVITY)
+    # The mass lies off Po, on an axis that tilts with the platform.
+    rx, ry = 2.0 * HEIGHT * (x * z + w * y), 2.0 * HEIGHT * (y * z - w * x)
+    rz = HEIGHT * (1.0 - 2.0 * (x * x + y * y))
     mx, my, mz = (INERTIA[k] * wanted[k] for k in range(3))
-    return [mx - HEIGHT * fy, my + HEIGHT * fx, mz, fx, fy, fz]
+    return [mx + ry * fz - rz * fy, my + rz * fx - rx * fz, mz + rx * fy - ry * fx, fx, fy, fz]
 
 
 socket = zmq.Context().socket(zmq.REQ)

@@ -131,7 +131,7 @@ def pick_and_place_facts(summary: dict[str, Any]) -> list[tuple[str, str]]:
         seen += f"; a tag was hidden for {views['hidden_s']:.2f} s"
     low, high = summary["tension_n"]["min"], summary["tension_n"]["max"]
     return [
-        ("simulated", model_words(summary["simulated"])),
+        ("model", model_words(summary["simulated"])),
         ("set down", words),
         ("phases [s]", times),
         ("view", seen),

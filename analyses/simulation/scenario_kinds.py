@@ -195,7 +195,7 @@ def _servo_facts(summary: dict[str, Any]) -> list[tuple[str, str]]:
     if plan is not None:
         way = ("from the plan", f"{1e3 * plan:.2f} mm, {np.degrees(turn):.3f} deg")
     facts = [
-        ("simulated", model_words(summary["simulated"])),
+        ("model", model_words(summary["simulated"])),
         ("final error", f"{1e3 * final[0]:.3f} mm, {np.degrees(final[1]):.3f} deg"),
         ("pose estimate, error", error("final_pose_estimate")),
         way,
@@ -226,7 +226,7 @@ def _tension_facts(summary: dict[str, Any]) -> list[tuple[str, str]]:
     tension, remote = summary["tension_n"], summary.get("remote")
     by = "the client" if remote and remote["place"] == DISTRIBUTOR else summary["method"]
     return [
-        ("simulated", model_words(summary["simulated"])),
+        ("model", model_words(summary["simulated"])),
         (
             "largest error",
             f"{1e3 * position['max']:.4f} mm, {np.degrees(rotation['max']):.5f} deg",

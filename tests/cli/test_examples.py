@@ -1,9 +1,12 @@
 """The examples run as they are shipped, are listed and copied; each help has two that parse."""
 
 import json
+import re
 import runpy
 import shlex
+from pathlib import Path
 
+import numpy as np
 import pytest
 import typer
 
@@ -23,8 +26,87 @@ TABLES = (METHODS, SCHEMES, ESTIMATORS)
 """What examples put rows of their own into."""
 
 
+def numbers(pattern, out):
+    """What the groups of a pattern hold wherever it is found, shape (n, groups)."""
+    found = re.findall(pattern, out)
+    assert found, (pattern, out)
+    return np.array(found, float).reshape(len(found), -1)
+
+
+def calibrates(out):
+    return all(
+        after < before for before, after in numbers(r"([\d.]+) mm off before, ([\d.]+)", out)
+    )
+
+
+def learns(out):
+    return re.search(r"32 of 32 at their goals, 0 lost", out)
+
+
+def repeats(out):
+    ends = numbers(r"([\d.]+)(?=[ \]])", out.rpartition("[mm]: [")[2])
+    return "4 converged" in out and len(ends) == 4 and ends.max() < 0.3
+
+
+def winds_to_the_goal(out):
+    away = numbers(r"s: ([\d.]+) mm away", out)[:, 0]
+    return len(away) == 6 and np.all(np.diff(away) < 0.0) and away[-1] < 0.5
+
+
+def logs_beside(out):
+    return "acrobot_pbvs: converged" in out and "['X_WP_homing']" in out
+
+
+def is_heavier_saved_and_asked(out):
+    share = numbers(r"static +([\d.]+) % of the poses", out)[0, 0]
+    there = Path("mine.yaml").is_file() and Path("mine_workspace.png").stat().st_size > 0
+    return "Robot mine" in out and "1 kg, box" in out and 0.0 < share <= 100.0 and there
+
+
+def both_schemes_arrive(out):
+    return "weighted: " in out and np.all(numbers(r": ([\d.]+) mm off", out) < 0.3)
+
+
+def is_known_by_name(out):
+    rows = numbers(r"tensions \[N\] +([\d.]+)", out)
+    return "tensions by least_norm: feasible" in out and len(rows) == 2
+
+
+def is_tracked(out):
+    return "all kept; steps without tensions: 0" in out and Path("plan.png").is_file()
+
+
+def is_closed_for_two_seconds(out):
+    told = json.loads(Path("served/summary.json").read_text())
+    assert (told["outcome"], told["sim_time_s"]) == ("completed", pytest.approx(2.0))
+    off = told["position_error_m"]["max"], told["rotation_error_rad"]["max"]
+    return "'outcome': 'completed'" in out and off[0] < 1e-3 and off[1] < 0.02
+
+
+def changes_with_the_arm(out):
+    first, _, last = re.findall(r"rad: \[([^\]]+)\] N", out)
+    apart = np.array(first.split(), float) - np.array(last.split(), float)
+    return np.max(np.abs(apart)) > 1.0 and "at rest: stable" in out
+
+
+def one_winds_and_one_waits(out):
+    heights = numbers(r"\[[\d.]+ +[\d.]+ +([\d.]+)\]", out)[:, 0]
+    return heights[0] > heights[1] + 1e-3 and abs(heights[1] - 0.15) < 1e-4
+
+
+SAID = {
+    "calibrate": calibrates, "learning": learns, "monte_carlo": repeats,
+    "own_controller": winds_to_the_goal, "own_estimator": logs_beside,
+    "own_robot": is_heavier_saved_and_asked, "own_scheme": both_schemes_arrive,
+    "own_tension_method": is_known_by_name, "plan_and_follow": is_tracked,
+    "process_outside": is_closed_for_two_seconds, "robot_with_arm": changes_with_the_arm,
+    "two_robots": one_winds_and_one_waits,
+}  # fmt: skip
+"""What the text of each example says, of what it prints and writes. A new one has a row."""
+
+
 @pytest.mark.parametrize("name", example_names())
-def test_an_example_runs_in_an_empty_folder(name, tmp_path, monkeypatch, capfd):
+def test_an_example_does_what_it_says_in_an_empty_folder(name, tmp_path, monkeypatch, capfd):
     monkeypatch.chdir(tmp_path)
     before = [dict(table) for table in TABLES]
     try:
@@ -33,7 +115,8 @@ def test_an_example_runs_in_an_empty_folder(name, tmp_path, monkeypatch, capfd):
         for table, rows in zip(TABLES, before, strict=True):
             table.clear()
             table.update(rows)
-    assert capfd.readouterr().out.strip()
+    out = capfd.readouterr().out
+    assert SAID[name](out), out
     assert len((FOLDER / f"{name}.py").read_text().splitlines()) <= LONG
 
 

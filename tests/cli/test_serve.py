@@ -23,7 +23,7 @@ from tests.messages import printed
 
 PLAIN_CLIENT = Path(str(files("cdpr_drake").joinpath("notebooks/plain_client.py")))
 
-MOST_LINES = 40
+MOST_LINES = 45
 """Of the client without the package."""
 
 LONG = 1800.0
@@ -32,8 +32,8 @@ LONG = 1800.0
 BUSY = 0.5
 """Time that a client takes for a step [s]; a server that stops has to wait for it."""
 
-FOLLOWED = 1e-3
-"""Distance that a PD law with a feedforward keeps from a quintic [m]."""
+FOLLOWED, UPRIGHT = 1e-3, 2e-3
+"""Distance and angle that a PD law with a feedforward keeps from a quintic [m, rad]."""
 
 SCENARIO = ["acrobot_computed_torque", "--set", "integration.engine=compiled"]
 
@@ -57,9 +57,15 @@ def test_a_client_without_the_package(capsys, tmp_path):
     command = [sys.executable, str(PLAIN_CLIENT), f"tcp://127.0.0.1:{port}"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as client:
         code = serve(
-            *SCENARIO, "--place", "controller", "--duration", "1.0", "--port", str(port),
-            "--out", str(out), "--json",
-        )  # fmt: skip
+            *SCENARIO,
+            "--place",
+            "controller",
+            "--port",
+            str(port),
+            "--out",
+            str(out),
+            "--json",
+        )
         said = client.communicate()[0]
     assert code == 0
     assert "'outcome': 'completed'" in said
@@ -67,8 +73,12 @@ def test_a_client_without_the_package(capsys, tmp_path):
     summary = json.loads(shown.out)
     assert f"waiting at tcp://127.0.0.1:{port}" in shown.err
     assert summary["position_error_m"]["max"] < FOLLOWED
+    assert summary["rotation_error_rad"]["max"] < UPRIGHT
     exchanges = summary["remote"].pop("exchanges")
-    assert exchanges in (1000, 1001)  # a row of the log at the very end needs one more
+    assert exchanges in (
+        8000,
+        8001,
+    )  # the 8 s of the scenario; a row of the log at the very end needs one more
     assert summary["remote"] == {
         "place": "controller", "codec": "json", "services": 0, "held_steps": 0, "late_steps": 0
     }  # fmt: skip
