@@ -220,13 +220,15 @@ def _servo_facts(summary: dict[str, Any]) -> list[tuple[str, str]]:
 
 def _tension_facts(summary: dict[str, Any]) -> list[tuple[str, str]]:
     position, rotation = summary["position_error_m"], summary["rotation_error_rad"]
-    tension = summary["tension_n"]
+    tension, method = summary["tension_n"], summary["method"]
+    none = tension["min"] is None  # the run ended before the first control step
+    told = "none yet" if none else f"{tension['min']:.2f} to {tension['max']:.2f} N"
     return [
         (
             "largest error",
             f"{1e3 * position['max']:.4f} mm, {np.degrees(rotation['max']):.5f} deg",
         ),
-        ("tensions", f"{tension['min']:.2f} to {tension['max']:.2f} N by {summary['method']}"),
+        ("tensions", f"{told} by {method}"),
         ("infeasible steps", str(summary["infeasible_steps"])),
         *world_facts(summary),
     ]
