@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from cdpr_drake.analyses.front.session import Say, Session, asked_workers
-from cdpr_drake.analyses.reporting.deferred_figures import write_pictures
+from cdpr_drake.analyses.reporting.deferred_figures import drawing, is_undrawn, write_pictures
 from cdpr_drake.analyses.reporting.exported_logs import checked_log_formats, log_exports
 from cdpr_drake.analyses.reporting.log_files import log_columns
 from cdpr_drake.analyses.reporting.log_on_disk import CHECKPOINT, PARTS, LogOnDisk
 from cdpr_drake.analyses.reporting.output_folder import (
     ResultsFolder,
     continued_folder,
+    finished_folder,
     results_folder,
     resumed_folder,
     shown_path,
@@ -35,6 +39,7 @@ from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.schema.input_files import inputs_read_once
+from cdpr_drake.schema.json_text import load_json
 from cdpr_drake.summaries import Tabulated
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.loops.loop_choice import set_loop
@@ -47,6 +52,9 @@ if TYPE_CHECKING:
 
 REPLAY = "replay.html"
 """Among the pictures of every run."""
+
+SUMMARY, LOG = "summary.json", "log.npz"
+"""The data of one run."""
 
 SCENARIO_FILE = "scenario.yaml"
 """Of every folder of a run, see `write_run_inputs`."""
@@ -228,6 +236,10 @@ def simulate(
         _check(kind, loaded, note, told)
         result = _run(kind, loaded, None, told)
         return Run(loaded, result, kind.numbers(result))
+    if not overwrite and is_undrawn(where):
+        drawn = _drawn(where, kind, loaded, wanted, told)
+        if drawn is not None:
+            return drawn
     with results_folder(where, overwrite) as results:
         told.opened(results)
         _check(kind, loaded, note, told)
@@ -368,16 +380,41 @@ def _run_into(
     return Run(scenario, result, numbers, folder, failed, goes_on)
 
 
+def _drawn(
+    where: Path, kind: ScenarioKind, scenario: Any, wanted: _Wanted, session: Session
+) -> Run | None:
+    """A run that ended while its pictures were drawn, with those that were missing.
+
+    None: the folder has data of another scenario or robot.
+    """
+    with TemporaryDirectory() as there:
+        kind.inputs(Path(there), scenario)
+        for file in Path(there).iterdir():
+            same = where / file.name
+            if not same.is_file() or same.read_bytes() != file.read_bytes():
+                return None
+    with finished_folder(where) as folder, session.doing("Drawing what is missing") as say:
+        numbers = load_json((folder / SUMMARY).read_text(encoding="utf-8"))
+        with np.load(folder / LOG, allow_pickle=False) as arrays:
+            log = {name: arrays[name] for name in arrays.files}
+        outcome = Outcome[str(numbers["outcome"]).upper()]
+        result = replace(kind.unfinished(scenario, log), outcome=outcome)
+        place = shown_path(folder)
+        failed = _write_pictures(place, kind, result, wanted, say, session, missing=True)
+    return Run(scenario, result, numbers, folder, failed)
+
+
 def _write_pictures(
-    folder: Path, kind: ScenarioKind, result: Any, wanted: _Wanted, say: Say, session: Session
-) -> dict[str, str]:
-    return write_pictures(
-        folder,
-        log_exports(folder, wanted.log_formats)
-        | kind.pictures(result, wanted.video, wanted.formats),
-        lambda name: say(f"Writing {name}"),
-        session.stop,
-    )
+    folder: Path, kind: ScenarioKind, result: Any, wanted: _Wanted, say: Say, session: Session,
+    missing: bool = False,
+) -> dict[str, str]:  # fmt: skip
+    """Writes pictures, those that are there anew, or only the `missing` ones."""
+    pictures = log_exports(folder, wanted.log_formats)
+    pictures |= kind.pictures(result, wanted.video, wanted.formats)
+    if missing:
+        pictures = {name: pictures[name] for name in pictures if not (folder / name).exists()}
+    with drawing(folder, session.stop):
+        return write_pictures(folder, pictures, lambda name: say(f"Writing {name}"), session.stop)
 
 
 def _repeat(

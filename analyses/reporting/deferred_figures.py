@@ -7,7 +7,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from cdpr_drake.analyses.reporting.written_files import claim, whole_file
+from cdpr_drake.analyses.reporting.log_files import write_whole
+from cdpr_drake.analyses.reporting.written_files import DRAWING, claim, whole_file
 
 Pictures = dict[str, Callable[[Path], object]]
 """What writes a file to a path, by the name of the file."""
@@ -56,6 +57,23 @@ def write_pictures(
             if maker is None or maker is not next_one:  # else the same figure in another format
                 gc.collect(0)  # figures refer to themselves; those of hours hold 100 MB
     return failed
+
+
+@contextmanager
+def drawing(folder: Path, should_stop: Callable[[], bool]) -> Iterator[None]:
+    """Marks a folder of complete data as one whose pictures are drawn inside the block.
+
+    The mark stays where the block is ended or asked to stop, so that they can be completed.
+    """
+    write_whole(folder / DRAWING, "")
+    yield
+    if not should_stop():
+        (folder / DRAWING).unlink()
+
+
+def is_undrawn(folder: Path) -> bool:
+    """Whether a folder has the data of a run that ended while its pictures were drawn."""
+    return (folder / DRAWING).is_file()
 
 
 MOST_NEW = 2_000_000

@@ -365,6 +365,17 @@ def unfinished_folder(folder: Path) -> Iterator[Path]:
 
 
 @contextmanager
+def finished_folder(folder: Path) -> Iterator[Path]:
+    """A folder of finished data to which pictures are added, for nobody else inside the block.
+
+    Raises:
+        OutputFolderError: It is not there, or is written just now.
+    """
+    with _left(folder) as final, writing(final):
+        yield final
+
+
+@contextmanager
 def _left(folder: Path) -> Iterator[Path]:
     """Where a run was to write its results, as `_checked`, for nobody else inside the block."""
     final = _checked(folder)

@@ -30,6 +30,10 @@ JOURNAL = ".cdpr_drake.writing"
 WORK = "-work-"
 """What follows a results folder's name in that of the hidden one in which it is made."""
 
+DRAWING = ".cdpr_drake.drawing"
+"""In a folder whose data is complete while its pictures are drawn, and afterwards where that was
+stopped."""
+
 FILES = "files"
 """Key of the list in the marker."""
 

@@ -225,13 +225,15 @@ def _tension_facts(summary: dict[str, Any]) -> list[tuple[str, str]]:
     position, rotation = summary["position_error_m"], summary["rotation_error_rad"]
     tension, remote = summary["tension_n"], summary.get("remote")
     by = "the client" if remote and remote["place"] == DISTRIBUTOR else summary["method"]
+    none = tension["min"] is None  # the run ended before the first control step
+    told = "none yet" if none else f"{tension['min']:.2f} to {tension['max']:.2f} N"
     return [
         ("model", model_words(summary["simulated"])),
         (
             "largest error",
             f"{1e3 * position['max']:.4f} mm, {np.degrees(rotation['max']):.5f} deg",
         ),
-        ("tensions", f"{tension['min']:.2f} to {tension['max']:.2f} N by {by}"),
+        ("tensions", f"{told} by {by}"),
         ("infeasible steps", str(summary["infeasible_steps"])),
         *world_facts(summary),
     ]

@@ -423,7 +423,7 @@ def frame_indices(times: Array, rate: float, most: int = MOST_FRAMES) -> list[in
         most: Largest number of frames.
     """
     duration = float(times[-1] - times[0])
-    period = max(1.0 / rate, duration / (most - 1))
+    period = max(1.0 / rate, duration / max(most - 1, 1))
     wanted = np.arange(times[0], times[-1] + 0.5 * period, period)
     after = np.clip(np.searchsorted(times, wanted), 1, max(len(times) - 1, 1))
     before = after - 1

@@ -320,4 +320,9 @@ def _main(given: Sequence[str], imported: Callable[[], None] = lambda: None) -> 
     except (typer.Abort, KeyboardInterrupt, _Interrupted) as problem:
         print(f"cdpr: stopped{plain_words(_notes(problem))}", file=sys.stderr)
         sys.exit(INTERRUPTED)
+    except Exception as problem:  # compilers and compiled modules wrap what they are stopped by
+        if not _was_interrupted(problem):
+            raise
+        print(f"cdpr: stopped{plain_words(_notes(problem))}", file=sys.stderr)
+        sys.exit(INTERRUPTED)
     sys.exit(code if isinstance(code, int) else 0)

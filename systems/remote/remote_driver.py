@@ -273,9 +273,12 @@ class Driver:
             self._packed = message.get("packed") is True and codec == MSGPACK
             self._who, self._pending, self._codec = envelope[0], envelope, codec
             self._socket.follow()
-        elif asked == "stop" and envelope[0] == self._who:
+        elif asked == "stop" and self._who in (None, envelope[0]):
+            if self._who is None:  # nobody drives yet: the run does not begin
+                end = {"outcome": "client_ended", "message": SAID_STOP, "sim_time_s": 0.0}
+                self._reply(envelope, {"ok": True, "end": end}, codec)
             self._pending = envelope
-            raise ClientEndedError("the client said stop")
+            raise ClientEndedError(SAID_STOP)
         else:
             words = ["describe", "start", "step", "stop", *self._services]
             if asked in words:
@@ -295,6 +298,9 @@ class Driver:
                 f"outputs: found {shown(names)}; accepted: a list of {', '.join(self._outputs)}"
             )
         return list(dict.fromkeys(names))
+
+
+SAID_STOP = "the client said stop"
 
 
 class _RefusedServiceError(BridgeError):

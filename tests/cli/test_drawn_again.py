@@ -1,0 +1,96 @@
+"""A run that ends while its figures are drawn is completed by the same command."""
+
+import os
+import shutil
+
+import pytest
+
+from cdpr_drake.analyses.front import simulation
+from cdpr_drake.analyses.reporting.written_files import DRAWING, others_in
+from cdpr_drake.cli import main
+from cdpr_drake.models.robot_loader import robot_file
+from tests.messages import printed
+
+COMMAND = ["simulate", "acrobot_pbvs", "--camera", "projected", "--duration", "0.05", "--out", "run"]
+TENSIONS = ["simulate", "planar_computed_torque", "--duration", "0.05", "--out", "run"]
+
+
+def call(words):
+    with pytest.raises(SystemExit) as end:
+        main(words)
+    return end.value.code
+
+
+class Ended(BaseException):
+    """What no handler takes, as the end of a process."""
+
+
+def end_after(monkeypatch, count, error=Ended):
+    """The process ends when so many pictures are drawn."""
+    write = simulation.write_pictures
+
+    def some(folder, pictures, say, stop):
+        write(folder, dict(list(pictures.items())[:count]), say, stop)
+        raise error
+
+    monkeypatch.setattr(simulation, "write_pictures", some)
+
+
+@pytest.mark.parametrize("words", [COMMAND, TENSIONS], ids=["servo", "tensions"])
+def test_the_same_command_draws_what_is_missing(words, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert call(words) in (0, 3)
+    whole = sorted(os.listdir("run"))
+    shutil.rmtree("run")
+    with monkeypatch.context() as ending:
+        end_after(ending, 2)
+        with pytest.raises(Ended):
+            main(words)
+    there = sorted(os.listdir("run"))
+    assert DRAWING in there
+    assert len(there) < len(whole)
+    assert others_in(tmp_path / "run") == []
+    data = (tmp_path / "run" / "log.npz").read_bytes()
+    times = {name: os.stat(f"run/{name}").st_mtime_ns for name in there if name[0] != "."}
+    printed(capsys)
+    assert call(words) in (0, 3)
+    assert sorted(os.listdir("run")) == whole
+    assert (tmp_path / "run" / "log.npz").read_bytes() == data
+    assert {name: os.stat(f"run/{name}").st_mtime_ns for name in times} == times
+    assert "results: run" in printed(capsys).out or "run" in os.listdir(".")
+    assert call(words) == 2  # what is complete is not touched
+    assert "--overwrite" in printed(capsys).err
+
+
+def test_another_command_does_not_touch_it(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    shutil.copy(robot_file("acrobot_small"), "mine.yaml")
+    words = [*COMMAND, "--set", "robot=mine.yaml"]
+    with monkeypatch.context() as ending:
+        end_after(ending, 1)
+        with pytest.raises(Ended):
+            main(words)
+    before = sorted(os.listdir("run"))
+    assert call([*words, "--seed", "7"]) == 2
+    text = (tmp_path / "mine.yaml").read_text()
+    (tmp_path / "mine.yaml").write_text(text.replace("  mass: 1.5\n", "  mass: 1.95\n"))
+    assert call(words) == 2
+    assert sorted(os.listdir("run")) == before
+    assert "holds files already" in printed(capsys).err
+    (tmp_path / "mine.yaml").write_text(text)
+    assert call(words) in (0, 3)
+    assert DRAWING not in os.listdir("run")
+
+
+@pytest.mark.parametrize("kind", [SystemError, KeyError, RuntimeError, TypeError])
+def test_an_interruption_that_a_compiler_wraps_is_no_traceback(kind, monkeypatch, capsys):
+    def wrapped(*_, **__):
+        try:
+            raise KeyboardInterrupt
+        except KeyboardInterrupt as problem:
+            raise kind("returned a result with an exception set") from problem
+
+    monkeypatch.setattr("cdpr_drake.cli.check.check_file", wrapped, raising=False)
+    monkeypatch.setattr("cdpr_drake.cli.app.make_app", lambda given: wrapped)
+    assert call(["check", "x.yaml"]) == 130
+    assert printed(capsys).err == "cdpr: stopped\n"
