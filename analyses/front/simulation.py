@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 
 from cdpr_drake.analyses.front.session import Say, Session, asked_workers
 from cdpr_drake.analyses.reporting.deferred_figures import write_pictures
@@ -164,6 +164,38 @@ class RepeatedRuns(Tabulated):
         return f"{len(told['seeds'])} of {told['wanted']} runs of {told['scenario']}", rows
 
 
+@overload
+def simulate(
+    scenario: RunHeader | str | Path,
+    overrides: Sequence[str] = (),
+    folder: Path | str | None = None,
+    seeds: None = None,
+    *,
+    workers: int | str | None = None,
+    overwrite: bool = False,
+    formats: Sequence[str] = DEFAULT_FORMATS,
+    log_formats: Sequence[str] = (),
+    video: bool = False,
+    session: Session | None = None,
+) -> Run: ...
+
+
+@overload
+def simulate(
+    scenario: RunHeader | str | Path,
+    overrides: Sequence[str] = (),
+    folder: Path | str | None = None,
+    *,
+    seeds: Sequence[int],
+    workers: int | str | None = None,
+    overwrite: bool = False,
+    formats: Sequence[str] = DEFAULT_FORMATS,
+    log_formats: Sequence[str] = (),
+    video: bool = False,
+    session: Session | None = None,
+) -> RepeatedRuns: ...
+
+
 def simulate(
     scenario: RunHeader | str | Path,
     overrides: Sequence[str] = (),
@@ -176,7 +208,7 @@ def simulate(
     log_formats: Sequence[str] = (),
     video: bool = False,
     session: Session | None = None,
-) -> Any:
+) -> Run | RepeatedRuns:
     """Simulates a scenario of any kind until its outcome is known or its duration is over.
 
     Args:
