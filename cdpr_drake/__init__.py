@@ -29,6 +29,7 @@ Compiled kernels are cached in the user's cache folder, or where NUMBA_CACHE_DIR
 
 import lazy_loader
 
+from cdpr_drake.kernel_cache.first_use import announce_first_use
 from cdpr_drake.kernel_cache.folder import use_kernel_cache
 
 use_kernel_cache()
@@ -37,13 +38,15 @@ _lazy, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
 
 
 def __getattr__(name: str) -> object:
-    """Loads a public name.
+    """Loads a public name; from then on the first kernel that is compiled is told of, once.
 
     Raises:
         AttributeError: There is no such name; says the nearest ones.
     """
     try:
-        return _lazy(name)
+        found: object = _lazy(name)
+        announce_first_use()
+        return found
     except AttributeError as problem:
         from difflib import get_close_matches
 

@@ -2,13 +2,19 @@
 
 import re
 import subprocess
+import sys
 import tomllib
+import zipfile
 from itertools import chain
 from pathlib import Path
+from typing import TypeVar, get_args, get_overloads, get_type_hints
 
 import yaml
 from setuptools import find_packages
 
+import cdpr_drake as cdpr
+from cdpr_drake.analyses.front.simulation import RepeatedRuns, Run
+from cdpr_drake.systems.diagrams.load import SCENARIO_SCHEMAS
 from cdpr_drake.version import __version__
 from tests.lowest import LISTED, REQUIREMENT, lowest
 
@@ -42,6 +48,27 @@ def test_every_python_folder_says_what_it_is_for():
     for top in (*TOP, "tests", "cdpr_drake/cli"):
         first = (ROOT / top / "__init__.py").read_text()
         assert first.startswith('"""')
+
+
+def test_an_editable_install_is_a_path_that_type_checkers_follow(tmp_path):
+    """By an import hook, as flat layouts are installed otherwise, mypy and editors see no types."""
+    build = f"from setuptools import build_meta; build_meta.build_editable({str(tmp_path)!r})"
+    subprocess.run([sys.executable, "-c", build], cwd=ROOT, check=True, capture_output=True)
+    (wheel,) = tmp_path.glob("*.whl")
+    with zipfile.ZipFile(wheel) as held:
+        (link,) = (name for name in held.namelist() if name.endswith(".pth"))
+        assert not [name for name in held.namelist() if name.endswith(".py")]
+        assert Path(held.read(link).decode().strip()) == ROOT
+    assert (ROOT / "cdpr_drake" / "py.typed").is_file()
+
+
+def test_verbs_that_give_several_kinds_say_which():
+    """Without an overload, editors and mypy would take what they give for anything."""
+    given = [get_type_hints(each)["return"] for each in get_overloads(cdpr.simulate)]
+    assert given == [Run, RepeatedRuns]
+    own, all_kinds = (get_type_hints(each)["return"] for each in get_overloads(cdpr.load_scenario))
+    assert isinstance(own, TypeVar)
+    assert set(get_args(all_kinds)) == {schema for schema, _ in SCENARIO_SCHEMAS.values()}
 
 
 def test_links_serve_editors():

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
@@ -174,6 +174,38 @@ class RepeatedRuns(Tabulated):
         return f"{len(told['seeds'])} of {told['wanted']} runs of {told['scenario']}", rows
 
 
+@overload
+def simulate(
+    scenario: RunHeader | str | Path,
+    overrides: Sequence[str] = (),
+    folder: Path | str | None = None,
+    seeds: None = None,
+    *,
+    workers: int | str | None = None,
+    overwrite: bool = False,
+    formats: Sequence[str] = DEFAULT_FORMATS,
+    log_formats: Sequence[str] = (),
+    video: bool = False,
+    session: Session | None = None,
+) -> Run: ...
+
+
+@overload
+def simulate(
+    scenario: RunHeader | str | Path,
+    overrides: Sequence[str] = (),
+    folder: Path | str | None = None,
+    *,
+    seeds: Sequence[int],
+    workers: int | str | None = None,
+    overwrite: bool = False,
+    formats: Sequence[str] = DEFAULT_FORMATS,
+    log_formats: Sequence[str] = (),
+    video: bool = False,
+    session: Session | None = None,
+) -> RepeatedRuns: ...
+
+
 @inputs_read_once()
 def simulate(
     scenario: RunHeader | str | Path,
@@ -187,7 +219,7 @@ def simulate(
     log_formats: Sequence[str] = (),
     video: bool = False,
     session: Session | None = None,
-) -> Any:
+) -> Run | RepeatedRuns:
     """Simulates a scenario of any kind until its outcome is known or its duration is over.
 
     Args:

@@ -123,14 +123,14 @@ class TensionsAtPose(Summarized):
         return tension_figure(self._cables(), found, (asked.lower, asked.upper), title)
 
     def plot_polygon(self, title: str | None = None) -> Figure:
-        """The feasible polygon with a point for each method; `title` as of `plot`.
+        """The feasible polygon with a point for each method that was asked; `title` as of `plot`.
 
         Raises:
             TensionProblemError: There are not two cables more than needed, or no tensions at all.
         """
         from cdpr_drake.analyses.statics.static_figures import polygon_figure
 
-        return polygon_figure(self.problem, title or self._where())
+        return polygon_figure(self.problem, self.solutions, title or self._where())
 
     def plot_wrenches(self, title: str | None = None) -> Figure:
         """Sections of the wrenches that the cables can give at the pose; `title` as of `plot`."""

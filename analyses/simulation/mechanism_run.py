@@ -30,7 +30,7 @@ from cdpr_drake.analyses.simulation.run_loop import (
     left_unfinished,
 )
 from cdpr_drake.analyses.simulation.session import DEFAULT_SESSION, RunSession, check_connected
-from cdpr_drake.analyses.simulation.start_checks import check_length
+from cdpr_drake.analyses.simulation.start_checks import check_length, limit_warnings
 from cdpr_drake.analyses.visualization.curves import by_pieces
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CableGeometryError
@@ -69,7 +69,8 @@ def check_mechanism_run(scenario: MechanismScenario) -> list[str]:
     check_length(scenario.name, scenario.duration, step)
     follower = build_mechanism_follower(scenario)
     follower.make_context()
-    warnings = []
+    limits = limit_warnings("control.limits", scenario.control.limits, follower.mechanism)
+    warnings = [f"{scenario.name}: {words}" for words in limits]
     if follower.motion.end_time > scenario.duration:
         warnings.append(
             f"{scenario.name}: duration: found {scenario.duration:g} s; the last of "
@@ -189,6 +190,7 @@ def summarize_mechanism_run(run: MechanismRun) -> dict[str, Any]:
             "max": float(np.max(tensions, initial=-np.inf)),
         },
         "tension_limits_n": [low, high],
+        "remarks": limit_warnings("control.limits", control.limits, follower.mechanism),
         "beyond_limits_n": float(
             max(np.max(tensions - high, initial=0.0), np.max(low - tensions, initial=0.0))
         ),

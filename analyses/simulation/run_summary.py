@@ -13,6 +13,7 @@ from cdpr_drake.analyses.reporting.provenance import package_versions
 from cdpr_drake.analyses.simulation.adaptation_report import adaptation_summary
 from cdpr_drake.analyses.simulation.pan_tilt_report import pan_tilt_summary
 from cdpr_drake.analyses.simulation.run_stability import stability_of_run
+from cdpr_drake.analyses.simulation.start_checks import servo_limit_warnings
 from cdpr_drake.analyses.simulation.unexpected_end import servo_message
 from cdpr_drake.analyses.simulation.visual_servo_run import RunResult
 from cdpr_drake.analyses.simulation.worlds import world_summary
@@ -174,6 +175,7 @@ def summarize(result: RunResult) -> dict[str, Any]:
         "loop": result.loop,
         "integration_step_s": servo.max_step,
         "step_error": _step_errors(result),
+        "remarks": servo_limit_warnings(scenario, servo.robot),
         "versions": package_versions(),
     }
     if (gain := _tension_gain(result)) is not None:

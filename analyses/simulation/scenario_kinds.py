@@ -55,6 +55,8 @@ from cdpr_drake.analyses.simulation.start_checks import (
     check_start,
     contact_warnings,
     goal_warnings,
+    limit_warnings,
+    servo_limit_warnings,
     sheave_warnings,
     step_warnings,
 )
@@ -155,6 +157,7 @@ def _check_servo(scenario: Scenario) -> list[str]:
     check_length(scenario.name, scenario.duration, servo.max_step)
     loop = loop_warnings(scenario, servo.robot)
     steps = [*step_warnings(servo), *contact_warnings(scenario, servo.robot)]
+    steps += [f"{scenario.name}: {w}" for w in servo_limit_warnings(scenario, servo.robot)]
     return [*steps, *loop, *sheave_warnings(scenario, servo.robot), *goal_warnings(servo)]
 
 
@@ -162,8 +165,10 @@ def _check_tension(scenario: TensionScenario) -> list[str]:
     control = make_control(scenario)
     control.make_context()
     check_length(scenario.name, scenario.duration, scenario.integration.max_step)
+    limits = limit_warnings("distribution.limits", scenario.distribution.limits, control.robot)
     return [
-        *contact_warnings(scenario, control.robot), *sheave_warnings(scenario, control.robot)
+        *contact_warnings(scenario, control.robot), *sheave_warnings(scenario, control.robot),
+        *(f"{scenario.name}: {words}" for words in limits),
     ]  # fmt: skip
 
 

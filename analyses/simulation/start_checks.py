@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from cdpr_drake.arrays import Array
 from cdpr_drake.errors import InfeasibleTensionError, ScenarioError, TensionProblemError
+from cdpr_drake.models.mechanism_schema import Mechanism
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.systems.diagrams.pan_tilt import aimed_mounting
 from cdpr_drake.systems.diagrams.servo_models import LoopServo
+from cdpr_drake.systems.diagrams.torque_control import TORQUE
 from cdpr_drake.systems.diagrams.visual_servo import VisualServo
 from cdpr_drake.systems.robots.cable_robot import (
     SEMI_IMPLICIT,
@@ -84,6 +87,31 @@ def check_length(name: str, duration: float, step: float) -> None:
             f"{name}: duration: found {duration:g} s, {steps:.2g} integration steps of {step:g} s; "
             f"accepted: at most {MOST_STEPS:g} steps"
         )
+
+
+def limit_warnings(key: str, given: Array | None, limited: Robot | Mechanism) -> list[str]:
+    """What is said where a scenario replaces the tension bounds of a robot's file.
+
+    Args:
+        key: The scenario's key.
+        given: Its smallest and largest tension, shape (2,) [N]; None: the robot's.
+        limited: The robot or mechanism.
+    """
+    own = limited.tension_limits()
+    if given is None or (float(given[0]), float(given[1])) == own:
+        return []
+    return [
+        f"{key} = {given[0]:g} to {given[1]:g} N replace tension_bounds of {limited.name}, "
+        f"{own[0]:g} to {own[1]:g} N; null takes those"
+    ]
+
+
+def servo_limit_warnings(scenario: Scenario, robot: Robot) -> list[str]:
+    """`limit_warnings` of a visual servo, which limits tensions where its winches are by torque."""
+    settings = scenario.torque_control
+    if settings is None or scenario.winches.mode != TORQUE:
+        return []
+    return limit_warnings("torque_control.limits", settings.limits, robot)
 
 
 def contact_warnings(scenario: Scenario | TensionScenario, robot: Robot) -> list[str]:

@@ -37,6 +37,7 @@ from cdpr_drake.analyses.simulation.session import (
     check_connected,
     resting,
 )
+from cdpr_drake.analyses.simulation.start_checks import limit_warnings
 from cdpr_drake.analyses.simulation.unexpected_end import tension_control_message
 from cdpr_drake.analyses.simulation.worlds import (
     world_columns,
@@ -272,6 +273,10 @@ def summarize_tension_run(run: TensionRun) -> dict[str, Any]:
             "min": float(np.min(tensions, initial=np.inf)),
             "max": float(np.max(tensions, initial=-np.inf)),
         },
+        "tension_limits_n": list(run.control.robot.tension_limits(scenario.limits())),
+        "remarks": limit_warnings(
+            "distribution.limits", scenario.distribution.limits, run.control.robot
+        ),
         "infeasible_steps": int(log["failures"][-1, 0]),
         "simulated": simulated_model(run.control.robot, None, scenario.damping),
         "engine": engine_of(scenario),

@@ -10,7 +10,6 @@ from matplotlib.figure import Figure
 from scipy.spatial import ConvexHull, QhullError
 
 from cdpr_drake.analyses.statics.static_query import StaticReport
-from cdpr_drake.analyses.statics.tension_query import solve_all
 from cdpr_drake.analyses.visualization.figure_style import (
     bar_style,
     bare_figure,
@@ -106,8 +105,15 @@ def _outline(points: Array) -> Array:
     return points[:, np.append(around, around[0])]
 
 
-def polygon_figure(problem: TensionProblem, title: str) -> Figure:
-    """The feasible polygon in the null space with the point of each method.
+def polygon_figure(
+    problem: TensionProblem, solutions: Sequence[TensionSolution], title: str
+) -> Figure:
+    """The feasible polygon in the null space with a point for each solution.
+
+    Args:
+        problem: What was asked.
+        solutions: Its solutions; those without tensions are left out.
+        title: Title.
 
     Raises:
         TensionProblemError: The redundancy is not 2, or the polygon is empty.
@@ -122,7 +128,7 @@ def polygon_figure(problem: TensionProblem, title: str) -> Figure:
     closed = np.column_stack([vertices, vertices[:, 0]])
     axes.fill(*vertices, color=PLATFORM.color, alpha=0.15, label="feasible")
     axes.plot(*closed, color=PLATFORM.color, linestyle=SOLID)
-    solutions = [s for s in solve_all(problem) if np.all(np.isfinite(s.tensions))]
+    solutions = [s for s in solutions if np.all(np.isfinite(s.tensions))]
     extent = float(np.max(np.ptp(vertices, axis=1)))
     free = list(MARKERS)
     for eta, labels, filled in _places(solutions, N, extent):
@@ -150,7 +156,7 @@ def polygon_figure(problem: TensionProblem, title: str) -> Figure:
 
 
 def _places(
-    solutions: list[TensionSolution], N: Array, extent: float
+    solutions: Sequence[TensionSolution], N: Array, extent: float
 ) -> list[tuple[Array, list[str], bool]]:
     """Points of the plane with the methods that meet there, and whether they are feasible."""
     places: list[tuple[Array, list[str], bool]] = []

@@ -17,7 +17,8 @@ from cdpr_drake.cli.notebooks import FOLDER as NOTEBOOKS
 from cdpr_drake.cli.robot_folder import write_files
 from cdpr_drake.cli.terminal import message_console
 from cdpr_drake.errors import CdprError, plain_words
-from cdpr_drake.models.robot_loader import load_robot, robot_text
+from cdpr_drake.models.exit_points import split_name
+from cdpr_drake.models.robot_loader import load_robot, robot_file, robot_names, robot_text
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.schema.templates import commented_yaml
 from cdpr_drake.schema.typed_yaml import closest
@@ -144,11 +145,13 @@ def _robot(source: str) -> tuple[type, dict[str, Any]]:
 
 
 def _reference(robot: str, out: Path) -> str:
-    """How a scenario in a folder names a robot: from there where the robot is there, else whole."""
-    whole = Path(resolve_robot_path(Path("scenario.yaml"), robot))
-    folder = out.absolute()
-    beside = whole.is_absolute() and whole.is_relative_to(folder) and whole != folder
-    return str(whole.relative_to(folder) if beside else whole)
+    """How a scenario in a folder names a robot: by name, or by its file, from there if it can."""
+    name = split_name(robot)[0]
+    if name in robot_names():
+        return robot
+    file, folder = robot_file(name).absolute(), out.absolute()
+    beside = file.is_relative_to(folder) and not file.is_dir()
+    return str(file.relative_to(folder) if beside else file) + robot.removeprefix(name)
 
 
 def _scenario(source: str) -> tuple[type, dict[str, Any]]:

@@ -371,6 +371,8 @@ def _print_summary(found: Run, folder: Path, as_json: bool) -> None:
     table.add_row("cables", summary["geometry"])
     for label, words in found.facts():
         table.add_row(label, words)
+    for words in summary.get("remarks", ()):
+        table.add_row("remark", words)
     table.add_row("results", str(folder))
     if summary["message"]:
         table.add_row("message", summary["message"])

@@ -88,6 +88,28 @@ def test_a_robot_of_ones_own_arrives_with_taut_cables(capsys, tmp_path):
     assert low <= told["tension_n"]["min"] <= told["tension_n"]["max"] <= high
 
 
+def test_robots_in_folders_are_found_again_from_anywhere(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "bay").mkdir()
+    (tmp_path / "bay" / "robot.yaml").write_text(OWN_ROBOT.read_text())
+    found = {}
+    for robot, folder in (
+        ("bay", "."),
+        ("bay", "bay"),
+        ("bay/robot.yaml", "aside"),
+        ("planar", "."),
+    ):
+        code, said, path = made(capsys, tmp_path / folder, robot)
+        assert code == 0, said
+        found[robot, folder] = path.read_text().partition("\nrobot: ")[2].partition("\n")[0]
+        with monkeypatch.context() as elsewhere:
+            elsewhere.chdir("/")
+            load_scenario(str(path))
+        path.unlink()
+    whole = str(tmp_path / "bay" / "robot.yaml")
+    assert list(found.values()) == ["bay/robot.yaml", "robot.yaml", whole, "planar"]
+
+
 def test_a_camera_that_looks_another_way_has_its_target_there(capsys, tmp_path):
     tilted = OWN_ROBOT.read_text().replace("[0.0, 180.0, 0.0]", "[60.0, 120.0, 30.0]")
     (tmp_path / "bay.yaml").write_text(tilted)

@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 
+import cdpr_drake as cdpr
 from cdpr_drake.analyses.statics.static_figures import polygon_figure
 from cdpr_drake.analyses.statics.tension_query import (
     applicable_methods,
@@ -16,6 +17,7 @@ from cdpr_drake.errors import TensionProblemError
 from cdpr_drake.geometry.poses import pose_from_angles
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_statics import tension_problem
+from cdpr_drake.tensions import methods
 from cdpr_drake.tensions.methods import METHODS
 from tests.figure_faults import figure_faults
 from tests.messages import printed
@@ -59,7 +61,7 @@ def test_polygon_corners_balance_the_wrench(problem):
 
 
 def test_picture_names_every_method_once(problem):
-    figure = polygon_figure(problem, "title")
+    figure = polygon_figure(problem, solve_all(problem), "title")
     assert figure_faults(figure) == []
     (axes,) = figure.axes
     markers = [line.get_marker() for line in axes.lines if line.get_linestyle() == "None"]
@@ -72,7 +74,7 @@ def test_picture_names_every_method_once(problem):
 
 def test_no_picture_of_nothing(hopeless):
     with pytest.raises(TensionProblemError, match="found none to draw"):
-        polygon_figure(hopeless, "title")
+        polygon_figure(hopeless, [], "title")
 
 
 def command(capsys, *arguments):
@@ -131,3 +133,22 @@ def test_command_refuses(capsys, tmp_path, monkeypatch, arguments, words):
     assert words in err
     assert len(err.strip().splitlines()) == 1
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("call", "names"),
+    [
+        (lambda: cdpr.solve_tensions("acrobot_large", method="barycenter"), ["barycenter"]),
+        (lambda: cdpr.compare_tensions("acrobot_large"), None),
+    ],
+)
+def test_a_figure_has_the_methods_that_were_asked_for(monkeypatch, call, names):
+    """One of a single method once ran, and compiled, all of them."""
+    found, asked = call(), []
+    monkeypatch.setattr(methods, "kernel_address", asked.append)
+    figure = found.plot()
+    assert asked == []
+    (axes,) = figure.axes
+    words = " ".join(text.get_text() for text in axes.get_legend().get_texts()).split()
+    shown = sorted(word for word in words if word in METHODS)
+    assert shown == sorted(names or applicable_methods(found.problem))
