@@ -67,7 +67,7 @@ def summarize_pick_and_place(run: PickAndPlaceRun) -> dict[str, Any]:
         "scenario": scenario.name,
         "kind": scenario.kind,
         "robot": built.robot.name,
-        "geometry": scenario.cables.geometry_words(built.robot, scenario.controller.pulleys),
+        "geometry": scenario.cables.geometry_words(built.robot),
         "camera": scenario.camera.kind,
         "seed": scenario.seed,
         **run.ending(),
