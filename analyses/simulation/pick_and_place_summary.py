@@ -69,7 +69,7 @@ def summarize_pick_and_place(run: PickAndPlaceRun) -> dict[str, Any]:
         "kind": scenario.kind,
         "robot": built.robot.name,
         "simulated": simulated_model(built.robot, scenario.cables, scenario.damping),
-        "geometry": scenario.cables.geometry_words(built.robot, scenario.controller.pulleys),
+        "geometry": scenario.cables.geometry_words(built.robot),
         "camera": scenario.camera.kind,
         "seed": scenario.seed,
         **run.ending(),

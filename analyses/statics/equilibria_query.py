@@ -168,7 +168,7 @@ def elastic_equilibria(
     if not found.stopped:
         words += "; the stopping rule asks for more searches"
     given = np.asarray(l0, float)
-    return _report(robot, platform, found.rests, given, evidence, words, "elastic")
+    return _report(robot, platform, found.rests, given, evidence, words, model="elastic")
 
 
 def equilibria_with_position(robot: Robot, p_WP: Array, taut: list[int]) -> EquilibriaReport:
@@ -217,6 +217,7 @@ def _report(
     lengths: Array | None,
     evidence: dict[str, Any],
     words: str,
+    *,
     model: str = "inextensible",
 ) -> EquilibriaReport:
     over = platform.cables.has_pulleys()

@@ -176,7 +176,7 @@ def test_limits_and_rates_hold_at_every_step_and_what_cannot_be_is_flagged(metho
             assert step <= LOOP.tension_rate * PERIOD * (1.0 + 1e-12)
         before = command.tensions
         # Feasible is what Drake's inverse dynamics asks of cables within their limits.
-        problem = tension_problem(ROBOT, X_WP, limits=(LOWER, UPPER))
+        problem = tension_problem(ROBOT, X_WP, limits=(LOWER, UPPER), cables=CABLES)
         asked = TensionProblem(problem.W, -command.wrench, problem.lower, problem.upper)
         assert command.relaxed == (exact_tensions(asked) is None)
         flags.append(command.relaxed)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.planning.robot_path_task import LimitSettings, path_task
+from cdpr_drake.analyses.planning.robot_path_task import RESERVE, LimitSettings, path_task
 from cdpr_drake.geometry.poses import pose_from_angles, pose_row
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.planning.failures import not_held
@@ -20,7 +20,7 @@ OUTSIDE = pose_from_angles(np.array([-0.2, -0.42, 0.3]), np.zeros(3))
 @pytest.mark.parametrize("torque", [np.inf, 0.3, 0.15])
 def test_cables_that_miss_most_are_named(torque):
     """C1 pulls too much and C3 too little, by as much: also where torques keep their limit."""
-    task = path_task(load_robot("planar"), LimitSettings(tensions=(1.0, 60.0)))
+    task = path_task(load_robot("planar"), LimitSettings(tensions=(1.0, 60.0), reserve=RESERVE))
     task = replace(task, limits=replace(task.limits, torque=torque))
     point = np.concatenate([pose_row(OUTSIDE), np.zeros(POINT_SIZE - 7)])
     nearest = not_held(task, point).split("the nearest they come: ")[1].split("; accepted")[0]

@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.planning.robot_path_task import LimitSettings, make_path, path_task
+from cdpr_drake.analyses.planning.robot_path_task import (
+    RESERVE,
+    LimitSettings,
+    make_path,
+    path_task,
+)
 from cdpr_drake.errors import PlanningError
 from cdpr_drake.geometry.convex_shapes import ConvexShape
 from cdpr_drake.geometry.poses import pose_error, pose_from_angles
@@ -34,7 +39,7 @@ APART = 0.01  # of cables [m]
 def robot_task():
     robot = load_robot("acrobot_large")
     cables = robot.cable_set().without_pulleys()
-    return robot, path_task(robot, LimitSettings(tensions=(1.0, 60.0)), cables)
+    return robot, path_task(robot, LimitSettings(tensions=(1.0, 60.0), reserve=RESERVE), cables)
 
 
 @cache
@@ -118,7 +123,7 @@ def test_the_target_stays_in_view_all_along():
 def test_least_time_is_that_of_the_best_path_or_more():
     """A planar robot along a line that symmetry makes the best path."""
     robot = load_robot("planar")
-    task = path_task(robot, LimitSettings(), robot.cable_set().without_pulleys())
+    task = path_task(robot, LimitSettings(reserve=RESERVE), robot.cable_set().without_pulleys())
     ends = RigidTransform([-0.15, 0.0, 0.3]), RigidTransform([0.15, 0.0, 0.3])
     program = FreePathProgram(task, *ends, 8)
     program.AddLeastTime()

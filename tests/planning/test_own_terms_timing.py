@@ -8,7 +8,12 @@ import pytest
 from scipy.linalg import null_space
 from scipy.optimize import minimize
 
-from cdpr_drake.analyses.planning.robot_path_task import LimitSettings, make_path, path_task
+from cdpr_drake.analyses.planning.robot_path_task import (
+    RESERVE,
+    LimitSettings,
+    make_path,
+    path_task,
+)
 from cdpr_drake.analyses.studies.planning.convex_timing import difference_asks
 from cdpr_drake.errors import PlanningError
 from cdpr_drake.geometry.poses import pose_from_angles
@@ -31,7 +36,7 @@ def pose(*numbers):
 @cache
 def case(corners="smooth", name="acrobot_large"):
     robot = load_robot(name)
-    task = path_task(robot, LimitSettings(tensions=(1.0, 60.0)))
+    task = path_task(robot, LimitSettings(tensions=(1.0, 60.0), reserve=RESERVE))
     places = [pose(0, 0, 0.2), pose(0.15, -0.1, 0.4, 4, -3, 6), pose(-0.1, 0.1, 0.3)]
     if corners == "line":
         places, corners = [pose(-0.1, 0, 0.3), pose(0.1, 0.05, 0.35)], "smooth"

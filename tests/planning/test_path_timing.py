@@ -15,6 +15,7 @@ from pydrake.trajectories import PiecewisePolynomial
 
 from cdpr_drake.analyses.planning.plan_tracking import track_plan
 from cdpr_drake.analyses.planning.robot_path_task import (
+    RESERVE,
     LimitSettings,
     make_path,
     path_task,
@@ -60,7 +61,7 @@ PATHS = {
 def planned(name, corners="smooth"):
     robot = load_robot(name)
     limits, poses = PATHS[name]
-    task = path_task(robot, LimitSettings(tensions=limits))
+    task = path_task(robot, LimitSettings(tensions=limits, reserve=RESERVE))
     return robot, plan_along_path(task, make_path(robot, poses, corners))
 
 
@@ -129,7 +130,7 @@ def toppra_time(plan, speed, acceleration):
 
 def test_with_limits_of_winches_alone_it_agrees_with_drakes_toppra():
     robot = load_robot("acrobot_large")
-    task = path_task(robot, LimitSettings())
+    task = path_task(robot, LimitSettings(reserve=RESERVE))
     limits = MotionLimits(lower=0.0, upper=1e6, cable_speed=0.8, cable_acceleration=3.0)
     # Tensions without end: any wrench can be given by cables that pull from all sides.
     loose = load_robot("acrobot_fully_constrained")
@@ -157,7 +158,9 @@ def test_faster_winches_never_make_it_slower():
     _, poses = PATHS["planar"]
     path = make_path(robot, poses, "smooth")
     times = [
-        plan_along_path(path_task(robot, LimitSettings(cable_speed=v)), path, 200).duration
+        plan_along_path(
+            path_task(robot, LimitSettings(cable_speed=v, reserve=RESERVE)), path, 200
+        ).duration
         for v in (0.3, 0.6, 1.2)
     ]
     assert times[0] > times[1] > times[2]
@@ -177,7 +180,7 @@ def test_where_it_cannot_rest_the_motion_carries_it_through():
     """A turning point outside of where the platform can be held: not with a rest, nor slowly."""
     robot = load_robot("acrobot_large")
     poses = [pose(0, 0, 0.2), pose(0.5, 0.4, 0.6), pose(0, 0.1, 0.2)]
-    given = LimitSettings(tensions=(1.0, 60.0))
+    given = LimitSettings(tensions=(1.0, 60.0), reserve=RESERVE)
     task = path_task(robot, given)
     plan = plan_along_path(task, make_path(robot, poses, "blend"))
     assert np.max(plan.reachable[:, 0]) > 0.1
@@ -186,7 +189,7 @@ def test_where_it_cannot_rest_the_motion_carries_it_through():
     assert track_plan(robot, plan, robot_limits(robot, given)).keeps_limits()
     with pytest.raises(PlanningError, match=r"pose \(0.5, 0.4, 0.6\).*cannot hold.*C1"):
         plan_along_path(task, make_path(robot, poses, "rest"))
-    slow = path_task(robot, LimitSettings(tensions=(1.0, 60.0), speed=0.2))
+    slow = path_task(robot, LimitSettings(tensions=(1.0, 60.0), speed=0.2, reserve=RESERVE))
     with pytest.raises(PlanningError, match=r"pose .*cannot hold.*C1"):
         plan_along_path(slow, make_path(robot, poses, "blend"))
 
@@ -200,7 +203,7 @@ def test_what_stops_a_motion_between_two_points_is_named():
 
 def test_too_few_cables_and_wrong_limits_are_refused():
     robot = load_robot("acrobot_large")
-    task = path_task(robot, LimitSettings())
+    task = path_task(robot, LimitSettings(reserve=RESERVE))
     few = robot.cable_set()
     few = type(few)(**{f.name: np.asarray(getattr(few, f.name))[..., :5] for f in fields(few)})
     with pytest.raises(PlanningError, match="found 5 cables"):

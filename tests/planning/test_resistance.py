@@ -7,7 +7,12 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from cdpr_drake.analyses.planning.robot_path_task import LimitSettings, make_path, path_task
+from cdpr_drake.analyses.planning.robot_path_task import (
+    RESERVE,
+    LimitSettings,
+    make_path,
+    path_task,
+)
 from cdpr_drake.control.task_space import TaskGains, computed_torque
 from cdpr_drake.errors import PlanningError, WrenchSetError
 from cdpr_drake.geometry.cable_paths import cable_jacobian
@@ -61,7 +66,7 @@ CASES = {
 def path_of(name):
     limits, poses, wrenches = CASES[name]
     robot = load_robot(name)
-    task = path_task(robot, LimitSettings(tensions=limits), resist=wrenches)
+    task = path_task(robot, LimitSettings(tensions=limits, reserve=RESERVE), resist=wrenches)
     return task, make_path(robot, poses, "smooth")
 
 
@@ -162,7 +167,7 @@ def test_where_it_fails_the_message_names_wrench_and_cables():
     robot = load_robot("acrobot_large")
     poses = CASES["acrobot_large"][1]
     wrenches = SpatialSet(box=np.array([0.0, 0, 0, 9.0, 0, 0]))
-    task = path_task(robot, LimitSettings(tensions=(1.0, 60.0)), resist=wrenches)
+    task = path_task(robot, LimitSettings(tensions=(1.0, 60.0), reserve=RESERVE), resist=wrenches)
     with pytest.raises(
         PlanningError,
         match=r"at s = 0 m .*pose \(0, 0, 0.2\).* under the wrench \(0, 0, 0\) N m, "
@@ -194,7 +199,9 @@ def test_the_number_of_bounds_and_what_is_refused():
     robot = load_robot("planar")
     with pytest.raises(WrenchSetError, match="ellipsoid: found one"):
         path_task(
-            robot, LimitSettings(), resist=SpatialSet(ellipsoid=np.array([0, 0, 0, 1.0, 1, 0]))
+            robot,
+            LimitSettings(reserve=RESERVE),
+            resist=SpatialSet(ellipsoid=np.array([0, 0, 0, 1.0, 1, 0])),
         )
     with pytest.raises(PlanningError, match="wrenches to resist: found shape"):
         replace(task, resist=np.zeros((2, 3)))

@@ -9,7 +9,12 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.planning.free_motion import FreeSettings, solve_free_motion
 from cdpr_drake.analyses.planning.plan_tracking import track_plan
-from cdpr_drake.analyses.planning.robot_path_task import LimitSettings, path_task, robot_limits
+from cdpr_drake.analyses.planning.robot_path_task import (
+    RESERVE,
+    LimitSettings,
+    path_task,
+    robot_limits,
+)
 from cdpr_drake.analyses.reporting.provenance import write_run_inputs
 from cdpr_drake.analyses.simulation.tension_control_run import run_tension_scenario
 from cdpr_drake.cli.app import main
@@ -69,7 +74,7 @@ def scenario_of(file, *more):
 
 def test_planned_limits_hold_in_the_run_of_a_scenario(planned, tmp_path):
     robot = load_robot("acrobot_large")
-    limits = robot_limits(robot, LimitSettings(tensions=(1.0, 60.0)))
+    limits = robot_limits(robot, LimitSettings(tensions=(1.0, 60.0), reserve=RESERVE))
     scenario = scenario_of(planned / "motion.csv")
     result = run_tension_scenario(scenario)
     log = result.log
@@ -106,7 +111,7 @@ def test_files_that_a_scenario_cannot_track_are_named(planned, changes, said):
 @pytest.fixture(scope="module")
 def task():
     robot = load_robot("planar")
-    given = LimitSettings(cable_acceleration=4.0, speed=0.5)
+    given = LimitSettings(cable_acceleration=4.0, speed=0.5, reserve=RESERVE)
     return robot, path_task(robot, given), robot_limits(robot, given)
 
 

@@ -9,6 +9,7 @@ import pytest
 from cdpr_drake.analyses.planning.path_files import read_path
 from cdpr_drake.analyses.planning.plan_tracking import track_plan
 from cdpr_drake.analyses.planning.robot_path_task import (
+    RESERVE,
     LimitSettings,
     make_path,
     path_task,
@@ -86,7 +87,7 @@ def test_what_is_no_text_is_refused(tmp_path):
 
 def test_the_simulated_robot_keeps_the_limits(tmp_path):
     robot = load_robot("acrobot_large")
-    given = LimitSettings(tensions=(1.0, 60.0))
+    given = LimitSettings(tensions=(1.0, 60.0), reserve=RESERVE)
     poses = read_path(write(tmp_path / "p.csv", "0,0,0.2\n0.15,-0.1,0.4\n-0.1,0.1,0.3\n")).poses
     plan = plan_along_path(path_task(robot, given), make_path(robot, poses, "blend"))
     tracked = track_plan(robot, plan, robot_limits(robot, given))
@@ -102,22 +103,22 @@ def test_the_simulated_robot_keeps_the_limits(tmp_path):
 
 def test_the_torque_that_friction_leaves_is_what_a_plan_may_use():
     robot = load_robot("caroca")
-    limits = robot_limits(robot, LimitSettings())
+    limits = robot_limits(robot, LimitSettings(reserve=RESERVE))
     viscous = 2e-3 * robot.winch.rated_cable_speed() / limits.ratio
     assert limits.torque == pytest.approx(15.34 - 0.2 - viscous)
-    assert np.isinf(robot_limits(load_robot("planar"), LimitSettings()).torque)
+    assert np.isinf(robot_limits(load_robot("planar"), LimitSettings(reserve=RESERVE)).torque)
 
 
 def test_robots_whose_winches_or_pulleys_are_not_known_to_plans_are_refused():
     shared = load_robot("planar")
     shared.cables[0].winch = shared.cables[1].winch = "one"
     with pytest.raises(PlanningError, match="several cables on a winch"):
-        path_task(shared, LimitSettings())
+        path_task(shared, LimitSettings(reserve=RESERVE))
     robot = load_robot("acrobot_large")
     axes = np.tile([[0.0], [0.0], [1.0]], (1, 8))
     pulleys = robot.cable_set().over_platform_pulleys(0.01, axes)
     with pytest.raises(PlanningError, match="pulleys at the platform"):
-        path_task(robot, LimitSettings(), pulleys)
+        path_task(robot, LimitSettings(reserve=RESERVE), pulleys)
 
 
 def test_the_command_plans_and_writes(tmp_path, capsys):

@@ -10,7 +10,12 @@ from scipy.optimize import linprog
 
 from cdpr_drake.analyses.benchmarks.groups import BENCH_GROUPS
 from cdpr_drake.analyses.benchmarks.planning import station_programs
-from cdpr_drake.analyses.planning.robot_path_task import LimitSettings, make_path, path_task
+from cdpr_drake.analyses.planning.robot_path_task import (
+    RESERVE,
+    LimitSettings,
+    make_path,
+    path_task,
+)
 from cdpr_drake.analyses.reporting.progress import StudySession
 from cdpr_drake.analyses.studies.framework.statement import OURS
 from cdpr_drake.analyses.studies.framework.study import Form
@@ -117,7 +122,7 @@ def test_the_baseline_of_the_benchmark_asks_the_same_limits():
     """Without limits of speeds the largest (ds/dt)^2 of a station is that of HiGHS."""
     assert "planning" in BENCH_GROUPS
     robot = load_robot("acrobot_large")
-    task = path_task(robot, LimitSettings(tensions=(1.0, 60.0), cable_speed=1e3))
+    task = path_task(robot, LimitSettings(tensions=(1.0, 60.0), cable_speed=1e3, reserve=RESERVE))
     poses = [
         pose_from_angles(np.array(p), np.zeros(3))
         for p in ([0, 0, 0.2], [0.15, -0.1, 0.4], [-0.1, 0.1, 0.3])
