@@ -170,7 +170,7 @@ def _mark_used(seen: ET.Element, carried: CarriedBodies, draft: RobotDraft) -> N
                 if _is_box(part, draft):
                     mark_below(part)
         elif tag == "joint" and item.find("parent") is not None:
-            ends = {end.get("link") or end.findtext(".", "") for end in item
+            ends = {end.get("link", "") or end.findtext(".", "") for end in item
                     if end.tag in ("parent", "child")}  # fmt: skip
             kind = item.attrib.get("type")
             if ends & left or name in fixed or kind == "fixed":
@@ -199,7 +199,7 @@ def _is_box(collision: ET.Element, draft: RobotDraft) -> bool:
     box = collision.find("geometry/box")
     if box is None or draft.box_size is None:
         return False
-    words = box.get("size") or box.findtext("size", "")
+    words = box.get("size", "") or box.findtext("size", "")
     try:
         return np.array_equal(np.array(words.split(), float), draft.box_size)
     except ValueError:

@@ -48,8 +48,8 @@ def case(request):
 
 
 def test_tensions_of_a_plan_move_the_mass_as_newton_says(case):
-    """Pulls along straight lines from the mass to the exit points, and its weight: mass times
-    acceleration along each axis that it can move."""
+    """Pulls along straight lines from the mass, or the ends of its level arms, to the exit points,
+    and its weight: mass times acceleration along each axis that it can move."""
     run, axes = case
     robot, samples = run.robot, run.samples
     exits = np.array([cable.exit_point for cable in robot.cables])
@@ -58,6 +58,8 @@ def test_tensions_of_a_plan_move_the_mass_as_newton_says(case):
     for k in np.linspace(0, len(samples.times) - 1, 25).astype(int):
         row = np.asarray(run.motion.motion(float(samples.times[k])))
         way = exits - row[4:7]
+        across = np.linalg.norm(way[:, :2], axis=1, keepdims=True)
+        way[:, :2] *= 1.0 - robot.pulley.arm / across
         units = way / np.linalg.norm(way, axis=1)[:, None]
         force = samples.tensions[k] @ units + weight
         np.testing.assert_allclose(

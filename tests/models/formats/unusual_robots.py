@@ -119,7 +119,6 @@ def robot_with_arms() -> Robot:
     made = yaml.safe_load(robot_text("maslow_4"))
     made |= {"name": "arms", "title": "Arms"}
     made["pulley"]["arm"] = 0.1234
-    made["cable"]["retardation_time"] = 0.0007
     return robot_of(made)
 
 
