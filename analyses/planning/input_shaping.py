@@ -16,7 +16,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
-from pydrake.systems.primitives import TrajectorySource
+from pydrake.systems.primitives import TrajectorySource, ZeroOrderHold
 from pydrake.trajectories import PiecewisePolynomial
 from scipy.interpolate import BSpline, CubicSpline
 
@@ -31,6 +31,7 @@ from cdpr_drake.statics.equilibrium import Equilibrium, equilibrium_near
 from cdpr_drake.statics.static_tensions import find_static_tensions
 from cdpr_drake.statics.stiffness import natural_modes, platform_stiffness
 from cdpr_drake.systems.robots.compiled_cable_robot import CompiledCableRobot
+from cdpr_drake.systems.robots.compiled_motion import HELD
 from cdpr_drake.systems.robots.compiled_step import StepRule
 from cdpr_drake.systems.robots.settings import CableRobotSettings, CableSettings, DampingSettings
 from cdpr_drake.trajectories.pose_path import straight_path
@@ -224,12 +225,14 @@ def simulate_swing(
         robot,
         CableRobotSettings(cables=settings),
         rule=StepRule(method="runge_kutta3", max_step=STEP),
-        command_period=PERIOD,
+        command_period=HELD,
     )
     builder = DiagramBuilder()
     builder.AddNamedSystem("robot", block)
     source = builder.AddNamedSystem("velocities", TrajectorySource(_velocities(motion, end)))
-    builder.Connect(source.get_output_port(), block.GetInputPort("cable_velocities"))
+    hold = builder.AddNamedSystem("hold", ZeroOrderHold(PERIOD, block.motion.cable_set().count))
+    builder.Connect(source.get_output_port(), hold.get_input_port())
+    builder.Connect(hold.get_output_port(), block.GetInputPort("cable_velocities"))
     simulator = Simulator(builder.Build())
     context = block.motion.GetMyMutableContextFromRoot(simulator.get_mutable_context())
     block.motion.hold(context, rest.X_WP, motion.lengths(0.0), rest.tensions)
@@ -262,10 +265,10 @@ def _velocities(motion: ShapedRest, end: float) -> PiecewisePolynomial:
     """Cable velocities, constant for a period, that wind exactly the lengths of the plan."""
     times = np.asarray(np.arange(int(np.ceil(end / PERIOD)) + 2) * PERIOD, dtype=np.float64)
     steps = np.diff(motion.lengths_at(times), axis=0).T / PERIOD
-    # The compiled robot takes the command that stands when a period ends: half a period late, it is
-    # the one of that period, whichever way times are rounded.
+    # Held from the beginning of each period: half a period early, the velocity is that of the
+    # period, whichever way times are rounded.
     velocities = np.column_stack([steps, np.zeros(len(steps))])
-    found: Any = PiecewisePolynomial.ZeroOrderHold(times + 0.5 * PERIOD, velocities)
+    found: Any = PiecewisePolynomial.ZeroOrderHold(times - 0.5 * PERIOD, velocities)
     return found
 
 

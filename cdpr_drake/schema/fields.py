@@ -129,7 +129,7 @@ class _DocumentedField(Field):  # type: ignore[type-arg]
     __slots__ = ()
 
     def __set_name__(self, owner: type, name: str) -> None:
-        super().__set_name__(owner, name)  # type: ignore[misc]
+        super().__set_name__(owner, name)
         rule: FieldRule = self.metadata["rule"]
         known = (owner.__doc__ or f"{owner.__name__}.").rstrip()
         head = "" if FIELDS_HEAD in known else f"\n\n    {FIELDS_HEAD}"

@@ -101,7 +101,7 @@ class MotorWinch(Diagram):
         m = len(home)
         builder = DiagramBuilder()
         motors = self._motors = builder.AddNamedSystem(
-            "motors", WinchMotors(law, mode, home, may_fail, start, following)
+            "motors", WinchMotors(law, mode, home, may_fail, start=start, following=following)
         )
         parts = builder.AddNamedSystem("parts", Demultiplexer([m] * motors.num_groups()))
         builder.Connect(motors.GetOutputPort("state"), parts.get_input_port())
@@ -154,6 +154,7 @@ def WinchMotors_(T: Any) -> type[LeafSystem]:
             mode: str,
             home: Array,
             may_fail: bool = False,
+            *,
             start: tuple[Array, Array] | None = None,
             following: Following | None = None,
             converter: Any = None,
@@ -201,8 +202,8 @@ def WinchMotors_(T: Any) -> type[LeafSystem]:
         def _construct_copy(self, other: Any, converter: Any = None) -> None:
             may_fail = bool(other._faults)
             Impl._construct(
-                self, other._law, other._mode_name, other._home, may_fail, other._start,
-                other._following, converter=converter,
+                self, other._law, other._mode_name, other._home, may_fail, start=other._start,
+                following=other._following, converter=converter,
             )  # fmt: skip
 
         def num_groups(self) -> int:
@@ -300,6 +301,7 @@ if TYPE_CHECKING:  # what an editor cannot see in a template
             mode: str,
             home: Array,
             may_fail: bool = False,
+            *,
             start: tuple[Array, Array] | None = None,
             following: Following | None = None,
         ) -> None: ...

@@ -105,8 +105,11 @@ def commanded_path(
         State of the platform after each period, shape (k, 13 or 6), unstrained lengths then, shape
         (k, m) [m], and tensions, shape (k, m) [N].
     """
-    compiled = kind is CompiledCableRobot
-    block = kind(robot, settings, **({"command_period": HELD} if compiled else {}))
+    block: CableRobot | CompiledCableRobot
+    if kind is CompiledCableRobot:
+        block = CompiledCableRobot(robot, settings, command_period=HELD)
+    else:
+        block = CableRobot(robot, settings)
     simulator = Simulator(block)
     context = simulator.get_mutable_context()
     block.set_at_equilibrium(context, X_WP, slack)
