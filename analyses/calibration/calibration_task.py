@@ -131,7 +131,7 @@ def calibrate(
             f"residuals are {result.spread():.3g} times what sigmas say; standard deviations are "
             "as much too small, or something that was not asked for is off"
         )
-    remarks += [*remarked_groups(groups), *likely_scales(result, prepared, groups)]
+    remarks += [*remarked_groups(groups), *likely_scales(result, prepared)]
     remarks += [*bad_sensors(result), *doubts(result, found.minima), *undecided]
     remarks += [
         f"{name} is held at its bound, {value:.6g}; standard deviations are those of the others "

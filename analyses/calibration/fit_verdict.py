@@ -24,8 +24,9 @@ from cdpr_drake.calibration.result import CalibrationResult, Fit
 MISFIT = "misfit"
 """Status of a result that does not fit what was measured."""
 
-MOST_LEFT_OUT = 0.5
-"""Outliers over the degrees of freedom that remain; of more, the search chose what it fits."""
+MOST_LEFT_OUT, FEWEST_LEFT_OUT = 0.3, 4
+"""Outliers over the degrees of freedom that remain; of more, and of so many at least, the search
+chose what it fits."""
 
 MISFIT_FACTOR = 3.0
 """Residuals of so many sigmas, root mean square, are no fit."""
@@ -77,7 +78,8 @@ def misfits(result: CalibrationResult, groups: Sequence[GroupFault] = ()) -> tup
         if is_thrown_out(fit):
             why.append(f"{fit.dropped} of {whole} {kind} do not fit: {HINTS.get(kind, '')}")
     left_out = len(result.outliers)
-    if result.degrees > 0 and left_out > MOST_LEFT_OUT * result.degrees:
+    many = left_out >= FEWEST_LEFT_OUT and left_out > MOST_LEFT_OUT * result.degrees
+    if result.degrees > 0 and many:
         why.append(
             f"{left_out} readings were left out beside {result.degrees} degrees of freedom; "
             f"accepted: at most {MOST_LEFT_OUT:g} of these"
@@ -109,9 +111,7 @@ def remarked_groups(groups: Sequence[GroupFault]) -> tuple[str, ...]:
     )
 
 
-def likely_scales(
-    result: CalibrationResult, prepared: Prepared, groups: Sequence[GroupFault]
-) -> tuple[str, ...]:
+def likely_scales(result: CalibrationResult, prepared: Prepared) -> tuple[str, ...]:
     """That offsets of lengths are more likely factors, in words.
 
     Lengths of a cable that change less than they are long tell an offset from a factor hardly, and

@@ -31,9 +31,6 @@ TRIED = {
 BY_CABLE = ("swivels", "lengths", "angles", "tensions")
 """Fields with a column a cable, each of which may be turned by itself."""
 
-CLEAR = ("rows", "split", "row factors")
-"""Tests of groups that say by themselves what is wrong: rows, and no sensor's sign."""
-
 TILTS = ("roll", "pitch", "yaw")
 
 
@@ -81,7 +78,7 @@ def turned_sensors(
     """
     lost = [g.quantity.removeprefix("readings of ") for g in groups if g.test == "dropped"]
     suspects = [kind for kind, fit in result.residuals.items() if is_thrown_out(fit)]
-    if not lost and not suspects and any(g.counts and g.test in CLEAR for g in groups):
+    if not lost and not suspects and any(_is_clear(group) for group in groups):
         return ()
     single = _first_that_fits(task, _single_sensors(task, log, lost), refitted)
     if single:
@@ -108,6 +105,12 @@ def turned_sensors(
     if lost:
         return ()
     return _first_that_fits(task, _turned_cables(task, log, tried), refitted)
+
+
+def _is_clear(group: GroupFault) -> bool:
+    """Whether a group says by itself what is wrong: rows, or a factor that is no sign."""
+    rows = group.test in ("rows", "split", "row factors")
+    return group.counts and (rows or (group.test == "factor" and group.size > 0.0))
 
 
 def turned_where_lost(
@@ -163,12 +166,14 @@ def _single_sensors(
             what = name if field == "tilts" else f"{kind.removesuffix('s')} of {name}"
             columns[what] = (kind, field, k)
     known = [what for what in lost if what in columns]
+    if len(known) > MOST_SUSPECTS:  # no single sensor is to blame
+        return
     for what in known:
         kind, field, k = columns[what]
         name = what if field == "tilts" else what.rpartition(" of ")[2]
         words = f"the sign of {what}" if field == "tilts" else f"the sign of the {kind} of {name}"
         yield f"{words} turned", _with_column(log, field, k, -1.0)
-    for what, other in combinations(known[:MOST_EXCHANGED], 2):
+    for what, other in combinations(known, 2):
         (kind, field, k), (other_kind, _, n) = columns[what], columns[other]
         values = getattr(log, field)
         if kind == other_kind and values is not None and field != "tilts":
@@ -177,8 +182,8 @@ def _single_sensors(
             yield f"{what} and {other} exchanged", replace(log, **{field: values})
 
 
-MOST_EXCHANGED = 4
-"""Sensors that are exchanged in pairs."""
+MOST_SUSPECTS = 3
+"""Sensors that are tried one by one, and exchanged in pairs."""
 
 
 def _with_column(log: CalibrationLog, field: str, k: int, factor: float) -> CalibrationLog:

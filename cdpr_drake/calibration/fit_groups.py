@@ -33,7 +33,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import eigh
 from scipy.optimize import nnls
-from scipy.stats import binom, f, t
+from scipy.stats import binom, f, norm, t
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.calibration.elimination import UNTOLD, LeastSquares
@@ -51,6 +51,10 @@ MOST_DROPPED = 1.0 / 3.0
 
 MOST_OF_KIND = 0.1
 """Share of the readings of a kind, over all sensors, that may be thrown out."""
+
+SINGLE_OUTLIERS, TRUNCATED = 0.02, 1.1
+"""Share of a kind that single outliers are expected to be, and by how much its scatter is larger
+than that of the readings that remain, where noise is twice its sigma."""
 
 DROPPED_BY_NOISE = 0.05
 """Share that noise of twice the stated sigma throws out: P(|x| > 4 / 2) = 0.0455."""
@@ -125,28 +129,31 @@ def group_faults(problem: LeastSquares, result: CalibrationResult) -> tuple[Grou
         problem: What was solved, with the rows that were dropped.
         result: Its minimum.
     """
-    at, pose_std = Point(result.model, result.stations), result.pose_std
+    at = Point(result.model, result.stations)
     used = [used_rows(problem, k) for k in range(len(problem.terms))]
+    residuals = _Residuals(problem, at, used, result.pose_std)
     dropped = [
-        *_explained_rows(problem, at, used), *_dropped_quantities(problem, at, used),
+        *_explained_rows(problem, at, used), *_dropped_quantities(residuals, used),
         *_dropped_rows(problem, at, used),
     ]  # fmt: skip
-    residuals = _Residuals(problem, at, used, pose_std)
     systematic = _systematic(residuals) if residuals.degrees > 1.0 else []
     return (*dropped, *sorted(systematic, key=lambda fault: fault.probability))
 
 
 def _dropped_quantities(
-    problem: LeastSquares, at: Point, used: Sequence[npt.NDArray[np.bool_]]
+    residuals: _Residuals, used: Sequence[npt.NDArray[np.bool_]]
 ) -> list[GroupFault]:
     """Single sensors, such as roll or the length of a cable, of which too much was thrown out; and
     kinds of measurement of which too much was, though each sensor lost little."""
     faults: list[GroupFault] = []
+    problem, at = residuals.problem, residuals.at
     count = sum(1 + term.measured().any(axis=0).sum() for term in problem.terms)
 
-    def look(kind: str, what: str, lost: npt.NDArray[np.bool_], whole: int, most: float) -> bool:
+    def look(
+        kind: str, what: str, lost: npt.NDArray[np.bool_], whole: int, most: float, expected: float
+    ) -> bool:
         gone = int(lost.sum())
-        chance = float(binom.sf(gone - 1, whole, DROPPED_BY_NOISE)) if gone else 1.0
+        chance = float(binom.sf(gone - 1, whole, expected)) if gone else 1.0
         if gone <= most * whole or chance >= FALSE_ALARM / count:
             return False
         rows = tuple(np.flatnonzero(lost.reshape(len(lost), -1).any(axis=1)).tolist())
@@ -154,15 +161,17 @@ def _dropped_quantities(
         faults.append(GroupFault("dropped", kind, what, rows, gone, 0.0, chance, np.inf, words))
         return True
 
-    for term, counted in zip(problem.terms, used, strict=True):
+    for term, counted, scatter in zip(problem.terms, used, residuals.scatter, strict=True):
         measured = term.measured()
         lost, named = measured & ~counted, False
         for column in np.flatnonzero(lost.any(axis=0)).tolist():
             what = f"readings of {term.row_name(column, at.model.names)}"
             whole = int(measured[:, column].sum())
-            named |= look(term.kind, what, lost[:, column], whole, MOST_DROPPED)
+            named |= look(term.kind, what, lost[:, column], whole, MOST_DROPPED, DROPPED_BY_NOISE)
         if not named:
-            look(term.kind, term.kind, lost, int(measured.sum()), MOST_OF_KIND)
+            beyond = 2.0 * norm.sf(OUTLIER / max(TRUNCATED * scatter, 1e-9))
+            expected = max(float(beyond), SINGLE_OUTLIERS)
+            look(term.kind, term.kind, lost, int(measured.sum()), MOST_OF_KIND, expected)
     return faults
 
 

@@ -2,8 +2,8 @@
 
 `python -m tests.analyses.calibration.attack` prints a table of attacks. `--clean 200` calibrates so
 many clean logs and counts false alarms. `--robot ROBOT --log LOG` attacks another log, whose clean
-fit is the truth then. An attack is met where the verdict is a misfit, or a refusal, with its reason,
-or where poses stay within their stated deviations.
+fit is the truth then. An attack is met where the verdict is a misfit, or a refusal, with its
+reason, or where poses stay within their stated deviations.
 """
 
 import argparse

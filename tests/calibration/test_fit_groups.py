@@ -1,0 +1,162 @@
+"""Groups of measurements that do not agree: the projector, tests behind it, what is thrown out."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cdpr_drake.calibration.fit_groups import _Residuals, group_faults
+from cdpr_drake.calibration.measurements import simulated_lengths, simulated_poses
+from cdpr_drake.calibration.program import CalibrationProgram
+from cdpr_drake.calibration.result import used_rows
+from cdpr_drake.calibration.stations import Point
+from tests.calibration.bench import poses, start_readings, true_model
+
+SIGMA, PLACE, TURN = 5e-4, 5e-4, 1e-3
+COUNT = 24
+EXACT = 1e-8
+"""Share by which block elimination and dense algebra differ."""
+
+
+def fitted(noise=1.0, seed=0, spoil=lambda readings: readings, place=1.0):
+    """A result and its problem: lengths of eight cables and tracked poses, with sigmas as said."""
+    random, true = np.random.default_rng(seed), true_model()
+    at = poses(COUNT, random)
+    zero = start_readings(true, at[0])
+    program = CalibrationProgram(true, at, ["length_offsets"])
+    program.AddPrior(["length_offsets"], 0.05)
+    readings = simulated_lengths(true, at, zero, SIGMA, random)
+    program.AddLengths(spoil(readings), SIGMA / noise, zero)
+    seen = simulated_poses(at, TURN, PLACE, random)
+    program.AddTrackedPoses(seen, TURN / place, PLACE / place)
+    result = program.Solve()
+    return program.SolvedProblem(result), result
+
+
+def residuals_of(problem, result):
+    at = Point(result.model, result.stations)
+    used = [used_rows(problem, k) for k in range(len(problem.terms))]
+    return _Residuals(problem, at, used, result.pose_std)
+
+
+@pytest.fixture(scope="module")
+def clean():
+    return fitted()
+
+
+def test_directions_are_projected_as_by_dense_least_squares(clean):
+    """M = I - J (J'J)^-1 J' of all parameters, poses and priors at once."""
+    problem, result = clean
+    mine = residuals_of(problem, result)
+    at = Point(result.model, result.stations)
+    _, A, B = problem.evaluate(at)
+    k, rows, q = B.shape
+    poses_of = np.zeros((k, rows, k, q))
+    poses_of[np.arange(k), :, np.arange(k)] = B
+    prior = problem.prior.evaluate(at, problem.free)[1] * at.layout.typical[problem.free]
+    J = np.vstack(
+        [
+            np.hstack([A.reshape(k * rows, -1), poses_of.reshape(k * rows, k * q)]),
+            np.hstack([prior, np.zeros((len(prior), k * q))]),
+        ]
+    )
+    Q = np.linalg.qr(J)[0]
+    D = np.random.default_rng(1).standard_normal((k, rows, 3))
+    whole = np.vstack([D.reshape(k * rows, 3), np.zeros((len(prior), 3))])
+    expected = whole - Q @ (Q.T @ whole)
+    projected, of_prior = mine.projected(D)
+    np.testing.assert_allclose(projected.reshape(k * rows, 3), expected[: k * rows], atol=EXACT)
+    np.testing.assert_allclose(of_prior, expected[k * rows :], atol=EXACT)
+    trace = k * rows - np.sum(Q[: k * rows] ** 2)
+    assert mine.degrees == pytest.approx(trace, rel=EXACT)
+
+
+def test_scatter_of_each_kind_is_found_whatever_its_stated_sigma():
+    """Lengths stated 1.5 times too sure, the tracker 1.5 times too unsure."""
+    found = [residuals_of(*fitted(noise=1.5, seed=s, place=1.0 / 1.5)).scatter for s in range(6)]
+    mean = np.sqrt(np.mean(np.square(found), axis=0))
+    np.testing.assert_allclose(mean, [1.5, 1.0 / 1.5], rtol=0.1)  # of 6 x 144 degrees or more
+
+
+@pytest.mark.parametrize("noise", [0.25, 1.0, 2.0])
+def test_noise_alone_makes_no_fault(noise):
+    problem, result = fitted(noise=noise)
+    assert [fault for fault in group_faults(problem, result) if fault.counts] == []
+
+
+def scaled(cable, factor):
+    def spoil(readings):
+        readings[:, cable] *= factor
+        return readings
+
+    return spoil
+
+
+def test_a_factor_of_one_cable_is_estimated_with_its_deviation():
+    """Small enough that nothing is thrown out; sigmas stated ten times too large."""
+    problem, result = fitted(noise=0.1, spoil=scaled(2, 1.02), place=0.1)
+    fault = next(f for f in group_faults(problem, result) if f.test == "factor")
+    assert fault.quantity == "length of C3"
+    assert fault.std < 2e-3
+    assert abs(fault.size - 1.02) < 4.0 * fault.std
+    assert fault.words.startswith(f"length of C3 is {fault.size:.4g} +- ")
+
+
+def test_a_reading_late_by_a_row_is_named():
+    def late(readings):
+        readings[1:, 4] = readings[:-1, 4]
+        return readings
+
+    problem, result = fitted(spoil=late)
+    faults = [fault for fault in group_faults(problem, result) if fault.counts]
+    assert any("length of C5" in fault.quantity for fault in faults)
+
+
+def test_rows_that_one_factor_explains_are_named():
+    rows = [3, 9, 17]
+
+    def spoil(readings):
+        readings[rows] *= 1.05
+        return readings
+
+    problem, result = fitted(spoil=spoil)
+    fault = group_faults(problem, result)[0]
+    assert fault.counts
+    assert list(fault.rows) == rows
+    assert fault.size == pytest.approx(1.05, abs=0.01)
+    assert "rows 4, 10, 18" in fault.words
+
+
+def test_single_outliers_are_no_group():
+    def spoil(readings):
+        readings[5, 1] += 0.05
+        readings[11, 6] -= 0.2
+        readings[20, 0] += 0.01
+        return readings
+
+    problem, result = fitted(spoil=spoil)
+    assert len(result.outliers) == 3
+    assert [fault for fault in group_faults(problem, result) if fault.counts] == []
+
+
+def test_a_sensor_that_loses_a_third_is_named_and_fewer_are_not():
+    def spoil(share):
+        def off(readings):
+            count = round(share * COUNT)
+            readings[1 : 1 + count, 3] += np.random.default_rng(3).choice([-1, 1], count) * 0.1
+            return readings
+
+        return off
+
+    lost = [f for f in group_faults(*fitted(spoil=spoil(0.5))) if f.test == "dropped"]
+    assert [fault.words for fault in lost] == ["12 of 24 readings of length of C4 do not fit"]
+    few = group_faults(*fitted(spoil=spoil(0.2)))
+    assert [f for f in few if f.test == "dropped"] == []
+
+
+def test_what_was_not_measured_is_in_no_group(clean):
+    problem, result = clean
+    lengths = problem.terms[0]
+    gone = replace(lengths, readings=np.where(np.arange(8) == 7, np.nan, lengths.readings))
+    other = replace(problem, terms=[gone, problem.terms[1]], dropped=None)
+    assert all("C8" not in fault.quantity for fault in group_faults(other, result))
