@@ -32,6 +32,7 @@ from cdpr_drake.analyses.simulation.scenario_kinds import SCENARIO_KINDS, Scenar
 from cdpr_drake.analyses.simulation.session import RunSession, check_connected
 from cdpr_drake.analyses.sweeps.workers import check_scheduler
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
+from cdpr_drake.blas_threads import one_blas_thread
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.summaries import Tabulated
@@ -164,6 +165,7 @@ class RepeatedRuns(Tabulated):
         return f"{len(told['seeds'])} of {told['wanted']} runs of {told['scenario']}", rows
 
 
+@one_blas_thread()
 def simulate(
     scenario: RunHeader | str | Path,
     overrides: Sequence[str] = (),
@@ -232,6 +234,7 @@ def simulate(
         return _run_into(results, kind, loaded, wanted, told)
 
 
+@one_blas_thread()
 def continue_run(
     folder: Path | str,
     *,
@@ -260,6 +263,7 @@ def continue_run(
         return _run_into(results, kind, scenario, wanted, session or Session(), resume=True)
 
 
+@one_blas_thread()
 def finish_run(
     folder: Path | str,
     *,

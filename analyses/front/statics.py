@@ -19,6 +19,7 @@ from cdpr_drake.analyses.statics.equilibria_query import (
 )
 from cdpr_drake.analyses.statics.static_query import StaticReport, static_at_lengths, static_at_pose
 from cdpr_drake.arrays import Array
+from cdpr_drake.blas_threads import one_blas_thread
 from cdpr_drake.cables.models import CABLE_MODELS
 from cdpr_drake.errors import EquilibriumError
 from cdpr_drake.geometry.poses import angles_from_rotation
@@ -134,6 +135,7 @@ class PoseFromLengths(Summarized):
         ]
 
 
+@one_blas_thread()
 def solve_static(
     robot: Robot | str | Path,
     pose: object = None,
@@ -168,6 +170,7 @@ def solve_static(
     return as_kind(RobotAtRest, found)
 
 
+@one_blas_thread()
 def find_equilibria(
     robot: Robot | str | Path,
     lengths: Array | Sequence[float] | None = None,
@@ -226,6 +229,7 @@ def find_equilibria(
     return as_kind(RobotEquilibria, rests, loaded=loaded)
 
 
+@one_blas_thread()
 def solve_forward_kinematics(
     robot: Robot | str | Path,
     lengths: Array | Sequence[float],

@@ -26,6 +26,7 @@ from cdpr_drake.analyses.studies.framework.study import Study
 from cdpr_drake.analyses.sweeps.earlier_runs import check_earlier
 from cdpr_drake.analyses.sweeps.workers import check_scheduler
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
+from cdpr_drake.blas_threads import one_blas_thread
 from cdpr_drake.errors import CdprError
 from cdpr_drake.schema.typed_yaml import closest
 from cdpr_drake.summaries import Summarized
@@ -105,6 +106,7 @@ def studies() -> tuple[str, ...]:
     return tuple(STUDIES)
 
 
+@one_blas_thread()
 def run_study(
     name: str | Study,
     folder: Path | str | None = None,
