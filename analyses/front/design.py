@@ -23,6 +23,7 @@ from cdpr_drake.analyses.design.settings import (
 from cdpr_drake.analyses.front.session import Session, asked_workers, kept_folder
 from cdpr_drake.analyses.reporting.progress import StudySession
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
+from cdpr_drake.blas_threads import one_blas_thread
 from cdpr_drake.errors import DesignError
 from cdpr_drake.models.robot_loader import load_robot, robot_reference
 from cdpr_drake.models.robot_schema import Robot
@@ -55,6 +56,7 @@ def plain_design(robot: Robot, goals: str | Sequence[str]) -> DesignSettings:
 
 
 @inputs_read_once()
+@one_blas_thread()
 def optimize_design(
     robot: Robot | str | Path,
     settings: DesignSettings | Path | str | Sequence[str],

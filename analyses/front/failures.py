@@ -17,6 +17,7 @@ from cdpr_drake.analyses.simulation.break_report import REACTIONS, after_break
 from cdpr_drake.analyses.simulation.session import RunSession
 from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS, figure_writers
+from cdpr_drake.blas_threads import one_blas_thread
 from cdpr_drake.errors import ScenarioError, StoppedError
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.schema.input_files import inputs_read_once
@@ -101,6 +102,7 @@ class BreakReactions(Tabulated):
 
 
 @inputs_read_once()
+@one_blas_thread()
 def compare_reactions(
     scenario: str | Path = "acrobot_broken_redistributed",
     cable: int = 2,

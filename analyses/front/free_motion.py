@@ -20,6 +20,7 @@ from cdpr_drake.analyses.calibration.log_file import CalibrationLog, read_log
 from cdpr_drake.analyses.front.fitted_robots import FittedRobot, Keeping, kept_fit
 from cdpr_drake.analyses.front.session import Say, Session
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
+from cdpr_drake.blas_threads import one_blas_thread
 from cdpr_drake.errors import IdentificationError, accepted_names
 from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
@@ -64,6 +65,7 @@ KEPT = ("folder", "overwrite", "formats", "say", "session")
 
 
 @inputs_read_once()
+@one_blas_thread()
 def identify_free_motion(
     robot: Robot | str | Path,
     log: CalibrationLog | Path | str,

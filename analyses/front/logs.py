@@ -15,6 +15,7 @@ from cdpr_drake.analyses.logs.recorded_log import RecordedLog
 from cdpr_drake.analyses.reporting.deferred_figures import write_pictures
 from cdpr_drake.analyses.reporting.log_files import write_json
 from cdpr_drake.analyses.reporting.output_folder import results_folder
+from cdpr_drake.blas_threads import one_blas_thread
 from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.summaries import Summarized
@@ -59,6 +60,7 @@ class ImportedLog(Summarized):
         return log_figure(self.log)
 
 
+@one_blas_thread()
 def import_log(
     path: Path | str,
     request: LogRequest | None = None,
@@ -146,6 +148,7 @@ class ReplayedLog(Summarized):
         return residual_figure(self.replay, self.followed)
 
 
+@one_blas_thread()
 def replay_log(
     path: Path | str,
     robot: Robot | str | Path,

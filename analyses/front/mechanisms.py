@@ -15,6 +15,7 @@ from pydrake.systems.framework import Context
 
 from cdpr_drake.analyses.statics.tension_query import solve_all
 from cdpr_drake.arrays import Array
+from cdpr_drake.blas_threads import one_blas_thread
 from cdpr_drake.cables.models import CABLE_MODELS
 from cdpr_drake.errors import EquilibriumError, TensionProblemError
 from cdpr_drake.geometry.poses import angles_from_rotation
@@ -243,6 +244,7 @@ class MechanismAtRest(Summarized):
         ]
 
 
+@one_blas_thread()
 def hang_mechanism(
     mechanism: Mechanism | str | Path,
     lengths: Array | Sequence[float] | None = None,
@@ -383,6 +385,7 @@ class MechanismTensions(Summarized):
         ]  # fmt: skip
 
 
+@one_blas_thread()
 def solve_mechanism_tensions(
     mechanism: Mechanism | str | Path,
     method: str = UNDERACTUATED,

@@ -26,6 +26,7 @@ from cdpr_drake.analyses.planning.robot_path_task import (
 )
 from cdpr_drake.analyses.workspaces.workspace_files import load_obstacles, load_wrench_set
 from cdpr_drake.arrays import Array
+from cdpr_drake.blas_threads import one_blas_thread
 from cdpr_drake.errors import PlanningError, WrenchSetError
 from cdpr_drake.geometry.poses import angles_from_rotation
 from cdpr_drake.models.robot_loader import as_robot
@@ -118,6 +119,7 @@ TRACKING = "computed torque, which --track asks for"
 
 
 @inputs_read_once()
+@one_blas_thread()
 def plan_path(
     robot: Robot | str | Path,
     path: PathPoses | Path | str | Sequence[object],
@@ -186,6 +188,7 @@ def plan_path(
 
 
 @inputs_read_once()
+@one_blas_thread()
 def plan_free_motion(
     robot: Robot | str | Path,
     start: object,

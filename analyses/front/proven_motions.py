@@ -38,6 +38,7 @@ from cdpr_drake.analyses.workspaces.proven_sets import (
 )
 from cdpr_drake.analyses.workspaces.workspace_files import load_all_obstacles
 from cdpr_drake.arrays import Array
+from cdpr_drake.blas_threads import one_blas_thread
 from cdpr_drake.errors import PlanningError, WorkspaceError
 from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
@@ -112,6 +113,7 @@ class DrawnProvenPlan(ProvenRun):
 
 
 @inputs_read_once()
+@one_blas_thread()
 def plan_proven_motion(
     robot: Robot | str | Path,
     start: object,

@@ -21,6 +21,7 @@ from cdpr_drake.analyses.design.reconfiguration import (
 from cdpr_drake.analyses.front.planning import PathPoses, Say, path_poses
 from cdpr_drake.analyses.planning.robot_path_task import make_path
 from cdpr_drake.analyses.workspaces.workspace_files import load_wrench_set
+from cdpr_drake.blas_threads import one_blas_thread
 from cdpr_drake.errors import PlanningError, WrenchSetError
 from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
@@ -47,6 +48,7 @@ class DrawnReconfiguration(Reconfiguration):
 
 
 @inputs_read_once()
+@one_blas_thread()
 def reconfigure(
     robot: Robot | str | Path,
     rails: Path | str | Sequence[RailSettings] | None,

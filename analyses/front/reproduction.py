@@ -28,6 +28,7 @@ from cdpr_drake.analyses.reproduction.states import (
 )
 from cdpr_drake.analyses.studies.published.register import published_registers
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
+from cdpr_drake.blas_threads import one_blas_thread
 from cdpr_drake.summaries import Summarized
 
 if TYPE_CHECKING:
@@ -103,6 +104,7 @@ class Reproduction(Summarized):
         ]
 
 
+@one_blas_thread()
 def reproduce(
     folder: Path | str,
     quick: bool = False,

@@ -36,6 +36,7 @@ from cdpr_drake.analyses.simulation.scenario_kinds import SCENARIO_KINDS, Scenar
 from cdpr_drake.analyses.simulation.session import RunSession, check_connected
 from cdpr_drake.analyses.sweeps.workers import check_scheduler
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
+from cdpr_drake.blas_threads import one_blas_thread
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.schema.input_files import inputs_read_once
@@ -207,6 +208,7 @@ def simulate(
 
 
 @inputs_read_once()
+@one_blas_thread()
 def simulate(
     scenario: RunHeader | str | Path,
     overrides: Sequence[str] = (),
@@ -280,6 +282,7 @@ def simulate(
 
 
 @inputs_read_once()
+@one_blas_thread()
 def continue_run(
     folder: Path | str,
     *,
@@ -309,6 +312,7 @@ def continue_run(
 
 
 @inputs_read_once()
+@one_blas_thread()
 def finish_run(
     folder: Path | str,
     *,

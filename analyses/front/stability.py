@@ -25,6 +25,7 @@ from cdpr_drake.analyses.workspaces.stability_results import (
     stability_workspaces,
 )
 from cdpr_drake.analyses.workspaces.static_feasible import static_case
+from cdpr_drake.blas_threads import one_blas_thread
 from cdpr_drake.errors import StabilityError
 from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
@@ -122,6 +123,7 @@ def stability_question(
 
 
 @inputs_read_once()
+@one_blas_thread()
 def assess_stability(
     robot: Robot | str | Path,
     scheme: str = "pbvs",

@@ -19,6 +19,7 @@ from cdpr_drake.analyses.statics.equilibria_query import (
 )
 from cdpr_drake.analyses.statics.static_query import StaticReport, static_at_lengths, static_at_pose
 from cdpr_drake.arrays import Array
+from cdpr_drake.blas_threads import one_blas_thread
 from cdpr_drake.cables.models import CABLE_MODELS, ELASTIC
 from cdpr_drake.errors import EquilibriumError, TensionProblemError
 from cdpr_drake.geometry.cable_paths import cable_paths
@@ -231,6 +232,7 @@ class CableLengths(Tabulated):
         ]
 
 
+@one_blas_thread()
 def solve_static(
     robot: Robot | str | Path,
     pose: object = None,
@@ -267,6 +269,7 @@ def solve_static(
     return as_kind(RobotAtRest, found)
 
 
+@one_blas_thread()
 def find_equilibria(
     robot: Robot | str | Path,
     lengths: Array | Sequence[float] | None = None,
@@ -366,6 +369,7 @@ def plot(robot: Robot | str | Path, pose: object = None) -> Figure:
     return poses_figure(loaded.title or loaded.name, loaded, {"platform": as_pose(loaded, pose)})
 
 
+@one_blas_thread()
 def solve_forward_kinematics(
     robot: Robot | str | Path,
     lengths: Array | Sequence[float],

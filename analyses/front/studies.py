@@ -26,6 +26,7 @@ from cdpr_drake.analyses.studies.framework.study import Study
 from cdpr_drake.analyses.sweeps.earlier_runs import check_earlier
 from cdpr_drake.analyses.sweeps.workers import check_scheduler
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
+from cdpr_drake.blas_threads import one_blas_thread
 from cdpr_drake.errors import CdprError
 from cdpr_drake.schema.input_files import inputs_read_once
 from cdpr_drake.schema.typed_yaml import closest
@@ -107,6 +108,7 @@ def studies() -> tuple[str, ...]:
 
 
 @inputs_read_once()
+@one_blas_thread()
 def run_study(
     name: str | Study,
     folder: Path | str | None = None,

@@ -17,6 +17,7 @@ from cdpr_drake.analyses.statics.tension_query import (
     underactuated_answer,
 )
 from cdpr_drake.arrays import Array
+from cdpr_drake.blas_threads import one_blas_thread
 from cdpr_drake.errors import TensionProblemError
 from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
@@ -259,6 +260,7 @@ class UnderactuatedTensions(Summarized):
         ]  # fmt: skip
 
 
+@one_blas_thread()
 def solve_tensions(
     robot: Robot | str | Path,
     pose: object = None,
@@ -323,6 +325,7 @@ def solve_tensions(
     return RobotTensions(loaded, X_WP, problem, (distribute(problem, method),), pulleys)
 
 
+@one_blas_thread()
 def compare_tensions(
     robot: Robot | str | Path,
     pose: object = None,

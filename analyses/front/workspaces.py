@@ -48,6 +48,7 @@ from cdpr_drake.analyses.workspaces.workspace_question import (
 )
 from cdpr_drake.analyses.workspaces.workspace_results import RobotWorkspace, robot_workspace
 from cdpr_drake.arrays import Array
+from cdpr_drake.blas_threads import one_blas_thread
 from cdpr_drake.errors import StoppedError, WorkspaceError, WorkspaceGridError
 from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
@@ -337,6 +338,7 @@ def workspace_question(
 
 
 @inputs_read_once()
+@one_blas_thread()
 def compute_workspace(
     robot: Robot | str | Path,
     kinds: str | Sequence[str] = "static",

@@ -13,6 +13,7 @@ from concurrent.futures.process import BrokenProcessPool
 from multiprocessing.context import SpawnContext, SpawnProcess
 from typing import Any, Self, TypeVar
 
+from cdpr_drake.blas_threads import started_with_one_thread
 from cdpr_drake.kernel_cache.locks import compilation_time, share_compilation
 from cdpr_drake.schema.input_files import SentInputs, inputs_held
 from cdpr_drake.worker_process import become_worker, resident_memory
@@ -269,7 +270,8 @@ class _ShelteredProcess(SpawnProcess):
         """Starts it; the parent gets what was sent meanwhile."""
         held = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT, signal.SIGTERM))
         try:
-            super().start()
+            with started_with_one_thread():
+                super().start()
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, held)
 

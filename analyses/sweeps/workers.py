@@ -14,6 +14,7 @@ import numpy as np
 
 from cdpr_drake.analyses.reporting.provenance import code_version
 from cdpr_drake.analyses.sweeps.worker_pool import PersistentPool, run_jobs, with_inputs
+from cdpr_drake.blas_threads import one_blas_thread
 from cdpr_drake.errors import SweepError
 from cdpr_drake.kernel_cache.locks import share_compilation
 
@@ -72,7 +73,8 @@ def do_by_same_code(work: Callable[[Job], Result], job: Job, version: str) -> Re
             "here; install the same on all workers"
         )
     share_compilation()
-    return work(job)
+    with one_blas_thread():
+        return work(job)
 
 
 def computed(

@@ -13,7 +13,10 @@ weight: (1 + T / ES)^2 - 2 w z / ES is the same all along. What remains are two 
 (H, V_A), solved by Newton's method with steps that keep H positive and make the error smaller.
 
 Source: Irvine, Cable Structures, 1981, 1.3, for the free part, and the servoing thesis 1.3.1 for
-the pulley; the two together are solved here.
+the pulley; the two together are solved here. Over a pulley the equations are not the slope of a
+convex energy, as those of a free cable are, and Newton's steps can end where they are not solved.
+Then alpha is searched for: the free part from A' to B has a solution for each, of which the angle
+of the force must be alpha.
 """
 
 from __future__ import annotations
@@ -38,6 +41,9 @@ ROUNDING = 1e-5
 
 SENSITIVITIES = 6
 """Rows of `sagging_cable`'s derivatives: H, V_B, tension at B, tension at A, length, sag."""
+
+ANGLES, HALVINGS = 24, 30
+"""Angles at which a cable is tried to leave its groove, and halvings between two of them."""
 
 _NODES = (0.5 - 0.5 * np.sqrt(0.6), 0.5, 0.5 + 0.5 * np.sqrt(0.6))
 _WEIGHTS = (5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0)
@@ -126,6 +132,93 @@ def _along_chord(x: float, z: float, s: float, ES: float, w: float) -> Any:
 
 
 @njit(cache=True, error_model="numpy")
+def _newton(
+    rho: float, z: float, r: float, sigma: float, l0: float, ES: float, w: float,
+    H: float, V_A: float,
+) -> Any:  # fmt: skip
+    """Newton's steps from one force; as `solve_catenary`."""
+    e_x, e_z, xx, xz, zx, zz, good = equations(H, V_A, rho, z, r, sigma, l0, ES, w)
+    halvings = 0
+    while not good and halvings < 60:  # all of the cable in the groove: pull harder
+        H, V_A = 2.0 * H, 2.0 * V_A
+        e_x, e_z, xx, xz, zx, zz, good = equations(H, V_A, rho, z, r, sigma, l0, ES, w)
+        halvings += 1
+    before = np.inf
+    for _ in range(STEPS):
+        if not good:
+            break
+        det = xx * zz - xz * zx
+        d_H, d_V = -(zz * e_x - xz * e_z) / det, -(xx * e_z - zx * e_x) / det
+        tension = np.hypot(H, V_A)
+        step = np.hypot(d_H, d_V)
+        if not np.isfinite(step):
+            break
+        # H is a small part of the tension where a cable hangs down, but has its own logarithm.
+        share_H = abs(d_H / H)
+        small = step <= ROUNDING * tension and share_H <= ROUNDING
+        last = step <= LAST_STEP_SHARE * tension and share_H <= LAST_STEP_SHARE
+        if small and (last or step >= 0.5 * before):
+            return H + d_H, V_A + d_V, True
+        before = step
+        share = 1.0
+        if d_H * H < -0.9 * H * H:
+            share = -0.9 * H / d_H
+        error = e_x * e_x + e_z * e_z
+        for _ in range(60):
+            new_H, new_V = H + share * d_H, V_A + share * d_V
+            e_x, e_z, xx, xz, zx, zz, good = equations(new_H, new_V, rho, z, r, sigma, l0, ES, w)
+            if good and (small or e_x * e_x + e_z * e_z < error):
+                break
+            share *= 0.5
+            good = False
+        H, V_A = new_H, new_V
+    return H, V_A, False
+
+
+@njit(cache=True, error_model="numpy")
+def _off_angle(
+    alpha: float, rho: float, z: float, r: float, sigma: float, l0: float, ES: float, w: float
+) -> Any:
+    """Angle of the force less alpha, of a free part that begins at alpha, the force, and success."""
+    x, up = rho - r * (1.0 + np.cos(alpha)), z - sigma * r * np.sin(alpha)
+    s = l0 - r * (np.pi - alpha)
+    if s <= 0.0 or x == 0.0:
+        return 0.0, 0.0, 0.0, False
+    H, V_A = first_guess(x, up, s, ES, w)
+    H, V_A, good = _newton(x, up, 0.0, sigma, s, ES, w, H, V_A)
+    if not good:
+        H, V_A = _along_chord(x, up, s, ES, w)
+        H, V_A, good = _newton(x, up, 0.0, sigma, s, ES, w, H, V_A)
+    return np.arctan2(H, -sigma * V_A) - alpha, H, V_A, good
+
+
+@njit(cache=True, error_model="numpy")
+def _search(rho: float, z: float, r: float, sigma: float, l0: float, ES: float, w: float) -> Any:
+    """As `solve_catenary`, by the angle at which the cable leaves its groove."""
+    before, off_before, known = 0.0, 0.0, False
+    for k in range(ANGLES + 1):
+        alpha = -0.5 * np.pi + 2.0 * np.pi * k / ANGLES
+        off, H, V_A, good = _off_angle(alpha, rho, z, r, sigma, l0, ES, w)
+        if good and known and off * off_before <= 0.0 and abs(off - off_before) < np.pi:
+            low, high = before, alpha
+            for _ in range(HALVINGS):
+                mid = 0.5 * (low + high)
+                there, H, V_A, good = _off_angle(mid, rho, z, r, sigma, l0, ES, w)
+                if not good:
+                    break
+                if there * off_before > 0.0:
+                    low = mid
+                else:
+                    high = mid
+            H, V_A, good = _newton(rho, z, r, sigma, l0, ES, w, H, V_A)
+            if good:
+                return H, V_A, True
+            good = True
+        before, off_before, known = alpha, off, good
+    return 0.0, 0.0, False
+
+
+@njit(cache=True, error_model="numpy")
 def solve_catenary(
     rho: float, z: float, r: float, sigma: float, l0: float, ES: float, w: float,
     H: float, V_A: float,
@@ -149,43 +242,11 @@ def solve_catenary(
     for attempt in range(0 if abs(H) > 0.0 else 1, 3):
         if attempt > 0:
             H, V_A = _begin(rho, z, r, sigma, l0, ES, w, attempt == 2)
-        e_x, e_z, xx, xz, zx, zz, good = equations(H, V_A, rho, z, r, sigma, l0, ES, w)
-        halvings = 0
-        while not good and halvings < 60:  # all of the cable in the groove: pull harder
-            H, V_A = 2.0 * H, 2.0 * V_A
-            e_x, e_z, xx, xz, zx, zz, good = equations(H, V_A, rho, z, r, sigma, l0, ES, w)
-            halvings += 1
-        before = np.inf
-        for _ in range(STEPS):
-            if not good:
-                break
-            det = xx * zz - xz * zx
-            d_H, d_V = -(zz * e_x - xz * e_z) / det, -(xx * e_z - zx * e_x) / det
-            tension = np.hypot(H, V_A)
-            step = np.hypot(d_H, d_V)
-            if not np.isfinite(step):
-                break
-            # H is a small part of the tension where a cable hangs down, but has its own logarithm.
-            share_H = abs(d_H / H)
-            small = step <= ROUNDING * tension and share_H <= ROUNDING
-            last = step <= LAST_STEP_SHARE * tension and share_H <= LAST_STEP_SHARE
-            if small and (last or step >= 0.5 * before):
-                return H + d_H, V_A + d_V, True
-            before = step
-            share = 1.0
-            if d_H * H < -0.9 * H * H:
-                share = -0.9 * H / d_H
-            error = e_x * e_x + e_z * e_z
-            for _ in range(60):
-                new_H, new_V = H + share * d_H, V_A + share * d_V
-                e_x, e_z, xx, xz, zx, zz, good = equations(
-                    new_H, new_V, rho, z, r, sigma, l0, ES, w
-                )
-                if good and (small or e_x * e_x + e_z * e_z < error):
-                    break
-                share *= 0.5
-                good = False
-            H, V_A = new_H, new_V
+        H, V_A, good = _newton(rho, z, r, sigma, l0, ES, w, H, V_A)
+        if good:
+            return H, V_A, True
+    if r > 0.0:
+        return _search(rho, z, r, sigma, l0, ES, w)
     return H, V_A, False
 
 

@@ -22,6 +22,7 @@ from typing import Annotated, Any, NoReturn
 import typer
 from typer.core import TyperGroup
 
+from cdpr_drake.blas_threads import ONE_THREAD, one_blas_thread, started_with_one_thread
 from cdpr_drake.cli.command_help import COMMANDS, examples_of, first_steps, groups
 from cdpr_drake.cli.completion import PROGRAM, asked_words, stand_in
 from cdpr_drake.cli.option_names import SHARED_OPTIONS, with_options
@@ -231,9 +232,11 @@ def main(arguments: list[str] | None = None) -> None:
     end it at once when there is nothing left to do. Garbage is never searched for among what is
     imported: that stays, and each search would walk through hundreds of thousands of objects.
     """
-    if arguments is not None:
-        _main(arguments)
+    if arguments is not None:  # somebody else's process
+        with one_blas_thread(), started_with_one_thread():
+            _main(arguments)
         return
+    os.environ.update(ONE_THREAD)  # before NumPy is loaded
     for each in SIGNALS:
         signal.signal(each, _end_at_once)
     gc.disable()

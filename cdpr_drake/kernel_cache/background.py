@@ -19,6 +19,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from cdpr_drake.blas_threads import ONE_THREAD
 from cdpr_drake.errors import CdprError
 from cdpr_drake.kernel_cache.kernel_list import (
     ListedKernel,
@@ -99,7 +100,7 @@ def _start(groups: Collection[str]) -> None:
     environment = {
         **os.environ,
         "PYTHONPATH": os.pathsep.join([above, *([path] if path else [])]),
-        "OPENBLAS_NUM_THREADS": "1",
+        **ONE_THREAD,
         HELPERS: "0",
     }
     # -P: nothing in the working folder is imported by accident.

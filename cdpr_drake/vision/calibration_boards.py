@@ -57,7 +57,7 @@ FINDERS = (
     ),
 )
 """OpenCV's finders of chessboards, one after the other until one finds it. The last one makes the
-histogram even (`CALIB_CB_NORMALIZE_IMAGE`), which melts board and wall together in many pictures."""
+histogram even (`CALIB_CB_NORMALIZE_IMAGE`), which melts board and wall together in many images."""
 
 
 @dataclass(frozen=True)

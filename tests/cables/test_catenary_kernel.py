@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from cdpr_drake.cables.catenary_kernel import free_part, sag_of, stored_energy, stretched_length
-from cdpr_drake.cables.hanging_kernel import solve_catenary
+from cdpr_drake.cables.hanging_kernel import equations, solve_catenary
+from cdpr_drake.geometry.pulley_kernel import tangent
 
 ROUNDING = 1e-11  # asinh and root of numbers up to 1e4, subtracted in the printed formulas
 CHAIN = 1e-6
@@ -136,3 +137,27 @@ def test_the_size_of_cogiro_by_the_parabola():
         assert abs(error) < 8.0 / 3.0 * (span_sag / x) ** 2 + 2.0 * H / ES * chord / x
         parabola = np.hypot(H, H * abs(z) / x + w * chord / 2)
         np.testing.assert_allclose(np.hypot(H, V_A), parabola, rtol=10 * (span_sag / x) ** 2 + 1e-3)
+
+
+SOLVED = 1e-9  # [m] of the end of a cable that was found
+
+
+def test_cables_over_pulleys_are_found_near_the_groove_and_far_from_it():
+    """The first one, with its forces by SciPy's least squares; Newton's steps alone gave it up."""
+    random = np.random.default_rng(0)
+    cases = [(0.5, 0.5, 0.15, -1.0, -0.0996, 2.9e6, 2.18)]
+    for _ in range(2000):
+        r = random.choice([0.03, 0.15])
+        cases.append((
+            2.0 * r + random.uniform(0.02, 2.0), random.uniform(-2.0, 2.0), r,
+            random.choice([-1.0, 1.0]), -(10.0 ** random.uniform(-4.0, -0.6)),
+            10.0 ** random.uniform(4.0, 7.0), 10.0 ** random.uniform(-1.0, 1.0),
+        ))  # fmt: skip
+    for rho, z, r, sigma, strain, ES, w in cases:
+        free, sine, cosine = tangent(rho, sigma * z, r)
+        l0 = (free + r * (np.pi - np.arctan2(sine, cosine))) / (1.0 + strain)
+        H, V_A, good = solve_catenary(rho, z, r, sigma, l0, ES, w, 0.0, 0.0)
+        assert good, (rho, z, r, sigma, strain, ES, w)
+        assert np.hypot(*equations(H, V_A, rho, z, r, sigma, l0, ES, w)[:2]) < SOLVED
+        if strain == -0.0996:
+            np.testing.assert_allclose((H, V_A), (0.262158, -0.497468), atol=1e-6)

@@ -164,9 +164,10 @@ def test_sets_cover_poses_of_their_cells_and_no_other():
     random = np.random.default_rng(0)
     poses = np.repeat(FLAT.lower[np.newaxis], 500, axis=0)
     poses[:, :2] = random.uniform(FLAT.lower[:2], FLAT.upper[:2], (500, 2))
-    for pose in poses:
-        inside = np.any(cells.inside[tuple(cells.cells_at(pose).T)])
-        assert inside or not sets.covers(pose)
+    covered = [sets.covers(pose) for pose in poses]
+    inside = [bool(np.any(cells.inside[tuple(cells.cells_at(pose).T)])) for pose in poses]
+    assert covered == inside
+    assert 0 < sum(covered) < len(covered)
     other = poses[0].copy()
     other[5] = 0.1
     assert not sets.covers(other)
