@@ -11,6 +11,7 @@ from pydrake.systems.framework import DiagramBuilder
 from cdpr_drake.geometry.cable_routes import CableRoutes
 from cdpr_drake.models.robot_in_plant import add_robot
 from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_schema import PlatformDamping
 from cdpr_drake.systems.robots.assembly import add_cable_robot
 from cdpr_drake.systems.robots.route_assembly import add_cables
 from cdpr_drake.systems.robots.settings import CableRobotSettings, CableSettings
@@ -27,8 +28,8 @@ STIFFNESS = 1e4
 """E S of cables [N]: at this step the integrator does not hold those of the robots' files."""
 
 MODELS = {
-    "points": CableSettings(pulleys=False),
-    "pulleys": CableSettings(pulleys=True),
+    "points": CableSettings(model="kelvin_voigt", pulleys=False),
+    "pulleys": CableSettings(model="kelvin_voigt", pulleys=True),
     "sagging": CableSettings(model="catenary", pulleys=True),
 }
 
@@ -36,6 +37,7 @@ MODELS = {
 def states_of(name, settings, as_routes):
     """States of plant and winches, and tensions, from a moving start, by either kind of block."""
     robot, builder = load_robot(name), DiagramBuilder()
+    robot.damping = PlatformDamping()  # cables between bodies have no robot's file
     settings = replace(settings, stiffness_ratio=STIFFNESS / np.max(robot.stiffness()))
     plant = builder.AddNamedSystem("plant", MultibodyPlant(0.0))
     in_plant = add_robot(plant, robot)

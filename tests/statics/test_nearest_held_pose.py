@@ -18,7 +18,8 @@ from cdpr_drake.statics.nearest_held_pose import (
 
 ROBOT = load_robot("acrobot_large")
 CABLES = ROBOT.cable_set().without_pulleys()
-LOAD = Load(ROBOT.platform.mass, ROBOT.center_of_mass(), ROBOT.gravity_vector())
+LOAD = Load(ROBOT.platform.mass, ROBOT.box_center(), ROBOT.gravity_vector())
+"""In the middle of the box: the poses below were found for it."""
 SIZE = 0.135
 LEAST, MOST = 0.5, 60.0
 HOME = ROBOT.home.transform()
