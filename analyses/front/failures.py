@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cdpr_drake.analyses.front.session import Session
-from cdpr_drake.analyses.reporting.deferred_figures import write_pictures
+from cdpr_drake.analyses.reporting.deferred_figures import drawing, write_pictures
 from cdpr_drake.analyses.reporting.left_folders import RESULTS
 from cdpr_drake.analyses.reporting.log_files import write_json
 from cdpr_drake.analyses.reporting.output_folder import results_folder
@@ -141,7 +141,7 @@ def compare_reactions(
     folder, formats = kept.get("folder"), kept.get("formats", DEFAULT_FORMATS)
     with (
         nullcontext() if folder is None
-        else results_folder(Path(folder), kept.get("overwrite", False))
+        else results_folder(Path(folder), kept.get("overwrite", False), redo=True)
     ) as results:  # fmt: skip
         if results is not None:
             told.opened(results)
@@ -171,8 +171,8 @@ def compare_reactions(
             return found
         write_json(results.path / RESULTS, found.as_dict())
         pictures = figure_writers({"reactions": found.plot}, formats)
-        failed = write_pictures(results.path, dict(pictures))
-        results.publish()
+        with drawing(results.publish()):
+            failed = write_pictures(results.path, dict(pictures))
         return replace(found, failed=failed)
 
 

@@ -12,7 +12,7 @@ from cdpr_drake.analyses.logs.log_replay import replay_log as compare_log
 from cdpr_drake.analyses.logs.log_request import LogRequest
 from cdpr_drake.analyses.logs.packets import without_packets
 from cdpr_drake.analyses.logs.recorded_log import RecordedLog
-from cdpr_drake.analyses.reporting.deferred_figures import write_pictures
+from cdpr_drake.analyses.reporting.deferred_figures import drawing, write_pictures
 from cdpr_drake.analyses.reporting.log_files import write_json
 from cdpr_drake.analyses.reporting.output_folder import results_folder
 from cdpr_drake.blas_threads import one_blas_thread
@@ -191,9 +191,9 @@ def replay_log(
     if folder is not None:
         from cdpr_drake.analyses.logs.replay_figures import replay_pictures
 
-        with results_folder(Path(folder), overwrite) as results:
+        with results_folder(Path(folder), overwrite, redo=True) as results:
             found.write(results.path)
             write_json(results.path / SUMMARY, result.as_dict())
-            write_pictures(results.path, replay_pictures(found, result.followed, formats))
-            results.publish()
+            with drawing(results.publish()):
+                write_pictures(results.path, replay_pictures(found, result.followed, formats))
     return result

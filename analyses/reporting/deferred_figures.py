@@ -60,14 +60,14 @@ def write_pictures(
 
 
 @contextmanager
-def drawing(folder: Path, should_stop: Callable[[], bool]) -> Iterator[None]:
+def drawing(folder: Path, should_stop: Callable[[], bool] | None = None) -> Iterator[None]:
     """Marks a folder of complete data as one whose pictures are drawn inside the block.
 
     The mark stays where the block is ended or asked to stop, so that they can be completed.
     """
     write_whole(folder / DRAWING, "")
     yield
-    if not should_stop():
+    if should_stop is None or not should_stop():
         (folder / DRAWING).unlink()
 
 

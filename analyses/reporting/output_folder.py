@@ -14,6 +14,7 @@ from pathlib import Path
 from cdpr_drake.analyses.reporting.folder_lock import free_folder, locked
 from cdpr_drake.analyses.reporting.left_folders import (
     BEFORE,
+    FINISHED,
     RESULTS,
     KeptFiles,
     clear_hidden,
@@ -23,6 +24,7 @@ from cdpr_drake.analyses.reporting.left_folders import (
     sibling_folder,
 )
 from cdpr_drake.analyses.reporting.written_files import (
+    DRAWING,
     MARKER,
     WORK,
     WritingFolder,
@@ -35,6 +37,7 @@ from cdpr_drake.analyses.reporting.written_files import (
 )
 from cdpr_drake.errors import OutputFolderError
 from cdpr_drake.schema.input_files import inputs_held
+from cdpr_drake.schema.json_text import load_json
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 """What fails when a file is written that was opened before, and then has no name."""
@@ -56,6 +59,7 @@ class ResultsFolder:
         unfinished: Whether what is written is not all that was asked for; older results, which it
             would replace, are kept beside it then, as NAME-before.
         kept: What of older results was not this program's, once they are replaced.
+        redone: Whether older results are those that ended while their pictures were drawn.
     """
 
     def __init__(
@@ -64,6 +68,7 @@ class ResultsFolder:
         """With the hidden folder and the final one, and the list of the former's files."""
         self.path, self.recovered, self.unfinished = work, recovered, False
         self.kept: list[KeptFiles] = []
+        self.redone = False
         self._final, self._files = final, files
 
     @property
@@ -98,7 +103,8 @@ class ResultsFolder:
                 before = self._put_aside()
             self.path.rename(self._final)
             self._files.shown_as(self._final)
-            if before is not None and self.unfinished:
+            other = self.redone and before is not None and not _same_asked(before, self._final)
+            if before is not None and (self.unfinished or other):
                 _rename_own(before, sibling_folder(self._final))
             elif before is not None:
                 self.replace(before)
@@ -146,7 +152,9 @@ def _rename_own(folder: Path, name: Path) -> Path:
 
 
 @contextmanager
-def results_folder(folder: Path, overwrite: bool = False) -> Iterator[ResultsFolder]:
+def results_folder(
+    folder: Path, overwrite: bool = False, redo: bool = False
+) -> Iterator[ResultsFolder]:
     """A fresh hidden folder to write to, which gets its name when its data is finished.
 
     Entering it before a long computation finds out in time whether results can be written. Where
@@ -157,6 +165,8 @@ def results_folder(folder: Path, overwrite: bool = False) -> Iterator[ResultsFol
     Args:
         folder: Where the results shall be.
         overwrite: Whether results of this program that are there already may be replaced.
+        redo: Whether those may be that ended while their pictures were drawn, which are the same
+            where the same was asked; of what was asked otherwise they are kept as NAME-before.
 
     Raises:
         OutputFolderError: The folder holds something, is a file, a mount point, the working folder
@@ -166,7 +176,8 @@ def results_folder(folder: Path, overwrite: bool = False) -> Iterator[ResultsFol
     if final.exists():
         if not final.is_dir():
             raise OutputFolderError(f"{final}: found a file; accepted: a folder")
-        if any(final.iterdir()) and not overwrite:
+        redo = redo and not overwrite and (final / DRAWING).is_file()
+        if any(final.iterdir()) and not (overwrite or redo):
             raise OutputFolderError(
                 f"{final}: holds files already; name another folder or allow overwrite"
             )
@@ -195,6 +206,7 @@ def results_folder(folder: Path, overwrite: bool = False) -> Iterator[ResultsFol
             with writing(work, hidden=True) as files:
                 results = ResultsFolder(work, final, recovered, files)
                 results.kept += kept
+                results.redone = redo
                 try:
                     yield results
                     results.publish()
@@ -407,3 +419,15 @@ def _tell_inputs(folder: Path) -> None:
     if hashes and folder.is_dir():
         with whole_file(folder / INPUTS) as part:
             part.write_text(json.dumps(hashes, indent=2) + "\n", encoding="utf-8")
+
+
+def _same_asked(one: Path, other: Path) -> bool:
+    """Whether two folders have summaries that were asked for the same."""
+    asked: list[object] = []
+    for folder in (one, other):
+        try:
+            told = load_json((folder / FINISHED[0]).read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            return False
+        asked.append(told.get("arguments") if isinstance(told, dict) else None)
+    return asked[0] is not None and asked[0] == asked[1]

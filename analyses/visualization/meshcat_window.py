@@ -68,7 +68,7 @@ def open_meshcat(host: str | None = None, port: int | None = None) -> Meshcat:
     meshcat = _sealed_meshcat()
     if listening is not None:
         MeshcatDoor(meshcat, listening, _allowed_hosts(host or LOCAL, listening)).open()
-        _page_ports[meshcat.port()] = listening.getsockname()[1]
+        _pages[meshcat.port()] = host or LOCAL, listening.getsockname()[1]
     return meshcat
 
 
@@ -90,14 +90,21 @@ def private_door(meshcat: Meshcat) -> Path:
 _folders: list[tempfile.TemporaryDirectory[str]] = []
 
 
-def page_address(meshcat: Meshcat, host: str = LOCAL) -> str:
-    """What to open in a browser, also on another machine where `host` stands for all addresses."""
+def page_address(meshcat: Meshcat, host: str | None = None) -> str:
+    """What to open in a browser, also on another machine where `host` stands for all addresses.
+
+    Args:
+        meshcat: From `open_meshcat`, with a host or a port.
+        host: Another name of this machine; None: the one with which it was opened.
+    """
+    given, port = _pages[meshcat.port()]
+    host = given if host is None else host
     name = socket.gethostname() if host in EVERYWHERE else host
-    return f"http://{f'[{name}]' if ':' in name else name}:{_page_ports[meshcat.port()]}"
+    return f"http://{f'[{name}]' if ':' in name else name}:{port}"
 
 
-_page_ports: dict[int, int] = {}
-"""Where browsers look, by the port of a Meshcat."""
+_pages: dict[int, tuple[str, int]] = {}
+"""Host and port where browsers look, by the port of a Meshcat."""
 
 
 def _listening(host: str, port: int | None) -> socket.socket:

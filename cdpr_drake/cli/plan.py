@@ -31,7 +31,7 @@ from cdpr_drake.analyses.planning.robot_path_task import (
     LimitSettings,
 )
 from cdpr_drake.analyses.planning.timed_plan_results import TimedRun
-from cdpr_drake.analyses.reporting.deferred_figures import Pictures, write_pictures
+from cdpr_drake.analyses.reporting.deferred_figures import Pictures, drawing, write_pictures
 from cdpr_drake.analyses.reporting.folder_lock import free_folder
 from cdpr_drake.analyses.reporting.output_folder import results_folder, shown_path
 from cdpr_drake.cli.completion import words_among
@@ -407,7 +407,7 @@ Planner = Callable[[Callable[[str], None]], MotionRun]
 def _run(robot: Robot, planner: Planner, folder: Path, ending: _Ending) -> int:
     """Plans, tracks, writes, and says what was found."""
     console = message_console()
-    with results_folder(folder, ending.overwrite) as results:
+    with results_folder(folder, ending.overwrite, redo=True) as results:
         report_recovered(console, results)
         with working(console, f"Planning for {robot.name}") as say:
             run = planner(say)
@@ -422,8 +422,9 @@ def _run(robot: Robot, planner: Planner, folder: Path, ending: _Ending) -> int:
                 from cdpr_drake.analyses.planning.stream_figures import stream_pictures
 
                 pictures = {**pictures, **stream_pictures(streamed, ending.formats)}
-            failed = write_pictures(results.path, pictures, say)
             folder = shown_path(results.publish())
+            with drawing(folder):
+                failed = write_pictures(folder, pictures, say)
     report_kept_files(console, results.kept)
     if ending.as_json:
         print_json(told)

@@ -21,7 +21,7 @@ from cdpr_drake.analyses.design.reconfiguration import (
 )
 from cdpr_drake.analyses.front.reconfiguration import SAMPLES
 from cdpr_drake.analyses.front.reconfiguration import reconfigure as put_on_rails
-from cdpr_drake.analyses.reporting.deferred_figures import write_pictures
+from cdpr_drake.analyses.reporting.deferred_figures import drawing, write_pictures
 from cdpr_drake.analyses.reporting.folder_lock import free_folder
 from cdpr_drake.analyses.reporting.output_folder import results_folder, shown_path
 from cdpr_drake.cli.completion import words_among
@@ -111,7 +111,7 @@ def reconfigure(
         asked = [one_pose("--poses", word) for word in poses.split(";") if word.strip()]
     console = message_console()
     folder = out if out is not None else free_folder(Path("rails") / loaded.name)
-    with results_folder(folder, overwrite) as results:
+    with results_folder(folder, overwrite, redo=True) as results:
         report_recovered(console, results)
         with working(console, f"Moving exit points of {loaded.name}") as say:
             run = put_on_rails(
@@ -122,8 +122,9 @@ def reconfigure(
             told = run.write(results.path)
             from cdpr_drake.analyses.design.rail_figures import rail_pictures
 
-            failed = write_pictures(results.path, rail_pictures(run, formats), say)
             folder = shown_path(results.publish())
+            with drawing(folder):
+                failed = write_pictures(folder, rail_pictures(run, formats), say)
     report_kept_files(console, results.kept)
     if as_json:
         print_json(told)

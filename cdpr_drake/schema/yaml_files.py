@@ -72,7 +72,8 @@ class _Reader(yaml.SafeLoader):
     def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
         self.depth += 1
         if self.depth > MOST_DEPTH:
-            words, mark = f"nested more than {MOST_DEPTH} deep", self.peek_event().start_mark
+            mark = self.peek_event().start_mark  # type: ignore[no-untyped-call]
+            words = f"nested more than {MOST_DEPTH} deep"
             raise yaml.composer.ComposerError(None, None, words, mark)
         node: yaml.Node | None = super().compose_node(parent, index)
         self.depth -= 1

@@ -10,13 +10,12 @@ from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import yaml
 from nicegui import app, background_tasks, ui
 from nicegui.server import Server
 
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models.robot_loader import robot_names
-from cdpr_drake.schema.yaml_files import too_many_bytes
+from cdpr_drake.schema.yaml_files import load_yaml, too_many_bytes
 from cdpr_drake.studio.entrance import Entrance, is_token, token_words
 from cdpr_drake.studio.guard import EVERYWHERE, TOKEN, Guard
 from cdpr_drake.studio.page import make_page
@@ -175,8 +174,8 @@ def _is_scenario(path: Path) -> bool:
     if path.suffix.lower() not in (".yaml", ".yml") or too_many_bytes(path):
         return False
     try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError, yaml.YAMLError):
+        content = load_yaml(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
         return False  # the reader of robots says what is wrong
     return isinstance(content, dict) and "robot" in content
 

@@ -11,7 +11,16 @@ from cdpr_drake.cli import main
 from cdpr_drake.models.robot_loader import robot_file
 from tests.messages import printed
 
-COMMAND = ["simulate", "acrobot_pbvs", "--camera", "projected", "--duration", "0.05", "--out", "run"]
+COMMAND = [
+    "simulate",
+    "acrobot_pbvs",
+    "--camera",
+    "projected",
+    "--duration",
+    "0.05",
+    "--out",
+    "run",
+]
 TENSIONS = ["simulate", "planar_computed_torque", "--duration", "0.05", "--out", "run"]
 
 
@@ -94,3 +103,23 @@ def test_an_interruption_that_a_compiler_wraps_is_no_traceback(kind, monkeypatch
     monkeypatch.setattr("cdpr_drake.cli.app.make_app", lambda given: wrapped)
     assert call(["check", "x.yaml"]) == 130
     assert printed(capsys).err == "cdpr: stopped\n"
+
+
+PLAN = ["plan", "planar", "--waypoints", "0,0,0.3;0.02,0,0.3", "--out", "plan"]
+
+
+def test_a_plan_that_ends_while_its_figures_are_drawn_is_made_again(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    for _ in range(2):  # and nothing piles up beside it
+        with monkeypatch.context() as ending:
+            ending.setattr(
+                "cdpr_drake.cli.plan.write_pictures", lambda *_: (_ for _ in ()).throw(Ended)
+            )
+            with pytest.raises(Ended):
+                main(PLAN)
+        assert DRAWING in os.listdir("plan")
+        assert os.listdir(".") == ["plan"]
+    assert call([*PLAN[:2], "--waypoints", "0,0,0.3;0.01,0,0.3", *PLAN[-2:]]) == 0
+    assert sorted(os.listdir(".")) == ["plan", "plan-before"]
+    assert call(PLAN) == 2
+    assert "--overwrite" in printed(capsys).err

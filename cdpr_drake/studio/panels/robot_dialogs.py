@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from nicegui import events, ui
+from nicegui import events, run, ui
 
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models.robot_loader import robot_names
@@ -49,6 +49,21 @@ def _attempt(said: Any, action: Callable[[], None]) -> bool:
     return True
 
 
+async def _attempt_reading(
+    said: Any, read: Callable[[], OpenedRobot], take: Callable[[OpenedRobot], OpenedRobot]
+) -> bool:
+    """As `_attempt` of what another thread reads: the server answers others meanwhile."""
+    said.text = ""
+    try:
+        opened = await run.io_bound(read)
+        if opened is not None:  # the server is not ending
+            tell_opened(take(opened))
+    except (CdprError, OSError) as problem:
+        said.text = message(problem)
+        return False
+    return True
+
+
 def tell_opened(opened: OpenedRobot) -> None:
     """Says that a robot comes from another tool's file; a card has what was assumed."""
     if opened.notes:
@@ -60,12 +75,11 @@ def open_dialog(bench: Workbench) -> None:
     with _dialog("Open a robot") as dialog:
         said = _problem_label()
 
-        def take(name: Any) -> None:
-            def action() -> None:
-                tell_opened(bench.open(str(name)))
-
-            if name and _attempt(said, action):
-                dialog.close()
+        async def take(name: Any) -> None:
+            with show_errors():
+                read = lambda: bench.files.open(str(name))  # noqa: E731
+                if name and await _attempt_reading(said, read, bench.take_opened):
+                    dialog.close()
 
         chosen = ui.select(list(robot_names()), label="Robot of the package", with_input=True)
         chosen.props("dense outlined").classes("w-full").mark("open-robot")
@@ -78,11 +92,9 @@ def open_dialog(bench: Workbench) -> None:
         async def receive(event: events.MultiUploadEventArguments) -> None:
             content = {one.name: await one.read() for one in event.files}
 
-            def action() -> None:
-                tell_opened(bench.upload(content))
-
             with show_errors():
-                if _attempt(said, action):
+                read = lambda: bench.files.upload(content)  # noqa: E731
+                if await _attempt_reading(said, read, bench.take_upload):
                     dialog.close()
                 else:
                     upload.reset()

@@ -242,10 +242,13 @@ class RunPanel:
         self._which.text, self._own.text = words, f"Open {own}"
         self._own.set_visibility(bool(own))
 
-    def _open_own_robot(self) -> None:
+    async def _open_own_robot(self) -> None:
         with show_errors():
             if self._board.draft is not None:
-                self._bench.open(self._board.draft.own_robot)
+                own = self._board.draft.own_robot
+                opened = await run.io_bound(self._bench.files.open, own)
+                if opened is not None:  # the server is not ending
+                    self._bench.take_opened(opened)
 
     async def _start(self) -> None:
         if self._form is None or not await self._form.check():

@@ -191,7 +191,10 @@ class Workbench:
         Raises:
             CdprError: It is not accepted; nothing has changed.
         """
-        opened = self.files.open(name)
+        return self.take_opened(self.files.open(name))
+
+    def take_opened(self, opened: OpenedRobot) -> OpenedRobot:
+        """Works with what `files.open` has read, which another thread may do."""
         own = opened.path.is_relative_to(self.folder.root) and opened.path.is_file()
         if own and not opened.notes:
             self._saved[opened.path] = opened.text
@@ -209,7 +212,10 @@ class Workbench:
         Raises:
             CdprError: It is not accepted; nothing has changed.
         """
-        opened = self.files.upload(files)
+        return self.take_upload(self.files.upload(files))
+
+    def take_upload(self, opened: OpenedRobot) -> OpenedRobot:
+        """Works with what `files.upload` has read, which another thread may do."""
         self._saved.pop(opened.path, None)
         self._take_opened(opened)
         return opened
