@@ -93,7 +93,7 @@ def new(
         for path in write_files(out, _block(kind, name), overwrite):
             print(path)
         return
-    of_robot, remarks = kind == ROBOT, []
+    of_robot, remarks = kind == ROBOT, list[str]()
     head = f"# Check it with `cdpr check {name}.yaml`.\n"
     if robot is not None:
         loaded = load_robot(robot, "cdpr new scenario")
