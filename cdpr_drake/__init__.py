@@ -29,7 +29,6 @@ Compiled kernels are cached in the user's cache folder, or where NUMBA_CACHE_DIR
 
 import lazy_loader
 
-from cdpr_drake.kernel_cache.first_use import announce_first_use
 from cdpr_drake.kernel_cache.folder import use_kernel_cache
 
 use_kernel_cache()
@@ -45,6 +44,8 @@ def __getattr__(name: str) -> object:
     """
     try:
         found: object = _lazy(name)
+        from cdpr_drake.kernel_cache.first_use import announce_first_use  # commands go without
+
         announce_first_use()
         return found
     except AttributeError as problem:

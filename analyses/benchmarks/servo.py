@@ -132,7 +132,7 @@ def numpy_step(step: Step, scenario: Scenario) -> Callable[[], Array]:
 
 def step_row(scheme: str, repeats: int, calls: int) -> TimingRow:
     """The control step of one scheme against its budget."""
-    step = Step(load_scenario(SCENARIOS[scheme], schema=Scenario))
+    step = Step(load_scenario(SCENARIOS[scheme]))
     (time,) = interleaved([lambda: seconds_per_call(step, calls)], repeats)
     return TimingRow(
         f"control step, {scheme}",
@@ -151,10 +151,9 @@ TORQUE_BUDGET_US = 200.0
 
 def torque_row(repeats: int, calls: int) -> TimingRow:
     """One step of the fast loop of a servo by torque, from twist to torques, against its budget."""
-    scenario = load_scenario("acrobot_torque_servo", schema=Scenario)
+    scenario = load_scenario("acrobot_torque_servo")
     robot = load_robot(scenario.robot)
     settings, X_WP = scenario.torque_control, scenario.initial_pose.transform()
-    assert settings is not None
     law = torque_law(settings, robot, believed_robot(scenario, robot), scenario)
     wanted = np.array([0.05, -0.02, 0.1, 0.03, -0.05, 0.02])
     readings = np.array([np.full(law.cable_count, 6.0), np.zeros(law.cable_count)])
@@ -177,7 +176,7 @@ def torque_row(repeats: int, calls: int) -> TimingRow:
 
 def texture_rows(repeats: int, calls: int) -> list[TimingRow]:
     """A textured square in an image of 640 x 480 px, where it was and by features, beside a tag."""
-    scenario = load_scenario("acrobot_pbvs_textured", schema=Scenario)
+    scenario = load_scenario("acrobot_pbvs_textured")
     pinhole = load_camera(load_robot(scenario.robot).camera_mount("onboard").model).pinhole(
         640, 480
     )
@@ -232,9 +231,7 @@ class Correction:
 def correction_row(kind: str, repeats: int, calls: int) -> TimingRow:
     """A step of one kind of tension management beside the servo's own step."""
     scenario = load_scenario(
-        "acrobot_slack_start",
-        [f"tension_management={CORRECTIONS[kind]}", "camera.kind=projected"],
-        schema=Scenario,
+        "acrobot_slack_start", [f"tension_management={CORRECTIONS[kind]}", "camera.kind=projected"]
     )
     correction, servo = Correction(scenario), Step(scenario)
     added, own = interleaved(
@@ -254,7 +251,7 @@ def correction_row(kind: str, repeats: int, calls: int) -> TimingRow:
 
 def numpy_row(repeats: int, calls: int) -> TimingRow:
     """IBVS against the same formulas in plain NumPy, which know no other scheme and no start."""
-    scenario = load_scenario(SCENARIOS["ibvs"], schema=Scenario)
+    scenario = load_scenario(SCENARIOS["ibvs"])
     step = Step(scenario)
     plain = numpy_step(step, scenario)
     fast, slow = interleaved(

@@ -278,7 +278,7 @@ def scenario_task(robot: Robot | str | Path, scenario: str) -> CameraTask:
     from cdpr_drake.systems.diagrams.load import load_scenario  # most questions have none
 
     with robot_reference(robot, "stability") as name:
-        loaded: Any = load_scenario(scenario, [f"robot={name}"])
+        loaded = load_scenario(scenario, [f"robot={name}"])
     where = f"scenario {scenario}"
     if loaded.target.carrier != "world":
         raise StabilityError(

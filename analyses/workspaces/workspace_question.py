@@ -332,7 +332,7 @@ def _break_task(robot: Robot, asked: WorkspaceRequest, grid: WorkspaceGrid) -> B
                 f"{name}: found with kinds {SURVIVES}, which simulates the robot as its file has "
                 "it; accepted: without"
             )
-    scenario: Any = load_scenario(asked.scenario or BREAKING)
+    scenario = load_scenario(asked.scenario or BREAKING)
     if not isinstance(scenario, Scenario):
         raise WorkspaceError(
             f"scenario {asked.scenario}: found kind {scenario.kind}; accepted for the kind "
@@ -421,7 +421,7 @@ def camera_view(robot: Robot, scenario: str) -> CameraView:
     from cdpr_drake.systems.diagrams.load import load_scenario  # most questions have none
 
     with robot_reference(robot, "a workspace") as name:
-        loaded: Any = load_scenario(scenario, [f"robot={name}"])
+        loaded = load_scenario(scenario, [f"robot={name}"])
     if loaded.target.carrier != "world" or loaded.target.motion is not None:
         raise WorkspaceError(
             f"scenario {scenario}: found a target that moves; accepted: one that rests in the "

@@ -39,7 +39,7 @@ def announce_first_use() -> None:
         return
     event = sys.modules["numba.core.event"]
 
-    class Listener(event.Listener):  # type: ignore[name-defined, misc]
+    class Listener(event.Listener):  # type: ignore[name-defined]
         said = False
 
         def on_start(self, event: Any) -> None:

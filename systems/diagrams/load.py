@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, TypeAlias, TypeVar, overload
+from typing import Any
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -46,7 +46,7 @@ from cdpr_drake.systems.scenarios.pick_and_place_scenario import (
     PickAndPlaceScenario,
     check_pick_and_place,
 )
-from cdpr_drake.systems.scenarios.run_settings import RunHeader, ScenarioHeader
+from cdpr_drake.systems.scenarios.run_settings import ScenarioHeader
 from cdpr_drake.systems.scenarios.tension_control_scenario import TensionScenario
 from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
 from cdpr_drake.systems.worlds.checks import check_world
@@ -224,9 +224,6 @@ def check_robot_motion(robot: Robot, where: Path | str) -> None:
         )
 
 
-AnyScenario: TypeAlias = Scenario | TensionScenario | PickAndPlaceScenario | MechanismScenario
-"""What `load_scenario` gives, by the key `kind` of a file."""
-
 SCENARIO_SCHEMAS: dict[str, tuple[type[Any], Callable[[Any, Any, Path], None]]] = {
     VISUAL_SERVO: (Scenario, check_scenario),
     TENSION_CONTROL: (TensionScenario, _check_tension_scenario),
@@ -235,17 +232,6 @@ SCENARIO_SCHEMAS: dict[str, tuple[type[Any], Callable[[Any, Any, Path], None]]] 
 }
 """Schema of each kind of scenario, and its check against robot or mechanism, by what its file gives
 as `kind`."""
-
-
-S = TypeVar("S", bound=RunHeader)
-
-
-@overload
-def load_scenario(name: str, overrides: Sequence[str] = (), *, schema: type[S]) -> S: ...
-
-
-@overload
-def load_scenario(name: str, overrides: Sequence[str] = ()) -> AnyScenario: ...
 
 
 def load_scenario(

@@ -92,9 +92,7 @@ class BasinSetup:
 @cache
 def basin_setup(scheme: str) -> BasinSetup:
     """What all loops of a scheme have in common."""
-    scenario = load_scenario(
-        "acrobot_pbvs", [*SETTINGS, f"controller.scheme={scheme}"], schema=Scenario
-    )
+    scenario = load_scenario("acrobot_pbvs", [*SETTINGS, f"controller.scheme={scheme}"])
     robot, common = load_robot(ROBOT), servo_case(scenario, LOWEST)
     box = common.box
     # One step for all loops: to find one for each start takes as long as a third of the loop.
