@@ -222,8 +222,8 @@ class CableLengths(Tabulated):
 
     def summary(self) -> tuple[str, list[tuple[str, str]]]:
         """What it shows of itself."""
-        title = f"Cables of {self.robot.name} at ({numbers(self.X_WP.translation())}) m, {self.geometry}"
-        return title, [
+        place = numbers(self.X_WP.translation())
+        return f"Cables of {self.robot.name} at ({place}) m, {self.geometry}", [
             ("lengths [m]", numbers(self.lengths, 5)),
             *(
                 (f"u_{axis}", numbers(row))
