@@ -57,7 +57,7 @@ class DistanceTask:
         """Arrays of the poses start to stop, shape (n,): which are `wrong`, which were `settled` by
         least squares, and the largest `differences` from who decided [m]."""
         robot = load_robot(self.robot)
-        around = interference_bodies(robot)
+        around = interference_bodies(robot, pulleys=False)
         around = replace(around, radius=np.maximum(around.radius, 1e-4))  # a capsule has one
         positions, rotations = np.empty((stop - start, 3)), np.empty((stop - start, 3, 3))
         for k in range(stop - start):

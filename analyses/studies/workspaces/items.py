@@ -233,7 +233,7 @@ def figure_cases(quick: bool) -> Iterator[Case]:
             for share in UPPER_SHARES:
                 limits = (lower, share * file_upper)
                 question = make_workspace_question(
-                    name, ["static"], grid, asked=WorkspaceRequest(limits=limits)
+                    name, ["static"], grid, asked=WorkspaceRequest(limits=limits, pulleys=False)
                 )
                 words = f"{name}, {limits[0]:g} to {limits[1]:g} N"
                 yield question_case(words, FIGURE, question, share)
@@ -274,14 +274,14 @@ def robot_cases(name: str, counts: Sequence[int]) -> Iterator[Case]:
     yield question_case(f"{name}, {EVERY}", EVERY, every, left_out=left_out)
     for kind in kinds:
         yield question_case(f"{name}, {kind} alone", ALONE, replace(every, kinds=(kind,)))
-    zero = WorkspaceRequest(required=SpatialSet(), accelerations=SpatialSet())
+    zero = WorkspaceRequest(required=SpatialSet(), accelerations=SpatialSet(), pulleys=False)
     low = robot.tension_limits(None)[0]
     checks: list[tuple[str, list[str], WorkspaceRequest]] = [
         (ZERO, ["static", "dynamic", "wrench-feasible"], zero),
-        (ENDLESS, ["static"], WorkspaceRequest(limits=(low, STRONG))),
+        (ENDLESS, ["static"], WorkspaceRequest(limits=(low, STRONG), pulleys=False)),
     ]
     if "wrench-closure" in kinds:
-        heavy = WorkspaceRequest(mass=OTHER_MASS * robot.platform.mass)
+        heavy = WorkspaceRequest(mass=OTHER_MASS * robot.platform.mass, pulleys=False)
         checks.append((HEAVY, ["wrench-closure"], heavy))
     for group, some, given in checks:
         question = make_workspace_question(name, some, grid, asked=given)
@@ -318,4 +318,5 @@ def sets_of(robot: Robot) -> WorkspaceRequest:
     return WorkspaceRequest(
         required=SpatialSet(box=np.repeat([force * arm, force], 3)),
         accelerations=SpatialSet(box=np.repeat([angular, linear], 3)),
+        pulleys=False,  # as the theses have their workspaces
     )

@@ -27,7 +27,8 @@ def robot():
 
 def holds_by_linprog(robot, position):
     """An independent verdict."""
-    problem = tension_problem(robot, pose_from_angles(position, np.zeros(3)))
+    X_WP, cables = pose_from_angles(position, np.zeros(3)), robot.cable_set(pulleys=False)
+    problem = tension_problem(robot, X_WP, cables=cables)
     bounds = np.column_stack([problem.lower, problem.upper])
     return linprog(np.ones(8), A_eq=problem.W, b_eq=-problem.wrench, bounds=bounds).status == 0
 
