@@ -59,7 +59,8 @@ def test_tensions_of_a_plan_move_the_mass_as_newton_says(case):
         row = np.asarray(run.motion.motion(float(samples.times[k])))
         way = exits - row[4:7]
         across = np.linalg.norm(way[:, :2], axis=1, keepdims=True)
-        way[:, :2] *= 1.0 - robot.pulley.arm / across
+        if robot.pulley.arm > 0.0:
+            way[:, :2] *= 1.0 - robot.pulley.arm / across
         units = way / np.linalg.norm(way, axis=1)[:, None]
         force = samples.tensions[k] @ units + weight
         np.testing.assert_allclose(
