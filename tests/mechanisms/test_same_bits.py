@@ -8,6 +8,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import DiagramBuilder
 
+from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.cable_routes import CableRoutes
 from cdpr_drake.models.robot_in_plant import add_robot
 from cdpr_drake.models.robot_loader import load_robot
@@ -57,9 +58,7 @@ def states_of(name, settings, as_routes):
     in_plant.set_pose(plant_context, robot.home.transform())
     plant.SetVelocities(plant_context, 0.05 * np.cos(np.arange(nv)))
     winches = block.winches.GetMyMutableContextFromRoot(context)
-    lengths = block.GetOutputPort("lengths").Eval(
-        diagram.GetSubsystemContext(block.forces, context)
-    )
+    lengths = cable_paths(robot.home.transform(), settings.cable_set(robot)).lengths
     block.winches.hold(winches, lengths, np.zeros(m))
     simulator = Simulator(diagram, context)
     ResetIntegratorFromFlags(simulator, "runge_kutta3", STEP).set_fixed_step_mode(True)
