@@ -109,8 +109,9 @@ def turned_sensors(
 
 def _is_clear(group: GroupFault) -> bool:
     """Whether a group says by itself what is wrong: rows, or a factor that is no sign."""
-    rows = group.test in ("rows", "split", "row factors")
-    return group.counts and (rows or (group.test == "factor" and group.size > 0.0))
+    if group.test == "rows":
+        return group.counts
+    return group.counts and group.test in ("factor", "split", "row factors") and group.size > 0.0
 
 
 def turned_where_lost(

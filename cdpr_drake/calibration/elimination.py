@@ -155,8 +155,9 @@ class LeastSquares:
             )
         whole = sum(int(np.sum(term.measured()[pose])) for term in self.terms)
         return (
-            f"pose {pose + 1}: {gone} of {whole} readings there do not fit, and the others do not "
-            "determine where the platform is; accepted: readings that agree, or another start"
+            f"pose {pose + 1}: what was measured there does not determine where the platform is "
+            f"without the {gone} of {whole} readings that do not fit; accepted: readings that "
+            "agree, or another start"
         )
 
     def normal_equations(self, at: Point, damping: float, robust: bool = True) -> NormalEquations:

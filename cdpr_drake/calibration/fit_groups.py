@@ -431,7 +431,7 @@ def _directions(residuals: _Residuals) -> list[_Direction]:
     values, used, terms = _values(residuals), residuals.used, residuals.problem.terms
     count = len(values)
     splits, jumps = _instants(count, MOST_SPLITS), _instants(count, MOST_JUMPS)
-    directions = []
+    directions: list[_Direction] = []
     begin = 0
     for g, term in enumerate(terms):
         width = term.measured().shape[1]
@@ -499,6 +499,8 @@ def _tested(
         if size[n] <= LEAST_SEEN * whole[n] or size[n] <= 0.0:
             continue
         c = along[n] / size[n]
+        if direction.test in ("factor", "split") and abs(c) > LARGEST_CHANGE:
+            continue
         sums = np.maximum(residuals.sums - 2.0 * c * own[:, n] + c**2 * kinds[:, n], 0.0)
         degrees = residuals.degrees_of - kinds[:, n] / size[n]
         variance, freedom, scatter = _variance(residuals, sums, degrees, kinds[:, n])
@@ -516,6 +518,9 @@ def _tested(
             faults.append(fault)
     return faults
 
+
+LARGEST_CHANGE = 3.0
+"""A factor that differs from 1 by more is none: a sign makes 2, and units are seen at once."""
 
 LEAST_SEEN = 1e-6
 """Share of an error that residuals show; of less, rounding decides."""
@@ -646,6 +651,5 @@ def _fewer(c: Array) -> npt.NDArray[np.bool_]:
         cost = float(np.sum((low - low.mean()) ** 2) + np.sum((high - high.mean()) ** 2))
         if cost < best:
             best, cut = cost, k
-    high = np.zeros(len(c), dtype=bool)
-    high[order[cut:]] = True
-    return high if 2 * high.sum() <= len(c) else ~high
+    high: npt.NDArray[np.bool_] = np.isin(np.arange(len(c)), order[cut:])
+    return high if 2 * high.sum() <= len(c) else np.logical_not(high)

@@ -1,0 +1,119 @@
+"""Systematic errors in logs are misfits with their reason; a far start still converges.
+
+`attack` has the whole table; here is a cheap part of it.
+"""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import cdpr_drake as cdpr
+from cdpr_drake.analyses.calibration.calibrated_robots import calibration_model
+from cdpr_drake.analyses.calibration.log_file import CalibrationLog
+from cdpr_drake.calibration.stations import Point, Stations
+from cdpr_drake.geometry.poses import pose_from_angles
+from cdpr_drake.models.robot_loader import load_robot
+from tests.analyses.calibration.attack import attacks, clean, outcome, scene
+
+ROWS = 20
+"""Of a log that is attacked."""
+
+SAME = 2e-3
+"""Distances of exit points by noise of a millimetre in 40 rows [m]."""
+
+
+@pytest.fixture(scope="module")
+def scenes():
+    return {name: scene(name, ROWS) for name in ("tracked8", "blind4")}
+
+
+@pytest.mark.parametrize(
+    ("name", "attack", "words"),
+    [
+        ("blind4", "-roll", "all fits with the sign of roll turned"),
+        ("blind4", "-swivel of cable 1", "the sign of the swivel angles of C1 turned"),
+        ("blind4", "50 % of rows, mixed, x 1.05", "times what fits the other rows"),
+        ("blind4", "30 % of rows, the first, x 1.05", "lengths of rows 1, 2, 3, 4, 5, 6 are 1.0"),
+        ("blind4", "cables 1, 2 swapped", "length of C1 and length of C2 exchanged"),
+        ("tracked8", "-pitch of tracker", "readings of tracker, turn y do not fit"),
+        ("tracked8", "10 % of rows, mixed, x 1.05", "times what fits the other rows"),
+        ("tracked8", "half of all lengths x 1.05", "do not fit"),
+        ("tracked8", "cable 1 late by 1", "readings of length of C1 do not fit"),
+    ],
+)
+def test_a_systematic_error_is_a_misfit_with_its_reason(scenes, name, attack, words):
+    one = scenes[name]
+    said = outcome(one, dict(attacks(one.log))[attack])
+    assert said.status == "misfit"
+    assert words in said.words
+
+
+@pytest.mark.parametrize("number", [0, 3, 4])
+def test_a_clean_log_is_no_misfit_whatever_its_sigmas(number):
+    """By `clean`: with 4, 6 and 8 cables, sigmas off by up to 4, and outliers."""
+    said = outcome(clean(number)[1])
+    assert said.status == "converged", said.words
+    assert said.is_met
+
+
+def test_all_that_is_said_is_in_the_numbers_and_the_figure(scenes):
+    one = scenes["tracked8"]
+    rows = [2, 8, 16]
+    lengths = one.log.lengths.copy()
+    lengths[rows] *= 1.05
+    found = cdpr.calibrate(one.robot, replace(one.log, lengths=lengths), **one.options)
+    group = json.loads(json.dumps(found.as_dict()))["groups"][0]
+    assert group["test"] == "row factors"
+    assert group["measurement"] == "lengths"
+    assert group["rows"] == [row + 1 for row in rows]
+    assert group["size"] == pytest.approx(1.05, abs=0.01)
+    assert group["misfit"]
+    assert found.as_dict()["misfit"][0] == group["words"]
+    title = " ".join(found.plot().get_suptitle().split())
+    assert "rows 3, 9, 17" in title
+
+
+def test_offsets_of_some_per_cent_of_the_lengths_are_told_to_be_scales(scenes):
+    one = scenes["blind4"]
+    longer = replace(one.log, lengths=1.05 * one.log.lengths)
+    told = " ".join(cdpr.calibrate(one.robot, longer, **one.options).remarks)
+    assert "more likely scales" in told
+    assert "more likely scales" not in " ".join(
+        cdpr.calibrate(one.robot, one.log, **one.options).remarks
+    )
+
+
+def distances(points):
+    """Between all exit points, which no motion of the frame changes [m]."""
+    return np.linalg.norm(points[:, :, None] - points[:, None], axis=0)
+
+
+def test_a_frame_believed_far_too_small_ends_in_the_right_anchors():
+    """Lengths that no pose of the believed frame has put poses on the lines between its anchors."""
+    robot = load_robot("maslow_4")
+    believed = np.array([np.asarray(c.exit_point, float) for c in robot.cables])
+    wide = believed * [1.7, 1.0, 1.0]
+
+    def with_exits(points):
+        cables = [replace(c, exit_point=p) for c, p in zip(robot.cables, points, strict=True)]
+        return replace(robot, cables=cables)
+
+    machine, random = with_exits(wide), np.random.default_rng(0)
+    low, high = wide.min(axis=0), wide.max(axis=0)
+    moves = high - low > 0.5  # the plane in which the sled slides
+    poses = []
+    for _ in range(40):
+        place = low + random.uniform(0.1, 0.9, 3) * (high - low)
+        place = np.where(moves, place, robot.home.transform().translation())
+        poses.append(pose_from_angles(place, np.zeros(3)))
+    lengths = Point(calibration_model(machine), Stations.at(poses)).numbers[:, :, 0]
+    lengths = lengths + 1e-3 * random.standard_normal(lengths.shape)
+    small = with_exits(0.55 * believed)
+    found = cdpr.calibrate(small, CalibrationLog(Path("wide"), len(poses), lengths=lengths))
+    assert found.result.status == "converged"
+    np.testing.assert_allclose(
+        distances(found.result.model.cables.p_WA), distances(wide.T), atol=SAME
+    )
