@@ -179,7 +179,7 @@ def _newton(
 def _off_angle(
     alpha: float, rho: float, z: float, r: float, sigma: float, l0: float, ES: float, w: float
 ) -> Any:
-    """Angle of the force less alpha, of a free part that begins at alpha, the force, and success."""
+    """Angle of the force less alpha, of a free part that begins there; the force; and success."""
     x, up = rho - r * (1.0 + np.cos(alpha)), z - sigma * r * np.sin(alpha)
     s = l0 - r * (np.pi - alpha)
     if s <= 0.0 or x == 0.0:

@@ -8,7 +8,6 @@ from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.geometry.drake_pose_kernel import (
-    agrees,
     compose,
     invert,
     pack_rows,
@@ -18,12 +17,11 @@ from cdpr_drake.geometry.drake_pose_kernel import (
     unpack_rows,
 )
 from cdpr_drake.geometry.poses import euclidean_length
+from tests.processors import needs_fused_products
 
 COUNT = 500
 
-pytestmark = pytest.mark.skipif(
-    not agrees(), reason="Drake rounds otherwise here, and loops step in Python"
-)
+pytestmark = needs_fused_products
 
 
 def columns(X):

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import linprog
 
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.straight_cables import PLANAR_ROWS
@@ -12,6 +13,8 @@ from cdpr_drake.tensions.closed_form_kernel import NOT_FOUND
 from cdpr_drake.tensions.control_step_kernel import update_tensions, wrench_matrix_at
 from cdpr_drake.tensions.methods import METHODS
 from cdpr_drake.tensions.quadratic_program_kernel import FEASIBLE, INFEASIBLE, workspace_shape
+
+TIGHT = 0.6  # [N] at most, where 0.5 N are the least: nothing balances
 
 ROUNDING = 1e-13
 """Two ways to write the same sums of numbers around one."""
@@ -36,7 +39,8 @@ def test_wrench_matrix_and_tensions(name, pulleys, moments):
     height = robot.plane_height or 0.0
     cables = robot.cable_set() if pulleys else robot.cable_set().without_pulleys()
     bounds = np.vstack([np.full(m, 0.5), np.full(m, 5000.0), np.zeros(m)])
-    for _ in range(10):
+    held_at_all = []
+    for number in range(10):
         state = random_state(robot, random)
         W = np.empty((n, m))
         wrench_matrix_at(state, cables.packed(), height, W)
@@ -44,6 +48,10 @@ def test_wrench_matrix_and_tensions(name, pulleys, moments):
         expected = -cable_paths(X_WP, cables).J.T[rows]
         np.testing.assert_allclose(W, expected, atol=ROUNDING)
         desired = np.concatenate([random.normal(size=3) * 0.1, [0.0, 0.0, 200.0]])
+        bounds[1] = TIGHT if number % 2 else 5000.0
+        limits = list(zip(bounds[0], bounds[1], strict=True))
+        holds = linprog(np.ones(m), A_eq=W, b_eq=desired[rows], bounds=limits).success
+        held_at_all.append(holds)
         for name, method in METHODS.items():
             if not method.takes(m - n):
                 continue
@@ -57,6 +65,9 @@ def test_wrench_matrix_and_tensions(name, pulleys, moments):
             )
             # A verdict of missed is looked into by the batch only.
             assert code == codes[0] or (code == NOT_FOUND and codes[0] == INFEASIBLE)
+            assert codes[0] == (FEASIBLE if holds else INFEASIBLE) or (
+                codes[0] == NOT_FOUND and holds and not method.exact
+            )
             assert feasible[0] == (code == FEASIBLE)
             if code == FEASIBLE:
                 np.testing.assert_allclose(t, many[0], rtol=1e-10)
@@ -65,3 +76,4 @@ def test_wrench_matrix_and_tensions(name, pulleys, moments):
                 np.testing.assert_array_equal(held, t)
             else:
                 np.testing.assert_array_equal(held, 7.0)
+    assert 0 < sum(held_at_all) < 10

@@ -166,8 +166,9 @@ def test_sets_cover_poses_of_their_cells_and_no_other():
     poses[:, :2] = random.uniform(FLAT.lower[:2], FLAT.upper[:2], (500, 2))
     covered = [sets.covers(pose) for pose in poses]
     inside = [bool(np.any(cells.inside[tuple(cells.cells_at(pose).T)])) for pose in poses]
-    assert covered == inside
-    assert 0 < sum(covered) < len(covered)
+    assert not any(has and not within for has, within in zip(covered, inside, strict=True))
+    assert sum(inside) < len(inside)
+    assert sum(covered) > 0.9 * sum(inside)  # sets that hold 95 % of the cells were asked for
     other = poses[0].copy()
     other[5] = 0.1
     assert not sets.covers(other)

@@ -1,7 +1,6 @@
 """The kernel goes from event to event as the loop in Python does, to the last bit."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,20 +15,15 @@ from cdpr_drake.systems.loops.loop_choice import check_loop, set_loop
 from cdpr_drake.systems.loops.servo_events import KINDS
 from cdpr_drake.systems.loops.servo_loop import ServoLoop
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
+from tests.processors import needs_fused_products
 
 PIECE = 0.1
 """How far a loop goes at once, as runs do [s]."""
 
-needs_kernel = pytest.mark.skipif(
-    not agrees(), reason="Drake rounds otherwise here, and loops step in Python"
-)
 
-
+@needs_fused_products
 def test_the_kernel_goes_where_processors_fuse_products():
     """NumPy's `dot` adds in another order on some, and all loops stepped in Python there."""
-    processor = Path("/proc/cpuinfo")
-    if not processor.is_file() or " fma " not in processor.read_text():
-        pytest.skip("Drake rounds otherwise here, and loops step in Python")
     assert agrees()
 
 
@@ -71,7 +65,7 @@ def check(scenario, seeds=(0,)):
         same(go(begun(seeded, python=True), scenario.duration), go(compiled, scenario.duration))
 
 
-@needs_kernel
+@needs_fused_products
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize(
     ("name", "overrides"),
@@ -88,7 +82,7 @@ def test_schemes_and_estimators(name, overrides, kind):
     check(scenario_of(name, *overrides, f"estimator.kind={kind}"), seeds=(0, 7, 2**40))
 
 
-@needs_kernel
+@needs_fused_products
 @pytest.mark.parametrize(
     ("name", "overrides"),
     [
@@ -117,7 +111,7 @@ def behaving(tmp_path):
     return write
 
 
-@needs_kernel
+@needs_fused_products
 def test_cables_that_stiffen_and_rub(behaving):
     check(behaving(stiffening=2e-3, sheave_friction=0.03))
 
@@ -127,7 +121,7 @@ def test_cables_that_creep_stay_in_python(behaving):
     assert loop.python_reason == "its cables creep"
 
 
-@needs_kernel
+@needs_fused_products
 def test_a_target_that_gets_out_of_view_ends_it():
     away = "desired={position: [0.4, 0.4, 0.09], angles_deg: [180, 0, 180]}"
     scenario = scenario_of("acrobot_pbvs", away, "stop.target_lost=0.1", duration=8.0)
@@ -135,14 +129,14 @@ def test_a_target_that_gets_out_of_view_ends_it():
     assert go(begun(scenario, python=False), 8.0).outcome == Outcome.TARGET_LOST
 
 
-@needs_kernel
+@needs_fused_products
 def test_a_pose_that_is_held_ends_it():
     scenario = scenario_of("acrobot_pbvs", duration=20.0)
     check(scenario)
     assert go(begun(scenario, python=False), 20.0).outcome == Outcome.CONVERGED
 
 
-@needs_kernel
+@needs_fused_products
 @pytest.mark.parametrize("first", [True, False])
 def test_a_state_goes_from_one_to_the_other(first):
     """Halfway, in the middle of a period, as from a checkpoint."""
@@ -159,7 +153,7 @@ def test_a_state_goes_from_one_to_the_other(first):
     same(go(went_on, 0.5), go(began, 0.5))
 
 
-@needs_kernel
+@needs_fused_products
 def test_what_python_raises_is_raised():
     scenario = scenario_of("acrobot_pbvs", duration=5.0)
     messages = []
@@ -174,7 +168,7 @@ def test_what_python_raises_is_raised():
     assert messages[0] == messages[1]
 
 
-@needs_kernel
+@needs_fused_products
 def test_any_number_of_workers_gives_the_same():
     runs = with_seeds(scenario_of("acrobot_pbvs", duration=0.2), range(3))
     one, two = (run_many(runs, workers, keep_traces=True) for workers in (1, 2))
@@ -203,7 +197,7 @@ def test_what_stays_in_python_is_said(name, overrides, reason):
     assert f"(its events in Python, since {reason})" in set_loop(scenario)[1]
 
 
-@needs_kernel
+@needs_fused_products
 def test_nothing_is_said_where_the_kernel_goes():
     scenario = scenario_of("acrobot_pbvs")
     assert set_loop(scenario)[1] == f"{scenario.name}: by the compiled loop"
