@@ -57,7 +57,7 @@ ACROBOT = "ACROBOT"
 ACROBOT_PERTURBED = "ACROBOT perturbed"
 CAROCA = "CAROCA"
 CAROCA_PERTURBED = "CAROCA perturbed"
-CAROCA_RAISED = "CAROCA perturbed, raised"
+CAROCA_RAISED = "CAROCA perturbed raised"
 MOVING = "moving object"
 
 ACROBOT_BELIEF = as_transform(((0.056, -0.077, 0.308), (-6.0, -12.0, -5.0)))
