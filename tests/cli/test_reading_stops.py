@@ -54,10 +54,9 @@ def test_a_motive_log_without_a_column_names_it(lost, tmp_path):
     text = recorders.motive(40, units="Meters")
     assert lost in text
     file = tmp_path / "take.csv"
-    file.write_text(
-        text.replace(lost, lost.replace("X", "W").replace("Pos", "Dis").replace("Rot", "Mot"), 1)
-    )
-    with pytest.raises(LogFileError, match="found no column|accepted"):
+    other = lost.replace("X", "W").replace("Pos", "Dis").replace("Rot", "Mot")
+    file.write_text(text.replace(lost, other, 1))
+    with pytest.raises(LogFileError, match="accepted"):
         read_motive(file, LogRequest())
 
 
