@@ -442,7 +442,7 @@ def _drawn(
 
 def _write_pictures(
     folder: Path, kind: ScenarioKind, result: Any, wanted: _Wanted, say: Say, session: Session,
-    missing: bool = False,
+    *, missing: bool = False,
 ) -> dict[str, str]:  # fmt: skip
     """Writes pictures, those that are there anew, or only the `missing` ones."""
     pictures = log_exports(folder, wanted.log_formats)

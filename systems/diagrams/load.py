@@ -69,8 +69,8 @@ def read_inputs(scenario: Scenario) -> None:
     believed, asked = scenario.perturbations.believed_robot, scenario.camera
     robots = [robot] if believed is None else [robot, load_robot(believed)]
     models = {mount.model for each in robots for mount in each.cameras}
-    models |= {asked.model, scenario.perturbations.camera_model} - {None}
-    for model in sorted(models):
+    named = (asked.model, scenario.perturbations.camera_model)
+    for model in sorted(models.union(name for name in named if name is not None)):
         load_camera(model)
     if scenario.world is not None:
         make_world(scenario.world, robot)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
@@ -168,10 +169,11 @@ def resolve_file_path(scenario_path: Path, file: str) -> str:
 
 def _resolve(scenario_path: Path, robot: str) -> str:
     beside = scenario_path.parent / robot
-    folder = "/" in robot and (beside.is_dir() or Path(robot).is_dir())
+    folder = "/" in robot and (os.path.isdir(beside) or os.path.isdir(robot))
     if not robot.lower().endswith(ROBOT_SUFFIXES) and not folder:
         return robot
-    return str((beside if beside.exists() else Path(robot)).absolute())
+    here = input_there(beside) or os.path.isdir(beside)
+    return str((beside if here else Path(robot)).absolute())
 
 
 class _OfRobot(Protocol):

@@ -328,3 +328,19 @@ def test_in_real_time_a_command_holds_until_the_next():
     report = run.control.remote.report()
     assert report["held_steps"] > 0
     assert report["exchanges"] + report["held_steps"] >= len(commanded) - 1
+
+
+def test_stop_before_anybody_drives_is_answered_and_ends_the_wait():
+    def stop(address):
+        with RemoteClient(address, codec="json", timeout=LONG) as client:
+            return client.stop().end
+
+    with server() as one, beside(stop, one.socket.address) as found:
+        driver = Driver(
+            one.socket, {}, [], [], pace=SyncMode.LOCK_STEP, timeout=1.0, period=1.0, services={}
+        )
+        with pytest.raises(ClientEndedError, match="said stop"):
+            driver.wait(LONG)
+    assert found[0] == {
+        "outcome": "client_ended", "message": "the client said stop", "sim_time_s": 0.0
+    }  # fmt: skip
