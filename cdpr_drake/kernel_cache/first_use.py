@@ -29,7 +29,7 @@ _listener: Any = None
 
 
 def announce_first_use() -> None:
-    """Lets the logger "cdpr_drake" warn once, when this process compiles a kernel that is kept.
+    """Lets the logger of this module warn once, when this process compiles a kernel that is kept.
 
     Nothing is imported for it: where numba is not there yet, nothing is done, and it may be called
     again. Python prints the line on stderr unless the program configures logging.
@@ -46,7 +46,7 @@ def announce_first_use() -> None:
             if not self.said and _is_kept_kernel(event.data):
                 Listener.said = True
                 logging = import_module("logging")  # which the import of the package goes without
-                logging.getLogger(PACKAGE).warning("%s", first_use_words(sys._getframe()))
+                logging.getLogger(__name__).warning("%s", first_use_words(sys._getframe()))
 
         def on_end(self, event: Any) -> None:
             pass

@@ -69,6 +69,11 @@ def test_every_number_is_that_of_the_log(run):
         "wall_time_s": 0.25,
         "realtime_factor": 4.0,
         "tension_n": {"min": 4.5, "max": 61.5},
+        "tension_limits_n": [1.0, 60.0],
+        "remarks": [
+            "distribution.limits = 1 to 60 N replace tension_bounds of acrobot_large, 0 to 60 N; "
+            "null takes those"
+        ],
         "infeasible_steps": 5,
         "engine": "plant",
         "integration_step_s": 0.002,

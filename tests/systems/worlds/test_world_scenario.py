@@ -345,13 +345,14 @@ def test_dynamic_control_meets_the_ground():
     assert run.log["X_WP"][-1, 6] == pytest.approx(0.15, abs=RESTS)
     assert run.log["contact_count"][-1, 0] > 0.0
     kind = SCENARIO_KINDS["tension_control"]
-    (warning,) = kind.check(scenario)
+    warning, limits = kind.check(scenario)
+    assert "replace tension_bounds" in limits
     assert "integration.max_step: found 0.001; the largest stable one" in warning
     fine = load_scenario(
         "acrobot_computed_torque",
         [low, *TENSION[1:], ground, "integration.max_step=1e-4"],
     )
-    assert kind.check(fine) == []
+    assert kind.check(fine) == [limits]
     facts = dict(kind.facts(kind.data.__globals__["summarize_tension_run"](run)))
     assert "from ground" in facts["least clearance"]
     ends = run_tension_scenario(
