@@ -237,7 +237,7 @@ def solids_figure(
         robot: The robot, for its frame and exit points.
         bounds: Name of the perturbation bounds; None: the first.
     """
-    figure = bare_figure((13.0, 5.3), _title(workspaces, "Workspaces as solids", bounds))
+    figure = bare_figure((13.0, 5.7), _title(workspaces, "Workspaces as solids", bounds))
     lower, upper = robot.frame.lower, robot.frame.upper
     exits = robot.cable_set().p_WA
     handles: list[Line2D] = []
