@@ -41,10 +41,12 @@ def plain(value: Any) -> Any:
         names = [
             "p_WA",
             "p_PB",
-            *(["pulley_radius", "swivel_axis", "arm"] if value.has_pulleys() else []),
+            *(["pulley_radius", "swivel_axis"] if value.has_pulleys() else []),
         ]
         if value.has_platform_pulleys():
             names += ["anchor_pulley_radius", "anchor_swivel_axis"]
+        if np.any(value.arm > 0.0):
+            names.append("arm")
         return {"kind": "CableSet", **{name: plain(getattr(value, name)) for name in names}}
     if is_dataclass(value):
         found = {
