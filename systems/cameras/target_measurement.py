@@ -81,9 +81,13 @@ class TargetMeasurement(LeafSystem):
         if target.quality:
             self.DeclareVectorOutputPort("quality", len(target.quality), self._calc_quality, ticket)
 
+    unread: tuple[str, ...] = ()
+    """Inputs that may stay open since the block does not read them."""
+
     def _check_inputs(self, context: Context) -> None:
         """Checks that no input is open, before the first image."""
         ports = [self.get_input_port(k) for k in range(self.num_input_ports())]
+        ports = [port for port in ports if port.get_name() not in self.unread]
         open_ports = [port.get_name() for port in ports if not port.HasValue(context)]
         if open_ports:
             raise CdprError(

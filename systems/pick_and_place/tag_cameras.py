@@ -53,6 +53,8 @@ class AttentiveProjection(ProjectedCamera):
     Where the tag is it knows from the box's pose or by itself; the port X_WO is not read.
     """
 
+    unread = ("X_WO",)
+
     def __init__(
         self,
         target: TagTarget,
