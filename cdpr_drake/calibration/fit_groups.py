@@ -651,5 +651,5 @@ def _fewer(c: Array) -> npt.NDArray[np.bool_]:
         cost = float(np.sum((low - low.mean()) ** 2) + np.sum((high - high.mean()) ** 2))
         if cost < best:
             best, cut = cost, k
-    high: npt.NDArray[np.bool_] = np.isin(np.arange(len(c)), order[cut:])
-    return high if 2 * high.sum() <= len(c) else np.logical_not(high)
+    larger: npt.NDArray[np.bool_] = np.isin(np.arange(len(c)), order[cut:])
+    return larger if 2 * larger.sum() <= len(c) else np.isin(np.arange(len(c)), order[:cut])

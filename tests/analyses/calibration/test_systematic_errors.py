@@ -22,7 +22,7 @@ ROWS = 20
 """Of a log that is attacked."""
 
 SAME = 2e-3
-"""Distances of exit points by noise of a millimetre in 40 rows [m]."""
+"""Distances of exit points by noise of a millimetre in 99 rows [m]."""
 
 
 @pytest.fixture(scope="module")
@@ -91,29 +91,36 @@ def distances(points):
     return np.linalg.norm(points[:, :, None] - points[:, None], axis=0)
 
 
+TRUE_CORNERS = [(-0.9, 2.2), (2.7, 2.6), (-1.1, 0.1), (2.6, -0.3)]
+BELIEVED_CORNERS = [(0.0, 2.0), (2.0, 2.0), (0.0, 0.0), (2.0, 0.0)]
+"""Top left, top right, bottom left, bottom right of a point mass in a plane, x and y [m]."""
+
+
+def framed(corners):
+    """Maslow 4 with other anchors; it hangs in their middle."""
+    robot = load_robot("maslow_4")
+    middle = np.append(np.mean(corners, axis=0), robot.home.position[2])
+    cables = [
+        replace(cable, exit_point=np.append(corner, cable.exit_point[2]))
+        for cable, corner in zip(robot.cables, corners, strict=True)
+    ]
+    return replace(robot, cables=cables, home=replace(robot.home, position=middle))
+
+
 def test_a_frame_believed_far_too_small_ends_in_the_right_anchors():
     """Lengths that no pose of the believed frame has put poses on the lines between its anchors."""
-    robot = load_robot("maslow_4")
-    believed = np.array([np.asarray(c.exit_point, float) for c in robot.cables])
-    wide = believed * [1.7, 1.0, 1.0]
-
-    def with_exits(points):
-        cables = [replace(c, exit_point=p) for c, p in zip(robot.cables, points, strict=True)]
-        return replace(robot, cables=cables)
-
-    machine, random = with_exits(wide), np.random.default_rng(0)
-    low, high = wide.min(axis=0), wide.max(axis=0)
-    moves = high - low > 0.5  # the plane in which the sled slides
+    machine, random = framed(TRUE_CORNERS), np.random.default_rng(0)
+    low, high = np.min(TRUE_CORNERS, axis=0), np.max(TRUE_CORNERS, axis=0)
     poses = []
-    for _ in range(40):
-        place = low + random.uniform(0.1, 0.9, 3) * (high - low)
-        place = np.where(moves, place, robot.home.transform().translation())
-        poses.append(pose_from_angles(place, np.zeros(3)))
-    lengths = Point(calibration_model(machine), Stations.at(poses)).numbers[:, :, 0]
+    for _ in range(99):
+        place = low + random.uniform(0.02, 0.98, 3)[:2] * (high - low)
+        poses.append(pose_from_angles(np.append(place, machine.home.position[2]), np.zeros(3)))
+    model = calibration_model(machine)
+    lengths = Point(model, Stations.at(poses)).numbers[:, :, 0]
     lengths = lengths + 1e-3 * random.standard_normal(lengths.shape)
-    small = with_exits(0.55 * believed)
-    found = cdpr.calibrate(small, CalibrationLog(Path("wide"), len(poses), lengths=lengths))
+    log = CalibrationLog(Path("wide"), len(poses), lengths=lengths)
+    found = cdpr.calibrate(framed(BELIEVED_CORNERS), log)
     assert found.result.status == "converged"
     np.testing.assert_allclose(
-        distances(found.result.model.cables.p_WA), distances(wide.T), atol=SAME
+        distances(found.result.model.cables.p_WA), distances(model.cables.p_WA), atol=SAME
     )
