@@ -398,7 +398,7 @@ class _Ending:
     overwrite: bool
     formats: tuple[str, ...]
     as_json: bool
-    stream: tuple[float, str] | None = None
+    stream: tuple[float, str | None] | None = None
 
 
 Planner = Callable[[Callable[[str], None]], MotionRun]

@@ -96,7 +96,7 @@ def measure_run(case: Case, seed: int) -> dict[str, Any]:
     items = [*case.changes, f"seed={seed}"]
     scenario = load_scenario(recipe.scenario, items)
     robot = load_robot(scenario.robot)
-    given = {key: np.asarray(value) for key, value in recipe.platform.items()}
+    given: dict[str, Any] = {key: np.asarray(value) for key, value in recipe.platform.items()}
     robot.platform = replace(robot.platform, **given)
     with robot_reference(robot if recipe.platform else scenario.robot) as name:
         scenario = load_scenario(recipe.scenario, [*items, f"robot={name}"])
