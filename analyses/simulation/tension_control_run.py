@@ -246,7 +246,8 @@ def geometry_words(run: TensionRun) -> str:
     """Geometry of the cables, as `Robot.geometry_words`, and of those of the distribution."""
     scenario = run.scenario
     settings = CableSettings(pulleys=scenario.cables.pulleys)
-    return settings.geometry_words(run.control.robot, scenario.distribution.pulleys)
+    believed = scenario.cables.pulleys and scenario.distribution.pulleys
+    return settings.geometry_words(run.control.robot, believed)
 
 
 def summarize_tension_run(run: TensionRun) -> dict[str, Any]:

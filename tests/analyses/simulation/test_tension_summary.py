@@ -60,6 +60,7 @@ def test_every_number_is_that_of_the_log(run):
         "kind": "tension_control",
         "loop": None,
         "robot": "acrobot_large",
+        "geometry": "pulleys ignored",
         "controller": "computed_torque",
         "method": "barycenter",
         "seed": 3,
