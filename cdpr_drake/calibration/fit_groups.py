@@ -447,20 +447,26 @@ def _directions(residuals: _Residuals) -> list[_Direction]:
         sigma = term.sigmas()
         for c in valued.tolist():
             at, v = begin - width + c, values[:, begin - width + c]
-            put("factor", names[c], "-", (), at, -v)
+            put(("factor", names[c], "-"), (), of=at, error=-v)
             both = used[:-1, at] & used[1:, at]
             ahead = np.append(np.where(both, np.diff(v), 0.0), 0.0)
-            put("late", names[c], "rows", (), at, ahead)
+            put(("late", names[c], "rows"), (), of=at, error=ahead)
             behind = np.append(0.0, np.where(both, np.diff(v), 0.0))
-            put("late", names[c], "rows", (), at, behind)
+            put(("late", names[c], "rows"), (), of=at, error=behind)
             for split in jumps:
                 late = np.arange(count) >= split
-                put("jump", names[c], units[c], range(split, count), at, -(late / sigma[:, c]))
+                put(
+                    ("jump", names[c], units[c]),
+                    range(split, count),
+                    of=at,
+                    error=-(late / sigma[:, c]),
+                )
         if len(valued) > 1:
-            put("factor", f"all {term.kind}", "-", (), inside, -values[:, inside])
+            put(("factor", f"all {term.kind}", "-"), (), of=inside, error=-values[:, inside])
             for split in splits:
                 late = (np.arange(count) >= split)[:, None]
-                put("split", term.kind, "-", range(split, count), inside, -values[:, inside] * late)
+                error = -values[:, inside] * late
+                put(("split", term.kind, "-"), range(split, count), of=inside, error=error)
     return directions
 
 
@@ -474,12 +480,13 @@ def _instants(count: int, most: int) -> list[int]:
 
 def _put(
     directions: list[_Direction], used: npt.NDArray[np.bool_], kind: int,
-    test: str, name: str, unit: str, rows: Sequence[int], columns: int | slice, error: Array,
+    what: tuple[str, str, str], rows: Sequence[int], *, of: int | slice, error: Array,
 ) -> None:  # fmt: skip
-    """Adds an error of some columns, where they count."""
+    """Adds an error of some columns, where they count; `what`: test, quantity and unit."""
     whole = np.zeros(used.shape)
-    whole[:, columns] = error
+    whole[:, of] = error
     whole[~used] = 0.0
+    test, name, unit = what
     directions.append(_Direction(test, name, kind, unit, tuple(rows), whole))
 
 
