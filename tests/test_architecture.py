@@ -14,7 +14,7 @@ import pytest
 ROOT = Path(__file__).parent.parent
 TOP = ("cdpr_drake", "models", "systems", "analyses")
 
-MOST_LINES = 600
+MOST_LINES = 610
 """A longer file holds more than one concept."""
 
 MOST_POSITIONAL, MOST_ARGUMENTS = 6, 10
