@@ -10,6 +10,7 @@ Source: OpenCV, modules objdetect and calib3d; Garrido-Jurado et al., Pattern Re
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -48,13 +49,11 @@ SHARPEST, BLURRED = 3, (5, 53, 12)
 the edges of these surroundings [px]: dim, flat and blurred pictures lose markers with OpenCV's 7
 and 3 to 23."""
 
-FINDERS = (
-    lambda gray, inner: cv2.findChessboardCorners(gray, inner, flags=cv2.CALIB_CB_ADAPTIVE_THRESH),
-    lambda gray, inner: cv2.findChessboardCornersSB(gray, inner, flags=cv2.CALIB_CB_ACCURACY),
-    lambda gray, inner: cv2.findChessboardCornersSB(gray, inner, flags=cv2.CALIB_CB_EXHAUSTIVE),
-    lambda gray, inner: cv2.findChessboardCornersSB(
-        gray, inner, flags=cv2.CALIB_CB_NORMALIZE_IMAGE + cv2.CALIB_CB_EXHAUSTIVE
-    ),
+FINDERS: tuple[tuple[Callable[..., tuple[bool, np.ndarray]], int], ...] = (
+    (cv2.findChessboardCorners, cv2.CALIB_CB_ADAPTIVE_THRESH),
+    (cv2.findChessboardCornersSB, cv2.CALIB_CB_ACCURACY),
+    (cv2.findChessboardCornersSB, cv2.CALIB_CB_EXHAUSTIVE),
+    (cv2.findChessboardCornersSB, cv2.CALIB_CB_NORMALIZE_IMAGE + cv2.CALIB_CB_EXHAUSTIVE),
 )
 """OpenCV's finders of chessboards, one after the other until one finds it. The last one makes the
 histogram even (`CALIB_CB_NORMALIZE_IMAGE`), which melts board and wall together in many images."""
@@ -177,8 +176,8 @@ class CalibrationBoard:
         inner = (self.columns - 1, self.rows - 1)
         y, x = np.mgrid[: inner[1], : inner[0]]
         points = self.size * np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
-        for finder in FINDERS:
-            there, uv = finder(gray, inner)
+        for finder, flags in FINDERS:
+            there, uv = finder(gray, inner, flags=flags)
             if there:
                 return points, self._refined(gray, points, uv.reshape(-1, 2))
         return None
@@ -221,4 +220,4 @@ class CalibrationBoard:
         for share in WINDOW_SHARES[self.kind]:
             half = int(np.clip(share * least, LEAST_WINDOW, MOST_WINDOW))
             found = np.asarray(cv2.cornerSubPix(gray, found, (half, half), (-1, -1), criteria))
-        return found
+        return np.asarray(found, float)
