@@ -66,11 +66,14 @@ try:
             shape = inspector.GetShape(geometry)
             if isinstance(shape, Mesh):
                 shape.GetConvexHull()
-except BaseException:
-    pass
+except BaseException as problem:
+    if "mesh" in asked:
+        os.write(1, str(problem).encode())
+        os._exit(3)
 os._exit(0)
 """
-"""Reads a file as this module does; what is refused there is refused here again, with words."""
+"""Reads a file as this module does; what is refused of a model is refused here again, with words.
+Of a mesh it says the words itself: VTK writes others on stderr."""
 
 _read: set[str] = set()
 """What was read to its end before, by what was asked and the state of the file."""
@@ -155,7 +158,7 @@ def try_mesh(file: Path) -> None:
     """Reads a mesh in another process; to be called within `drake_refusals`.
 
     Raises:
-        RuntimeError: The file ends or holds up a process that reads it.
+        RuntimeError: Drake refuses it, or it ends or holds up a process that reads it.
     """
     try_first(file, {"mesh": str(file.absolute())})
 
@@ -178,7 +181,7 @@ def try_first(file: Path, asked: Mapping[str, object]) -> None:
     done = subprocess.run(
         [sys.executable, "-P", "-c", _PROGRAM, words],
         stdin=subprocess.DEVNULL,
-        stdout=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
         check=False,
     )
@@ -193,5 +196,7 @@ def try_first(file: Path, asked: Mapping[str, object]) -> None:
             f"Drake's parser ends by {how}, as where a file includes itself or has fewer bytes "
             "than it says"
         )
+    if done.returncode == 3:
+        raise RuntimeError(done.stdout.decode("utf-8", "replace"))
     if done.returncode == 0:
         _read.add(key)
