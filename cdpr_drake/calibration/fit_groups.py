@@ -67,8 +67,8 @@ FEWEST_DROPPED = 3
 
 MODEL_ERROR = 2.5
 """Errors of a robot's model, such as of its geometry, are no white noise: they shift directions by
-more than scatter says. t counts as that of noise so many times larger, F as of its square. On the
-public log of IRMA4U, at rest and between, errors that are there stay below 2.4 times."""
+more than scatter says. t counts as that of noise so many times larger, F as of its square. Chosen,
+and not derived: with 1 the public log of IRMA4U, whose model has such errors, is a misfit."""
 
 MATERIAL = 1.5
 """An error moves poses by more of their stated deviations than this, root mean square."""
