@@ -39,6 +39,7 @@ from cdpr_drake.summaries import Summarized, numbers
 from cdpr_drake.tensions.methods import distribute
 from cdpr_drake.tensions.null_space_kernel import RANK_TOLERANCE
 from cdpr_drake.tensions.problem import TensionProblem, TensionSolution, TensionStatus
+from cdpr_drake.tensions.shortfall import Shortfall, shortfall
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -309,12 +310,14 @@ class MechanismTensions(Summarized):
         rows: What has to be balanced, in words: what no motor holds, n of them.
         solutions: The answer of each method; none where `control` is there.
         control: Where the cables do not control all of that: what they can do; else None.
+        shortfall: By how much tensions miss what has to be balanced; None where some balance it.
     """
 
     placed: PlacedMechanism
     rows: tuple[str, ...]
     solutions: tuple[TensionSolution, ...]
     control: WrenchControl | None
+    shortfall: Shortfall | None
 
     @property
     def status(self) -> str:
@@ -341,13 +344,14 @@ class MechanismTensions(Summarized):
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON, keys as of `TensionsAtPose`."""
-        m, n = self.placed.cables.routes.count, len(self.rows)
+        names, n = self.placed.cables.routes.names, len(self.rows)
         found = {
             "mechanism": self.placed.mechanism.name,
             "geometry": self.placed.geometry,
-            "cables": list(self.placed.cables.routes.names),
-            "redundancy": m - n,
+            "cables": list(names),
+            "redundancy": len(names) - n,
             "rows": list(self.rows),
+            "infeasible_by": None if self.shortfall is None else self.shortfall.as_dict(names),
         }
         if self.control is None:
             return {**found, "solutions": [one.as_dict() for one in self.solutions]}
@@ -371,17 +375,19 @@ class MechanismTensions(Summarized):
 
     def summary(self) -> tuple[str, list[tuple[str, str]]]:
         """What it shows of itself."""
-        name = self.placed.mechanism.name
+        name, cables = self.placed.mechanism.name, self.placed.cables.routes.names
+        missed = [] if self.shortfall is None else self.shortfall.rows(cables, self.rows)
         if self.control is None:
             return f"Tensions of {name} [N], {self.placed.geometry}", [
                 (one.method, f"{one.status}: {numbers(one.tensions)}") for one in self.solutions
-            ]
+            ] + missed
         title = (
             f"{name}: cables control {self.control.rank} of {len(self.rows)} rows: {self.status}"
         )
         rows = [("not controlled", words) for words, _ in self.uncontrolled()]
         return title, [
             ("geometry", self.placed.geometry), ("tensions [N]", numbers(self.tensions)), *rows,
+            *missed,
         ]  # fmt: skip
 
 
@@ -445,12 +451,13 @@ def solve_mechanism_tensions(
                 f"{placed.mechanism.name}; accepted: {UNDERACTUATED}"
             )
         control = wrench_control(W, wrench, lower, upper, scale)
-        return MechanismTensions(placed, names, (), control)
+        return MechanismTensions(placed, names, (), control, control.shortfall())
     wanted = None if reference is None else np.broadcast_to(np.asarray(reference, float), (m,))
     problem = TensionProblem(W, wrench, lower, upper, wanted, scale)
     every = method == ALL_METHODS
     solutions = tuple(solve_all(problem)) if every else (distribute(problem, method),)
-    return MechanismTensions(placed, names, solutions, None)
+    none = any(one.status == TensionStatus.INFEASIBLE for one in solutions)
+    return MechanismTensions(placed, names, solutions, None, shortfall(problem) if none else None)
 
 
 def _row_scale(W: Array, turns: Array, length_scale: float | None) -> Array:

@@ -124,6 +124,7 @@ def print_tensions(found: MechanismTensions) -> None:
             cells = [f"{t:.2f}" if np.isfinite(t) else "-" for t in one.tensions]
             table.add_row(one.method, str(one.status), *cells)
         console.print(table)
+        _print_shortfall(found)
         return
     console.print(
         f"{told['mechanism']}: {len(told['cables'])} cables for {len(found.rows)} rows that no "
@@ -136,6 +137,14 @@ def print_tensions(found: MechanismTensions) -> None:
     console.print("no tensions change, and at rest all of these are zero:")
     for words, off in found.uncontrolled():
         console.print(f"  {words}: {off:.4g}")
+    _print_shortfall(found)
+
+
+def _print_shortfall(found: MechanismTensions) -> None:
+    """Prints by how much tensions miss what has to be balanced, if they do."""
+    if found.shortfall is not None:
+        for label, words in found.shortfall.rows(found.placed.cables.routes.names, found.rows):
+            wide_console(160).print(f"{label}: {words}")
 
 
 def _words(values: list[float]) -> str:

@@ -148,6 +148,19 @@ def test_every_method_balances() -> None:
         assert np.max(np.abs(W @ one.tensions + w)) < 1e-6, one.method
 
 
+def test_bounds_that_give_way_by_the_shortfall_hold_a_mechanism() -> None:
+    least = solve_mechanism_tensions("cable_arm")
+    assert least.shortfall is None
+    largest = float(np.max(least.tensions))
+    limits = (0.6 * largest, 0.7 * largest)
+    found = solve_mechanism_tensions("cable_arm", limits=limits)
+    assert found.status == "infeasible"
+    beyond = found.as_dict()["infeasible_by"]["beyond_bounds_n"]
+    for give, status in ((1.001, "feasible"), (0.999, "infeasible")):
+        wider = (limits[0] - give * beyond, limits[1] + give * beyond)
+        assert solve_mechanism_tensions("cable_arm", limits=wider).status == status
+
+
 def test_what_no_cable_acts_on_is_said() -> None:
     found = solve_mechanism_tensions("arm_on_platform", held=[])
     assert found.status == "infeasible"
