@@ -20,7 +20,8 @@ on a busy machine that once took 400 s."""
 
 BEGIN = """
 get_ipython().reset()
-import os, sys
+import logging, os, sys
+logging.getLogger("cdpr_drake.kernel_cache.first_use").setLevel(logging.ERROR)
 if "matplotlib.pyplot" in sys.modules:
     sys.modules["matplotlib.pyplot"].close("all")
 methods = sys.modules.get("cdpr_drake.tensions.methods")
@@ -28,11 +29,11 @@ if methods is not None:
     for name in [name for name, one in methods.METHODS.items() if one.asked is not None]:
         del methods.METHODS[name]
 os.chdir({folder!r})
-del os, sys, methods
+del logging, os, sys, methods
 get_ipython().execution_count = 0
 """
 """Forgets what the notebook before has made: its names, numbers of cells, open figures, folder,
-its own methods of tensions."""
+its own methods of tensions. An empty cache of kernels is no matter of a notebook."""
 
 
 @pytest.fixture(scope="module")
