@@ -27,6 +27,10 @@ ROUNDS = 200
 SETTLED_CHANGE = 1e-12
 """Change of the tensions between two rounds that counts as none, relative to the largest."""
 
+ROUNDING = 1e-10
+"""A change below this that does not become smaller any more is rounding, too: it ends in a cycle of
+some 1e-12 where W is badly conditioned."""
+
 
 @dataclass(frozen=True, eq=False)
 class StaticTensions:
@@ -88,16 +92,17 @@ def find_static_tensions(
         return StaticTensions(tensions, tensions, counted)
     lower = np.maximum(lower, LEAST_TENSION_WEIGHTS * cables.linear_weight * paths.lengths)
     arms = (R @ cables.p_PB).T
-    before = np.zeros(m)
+    before, last = np.zeros(m), np.inf
     for _ in range(ROUNDS):
         tensions = _balancing(motion.components(-J.T, R), wanted, lower, upper)
         if tensions is None:
             return None
         l0 = lengths_for_tensions(cables, model, X_WP, tensions)
         state = cable_state(cables, model, X_WP, l0)
-        if np.max(np.abs(tensions - before)) <= SETTLED_CHANGE * np.max(tensions):
+        change = np.max(np.abs(tensions - before)) / np.max(tensions)
+        if change <= SETTLED_CHANGE or last <= change <= ROUNDING:
             return StaticTensions(state.tensions, state.drum_tensions, l0)
-        before = tensions
+        before, last = tensions, change
         u = -(state.forces / state.tensions).T
         J = np.hstack([np.cross(arms, u), u])
     raise CableGeometryError(

@@ -1,11 +1,15 @@
 """What holds a robot, and the named errors where a pose cannot be."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator
 
+from cdpr_drake.cables.models import cable_state
 from cdpr_drake.errors import CableGeometryError, CdprError, InfeasibleTensionError
+from cdpr_drake.geometry.poses import pose_from_angles
 from cdpr_drake.models.robot_holding import check_pulleys, hold_robot
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.robots.cable_robot import CableRobot, holding_tensions
@@ -16,6 +20,10 @@ from tests.models.representative_robots import REPRESENTATIVE_ROBOTS
 
 STILL = 1e-6
 """Acceleration that is left [m/s^2, rad/s^2]: 1e-9 N on platforms of 1.5 kg and 2 g m^2."""
+
+
+BALANCED = 1e-8
+"""Share of the weight that a catenary's own iteration, which stops at some nanonewtons, leaves."""
 
 
 @pytest.mark.parametrize("name", REPRESENTATIVE_ROBOTS)
@@ -33,6 +41,18 @@ def test_a_hanging_robot_stands_still(name, model):
     rates = block.EvalTimeDerivatives(context).CopyToVector()
     assert np.max(np.abs(rates)) < STILL
     np.testing.assert_allclose(block.GetOutputPort("tensions").Eval(context), tensions, atol=1e-6)
+
+
+def test_sagging_cables_settle_up_to_rounding():
+    """High in the frame rounding of 1e-12 goes round in a cycle; the forces are in balance."""
+    robot = load_robot("acrobot_large")
+    place = np.array([0.06923106846, -0.06979347198, 0.8983259596])
+    X_WP = pose_from_angles(place, np.array([0.0961670697, 0.0371083998, 0.0300918578]))
+    rigid = replace(robot.cable_set(), stiffness=np.full(8, 3.487167854e9))
+    held = hold_robot(robot, X_WP, rigid, "catenary")
+    state = cable_state(rigid, "catenary", X_WP, held.unstrained_lengths)
+    weight = robot.platform.mass * 9.81
+    np.testing.assert_allclose(state.forces.sum(axis=1), [0.0, 0.0, weight], atol=BALANCED * weight)
 
 
 def test_straight_cables_are_held_as_by_holding_tensions():
