@@ -1,15 +1,13 @@
 """What holds a robot, and the named errors where a pose cannot be."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator
 
+from cdpr_drake.analyses.statics.modelling_errors import poses_in, usual_beliefs
 from cdpr_drake.cables.models import cable_state
 from cdpr_drake.errors import CableGeometryError, CdprError, InfeasibleTensionError
-from cdpr_drake.geometry.poses import pose_from_angles
 from cdpr_drake.models.robot_holding import check_pulleys, hold_robot
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.robots.cable_robot import CableRobot, holding_tensions
@@ -46,9 +44,8 @@ def test_a_hanging_robot_stands_still(name, model):
 def test_sagging_cables_settle_up_to_rounding():
     """High in the frame rounding of 1e-12 goes round in a cycle; the forces are in balance."""
     robot = load_robot("acrobot_large")
-    place = np.array([0.06923106846, -0.06979347198, 0.8983259596])
-    X_WP = pose_from_angles(place, np.array([0.0961670697, 0.0371083998, 0.0300918578]))
-    rigid = replace(robot.cable_set(), stiffness=np.full(8, 3.487167854e9))
+    X_WP = poses_in(robot, 12)[4]
+    rigid = next(each for each in usual_beliefs(robot) if each.name == "no stretch").cables
     held = hold_robot(robot, X_WP, rigid, "catenary")
     state = cable_state(rigid, "catenary", X_WP, held.unstrained_lengths)
     weight = robot.platform.mass * 9.81
