@@ -48,7 +48,9 @@ def _is_locked(folder: Path) -> bool:
         file = _opened(_lock_of(folder))
     except FileNotFoundError:
         return False
-    except OSError:
+    except OSError as problem:
+        if problem.errno in (errno.EMFILE, errno.ENFILE):  # else every name would be one
+            raise
         return True
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -12,6 +12,7 @@ import ctypes
 import logging
 import os
 import socket
+import stat
 import struct
 import sys
 import tempfile
@@ -233,8 +234,10 @@ def _own_listener(port: int) -> socket.socket | None:
     """The socket of this process that listens at a port of `_INSIDE`."""
     for name in os.listdir("/proc/self/fd"):
         try:
+            if not stat.S_ISSOCK(os.fstat(int(name)).st_mode):
+                continue  # a copy of what is no socket would stay open
             found = socket.socket(fileno=os.dup(int(name)))
-        except OSError:
+        except OSError:  # closed meanwhile
             continue
         with suppress(OSError):
             listens = found.getsockopt(socket.SOL_SOCKET, socket.SO_ACCEPTCONN)

@@ -1,6 +1,7 @@
 """Meshcat's own port answers nobody; other sites' pages see nothing, and no message ends it."""
 
 import asyncio
+import os
 import socket
 import sys
 
@@ -122,3 +123,14 @@ def test_a_scene_that_nobody_looks_at_has_no_page():
     meshcat = open_meshcat()
     with pytest.raises(KeyError):
         page_address(meshcat)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="files of a process are listed by Linux alone")
+def test_files_of_the_process_are_not_copied(tmp_path):
+    files = [(tmp_path / f"{number}").open("w") for number in range(50)]
+    before = len(os.listdir("/proc/self/fd"))
+    meshcat = open_meshcat("localhost")
+    assert len(os.listdir("/proc/self/fd")) - before < 25  # Meshcat's own loops and sockets
+    del meshcat
+    for file in files:
+        file.close()
