@@ -1,5 +1,6 @@
 """A folder has one writer at a time, and its lock harms no file of anybody else."""
 
+import errno
 import multiprocessing
 import os
 import stat
@@ -158,3 +159,12 @@ def test_a_folder_that_is_not_there_is_named(tmp_path):
         locked(tmp_path / "none" / "out"),
     ):
         pass
+
+
+def test_a_process_without_files_to_open_looks_for_no_other_name(tmp_path, monkeypatch):
+    def full(*_):
+        raise OSError(errno.EMFILE, "Too many open files")
+
+    monkeypatch.setattr(folder_lock.os, "open", full)
+    with pytest.raises(OSError, match="Too many open files"):
+        free_folder(tmp_path / "out")
