@@ -21,7 +21,7 @@ from cdpr_drake.systems.diagrams.tension_control import (
     build_tension_control,
 )
 from cdpr_drake.systems.diagrams.tension_loop import TensionLoop
-from cdpr_drake.systems.robots.settings import COMPILED, PLANT
+from cdpr_drake.systems.robots.settings import COMPILED, PLANT, DampingSettings
 from cdpr_drake.systems.scenarios.tension_control_scenario import TensionScenario
 
 SCENARIO = "caroca_computed_torque"
@@ -43,6 +43,7 @@ def dynamic_control(scenario: TensionScenario) -> TensionControl:
         limits=scenario.limits(),
         rate=scenario.controller.rate,
         rule=scenario.step_rule(),
+        damping=DampingSettings(translation=0.0, rotation=0.0),  # as the MuJoCo model
     )
     return build_tension_control(load_robot(scenario.robot), settings, log_rate=scenario.log_rate)
 

@@ -60,7 +60,7 @@ EFFECTS = {
     "pulleys, damped elasticity, friction": ("acrobot_friction", ("cables.pulleys=true",)),
     "pulleys, undamped elasticity, friction": ("acrobot_elastic", ()),
     "catenary, pulleys": ("acrobot_pulleys", ("cables.model=catenary",)),
-    "CAROCA, straight cables": ("caroca_pbvs", ()),
+    "CAROCA, straight cables": ("caroca_pbvs", ("cables.model=kelvin_voigt",)),
     "CAROCA, catenary, pulleys": ("caroca_catenary", ()),
 }
 """What is on, and the scenario with overrides that has it; the camera is projected."""

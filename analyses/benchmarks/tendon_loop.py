@@ -38,7 +38,7 @@ class DaqpLoop:
         sense[m:] = 5  # equalities
         self._m = m
         self._model: Any = daqp.Model()
-        self._model.setup(np.eye(m), np.zeros(m), problem.W, self._upper, self._lower, sense)
+        self._model.setup(np.eye(m), np.zeros(m), problem.W.copy(), self._upper, self._lower, sense)
 
     def solve(self, W: Array, wrench: Array) -> Any:
         """The least-norm tensions; bounds as they were set up."""

@@ -1,6 +1,7 @@
 """The closed loops with physical effects run, and their rows say what they measured."""
 
 from cdpr_drake.analyses.benchmarks.simulation import EFFECTS, effect_rows
+from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.diagrams.load import load_scenario
 
 
@@ -16,5 +17,6 @@ def test_names_say_what_is_on():
     for name, (scenario, overrides) in EFFECTS.items():
         loaded = load_scenario(scenario, list(overrides))
         assert ("pulleys" in name) == loaded.cables.pulleys
-        assert ("catenary" in name) == (loaded.cables.model == "catenary")
+        model = loaded.cables.model_of(load_robot(loaded.robot))
+        assert ("catenary" in name) == (model == "catenary")
         assert ("friction" in name) == (loaded.winches.kind == "motor")
