@@ -245,7 +245,7 @@ def solve_catenary(
         H, V_A, good = _newton(rho, z, r, sigma, l0, ES, w, H, V_A)
         if good:
             return H, V_A, True
-    if r > 0.0:
+    if r > 0.0 and np.hypot(rho - r, z) > r:  # B is outside the pulley
         return _search(rho, z, r, sigma, l0, ES, w)
     return H, V_A, False
 
