@@ -345,6 +345,7 @@ def table(runs: Runs) -> Finding:
     rule="Arithmetic alone: |N't| of the printed tensions at the printed pose, which no choice of "
     f"the basis N changes, agrees with the printed |eta| within {ROUNDING:.2f} N, by which the "
     "printed digits can change it. Each experiment is a part",
+    cause=SOURCE,
 )
 def eta(runs: Runs) -> Finding:
     """Norms of the null-space coordinates of the printed tensions."""
