@@ -76,6 +76,7 @@ def test_every_number_is_that_of_the_log(run):
             "null takes those"
         ],
         "infeasible_steps": 5,
+        "simulated": {"damping_n_s_per_m": 0.0, "damping_n_m_s_per_rad": 0.0, "overrides": []},
         "engine": "plant",
         "integration_step_s": 0.002,
         "world": None,
