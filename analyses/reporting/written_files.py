@@ -352,10 +352,14 @@ def _read_marker(folder: Path) -> dict[str, Any] | None:
 
 
 def _write_marker(folder: Path, names: Iterable[str]) -> None:
+    """Writes the marker, and removes before what killed programs left of it in the making."""
     listed = sorted(
         name for name in names if name not in (MARKER, JOURNAL) and whole_name(name) != MARKER
     )
     words = json.dumps({"program": "cdpr_drake", "version": __version__, FILES: listed}, indent=1)
+    for left in left_parts(folder, (MARKER,)):
+        with suppress(OSError):  # somebody else's folder of that name
+            left.unlink()
     part = new_part(folder / MARKER)
     try:
         part.write_text(words + "\n", encoding="utf-8")
