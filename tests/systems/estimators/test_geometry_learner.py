@@ -72,7 +72,7 @@ def test_late_images_are_put_beside_the_lengths_of_their_instant():
 
 def test_a_frozen_encoder_is_named():
     changes = (
-        *RUN, "duration=5", "sensors.log=[encoder]",
+        *RUN, "duration=7", "sensors.log=[encoder]",
         "failures.events=[{kind: sensor_freezes, sensor: encoder, cable: 3, time: 1.0}]",
     )  # fmt: skip
     told = summarize(run_scenario(load_scenario("acrobot_adaptation", changes)))["adaptation"]
