@@ -15,6 +15,7 @@ from cdpr_drake.analyses.reporting.written_files import (
     claim,
     list_all,
     mark,
+    new_part,
     others_in,
     remove_written,
     whole_file,
@@ -286,6 +287,21 @@ def test_a_file_in_the_making_follows_no_link(name, tmp_path):
                 part.write_text("new")
     assert victim.read_text() == "years of work"
     assert name == MARKER or len(names) == 3
+
+
+def test_who_writes_the_marker_removes_what_was_left_of_it_and_nothing_else(tmp_path):
+    left = new_part(tmp_path / MARKER)  # of who was killed
+    foreign = [
+        tmp_path / ".part-abcdefgh-theirs.csv", tmp_path / f".part-short-{MARKER}",
+        tmp_path / f".{MARKER}.part",
+    ]  # fmt: skip
+    for path in foreign:
+        path.write_text("years of work")
+    kept = tmp_path / f".part-abcdefgh-{MARKER}"
+    kept.mkdir()
+    mark(tmp_path)
+    assert not left.exists()
+    assert set(tmp_path.iterdir()) == {*foreign, kept, tmp_path / MARKER}
 
 
 def test_files_get_the_rights_that_others_get(tmp_path):
