@@ -97,14 +97,19 @@ BELIEVED_CORNERS = [(0.0, 2.0), (2.0, 2.0), (0.0, 0.0), (2.0, 0.0)]
 
 
 def framed(corners):
-    """Maslow 4 with other anchors; it hangs in their middle."""
+    """Maslow 4 with other anchors and no arms at them; it hangs in their middle."""
     robot = load_robot("maslow_4")
     middle = np.append(np.mean(corners, axis=0), robot.home.position[2])
     cables = [
         replace(cable, exit_point=np.append(corner, cable.exit_point[2]))
         for cable, corner in zip(robot.cables, corners, strict=True)
     ]
-    return replace(robot, cables=cables, home=replace(robot.home, position=middle))
+    return replace(
+        robot,
+        cables=cables,
+        pulley=replace(robot.pulley, arm=0.0),
+        home=replace(robot.home, position=middle),
+    )
 
 
 def test_a_frame_believed_far_too_small_ends_in_the_right_anchors():
