@@ -98,9 +98,9 @@ class FuzzedServer:
             self._socket, {"scenario": "fuzz"}, INPUTS, OUTPUTS, pace=self._pace, timeout=LONG,
             period=1e-3, services={"distribute": self._service},
         )  # fmt: skip
-        driver.wait(LONG)
         now, X_WP = 0.0, np.array([1.0, 0, 0, 0, 0, 0, 0.1])
         try:
+            driver.wait(LONG)  # which somebody may end by `stop`
             while True:
                 given = driver.exchange(now, lambda _: X_WP)
                 assert {name: len(row) for name, row in given.items()} == {
