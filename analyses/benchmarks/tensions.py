@@ -10,6 +10,7 @@ from pydrake.solvers import ClarabelSolver, OsqpSolver
 
 from cdpr_drake.analyses.benchmarks.tendon_loop import DaqpLoop
 from cdpr_drake.analyses.reporting.timing import (
+    Item,
     TimingRow,
     interleaved,
     real_time_row,
@@ -17,6 +18,7 @@ from cdpr_drake.analyses.reporting.timing import (
     seconds_per_call,
 )
 from cdpr_drake.analyses.simulation.tension_control_run import run_tension_scenario
+from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CdprError
 from cdpr_drake.geometry.poses import pose_from_angles
 from cdpr_drake.models.robot_loader import load_robot
@@ -25,7 +27,7 @@ from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.tensions.batch import distribute_batch
 from cdpr_drake.tensions.closed_form_kernel import closed_form
 from cdpr_drake.tensions.methods import METHODS, Distributor, TensionMethod, distribute
-from cdpr_drake.tensions.problem import TensionProblem
+from cdpr_drake.tensions.problem import TensionProblem, writable
 from cdpr_drake.tensions.program import TensionProgram, program_tensions
 from cdpr_drake.tensions.quadratic_program_kernel import nearest_tensions, workspace_shape
 
@@ -63,9 +65,14 @@ def random_problems(count: int) -> list[TensionProblem]:
     return problems
 
 
-def _over(problems: list[TensionProblem], call: Callable[[TensionProblem], object]) -> float:
-    """Mean time of a call over problems [us]."""
+def _over(problems: list[Item], call: Callable[[Item], object]) -> float:
+    """Mean time of a call over problems, or over their arrays [us]."""
     return 1e6 * seconds_each(problems, call)
+
+
+def _arrays(problems: list[TensionProblem]) -> list[tuple[Array, Array]]:
+    """W and wrench of each problem, writable as those of a loop are: kernels take no others."""
+    return [(writable(p.W), writable(p.wrench)) for p in problems]
 
 
 def single_rows(problems: list[TensionProblem], repeats: int) -> list[TimingRow]:
@@ -73,20 +80,16 @@ def single_rows(problems: list[TensionProblem], repeats: int) -> list[TimingRow]
     first = problems[0]
     m = first.W.shape[1]
     t, zero, work = np.empty(m), np.zeros(m), np.empty(workspace_shape(*first.W.shape))
-    lower, upper = first.lower, first.upper
+    lower, upper = writable(first.lower), writable(first.upper)
+    loads = _arrays(problems)
     daqp, ready = DaqpLoop(first), Distributor(first)
     exact, closed, front, loop, other = interleaved(
         [
-            lambda: _over(
-                problems, lambda p: nearest_tensions(p.W, p.wrench, lower, upper, zero, t)
-            ),
-            lambda: _over(
-                problems,
-                lambda p: closed_form(work, p.W, p.wrench, lower, upper, zero, zero, t),
-            ),
+            lambda: _over(loads, lambda p: nearest_tensions(*p, lower, upper, zero, t)),
+            lambda: _over(loads, lambda p: closed_form(work, *p, lower, upper, zero, zero, t)),
             lambda: _over(problems, distribute),
-            lambda: _over(problems, lambda p: ready(p.W, p.wrench)),
-            lambda: _over(problems, lambda p: daqp.solve(p.W, p.wrench)),
+            lambda: _over(loads, lambda p: ready(*p)),
+            lambda: _over(loads, lambda p: daqp.solve(*p)),
         ],
         repeats,
     )
@@ -107,7 +110,7 @@ def batch_row(problems: list[TensionProblem], repeats: int) -> TimingRow:
     W = np.array([p.W for p in problems])
     w = np.array([p.wrench for p in problems])
     lower, upper = problems[0].lower, problems[0].upper
-    daqp = DaqpLoop(problems[0])
+    loads, daqp = _arrays(problems), DaqpLoop(problems[0])
     batch, loop = interleaved(
         [
             lambda: (
@@ -115,7 +118,7 @@ def batch_row(problems: list[TensionProblem], repeats: int) -> TimingRow:
                 * seconds_per_call(lambda: distribute_batch(W, w, lower, upper, threads=1), 5)
                 / len(problems)
             ),
-            lambda: _over(problems, lambda p: daqp.solve(p.W, p.wrench)),
+            lambda: _over(loads, lambda p: daqp.solve(*p)),
         ],
         repeats,
     )
@@ -198,7 +201,7 @@ def program_rows(count: int) -> list[TimingRow]:
         )
         for place in places
     ]
-    kernel = Distributor(steps[0])
+    kernel, loads = Distributor(steps[0]), _arrays(steps)
     for label, build in (("own quadratic program", _near), ("own nonlinear program", _never_slack)):
         name = label.replace(" ", "_")
         method = TensionMethod.from_program(name, build)
@@ -207,8 +210,8 @@ def program_rows(count: int) -> list[TimingRow]:
 
             def follow(own: Distributor = own) -> None:
                 last = None
-                for step in steps:
-                    last = own(step.W, step.wrench, last).tensions
+                for W, wrench in loads:
+                    last = own(W, wrench, last).tensions
 
             follow()
             times = method.step_times
@@ -217,7 +220,7 @@ def program_rows(count: int) -> list[TimingRow]:
             took, base = interleaved(
                 [
                     lambda follow=follow: 1e6 * seconds_per_call(follow, 1) / count,  # type: ignore[misc]
-                    lambda: _over(steps, lambda p: kernel(p.W, p.wrench)),
+                    lambda: _over(loads, lambda p: kernel(*p)),
                 ],
                 3,
             )
