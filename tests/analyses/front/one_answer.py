@@ -33,6 +33,9 @@ SHORT = 1e-3
 SAME_POSE = 1e-6
 """A rest so near is the one at the pose [m, rad]."""
 
+SAGGING = "sagging cables"
+"""Cables of the robot file that sag have weight, and are asked for more tension than the least."""
+
 REASONS = {
     "few searches": r"not proven to be all|found in \d+ searches",
     "shared winch": r"several cables on a winch|several cables on one winch",
@@ -41,6 +44,7 @@ REASONS = {
     "fewer cables": r"for \d degrees of freedom; accepted: at least|fewer cannot follow",
     "more than 8 cables": r"accepted: 1 to 8 cables",
     "exit point in platform": r"reaches into the platform",
+    SAGGING: r"with at least [\d.]+ times its own in each",
 }
 """Why a call answers otherwise, or not at all, by the words that its result or refusal has."""
 
