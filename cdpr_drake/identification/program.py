@@ -56,7 +56,12 @@ are as large as their noise."""
 @dataclass(frozen=True, eq=False)
 class _Fit:
     """A least squares solution: vector, directions that are free, information along them, and
-    what the belief left unexplained."""
+    what the belief left unexplained.
+
+    Attributes:
+        active: What no robot has of the solution without inequalities, in words.
+        solver: What found the vector.
+    """
 
     theta: Array
     Z: Array
@@ -67,6 +72,8 @@ class _Fit:
     limits: list[float]
     steps: int
     last_step: float
+    active: tuple[str, ...] = ()
+    solver: str = "least squares"
 
     def pairs(self) -> list[tuple[Rows, Array]]:
         """Rows and weights of each term, and of priors."""
@@ -230,20 +237,10 @@ class IdentificationProgram(OwnTerms):
         fit = self._weighed_fit(outliers)
         if self.has_own_terms:
             return self._with_own_terms(fit, began)
-        status, solver, active = OPTIMAL, "least squares", violated(self.layout, fit.theta)
-        theta = fit.theta
-        if active:
-            program = self._program(fit.rows, fit.weights, theta)
-            found = Solve(program)
-            if not found.is_success():
-                raise IdentificationError(
-                    f"identification: found {found.get_solution_result()} by "
-                    f"{found.get_solver_id().name()}; accepted: data that some body can have"
-                )
-            theta = found.GetSolution(program.decision_variables()) * self.layout.typical
-            status, solver = AT_THE_RIM, found.get_solver_id().name()
-        self._check_end(theta, fit)
-        return self._result(fit, theta, (status, solver, active), time.perf_counter() - began)
+        fit = self._some_robot(fit)
+        self._check_end(fit.theta, fit)
+        how = AT_THE_RIM if fit.active else OPTIMAL, fit.solver, fit.active
+        return self._result(fit, fit.theta, how, time.perf_counter() - began)
 
     def _with_own_terms(self, fit: _Fit, began: float) -> IdentificationResult:
         """The whole program, again and again until its weights do not change what it finds."""
@@ -458,6 +455,69 @@ class IdentificationProgram(OwnTerms):
             self._weighed = found
             fit = self._least_squares(outliers, fit.theta)
         return fit
+
+    def _some_robot(self, fit: _Fit) -> _Fit:
+        """The same with inequalities, where least squares found what no robot has.
+
+        Noise, and so weights, depend on the body: those at a body that cannot be are of no use.
+        So the program is solved again and again, weighted as at its last solution, or at the belief
+        if that is better than the first, by steps that do not raise the cost.
+
+        Raises:
+            IdentificationError: The program has no solution.
+        """
+        active, typical = violated(self.layout, fit.theta), self.layout.typical
+        if not active:
+            return fit
+
+        def at(theta: Array) -> tuple[float, list[Rows], list[Array]]:
+            rows = self._rows(theta)
+            rests = [r.A @ (theta / typical) - r.b for r in rows]
+            weights = [huber_weights(*each) for each in zip(rests, fit.limits, strict=True)]
+            return _cost(rests, fit.limits), rows, weights
+
+        theta, solver = self._solved(fit.rows, fit.weights, fit.theta)
+        cost, rows, weights = at(theta)
+        belief = self.layout.model.vector()
+        if not violated(self.layout, belief):
+            there = at(belief)
+            if there[0] < cost:
+                theta, (cost, rows, weights) = belief, there
+        far, step = np.inf, 0
+        while far >= ROUGHLY_SETTLED and step < MOST_STEPS:
+            step += 1
+            way = self._solved(rows, weights, theta)[0] - theta
+            x = way / typical
+            far = float(np.sqrt(max(float(x @ self._information(rows, weights) @ x), 0.0)))
+            for k in range(MOST_HALVINGS):
+                there = at(theta + 0.5**k * way)
+                if there[0] <= cost:
+                    theta, (cost, rows, weights) = theta + 0.5**k * way, there
+                    break
+            else:
+                break  # nothing along it is better
+        Z = self._directions(self._scaled(theta)[0])
+        H = np.asarray(Z.T @ self._information(rows, weights) @ Z)
+        return replace(
+            fit, theta=theta, Z=Z, H=H, rows=rows, weights=weights, steps=fit.steps + step,
+            last_step=far, active=active, solver=solver,
+        )  # fmt: skip
+
+    def _solved(self, rows: list[Rows], weights: list[Array], theta: Array) -> tuple[Array, str]:
+        """What Drake finds of the program, weighted as at a vector, and by which solver.
+
+        Raises:
+            IdentificationError: It finds nothing.
+        """
+        program = self._program(rows, weights, theta)
+        found = Solve(program)
+        if not found.is_success():
+            raise IdentificationError(
+                f"identification: found {found.get_solution_result()} by "
+                f"{found.get_solver_id().name()}; accepted: data that some body can have"
+            )
+        x = found.GetSolution(program.decision_variables())
+        return x * self.layout.typical, found.get_solver_id().name()
 
     def _least_squares(self, outliers: bool, start: Array | None = None) -> _Fit:
         """Without inequalities, until weights and what is not quite linear do not change.
