@@ -58,6 +58,7 @@ from cdpr_drake.systems.robots.compiled_step import StepRule
 from cdpr_drake.systems.robots.settings import CableRobotSettings
 from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
 from cdpr_drake.tensions.methods import method_for
+from cdpr_drake.winches.failed_winches import HOLD
 
 RULES = {
     name: EmergencySettings(reaction=name, delay=BRAKE if name == STOP else 0.0) for name in SAVING
@@ -230,6 +231,8 @@ class _Hung:
         scenario, self._asked, self._robot = asked.scenario, asked, robot
         settings = asked.torque_control(robot)
         self._believed = scenario.cables.cable_set(robot)
+        # Brakes of a reaction hold in a diagram whatever the file says of one, and do not slip.
+        self._braked = replace(robot, winch=replace(robot.winch, brake_torque=HOLD))
         self._most = wanted_limits(settings, robot)[1]
         # Without a camera: the law reads its cables alone.
         believed = BelievedRobot(self._believed, RigidTransform(), robot.home.transform())
@@ -243,7 +246,9 @@ class _Hung:
         self._rule = StepRule()
 
     def _robots(self, count: int) -> BatchRobots:
-        return BatchRobots(self._robot, count, settings=self._simulated, rule=self._rule, threads=1)
+        return BatchRobots(
+            self._braked, count, settings=self._simulated, rule=self._rule, threads=1
+        )
 
     def fly_to(self, X_WP: RigidTransform) -> _Moment | None:
         """Lets it settle, and fly until it passes the pose, which takes no longer than twice as
@@ -251,7 +256,7 @@ class _Hung:
         integration = self._asked.scenario.integration
         method, step = integration.integrator, integration.max_step
         if step is None:
-            step = automatic_step(self._robot, X_WP, method, self._simulated)
+            step = automatic_step(self._braked, X_WP, method, self._simulated)
         self._rule = StepRule(
             method=method, max_step=min(step, self._period), accuracy=integration.accuracy
         )
