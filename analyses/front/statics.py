@@ -329,6 +329,7 @@ def find_equilibria(
     return as_kind(RobotEquilibria, rests, loaded=loaded)
 
 
+@one_blas_thread()
 def solve_inverse_kinematics(
     robot: Robot | str | Path, pose: object = None, pulleys: bool = True
 ) -> CableLengths:
@@ -353,6 +354,7 @@ def solve_inverse_kinematics(
     return CableLengths(loaded, X_WP, loaded.geometry_words(pulleys), paths.lengths, paths.u_W)
 
 
+@one_blas_thread()
 def plot(robot: Robot | str | Path, pose: object = None) -> Figure:
     """A robot with its frame, cables and platform at a pose, in 3D.
 

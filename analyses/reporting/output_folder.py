@@ -413,9 +413,9 @@ INPUTS = "inputs.json"
 
 
 def _tell_inputs(folder: Path) -> None:
-    """Writes `INPUTS`, where files of users were read."""
+    """Writes `INPUTS`, where files of users were read; not of files that the folder has itself."""
     held = inputs_held()
-    hashes = {} if held is None else held.hashes()
+    hashes = {} if held is None else held.hashes(folder)
     if hashes and folder.is_dir():
         with whole_file(folder / INPUTS) as part:
             part.write_text(json.dumps(hashes, indent=2) + "\n", encoding="utf-8")

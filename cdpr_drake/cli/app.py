@@ -233,7 +233,8 @@ def main(arguments: list[str] | None = None) -> None:
     imported: that stays, and each search would walk through hundreds of thousands of objects.
     """
     if arguments is not None:  # somebody else's process
-        with one_blas_thread(), started_with_one_thread():
+        held = one_blas_thread() if "numpy" in sys.modules else nullcontext()
+        with held, started_with_one_thread():  # NumPy reads the environment when it is loaded
             _main(arguments)
         return
     os.environ.update(ONE_THREAD)  # before NumPy is loaded

@@ -61,9 +61,16 @@ class InputFiles:
         known = {os.path.abspath(path): self.content(path) for path in paths}
         return _placed(tuple(sorted(known.items())))
 
-    def hashes(self) -> dict[str, dict[str, Any]]:
-        """SHA-256 and size of all files, by name, or by path where two have one name."""
-        paths = {key: key.removesuffix(_MADE) for key in self._contents}
+    def hashes(self, folder: Path) -> dict[str, dict[str, Any]]:
+        """SHA-256 and size of all files, by name, or by path where two have one name.
+
+        Without those that lie in a folder of results with the same bytes, as a run's own scenario
+        does when the run is continued.
+        """
+        paths = {
+            key: path for key, content in self._contents.items()
+            if not _has(folder, Path(path := key.removesuffix(_MADE)).name, content)
+        }  # fmt: skip
         names = [Path(path).name for path in paths.values()]
         return {
             Path(path).name if names.count(Path(path).name) == 1 else key: {
@@ -72,6 +79,11 @@ class InputFiles:
             }
             for key, path in sorted(paths.items())
         }
+
+
+def _has(folder: Path, name: str, content: bytes) -> bool:
+    file = folder / name
+    return file.is_file() and file.read_bytes() == content
 
 
 _held: ContextVar[InputFiles | None] = ContextVar("input_files", default=None)

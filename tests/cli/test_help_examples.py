@@ -15,6 +15,7 @@ import cdpr_drake as cdpr
 from cdpr_drake.cli.app import main
 from cdpr_drake.cli.command_help import COMMANDS, FIRST_STEPS
 from tests.analyses.logs.recorders import hangprinter_script, motive
+from tests.messages import printed
 from tests.newcomer import OWN_ROBOT
 
 EXAMPLES = sorted({line for _, *lines in COMMANDS.values() for line in lines})
@@ -155,7 +156,7 @@ def test_an_example_is_accepted(line, capsys, tmp_path, monkeypatch):
         else:
             monkeypatch.setattr(target, begin)
     found = ended([command, *arguments])
-    said = capsys.readouterr().err
+    said = printed(capsys).err
     assert found == ("accepted" if command in LONG_WORK else 0), said
 
 
@@ -173,4 +174,4 @@ def test_what_is_refused_is_no_example(capsys, tmp_path, monkeypatch):
         "equilibria grab_four --position 0,0,0.5",
     ):
         assert ended(shlex.split(line)) == 2
-    capsys.readouterr()
+    printed(capsys)

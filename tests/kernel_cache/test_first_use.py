@@ -4,6 +4,8 @@ import os
 import subprocess
 import sys
 
+from tests.messages import messages
+
 PROGRAM = """
 import sys
 import cdpr_drake as cdpr
@@ -23,7 +25,7 @@ def run(program, folder):
         [sys.executable, "-c", program], capture_output=True, text=True, check=True, cwd=folder,
         env=os.environ | {"NUMBA_CACHE_DIR": str(folder / "cache")},
     )  # fmt: skip
-    return done.stderr.splitlines(), done.stdout
+    return messages(done.stderr).splitlines(), done.stdout
 
 
 def test_the_first_call_that_compiles_says_so_once_and_before(tmp_path):

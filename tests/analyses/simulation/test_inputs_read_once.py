@@ -133,10 +133,10 @@ def test_results_have_the_hash_of_what_was_read(tmp_path):
     assert not (tmp_path / "ours" / "inputs.json").exists()  # the code's version says those
 
 
-def test_files_of_the_package_are_read_where_they_are():
+def test_files_of_the_package_are_read_where_they_are(tmp_path):
     with inputs_read_once():
         load_robot("acrobot_small")
-        assert inputs_held().hashes() == {}
+        assert inputs_held().hashes(tmp_path) == {}
         assert input_path(robot_file("acrobot_small")) == robot_file("acrobot_small")
 
 
