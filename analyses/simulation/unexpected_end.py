@@ -119,8 +119,10 @@ def _missed_limits(servo: ServoModel, scenario: Scenario, log: Log, keys: list[s
         keys += ["duration", "stop.hold"]
         return [f"{over} before both limits had held for stop.hold = {stop.hold:g} s"]
     half = len(found) // 2
-    means = np.mean(found[:half], axis=0), np.mean(found[half:], axis=0)
-    falls = [k for k in missed if half and means[1][k] < FALLING * means[0][k]]
+    falls = []
+    if half:
+        means = np.mean(found[:half], axis=0), np.mean(found[half:], axis=0)
+        falls = [k for k in missed if means[1][k] < FALLING * means[0][k]]
     if falls:
         keys.append("duration (longer)")
     if len(falls) < len(missed):

@@ -30,9 +30,11 @@ def run(capsys, *arguments):
 
 
 def refuse(capsys, *arguments):
-    """The one line that a command says when it refuses."""
+    """The one line that a command says when it refuses, apart from warnings of the scenario."""
     code, _, err = run(capsys, *arguments)
     assert code == 2
+    lines = err.splitlines(keepends=True)
+    err = "".join(line for line in lines if not line.startswith("warning: "))
     assert err.startswith("cdpr: ")
     assert len(err.strip().splitlines()) == 1
     return err

@@ -76,7 +76,8 @@ def test_every_subset_holds_as_linear_programs_say(name):
     np.testing.assert_array_equal(breaks_survived(case, positions, rotations), count)
     assert found.any() == (name == "segesta")
     assert not found.all()
-    assert len(np.unique(count)) > 2
+    # Upper and lower cables of ACROBOT come in fours: 0 or 4 breaks leave it held.
+    assert len(np.unique(count)) > (2 if name == "segesta" else 1)
 
 
 def test_of_a_pentagon_the_one_of_its_diagonals_survives():
