@@ -13,7 +13,6 @@ import numpy as np
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import BridgeError
-from cdpr_drake.schema.json_text import load_json
 
 PROTOCOL = 1
 """Version of the messages."""
@@ -85,7 +84,7 @@ def decode(payload: bytes) -> tuple[dict[str, Any], str]:
     codec = JSON if payload[:1] == b"{" else MSGPACK
     try:
         if codec == JSON:
-            found = load_json(payload, parse_constant=_no_number)
+            found = json.loads(payload, parse_constant=_no_number)
         else:
             found = _msgpack().unpack(payload)
     except (ValueError, TypeError, RecursionError) as problem:
