@@ -76,7 +76,7 @@ def test_every_subset_holds_as_linear_programs_say(name):
     np.testing.assert_array_equal(breaks_survived(case, positions, rotations), count)
     assert found.any() == (name == "segesta")
     assert not found.all()
-    # Upper and lower cables of ACROBOT come in fours: 0 or 4 breaks leave it held.
+    # At these poses the counts of ACROBOT, with its fitted centre of mass, are 0 and 4 alone.
     assert len(np.unique(count)) > (2 if name == "segesta" else 1)
 
 
