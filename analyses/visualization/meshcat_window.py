@@ -8,6 +8,7 @@ A web page of another site is refused by its Origin, one that came by another na
 
 from __future__ import annotations
 
+import atexit
 import ctypes
 import logging
 import os
@@ -17,11 +18,13 @@ import struct
 import sys
 import tempfile
 import threading
+import weakref
 from collections.abc import Iterator
 from contextlib import closing, contextmanager, suppress
+from dataclasses import dataclass, field
 from pathlib import Path
 
-from pydrake.geometry import Meshcat, MeshcatParams
+from pydrake.geometry import Meshcat, MeshcatParams, MeshcatVisualizer
 
 from cdpr_drake.errors import MeshcatError
 
@@ -69,7 +72,7 @@ def open_meshcat(host: str | None = None, port: int | None = None) -> Meshcat:
     meshcat = _sealed_meshcat()
     if listening is not None:
         MeshcatDoor(meshcat, listening, _allowed_hosts(host or LOCAL, listening)).open()
-        _pages[meshcat.port()] = host or LOCAL, listening.getsockname()[1]
+        _scenes[meshcat.port()].page = host or LOCAL, listening.getsockname()[1]
     return meshcat
 
 
@@ -79,16 +82,13 @@ def private_door(meshcat: Meshcat) -> Path:
     Who hands the scene on to browsers says who may look.
     """
     folder = tempfile.TemporaryDirectory(prefix="cdpr-scene-", ignore_cleanup_errors=True)
-    _folders.append(folder)  # goes with this process
     path = Path(folder.name, "scene")
     listening = socket.socket(socket.AF_UNIX)
     listening.bind(str(path))
     listening.listen(64)
     MeshcatDoor(meshcat, listening, None).open()
+    _scenes[meshcat.port()].folders.append(folder)
     return path
-
-
-_folders: list[tempfile.TemporaryDirectory[str]] = []
 
 
 def page_address(meshcat: Meshcat, host: str | None = None) -> str:
@@ -97,15 +97,17 @@ def page_address(meshcat: Meshcat, host: str | None = None) -> str:
     Args:
         meshcat: From `open_meshcat`, with a host or a port.
         host: Another name of this machine; None: the one with which it was opened.
+
+    Raises:
+        MeshcatError: It was opened without.
     """
-    given, port = _pages[meshcat.port()]
+    page = _scenes[meshcat.port()].page
+    if page is None:
+        raise MeshcatError("meshcat: found one without a page; open it with a host or a port")
+    given, port = page
     host = given if host is None else host
     name = socket.gethostname() if host in EVERYWHERE else host
     return f"http://{f'[{name}]' if ':' in name else name}:{port}"
-
-
-_pages: dict[int, tuple[str, int]] = {}
-"""Host and port where browsers look, by the port of a Meshcat."""
 
 
 def _listening(host: str, port: int | None) -> socket.socket:
@@ -159,7 +161,10 @@ def _sealed_meshcat() -> Meshcat:
             port = probe.getsockname()[1]
         with suppress(RuntimeError), _quiet_drake():
             meshcat = Meshcat(MeshcatParams(host=_INSIDE, port=port, show_stats_plot=False))
-            _seals[port] = _Seal(port)
+            _end_scenes()
+            _scenes[port] = _Scene(
+                weakref.ref(meshcat), MeshcatVisualizer(meshcat), threading.get_ident(), _Seal(port)
+            )
             return meshcat
     raise MeshcatError("host, port: found no port of this machine at which Meshcat can listen")
 
@@ -211,9 +216,56 @@ class _Seal:
             struct.pack("HxxxxxxQ", len(program), ctypes.addressof(code)),
         )  # fmt: skip
 
+    def end(self) -> None:
+        """Once Meshcat has gone."""
+        if self._listening is not None:
+            self._listening.close()
 
-_seals: dict[int, _Seal] = {}
-"""Those of Meshcats of this process, by port."""
+
+@dataclass
+class _Scene:
+    """A Meshcat of this process, and what ends with it.
+
+    Drake ends the process if a Meshcat goes in another thread than the one that made it, and
+    Python's collector runs in whichever thread it likes. So the last share of it is kept here, by
+    a visualizer that nobody sees, until its own thread opens the next one.
+    """
+
+    meshcat: weakref.ref[Meshcat]
+    share: MeshcatVisualizer
+    thread: int
+    seal: _Seal
+    page: tuple[str, int] | None = None
+    """Host and port where browsers look."""
+    doors: list[socket.socket] = field(default_factory=list)
+    folders: list[tempfile.TemporaryDirectory[str]] = field(default_factory=list)
+
+
+_scenes: dict[int, _Scene] = {}
+"""By the port of their Meshcat."""
+
+
+def _end_scenes() -> None:
+    """Ends those of this thread that nobody has any more."""
+    for port, scene in list(_scenes.items()):
+        if scene.thread == threading.get_ident() and scene.meshcat() is None:
+            del _scenes[port]
+            for door in scene.doors:
+                with suppress(OSError):
+                    door.shutdown(socket.SHUT_RDWR)
+                door.close()
+            scene.seal.end()
+            for folder in scene.folders:
+                folder.cleanup()
+
+
+@atexit.register
+def _leave_scenes() -> None:
+    """Leaves those of other threads to the end of the process, which takes them without Drake."""
+    for scene in _scenes.values():
+        if scene.thread != threading.get_ident():
+            ctypes.pythonapi.Py_IncRef(ctypes.py_object(scene.share))
+
 
 _SO_ATTACH_FILTER = 26
 
@@ -254,7 +306,9 @@ class MeshcatDoor:
         self, meshcat: Meshcat, listening: socket.socket, hosts: frozenset[str] | None
     ) -> None:
         """With the socket at which browsers ask, and what they may call this machine."""
-        self._seal, self._listening, self._hosts = _seals[meshcat.port()], listening, hosts
+        scene = _scenes[meshcat.port()]
+        scene.doors.append(listening)
+        self._seal, self._listening, self._hosts = scene.seal, listening, hosts
 
     def open(self) -> None:
         """Lets browsers in from now on."""

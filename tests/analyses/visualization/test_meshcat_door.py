@@ -3,6 +3,7 @@
 import asyncio
 import os
 import socket
+import subprocess
 import sys
 
 import aiohttp
@@ -17,6 +18,7 @@ from cdpr_drake.analyses.visualization.meshcat_window import (
     page_address,
     private_door,
 )
+from cdpr_drake.errors import MeshcatError
 
 WAIT = 1.0
 """Time after which what was not answered counts as not answered [s]."""
@@ -121,7 +123,7 @@ def test_the_private_door_is_a_socket_of_this_user(scene):
 
 def test_a_scene_that_nobody_looks_at_has_no_page():
     meshcat = open_meshcat()
-    with pytest.raises(KeyError):
+    with pytest.raises(MeshcatError, match="without a page"):
         page_address(meshcat)
 
 
@@ -134,3 +136,51 @@ def test_files_of_the_process_are_not_copied(tmp_path):
     del meshcat
     for file in files:
         file.close()
+
+
+COLLECTED_ELSEWHERE = """
+import gc, threading
+from pydrake.geometry import MeshcatVisualizer
+from cdpr_drake.analyses.visualization.meshcat_window import open_meshcat, private_door
+
+def leave():
+    meshcat = open_meshcat("localhost")
+    private_door(meshcat)
+    cycle = [meshcat, MeshcatVisualizer(meshcat)]
+    cycle.append(cycle)
+
+def collect():
+    thread = threading.Thread(target=gc.collect)
+    thread.start()
+    thread.join()
+
+leave()
+collect()
+again = open_meshcat("localhost")
+others = []
+thread = threading.Thread(target=lambda: others.append(open_meshcat()))
+thread.start()
+thread.join()
+others.clear()
+print("alive")
+"""
+"""A scene that another thread collects, and one that outlives its own thread, until the end."""
+
+
+def test_a_scene_may_be_collected_in_any_thread():
+    ran = subprocess.run(
+        [sys.executable, "-c", COLLECTED_ELSEWHERE], capture_output=True, text=True, check=False
+    )
+    assert (ran.returncode, ran.stdout) == (0, "alive\n"), ran.stderr
+
+
+def test_a_scene_that_has_gone_leaves_no_file_open():
+    meshcat = open_meshcat("localhost")
+    path = private_door(meshcat)
+    before, address = len(os.listdir("/proc/self/fd")), page_address(meshcat)
+    for _ in range(5):
+        del meshcat
+        meshcat = open_meshcat("localhost")
+    assert len(os.listdir("/proc/self/fd")) <= before
+    assert not path.parent.exists()
+    assert page_address(meshcat).rpartition(":")[0] == address.rpartition(":")[0]
