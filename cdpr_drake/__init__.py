@@ -10,8 +10,9 @@ The names of this package are loaded when they are first asked for. Those of mos
 
 `cdpr.robot_names()` and `cdpr.scenario_names()` list what comes with the package. Each of these
 functions takes a robot by name, by path or as a Robot; a pose as 3 or 6 numbers [m, deg], a
-RigidTransform, a matrix of shape (4, 4), a `Pose`, or None for the home pose. Results show themselves, have `as_dict()`, the
-same as `cdpr ... --json` prints, and mostly `plot()`. What users can do wrong raises a `CdprError`.
+RigidTransform, a matrix of shape (4, 4), a `Pose`, or None for the home pose. Results show
+themselves, have `as_dict()`, the same as `cdpr ... --json` prints, and mostly `plot()`. What users
+can do wrong raises a `CdprError`.
 
 Conventions hold everywhere and are stated once, here. Units are SI and angles radians unless a name
 says otherwise. Drake's monogram notation: `X_WP` is the pose of the platform P in the world W,

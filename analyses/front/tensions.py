@@ -108,39 +108,36 @@ class TensionsAtPose(Summarized):
             (one.method, f"{one.status}: {numbers(one.tensions)}") for one in self.solutions
         ] + self.shortfall_rows()
 
-    def plot(self, title: str | None = None) -> Figure:
+    def plot(self) -> Figure:
         """With two cables more than needed and a feasible polygon that with a point for each
         method, else tensions with their bounds.
-
-        Args:
-            title: Of the figure; None: robot and position.
         """
-        asked, title = self.problem, title or self._where()
+        asked = self.problem
         if asked.redundancy == 2 and feasible_polygon(asked).shape[1]:
-            return self.plot_polygon(title)
+            return self.plot_polygon()
         from cdpr_drake.analyses.statics.static_figures import tension_figure
 
         found = {one.method: one.tensions for one in self.solutions}
-        return tension_figure(self._cables(), found, (asked.lower, asked.upper), title)
+        return tension_figure(self._cables(), found, (asked.lower, asked.upper), self._where())
 
-    def plot_polygon(self, title: str | None = None) -> Figure:
-        """The feasible polygon with a point for each method that was asked; `title` as of `plot`.
+    def plot_polygon(self) -> Figure:
+        """The feasible polygon with a point for each method that was asked.
 
         Raises:
             TensionProblemError: There are not two cables more than needed, or no tensions at all.
         """
         from cdpr_drake.analyses.statics.static_figures import polygon_figure
 
-        return polygon_figure(self.problem, self.solutions, title or self._where())
+        return polygon_figure(self.problem, self.solutions, self._where())
 
-    def plot_wrenches(self, title: str | None = None) -> Figure:
-        """Sections of the wrenches that the cables can give at the pose; `title` as of `plot`."""
+    def plot_wrenches(self) -> Figure:
+        """Sections of the wrenches that the cables can give at the pose."""
         from cdpr_drake.analyses.workspaces.workspace_figures import wrench_set_figure
         from cdpr_drake.workspaces.available_wrenches import available_wrenches
 
         asked = self.problem
         found = available_wrenches(asked.W, asked.lower, asked.upper, asked.row_scale)
-        title = f"{title or self._where()}: what the cables can give"
+        title = f"{self._where()}: what the cables can give"
         return wrench_set_figure(found, -asked.wrench, title)
 
     def _where(self) -> str:

@@ -136,7 +136,6 @@ def tension(
         "length_scale": length_scale,
     }  # fmt: skip
     cables = [cable.name for cable in loaded.cables]
-    place = "home" if pose is None else f"({pose})"
     every = method == "all"
     if loaded.is_underactuated():
         for option, given in (("plot", plot), ("wrench-set-plot", wrench_set_plot)):
@@ -153,11 +152,9 @@ def tension(
         else:
             found = solve_tensions(loaded, X_WP, external, method, **asked)
     if plot is not None and isinstance(found, TensionsAtPose):
-        save_plot(found.plot_polygon(f"{loaded.name} at {place}, {found.geometry}"), plot)
+        save_plot(found.plot_polygon(), plot)
     if wrench_set_plot is not None and isinstance(found, TensionsAtPose):
-        save_plot(
-            found.plot_wrenches(f"{loaded.name} at {place}, {found.geometry}"), wrench_set_plot
-        )
+        save_plot(found.plot_wrenches(), wrench_set_plot)
     if as_json:
         print_json(found.as_dict())
     elif isinstance(found, TensionsAtPose):
