@@ -105,10 +105,12 @@ def make_control(scenario: TensionScenario) -> TensionControl:
         )
     robot, belief = load_robot(scenario.robot), scenario.perturbations.believed_robot
     believed = robot if belief is None else load_robot(belief)
+    damping = scenario.damping.of(robot) if belief is None else None
+    dynamics = platform_dynamics(believed, damping=damping)
     trajectory, distributor = scenario.trajectory.trajectory(), TensionControlSettings.distributor
     if scenario.predictive is not None:
         ahead, view = scenario.predictive.steps, scenario.predictive.view(robot)
-        distributor = PredictiveTensions(trajectory, ahead, view)
+        distributor = PredictiveTensions(trajectory, ahead, view, dynamics)
     return build_tension_control(
         robot,
         TensionControlSettings(
@@ -120,7 +122,7 @@ def make_control(scenario: TensionScenario) -> TensionControl:
             reference=scenario.reference_tensions(robot),
             cables=scenario.cable_set(robot),
             believed_cables=scenario.believed_cables(believed),
-            dynamics=None if belief is None else platform_dynamics(believed),
+            dynamics=dynamics,
             balance=scenario.controller.balance,
             rule=scenario.step_rule(),
             remote=None if scenario.remote is None else scenario.remote.place,
