@@ -113,7 +113,7 @@ def computed_torque(
 
         F_P_W = M (A_WD + Kp e + Kd (V_WD - V_WP)) + b
 
-    with M the spatial inertia about Po in W and b the terms of velocity and damping less the weight,
+    with M the spatial inertia about Po in W and b the terms of velocity and damping less weight,
 
         b = (w x I w + d_r w, m w x (w x c) + d_t v) - (c x m g, m g),   c = p_PPcm in W.
 
@@ -135,8 +135,8 @@ def computed_torque(
         desired accelerations do not count. Of a point mass the force of
         `force_balance.point_mass_force` through the centre of mass, with its moment about Po.
 
-    Source: Gazebo thesis (6.4), (6.5), which leaves out velocity terms and damping, takes Po for the
-    centre of mass, and whose (2.17) gives the sign of the weight.
+    Source: Gazebo thesis (6.4), (6.5), which leaves out terms of velocity and damping, takes Po for
+    the centre of mass, and whose (2.17) gives the sign of the weight.
     """
     state = np.concatenate([pose_row(X_WP), np.asarray(V_WP, float)])
     F = np.empty(6)

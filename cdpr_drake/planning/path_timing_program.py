@@ -2,8 +2,8 @@
 
 With u = d2s/dt2 and x = (ds/dt)^2, the time is the sum of 2 D / (sqrt x_i + sqrt x_i+1) over the
 stretches of length D, which a second-order cone program minimises: all speeds and tensions at once,
-where the passes of `path_timing` go from station to station. Damping of the platform is taken at the
-roots of x, which may be below them: the program's time is then a lower bound.
+where the passes of `path_timing` go from station to station. The program takes the damping of a
+platform at its roots, which may be below those of x: its time is then a lower bound.
 
 Source: Verscheure, Demeulenaere, Swevers, De Schutter, Diehl, Time-optimal path tracking for
 robots: a convex optimization approach, 2009.
@@ -50,8 +50,8 @@ class PathAsks:
     """What points of a path ask of cables, with u = d2s/dt2 and x = (ds/dt)^2, k points.
 
     Attributes:
-        balance: E, shape (k, n, m), with E t = by_u u + by_x x + by_root sqrt(x) + rest for tensions
-            t [N].
+        balance: E, shape (k, n, m), with E t = by_u u + by_x x + by_root sqrt(x) + rest for
+            tensions t [N].
         by_u: Shape (k, n).
         by_x: Shape (k, n).
         by_root: Of the platform's damping, shape (k, n).
@@ -90,7 +90,8 @@ def task_asks(task: PathTask) -> Asks:
             [null_space(one[BASIS:]).T if one.shape[0] > BASIS else np.eye(m) for one in rows]
         )
         by_u, by_x, by_root, rest = (
-            np.einsum("knm,km->kn", E, t) for t in (rows[:, T_U], rows[:, T_X], damping, rows[:, T_0])
+            np.einsum("knm,km->kn", E, t)
+            for t in (rows[:, T_U], rows[:, T_X], damping, rows[:, T_0])
         )
         return PathAsks(E, by_u, by_x, by_root, rest, rows[:, RATE], rows[:, BEND], reach)
 

@@ -197,7 +197,11 @@ def test_where_it_cannot_rest_the_motion_carries_it_through():
 
 @pytest.mark.parametrize(
     ("name", "count", "damping"),
-    [("planar", 600, (6.0, 0.2)), ("acrobot_large", 300, (20.0, 0.5)), ("caroca", 200, (2e3, 40.0))],
+    [
+        ("planar", 600, (6.0, 0.2)),
+        ("acrobot_large", 300, (20.0, 0.5)),
+        ("caroca", 200, (2e3, 40.0)),
+    ],
 )
 def test_the_damping_of_a_platform_is_planned_with(name, count, damping):
     """Against the convex program, which has it at the roots, and the simulated damped robot."""
