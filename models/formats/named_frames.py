@@ -125,7 +125,6 @@ _STRUCTURE = {
     "parent",
     "child",
     "origin",
-    "home",
     "pose",
     "frame",
     "placement_frame",
@@ -222,15 +221,11 @@ def _without_balls(root: ET.Element) -> int:
 
 
 def _place_floating(path: Path, root: ET.Element, plant: MultibodyPlant, context: Context) -> None:
-    """Puts bodies where floating joints of URDF, or our element `home`, have them.
+    """Puts bodies where floating joints of URDF have them.
 
     Drake leaves such bodies free.
     """
     found: dict[str, tuple[str, RigidTransform]] = {}
-    for home in root.findall("home"):
-        name, origin = home.get("link", ""), home.find("origin")
-        if origin is not None and plant.NumBodiesWithName(name) == 1:
-            found[name] = plant.world_body().name(), _origin(path, "home", origin)
     for joint in root.findall("joint"):
         parent, child, origin = joint.find("parent"), joint.find("child"), joint.find("origin")
         if joint.get("type") != "floating" or parent is None or child is None or origin is None:
