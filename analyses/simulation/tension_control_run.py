@@ -70,6 +70,7 @@ from cdpr_drake.systems.monitoring.run_monitor import Outcome
 from cdpr_drake.systems.robots.settings import CableSettings, simulated_model
 from cdpr_drake.systems.scenarios.files import TENSION_CONTROL
 from cdpr_drake.systems.scenarios.run_settings import engine_of
+from cdpr_drake.systems.remote.remote_place import DISTRIBUTOR
 from cdpr_drake.systems.scenarios.tension_control_scenario import TensionScenario
 
 COMPILED_LOOP, DIAGRAM, REMOTE_LOOP = "compiled", "diagram", "remote"
@@ -309,7 +310,9 @@ def tension_end_error(run: TensionRun) -> tuple[float, float]:
 def _title(run: TensionRun, words: str) -> str:
     """What the figure shows, and below what the run was."""
     scenario = run.scenario
-    method = scenario.distribution.method.replace("_", " ")
+    remote = run.control.remote
+    client = remote is not None and remote.place == DISTRIBUTOR
+    method = "client" if client else scenario.distribution.method.replace("_", " ")
     how = f"{scenario.name}, tensions by the {method}, {geometry_words(run)}"
     return f"{words}\n{scenario.title}\n({how})"
 

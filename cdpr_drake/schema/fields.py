@@ -139,7 +139,9 @@ class _DocumentedField(Field):  # type: ignore[type-arg]
             known += f"\n\n    {FIELDS_HEAD}"
             for base in reversed(owner.__mro__[1:]):
                 fields = getattr(base, "__dataclass_fields__", {}).values()
-                rules |= {one.name: one.metadata["rule"] for one in fields if "rule" in one.metadata}
+                rules |= {
+                    one.name: one.metadata["rule"] for one in fields if "rule" in one.metadata
+                }
             own = owner.__dict__.get("__annotations__", {})
             rules = {each: rule for each, rule in rules.items() if each not in own}
         for each, rule in (rules | {name: self.metadata["rule"]}).items():
