@@ -67,10 +67,10 @@ from cdpr_drake.systems.diagrams.tension_control import (
 from cdpr_drake.systems.diagrams.tension_loop import TensionLoop, can_be_compiled
 from cdpr_drake.systems.loops.remote_tension_loop import RemoteTensionLoop, can_be_stepped
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
+from cdpr_drake.systems.remote.remote_place import DISTRIBUTOR
 from cdpr_drake.systems.robots.settings import CableSettings, simulated_model
 from cdpr_drake.systems.scenarios.files import TENSION_CONTROL
 from cdpr_drake.systems.scenarios.run_settings import engine_of
-from cdpr_drake.systems.remote.remote_place import DISTRIBUTOR
 from cdpr_drake.systems.scenarios.tension_control_scenario import TensionScenario
 
 COMPILED_LOOP, DIAGRAM, REMOTE_LOOP = "compiled", "diagram", "remote"

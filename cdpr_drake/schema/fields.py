@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import KW_ONLY, Field, dataclass, field
@@ -142,7 +143,7 @@ class _DocumentedField(Field):  # type: ignore[type-arg]
                 rules |= {
                     one.name: one.metadata["rule"] for one in fields if "rule" in one.metadata
                 }
-            own = owner.__dict__.get("__annotations__", {})
+            own = inspect.get_annotations(owner)
             rules = {each: rule for each, rule in rules.items() if each not in own}
         for each, rule in (rules | {name: self.metadata["rule"]}).items():
             known += f"\n        {each}: {rule.doc} Accepted: {rule.accepts()}."

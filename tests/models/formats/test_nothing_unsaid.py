@@ -21,7 +21,7 @@ HIDDEN = {
     "sdf": named_frames._PRESENTATION | {"parent", "child"},
     "xml": mjcf.PRESENTATION,
     "wcrfx": wirex._PRESENTATION,
-    "caspr": caspr._PRESENTATION,
+    "caspr": caspr.PRESENTATION,
 }
 """Elements and attributes that only say how things look or are called, by ending."""
 
