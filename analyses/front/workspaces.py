@@ -361,7 +361,8 @@ def compute_workspace(
             wrench-feasible, interference-free.
         grid: Poses: a WorkspaceGrid, or numbers of points along x, y, z; None: as the robot's
             default grid.
-        measures: Names of `MEASURES` of the same module.
+        measures: Names of `MEASURES` of the same module. Kinds say inside or outside only;
+            capacity-margin says how far, negative outside [N].
         orientations: Where kinds must hold: in all of the grid's orientations, or in any.
         box: Lower and upper corner in W, shape (3,) each, instead of the robot's frame [m]:
             where the default grid and certified boxes lie, and the hull ends.

@@ -173,7 +173,8 @@ def solve_free_motion(
     knots, cable speeds also halfway between, distances and the view wherever the motion is looked
     at. The solver starts from the straight line, in times from `GUESSES` on, until it succeeds;
     where that is not free, from detours that are, the shortest first. What it finds is the best
-    nearby, not of all.
+    nearby, not of all. Where no start keeps between the knots what was asked, the first motion that
+    does at the knots is given, whose `status` says what it misses.
 
     Args:
         robot: The robot.
@@ -200,7 +201,7 @@ def solve_free_motion(
         bounds = (SHORTEST, LONGEST) if asked.duration is None else (asked.duration,) * 2
         program = _program(robot, task, asked, bounds)
         found = program.Solve(float(np.clip(time, SHORTEST, LONGEST)), path)
-        if solution is None or found.success:
+        if solution is None or solution.trajectory is None or found.success:
             solution = found
         if found.success:
             break

@@ -119,10 +119,6 @@ class MotionRun(Tabulated):
             ("most reached", most if reached[most] else "none"),
             *self.more_rows(),
         ]  # fmt: skip
-        damping = self.robot.damping
-        if damping.translation > 0.0 or damping.rotation > 0.0:
-            words = f"damping {damping.translation:g} N s/m, {damping.rotation:g} N m s/rad"
-            rows.append(("not planned with", f"{words} of the robot file"))
         if self.tracked is not None:
             told = self.tracked.as_dict()
             words = "all limits kept" if told["keeps_limits"] else "limits missed"

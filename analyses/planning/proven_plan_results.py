@@ -93,8 +93,7 @@ class ProvenRun(RunInSets):
         yes += [words[kind] for kind in self.kinds if kind in words]
         if not self.path_proven:
             no.append("the platform stays off the obstacles")
-        if np.isfinite(lim.torque) or np.isfinite(lim.cable_acceleration):
-            no.append("torques of motors and accelerations of cables, kept at samples")
+        no += self.kept_at_samples()
         return yes, no
 
     def details(self) -> dict[str, Any]:

@@ -159,7 +159,8 @@ def moved_dynamics(robot: Robot) -> PlatformDynamics:
             f"robot {robot.name}: gravity_direction: found {robot.gravity_direction.tolist()}; "
             "accepted by a plan: along -z of W"
         )
-    return PlatformDynamics(platform_inertia(robot), robot.gravity, kind.rows)
+    damping = robot.damping.translation, robot.damping.rotation
+    return PlatformDynamics(platform_inertia(robot), robot.gravity, kind.rows, damping=damping)
 
 
 def length_scale(robot: Robot) -> float:

@@ -9,6 +9,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from cdpr_drake.analyses.planning.plan_results import MotionRun
 from cdpr_drake.planning.path_task import MotionSamples, PathTask
 from cdpr_drake.planning.path_timing import PathPlan
@@ -57,6 +59,19 @@ class RunInSets(MotionRun):
     def samples(self) -> MotionSamples:
         """The motion, as often as it is controlled."""
         return self.plan.samples()
+
+    def kept_at_samples(self) -> list[str]:
+        """What the motion keeps only at samples, in words."""
+        lim, (by_move, by_turn) = self.task.limits, self.task.dynamics.damping
+        words = []
+        if np.isfinite(lim.torque) or np.isfinite(lim.cable_acceleration):
+            words.append("torques of motors and accelerations of cables, kept at samples")
+        if self.task.dynamics.is_damped:
+            words.append(
+                f"tensions against the platform's damping, {by_move:g} N s/m and {by_turn:g} N m "
+                "s/rad, kept at samples"
+            )
+        return words
 
     def write(self, folder: Path) -> dict[str, Any]:
         """Writes the sets, too."""

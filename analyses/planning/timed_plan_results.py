@@ -86,9 +86,7 @@ class TimedRun(RunInSets):
         ]
         if np.isfinite(lim.cable_speed):
             yes.insert(1, f"cables are not faster than {lim.cable_speed:.4g} m/s")
-        no = []
-        if np.isfinite(lim.torque) or np.isfinite(lim.cable_acceleration):
-            no.append("torques of motors and accelerations of cables, kept at samples")
+        no = self.kept_at_samples()
         if not self._settles():
             no.append(f"what obstacles do at the goal after {self.sets.horizon:.4g} s")
         return yes, no

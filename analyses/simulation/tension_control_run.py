@@ -67,6 +67,7 @@ from cdpr_drake.systems.diagrams.tension_control import (
 from cdpr_drake.systems.diagrams.tension_loop import TensionLoop, can_be_compiled
 from cdpr_drake.systems.loops.remote_tension_loop import RemoteTensionLoop, can_be_stepped
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
+from cdpr_drake.systems.remote.remote_place import DISTRIBUTOR
 from cdpr_drake.systems.robots.settings import CableSettings, simulated_model
 from cdpr_drake.systems.scenarios.files import TENSION_CONTROL
 from cdpr_drake.systems.scenarios.run_settings import engine_of
@@ -105,10 +106,12 @@ def make_control(scenario: TensionScenario) -> TensionControl:
         )
     robot, belief = load_robot(scenario.robot), scenario.perturbations.believed_robot
     believed = robot if belief is None else load_robot(belief)
+    damping = scenario.damping.of(robot) if belief is None else None
+    dynamics = platform_dynamics(believed, damping=damping)
     trajectory, distributor = scenario.trajectory.trajectory(), TensionControlSettings.distributor
     if scenario.predictive is not None:
         ahead, view = scenario.predictive.steps, scenario.predictive.view(robot)
-        distributor = PredictiveTensions(trajectory, ahead, view)
+        distributor = PredictiveTensions(trajectory, ahead, view, dynamics)
     return build_tension_control(
         robot,
         TensionControlSettings(
@@ -120,7 +123,7 @@ def make_control(scenario: TensionScenario) -> TensionControl:
             reference=scenario.reference_tensions(robot),
             cables=scenario.cable_set(robot),
             believed_cables=scenario.believed_cables(believed),
-            dynamics=None if belief is None else platform_dynamics(believed),
+            dynamics=dynamics,
             balance=scenario.controller.balance,
             rule=scenario.step_rule(),
             remote=None if scenario.remote is None else scenario.remote.place,
@@ -307,7 +310,9 @@ def tension_end_error(run: TensionRun) -> tuple[float, float]:
 def _title(run: TensionRun, words: str) -> str:
     """What the figure shows, and below what the run was."""
     scenario = run.scenario
-    method = scenario.distribution.method.replace("_", " ")
+    remote = run.control.remote
+    client = remote is not None and remote.place == DISTRIBUTOR
+    method = "client" if client else scenario.distribution.method.replace("_", " ")
     how = f"{scenario.name}, tensions by the {method}, {geometry_words(run)}"
     return f"{words}\n{scenario.title}\n({how})"
 

@@ -253,7 +253,11 @@ def workspace(
     ] = "static",
     measure: Annotated[
         str | None,
-        typer.Option(help="One or several, separated by commas: " + ", ".join(MEASURES) + "."),
+        typer.Option(
+            help="One or several, separated by commas: "
+            + ", ".join(MEASURES)
+            + ". A negative capacity-margin says how far outside a pose is."
+        ),
     ] = None,
     grid: GridWords = None,
     orientation: Orientations = None,

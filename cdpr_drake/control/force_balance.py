@@ -65,10 +65,11 @@ def point_mass_force(
     mass: float,
     gravity: float,
     gains: tuple[float, float],
+    damping: Array | float = 0.0,
 ) -> Array:
     """Force that makes a point mass follow a desired motion, shape (3,) in W [N].
 
-        f = m (a_WD + Kp (p_WD - p_WC) + Kd (v_WD - v_WC) - g)
+        f = m (a_WD + Kp (p_WD - p_WC) + Kd (v_WD - v_WC) - g) + d v_WP
 
     Args:
         p_WC: Where the centre of mass C is, shape (3,) [m].
@@ -79,12 +80,13 @@ def point_mass_force(
         mass: Mass m [kg].
         gravity: Acceleration along -z of W [m/s^2].
         gains: Kp [1/s^2] and Kd [1/s].
+        damping: Force d v_WP against the damping of Po's motion, shape (3,) [N]; default: none.
 
     Source: Gazebo thesis (6.4), (6.5), the rows of forces; (2.17) gives the sign of the weight.
     """
     Kp, Kd = gains
     errors = Kp * (np.asarray(p_WD) - p_WC) + Kd * (np.asarray(v_WD) - v_WC)
-    wanted: Array = mass * (a_WD + errors + np.array([0.0, 0.0, gravity]))
+    wanted: Array = mass * (a_WD + errors + np.array([0.0, 0.0, gravity])) + damping
     return wanted
 
 
@@ -151,7 +153,10 @@ def write_point_mass_wrench(
         + Kd * (desired[12] + vz - X[17] - uz)
         + gravity
     )  # fmt: skip
-    fx, fy, fz = moves[3] * fx, moves[4] * fy, moves[5] * fz
+    by_move = dynamics[18]
+    fx = moves[3] * (fx + by_move * X[15])
+    fy = moves[4] * (fy + by_move * X[16])
+    fz = moves[5] * (fz + by_move * X[17])
     lx, ly, lz = _cross(cx, cy, cz, fx, fy, fz)
     out[0] = moves[0] * lx
     out[1] = moves[1] * ly

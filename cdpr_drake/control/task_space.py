@@ -31,12 +31,20 @@ class PlatformDynamics:
             platform can move: all six, or `PLANAR_ROWS` of `geometry.straight_cables` for 2T1R.
         point_mass: Whether it is taken for a point mass in its centre of mass, which a force moves
             and nothing turns, see `force_balance`.
+        damping: Viscous damping of its motion about Po: force per velocity of Po [N s/m] and
+            moment per angular velocity [N m s/rad].
     """
 
     M_PPo_P: SpatialInertia
     gravity: float = 9.81
     motions: tuple[int, ...] = ALL_ROWS
     point_mass: bool = False
+    damping: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def is_damped(self) -> bool:
+        """Whether its motion is damped."""
+        return any(self.damping)
 
     def packed(self) -> Array:
         """For the kernels of this module, shape (`DYNAMICS_SIZE`,)."""
@@ -46,18 +54,19 @@ class PlatformDynamics:
         moves[list(self.motions)] = 1.0
         parts = (
             [mass], p_PPcm, np.diag(G), [G[0, 1], G[0, 2], G[1, 2]], [self.gravity], moves,
-            [float(self.point_mass)],
+            [float(self.point_mass)], self.damping,
         )  # fmt: skip
         return np.concatenate(parts)
 
 
-DYNAMICS_SIZE = 18
+DYNAMICS_SIZE = 20
 """Of packed dynamics: mass [kg], p_PPcm (3) [m], moments (xx, yy, zz) and products (xy, xz, yz) of
-inertia about Po in P [kg m^2], gravity [m/s^2], six flags, 1 where a component can move, and one
-that is 1 where it is taken for a point mass."""
+inertia about Po in P [kg m^2], gravity [m/s^2], six flags, 1 where a component can move, one that
+is 1 where it is taken for a point mass, and damping of translation [N s/m] and rotation
+[N m s/rad]."""
 
-POINT_MASS = DYNAMICS_SIZE - 1
-"""Place of that last flag."""
+POINT_MASS, DAMPING = 17, 18
+"""Places of the flag of a point mass, and of the damping (translation, rotation)."""
 
 
 @dataclass(frozen=True)
@@ -104,9 +113,9 @@ def computed_torque(
 
         F_P_W = M (A_WD + Kp e + Kd (V_WD - V_WP)) + b
 
-    with M the spatial inertia about Po in W and b the terms of velocity less the weight,
+    with M the spatial inertia about Po in W and b the terms of velocity and damping less weight,
 
-        b = (w x I w, m w x (w x c)) - (c x m g, m g),   c = p_PPcm in W.
+        b = (w x I w + d_r w, m w x (w x c) + d_t v) - (c x m g, m g),   c = p_PPcm in W.
 
     The error e is (2 sign(q_w) (q_x, q_y, q_z), p_PD) in W, q being the quaternion of the rotation
     R_WD R_PW from P to D. That rotation part is 2 sin(theta / 2) u: for small angles the rotation
@@ -118,7 +127,7 @@ def computed_torque(
         X_WD: Desired pose, D being where P should be.
         V_WD: Desired velocity, as V_WP.
         A_WD: Desired spatial acceleration (alpha, a) in W, shape (6,) [rad/s^2, m/s^2].
-        dynamics: Inertia, gravity and the components that can move.
+        dynamics: Inertia, gravity, damping and the components that can move.
         gains: Kp and Kd.
 
     Returns:
@@ -126,8 +135,8 @@ def computed_torque(
         desired accelerations do not count. Of a point mass the force of
         `force_balance.point_mass_force` through the centre of mass, with its moment about Po.
 
-    Source: Gazebo thesis (6.4), (6.5), which leaves out velocity terms, takes Po for the centre of
-    mass, and whose (2.17) gives the sign of the weight.
+    Source: Gazebo thesis (6.4), (6.5), which leaves out terms of velocity and damping, takes Po for
+    the centre of mass, and whose (2.17) gives the sign of the weight.
     """
     state = np.concatenate([pose_row(X_WP), np.asarray(V_WP, float)])
     F = np.empty(6)
@@ -274,12 +283,13 @@ def _wrench(
     hx, hy, hz = _inertia_times(X, dynamics, wx, wy, wz)
     gx, gy, gz = _cross(wx, wy, wz, hx, hy, hz)
     sx, sy, sz = _cross(cx, cy, cz, mass * bx, mass * by, mass * (bz + gravity))
-    out[0] = moves[0] * (lx + gx + sx)
-    out[1] = moves[1] * (ly + gy + sy)
-    out[2] = moves[2] * (lz + gz + sz)
-    out[3] = moves[3] * fx
-    out[4] = moves[4] * fy
-    out[5] = moves[5] * fz
+    by_move, by_turn = dynamics[DAMPING], dynamics[DAMPING + 1]
+    out[0] = moves[0] * (lx + gx + sx + by_turn * wx)
+    out[1] = moves[1] * (ly + gy + sy + by_turn * wy)
+    out[2] = moves[2] * (lz + gz + sz + by_turn * wz)
+    out[3] = moves[3] * (fx + by_move * X[15])
+    out[4] = moves[4] * (fy + by_move * X[16])
+    out[5] = moves[5] * (fz + by_move * X[17])
 
 
 @njit(cache=True)

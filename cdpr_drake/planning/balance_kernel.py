@@ -24,7 +24,7 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.control.task_space import POINT_MASS
+from cdpr_drake.control.task_space import DAMPING, POINT_MASS
 from cdpr_drake.geometry.motion_kernel import floating_motion
 from cdpr_drake.geometry.pulley_kernel import pulley_line, unit_vector_derivative
 from cdpr_drake.numerics.linear_algebra_kernel import eliminate, substitute
@@ -85,6 +85,7 @@ def needed_wrench(point: Array, dynamics: Array, F: Array, G: Array) -> None:
     X = floating_motion(point)
     mass, gravity, moves = dynamics[0], dynamics[10], dynamics[11:]
     point_mass = dynamics[POINT_MASS] != 0.0
+    by_move, by_turn = dynamics[DAMPING], dynamics[DAMPING + 1]
     p = (dynamics[1], dynamics[2], dynamics[3])
     c = (
         X[0] * p[0] + X[1] * p[1] + X[2] * p[2],
@@ -96,17 +97,19 @@ def needed_wrench(point: Array, dynamics: Array, F: Array, G: Array) -> None:
     lifted = (point[16], point[17], point[18] + gravity)
     wc = cross(w, c)
     f = _scaled(mass, _plus(lifted, _plus(cross(alpha, c), cross(w, wc))))
+    f = _plus(f, _scaled(by_move, (point[10], point[11], point[12])))
     Iw, Ia = _inertia(X, dynamics, w), _inertia(X, dynamics, alpha)
     if point_mass:
         f = (moves[3] * f[0], moves[4] * f[1], moves[5] * f[2])
         n = cross(c, f)
     else:
         n = _plus(_plus(Ia, cross(w, Iw)), cross(c, _scaled(mass, lifted)))
+        n = _plus(n, _scaled(by_turn, w))
     for i in range(3):
         F[i], F[3 + i] = moves[i] * n[i], moves[3 + i] * f[i]
     zero = (0.0, 0.0, 0.0)
     G[:] = 0.0
-    for part in range(4):
+    for part in range(5):
         for j in range(3):
             one = axis(j)
             turn = one if part == 0 else zero
@@ -117,6 +120,8 @@ def needed_wrench(point: Array, dynamics: Array, F: Array, G: Array) -> None:
             df = _plus(dl, _plus(cross(da, c), cross(alpha, dc)))
             df = _plus(df, cross(dw, wc))
             df = _scaled(mass, _plus(df, cross(w, _plus(cross(dw, c), cross(w, dc)))))
+            if part == 4:
+                df = _scaled(by_move, one)
             if point_mass:
                 df = (moves[3] * df[0], moves[4] * df[1], moves[5] * df[2])
                 dn = _plus(cross(dc, f), cross(c, df))
@@ -127,6 +132,7 @@ def needed_wrench(point: Array, dynamics: Array, F: Array, G: Array) -> None:
                 dIa = _plus(dIa, cross(turn, Ia))
                 dn = _plus(dIa, _plus(cross(dw, Iw), cross(w, dIw)))
                 dn = _plus(dn, _scaled(mass, _plus(cross(dc, lifted), cross(c, dl))))
+                dn = _plus(dn, _scaled(by_turn, dw))
             seed = j
             if part == 1:
                 seed = 6 + j
@@ -134,6 +140,8 @@ def needed_wrench(point: Array, dynamics: Array, F: Array, G: Array) -> None:
                 seed = 12 + j
             elif part == 3:
                 seed = 15 + j
+            elif part == 4:
+                seed = 9 + j
             for i in range(3):
                 G[i, seed], G[3 + i, seed] = moves[i] * dn[i], moves[3 + i] * df[i]
 

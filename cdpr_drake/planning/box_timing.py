@@ -13,7 +13,7 @@ linear in (u, x), too, and `turning_bounds` bounds them between stations.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -54,8 +54,9 @@ class BoxTask(PathTask):
     moments: Array | None = None
     shares: tuple[float, float] = (1.0, 1.0)
 
-    def stations(self, points: Array) -> tuple[Array, Array]:
-        """As `PathTask.stations`, with 1 + (a component over its limit) for a tension, 0 to 2."""
+    def stations(self, points: Array, x: Array | None = None) -> tuple[Array, Array]:
+        """As `PathTask.stations`, with 1 + (a component over its limit) for a tension, 0 to 2;
+        there is no damping, whatever x."""
         if self.moments is not None:
             return self._turning(points)
         out, slopes = np.zeros((len(points), BASIS, 3)), points[:, 10:13]
@@ -161,8 +162,9 @@ def time_within_box(
 
     The speed of Po is kept below its limit and below the largest cable speed, which no cable then
     exceeds, as the platform does not turn; where it turns, those of the anchor points are.
-    Accelerations of cables and torques of motors are limits of samples: where they are missed, the
-    motion is slowed down.
+    Accelerations of cables and torques of motors are limits of samples, and so are tensions where
+    the platform is damped, as the box holds no damping: where they are missed, the motion is slowed
+    down.
 
     Args:
         task: The robot and its limits.
@@ -192,8 +194,8 @@ def time_within_box(
     lim = task.limits
     limits = MotionLimits(lower=0.0, upper=2.0, speed=min(lim.speed, lim.cable_speed))
     within = BoxTask(
-        task.cables, task.dynamics, limits, task.names, box=box, moments=moments,
-        shares=_shares(limits.speed, lim.speed, lim.cable_speed),
+        task.cables, replace(task.dynamics, damping=(0.0, 0.0)), limits, task.names, box=box,
+        moments=moments, shares=_shares(limits.speed, lim.speed, lim.cable_speed),
     )  # fmt: skip
     found = plan_along_path(within, path, stations)
     over = _over(within, found.trajectory)
@@ -201,7 +203,11 @@ def time_within_box(
     motion = _slower(found.trajectory, over)
     for _ in range(MOST_SLOWER):
         plan = PathPlan(task, path, motion, found.reachable / over, found.largest / over)
-        if not (np.isfinite(lim.torque) or np.isfinite(lim.cable_acceleration)):
+        if not (
+            np.isfinite(lim.torque)
+            or np.isfinite(lim.cable_acceleration)
+            or task.dynamics.is_damped
+        ):
             break
         most = float(np.max(plan.samples().uses))
         if most <= 1.0 + ROUNDING:

@@ -97,19 +97,20 @@ def check_held(task: PathTask, X_WP: RigidTransform, where: str) -> None:
 
 
 def stuck(
-    task: PathTask, points: Array, places: Array, whole: float, fastest: float, goal: Array
-) -> str:
+    task: PathTask, points: Array, stations: Array, places: Array, whole: float, fastest: float,
+    goal: Array,
+) -> str:  # fmt: skip
     """Of two stations of which the second cannot be reached from the first at any speed.
 
     Args:
         task: The robot.
         points: Of the path, shape (2, 19).
+        stations: What they ask.
         places: s of both, shape (2,) [m].
         whole: Where the path ends [m].
         fastest: Largest (ds/dt)^2 at the first [m^2/s^2].
         goal: Smallest and largest at the second, shape (2,) [m^2/s^2].
     """
-    stations, _ = task.stations(points)
     limits, way = task.limits.packed(), float(places[1] - places[0])
     bounds = resistance_bounds(task, points, stations)
     p, k = row_count(task.cables.count, limits, bounds.shape[1]), 2 + 2 * (len(stations[0]) - BASIS)

@@ -305,9 +305,10 @@ class FreePathProgram:
     ) -> FreePathSolution:
         """Solves from a guess, at rest at both ends, and again where the motion misses something.
 
-        The first solver that is there: SNOPT, IPOPT, NLopt. The answer says whether it succeeded.
-        What was asked at knots is then looked at between them; where it is missed, it is asked for
-        at these places too, and the program is solved again from what was found.
+        The first solver that is there: SNOPT, IPOPT, NLopt. What was asked at knots is then looked
+        at between them; where it is missed, it is asked for at these places too, and the program is
+        solved again from what was found. The answer says whether all of this succeeded: what is
+        still missed between knots after the last round is no success, see `FreePathSolution`.
 
         Args:
             duration: Time of the guess; that of a `TimedPath` is its own [s].
@@ -346,7 +347,7 @@ class FreePathProgram:
                 words = f"{result.get_solution_result().name}; refined: {words}"
                 break
             result, asked = better, self._asked()
-        return self._solution(result, asked, (name, words, took), refine)
+        return self._solution(result, asked, (name, words, took), rounds, refine)
 
     def _asked(self) -> dict[str, list[Binding]]:
         """What the program has now: a solution knows no more."""
@@ -357,28 +358,38 @@ class FreePathProgram:
         result: MathematicalProgramResult,
         asked: dict[str, list[Binding]],
         told: tuple[str, str, float],
+        rounds: int,
         refine: Refinement,
     ) -> FreePathSolution:
-        success = bool(result.is_success())
+        solved = bool(result.is_success())
         found = self._found(result)
         missed = {key: violation(result, some) for key, some in asked.items()}
         watched = [TensionFeasible(self.task, self.pose_coordinates), *self._watched]
         T = float(result.GetSolution(self._T)[0])
+        between = refine.look(watched, found) if solved else {}
+        left = [
+            f"{key} by {between[key].missed:.3g}{f' of {who}' if (who := between[key].who) else ''}"
+            for key in sorted({one.description for one in self._watched})
+            if solved and refine.rounds and not between[key].kept
+        ]
+        words = told[1]
+        if left:
+            words += f"; missed between knots after {rounds} rounds: {', '.join(left)}"
         return FreePathSolution(
             task=self.task,
-            success=success,
-            status=told[1],
+            success=solved and not left,
+            status=words,
             solver=told[0],
             solve_time=told[2],
             cost=float(result.get_optimal_cost()),
             duration=T,
             violations={key: size for key, (size, _, _) in missed.items()},
-            between=refine.look(watched, found) if success else {},
+            between=between,
             worst=self._worst(result, missed),
             multipliers={key: multipliers(result, some) for key, some in asked.items()},
             times=np.linspace(0.0, T, len(self._q)),
             tensions=self.task.limits.upper * np.asarray(result.GetSolution(self._t)),
-            trajectory=self._trajectory(result) if success else None,
+            trajectory=self._trajectory(result) if solved else None,
         )
 
     def _found(self, result: MathematicalProgramResult) -> tuple[Array, Array, Array, float]:

@@ -39,6 +39,7 @@ class BetweenKnots:
 
     Attributes:
         missed: By how much at most, at the instants that were looked at, in its own unit.
+        kept: Whether it is missed by no more than its kind may be, `PoseConstraint.kept_within`.
         where: When that was, as a share of the time from start to goal.
         who: Which of its rows.
         bound: What it can miss by at most at any instant, for distances of what moves no farther
@@ -46,6 +47,7 @@ class BetweenKnots:
     """
 
     missed: float
+    kept: bool
     where: float
     who: str
     bound: float | None
@@ -61,7 +63,7 @@ class Refinement:
     """
 
     instants: int = 40
-    rounds: int = 6
+    rounds: int = 10
 
     def __post_init__(self) -> None:
         """Checks the numbers.
@@ -119,6 +121,7 @@ class Refinement:
             k, i, row = np.unravel_index(int(np.argmax(gaps)), gaps.shape)
             told[constraint.description] = BetweenKnots(
                 missed=float(gaps[k, i, row]),
+                kept=bool(gaps[k, i, row] <= constraint.kept_within),
                 where=float((k + i / self.instants) / len(gaps)),
                 who=constraint.rows[row],
                 bound=self._bound(constraint, found),

@@ -39,8 +39,10 @@ class FreePathSolution:
 
     Attributes:
         task: The robot and its limits.
-        success: Whether the solver says that it found an optimum; a local one.
-        status: In the solver's words.
+        success: Whether the solver says that it found an optimum, a local one, and its refinement
+            left nothing missed between knots. Tensions and torques, and without rounds of
+            refinement everything, are asked at knots only: `between` and `samples` say the rest.
+        status: In the solver's words, and what is missed between knots.
         solver: Which one.
         solve_time: Time that it took [s].
         cost: The cost.
@@ -48,14 +50,14 @@ class FreePathSolution:
         violations: By name of what was added: by how much its worst constraint is missed, in its
             own unit; 0 where none is.
         between: What is asked at the knots, by how much it is missed between them, by name; empty
-            without success. Tensions, in newtons, are those of the best distribution.
+            without a motion. Tensions, in newtons, are those of the best distribution.
         worst: What is missed most, where on the way and by what, in words; empty where nothing is.
         multipliers: By the same names, where the solver gives them: which constraints the cost
             rests on, flat, in the order in which they were added.
         times: Of the knots, shape (k,) [s].
         tensions: At the knots, shape (k, m) [N].
-        trajectory: The motion; None without success. It holds at the knots what the program says,
-            and between them what `between` says; `samples` says more.
+        trajectory: The motion; None where the solver found none. It holds at the knots what the
+            program says, and between them what `between` says; `samples` says more.
     """
 
     task: PathTask

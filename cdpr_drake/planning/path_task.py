@@ -68,20 +68,27 @@ class PathTask:
         """Of a cable, counted from 0."""
         return self.names[cable] if self.names else f"cable {cable + 1}"
 
-    def stations(self, points: Array) -> tuple[Array, Array]:
+    def stations(self, points: Array, x: Array | None = None) -> tuple[Array, Array]:
         """What points of a path, shape (n, 19), ask: as `station_kernel.stations_of` writes it.
+
+        Args:
+            points: The points.
+            x: (ds/dt)^2 at which the platform's damping is exact, shape (n,) [m^2/s^2]; where it is
+                0, and by default, without damping.
 
         Raises:
             PlanningError: A cable cannot run, or the wrench matrix is singular; names the pose.
         """
         m = self.cables.count
         rank = len(self.dynamics.motions)
+        slowness = np.zeros(len(points)) if x is None else slowness_at(x)
         out, reach = np.empty((len(points), BASIS + m - rank, m)), np.empty(len(points))
         problem, where = stations_of(
             np.ascontiguousarray(points),
             self.cables.packed(),
             self.dynamics.packed(),
             np.array(self.dynamics.motions, np.int64),
+            slowness,
             out,
             reach,
         )
@@ -95,6 +102,12 @@ class PathTask:
                 f"accepted: poses where it has rank {rank}"
             )
         return out, reach
+
+
+def slowness_at(x: Array) -> Array:
+    """dt/ds of (ds/dt)^2 = x [m^2/s^2], shape (n,) [s/m]; 0 at rest."""
+    x = np.asarray(x, float)
+    return np.divide(1.0, np.sqrt(np.maximum(x, 0.0)), out=np.zeros(len(x)), where=x > 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,7 +192,7 @@ def samples_at(
     Raises:
         PlanningError: As `sample_motion`.
     """
-    stations, reach = task.stations(points)
+    stations, reach = task.stations(points, speeds**2)
     n, m = len(points), task.cables.count
     uses, tensions, rates = np.empty((n, 4)), np.empty((n, m)), np.empty((n, 2, m))
     uses_of(stations, reach, u, speeds**2, task.limits.packed(), uses, tensions, rates)

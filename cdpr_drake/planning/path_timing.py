@@ -6,6 +6,9 @@ degrees of freedom, are not among them. The Python side of `toppra` takes any po
 leaves the projection along the redundancy to who asks. So the passes are here, over programs that
 have the redundancy in them; with limits of the winches alone they agree with Drake's, which is a
 test.
+
+Damping of the platform is linear in ds/dt, and the programs are linear in (ds/dt)^2: it is taken as
+a share of (ds/dt)^2 that is exact at the speeds of the plan before, until these stay.
 """
 
 from __future__ import annotations
@@ -38,6 +41,11 @@ STATIONS = 500
 
 FEWEST, MOST = 10, 100_000
 """Numbers of stations that are accepted."""
+
+SETTLED, MOST_ROUNDS = 1e-6, 60
+"""Relative change of (ds/dt)^2 at which the damping has settled, and rounds until then: each takes
+the damping at the speeds of the one before, which halves the error at least where damping alone
+limits the speed."""
 
 EVEN_SHARE = 0.5
 """Of the stations, those that all pieces of a path share evenly: a rounded corner is short, and its
@@ -95,7 +103,7 @@ def plan_along_path(
         PlanningError: There is no such motion, and says where and which cable; a cable cannot run;
             the number of stations is not accepted.
     """
-    legs = [_plan_leg(task, *leg, path.length) for leg in stations_of_leg(path, stations)]
+    legs = [_settled_leg(task, *leg, path.length) for leg in stations_of_leg(path, stations)]
     places = np.concatenate([legs[0].places[:1], *(leg.places[1:] for leg in legs)])
     x = np.concatenate([legs[0].x[:1], *(leg.x[1:] for leg in legs)])
     reachable = np.concatenate([legs[0].reachable[:1], *(leg.reachable[1:] for leg in legs)])
@@ -133,9 +141,25 @@ class _Leg:
     largest: Array
 
 
-def _plan_leg(task: PathTask, leg: PosePath, places: Array, whole: float) -> _Leg:
+def _settled_leg(task: PathTask, leg: PosePath, places: Array, whole: float) -> _Leg:
+    """The leg whose damping is that of its own speeds, planned again until they stay."""
+    found = _plan_leg(task, leg, places, whole, np.zeros(len(places)))
+    if not task.dynamics.is_damped:
+        return found
+    for _ in range(MOST_ROUNDS):
+        before, found = found.x, _plan_leg(task, leg, places, whole, found.x)
+        if np.max(np.abs(found.x - before)) <= SETTLED * np.max(found.x):
+            return found
+    raise PlanningError(
+        f"path: found no law of time under the platform's damping in {MOST_ROUNDS} rounds; "
+        "accepted: another number of stations"
+    )
+
+
+def _plan_leg(task: PathTask, leg: PosePath, places: Array, whole: float, damped_at: Array) -> _Leg:
+    """The fastest law of time of a leg, with damping that is exact at (ds/dt)^2 = `damped_at`."""
     points = leg.points(places)
-    stations, reach = task.stations(points)
+    stations, reach = task.stations(points, damped_at)
     limits, lim = task.limits.packed(), task.limits
     fastest = lim.cable_speed / np.maximum(np.max(np.abs(stations[:, RATE]), axis=1), 1e-300)
     most = np.minimum(leg.largest_speeds(places), lim.speed)
@@ -173,6 +197,7 @@ def _plan_leg(task: PathTask, leg: PosePath, places: Array, whole: float) -> _Le
             stuck(
                 task,
                 points[where : where + 2],
+                stations[where : where + 2],
                 places[where : where + 2],
                 whole,
                 fastest[where],

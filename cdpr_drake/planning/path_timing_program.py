@@ -2,7 +2,8 @@
 
 With u = d2s/dt2 and x = (ds/dt)^2, the time is the sum of 2 D / (sqrt x_i + sqrt x_i+1) over the
 stretches of length D, which a second-order cone program minimises: all speeds and tensions at once,
-where the passes of `path_timing` go from station to station.
+where the passes of `path_timing` go from station to station. The program takes the damping of a
+platform at its roots, which may be below those of x: its time is then a lower bound.
 
 Source: Verscheure, Demeulenaere, Swevers, De Schutter, Diehl, Time-optimal path tracking for
 robots: a convex optimization approach, 2009.
@@ -49,9 +50,11 @@ class PathAsks:
     """What points of a path ask of cables, with u = d2s/dt2 and x = (ds/dt)^2, k points.
 
     Attributes:
-        balance: E, shape (k, n, m), with E t = by_u u + by_x x + rest for tensions t [N].
+        balance: E, shape (k, n, m), with E t = by_u u + by_x x + by_root sqrt(x) + rest for
+            tensions t [N].
         by_u: Shape (k, n).
         by_x: Shape (k, n).
+        by_root: Of the platform's damping, shape (k, n).
         rest: Shape (k, n).
         rates: l' of the cables, shape (k, m) [-].
         bends: l'', shape (k, m) [1/m].
@@ -61,6 +64,7 @@ class PathAsks:
     balance: Array
     by_u: Array
     by_x: Array
+    by_root: Array
     rest: Array
     rates: Array
     bends: Array
@@ -78,13 +82,18 @@ def task_asks(task: PathTask) -> Asks:
     """
 
     def asks(leg: PosePath, places: Array) -> PathAsks:
-        rows, reach = task.stations(leg.points(places))
+        points = leg.points(places)
+        rows, reach = task.stations(points)
+        damping = task.stations(points, np.ones(len(points)))[0][:, T_X] - rows[:, T_X]
         m = rows.shape[2]
         E = np.array(
             [null_space(one[BASIS:]).T if one.shape[0] > BASIS else np.eye(m) for one in rows]
         )
-        by_u, by_x, rest = (np.einsum("knm,km->kn", E, rows[:, row]) for row in (T_U, T_X, T_0))
-        return PathAsks(E, by_u, by_x, rest, rows[:, RATE], rows[:, BEND], reach)
+        by_u, by_x, by_root, rest = (
+            np.einsum("knm,km->kn", E, t)
+            for t in (rows[:, T_U], rows[:, T_X], damping, rows[:, T_0])
+        )
+        return PathAsks(E, by_u, by_x, by_root, rest, rows[:, RATE], rows[:, BEND], reach)
 
     return asks
 
@@ -222,11 +231,16 @@ class PathTimingProgram(OwnTerms):
 
         Raises:
             PlanningError: There is none, as of `plan_along_path`; or own terms leave none, or no
-                solver came to an end.
+                solver came to an end; or there are own terms and the platform is damped.
         """
         plan = plan_along_path(self.task, self.path, self._count, self._start_time)
         if not self.has_own_terms:
             return plan
+        if self.task.dynamics.is_damped:
+            raise PlanningError(
+                f"own terms: found a platform with damping {self.task.dynamics.damping}, which is "
+                "not convex in squared speeds; accepted: dynamics with damping (0, 0)"
+            )
         found, solver, said = self._optimum(self._guess(plan))
         x = np.maximum(found[self._prog.FindDecisionVariableIndices(self._x)], 0.0)
         x[self._rests] = 0.0
@@ -279,9 +293,15 @@ class PathTimingProgram(OwnTerms):
         both = self._x[stretch : stretch + 2]
         unknown = np.concatenate([t, both])
         needed = np.outer(asked.by_u[k], u) + np.outer(asked.by_x[k], x)
-        program.AddLinearEqualityConstraint(
-            np.hstack([asked.balance[k] / scale, -needed]), asked.rest[k], unknown
-        )
+        balance = np.hstack([asked.balance[k] / scale, -needed])
+        if self.task.dynamics.is_damped:
+            roots = self._root[stretch : stretch + 2]
+            program.AddLinearEqualityConstraint(
+                np.hstack([balance, -np.outer(asked.by_root[k], x)]), asked.rest[k],
+                np.concatenate([unknown, roots]),
+            )  # fmt: skip
+        else:
+            program.AddLinearEqualityConstraint(balance, asked.rest[k], unknown)
         low, high = np.full(m, lim.lower * scale), np.full(m, lim.upper * scale)
         program.AddBoundingBoxConstraint(low, high, t)
         bent = np.outer(asked.rates[k], u) + np.outer(asked.bends[k], x)

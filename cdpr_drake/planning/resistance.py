@@ -54,7 +54,7 @@ class ResistingTask(Protocol):
     def name(self, cable: int) -> str:
         """Of a cable, counted from 0."""
 
-    def stations(self, points: Array) -> tuple[Array, Array]:
+    def stations(self, points: Array, x: Array | None = None) -> tuple[Array, Array]:
         """What points of a path ask."""
 
 
@@ -145,7 +145,7 @@ def resisted(task: ResistingTask, points: Array, s: Array, u: Array, x: Array) -
     Raises:
         PlanningError: A cable cannot run, or the wrench matrix is singular; names the pose.
     """
-    stations, _ = task.stations(points)
+    stations, _ = task.stations(points, x)
     margins = np.empty(len(task.resist))
     where = np.empty(len(task.resist), np.int64)
     corner_margins(stations, responses(task, points), u, x, task.limits.packed(), margins, where)

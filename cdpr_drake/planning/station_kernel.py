@@ -6,6 +6,9 @@ matrix, the tensions that give it, and the accelerations of the cables:
 
     t = T_0 + T_u u + T_x x + N' eta,    d2l/dt2 = l' u + l'' x,    dl/dt = l' sqrt(x).
 
+Viscous damping of the platform needs a wrench D X' sqrt(x), which is not linear in x. It is taken
+as D X' x / v, which is exact at a speed v = ds/dt: the caller says at which.
+
 Source: Bobrow, Dubowsky and Gibson, 1985; for cable robots with redundancy as free variables,
 Pham and Stasse, Time-optimal path parameterization for redundantly actuated robots, 2015.
 """
@@ -35,8 +38,9 @@ GOOD, NO_CABLE, SINGULAR = range(3)
 
 @njit(cache=True)
 def stations_of(
-    points: Array, cables: Array, dynamics: Array, moves: np.ndarray, out: Array, reach: Array
-) -> tuple[int, int]:
+    points: Array, cables: Array, dynamics: Array, moves: np.ndarray, slowness: Array, out: Array,
+    reach: Array,
+) -> tuple[int, int]:  # fmt: skip
     """Fills the rows of all stations.
 
     Args:
@@ -45,6 +49,7 @@ def stations_of(
         dynamics: `PlatformDynamics.packed`.
         moves: Components of a spatial vector in W that the platform can move, whole numbers in
             growing order, shape (f,).
+        slowness: 1 / v, shape (n,) [s/m]; 0: without damping.
         out: Gets the rows, shape (n, 5 + r, m), r = m - f.
         reach: Gets |p'| of Po, shape (n,).
 
@@ -54,7 +59,7 @@ def stations_of(
     n, m = points.shape[0], cables.shape[0]
     rows = moves.shape[0]
     state, desired, still = np.zeros(13), np.zeros(19), np.zeros(4)
-    F0, Fu, Fx = np.empty(6), np.empty(6), np.empty(6)
+    F0, Fu, Fx, back = np.empty(6), np.empty(6), np.empty(6), np.empty(6)
     W, D = np.empty((rows, m)), np.empty((3, 3))
     N, spare = np.empty((m - rows, m)), np.empty((m - rows, m))
     w, turning, pull = np.empty((3, rows)), np.empty((6, 6)), np.empty(6)
@@ -77,10 +82,16 @@ def stations_of(
             desired[7 + k] = point[7 + k]
             desired[13 + k] = point[13 + k]
         floating_wrench(state, desired, dynamics, still, Fx)
+        for k in range(6):
+            state[7 + k] = -point[7 + k]
+        floating_wrench(state, desired, dynamics, still, back)
         for k in range(rows):
-            w[0, k] = -F0[moves[k]]
-            w[1, k] = F0[moves[k]] - Fu[moves[k]]
-            w[2, k] = F0[moves[k]] - Fx[moves[k]]
+            row = moves[k]
+            # Backwards the terms of velocity are the same but those of damping, which turn around.
+            even, odd = 0.5 * (Fx[row] + back[row]), 0.5 * (Fx[row] - back[row])
+            w[0, k] = -F0[row]
+            w[1, k] = F0[row] - Fu[row]
+            w[2, k] = F0[row] - even - slowness[i] * odd
         X = floating_motion(state)[:12]
         wx, wy, wz = point[7], point[8], point[9]
         ax, ay, az = point[13], point[14], point[15]

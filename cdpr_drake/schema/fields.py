@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import KW_ONLY, Field, dataclass, field
@@ -124,16 +125,29 @@ FIELDS_HEAD = "Attributes:"
 
 
 class _DocumentedField(Field):  # type: ignore[type-arg]
-    """A field that adds its words, unit and range to the docstring of its class, for `help`."""
+    """A field that adds its words, unit and range to the docstring of its class, for `help`.
+
+    The first one of a class adds those of inherited fields before.
+    """
 
     __slots__ = ()
 
     def __set_name__(self, owner: type, name: str) -> None:
         super().__set_name__(owner, name)
-        rule: FieldRule = self.metadata["rule"]
         known = (owner.__doc__ or f"{owner.__name__}.").rstrip()
-        head = "" if FIELDS_HEAD in known else f"\n\n    {FIELDS_HEAD}"
-        owner.__doc__ = f"{known}{head}\n        {name}: {rule.doc} Accepted: {rule.accepts()}."
+        rules: dict[str, FieldRule] = {}
+        if FIELDS_HEAD not in known:
+            known += f"\n\n    {FIELDS_HEAD}"
+            for base in reversed(owner.__mro__[1:]):
+                fields = getattr(base, "__dataclass_fields__", {}).values()
+                rules |= {
+                    one.name: one.metadata["rule"] for one in fields if "rule" in one.metadata
+                }
+            own = inspect.get_annotations(owner)
+            rules = {each: rule for each, rule in rules.items() if each not in own}
+        for each, rule in (rules | {name: self.metadata["rule"]}).items():
+            known += f"\n        {each}: {rule.doc} Accepted: {rule.accepts()}."
+        owner.__doc__ = known
 
 
 def _make(rule: dict[str, Any], default: Any, placeholder: Any) -> Any:

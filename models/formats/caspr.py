@@ -22,7 +22,7 @@ from pydrake.math import RotationMatrix
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import RobotFileError
 from cdpr_drake.models.formats.caspr_pulleys import PULLEYS, read_pulley, short_name, triple
-from cdpr_drake.models.formats.caspr_trees import AXIS_KINDS, KINDS, QUATERNIONS
+from cdpr_drake.models.formats.caspr_trees import AXIS_KINDS, KINDS, PRESENTATION, QUATERNIONS
 from cdpr_drake.models.formats.draft import DraftCable, RobotDraft
 from cdpr_drake.models.formats.reading import (
     child_text,
@@ -53,9 +53,6 @@ MOTIONS = {
     "P_Z": "1T",
 }
 """Joints of one body that cables move as a whole, and the motion that each gives."""
-
-_PRESENTATION = {"@num", "@id", "@name", "@view_angle", "@display_range"}
-"""What only names or counts things, or says how they are drawn: a frame comes first."""
 
 _COORDINATES = {"SPATIAL_EULER_XYZ": 6, "SPATIAL_QUATERNION": 7}
 """Numbers of the joints that are no translations along axes with a turn about the third."""
@@ -119,7 +116,7 @@ def read_caspr(path: Path, model: str | None = None, cable_set: str | None = Non
     system = root if root.tag == "links" else root.find("links")
     _display_range(bodies, system, draft)
     _cables(cables, cable_set, draft)
-    draft.remarks += not_kept(root, _PRESENTATION)
+    draft.remarks += not_kept(root, PRESENTATION)
     return draft
 
 
@@ -336,7 +333,7 @@ def _cables(path: Path, wanted: str | None, draft: RobotDraft) -> None:
         draft.remarks.append(
             f"Cables are of the kind {', '.join(sorted(kinds))}; their stiffness was not kept."
         )
-    draft.remarks += not_kept(root, _PRESENTATION)
+    draft.remarks += not_kept(root, PRESENTATION)
 
 
 def _cable(path: Path, item: ET.Element, draft: RobotDraft) -> DraftCable:

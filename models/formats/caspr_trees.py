@@ -46,6 +46,10 @@ from cdpr_drake.models.formats.reading import (
     numbers,
     read_xml,
 )
+from cdpr_drake.models.formats.unread import mark, mark_below, not_kept, watched
+
+PRESENTATION = {"@num", "@id", "@name", "@view_angle", "@display_range"}
+"""What only names or counts things, or says how they are drawn: a frame comes first."""
 
 GRAVITY = 9.81
 """Of CASPR, along -z [m/s^2]."""
@@ -226,12 +230,13 @@ def read_tree(
         RobotFileError: A file is not accepted; names element, value and what is accepted.
     """
     remarks: list[str] = []
-    root = read_xml(bodies)
+    root = watched(read_xml(bodies))
     links = _links(bodies, root, repair_inertia, remarks)
     system = root if root.tag == "links" else root.find("links")
     words = "" if system is None else system.get("display_range") or ""
     display = numbers(bodies, "display_range", words, 6) if words.strip() else None
     chosen, found = _cables(cables, cable_set, links, remarks)
+    remarks += not_kept(root, PRESENTATION)
     return CasprTree(
         name=name, links=links, cables=found, cable_set=chosen, display=display,
         remarks=tuple(remarks),
@@ -393,6 +398,7 @@ def _joint(path: Path, item: ET.Element, where: str, remarks: list[str]) -> Casp
             "limits were left out."
         )
         kind = QUATERNIONS[kind]
+        mark(found, "q_min", "q_max")
         return CasprJoint(kind=kind, steps=KINDS[kind], initial=q, actuated=_actuated(found))
     steps = KINDS.get(kind, ())
     words = found.get("axis")
@@ -440,7 +446,7 @@ def _cables(
     path: Path, wanted: str | None, links: tuple[CasprLink, ...], remarks: list[str]
 ) -> tuple[str, tuple[CasprCable, ...]]:
     """The name of a set of cables, and its cables."""
-    root = read_xml(path)
+    root = watched(read_xml(path))
     sets = {item.get("id", ""): item for item in root.iter("cable_set")}
     if not sets:
         raise fail(path, "cable_set", "none", "at least one")
@@ -455,6 +461,9 @@ def _cables(
     if len(filled) > 1:
         rest = ", ".join(other for other in filled if other != name)
         remarks.append(f"Cables of the set {name}; the file also has {rest}.")
+    for other, item in sets.items():
+        if other != name:
+            mark_below(item)
     cables: list[CasprCable] = []
     varying: set[str] = set()
     for item in sets[name]:
@@ -462,6 +471,7 @@ def _cables(
             if item.tag.startswith("cable_"):
                 what = item.get("name", "a spring")
                 remarks.append(f"{what}, a passive spring, was left out.")
+                mark_below(item)
             continue
         if item.tag not in ("cable_ideal", "cable_linear_spring"):
             varying.add(item.tag)
@@ -471,6 +481,7 @@ def _cables(
             f"Cables are of the kind {', '.join(sorted(varying))}, whose stiffness depends on "
             "their force; it was not kept."
         )
+    remarks += not_kept(root, PRESENTATION)
     return name, _told_apart(cables, remarks)
 
 

@@ -25,7 +25,7 @@ PACKAGE = """<?xml version="1.0"?>
 """
 
 DIRECTIVES = """\
-# The frame is welded to the world; the platform is free, at its home pose. Cables are no model:
+# The frame stands in the world; the platform is free, at its home pose. Cables are no model:
 # models.find_robot finds the platform, systems.robots.add_cable_robot adds them.
 directives:
 - add_model:
@@ -35,9 +35,6 @@ directives:
       platform:
         translation: {translation}
         rotation: !Rpy {{deg: {angles}}}
-- add_weld:
-    parent: world
-    child: {name}::frame
 """
 
 

@@ -185,14 +185,17 @@ def write_urdf(draft: RobotDraft) -> str:
     """The platform as URDF, with a link of a name for each exit and anchor point.
 
     It holds points, box, mass, inertia, centre of mass, home pose and frame; no cables: URDF has no
-    loops. The platform is a free body without a joint, since Drake has no floating ones; the home
-    pose is in an element `home`, which other programs pass over.
+    loops. All links are one tree, as ROS' parser demands: the frame is fixed to the link `world`,
+    and the platform is on a floating joint there, with the home pose as its origin. MuJoCo makes a
+    free joint of it. Drake has no such joint, and warns of one that it is not told to ignore; a
+    body without a joint is free there.
     """
     assert draft.inertia is not None
     assert draft.center_of_mass is not None
     assert draft.box_size is not None
     assert draft.box_center is not None
     robot = ET.Element("robot", name=draft.name)
+    ET.SubElement(robot, "link", name="world")
     frame = ET.SubElement(robot, "link", name="frame")
     for X, length in _beams(draft):
         visual = ET.SubElement(frame, "visual")
@@ -212,9 +215,9 @@ def write_urdf(draft: RobotDraft) -> str:
         shape = ET.SubElement(link, kind)
         ET.SubElement(shape, "origin", xyz=_words(draft.box_center), rpy="0 0 0")
         ET.SubElement(ET.SubElement(shape, "geometry"), "box", size=_words(draft.box_size))
-    X_WP = _home(draft)
-    home = ET.SubElement(robot, "home", link="platform")
-    ET.SubElement(home, "origin", _origin(X_WP))
+    _urdf_joint(robot, "frame_to_world", "fixed", ("world", "frame"), RigidTransform())
+    free = _urdf_joint(robot, "platform_in_world", "floating", ("world", "platform"), _home(draft))
+    free.set("drake_ignore", "true")
     for cable in draft.cables:
         for word, parent, point in (
             ("exit", "frame", cable.exit_point),
@@ -229,11 +232,12 @@ def write_urdf(draft: RobotDraft) -> str:
 
 def _urdf_joint(
     robot: ET.Element, name: str, kind: str, links: tuple[str, str], X: RigidTransform
-) -> None:
+) -> ET.Element:
     joint = ET.SubElement(robot, "joint", name=name, type=kind)
     ET.SubElement(joint, "parent", link=links[0])
     ET.SubElement(joint, "child", link=links[1])
     ET.SubElement(joint, "origin", _origin(X))
+    return joint
 
 
 def _origin(X: RigidTransform) -> dict[str, str]:

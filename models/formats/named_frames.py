@@ -11,6 +11,7 @@ Source: SDFormat 1.12; Gazebo thesis 5.4 and the simulator's files for the chain
 
 from __future__ import annotations
 
+import copy
 import re
 import xml.etree.ElementTree as ET
 from collections import Counter
@@ -19,7 +20,7 @@ from pathlib import Path
 import numpy as np
 from pydrake.geometry import Box, Cylinder, Role, SceneGraph
 from pydrake.math import RigidTransform, RollPitchYaw
-from pydrake.multibody.parsing import Parser
+from pydrake.multibody.parsing import PackageMap, Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import Frame, FrameIndex, PrismaticJoint
 from pydrake.systems.framework import Context
@@ -57,11 +58,10 @@ def read_named_frames(path: Path) -> RobotDraft:
 
 def _read_draft(path: Path) -> RobotDraft:
     root = read_xml(path)
-    seen = watched(root)
     tool = SDF_TOOL if is_sdformat(root) else URDF_TOOL
     model = root.find("model") if is_sdformat(root) else root
     if is_sdformat(root) and model is not None and _chains(model):
-        return _read_chains(path, seen)
+        return _read_chains(path, watched(root))
     words = path.stem if model is None else model.get("name") or path.stem
     draft = RobotDraft(name=robot_name(words), tool=tool, title=words)
     scene_graph = SceneGraph()
@@ -69,6 +69,7 @@ def _read_draft(path: Path) -> RobotDraft:
     plant.RegisterAsSourceForSceneGraph(scene_graph)
     parser = Parser(plant)
     parser.SetAutoRenaming(True)
+    whole, unread = copy.deepcopy(root), list[str]()
     balls = _without_balls(root)
     parse_models(parser, path, ET.tostring(root, encoding="unicode") if balls else None, "sdf")
     plant.Finalize()
@@ -110,9 +111,54 @@ def _read_draft(path: Path) -> RobotDraft:
     draft.gravity = float(np.linalg.norm(gravity))
     if np.any(gravity[:2] != 0.0) or gravity[2] > 0.0:
         draft.gravity_direction = gravity
+    _include(whole, parser.package_map(), unread, [0])
+    seen = watched(whole)
     _mark_used(seen, carried, draft)
     draft.remarks += not_kept(seen, _PRESENTATION)
+    if unread:
+        draft.remarks.append(
+            "Of these included files only bodies, joints and frames were read, and what else they "
+            f"hold is not named: {', '.join(unread)}."
+        )
     return draft
+
+
+_MOST_INCLUDES = 1000
+"""Included files that are looked into for what is not kept."""
+
+
+def _include(root: ET.Element, packages: PackageMap, unread: list[str], count: list[int]) -> None:
+    """Puts models of included files into their elements `include`.
+
+    Args:
+        root: A document; changed.
+        packages: Those that Drake's parser knows.
+        unread: Gets the names of files that are not found.
+        count: How many there were so far.
+    """
+    for item in list(root.iter("include")):
+        uri = (item.findtext("uri") or "").strip()
+        file = _included_file(uri, packages)
+        count[0] += 1
+        if file is None or count[0] > _MOST_INCLUDES:
+            unread.append(uri)
+            continue
+        inner = read_xml(file)
+        _include(inner, packages, unread, count)
+        item.extend([inner] if inner.tag == "robot" else inner.findall("model"))
+
+
+def _included_file(uri: str, packages: PackageMap) -> Path | None:
+    """The file that Drake's parser includes; None: it is not found."""
+    file = Path(uri.removeprefix("file://"))
+    if uri.startswith(("package://", "model://")):
+        try:
+            file = Path(packages.ResolveUrl(uri))
+        except RuntimeError:
+            return None
+    if file.is_dir() and (file / "model.config").is_file():
+        file = file / (read_xml(file / "model.config").findtext("sdf") or "")
+    return file if file.is_file() else None
 
 
 _PRESENTATION = {
@@ -125,14 +171,14 @@ _STRUCTURE = {
     "parent",
     "child",
     "origin",
-    "home",
     "pose",
     "frame",
+    "name",
     "placement_frame",
     "static",
     "uri",
 }
-"""Elements that say where things are, which Drake uses."""
+"""Elements that say where things are and how included ones are called, which Drake uses."""
 
 
 def _gravity(path: Path, root: ET.Element, plain: Array) -> Array:
@@ -222,15 +268,11 @@ def _without_balls(root: ET.Element) -> int:
 
 
 def _place_floating(path: Path, root: ET.Element, plant: MultibodyPlant, context: Context) -> None:
-    """Puts bodies where floating joints of URDF, or our element `home`, have them.
+    """Puts bodies where floating joints of URDF have them.
 
     Drake leaves such bodies free.
     """
     found: dict[str, tuple[str, RigidTransform]] = {}
-    for home in root.findall("home"):
-        name, origin = home.get("link", ""), home.find("origin")
-        if origin is not None and plant.NumBodiesWithName(name) == 1:
-            found[name] = plant.world_body().name(), _origin(path, "home", origin)
     for joint in root.findall("joint"):
         parent, child, origin = joint.find("parent"), joint.find("child"), joint.find("origin")
         if joint.get("type") != "floating" or parent is None or child is None or origin is None:

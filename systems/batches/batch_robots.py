@@ -281,7 +281,8 @@ class BatchRobots:
             duration: For how long [s].
             rates: By which commanded lengths change, of winches by position, so that they are the
                 command at the end; shaped as commands [m/s]. None: not.
-            brakes: 1 where a motor's brake holds, shaped as commands; None: none.
+            brakes: 1 where a motor's brake holds, shaped as commands; None: none. Robots need
+                `winch.brake_torque` in their files, and winches with motors.
             wrenches: What acts on the platforms meanwhile beside cables and weight, moment about Po
                 and force in W, shape (6,) or (count, 6) [N m, N]; None: nothing.
 
@@ -289,7 +290,8 @@ class BatchRobots:
             Which robots go on, shape (count,): all but `failed`.
 
         Raises:
-            CdprError: An array is of another shape or not finite, or the duration not positive.
+            CdprError: An array is of another shape or not finite, the duration not positive, or
+                there are rates or brakes that the winches do not have.
         """
         self._move([commands], duration, wrenches, rates=rates, brakes=brakes)
         return ~self.failed
@@ -336,6 +338,7 @@ class BatchRobots:
         others = np.zeros_like(self._others)
         for row, (what, given) in enumerate((("rates", rates), ("brakes", brakes))):
             if given is not None:
+                self._check_has(what)
                 others[:, row] = per_robot(what, given, count, k)[:, self._of_cable]
         self._apply(None if wrenches is None else per_robot("wrenches", wrenches, count, 6))
         self._commands[:], self._others[:] = asked[-1], others
@@ -348,6 +351,21 @@ class BatchRobots:
         )  # fmt: skip
         self._table = None
         return reached
+
+    def _check_has(self, what: str) -> None:
+        """Checks that the winches take rates, or have brakes."""
+        motors, mode = self._drive.kind == MOTORS, self._drive.mode
+        found = f"winches by {mode}" if motors else "winches without motors"
+        if what == "rates" and not (motors and mode == "position"):
+            raise CdprError(f"rates: found {found}; accepted: winches with motors, by position")
+        if what == "brakes":
+            laws = [one.drive.law for one in self._members]
+            bare = [row for row, law in enumerate(laws) if law is None or law.brake_torque == 0.0]
+            if motors and not bare:
+                return
+            if motors:
+                found = f"no winch.brake_torque in the file of robot {bare[0]}"
+            raise CdprError(f"brakes: found {found}; accepted: motors with winch.brake_torque")
 
     def _apply(self, wrenches: Array | None) -> None:
         """As `apply_wrench`, for each robot."""

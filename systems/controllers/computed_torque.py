@@ -24,12 +24,15 @@ from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
 
 
-def platform_dynamics(robot: Robot, balance: str = WRENCH) -> PlatformDynamics:
+def platform_dynamics(
+    robot: Robot, balance: str = WRENCH, damping: tuple[float, float] | None = None
+) -> PlatformDynamics:
     """The dynamics of a robot's platform, exactly as the plant has them.
 
     Args:
         robot: The robot.
         balance: A name of `force_balance.BALANCES`; by forces alone it is taken for a point mass.
+        damping: Of the platform, [N s/m] and [N m s/rad]; None: the robot file's.
 
     Raises:
         RobotFileError: It is of a motion type that computed torque does not know, or its gravity
@@ -41,7 +44,11 @@ def platform_dynamics(robot: Robot, balance: str = WRENCH) -> PlatformDynamics:
             f"robot {robot.name}: gravity_direction: found {robot.gravity_direction.tolist()}; "
             "accepted by computed torque: along -z of W"
         )
-    return PlatformDynamics(platform_inertia(robot), robot.gravity, motions, balance == FORCE)
+    if damping is None:
+        damping = robot.damping.translation, robot.damping.rotation
+    return PlatformDynamics(
+        platform_inertia(robot), robot.gravity, motions, balance == FORCE, damping
+    )
 
 
 class PoseTracking(LeafSystem):
@@ -64,6 +71,9 @@ class PoseTracking(LeafSystem):
     computes. The wrench follows the state at once; what holds it samples it.
 
     Source: see `task_space.computed_torque`.
+
+    Attributes:
+        dynamics: What the controller believes of the platform.
     """
 
     def __init__(
@@ -81,7 +91,8 @@ class PoseTracking(LeafSystem):
             in_plant: The robot in its plant; only its kind of joint and its state's size matter.
             trajectory: The desired motion.
             gains: Kp and Kd.
-            dynamics: What the controller believes of the platform; None for the exact model.
+            dynamics: What the controller believes of the platform; None for the exact model, with
+                the damping of the robot's file.
             balance: What tensions balance, a name of `force_balance.BALANCES`.
         """
         super().__init__()
@@ -89,6 +100,7 @@ class PoseTracking(LeafSystem):
         believed = dynamics or platform_dynamics(robot)
         if balance == FORCE:
             believed = replace(believed, point_mass=True)
+        self.dynamics = believed
         self._joint, self._trajectory = robot.joint(), trajectory
         self._step = TrackingStep(
             trajectory.stretches(),

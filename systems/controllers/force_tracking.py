@@ -306,7 +306,10 @@ class ForceTracking(PoseTracking):
         J = cable_jacobian(X_WP, self._cables)
         watch = self._watch
         watch.memory[:] = context.get_discrete_state(self._memory).value()
-        outer = watch.update(X_WP, -J.T @ self._tensions(context))
+        # The known forces: cables, and the damping that the platform is believed to have.
+        by_move, by_turn = self._dynamics.damping
+        braked = np.repeat([by_turn, by_move], 3) * self._state(context)[7:]
+        outer = watch.update(X_WP, -J.T @ self._tensions(context) - braked)
         state.set_value(self._memory, watch.memory)
         state.set_value(self._outer, outer)
         if self._admittance is not None:

@@ -9,6 +9,7 @@ from pydrake.systems.framework import Context, DiscreteValues
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.control.force_balance import WRENCH
+from cdpr_drake.control.task_space import PlatformDynamics
 from cdpr_drake.errors import PlanningError
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.models.robot_in_plant import RobotInPlant, pose_from_state
@@ -28,11 +29,13 @@ class PredictiveTensions:
         trajectory: The desired motion.
         steps: Steps ahead, of a period of control each.
         view: What the camera shall keep in view; None: nothing.
+        dynamics: What is believed of the platform; None: as its file has it.
     """
 
     trajectory: PoseTrajectory
     steps: int
     view: View | None = None
+    dynamics: PlatformDynamics | None = None
 
     def __call__(
         self,
@@ -93,9 +96,8 @@ class PredictiveDistributor(TensionDistributor):
         robot = self._robot = in_plant.robot
         low, high = robot.tension_limits(limits)
         speed = robot.winch.rated_cable_speed()
-        task = PathTask(
-            cables, platform_dynamics(robot), MotionLimits(lower=low, upper=high, cable_speed=speed)
-        )
+        limits_ahead = MotionLimits(lower=low, upper=high, cable_speed=speed)
+        task = PathTask(cables, ahead.dynamics or platform_dynamics(robot), limits_ahead)
         self._horizon = Horizon(task, ahead.trajectory, ahead.steps, 1.0 / rate, ahead.view)
 
     def _update(self, context: Context, state: DiscreteValues) -> None:

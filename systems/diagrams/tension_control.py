@@ -21,7 +21,7 @@ from cdpr_drake.geometry.poses import pose_error, pose_from_row, pose_row
 from cdpr_drake.models.robot_in_plant import RobotInPlant, add_robot, pose_on_joint
 from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.systems.controllers.computed_torque import PoseTracking
+from cdpr_drake.systems.controllers.computed_torque import PoseTracking, platform_dynamics
 from cdpr_drake.systems.controllers.force_tracking import ForceControl, ForceTracking
 from cdpr_drake.systems.controllers.tension_distributor import TensionDistributor
 from cdpr_drake.systems.monitoring.log_row import RunLog, add_log
@@ -187,8 +187,8 @@ class TensionControlSettings:
         force: How the platform answers forces; None: as computed torque does. Needs the plant.
         disturbances: What pushes the platform; None: nothing. Needs the plant.
         seed: Of their random numbers.
-        damping: Of the simulated platform; by default the robot file's. The controller does not
-            know it.
+        damping: Of the simulated platform; by default the robot file's. It is in the dynamics that
+            the controller believes unless `dynamics` says otherwise.
     """
 
     trajectory: PoseTrajectory
@@ -315,21 +315,24 @@ def _deciders(
 ) -> tuple[PoseTracking, TensionDistributor]:
     """Controller and distributor, or what stands in the place of one of them."""
     trajectory, gains, place = settings.trajectory, settings.gains, settings.remote
-    balance = settings.balance
+    balance, robot = settings.balance, in_plant.robot
+    dynamics = settings.dynamics or platform_dynamics(
+        robot, balance, damping=settings.damping.of(robot)
+    )
     distribution = (settings.method, settings.limits, settings.rate, settings.reference, believed)
     control, distributor = PoseTracking, settings.distributor
     if place == DISTRIBUTOR:
         remote = RemoteDistributor(in_plant, trajectory, *distribution, balance=balance)
-        return control(in_plant, trajectory, gains, settings.dynamics, balance=balance), remote
+        return control(in_plant, trajectory, gains, dynamics, balance=balance), remote
     own = distributor(in_plant, *distribution, balance=balance)
     if settings.force is not None:
         return ForceTracking(
             in_plant, trajectory, gains, settings.force, believed, settings.rate,
-            dynamics=settings.dynamics,
+            dynamics=dynamics,
         ), own  # fmt: skip
     if place is None:
-        return control(in_plant, trajectory, gains, settings.dynamics, balance=balance), own
-    return RemoteTracking(in_plant, trajectory, gains, place, balance=balance), own
+        return control(in_plant, trajectory, gains, dynamics, balance=balance), own
+    return RemoteTracking(in_plant, trajectory, gains, place, dynamics, balance=balance), own
 
 
 def _add_pushes(

@@ -12,13 +12,18 @@ from pydrake.systems.framework import BasicVector, Context, DiscreteValues
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.control.force_balance import WRENCH
-from cdpr_drake.control.task_space import TaskGains, floating_wrench, planar_wrench
+from cdpr_drake.control.task_space import (
+    PlatformDynamics,
+    TaskGains,
+    floating_wrench,
+    planar_wrench,
+)
 from cdpr_drake.errors import ClientEndedError
 from cdpr_drake.geometry.poses import pose_from_row, pose_row
 from cdpr_drake.geometry.straight_cables import gravity_wrench
 from cdpr_drake.models.robot_in_plant import RobotInPlant, pose_from_state
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.systems.controllers.computed_torque import PoseTracking, platform_dynamics
+from cdpr_drake.systems.controllers.computed_torque import PoseTracking
 from cdpr_drake.systems.controllers.tension_distributor import TensionDistributor
 from cdpr_drake.systems.remote.remote_place import (
     CONTROLLER,
@@ -84,13 +89,14 @@ class RemoteTracking(PoseTracking):
         trajectory: PoseTrajectory,
         gains: TaskGains,
         place: str,
+        dynamics: PlatformDynamics | None = None,
         *,
         balance: str = WRENCH,
     ) -> None:
         """Arguments as of `PoseTracking`; place is CONTROLLER or TRAJECTORY."""
-        super().__init__(in_plant, trajectory, gains, balance=balance)
+        super().__init__(in_plant, trajectory, gains, dynamics, balance=balance)
         robot = in_plant.robot
-        self._dynamics, self._gains = platform_dynamics(robot, balance).packed(), gains.packed()
+        self._dynamics, self._gains = self.dynamics.packed(), gains.packed()
         self._height, self.view = robot.plane_height, _View(robot, trajectory)
         inputs, outputs = tension_ports(place, robot)
         resting = {

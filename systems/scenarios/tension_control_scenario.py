@@ -198,7 +198,8 @@ class TensionScenario(ScenarioHeader):
         "The simulated cables.", DrivenCableSettings, required=False
     )
     damping: DampingSettings = section(
-        "Additional damping of the simulated platform, which the controller does not know.",
+        "Damping of the simulated platform, which the controller knows unless it believes in "
+        "another robot.",
         DampingSettings, required=False,
     )  # fmt: skip
     trajectory: TrajectorySettings = section("Desired motion.", TrajectorySettings)

@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.multibody.tree import MultibodyForces
 
 from cdpr_drake.control.task_space import (
     PlatformDynamics,
@@ -17,6 +18,7 @@ from cdpr_drake.errors import ControlGainError
 from cdpr_drake.geometry.poses import rotation_from_vector, rotation_vector
 from cdpr_drake.geometry.straight_cables import PLANAR_ROWS, gravity_wrench
 from cdpr_drake.models.robot_in_plant import platform_inertia
+from cdpr_drake.systems.robots.settings import DampingSettings
 from cdpr_drake.trajectories.pose_trajectory import motion_row
 from tests.control.awkward_robots import GAINS, awkward_robot, plant_of, spatial, triple, turn
 
@@ -33,14 +35,20 @@ FLOATING_PLANT = plant_of(FLOATING)
 PLANAR_PLANT = plant_of(PLANAR)
 
 
-def inverse_dynamics(plant, context, accelerations):
-    """Generalized force of the cables that gives these generalized accelerations."""
-    M = plant.CalcMassMatrix(context)
-    return (
-        M @ accelerations
-        + plant.CalcBiasTerm(context)
-        - plant.CalcGravityGeneralizedForces(context)
-    )
+DAMPING = 7.0, 0.9
+
+
+def inverse_dynamics(plant, in_plant, context, accelerations):
+    """Generalized force of the cables for these generalized accelerations, against the damping.
+
+    The damping's force is that of the block which brakes the simulated platform.
+    """
+    forces = MultibodyForces(plant)
+    plant.CalcForceElementsContribution(context, forces)
+    brake = DampingSettings(translation=DAMPING[0], rotation=DAMPING[1]).block(in_plant)
+    state = plant.GetPositionsAndVelocities(context)
+    forces.mutable_generalized_forces()[:] += brake.D() @ state
+    return plant.CalcInverseDynamics(context, accelerations, forces)
 
 
 def sine_error(R_WP, R_WD):
@@ -63,8 +71,8 @@ def test_is_the_inverse_dynamics_of_a_floating_plant(r, p, V_WP, off, p_WD, V_WD
     plant.SetVelocities(context, V_WP)
     e = np.concatenate([sine_error(X_WP.rotation(), X_WD.rotation()), p_WD - p])
     Kp, Kd = np.repeat([90.0, 120.0], 3), np.repeat([18.0, 25.0], 3)
-    expected = inverse_dynamics(plant, context, A_WD + Kp * e + Kd * (V_WD - V_WP))
-    dynamics = PlatformDynamics(platform_inertia(FLOATING), FLOATING.gravity)
+    expected = inverse_dynamics(plant, in_plant, context, A_WD + Kp * e + Kd * (V_WD - V_WP))
+    dynamics = PlatformDynamics(platform_inertia(FLOATING), FLOATING.gravity, damping=DAMPING)
     found = computed_torque(X_WP, V_WP, X_WD, V_WD, A_WD, dynamics=dynamics, gains=GAINS)
     assert close(found, expected, ORACLE)
 
@@ -72,16 +80,18 @@ def test_is_the_inverse_dynamics_of_a_floating_plant(r, p, V_WP, off, p_WD, V_WD
 @given(triple, triple, st.floats(-3.0, 3.0), triple, triple, triple)
 def test_is_the_inverse_dynamics_of_a_planar_plant(q, v, off, p_WD, v_WD, a_WD):
     """State and acceleration (x, y, theta) of the joint; what leaves the plane does not count."""
-    plant, _, context = PLANAR_PLANT
+    plant, in_plant, context = PLANAR_PLANT
     plant.SetPositions(context, q)
     plant.SetVelocities(context, v)
     R_WD = RotationMatrix.MakeZRotation(q[2] + off)
     e = np.array([*(p_WD[:2] - q[:2]), 2.0 * np.sin(off / 2.0)])
     Kp, Kd = np.array([120.0, 120.0, 90.0]), np.array([25.0, 25.0, 18.0])
-    expected = inverse_dynamics(plant, context, a_WD + Kp * e + Kd * (v_WD - v))
+    expected = inverse_dynamics(plant, in_plant, context, a_WD + Kp * e + Kd * (v_WD - v))
     V_WD, A_WD = np.full(6, 7.0), np.full(6, -3.0)
     V_WD[[3, 4, 2]], A_WD[[3, 4, 2]] = v_WD, a_WD
-    dynamics = PlatformDynamics(platform_inertia(PLANAR), PLANAR.gravity, PLANAR_ROWS)
+    dynamics = PlatformDynamics(
+        platform_inertia(PLANAR), PLANAR.gravity, PLANAR_ROWS, damping=DAMPING
+    )
     found = np.empty(6)
     planar_wrench(
         np.concatenate([q, v]),

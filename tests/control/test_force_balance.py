@@ -35,10 +35,13 @@ C = np.array(ROBOT.platform.center_of_mass)
 
 
 PLANT = plant_of(ROBOT)
+DAMPING = 7.0, 0.9
 
 
 def force_law(X_WP, V_WP, X_WD, V_WD, A_WD, robot=ROBOT, *, point_mass=True):
-    dynamics = PlatformDynamics(platform_inertia(robot), robot.gravity, point_mass=point_mass)
+    dynamics = PlatformDynamics(
+        platform_inertia(robot), robot.gravity, point_mass=point_mass, damping=DAMPING
+    )
     return computed_torque(X_WP, V_WP, X_WD, V_WD, A_WD, dynamics=dynamics, gains=GAINS)
 
 
@@ -59,7 +62,10 @@ def test_the_centre_of_mass_accelerates_as_asked(r, p, V_WP, off, p_WD, V_WD, A_
     wrench[:3] += [0.3, -0.2, 0.1]
     A_WP = np.linalg.solve(
         plant.CalcMassMatrix(context),
-        wrench - plant.CalcBiasTerm(context) + plant.CalcGravityGeneralizedForces(context),
+        wrench
+        - np.repeat(DAMPING[::-1], 3) * V_WP
+        - plant.CalcBiasTerm(context)
+        + plant.CalcGravityGeneralizedForces(context),
     )
     p_WC, v_WC, a_WC = carried_point(X_WP, V_WP, A_WP, C)
     goal, speed, asked = carried_point(X_WD, V_WD, A_WD, C)
@@ -75,6 +81,7 @@ def test_it_is_the_closed_form_of_a_point_mass(r, p, V_WP, off, p_WD, V_WD, A_WD
     force = point_mass_force(
         p_WC, v_WC, *carried_point(X_WD, V_WD, A_WD, C),
         mass=ROBOT.platform.mass, gravity=ROBOT.gravity, gains=(120.0, 25.0),
+        damping=DAMPING[0] * V_WP[3:],
     )  # fmt: skip
     assert close(wrench[3:], force)
     # The force goes through the centre of mass.

@@ -28,6 +28,7 @@ from cdpr_drake.geometry.poses import (
     pose_row,
 )
 from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_schema import PlatformDamping
 from cdpr_drake.models.robot_statics import tension_problem
 from cdpr_drake.planning.path_task import PathTask
 from cdpr_drake.planning.place_constraints import (
@@ -66,6 +67,7 @@ COORDINATES = {"relative": RelativePose(START), "angles": PlaceAndAngles(), "bod
 @cache
 def robot_task(pulleys=False):
     robot = load_robot("acrobot_large")
+    robot.damping = PlatformDamping(translation=7.0, rotation=0.9)
     cables = robot.cable_set() if pulleys else robot.cable_set().without_pulleys()
     return robot, path_task(robot, LimitSettings(tensions=(1.0, 60.0)), cables)
 
@@ -187,7 +189,9 @@ def test_a_point_mass_and_a_planar_platform_have_their_own_balance():
         2.0, [0.01, -0.02, 0.03], UnitInertia(0.02, 0.03, 0.04, 0.001, 0.002, -0.003)
     )
     for motions, point_mass in (((2, 3, 4), False), (tuple(range(6)), True)):
-        dynamics = PlatformDynamics(inertia, motions=motions, point_mass=point_mass)
+        dynamics = PlatformDynamics(
+            inertia, motions=motions, point_mass=point_mass, damping=(7.0, 0.9)
+        )
         changed = PathTask(task.cables, dynamics, task.limits)
         here = RelativePose(START, motions)
         balance = TensionBalance(changed, here)

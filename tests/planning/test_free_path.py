@@ -183,11 +183,12 @@ def test_pieces_are_cubic_and_their_jacobians_those_of_differences():
     np.testing.assert_allclose(every[3], between(x, 1, 0.3)[0], atol=1e-14)
 
 
+@cache
 def box_program(rounds):
     """Past a box whose corner a motion cuts between knots, with the platform's own box.
 
     The mass is in the middle of the platform's box. With it at the bottom, where the file has it,
-    refinement is slower: four rounds leave 0.8 mm, six 0.02 mm.
+    refinement is slower: four rounds leave 0.8 mm, six 0.02 mm, eight 0.001 mm.
     """
     robot, task = robot_task(com=MIDDLE_OF_BOX)
     program = FreePathProgram(task, START, GOAL, 6, (0.9, 0.9))
@@ -218,6 +219,19 @@ def test_what_is_missed_between_knots_is_asked_for_there():
     assert gaps[1] > CLEARANCE - missed[1].bound
     for one in missed:
         assert one.missed <= one.bound < one.missed + 0.03  # half the way between instants
+
+
+@pytest.mark.parametrize(("rounds", "kept"), [(0, False), (1, False), (4, True)])
+def test_what_rounds_leave_missed_between_knots_is_no_success(rounds, kept):
+    """Without rounds nothing between knots was asked."""
+    solution = box_program(rounds)
+    left = solution.between["obstacles"]
+    assert left.kept == kept
+    assert (left.missed > 1e-5) != kept
+    assert solution.success == (kept or rounds == 0)
+    words = f"missed between knots after {rounds} rounds: obstacles by {left.missed:.3g}"
+    assert (words in solution.status) == (not solution.success)
+    assert solution.motion().end_time == pytest.approx(0.9)
 
 
 def test_a_guess_decides_on_which_side_an_obstacle_is_passed():

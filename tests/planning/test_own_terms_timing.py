@@ -84,6 +84,17 @@ def test_a_cost_of_nothing_gives_the_time_of_the_passes(corners):
     assert found.program.own_costs == {"nothing": 0.0}
 
 
+def test_own_terms_and_a_damped_platform_are_refused():
+    _, task, path = case()
+    damped = replace(task, dynamics=replace(task.dynamics, damping=(20.0, 0.5)))
+    program = PathTimingProgram(damped, path, STATIONS)
+    plan = plan_along_path(damped, path, STATIONS)
+    assert program.Solve().duration == plan.duration
+    program.AddQuadraticCost(0.0, 0.0, name="nothing")
+    with pytest.raises(PlanningError, match=r"a platform with damping \(20.0, 0.5\).*accepted"):
+        program.Solve()
+
+
 def test_a_quadratic_preference_is_what_scipy_finds():
     _, task, path = case()
     fastest = plan_along_path(task, path, STATIONS).trajectory.squared_speeds
@@ -155,12 +166,15 @@ def test_a_nonlinear_cost_is_what_scipy_finds():
 def test_what_points_ask_is_what_differences_of_poses_say():
     """Tensions of least norm that a speed and an acceleration need, by both; statics apart."""
     robot, task, path = case()
+    task = replace(task, dynamics=replace(task.dynamics, damping=(7.0, 0.9)))
     places = np.linspace(0.1, 0.9, 7) * path.length
     one, other = task_asks(task)(path, places), difference_asks(robot, task)(path, places)
     for u, x in ((0.0, 0.0), (0.7, 0.0), (0.0, 0.4), (-0.5, 0.3)):
         by_both = [
-            np.array([np.linalg.pinv(E) @ (b + u * a + x * c) for E, a, c, b in zip(
-                asks.balance, asks.by_u, asks.by_x, asks.rest, strict=True)])
+            np.array([
+                np.linalg.pinv(E) @ (b + u * a + x * c + np.sqrt(x) * d) for E, a, c, d, b in zip(
+                    asks.balance, asks.by_u, asks.by_x, asks.by_root, asks.rest, strict=True)
+            ])
             for asks in (one, other)
         ]  # fmt: skip
         np.testing.assert_allclose(*by_both, rtol=0.0, atol=1e-4 * np.max(np.abs(by_both[0])))

@@ -1,7 +1,7 @@
 """Time-optimal motions along paths: Drake's Toppra, a convex program, first principles."""
 
 import re
-from dataclasses import fields
+from dataclasses import fields, replace
 from functools import cache
 from itertools import pairwise
 
@@ -27,6 +27,7 @@ from cdpr_drake.errors import PlanningError
 from cdpr_drake.geometry.cable_paths import cable_jacobian, cable_paths
 from cdpr_drake.geometry.poses import pose_from_angles
 from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_schema import PlatformDamping
 from cdpr_drake.planning.failures import stuck
 from cdpr_drake.planning.limits import MotionLimits
 from cdpr_drake.planning.path_task import PathTask
@@ -194,10 +195,39 @@ def test_where_it_cannot_rest_the_motion_carries_it_through():
         plan_along_path(slow, make_path(robot, poses, "blend"))
 
 
+@pytest.mark.parametrize(
+    ("name", "count", "damping"),
+    [
+        ("planar", 600, (6.0, 0.2)),
+        ("acrobot_large", 300, (20.0, 0.5)),
+        ("caroca", 200, (2e3, 40.0)),
+    ],
+)
+def test_the_damping_of_a_platform_is_planned_with(name, count, damping):
+    """Against the convex program, which has it at the roots, and the simulated damped robot."""
+    limits, poses = PATHS[name]
+    given = LimitSettings(tensions=limits, reserve=RESERVE)
+    robot, free = load_robot(name), planned(name)[1]
+    robot.damping = PlatformDamping(translation=damping[0], rotation=damping[1])
+    task = path_task(robot, given)
+    plan = plan_along_path(task, make_path(robot, poses, "smooth"))
+    assert plan.duration > (1.0005 if name == "planar" else 1.05) * free.duration
+    assert np.max(plan.samples().uses) <= 1.0 + BETWEEN
+    reference = convex_time(robot, task, plan.path, count)
+    np.testing.assert_allclose(plan.duration, reference, rtol=AGREEMENT)
+    tracked = track_plan(robot, plan, robot_limits(robot, given))
+    assert tracked.keeps_limits()
+    assert tracked.errors()[0] < 2e-3
+    unplanned = replace(plan, task=task, trajectory=free.trajectory)
+    assert np.max(unplanned.samples().uses) > 1.0 + BETWEEN
+
+
 def test_what_stops_a_motion_between_two_points_is_named():
     _, plan = planned("planar")
     points = plan.path.points(np.array([0.1, 0.11]))
-    words = stuck(plan.task, points, np.array([0.1, 0.11]), 0.5, 1e-3, np.array([2.0, 3.0]))
+    stations, _ = plan.task.stations(points)
+    places, goal = np.array([0.1, 0.11]), np.array([2.0, 3.0])
+    words = stuck(plan.task, points, stations, places, 0.5, 1e-3, goal)
     assert re.search(r"s = 0.1 m of 0.5 m.*C\d needs (more|less) than its", words), words
 
 

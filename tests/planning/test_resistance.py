@@ -184,7 +184,8 @@ def test_of_stations_that_no_speed_joins_the_cables_are_named():
     points = np.zeros((2, POINT_SIZE))
     points[:, :7] = pose_row(pose(0.1, 0.0, 0.3))
     points[:, 10] = 1.0
-    words = stuck(task, points, np.array([0.0, 1e-3]), 1.0, 0.01, np.array([0.5, 0.6]))
+    stations, _ = task.stations(points)
+    words = stuck(task, points, stations, np.array([0.0, 1e-3]), 1.0, 0.01, np.array([0.5, 0.6]))
     assert "cannot resist the wrenches together" in words
 
 

@@ -81,10 +81,11 @@ def difference_asks(robot: Robot, task: PathTask) -> Asks:
         gyration = np.concatenate(
             [np.cross(w, inertia @ w), platform.mass * np.cross(w, np.cross(w, c))]
         )
+        by_move, by_turn = task.dynamics.damping
         return (
             -J.T[rows], (M @ twist)[rows], (M @ bend + gyration)[rows],
-            -platform.weight_wrench(X)[rows], J @ twist, (after - before) / (2.0 * h),
-            np.linalg.norm(twist[3:]),
+            (np.repeat([by_turn, by_move], 3) * twist)[rows], -platform.weight_wrench(X)[rows],
+            J @ twist, (after - before) / (2.0 * h), np.linalg.norm(twist[3:]),
         )  # fmt: skip
 
     def asks(path: PosePath, places: Array) -> PathAsks:

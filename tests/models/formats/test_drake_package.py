@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import xml.etree.ElementTree as ET
+
 import numpy as np
 import pytest
 from pydrake.multibody.parsing import (
@@ -91,7 +93,11 @@ def test_what_is_no_such_robot_is_said(tmp_path):
     with pytest.raises(RobotFileError, match="accepted by find_robot: 3R3T"):
         find_robot(plant, load_robot("planar"), ROBOT)
     loose = MultibodyPlant(0.0)
-    Parser(loose).AddModels(str(tmp_path / f"{ROBOT}.urdf"))
+    text = (tmp_path / f"{ROBOT}.urdf").read_text(encoding="utf-8")
+    standing = '<joint name="frame_to_world" type="fixed">'
+    assert standing in text
+    text = text.replace(standing, standing[:-1] + ' drake_ignore="true">')
+    Parser(loose).AddModelsFromString(text, "urdf")
     loose.Finalize()
     with pytest.raises(RobotFileError, match="found 12 velocities"):
         find_robot(loose, robot)
@@ -106,4 +112,32 @@ def test_drake_reads_exports_without_a_warning(format, tmp_path, caplog):
     with caplog.at_level("WARNING"):
         Parser(plant).AddModels(str(first))
     assert caplog.messages == []
-    assert "floating" not in first.read_text(encoding="utf-8")
+
+
+def test_an_exported_urdf_is_one_tree_with_a_free_platform_at_home(tmp_path):
+    """ROS' parser takes one root link; Drake and MuJoCo take the platform for a free body."""
+    mujoco = pytest.importorskip("mujoco")
+    robot = load_robot("acrobot_large")
+    robot.home.angles_deg = np.array([4.0, -3.0, 8.0])
+    X_WP = robot.home.transform()
+    (text,) = export_robot(robot, "urdf").values()
+    path = tmp_path / "robot.urdf"
+    path.write_text(text, encoding="utf-8")
+    tree = ET.fromstring(text.partition("?>")[2])
+    parents = {joint.find("child").get("link"): joint.find("parent").get("link")
+               for joint in tree.iter("joint")}  # fmt: skip
+    links = {link.get("name") for link in tree.iter("link")}
+    assert links - set(parents) == {"world"}
+    assert set(parents.values()) <= links
+    plant = MultibodyPlant(0.0)
+    Parser(plant).AddModels(str(path))
+    plant.Finalize()
+    assert plant.num_positions() == 7
+    assert plant.GetBodyByName("platform").is_floating_base_body()
+    context = plant.CreateDefaultContext()
+    exit_1 = plant.GetBodyByName("exit_C1").EvalPoseInWorld(context).translation()
+    np.testing.assert_allclose(exit_1, robot.exit_points()[:, 0], atol=DECIMALS)
+    model = mujoco.MjModel.from_xml_path(str(path))
+    q = X_WP.rotation().ToQuaternion().wxyz()
+    np.testing.assert_allclose(model.qpos0, [*X_WP.translation(), *q], atol=DECIMALS)
+    assert model.body("platform").mass == pytest.approx(robot.platform.mass)

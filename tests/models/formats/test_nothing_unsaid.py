@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import json
+import re
 import xml.etree.ElementTree as ET
 from dataclasses import asdict
 
@@ -13,15 +14,17 @@ import yaml
 
 from cdpr_drake.errors import RobotFileError
 from cdpr_drake.models.formats import caspr, gazebo_yaml, mjcf, named_frames, wirex
+from cdpr_drake.models.formats.caspr_trees import read_tree
 from cdpr_drake.models.formats.detection import read_foreign
 from tests.models.formats import foreign_files, rich_files
+from tests.models.formats.tree_files import two_link
 
 HIDDEN = {
     "urdf": named_frames._PRESENTATION,
     "sdf": named_frames._PRESENTATION | {"parent", "child"},
     "xml": mjcf.PRESENTATION,
     "wcrfx": wirex._PRESENTATION,
-    "caspr": caspr._PRESENTATION,
+    "caspr": caspr.PRESENTATION,
 }
 """Elements and attributes that only say how things look or are called, by ending."""
 
@@ -265,3 +268,78 @@ def test_the_comparison_sees_what_is_unsaid(tmp_path, monkeypatch):
 
 def test_gazebo_presentation_is_of_keys_that_exist():
     assert "platform.color" in gazebo_yaml._PRESENTATION
+
+
+def test_what_included_files_hold_is_used_or_named_too(tmp_path, monkeypatch):
+    """By a file, by a folder with a model.config, and by a file that includes one."""
+    start = '<sdf version="1.9">'
+    model = rich_files.SDF[rich_files.SDF.index('<model name="rich">') :].replace("</world>", "")
+    inner = tmp_path / "inner.sdf"
+    inner.write_text(start + model)
+    config = f"<model><name>rich</name>{start}inner.sdf</sdf></model>"
+    (tmp_path / "model.config").write_text(config)
+
+    def including(name, uri):
+        path = tmp_path / name
+        text = f"<include><uri>file://{uri}</uri><name>inside</name></include>"
+        path.write_text(f'{start}<model name="{path.stem}">{text}</model></sdf>')
+        return path
+
+    def parts(words):
+        """What is not kept, without the elements round it."""
+        return sorted(re.findall(r"link/[a-z/@]+ of [a-z]+|plugin of [a-z]+", " ".join(words)))
+
+    _, own = told(inner)
+    assert len(parts(own)) == 5
+    by_file = including("file.sdf", inner)
+    deep = including("deep.sdf", by_file)
+    for path in (by_file, including("folder.sdf", tmp_path), deep):
+        _, remarks = told(path)
+        assert parts(remarks) == parts(own)
+        assert "name" not in remarks[-1]
+    monkeypatch.setattr(named_frames, "_MOST_INCLUDES", 1)
+    _, remarks = told(deep)
+    assert remarks[-1].startswith("Of these included files only bodies, joints and frames were")
+    assert remarks[-1].endswith(f"is not named: file://{inner}.")
+
+
+def test_every_part_of_a_tree_of_caspr_is_used_or_named(tmp_path):
+    """Each attribute and text is taken out, and each element gets one that no reader knows."""
+    model = two_link()
+    bodies = model.write(tmp_path)
+    cables = bodies.with_name(f"{model.name}_cables.xml")
+
+    def read():
+        try:
+            tree = read_tree(bodies, cables, "toy")
+        except RobotFileError as problem:
+            return str(problem), []
+        return repr(plain(tree)), list(tree.remarks)
+
+    def plain(tree):
+        return {**asdict(tree), "remarks": ()}
+
+    before, count, unsaid = read(), 0, []
+    hidden = HIDDEN["caspr"] | {
+        "@default_cable_set"
+    }  # which names the first set, here the only one
+    for path in (bodies, cables):
+        text = path.read_text()
+        head, start, body = text.partition("<bodies_system" if path == bodies else "<cables ")
+        root = ET.fromstring(start + body)
+        for place, key in parts_of(root):
+            if is_hidden(place, key, hidden) or is_named(place, key, before[1]):
+                continue
+            count += 1
+            path.write_text(head + ET.tostring(without(root, place, key), encoding="unicode"))
+            if read() == before:
+                unsaid.append(("/".join(str(item.tag) for item in place), key))
+        for number, item in enumerate(root.iter()):
+            changed = copy.deepcopy(root)
+            ET.SubElement(list(changed.iter())[number], "oddity", value="3")
+            path.write_text(head + ET.tostring(changed, encoding="unicode"))
+            words, remarks = read()
+            assert "oddity" in " ".join([words, *remarks]), item.tag
+        path.write_text(text)
+    assert count > 40
+    assert unsaid == []

@@ -285,6 +285,14 @@ def test_a_robot_that_fails_stops_and_the_others_go_on():
     assert batch.step(np.zeros(8), PERIOD).all()
 
 
+def motors(mode):
+    """Two robots with motors, of which only the first has brakes."""
+    braked, bare = load_robot("caroca"), load_robot("caroca")
+    braked.winch.brake_torque = 20.0
+    how = settings(mode, model="elastic")
+    return BatchRobots(braked, 2, settings=how, parameters=[braked, bare])
+
+
 @pytest.mark.parametrize(
     ("how", "words"),
     [
@@ -318,6 +326,22 @@ def test_a_robot_that_fails_stops_and_the_others_go_on():
         (lambda: BatchRobots(behaving(creep_stiffness=2.0), 1), "creep_stiffness: found 2"),
         (lambda: BatchRobots(ROBOT, 2).step(np.zeros(8), -1.0), "duration: found -1 s"),
         (lambda: BatchRobots(ROBOT, 2).rollout(np.zeros(8), PERIOD), r"found shape \(8,\)"),
+        (
+            lambda: BatchRobots(ROBOT, 2).step(np.zeros(8), PERIOD, brakes=np.ones(8)),
+            "brakes: found winches without motors; accepted: motors with winch.brake_torque",
+        ),
+        (
+            lambda: motors("torque").step(np.zeros(8), PERIOD, brakes=np.ones(8)),
+            "brakes: found no winch.brake_torque in the file of robot 1; accepted",
+        ),
+        (
+            lambda: motors("torque").step(np.zeros(8), PERIOD, rates=np.ones(8)),
+            "rates: found winches by torque; accepted: winches with motors, by position",
+        ),
+        (
+            lambda: BatchRobots(ROBOT, 1).step(np.zeros(8), PERIOD, rates=np.ones(8)),
+            "rates: found winches without motors",
+        ),
         (lambda: BatchRobots(ROBOT, 2).reset(poses=np.ones((2, 7))), "a quaternion of norm 2"),
     ],
 )

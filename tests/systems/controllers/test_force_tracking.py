@@ -94,6 +94,20 @@ def test_an_observer_holds_against_wind():
     assert errors["true"] < 0.2 * errors["false"]
 
 
+def test_an_observer_does_not_take_the_platform_s_damping_for_a_push():
+    """Along 0.1 m in half a second 20 N s/m brake with 7.5 N."""
+    way = (
+        "trajectory={pause: 0.1, start: {position: [0, 0, 0.3]}, "
+        "stretches: [{pose: {position: [0.1, 0, 0.3]}, duration: 0.5}]}"
+    )
+    log = run(
+        WIND, "disturbances=null", way, "duration=0.7", "damping.translation=20",
+        "log_rate=500",
+    ).log  # fmt: skip
+    assert np.all(log["feasible"][1:] == 1.0)
+    assert np.max(np.abs(log["wrench_estimated"][:, 3:])) < 1.0
+
+
 def pushed_at_random(K, D, count=100, spacing=0.6, rate=250.0):
     """Energy that the port took in from the begin of each push to that of the next [J]."""
     random = np.random.default_rng(7)

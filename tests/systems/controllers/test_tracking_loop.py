@@ -18,7 +18,10 @@ from cdpr_drake.geometry.poses import (
 )
 from cdpr_drake.models.robot_in_plant import add_robot
 from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_schema import PlatformDamping
 from cdpr_drake.systems.controllers.computed_torque import PoseTracking, platform_dynamics
+from cdpr_drake.systems.robots.assembly import apply_force
+from cdpr_drake.systems.robots.settings import DampingSettings
 from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
 
 INTEGRATION = 1e-7
@@ -30,10 +33,11 @@ MODEL_GAINS = TaskGains(100.0, 20.0)
 
 
 class Loop:
-    """A robot whose platform gets the desired wrench itself, without cables."""
+    """A robot whose damped platform gets the desired wrench itself, without cables."""
 
     def __init__(self, name, trajectory):
         self.robot = load_robot(name)
+        self.robot.damping = PlatformDamping(translation=225.0, rotation=4.2)
         builder = DiagramBuilder()
         self.plant = builder.AddSystem(MultibodyPlant(0.0))
         self.in_plant = add_robot(self.plant, self.robot)
@@ -44,9 +48,10 @@ class Loop:
         state = self.plant.get_state_output_port(self.in_plant.model_instance)
         builder.Connect(state, control.GetInputPort("platform_state"))
         builder.Connect(control.GetOutputPort("desired_wrench"), pick.get_input_port())
-        builder.Connect(
-            pick.get_output_port(), self.plant.get_applied_generalized_force_input_port()
-        )
+        brake = builder.AddSystem(DampingSettings().block(self.in_plant))
+        builder.Connect(state, brake.get_input_port())
+        apply_force(builder, self.plant, pick.get_output_port(), name="wrench")
+        apply_force(builder, self.plant, brake.get_output_port(), name="brake")
         self.simulator = Simulator(builder.Build())
         ResetIntegratorFromFlags(self.simulator, "runge_kutta3", 1e-3)
         self.simulator.get_mutable_integrator().set_fixed_step_mode(True)

@@ -14,6 +14,7 @@ from cdpr_drake.systems.diagrams.tension_control import (
 )
 from cdpr_drake.systems.diagrams.tension_loop import TensionLoop, can_be_compiled
 from cdpr_drake.systems.robots.compiled_step import StepRule
+from cdpr_drake.systems.robots.settings import DampingSettings
 
 SAME = 1e-13
 """Of largest numbers: the same kernels in the same order, compiled together and apart."""
@@ -52,6 +53,7 @@ def by_diagram(built, pieces):
     [
         ("acrobot_computed_torque", {}),
         ("acrobot_computed_torque", {"rate": 700.0, "log_rate": 330.0, "max_step": 4e-4}),
+        ("acrobot_computed_torque", {"damping": DampingSettings(translation=40.0, rotation=0.5)}),
         # Requests that are not met, which are held and counted.
         ("acrobot_computed_torque", {"rate": 90.0, "log_rate": 1000.0, "method": "dykstra"}),
     ],
