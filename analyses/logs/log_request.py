@@ -12,6 +12,7 @@ import numpy as np
 from cdpr_drake.analyses.calibration.columns import UNITS
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import LogFileError, accepted_names, why_not_read
+from cdpr_drake.schema.input_files import file_size
 from cdpr_drake.schema.yaml_files import load_yaml
 
 DIMENSIONS = tuple(sorted({dimension for dimension, _ in UNITS.values()}))
@@ -138,7 +139,7 @@ def read_mapping(path: Path) -> ColumnMapping:
         LogFileError: It cannot be read, or says something else.
     """
     try:
-        if path.stat().st_size > MOST_MAPPING:
+        if file_size(path) > MOST_MAPPING:
             raise LogFileError(f"{path}: found more than {MOST_MAPPING:,} bytes; accepted: fewer")
         content = load_yaml(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as problem:

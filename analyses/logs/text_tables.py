@@ -12,6 +12,7 @@ import numpy as np
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import LogFileError
 from cdpr_drake.schema.fields import LARGEST
+from cdpr_drake.schema.input_files import file_size
 
 MOST_BYTES = 500_000_000
 """A minute of a hundred columns at 1 kHz has a tenth of that."""
@@ -80,7 +81,7 @@ def log_text(path: Path) -> str:
         LogFileError: It cannot be read, is too large, or is no text.
     """
     try:
-        if path.stat().st_size > MOST_BYTES:
+        if file_size(path) > MOST_BYTES:
             raise LogFileError(f"{path}: found more than {MOST_BYTES:,} bytes; accepted: fewer")
         raw = path.read_bytes()
     except OSError as problem:

@@ -19,6 +19,7 @@ from cdpr_drake.errors import CdprError, plain_words
 from cdpr_drake.models.exit_points import split_name
 from cdpr_drake.models.robot_loader import load_robot, robot_file, robot_names, robot_text
 from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.schema.input_files import input_text
 from cdpr_drake.schema.templates import commented_yaml
 from cdpr_drake.schema.typed_yaml import closest
 from cdpr_drake.schema.yaml_files import load_yaml
@@ -157,7 +158,7 @@ def _reference(robot: str, out: Path) -> str:
 def _scenario(source: str) -> tuple[type, dict[str, Any]]:
     load_scenario(source)
     path = scenario_file(source)
-    content = load_yaml(path.read_text(encoding="utf-8"))
+    content = load_yaml(input_text(path))
     moved = "robot" if "robot" in content else "mechanism"
     content[moved] = resolve_robot_path(path, str(content[moved]))
     for obstacle in (content.get("world") or {}).get("obstacles") or ():
