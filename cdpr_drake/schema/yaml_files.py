@@ -18,6 +18,7 @@ from typing import Any
 import yaml
 from pydrake.common.yaml import yaml_dump_typed, yaml_load_typed
 
+from cdpr_drake.errors import CdprError
 from cdpr_drake.schema.input_files import input_size
 from cdpr_drake.schema.json_text import MOST_DEPTH, MOST_DIGITS
 
@@ -46,7 +47,7 @@ SMALL, MOST = 20_000, 32
 """Letters of files that are kept, and how many of them."""
 
 
-class YamlTextError(ValueError):
+class YamlTextError(CdprError, ValueError):
     """Text that is not YAML, or more of it than is read; in words that follow a file's name."""
 
     def __init__(self, words: str, line: int | None = None) -> None:

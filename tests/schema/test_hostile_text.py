@@ -1,9 +1,12 @@
 """YAML and JSON that would stop a reader are refused by one kind of error, with its line."""
 
 import json
+import re
 
 import pytest
 
+from cdpr_drake.errors import RobotFileError, plain_words
+from cdpr_drake.models.robot_loader import load_robot, robot_file
 from cdpr_drake.schema.json_text import load_json
 from cdpr_drake.schema.yaml_files import MOST_DEPTH, YamlTextError, compose_yaml, load_yaml
 
@@ -77,3 +80,26 @@ def test_json_is_read_as_before():
     assert found == {"a": [1, 2.5, 1e300, None], "b": float("inf")}
     with pytest.raises(ValueError, match="Infinity"):
         load_json(text, lambda word: (_ for _ in ()).throw(ValueError("Infinity")))
+
+
+@pytest.mark.parametrize(
+    ("value", "words"),
+    [
+        (r'"\e[31mred"', "accepted: no control characters"),
+        (r'"\x9b2J"', "accepted: no control characters"),
+        (r'"a\0b"', "accepted: no control characters"),
+        ("!!python/object/apply:os.system x", "title: found"),
+        ("!!binary x", "title: found"),
+        ("!mine x", "title: found"),
+    ],
+)
+def test_texts_that_control_a_terminal_or_have_a_tag_are_refused(value, words, tmp_path):
+    text = robot_file("acrobot_small").read_text()
+    path = tmp_path / "robot.yaml"
+    path.write_text(re.sub("(?m)^title: .*$", lambda _: f"title: {value}", text))
+    with pytest.raises(RobotFileError, match=words) as caught:
+        load_robot(path)
+    assert plain_words(str(caught.value)).count("\n") == 0
+    good = 'title: "two\\nlines, caf\\u00e9"'
+    path.write_text(re.sub("(?m)^title: .*$", lambda _: good, text))
+    assert load_robot(path).title == "two\nlines, caf\u00e9"
