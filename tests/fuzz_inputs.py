@@ -17,6 +17,7 @@ import hashlib
 import json
 import os
 import pkgutil
+import re
 import resource
 import shutil
 import signal
@@ -201,7 +202,7 @@ def judge(case: Case, status: int | None, out: str, err: str, before: dict[str, 
         yield f"code: {code}: {err[:200]}"
     if "\x1b" in out + err:
         yield f"escape: {(out + err)[:300]!r}"
-    if "Warning: " in err:
+    if re.search(r"[a-z]Warning: ", err):  # Python's; Drake has the word alone
         yield f"warning: {err.strip()[:300]}"
     changed = [p for p, kind in before.items() if after.get(p) != kind and not p.startswith(MINE)]
     if changed:
