@@ -17,6 +17,7 @@ from cdpr_drake.errors import Problems, RobotFileError
 from cdpr_drake.geometry.cable_routes import CableRoute, CableRoutes
 from cdpr_drake.models.drake_parsing import drake_refusals, parse_models
 from cdpr_drake.models.mechanism_schema import WORLD, EndPulley, Mechanism, MechanismCable
+from cdpr_drake.schema.input_files import input_text
 from cdpr_drake.schema.yaml_files import compose_yaml
 
 DIRECTIVES = (".dmd.yaml", ".dmd.yml")
@@ -158,7 +159,7 @@ def absolute_directives(file: Path) -> str:
         YamlTextError: It is no YAML.
         OSError: It cannot be read.
     """
-    root = compose_yaml(file.read_text(encoding="utf-8"))
+    root = compose_yaml(input_text(file))
     for key, items in root.value if isinstance(root, yaml.MappingNode) else ():
         for item in items.value if key.value == "directives" else ():
             for kind, content in item.value if isinstance(item, yaml.MappingNode) else ():

@@ -92,9 +92,7 @@ class PlatformShape:
             assert self.file is not None
             with drake_refusals(f"{self.file}: cannot be read as a mesh"):
                 file = mesh_in_place(Path(self.file))
-                try_mesh(file)
-                hull = Mesh(str(file), self.scale).GetConvexHull()
-            corners = np.array([hull.vertex(i) for i in range(hull.num_vertices())]).T
+                corners = _mesh_corners(str(file), self.scale, file.stat().st_mtime_ns)
             points = R @ corners + X_PS.translation()[:, np.newaxis]
             return points.min(axis=1), points.max(axis=1)
         if self.kind == BOX:
@@ -153,6 +151,14 @@ def _check_closed(file: str) -> None:
         count += 3
     if len(edges) != count or any((b, a) not in edges for a, b in edges):
         raise RobotFileError(f"{file}: {_NO_INERTIA}")
+
+
+@lru_cache(maxsize=8)
+def _mesh_corners(file: str, scale: float, changed: int) -> Array:
+    """Of the convex hull, shape (3, n) [m], read once for each state of its file."""
+    try_mesh(Path(file))
+    hull = Mesh(file, scale).GetConvexHull()
+    return np.array([hull.vertex(i) for i in range(hull.num_vertices())]).T
 
 
 @lru_cache(maxsize=8)

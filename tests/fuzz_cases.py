@@ -290,6 +290,88 @@ def mesh_file(rng: random.Random) -> Case:
     return Case(["check", "robot.yaml"], files, words=f"{name}: {words}")
 
 
+# Other files that commands take
+
+OTHERS: list[tuple[str, str, bytes]] = [
+    (
+        "import-log log.csv --mapping map.yaml",
+        "map.yaml",
+        b"columns: [time_ms, C1_length_mm, C2_length_mm, '', '']\nskip_rows: 1\nseparator: ','\n",
+    ),
+    (
+        "plan acrobot_large --path path.csv --limits 1,60",
+        "path.csv",
+        b"x,y,z,phi,theta,psi\n0,0,0.2,0,0,0\n0.1,-0.1,0.3,0,0,0\n",
+    ),
+    (
+        "plan acrobot_large --path path.gcode --limits 1,60 --corners rest",
+        "path.gcode",
+        b"G90 G21\nG0 X0 Y0 Z200 F3000\nG1 X80 F1200\nG1 Y80\nG2 X0 Y0 I-40 J-40\n",
+    ),
+    (
+        "plan acrobot_large --waypoints 0,0,0.2;0.1,0,0.3 --resist push.yaml",
+        "push.yaml",
+        b"box: [0.02, 0.02, 0.02, 2, 2, 1]\n",
+    ),
+    (
+        "workspace acrobot_large --kind wrench-feasible --grid 2,2,1 --wrench-set push.yaml",
+        "push.yaml",
+        b"vertices: [[0, 0, 0, 5, 0, 0], [0, 0, 0, -5, 0, 0]]\n",
+    ),
+    (
+        "reconfigure acrobot_large --rails rails.yaml --poses 0.2,0.1,0.3",
+        "rails.yaml",
+        b"rails:\n- {cables: [C1, C2], axis: [0, 0, 1], lower: -0.4, upper: 0.1}\n",
+    ),
+    (
+        "design acrobot_large --parameters design.yaml --generations 2",
+        "design.yaml",
+        b"exit_points: {reach: [0.1, 0.1, 0.1]}\nmirrors: [{axis: x, pairs: [C1-C8, C2-C7]}]\n"
+        b"goals: [{name: static}]\nposes: {counts: [3, 3, 2]}\npopulation: 4\n",
+    ),
+]
+"""Words, the file that is bad, and what a good one says."""
+
+
+def other_file(rng: random.Random) -> Case:
+    """A path, a mapping of columns, wrenches, rails, parameters of a design."""
+    words, name, data = rng.choice(OTHERS)
+    content, done = change_text(rng, data, Path(name).suffix)
+    case = Case(words.split(), {name: content}, words=f"{name}: {done}")
+    if name == "map.yaml":
+        case.files["log.csv"] = LOGS["columns"]().encode()
+    kind = _file_kind(rng)
+    if kind:
+        case.kinds[name] = kind
+    return case
+
+
+def asked_of_robot(rng: random.Random) -> Case:
+    """A bad robot file for what writes another one, and for poses of rest."""
+    path = rng.choice(ROBOTS)
+    tree = yaml.safe_load(path.read_text(encoding="utf-8"))
+    place = ",".join(str(x) for x in tree["home"]["position"])
+    words = rng.choice([
+        ["new", "scenario", "mine", "--robot", "robot.yaml"],
+        ["new", "robot", "mine", "--from", "robot.yaml"],
+        ["export", "robot.yaml", "--format", "urdf", "--out", "new"],
+        ["equilibria", "robot.yaml", "--position", place],
+        ["check", "robot.yaml"],
+    ])  # fmt: skip
+    return _with_file(rng, "robot.yaml", path, words)
+
+
+def log_of_robot(rng: random.Random) -> Case:
+    """A bad log for a fit, or for a replay."""
+    words = rng.choice([["calibrate", "acrobot_small", "log.csv"], ["identify", "acrobot_small",
+                        "log.csv"], ["replay", "log.csv", "--robot", "acrobot_small"]])  # fmt: skip
+    names = [f"C{k}_length_m" for k in range(1, 9)] + ["x_m", "y_m", "z_m"]
+    rows = [[f"{0.1 * t:.1f}", *(f"{1 + 0.01 * k * t:.4f}" for k in range(11))] for t in range(5)]
+    text = "\n".join(",".join(row) for row in [["time_s", *names], *rows]) + "\n"
+    content, done = change_text(rng, text.encode(), ".csv")
+    return Case([*words, "--out", "new"], {"log.csv": content}, words=done)
+
+
 # Options
 
 POSE = ["--pose", "0,0,0.2"]
@@ -382,7 +464,7 @@ def written_file(rng: random.Random) -> Case:
 KINDS: list[Callable[[random.Random], Case]] = [
     *[robot_file] * 5, *[scenario_file] * 6, *[scenario_of_robot] * 2, catalogue_file, bounds_file,
     *[options] * 5, *[output_folder] * 2, written_file, *[foreign_file] * 5, *[log_file] * 2,
-    body_file, mesh_file,
+    body_file, mesh_file, *[other_file] * 3, *[asked_of_robot] * 2, log_of_robot,
 ]  # fmt: skip
 
 

@@ -127,6 +127,18 @@ def change_bytes(rng: random.Random, data: bytes) -> tuple[bytes, str]:
         "list": lambda: b"- 1\n- 2\n",
         "binary": lambda: rng.randbytes(2000),
         "deep": lambda: b"name: " + b"[" * 3000 + b"]" * 3000,
+        "deepest": lambda: rng.choice([b"[", b"- ", b'{"a":', b"? ", b"!!set {"]) * 100_000,
+        "merged": lambda: b"<<: &m {<<: *m}\n" + data,
+        "merge bomb": lambda: MERGES + data,
+        "python": lambda: data.replace(b": ", b": !!python/object/apply:os.system ", at % 9 + 1),
+        "long number": lambda: _NUMBER.sub(LONG_NUMBER, data, count=at % 9 + 1),
+        "long name": lambda: _WORD.sub(b"n" * 300, data, count=at % 9 + 1),
+        "nul": lambda: data.replace(b"\n", b"\0", at % 9 + 1),
+        "huge power": lambda: _NUMBER.sub(b"1e999999", data, count=at % 9 + 1),
+        "keys twice": lambda: b"\n".join(each for each in lines for _ in range(2)),
+        "long line": lambda: data.replace(b"\n", b" ", at % 99 + 1) + b"x" * 200_000,
+        "utf-32": lambda: data.decode().encode("utf-32"),
+        "half a bom": lambda: b"\xef\xbb" + data,
         "deeper keys": lambda: b"".join(b" " * k + b"a:\n" for k in range(900)),
         "itself": lambda: data + b"\nassumptions: &a [*a]\n",
         "own top": lambda: b"&a\n" + data + b"\nextra: *a\n",
@@ -147,6 +159,11 @@ def change_bytes(rng: random.Random, data: bytes) -> tuple[bytes, str]:
 
 LONG_NUMBER = b"9" * 5000
 
+MERGES = b"m0: &m0 {a: 1, b: 2}\n" + b"".join(
+    b"m%d: &m%d {<<: [%s]}\n" % (k, k, b", ".join([b"*m%d" % (k - 1)] * 30)) for k in range(1, 12)
+)
+"""Mappings that are merged over and over."""
+
 BOMB = b"a0: &a0 [lol, lol]\n" + b"".join(
     b"a%d: &a%d [%s]\n" % (k, k, b", ".join([b"*a%d" % (k - 1)] * 10)) for k in range(1, 10)
 )
@@ -157,6 +174,7 @@ ENTITIES = b"<!DOCTYPE z [<!ENTITY a0 'lol'>" + b"".join(
 
 SIZES = [
     b"0", b"-1", b"1e300", b"-1e300", b"1e-300", b"nan", b"inf", b"", b"1 1", b"x", b"1e999",
+    b"1e999999", b"2026-11-28", b".inf", b"-.inf", b"0o17", b"1_000", b"12:30:45", b"~", b"yes",
     LONG_NUMBER, b"1" * 400, b"0x10", b"\xc2\xbd", b"null", b"[]", b"{}", b"true", b"2147483648",
 ]  # fmt: skip
 """What may stand where a number belongs in any text: degenerate, huge, long, and none."""
@@ -177,16 +195,20 @@ def change_text(rng: random.Random, data: bytes, ending: str) -> tuple[bytes, st
     if kind == "bomb":
         whole = {
             ".yaml": BOMB + b"points: *a9\nplatform: *a9\nkinematics: *a9\n",
-            ".json": rng.choice([b'{"a": %s}' % LONG_NUMBER, b"[" * 9999, b"[" * 500 + b"]" * 500]),
+            ".json": rng.choice([
+                b'{"a": %s}' % LONG_NUMBER, b"[" * 100_000, b"[" * 500 + b"]" * 500,
+                b'{"a":' * 100_000, b'{"a": 1e999999, "a": NaN}', data + data,
+            ]),
         }.get(ending)  # fmt: skip
-        return whole or rng.choice([ENTITIES, b"<a>" * 9999, data * 3]), kind
+        return whole or rng.choice([ENTITIES, b"<a>" * 100_000, data * 3]), kind
     pattern = {"number": _NUMBER, "cell": _CELL, "name": _WORD, "word gone": _WORD}[kind]
     places = list(pattern.finditer(data))
     if kind == "cell":
         places = places[: max(60, len(places) // 50)]  # heads stand at the top
     if not places:
         return data[: len(data) // 2], "half"
-    new = {"name": rng.choice([b"n" * 300, b"\x1b[31mred", b"../../x", b"a,b", b"a\nb"]),
+    new = {"name": rng.choice([b"n" * 300, b"\x1b[31mred", b"../../x", b"a,b", b"a\nb", b"\x00",
+                                b"\x9b2J", b"\xe2\x80\xae", b"\xc2\x9b2J", b"=1+1"]),
            "word gone": b"", "cell": rng.choice([b"", b"W", b"X", *SIZES])}.get(kind)  # fmt: skip
     for place in sorted(rng.sample(places, min(len(places), rng.choice([1, 1, 2, 9]))),
                         key=lambda found: -found.start()):  # fmt: skip

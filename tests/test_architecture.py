@@ -153,6 +153,62 @@ def test_modules_that_declare_fields_of_files_have_no_postponed_annotations():
     assert not {name for name in schema if read(name)[2]}
 
 
+READERS = {
+    "yaml.load": {"cdpr_drake.schema.yaml_files"},
+    "yaml_load_typed": {"cdpr_drake.schema.yaml_files"},
+    "LoadIrisRegionsYamlFile": {"cdpr_drake.workspaces.proven_sets"},  # what Drake wrote for it
+    "json.loads": {"cdpr_drake.schema.json_text"},
+    "AddModels": {"cdpr_drake.models.drake_parsing"},
+}
+"""What reads text of others, and the only modules that may call it."""
+
+OTHER_READERS = {
+    "yaml.load": [
+        *("safe_load", "full_load", "unsafe_load", "load_all", "safe_load_all", "compose"),
+        *("compose_all", "parse", "scan", "SafeLoader", "CSafeLoader", "Loader", "FullLoader"),
+    ],
+    "json.loads": ["load", "JSONDecoder", "decoder"],
+    "yaml_load_typed": ["yaml_load", "yaml_load_data", "yaml_load_file"],
+    "AddModels": [
+        *("AddModelsFromString", "AddModelsFromUrl", "AddModelFromFile", "LoadModelDirectives"),
+        *("LoadModelDirectivesFromString", "ProcessModelDirectives"),
+    ],
+}
+"""What is meant with them; of a module, where they are of one."""
+
+SAME_READER = {
+    f"{reader.partition('.')[0]}.{name}" if "." in reader else name: reader
+    for reader, names in OTHER_READERS.items()
+    for name in names
+}
+
+
+def readers(path):
+    """Names of READERS that a file calls or hands on."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        found = []
+        if isinstance(node, ast.Attribute):
+            base = node.value.id if isinstance(node.value, ast.Name) else ""
+            found = [f"{base}.{node.attr}", node.attr]
+        elif isinstance(node, ast.Name):
+            found = [node.id]
+        elif isinstance(node, ast.ImportFrom):
+            found = [f"{node.module}.{each.name}" for each in node.names]
+        for name in found:
+            name = SAME_READER.get(name, name)
+            if name in READERS:
+                yield name
+
+
+def test_yaml_json_and_models_are_read_at_one_place_each():
+    """There a damaged or hostile text is refused by one kind of error, before it grows."""
+    bool_values = "cdpr_drake.schema.typed_yaml"  # PyYAML's words for true and false, no reader
+    found = {(name, reader) for name, path in FILES.items() for reader in readers(path)}
+    wrong = {(name, reader) for name, reader in found if name not in READERS[reader]}
+    assert wrong - {(bool_values, "yaml.load")} == set()
+    assert {reader for _, reader in found} == set(READERS)
+
+
 def test_the_package_alone_is_light():
     words = "import sys, cdpr_drake; print(any(m in sys.modules for m in ('numba', 'pydrake')))"
     done = subprocess.run([sys.executable, "-c", words], capture_output=True, text=True, check=True)

@@ -38,6 +38,7 @@ from cdpr_drake.analyses.calibration.columns import (
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CalibrationError, why_not_read
 from cdpr_drake.geometry.poses import rotation_from_angles, rotation_from_vector
+from cdpr_drake.schema.input_files import file_size
 
 ROTATIONS = (QUATERNION, TAIT, TURN, RPY)
 """Columns that a rotation may stand in."""
@@ -168,7 +169,7 @@ def _keep_preferred(path: Path, headers: Sequence[str], columns: list[Column | N
 def split_cells(path: Path) -> tuple[list[list[str]], list[int]]:
     """Cells of all rows, and the lines that they stand in."""
     try:
-        if path.stat().st_size > MOST_BYTES:
+        if file_size(path) > MOST_BYTES:
             raise CalibrationError(f"{path}: found more than {MOST_BYTES:,} bytes; accepted: fewer")
         text = path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as problem:
@@ -190,7 +191,10 @@ def split_cells(path: Path) -> tuple[list[list[str]], list[int]]:
     if mark is None:
         cells = [line.split() for line in lines]
     else:
-        cells = [[cell.strip() for cell in row] for row in csv.reader(lines, delimiter=mark)]
+        try:
+            cells = [[cell.strip() for cell in row] for row in csv.reader(lines, delimiter=mark)]
+        except csv.Error as problem:
+            raise CalibrationError(f"{path}: cannot be read as a table: {problem}") from problem
     return cells, [number for number, _ in kept]
 
 

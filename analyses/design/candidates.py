@@ -17,6 +17,7 @@ from cdpr_drake.errors import DesignError
 from cdpr_drake.models.robot_loader import load_robot, parse_robot, robot_text
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.schema.typed_yaml import closest
+from cdpr_drake.schema.yaml_files import load_yaml
 
 LEAST_CABLES, MOST_CABLES = 4, 8
 
@@ -46,7 +47,7 @@ class Candidates:
 
     def robot_text(self, number: int, coordinates: Array, title: str = "") -> str:
         """The robot file of a design, of the set of cables with a number."""
-        found: dict[str, Any] = yaml.safe_load(self.text)
+        found: dict[str, Any] = load_yaml(self.text)
         moved = self.points.displacements(coordinates[: self.points.size])
         m = len(found["cables"])
         for k, cable in enumerate(found["cables"]):

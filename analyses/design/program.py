@@ -9,7 +9,6 @@ from collections.abc import Callable, Sequence
 from fnmatch import fnmatchcase
 
 import numpy as np
-import yaml
 from pydrake.solvers import Binding, MathematicalProgram
 
 from cdpr_drake.analyses.design.candidates import make_candidates
@@ -35,6 +34,7 @@ from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.numerics.own_terms import OwnTerms, ProgramValues
 from cdpr_drake.numerics.program_functions import ProgramCost, ProgramFunction
+from cdpr_drake.schema.yaml_files import load_yaml
 
 STEPPED = (*KINDS, "csw", "cables", "survives", "breaks-survived")
 """Goals that are counts: they have no slope, and no program finds a better one by it."""
@@ -255,7 +255,7 @@ class DesignProgram(OwnTerms):
 
     def _read(self) -> tuple[Array, Array, tuple[str, ...]]:
         """Scale, offset and names of the values."""
-        text = yaml.safe_load(self.candidates.text)
+        text = load_yaml(self.candidates.text)
         points, cables = self.candidates.points, text["cables"]
         m = len(cables)
         low, high = (points.displacements(np.full(points.size, end)) for end in (0.0, 1.0))

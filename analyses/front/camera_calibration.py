@@ -20,6 +20,7 @@ from cdpr_drake.analyses.calibration.camera_report import (
     fitted_camera,
 )
 from cdpr_drake.analyses.front.session import Say, Session
+from cdpr_drake.analyses.reporting.deferred_figures import drawing
 from cdpr_drake.analyses.reporting.log_files import write_json, write_whole
 from cdpr_drake.analyses.reporting.output_folder import results_folder
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS, write_figures
@@ -142,7 +143,7 @@ def calibrate_camera(
         with follows.doing("Looking for boards") as told:
             return work(told)
     with (
-        results_folder(Path(folder), options.get("overwrite", False)) as results,
+        results_folder(Path(folder), options.get("overwrite", False), redo=True) as results,
         follows.doing("Looking for boards") as told,
     ):
         follows.opened(results)
@@ -151,9 +152,10 @@ def calibrate_camera(
         write_whole(results.path / CAMERA, yaml_dump_typed(found.camera))
         place = results.publish()
         told("figures")
-        failed = write_figures(
-            place, {"camera": found.plot}, options.get("formats", DEFAULT_FORMATS)
-        )
+        with drawing(place):
+            failed = write_figures(
+                place, {"camera": found.plot}, options.get("formats", DEFAULT_FORMATS)
+            )
     return replace(found, folder=place, failed=failed)
 
 

@@ -11,6 +11,7 @@ from rich.table import Table
 
 from cdpr_drake.analyses.calibration.log_fit import LogFit
 from cdpr_drake.analyses.front.session import Say, Session
+from cdpr_drake.analyses.reporting.deferred_figures import drawing
 from cdpr_drake.analyses.reporting.output_folder import results_folder
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS, write_figures
 from cdpr_drake.errors import CdprError
@@ -85,7 +86,7 @@ def kept_fit(
     """A fit, written where it is to be kept.
 
     Figures come last, when the results have their place: one that cannot be written costs nothing
-    else.
+    else, and what ends while they are drawn is made again by the same call.
 
     Args:
         keeping: Where to.
@@ -100,12 +101,13 @@ def kept_fit(
         with session.doing(title) as say:
             return work(None, say)
     with (
-        results_folder(Path(keeping.folder), keeping.overwrite) as results,
+        results_folder(Path(keeping.folder), keeping.overwrite, redo=True) as results,
         session.doing(title) as say,
     ):
         session.opened(results)
         found = work(results.path, say)
         folder = results.publish()
         say("figures")
-        failed = write_figures(folder, found.fit.drawings, keeping.formats)
+        with drawing(folder):
+            failed = write_figures(folder, found.fit.drawings, keeping.formats)
     return replace(found, folder=folder, failed=failed)

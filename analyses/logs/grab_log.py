@@ -30,6 +30,7 @@ from cdpr_drake.analyses.logs.recorded_log import (
 from cdpr_drake.analyses.logs.text_tables import log_text, parsed
 from cdpr_drake.analyses.reporting.exported_logs import Columns
 from cdpr_drake.errors import LogFileError
+from cdpr_drake.schema.fields import LARGEST
 
 ACTUATOR, INCLINOMETER = "3", "5"
 
@@ -112,7 +113,8 @@ def _numbers(path: Path, number: int, cells: list[str], kind: str) -> list[float
         value = parsed(cell)
         if value is None or np.isnan(value):
             raise LogFileError(
-                f"{path}:{number}: cell {j + 1}: found {cell[:30]!r}; accepted: a finite number"
+                f"{path}:{number}: cell {j + 1}: found {cell[:30]!r}; accepted: a number "
+                f"up to {LARGEST:g}"
             )
         values.append(value)
     return values

@@ -17,6 +17,7 @@ from cdpr_drake.analyses.logs.mcap_log import knows_mcap, read_mcap
 from cdpr_drake.analyses.logs.motive import knows_motive, read_motive
 from cdpr_drake.analyses.logs.recorded_log import COMMANDED, ESTIMATED, RecordedLog
 from cdpr_drake.errors import LogFileError, accepted_names
+from cdpr_drake.schema.input_files import file_size
 
 AUTO = "auto"
 
@@ -80,6 +81,7 @@ def detect_log(path: Path) -> Detected | None:
         LogFileError: It cannot be read, or several know it.
     """
     try:
+        file_size(path)
         with path.open("rb") as file:
             raw = file.read(HEAD)
     except OSError as problem:

@@ -8,11 +8,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
 from cdpr_drake.analyses.calibration.columns import UNITS
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import LogFileError, accepted_names, why_not_read
+from cdpr_drake.schema.input_files import file_size
+from cdpr_drake.schema.yaml_files import load_yaml
 
 DIMENSIONS = tuple(sorted({dimension for dimension, _ in UNITS.values()}))
 """Of what a unit may be told."""
@@ -138,10 +139,10 @@ def read_mapping(path: Path) -> ColumnMapping:
         LogFileError: It cannot be read, or says something else.
     """
     try:
-        if path.stat().st_size > MOST_MAPPING:
+        if file_size(path) > MOST_MAPPING:
             raise LogFileError(f"{path}: found more than {MOST_MAPPING:,} bytes; accepted: fewer")
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError, RecursionError) as problem:
+        content = load_yaml(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as problem:
         words = " ".join(why_not_read(problem).split())
         raise LogFileError(f"{path}: cannot be read: {words[:200]}") from problem
     if not isinstance(content, dict) or "columns" not in content:

@@ -34,6 +34,7 @@ from cdpr_drake.analyses.logs.text_tables import MOST_BYTES
 from cdpr_drake.analyses.reporting.exported_logs import Columns
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import LogFileError
+from cdpr_drake.schema.input_files import file_size
 
 GRAB_VARIABLES = {
     "t": (TIME,),
@@ -66,7 +67,7 @@ def read_mat_variables(path: Path) -> dict[str, Any]:
     from scipy.io import loadmat
 
     try:
-        if path.stat().st_size > MOST_BYTES:
+        if file_size(path) > MOST_BYTES:
             raise LogFileError(f"{path}: found more than {MOST_BYTES:,} bytes; accepted: fewer")
         content = loadmat(str(path), squeeze_me=True, struct_as_record=False)
     except LogFileError:

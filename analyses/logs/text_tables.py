@@ -11,6 +11,8 @@ import numpy as np
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import LogFileError
+from cdpr_drake.schema.fields import LARGEST
+from cdpr_drake.schema.input_files import file_size
 
 MOST_BYTES = 500_000_000
 """A minute of a hundred columns at 1 kHz has a tenth of that."""
@@ -47,7 +49,7 @@ class CellTable:
         if value is None:
             raise LogFileError(
                 f"{self.path}:{self.lines[row]}: column {column + 1}: found "
-                f"{cell[:SHOWN]!r}; accepted: a finite number, or an empty cell"
+                f"{cell[:SHOWN]!r}; accepted: a number up to {LARGEST:g}, or an empty cell"
             )
         return value
 
@@ -62,14 +64,14 @@ class CellTable:
 
 
 def parsed(cell: str, decimal: str = ".") -> float | None:
-    """A number, NaN of an empty cell, None of what is no finite number."""
+    """A number, NaN of an empty cell, None of what is none or larger than `LARGEST`."""
     if not cell:
         return float("nan")
     try:
         value = float(cell.replace(",", ".") if decimal == "," else cell)
     except ValueError:
         return None
-    return value if np.isfinite(value) else None
+    return value if abs(value) <= LARGEST else None
 
 
 def log_text(path: Path) -> str:
@@ -79,7 +81,7 @@ def log_text(path: Path) -> str:
         LogFileError: It cannot be read, is too large, or is no text.
     """
     try:
-        if path.stat().st_size > MOST_BYTES:
+        if file_size(path) > MOST_BYTES:
             raise LogFileError(f"{path}: found more than {MOST_BYTES:,} bytes; accepted: fewer")
         raw = path.read_bytes()
     except OSError as problem:

@@ -68,7 +68,7 @@ def _read_table(path: Path, lines: list[str]) -> PathFile:
     """Rows of `COLUMNS`, or of the first three; a head with these names may stand above them."""
     poses: list[RigidTransform] = []
     size = 0
-    for number, row in _rows(lines):
+    for number, row in _rows(path, lines):
         words = [word.strip() for word in row]
         if not size and words[0].isidentifier():
             names = tuple(word.lower() for word in words)
@@ -92,11 +92,15 @@ def _read_table(path: Path, lines: list[str]) -> PathFile:
     return PathFile(poses)
 
 
-def _rows(lines: list[str]) -> Iterator[tuple[int, list[str]]]:
+def _rows(path: Path, lines: list[str]) -> Iterator[tuple[int, list[str]]]:
     """Number and words of the lines that say something."""
-    for number, row in enumerate(csv.reader(lines), 1):
-        if any(word.strip() for word in row) and not row[0].lstrip().startswith("#"):
-            yield number, row
+    reader = csv.reader(lines)
+    try:
+        for number, row in enumerate(reader, 1):
+            if any(word.strip() for word in row) and not row[0].lstrip().startswith("#"):
+                yield number, row
+    except csv.Error as problem:
+        raise DataFileError(f"{path}: line {reader.line_num}: {problem}") from problem
 
 
 def _number(word: str) -> float:

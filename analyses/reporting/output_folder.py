@@ -412,6 +412,10 @@ INPUTS = "inputs.json"
 """Which files of users the results follow from, with their SHA-256 and sizes [byte]."""
 
 
+IDENTIFIED = "identification.json"
+"""What identifications have in the place of summary or results."""
+
+
 def _tell_inputs(folder: Path) -> None:
     """Writes `INPUTS`, where files of users were read; not of files that the folder has itself."""
     held = inputs_held()
@@ -422,12 +426,18 @@ def _tell_inputs(folder: Path) -> None:
 
 
 def _same_asked(one: Path, other: Path) -> bool:
-    """Whether two folders have summaries that were asked for the same."""
-    asked: list[object] = []
-    for folder in (one, other):
+    """Whether two folders have the same arguments, or, where none are told, the same numbers."""
+    found = [_told(folder) for folder in (one, other)]
+    return bool(found[0]) and found[0] == found[1]
+
+
+def _told(folder: Path) -> object:
+    """What was asked, or all that was found but for how long it took; None: nothing is told."""
+    for name in (*FINISHED, IDENTIFIED):
         try:
-            told = load_json((folder / FINISHED[0]).read_text(encoding="utf-8"))
+            told = load_json((folder / name).read_text(encoding="utf-8"))
         except (OSError, ValueError):
-            return False
-        asked.append(told.get("arguments") if isinstance(told, dict) else None)
-    return asked[0] is not None and asked[0] == asked[1]
+            continue
+        if isinstance(told, dict):
+            return told.get("arguments") or {k: v for k, v in told.items() if k != "wall_time_s"}
+    return None

@@ -16,7 +16,6 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-import yaml
 from pydrake.common.yaml import yaml_dump_typed
 
 from cdpr_drake.analyses.reporting.log_files import write_scenario, write_whole
@@ -28,6 +27,7 @@ from cdpr_drake.models.robot_copies import portable_robot
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.schema.input_files import input_bytes
+from cdpr_drake.schema.yaml_files import plain_values
 from cdpr_drake.version import __version__
 
 PACKAGES = ("cdpr_drake", "cdpr_drake.models", "cdpr_drake.systems", "cdpr_drake.analyses")
@@ -142,7 +142,7 @@ def mechanism_arguments(name: str) -> dict[str, Any]:
     folder = Path(mechanism.mechanism).parent
     files = [each for each in sorted(folder.iterdir()) if each.name.endswith(MODEL_SUFFIXES)]
     hashes = {each.name: hashlib.sha256(each.read_bytes()).hexdigest() for each in files}
-    return {"mechanism": yaml.safe_load(yaml_dump_typed(mechanism)), "bodies": hashes}
+    return {"mechanism": plain_values(mechanism), "bodies": hashes}
 
 
 def _write(path: Path, robot: Robot) -> str:

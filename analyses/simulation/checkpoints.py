@@ -12,8 +12,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
-from pydrake.common.yaml import yaml_dump_typed
 
 from cdpr_drake.analyses.reporting.log_on_disk import CHECKPOINT, UNWRITTEN_CHECKPOINT
 from cdpr_drake.analyses.reporting.provenance import code_version, mechanism_arguments
@@ -23,6 +21,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CheckpointError
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.schema.json_text import load_json
+from cdpr_drake.schema.yaml_files import plain_values
 
 _ABOUT, _STATE = "about", "state."
 NAMED = 3
@@ -48,7 +47,7 @@ class Checkpoint:
 
 def run_arguments(scenario: Any) -> dict[str, Any]:
     """All that a run of a scenario of any kind depends on, for JSON: code, scenario, robot."""
-    wanted = yaml.safe_load(yaml_dump_typed(scenario))
+    wanted = plain_values(scenario)
     if "mechanism" in wanted:  # by its contents, wherever its file is
         moved = mechanism_arguments(wanted.pop("mechanism"))
         return {"cdpr_drake": code_version(), "scenario": wanted, **moved}
@@ -56,7 +55,7 @@ def run_arguments(scenario: Any) -> dict[str, Any]:
     file = getattr(getattr(scenario, "trajectory", None), "file", None)
     if file is not None:
         wanted["trajectory"]["file"] = hashlib.sha256(Path(file).read_bytes()).hexdigest()
-    robot = yaml.safe_load(yaml_dump_typed(load_robot(scenario.robot)))
+    robot = plain_values(load_robot(scenario.robot))
     return {"cdpr_drake": code_version(), "scenario": wanted, "robot": robot}
 
 
@@ -117,7 +116,7 @@ def read_checkpoint(folder: Path, asked: dict[str, Any]) -> Checkpoint:
             )
     except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile, zlib.error) as problem:
         raise CheckpointError(f"{path}: no checkpoint that can be read: {problem}") from problem
-    different = list(differences(found.asked, json.loads(json.dumps(asked))))
+    different = list(differences(found.asked, load_json(json.dumps(asked))))
     if different:
         more = len(different) - NAMED
         raise CheckpointError(

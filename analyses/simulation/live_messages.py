@@ -28,6 +28,7 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 from cdpr_drake.errors import CdprError
+from cdpr_drake.schema.json_text import load_json
 
 LARGEST_MESSAGE = 16 * 2**20
 """Bytes of a message or image; more is no message of ours."""
@@ -82,7 +83,7 @@ def receive(connection: Connection) -> Message:
         OSError: The connection broke.
         ValueError: That was no message.
     """
-    head = json.loads(connection.recv_bytes(LARGEST_MESSAGE))
+    head = load_json(connection.recv_bytes(LARGEST_MESSAGE))
     if not isinstance(head, dict) or not isinstance(head.get("kind"), str):
         raise ValueError("found no kind in a message")
     kind, size = head.pop("kind"), head.pop("blob", 0)

@@ -13,14 +13,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
-from pydrake.common.yaml import yaml_dump_typed
 
 from cdpr_drake.analyses.reporting.provenance import code_version
 from cdpr_drake.analyses.sweeps.folder import SweepFolder
 from cdpr_drake.arrays import Array
 from cdpr_drake.models.robot_loader import robot_text
 from cdpr_drake.schema.json_text import load_json
+from cdpr_drake.schema.yaml_files import load_yaml, plain_values
 from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
 
 CONVERGED = "converged"
@@ -55,9 +54,9 @@ _SUMMARY, _END, _TRACE = "summary", "end", "trace."
 
 def repetition_arguments(scenario: Scenario) -> dict[str, Any]:
     """All that a run over a seed depends on but the seed, for JSON: scenario, robot, code."""
-    wanted = yaml.safe_load(yaml_dump_typed(scenario))
+    wanted = plain_values(scenario)
     del wanted["seed"]
-    robot = yaml.safe_load(robot_text(scenario.robot))
+    robot = load_yaml(robot_text(scenario.robot))
     return {"cdpr_drake": code_version(), "scenario": wanted, "robot": robot}
 
 

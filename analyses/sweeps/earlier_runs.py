@@ -174,4 +174,4 @@ def _alike(there: Mapping[str, Any], here: Mapping[str, Any]) -> set[str]:
 
 def _plain(value: Any) -> Any:
     """As JSON gives it back."""
-    return json.loads(json.dumps(value))
+    return load_json(json.dumps(value))

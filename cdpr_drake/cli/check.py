@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-import yaml
 
 from cdpr_drake.analyses.front.logs import import_log
 from cdpr_drake.analyses.front.mechanisms import hang_mechanism
@@ -28,6 +27,8 @@ from cdpr_drake.models.robot_loader import (
     robot_file,
     robot_names,
 )
+from cdpr_drake.schema.input_files import input_text
+from cdpr_drake.schema.yaml_files import load_yaml, too_many_bytes
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.scenarios.files import scenario_file, scenario_names
 
@@ -105,8 +106,8 @@ def _mechanism_notes(path: Path) -> list[str]:
 
 def _is_scenario(path: Path) -> bool:
     try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError, yaml.YAMLError):
+        content = None if too_many_bytes(path) else load_yaml(input_text(path))
+    except (OSError, ValueError):
         return False  # the reader of robots says what is wrong
     if not isinstance(content, dict):
         return False

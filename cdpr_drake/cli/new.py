@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-import yaml
 
 from cdpr_drake.cli.completion import robot_words, words_among
 from cdpr_drake.cli.notebooks import FOLDER as NOTEBOOKS
@@ -20,8 +19,10 @@ from cdpr_drake.errors import CdprError, plain_words
 from cdpr_drake.models.exit_points import split_name
 from cdpr_drake.models.robot_loader import load_robot, robot_file, robot_names, robot_text
 from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.schema.input_files import input_text
 from cdpr_drake.schema.templates import commented_yaml
 from cdpr_drake.schema.typed_yaml import closest
+from cdpr_drake.schema.yaml_files import YamlTextError, load_yaml
 from cdpr_drake.systems.diagrams.first_scenario import first_scenario
 from cdpr_drake.systems.diagrams.load import SCENARIO_SCHEMAS, load_scenario
 from cdpr_drake.systems.scenarios.files import (
@@ -141,7 +142,16 @@ def _block(kind: str, name: str) -> dict[str, str]:
 
 def _robot(source: str) -> tuple[type, dict[str, Any]]:
     load_robot(source, "cdpr new")  # for its message, where there is none
-    return Robot, yaml.safe_load(robot_text(source))
+    return Robot, _read(source, robot_text(source))
+
+
+def _read(source: object, text: str) -> dict[str, Any]:
+    """What a text says that was accepted before, though perhaps not word by word."""
+    try:
+        found: dict[str, Any] = load_yaml(text)
+    except YamlTextError as problem:
+        raise CdprError(problem.at(source)) from problem
+    return found
 
 
 def _reference(robot: str, out: Path) -> str:
@@ -157,7 +167,7 @@ def _reference(robot: str, out: Path) -> str:
 def _scenario(source: str) -> tuple[type, dict[str, Any]]:
     load_scenario(source)
     path = scenario_file(source)
-    content = yaml.safe_load(path.read_text(encoding="utf-8"))
+    content = _read(source, input_text(path))
     moved = "robot" if "robot" in content else "mechanism"
     content[moved] = resolve_robot_path(path, str(content[moved]))
     for obstacle in (content.get("world") or {}).get("obstacles") or ():

@@ -45,6 +45,8 @@ def view(
         raise OutputFolderError(f"--html: found {html}; accepted: a file that ends in .html")
     if html is not None and not html.absolute().parent.is_dir():
         raise OutputFolderError(f"{html}: found no folder to write to; accepted: one that exists")
+    if html is not None and html.exists() and not _is_page(html):
+        raise OutputFolderError(f"{html}: found what cdpr view did not write; accepted: a new name")
     with named_options(LISTENING):
         meshcat = open_meshcat(host or LOCAL, port) if html is None else open_meshcat()
     with working(message_console(), f"Drawing {loaded.name}"):
@@ -65,3 +67,11 @@ def view(
             time.sleep(1.0)
     except KeyboardInterrupt:
         print()
+
+
+def _is_page(file: Path) -> bool:
+    """Whether a file is a page of Meshcat, which may be replaced."""
+    if not file.is_file():
+        return False
+    with file.open("rb") as content:
+        return b"MeshCat" in content.read(4096)

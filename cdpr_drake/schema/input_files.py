@@ -10,9 +10,11 @@ Files of the package count as its code, and are read where they are.
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import importlib.util
 import os
+import stat
 from collections.abc import Callable, Iterable
 from contextlib import ContextDecorator
 from contextvars import ContextVar, Token
@@ -140,6 +142,9 @@ class SentInputs(Generic[Job, Result]):
 def input_bytes(path: Path) -> bytes:
     """The content of a file; raises OSError."""
     held = _held.get()
+    if held is not None and held.knows(path):
+        return held.content(path)
+    file_size(path)
     return path.read_bytes() if held is None else held.content(path)
 
 
@@ -152,7 +157,15 @@ def input_size(path: Path) -> int:
     """Size of a file [byte]; raises OSError."""
     held = _held.get()
     known = held is not None and held.knows(path)
-    return len(input_bytes(path)) if known else path.stat().st_size
+    return len(input_bytes(path)) if known else file_size(path)
+
+
+def file_size(path: Path) -> int:
+    """Size of a file [byte]; OSError of what may never end, as a pipe or a device."""
+    state = path.stat()
+    if not (stat.S_ISREG(state.st_mode) or stat.S_ISDIR(state.st_mode)):
+        raise OSError(errno.EINVAL, "no regular file", str(path))
+    return state.st_size
 
 
 def input_there(path: Path) -> bool:

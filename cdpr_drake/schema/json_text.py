@@ -6,7 +6,11 @@ import json
 from collections.abc import Callable
 from typing import Any
 
-from cdpr_drake.schema.yaml_files import MOST_DEPTH, MOST_DIGITS
+MOST_DEPTH = 100
+"""Levels of brackets or indentation; PyYAML needs three calls for each."""
+
+MOST_DIGITS = 300
+"""Of a whole number; more have no place among floating-point numbers."""
 
 
 def load_json(

@@ -60,6 +60,13 @@ _TAG = "tag:yaml.org,2002:"
 _NULL_TAG = _TAG + "null"
 _BOOLEANS = yaml.SafeLoader.bool_values
 
+_SCALARS = frozenset(_TAG + name for name in ("str", "int", "float", "bool", "null", "timestamp",
+                                              "value", "merge"))  # fmt: skip
+"""What YAML takes plain words for; another tag was written there."""
+
+_CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff]")
+"""What controls a terminal and no figure can draw; ends of lines and tabs are text."""
+
 
 def closest(name: str, known: Iterable[str]) -> str:
     """Words that help after an unknown name: the likely one, then all that exist."""
@@ -366,6 +373,9 @@ class _Checker:
 
     def scalar(self, rule: FieldRule, node: yaml.Node, key: str) -> None:
         if not _convert(rule, node):
+            if rule.kind == "text" and _CONTROL.search(str(node.value)):
+                self.fail(node, key, f"found {show(node)}; accepted: no control characters")
+                return
             found = node.value if isinstance(node, yaml.ScalarNode) else ""
             hint = "".join(f"did you mean {name}? " for name in meant_names(found, rule.choices))
             self.fail(node, key, f"found {show(node)}; {hint}accepted: {rule.accepts(found)}")
@@ -374,9 +384,11 @@ class _Checker:
 def _convert(rule: FieldRule, node: yaml.Node) -> bool:
     """Makes a node say what was checked, however YAML would read it; False where it is not
     accepted."""
-    if not isinstance(node, yaml.ScalarNode) or not node.tag.startswith(_TAG):
+    if not isinstance(node, yaml.ScalarNode) or node.tag not in _SCALARS:
         return False
     if rule.kind == "text":
+        if _CONTROL.search(node.value):
+            return False
         if rule.choices and node.value not in rule.choices:
             return False
         if rule.pattern and not re.fullmatch(rule.pattern, node.value):

@@ -16,9 +16,11 @@ from threading import Lock
 from typing import Any
 
 import yaml
-from pydrake.common.yaml import yaml_load_typed
+from pydrake.common.yaml import yaml_dump_typed, yaml_load_typed
 
+from cdpr_drake.errors import CdprError
 from cdpr_drake.schema.input_files import input_size
+from cdpr_drake.schema.json_text import MOST_DEPTH, MOST_DIGITS
 
 FILE_KINDS: dict[str, tuple[frozenset[str], str]] = {
     "a robot": (frozenset({"platform", "winch", "tension_bounds"}), "cdpr_drake.models.load_robot"),
@@ -41,17 +43,11 @@ MOST_BYTES = 262_144
 MOST_NODES = 100_000
 """Keys and values of a file, those that an alias repeats counted again."""
 
-MOST_DEPTH = 100
-"""Levels of brackets or indentation; PyYAML needs three calls for each."""
-
-MOST_DIGITS = 300
-"""Of a whole number; more have no place among floating-point numbers."""
-
 SMALL, MOST = 20_000, 32
 """Letters of files that are kept, and how many of them."""
 
 
-class YamlTextError(ValueError):
+class YamlTextError(CdprError, ValueError):
     """Text that is not YAML, or more of it than is read; in words that follow a file's name."""
 
     def __init__(self, words: str, line: int | None = None) -> None:
@@ -94,7 +90,7 @@ def compose_yaml(content: str) -> yaml.Node | None:
 
     Raises:
         YamlTextError: It is none, is larger than `MOST_BYTES`, is nested deeper than `MOST_DEPTH`,
-            or has more than `MOST_NODES` keys and values.
+            has an alias within what it names, or more than `MOST_NODES` keys and values.
     """
     return _read(content, construct=False)
 
@@ -106,6 +102,12 @@ def load_yaml(content: str) -> Any:
         YamlTextError: As `compose_yaml`, or a value is not what its tag says.
     """
     return _read(content, construct=True)
+
+
+def plain_values(instance: Any) -> dict[str, Any]:
+    """What an instance of a schema says, as mappings, lists, words and numbers of one's own."""
+    found: dict[str, Any] = yaml.safe_load(yaml_dump_typed(instance))
+    return found
 
 
 def _read(content: str, construct: bool) -> Any:
@@ -174,12 +176,16 @@ def too_many_nodes(root: yaml.Node | None) -> str:
 def _size(node: yaml.Node, sizes: dict[int, int]) -> int:
     """Number of nodes below and with one; each is looked at once.
 
-    An anchor that contains itself counts as more than is accepted.
+    Raises:
+        YamlTextError: An alias stands within what it names.
     """
     known = sizes.get(id(node))
+    if known == 0:
+        words = "found an alias within what it names; accepted: aliases of what has ended"
+        raise YamlTextError(words, node.start_mark.line + 1)
     if known is not None:
         return known
-    sizes[id(node)] = MOST_NODES + 1  # until it is known, should it lie within itself
+    sizes[id(node)] = 0  # until it is known
     total = 1
     if isinstance(node, yaml.SequenceNode):
         total += sum(_size(child, sizes) for child in node.value)

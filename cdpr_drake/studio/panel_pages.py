@@ -53,7 +53,10 @@ class PanelPages:
         self._bench.ask()
 
     def _load(self) -> None:
-        """Imports what panels need; in the calculator's thread."""
+        """Imports and reads what panels need; in the calculator's thread."""
+        from cdpr_drake.systems.scenarios.files import robot_scenario_names
+
+        robot_scenario_names()  # read once, for the panels that offer them
         for panel in PANELS.values():
             with suppress(Exception):  # said in its place, when it is built
                 panel.load()

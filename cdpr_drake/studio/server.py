@@ -17,7 +17,7 @@ from cdpr_drake.errors import CdprError
 from cdpr_drake.models.robot_loader import robot_names
 from cdpr_drake.schema.yaml_files import load_yaml, too_many_bytes
 from cdpr_drake.studio.entrance import Entrance, is_token, token_words
-from cdpr_drake.studio.guard import EVERYWHERE, TOKEN, Guard
+from cdpr_drake.studio.guard import EVERYWHERE, SESSION, TOKEN, Guard, Receive, Scope, Send
 from cdpr_drake.studio.page import make_page
 from cdpr_drake.studio.scene_relay import add_scene_relay
 from cdpr_drake.studio.sessions import Sessions
@@ -103,7 +103,7 @@ def serve(options: StudioOptions) -> None:
 
     app.on_startup(lambda: background_tasks.create(announce(), name="announce"))
     app.on_shutdown(end)
-    _put_before_all(options.host, Entrance(token, port))
+    _put_before_all(options.host, Entrance(token, port), sessions)
     app.config.quasar_config["loadingBar"] = {"skipHijack": True}  # it has no name to be read aloud
     ui.run(
         make_page(sessions), host=host, port=port, title="cdpr studio", show=False, reload=False,
@@ -140,13 +140,26 @@ def _who_may(token: str) -> str:
     return "without a token: every program and user of this machine may open it"
 
 
-def _put_before_all(host: str, entrance: Entrance) -> None:
+def _put_before_all(host: str, entrance: Entrance, sessions: Sessions) -> None:
     """Puts the guard before the whole application, also before what keeps sessions in memory.
 
-    NiceGUI adds what it needs round everything that `add_middleware` was told before.
+    NiceGUI adds what it needs round everything that `add_middleware` was told before. Behind the
+    guard the workbench of a new session is made in another thread, as that reads a robot's file.
     """
     build = app.build_middleware_stack
-    app.build_middleware_stack = lambda: Guard(build(), host, entrance)  # type: ignore[method-assign]
+
+    def guarded() -> Guard:
+        inside = build()
+
+        async def prepared(scope: Scope, receive: Receive, send: Send) -> None:
+            session = scope.get(SESSION)
+            if session and sessions.bench_of(session) is None:
+                await asyncio.to_thread(sessions.prepare, session)
+            await inside(scope, receive, send)
+
+        return Guard(prepared, host, entrance)
+
+    app.build_middleware_stack = guarded  # type: ignore[method-assign]
 
 
 def _opened(name: str | None) -> tuple[str, str]:

@@ -18,18 +18,31 @@ class Sessions:
         """With what makes a new workbench."""
         self._make = make
         self._benches: OrderedDict[str, Workbench] = OrderedDict()
+        self._refused: dict[str, Exception] = {}
         self._pages: dict[str, int] = {}
 
     def bench_of(self, session: str) -> Workbench | None:
         """The workbench of a session, if there is one."""
         return self._benches.get(session)
 
+    def prepare(self, session: str) -> None:
+        """Makes the workbench of a session that has none; for a thread that may read files."""
+        if session not in self._benches:
+            try:
+                self._benches.setdefault(session, self._make())
+                self._refused.pop(session, None)
+            except Exception as problem:
+                self._refused[session] = problem
+
     def open_page(self, session: str) -> Workbench:
-        """The workbench for a page of a session, made if need be.
+        """The workbench for a page of a session, made if `prepare` has not.
 
         Raises:
             CdprError: It cannot be made.
         """
+        refused = self._refused.pop(session, None)
+        if refused is not None:
+            raise refused
         if session not in self._benches:
             self._benches[session] = self._make()
         self._benches.move_to_end(session)

@@ -20,6 +20,7 @@ from scipy.sparse.csgraph import connected_components
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import DataFileError, WorkspaceError
+from cdpr_drake.schema.yaml_files import load_yaml
 from cdpr_drake.workspaces.box_expansion_kernel import NUMBERS
 from cdpr_drake.workspaces.cuboid_cover import cover_cells
 from cdpr_drake.workspaces.cuboid_cover_kernel import overlapping_pairs
@@ -135,7 +136,8 @@ class PoseSets:
         if not path.is_file():
             raise DataFileError(f"{path}: there is no such file of proven sets")
         try:
-            about = dict(yaml.safe_load(path.read_text(encoding="utf-8"))[ABOUT])
+            told = path.read_text(encoding="utf-8").rpartition(f"\n{ABOUT}:")[2]  # at the end
+            about = dict(load_yaml(f"{ABOUT}:{told}")[ABOUT])
             axes = np.array([NUMBER_NAMES.index(name) for name in about.pop("axes")])
             others = about.pop("others_m_rad")
             found = LoadIrisRegionsYamlFile(path, REGIONS)
@@ -151,7 +153,7 @@ class PoseSets:
             upper[:, axes], lower[:, axes] = np.split(ends, [len(axes)], axis=1)
             lower[:, axes] *= -1.0
             return cls(lower, upper, axes, about)
-        except (RuntimeError, ValueError, KeyError, TypeError, yaml.YAMLError) as problem:
+        except (RuntimeError, ValueError, KeyError, TypeError) as problem:
             words = " ".join(str(problem).split())
             raise DataFileError(
                 f"{path}: found {words}; accepted: a file of proven sets, regions and about"

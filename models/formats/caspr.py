@@ -65,7 +65,11 @@ def caspr_models(path: Path) -> dict[str, tuple[Path, Path]]:
         RobotFileError: The file is no such list.
     """
     found = {}
-    for row in csv.reader(read_text(path).splitlines()):
+    try:
+        rows = list(csv.reader(read_text(path).splitlines()))
+    except csv.Error as problem:
+        raise RobotFileError(f"{path}: cannot be read as a table: {problem}") from problem
+    for row in rows:
         if len(row) >= 4 and row[2].endswith(".xml") and row[3].endswith(".xml"):
             folder = path.parent / row[1].strip().strip("/")
             found[row[0].strip()] = folder / row[2].strip(), folder / row[3].strip()

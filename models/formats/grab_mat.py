@@ -21,6 +21,7 @@ from cdpr_drake.errors import RobotFileError
 from cdpr_drake.models.formats.draft import DraftCable, RobotDraft
 from cdpr_drake.models.formats.grab import GRAVITY
 from cdpr_drake.models.formats.reading import fail, robot_name
+from cdpr_drake.schema.input_files import file_size
 
 TOOL = "GRAB MATLAB file"
 
@@ -52,6 +53,7 @@ def _robot(path: Path) -> Any:
     from scipy.io import loadmat
 
     try:
+        file_size(path)
         with path.open("rb") as file:
             if file.read(len(_MAGIC)) != _MAGIC:
                 return None

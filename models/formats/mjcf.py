@@ -24,6 +24,7 @@ from cdpr_drake.models.formats.mjcf_parts import (
     compiled_model,
     home_key,
     mark_used,
+    told_by_mujoco,
 )
 from cdpr_drake.models.formats.platform_motion import moved_by_joints, set_motion
 from cdpr_drake.models.formats.reading import fail, robot_name
@@ -48,6 +49,13 @@ def read_mjcf(path: Path) -> RobotDraft:
         RobotFileError: MuJoCo is not installed or cannot read the file, or its tendons do not
             hold one body.
     """
+    with told_by_mujoco() as warnings:
+        draft = _read(path)
+    draft.remarks += [f"MuJoCo warns: {words}" for words in warnings]
+    return draft
+
+
+def _read(path: Path) -> RobotDraft:
     compiled, document, missing = compiled_model(path)
     mujoco, model, data = compiled
     draft = RobotDraft(name=robot_name(path.stem), tool=TOOL, title=f"from {path.name}")

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -43,6 +45,27 @@ class Compiled(NamedTuple):
     mujoco: Any
     model: Any
     data: Any
+
+
+@contextmanager
+def told_by_mujoco() -> Iterator[list[str]]:
+    """What MuJoCo warns of meanwhile, each once.
+
+    It would write that on stderr, and into a file in the working folder.
+    """
+    try:
+        import mujoco
+    except ImportError:  # `compiled_model` says so
+        yield []
+        return
+    words: list[str] = []
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(words.append)
+    try:
+        yield words
+    finally:
+        mujoco.set_mju_user_warning(before)
+        words[:] = dict.fromkeys(" ".join(each.split()) for each in words)
 
 
 def compiled_model(path: Path) -> tuple[Compiled, ET.Element, list[str]]:

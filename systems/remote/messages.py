@@ -13,6 +13,7 @@ import numpy as np
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import BridgeError
+from cdpr_drake.schema.json_text import load_json
 
 PROTOCOL = 1
 """Version of the messages."""
@@ -83,11 +84,8 @@ def decode(payload: bytes) -> tuple[dict[str, Any], str]:
         raise BridgeError(f"message: found {len(payload)} bytes; accepted: at most {LARGEST}")
     codec = JSON if payload[:1] == b"{" else MSGPACK
     try:
-        if codec == JSON:
-            found = json.loads(payload, parse_constant=_no_number)
-        else:
-            found = _msgpack().unpack(payload)
-    except (ValueError, TypeError, RecursionError) as problem:
+        found = load_json(payload, _no_number) if codec == JSON else _msgpack().unpack(payload)
+    except (ValueError, TypeError) as problem:
         # Those of msgpack are ValueErrors, and so is UTF-8 that is none.
         words = shown(payload[:20])
         raise BridgeError(

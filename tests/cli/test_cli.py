@@ -286,6 +286,10 @@ def test_view_writes_a_page(capsys, tmp_path):
     assert code == 0
     assert out.strip() == "robot.html"
     assert (tmp_path / "robot.html").stat().st_size > 100_000
+    assert run(capsys, "view", "planar", "--html", "robot.html")[0] == 0
+    (tmp_path / "notes.html").write_text("years of work")
+    assert "did not write" in refuse(capsys, "view", "planar", "--html", "notes.html")
+    assert (tmp_path / "notes.html").read_text() == "years of work"
 
 
 def test_view_refuses(capsys):

@@ -2,14 +2,21 @@
 
 import os
 import shutil
+from pathlib import Path
 
+import cv2
 import pytest
 
 from cdpr_drake.analyses.front import simulation
 from cdpr_drake.analyses.reporting.written_files import DRAWING, others_in
 from cdpr_drake.cli import main
 from cdpr_drake.models.robot_loader import robot_file
+from cdpr_drake.schema.yaml_files import load_yaml
+from tests.cli.test_calibrate_camera import BOARD, LENS, K
+from tests.cli.test_identify import write
+from tests.identification.logs import log
 from tests.messages import printed
+from tests.vision.boards import board_image, board_poses, make_board
 
 COMMAND = [
     "simulate",
@@ -123,3 +130,48 @@ def test_a_plan_that_ends_while_its_figures_are_drawn_is_made_again(tmp_path, mo
     assert sorted(os.listdir(".")) == ["plan", "plan-before"]
     assert call(PLAN) == 2
     assert "--overwrite" in printed(capsys).err
+
+
+def fitted(folder):
+    """A command that identifies a robot in a log."""
+    write(folder / "log.csv", *log(span=2.0, tension=0.3, place=1e-4, angle=2e-4))
+    return ["identify", "acrobot_large", "log.csv", "--no-pulleys", "--out", "fit"]
+
+
+def seen(folder):
+    """A command that finds a camera in images of a board."""
+    board, names = make_board("charuco"), []
+    for k, pose in enumerate(board_poses(board, 6, 0.45, spread=0.35)):
+        names.append(f"{k}.png")
+        cv2.imwrite(str(folder / names[-1]), board_image(board, K, LENS, (640, 480), pose))
+    return ["calibrate-camera", *names, *BOARD, "--out", "fit"]
+
+
+def told(name):
+    """What a file of the fit says, but for how long it took, and which files there are."""
+    told = load_yaml(Path("fit", name).read_text())
+    return {key: told[key] for key in told.keys() - {"wall_time_s", "files"}}
+
+
+@pytest.mark.parametrize("asked", [fitted, seen])
+def test_a_fit_that_ends_while_its_figures_are_drawn_is_made_again(asked, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    words = asked(tmp_path)
+    with monkeypatch.context() as ending:
+        ending.setattr(
+            "cdpr_drake.analyses.visualization.figure_files.write_pictures",
+            lambda *_: (_ for _ in ()).throw(Ended),
+        )
+        with pytest.raises(Ended):
+            main(words)
+    there = sorted(os.listdir("fit"))
+    assert DRAWING in there  # and the numbers, which no figure can cost
+    numbers = {name: told(name) for name in there if name.endswith((".json", ".yaml"))}
+    assert len(numbers) == 3
+    assert call(words) == 0
+    made = os.listdir("fit")
+    assert any(name.endswith(".png") for name in made)
+    assert DRAWING not in made
+    assert {name: told(name) for name in numbers} == numbers
+    assert [name for name in os.listdir(".") if name.startswith("fit")] == ["fit"]
+    assert call(words) == 2  # what is complete is not touched

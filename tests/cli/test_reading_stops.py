@@ -1,5 +1,7 @@
 """Commands refuse in one line what would stop a reader, or the program."""
 
+import os
+
 import pytest
 
 from cdpr_drake.analyses.logs.log_request import LogRequest
@@ -72,3 +74,46 @@ def test_numbers_without_sense_are_refused_before_they_are_squared(tmp_path):
     file.write_text('{"platform": {"mass": 1e300}, "actuators": []}')
     with pytest.raises(RobotFileError):
         read_grab(file)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["plan", "acrobot_large", "--path", "long.csv"],
+        ["calibrate", "acrobot_small", "long.csv"],
+        ["import-log", "long.csv", "--log-format", "csv"],
+        ["import", "long.csv"],
+    ],
+    ids=["plan", "calibrate", "import-log", "import"],
+)
+def test_cells_that_are_too_long_are_a_line(words, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "long.csv").write_text("time_s,C1_length_m,x_m\n0,1," + "9" * 200_000 + "\n")
+    with pytest.raises(SystemExit) as end:
+        main(words)
+    out, err = printed(capsys)
+    assert end.value.code == 2
+    assert "Traceback" not in out + err
+    assert "long.csv" in err
+    assert len(err.strip().split("\n")) == 1
+
+
+@pytest.mark.parametrize("name", ["pipe.yaml", "pipe.csv", "pipe.urdf", "pipe.mat", "pipe"])
+@pytest.mark.parametrize("command", ["check", "import", "import-log", "tension", "simulate"])
+def test_pipes_are_not_waited_for(command, name, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    os.mkfifo(name)
+    with pytest.raises(SystemExit) as end:
+        main([command, name])
+    out, err = printed(capsys)
+    assert end.value.code == 2
+    assert name in out + err
+
+
+def test_devices_are_not_read_to_their_end(monkeypatch, capsys):
+    for words in (["check", "/dev/zero"], ["import-log", "/dev/zero"], ["calibrate", "planar",
+                  "/dev/zero"], ["import-log", "x", "--mapping", "/dev/zero"]):  # fmt: skip
+        with pytest.raises(SystemExit) as end:
+            main(words)
+        assert end.value.code == 2
+    assert "/dev/zero" in printed(capsys).err

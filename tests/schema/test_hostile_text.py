@@ -1,9 +1,12 @@
 """YAML and JSON that would stop a reader are refused by one kind of error, with its line."""
 
 import json
+import re
 
 import pytest
 
+from cdpr_drake.errors import RobotFileError, plain_words
+from cdpr_drake.models.robot_loader import load_robot, robot_file
 from cdpr_drake.schema.json_text import load_json
 from cdpr_drake.schema.yaml_files import MOST_DEPTH, YamlTextError, compose_yaml, load_yaml
 
@@ -18,13 +21,14 @@ LONG = "9" * 5000
     ("text", "words"),
     [
         (BOMB, "more than 100,000 keys and values"),
-        ("a: &a {<<: *a}", "more than|found undefined alias"),
-        ("a: &a [*a]", "more than"),
+        ("a: &a {<<: *a}", "^found an alias within what it names"),
+        ("a: &a [*a]", "^found an alias within what it names"),
+        ("&a\nb: 1\nc: {d: *a}", "^found an alias within what it names"),
         ("[" * 200 + "]" * 200, f"nested more than {MOST_DEPTH} deep"),
         ("- " * 200 + "1", f"nested more than {MOST_DEPTH} deep"),
         ("x" * 300_000, "found 300,000 bytes"),
     ],
-    ids=["bomb", "merged into itself", "holds itself", "brackets", "dashes", "long"],
+    ids=["bomb", "merged into itself", "holds itself", "top", "brackets", "dashes", "long"],
 )
 def test_yaml_that_grows_is_refused_before_it_does(text, words):
     for read in (compose_yaml, load_yaml):
@@ -76,3 +80,26 @@ def test_json_is_read_as_before():
     assert found == {"a": [1, 2.5, 1e300, None], "b": float("inf")}
     with pytest.raises(ValueError, match="Infinity"):
         load_json(text, lambda word: (_ for _ in ()).throw(ValueError("Infinity")))
+
+
+@pytest.mark.parametrize(
+    ("value", "words"),
+    [
+        (r'"\e[31mred"', "accepted: no control characters"),
+        (r'"\x9b2J"', "accepted: no control characters"),
+        (r'"a\0b"', "accepted: no control characters"),
+        ("!!python/object/apply:os.system x", "title: found"),
+        ("!!binary x", "title: found"),
+        ("!mine x", "title: found"),
+    ],
+)
+def test_texts_that_control_a_terminal_or_have_a_tag_are_refused(value, words, tmp_path):
+    text = robot_file("acrobot_small").read_text()
+    path = tmp_path / "robot.yaml"
+    path.write_text(re.sub("(?m)^title: .*$", lambda _: f"title: {value}", text))
+    with pytest.raises(RobotFileError, match=words) as caught:
+        load_robot(path)
+    assert plain_words(str(caught.value)).count("\n") == 0
+    good = 'title: "two\\nlines, caf\\u00e9"'
+    path.write_text(re.sub("(?m)^title: .*$", lambda _: good, text))
+    assert load_robot(path).title == "two\nlines, caf\u00e9"

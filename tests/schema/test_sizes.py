@@ -23,7 +23,7 @@ def bomb(levels=12, width=10):
     [
         (bomb(), "found more than 100,000 keys and values"),
         ("name: [" + "1, " * 700_000 + "1]", "found 2,100,009 bytes; accepted: at most 262,144"),
-        ("a: &a [*a]", "unknown|contains itself|does not parse|more than"),
+        ("a: &a [*a]", "found an alias within what it names"),
     ],
     ids=["bomb", "long", "itself"],
 )

@@ -1,14 +1,20 @@
 """What tests of the studio share."""
 
+import asyncio
 import gc
+import os
+import sys
 from contextlib import redirect_stdout
 from io import StringIO
+from pathlib import Path
 
 import pytest
 
 from cdpr_drake.analyses.front.logs import replay_log
 from cdpr_drake.cli.app import main
 from tests.studio.served import served
+
+ROOT = Path(__file__).parents[2]
 
 RUN_SETTINGS = ("camera.kind=projected", "duration=0.2")
 """Of a short run of acrobot_pbvs."""
@@ -58,3 +64,44 @@ def studio(tmp_path_factory):
     folder = tmp_path_factory.mktemp("work")
     with served(folder) as (address, _):
         yield folder, address
+
+
+READ_IN_LOOP: list[str] = []
+"""Files that the package read in the thread of an event loop, and from where."""
+
+
+HANDLERS = tuple(f"/studio/{name}" for name in ("panels/", "page", "panel_pages", "sessions"))
+"""What calls for reading in a page; a test may read what it likes."""
+
+
+def _watch(event, arguments):
+    if event != "open" or asyncio._get_running_loop() is None:
+        return
+    path, _, flags = arguments
+    if not isinstance(path, str | bytes) or (flags & (os.O_WRONLY | os.O_RDWR)):
+        return
+    name = os.fsdecode(path)
+    if (
+        name.endswith((".py", ".pyc", ".so"))
+        or "site-packages" in name
+        or name.startswith(sys.base_prefix)
+    ):  # modules, at their import
+        return
+    frame = sys._getframe(1)
+    while frame is not None and not frame.f_code.co_filename.startswith(str(ROOT)):
+        frame = frame.f_back
+    while frame is not None and "/tests/" not in frame.f_code.co_filename:
+        if any(part in frame.f_code.co_filename for part in HANDLERS):
+            READ_IN_LOOP.append(f"{name} in {frame.f_code.co_filename}:{frame.f_lineno}")
+            return
+        frame = frame.f_back
+
+
+sys.addaudithook(_watch)
+
+
+@pytest.fixture(autouse=True)
+def _no_file_is_read_in_the_event_loop():
+    del READ_IN_LOOP[:]
+    yield
+    assert sorted(set(READ_IN_LOOP)) == []

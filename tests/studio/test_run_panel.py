@@ -36,6 +36,7 @@ def acted(bench, act):
     async def session():
         async with user_simulation(root=lambda: run_panel(bench)) as user:
             await user.open("/")
+            await until(lambda: one(user, "field-duration"))
             await act(user)
 
     asyncio.run(session())

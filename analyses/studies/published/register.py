@@ -24,7 +24,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-import yaml
+from cdpr_drake.schema.yaml_files import load_yaml
 
 SOURCES = ("gazebo_thesis", "servoing_thesis", "ours")
 """Files, in the order of a report."""
@@ -154,6 +154,6 @@ def published_registers() -> tuple[Register, ...]:
     """The registers of all sources, in the order of a report."""
     folder = Path(__file__).parent
     return tuple(
-        read_register(name, yaml.safe_load((folder / f"{name}.yaml").read_text(encoding="utf-8")))
+        read_register(name, load_yaml((folder / f"{name}.yaml").read_text(encoding="utf-8")))
         for name in SOURCES
     )

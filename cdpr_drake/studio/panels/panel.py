@@ -6,12 +6,13 @@ Errors are messages, too: whatever a handler raises, the server stays alive, see
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Awaitable, Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import import_module
+from inspect import iscoroutinefunction
 
-from nicegui import ui
+from nicegui import background_tasks, ui
 
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models.robot_loader import robot_names
@@ -87,9 +88,24 @@ def _fingerprint(words: str, subject: Subject) -> str:
     return f"{words}: {subject.robot}, {subject.fingerprint}" if subject.digest else ""
 
 
-def on_page(signal: Signal, listener: Callable[[], None]) -> None:
-    """Calls a listener of the page that is being built, until that is closed for good."""
-    ui.context.client.on_delete(signal.connect(listener))
+def on_page(signal: Signal, listener: Callable[[], Awaitable[None] | None]) -> None:
+    """Calls a listener of the page that is being built, until that is closed for good.
+
+    One that waits for something is called soon.
+    """
+    client = ui.context.client
+
+    async def later() -> None:
+        with client:
+            await listener()  # type: ignore[misc]
+
+    def call() -> None:
+        if iscoroutinefunction(listener):
+            background_tasks.create(later(), name="listener")
+        else:
+            listener()
+
+    client.on_delete(signal.connect(call))
 
 
 def robot_argument(bench: Workbench) -> str:

@@ -23,7 +23,7 @@ from cdpr_drake.studio.panels.run_watch import RUN_STYLE, RunWatch
 from cdpr_drake.studio.panels.scenario_form import ScenarioForm
 from cdpr_drake.studio.workbench.finished_run import zipped
 from cdpr_drake.studio.workbench.job import JobState
-from cdpr_drake.studio.workbench.result_subject import subject_of
+from cdpr_drake.studio.workbench.result_subject import Subject, subject_of
 from cdpr_drake.studio.workbench.run_board import RunBoard, RunEntry
 from cdpr_drake.studio.workbench.run_job import RunJob
 from cdpr_drake.studio.workbench.scenario_draft import ROBOT
@@ -129,6 +129,7 @@ class RunPanel:
         self._bench, self._board, self._scene = bench, board, scene
         self._form: ScenarioForm | None = None
         self._key = self._other = ""
+        self._shipped: frozenset[str] = frozenset()
         self._refused: CdprError | None = None
         self._names: dict[str, str] = {}
         self._told: dict[str, str] = {}
@@ -138,21 +139,17 @@ class RunPanel:
             self._place_watch()
         with ui.expansion("Fields of the scenario", value=True).classes("w-full"):
             self._body = ui.element("div")
-        self._choose_scenario(self._scenario.value)
-        on_page(bench.robot.changed, self._take_robot)
+        ui.timer(0.0, self._begin, once=True)
+        on_page(bench.robot.changed, self._robot_changed)
         ui.timer(TICK, self._tick)
         ui.timer(SLOW_TICK, self._slow_tick)
         ui.context.client.on_delete(self._watch.forget)
 
     def _place_start(self) -> None:
-        options = self._scenarios()
-        wanted = self._chosen(options) or DEFAULT_SCENARIO
-        if self._board.draft is not None and self._shown_name() in options:
-            wanted = self._shown_name()
         with ui.row().classes("w-full items-center no-wrap"):
-            self._scenario = ui.select(options, value=wanted, label="scenario", with_input=True)
+            self._scenario = ui.select([], label="scenario", with_input=True)
             self._scenario.props("dense outlined").classes("col").mark("scenario")
-            self._scenario.on_value_change(lambda: self._choose_scenario(self._scenario.value))
+            self._scenario.on_value_change(self._choose_scenario)
             self._paused = ui.checkbox("paused").mark("paused")
             self._paused.props('title="Stands at the start"')
             self._by_hand = ui.checkbox("by hand").mark("by-hand")
@@ -187,9 +184,17 @@ class RunPanel:
             self._download.props('no-caps outline title="All files of the run"').mark("download")
         self._download.visible = False
 
-    def _scenarios(self) -> list[str]:
-        files = self._bench.folder.files((".yaml", ".yml"))
-        return [*robot_scenario_names(), *files]
+    async def _begin(self) -> None:
+        """Offers scenarios, which are read in another thread, as all files here are."""
+        shipped = await run.io_bound(robot_scenario_names)
+        if shipped is None:  # the server is ending
+            return
+        self._shipped = frozenset(shipped)
+        options = [*shipped, *self._bench.folder.files((".yaml", ".yml"))]
+        wanted = self._chosen(options) or DEFAULT_SCENARIO
+        if self._board.draft is not None and self._shown_name() in options:
+            wanted = self._shown_name()
+        self._scenario.set_options(options, value=wanted)
 
     def _shown_name(self) -> str:
         """The draft's scenario as the list has it."""
@@ -207,29 +212,37 @@ class RunPanel:
         file = self._bench.folder.shown(Path(name).resolve()) if name else ""
         return file if file in options else ""
 
-    def _choose_scenario(self, name: str | None) -> None:
+    async def _choose_scenario(self) -> None:
         """Shows the form of another scenario."""
+        name = self._scenario.value
         if not name:
             return
         self._body.clear()
         self._form = None
         with self._body, show_errors():
-            known = name in robot_scenario_names()
-            draft = self._board.choose(name if known else str(self._bench.folder.path(name)))
+            file = name if name in self._shipped else str(self._bench.folder.path(name))
+            draft = await run.io_bound(self._board.choose, file)
+            if draft is None or name != self._scenario.value:  # another was chosen meanwhile
+                return
             self._form = ScenarioForm(draft)
-            self._take_robot()
+            await self._take_robot()
 
-    def _take_robot(self) -> None:
+    async def _robot_changed(self) -> None:
+        with show_errors():
+            await self._take_robot()
+
+    async def _take_robot(self) -> None:
         """Lets the next run be of the robot that is open, and says so."""
-        draft, now = self._board.draft, self._bench.subject
+        draft = self._board.draft
         if draft is None:
             return
-        own, self._refused = draft.own_robot, None
-        with suppress(CdprError, OSError):  # a robot that cannot be read is another one
-            if not subject_of(load_robot(own)).is_another(now):
-                draft.change(ROBOT, own)
-                self._say_robot(f"Runs {now.robot}, the robot that is open.")
-                return
+        own = draft.own_robot
+        own_subject = await run.io_bound(_subject_named, own)
+        now, self._refused = self._bench.subject, None
+        if own_subject is not None and not own_subject.is_another(now):
+            draft.change(ROBOT, own)
+            self._say_robot(f"Runs {now.robot}, the robot that is open.")
+            return
         words = f"Runs {now.robot}, the robot that is open, in the place of the scenario's {own}."
         try:
             draft.change(ROBOT, robot_argument(self._bench))
@@ -254,7 +267,7 @@ class RunPanel:
         if self._form is None or not await self._form.check():
             return
         with show_errors():
-            self._take_robot()
+            await self._take_robot()
             if self._refused is not None:
                 raise self._refused
             paused, by_hand = bool(self._paused.value), bool(self._by_hand.value)
@@ -374,6 +387,13 @@ def _left_log(job: RunJob) -> bool:
         return False
     hidden = folder.parent.glob(f".{folder.name}-work-*/log.parts")
     return any(hidden) or (folder.with_name(f"{folder.name}-unfinished")).is_dir()
+
+
+def _subject_named(robot: str) -> Subject | None:
+    """What a robot is to results, by its name or file; None: it cannot be read."""
+    with suppress(CdprError, OSError):
+        return subject_of(load_robot(robot))
+    return None
 
 
 def _packed(folder: Path) -> bytes:

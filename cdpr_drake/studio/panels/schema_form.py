@@ -6,12 +6,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import yaml
 from nicegui import ui
 
 from cdpr_drake.errors import CdprError
 from cdpr_drake.schema.fields import FieldRule
 from cdpr_drake.schema.typed_yaml import rules_of
+from cdpr_drake.schema.yaml_files import load_yaml
 from cdpr_drake.studio.panels.field_words import (
     axis_names,
     field_words,
@@ -175,7 +175,7 @@ class SchemaForm:
         if cell.index is None:
             return with_value(text, place, typed_value(rule, str(typed or "")), cell.order)
         value: Any = typed_value(_NUMBER, str(typed or ""))
-        if has(yaml.safe_load(text), (*place, cell.index)):
+        if has(load_yaml(text), (*place, cell.index)):
             return with_value(text, (*place, cell.index), value)
         whole = [float(item) for item in value_at(self._document.value, place)]
         return with_value(
@@ -188,7 +188,7 @@ class SchemaForm:
             self._document.change(edit(self._document.text))
         except CdprError as problem:
             return "\n".join(self._document.words(problem))
-        except (yaml.YAMLError, ValueError, RecursionError) as problem:
+        except ValueError as problem:
             return " ".join(str(problem).split())[:400]
         return ""
 

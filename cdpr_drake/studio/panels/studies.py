@@ -202,15 +202,32 @@ def _place_study(study: StudyFolder) -> None:
 
 def _place_figure(path: Path, style: str) -> None:
     """A figure as an image in the page; nothing in it is run, whatever it is."""
+    place = ui.element("div").classes("w-full")
+
+    async def fill() -> None:
+        with place, show_errors():
+            data = await run.io_bound(_figure_data, path)
+            if data is None:  # the server is ending
+                return
+            if not data:
+                words = f"{path.name}: too large to be shown; it is in {path.parent.name}"
+                notify(words, "warning")
+                return
+            kind = TYPES[path.suffix.lower()]
+            words = escape(path.stem.replace("_", " "), quote=True)
+            ui.html(
+                f'<img src="data:{kind};base64,{data}" alt="{words}" style="{style}">',
+                sanitize=False,
+            )
+
+    ui.timer(0.0, fill, once=True)
+
+
+def _figure_data(path: Path) -> str:
+    """A file as text of base 64; empty: it is too large."""
     if path.stat().st_size > LARGEST_FIGURE:
-        notify(f"{path.name}: too large to be shown; it is in {path.parent.name}", "warning")
-        return
-    data = base64.b64encode(path.read_bytes()).decode("ascii")
-    kind = TYPES[path.suffix.lower()]
-    words = escape(path.stem.replace("_", " "), quote=True)
-    ui.html(
-        f'<img src="data:{kind};base64,{data}" alt="{words}" style="{style}">', sanitize=False
-    ).classes("w-full")
+        return ""
+    return base64.b64encode(path.read_bytes()).decode("ascii")
 
 
 def _statements_html(study: StudyFolder) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
@@ -16,6 +17,7 @@ from cdpr_drake.studio.workbench.command_job import CommandJob
 from cdpr_drake.studio.workbench.job_manager import JobManager
 
 MOST_FOLDERS = 200
+MOST_TOLD = 4 * MOST_FOLDERS
 """Results folders that are offered, the newest ones."""
 
 ASKED = ".asked.json"
@@ -194,10 +196,36 @@ class CommandBoard:
 
 
 def _told(path: Path) -> Any:
-    """What a file of JSON beside a folder says; None: nothing that can be read."""
+    """What a file of JSON beside a folder says; None: nothing that can be read.
+
+    In an event loop it is read by another thread: there it is None until that is done, and a page
+    asks again soon.
+    """
     try:
-        if path.is_symlink() or path.stat().st_size > LARGEST_ASKED:
-            return None
-        return load_json(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError):
+        state = path.lstat()
+    except OSError:
         return None
+    key = (path, state.st_mtime_ns, state.st_size)
+    if key not in _TOLD:
+        with suppress(RuntimeError):  # there is no loop here
+            loop = asyncio.get_running_loop()
+            _TOLD[key] = None
+            loop.run_in_executor(None, _read, key)
+            return None
+        _read(key)
+    return _TOLD.get(key)
+
+
+def _read(key: tuple[Path, int, int]) -> None:
+    path, _, size = key
+    told = None
+    with suppress(OSError, ValueError):
+        if not path.is_symlink() and size <= LARGEST_ASKED:
+            told = load_json(path.read_text(encoding="utf-8"))
+    if len(_TOLD) > MOST_TOLD:
+        _TOLD.pop(next(iter(_TOLD)))
+    _TOLD[key] = told
+
+
+_TOLD: dict[tuple[Path, int, int], Any] = {}
+"""What files say by their path and state."""

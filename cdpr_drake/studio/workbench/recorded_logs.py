@@ -143,7 +143,7 @@ def read_comparison(folder: Path) -> Comparison:
         cells = [[float(cell) if cell else np.nan for cell in lines[k]] for k in kept]
         table = dict(zip(heads, np.array(cells).T, strict=True))
         return _compared(summary, table)
-    except (OSError, ValueError, KeyError, IndexError) as problem:
+    except (OSError, ValueError, KeyError, IndexError, csv.Error) as problem:
         raise OutputFolderError(f"{folder.name}: cannot be read: {problem}") from problem
 
 

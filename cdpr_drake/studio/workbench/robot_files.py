@@ -13,8 +13,6 @@ from tempfile import TemporaryDirectory
 from typing import Any
 from xml.etree import ElementTree
 
-import yaml
-
 from cdpr_drake.errors import CdprError, RobotFileError
 from cdpr_drake.models.formats.file_kinds import SUFFIXES as ROBOT_SUFFIXES
 from cdpr_drake.models.formats.file_kinds import is_foreign
@@ -22,6 +20,7 @@ from cdpr_drake.models.robot_exchange import export_robot, import_robot
 from cdpr_drake.models.robot_exports import EXPORTS, export_omissions, omission_words
 from cdpr_drake.models.robot_loader import parse_robot, robot_file, robot_names, robot_text
 from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.schema.yaml_files import load_yaml
 from cdpr_drake.studio.workbench.working_folder import WorkingFolder
 
 LARGEST_TEXT = 262_144
@@ -78,8 +77,8 @@ class RobotFiles:
 
     def _check_mesh(self, text: str, path: Path) -> None:
         try:
-            found: Any = yaml.safe_load(text)
-        except (yaml.YAMLError, ValueError, RecursionError):
+            found: Any = load_yaml(text)
+        except ValueError:
             return  # the reader of robots says what is wrong
         for key in ("platform", "shape", "file"):
             found = found.get(key) if isinstance(found, dict) else None

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 import yaml
-from pydrake.common.yaml import yaml_dump_typed
 
 import cdpr_drake
 from cdpr_drake.analyses.simulation.by_hand import UNTOUCHED
@@ -20,6 +19,7 @@ from cdpr_drake.analyses.simulation.live_control import check_steered
 from cdpr_drake.errors import CdprError, DataFileError, ScenarioError
 from cdpr_drake.schema.fields import FieldRule
 from cdpr_drake.schema.typed_yaml import rules_of
+from cdpr_drake.schema.yaml_files import plain_values
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.scenarios.files import check_moves_robot
 
@@ -100,7 +100,7 @@ class ScenarioDraft:
         check_moves_robot(name, "the studio")
         scenario = load_scenario(name)
         check_files(scenario, self._folder)
-        self.form = _section(type(scenario), yaml.safe_load(yaml_dump_typed(scenario)), "", "")
+        self.form = _section(type(scenario), plain_values(scenario), "", "")
         self._fields = {field.key: field for field in self.form.all_fields()}
         self.changes: dict[str, str] = {}
 

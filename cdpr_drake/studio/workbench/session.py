@@ -102,6 +102,9 @@ class Workbench:
         )
         self._saved: dict[Path, str] = {}
         self._assumed: dict[Path, list[str]] = {}
+        self._shipped: dict[Path, str] = {}
+        if robot in robot_names() or Path(robot).is_file():  # not with rails that the name moves
+            self._keep_shipped(where, self.robot.text)
         is_own = where.is_relative_to(folder.root) and where.is_file() and not is_foreign(where)
         if is_own:  # with rails that the name moves, the text is not that of the file
             self._saved[where] = where.read_text(encoding="utf-8")
@@ -182,8 +185,13 @@ class Workbench:
         """By which commands know the robot as it is, in the folder; empty: they do not."""
         name = self.robot.value.name
         if name in robot_names() and self.robot.path == robot_file(name).resolve():
-            return name if self.robot.text == robot_text(name) else ""
+            return name if self.robot.text == self._shipped.get(self.robot.path) else ""
         return self.file if self.is_saved else ""
+
+    def _keep_shipped(self, path: Path, text: str) -> None:
+        """Remembers what a file of the package says, where it is one."""
+        if any(path == robot_file(name).resolve() for name in robot_names()):
+            self._shipped[path] = text
 
     def open(self, name: str) -> OpenedRobot:
         """Works with a robot of the package, or with a file of the folder.
@@ -195,6 +203,7 @@ class Workbench:
 
     def take_opened(self, opened: OpenedRobot) -> OpenedRobot:
         """Works with what `files.open` has read, which another thread may do."""
+        self._keep_shipped(opened.path, opened.text)
         own = opened.path.is_relative_to(self.folder.root) and opened.path.is_file()
         if own and not opened.notes:
             self._saved[opened.path] = opened.text

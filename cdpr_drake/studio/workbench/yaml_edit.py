@@ -12,6 +12,8 @@ from typing import Any
 
 import yaml
 
+from cdpr_drake.schema.yaml_files import YamlTextError, compose_yaml, load_yaml
+
 Path = Sequence[str | int]
 """Keys and numbers of items, from the top."""
 
@@ -27,7 +29,7 @@ def with_value(text: str, path: Path, value: Any, order: Sequence[str] = ()) -> 
         value: Numbers, texts, switches, None, and lists and mappings of them.
         order: Keys of the mapping in their usual order, for one that is added.
     """
-    data = yaml.safe_load(text)
+    data = load_yaml(text)
     for depth in range(1, len(path)):
         if not has(data, path[:depth]) or _at(data, path[:depth]) is None:
             for key in reversed(path[depth:]):
@@ -41,7 +43,7 @@ def with_value(text: str, path: Path, value: Any, order: Sequence[str] = ()) -> 
 
 def with_item(text: str, path: Path, value: Any) -> str:
     """The text with one more item at the end of the list at a path, made if it is not there."""
-    data = yaml.safe_load(text)
+    data = load_yaml(text)
     parent = _at(data, path[:-1])
     found = parent.get(path[-1]) if isinstance(parent, dict) else parent[path[-1]]
     if not found:
@@ -52,7 +54,7 @@ def with_item(text: str, path: Path, value: Any) -> str:
 
 def without_item(text: str, path: Path) -> str:
     """The text without the item of a list at a path."""
-    data = yaml.safe_load(text)
+    data = load_yaml(text)
     del _at(data, path[:-1])[path[-1]]
     return _checked(_remove(text, path), text, data)
 
@@ -83,7 +85,7 @@ def _float_words(value: float) -> str:
 
 def _text_words(words: str) -> str:
     plain = words.isascii() and words.replace("_", "").replace("-", "").isalnum()
-    if plain and words[0].isalpha() and yaml.safe_load(words) == words:
+    if plain and words[0].isalpha() and load_yaml(words) == words:
         return words
     return json.dumps(words, ensure_ascii=False)
 
@@ -106,9 +108,9 @@ def _at(data: Any, path: Path) -> Any:
 def _checked(new: str | None, text: str, wanted: Any) -> str:
     """The edited text if it means what is wanted, else all of it written anew."""
     try:
-        if new is not None and _same(yaml.safe_load(new), wanted):
+        if new is not None and _same(load_yaml(new), wanted):
             return new
-    except yaml.YAMLError:
+    except YamlTextError:
         pass
     return yaml.safe_dump(
         wanted, sort_keys=False, allow_unicode=True, default_flow_style=None, width=100
@@ -172,7 +174,7 @@ def _line_end(text: str, index: int) -> int:
 
 
 def _put(text: str, path: Path, value: Any, order: Sequence[str]) -> str | None:
-    root = yaml.compose(text, Loader=yaml.SafeLoader)
+    root = compose_yaml(text)
     node, parent = _node(root, path), _node(root, path[:-1])
     if node is not None:
         start, end = node.start_mark.index, _content_end(node)
@@ -201,7 +203,7 @@ def _put(text: str, path: Path, value: Any, order: Sequence[str]) -> str | None:
 
 
 def _append(text: str, path: Path, value: Any) -> str | None:
-    node = _node(yaml.compose(text, Loader=yaml.SafeLoader), path)
+    node = _node(compose_yaml(text), path)
     if not isinstance(node, yaml.SequenceNode):
         return None
     if _is_flow(node):
@@ -212,7 +214,7 @@ def _append(text: str, path: Path, value: Any) -> str | None:
 
 
 def _remove(text: str, path: Path) -> str | None:
-    parent = _node(yaml.compose(text, Loader=yaml.SafeLoader), path[:-1])
+    parent = _node(compose_yaml(text), path[:-1])
     if not isinstance(parent, yaml.SequenceNode) or _is_flow(parent) or len(parent.value) < 2:
         return None
     number = path[-1]

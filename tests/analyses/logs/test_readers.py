@@ -305,3 +305,11 @@ def test_a_run_s_own_log_is_read(tmp_path):
     assert log.columns["C2_length_m"].tolist() == [1.15, 1.16]
     assert "lengths.C2_m" not in log.columns
     assert any(remark.endswith(": lengths.C1_m, lengths.C2_m") for remark in log.remarks)
+
+
+@pytest.mark.parametrize("number", ["1e300", "-1e31", "inf", "1e999999", "9" * 5000])
+def test_numbers_that_have_no_square_are_refused(number, write):
+    text = recorders.columns().replace("2000.250", number, 1)
+    assert number in text
+    with pytest.raises(LogFileError, match=r"log.csv:2: column 3: found .*accepted: a number up"):
+        import_log(write("log.csv", text))

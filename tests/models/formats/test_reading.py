@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
+import re
+
 import numpy as np
 import pytest
 from pydrake.math import RigidTransform, RollPitchYaw
@@ -289,3 +292,15 @@ def test_an_import_says_what_it_assumed(tmp_path):
     again = models.load_robot(str(own))
     np.testing.assert_array_equal(again.cable_set().p_WA, imported.robot.cable_set().p_WA)
     assert again.assumptions == imported.robot.assumptions
+
+
+def test_what_mujoco_warns_of_is_said_and_no_file_is_left(tmp_path, monkeypatch, capfd):
+    monkeypatch.chdir(tmp_path)
+    text = next(iter(models.export_robot("acrobot_small", "mjcf").values()))
+    file = tmp_path / "bad.xml"
+    file.write_text(re.sub(r'springlength="0(\.0)? [^"]*"', 'springlength="0 nan"', text, count=1))
+    assert "nan" in file.read_text()
+    with contextlib.suppress(RobotFileError):
+        assert any("NaN" in words for words in models.import_robot(file).completed.remarks)
+    assert [path.name for path in tmp_path.iterdir()] == ["bad.xml"]
+    assert capfd.readouterr().err == ""
