@@ -1,9 +1,9 @@
 """Laws by which a platform answers forces: impedance, admittance, position beside force.
 
 All give a wrench F_P_W about Po that the cables shall put on the platform, which any tension
-method distributes. M is the platform's inertia, b the terms of velocity less the weight, e the
-error of its pose and V_D - V that of its velocity, as in `task_space.computed_torque`; w is what
-pushes it. Axes are those of a task frame T that rests in W.
+method distributes. M is the platform's inertia, b the terms of velocity and damping less the
+weight, e the error of its pose and V_D - V that of its velocity, as in
+`task_space.computed_torque`; w is what pushes it. Axes are those of a task frame T that rests in W.
 
 * **Impedance.** F = M A_D + b + D (V_D - V) + K e, so that M e'' + D e' + K e = -w: the inertia is
   the platform's own, and nothing is measured. Of a mass m on a line: omega = sqrt(K / m), and the

@@ -37,7 +37,12 @@ ROUNDING = 1e-9
 """Limits that are missed by less, relative to them, are kept."""
 
 MOST_SLOWER = 20
-"""Times that a motion is slowed down until samples keep the limits of the winches."""
+"""Times that a motion is slowed down until samples keep the limits of winches, and of tensions
+against damping."""
+
+LEAST_SLOWER = 1.1
+"""Factor by which a damped platform is slowed down at least each time: most of what its tensions
+use of their limits is not due to speed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,11 +217,12 @@ def time_within_box(
         most = float(np.max(plan.samples().uses))
         if most <= 1.0 + ROUNDING:
             break
-        motion, over, slowed = _slower(motion, most**2), over * most**2, slowed * most
+        by = max(most, LEAST_SLOWER) if task.dynamics.is_damped else most
+        motion, over, slowed = _slower(motion, by**2), over * by**2, slowed * by
     else:
         raise PlanningError(
-            f"path: the winches' limits are missed, by {most - 1.0:.3g} of them, at any speed; "
-            "accepted: a path along which the motors hold the platform"
+            f"path: limits of cables and winches are missed, by {most - 1.0:.3g} of them, at any "
+            "speed; accepted: a path along which the motors hold the platform"
         )
     if moments is None:
         bounds = _with_bounds(motion)

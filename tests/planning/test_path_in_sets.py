@@ -1,5 +1,7 @@
 """Paths in sets: shortest by hand, inside at every instant, timed within a box of accelerations."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -167,6 +169,19 @@ def test_a_straight_line_takes_the_time_of_full_thrust(task):
     found = proven_motion(wall_sets(), START, goal, task, 0.1)
     assert found.plan.duration == pytest.approx(2.0 * np.sqrt(0.3 / 0.5), rel=1e-3)
     assert found.time_bound() == pytest.approx(2.0 * np.sqrt(0.3 / 0.5), rel=1e-9)
+
+
+def test_against_damping_tensions_are_kept_at_samples(task):
+    """The box holds no damping: with it the motion in the box asks for too much, and is slowed."""
+    loose = replace(task, limits=replace(task.limits, lower=1.0, upper=60.0))
+    damped = replace(loose, dynamics=replace(loose.dynamics, damping=(60.0, 0.0)))
+    path = proven_path(wall_sets(), START, GOAL, 0.1).path
+    found = time_within_box(damped, path, BOX)
+    in_box = time_within_box(loose, path, BOX)
+    assert found.slowed > 1.05
+    assert found.plan.duration == pytest.approx(found.slowed / in_box.slowed * in_box.plan.duration)
+    assert np.max(found.plan.samples().uses) <= 1.0 + ROUNDING
+    assert np.max(replace(in_box.plan, task=damped).samples().uses) > 1.05
 
 
 def test_control_points_bound_a_polynomial():
