@@ -26,8 +26,8 @@ SETTLED = 1e-3
 more than one."""
 
 BOUNDED, BOUNDED_SQUARE = 1.5, 0.7784
-"""Residuals count as no more than so many sigmas where the error of poses is estimated, and the mean
-square that normal ones then have: as usual for proposal 2, which bears a third of outliers."""
+"""Residuals count as no more than so many sigmas where the error of poses is estimated, and the
+mean square that normal ones then have: as usual for proposal 2, which bears a third of outliers."""
 
 LEAST_OFF, MOST_OFF, OFF_WITHIN = 1e-7, 1.0, 0.05
 """Errors of poses that are looked for [m], and how exactly, as a share of them."""
@@ -75,8 +75,8 @@ class MotionTerm:
     estimate on that error. So poses are also off by `off` in each coordinate, and by `off` over
     `size` about each axis, independently at each sample, which adds G_0 D^2 G_0' with the part G_0
     of G that goes with the poses themselves. `off` is the variance component with which residuals
-    are as large as weights say, each of them bounded (Huber's proposal 2): poses that are lost for a
-    while do not pass for an error of all.
+    are as large as weights say, each of them bounded (Huber's proposal 2): poses that are lost for
+    a while do not pass for an error of all.
 
     Source: Fuller, Measurement error models, 1987, chapter 3; Boggs, Byrd, Schnabel, A stable and
     efficient algorithm for nonlinear orthogonal distance regression, 1987; Paule, Mandel, Consensus

@@ -42,7 +42,8 @@ WINDOW_SHARES = {CHESSBOARD: (0.3,), CHARUCO: (0.3,), TAGS: (1.0 / 16.0,)}
 """The same per distance of neighbouring corners, one refinement after the other. What is around a
 corner of a chessboard is the same when turned by half a turn, and so are the errors that blur
 makes, which cancel. Corners of a ChArUco board are first found among the dark rims of its markers,
-then in the white between corner and markers. The window keeps to half a cell of a tag, which has eight."""
+then in the white between corner and markers. The window keeps to half a cell of a tag, which has
+eight."""
 
 SHARPEST, BLURRED = 3, (5, 53, 12)
 """How much darker than its surroundings a marker is, of 255, and the least, largest and step of

@@ -5,9 +5,10 @@ was found, says what it is worth beyond the images that it was fitted to. Images
 than the others are named and, unless they shall stay, left out of a second fit.
 
 Standard deviations are those of linear least squares at the solution, with the noise that the
-residuals have: what a lens model cannot show is not in them. Blur and the search for corners draw all
-corners of tags inwards by as much: that growth is a parameter of the fit, and is taken out. What is
-left of one tag's corners goes together: their residuals are added up before squares.
+residuals have: what a lens model cannot show is not in them. Blur and the search for corners draw
+all corners of tags inwards by as much: that growth is a parameter of the fit, and is taken out.
+What is left of one tag's corners goes together: their residuals are added up before squares, each
+tag's over what a fit leaves of its errors.
 
 Source: Zhang, IEEE TPAMI 22(11), 2000; OpenCV, modules calib3d and fisheye; Liang, Zeger,
 Longitudinal data analysis using generalized linear models, 1986, for corners that go together.
@@ -49,6 +50,9 @@ this share of its image is; and how often the rest is fitted again."""
 
 GROWTHS = 3
 """How often tags are fitted, each time with the growth that the time before has shown."""
+
+NOTHING = 1e-9
+"""Share of an error that a fit leaves, from which on it leaves none."""
 
 LEAST_TILT = 12.0
 """Angle between two boards of a fit, at least [deg]: of parallel ones the distance and the focal
@@ -246,7 +250,7 @@ def fit_camera(
 
 
 class _Fit(NamedTuple):
-    """What OpenCV found: parameters, their standard deviations, how views fit, growth of tags [px]."""
+    """What OpenCV found: parameters, deviations, how views fit, and how much tags grew [px]."""
 
     model: str
     values: Array
@@ -360,8 +364,12 @@ def _linear_fit(
     """How parameters change in linear least squares, poses of boards left free, and deviations.
 
     Deviations are as those of `cv2.calibrateCameraExtended`, which OpenCV does not give of a
-    fisheye. Where corners go together their gradients g are summed first, and the covariance is
-    N^-1 sum(g g') N^-1.
+    fisheye. Where corners go together, with the rows F of N = F'F and residuals r of a tag, the
+    covariance is N^-1 sum(g g') N^-1 with g = F' (I - H)^(-1/2) r: of independent errors r has the
+    share I - H, H the tag's part of the hat matrix.
+
+    Source: Bell, McCaffrey, Bias reduction in standard errors for linear regression with
+    multi-stage samples, 2002.
     """
     size = J[0].shape[1]
     free = [
@@ -378,9 +386,13 @@ def _linear_fit(
             F = mine.reshape(-1, 2 * group, size)
             Q = np.linalg.qr(pose)[0].reshape(-1, 2 * group, 6)
             rest = np.eye(2 * group) - Q @ Q.transpose(0, 2, 1) - F @ back @ F.transpose(0, 2, 1)
-            size_, way = np.linalg.eigh(rest)
-            alone = way.transpose(0, 2, 1) @ one.reshape(-1, 2 * group, 1)
-            g = (F.transpose(0, 2, 1) @ way @ (alone / np.sqrt(size_[..., np.newaxis])))[..., 0]
+            shares, V = np.linalg.eigh(rest)
+            parts = V.transpose(0, 2, 1) @ one.reshape(-1, 2 * group, 1)
+            g = (
+                F.transpose(0, 2, 1)
+                @ V
+                @ (parts / np.sqrt(np.maximum(shares, NOTHING))[..., np.newaxis])
+            )[..., 0]
             M += g.T @ g
         covariance = back @ M @ back
     return -back @ A.T @ r, np.sqrt(np.diag(covariance))
