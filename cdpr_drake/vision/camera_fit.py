@@ -138,6 +138,7 @@ class CameraFit:
         reach: Distance of the farthest fitted corner from the middle, per half diagonal [-].
         tilt: Largest angle between two fitted boards [rad].
         left_out: Corners that are in no view's residuals, since they are off by far more.
+        growth: By how much corners of tags were seen farther from their middle than they are [px].
     """
 
     camera: Pinhole
@@ -150,6 +151,7 @@ class CameraFit:
     reach: float
     tilt: float
     left_out: int = 0
+    growth: float = 0.0
 
     def rms(self, role: str) -> float:
         """Of all corners of views of a role [px]; NaN where there are none."""
@@ -245,7 +247,7 @@ def fit_camera(
     return CameraFit(
         camera, model, names, fit.values, fit.deviations, tuple(told),
         len({tuple(cell) for cell in cells}) / (CELLS[0] * CELLS[1]), float(reach), fit.tilt,
-        every - sum(len(view.uv) for view in views),
+        every - sum(len(view.uv) for view in views), fit.growth,
     )  # fmt: skip
 
 
