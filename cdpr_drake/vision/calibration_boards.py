@@ -38,7 +38,11 @@ FEWEST_CORNERS = 8
 LEAST_WINDOW, MOST_WINDOW = 2, 11
 """Half the edge of the window in which a corner is refined [px]."""
 
-WINDOW_SHARES = {CHESSBOARD: (0.3,), CHARUCO: (0.3,), TAGS: (1.0 / 16.0,)}
+WINDOW_SHARES: dict[str, tuple[float, ...]] = {
+    CHESSBOARD: (0.3,),
+    CHARUCO: (0.3,),
+    TAGS: (1.0 / 16.0,),
+}
 """The same per distance of neighbouring corners, one refinement after the other. What is around a
 corner of a chessboard is the same when turned by half a turn, and so are the errors that blur
 makes, which cancel. Corners of a ChArUco board are first found among the dark rims of its markers,
