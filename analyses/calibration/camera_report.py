@@ -73,6 +73,11 @@ def camera_remarks(fit: CameraFit, unseen: list[str]) -> list[str]:
             f"{fit.left_out} corners were left out, since they are off by more than "
             f"{CORNER_OUTLIER:g} standard deviations of all"
         )
+    if fit.growth:
+        said.append(
+            f"corners of tags were seen {abs(fit.growth):.2f} px too far "
+            f"{'in' if fit.growth < 0.0 else 'out'}, which is taken out"
+        )
     own = fit.rms("fitted")
     far = [
         f"{view.name} ({view.rms:.2f} px)"
@@ -121,6 +126,7 @@ def camera_numbers(fit: CameraFit, remarks: list[str], camera: Camera) -> dict[s
         "coverage": fit.coverage,
         "reach": fit.reach,
         "corners_left_out": fit.left_out,
+        "tag_growth_px": fit.growth,
         "largest_tilt_deg": float(np.degrees(fit.tilt)),
         "images": [
             {

@@ -45,9 +45,6 @@ SLACK_SHARE = 0.01
 WORTH_A_WORD = 2.0
 """Residuals beyond this many sigmas are worth a remark; beyond `MISFIT_FACTOR` nothing fits."""
 
-UNSETTLED = 0.1
-"""Standard errors by which the last step moved that are worth a remark."""
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class IdentificationTask:
@@ -167,11 +164,7 @@ def identify(
             "the log is smoother than sensors are: its noise counts as at least "
             f"{LEAST_POSE:g} m and rad of poses, {LEAST_TENSION:g} of the largest tension"
         )
-    if found.last_step > UNSETTLED:
-        remarks.append(
-            f"after {found.steps} steps the parameters still moved by {found.last_step:.2g} "
-            "standard errors"
-        )
+    remarks += found.remarks
     if found.spread > WORTH_A_WORD:
         remarks.append(_misfit_words(found))
     return Identification(task, bandwidth, found, fitted, validated, tuple(remarks))

@@ -34,8 +34,8 @@ from cdpr_drake.analyses.calibration.tag_file import read_tags
 from cdpr_drake.analyses.calibration.tracker import shifted_log
 from cdpr_drake.analyses.front.fitted_robots import FittedRobot, Keeping, kept_fit
 from cdpr_drake.analyses.front.session import Say, Session
+from cdpr_drake.analyses.front.verb import verb
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
-from cdpr_drake.blas_threads import one_blas_thread
 from cdpr_drake.errors import CalibrationError, IdentificationError
 from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
@@ -95,7 +95,7 @@ class RobotIdentification(FittedRobot, Identification):
         ]
 
 
-@one_blas_thread()
+@verb()
 def calibrate(
     robot: Robot | str | Path,
     log: CalibrationLog | Path | str,
@@ -216,7 +216,7 @@ def _inputs(
     return read, dict(tags or {})
 
 
-@one_blas_thread()
+@verb()
 def identify(
     robot: Robot | str | Path,
     log: CalibrationLog | Path | str,

@@ -21,13 +21,12 @@ from cdpr_drake.analyses.design.settings import (
     load_design_settings,
 )
 from cdpr_drake.analyses.front.session import Session, asked_workers, kept_folder
+from cdpr_drake.analyses.front.verb import verb
 from cdpr_drake.analyses.reporting.progress import StudySession
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
-from cdpr_drake.blas_threads import one_blas_thread
 from cdpr_drake.errors import DesignError
 from cdpr_drake.models.robot_loader import load_robot, robot_reference
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.schema.input_files import inputs_read_once
 from cdpr_drake.schema.typed_yaml import closest
 
 REACH = 0.1
@@ -55,8 +54,7 @@ def plain_design(robot: Robot, goals: str | Sequence[str]) -> DesignSettings:
     return settings
 
 
-@inputs_read_once()
-@one_blas_thread()
+@verb()
 def optimize_design(
     robot: Robot | str | Path,
     settings: DesignSettings | Path | str | Sequence[str],

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cdpr_drake.blas_threads import one_blas_thread
+from cdpr_drake.analyses.front.verb import verb
 from cdpr_drake.models.robot_exchange import ImportedRobot
 from cdpr_drake.models.robot_exchange import import_robot as read_robot
 from cdpr_drake.summaries import as_kind
@@ -25,7 +25,7 @@ class DrawnImport(ImportedRobot):
         return poses_figure(title, self.robot, {"home pose": self.robot.home.transform()})
 
 
-@one_blas_thread()
+@verb()
 def import_robot(
     path: Path | str,
     *,

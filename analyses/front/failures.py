@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cdpr_drake.analyses.front.session import Session
+from cdpr_drake.analyses.front.verb import verb
 from cdpr_drake.analyses.reporting.deferred_figures import drawing, write_pictures
 from cdpr_drake.analyses.reporting.left_folders import RESULTS
 from cdpr_drake.analyses.reporting.log_files import write_json
@@ -17,10 +18,8 @@ from cdpr_drake.analyses.simulation.break_report import REACTIONS, after_break
 from cdpr_drake.analyses.simulation.session import RunSession
 from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS, figure_writers
-from cdpr_drake.blas_threads import one_blas_thread
 from cdpr_drake.errors import ScenarioError, StoppedError
 from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.schema.input_files import inputs_read_once
 from cdpr_drake.schema.typed_yaml import closest
 from cdpr_drake.summaries import Tabulated
 from cdpr_drake.systems.diagrams.load import load_scenario
@@ -101,8 +100,7 @@ class BreakReactions(Tabulated):
         return (f"{self.cable} breaks at {self.time:g} s in {self.scenario}, {self.geometry}", rows)
 
 
-@inputs_read_once()
-@one_blas_thread()
+@verb()
 def compare_reactions(
     scenario: str | Path = "acrobot_broken_redistributed",
     cable: int = 2,

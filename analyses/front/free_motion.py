@@ -19,13 +19,12 @@ from cdpr_drake.analyses.calibration.free_motion_report import free_motion_fit
 from cdpr_drake.analyses.calibration.log_file import CalibrationLog, read_log
 from cdpr_drake.analyses.front.fitted_robots import FittedRobot, Keeping, kept_fit
 from cdpr_drake.analyses.front.session import Say, Session
+from cdpr_drake.analyses.front.verb import verb
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
-from cdpr_drake.blas_threads import one_blas_thread
 from cdpr_drake.errors import IdentificationError, accepted_names
 from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import as_pose
-from cdpr_drake.schema.input_files import inputs_read_once
 from cdpr_drake.schema.typed_yaml import closest
 from cdpr_drake.summaries import as_kind
 
@@ -64,8 +63,7 @@ KEPT = ("folder", "overwrite", "formats", "say", "session")
 """Arguments on what is written, and who follows."""
 
 
-@inputs_read_once()
-@one_blas_thread()
+@verb()
 def identify_free_motion(
     robot: Robot | str | Path,
     log: CalibrationLog | Path | str,

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from cdpr_drake.analyses.front.verb import verb
 from cdpr_drake.analyses.logs.log_formats import AUTO, read_recorded, unused
 from cdpr_drake.analyses.logs.log_replay import SUMMARY, LogReplay
 from cdpr_drake.analyses.logs.log_replay import replay_log as compare_log
@@ -15,7 +16,6 @@ from cdpr_drake.analyses.logs.recorded_log import RecordedLog
 from cdpr_drake.analyses.reporting.deferred_figures import drawing, write_pictures
 from cdpr_drake.analyses.reporting.log_files import write_json
 from cdpr_drake.analyses.reporting.output_folder import results_folder
-from cdpr_drake.blas_threads import one_blas_thread
 from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.summaries import Summarized
@@ -60,7 +60,7 @@ class ImportedLog(Summarized):
         return log_figure(self.log)
 
 
-@one_blas_thread()
+@verb()
 def import_log(
     path: Path | str,
     request: LogRequest | None = None,
@@ -148,7 +148,7 @@ class ReplayedLog(Summarized):
         return residual_figure(self.replay, self.followed)
 
 
-@one_blas_thread()
+@verb()
 def replay_log(
     path: Path | str,
     robot: Robot | str | Path,

@@ -13,9 +13,9 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import JointIndex
 from pydrake.systems.framework import Context
 
+from cdpr_drake.analyses.front.verb import verb
 from cdpr_drake.analyses.statics.tension_query import solve_all
 from cdpr_drake.arrays import Array
-from cdpr_drake.blas_threads import one_blas_thread
 from cdpr_drake.cables.models import CABLE_MODELS
 from cdpr_drake.errors import EquilibriumError, TensionProblemError
 from cdpr_drake.geometry.poses import angles_from_rotation
@@ -245,7 +245,7 @@ class MechanismAtRest(Summarized):
         ]
 
 
-@one_blas_thread()
+@verb()
 def hang_mechanism(
     mechanism: Mechanism | str | Path,
     lengths: Array | Sequence[float] | None = None,
@@ -391,7 +391,7 @@ class MechanismTensions(Summarized):
         ]  # fmt: skip
 
 
-@one_blas_thread()
+@verb()
 def solve_mechanism_tensions(
     mechanism: Mechanism | str | Path,
     method: str = UNDERACTUATED,

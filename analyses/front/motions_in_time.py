@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cdpr_drake.analyses.front.verb import verb
 from cdpr_drake.analyses.planning.timed_plan_results import TimedRun
 from cdpr_drake.analyses.workspaces.proven_sets import ProvenSets
 from cdpr_drake.analyses.workspaces.timed_sets import find_timed_sets
@@ -16,7 +17,6 @@ from cdpr_drake.errors import PlanningError
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.planning.path_task import PathTask
 from cdpr_drake.planning.timed_motion import MotionInTime, motion_in_time, straight_time
-from cdpr_drake.schema.input_files import inputs_read_once
 from cdpr_drake.workspaces.cable_interference import Surroundings
 from cdpr_drake.workspaces.moving_clearances import moving_clearances
 from cdpr_drake.workspaces.moving_shapes import MovingObstacle
@@ -62,7 +62,7 @@ def check_timed(method: str, accelerations: Any, ends: Sequence[Array]) -> None:
         )
 
 
-@inputs_read_once()
+@verb()
 def plan_among_moving(
     robot: Robot, sets: ProvenSets, things: Sequence[MovingObstacle], ends: tuple[Array, Array],
     task: PathTask, least: str, *, arguments: dict[str, Any], begin: float,

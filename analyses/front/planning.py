@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pydrake.math import RigidTransform
 
+from cdpr_drake.analyses.front.verb import verb
 from cdpr_drake.analyses.planning.free_motion import FreeSettings, solve_free_motion
 from cdpr_drake.analyses.planning.free_plan_results import FreeRun
 from cdpr_drake.analyses.planning.path_files import read_path
@@ -26,7 +27,6 @@ from cdpr_drake.analyses.planning.robot_path_task import (
 )
 from cdpr_drake.analyses.workspaces.workspace_files import load_obstacles, load_wrench_set
 from cdpr_drake.arrays import Array
-from cdpr_drake.blas_threads import one_blas_thread
 from cdpr_drake.errors import PlanningError, WrenchSetError
 from cdpr_drake.geometry.poses import angles_from_rotation
 from cdpr_drake.models.robot_loader import as_robot
@@ -36,7 +36,6 @@ from cdpr_drake.planning.free_path_solution import FreePathSolution
 from cdpr_drake.planning.limits import MotionLimits
 from cdpr_drake.planning.path_task import PathTask
 from cdpr_drake.planning.path_timing import STATIONS, PathPlan, plan_along_path
-from cdpr_drake.schema.input_files import inputs_read_once
 from cdpr_drake.schema.typed_yaml import closest
 from cdpr_drake.trajectories.curved_path import Move
 from cdpr_drake.trajectories.sampled_motion import read_motion
@@ -118,8 +117,7 @@ def path_poses(robot: Robot, path: PathPoses | Path | str | Sequence[object]) ->
 TRACKING = "computed torque, which --track asks for"
 
 
-@inputs_read_once()
-@one_blas_thread()
+@verb()
 def plan_path(
     robot: Robot | str | Path,
     path: PathPoses | Path | str | Sequence[object],
@@ -187,8 +185,7 @@ def plan_path(
     )  # fmt: skip
 
 
-@inputs_read_once()
-@one_blas_thread()
+@verb()
 def plan_free_motion(
     robot: Robot | str | Path,
     start: object,

@@ -28,6 +28,7 @@ from cdpr_drake.analyses.front.planning import (
     silent,
     tracked_by,
 )
+from cdpr_drake.analyses.front.verb import verb
 from cdpr_drake.analyses.planning.proven_plan_results import ProvenRun
 from cdpr_drake.analyses.planning.robot_path_task import length_scale
 from cdpr_drake.analyses.workspaces.proven_sets import (
@@ -38,14 +39,12 @@ from cdpr_drake.analyses.workspaces.proven_sets import (
 )
 from cdpr_drake.analyses.workspaces.workspace_files import load_all_obstacles
 from cdpr_drake.arrays import Array
-from cdpr_drake.blas_threads import one_blas_thread
 from cdpr_drake.errors import PlanningError, WorkspaceError
 from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import as_pose
 from cdpr_drake.planning.path_in_sets import SEQUENCES, proven_motion
 from cdpr_drake.planning.path_timing import STATIONS, PathPlan
-from cdpr_drake.schema.input_files import inputs_read_once
 from cdpr_drake.workspaces.moving_shapes import MovingObstacle
 from cdpr_drake.workspaces.proven_cells import CELLS
 from cdpr_drake.workspaces.proven_sets import COVER
@@ -112,8 +111,7 @@ class DrawnProvenPlan(ProvenRun):
         return sets_figure(self)
 
 
-@inputs_read_once()
-@one_blas_thread()
+@verb()
 def plan_proven_motion(
     robot: Robot | str | Path,
     start: object,

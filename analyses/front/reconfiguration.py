@@ -19,15 +19,14 @@ from cdpr_drake.analyses.design.reconfiguration import (
     reconfigured,
 )
 from cdpr_drake.analyses.front.planning import PathPoses, Say, path_poses
+from cdpr_drake.analyses.front.verb import verb
 from cdpr_drake.analyses.planning.robot_path_task import make_path
 from cdpr_drake.analyses.workspaces.workspace_files import load_wrench_set
-from cdpr_drake.blas_threads import one_blas_thread
 from cdpr_drake.errors import PlanningError, WrenchSetError
 from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import as_pose
 from cdpr_drake.planning.reconfiguration import STARTS
-from cdpr_drake.schema.input_files import inputs_read_once
 from cdpr_drake.workspaces.demanded_wrenches import SpatialSet
 
 if TYPE_CHECKING:
@@ -47,8 +46,7 @@ class DrawnReconfiguration(Reconfiguration):
         return rails_figure(self)
 
 
-@inputs_read_once()
-@one_blas_thread()
+@verb()
 def reconfigure(
     robot: Robot | str | Path,
     rails: Path | str | Sequence[RailSettings] | None,

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from cdpr_drake.analyses.front.session import Session
 from cdpr_drake.analyses.front.studies import chosen_studies
+from cdpr_drake.analyses.front.verb import verb
 from cdpr_drake.analyses.reporting.deferred_figures import write_pictures
 from cdpr_drake.analyses.reporting.log_files import write_json
 from cdpr_drake.analyses.reporting.output_folder import continued_folder
@@ -28,7 +29,6 @@ from cdpr_drake.analyses.reproduction.states import (
 )
 from cdpr_drake.analyses.studies.published.register import published_registers
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
-from cdpr_drake.blas_threads import one_blas_thread
 from cdpr_drake.summaries import Summarized
 
 if TYPE_CHECKING:
@@ -104,7 +104,7 @@ class Reproduction(Summarized):
         ]
 
 
-@one_blas_thread()
+@verb()
 def reproduce(
     folder: Path | str,
     quick: bool = False,

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, TypeAlias, TypeVar, overload
 
-from cdpr_drake.blas_threads import one_blas_thread
+from cdpr_drake.analyses.front.verb import verb
 from cdpr_drake.systems.diagrams.load import load_scenario as load_any_scenario
 from cdpr_drake.systems.scenarios.mechanism_scenario import MechanismScenario
 from cdpr_drake.systems.scenarios.pick_and_place_scenario import PickAndPlaceScenario
@@ -28,7 +28,7 @@ def load_scenario(name: str | Path, overrides: Sequence[str] = (), *, schema: ty
 def load_scenario(name: str | Path, overrides: Sequence[str] = ()) -> AnyScenario: ...
 
 
-@one_blas_thread()
+@verb()
 def load_scenario(
     name: str | Path, overrides: Sequence[str] = (), *, schema: type[Any] | None = None
 ) -> Any:

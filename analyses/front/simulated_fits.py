@@ -27,10 +27,10 @@ from cdpr_drake.analyses.front.calibration import proposed_poses
 from cdpr_drake.analyses.front.fitted_robots import FittedRobot, Keeping, kept_fit
 from cdpr_drake.analyses.front.planning import path_poses
 from cdpr_drake.analyses.front.session import Say, Session
+from cdpr_drake.analyses.front.verb import verb
 from cdpr_drake.analyses.reporting.provenance import BELIEVED_FILE, write_run_inputs
 from cdpr_drake.analyses.reporting.statements import new_table
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
-from cdpr_drake.blas_threads import one_blas_thread
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.summaries import as_kind
@@ -94,7 +94,7 @@ class SimulatedIdentification(FittedRobot, DynamicCampaign):
         ]
 
 
-@one_blas_thread()
+@verb()
 def calibrate_in_simulation(
     scenario: Scenario | str | Path,
     poses: int | Path | str | Sequence[object] = POSES,
@@ -165,7 +165,7 @@ def _calibrated(run: Campaign, folder: Path, propose: int | None, say: Say) -> S
     return as_kind(SimulatedCalibration, run, fit=fit, servo=servo)
 
 
-@one_blas_thread()
+@verb()
 def identify_in_simulation(
     scenario: TensionScenario | str | Path,
     unknown: str | Sequence[str] = CAMPAIGN_UNKNOWN,

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 
 from cdpr_drake.analyses.front.session import Say, Session, asked_workers
+from cdpr_drake.analyses.front.verb import verb
 from cdpr_drake.analyses.reporting.deferred_figures import drawing, is_undrawn, write_pictures
 from cdpr_drake.analyses.reporting.exported_logs import checked_log_formats, log_exports
 from cdpr_drake.analyses.reporting.log_files import log_columns
@@ -36,10 +37,8 @@ from cdpr_drake.analyses.simulation.scenario_kinds import SCENARIO_KINDS, Scenar
 from cdpr_drake.analyses.simulation.session import RunSession, check_connected
 from cdpr_drake.analyses.sweeps.workers import check_scheduler
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
-from cdpr_drake.blas_threads import one_blas_thread
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.schema.input_files import inputs_read_once
 from cdpr_drake.schema.json_text import load_json
 from cdpr_drake.summaries import Tabulated
 from cdpr_drake.systems.diagrams.load import load_scenario
@@ -207,8 +206,7 @@ def simulate(
 ) -> RepeatedRuns: ...
 
 
-@inputs_read_once()
-@one_blas_thread()
+@verb()
 def simulate(
     scenario: RunHeader | str | Path,
     overrides: Sequence[str] = (),
@@ -281,8 +279,7 @@ def simulate(
         return _run_into(results, kind, loaded, wanted, told)
 
 
-@inputs_read_once()
-@one_blas_thread()
+@verb()
 def continue_run(
     folder: Path | str,
     *,
@@ -311,8 +308,7 @@ def continue_run(
         return _run_into(results, kind, scenario, wanted, session or Session(), resume=True)
 
 
-@inputs_read_once()
-@one_blas_thread()
+@verb()
 def finish_run(
     folder: Path | str,
     *,

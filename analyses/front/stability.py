@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cdpr_drake.analyses.front.session import Say, Session, asked_workers, kept_folder
+from cdpr_drake.analyses.front.verb import verb
 from cdpr_drake.analyses.front.workspaces import pose_grid, stopped
 from cdpr_drake.analyses.reporting.deferred_figures import write_pictures
 from cdpr_drake.analyses.reporting.left_folders import RESULTS
@@ -25,12 +26,10 @@ from cdpr_drake.analyses.workspaces.stability_results import (
     stability_workspaces,
 )
 from cdpr_drake.analyses.workspaces.static_feasible import static_case
-from cdpr_drake.blas_threads import one_blas_thread
 from cdpr_drake.errors import StabilityError
 from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import as_wrench
-from cdpr_drake.schema.input_files import inputs_read_once
 from cdpr_drake.schema.typed_yaml import closest
 from cdpr_drake.stability.perturbation_bounds import PerturbationBounds
 from cdpr_drake.stability.verdict import VerdictOptions
@@ -122,8 +121,7 @@ def stability_question(
     )  # fmt: skip
 
 
-@inputs_read_once()
-@one_blas_thread()
+@verb()
 def assess_stability(
     robot: Robot | str | Path,
     scheme: str = "pbvs",

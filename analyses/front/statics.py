@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pydrake.math import RigidTransform
 
+from cdpr_drake.analyses.front.verb import verb
 from cdpr_drake.analyses.statics.equilibria_query import (
     SHOWN,
     EquilibriaReport,
@@ -19,7 +20,6 @@ from cdpr_drake.analyses.statics.equilibria_query import (
 )
 from cdpr_drake.analyses.statics.static_query import StaticReport, static_at_lengths, static_at_pose
 from cdpr_drake.arrays import Array
-from cdpr_drake.blas_threads import one_blas_thread
 from cdpr_drake.cables.models import CABLE_MODELS, ELASTIC
 from cdpr_drake.errors import EquilibriumError, TensionProblemError
 from cdpr_drake.geometry.cable_paths import cable_paths
@@ -232,7 +232,7 @@ class CableLengths(Tabulated):
         ]
 
 
-@one_blas_thread()
+@verb()
 def solve_static(
     robot: Robot | str | Path,
     pose: object = None,
@@ -269,7 +269,7 @@ def solve_static(
     return as_kind(RobotAtRest, found)
 
 
-@one_blas_thread()
+@verb()
 def find_equilibria(
     robot: Robot | str | Path,
     lengths: Array | Sequence[float] | None = None,
@@ -329,7 +329,7 @@ def find_equilibria(
     return as_kind(RobotEquilibria, rests, loaded=loaded)
 
 
-@one_blas_thread()
+@verb()
 def solve_inverse_kinematics(
     robot: Robot | str | Path, pose: object = None, pulleys: bool = True
 ) -> CableLengths:
@@ -354,7 +354,7 @@ def solve_inverse_kinematics(
     return CableLengths(loaded, X_WP, loaded.geometry_words(pulleys), paths.lengths, paths.u_W)
 
 
-@one_blas_thread()
+@verb()
 def plot(robot: Robot | str | Path, pose: object = None) -> Figure:
     """A robot with its frame, cables and platform at a pose, in 3D.
 
@@ -371,7 +371,7 @@ def plot(robot: Robot | str | Path, pose: object = None) -> Figure:
     return poses_figure(loaded.title or loaded.name, loaded, {"platform": as_pose(loaded, pose)})
 
 
-@one_blas_thread()
+@verb()
 def solve_forward_kinematics(
     robot: Robot | str | Path,
     lengths: Array | Sequence[float],

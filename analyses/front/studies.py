@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from rich.table import Table
 
 from cdpr_drake.analyses.front.session import Session, asked_workers
+from cdpr_drake.analyses.front.verb import verb
 from cdpr_drake.analyses.reporting.output_folder import continued_folder
 from cdpr_drake.analyses.reporting.progress import StudySession
 from cdpr_drake.analyses.reproduction.runner import earlier_words
@@ -26,9 +27,7 @@ from cdpr_drake.analyses.studies.framework.study import Study
 from cdpr_drake.analyses.sweeps.earlier_runs import check_earlier
 from cdpr_drake.analyses.sweeps.workers import check_scheduler
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
-from cdpr_drake.blas_threads import one_blas_thread
 from cdpr_drake.errors import CdprError
-from cdpr_drake.schema.input_files import inputs_read_once
 from cdpr_drake.schema.typed_yaml import closest
 from cdpr_drake.summaries import Summarized
 
@@ -107,8 +106,7 @@ def studies() -> tuple[str, ...]:
     return tuple(STUDIES)
 
 
-@inputs_read_once()
-@one_blas_thread()
+@verb()
 def run_study(
     name: str | Study,
     folder: Path | str | None = None,

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pydrake.math import RigidTransform
 
+from cdpr_drake.analyses.front.verb import verb
 from cdpr_drake.analyses.statics.tension_query import (
     polygon_tensions,
     solve_all,
     underactuated_answer,
 )
 from cdpr_drake.arrays import Array
-from cdpr_drake.blas_threads import one_blas_thread
 from cdpr_drake.errors import TensionProblemError
 from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
@@ -257,7 +257,7 @@ class UnderactuatedTensions(Summarized):
         ]  # fmt: skip
 
 
-@one_blas_thread()
+@verb()
 def solve_tensions(
     robot: Robot | str | Path,
     pose: object = None,
@@ -322,7 +322,7 @@ def solve_tensions(
     return RobotTensions(loaded, X_WP, problem, (distribute(problem, method),), pulleys)
 
 
-@one_blas_thread()
+@verb()
 def compare_tensions(
     robot: Robot | str | Path,
     pose: object = None,

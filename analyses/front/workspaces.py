@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cdpr_drake.analyses.front.session import Say, Session, asked_workers, kept_folder
+from cdpr_drake.analyses.front.verb import verb
 from cdpr_drake.analyses.reporting.deferred_figures import write_pictures
 from cdpr_drake.analyses.reporting.left_folders import RESULTS
 from cdpr_drake.analyses.reporting.log_files import write_json
@@ -48,11 +49,9 @@ from cdpr_drake.analyses.workspaces.workspace_question import (
 )
 from cdpr_drake.analyses.workspaces.workspace_results import RobotWorkspace, robot_workspace
 from cdpr_drake.arrays import Array
-from cdpr_drake.blas_threads import one_blas_thread
 from cdpr_drake.errors import StoppedError, WorkspaceError, WorkspaceGridError
 from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.schema.input_files import inputs_read_once
 from cdpr_drake.schema.typed_yaml import closest
 from cdpr_drake.summaries import as_kind
 from cdpr_drake.workspaces.box_grid_agreement import BoxAgreement
@@ -337,8 +336,7 @@ def workspace_question(
     )  # fmt: skip
 
 
-@inputs_read_once()
-@one_blas_thread()
+@verb()
 def compute_workspace(
     robot: Robot | str | Path,
     kinds: str | Sequence[str] = "static",

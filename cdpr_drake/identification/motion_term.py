@@ -25,9 +25,9 @@ SETTLED = 1e-3
 """Corrections end where weighted residuals change by less [sigma], over the largest where that is
 more than one."""
 
-BOUNDED = 4.0
-"""Residuals count as no more than so many sigmas where the error of poses is estimated, so that
-few outliers do not pass for an error of all poses."""
+BOUNDED, BOUNDED_SQUARE = 1.5, 0.7784
+"""Residuals count as no more than so many sigmas where the error of poses is estimated, and the
+mean square that normal ones then have: as usual for proposal 2, which bears a third of outliers."""
 
 LEAST_OFF, MOST_OFF, OFF_WITHIN = 1e-7, 1.0, 0.05
 """Errors of poses that are looked for [m], and how exactly, as a share of them."""
@@ -75,8 +75,8 @@ class MotionTerm:
     estimate on that error. So poses are also off by `off` in each coordinate, and by `off` over
     `size` about each axis, independently at each sample, which adds G_0 D^2 G_0' with the part G_0
     of G that goes with the poses themselves. `off` is the variance component with which residuals
-    are as large as weights say: chi-square equal to the number of equations, each residual bounded
-    (Huber's proposal 2).
+    are as large as weights say, each of them bounded (Huber's proposal 2): poses that are lost for
+    a while do not pass for an error of all.
 
     Source: Fuller, Measurement error models, 1987, chapter 3; Boggs, Byrd, Schnabel, A stable and
     efficient algorithm for nonlinear orthogonal distance regression, 1987; Paule, Mandel, Consensus
@@ -126,13 +126,13 @@ class MotionTerm:
 
         Args:
             theta: The unknown vector.
-            bounded: Whether residuals count as no more than `BOUNDED` sigmas.
+            bounded: True if residuals count as no more than `BOUNDED` sigmas.
         """
-        most = BOUNDED if bounded else np.inf
+        most, usual = (BOUNDED, BOUNDED_SQUARE) if bounded else (np.inf, 1.0)
 
         def excess(log_off: float) -> float:
             A, b = replace(self, off=float(np.exp(log_off))).rows(theta)
-            return float(np.log(np.mean(np.minimum(np.abs(A @ theta - b), most) ** 2)))
+            return float(np.log(np.mean(np.minimum(np.abs(A @ theta - b), most) ** 2) / usual))
 
         low, high = np.log([LEAST_OFF, MOST_OFF])
         if excess(low) <= 0.0:

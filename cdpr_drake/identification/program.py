@@ -36,6 +36,11 @@ BY_LIKELIHOOD = (
     "terms are not in them"
 )
 NOT_SETTLED = "weights and own terms did not settle: the last step went {0:.2g} standard errors"
+STILL_MOVED = "after {0} steps the parameters still moved by {1:.2g} standard errors"
+CONTRADICTED = (
+    "priors are passed by up to {0:.3g} of their standard deviations: they contradict the log, or "
+    "each other"
+)
 
 MOST_STEPS = 30
 CLOSE, SETTLED = 1e-9, 1e-5
@@ -43,6 +48,9 @@ CLOSE, SETTLED = 1e-9, 1e-5
 
 ROUGHLY_SETTLED = 1e-2
 """The same where a solver of nonlinear programs takes the steps."""
+
+UNSETTLED, CONTRADICTION = 0.1, 4.0
+"""Standard errors of the last step, and of priors, from which on a remark says so."""
 
 MOST_WEIGHINGS = 6
 """Times that the error of poses is estimated, each from the last parameters."""
@@ -632,6 +640,11 @@ class IdentificationProgram(OwnTerms):
         if any(offs):
             larger *= max(self._between_blocks(fit, x), 1.0)
         status = MISFIT if spread > MISFIT_FACTOR else how[0]
+        remarks = []
+        if fit.last_step > UNSETTLED:
+            remarks.append(STILL_MOVED.format(fit.steps, fit.last_step))
+        if np.max(np.abs(prior), initial=0.0) > CONTRADICTION:
+            remarks.append(CONTRADICTED.format(np.max(np.abs(prior))))
         largest = [one for term in self.terms for one in term.largest(theta)]
         parameters = layout.parameters()
         return IdentificationResult(
@@ -643,6 +656,7 @@ class IdentificationProgram(OwnTerms):
             degrees=degrees, spread=spread, active=how[2], outliers=off,
             largest=tuple(sorted(largest, key=lambda one: -one.sigmas)), steps=fit.steps,
             last_step=fit.last_step, wall_time=wall, pose_error=max(offs, default=0.0),
+            remarks=tuple(remarks),
         )  # fmt: skip
 
 

@@ -87,6 +87,7 @@ class IdentificationResult:
         pose_error: By how much poses are off beyond their noise, as residuals tell [m]; of
             rotations over the size of the platform [rad]. Equations are weighted with it; 0: the
             noise explains the residuals.
+        remarks: That steps did not settle, or that priors contradict the log, in words.
         program: With own terms, how the program was solved; None: without.
     """
 
@@ -111,6 +112,7 @@ class IdentificationResult:
     last_step: float
     wall_time: float
     pose_error: float = 0.0
+    remarks: tuple[str, ...] = ()
     program: ProgramReport | None = None
 
     @property

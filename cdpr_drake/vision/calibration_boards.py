@@ -38,11 +38,16 @@ FEWEST_CORNERS = 8
 LEAST_WINDOW, MOST_WINDOW = 2, 11
 """Half the edge of the window in which a corner is refined [px]."""
 
-WINDOW_SHARES = {CHESSBOARD: (0.3,), CHARUCO: (0.3, 0.16), TAGS: (1.0 / 16.0,)}
+WINDOW_SHARES: dict[str, tuple[float, ...]] = {
+    CHESSBOARD: (0.3,),
+    CHARUCO: (0.3,),
+    TAGS: (1.0 / 16.0,),
+}
 """The same per distance of neighbouring corners, one refinement after the other. What is around a
 corner of a chessboard is the same when turned by half a turn, and so are the errors that blur
 makes, which cancel. Corners of a ChArUco board are first found among the dark rims of its markers,
-then between them. The window keeps to half a cell of a tag, which has eight."""
+then in the white between corner and markers. The window keeps to half a cell of a tag, which has
+eight."""
 
 SHARPEST, BLURRED = 3, (5, 53, 12)
 """How much darker than its surroundings a marker is, of 255, and the least, largest and step of
@@ -217,7 +222,10 @@ class CalibrationBoard:
         least = float(np.min(np.linalg.norm(uv[:, np.newaxis] - uv, axis=2)[near]))
         criteria = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 60, 1e-3)
         found = np.array(uv, np.float32, order="C")
-        for share in WINDOW_SHARES[self.kind]:
+        shares = WINDOW_SHARES[self.kind]
+        if self.kind == CHARUCO:
+            shares += (0.5 * (1.0 - self.drawing.getMarkerLength() / self.size),)
+        for share in shares:
             half = int(np.clip(share * least, LEAST_WINDOW, MOST_WINDOW))
             found = np.asarray(cv2.cornerSubPix(gray, found, (half, half), (-1, -1), criteria))
         return np.asarray(found, float)

@@ -5,8 +5,10 @@ was found, says what it is worth beyond the images that it was fitted to. Images
 than the others are named and, unless they shall stay, left out of a second fit.
 
 Standard deviations are those of linear least squares at the solution, with the noise that the
-residuals have: what a lens model cannot show is not in them. Corners of one tag are off together,
-outwards or inwards by what blur makes of its edges: their residuals are added up before squares.
+residuals have: what a lens model cannot show is not in them. Blur and the search for corners draw
+all corners of tags inwards by as much: that growth is a parameter of the fit, and is taken out.
+What is left of one tag's corners goes together: their residuals are added up before squares, each
+tag's over what a fit leaves of its errors.
 
 Source: Zhang, IEEE TPAMI 22(11), 2000; OpenCV, modules calib3d and fisheye; Liang, Zeger,
 Longitudinal data analysis using generalized linear models, 1986, for corners that go together.
@@ -46,6 +48,12 @@ CORNER_OUTLIER, MOST_CORNERS, MOST_CLEANINGS = 4.0, 0.2, 4
 """A corner that is so many standard deviations of all corners off is left out, where no more than
 this share of its image is; and how often the rest is fitted again."""
 
+GROWTHS = 3
+"""How often tags are fitted, each time with the growth that the time before has shown."""
+
+NOTHING = 1e-9
+"""Share of an error that a fit leaves, from which on it leaves none."""
+
 LEAST_TILT = 12.0
 """Angle between two boards of a fit, at least [deg]: of parallel ones the distance and the focal
 length are one."""
@@ -71,6 +79,16 @@ class View(NamedTuple):
     points: Array
     uv: Array
     together: int = 1
+
+    def outward(self) -> Array:
+        """Directions from the middle of its tag to each corner, shape (n, 2)."""
+        tags = self.uv.reshape(-1, self.together, 2)
+        away = tags - np.mean(tags, axis=1, keepdims=True)
+        return (away / np.linalg.norm(away, axis=2, keepdims=True)).reshape(-1, 2)
+
+    def grown(self, growth: float) -> View:
+        """The view with corners moved outwards [px]."""
+        return self._replace(uv=self.uv + growth * self.outward()) if growth else self
 
     def without(self, residuals: Array, most: float) -> View:
         """The view without corners that are off by more than `most` [px]; itself where many are.
@@ -120,6 +138,7 @@ class CameraFit:
         reach: Distance of the farthest fitted corner from the middle, per half diagonal [-].
         tilt: Largest angle between two fitted boards [rad].
         left_out: Corners that are in no view's residuals, since they are off by far more.
+        growth: By how much corners of tags were seen farther from their middle than they are [px].
     """
 
     camera: Pinhole
@@ -132,6 +151,7 @@ class CameraFit:
     reach: float
     tilt: float
     left_out: int = 0
+    growth: float = 0.0
 
     def rms(self, role: str) -> float:
         """Of all corners of views of a role [px]; NaN where there are none."""
@@ -227,18 +247,19 @@ def fit_camera(
     return CameraFit(
         camera, model, names, fit.values, fit.deviations, tuple(told),
         len({tuple(cell) for cell in cells}) / (CELLS[0] * CELLS[1]), float(reach), fit.tilt,
-        every - sum(len(view.uv) for view in views),
+        every - sum(len(view.uv) for view in views), fit.growth,
     )  # fmt: skip
 
 
 class _Fit(NamedTuple):
-    """What OpenCV found: parameters, their standard deviations, and how views fit."""
+    """What OpenCV found: parameters, deviations, how views fit, and how much tags grew [px]."""
 
     model: str
     values: Array
     deviations: Array
     residuals: list[Array]
     tilt: float
+    growth: float
 
     @property
     def rms(self) -> list[float]:
@@ -258,22 +279,27 @@ class _Fit(NamedTuple):
 
 @_one_thread()
 def _fit(views: Sequence[View], size: tuple[int, int], model: str) -> _Fit:
-    fisheye = model == "fisheye"
-    try:
-        found = _fisheye(views, size) if fisheye else _brown_conrady(views, size, model)
-    except cv2.error as problem:
-        why = str(problem.err or problem).strip().splitlines()[0]
-        raise CameraCalibrationError(
-            f"images: found {len(views)} from which OpenCV finds no camera with a lens of model "
-            f"{model} ({why}); accepted: boards tilted in several ways, or another model"
-        ) from problem
-    values, turns, moves = found
-    residuals, J, extrinsic = [], [], []
-    for view, r, p in zip(views, turns, moves, strict=True):
-        uv, mine, pose = _project(view.points, r, p, values, fisheye)
-        residuals.append(uv - view.uv)
-        J.append(mine)
-        extrinsic.append(pose)
+    fisheye, groups, growth = model == "fisheye", [view.together for view in views], 0.0
+    tags = max(groups) > 1
+    for _ in range(GROWTHS if tags else 1):
+        grown = [view.grown(-growth) for view in views]
+        try:
+            found = _fisheye(grown, size) if fisheye else _brown_conrady(grown, size, model)
+        except cv2.error as problem:
+            why = str(problem.err or problem).strip().splitlines()[0]
+            raise CameraCalibrationError(
+                f"images: found {len(views)} from which OpenCV finds no camera with a lens of "
+                f"model {model} ({why}); accepted: boards tilted in several ways, or another model"
+            ) from problem
+        values, turns, moves = found
+        residuals, J, extrinsic = [], [], []
+        for view, r, p in zip(grown, turns, moves, strict=True):
+            uv, mine, pose = _project(view.points, r, p, values, fisheye)
+            residuals.append(uv - view.uv)
+            J.append(np.column_stack([mine, view.outward().ravel()]) if tags else mine)
+            extrinsic.append(pose)
+        step, deviations = _linear_fit(J, extrinsic, residuals, groups)
+        growth += float(step[-1]) if tags else 0.0
     normals = np.array([cv2.Rodrigues(r)[0][:, 2] for r in turns])
     tilt = float(np.arccos(np.clip(np.min(normals @ normals.T), -1.0, 1.0)))
     if np.degrees(tilt) < LEAST_TILT:
@@ -282,8 +308,7 @@ def _fit(views: Sequence[View], size: tuple[int, int], model: str) -> _Fit:
             "which distance and focal length are one; accepted: boards tilted by "
             f"{LEAST_TILT:g} deg and more against each other"
         )
-    together = [view.together for view in views]
-    return _Fit(model, values, _deviations(J, extrinsic, residuals, together), residuals, tilt)
+    return _Fit(model, values, deviations[: len(values)], residuals, tilt, growth)
 
 
 def _brown_conrady(
@@ -335,29 +360,44 @@ def _project(
     return uv.reshape(-1, 2), J[:, 6 : 10 + free], J[:, :6]
 
 
-def _deviations(
+def _linear_fit(
     J: list[Array], extrinsic: list[Array], residuals: list[Array], together: list[int]
-) -> Array:
-    """Standard deviations of the parameters of the camera, poses of boards left free.
+) -> tuple[Array, Array]:
+    """How parameters change in linear least squares, poses of boards left free, and deviations.
 
-    As those of `cv2.calibrateCameraExtended`, which OpenCV does not give of a fisheye. Where
-    corners go together their gradients g are summed first, and the covariance is
-    N^-1 sum(g g') N^-1.
+    Deviations are as those of `cv2.calibrateCameraExtended`, which OpenCV does not give of a
+    fisheye. Where corners go together, with the rows F of N = F'F and residuals r of a tag, the
+    covariance is N^-1 sum(g g') N^-1 with g = F' (I - H)^(-1/2) r: of independent errors r has the
+    share I - H, H the tag's part of the hat matrix.
+
+    Source: Bell, McCaffrey, Bias reduction in standard errors for linear regression with
+    multi-stage samples, 2002.
     """
     size = J[0].shape[1]
-    N, M, squares = np.zeros((size, size)), np.zeros((size, size)), 0.0
-    for mine, pose, one, group in zip(J, extrinsic, residuals, together, strict=True):
-        free = mine - pose @ np.linalg.solve(pose.T @ pose, pose.T @ mine)
-        N += free.T @ free
-        g = (free * one.reshape(-1, 1)).reshape(-1, 2 * group, size).sum(axis=1)
-        M += g.T @ g if group > 1 else 0.0
-        squares += float(np.sum(one**2))
-    count = 2 * sum(len(one) for one in residuals)
-    larger = count / max(count - size - 6 * len(J), 1)
+    free = [
+        mine - pose @ np.linalg.solve(pose.T @ pose, pose.T @ mine)
+        for mine, pose in zip(J, extrinsic, strict=True)
+    ]
+    A, r = np.concatenate(free), np.concatenate(residuals).ravel()
+    back = np.linalg.pinv(A.T @ A, hermitian=True)
     if max(together) == 1:
-        M = squares / count * N
-    back = np.linalg.pinv(N, hermitian=True)
-    return np.sqrt(larger * np.diag(back @ M @ back))
+        covariance = float(r @ r) / max(len(r) - size - 6 * len(J), 1) * back
+    else:
+        M = np.zeros((size, size))
+        for mine, pose, one, group in zip(free, extrinsic, residuals, together, strict=True):
+            F = mine.reshape(-1, 2 * group, size)
+            Q = np.linalg.qr(pose)[0].reshape(-1, 2 * group, 6)
+            rest = np.eye(2 * group) - Q @ Q.transpose(0, 2, 1) - F @ back @ F.transpose(0, 2, 1)
+            shares, V = np.linalg.eigh(rest)
+            parts = V.transpose(0, 2, 1) @ one.reshape(-1, 2 * group, 1)
+            g = (
+                F.transpose(0, 2, 1)
+                @ V
+                @ (parts / np.sqrt(np.maximum(shares, NOTHING))[..., np.newaxis])
+            )[..., 0]
+            M += g.T @ g
+        covariance = back @ M @ back
+    return -back @ A.T @ r, np.sqrt(np.diag(covariance))
 
 
 def _refuse_loose(fit: _Fit) -> None:
@@ -378,6 +418,7 @@ def _refuse_loose(fit: _Fit) -> None:
 def _residuals_at_best(view: View, fit: _Fit) -> Array:
     """Residuals of a view that was not fitted, with its board where it fits best, shape (n, 2)
     [px]."""
+    view = view.grown(-fit.growth)
     fisheye, K = fit.model == "fisheye", fit.matrix()
     lens = fit.camera((1, 1)).distortion
     xy = (view.uv.T - K[:2, 2:]) / np.diag(K)[:2, np.newaxis]

@@ -147,22 +147,20 @@ HONEST, LARGEST = (0.8, 1.3), 4.0
 """Root mean square, and the largest, of errors over their standard deviations."""
 
 
-def test_boards_are_found_in_any_light_and_deviations_are_the_real_ones():
-    off, plain = [], np.zeros(5)
-    for kind in ("chessboard", "charuco", "tags"):
-        board = make_board(kind)
-        for number, (light, wall) in enumerate(LIGHTS.values()):
-            poses = board_poses(board, 8, 0.55, seed=number, spread=0.2)
-            images = [board_image(board, K, plain, SIZE, pose, wall=wall) for pose in poses]
-            views = []
-            for k, image in enumerate(images):
-                found = board.find(lit(image, light, [number, k]))
-                assert found is not None, (kind, number, k)
-                views.append(View(str(k), *found, board.together))
-            fit = fit_camera(views, SIZE, "none", hold_out=0.0)
-            off.append((fit.values - truth("none")) / fit.deviations)
-    rms = float(np.sqrt(np.mean(np.square(off))))
-    assert HONEST[0] < rms < HONEST[1]
+@pytest.mark.parametrize("kind", ["chessboard", "charuco", "tags"])
+def test_boards_are_found_in_any_light_and_deviations_are_the_real_ones(kind):
+    """Four cameras a light: 80 errors, whose root mean square scatters by a tenth."""
+    board, off, plain = make_board(kind), [], np.zeros(5)
+    for number, (light, wall) in enumerate(4 * list(LIGHTS.values())):
+        views = []
+        for k, pose in enumerate(board_poses(board, 6, 0.55, seed=number, spread=0.2)):
+            image = board_image(board, K, plain, SIZE, pose, wall=wall)
+            found = board.find(lit(image, light, [number, k]))
+            assert found is not None, (number, k)
+            views.append(View(str(k), *found, board.together))
+        fit = fit_camera(views, SIZE, "none", hold_out=0.0)
+        off.append((fit.values - truth("none")) / fit.deviations)
+    assert HONEST[0] < float(np.sqrt(np.mean(np.square(off)))) < HONEST[1]
     assert np.max(np.abs(off)) < LARGEST
 
 
