@@ -18,10 +18,10 @@ EXACT = 1e-8
 """Share by which block elimination and dense algebra differ."""
 
 
-def fitted(noise=1.0, seed=0, spoil=lambda readings: readings, place=1.0):
+def fitted(noise=1.0, seed=0, spoil=lambda readings: readings, place=1.0, count=COUNT):
     """A result and its problem: lengths of eight cables and tracked poses, with sigmas as said."""
     random, true = np.random.default_rng(seed), true_model()
-    at = poses(COUNT, random)
+    at = poses(count, random)
     zero = start_readings(true, at[0])
     program = CalibrationProgram(true, at, ["length_offsets"])
     program.AddPrior(["length_offsets"], 0.05)
@@ -178,10 +178,10 @@ def test_runs_are_as_rare_as_among_all_orders(positive):
 
 def test_a_reading_that_swings_slowly_has_too_few_runs():
     def spoil(readings):
-        readings[:, 2] += 8.0 * SIGMA * np.sin(np.linspace(0.0, 2.0 * np.pi, COUNT))
+        readings[:, 2] += 8.0 * SIGMA * np.sin(np.linspace(0.0, 2.0 * np.pi, 60))
         return readings
 
-    runs = [f for f in group_faults(*fitted(noise=0.25, spoil=spoil)) if f.test == "runs"]
+    runs = [f for f in group_faults(*fitted(noise=0.25, spoil=spoil, count=60)) if f.test == "runs"]
     assert [fault.quantity for fault in runs] == ["length of C3"]
 
 
