@@ -187,7 +187,8 @@ def _explained_rows(residuals: _Residuals) -> Iterator[GroupFault]:
 
     One factor of several such rows is no chance: outliers have no reason to agree with one.
     """
-    rows = np.flatnonzero(residuals.gross.any(axis=1))
+    rows = np.flatnonzero(residuals.lost.any(axis=1))
+    gross = residuals.gross[rows].any(axis=1)
     if len(rows) < FEWEST_EXPLAINED:
         return
     for kind, columns in zip(residuals.kinds, residuals.columns, strict=True):
@@ -196,7 +197,7 @@ def _explained_rows(residuals: _Residuals) -> Iterator[GroupFault]:
         clear = after < np.maximum(LEFT_OVER * before, np.minimum(OUTLIER, HALF * before))
         middle = float(np.median(c[clear])) if clear.any() else 0.0
         agree = clear & (np.abs(c - middle) < AGREEING * abs(middle))
-        if agree.sum() < FEWEST_EXPLAINED:
+        if np.sum(agree & gross) < FEWEST_EXPLAINED:
             continue
         yield GroupFault(
             "row factors", kind, kind, tuple(rows[agree].tolist()), 1.0 + middle,
