@@ -49,6 +49,9 @@ FALSE_ALARM = 1e-4
 """Probability that noise alone makes a log a misfit; of 200 logs, 2 % have a false alarm. Each of n
 tests has this over n (Bonferroni)."""
 
+LIKELY = 1e-2
+"""As `FALSE_ALARM`, of errors that are remarked."""
+
 MOST_DROPPED = 0.1
 """Share of the readings of a sensor or a kind that may be thrown out."""
 
@@ -85,6 +88,9 @@ LEAST_SEEN = 1e-6
 LEAST_COMPONENT = 0.1
 """A variance component is no smaller than this share of the kind's own mean square over its degrees
 of freedom, which holds where readings of few degrees leave components undecided."""
+
+LEAST_DEGREES = 0.5
+"""Degrees of freedom from which on a kind tells its own scatter; below, that of all is taken."""
 
 Rows = npt.NDArray[np.intp]
 Flags = npt.NDArray[np.bool_]
@@ -260,7 +266,8 @@ class _Residuals:
         kinds, columns, scatter: Of each kind its name, columns, and s_g.
         noise: Scatter with that of the readings that were thrown out, shape (g,); at least 1.
         gross: Readings that were thrown out and are no such noise, shape (k, R).
-        degrees: Degrees of freedom, trace of M.
+        degrees, degrees_of: Degrees of freedom, trace of M; and of each kind.
+        told: Whether a kind tells its own scatter, shape (g,).
     """
 
     def __init__(self, problem: LeastSquares, at: Point, pose_std: Array) -> None:
@@ -315,8 +322,11 @@ class _Residuals:
         known = np.array([np.sum((V @ S[a]) * (V @ P).T) for a in range(count)])
         self.sums = self.members @ np.sum(self.r**2, axis=0)
         found, _ = nnls(squares, np.maximum(self.sums - known, 0.0))
-        plain = self.sums / np.maximum(self.degrees_of, 1e-9)
-        self.scatter = np.sqrt(np.maximum(found, LEAST_COMPONENT * plain) + 1e-30)
+        self.told = self.degrees_of > LEAST_DEGREES
+        plain = self.sums / np.where(self.told, self.degrees_of, np.inf)
+        pooled = self.sums.sum() / max(self.degrees, LEAST_DEGREES)
+        squares_of = np.where(self.told, np.maximum(found, LEAST_COMPONENT * plain), pooled)
+        self.scatter = np.sqrt(squares_of + 1e-30)
 
     def likely_instant(self, error: Array) -> Rows:
         """Rows from an instant on in which an error explains most of the residuals."""
@@ -389,7 +399,7 @@ class _Error(NamedTuple):
 def _systematic(residuals: _Residuals) -> list[GroupFault]:
     """Factors, delays, jumps, splits, rows and runs that are certain."""
     errors = _errors(residuals)
-    faults = list(_tested(residuals, errors, FALSE_ALARM / len(errors))) if errors else []
+    faults = list(_tested(residuals, errors)) if errors else []
     return faults + _runs(residuals, FALSE_ALARM / residuals.r.shape[1])
 
 
@@ -457,8 +467,8 @@ def _likely_rows(residuals: _Residuals, columns: Rows) -> Rows:
     return np.sort(order[:cut] if 2 * cut <= len(order) else order[cut:])
 
 
-def _tested(residuals: _Residuals, errors: Sequence[_Error], level: float) -> Iterator[GroupFault]:
-    """Those of some errors that are certain, one of each test and quantity."""
+def _tested(residuals: _Residuals, errors: Sequence[_Error]) -> Iterator[GroupFault]:
+    """Those of some errors that are likely, one of each test and quantity."""
     D = np.stack([one.error for one in errors], axis=2)
     projected, prior = residuals.projected(D)
     size = np.einsum("krn,krn->n", D, projected)
@@ -481,8 +491,9 @@ def _tested(residuals: _Residuals, errors: Sequence[_Error], level: float) -> It
             continue
         std = float(np.sqrt(variance)) / size[n]
         chance, key = 2.0 * float(t.sf(abs(c) / std, freedom)) * one.sets, (one.test, one.quantity)
-        if chance < min(level, best[key].probability if key in best else 1.0):
-            best[key] = _fault(residuals, one, c, std, chance)
+        if chance < min(LIKELY / len(errors), best[key].probability if key in best else 1.0):
+            certain = chance < FALSE_ALARM / len(errors)
+            best[key] = _fault(residuals, one, (c, std, chance), certain)
     yield from best.values()
 
 
@@ -497,17 +508,21 @@ def _variance(
         degrees: Their degrees of freedom, shape (g,).
         weights: Squares of M d in each kind, shape (g,).
     """
-    before = residuals.sums / np.maximum(residuals.degrees_of, 1e-9)
-    after = sums / np.maximum(degrees, 1e-9)
-    ratio = np.where(before > 0.0, after / np.maximum(before, 1e-300), 1.0)
-    parts = residuals.scatter**2 * ratio * weights
+    told = residuals.told & (residuals.sums > 0.0)
+    before = np.where(told, residuals.sums / np.where(told, residuals.degrees_of, 1.0), 1.0)
+    after = np.where(told, sums / np.maximum(degrees, 1e-9), 1.0)
+    parts = residuals.scatter**2 * after / before * weights
     variance = float(np.sum(parts))
-    freedom = variance**2 / float(np.sum(parts**2 / np.maximum(degrees, 1e-3)) + 1e-300)
+    degrees = np.where(told, np.maximum(degrees, 1e-3), residuals.degrees)
+    freedom = variance**2 / float(np.sum(parts**2 / degrees) + 1e-300)
     return variance, freedom
 
 
-def _fault(residuals: _Residuals, one: _Error, c: float, std: float, chance: float) -> GroupFault:
-    """An error that is certain, in words, and whether it counts."""
+def _fault(
+    residuals: _Residuals, one: _Error, found: tuple[float, float, float], certain: bool
+) -> GroupFault:
+    """An error of some size, deviation and probability, in words, and whether it counts."""
+    c, std, chance = found
     moves, what = residuals.moves(c * one.error), one.quantity
     size = 1.0 + c if one.unit == "-" else c
     verb = "is" if what in residuals.names else "are"
@@ -522,7 +537,7 @@ def _fault(residuals: _Residuals, one: _Error, c: float, std: float, chance: flo
         words = f"{what} {where}{verb} {size:.4g} +- {std:.2g} times what fits"
     return GroupFault(
         one.test, residuals.kinds[one.kind], what, one.rows, size, std, chance, moves, words,
-        moves > MATERIAL,
+        certain and moves > MATERIAL,
     )  # fmt: skip
 
 

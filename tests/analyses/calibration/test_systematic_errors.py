@@ -16,7 +16,7 @@ from cdpr_drake.analyses.calibration.log_file import CalibrationLog
 from cdpr_drake.calibration.stations import Point, Stations
 from cdpr_drake.geometry.poses import pose_from_angles
 from cdpr_drake.models.robot_loader import load_robot
-from tests.analyses.calibration.attack import attacks, clean, outcome, scene
+from tests.analyses.calibration.attack import attacks, clean, hangprinter, outcome, scene
 
 ROWS = 20
 """Of a log that is attacked."""
@@ -49,6 +49,14 @@ def test_a_systematic_error_is_a_misfit_with_its_reason(scenes, name, attack, wo
     said = outcome(one, dict(attacks(one.log))[attack])
     assert said.status == "misfit"
     assert words in said.words
+
+
+def test_rows_off_are_found_beside_positions_that_are_exact():
+    """These have no degree of freedom, and so no scatter of their own."""
+    one = hangprinter()
+    said = outcome(one, dict(attacks(one.log))["30 % of rows, the first, x 1.05"])
+    assert said.status == "misfit"
+    assert "motor angles from row " in said.words
 
 
 def test_an_error_that_moves_poses_little_enlarges_their_deviations(scenes):
