@@ -432,7 +432,6 @@ def _errors(residuals: _Residuals) -> list[_Error]:
             put("late", name, g, "rows", of, np.vstack([step, [[0.0]]]))
             put("late", name, g, "rows", of, np.vstack([[[0.0]], step]))
             put("jump", name, g, residuals.units[c], of, -1.0 / residuals.sigma[:, of])
-            put("row factors", name, g, "-", of, -v[:, of])
         if len(valued) > 1:
             put("factor", f"all {kind}", g, "-", valued, -v[:, valued])
             put("split", kind, g, "-", valued, -v[:, valued])
