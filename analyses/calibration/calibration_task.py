@@ -22,6 +22,7 @@ from cdpr_drake.analyses.calibration.fit_verdict import (
     misfits,
     remarked_groups,
     unused_columns,
+    with_enlarged_deviations,
 )
 from cdpr_drake.analyses.calibration.held_out import (
     EACH,
@@ -49,9 +50,6 @@ from cdpr_drake.errors import CalibrationError
 
 LOST = ("pose ", "search: ", "start: ")
 """How errors begin that a sensor's sign may be the reason of."""
-
-REMARKED = 2.0
-"""A fit that is worse than this many sigmas is remarked."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,12 +124,8 @@ def calibrate(
     if misfit:
         result = replace(result, status=MISFIT)
     remarks = [*log.remarks, *unused_columns(prepared)]
-    if result.degrees > 0 and result.spread() > REMARKED:
-        remarks.append(
-            f"residuals are {result.spread():.3g} times what sigmas say; standard deviations are "
-            "as much too small, or something that was not asked for is off"
-        )
-    remarks += [*remarked_groups(groups), *likely_scales(result, prepared)]
+    result, larger = with_enlarged_deviations(result, groups)
+    remarks += [*remarked_groups(groups), *larger, *likely_scales(result, prepared)]
     remarks += [*bad_sensors(result), *doubts(result, found.minima), *undecided]
     remarks += [
         f"{name} is held at its bound, {value:.6g}; standard deviations are those of the others "

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
+from scipy.stats import chi2
 
 from cdpr_drake.analyses.calibration.calibration_request import Prepared
 from cdpr_drake.analyses.calibration.columns import (
@@ -39,6 +41,10 @@ FEWEST_DROPPED = 3
 
 MOST_OF_ONE, FEWEST_OF_ONE = 0.5, 4
 """One sensor of which a larger share does not fit, of so many readings at least, is remarked."""
+
+BY_CHANCE, NOTICED = 1e-3, 0.5
+"""Residuals that are larger than sigmas say with a smaller probability enlarge deviations, and so
+do errors that move poses by more of their deviations."""
 
 MOST_OUTLYING = 0.1
 """Outliers are many where they are a larger share of what was measured beyond what is unknown."""
@@ -91,6 +97,45 @@ def misfits(result: CalibrationResult, groups: Sequence[GroupFault] = ()) -> tup
             f"{worst.unit}, {abs(worst.sigmas):.3g} sigmas"
         )
     return tuple(why)
+
+
+def with_enlarged_deviations(
+    result: CalibrationResult, groups: Sequence[GroupFault]
+) -> tuple[CalibrationResult, tuple[str, ...]]:
+    """The same with deviations that hold what residuals say beyond sigmas, and in words why.
+
+    All grow by the scatter of the data where that is more than sigmas say: the root of squares of
+    residuals over sigma per degree of freedom, with 16 of each outlier, since those that were cut
+    off would make it too small. Those of poses hold the largest of the errors that are certain and
+    make no misfit; in a row where it is open which readings are right, any may be off by as much as
+    what was thrown out. Source: the variance of unit weight after adjustment, and its global test;
+    Baarda, A testing procedure for use in geodetic networks, 1968.
+    """
+    told = []
+    degrees = result.degrees + len(result.outliers)
+    squares = max(result.robust_cost, result.chi_square)
+    if result.degrees > 0 and chi2.sf(squares, degrees) < BY_CHANCE:
+        scale = float(np.sqrt(squares / degrees))
+        result = replace(
+            result, std=scale * result.std, pose_std=scale * result.pose_std,
+            covariance=scale**2 * result.covariance, information=result.information / scale**2,
+        )  # fmt: skip
+        told.append(
+            f"residuals are {scale:.3g} times what sigmas say; standard deviations are enlarged by "
+            "as much, unless something that was not asked for is off"
+        )
+    moves = max((group.moves for group in groups if not group.counts), default=0.0)
+    if NOTICED < moves < np.inf:
+        scale = float(np.hypot(1.0, moves))
+        result = replace(result, pose_std=scale * result.pose_std)
+        told.append(f"standard deviations of poses are {scale:.3g} times larger for these errors")
+    undecided = {row for group in groups if group.test == "rows" for row in group.rows}
+    by_row = np.ones(len(result.pose_std))
+    for outlier in result.outliers:
+        if outlier.pose in undecided:
+            by_row[outlier.pose] = max(by_row[outlier.pose], abs(outlier.sigmas))
+    result = replace(result, pose_std=by_row[:, None] * result.pose_std)
+    return result, tuple(told)
 
 
 def _reason(group: GroupFault) -> str:

@@ -76,7 +76,9 @@ def turned_sensors(
         groups: Groups of its measurements that do not agree.
         refitted: Calibrates anew, from one start.
     """
-    lost = [g.quantity.removeprefix("readings of ") for g in groups if g.test == "dropped"]
+    gone = [group for group in groups if group.test == "dropped"]
+    most = max((group.size for group in gone), default=0.0)
+    lost = [g.quantity.removeprefix("readings of ") for g in gone if 2.0 * g.size >= most]
     suspects = [kind for kind, fit in result.residuals.items() if is_thrown_out(fit)]
     if not lost and not suspects and any(_is_clear(group) for group in groups):
         return ()

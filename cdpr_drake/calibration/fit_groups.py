@@ -1,4 +1,4 @@
-"""Whether groups of a fit's measurements agree: quantities, rows, and the factors they need.
+"""Groups of a fit's measurements that disagree: sensors, kinds and rows, and what they need.
 
 At a minimum the residuals over sigma are r = M e, with e the noise and M the projector off all that
 parameters and poses can follow. A systematic error c d, such as all lengths of a cable being a
@@ -11,86 +11,89 @@ of the residuals themselves once c d is taken out: sigmas that are too large or 
 factor change no test, and an error does not hide behind the scatter that it makes. t has Student's
 distribution, with degrees of freedom by Satterthwaite's rule.
 
-An error makes a misfit where it is certain (`FALSE_ALARM` over the number of tests, with an
-allowance for errors of the model, `MODEL_ERROR`), larger than the scatter itself, and where it
-moves poses by more than their stated deviations (`MATERIAL`). Errors that are large beside the
-stated sigma are thrown out of the fit instead: there the shares of a sensor, a kind and a row are
-limited (`MOST_DROPPED`), and one factor that explains several such rows is sought.
+An error makes a misfit where it is certain (`FALSE_ALARM` over the number of tests) and where it
+moves poses by more than their stated deviations (`MATERIAL`). Rows that are off are sought among
+all sets of rows: that of n rows of N has one of C(N, n) tests.
+
+Errors that are large beside sigma are thrown out of the fit instead. The fit then rests on the
+readings that remain, and it contradicts itself where a row has no more of these to check its pose
+than it lost, or where a sensor or a kind lost more than single outliers explain.
 
 Source: Lagrange-multiplier test of omitted variables: Cook and Weisberg, Residuals and influence in
 regression, 1982, 2.2; Baarda, A testing procedure for use in geodetic networks, 1968, for tests of
 gross errors behind a projector; Rao, Estimation of variance components, 1971, for s_g;
-Satterthwaite, An approximate distribution of estimates of variance components, 1946.
+Satterthwaite, An approximate distribution of estimates of variance components, 1946; Wald and
+Wolfowitz, On a test whether two samples are from the same population, 1940, for runs.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 from scipy.linalg import eigh
 from scipy.optimize import nnls
-from scipy.stats import binom, f, norm, t
+from scipy.special import comb, gammaln
+from scipy.stats import binom, hypergeom, norm, t
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.calibration.elimination import UNTOLD, LeastSquares
 from cdpr_drake.calibration.pose_search import OUTLIER
 from cdpr_drake.calibration.result import CalibrationResult, used_rows
 from cdpr_drake.calibration.stations import POSE, Point
-from cdpr_drake.calibration.terms import Term
 
 FALSE_ALARM = 1e-4
 """Probability that noise alone makes a log a misfit; of 200 logs, 2 % have a false alarm. Each of n
 tests has this over n (Bonferroni)."""
 
-MOST_DROPPED = 1.0 / 3.0
-"""Share of a quantity's readings that may be thrown out."""
+LIKELY = 1e-2
+"""As `FALSE_ALARM`, of errors that are remarked."""
 
-MOST_OF_KIND = 0.1
-"""Share of the readings of a kind, over all sensors, that may be thrown out."""
+MOST_DROPPED = 0.1
+"""Share of the readings of a sensor or a kind that may be thrown out."""
 
 SINGLE_OUTLIERS, TRUNCATED = 0.02, 1.1
-"""Share of a kind that single outliers are expected to be, and by how much its scatter is larger
-than that of the readings that remain, where noise is twice its sigma."""
-
-DROPPED_BY_NOISE = 0.05
-"""Share that noise of twice the stated sigma throws out: P(|x| > 4 / 2) = 0.0455."""
+"""Share that single outliers are expected to be, and by how much the scatter is larger than that of
+the readings that remain, where noise is twice its sigma."""
 
 MOST_ROWS = 0.05
-"""Share of rows that may have lost so many of their readings."""
+"""Share of rows, or one row, that may have lost a single reading of which none but itself tells."""
 
-FEWEST_DROPPED = 3
-"""So many readings of a kind that a row loses make it a bad row."""
+FEWEST_EXPLAINED = 2
+"""Rows that one factor explains."""
 
-MODEL_ERROR = 2.5
-"""Errors of a robot's model, such as of its geometry, are no white noise: they shift directions by
-more than scatter says. t counts as that of noise so many times larger, F as of its square. Chosen,
-and not derived: with 1 the public log of IRMA4U, whose model has such errors, is a misfit."""
+LEFT_OVER, HALF, AGREEING = 0.1, 0.5, 0.2
+"""Shares of the largest residual of a row that its factor leaves, since poses turn with it, and
+where what it leaves is no outlier; and share by which factors of rows differ from their median."""
 
-MATERIAL = 1.5
-"""An error moves poses by more of their stated deviations than this, root mean square."""
+MATERIAL = 2.5
+"""An error moves poses by more of their stated deviations than this, root mean square. Beside noise
+of these deviations, poses are then within 2.7 of them."""
 
-FAR = 5.0
-"""An error that moves poses by more of their deviations is none of a model: it has to be certain
-beside scatter alone."""
+LARGEST_CHANGE = 3.0
+"""A factor that differs from 1 by more is none: a sign makes 2, and units are seen at once."""
 
-LEAST_FACTOR = 0.01
-"""Factors nearer to 1 are remarked: stretch of cables, or a drum's radius, makes as much."""
+END_ROWS = 3
+"""Rows on each side of an instant at which a log is split, at least."""
 
-ABOVE_SCATTER = 1.5
-"""An error is this many times the scatter of readings, root mean square, where it acts."""
+RUNNING = 5
+"""Rows of a running mean."""
 
-MOST_SPLITS, MOST_JUMPS, END_ROWS = 100, 30, 3
-"""Instants at which a log is split in two, and a sensor may jump; rows on each side at least."""
+LEAST_SEEN = 1e-6
+"""Share of an error that residuals show; of less, poses and parameters follow it."""
 
-MOST_ROW_TESTS = 200
-"""Rows whose own factors are compared, spread over the log."""
+LEAST_COMPONENT = 0.1
+"""A variance component is no smaller than this share of the kind's own mean square over its degrees
+of freedom, which holds where readings of few degrees leave components undecided."""
 
-BLOCK = 64
-"""Directions that are projected at once."""
+LEAST_DEGREES = 0.5
+"""Degrees of freedom from which on a kind tells its own scatter; below, that of all is taken."""
+
+Rows = npt.NDArray[np.intp]
+Flags = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -98,14 +101,14 @@ class GroupFault:
     """A group of measurements that does not agree with the others.
 
     Attributes:
-        test: "dropped", "rows", "factor", "late", "jump", "split" or "row factors".
+        test: "dropped", "rows", "factor", "late", "jump", "split", "row factors" or "runs".
         kind: Kind of measurement.
         quantity: What was measured, in words.
         rows: Rows it is about, from 0; empty: all.
-        size: Factor, delay in rows, jump in the unit, or number of readings.
+        size: Factor, delay in rows, jump in the unit, or number of readings, rows or runs.
         std: Its standard deviation, by the data's own scatter; 0: a count.
         probability: That noise alone does as much.
-        moves: By how many of their stated deviations poses or parameters move if it is corrected.
+        moves: By how many of their stated deviations poses move if it is corrected.
         words: All of it.
         counts: Whether it makes a misfit; else it is to be remarked.
     """
@@ -129,138 +132,118 @@ def group_faults(problem: LeastSquares, result: CalibrationResult) -> tuple[Grou
         problem: What was solved, with the rows that were dropped.
         result: Its minimum.
     """
-    at = Point(result.model, result.stations)
-    used = [used_rows(problem, k) for k in range(len(problem.terms))]
-    residuals = _Residuals(problem, at, used, result.pose_std)
-    dropped = [
-        *_explained_rows(problem, at, used), *_dropped_quantities(residuals, used),
-        *_dropped_rows(problem, at, used),
-    ]  # fmt: skip
+    residuals = _Residuals(problem, Point(result.model, result.stations), result.pose_std)
+    lost = [*_explained_rows(residuals), *_undecided_rows(residuals), *_dropped(residuals)]
     systematic = _systematic(residuals) if residuals.degrees > 1.0 else []
-    return (*dropped, *sorted(systematic, key=lambda fault: fault.probability))
+    return (*lost, *sorted(systematic, key=lambda fault: fault.probability))
 
 
-def _dropped_quantities(
-    residuals: _Residuals, used: Sequence[npt.NDArray[np.bool_]]
-) -> list[GroupFault]:
-    """Single sensors, such as roll or the length of a cable, of which too much was thrown out; and
-    kinds of measurement of which too much was, though each sensor lost little."""
-    faults: list[GroupFault] = []
-    problem, at = residuals.problem, residuals.at
-    count = sum(1 + term.measured().any(axis=0).sum() for term in problem.terms)
+def _dropped(residuals: _Residuals) -> Iterator[GroupFault]:
+    """Sensors, such as roll or the length of a cable, of which too much was thrown out; and kinds
+    of measurement of which too much was, though each sensor lost little."""
+    lost, measured = residuals.lost, residuals.measured
+    level = FALSE_ALARM / (measured.shape[1] + len(residuals.kinds))
 
-    def look(
-        kind: str, what: str, lost: npt.NDArray[np.bool_], whole: int, most: float, expected: float
-    ) -> bool:
-        gone = int(lost.sum())
-        chance = float(binom.sf(gone - 1, whole, expected)) if gone else 1.0
-        if gone <= most * whole or chance >= FALSE_ALARM / count:
-            return False
-        rows = tuple(np.flatnonzero(lost.reshape(len(lost), -1).any(axis=1)).tolist())
+    def fault(kind: str, what: str, of: Rows, scatter: float) -> GroupFault | None:
+        gone, whole = int(lost[:, of].sum()), int(measured[:, of].sum())
+        beyond = float(2.0 * norm.sf(OUTLIER / scatter))
+        chance = float(binom.sf(gone - 1, whole, max(beyond, SINGLE_OUTLIERS))) if gone else 1.0
+        if gone <= MOST_DROPPED * whole or chance >= level:
+            return None
+        rows = tuple(np.flatnonzero(lost[:, of].any(axis=1)).tolist())
         words = f"{gone} of {whole} {what} do not fit"
-        faults.append(GroupFault("dropped", kind, what, rows, gone, 0.0, chance, np.inf, words))
-        return True
+        return GroupFault("dropped", kind, what, rows, gone, 0.0, chance, np.inf, words)
 
-    for term, counted, scatter in zip(problem.terms, used, residuals.scatter, strict=True):
-        measured = term.measured()
-        lost, named = measured & ~counted, False
-        for column in np.flatnonzero(lost.any(axis=0)).tolist():
-            what = f"readings of {term.row_name(column, at.model.names)}"
-            whole = int(measured[:, column].sum())
-            named |= look(term.kind, what, lost[:, column], whole, MOST_DROPPED, DROPPED_BY_NOISE)
-        if not named:
-            beyond = 2.0 * norm.sf(OUTLIER / max(TRUNCATED * scatter, 1e-9))
-            expected = max(float(beyond), SINGLE_OUTLIERS)
-            look(term.kind, term.kind, lost, int(measured.sum()), MOST_OF_KIND, expected)
-    return faults
+    for kind, columns, scatter in zip(
+        residuals.kinds, residuals.columns, residuals.noise, strict=True
+    ):
+        sensors = [
+            fault(kind, f"readings of {residuals.names[c]}", np.array([c]), scatter)
+            for c in columns
+        ]
+        found = [one for one in sensors if one is not None]
+        whole = None if found else fault(kind, kind, columns, scatter)
+        yield from found if whole is None else [whole]
 
 
-def _dropped_rows(
-    problem: LeastSquares, at: Point, used: Sequence[npt.NDArray[np.bool_]]
-) -> list[GroupFault]:
-    """Rows that lost half of what they measured of one kind, or more."""
-    spare = sum(counted.sum(axis=1) for counted in used)
-    spare = spare - problem.freedom.count(at.stations.width)
-    faults = []
-    for term, counted in zip(problem.terms, used, strict=True):
-        whole = term.measured().sum(axis=1)
-        gone = whole - counted.sum(axis=1)
-        bad = (gone >= FEWEST_DROPPED) & (2 * gone >= whole)
-        rows = np.flatnonzero(bad)
-        if not len(rows):
-            continue
-        many = len(rows) > max(1.0, MOST_ROWS * len(whole))
-        faults.append(
-            GroupFault(
-                "rows", term.kind, term.kind, tuple(rows.tolist()), len(rows), 0.0, 0.0, np.inf,
-                f"{_row_words(rows)} of {len(whole)} lost half of their {term.kind}, or more",
-                bool(many or (spare[rows] <= 0).any()),
-            )
-        )  # fmt: skip
-    return faults
+def _undecided_rows(residuals: _Residuals) -> Iterator[GroupFault]:
+    """Rows that lost more than remains to check their pose: which readings are right is open."""
+    freedom = residuals.problem.freedom.count(residuals.at.stations.width)
+    spare = np.maximum(residuals.used.sum(axis=1) - freedom, 0)
+    lost, gross = residuals.lost.sum(axis=1), residuals.gross.sum(axis=1)
+    rows = np.flatnonzero(lost > spare)
+    if not len(rows):
+        return
+    worst = rows[np.argmax(lost[rows])]
+    by_kind = [int(residuals.lost[worst][columns].sum()) for columns in residuals.columns]
+    kind, count = residuals.kinds[int(np.argmax(by_kind))], len(lost)
+    bad = gross > spare
+    yield GroupFault(
+        "rows", kind, "all readings", tuple(rows.tolist()), len(rows), 0.0, 0.0, np.inf,
+        f"{_row_words(rows)} of {count} contradict{'' if len(rows) > 1 else 's'} "
+        f"{'themselves' if len(rows) > 1 else 'itself'}: {int(lost[worst])} of "
+        f"{int(residuals.measured[worst].sum())} readings of row {worst + 1} do not fit the "
+        "others, and which are right is open",
+        bool(np.any(bad & (gross > 1)) or bad.sum() > max(1.0, MOST_ROWS * count)),
+    )  # fmt: skip
 
 
-def _explained_rows(
-    problem: LeastSquares, at: Point, used: Sequence[npt.NDArray[np.bool_]]
-) -> list[GroupFault]:
+def _explained_rows(residuals: _Residuals) -> Iterator[GroupFault]:
     """Rows in which nothing has to be thrown out once all they measured of a kind has a factor.
 
     One factor of several such rows is no chance: outliers have no reason to agree with one.
     """
-    whole = replace(problem, dropped=None)
-    lost = [term.measured() & ~counted for term, counted in zip(problem.terms, used, strict=True)]
-    rows = np.flatnonzero(np.any(np.concatenate(lost, axis=1), axis=1))
+    rows = np.flatnonzero(residuals.lost.any(axis=1))
+    gross = residuals.gross[rows].any(axis=1)
     if len(rows) < FEWEST_EXPLAINED:
-        return []
-    evaluated, _, B = whole.evaluate(at)
-    r, B = evaluated[rows], B[rows]
-    hat = B @ np.linalg.solve(np.swapaxes(B, 1, 2) @ B, np.swapaxes(B, 1, 2))
-    faults, begin = [], 0
-    for term in problem.terms:
-        inside = slice(begin, begin + term.measured().shape[1])
-        begin = inside.stop
-        values = _expected(term, evaluated[:, inside], at)[rows]
-        if np.sum(np.any(values != 0.0, axis=0)) < 2:
-            continue
-        d = np.zeros(r.shape)
-        d[:, inside] = -values
-        off, seen = (x - np.einsum("krs,ks->kr", hat, x) for x in (r, d))
-        size = np.sum(d * seen, axis=1)
-        told = size > LEAST_ROW_SEEN * np.sum(d**2, axis=1)
-        c = np.where(told, np.sum(d * off, axis=1) / np.where(told, size, 1.0), 0.0)
+        return
+    for kind, columns in zip(residuals.kinds, residuals.columns, strict=True):
+        off, seen, c, _ = _own_factors(residuals, rows, columns, residuals.measured)
         before, after = (np.max(np.abs(x), axis=1) for x in (off, off - c[:, None] * seen))
-        clear = told & (before > GROSS * OUTLIER) & (np.abs(c) > LEAST_FACTOR)
-        clear &= after < np.maximum(OUTLIER, LEFT_OVER * before)
-        if not clear.any():
-            continue
-        middle = float(np.median(c[clear]))
+        clear = after < np.maximum(LEFT_OVER * before, np.minimum(OUTLIER, HALF * before))
+        middle = float(np.median(c[clear])) if clear.any() else 0.0
         agree = clear & (np.abs(c - middle) < AGREEING * abs(middle))
-        if agree.sum() < FEWEST_EXPLAINED:
+        if np.sum(agree & gross) < FEWEST_EXPLAINED:
             continue
-        factor = 1.0 + middle
-        faults.append(
-            GroupFault(
-                "row factors", term.kind, term.kind, tuple(rows[agree].tolist()), factor,
-                float(np.std(c[agree])), 0.0, np.inf,
-                f"{term.kind} of {_row_words(rows[agree])} are {factor:.4g} times what fits the "
-                "other rows; with that, nothing of these rows is thrown out",
-            )
+        yield GroupFault(
+            "row factors", kind, kind, tuple(rows[agree].tolist()), 1.0 + middle,
+            float(np.std(c[agree])), 0.0, np.inf,
+            f"{kind} of {_row_words(rows[agree])} are {1.0 + middle:.4g} times what fits the "
+            "other rows; with that, nothing of these rows is thrown out",
         )  # fmt: skip
-    return faults
 
 
-FEWEST_EXPLAINED = 2
-"""Rows that one factor explains."""
+def _own_factors(
+    residuals: _Residuals, rows: Rows, columns: Rows, counted: Flags
+) -> tuple[Array, Array, Array, Array]:
+    """Factors of some columns that rows need by themselves, the model as it is.
 
-GROSS = 2.0
-"""So many times the limit of outliers are off in them: noise of twice its sigma is no error."""
+    Args:
+        residuals: All of them.
+        rows: Rows k that are looked at.
+        columns: What the factor multiplies.
+        counted: Readings that count, of all rows.
 
-LEFT_OVER, AGREEING = 0.1, 0.2
-"""Share of the largest residual of a row that its factor leaves, since poses turn with it; and
-share by which factors of rows differ from their median."""
+    Returns:
+        Residuals and errors for a change of 1 behind the poses alone, each shape (k, R); the change
+        of the factor, shape (k,), zero where it is not seen; and the error before, (k, R).
+    """
+    counts = counted[rows]
+    B = residuals.slopes[rows] * counts[:, :, None]
+    d = np.zeros(counts.shape)
+    d[:, columns] = -residuals.expected[rows][:, columns]
+    d[~counts | (np.sum(np.any(d != 0.0, axis=0)) < 2)] = 0.0  # of one sensor: a test of its own
+    Q = B @ np.linalg.pinv(B)
+    off, seen = (
+        x - np.einsum("krs,ks->kr", Q, x) for x in (np.where(counts, residuals.whole[rows], 0.0), d)
+    )
+    size = np.sum(seen**2, axis=1)
+    told = size > LEAST_SEEN * np.sum(d**2, axis=1)
+    c = np.where(told, np.sum(d * off, axis=1) / np.where(told, size, 1.0), 0.0)
+    return off, seen * told[:, None], c, d
 
 
-def _row_words(rows: Sequence[int] | npt.NDArray[np.intp]) -> str:
+def _row_words(rows: Sequence[int] | Rows) -> str:
     """Numbers of rows, from 1, in words."""
     numbers = ", ".join(str(row + 1) for row in rows[:8])
     more = f" and {len(rows) - 8} more" if len(rows) > 8 else ""
@@ -274,21 +257,43 @@ class _Residuals:
 
     Attributes:
         r: Residuals, shape (k, R); zero where none counts.
-        kinds: Which term a column belongs to, shape (R,).
-        degrees: Degrees of freedom of each kind, trace of M, shape (g,).
-        scatter: s_g of each kind, shape (g,).
+        whole: Those of readings that were thrown out as well.
+        expected: What the fit expects, shape (k, R); zero where a factor means nothing. Measured
+            values would not do: the noise in them fits itself with a factor of 0.
+        slopes: Derivatives by poses of all that was measured, shape (k, R, q).
+        measured, used, lost: Readings by what became of them, each shape (k, R).
+        names, units, sigma: Of columns; sigma has shape (k, R).
+        kinds, columns, scatter: Of each kind its name, columns, and s_g.
+        noise: Scatter with that of the readings that were thrown out, shape (g,); at least 1.
+        gross: Readings that were thrown out and are no such noise, shape (k, R).
+        degrees, degrees_of: Degrees of freedom, trace of M; and of each kind.
+        told: Whether a kind tells its own scatter, shape (g,).
     """
 
-    def __init__(
-        self, problem: LeastSquares, at: Point, used: Sequence[npt.NDArray[np.bool_]],
-        pose_std: Array,
-    ) -> None:  # fmt: skip
+    def __init__(self, problem: LeastSquares, at: Point, pose_std: Array) -> None:
         self.problem, self.at, self.pose_std = problem, at, pose_std
-        self.used = np.concatenate(used, axis=1)
-        self.kinds = np.repeat(np.arange(len(used)), [counted.shape[1] for counted in used])
-        self.members = np.array([self.kinds == g for g in range(len(used))], float)
-        r, A, B = problem.evaluate(at)
-        self.r, self._A, self._B = np.where(self.used, r, 0.0), A, B
+        terms = problem.terms
+        self.measured = np.concatenate([term.measured() for term in terms], axis=1)
+        self.used = np.concatenate([used_rows(problem, k) for k in range(len(terms))], axis=1)
+        self.lost = self.measured & ~self.used
+        widths = [term.measured().shape[1] for term in terms]
+        ends = np.cumsum(widths)
+        self.kinds = [term.kind for term in terms]
+        self.columns = [
+            np.arange(end - width, end) for end, width in zip(ends, widths, strict=True)
+        ]
+        self.members = np.array([np.isin(np.arange(ends[-1]), own) for own in self.columns], float)
+        every = [(term, c) for term, width in zip(terms, widths, strict=True) for c in range(width)]
+        self.names = [term.row_name(c, at.model.names) for term, c in every]
+        self.units = [term.row_unit(c) for term, c in every]
+        self.sigma = np.concatenate([term.sigmas() for term in terms], axis=1)
+        self.whole, A, self.slopes = replace(problem, dropped=None).evaluate(at)
+        values = np.nan_to_num(np.concatenate([term.values(at) for term in terms], axis=1))
+        valued = self.measured & np.any(values != 0.0, axis=0)
+        self.expected = np.where(valued, values / self.sigma + self.whole, 0.0)
+        self.r = np.where(self.used, self.whole, 0.0)
+        A, B = (np.where(self.used[:, :, None], x, 0.0) for x in (A, self.slopes))
+        self._A, self._B = A, B
         H = np.swapaxes(B, 1, 2) @ B
         self._Bt = np.linalg.solve(H, np.swapaxes(B, 1, 2))  # (k, q, R)
         self.A = A - B @ (self._Bt @ A)
@@ -297,31 +302,43 @@ class _Residuals:
         flat = self.A.reshape(self.r.size, A.shape[2])
         self._inverse = _told_inverse(flat.T @ flat + self._prior.T @ self._prior)
         self._components()
+        self.noise = np.maximum(1.0, TRUNCATED * self.scatter)
+        self.gross = self.lost & (np.abs(self.whole) > OUTLIER * (self.noise @ self.members))
 
     def _components(self) -> None:
         """Degrees of freedom and scatter of each kind, by variance components."""
-        g, V = len(self.members), self._inverse
-        alone = self._B @ self._Bt
+        count, V = len(self.members), self._inverse
         own = np.where(self.used, 1.0, 0.0)
-        hat = np.einsum("krf,fh,krh->kr", self.A, V, self.A)
-        diagonal = own - np.einsum("krr->kr", alone) - hat
-        self.degrees_of = self.members @ diagonal.sum(axis=0)
+        rest = np.eye(own.shape[1]) * own[:, :, None] - self._B @ self._Bt
+        hat = self.A @ V @ np.swapaxes(self.A, 1, 2)
+        self.degrees_of = self.members @ np.einsum("krr->r", rest - hat)
         self.degrees = float(self.degrees_of.sum())
-        by_kind = [self.A * member[None, :, None] for member in self.members]
-        S = np.array([np.einsum("krf,krh->fh", part, part) for part in by_kind])
-        rest = np.eye(alone.shape[1]) * own[:, :, None] - alone
-        squares = np.einsum("gr,krs,hs->gh", self.members, rest**2, self.members)
-        for a in range(g):
-            for b in range(g):
-                crossed = np.einsum("krf,krs,ksh->fh", by_kind[a], rest, by_kind[b])
-                squares[a, b] += np.sum((V @ S[a]) * (V @ S[b]).T) - 2.0 * np.sum(crossed * V)
+        S = [
+            np.einsum("krf,krh->fh", self.A * own, self.A) for own in self.members[:, None, :, None]
+        ]
+        squares = self.members @ np.sum(rest**2 - 2.0 * rest * hat, axis=0) @ self.members.T
         P = self._prior.T @ self._prior
-        known = np.array([np.sum((V @ S[a]) * (V @ P).T) for a in range(g)])
-        sums = self.members @ np.sum(self.r**2, axis=0)
-        found, _ = nnls(squares, np.maximum(sums - known, 0.0))
-        plain = sums / np.maximum(self.degrees_of, 1e-9)
-        self.sums, self._S, self._P = sums, S, P
-        self.scatter = np.sqrt(np.maximum(found, LEAST_COMPONENT * plain) + 1e-30)
+        squares += [[np.sum((V @ S[a]) * (V @ S[b]).T) for b in range(count)] for a in range(count)]
+        known = np.array([np.sum((V @ S[a]) * (V @ P).T) for a in range(count)])
+        self.sums = self.members @ np.sum(self.r**2, axis=0)
+        found, _ = nnls(squares, np.maximum(self.sums - known, 0.0))
+        self.told = self.degrees_of > LEAST_DEGREES
+        plain = self.sums / np.where(self.told, self.degrees_of, np.inf)
+        pooled = self.sums.sum() / max(self.degrees, LEAST_DEGREES)
+        squares_of = np.where(self.told, np.maximum(found, LEAST_COMPONENT * plain), pooled)
+        self.scatter = np.sqrt(squares_of + 1e-30)
+
+    def likely_instant(self, error: Array) -> Rows:
+        """Rows from an instant on in which an error explains most of the residuals."""
+        rest = error - np.einsum("krq,kq->kr", self._B, np.einsum("kqr,kr->kq", self._Bt, error))
+        follows = np.einsum("krf,kr->kf", self.A, error)
+        sums = [np.sum(x, axis=1) for x in (error * rest, self.r * error, error**2)]
+        size, along, whole, a = (np.cumsum(x[::-1], axis=0)[::-1] for x in (*sums, follows))
+        size = size - np.einsum("kf,kf->k", a @ self._inverse, a)
+        told = size > LEAST_SEEN * whole
+        told[:END_ROWS] = told[max(len(told) - END_ROWS + 1, 0) :] = False
+        first = int(np.argmax(np.where(told, along**2 / np.where(told, size, 1.0), 0.0)))
+        return np.arange(first or len(told), len(told))
 
     def projected(self, D: Array) -> tuple[Array, Array]:
         """M D of directions, shape (k, R, n), and its prior rows, shape (p, n)."""
@@ -349,11 +366,6 @@ class _Residuals:
         return float(np.max(np.sqrt(np.mean(ratios**2, axis=0))))
 
 
-LEAST_COMPONENT = 0.1
-"""A variance component is no smaller than this share of the kind's own mean square over its degrees
-of freedom, which holds where readings of few degrees leave components undecided."""
-
-
 def _told_inverse(S: Array) -> Array:
     """Inverse of an information in what it tells, as `symmetric_solve` has it."""
     if not len(S):
@@ -363,13 +375,15 @@ def _told_inverse(S: Array) -> Array:
     return np.asarray((V[:, told] / values[told]) @ V[:, told].T)
 
 
-@dataclass(frozen=True, eq=False)
-class _Direction:
+class _Error(NamedTuple):
     """An error that measurements may have.
 
     Attributes:
-        test, quantity, kind, unit: What it is.
-        rows: Rows it is about, from 0.
+        test, quantity: What it is.
+        kind: Number of the kind.
+        unit: Of its size.
+        rows: Rows it is about, from 0; empty: all.
+        sets: Sets of so many rows, of which this one was chosen.
         error: Of residuals over sigma for a size of 1, shape (k, R).
     """
 
@@ -378,165 +392,114 @@ class _Direction:
     kind: int
     unit: str
     rows: tuple[int, ...]
+    sets: float
     error: Array
 
 
 def _systematic(residuals: _Residuals) -> list[GroupFault]:
-    """Factors, delays, jumps and splits that are certain."""
-    directions = _directions(residuals)
-    kinds = _valued_kinds(residuals)
-    tests = len(directions) + len(kinds)
-    level = FALSE_ALARM / max(tests, 1)
-    best: dict[tuple[str, str], GroupFault] = {}
-    for begin in range(0, len(directions), BLOCK):
-        some = directions[begin : begin + BLOCK]
-        for fault in _tested(residuals, some, level):
-            key = (fault.test, fault.quantity)
-            if key not in best or fault.probability < best[key].probability:
-                best[key] = fault
-    faults = list(best.values())
-    for kind in kinds:
-        faults += _row_factors(residuals, kind, level)
-    return faults
+    """Factors, delays, jumps, splits, rows and runs that are certain."""
+    errors = _errors(residuals)
+    faults = list(_tested(residuals, errors)) if errors else []
+    return faults + _runs(residuals, FALSE_ALARM / residuals.r.shape[1])
 
 
-def _expected(term: Term, r: Array, at: Point) -> Array:
-    """What the fit expects a term to have measured, over sigma, shape (k, rows).
+def _errors(residuals: _Residuals) -> list[_Error]:
+    """Errors that are tested; of jumps, splits and sets of rows the most likely one."""
+    count, used, v = len(residuals.r), residuals.used, residuals.expected
+    errors: list[_Error] = []
 
-    Measured values would not do in its place: the noise in them fits itself with a factor of 0.
-    """
-    values = term.values(at) / term.sigmas()
-    valued = np.any(np.nan_to_num(values) != 0.0, axis=0)
-    return np.where(term.measured() & valued, values + r, 0.0)
+    def put(test: str, name: str, kind: int, unit: str, of: Rows, error: Array) -> None:
+        whole = np.zeros(used.shape)
+        whole[:, of] = np.where(used[:, of], error, 0.0)
+        rows, sets = np.zeros(0, np.intp), 1.0
+        if test in ("jump", "split", "row factors"):
+            rows = residuals.likely_instant(whole)
+            sets = float(count)
+            if test == "row factors":
+                rows = _likely_rows(residuals, of)
+                sets = float(comb(count, len(rows)))
+            if not len(rows):
+                return
+            whole[np.setdiff1d(np.arange(count), rows)] = 0.0
+        errors.append(_Error(test, name, kind, unit, tuple(rows.tolist()), sets, whole))
 
-
-def _values(residuals: _Residuals) -> Array:
-    """What the fit expects over sigma, shape (k, R); zero where a factor means nothing."""
-    ends = np.cumsum([term.measured().shape[1] for term in residuals.problem.terms])[:-1]
-    parts = [
-        _expected(term, r, residuals.at)
-        for term, r in zip(
-            residuals.problem.terms, np.split(residuals.r, ends, axis=1), strict=True
-        )
-    ]
-    return np.where(residuals.used, np.concatenate(parts, axis=1), 0.0)
-
-
-def _valued_kinds(residuals: _Residuals) -> list[int]:
-    values = _values(residuals)
-    return [g for g, member in enumerate(residuals.members) if np.any(values * member)]
-
-
-def _directions(residuals: _Residuals) -> list[_Direction]:
-    values, used, terms = _values(residuals), residuals.used, residuals.problem.terms
-    count = len(values)
-    splits, jumps = _instants(count, MOST_SPLITS), _instants(count, MOST_JUMPS)
-    directions: list[_Direction] = []
-    begin = 0
-    for g, term in enumerate(terms):
-        width = term.measured().shape[1]
-        inside = slice(begin, begin + width)
-        begin += width
-        valued = np.flatnonzero(np.any(values[:, inside] != 0.0, axis=0))
-        if not len(valued):
-            continue
-        names = [term.row_name(int(c), residuals.at.model.names) for c in range(width)]
-        units = [term.row_unit(int(c)) for c in range(width)]
-
-        put = partial(_put, directions, used, g)
-        sigma = term.sigmas()
-        for c in valued.tolist():
-            at, v = begin - width + c, values[:, begin - width + c]
-            put(("factor", names[c], "-"), (), of=at, error=-v)
-            both = used[:-1, at] & used[1:, at]
-            ahead = np.append(np.where(both, np.diff(v), 0.0), 0.0)
-            put(("late", names[c], "rows"), (), of=at, error=ahead)
-            behind = np.append(0.0, np.where(both, np.diff(v), 0.0))
-            put(("late", names[c], "rows"), (), of=at, error=behind)
-            for split in jumps:
-                late = np.arange(count) >= split
-                put(
-                    ("jump", names[c], units[c]),
-                    range(split, count),
-                    of=at,
-                    error=-(late / sigma[:, c]),
-                )
+    for g, (kind, columns) in enumerate(zip(residuals.kinds, residuals.columns, strict=True)):
+        valued = columns[np.any(v[:, columns] != 0.0, axis=0)]
+        for c in valued:
+            of, name = np.array([c]), residuals.names[c]
+            put("factor", name, g, "-", of, -v[:, of])
+            step = np.where(used[:-1, of] & used[1:, of], np.diff(v[:, of], axis=0), 0.0)
+            put("late", name, g, "rows", of, np.vstack([step, [[0.0]]]))
+            put("late", name, g, "rows", of, np.vstack([[[0.0]], step]))
+            put("jump", name, g, residuals.units[c], of, -1.0 / residuals.sigma[:, of])
         if len(valued) > 1:
-            put(("factor", f"all {term.kind}", "-"), (), of=inside, error=-values[:, inside])
-            for split in splits:
-                late = (np.arange(count) >= split)[:, None]
-                error = -values[:, inside] * late
-                put(("split", term.kind, "-"), range(split, count), of=inside, error=error)
-    return directions
+            put("factor", f"all {kind}", g, "-", valued, -v[:, valued])
+            put("split", kind, g, "-", valued, -v[:, valued])
+            put("row factors", kind, g, "-", valued, -v[:, valued])
+    return errors
 
 
-def _instants(count: int, most: int) -> list[int]:
-    """Rows at which a log is split, at most so many, with rows enough on each side."""
-    if count < 2 * END_ROWS:
-        return []
-    steps = np.linspace(END_ROWS, count - END_ROWS, min(most, count - 2 * END_ROWS + 1))
-    return sorted({round(float(step)) for step in steps})
+def _likely_rows(residuals: _Residuals, columns: Rows) -> Rows:
+    """The fewer of two groups of rows that differ most in the factor of some columns; none where
+    that is no more than chance.
+
+    Two groups of numbers with weights w differ by W_1 W_2 / (W_1 + W_2) (c_1 - c_2)^2, which grows
+    by about 2 log C(N, n) if n of N are chosen for it.
+    """
+    _, seen, c, _ = _own_factors(residuals, np.arange(len(residuals.r)), columns, residuals.used)
+    w = np.sum(seen**2, axis=1)
+    order = np.flatnonzero(w > 0.0)
+    order = order[np.argsort(c[order])]
+    if len(order) < 2 * END_ROWS:
+        return np.zeros(0, np.intp)
+    n = np.arange(1, len(order))
+    W, along = np.cumsum(w[order]), np.cumsum((w * c)[order])
+    low, high = along[:-1] / W[:-1], (along[-1] - along[:-1]) / (W[-1] - W[:-1])
+    apart = W[:-1] * (W[-1] - W[:-1]) / W[-1] * (high - low) ** 2
+    left = max(float(np.sum((w * c**2)[order])) - along[-1] ** 2 / W[-1], 1e-300)
+    chosen = gammaln(len(order) + 1) - gammaln(n + 1) - gammaln(len(order) - n + 1)
+    likely = -0.5 * len(order) * np.log(np.maximum(1.0 - apart / left, 1e-12)) - chosen
+    best = int(np.argmax(likely))
+    if likely[best] <= 0.0:
+        return np.zeros(0, np.intp)
+    cut = int(n[best])
+    return np.sort(order[:cut] if 2 * cut <= len(order) else order[cut:])
 
 
-def _put(
-    directions: list[_Direction], used: npt.NDArray[np.bool_], kind: int,
-    what: tuple[str, str, str], rows: Sequence[int], *, of: int | slice, error: Array,
-) -> None:  # fmt: skip
-    """Adds an error of some columns, where they count; `what`: test, quantity and unit."""
-    whole = np.zeros(used.shape)
-    whole[:, of] = error
-    whole[~used] = 0.0
-    test, name, unit = what
-    directions.append(_Direction(test, name, kind, unit, tuple(rows), whole))
-
-
-def _tested(
-    residuals: _Residuals, directions: Sequence[_Direction], level: float
-) -> list[GroupFault]:
-    """Those of some directions that are certain."""
-    D = np.stack([direction.error for direction in directions], axis=2)
+def _tested(residuals: _Residuals, errors: Sequence[_Error]) -> Iterator[GroupFault]:
+    """Those of some errors that are likely, one of each test and quantity."""
+    D = np.stack([one.error for one in errors], axis=2)
     projected, prior = residuals.projected(D)
     size = np.einsum("krn,krn->n", D, projected)
     along = np.einsum("kr,krn->n", residuals.r, D)
     whole = np.einsum("krn,krn->n", D, D)
     kinds = residuals.members @ np.einsum("krn,krn->rn", projected, projected)
     own = residuals.members @ np.einsum("kr,krn->rn", residuals.r, projected)
-    faults = []
-    for n, direction in enumerate(directions):
+    best: dict[tuple[str, str], GroupFault] = {}
+    for n, one in enumerate(errors):
         if size[n] <= LEAST_SEEN * whole[n] or size[n] <= 0.0:
             continue
-        c = along[n] / size[n]
-        if direction.test in ("factor", "split") and abs(c) > LARGEST_CHANGE:
+        c = float(along[n] / size[n])
+        if one.unit == "-" and abs(c) > LARGEST_CHANGE:
             continue
         sums = np.maximum(residuals.sums - 2.0 * c * own[:, n] + c**2 * kinds[:, n], 0.0)
         degrees = residuals.degrees_of - kinds[:, n] / size[n]
-        variance, freedom, scatter = _variance(residuals, sums, degrees, kinds[:, n])
+        variance, freedom = _variance(residuals, sums, degrees, kinds[:, n])
         variance += float(np.sum(prior[:, n] ** 2))
         if freedom < 1.0 or variance <= 0.0:
             continue
         std = float(np.sqrt(variance)) / size[n]
-        plain, chance = 2.0 * t.sf(abs(c) / std / np.array([1.0, MODEL_ERROR]), freedom)
-        if plain >= level:
-            continue
-        fault = _fault(residuals, direction, float(c), std, float(chance), scatter[direction.kind])
-        if chance >= level and fault.moves > FAR:
-            fault = replace(fault, probability=float(plain))
-        if fault.probability < level:
-            faults.append(fault)
-    return faults
-
-
-LARGEST_CHANGE = 3.0
-"""A factor that differs from 1 by more is none: a sign makes 2, and units are seen at once."""
-
-LEAST_SEEN = 1e-6
-"""Share of an error that residuals show; of less, rounding decides."""
+        chance, key = 2.0 * float(t.sf(abs(c) / std, freedom)) * one.sets, (one.test, one.quantity)
+        if chance < min(LIKELY / len(errors), best[key].probability if key in best else 1.0):
+            certain = chance < FALSE_ALARM / len(errors)
+            best[key] = _fault(residuals, one, (c, std, chance), certain)
+    yield from best.values()
 
 
 def _variance(
     residuals: _Residuals, sums: Array, degrees: Array, weights: Array
-) -> tuple[float, float, Array]:
-    """Of d' r, its degrees of freedom by Satterthwaite, and the scatter of each kind.
+) -> tuple[float, float]:
+    """Of d' r, and its degrees of freedom by Satterthwaite.
 
     Args:
         residuals: All of them.
@@ -544,119 +507,73 @@ def _variance(
         degrees: Their degrees of freedom, shape (g,).
         weights: Squares of M d in each kind, shape (g,).
     """
-    before = residuals.sums / np.maximum(residuals.degrees_of, 1e-9)
-    after = sums / np.maximum(degrees, 1e-9)
-    ratio = np.where(before > 0.0, after / np.maximum(before, 1e-300), 1.0)
-    squares = residuals.scatter**2 * ratio
-    parts = squares * weights
+    told = residuals.told & (residuals.sums > 0.0)
+    before = np.where(told, residuals.sums / np.where(told, residuals.degrees_of, 1.0), 1.0)
+    after = np.where(told, sums / np.maximum(degrees, 1e-9), 1.0)
+    parts = residuals.scatter**2 * after / before * weights
     variance = float(np.sum(parts))
-    freedom = variance**2 / float(np.sum(parts**2 / np.maximum(degrees, 1e-3)) + 1e-300)
-    return variance, freedom, np.sqrt(squares)
+    degrees = np.where(told, np.maximum(degrees, 1e-3), residuals.degrees)
+    freedom = variance**2 / float(np.sum(parts**2 / degrees) + 1e-300)
+    return variance, freedom
 
 
 def _fault(
-    residuals: _Residuals, direction: _Direction, c: float, std: float, chance: float,
-    scatter: float,
-) -> GroupFault:  # fmt: skip
-    """An error that is certain, in words, and whether it counts."""
-    error = c * direction.error
-    acts = direction.error != 0.0
-    above = float(np.sqrt(np.mean(error[acts] ** 2))) / max(scatter, 1e-30)
-    moves = residuals.moves(error)
-    size, what, rows = c, direction.quantity, direction.rows
-    large = direction.test not in ("factor", "split") or abs(c) > LEAST_FACTOR
-    if direction.test in ("factor", "split"):
-        size = 1.0 + c
-        where = "" if direction.test == "factor" else f"from row {rows[0] + 1} on "
-        verb = "are" if what.startswith("all ") or where else "is"
-        words = f"{what} {where}{verb} {size:.4g} +- {std:.2g} times what fits"
-    elif direction.test == "late":
+    residuals: _Residuals, one: _Error, found: tuple[float, float, float], certain: bool
+) -> GroupFault:
+    """An error of some size, deviation and probability, in words, and whether it counts."""
+    c, std, chance = found
+    moves, what = residuals.moves(c * one.error), one.quantity
+    size = 1.0 + c if one.unit == "-" else c
+    verb = "is" if what in residuals.names else "are"
+    if one.test == "late":
         words = f"{what} is {abs(size):.3g} +- {std:.2g} rows {'late' if size > 0 else 'early'}"
+    elif one.test == "jump":
+        words = f"{what} jumps at row {one.rows[0] + 1} by {size:.4g} +- {std:.2g} {one.unit}"
+    elif one.test == "row factors":
+        words = f"{what} of {_row_words(one.rows)} {verb} {size:.4g} times what fits the other rows"
     else:
-        words = f"{what} jumps at row {rows[0] + 1} by {size:.4g} +- {std:.2g} {direction.unit}"
-    kind = residuals.problem.terms[direction.kind].kind
+        where = f"from row {one.rows[0] + 1} on " if one.rows else ""
+        words = f"{what} {where}{verb} {size:.4g} +- {std:.2g} times what fits"
     return GroupFault(
-        direction.test, kind, what, rows, size, std, chance, moves, words,
-        large and above > ABOVE_SCATTER and moves > MATERIAL,
+        one.test, residuals.kinds[one.kind], what, one.rows, size, std, chance, moves, words,
+        certain and moves > MATERIAL,
     )  # fmt: skip
 
 
-def _row_factors(residuals: _Residuals, kind: int, level: float) -> list[GroupFault]:
-    """Whether rows of a kind need factors of their own: rows that are off, wherever they stand."""
-    values = _values(residuals) * residuals.members[kind]
-    rows = np.flatnonzero(np.any(values, axis=1))
-    if len(rows) > MOST_ROW_TESTS:
-        rows = rows[np.linspace(0, len(rows) - 1, MOST_ROW_TESTS).astype(int)]
-    B, Bt, A, V = residuals._B[rows], residuals._Bt[rows], residuals.A[rows], residuals._inverse
-    d = -values[rows]
-    rest = d - (B @ (Bt @ d[:, :, None]))[:, :, 0]
-    seen = np.sum(rest**2, axis=1) > LEAST_ROW_SEEN * np.sum(d**2, axis=1)
-    rows, d, rest, A = rows[seen], d[seen], rest[seen], A[seen]
-    if len(rows) < 2 * END_ROWS:
-        return []
-    a = np.einsum("krf,kr->kf", A, rest)
-    aV = a @ V
-    size = np.diag(np.sum(rest**2, axis=1)) - aV @ a.T
-    along = np.sum(residuals.r[rows] * d, axis=1)
-    c = np.linalg.pinv(size, rcond=1e-8, hermitian=True) @ along
-    error = np.zeros(values.shape)
-    error[rows] = c[:, None] * d
-    projected, _ = residuals.projected(error[:, :, None])
-    left = residuals.r - projected[:, :, 0]
-    shares = np.array([
-        np.sum((rest**2) @ member / np.maximum(np.sum(rest**2, axis=1), 1e-300))
-        for member in residuals.members
-    ])  # fmt: skip
-    sums = residuals.members @ np.sum(left**2, axis=0)
-    degrees = residuals.degrees_of - shares
-    weights = residuals.members @ np.sum(rest**2, axis=0)
-    _, freedom, scatter = _variance(residuals, sums, degrees, weights)
-    if freedom < 2.0 or np.any((degrees < 1.0) & (shares > 0.5)):
-        return []
-    C = aV @ residuals._P @ aV.T
-    for g, member in enumerate(residuals.members):
-        mine = rest * member
-        u = np.einsum("krf,kr->kf", A * member[None, :, None], mine)
-        crossed = u @ aV.T
-        C += scatter[g] ** 2 * (
-            np.diag(np.sum(mine**2, axis=1)) - crossed - crossed.T + aV @ residuals._S[g] @ aV.T
-        )
-    w, Q = eigh(0.5 * (C + C.T))
-    told = w > 1e-9 * w[-1]
-    rank = int(told.sum())
-    statistic = float(np.sum((Q[:, told].T @ along) ** 2 / w[told])) / rank
-    chance = float(f.sf(statistic / MODEL_ERROR**2, rank, freedom))
-    if chance >= level:
-        return []
-    off = _fewer(c)
-    error = np.zeros(values.shape)
-    error[rows] = (c * off - np.mean(c[~off]) * off)[:, None] * d
-    above = float(np.sqrt(np.mean(error[error != 0.0] ** 2))) / max(scatter[kind], 1e-30)
-    moves = residuals.moves(error)
-    name = residuals.problem.terms[kind].kind
-    factor = 1.0 + np.mean(c[off]) - np.mean(c[~off])
-    return [
-        GroupFault(
-            "row factors", name, name, tuple(rows[off].tolist()), float(factor),
-            float(np.std(c[off])), chance, moves,
-            f"{name} of {_row_words(rows[off])} are {factor:.4g} times what fits the other rows",
-            abs(factor - 1.0) > LEAST_FACTOR and above > ABOVE_SCATTER and moves > MATERIAL,
-        )
-    ]  # fmt: skip
+def _runs(residuals: _Residuals, level: float) -> list[GroupFault]:
+    """The sensor whose residuals change their sign too seldom, row by row: a drift.
+
+    It counts where poses would move by the running mean of its residuals.
+    """
+    best: GroupFault | None = None
+    for g, columns in enumerate(residuals.columns):
+        for c in columns:
+            rows = np.flatnonzero(residuals.used[:, c])
+            r = residuals.r[rows, c]
+            runs, chance = runs_test(r)
+            if chance >= min(level, best.probability if best else 1.0):
+                continue
+            error = np.zeros(residuals.r.shape)
+            error[rows, c] = np.convolve(r, np.full(RUNNING, 1.0 / RUNNING), "same")
+            moves, name = residuals.moves(error), residuals.names[c]
+            best = GroupFault(
+                "runs", residuals.kinds[g], name, tuple(rows.tolist()), runs, 0.0, chance, moves,
+                f"residuals of {name} have one sign for long: {runs} times positive in "
+                f"{len(rows)} rows: a drift, or an error that varies with the pose",
+                moves > MATERIAL,
+            )  # fmt: skip
+    return [] if best is None else [best]
 
 
-LEAST_ROW_SEEN = 1e-6
-"""Share of a row's factor that its own residuals show; of less, its pose follows it."""
+def runs_test(r: Array) -> tuple[int, float]:
+    """Number of runs of positive numbers, and the probability of so few if order is by chance.
 
-
-def _fewer(c: Array) -> npt.NDArray[np.bool_]:
-    """The smaller of two groups of numbers, those with the least squares about their means."""
-    order = np.argsort(c)
-    best, cut = np.inf, 1
-    for k in range(1, len(c)):
-        low, high = c[order[:k]], c[order[k:]]
-        cost = float(np.sum((low - low.mean()) ** 2) + np.sum((high - high.mean()) ** 2))
-        if cost < best:
-            best, cut = cost, k
-    larger: npt.NDArray[np.bool_] = np.isin(np.arange(len(c)), order[cut:])
-    return larger if 2 * larger.sum() <= len(c) else np.isin(np.arange(len(c)), order[:cut])
+    With n positive numbers and m others, j runs are C(n - 1, n - j) C(m + 1, j) of C(n + m, n)
+    orders: a hypergeometric distribution.
+    """
+    positive = np.concatenate([[False], np.asarray(r) > 0.0])
+    count = int(positive.sum())
+    runs = int(np.sum(positive[1:] & ~positive[:-1]))
+    if count in (0, len(r)):
+        return runs, 1.0
+    return runs, float(hypergeom.cdf(runs, len(r), len(r) - count + 1, count))

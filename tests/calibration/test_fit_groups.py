@@ -1,14 +1,14 @@
 """Groups of measurements that do not agree: the projector, tests behind it, what is thrown out."""
 
 from dataclasses import replace
+from itertools import permutations
 
 import numpy as np
 import pytest
 
-from cdpr_drake.calibration.fit_groups import _Residuals, group_faults
+from cdpr_drake.calibration.fit_groups import _Residuals, group_faults, runs_test
 from cdpr_drake.calibration.measurements import simulated_lengths, simulated_poses
 from cdpr_drake.calibration.program import CalibrationProgram
-from cdpr_drake.calibration.result import used_rows
 from cdpr_drake.calibration.stations import Point
 from tests.calibration.bench import poses, start_readings, true_model
 
@@ -18,10 +18,10 @@ EXACT = 1e-8
 """Share by which block elimination and dense algebra differ."""
 
 
-def fitted(noise=1.0, seed=0, spoil=lambda readings: readings, place=1.0):
+def fitted(noise=1.0, seed=0, spoil=lambda readings: readings, place=1.0, count=COUNT):
     """A result and its problem: lengths of eight cables and tracked poses, with sigmas as said."""
     random, true = np.random.default_rng(seed), true_model()
-    at = poses(COUNT, random)
+    at = poses(count, random)
     zero = start_readings(true, at[0])
     program = CalibrationProgram(true, at, ["length_offsets"])
     program.AddPrior(["length_offsets"], 0.05)
@@ -35,8 +35,7 @@ def fitted(noise=1.0, seed=0, spoil=lambda readings: readings, place=1.0):
 
 def residuals_of(problem, result):
     at = Point(result.model, result.stations)
-    used = [used_rows(problem, k) for k in range(len(problem.terms))]
-    return _Residuals(problem, at, used, result.pose_std)
+    return _Residuals(problem, at, result.pose_std)
 
 
 @pytest.fixture(scope="module")
@@ -152,6 +151,51 @@ def test_a_sensor_that_loses_a_third_is_named_and_fewer_are_not():
     assert [fault.words for fault in lost] == ["12 of 24 readings of length of C4 do not fit"]
     few = group_faults(*fitted(spoil=spoil(0.2)))
     assert [f for f in few if f.test == "dropped"] == []
+
+
+def test_a_row_that_lost_more_than_checks_it_contradicts_itself():
+    """Seven readings are left for six coordinates: one, to check against the seven others."""
+
+    def spoil(readings):
+        readings[6] += 0.05 * np.array([1, -1, 1, 1, -1, 1, -1, -1])
+        return readings
+
+    fault = next(f for f in group_faults(*fitted(spoil=spoil)) if f.test == "rows")
+    assert fault.rows == (6,)
+    assert fault.counts
+    assert "row 7 of 24 contradicts itself: 7 of 14 readings" in fault.words
+
+
+@pytest.mark.parametrize("positive", [1, 3, 4])
+def test_runs_are_as_rare_as_among_all_orders(positive):
+    """Against the orders of seven signs, each counted."""
+    signs = np.where(np.arange(7) < positive, 1.0, -1.0)
+    orders = [runs_test(signs[list(order)]) for order in set(permutations(range(7)))]
+    counts = np.array([runs for runs, _ in orders])
+    for runs, chance in orders[:50]:
+        assert chance == pytest.approx(np.mean(counts <= runs), rel=1e-12)
+
+
+def test_a_reading_that_swings_slowly_has_too_few_runs():
+    def spoil(readings):
+        readings[:, 2] += 8.0 * SIGMA * np.sin(np.linspace(0.0, 2.0 * np.pi, 60))
+        return readings
+
+    runs = [f for f in group_faults(*fitted(noise=0.25, spoil=spoil, count=60)) if f.test == "runs"]
+    assert [fault.quantity for fault in runs] == ["length of C3"]
+
+
+def test_the_instant_of_a_jump_is_the_likeliest_of_all(clean):
+    problem, result = clean
+    mine = residuals_of(problem, result)
+    error = np.zeros(mine.r.shape)
+    error[:, 3] = -1.0 / mine.sigma[:, 3]
+    gains = {}
+    for first in range(3, COUNT - 2):
+        late = error * (np.arange(COUNT) >= first)[:, None]
+        projected, _ = mine.projected(late[:, :, None])
+        gains[first] = np.sum(mine.r * late) ** 2 / np.sum(late * projected[:, :, 0])
+    assert mine.likely_instant(error)[0] == max(gains, key=gains.get)
 
 
 def test_what_was_not_measured_is_in_no_group(clean):

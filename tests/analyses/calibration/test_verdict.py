@@ -7,7 +7,13 @@ import numpy as np
 import pytest
 
 from cdpr_drake.analyses.calibration.calibration_report import calibration_drawings
-from cdpr_drake.analyses.calibration.fit_verdict import bad_sensors, doubts, misfits
+from cdpr_drake.analyses.calibration.fit_verdict import (
+    bad_sensors,
+    doubts,
+    misfits,
+    with_enlarged_deviations,
+)
+from cdpr_drake.calibration.fit_groups import GroupFault
 from cdpr_drake.calibration.result import CalibrationResult, Fit, Outlier
 from cdpr_drake.models.robot_loader import load_robot
 from tests.figure_faults import figure_faults
@@ -75,6 +81,45 @@ def test_outliers_beyond_a_tenth_are_many(outliers, degrees, many):
         assert alone[0].startswith(f"{outliers} outliers beside {degrees} degrees of freedom")
         assert "minima" not in alone[0]
         assert several[0].endswith("; starts ended in 2 minima, of which this is the best")
+
+
+def fit(chi_square, outliers=()):
+    """A fit of 100 degrees of freedom and two poses, whose deviations are all 1."""
+    return result(
+        chi_square=chi_square, robust_cost=chi_square + 16.0 * len(outliers), degrees=100,
+        outliers=outliers, std=np.ones(1), covariance=np.eye(1), information=np.eye(1),
+        pose_std=np.ones((2, 2)),
+    )  # fmt: skip
+
+
+def fault(test, moves, rows=()):
+    words = f"a {test}"
+    return GroupFault(test, "lengths", "lengths", rows, 1.0, 0.1, 1e-9, moves, words, counts=False)
+
+
+def test_deviations_are_as_large_as_residuals_say():
+    """Three standard deviations of chi-square, 42.4, are beyond chance; outliers count as 16."""
+    same, words = with_enlarged_deviations(fit(120.0), ())
+    assert words == ()
+    assert same.std[0] == same.pose_std[0, 0] == 1.0
+    larger, words = with_enlarged_deviations(fit(116.0, (outlier(0),) * 4), ())
+    scale = np.sqrt(180.0 / 104.0)
+    assert larger.std[0] == larger.pose_std[0, 0] == pytest.approx(scale)
+    assert larger.covariance[0, 0] == 1.0 / larger.information[0, 0] == pytest.approx(scale**2)
+    assert words[0].startswith(f"residuals are {scale:.3g} times what sigmas say")
+
+
+def test_deviations_of_poses_hold_errors_that_are_no_misfit():
+    larger, words = with_enlarged_deviations(fit(90.0), (fault("factor", 2.0), fault("jump", 1.0)))
+    assert larger.std[0] == 1.0
+    assert larger.pose_std[1, 1] == pytest.approx(np.sqrt(5.0))
+    assert words == ("standard deviations of poses are 2.24 times larger for these errors",)
+
+
+def test_a_row_that_contradicts_itself_is_as_unsure_as_what_was_thrown_out():
+    of = fit(60.0, (outlier(1),))
+    larger, _ = with_enlarged_deviations(of, (fault("rows", np.inf, (1,)),))
+    np.testing.assert_allclose(larger.pose_std, [[1.0, 1.0], [50.0, 50.0]])
 
 
 @pytest.mark.parametrize("spread", [1.0, 4.0])
