@@ -176,8 +176,8 @@ def _find_packages(
                 found.AddPackageXml(str(manifest))
             except RuntimeError:  # no manifest, or a second package of that name
                 continue
-        elif (name := package_name(manifest)) is not None:
-            given.setdefault(name, str(manifest.parent))
+        elif (held := package_name(manifest)) is not None:
+            given.setdefault(held, str(manifest.parent))
     for name in found.GetPackageNames():
         given.setdefault(name, found.GetPath(name))
     for name in elsewhere.GetPackageNames():

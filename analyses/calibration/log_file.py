@@ -110,8 +110,8 @@ def read_log(path: Path, cables: Sequence[str]) -> CalibrationLog:
         cables: Names of the cables.
 
     Raises:
-        CalibrationError: The file cannot be read, is empty, or a cell is no number up to `LARGEST`; names
-            the line and the column.
+        CalibrationError: The file cannot be read, is empty, or a cell is no number up to
+            `LARGEST`; names the line and the column.
     """
     rows, lines = split_cells(path)
     if _is_number(rows[0][0]) and all(_is_number(cell) for cell in rows[0] if cell):
