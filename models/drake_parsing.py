@@ -137,21 +137,62 @@ def parse_models(
     return list(parser.AddModelsFromString(text, kind))
 
 
-_NAMED = re.compile(r"""(?:filename|file|uri)\s*=\s*["']([^"']+)|<uri>\s*([^<]+?)\s*</uri>""")
+_NAMED = re.compile(
+    r"""(?:filename|file|uri)\s*=\s*["']([^"']+)|<uri>\s*([^<]+?)\s*</uri>"""
+    r"""|\b(?:file|uri)["']?\s*:\s*["']?([^"'\s,}\]]+)|^\s*(?:mtllib|map_\w+)\s+(\S+)""",
+    re.MULTILINE,
+)
+"""Names of files in URDF, SDFormat, model directives, glTF and OBJ."""
+
+_PACKAGE = "package.xml"
 
 
-def named_files(file: Path) -> list[Path]:
-    """Files that a model names by a path from its own folder, and what these name in turn."""
+def named_files(file: Path, packages: Mapping[str, str] | None = None) -> list[Path]:
+    """Files that a model names, and what these name in turn.
+
+    By a path from its own folder, or by package:// of the given packages, or of one above it. What
+    file:// names is not among them: Drake reads that where it is.
+    """
     found: dict[Path, None] = {}
     waiting = [file]
     while waiting:
         one = waiting.pop()
-        for match in _NAMED.finditer(input_bytes(one).decode("utf-8", "replace")):
-            other = Path(os.path.normpath(one.parent / (match[1] or match[2])))
-            if other not in found and other != file and input_there(other):
-                found[other] = None
-                waiting.append(other)
+        content = input_bytes(one)
+        if b"\0" in content:  # a picture or a mesh of bytes names none
+            continue
+        for match in _NAMED.finditer(content.decode("utf-8", "replace")):
+            named = next(filter(None, match.groups()))
+            for place in _places(named, one.parent, packages or {}):
+                other = Path(os.path.normpath(place))
+                if other not in found and other != file and input_there(other):
+                    found[other] = None
+                    waiting.append(other)
     return list(found)
+
+
+def _places(named: str, folder: Path, packages: Mapping[str, str]) -> list[Path]:
+    """Where a file lies that is named in a folder, with what makes its package one."""
+    scheme, is_uri, rest = named.partition("://")
+    if not is_uri:
+        return [folder / named]
+    name, _, inside = rest.partition("/")
+    if scheme not in ("package", "model"):
+        return []
+    above = [Path(packages[name])] if name in packages else [
+        parent for parent in folder.absolute().parents if package_name(parent / _PACKAGE) == name
+    ]  # fmt: skip
+    if package_name(folder / _PACKAGE) == name:
+        above.insert(0, folder)
+    return [above[0] / inside, above[0] / _PACKAGE] if above else []
+
+
+def package_name(manifest: Path) -> str | None:
+    """The name in the manifest of a package; None: there is no such file, or no name in it."""
+    if not input_there(manifest):
+        return None
+    content = input_bytes(manifest).decode("utf-8", "replace")
+    found = re.search(r"<name>\s*([^<]*?)\s*</name>", content)
+    return None if found is None else found[1]
 
 
 def try_mesh(file: Path) -> None:

@@ -15,9 +15,9 @@ from pydrake.multibody.tree import BodyIndex, FrameIndex, JointIndex
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import Problems, RobotFileError
 from cdpr_drake.geometry.cable_routes import CableRoute, CableRoutes
-from cdpr_drake.models.drake_parsing import drake_refusals, parse_models
+from cdpr_drake.models.drake_parsing import drake_refusals, named_files, parse_models
 from cdpr_drake.models.mechanism_schema import WORLD, EndPulley, Mechanism, MechanismCable
-from cdpr_drake.schema.input_files import input_text
+from cdpr_drake.schema.input_files import input_path, input_text, inputs_held
 from cdpr_drake.schema.yaml_files import compose_yaml
 
 DIRECTIVES = (".dmd.yaml", ".dmd.yml")
@@ -135,10 +135,17 @@ def add_mechanism(plant: MultibodyPlant, mechanism: Mechanism, name: str = "") -
     before = plant.num_frames(), set(map(int, plant.GetJointIndices())), plant.num_bodies()
     file = Path(mechanism.mechanism)
     with drake_refusals(f"mechanism: found {file.name}, which Drake refuses"):
+        held = inputs_held() is not None
+        placed = input_path(file, named_files(file, mechanism.packages)) if held else file
+        root = str(placed).removesuffix(str(file))  # empty where nothing is held
+        packages = {
+            key: root + folder for key, folder in mechanism.packages.items()
+            if Path(root + folder).is_dir()
+        }  # fmt: skip
         parser, text, kind = Parser(plant, name), None, ""
         if file.name.lower().endswith(DIRECTIVES):
-            text, kind = absolute_directives(file), DIRECTIVES[0].lstrip(".")
-        parse_models(parser, file, text, kind, mechanism.packages)
+            text, kind = absolute_directives(file, placed.parent), DIRECTIVES[0].lstrip(".")
+        parse_models(parser, placed, text, kind, packages)
         plant.mutable_gravity_field().set_gravity_vector(mechanism.gravity_vector())
         frames = {WORLD: int(plant.world_frame().index())}
         for index in range(before[0], plant.num_frames()):
@@ -150,10 +157,11 @@ def add_mechanism(plant: MultibodyPlant, mechanism: Mechanism, name: str = "") -
     return MechanismInPlant(plant, mechanism, name, frames)
 
 
-def absolute_directives(file: Path) -> str:
+def absolute_directives(file: Path, folder: Path | None = None) -> str:
     """Model directives with URIs in the place of paths relative to their file.
 
-    Drake takes URIs alone there; what else is wrong it says itself.
+    Drake takes URIs alone there; what else is wrong it says itself. `folder` is where Drake finds
+    what the file names beside itself; None: where the file is.
 
     Raises:
         YamlTextError: It is no YAML.
@@ -167,7 +175,7 @@ def absolute_directives(file: Path) -> str:
                     continue
                 for name, node in content.value if isinstance(content, yaml.MappingNode) else ():
                     if name.value == "file" and "://" not in str(node.value):
-                        node.value = (file.parent / str(node.value)).absolute().as_uri()
+                        node.value = ((folder or file.parent) / str(node.value)).absolute().as_uri()
     return "" if root is None else yaml.serialize(root)
 
 

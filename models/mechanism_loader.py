@@ -11,7 +11,7 @@ from pydrake.multibody.parsing import PackageMap
 from pydrake.multibody.plant import MultibodyPlant
 
 from cdpr_drake.errors import CdprError, Problems, RobotFileError
-from cdpr_drake.models.drake_parsing import drake_line
+from cdpr_drake.models.drake_parsing import drake_line, package_name
 from cdpr_drake.models.materials import check_materials
 from cdpr_drake.models.mechanism_files import is_mechanism
 from cdpr_drake.models.mechanism_in_plant import MODEL_SUFFIXES, add_mechanism
@@ -19,6 +19,7 @@ from cdpr_drake.models.mechanism_schema import Mechanism
 from cdpr_drake.models.plant_cables import PlantCables
 from cdpr_drake.models.robot_loader import LARGEST_LENGTH, load_robot, robot_file
 from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.schema.input_files import input_there
 from cdpr_drake.schema.typed_yaml import load_typed, parse_typed
 
 URL = "package://"
@@ -165,7 +166,8 @@ def _find_packages(
         if not where.is_dir():
             fail(f"packages.{name}", folder, "a folder")
         given[name] = str(where)
-    near = [here, *here.parents, *(child for child in sorted(here.iterdir()) if child.is_dir())]
+    below = sorted(here.iterdir()) if here.is_dir() else []  # gone, where its files were read
+    near = [here, *here.parents, *(child for child in below if child.is_dir())]
     found, elsewhere = PackageMap.MakeEmpty(), PackageMap.MakeEmpty()
     elsewhere.PopulateFromRosPackagePath()
     for manifest in (folder / MANIFEST for folder in near):
@@ -174,6 +176,8 @@ def _find_packages(
                 found.AddPackageXml(str(manifest))
             except RuntimeError:  # no manifest, or a second package of that name
                 continue
+        elif (held := package_name(manifest)) is not None:
+            given.setdefault(held, str(manifest.parent))
     for name in found.GetPackageNames():
         given.setdefault(name, found.GetPath(name))
     for name in elsewhere.GetPackageNames():
@@ -203,7 +207,7 @@ def _find_model(mechanism: Mechanism, path: Path, fail: Callable[[str, object, s
         file = path.absolute().parent / given
     if not file.name.lower().endswith(MODEL_SUFFIXES):
         fail("mechanism", given, f"a file that ends in {', '.join(MODEL_SUFFIXES)}")
-    elif not file.is_file():
+    elif not input_there(file):
         fail("mechanism", given, "a file that is there")
     else:
         mechanism.mechanism = str(file)

@@ -38,6 +38,7 @@ from cdpr_drake.analyses.calibration.columns import (
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CalibrationError, why_not_read
 from cdpr_drake.geometry.poses import rotation_from_angles, rotation_from_vector
+from cdpr_drake.schema.fields import LARGEST
 from cdpr_drake.schema.input_files import file_size
 
 ROTATIONS = (QUATERNION, TAIT, TURN, RPY)
@@ -109,8 +110,8 @@ def read_log(path: Path, cables: Sequence[str]) -> CalibrationLog:
         cables: Names of the cables.
 
     Raises:
-        CalibrationError: The file cannot be read, is empty, or a cell is no finite number; names
-            the line and the column.
+        CalibrationError: The file cannot be read, is empty, or a cell is no number up to
+            `LARGEST`; names the line and the column.
     """
     rows, lines = split_cells(path)
     if _is_number(rows[0][0]) and all(_is_number(cell) for cell in rows[0] if cell):
@@ -224,10 +225,10 @@ def parse_numbers(
             if columns[j] is None or not cell:
                 continue
             value = float(cell) if _is_number(cell) else np.nan
-            if not np.isfinite(value):
+            if not abs(value) <= LARGEST:
                 raise CalibrationError(
-                    f"{path}:{lines[k]}: {headers[j]}: found {cell[:40]}; accepted: a finite "
-                    "number, or an empty cell where nothing was measured"
+                    f"{path}:{lines[k]}: {headers[j]}: found {cell[:40]}; accepted: a number "
+                    f"up to {LARGEST:g}, or an empty cell where nothing was measured"
                 )
             table[k, j] = value
     return table

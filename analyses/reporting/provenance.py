@@ -141,7 +141,7 @@ def mechanism_arguments(name: str) -> dict[str, Any]:
     mechanism = load_mechanism(name)
     folder = Path(mechanism.mechanism).parent
     files = [each for each in sorted(folder.iterdir()) if each.name.endswith(MODEL_SUFFIXES)]
-    hashes = {each.name: hashlib.sha256(each.read_bytes()).hexdigest() for each in files}
+    hashes = {each.name: hashlib.sha256(input_bytes(each)).hexdigest() for each in files}
     return {"mechanism": plain_values(mechanism), "bodies": hashes}
 
 

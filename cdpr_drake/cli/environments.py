@@ -14,7 +14,7 @@ from cdpr_drake.analyses.front.environments import environment_names, make_envir
 from cdpr_drake.cli.completion import robot_words
 from cdpr_drake.cli.options import AsJson
 from cdpr_drake.cli.terminal import print_json, wide_console
-from cdpr_drake.errors import CdprError, OutputFolderError
+from cdpr_drake.errors import CdprError, OutputFolderError, why_not_read
 
 if TYPE_CHECKING:
     import numpy as np
@@ -100,4 +100,4 @@ def _write(path: Path, image: np.ndarray) -> None:
     try:
         imsave(path, image)
     except OSError as problem:
-        raise OutputFolderError(f"{path}: cannot be written: {problem}") from problem
+        raise OutputFolderError(f"{path}: cannot be written: {why_not_read(problem)}") from problem

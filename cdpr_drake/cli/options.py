@@ -15,7 +15,7 @@ from pydrake.math import RigidTransform
 from cdpr_drake.arrays import Array
 from cdpr_drake.cli.completion import robot_words
 from cdpr_drake.cli.option_names import with_options
-from cdpr_drake.errors import CdprError, OutputFolderError, accepted_names
+from cdpr_drake.errors import CdprError, OutputFolderError, accepted_names, why_not_read
 from cdpr_drake.geometry.poses import pose_from_angles
 
 if TYPE_CHECKING:
@@ -200,7 +200,7 @@ def save_plot(figure: Figure, path: Path) -> None:
     try:
         save_figure(figure, path)
     except (OSError, ValueError) as problem:
-        raise OutputFolderError(f"{path}: cannot be written: {problem}") from problem
+        raise OutputFolderError(f"{path}: cannot be written: {why_not_read(problem)}") from problem
 
 
 def named_values(

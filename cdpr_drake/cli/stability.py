@@ -48,7 +48,7 @@ from cdpr_drake.cli.options import (
 )
 from cdpr_drake.cli.run_endings import report_failures
 from cdpr_drake.cli.terminal import message_console, print_json, wide_console, working
-from cdpr_drake.errors import CdprError, OutputFolderError, StoppedError
+from cdpr_drake.errors import CdprError, OutputFolderError, StoppedError, why_not_read
 from cdpr_drake.stability.verdict import VerdictOptions
 
 
@@ -74,7 +74,9 @@ def show_stability_along(
             folder.mkdir(parents=True, exist_ok=True)
             failed = found.write(folder, formats)
         except OSError as problem:
-            raise OutputFolderError(f"{folder}: cannot be written: {problem}") from problem
+            raise OutputFolderError(
+                f"{folder}: cannot be written: {why_not_read(problem)}"
+            ) from problem
     numbers = found.as_dict()
     code = report_failures(message_console(), failed, folder, None)
     if as_json:

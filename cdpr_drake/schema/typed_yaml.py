@@ -376,6 +376,10 @@ class _Checker:
             if rule.kind == "text" and _CONTROL.search(str(node.value)):
                 self.fail(node, key, f"found {show(node)}; accepted: no control characters")
                 return
+            if isinstance(node, yaml.ScalarNode) and node.tag not in _SCALARS:
+                tag = node.tag.replace(_TAG, "!!")[:80]
+                self.fail(node, key, f"found the tag {tag}; accepted: a value without one")
+                return
             found = node.value if isinstance(node, yaml.ScalarNode) else ""
             hint = "".join(f"did you mean {name}? " for name in meant_names(found, rule.choices))
             self.fail(node, key, f"found {show(node)}; {hint}accepted: {rule.accepts(found)}")

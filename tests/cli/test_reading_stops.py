@@ -117,3 +117,18 @@ def test_devices_are_not_read_to_their_end(monkeypatch, capsys):
             main(words)
         assert end.value.code == 2
     assert "/dev/zero" in printed(capsys).err
+
+
+@pytest.mark.parametrize("command", ["calibrate", "identify"])
+def test_measurements_that_have_no_square_are_a_line(command, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    names = [f"C{k}_length_m" for k in range(1, 9)] + ["x_m", "y_m", "z_m"]
+    rows = [[str(0.1 * t), *["1.0"] * 7, "1e300", *["0.1"] * 3] for t in range(5)]
+    text = "\n".join(",".join(row) for row in [["time_s", *names], *rows])
+    (tmp_path / "log.csv").write_text(text + "\n")
+    with pytest.raises(SystemExit) as end:
+        main([command, "acrobot_small", "log.csv"])
+    err = printed(capsys).err
+    assert end.value.code == 2
+    assert err.startswith("cdpr: log.csv:2: C8_length_m: found 1e300; accepted: a number up to")
+    assert err.count("\n") == 1

@@ -88,9 +88,9 @@ def test_json_is_read_as_before():
         (r'"\e[31mred"', "accepted: no control characters"),
         (r'"\x9b2J"', "accepted: no control characters"),
         (r'"a\0b"', "accepted: no control characters"),
-        ("!!python/object/apply:os.system x", "title: found"),
-        ("!!binary x", "title: found"),
-        ("!mine x", "title: found"),
+        ("!!python/object/apply:os.system x", "found the tag !!python/object/apply:os.system"),
+        ("!!binary x", "found the tag !!binary; accepted"),
+        ("!mine x", "found the tag !mine; accepted"),
     ],
 )
 def test_texts_that_control_a_terminal_or_have_a_tag_are_refused(value, words, tmp_path):

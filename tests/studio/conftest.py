@@ -83,6 +83,7 @@ def _watch(event, arguments):
     name = os.fsdecode(path)
     if (
         name.endswith((".py", ".pyc", ".so"))
+        or name == sys.argv[0]  # where warnings look for lines
         or "site-packages" in name
         or name.startswith(sys.base_prefix)
     ):  # modules, at their import

@@ -35,7 +35,7 @@ async def guarded(folder):
     sessions = Sessions(lambda: Workbench(WorkingFolder(folder), calculator=calculator))
     try:
         async with user_simulation(make_page(sessions)):
-            _put_before_all("127.0.0.1", Entrance(TOKEN, 80))
+            _put_before_all("127.0.0.1", Entrance(TOKEN, 80), sessions)
             transport = httpx.ASGITransport(core.app)
             async with httpx.AsyncClient(transport=transport, base_url="http://127.0.0.1") as web:
                 yield web, sessions

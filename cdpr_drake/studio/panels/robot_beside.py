@@ -45,7 +45,7 @@ class RobotBeside:
             return
         with show_errors():
             bench, number = self._bench, self._number
-            one, other = bench.robot.value, bench.files.robot(name)
+            one = bench.robot.value
 
             def show(future: Future[list[Pair]]) -> None:
                 with self._table, show_errors():
@@ -54,4 +54,4 @@ class RobotBeside:
                         now = f"{one.name}, open"
                         self._table.content = pair_table(pairs, now, name)
 
-            bench.calculator.run(lambda: robots_side_by_side(one, other), show)
+            bench.calculator.run(lambda: robots_side_by_side(one, bench.files.robot(name)), show)

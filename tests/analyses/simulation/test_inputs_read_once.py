@@ -8,11 +8,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pydrake.multibody.plant import MultibodyPlant
 
 import cdpr_drake as cdpr
 from cdpr_drake.analyses.simulation.monte_carlo import run_many, with_seeds
 from cdpr_drake.analyses.sweeps.worker_pool import with_inputs
 from cdpr_drake.models.camera_catalogue import load_camera
+from cdpr_drake.models.mechanism_in_plant import add_mechanism
+from cdpr_drake.models.mechanism_loader import load_mechanism
 from cdpr_drake.models.robot_loader import load_robot, robot_file
 from cdpr_drake.schema.input_files import (
     InputFiles,
@@ -24,6 +27,7 @@ from cdpr_drake.schema.input_files import (
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.worlds.model_files import mesh_parts
 from tests.models.formats.foreign_files import caspr
+from tests.models.test_drake_parsing import MECHANISM
 
 SHORT = ["camera.kind=projected", "duration=0.1"]
 
@@ -143,3 +147,43 @@ def test_files_of_the_package_are_read_where_they_are(tmp_path):
 def test_a_job_is_done_with_what_it_was_sent():
     files = InputFiles()
     assert SentInputs(lambda job: (job, inputs_held() is files), files)(3) == (3, True)
+
+
+BODY = """\
+<robot name="two"><link name="platform"><inertial><mass value="{mass}"/>
+<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>
+<collision><geometry><mesh filename="package://toy/meshes/body.obj"/></geometry></collision>
+<visual><geometry><mesh filename="near.obj"/></geometry></visual></link></robot>
+"""
+
+
+@pytest.mark.parametrize("given", ["two.urdf", "two.dmd.yaml"])
+def test_bodies_of_mechanisms_and_what_they_name_are_read_once(given, tmp_path):
+    toy = tmp_path / "toy"
+    (toy / "meshes").mkdir(parents=True)
+    (toy / "package.xml").write_text("<package><name>toy</name></package>")
+    for mesh in (toy / "meshes" / "body.obj", toy / "near.obj"):
+        mesh.write_text(OBJ.format(x=0.1))
+    (toy / "two.urdf").write_text(BODY.format(mass=1.5))
+    (toy / "two.dmd.yaml").write_text("directives:\n- add_model: {name: two, file: two.urdf}\n")
+    file = toy / "mechanism.yaml"
+    frame = "platform" if given == "two.urdf" else "two::platform"
+    file.write_text(MECHANISM.format(file=given).replace("anchor_frame: platform",
+                                                         f"anchor_frame: '{frame}'"))  # fmt: skip
+
+    def mass():
+        plant = MultibodyPlant(0.0)
+        add_mechanism(plant, load_mechanism(file)).finalize()
+        return plant.CalcTotalMass(plant.CreateDefaultContext())
+
+    with inputs_read_once():
+        assert mass() == 1.5
+        sent = pickle.dumps(inputs_held())
+        (toy / "two.urdf").write_text(BODY.format(mass=2.5))
+        assert mass() == 1.5
+        names = set(inputs_held().hashes(tmp_path))
+    assert {"mechanism.yaml", "two.urdf", "body.obj", "near.obj", given} <= names
+    assert mass() == 2.5  # so that the edit would have been seen
+    shutil.rmtree(toy)
+    with inputs_read_once(pickle.loads(sent)):
+        assert mass() == 1.5
