@@ -373,7 +373,8 @@ class _Checker:
 
     def scalar(self, rule: FieldRule, node: yaml.Node, key: str) -> None:
         if not _convert(rule, node):
-            if rule.kind == "text" and _CONTROL.search(str(node.value)):
+            plain = rule.kind == "text" and not rule.pattern and not rule.choices
+            if plain and _CONTROL.search(str(node.value)):
                 self.fail(node, key, f"found {show(node)}; accepted: no control characters")
                 return
             if isinstance(node, yaml.ScalarNode) and node.tag not in _SCALARS:
