@@ -83,7 +83,7 @@ NONSENSE = {
     "infinite": (b'{"do":"step","inputs":{"tensions":[1e999,1,1,1,1,1,1,1]}}', "finite numbers"),
     "too large": (
         b'{"do":"step","inputs":{"tensions":[' + b"9" * 400 + b",1,1,1,1,1,1,1]}}",
-        "finite numbers",
+        "one object",
     ),
     "truth": ({"do": "step", "inputs": {"tensions": [True] * 8}}, "finite numbers"),
     "words": ({"do": "step", "inputs": {"tensions": ["1"] * 8}}, "finite numbers"),
