@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import tempfile
 from collections.abc import Mapping
 from contextlib import suppress
@@ -130,6 +131,7 @@ class RunPanel:
         self._form: ScenarioForm | None = None
         self._key = self._other = ""
         self._shipped: frozenset[str] = frozenset()
+        self._read = asyncio.Event()  # whether the scenario that is chosen has been read
         self._refused: CdprError | None = None
         self._names: dict[str, str] = {}
         self._told: dict[str, str] = {}
@@ -213,19 +215,24 @@ class RunPanel:
         return file if file in options else ""
 
     async def _choose_scenario(self) -> None:
-        """Shows the form of another scenario."""
+        """Shows the form of another scenario; `Start` waits for it."""
         name = self._scenario.value
         if not name:
             return
         self._body.clear()
         self._form = None
-        with self._body, show_errors():
-            file = name if name in self._shipped else str(self._bench.folder.path(name))
-            draft = await run.io_bound(self._board.choose, file)
-            if draft is None or name != self._scenario.value:  # another was chosen meanwhile
-                return
-            self._form = ScenarioForm(draft)
-            await self._take_robot()
+        self._read.clear()
+        try:
+            with self._body, show_errors():
+                file = name if name in self._shipped else str(self._bench.folder.path(name))
+                draft = await run.io_bound(self._board.choose, file)
+                if draft is None or name != self._scenario.value:  # another was chosen meanwhile
+                    return
+                self._form = ScenarioForm(draft)
+                await self._take_robot()
+        finally:
+            if name == self._scenario.value:
+                self._read.set()
 
     async def _robot_changed(self) -> None:
         with show_errors():
@@ -264,6 +271,7 @@ class RunPanel:
                     self._bench.take_opened(opened)
 
     async def _start(self) -> None:
+        await self._read.wait()
         if self._form is None or not await self._form.check():
             return
         with show_errors():

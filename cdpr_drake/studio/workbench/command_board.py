@@ -107,8 +107,10 @@ class CommandBoard:
         with suppress(OSError):  # a full disk, say: the command will tell
             self.folder.mkdir(parents=True, exist_ok=True)
             self._asked(folder).write_text(json.dumps(list(arguments)), encoding="utf-8")
+            _TOLD[_state(self._asked(folder))] = list(arguments)
             if about is not None:
                 self._about_file(folder).write_text(json.dumps(dict(about)), encoding="utf-8")
+                _TOLD[_state(self._about_file(folder))] = dict(about)
         return self._submit(folder, arguments)
 
     def go_on(self, computed: CommandEntry) -> CommandJob | None:
@@ -171,7 +173,8 @@ class CommandBoard:
                     asked = self._how(job.folder) if over else ()
                     found[key] = self._entry(words, job, job.folder, asked)
         for folder in self._results():
-            if folder.name not in found:
+            told = [_told(path) for path in (self._about_file(folder), self._asked(folder))]
+            if folder.name not in found and _UNREAD not in told:
                 asked = self._how(folder)
                 words = f"{folder.name}, stopped" if asked else folder.name
                 found[folder.name] = self._entry(words, None, folder, asked)
@@ -195,32 +198,40 @@ class CommandBoard:
         return sorted(some, key=lambda path: -path.stat().st_mtime)[:MOST_FOLDERS]
 
 
+_UNREAD = object()
+
+
 def _told(path: Path) -> Any:
     """What a file of JSON beside a folder says; None: nothing that can be read.
 
-    In an event loop it is read by another thread: there it is None until that is done, and a page
-    asks again soon.
+    In an event loop it is read by another thread: there it is `_UNREAD` until that is done, and a
+    page asks again soon.
     """
     try:
-        state = path.lstat()
+        key = _state(path)
     except OSError:
         return None
-    key = (path, state.st_mtime_ns, state.st_size)
     if key not in _TOLD:
-        with suppress(RuntimeError):  # there is no loop here
+        try:
             loop = asyncio.get_running_loop()
-            _TOLD[key] = None
+        except RuntimeError:
+            _read(key)
+        else:
+            _TOLD[key] = _UNREAD
             loop.run_in_executor(None, _read, key)
-            return None
-        _read(key)
     return _TOLD.get(key)
+
+
+def _state(path: Path) -> tuple[Path, int, int]:
+    state = path.lstat()
+    return path, state.st_mtime_ns, state.st_size
 
 
 def _read(key: tuple[Path, int, int]) -> None:
     path, _, size = key
     told = None
     with suppress(OSError, ValueError):
-        if not path.is_symlink() and size <= LARGEST_ASKED:
+        if path.is_file() and not path.is_symlink() and size <= LARGEST_ASKED:
             told = load_json(path.read_text(encoding="utf-8"))
     if len(_TOLD) > MOST_TOLD:
         _TOLD.pop(next(iter(_TOLD)))
