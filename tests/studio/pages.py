@@ -19,13 +19,19 @@ async def opened_page(folder, robot="acrobot_large"):
     """A user who has opened the page, and their workbench."""
     calculator = Calculator()
     sessions = Sessions(lambda: _bench(folder, robot, calculator))
+    failed = None  # NiceGUI's timers go on forever where an exception passes through it
     try:
         async with user_simulation(make_page(sessions, lambda _: "one")) as user:
             client = await user.open("/")
             await until(lambda: not _loading(user))
-            yield user, next(iter(sessions.benches())), client
+            try:
+                yield user, next(iter(sessions.benches())), client
+            except BaseException as problem:
+                failed = problem
     finally:
         calculator.close()
+    if failed is not None:
+        raise failed
 
 
 def _loading(user):
