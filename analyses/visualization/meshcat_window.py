@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import atexit
 import ctypes
+import gc
 import logging
 import os
 import socket
@@ -228,7 +229,8 @@ class _Scene:
 
     Drake ends the process if a Meshcat goes in another thread than the one that made it, and
     Python's collector runs in whichever thread it likes. So the last share of it is kept here, by
-    a visualizer that nobody sees, until its own thread opens the next one.
+    a visualizer that nobody sees, until its own thread opens the next one; what waits there for
+    the collector, such as a diagram that shows it, is collected by that thread before.
     """
 
     meshcat: weakref.ref[Meshcat]
@@ -247,16 +249,19 @@ _scenes: dict[int, _Scene] = {}
 
 def _end_scenes() -> None:
     """Ends those of this thread that nobody has any more."""
-    for port, scene in list(_scenes.items()):
-        if scene.thread == threading.get_ident() and scene.meshcat() is None:
-            del _scenes[port]
-            for door in scene.doors:
-                with suppress(OSError):
-                    door.shutdown(socket.SHUT_RDWR)
-                door.close()
-            scene.seal.end()
-            for folder in scene.folders:
-                folder.cleanup()
+    gone = [port for port, scene in list(_scenes.items())
+            if scene.thread == threading.get_ident() and scene.meshcat() is None]  # fmt: skip
+    if gone:
+        gc.collect()
+    for port in gone:
+        scene = _scenes.pop(port)
+        for door in scene.doors:
+            with suppress(OSError):
+                door.shutdown(socket.SHUT_RDWR)
+            door.close()
+        scene.seal.end()
+        for folder in scene.folders:
+            folder.cleanup()
 
 
 @atexit.register

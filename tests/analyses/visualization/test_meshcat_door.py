@@ -140,13 +140,21 @@ def test_files_of_the_process_are_not_copied(tmp_path):
 
 COLLECTED_ELSEWHERE = """
 import gc, threading
-from pydrake.geometry import MeshcatVisualizer
+from pydrake.geometry import MeshcatVisualizer, SceneGraph
+from pydrake.systems.framework import DiagramBuilder
 from cdpr_drake.analyses.visualization.meshcat_window import open_meshcat, private_door
 
 def leave():
     meshcat = open_meshcat("localhost")
     private_door(meshcat)
     cycle = [meshcat, MeshcatVisualizer(meshcat)]
+    cycle.append(cycle)
+
+def leave_shown():
+    builder = DiagramBuilder()
+    scene_graph = builder.AddSystem(SceneGraph())
+    MeshcatVisualizer.AddToBuilder(builder, scene_graph, open_meshcat())
+    cycle = [builder.Build()]
     cycle.append(cycle)
 
 def collect():
@@ -156,7 +164,9 @@ def collect():
 
 leave()
 collect()
+leave_shown()
 again = open_meshcat("localhost")
+collect()
 others = []
 thread = threading.Thread(target=lambda: others.append(open_meshcat()))
 thread.start()

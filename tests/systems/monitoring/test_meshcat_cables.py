@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from pydrake.geometry import Meshcat
 from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
+from cdpr_drake.analyses.visualization.meshcat_window import open_meshcat
 from cdpr_drake.geometry.straight_cables import cable_lengths
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.monitoring.meshcat_cables import CablePictures, MeshcatCables
@@ -167,7 +167,7 @@ def test_a_recording_keeps_what_moves_and_when_it_began_to(robot):
 
 
 def test_system_draws_while_a_simulation_runs(robot):
-    meshcat = Meshcat()
+    meshcat = open_meshcat()
     builder = DiagramBuilder()
     block = builder.AddNamedSystem("robot", CableRobot(robot))
     drawing = builder.AddNamedSystem(
