@@ -13,7 +13,7 @@ from cdpr_drake.workspaces import (
 from cdpr_drake.workspaces.box_expansion_kernel import INSIDE, OPEN, turn_axes
 from cdpr_drake.workspaces.cable_distance_kernel import segment_box_distance, segments_distance
 from cdpr_drake.workspaces.cable_interference import box_row
-from tests.workspaces.mutants import as_python
+from tests.mutants import as_python
 
 EXTENT = 5.0
 TRIES = 3000

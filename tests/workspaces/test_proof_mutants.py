@@ -18,7 +18,7 @@ from cdpr_drake.workspaces import (
 from cdpr_drake.workspaces.box_judges import CLOSURE_SHARE
 from cdpr_drake.workspaces.static_feasibility import StaticCase
 from cdpr_drake.workspaces.wrench_capacity import capacity_margins, closure_margins
-from tests.workspaces.mutants import as_python
+from tests.mutants import as_python
 from tests.workspaces.workspace_cases import robot_case
 
 SCALES = np.geomspace(2.0, 0.005, 28)

@@ -16,7 +16,7 @@ from cdpr_drake.workspaces.cable_interference import Surroundings, box_row, clea
 from cdpr_drake.workspaces.certified_boxes import PoseBox, certify
 from cdpr_drake.workspaces.static_feasibility import statically_feasible
 from cdpr_drake.workspaces.wrench_capacity import closure_margins
-from tests.workspaces.mutants import as_python
+from tests.mutants import as_python
 from tests.workspaces.test_certificate import check, frame_box
 from tests.workspaces.workspace_cases import robot_case
 
