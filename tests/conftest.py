@@ -1,5 +1,6 @@
 """Settings that all tests share."""
 
+import collections
 import gc
 import hashlib
 import os
@@ -31,7 +32,8 @@ def _kernel_cache() -> Path:
     root = Path(__file__).parent.parent
     sources = sorted(path for path in root.glob("cdpr_drake/*/**/*.py"))
     kernels = [path.read_bytes() for path in sources if b"njit" in path.read_bytes()]
-    return root / ".numba_cache" / hashlib.sha256(b"".join(kernels)).hexdigest()[:12]
+    kept = Path(os.environ.get("CDPR_TEST_KERNELS", root / ".numba_cache"))
+    return kept / hashlib.sha256(b"".join(kernels)).hexdigest()[:12]
 
 
 os.environ.setdefault("NUMBA_CACHE_DIR", str(_kernel_cache()))
@@ -86,12 +88,56 @@ def pytest_xdist_make_scheduler(config, log):
     return WorkStealingScheduling(config, log)
 
 
+def pytest_addoption(parser):
+    parser.addoption("--folders", action="store_true", help="tests and processor time by folder")
+
+
+def _processor_time():
+    """Of this process and those that it has waited for [s]."""
+    return sum(os.times()[:4])
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item, call):
+    """Reports say what tests have cost, with fixtures and processes that were made for them."""
+    report = yield
+    if call.when == "setup":
+        item.began = _ended[0]
+    if call.when == "teardown":
+        _ended[0] = _processor_time()
+        report.processor_time = _ended[0] - item.began
+    return report
+
+
+_ended = [_processor_time()]
+"""Processor time at the end of the last test [s]."""
+
+_folders = collections.defaultdict(list)
+"""Processor times of the tests of each folder [s]."""
+
+
+def pytest_collection_finish():
+    _ended[0] = _processor_time()
+
+
+def pytest_runtest_logreport(report):
+    if report.when == "teardown":
+        folder = report.nodeid.partition("::")[0].rpartition("/")[0]
+        _folders[folder].append(report.processor_time)
+
+
 def pytest_terminal_summary(terminalreporter):
     """What the session has cost: this process, and all that it has waited for, as its workers.
 
     A machine that others use as well makes a session longer, but hardly dearer.
     """
-    minutes, seconds = divmod(round(sum(os.times()[:4])), 60)
+    if terminalreporter.config.getoption("--folders"):
+        terminalreporter.write_line("\n  lines  tests  processor seconds")
+        for folder, costs in sorted(_folders.items(), key=lambda one: -sum(one[1])):
+            files = (HERE.parent / folder).glob("*.py")
+            lines = sum(len(path.read_bytes().splitlines()) for path in files)
+            terminalreporter.write_line(f"{lines:7} {len(costs):6} {sum(costs):8.1f}  {folder}")
+    minutes, seconds = divmod(round(_processor_time()), 60)
     terminalreporter.write_line(f"processor time of all processes: {minutes} min {seconds:02} s")
 
 
