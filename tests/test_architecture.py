@@ -8,6 +8,7 @@ from functools import cache
 from graphlib import TopologicalSorter
 from importlib import import_module
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 
@@ -48,42 +49,57 @@ def bound_names(body):
     return found
 
 
+class Module(NamedTuple):
+    """What these tests ask of a file, without its syntax, which is large."""
+
+    imports: list[tuple[str, str]]
+    """From this project as (module, name), wherever in the file they stand."""
+    defined: set[str]
+    """Names."""
+    postponed: bool
+    """Whether its annotations are text."""
+    declares: bool
+    """Whether it declares fields of files."""
+    readers: set[str]
+    """Names of READERS that it calls or hands on."""
+
+
 @cache
 def read(name):
-    """What these tests ask of a file, without its syntax, which is large.
-
-    Imports from this project as (module, name), wherever in the file they stand; names that are
-    defined; whether annotations are postponed, and whether fields of files are declared.
-    """
-    imports = []
-    tree = ast.parse(FILES[name].read_text())
-    postponed = declares = False
-    for node in ast.walk(tree):
-        if isinstance(node, ast.ImportFrom) and node.module == "__future__":
-            postponed = postponed or any(alias.name == "annotations" for alias in node.names)
-        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("cdpr_drake"):
-            imports += [(node.module, alias.name) for alias in node.names]
+    tree = ast.parse(FILES[name].read_text(encoding="utf-8"))
+    nodes = list(ast.walk(tree))
+    origins = [(node.module or "", alias.name) for node in nodes
+               if isinstance(node, ast.ImportFrom) for alias in node.names]  # fmt: skip
+    imports = [(module, what) for module, what in origins if module.startswith("cdpr_drake")]
     fields = {what for module, what in imports if module == "cdpr_drake.schema.fields"}
-    for node in ast.walk(tree):
-        if isinstance(node, ast.ClassDef):
-            for each in node.body:
-                call = getattr(each, "value", None) if isinstance(each, ast.AnnAssign) else None
-                declares = declares or (
-                    isinstance(call, ast.Call) and getattr(call.func, "id", None) in fields
-                )
-    return imports, bound_names(tree.body), postponed, declares
+    values = [node.value for node in nodes if isinstance(node, ast.AnnAssign)]
+    named = {f"{module}.{what}" for module, what in origins}
+    for node in nodes:
+        if isinstance(node, ast.Attribute):
+            base = node.value.id if isinstance(node.value, ast.Name) else ""
+            named |= {f"{base}.{node.attr}", node.attr}
+        elif isinstance(node, ast.Name):
+            named.add(node.id)
+    return Module(
+        imports,
+        bound_names(tree.body),
+        ("__future__", "annotations") in origins,
+        any(isinstance(value, ast.Call) and getattr(value.func, "id", None) in fields
+            for value in values),
+        {SAME_READER.get(one, one) for one in named} & set(READERS),
+    )  # fmt: skip
 
 
 def test_names_are_imported_from_the_module_that_defines_them():
     """So each file says what it needs; a face is for those who use the package."""
     wrong = []
     for name in sorted(FILES):
-        for module, what in read(name)[0]:
+        for module, what in read(name).imports:
             if f"{module}.{what}" in FILES:
                 continue  # a module as a whole
             if module not in FILES:
                 wrong.append(f"{name}: there is no {module}")
-            elif what not in read(module)[1]:
+            elif what not in read(module).defined:
                 wrong.append(f"{name}: {module} does not define {what}")
     assert not wrong, "\n".join(wrong)
 
@@ -109,7 +125,7 @@ def test_a_face_holds_what_its_stub_says(name):
     for node in stub.body:
         home = import_module(f"{name}.{node.module}")
         assert all(getattr(module, a.name) is getattr(home, a.name) for a in node.names)
-        assert {a.name for a in node.names} <= read(home.__name__)[1]
+        assert {a.name for a in node.names} <= read(home.__name__).defined
 
 
 @pytest.mark.parametrize("name", sorted(STUBS))
@@ -126,7 +142,7 @@ def test_no_study_is_known_but_to_the_catalogue():
     room = "cdpr_drake.analyses.studies."
     wrong = []
     for name in sorted(FILES):
-        for module, _ in read(name)[0]:
+        for module, _ in read(name).imports:
             study = module.removeprefix(room).partition(".")[0] if module.startswith(room) else ""
             shared = study in ("", "catalogue", "framework", "published")
             own = f"{name}.".startswith(f"{room}{study}.")
@@ -140,7 +156,7 @@ def test_files_have_no_circles():
     graph = {}
     for name in FILES:
         needs = set()
-        for module, what in read(name)[0]:
+        for module, what in read(name).imports:
             needs.add(f"{module}.{what}" if f"{module}.{what}" in FILES else module)
         graph[name] = needs - {name}
     assert len(list(TopologicalSorter(graph).static_order())) == len(FILES)
@@ -148,9 +164,9 @@ def test_files_have_no_circles():
 
 def test_modules_that_declare_fields_of_files_have_no_postponed_annotations():
     """Drake's YAML loader reads annotations as types; text in their place breaks every file."""
-    schema = {name for name in FILES if read(name)[3]}
+    schema = {name for name in FILES if read(name).declares}
     assert len(schema) > 20
-    assert not {name for name in schema if read(name)[2]}
+    assert not {name for name in schema if read(name).postponed}
 
 
 READERS = {
@@ -183,27 +199,10 @@ SAME_READER = {
 }
 
 
-def readers(path):
-    """Names of READERS that a file calls or hands on."""
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        found = []
-        if isinstance(node, ast.Attribute):
-            base = node.value.id if isinstance(node.value, ast.Name) else ""
-            found = [f"{base}.{node.attr}", node.attr]
-        elif isinstance(node, ast.Name):
-            found = [node.id]
-        elif isinstance(node, ast.ImportFrom):
-            found = [f"{node.module}.{each.name}" for each in node.names]
-        for name in found:
-            name = SAME_READER.get(name, name)
-            if name in READERS:
-                yield name
-
-
 def test_yaml_json_and_models_are_read_at_one_place_each():
     """There a damaged or hostile text is refused by one kind of error, before it grows."""
     bool_values = "cdpr_drake.schema.typed_yaml"  # PyYAML's words for true and false, no reader
-    found = {(name, reader) for name, path in FILES.items() for reader in readers(path)}
+    found = {(name, reader) for name in FILES for reader in read(name).readers}
     wrong = {(name, reader) for name, reader in found if name not in READERS[reader]}
     assert wrong - {(bool_values, "yaml.load")} == set()
     assert {reader for _, reader in found} == set(READERS)
