@@ -26,7 +26,7 @@ if "matplotlib.pyplot" in sys.modules:
     sys.modules["matplotlib.pyplot"].close("all")
 methods = sys.modules.get("cdpr_drake.tensions.methods")
 if methods is not None:
-    for name in [name for name, one in methods.METHODS.items() if one.asked is not None]:
+    for name in [name for name, one in methods.METHODS.items() if one.user_program is not None]:
         del methods.METHODS[name]
 os.chdir({folder!r})
 del logging, os, sys, methods

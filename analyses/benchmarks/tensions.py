@@ -24,9 +24,14 @@ from cdpr_drake.geometry.poses import pose_from_angles
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_statics import tension_problem
 from cdpr_drake.systems.diagrams.load import load_scenario
-from cdpr_drake.tensions.batch import distribute_batch
 from cdpr_drake.tensions.closed_form_kernel import closed_form
-from cdpr_drake.tensions.methods import METHODS, Distributor, TensionMethod, distribute
+from cdpr_drake.tensions.methods import (
+    METHODS,
+    Distributor,
+    TensionMethod,
+    distribute,
+    distribute_batch,
+)
 from cdpr_drake.tensions.problem import TensionProblem, writable
 from cdpr_drake.tensions.program import TensionProgram, program_tensions
 from cdpr_drake.tensions.quadratic_program_kernel import nearest_tensions, workspace_shape

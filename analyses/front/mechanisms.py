@@ -37,8 +37,8 @@ from cdpr_drake.schema.typed_yaml import closest
 from cdpr_drake.statics.controlled_wrenches import WrenchControl, combination_words, wrench_control
 from cdpr_drake.summaries import Summarized, numbers
 from cdpr_drake.tensions.methods import distribute
-from cdpr_drake.tensions.null_space_kernel import RANK_TOLERANCE
 from cdpr_drake.tensions.problem import TensionProblem, TensionSolution, TensionStatus
+from cdpr_drake.tensions.quadratic_program_kernel import RANK_TOLERANCE
 from cdpr_drake.tensions.shortfall import Shortfall, shortfall
 
 if TYPE_CHECKING:

@@ -30,7 +30,7 @@ from cdpr_drake.geometry.pulley_kernel import pulley_line, unit_vector_derivativ
 from cdpr_drake.numerics.linear_algebra_kernel import eliminate, substitute
 from cdpr_drake.numerics.linear_program_kernel import lowest_point
 from cdpr_drake.planning.cable_derivatives_kernel import axis, cross, dot
-from cdpr_drake.tensions.null_space_kernel import factor, null_space
+from cdpr_drake.tensions.quadratic_program_kernel import factor, null_space
 
 SHIFT = 1e-7
 """Of a bound, relative to the range of tensions: at a kink bounds are shifted by multiples of this,
@@ -317,7 +317,7 @@ def margin_with_multipliers(
 
 @njit(cache=True)
 def _solve_transposed(A: Array, right: Array, out: Array) -> None:
-    """out <- lambda with W' lambda = right, from the factors W = L Q' of `null_space_kernel`."""
+    """out <- lambda with W' lambda = right, from the factors W = L Q' of `factor`."""
     n = A.shape[0]
     m = A.shape[1] - 2
     y = np.empty(m)

@@ -23,7 +23,7 @@ from cdpr_drake.control.task_space import floating_wrench
 from cdpr_drake.geometry.motion_kernel import floating_motion
 from cdpr_drake.geometry.pulley_kernel import pulley_line, unit_vector_derivative
 from cdpr_drake.geometry.two_pulleys_kernel import ANCHOR_RADIUS, add_platform_turning
-from cdpr_drake.tensions.null_space_kernel import null_space
+from cdpr_drake.tensions.quadratic_program_kernel import null_space
 
 T_0, T_U, T_X, RATE, BEND = range(5)
 """Rows of a station that are the same for all robots: T_0 [N], T_u [N s^2/m], T_x [N s^2/m^2],

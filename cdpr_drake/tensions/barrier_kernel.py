@@ -1,15 +1,14 @@
-"""Tensions whose rates are continuous: a barrier at the bounds in place of active ones.
+"""Tensions with continuous rates: a barrier at the bounds instead of active bounds.
 
-With a_i = (t_i - lower_i) / (upper_i - lower_i), the way of a tension between its bounds, the
-method minimises over 0 < a < 1
+With a_i = (t_i - lower_i) / (upper_i - lower_i) the method minimises over 0 < a < 1
 
     sum_i a_i^4 / 4  -  BARRIER sum_i [ln a_i + ln (1 - a_i)]  +  |e|^2 / (2 SOFTNESS),
 
-e = (W t + w) / (row_scale size), where size is that of the wrench from the lower bounds on. This
-is strictly convex and smooth, so its minimum is, by the implicit function theorem, as smooth a
+e = (W t + w) / (row_scale size), where size is that of the wrench at the lower bounds. This is
+strictly convex and smooth, so its minimum is, by the implicit function theorem, as smooth a
 function of W and w as they are of time, also where a wrench becomes infeasible. Balance is not a
-constraint: the wrench error that is left is SOFTNESS times the multiplier y of e = 0, far below
-what counts as balanced unless the feasible tensions are a sliver, or there are none.
+constraint: the remaining error is SOFTNESS times the multiplier y of e = 0, far below the residual
+of balanced tensions unless the feasible tensions are a sliver, or there are none.
 
 The conditions for the minimum, with multipliers z and v of the bounds,
 
@@ -23,10 +22,10 @@ are solved by Newton's method. Its matrix is reduced to one of the size of the w
 in which y needs no start. From the tensions of a step before, mu is BARRIER from the first
 iteration on; else mu falls to it, tenfold at a time, from the middle of the bounds.
 
-Source: for barrier, p-norm, penalised wrench error and Newton's method from the last step, Ueland,
-Sauder and Skjetne, Optimal force allocation for overconstrained cable-driven parallel robots:
-continuously differentiable solutions with assessment of computational efficiency, 2020; for
-multipliers of their own, Nocedal and Wright, Numerical Optimization, chapter 19.
+Source: Ueland, Sauder and Skjetne, Optimal force allocation for overconstrained cable-driven
+parallel robots: continuously differentiable solutions with assessment of computational efficiency,
+2020, for barrier, p-norm, penalised wrench error and Newton's method from the last step; Nocedal
+and Wright, Numerical Optimization, chapter 19, for separate multipliers of the bounds.
 """
 
 from __future__ import annotations
@@ -35,47 +34,48 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.tensions.closed_form_kernel import NOT_FOUND
-from cdpr_drake.tensions.null_space_kernel import balance as nearest_balanced
-from cdpr_drake.tensions.null_space_kernel import factor
 from cdpr_drake.tensions.problem import RESIDUAL_TOLERANCE, balance
-from cdpr_drake.tensions.quadratic_program_kernel import FEASIBLE, SINGULAR, nearest_tensions_in
+from cdpr_drake.tensions.quadratic_program_kernel import (
+    FEASIBLE,
+    NOT_FOUND,
+    SINGULAR,
+    factor,
+    nearest_tensions_in,
+)
+from cdpr_drake.tensions.quadratic_program_kernel import balance as nearest_balanced
 
 BARRIER = 1e-4
-"""Weight of the barrier. Around the fourth root of it, a tenth of the range, barrier and 4-norm
-are of one size; of a range of 60 N, a tension that others push to its bound stays away by about
-1 N."""
+"""Weight of the barrier. At its fourth root, a tenth of the range, barrier and 4-norm are of one
+size; with a range of 60 N a tension that is pushed to its bound stays about 1 N away."""
 
 SOFTNESS = 1e-10
-"""Weight of balance, inverted: a wrench error of this times the multiplier y is left, relative to
-the wrench. A multiplier is around BARRIER over the least distance to a bound, as a share of the
-range: the error counts as none until feasible tensions come nearer to their bounds than about
-1e-5 of the range. Less of it would leave less to see where nothing is feasible: there y is the
-error over it, and rounding of y moves the tensions, now by some 1e-6 of the range."""
+"""Inverse weight of balance: the wrench error is this times y, relative to the wrench. A multiplier
+is about BARRIER over the least distance to a bound as a share of the range, so the error counts as
+none until feasible tensions are within about 1e-5 of the range of their bounds. Where nothing is
+feasible, y is the error over SOFTNESS, and rounding of y moves tensions by some 1e-6 of the range;
+a smaller value would move them more."""
 
 LEAST_SHARE = 1e-3
-"""Wrenches below this, relative to what the range of tensions can do, are not what an error is
-relative to."""
+"""Least scale of the error, relative to what the range of tensions can do."""
 
 COLD = 0.1
-"""Where mu begins without a start."""
+"""First mu without a start."""
 
 NEAREST = 0.99
-"""Share of the way to a bound that one iteration may go."""
+"""Largest share of the way to a bound in one iteration."""
 
 FALLING = 0.1
-"""By this mu falls from iteration to iteration."""
+"""Factor of mu from iteration to iteration."""
 
 CONVERGED = 1e-9
-"""A full step that changes no distance to a bound by more, relative, is the last: Newton's method
-squares what is left of it."""
+"""Relative change of all distances to bounds in the last step; Newton's method squares the rest."""
 
 STALLED = 1e-3
-"""A change below this that is not less than the one before is rounding: where a wrench is
-infeasible, multipliers are as large as SOFTNESS is small."""
+"""Change below which one that does not fall is rounding: where a wrench is infeasible, multipliers
+are as large as SOFTNESS is small."""
 
 MOST_ITERATIONS = 100
-"""More than any problem needs; a solution that has not converged counts as missed."""
+"""More than any problem needs; without convergence the solution counts as missed."""
 
 
 @njit(cache=True)
@@ -83,17 +83,16 @@ def log_barrier(
     work: Array, W: Array, w: Array, lower: Array, upper: Array,
     reference: Array, row_scale: Array, t: Array,
 ) -> int:  # fmt: skip
-    """Tensions away from their bounds, with continuous rates; always some, see above.
+    """Tensions with continuous rates, within the bounds in any case.
 
-    Arguments as `TensionMethod.kernel`. The reference is where it starts, such as the tensions of
-    the step before, and does not change where it ends; it starts in the middle of the bounds unless
-    the reference is between them.
+    The reference is the start, and does not change the result; if it is not between the bounds, the
+    start is their middle. Arguments and codes are those of `TensionMethod.kernel`.
     """
     n, m = W.shape
     if not factor(W, work[:n]):
         return SINGULAR
     converged = minimize_barrier(work, W, w, lower, upper, reference, row_scale, t) > 0
-    if not converged:  # from where it started; upper bounds start nothing
+    if not converged:  # once more from the middle: upper bounds are no start
         converged = minimize_barrier(work, W, w, lower, upper, upper, row_scale, t) > 0
     for i in range(m):
         if not lower[i] <= t[i] <= upper[i]:
@@ -118,10 +117,7 @@ def minimize_barrier(
     work: Array, W: Array, w: Array, lower: Array, upper: Array,
     start: Array, row_scale: Array, t: Array,
 ) -> int:  # fmt: skip
-    """Writes the minimum, shape (m,) [N]; returns the iterations, 0 if they did not converge.
-
-    Arguments as `log_barrier`; what is written is within the bounds in any case.
-    """
+    """Writes the minimum to t; returns the number of iterations, 0 without convergence."""
     n, m = W.shape
     B, M = work[:n], work[n : 2 * n]
     a, g, z, v = work[2 * n], work[2 * n + 1], work[2 * n + 2], work[2 * n + 3]
@@ -138,14 +134,14 @@ def minimize_barrier(
         if warm and span > 0.0:
             a[i], g[i] = (start[i] - lower[i]) / span, (upper[i] - start[i]) / span
         z[i], v[i] = mu / a[i], mu / g[i]
-    iterations, before = 0, np.inf
+    iterations, last_change = 0, np.inf
     for iteration in range(1, MOST_ITERATIONS + 1):
-        # Along which way?
+        # Direction.
         for i in range(m):
             D[i] = 3.0 * a[i] * a[i] + z[i] / a[i] + v[i] / g[i]
             pull[i] = a[i] * a[i] * a[i] - mu / a[i] + mu / g[i]
         _multipliers(B, b, a, D, pull, lower, upper, M, y)
-        # How far?
+        # Length of the step.
         share, dual_share, change = 1.0, 1.0, 0.0
         for i in range(m):
             if upper[i] <= lower[i]:
@@ -180,15 +176,15 @@ def minimize_barrier(
             a[i] += share * step[i]
             g[i] -= share * step[i]
             total += z[i] * a[i] + v[i] * g[i]
-        if mu == BARRIER and (change <= CONVERGED or before <= change <= STALLED):
+        if mu == BARRIER and (change <= CONVERGED or last_change <= change <= STALLED):
             iterations = iteration
             break
-        before = change if mu == BARRIER else np.inf
+        last_change = change if mu == BARRIER else np.inf
         mu = max(BARRIER, min(mu, FALLING * total / (2.0 * m)))
     for i in range(m):
         span = upper[i] - lower[i]
-        near = lower[i] + a[i] * span if a[i] < g[i] else upper[i] - g[i] * span
-        t[i] = min(max(near, lower[i]), upper[i])
+        tension = lower[i] + a[i] * span if a[i] < g[i] else upper[i] - g[i] * span
+        t[i] = min(max(tension, lower[i]), upper[i])
     return iterations
 
 
@@ -196,17 +192,17 @@ def minimize_barrier(
 def _scale(
     W: Array, w: Array, lower: Array, upper: Array, row_scale: Array, B: Array, b: Array
 ) -> None:
-    """Writes B, shape (n, m), and b, shape (n,), with e = B a + b."""
+    """B, shape (n, m), and b, shape (n,), of e = B a + b."""
     n, m = W.shape
-    square = asked = 0.0
+    square = wrench = 0.0
     for j in range(n):
         b[j] = w[j] / row_scale[j]
         for i in range(m):
             B[j, i] = W[j, i] * (upper[i] - lower[i]) / row_scale[j]
             b[j] += W[j, i] * lower[i] / row_scale[j]
             square += B[j, i] * B[j, i]
-        asked += b[j] * b[j]
-    size = np.sqrt(asked + LEAST_SHARE * LEAST_SHARE * square)
+        wrench += b[j] * b[j]
+    size = np.sqrt(wrench + LEAST_SHARE * LEAST_SHARE * square)
     size = size if size > 0.0 else 1.0
     for j in range(n):
         b[j] /= size
@@ -219,7 +215,7 @@ def _multipliers(
     B: Array, b: Array, a: Array, D: Array, pull: Array, lower: Array, upper: Array,
     M: Array, y: Array,
 ) -> None:  # fmt: skip
-    """Writes y, shape (n,), that solves the reduced system, by Cholesky's factors in M."""
+    """Solves the reduced system for y, shape (n,), by Cholesky's factors in M."""
     n, m = B.shape[0], lower.shape[0]
     for j in range(n):
         for k in range(j + 1):

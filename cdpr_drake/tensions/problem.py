@@ -1,4 +1,4 @@
-"""What a tension distribution is asked and what it answers, as plain data."""
+"""Problem and solution of a tension distribution, and the check of tensions against a problem."""
 
 from __future__ import annotations
 
@@ -12,27 +12,23 @@ from numba import njit
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import TensionProblemError
 from cdpr_drake.summaries import Summarized
-from cdpr_drake.tensions.null_space_kernel import RANK_TOLERANCE
+from cdpr_drake.tensions.quadratic_program_kernel import RANK_TOLERANCE
 
 if TYPE_CHECKING:
     from cdpr_drake.numerics.own_terms import ProgramReport
 
 RESIDUAL_TOLERANCE = 1e-9
-"""Tensions are feasible if |W t + w| is at most this, relative to |w| plus the cables' share."""
-
+"""Largest residual of feasible tensions, see `TensionProblem.residual`."""
 
 VERDICT_ROUNDING = 1e-12
-"""A tension beyond its bound by less, relative to the largest bound (or 1 N), is on it."""
+"""Distance to a bound that counts as on it, relative to the largest bound (or 1 N)."""
 
 LEAST_FORCE_SHARE = 1e-6
-"""Forces below this, relative to what the cables can do, are not what a residual is relative to:
-where all tensions are zero, rounding is all there is."""
+"""Least scale of a residual, relative to what the cables can do: where all tensions are zero there
+is nothing but rounding."""
 
 ENDLESS = 1e4
 """Tensions without an upper limit are looked for up to so many times a scale of the problem."""
-
-NUMBERS = ("W", "wrench", "lower", "upper", "reference", "row_scale")
-"""The arrays of a problem."""
 
 
 def read_only(array: Array) -> Array:
@@ -48,7 +44,7 @@ def writable(array: Array) -> Array:
 
 
 class TensionStatus(StrEnum):
-    """The verdict on tensions.
+    """Verdict on tensions.
 
     FEASIBLE: they balance the wrench within the bounds. INFEASIBLE: no tensions do; a proof.
     NOT_FOUND: the method found none although there are some.
@@ -71,15 +67,14 @@ class TensionProblem:
         lower: Smallest tensions, shape (m,), not negative [N].
         upper: Largest tensions, shape (m,) [N]; infinite where there is no limit, which methods
             that aim at the middle of the bounds do not take.
-        reference: Wanted tensions, shape (m,) [N]; None where a method needs none.
-        row_scale: What an unbalanced wrench is divided by, row by row, to say how large it is,
-            above 0, shape (n,): a length [m] for moments, 1 for forces; None: ones. Only methods
-            that relax ask, where nothing is feasible.
-        nothing_wanted: Zeros, what methods get that need no reference, shape (m,) [N].
+        reference: Preferred tensions, shape (m,) [N]; None where a method needs none.
+        row_scale: Unit of each row of an unbalanced wrench, above 0, shape (n,): a length [m] for
+            moments, 1 for forces; None: ones. Used only by methods that relax, where nothing is
+            feasible.
         scale_of_rows: `row_scale`, or ones, shape (n,).
 
     Raises:
-        TensionProblemError: Sizes that do not fit, numbers that are complex or not finite (`upper`
+        TensionProblemError: Shapes that do not fit, numbers that are complex or not finite (`upper`
             may be infinite), negative or crossed bounds, fewer cables than degrees of freedom, or a
             singular W.
     """
@@ -90,65 +85,27 @@ class TensionProblem:
     upper: Array
     reference: Array | None = None
     row_scale: Array | None = None
-    nothing_wanted: Array = field(init=False, repr=False, compare=False)
     scale_of_rows: Array = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         """Copies all arrays, which are read-only from then on, and checks them."""
-        for name in NUMBERS:
-            value = getattr(self, name)
-            if value is None:
-                continue
-            try:
-                if np.iscomplexobj(value) and np.any(np.imag(value)):
-                    raise TensionProblemError(f"{name}: found complex numbers; accepted: real ones")
-                converted = np.array(np.real(value), dtype=float, order="C", ndmin=1)
-            except (TypeError, ValueError) as problem:
-                raise TensionProblemError(
-                    f"{name}: found no array of numbers; accepted: one"
-                ) from problem
-            object.__setattr__(self, name, read_only(converted))
-        if self.W.ndim != 2:
-            raise TensionProblemError(f"W: found shape {self.W.shape}; accepted: (n, m)")
-        n, m = self.W.shape
-        for name, size in zip(NUMBERS[1:], (n, m, m, m, n), strict=True):
-            value = getattr(self, name)
-            if value is not None and value.shape != (size,):
-                raise TensionProblemError(f"{name}: found shape {value.shape}; accepted: ({size},)")
-        for name in NUMBERS:
-            value = getattr(self, name)
-            if value is not None and name == "upper":  # infinite: no limit
-                value = np.where(np.isposinf(value), 0.0, value)
-            if value is not None and not np.all(np.isfinite(value)):
-                raise TensionProblemError(
-                    f"{name}: found {_words(value)}; accepted: finite numbers"
-                )
-        if np.any(self.lower < 0.0):
-            raise TensionProblemError(f"lower: found {_words(self.lower)}; accepted: >= 0 [N]")
-        if np.any(self.lower > self.upper):
-            raise TensionProblemError(
-                f"upper: found {_words(self.upper)}, below lower {_words(self.lower)}; accepted: "
-                "lower <= upper [N]"
-            )
-        if self.row_scale is not None and np.any(self.row_scale <= 0.0):
-            raise TensionProblemError(
-                f"row_scale: found {_words(self.row_scale)}; accepted: above 0 [m, -]"
-            )
-        if n > m:
-            raise TensionProblemError(
-                f"W: found {m} cables for {n} degrees of freedom; accepted: at least {n} cables"
-            )
+        names = ("W", "wrench", "lower", "upper", "reference", "row_scale")
+        numbers = checked_numbers(
+            {name: getattr(self, name) for name in names}, "(n, m)", endless=True
+        )
+        for name, value in numbers.items():
+            object.__setattr__(self, name, read_only(value.copy()))
+        n = len(self.wrench)
+        scale = self.row_scale if self.row_scale is not None else read_only(np.ones(n))
+        object.__setattr__(self, "scale_of_rows", scale)
         singular = np.linalg.svd(self.W, compute_uv=False)
         rank = int(np.sum(singular > RANK_TOLERANCE * max(singular[0], 1e-300))) if n else 0
         if rank < n:
             raise TensionProblemError(f"W: found rank {rank}; accepted: {n}, full rank")
-        object.__setattr__(self, "nothing_wanted", read_only(np.zeros(m)))
-        scale = read_only(np.ones(n)) if self.row_scale is None else self.row_scale
-        object.__setattr__(self, "scale_of_rows", scale)
 
     @property
     def redundancy(self) -> int:
-        """r = m - n, cables more than degrees of freedom."""
+        """r = m - n, number of cables minus degrees of freedom."""
         return int(self.W.shape[1] - self.W.shape[0])
 
     def finite_upper(self) -> Array:
@@ -168,28 +125,90 @@ class TensionProblem:
         return np.where(endless, held + ENDLESS * max(load / singular, 1.0), self.upper)
 
     def residual(self, tensions: Array) -> float:
-        """|W t + w| relative to |w| plus the forces of the cables, shape (m,) [N] in, [-] out."""
-        # With w = 0 (a planar robot, a hovering point) the cables' own forces are the measure.
+        """|W t + w| relative to |w| plus the forces of the cables [-]; tensions, shape (m,) [N]."""
+        # With w = 0 (a planar robot, a hovering point) the forces of the cables are the scale.
         share = np.abs(self.W)
-        own = float(np.linalg.norm(share @ np.abs(tensions)))
-        able = float(np.linalg.norm(share @ self.finite_upper()))
-        scale = max(float(np.linalg.norm(self.wrench)) + own, LEAST_FORCE_SHARE * able)
+        forces = float(np.linalg.norm(share @ np.abs(tensions)))
+        capacity = float(np.linalg.norm(share @ self.finite_upper()))
+        scale = max(float(np.linalg.norm(self.wrench)) + forces, LEAST_FORCE_SHARE * capacity)
         return float(np.linalg.norm(self.W @ tensions + self.wrench)) / max(scale, 1e-300)
+
+
+def checked_numbers(
+    numbers: dict[str, Any], axes: str, *, endless: bool = False
+) -> dict[str, Array]:
+    """Arrays of a problem, or of many with one more axis of W and wrench; refuses what cannot be.
+
+    Args:
+        numbers: By name, W first, wrenches second; None is left out.
+        axes: Shape of W in words, "(n, m)" or "(k, n, m)".
+        endless: True if upper tensions may be infinite.
+
+    Raises:
+        TensionProblemError: As `TensionProblem`, except for the rank.
+    """
+    arrays: dict[str, Array] = {}
+    for name, value in numbers.items():
+        if value is not None:
+            try:
+                if np.iscomplexobj(value) and np.any(np.imag(value)):
+                    raise TensionProblemError(f"{name}: found complex numbers; accepted: real ones")
+                array = np.ascontiguousarray(np.real(value), float)
+            except (TypeError, ValueError) as error:
+                raise TensionProblemError(
+                    f"{name}: found no array of numbers; accepted: one"
+                ) from error
+            # Kernels at an address take nothing read-only.
+            arrays[name] = array if array.flags.writeable else array.copy()
+    (name, W), (second, _) = list(arrays.items())[:2]
+    if W.ndim != axes.count(",") + 1:
+        raise TensionProblemError(f"{name}: found shape {W.shape}; accepted: {axes}")
+    n, m = W.shape[-2:]
+    shapes = {second: W.shape[:-1], "row_scale": (n,)}
+    for name, value in list(arrays.items())[1:]:
+        shape = shapes.get(name, (m,))
+        if value.shape != shape:
+            raise TensionProblemError(f"{name}: found shape {value.shape}; accepted: {shape}")
+    for name, value in arrays.items():
+        limited = value[~np.isposinf(value)] if endless and name == "upper" else value
+        if not np.all(np.isfinite(limited)):
+            raise TensionProblemError(f"{name}: found {_words(value)}; accepted: finite numbers")
+    lower, upper = arrays["lower"], arrays["upper"]
+    if np.any(lower < 0.0):
+        raise TensionProblemError(f"lower: found {_words(lower)}; accepted: >= 0 [N]")
+    if np.any(lower > upper):
+        raise TensionProblemError(
+            f"upper: found {_words(upper)}, below lower {_words(lower)}; accepted: lower <= upper "
+            "[N]"
+        )
+    if "row_scale" in arrays and np.any(arrays["row_scale"] <= 0.0):
+        words = _words(arrays["row_scale"])
+        raise TensionProblemError(f"row_scale: found {words}; accepted: above 0 [m, -]")
+    if n > m:
+        raise TensionProblemError(
+            f"W: found {m} cables for {n} degrees of freedom; accepted: at least {n} cables"
+        )
+    return arrays
+
+
+def _words(values: Array) -> str:
+    words = np.array2string(values, precision=4, max_line_width=10_000, threshold=12)
+    return words.replace("\n", " ")
 
 
 @dataclass(frozen=True, repr=False)
 class TensionSolution(Summarized):
-    """The answer of a method.
+    """Answer of a method.
 
     Attributes:
         method: Name of the method.
-        status: The verdict.
-        tensions: Shape (m,) [N]. FEASIBLE: the answer. NOT_FOUND: what the method came to, outside
-            the bounds or off balance. INFEASIBLE: NaN, except for a method that relaxes.
+        status: Verdict.
+        tensions: Shape (m,) [N]. FEASIBLE: the answer. NOT_FOUND: the last iterate, out of the
+            bounds or off balance. INFEASIBLE: NaN, except for a method that relaxes.
         residual: |W t + w| relative to the forces at work; NaN where there are no tensions.
         active: -1 where a tension is on its lower bound, 1 on its upper, else 0, shape (m,).
-        slack: Wrench that the tensions leave unbalanced, W t + w, shape (n,) [N m, N].
-        program: Of a `TensionProgram` with own terms, how it was solved; None: by a kernel.
+        slack: Unbalanced wrench, W t + w, shape (n,) [N m, N].
+        program: How a `TensionProgram` with own terms was solved; None for a kernel.
     """
 
     method: str
@@ -201,9 +220,9 @@ class TensionSolution(Summarized):
     program: ProgramReport | None = None
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON; tensions that are not there are null."""
+        """Content for JSON; NaN becomes null."""
         finite = np.all(np.isfinite(self.tensions))
-        found: dict[str, Any] = {
+        content: dict[str, Any] = {
             "method": self.method,
             "status": str(self.status),
             "tensions_n": self.tensions.tolist() if finite else None,
@@ -212,11 +231,11 @@ class TensionSolution(Summarized):
             "slack_wrench": self.slack.tolist() if finite else None,
         }
         if self.program is not None:
-            found["program"] = self.program.as_dict()
-        return found
+            content["program"] = self.program.as_dict()
+        return content
 
     def summary(self) -> tuple[str, list[tuple[str, str]]]:
-        """What it shows of itself; tensions on a bound have a star."""
+        """Title and rows for people; a star marks a tension on a bound."""
         words = (
             f"{t:.2f}{'*' if bound else ''}"
             for t, bound in zip(self.tensions, self.active, strict=True)
@@ -227,11 +246,20 @@ class TensionSolution(Summarized):
         return f"Tensions by {self.method}: {self.status}", rows
 
 
+def refuse(problem: TensionProblem, method: str) -> TensionSolution:
+    """Solution of a problem without any tensions: NaN."""
+    n, m = problem.W.shape
+    nan, active = np.full(m, np.nan), np.zeros(m, int)
+    return TensionSolution(
+        method, TensionStatus.INFEASIBLE, nan, np.nan, active, np.full(n, np.nan)
+    )
+
+
 @njit(cache=True)
 def balance(W: Array, w: Array, lower: Array, upper: Array, t: Array) -> tuple[bool, float]:
-    """Whether tensions, shape (m,) [N], are within bounds, and `TensionProblem.residual` of them.
+    """Whether t is within the bounds, and its `TensionProblem.residual`.
 
-    Those that are out by rounding are put on their bounds. NaN is out of bounds.
+    Tensions that are out by rounding are put on their bounds. NaN is out of bounds.
     """
     n, m = W.shape
     largest = 1.0
@@ -244,26 +272,26 @@ def balance(W: Array, w: Array, lower: Array, upper: Array, t: Array) -> tuple[b
     if inside:
         for i in range(m):
             t[i] = min(max(t[i], lower[i]), upper[i])
-    own, able, wrench, off = 0.0, 0.0, 0.0, 0.0
+    forces, capacity, wrench, error = 0.0, 0.0, 0.0, 0.0
     for j in range(n):
-        force, its, possible = 0.0, 0.0, 0.0
+        force, size, largest_size = 0.0, 0.0, 0.0
         for i in range(m):
             force += W[j, i] * t[i]
-            its += abs(W[j, i]) * abs(t[i])
-            possible += abs(W[j, i]) * upper[i]
-        own += its * its
-        able += possible * possible
+            size += abs(W[j, i]) * abs(t[i])
+            largest_size += abs(W[j, i]) * upper[i]
+        forces += size * size
+        capacity += largest_size * largest_size
         wrench += w[j] * w[j]
-        off += (force + w[j]) * (force + w[j])
-    scale = max(np.sqrt(wrench) + np.sqrt(own), LEAST_FORCE_SHARE * np.sqrt(able))
-    return inside, np.sqrt(off) / max(scale, 1e-300)
+        error += (force + w[j]) * (force + w[j])
+    scale = max(np.sqrt(wrench) + np.sqrt(forces), LEAST_FORCE_SHARE * np.sqrt(capacity))
+    return inside, np.sqrt(error) / max(scale, 1e-300)
 
 
 @njit(cache=True)
 def describe(
     W: Array, w: Array, lower: Array, upper: Array, t: Array, active: np.ndarray, slack: Array
 ) -> None:
-    """Writes what `TensionSolution` says of tensions, shape (m,) [N]: `active` and `slack`."""
+    """Writes `active` and `slack` of a `TensionSolution`."""
     n, m = W.shape
     largest = 1.0
     for i in range(m):
@@ -279,18 +307,3 @@ def describe(
         slack[j] = w[j]
         for i in range(m):
             slack[j] += W[j, i] * t[i]
-
-
-def refuse(problem: TensionProblem, method: str) -> TensionSolution:
-    """The solution of a problem that has none: NaN."""
-    n, m = problem.W.shape
-    nan = np.full(m, np.nan)
-    return TensionSolution(
-        method, TensionStatus.INFEASIBLE, nan, np.nan, np.zeros(m, int), np.full(n, np.nan)
-    )
-
-
-def _words(values: Array) -> str:
-    return np.array2string(values, precision=4, max_line_width=10_000, threshold=12).replace(
-        "\n", " "
-    )

@@ -1,4 +1,4 @@
-"""Tension distribution as mathematical programs: with any solver, and with terms of one's own."""
+"""Tension distribution as programs of Drake: with any solver, and with own terms."""
 
 from __future__ import annotations
 
@@ -49,8 +49,8 @@ from cdpr_drake.tensions.quadratic_program_kernel import (
 )
 
 PRECISE = 1e-8
-"""Residuals at which OSQP stops, in the program's scaled units; its own 1e-3 would move tensions by
-a thousandth of the weight where it does not polish."""
+"""Residuals at which OSQP stops, in the scaled units of the program; its default, 1e-3, would move
+tensions by a thousandth of the weight where it does not polish."""
 
 MOVED = "tensions were moved by at most the solver's tolerance, to balance the wrench exactly"
 
@@ -58,68 +58,66 @@ MOVED = "tensions were moved by at most the solver's tolerance, to balance the w
 def make_program(
     problem: TensionProblem, goal: str
 ) -> tuple[MathematicalProgram, np.ndarray, float]:
-    """The program of a goal, with its decision variables t / scale, shape (m,), and the scale [N].
+    """Program of a goal, its variables t / scale, shape (m,), and the scale [N].
 
-    min goal(t) subject to W t + w = 0, lower <= t <= upper; `slack_relaxed` puts row_scale times a
-    slack in place of 0, and makes that least. Scaled by the size of the forces, so
-    that a solver's tolerances mean the same for every robot. Add to it what you like.
+    min goal(t) subject to W t + w = 0, lower <= t <= upper; `slack_relaxed` has row_scale times a
+    slack instead of 0, and minimises it. Numbers are divided by the size of the forces, so that the
+    tolerances of a solver mean the same for every robot. Costs and constraints may be added.
 
     Args:
         problem: The problem.
         goal: A name of `METHODS` that has a program.
 
     Raises:
-        TensionProblemError: Unknown goal, or one that needs a reference and finds none.
+        TensionProblemError: Unknown goal, or no reference where it needs one.
 
     Source: Gazebo thesis (6.24), (6.25); servoing thesis (1.24)-(1.26).
     """
-    add = METHODS[goal].program if goal in METHODS else None
-    if add is None:
-        accepted = ", ".join(name for name, method in METHODS.items() if method.program)
+    method = METHODS.get(goal)
+    if method is None or method.program is None:
+        accepted = ", ".join(name for name, row in METHODS.items() if row.program)
         raise TensionProblemError(f"goal: found {goal}; accepted: {accepted}")
-    if METHODS[goal].needs_reference and problem.reference is None:
+    if method.needs_reference and problem.reference is None:
         raise TensionProblemError(f"{goal}: found no reference; accepted: tensions [N]")
     scale = max(float(np.linalg.norm(problem.wrench)), float(np.linalg.norm(problem.lower)), 1.0)
     program = MathematicalProgram()
     t = program.NewContinuousVariables(problem.W.shape[1], "t")
-    if not METHODS[goal].relaxes:
+    if not method.relaxes:
         program.AddLinearEqualityConstraint(problem.W, -problem.wrench / scale, t)
     program.AddBoundingBoxConstraint(problem.lower / scale, problem.upper / scale, t)
-    add(program, t, problem, scale)
+    method.program(program, t, problem, scale)
     return program, t, scale
 
 
 def program_tensions(
     problem: TensionProblem, goal: str, solver: SolverId | None = None
 ) -> Array | None:
-    """Tensions by Drake's choice of solver or a given one, shape (m,) [N]; None: infeasible.
+    """Tensions by a solver (None: Drake's choice), shape (m,) [N]; None: infeasible.
 
-    As exact as the solver; `methods.distribute` is faster and judges what it returns.
+    They are as exact as the solver; `distribute` is faster and checks its result.
     """
     program, t, scale = make_program(problem, goal)
     result = Solve(program) if solver is None else MakeSolver(solver).Solve(program)
-    if not result.is_success():
-        return None
-    return np.asarray(result.GetSolution(t) * scale, float)
+    return np.asarray(result.GetSolution(t) * scale, float) if result.is_success() else None
 
 
 class TensionProgram(OwnTerms):
-    """Tensions that balance a wrench within bounds, best by a goal and by terms of one's own.
+    """Tensions that balance a wrench within bounds, optimal for a goal and own terms.
 
     `prog()` is the program of `make_program`, with variables t over `scale`. Costs and constraints
     that are added by `AddQuadraticCost`, `AddCost`, `AddLinearConstraint` and `AddConstraint` take
-    tensions in newtons; costs count beside the goal, in N where that is a sum, a largest tension or
-    a margin, in N^2 where it is a 2-norm or a distance (the sum of squares).
+    tensions in newtons. Costs are in the unit of the goal: N for a sum, a largest tension or a
+    margin, N^2 for a 2-norm or a distance (the sum of squares).
 
-    With nothing added `Solve` is `distribute`. With own terms Drake solves the whole program, from
-    the kernel's tensions: a quadratic program by OSQP, which starts warm, another convex one by
-    Clarabel, what is not convex by SNOPT to the best that is near. What a solver gives is put on
-    the balance by the nearest tensions within the bounds, and judged as every method's tensions.
+    Without own terms `Solve` is `distribute`. With own terms Drake solves the whole program from
+    the tensions of the kernel: a quadratic program by OSQP with a warm start, another convex one by
+    Clarabel, others by SNOPT to a local optimum. The result is replaced by the nearest tensions
+    that balance the wrench within the bounds, and checked like that of every method.
 
     Attributes:
         problem: The problem, with the wrench matrix and wrench of the last `update`.
         goal: Name of the goal, of `METHODS`.
-        scale: Of the variables [N].
+        scale: Scale of the variables [N].
     """
 
     problem_kind = TensionProblemError
@@ -130,28 +128,26 @@ class TensionProgram(OwnTerms):
         goal: str = "quadratic_program",
         names: Sequence[str] = (),
     ) -> None:
-        """For a problem.
+        """Makes the program of a problem.
 
         Args:
             problem: The problem.
             goal: A name of `METHODS` that has a program.
-            names: Of the cables; empty: cable 1, cable 2, ...
+            names: Names of the cables; empty: cable 1, cable 2, ...
 
         Raises:
-            TensionProblemError: Unknown goal, one that needs a reference and finds none, or another
-                number of names.
+            TensionProblemError: As `make_program`, or another number of names.
         """
         # `update` writes into the matrix and the wrench of a copy.
         problem = replace(problem)
         self.problem, self.goal = problem, goal
         self._prog, self._t, self.scale = make_program(problem, goal)
         self._relaxes = METHODS[goal].relaxes
-        count = problem.W.shape[1]
-        self._names = tuple(names) or tuple(f"cable {i + 1}" for i in range(count))
-        if len(self._names) != count:
-            raise TensionProblemError(f"names: found {len(self._names)}; accepted: {count}")
-        square = bool(self._prog.quadratic_costs())
-        self.cost_unit = self.scale**2 if square else self.scale
+        m = problem.W.shape[1]
+        self._names = tuple(names) or tuple(f"cable {i + 1}" for i in range(m))
+        if len(self._names) != m:
+            raise TensionProblemError(f"names: found {len(self._names)}; accepted: {m}")
+        self.cost_unit = self.scale ** (2 if self._prog.quadratic_costs() else 1)
         self._balance = self._prog.linear_equality_constraints()[0].evaluator()
         self._places = self._prog.FindDecisionVariableIndices(self._t)
         self._work = np.empty(workspace_shape(*problem.W.shape))
@@ -164,7 +160,7 @@ class TensionProgram(OwnTerms):
         self._seal()
 
     def prog(self) -> MathematicalProgram:
-        """The program; what is added to it counts in `Solve`."""
+        """The program; terms that are added to it count in `Solve`."""
         return self._prog
 
     def tensions(self) -> np.ndarray:
@@ -172,21 +168,21 @@ class TensionProgram(OwnTerms):
         return self._t
 
     def values(self, of: str | Sequence[str] | None = None) -> ProgramValues:
-        """Tensions [N], of all cables or of some by name.
+        """Tensions [N] of all cables, or of those with some names.
 
         Raises:
             TensionProblemError: There is no such cable.
         """
         m = len(self._t)
-        every = ProgramValues.scaled(self._t, np.full(m, self.scale), np.zeros(m), self._names)
+        values = ProgramValues.scaled(self._t, np.full(m, self.scale), np.zeros(m), self._names)
         if of is None:
-            return every
-        return every.only(chosen_names(self._names, of, TensionProblemError))
+            return values
+        return values.only(chosen_names(self._names, of, TensionProblemError))
 
     def update(self, W: Array, wrench: Array) -> None:
-        """Puts another wrench matrix, shape (n, m), and wrench, shape (n,) [N m, N], into it.
+        """Replaces wrench matrix, shape (n, m), and wrench, shape (n,) [N m, N].
 
-        They must be finite, of the sizes of before; the bounds and the scale stay.
+        They must be finite and of the same sizes; bounds and scale stay.
         """
         problem = self.problem
         writable(problem.W)[:], writable(problem.wrench)[:] = W, wrench
@@ -194,17 +190,15 @@ class TensionProgram(OwnTerms):
         self._balance.UpdateCoefficients(rows, -wrench / self.scale)
 
     def step(self, start: Array) -> Array | None:
-        """Tensions, shape (m,) [N], from a start, shape (m,) [N]; None: none keep everything.
+        """Tensions from a start, shape (m,) [N]; None: none keep all constraints.
 
-        For loops: terms that are added after the first step or `Solve` are seen by `Solve` only.
+        For loops: terms that are added after the first step or `Solve` count in `Solve` only.
         """
         if self._solvers is None:
             self._choose_solvers()
         z, _, _ = self._optimum(start)
-        if z is None:
-            return None
-        t = self._settled(z)
-        if t is None:
+        t = None if z is None else self._settled(z)
+        if z is None or t is None:
             return None
         x = self._with(z, t)
         for _, evaluator, places in self._own_constraints(anew=False):
@@ -213,61 +207,63 @@ class TensionProgram(OwnTerms):
         return t
 
     def Solve(self, start: Array | None = None) -> TensionSolution:
-        """The best tensions.
+        """The optimal tensions.
 
-        A problem without any tensions is `infeasible`; one whose tensions the own constraints
-        exclude is `missed`, with NaN, and its report says so.
+        A problem without any tensions is `infeasible`; if the own constraints exclude all of its
+        tensions, it is `missed`, with NaN and a report that says so.
 
         Args:
-            start: Where the search starts, shape (m,) [N]; None: at the goal's tensions.
+            start: Start of the search, shape (m,) [N]; None: the tensions of the goal alone.
         """
-        problem, n = self.problem, self.problem.W.shape[0]
+        problem = self.problem
         plain = distribute(problem, self.goal)
         if not self.has_own_terms:
             return plain
         if plain.status == TensionStatus.INFEASIBLE and not self._relaxes:
             return plain
         self._choose_solvers()
-        begin = plain.tensions if start is None else np.asarray(start, float)
-        z, solver, said = self._optimum(np.nan_to_num(begin))
+        z, solver, outcome = self._optimum(
+            np.nan_to_num(plain.tensions if start is None else np.asarray(start, float))
+        )
         t = None if z is None else self._settled(z)
         missed = [] if z is None or t is None else self._missed(self._with(z, t))
         if z is None or t is None or missed:
-            names = missed or [word for word, _, _ in self._own_constraints()]
+            names = missed or [name for name, _, _ in self._own_constraints()]
             words = (
                 f"no tensions within the bounds that balance the wrench keep {', '.join(names)}"
                 if names
                 else "the solver came to no end"
             )
-            gone = refuse(problem, self.goal)
-            report = ProgramReport(solver, said, float("nan"), {}, tuple(names), (words,))
-            return replace(gone, status=TensionStatus.NOT_FOUND, program=report)
+            report = ProgramReport(solver, outcome, float("nan"), {}, tuple(names), (words,))
+            return replace(
+                refuse(problem, self.goal), status=TensionStatus.NOT_FOUND, program=report
+            )
         arrays = [writable(a) for a in (problem.W, problem.wrench, problem.lower, problem.upper)]
         inside, residual = balance(*arrays, t)
-        good = inside and residual <= RESIDUAL_TOLERANCE
-        active, slack = np.empty(len(t), np.int64), np.empty(n)
+        active, slack = np.empty(len(t), np.int64), np.empty(len(problem.wrench))
         describe(*arrays, t, active, slack)
-        feasible = good and plain.status != TensionStatus.INFEASIBLE
+        balanced = inside and residual <= RESIDUAL_TOLERANCE
+        feasible = balanced and plain.status != TensionStatus.INFEASIBLE
         status = TensionStatus.FEASIBLE if feasible else TensionStatus.INFEASIBLE
         lost = () if self._relaxes else (MOVED,)
-        report = self._report(self._with(z, t), solver, said, lost)
+        report = self._report(self._with(z, t), solver, outcome, lost)
         return TensionSolution(self.goal, status, t, residual, active, slack, report)
 
     def _optimum(self, start: Array) -> tuple[Array | None, str, str]:
-        """All variables at the optimum, or None; the solver, and what it said."""
+        """All variables at the optimum, or None; the solver, and its outcome in words."""
         guess = np.zeros(self._prog.num_vars())
         guess[self._places] = start / self.scale
-        said, word = "no solver", ""
+        outcome, name = "no solver", ""
         for solver in self._solvers or ():
             result = solver.Solve(self._prog, guess, self._options)
-            word = solver.solver_id().name()
-            said = str(result.get_solution_result()).rpartition(".")[2]
+            name = solver.solver_id().name()
+            outcome = str(result.get_solution_result()).rpartition(".")[2]
             if result.is_success():
-                return np.asarray(result.get_x_val(), float), word, said
-        return None, word, said
+                return np.asarray(result.get_x_val(), float), name, outcome
+        return None, name, outcome
 
     def _choose_solvers(self) -> None:
-        """Solvers for the terms that there are, in the order in which they are asked."""
+        """Solvers for the present terms, in the order of trial."""
         kinds: tuple[Any, ...] = (SnoptSolver, IpoptSolver)
         if GetProgramType(self._prog) == ProgramType.kQP:
             kinds = (OsqpSolver, ClarabelSolver)
@@ -276,19 +272,19 @@ class TensionProgram(OwnTerms):
         self._solvers = [kind() for kind in kinds if kind().available() and kind().enabled()]
 
     def _settled(self, z: Array) -> Array | None:
-        """Tensions near a solver's, within the bounds and, unless relaxed, balanced exactly."""
-        problem, near = self.problem, np.ascontiguousarray(z[self._places] * self.scale)
+        """Tensions near those of a solver, within the bounds and, unless relaxed, in balance."""
+        problem, point = self.problem, np.ascontiguousarray(z[self._places] * self.scale)
         if self._relaxes:
-            return np.clip(near, problem.lower, problem.upper)
-        t = np.empty(len(near))
+            return np.clip(point, problem.lower, problem.upper)
+        t = np.empty(len(point))
         arrays = [writable(a) for a in (problem.W, problem.wrench, problem.lower, problem.upper)]
-        code = nearest_tensions_in(self._work, *arrays, near, t)
-        if code != FEASIBLE or np.max(np.abs(t - near)) > MISSED * self.scale * len(t):
+        code = nearest_tensions_in(self._work, *arrays, point, t)
+        if code != FEASIBLE or np.max(np.abs(t - point)) > MISSED * self.scale * len(t):
             return None
         return np.clip(t, problem.lower, problem.upper)
 
     def _with(self, z: Array, t: Array) -> Array:
-        """All variables with these tensions."""
+        """All variables z with the tensions t."""
         x = z.copy()
         x[self._places] = t / self.scale
         return x

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.tensions.optimal_kernel import least_slack
 from cdpr_drake.tensions.problem import TensionProblem, writable
-from cdpr_drake.tensions.slack_kernel import least_slack
 
 ACTIVE = 1e-9
 """A cable limits the shortfall where its multiplier, which all cables share to 1, is above this:
@@ -84,7 +84,7 @@ def shortfall(problem: TensionProblem) -> Shortfall:
     Args:
         problem: The problem; of a feasible one `beyond` and `size` are zero to rounding.
 
-    Source: for the least slack, `slack_kernel.least_slack`.
+    Source: for the least slack, `optimal_kernel.least_slack`.
     """
     from scipy.optimize import linprog  # half a second, which feasible problems do not need
 

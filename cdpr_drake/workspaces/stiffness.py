@@ -18,7 +18,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.pulley_kernel import pulley_jacobian, pulley_line, unit_vector_derivative
 from cdpr_drake.geometry.two_pulleys_kernel import add_platform_turning
 from cdpr_drake.numerics.kernel_calls import over_rows
-from cdpr_drake.tensions.batch import distribute_batch
+from cdpr_drake.tensions.methods import distribute_batch
 from cdpr_drake.tensions.quadratic_program_kernel import FEASIBLE
 from cdpr_drake.workspaces.demanded_wrenches import spatial_inertias, weight_wrenches
 from cdpr_drake.workspaces.static_feasibility import StaticCase, wrench_matrices

@@ -8,7 +8,7 @@ from numba import njit
 from cdpr_drake.arrays import Array
 from cdpr_drake.numerics.kernel_calls import over_rows
 from cdpr_drake.numerics.linear_program_kernel import lowest_point
-from cdpr_drake.tensions.null_space_kernel import null_space
+from cdpr_drake.tensions.quadratic_program_kernel import null_space
 from cdpr_drake.workspaces.demanded_wrenches import weight_wrenches
 from cdpr_drake.workspaces.static_feasibility import StaticCase, wrench_matrices
 from cdpr_drake.workspaces.stiffness import held_tensions

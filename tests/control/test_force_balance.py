@@ -52,13 +52,21 @@ def close(found, expected):
 
 @given(turn, triple, spatial, turn, triple, spatial, spatial)
 def test_the_centre_of_mass_accelerates_as_asked(r, p, V_WP, off, p_WD, V_WD, A_WD):
-    """By Drake's dynamics, with any moment that nobody asked for on the platform besides."""
+    """By the closed form of a point mass, and by Drake's dynamics with any moment besides."""
     plant, in_plant, context = PLANT
     X_WP = RigidTransform(rotation_from_vector(r), p)
     X_WD = RigidTransform(rotation_from_vector(off) @ X_WP.rotation(), p_WD)
     plant.SetFreeBodyPose(context, in_plant.body, X_WP)
     plant.SetVelocities(context, V_WP)
     wrench = force_law(X_WP, V_WP, X_WD, V_WD, A_WD)
+    desired = carried_point(X_WD, V_WD, A_WD, C)
+    p_WC, v_WC, _ = carried_point(X_WP, V_WP, np.zeros(6), C)
+    force = point_mass_force(
+        p_WC, v_WC, *desired, mass=ROBOT.platform.mass, gravity=ROBOT.gravity,
+        gains=(120.0, 25.0), damping=DAMPING[0] * V_WP[3:],
+    )  # fmt: skip
+    assert close(wrench[3:], force)
+    assert close(wrench[:3], np.cross(p_WC - p, force))  # through the centre of mass
     wrench[:3] += [0.3, -0.2, 0.1]
     A_WP = np.linalg.solve(
         plant.CalcMassMatrix(context),
@@ -67,25 +75,9 @@ def test_the_centre_of_mass_accelerates_as_asked(r, p, V_WP, off, p_WD, V_WD, A_
         - plant.CalcBiasTerm(context)
         + plant.CalcGravityGeneralizedForces(context),
     )
-    p_WC, v_WC, a_WC = carried_point(X_WP, V_WP, A_WP, C)
-    goal, speed, asked = carried_point(X_WD, V_WD, A_WD, C)
+    _, _, a_WC = carried_point(X_WP, V_WP, A_WP, C)
+    goal, speed, asked = desired
     assert close(a_WC, asked + 120.0 * (goal - p_WC) + 25.0 * (speed - v_WC))
-
-
-@given(turn, triple, spatial, turn, triple, spatial, spatial)
-def test_it_is_the_closed_form_of_a_point_mass(r, p, V_WP, off, p_WD, V_WD, A_WD):
-    X_WP = RigidTransform(rotation_from_vector(r), p)
-    X_WD = RigidTransform(rotation_from_vector(off) @ X_WP.rotation(), p_WD)
-    wrench = force_law(X_WP, V_WP, X_WD, V_WD, A_WD)
-    p_WC, v_WC, _ = carried_point(X_WP, V_WP, np.zeros(6), C)
-    force = point_mass_force(
-        p_WC, v_WC, *carried_point(X_WD, V_WD, A_WD, C),
-        mass=ROBOT.platform.mass, gravity=ROBOT.gravity, gains=(120.0, 25.0),
-        damping=DAMPING[0] * V_WP[3:],
-    )  # fmt: skip
-    assert close(wrench[3:], force)
-    # The force goes through the centre of mass.
-    assert close(wrench[:3], np.cross(p_WC - p, force))
 
 
 def test_the_closed_form_in_numbers():

@@ -5,7 +5,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydrake.math import RigidTransform
-from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import MultibodyForces
 from scipy.optimize import minimize
 
@@ -18,7 +17,6 @@ from cdpr_drake.geometry.cable_paths import cable_jacobian
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.geometry.motion_kernel import floating_motion
 from cdpr_drake.geometry.poses import exponential, pose_from_angles, pose_row, rotation_from_vector
-from cdpr_drake.models.robot_in_plant import add_robot
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_statics import tension_problem
 from cdpr_drake.systems.controllers.computed_torque import platform_dynamics
@@ -26,6 +24,7 @@ from cdpr_drake.tensions.methods import METHODS, distribute, exact_tensions
 from cdpr_drake.tensions.problem import TensionProblem
 from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
 from cdpr_drake.winches.friction import FrictionLaw
+from tests.control.awkward_robots import plant_of
 
 ORACLE = 1e-9
 """Difference from Drake's inverse dynamics, relative: products in another order."""
@@ -47,6 +46,8 @@ ROBOT = load_robot("acrobot_large")
 CABLES = ROBOT.cable_set().without_pulleys()
 X_WP = RigidTransform(rotation_from_vector(np.array([0.2, -0.1, 0.3])), [0.1, -0.05, 0.4])
 
+PLANT = plant_of(ROBOT)
+
 CASE_9_START = pose_from_angles([0.202, 0.118, 0.268], np.radians([-18.0, 10.0, 4.0]))
 
 number = st.floats(-0.3, 0.3)
@@ -60,6 +61,15 @@ def make_law(method="quadratic_program", loop=LOOP, wrench=OUTER, cables=CABLES,
         cables, platform_dynamics(ROBOT), bounds, wrench=wrench, loop=loop, period=PERIOD,
         row_scale=scale, method=method, drums=drums,
     )  # fmt: skip
+
+
+def run(law, measured, X=None, count=100):
+    """Command and memory after some steps, in which the limited rate of tensions comes to rest."""
+    memory, X = law.fresh_memory(), CASE_9_START if X is None else X
+    rates, wanted = np.zeros(len(measured)), np.zeros(6)
+    for k in range(count):
+        command, memory = law.step(memory, wanted, X, [measured, rates], k * PERIOD)
+    return command, memory
 
 
 def in_world(V_P):
@@ -130,10 +140,7 @@ def test_the_wrench_is_that_of_drake_s_inverse_dynamics(V, wanted):
     np.testing.assert_allclose(law.gathered(memory), -PERIOD * command.V_P, atol=1e-15)
     R, V_W = X_WP.rotation().matrix(), in_world(command.V_P)
     A_W = np.concatenate([R @ A_P[:3], R @ A_P[3:] + np.cross(V_W[:3], V_W[3:])])
-    plant = MultibodyPlant(0.0)
-    in_plant = add_robot(plant, ROBOT)
-    plant.Finalize()
-    context = plant.CreateDefaultContext()
+    plant, in_plant, context = PLANT
     in_plant.set_pose(context, X_WP)
     plant.SetVelocities(context, V_W)
     forces = MultibodyForces(plant)
@@ -189,11 +196,8 @@ def test_limits_and_rates_hold_at_every_step_and_what_cannot_be_is_flagged(metho
 
 def test_slack_cables_are_not_counted_on_and_are_wound_up():
     """Two of eight slack: the others' tensions are determined, and balance the wrench alone."""
-    law, measured = make_law("barycenter"), np.full(8, 6.0)
-    measured[:2], X, memory = 0.0, CASE_9_START, law.fresh_memory()
-    for k in range(100):
-        command, memory = law.step(memory, np.zeros(6), X, [measured, np.zeros(8)], k * PERIOD)
-    J = cable_jacobian(X, CABLES)
+    command, _ = run(make_law("barycenter"), np.array([0.0, 0.0, *np.full(6, 6.0)]))
+    J = cable_jacobian(CASE_9_START, CABLES)
     alone = np.linalg.solve(-J.T[:, 2:], command.wrench)
     assert np.all(alone >= LOWER)
     assert not command.relaxed
@@ -205,12 +209,7 @@ def test_slack_cables_are_not_counted_on_and_are_wound_up():
 
 @pytest.mark.parametrize(("tension", "slack"), [(0.49, True), (0.51, False)])
 def test_a_cable_is_slack_below_half_a_newton(tension, slack):
-    law, measured = make_law("barycenter"), np.full(8, 6.0)
-    measured[:2], memory = tension, law.fresh_memory()
-    for k in range(100):
-        command, memory = law.step(
-            memory, np.zeros(6), CASE_9_START, [measured, np.zeros(8)], k * PERIOD
-        )
+    command, _ = run(make_law("barycenter"), np.array([tension, tension, *np.full(6, 6.0)]))
     assert np.all(command.tensions[:2] == LOWER) == slack
 
 
@@ -226,11 +225,7 @@ def test_six_cables_have_one_answer(method):
         six, platform_dynamics(ROBOT), bounds, wrench=OUTER, loop=LOOP, period=PERIOD,
         row_scale=scale, method=method,
     )  # fmt: skip
-    memory = law.fresh_memory()
-    for k in range(100):  # the rate of tensions is limited
-        command, memory = law.step(
-            memory, np.zeros(6), CASE_9_START, [np.full(6, 6.0), np.zeros(6)], k * PERIOD
-        )
+    command, _ = run(law, np.full(6, 6.0))
     W = -cable_jacobian(CASE_9_START, six).T
     np.testing.assert_allclose(command.tensions, np.linalg.solve(W, command.wrench), rtol=1e-9)
 
@@ -240,14 +235,10 @@ def test_six_cables_have_one_answer(method):
 def test_without_a_cable_the_others_give_the_wrench(method, cable):
     """At a pose that seven cables hold; by scipy's least-norm tensions that only pull."""
     broken = np.arange(CABLES.count) == cable
-    law, home = make_law(method).without(broken), ROBOT.home.transform()
-    memory = law.fresh_memory()
+    home = ROBOT.home.transform()
     tensions = distribute(tension_problem(ROBOT, home, limits=(0.0, UPPER))).tensions
-    for k in range(200):  # the rate of tensions is limited
-        command, memory = law.step(
-            memory, np.zeros(6), home, [np.where(broken, 0.0, 6.0 + tensions), np.zeros(8)],
-            k * PERIOD,
-        )  # fmt: skip
+    measured = np.where(broken, 0.0, 6.0 + tensions)
+    command, _ = run(make_law(method).without(broken), measured, home, count=200)
     assert not command.relaxed
     assert command.tensions[cable] == 0.0
     W = -cable_jacobian(home, CABLES).T

@@ -1,4 +1,4 @@
-"""Winches with motors, as functions: closed forms, limits, poles; the kernel against the arrays."""
+"""Winches with motors: closed forms, limits, poles, failures; the kernel against the arrays."""
 
 from dataclasses import replace
 
@@ -8,7 +8,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydrake.autodiffutils import ExtractGradient, ExtractValue, InitializeAutoDiff
 
+from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.winches.drum import Drum
+from cdpr_drake.winches.failed_winches import (
+    fail_winches,
+    failed_law,
+    held_brakes,
+    pack_failing_winches,
+)
 from cdpr_drake.winches.friction import FrictionLaw
 from cdpr_drake.winches.motor import MODES, POSITION, TORQUE, VELOCITY, WinchLaw, winch_motion
 from cdpr_drake.winches.motor_kernel import WINCH_CONSTANTS, pack_winch, winch_rates, winch_torques
@@ -61,67 +68,62 @@ def test_lengths_accelerate_as_the_turning_drum_says():
     np.testing.assert_allclose(found.length_acceleration, expected, rtol=1e-5)
 
 
-def test_a_free_drum_accelerates_with_its_inertia():
-    """J dw/dt = rho t: Gazebo thesis (2.20) without friction and torque."""
-    found = motion(PLAIN, TORQUE, 0.0, 0.0, 0.0, 12.0, 0.0)
-    np.testing.assert_allclose(found.acceleration, 0.004 * 12.0 / 3e-5, rtol=1e-14)
+VISCOUS = replace(PLAIN, friction=FrictionLaw(viscous=2e-4))
+FRICTIONLESS = replace(LAW, friction=FrictionLaw())
+ENDLESS = replace(LAW, rated_torque=np.inf)
+OVER = 314.0 * 1.05 + 1e-9
+KP, KI = LAW.gains()
+
+CLOSED_FORMS = {
+    # J dw/dt = rho t: Gazebo thesis (2.20) without friction and torque.
+    "free drum": (PLAIN, TORQUE, (0, 0, 0, 12.0, 0), "acceleration", 0.004 * 12.0 / 3e-5, 0.0),
+    # Servoing thesis 5.2.3: t_c = r_w tau / R_g.
+    "held": (PLAIN, TORQUE, (0, 0, 0, 12.0, -0.04 / 10.0 * 12.0), "acceleration", 0.0, 1e-12),
+    # tau = F_v w.
+    "steady": (VISCOUS, TORQUE, (0, 0.03 / 2e-4, 0, 0, 0.03), "acceleration", 0.0, 1e-9),
+    "rated torque": (
+        LAW, TORQUE, (0, [0.0, 0.0, 10.0], 0, 0, [5.0, -5.0, 0.3]), "torque", [0.64, -0.64, 0.3],
+        0.0,
+    ),
+    # Beyond the rated speed a motor brakes but does not drive.
+    "rated speed": (
+        LAW, TORQUE, (0, [OVER, OVER, -OVER, 313.0], 0, 0, [0.5, -0.5, -0.5, 0.5]), "torque",
+        [0.0, -0.5, 0.0, 0.5], 1e-9,
+    ),
+    # Half of a small torque in the middle of the margin, nothing at its end.
+    "small torques": (
+        LAW, TORQUE, (0, [314.0 * 1.025, OVER, 314.0 * 0.99], 0, 0, [1e-3] * 3), "torque",
+        [0.5e-3, 0.0, 1e-3], 1e-12,
+    ),
+    "no integral": (
+        LAW, TORQUE, (0, [314.0 * 1.025, OVER, 314.0 * 0.99], 0, 0, [1e-3] * 3), "integral_rate",
+        0.0, 0.0,
+    ),
+    # The speed reference ends at the rated speed, and with it the torque that the loop asks for.
+    "speed reference": (ENDLESS, VELOCITY, (0, 314.0, 0, 0, [100.0, 3.0]), "torque", 0.0, 1e-9),
+    # dz/dt = Ki (tau_limited - z) / Kp: the integral does not wind up while torque is limited.
+    "limited": (LAW, VELOCITY, (0, 0, [0.0, 0.5, 0.64], 0, 100.0), "torque", 0.64, 0.0),
+    "limited integral": (
+        LAW, VELOCITY, (0, 0, [0.0, 0.5, 0.64], 0, 100.0), "integral_rate",
+        KI / KP * (0.64 - np.array([0.0, 0.5, 0.64])), 1e-9,
+    ),
+}  # fmt: skip
 
 
-def test_a_torque_of_radius_times_tension_holds_the_cable():
-    """Servoing thesis 5.2.3: t_c = r_w tau / R_g."""
-    found = motion(PLAIN, TORQUE, 0.0, 0.0, 0.0, 12.0, -0.04 / 10.0 * 12.0)
-    np.testing.assert_allclose(found.acceleration, 0.0, atol=1e-12)
+@pytest.mark.parametrize("case", CLOSED_FORMS.values(), ids=CLOSED_FORMS.keys())
+def test_closed_form(case):
+    law, mode, numbers, name, expected, tolerance = case
+    found = getattr(motion(law, mode, *numbers), name)
+    relative = 0.0 if tolerance else 1e-14
+    np.testing.assert_allclose(found, expected, rtol=relative, atol=tolerance)
 
 
 def test_layers_multiply_tension_by_the_radius_where_the_cable_leaves():
-    law = replace(LAW, friction=FrictionLaw())
     q = np.array([-60.0, 0.0, 180.0])
-    found = motion(law, TORQUE, q, 0.0, 0.0, 10.0, 0.0)
-    rho = law.drum.length_per_angle(q)
+    rho = LAW.drum.length_per_angle(q)
     assert rho[0] > rho[1] > rho[2]
-    np.testing.assert_allclose(found.acceleration, rho * 10.0 / law.inertia, rtol=1e-14)
-
-
-def test_viscous_friction_alone_gives_a_steady_speed():
-    """tau = F_v w."""
-    law = replace(PLAIN, friction=FrictionLaw(viscous=2e-4))
-    found = motion(law, TORQUE, 0.0, 0.03 / 2e-4, 0.0, 0.0, 0.03)
-    np.testing.assert_allclose(found.acceleration, 0.0, atol=1e-9)
-
-
-def test_torque_ends_at_the_rated_torque():
-    found = motion(LAW, TORQUE, 0.0, [0.0, 0.0, 10.0], 0.0, 0.0, [5.0, -5.0, 0.3])
-    np.testing.assert_array_equal(found.torque, [0.64, -0.64, 0.3])
-
-
-def test_beyond_the_rated_speed_a_motor_brakes_but_does_not_drive():
-    over = 314.0 * 1.05 + 1e-9
-    found = motion(LAW, TORQUE, 0.0, [over, over, -over, 313.0], 0.0, 0.0, [0.5, -0.5, -0.5, 0.5])
-    np.testing.assert_allclose(found.torque, [0.0, -0.5, 0.0, 0.5], atol=1e-9)
-
-
-def test_small_torques_do_not_drive_beyond_the_rated_speed_either():
-    """Half of a small torque in the middle of the margin, nothing at its end."""
-    speeds = 314.0 * np.array([1.025, 1.05 + 1e-9, 0.99])
-    found = motion(LAW, TORQUE, 0.0, speeds, 0.0, 0.0, [1e-3, 1e-3, 1e-3])
-    np.testing.assert_allclose(found.torque, [0.5e-3, 0.0, 1e-3], atol=1e-12)
-    np.testing.assert_array_equal(found.integral_rate, 0.0)
-
-
-def test_the_speed_reference_ends_at_the_rated_speed():
-    """And with it the torque that the loop asks for."""
-    law = replace(LAW, rated_torque=np.inf)
-    found = motion(law, VELOCITY, 0.0, 314.0, 0.0, 0.0, [100.0, 3.0])
-    np.testing.assert_allclose(found.torque, 0.0, atol=1e-9)
-
-
-def test_the_integral_does_not_wind_up_while_the_torque_is_limited():
-    """It follows the limit: dz/dt = Ki (tau_limited - z) / Kp, from dz/dt by definition."""
-    Kp, Ki = LAW.gains()
-    found = motion(LAW, VELOCITY, 0.0, 0.0, [0.0, 0.5, 0.64], 0.0, 100.0)
-    np.testing.assert_allclose(found.torque, 0.64)
-    rate = Ki / Kp * (0.64 - np.array([0.0, 0.5, 0.64]))
-    np.testing.assert_allclose(found.integral_rate, rate, atol=1e-9)
+    found = motion(FRICTIONLESS, TORQUE, q, 0.0, 0.0, 10.0, 0.0)
+    np.testing.assert_allclose(found.acceleration, rho * 10.0 / LAW.inertia, rtol=1e-14)
 
 
 def test_a_brake_holds_what_it_can():
@@ -155,34 +157,25 @@ def test_the_speed_loop_is_critically_damped():
     np.testing.assert_allclose(poles.imag, 0.0, atol=1e-3)
 
 
-def test_gains_of_the_speed_loop():
-    """s^2 + Kp / J s + Ki / J = (s + b / 2)^2."""
+def test_gains_and_defaults_of_a_winch():
+    """s^2 + Kp / J s + Ki / J = (s + b / 2)^2; defaults are those of the robot files."""
     Kp, Ki = replace(LAW, velocity_bandwidth=50.0).gains()
     assert Kp == pytest.approx(LAW.inertia * 50.0, rel=1e-14)
     assert Ki == pytest.approx(LAW.inertia * 625.0, rel=1e-14)
-
-
-def test_defaults_of_a_winch_are_those_of_the_robot_files():
     plain = WinchLaw(drum=LAW.drum, inertia=1.0, rated_speed=1.0)
     assert (plain.brake_torque, plain.rated_torque) == (0.0, np.inf)
     assert (plain.velocity_bandwidth, plain.position_bandwidth) == (200.0, 20.0)
     assert plain.friction == FrictionLaw()
+    assert MODES == {"torque": TORQUE, "velocity": VELOCITY, "position": POSITION}
 
 
 def test_whatever_holds_by_friction_or_brake_settles():
     """With a pole of its own, at the settling time of 1 ms."""
-    frictionless = replace(LAW, friction=FrictionLaw(), brake_torque=0.0)
-    assert len(frictionless.poles(TORQUE)) == 2
-    for law in (
-        replace(frictionless, brake_torque=0.1),
-        replace(frictionless, friction=FrictionLaw(static=0.1)),
-        LAW,
-    ):
+    plain = replace(FRICTIONLESS, brake_torque=0.0)
+    assert len(plain.poles(TORQUE)) == 2
+    braked, rough = replace(plain, brake_torque=0.1), replace(plain, friction=FRICTION)
+    for law in (braked, rough, LAW):
         np.testing.assert_allclose(np.min(law.poles(TORQUE).real), -1000.0)
-
-
-def test_modes_have_names():
-    assert MODES == {"torque": TORQUE, "velocity": VELOCITY, "position": POSITION}
 
 
 @st.composite
@@ -235,3 +228,44 @@ def test_values_do_not_depend_on_the_scalar(mode, x):
     np.testing.assert_array_equal(
         ExtractValue(dual.length_acceleration).ravel(), found(numbers).length_acceleration
     )
+
+
+# Winches that fail stand still or let go.
+
+
+SMALL, M = load_robot("acrobot_small").winch_law(), 4
+LENGTHS, TENSIONS = np.ones(M), np.array([5.0, 8.0, 3.0, 6.0])
+RATES = np.array([0.02, -0.05, 0.03, -0.01])
+NONE, JAMMED, POWERLESS = np.zeros(M), np.array([0.0, 1, 0, 0]), np.array([0.0, 0, 1, 0])
+
+
+def accelerations(mode, jammed, powerless):
+    """Of the lengths, by the kernel."""
+    whole = pack_failing_winches(SMALL, M)
+    constants = np.empty_like(whole)
+    brakes = fail_winches(whole, NONE, jammed, powerless, constants)
+    state = np.concatenate([LENGTHS, RATES, np.full(M, -0.1)][: 2 if mode == "torque" else 3])
+    out = np.empty_like(state)
+    winch_rates(state, TENSIONS, -0.1 * LENGTHS, brakes, LENGTHS, MODES[mode], constants, out)
+    return out[M : 2 * M]
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_the_kernel_does_what_the_law_says(mode):
+    motion = winch_motion(
+        failed_law(SMALL, JAMMED, POWERLESS), MODES[mode], (LENGTHS, RATES, np.full(M, -0.1)),
+        TENSIONS, -0.1 * LENGTHS, held_brakes(NONE, JAMMED), home=LENGTHS,
+    )  # fmt: skip
+    found = accelerations(mode, JAMMED, POWERLESS)
+    # Of what is jammed, rounding of what holds it.
+    np.testing.assert_allclose(found, motion.length_acceleration, rtol=1e-9)
+    assert motion.torque[2] == 0.0
+    assert found[1] == pytest.approx(-RATES[1] / SMALL.friction.settling_time, rel=1e-6)
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_where_nothing_failed_bits_are_those_of_winches_that_cannot(mode):
+    state = np.concatenate([LENGTHS, RATES, np.full(M, -0.1)][: 2 if mode == "torque" else 3])
+    out = np.empty_like(state)
+    winch_rates(state, TENSIONS, -0.1 * LENGTHS, NONE, LENGTHS, MODES[mode], pack_winch(SMALL), out)
+    assert np.array_equal(accelerations(mode, NONE, NONE), out[M : 2 * M])

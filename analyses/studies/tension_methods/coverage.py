@@ -15,8 +15,7 @@ from cdpr_drake.errors import TensionProblemError
 from cdpr_drake.geometry.poses import pose_from_angles
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_statics import tension_problem
-from cdpr_drake.tensions.batch import distribute_batch
-from cdpr_drake.tensions.methods import distribute
+from cdpr_drake.tensions.methods import distribute, distribute_batch
 from cdpr_drake.tensions.problem import TensionProblem, TensionStatus
 
 TURNS_DEG = ((0.0, 0.0, 0.0), (5.0, -5.0, 10.0))

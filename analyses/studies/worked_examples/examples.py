@@ -17,8 +17,12 @@ from cdpr_drake.geometry.poses import pose_from_angles
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import tension_problem
-from cdpr_drake.tensions.batch import distribute_batch
-from cdpr_drake.tensions.methods import distribute, feasible_polygon, solution_space
+from cdpr_drake.tensions.methods import (
+    distribute,
+    distribute_batch,
+    feasible_polygon,
+    solution_space,
+)
 from cdpr_drake.tensions.problem import TensionProblem, TensionStatus
 from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
 

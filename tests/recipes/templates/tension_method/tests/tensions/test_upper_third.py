@@ -13,8 +13,7 @@ from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_statics import tension_problem
 from cdpr_drake.systems.controllers.tension_distributor import TensionDistributor
 from cdpr_drake.systems.diagrams.load import load_scenario
-from cdpr_drake.tensions.batch import distribute_batch
-from cdpr_drake.tensions.methods import distribute
+from cdpr_drake.tensions.methods import distribute, distribute_batch
 from tests.messages import printed
 
 SAME = 1e-9

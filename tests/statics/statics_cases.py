@@ -1,26 +1,83 @@
-"""Platforms on cables for the tests, and an exhaustive search of another kind for plane ones."""
+"""Robots at rest, platforms on few cables, differences, and an exhaustive search for plane ones."""
+
+from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from pydrake.math import RigidTransform
 
+from cdpr_drake.cables.elastic_law import unstrained_lengths
 from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.geometry.poses import pose_from_angles, rotation_from_vector
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_statics import rigid_platform
+from cdpr_drake.statics.equilibrium import equilibrium_near
+from cdpr_drake.statics.forward_kinematics import ForwardKinematics
 from cdpr_drake.statics.inextensible_problem import HangingPlatform
+from cdpr_drake.statics.rigid_platform import RigidPlatform
+from cdpr_drake.systems.robots.cable_robot import holding_tensions
 
 WEIGHT = 10.0
 UPRIGHT = {"num_turns": 1, "num_moves": 2, "axis": (0.0, 1.0, 0.0)}
 """A body in the plane y = 0; turns about y."""
 
 
+@dataclass(frozen=True)
+class Scene:
+    """A robot with the unstrained lengths that give tensions [N] at a pose."""
+
+    robot: object
+    cables: CableSet
+    platform: RigidPlatform
+    lengths: np.ndarray
+    tensions: np.ndarray
+    X_WP: RigidTransform
+
+    def rest(self, model="elastic"):
+        """Pose of rest nearest to the pose."""
+        return equilibrium_near(self.cables, model, self.platform, self.lengths, self.X_WP)
+
+
+@cache
+def scene(name, pulleys=False, at=(0.05, -0.03, 0.1), turn=0.03, preload=5.0):
+    """Beside the home pose, with tensions that hold it; those of a planar robot with a preload."""
+    robot = load_robot(name)
+    at = np.array([*at[:2], 0.0 if robot.is_planar() else at[2]])
+    X = pose_from_angles(robot.home.transform().translation() + at, [0.0, 0.0, turn])
+    cables = robot.cable_set() if pulleys else robot.cable_set().without_pulleys()
+    tensions = holding_tensions(robot, X, cables.without_pulleys())
+    tensions = tensions + (preload if robot.is_planar() else 0.0)
+    paths = ForwardKinematics(cables, robot.motion_type()).lengths(X)
+    l0 = unstrained_lengths(paths, tensions, cables.stiffness)
+    return Scene(robot, cables, rigid_platform(robot), l0, tensions, X)
+
+
+def cables_at(exits, anchors, weight=0.0, stiffness=1e5):
+    """Cables from points, one a row."""
+    points = (np.array(points, float).T for points in (exits, anchors))
+    return CableSet.make(*points, stiffness, linear_weight=weight)
+
+
+def displaced(X, d):
+    """A pose after a small turn and move, shape (6,) [rad, m]."""
+    return RigidTransform(rotation_from_vector(d[:3]) @ X.rotation(), X.translation() + d[3:])
+
+
+def stiffness_by_differences(wrench, X, step):
+    """Minus the derivative of a wrench, a function of the pose, shape (6, 6)."""
+    columns = [wrench(displaced(X, -d)) - wrench(displaced(X, d)) for d in step * np.eye(6)]
+    return np.column_stack(columns) / (2.0 * step)
+
+
+# Inextensible cables.
+
+
 def hanging(exits, anchors, center, home=None, **motions):
     """A platform of 10 N."""
-    cables = CableSet.make(np.array(exits, float).T, np.array(anchors, float).T, 1e5)
-    return HangingPlatform(
-        cables=cables,
-        weight_W=np.array([0.0, 0.0, -WEIGHT]),
-        p_PCo=np.array(center, float),
-        home=home or RigidTransform(),
-        **motions,
-    )
+    cables = cables_at(exits, anchors)
+    weight, home = np.array([0.0, 0.0, -WEIGHT]), home or RigidTransform()
+    center = np.array(center, float)
+    return HangingPlatform(cables=cables, weight_W=weight, p_PCo=center, home=home, **motions)
 
 
 def flat(points):
