@@ -92,6 +92,11 @@ class Model:
         return bodies
 
 
+def pair(model: Model, folder: Path) -> tuple[Path, Path]:
+    """Writes a model; its files of bodies and of cables."""
+    return model.write(folder), folder / f"{model.name}_cables.xml"
+
+
 def two_link() -> Model:
     """Two links of 0.4 m and 0.3 m that turn about y, and two cables over one and two of them."""
     return Model(
