@@ -2,17 +2,14 @@
 
 import numpy as np
 import pytest
-from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import JointIndex
 
 from cdpr_drake import models
 from cdpr_drake.errors import RobotFileError
 from cdpr_drake.models.formats.caspr_mechanism import (
-    initial_joints,
     joint_names,
     link_names,
-    write_mechanism,
 )
 from cdpr_drake.models.formats.caspr_trees import (
     AXIS_KINDS,
@@ -24,7 +21,7 @@ from cdpr_drake.models.formats.caspr_trees import (
 )
 from cdpr_drake.models.mechanism_exchange import import_mechanism
 from cdpr_drake.models.mechanism_in_plant import add_mechanism
-from tests.models.formats.tree_files import BOX, Cable, Link, Model, pair, two_link
+from tests.models.formats.tree_files import BOX, Cable, Link, Model, at_start, pair, two_link
 
 pytestmark = pytest.mark.usefixtures("in_this_process")
 
@@ -105,18 +102,6 @@ DEFINED = {
 
 def test_all_kinds_have_a_definition_here():
     assert set(DEFINED) == {*KINDS, *AXIS_KINDS}
-
-
-def at_start(tree):
-    """A plant of the tree's own file, and its context at the initial coordinates."""
-    plant = MultibodyPlant(0.0)
-    Parser(plant).AddModelsFromString(write_mechanism(tree), "xml")
-    plant.Finalize()
-    context, q = plant.CreateDefaultContext(), np.zeros(plant.num_positions())
-    for name, value in initial_joints(tree).items():
-        q[plant.GetJointByName(name).position_start()] = value
-    plant.SetPositions(context, q)
-    return plant, context
 
 
 @pytest.mark.parametrize("kind", DEFINED)
