@@ -16,7 +16,6 @@ from cdpr_drake.geometry.straight_cables import gravity_wrench, wrench_matrix
 from cdpr_drake.models.camera_catalogue import load_camera
 from cdpr_drake.models.camera_files import camera_names
 from cdpr_drake.models.mechanism_files import mechanism_names
-from cdpr_drake.models.robot_exports import EXPORTS
 from cdpr_drake.models.robot_in_plant import platform_inertia
 from cdpr_drake.models.robot_loader import load_robot, robot_names
 from cdpr_drake.models.sensor_catalogue import (
@@ -28,7 +27,7 @@ from cdpr_drake.models.sensor_catalogue import (
     tension_sensor_names,
 )
 from cdpr_drake.systems.robots.cable_robot import CableRobot, automatic_step
-from tests.models.formats.unusual_robots import exported, made
+from tests.models.formats.unusual_robots import made
 from tests.models.published_points import LARGE_ANCHORS
 from tests.models.representative_robots import REPRESENTATIVE_ROBOTS
 
@@ -44,7 +43,6 @@ PRINTED_DIGITS = 0.005
 
 ROBOTS = files("cdpr_drake.models").joinpath("robots")
 ACROBOTS = ("acrobot_small", "acrobot_large", "acrobot_fully_constrained")
-FIRMWARES = ("klipper", "reprapfirmware", "maslow")  # which know points alone
 
 UPPER_EXITS = [
     (-0.47, -0.525, 1.165), (-0.52, -0.465, 1.165), (-0.52, 0.475, 1.165), (-0.47, 0.53, 1.165),
@@ -105,22 +103,6 @@ def test_loads_and_hangs_still_at_home(name):
         tensions = block.GetOutputPort("tensions").Eval(context)
         assert np.all(tensions >= bounds.lower - off)
         assert np.all(tensions <= bounds.upper + off)
-
-
-@pytest.mark.parametrize("name", robot_names())
-def test_is_exported_to_what_can_hold_it(name):
-    assert exported(name, "mjcf")
-    words, refused = [], []
-    for format in EXPORTS:
-        try:
-            written = exported(name, format)
-        except RobotFileError as problem:  # a format that cannot hold the motion type says so
-            refused.append(format)
-            words.append(str(problem))
-        else:
-            assert all(len(text) > 100 for text in written.values())
-    assert all(f"motion: found {made(name).motion}" in each for each in words)
-    assert made(name).motion != "3R3T" or set(refused) <= set(FIRMWARES)
 
 
 FILLED_IN = {

@@ -11,7 +11,7 @@ import numpy as np
 from cdpr_drake.models.robot_in_plant import platform_inertia
 from cdpr_drake.models.robot_schema import Robot
 
-SAME = 1e-9
+SAME = 1e-12
 """Of numbers that go through a file and a few rotations, relative to the largest of a field."""
 
 

@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from pydrake.common.eigen_geometry import Quaternion
+from pydrake.math import RotationMatrix
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import JointIndex
 
@@ -124,10 +126,8 @@ def test_a_joint_moves_as_it_is_defined(kind, tmp_path):
     plant, context = at_start(tree)
     R1, r1 = DEFINED[kind](q1)
     R2, r2 = DEFINED[kind](q2)
-    for name, R, p in (
-        ("one", R1, p1 + r1),
-        ("two", R1 @ R2, p1 + r1 + R1 @ (p2 + r2)),
-    ):
+    poses = (("one", R1, p1 + r1), ("two", R1 @ R2, p1 + r1 + R1 @ (p2 + r2)))
+    for name, R, p in poses:
         X_WB = plant.EvalBodyPoseInWorld(context, plant.GetBodyByName(name))
         np.testing.assert_allclose(X_WB.rotation().matrix(), R, rtol=0, atol=ROUNDING)
         np.testing.assert_allclose(X_WB.translation(), p, rtol=0, atol=ROUNDING)
@@ -159,12 +159,7 @@ def test_two_links_in_a_plane_have_lengths_by_hand(tmp_path):
     third = np.linalg.norm(Q - B1)
     u1, u2, u3 = (V - A1) / first, (P - V) / second, (Q - B1) / third
     # q1 turns both links, q2 the second one: d/dq1 = d/da + d/db, d/dq2 = d/db.
-    J = np.array(
-        [
-            [u1 @ V_a + u2 @ (elbow_a + P_b - V_a), u2 @ P_b],
-            [u3 @ (elbow_a + Q_b), u3 @ Q_b],
-        ]
-    )
+    J = [[u1 @ V_a + u2 @ (elbow_a + P_b - V_a), u2 @ P_b], [u3 @ (elbow_a + Q_b), u3 @ Q_b]]
     lengths, found = cables.lengths_and_jacobian(context)
     np.testing.assert_allclose(lengths, [first + second, third], rtol=0, atol=ROUNDING)
     np.testing.assert_allclose(found, J, rtol=0, atol=ROUNDING)
@@ -199,20 +194,11 @@ def test_the_jacobian_is_that_of_differences_for_chains_of_joints(tmp_path):
     ("kind", "moves"), [("S_QUATERNION", ""), ("SPATIAL_QUATERNION", "1 2 3 ")]
 )
 def test_quaternions_become_euler_angles(kind, moves, tmp_path):
-    model = Model(
-        [Link(kind, moves + "1.6 0.4 -0.6 0.2", name="one")] * 1,
-        [Cable([(0, "3 3 3"), (1, "0 0 1")])],
-    )
-    model.links.append(Link("R_X", "0", 1, name="two"))
+    links = [Link(kind, moves + "1.6 0.4 -0.6 0.2", name="one"), Link("R_X", "0", 1, name="two")]
+    model = Model(links, [Cable([(0, "3 3 3"), (1, "0 0 1")])])
     tree = read_tree(*pair(model, tmp_path), "toy")
-    e0, e1, e2, e3 = np.array([1.6, 0.4, -0.6, 0.2]) / np.linalg.norm([1.6, 0.4, -0.6, 0.2])
-    R = np.array(
-        [
-            [1 - 2 * (e2**2 + e3**2), 2 * (e1 * e2 - e0 * e3), 2 * (e1 * e3 + e0 * e2)],
-            [2 * (e1 * e2 + e0 * e3), 1 - 2 * (e1**2 + e3**2), 2 * (e2 * e3 - e0 * e1)],
-            [2 * (e1 * e3 - e0 * e2), 2 * (e2 * e3 + e0 * e1), 1 - 2 * (e1**2 + e2**2)],
-        ]
-    )
+    q = np.array([1.6, 0.4, -0.6, 0.2])
+    R = RotationMatrix(Quaternion(q / np.linalg.norm(q))).matrix()
     joint = tree.links[0].joint
     found, r = DEFINED[joint.kind](joint.initial)
     np.testing.assert_allclose(found, R, rtol=0, atol=ROUNDING)
@@ -221,20 +207,13 @@ def test_quaternions_become_euler_angles(kind, moves, tmp_path):
 
 
 def test_inertia_about_the_joint_is_turned_to_the_centre_of_mass(tmp_path):
-    model = two_link()
-    m, x, y, z = 1.5, 0.1, -0.2, 0.3
-    about_joint = np.array([0.02, 0.03, 0.04, 0.001, -0.002, 0.003]) + m * np.array(
-        [y * y + z * z, x * x + z * z, x * x + y * y, -x * y, -x * z, -y * z]
-    )
-    model.links[0] = Link(
-        "R_Y",
-        "0.3",
-        name="upper",
-        ref="joint",
-        inertia=" ".join(map(repr, map(float, about_joint))),
-    )
+    """Steiner's theorem, by hand."""
+    model, given = two_link(), np.array(BOX.split(), float)
+    x, y, z = 0.1, -0.2, 0.3
+    shift = [y * y + z * z, x * x + z * z, x * x + y * y, -x * y, -x * z, -y * z]
+    about_joint = " ".join(repr(float(value)) for value in given + 1.5 * np.array(shift))
+    model.links[0] = Link("R_Y", "0.3", name="upper", ref="joint", inertia=about_joint)
     tree = read_tree(*pair(model, tmp_path), "toy")
-    given = [float(value) for value in BOX.split()]
     np.testing.assert_allclose(tree.links[0].inertia, given, rtol=0, atol=1e-16)
 
 
@@ -249,9 +228,7 @@ def test_inertia_of_no_body_is_refused_or_repaired_by_name(tmp_path):
     assert "\n" not in str(caught.value)
     tree = read_tree(*files, "toy", None, True)
     np.testing.assert_allclose(tree.links[1].inertia, [0.05, 0.05, 0.1, 0, 0, 0], rtol=2e-6)
-    np.testing.assert_array_equal(
-        tree.links[0].inertia, [float(value) for value in BOX.split()]
-    )  # what a body can have stays
+    np.testing.assert_array_equal(tree.links[0].inertia, np.array(BOX.split(), float))
     told = [words for words in tree.remarks if "principal moments" in words]
     assert len(told) == 1
     assert told[0].startswith("link 2: principal moments 0.01, 0.01, 0.1 were changed to 0.05")
@@ -387,8 +364,6 @@ def test_limits_that_a_joint_starts_beyond_are_left_out_by_name(tmp_path):
     imported, plant, _ = loaded(tmp_path, model)
     assert plant.GetJointByName("upper_ry").position_upper_limits() == [2.0]
     assert plant.GetJointByName("lower_ry").position_upper_limits() == [np.inf]
-    assert (
-        "Limits of joints that start beyond them were left out: lower_ry."
-        in imported.completed.remarks
-    )
+    said = "Limits of joints that start beyond them were left out: lower_ry."
+    assert said in imported.completed.remarks
     assert plant.num_actuators() == 1

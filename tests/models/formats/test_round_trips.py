@@ -34,6 +34,8 @@ pytestmark = pytest.mark.usefixtures("in_this_process")
 EXACT = 1e-12
 """Text has all digits; rotations round a few times."""
 
+FIRMWARES = ("klipper", "reprapfirmware", "maslow")  # which know points alone
+
 PROSE = ("title", "assumptions")
 """Fields that are filled with words about the import where a robot says nothing there."""
 
@@ -59,21 +61,19 @@ def back(robot, files, folder):
 
 
 @pytest.mark.parametrize("name", ALL)
-def test_no_field_is_lost_unsaid_and_points_come_back_exactly(name, tmp_path):
+def test_no_field_is_lost_unsaid(name, tmp_path):
     """And of unusual robots nothing is named that comes back."""
-    robot, came = made(name), 0
+    robot = made(name)
     for format in formats():
         again = back(robot, lambda format=format: exported(name, format), tmp_path)
         if again is None:
+            assert format != "mjcf" or name == "beam"
+            assert robot.motion != "3R3T" or format in FIRMWARES
             continue
-        came += 1
         lost, differ = set(export_omissions(robot, format)), fields_that_differ(robot, again)
         assert differ - lost <= {key for key in PROSE if getattr(robot, key) == ""}, format
         if name in UNUSUAL and name != "arms":  # which has values that an import assumes
             assert lost <= differ, format
-        for key in {"cables[].exit_point", "cables[].anchor_point"} - lost:
-            found, expected = meaning(key, again, robot), meaning(key, robot, robot)
-            np.testing.assert_allclose(found, expected, rtol=0, atol=EXACT, err_msg=format)
         if format != "mjcf" and name in ("tilted", "tilted_gravity"):
             # In a turned world all is as that world has it.
             seen = models.turned_robot(robot, models.gravity_turn(robot))
@@ -81,7 +81,6 @@ def test_no_field_is_lost_unsaid_and_points_come_back_exactly(name, tmp_path):
             assert unsaid <= {key for key in PROSE if getattr(robot, key) == ""}, format
             said = export_omissions(robot, format)["gravity_direction"]
             assert said.startswith("The world was turned")
-    assert came > 0
 
 
 @pytest.mark.parametrize("name", ["acrobot_large", "caroca"])
