@@ -1,6 +1,6 @@
 """Robots that stand for all, for tests that would take long with each robot of the package.
 
-The library grows; that each of its robots loads, hangs, steps and is exported is
+The library grows; that each of its robots loads, hangs and steps is
 `tests/models/test_library.py`'s.
 """
 

@@ -4,15 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 from cdpr_drake.cables.elastic_law import axial_stiffness
 from cdpr_drake.cables.models import check_breaking
-from cdpr_drake.cli.app import make_app
-from cdpr_drake.errors import CableGeometryError, RobotFileError
+from cdpr_drake.errors import CableGeometryError
 from cdpr_drake.geometry.cable_paths import cable_paths
-from cdpr_drake.models.robot_exchange import export_robot
-from cdpr_drake.models.robot_exports import export_omissions
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_statics import rigid_platform
 from cdpr_drake.models.ups_robot import rod_masses
@@ -127,37 +123,3 @@ def arrays_of(law, state, tensions, command, home):
     parts = (state[:8], state[8:], np.zeros(8))
     motion = winch_motion(law, MODES["torque"], parts, tensions, command, np.zeros(8), home=home)
     return np.concatenate([state[8:], motion.length_acceleration])
-
-
-def test_a_size_without_sense_is_refused_by_its_key():
-    with pytest.raises(RobotFileError, match=r"cables\[2\]\.material\.diameter: found 3; accept"):
-        mixed({"diameter": 3.0})
-    with pytest.raises(RobotFileError, match=r"cables\[2\]\.material\.youngs_modulus: found -1"):
-        mixed({"youngs_modulus": -1.0})
-
-
-def test_mujoco_gets_width_and_stiffness_of_each_tendon(tmp_path):
-    pytest.importorskip("mujoco")
-    robot = mixed({"diameter": 0.004, "youngs_modulus": 2.5e9})
-    path = tmp_path / "robot.xml"
-    (text,) = export_robot(robot, "mjcf").values()
-    path.write_text(text)
-    again = load_robot(str(path))
-    np.testing.assert_allclose(again.diameters(), robot.diameters(), rtol=1e-15)
-    np.testing.assert_allclose(again.stiffness(), robot.stiffness(), rtol=1e-12)
-    own = {f"cables[].material.{key}" for key in ("diameter", "youngs_modulus")}
-    assert not own & set(export_omissions(robot, "mjcf"))
-    assert own <= set(export_omissions(robot, "wcrfx"))
-
-
-def test_export_says_what_it_leaves_out(tmp_path):
-    import yaml
-
-    content = content_of()
-    content["cables"][0]["material"] = {"diameter": 0.004}
-    path = tmp_path / "robot.yaml"
-    path.write_text(yaml.safe_dump(content))
-    options = ["export", str(path), "--format", "caspr", "--out", str(tmp_path)]
-    result = CliRunner().invoke(make_app(options[:1]), options)
-    assert result.exit_code == 0
-    assert "cables[].material.diameter" in result.stderr

@@ -100,19 +100,6 @@ def test_what_no_rail_can_do_is_named(path, suffix, words):
         load_robot(f"{path}@{suffix.format(*names())}")
 
 
-@pytest.mark.parametrize(
-    ("changes", "words"),
-    [
-        ({"axis": [0, 0, 0]}, r"cables\[0\]\.rail\.axis: found \(0, 0, 0\); accepted: a direction"),
-        ({"lower": 0.2}, r"cables\[0\]\.rail: found lower 0\.2, upper 0\.1; accepted: lower < upp"),
-        ({"at": 0.2}, r"cables\[0\]\.rail\.at: found 0\.2; accepted: -0\.2 to 0\.1"),
-    ],
-)
-def test_what_is_wrong_with_a_rail_is_named(changes, words):
-    with pytest.raises(RobotFileError, match=words):
-        robot_of(with_rails(**changes))
-
-
 def test_a_robot_without_rails_says_so():
     with pytest.raises(RobotFileError, match=r"accepted: none, since its file gives no cables\[\]"):
         load_robot(f"acrobot_small@{names()[0]}=0.1")

@@ -14,7 +14,7 @@ from cdpr_drake.models.robot_parameters import changed_robot, parameter_names
 ROBOT = load_robot("acrobot_small")
 FRICTION = load_robot("acrobot_large")
 
-COUNT = 4000
+COUNT = 1000
 SHARE = 5.0 / np.sqrt(COUNT)
 """Five standard errors of a mean or a correlation of so many draws; of a variance, with sqrt 2."""
 

@@ -141,25 +141,6 @@ def test_clearances_reckon_with_the_frames_own_beams():
     assert len(interference_bodies(robot_of(content_with())).fixtures) == 12
 
 
-@pytest.mark.parametrize(
-    ("shape", "inertia_of", "words"),
-    [
-        ({"kind": "sphere"}, None, r"platform\.shape\.radius: found null; accepted: a value, for"),
-        ({"kind": "cylinder", "radius": 0.1}, None, r"platform\.shape\.height: found null"),
-        ({"kind": "sphere", "radius": 0.3}, None, r"platform\.shape: found reaching from \(-0\.3"),
-        (
-            {"kind": "mesh", "file": "no.obj"},
-            None,
-            r"platform\.shape\.file: found no\.obj; acc",
-        ),
-        (None, "shape", r"platform\.inertia_of: found shape; accepted: box, or a section"),
-    ],
-)
-def test_what_is_wrong_with_a_shape_is_named(shape, inertia_of, words):
-    with pytest.raises(RobotFileError, match=words):
-        robot_of(content_with(shape, inertia_of))
-
-
 def test_a_mesh_that_encloses_nothing_has_no_inertia(tmp_path):
     crate(tmp_path)
     path = tmp_path / "crate.obj"

@@ -30,6 +30,16 @@ ANGLES = np.array([0.1, -0.2, 0.3])
 """Of R = Rx Ry Rz [rad]."""
 
 
+def edited(folder: Path, *pairs: tuple[str, str]) -> None:
+    """Replaces words wherever they are in the files of a folder; each must be somewhere."""
+    for old, new in pairs:
+        paths = [path for path in folder.iterdir() if old in path.read_text(encoding="utf-8")]
+        assert paths, old
+        for path in paths:
+            text = path.read_text(encoding="utf-8").replace(old, new)
+            path.write_text(text, encoding="utf-8")
+
+
 def words(values) -> str:
     return " ".join(repr(float(value)) for value in values)
 
@@ -246,3 +256,52 @@ def sdformat(folder: Path) -> Path:
         encoding="utf-8",
     )
     return path
+
+
+KLIPPER = """[printer]
+kinematics: winch
+max_velocity: 300
+max_accel: 3000
+[include mcu.cfg]
+[extruder]
+nozzle_diameter: 0.4
+""" + "".join(
+    f"[stepper_{letter}]\nstep_pin: PF0 # a comment\nrotation_distance: 40\ngear_ratio: 51:4\n"
+    f"anchor_x: {x}\nanchor_y: {y}\nanchor_z: {z}\n"
+    for letter, (x, y, z) in zip(
+        "abcd", [(0, -2000, -100), (2000, 1000, -100), (-2000, 1000, -100), (0, 0, 3000)],
+        strict=True,
+    )
+)  # fmt: skip
+
+REPRAP = """; Hangprinter
+M669 K6 N4 A0.0:-1604.5:-114.1 B1312.5:1270.9:-162.2 C-1440.3:741.6:-161.2 D0:0:2345.0 P2000
+M666 Q0.0 R65.0:65.0:65.0:65.0 U2:2:2:2 O1:1:1:1 L20:20:20:20 H255:255:255:255 J200:200:200:200
+M666 W2.5 S20000 I4:4:4:4 X90:90:90:90 Z3
+M92 X100
+"""
+
+MASLOW = """Maslow_vertical: true
+name: my board
+kinematics:
+  Cartesian: {}
+  MaslowKinematics: {tlX: 100.0, tlY: 2400.0, tlZ: 100.0, trX: 3600.0, trY: 2410.0, trZ: 56.0,
+    blX: 0.0, blY: 0.0, blZ: 34.0, brX: 3610.0, brY: 0.0, brZ: 78.0, beltEndExtension: 30.0,
+    armLength: 123.4, oddity: 1}
+"""
+
+
+def saved(name: str, text: str):
+    """What writes a text to a file of that name in a folder."""
+
+    def write(folder: Path) -> Path:
+        path = folder / name
+        path.write_text(text, encoding="utf-8")
+        return path
+
+    return write
+
+
+klipper = saved("printer.cfg", KLIPPER)
+reprap = saved("config.g", REPRAP)
+maslow = saved("maslow.yaml", MASLOW)

@@ -11,7 +11,7 @@ import numpy as np
 from cdpr_drake.models.robot_in_plant import platform_inertia
 from cdpr_drake.models.robot_schema import Robot
 
-SAME = 1e-9
+SAME = 1e-12
 """Of numbers that go through a file and a few rotations, relative to the largest of a field."""
 
 
@@ -60,11 +60,6 @@ _WHOLE: dict[str, Callable[[Robot], Any]] = {
     "cables[].exit_point": lambda robot: robot.exit_points().T,
 }
 
-_PULLEYS = {
-    "radius": ("pulley_radius", "pulley_radius"),
-    "swivel_axis": ("swivel_axis", "swivel_axis"),
-}
-
 
 def _own(robot: Robot, key: str, each: Sequence[Any], mine: Callable[[Any], Any]) -> list[Any]:
     """Of values of all cables those that the cables give themselves, or those that they do not."""
@@ -87,14 +82,14 @@ def meaning(key: str, robot: Robot, of: Robot) -> Any:
         return _directions(robot, of)
     if len(robot.cables) != len(of.cables):
         return len(robot.cables)
-    cables, last = robot.cable_set(), key.rpartition(".")[2]
+    last = key.rpartition(".")[2]
     if key.startswith("pulley.") or key in ("cables[].pulley_radius", "cables[].swivel_axis"):
         name = last if last == "swivel_axis" else "pulley_radius"
-        each = np.atleast_2d(getattr(cables, name)).T
+        each = np.atleast_2d(getattr(robot.cable_set(), name)).T
         return _own(of, key, list(each), lambda cable: getattr(cable, name))
     if key.startswith(("platform_pulley", "cables[].anchor_pulley", "cables[].anchor_swivel")):
         name = "anchor_swivel_axis" if last.endswith("swivel_axis") else "anchor_pulley_radius"
-        each = np.atleast_2d(getattr(cables, name)).T
+        each = np.atleast_2d(getattr(robot.cable_set(), name)).T
         return _own(of, key, list(each), lambda cable: getattr(cable, name))
     if key.startswith("cable.behaviour"):
         laws = robot.cable_behaviour()

@@ -134,3 +134,72 @@ MJCF = (
 </mujoco>
 """
 )
+
+
+POINTS = "".join(
+    f'<link name="exit_C{k}"/><joint name="e{k}" type="fixed"><parent link="world"/>'
+    f'<child link="exit_C{k}"/><origin xyz="{x} {y} 2"/></joint><link name="anchor_C{k}"/>'
+    f'<joint name="a{k}" type="fixed"><parent link="platform"/><child link="anchor_C{k}"/>'
+    f'<origin xyz="{0.1 * x} {0.1 * y} 0.05"/></joint>'
+    for k, (x, y) in enumerate(CORNERS)
+)
+
+SLIDER = '<link name="slider"/>'
+HEAVY = """<link name="slider"><inertial><mass value="3"/><inertia ixx="0.01" iyy="0.03" izz="0.02"
+ ixy="0" ixz="0" iyz="0"/></inertial></link>"""
+
+
+def joined(kind, axis="0 1 0", parent="world", child="platform", name="moves"):
+    """A joint of URDF, 1 m up unless it is the second of two."""
+    limits = '<limit effort="1" velocity="1" lower="-1" upper="1"/>'
+    return (
+        f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
+        f'<origin xyz="0 0 {0 if name == "second" else 1}"/><axis xyz="{axis}"/>'
+        f"{limits if kind in ('revolute', 'prismatic') else ''}</joint>"
+    )
+
+
+def slid(link, second, axis="0 0 1"):
+    """A platform on a joint of a link that slides along x."""
+    first = joined("prismatic", "1 0 0", child="slider")
+    return link + first + joined(second, axis, parent="slider", name="second")
+
+
+def urdf(joints):
+    """What writes a platform on four cables, on these joints."""
+
+    def write(folder):
+        path = folder / "r.urdf"
+        path.write_text(
+            """<robot name="r"><link name="world"/><link name="platform"><inertial>
+            <mass value="2"/><inertia ixx="0.01" iyy="0.03" izz="0.02" ixy="0" ixz="0" iyz="0"/>
+            </inertial></link>"""
+            f"{joints}{POINTS}</robot>"
+        )
+        return path
+
+    return write
+
+
+SITES = "".join(
+    f'<site name="a{k}" pos="{0.1 * x} {0.1 * y} 0.05"/>' for k, (x, y) in enumerate(CORNERS)
+)
+
+
+def hung(inner="", after="", world="", sites=SITES):
+    """What writes MJCF of a plate on four ropes, with more in it, behind it or in the world."""
+    exits = "".join(f'<site name="w{k}" pos="{x} {y} 2"/>' for k, (x, y) in enumerate(CORNERS))
+    ropes = "".join(
+        f'<spatial name="t{k}"><site site="w{k}"/><site site="a{k}"/></spatial>' for k in range(4)
+    )
+
+    def write(folder):
+        path = folder / "hung.xml"
+        path.write_text(
+            f'<mujoco><worldbody>{exits}<body name="p" pos="0 0 1"><freejoint/>'
+            f'<geom type="box" size="0.1 0.1 0.05" mass="2"/>{sites}{inner}</body>{world}'
+            f"</worldbody><tendon>{ropes}</tendon>{after}</mujoco>"
+        )
+        return path
+
+    return write

@@ -1,151 +1,265 @@
-"""Robots of other tools come in as their files have them."""
+"""What readers keep of files of other tools, by hand, and what they name as not kept."""
 
-from __future__ import annotations
-
-import re
+import json
 
 import numpy as np
 import pytest
-from pydrake.math import RigidTransform, RollPitchYaw
+from scipy.io import savemat
 
 from cdpr_drake import models
 from cdpr_drake.errors import RobotFileError
 from cdpr_drake.geometry.cable_paths import cable_jacobian, cable_paths
 from cdpr_drake.geometry.poses import pose_from_angles
 from cdpr_drake.geometry.straight_cables import cable_lengths
+from cdpr_drake.models.formats.caspr import caspr_models, read_caspr
+from cdpr_drake.models.formats.detection import read_foreign
+from cdpr_drake.models.formats.grab_mat import is_grab_mat
+from cdpr_drake.models.formats.reading import read_json
 from tests.messages import printed
 from tests.models.formats import foreign_files as files
+from tests.models.formats.foreign_files import ANCHORS, COM, EXITS, HOME, edited, words
+from tests.models.formats.test_refusals import WHOLE, attachment, toy
+
+pytestmark = pytest.mark.usefixtures("in_this_process")
 
 EXACT = 1e-12
 """Points go through text with all their digits, and through a few rotations."""
 
-R_30 = RollPitchYaw(0.0, 0.0, np.radians(30.0)).ToRotationMatrix()
-
-
-def expected_lengths(X_WP):
-    """|A B| by hand."""
-    R, p = X_WP.rotation().matrix(), X_WP.translation()
-    return np.array(
-        [
-            np.sqrt(sum((p + R @ B - A) ** 2))
-            for A, B in zip(files.EXITS.T, files.ANCHORS.T, strict=True)
-        ]
-    )
-
-
-def expected_wrench_matrix(X_WP):
-    """Moments about Po, then forces, of unit tensions, by hand."""
-    R, p = X_WP.rotation().matrix(), X_WP.translation()
-    columns = []
-    for A, B in zip(files.EXITS.T, files.ANCHORS.T, strict=True):
-        u = (A - p - R @ B) / np.linalg.norm(A - p - R @ B)
-        columns.append([*np.cross(R @ B, u), *u])
-    return np.array(columns).T
-
-
+LEVEL, TURNED = np.zeros(3), np.array([0.0, 0.0, np.radians(30.0)])
 READERS = {
-    "caspr": (files.caspr, pose_from_angles(files.HOME, files.ANGLES)),
-    "wirex": (files.wirex, None),
-    "gazebo": (files.gazebo, RigidTransform(files.HOME)),
-    "gazebo fork": (lambda f: files.gazebo(f, fork=True), RigidTransform(files.HOME)),
-    "gazebo world": (lambda f: files.gazebo(f, world_points=True), RigidTransform(files.HOME)),
-    "mjcf": (files.mjcf, RigidTransform(R_30, files.HOME)),
-    "sdformat": (files.sdformat, RigidTransform(files.HOME)),
+    "caspr": (files.caspr, files.ANGLES, COM),
+    "caspr com": (toy(reference="com"), files.ANGLES, COM),
+    "wirex": (files.wirex, None, None),
+    "gazebo": (files.gazebo, LEVEL, LEVEL),
+    "gazebo fork": (lambda folder: files.gazebo(folder, fork=True), LEVEL, LEVEL),
+    "gazebo world": (lambda folder: files.gazebo(folder, world_points=True), LEVEL, LEVEL),
+    "mjcf": (files.mjcf, TURNED, COM),
+    "sdformat": (files.sdformat, LEVEL, COM),
 }
 
 
 @pytest.mark.parametrize("kind", READERS)
-def test_points_lengths_wrench_matrix_and_home(kind, tmp_path):
+def test_points_home_lengths_wrench_matrix_and_inertia(kind, tmp_path):
     if kind == "mjcf":
         pytest.importorskip("mujoco")
-    write, home = READERS[kind]
+    write, angles, com = READERS[kind]
     robot = models.load_robot(str(write(tmp_path)))
-    cables = robot.cable_set().without_pulleys()
-    np.testing.assert_allclose(cables.p_WA, files.EXITS, atol=EXACT)
-    np.testing.assert_allclose(cables.p_PB, files.ANCHORS, atol=EXACT)
-    if home is not None:
-        found = robot.home.transform()
-        np.testing.assert_allclose(found.GetAsMatrix4(), home.GetAsMatrix4(), atol=EXACT)
-    X_WP = robot.home.transform() if home is None else home
-    lengths = cable_lengths(X_WP, cables.p_WA, cables.p_PB)
-    np.testing.assert_allclose(lengths, expected_lengths(X_WP), atol=EXACT)
-    W = -cable_jacobian(X_WP, cables).T
-    np.testing.assert_allclose(W, expected_wrench_matrix(X_WP), atol=EXACT)
+    cables, X_WP = robot.cable_set().without_pulleys(), robot.home.transform()
+    np.testing.assert_allclose(cables.p_WA, EXITS, atol=EXACT)
+    np.testing.assert_allclose(cables.p_PB, ANCHORS, atol=EXACT)
+    if angles is not None:
+        home = pose_from_angles(HOME, angles).GetAsMatrix4()
+        np.testing.assert_allclose(X_WP.GetAsMatrix4(), home, atol=EXACT)
+    arms = X_WP.rotation().matrix() @ ANCHORS
+    along = EXITS - X_WP.translation()[:, np.newaxis] - arms
+    lengths = np.linalg.norm(along, axis=0)
+    np.testing.assert_allclose(cable_lengths(X_WP, cables.p_WA, cables.p_PB), lengths, atol=EXACT)
+    W = np.vstack([np.cross(arms.T, (along / lengths).T).T, along / lengths])
+    np.testing.assert_allclose(-cable_jacobian(X_WP, cables).T, W, atol=EXACT)
     assert robot.platform.mass == files.MASS
+    if com is not None:
+        spatial = models.platform_inertia(robot)
+        np.testing.assert_allclose(spatial.get_com(), com, atol=EXACT)
+        about = spatial.Shift(com).CalcRotationalInertia()
+        found = [*about.get_moments(), *about.get_products()]
+        np.testing.assert_allclose(found, files.INERTIA, atol=EXACT)
 
 
-@pytest.mark.parametrize("kind", ["caspr", "gazebo", "gazebo fork", "mjcf", "sdformat"])
-def test_inertia_is_about_the_centre_of_mass(kind, tmp_path):
-    if kind == "mjcf":
-        pytest.importorskip("mujoco")
-    robot = models.load_robot(str(READERS[kind][0](tmp_path)))
-    spatial = models.platform_inertia(robot)
-    com = np.zeros(3) if kind.startswith("gazebo") else files.COM
-    np.testing.assert_allclose(spatial.get_com(), com, atol=EXACT)
-    about = spatial.Shift(com).CalcRotationalInertia()
-    found = [*about.get_moments(), *about.get_products()]
-    np.testing.assert_allclose(found, files.INERTIA, atol=EXACT)
+def limits(low, high):
+    """Limits of the toy's joint, which stands off the world's origin."""
+    given = "".join(f' {key}="{w}"' for key, w in (("q_min", low), ("q_max", high)) if w)
+    return [('"/>\n      <physical>', f'"{given}/>\n      <physical>'),
+            ("<location>0 0 0<", "<location>0.1 0.2 0.3<")]  # fmt: skip
 
 
+def corners(low, high):
+    return {"frame_lower": low, "frame_upper": high}
+
+
+def chain(*items):
+    """The first cable of the toy through other attachments."""
+    old = attachment(0, EXITS[:, 0]) + attachment(1, ANCHORS[:, 0])
+    return [(old, "".join(attachment(*item) for item in items))]
+
+
+def ends(exit_point):
+    return {"cables.0.exit_point": exit_point, "cables.0.anchor_point": END}
+
+
+ONE, TWO, END = np.array([1.0, 0.0, 2.0]), np.array([2.0, 0.5, 1.0]), np.array([0.1, 0.2, 0.0])
+SHOWN, LIMITED = corners([-3, -3, 0], [3, 3, 3]), "limits of the joint"
+LOW, HIGH = "-3.15 -3.15 -3.15", "3.15 3.15 3.15"
+RANGE = 'display_range="-3 3 -3 3 0 3">'
+X, Y, Z = COM
+STEINER = files.MASS * np.array(
+    [Y * Y + Z * Z, X * X + Z * Z, X * X + Y * Y, -X * Y, -X * Z, -Y * Z]
+)
+QUATERNION = np.array([np.cos(0.2), 0.0, np.sin(0.2), 0.0])
+ABOUT_Y = [[np.cos(0.4), 0, np.sin(0.4)], [0, 1, 0], [-np.sin(0.4), 0, np.cos(0.4)]]
+QUARTER = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
 LISTED = "<!DOCTYPE cables [\n  <!ATTLIST cable_set id ID #REQUIRED>\n]>"
-"""A document type as some files bring it along."""
+FLAT_Z = {"gravity_direction": [0.0, -np.sin(0.02), -np.cos(0.02)]}
+PULLEYS, LOAD = toy(pulley=True), '"platform": {"ext_force_loc": '
+MATERIAL = {"diameter": 0.006, "drum_radius": 0.1, "motor_inertia": 0.0015, "cables.0.lower": 5.0,
+            "cables.0.upper": 720.0, "cables.7.swivel_axis": [0, 1, 0], "name": "toy_1",
+            "inertia": [14, 14, 14, 0, 0, 0]}  # fmt: skip
+GRAB_3 = {"cables.2.exit_point": EXITS[:, 2], "cables.2.anchor_point": ANCHORS[:, 2],
+          "cables.0.swivel_axis": [0, 0.6, 0.8]}  # fmt: skip
+OLD_NAMES = [("pos_D_glob", "pos_glob_D"), ("pos_A_loc", "pos_loc_A"), ("pos_G_loc", "pos_loc_G"),
+             ("inertia_mat_G_loc", "inertia_mat_loc_G")]  # fmt: skip
+OLD = {**GRAB_3, "cables.3.pulley_radius": 0.02, "center_of_mass": COM, "inertia": files.INERTIA}
+WALL = {"cables.0.exit_point": [0.1, 0.1, 2.4], "axis": [0, 1, 0]}
+FLOOR = {"cables.0.exit_point": [0.1, 2.4, -0.1], "cables.1.exit_point": [3.6, 2.41, -0.056],
+         "cables.3.exit_point": [3.61, 0, -0.078]}  # fmt: skip
+OLD_MASLOW = "Maslow_vertical: false\n" + "".join(
+    f"Maslow_{key}: {value}\n"
+    for key, value in {"tlX": 100, "tlY": 2400, "tlZ": 100, "trX": 3600, "trY": 2410, "trZ": 56,
+                       "brX": 3610, "brY": 0, "brZ": 78, "blY": 0, "armLength": 120}.items()
+)  # fmt: skip
 
 
-def test_caspr_limits_sets_and_pulleys(tmp_path):
-    imported = models.import_robot(files.caspr(tmp_path, pulley=True))
-    robot = imported.robot
-    assert robot.tension_limits() == (7.0, 700.0)  # every cable's own limits hold
-    cables = robot.cable_set()
-    np.testing.assert_allclose(cables.pulley_radius, 0.04 + 0.001 * np.arange(8), atol=EXACT)
-    np.testing.assert_allclose(cables.swivel_axis[:, 3], np.array([0, 1, 1]) / np.sqrt(2))
-    assert any("differ from cable to cable" in words for words in imported.completed.remarks)
-    assert any("first" in words for words in imported.completed.remarks)
-    with pytest.raises(RobotFileError, match="cable_set first"):
-        models.import_robot(tmp_path, cable_set="first")
+WINCH = "[winch]\nmover_weight: 5.5\noddity: 3\n[extruder]"
 
 
-def test_caspr_points_relative_to_the_centre_of_mass(tmp_path):
-    robot = models.load_robot(str(files.caspr(tmp_path, reference="com")))
-    np.testing.assert_allclose(robot.cable_set().p_PB, files.ANCHORS, atol=EXACT)
+def old_grab(folder):
+    return files.grab(folder, old=True)
 
 
-def test_cables_of_one_name_are_told_apart(tmp_path):
-    """A public model of eight cables calls its last one as its first."""
-    path = files.caspr(tmp_path)
-    cables = tmp_path / "toy_cables.xml"
-    text = cables.read_text()
-    assert 'name="cable 8"' in text
-    text = text.replace('<!DOCTYPE cables SYSTEM "../../templates/cables.dtd">', LISTED)
-    cables.write_text(text.replace('name="cable 8"', 'name="cable 1"'))
-    imported = models.import_robot(path)
-    assert [cable.name for cable in imported.robot.cables] == [f"C{k}" for k in range(1, 9)]
-    np.testing.assert_allclose(imported.robot.cable_set().p_PB, files.ANCHORS, atol=EXACT)
-    assert any("it became C8" in words for words in imported.completed.remarks)
+# name -> (what writes the file, changes of its words, what the draft has, remarks, no remarks)
+KEPT = {
+    "older joint": (files.caspr, [(WHOLE, "<joint_type> spatial_euler_xyz </joint_type>")],
+                    {"motion": "3R3T", "home_position": None}, [], []),
+    "limits": (files.caspr, limits(f"-1 -2 0 {LOW}", f"1 2 3 {HIGH}"),
+               {**corners([-0.9, -1.8, 0.3], [1.1, 2.2, 3.3]), "home_position": [0.3, 0.1, 1.4]},
+               [LIMITED], []),
+    "one axis does not move": (files.caspr, limits(f"-1 0 0 {LOW}", f"1 0 3 {HIGH}"), SHOWN, [],
+                               [LIMITED]),
+    "none that anybody has built": (files.caspr, limits(f"-1 -9999 0 {LOW}", f"1 9999 3 {HIGH}"),
+                                    SHOWN, [], [LIMITED]),
+    "limits far off": (files.caspr, limits(f"-1e9 -1e9 0 {LOW}", f"-1 -2 3 {HIGH}"), SHOWN, [],
+                       [LIMITED]),
+    "lower limit": (files.caspr, limits(f"-1 -2 0 {LOW}", None), SHOWN, [], [LIMITED]),
+    "upper limit": (files.caspr, limits(None, f"1 2 3 {HIGH}"), SHOWN, [], [LIMITED]),
+    "two limits": (toy(joint="P_XZ", q="0.1 1.2"), [('="0.1 1.2"', '="0.1 1.2" q_min="-1 0"'
+                   ' q_max="1 2"')], SHOWN, [], []),
+    "range": (files.caspr, [(RANGE, "><display_range>-3 3 -3 3 0 3</display_range>")], SHOWN,
+              [], []),
+    "flat range": (files.caspr, [(RANGE, RANGE.replace("0 3", "3 3"))], {"frame_lower": None},
+                   [], []),
+    "empty range": (files.caspr, [(RANGE, 'display_range="">')], {"frame_lower": None}, [], []),
+    "no range": (files.caspr, [(RANGE, ">")], {"frame_lower": None}, [], []),
+    "world first": (files.caspr, chain((0, ONE), (1, END)), ends(ONE), [], ["runs over"]),
+    "body first": (files.caspr, chain((1, END), (0, ONE)), ends(ONE), [], ["runs over"]),
+    "next to the body": (files.caspr, chain((0, ONE), (0, TWO), (1, END)), ends(TWO),
+                         ["runs over 2 points"], []),
+    "body, then world": (files.caspr, chain((1, END), (0, ONE), (0, TWO)), ends(ONE),
+                         ["runs over 2 points"], []),
+    "pulleys": (PULLEYS, [], {"cables.7.pulley_radius": 0.047, "cables.7.lower": 7.0,
+                "cables.7.upper": 707.0, "cables.3.swivel_axis": np.sqrt([0, 0.5, 0.5])},
+                ["first"], []),
+    "no radius": (PULLEYS, [("<pulley_radius>0.04<", "<pulley_radius>0<")],
+                  {"cables.0.pulley_radius": 0.0, "cables.0.swivel_axis": np.sqrt([0, 0.5, 0.5])},
+                  [], []),
+    **{f"cable {name}": (files.caspr, [('name="cable 3"', f'name="{name}"')],
+                         {"cables.2.name": short}, [], [])
+       for name, short in [("cable 3", "C3"), ("Cable_3", "C3"), ("3", "C3"),
+                           ("cable a", "cable a"), ("C3b", "C3b")]},
+    "one name": (files.caspr, [('name="cable 8"', 'name="cable 1"'),
+                 ("<!DOCTYPE cables [<!ATTLIST cable_set id ID #REQUIRED>]>", LISTED)],
+                 {"cables.7.anchor_point": ANCHORS[:, 7]}, [], []),
+    "no default": (files.caspr, [(' default_cable_set="second"', ""),
+                   ('<cable_set id="first"/>', "")], {"cables.7.name": "C8"}, [], ["also has"]),
+    "springs": (files.caspr, [("cable_ideal", "cable_linear_spring")], {},
+                ["Cables are of the kind cable_linear_spring; their stiffness was not kept."], []),
+    "about the joint": (files.caspr, [('ia ref="com"', 'ia ref="joint"')],
+                        {"inertia": files.INERTIA - STEINER}, ["Inertia is given about joint"], []),
+    "quaternion": (toy(joint="SPATIAL_QUATERNION", q=words([*HOME, *QUATERNION])), [],
+                   {"R_WP": ABOUT_Y}, [], []),
+    "long quaternion": (toy(joint="SPATIAL_QUATERNION", q=words([*HOME, *(7 * QUATERNION)])), [],
+                        {"R_WP": ABOUT_Y}, [], []),
+    "degrees": (toy(q=f"{words(HOME)} 0 0 90"), [], {"R_WP": QUARTER}, ["degrees"], []),
+    "radians": (toy(q=f"{words(HOME)} 0 0 6.28"), [], {}, [], ["degrees"]),
+    **{f"product {w}": (files.caspr, [("<Ixy>0.01</Ixy>", w)],
+                        {"inertia": [0.1, 0.2, 0.25, 0, 0, -0.02]}, [], [])
+       for w in ("<Ixy/>", "<Ixy> </Ixy>", "")},
+    "level plane": (toy(joint="PLANAR_XY", q="0.1 0.2 0.3"),
+                    [("<location>0 0 0<", "<location>0.5 0 0.7<")],
+                    {"plane_height": 0.7, "home_position": [0.6, 0.2, 0.7]}, [], []),
+    "wirex": (files.wirex, [], MATERIAL, ["Ixx only"], []),
+    "grab": (files.grab, [], {**GRAB_3, "cables.2.pulley_radius": 0.022, "inertia": files.INERTIA},
+             ["Commas before a closing bracket were let pass: 2, the first in"], []),
+    "old grab": (old_grab, [], OLD, [], []),
+    "oldest grab": (old_grab, OLD_NAMES, OLD, [], []),
+    "tilted gravity": (lambda f: files.grab(f, tilt=True), [], {**GRAB_3, **FLAT_Z},
+                       ["tilted by 1.146 deg"], []),
+    "loose numbers": (files.grab, [("[-2.0]", "[-2.]")], GRAB_3,
+                      ["Numbers that strict JSON refuses were read: 2, the first -2. in"], []),
+    "unlike drums": (lambda f: files.grab_on_board(f, drums=(0.06, 0.08)), [],
+                     {"drum_radius": None}, ["Drums differ"], []),
+    "platform pulleys": (files.grab_on_board, [], {"drum_radius": 0.03},
+                         ["Keys that were not kept: h, l0, rotation_parametrization, swivel0, "
+                          "transmission_ratio, vers_i_loc."], []),
+    **{f"{key} {what}": (files.grab_on_board, [(LOAD[:13], f'"platform": {{"{key}": {load}, ')], {},
+                         [said] if load[2] else [], [] if load[2] else [said])
+       for key in ("ext_force_loc", "ext_torque_loc", "ext_moments_loc")
+       for said in [f"platform.{key} is a load and was not kept."]
+       for what, load in [("on the platform", [0.0, 0.0, -5.0]), ("of zero", [0.0, 0.0, 0.0])]},
+    "gazebo degrees": (files.gazebo, [("rpy: [0, 0, 0]", "rpy: [0, 0, 90]")], {"R_WP": QUARTER},
+                       ["degrees"], []),
+    "no partner": (files.sdformat, [('name="B_0"', 'name="Q_0"')], {"cables.6.name": "7"},
+                   ["partner: 0"], []),
+    "klipper": (files.klipper, [("[extruder]", WINCH)],
+                {"motion": "3T", "cables.1.exit_point": [2, 1, -0.1], "gear_ratio": 12.75,
+                 "drum_radius": 0.04 / (2 * np.pi), "cable_speed": 0.3, "cables.3.name": "D",
+                 "mass": 5.5},
+                ["Not kept: printer.max_accel, winch.oddity, extruder.",
+                 "Included files were not read: mcu.cfg.",
+                 "Keys of steppers that were not kept: step_pin."], []),
+    "reprapfirmware": (files.reprap, [],
+                       {"cables.3.exit_point": [0, 0, 2.345], "gear_ratio": 12.75, "mass": 2.5,
+                        "cables.3.mechanical_advantage": 2.0, "drum_radius": 0.065 - 0.5e-3,
+                        "cables.0.lower": 4.0, "cables.0.upper": 90.0},
+                       ["Parameters of M669 that were not kept: P.", "Commands that were not read: "
+                        "M92.", "Parameters of M666 that were not kept: Z."], []),
+    "anchor as a height": (files.reprap, [("D0:0:2345.0", "D2345.0")],
+                           {"cables.3.exit_point": [0, 0, 2.345]}, [], []),
+    "maslow on a wall": (files.maslow, [], WALL, ["Not kept: name, kinematics.Cartesian, "
+                         "kinematics.MaslowKinematics.oddity."], []),
+    "maslow on a floor": (files.maslow, [("true", "false")], {**FLOOR, "arm": 0.1534}, [], []),
+    "old maslow": (files.saved("old.yaml", OLD_MASLOW), [], {**FLOOR, "arm": None},
+                   ["120 mm before the middle"], []),
+}  # fmt: skip
 
 
-def test_caspr_list_with_another_case(tmp_path):
-    folder = tmp_path / "SCDM" / "TOY_Robot"
-    folder.mkdir(parents=True)
-    files.caspr(folder, name="toy")
-    listed = tmp_path / "models_list.csv"
-    listed.write_text("Toy,/SCDM/Toy_robot/,Toy_bodies.xml,Toy_cables.xml,t.xml,o.xml\n")
-    imported = models.import_robot(listed, model="toy")
-    assert imported.robot.name == "toy"
-    with pytest.raises(RobotFileError, match="accepted: Toy"):
-        models.import_robot(listed, model="other")
+def look(draft, key):
+    """A value of a draft, `cables.0.name` for that of an item."""
+    for name in key.split("."):
+        draft = draft[int(name)] if name.isdigit() else getattr(draft, name)
+    return draft
 
 
-def test_caspr_planar_robot(tmp_path):
-    path = files.caspr(tmp_path, joint="PLANAR_XY", q="0.1 0.2 0.3")
-    robot = models.load_robot(str(path))
-    assert robot.is_planar()
-    np.testing.assert_allclose(robot.home.position, [0.1, 0.2, 0.0])
-    np.testing.assert_allclose(robot.home.angles_deg, [0, 0, np.degrees(0.3)], atol=1e-9)
+@pytest.mark.parametrize(("write", "changes", "kept", "said", "silent"), KEPT.values(), ids=KEPT)
+def test_what_is_kept_and_what_is_named(write, changes, kept, said, silent, tmp_path):
+    path = write(tmp_path)
+    edited(tmp_path, *changes)
+    draft = read_foreign(path)
+    for key, expected in kept.items():
+        found = look(draft, key)
+        if expected is None or isinstance(expected, str):
+            assert found == expected, key
+        else:
+            np.testing.assert_allclose(found, expected, rtol=EXACT, atol=EXACT, err_msg=key)
+    remarks = "\n".join(draft.remarks)
+    for part in said:
+        assert part in remarks
+    for part in silent:
+        assert part not in remarks
 
 
 @pytest.mark.parametrize(
     ("joint", "q", "position", "angles", "rows"),
     [
+        ("PLANAR_XY", "0.1 0.2 0.3", [0.1, 0.2, 0.0], [0.0, 0.0, 0.3], (2, 3, 4)),
         ("PLANAR_XZ", "0.1 1.2 0.3", [0.1, 0.0, 1.2], [0.0, 0.3, 0.0], (1, 3, 5)),
         ("PLANAR_YZ", "0.1 1.2 0.3", [0.0, 0.1, 1.2], [0.3, 0.0, 0.0], (0, 4, 5)),
         ("T_XYZ", "0.1 0.2 1.2", [0.1, 0.2, 1.2], [0.0, 0.0, 0.0], (3, 4, 5)),
@@ -155,61 +269,90 @@ def test_caspr_planar_robot(tmp_path):
         ("P_Z", "1.2", [0.0, 0.0, 1.2], [0.0, 0.0, 0.0], (5,)),
     ],
 )
-def test_caspr_points_and_upright_planes(joint, q, position, angles, rows, tmp_path):
+def test_joints_of_caspr_are_motion_types(joint, q, position, angles, rows, tmp_path):
     imported = models.import_robot(files.caspr(tmp_path, joint=joint, q=q))
     robot = imported.robot
     motion = robot.motion_type()
     assert motion.rows == rows
+    assert robot.is_planar() == (joint == "PLANAR_XY")
     np.testing.assert_allclose(robot.home.position, position)
     np.testing.assert_allclose(np.radians(robot.home.angles_deg), angles, atol=1e-9)
+    if joint == "PLANAR_XY":  # whose cables lie in its plane here
+        return
     X_WP, cables = robot.home.transform(), robot.cable_set()
-    R = X_WP.rotation().matrix()
-    along = np.array(position)[:, np.newaxis] + R @ files.ANCHORS - files.EXITS
-    np.testing.assert_allclose(
-        cable_paths(X_WP, cables).lengths, np.linalg.norm(along, axis=0), atol=1e-12
-    )
+    along = np.array(position)[:, np.newaxis] + X_WP.rotation().matrix() @ ANCHORS - EXITS
+    lengths = np.linalg.norm(along, axis=0)
+    np.testing.assert_allclose(cable_paths(X_WP, cables).lengths, lengths, atol=EXACT)
     if motion.is_point:  # eight anchor points that are not one
         np.testing.assert_array_equal(cables.p_PB, 0.0)
-        assert any("does not turn" in words for words in imported.completed.remarks)
+        assert any("does not turn" in said for said in imported.completed.remarks)
 
 
 def test_a_point_mass_may_have_an_exit_point_in_the_origin(tmp_path):
     """A rectangle from the origin on, as point masses are published; all hold Po, 0 0 0 in P."""
-    corners = np.array([[0.0, 0.0, 0.0], [0.5, 0.0, 0.0], [0.5, 0.8, 0.0], [0.0, 0.8, 0.0]]).T
-    path = files.caspr(tmp_path, joint="P_XY", q="0.2 0.3", points=(corners, 0.0 * corners))
+    square = np.array([[0.0, 0.0, 0.0], [0.5, 0.0, 0.0], [0.5, 0.8, 0.0], [0.0, 0.8, 0.0]]).T
+    path = files.caspr(tmp_path, joint="P_XY", q="0.2 0.3", points=(square, 0.0 * square))
     robot = models.load_robot(str(path))
-    np.testing.assert_array_equal(robot.exit_points(), corners)
+    np.testing.assert_array_equal(robot.exit_points(), square)
     np.testing.assert_array_equal(robot.anchor_points(), 0.0)
     lengths = cable_lengths(robot.home.transform(), robot.exit_points(), robot.anchor_points())
     np.testing.assert_allclose(lengths, np.hypot([0.2, 0.3, 0.3, 0.2], [0.3, 0.3, 0.5, 0.5]))
 
 
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"joint": "R_Z", "q": "0"}, "joint space, no cable robot"),
-        ({"links": 2}, "2 bodies"),
-        ({"q": "1 2"}, "6 finite numbers"),
-        ({"q": "a b c d e f"}, "finite number"),
-    ],
-)
-def test_what_is_no_cable_robot_is_refused_by_name(change, message, tmp_path):
-    with pytest.raises(RobotFileError, match=message) as caught:
-        models.load_robot(str(files.caspr(tmp_path, **change)))
-    assert "\n" not in str(caught.value)
+def test_lists_of_caspr_and_names_of_its_files(tmp_path):
+    """A file's name must end in .xml; space before and after it, and its case, do not count."""
+    folder = tmp_path / "SCDM" / "TOY_Robot"
+    folder.mkdir(parents=True)
+    files.caspr(folder)
+    listed = tmp_path / "list.csv"
+    listed.write_text(
+        "name,folder,bodies,cables\n"
+        "half,/half/,half_bodies.xml,half_cables.txt,t.xml\n"
+        "other half,/half/,half_bodies.txt,half_cables.xml,t.xml\n"
+        "short,/short/,short_bodies.xml\n"
+        " Toy , /SCDM/Toy_robot/ , Toy_bodies.xml,Toy_cables.xml\n"
+    )
+    there = tmp_path / "SCDM" / "Toy_robot"
+    assert caspr_models(listed) == {"Toy": (there / "Toy_bodies.xml", there / "Toy_cables.xml")}
+    assert read_caspr(listed, "TOY").name == "toy"
+    assert models.import_robot(listed, model="toy").robot.name == "toy"
+    assert models.load_robot(str(folder)).name == "toy"
+    (folder / "toy_bodies.xml").rename(folder / "toy_body_properties.xml")
+    (folder / "toy_cables.xml").rename(folder / "TOY_cable_properties.XML")
+    assert len(read_caspr(folder / "toy_body_properties.xml").cables) == 8
+    assert len(read_caspr(folder / "toy_body_properties.xml", cable_set="second").cables) == 8
 
 
-def test_wirex_winch_cable_and_what_is_odd(tmp_path):
-    imported = models.import_robot(files.wirex(tmp_path))
-    robot = imported.robot
-    assert robot.name == "toy_1"
-    assert robot.tension_limits() == (5.0, 720.0)
-    assert robot.cable.diameter == 0.006
-    assert robot.winch.drum_radius == 0.1
-    assert robot.winch.inertia == 0.0015
-    np.testing.assert_allclose(robot.cable_set().swivel_axis, np.tile([[0.0], [1.0], [0.0]], 8))
-    np.testing.assert_allclose(robot.platform.inertia[:3], [14.0, 14.0, 14.0])
-    assert any("Ixx only" in words for words in imported.completed.remarks)
+def test_a_passive_spring_is_left_out_by_name(tmp_path):
+    path = files.caspr(tmp_path)
+    cables = tmp_path / "toy_cables.xml"
+    edited(tmp_path, ('<cable_ideal name="cable 8"', '<cable_passive name="cable 8"'))
+    head, _, tail = cables.read_text().rpartition("</cable_ideal>")
+    cables.write_text(f"{head}</cable_passive>{tail}")
+    draft = read_caspr(path)
+    assert [cable.name for cable in draft.cables] == [f"C{k}" for k in range(1, 8)]
+    assert "cable 8, a passive spring, was left out." in draft.remarks
+    assert not any("of the kind" in said for said in draft.remarks)
+
+
+def test_an_import_says_what_it_assumed_and_what_it_made_of_limits_and_names(tmp_path):
+    path = files.caspr(tmp_path, pulley=True)
+    edited(tmp_path, ('name="cable 8"', 'name="cable 1"'))  # as a public model has it
+    imported = models.import_robot(path)
+    assert "cable.youngs_modulus" in imported.completed.assumed
+    assert "cables[].exit_point" in imported.completed.given
+    assert "cable.youngs_modulus" in imported.readme()
+    assert imported.robot.tension_limits() == (7.0, 700.0)  # every cable's own limits hold
+    assert [cable.name for cable in imported.robot.cables] == [f"C{k}" for k in range(1, 9)]
+    remarks = "\n".join(imported.completed.remarks)
+    assert "differ from cable to cable" in remarks
+    assert "it became C8" in remarks
+    again = models.load_robot(str(files.saved("robot.yaml", imported.yaml())(tmp_path)))
+    np.testing.assert_array_equal(again.cable_set().p_WA, imported.robot.cable_set().p_WA)
+    assert again.assumptions == imported.robot.assumptions
+    underactuated = models.import_robot(files.grab(tmp_path))
+    assert underactuated.robot.gravity == pytest.approx(9.80665)
+    assert any("underactuated" in said for said in underactuated.completed.remarks)
 
 
 def test_wirex_home_is_held_within_the_limits(tmp_path):
@@ -219,87 +362,140 @@ def test_wirex_home_is_held_within_the_limits(tmp_path):
     assert np.all(holding.tensions >= 5.0 - 1e-6)
 
 
-@pytest.mark.parametrize("old", [False, True])
-def test_grab_both_schemas_and_trailing_commas(old, tmp_path):
-    imported = models.import_robot(files.grab(tmp_path, old=old))
-    robot, count = imported.robot, 4 if old else 3
-    np.testing.assert_allclose(robot.cable_set().p_WA, files.EXITS[:, :count], atol=EXACT)
-    np.testing.assert_allclose(robot.cable_set().p_PB, files.ANCHORS[:, :count], atol=EXACT)
-    radii = [0.02] * 4 if old else [0.02, 0.021, 0.022]
-    np.testing.assert_allclose(robot.cable_set().pulley_radius, radii)
-    np.testing.assert_allclose(robot.cable_set().swivel_axis[:, 0], [0.0, 0.6, 0.8])
-    assert robot.gravity == pytest.approx(9.80665)
-    assert any("underactuated" in words for words in imported.completed.remarks)
+def test_what_mujoco_warns_of_is_said_and_no_file_is_left(tmp_path, monkeypatch, capfd):
+    pytest.importorskip("mujoco")
+    monkeypatch.chdir(tmp_path)
+    files.mjcf(tmp_path)
+    edited(tmp_path, ('width="0.002"', 'width="0.002" springlength="0 nan"'))
+    imported = models.import_robot(tmp_path / "toy.xml")
+    assert any("NaN" in said for said in imported.completed.remarks)
+    assert [path.name for path in tmp_path.iterdir()] == ["toy.xml"]
+    assert printed(capfd).err == ""
 
 
-def test_grab_tilted_gravity_keeps_the_file_s_frame(tmp_path):
-    imported = models.import_robot(files.grab(tmp_path, tilt=True))
-    p_WA = imported.robot.cable_set().p_WA
-    np.testing.assert_allclose(p_WA, files.EXITS[:, :3], atol=EXACT)
-    g = imported.robot.gravity_vector()
-    np.testing.assert_allclose(g, -9.80665 * np.array([0.0, np.sin(0.02), np.cos(0.02)]))
-    assert any("tilted by 1.146 deg" in words for words in imported.completed.remarks)
+def grab_length(A_W, D_P, k_P, r, X_WP):
+    """Length from D over the pulley to A as GRAB's kinematics has it, in P [m].
+
+    With u from D to A across k: tan(psi / 2) = k'DA / s + sqrt(1 - 2 r / s + (k'DA / s)^2), where
+    s = u'DA, and psi the angle that the pulley leaves of half a turn.
+    """
+    DA = X_WP.inverse().multiply(A_W) - D_P
+    across = DA - k_P * (k_P @ DA)
+    u, s = across / np.linalg.norm(across), np.linalg.norm(across)
+    slope = k_P @ DA / s
+    psi = 2.0 * np.arctan(slope + np.sqrt(1.0 - 2.0 * r / s + slope**2))
+    n = u * np.cos(psi) + k_P * np.sin(psi)
+    return np.linalg.norm(DA - r * (u + n)) + r * (np.pi - psi)
 
 
-def test_gazebo_degrees_are_told(tmp_path):
-    path = files.gazebo(tmp_path)
-    path.write_text(path.read_text().replace("rpy: [0, 0, 0]", "rpy: [0, 0, 90]"))
-    imported = models.import_robot(path)
-    np.testing.assert_allclose(imported.robot.home.angles_deg, [0, 0, 90], atol=1e-9)
-    assert any("degrees" in words for words in imported.completed.remarks)
+def test_pulleys_on_the_platform_by_the_formula_of_grab(tmp_path):
+    imported = models.import_robot(files.grab_on_board(tmp_path))
+    cables = imported.robot.cable_set()
+    np.testing.assert_allclose(cables.p_WA, EXITS, atol=EXACT)
+    np.testing.assert_allclose(cables.p_PB, ANCHORS, atol=EXACT)
+    np.testing.assert_array_equal(cables.pulley_radius, 0.0)
+    np.testing.assert_allclose(cables.anchor_pulley_radius, files.RADIUS)
+    k = np.array([files.AXES[i % 4] for i in range(8)]).T
+    np.testing.assert_allclose(cables.anchor_swivel_axis, k, atol=EXACT)
+    X_WP = pose_from_angles(HOME, files.ANGLES)
+    expected = [grab_length(A, D, axis, files.RADIUS, X_WP)
+                for A, D, axis in zip(EXITS.T, ANCHORS.T, k.T, strict=True)]  # fmt: skip
+    np.testing.assert_allclose(cable_paths(X_WP, cables).lengths, expected, atol=EXACT)
+    assert imported.robot.winch.drum_radius == 0.03
+    assert {"cables[].anchor_pulley_radius", "winch.drum_radius"} <= set(imported.completed.given)
+    assert "pulley.radius" not in imported.completed.assumed
+    unlike = models.import_robot(files.grab_on_board(tmp_path, drums=(0.06, 0.08)))
+    assert "winch.drum_radius" in unlike.completed.assumed
+
+
+SQUARE = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) / 1.0
+MIDDLE = [[0.0, 0.0, 0.1]] * 4
+FLAT = {
+    "ONE_R_TWO_T": (np.insert(SQUARE, 1, 0.2, axis=1), np.insert(0.1 * SQUARE, 1, 0.1, axis=1)),
+    "TWO_T": (np.insert(SQUARE, 2, 0.5, axis=1), np.array(MIDDLE)),
+    "THREE_T": (np.insert(SQUARE, 2, 2.5, axis=1), np.array(MIDDLE)),
+}
+
+
+def patterned(folder, pattern, points):
+    """A robot of GRAB without pulleys."""
+    cables = [{"pos_OD_glob": A.tolist(), "pos_PA_loc": B.tolist(), "vers_k": [0, 0, 1]}
+              for A, B in zip(*points, strict=True)]  # fmt: skip
+    content = {"motion_pattern": pattern, "cable": cables, "platform": {"mass": 2.0}}
+    return models.import_robot(files.saved("flat.json", json.dumps(content))(folder))
 
 
 @pytest.mark.parametrize(
-    ("write", "old", "new", "message"),
+    ("pattern", "rows", "along", "at"),
     [
-        (files.caspr, "</links>", "", "is not well-formed XML"),
-        (files.wirex, 'mass="2.5"', 'mass="TODO"', "platform.mass: found TODO"),
-        (files.gazebo, "mass: 2.5", "mass: <mass>", "platform.mass: found <mass>"),
-        (files.gazebo, "size: [0.2, 0.2, 0.12]", "size: [0.2, 0.2]", "3 finite numbers"),
-        (files.grab, '"mass": 2.5', '"mass": NaN', "platform.mass: found nan"),
-        (files.grab, '"mass": 2.5', '"mass": ', "does not parse as JSON"),
-        (files.sdformat, 'name="B_', 'name="Q_', "accepted: frames exit_NAME"),
+        ("ONE_R_TWO_T", (1, 3, 5), 1, 0.1),
+        ("TWO_T", (3, 4), 2, 0.5),
+        ("THREE_T", (3, 4, 5), 2, None),
     ],
 )
-def test_wrong_files_end_in_one_line(write, old, new, message, tmp_path):
-    path = write(tmp_path)
-    text = path.read_text()
-    assert old in text
-    path.write_text(text.replace(old, new))
-    with pytest.raises(RobotFileError) as caught:
-        models.load_robot(str(path))
-    assert message in str(caught.value)
-    assert str(path) in str(caught.value)
-    assert "\n" not in str(caught.value)
-    assert len(str(caught.value)) < 500
+def test_motion_patterns(pattern, rows, along, at, tmp_path):
+    """A platform in a plane keeps the distance at which its cables lie in that plane."""
+    imported = patterned(tmp_path, pattern, FLAT[pattern])
+    robot = imported.robot
+    assert robot.motion_type().rows == rows
+    assert not any("motion_pattern" in said for said in imported.completed.remarks)
+    if at is not None:
+        assert robot.home.position[along] == pytest.approx(at)
+    if robot.motion_type().is_plane:
+        cables = robot.cable_set()
+        ends = robot.home.transform().multiply(cables.p_PB) - cables.p_WA
+        np.testing.assert_allclose(ends[along], 0.0, atol=EXACT)
 
 
-def test_frames_without_a_partner_are_named(tmp_path):
-    path = files.sdformat(tmp_path)
-    path.write_text(path.read_text().replace('name="B_0"', 'name="Q_0"'))
-    imported = models.import_robot(path)
-    assert len(imported.robot.cables) == 7
-    assert any(words.endswith("partner: 0") for words in imported.completed.remarks)
+@pytest.mark.parametrize(
+    ("pattern", "like"), [("ONE_R_TWO_T", "THREE_T"), ("HOP", "THREE_T"), (3, "TWO_T")]
+)
+def test_motion_patterns_that_do_not_fit_are_told(pattern, like, tmp_path):
+    exits, anchors = FLAT[like]
+    exits = np.vstack([exits[:3], [-1.0, 1.0, 2.0]])
+    imported = patterned(tmp_path, pattern, (exits, anchors))
+    assert imported.robot.motion == "3R3T"
+    said = f"motion_pattern {pattern} was read as a free body, 3R3T."
+    assert said in imported.completed.remarks
 
 
-def test_an_import_says_what_it_assumed(tmp_path):
-    imported = models.import_robot(files.caspr(tmp_path))
-    assert "cable.youngs_modulus" in imported.completed.assumed
-    assert "cables[].exit_point" in imported.completed.given
-    assert "cable.youngs_modulus" in imported.readme()
-    own = tmp_path / "robot.yaml"
-    own.write_text(imported.yaml())
-    again = models.load_robot(str(own))
-    np.testing.assert_array_equal(again.cable_set().p_WA, imported.robot.cable_set().p_WA)
-    assert again.assumptions == imported.robot.assumptions
+@pytest.mark.parametrize(
+    ("word", "value"),
+    [("0.", 0.0), ("-0.", 0.0), (".5", 0.5), ("-.25", -0.25), ("2.e1", 20.0), (".5E-1", 0.05)],
+)
+def test_numbers_with_digits_on_one_side_of_the_point(word, value, tmp_path):
+    text = f'{{"a": "0. and .5, ]",\n"b": [1.5, {word},\n{word}], "c": -1.25e-3, "d": 7}}'
+    content, remarks = read_json(files.saved("toy.json", text)(tmp_path))
+    assert content == {"a": "0. and .5, ]", "b": [1.5, value, value], "c": -0.00125, "d": 7}
+    said = f"Numbers that strict JSON refuses were read: 2, the first {word} in line 2."
+    assert remarks == [said]
 
 
-def test_what_mujoco_warns_of_is_said_and_no_file_is_left(tmp_path, monkeypatch, capfd):
-    monkeypatch.chdir(tmp_path)
-    text = next(iter(models.export_robot("acrobot_small", "mjcf").values()))
-    file = tmp_path / "bad.xml"
-    file.write_text(re.sub(r'springlength="0(\.0)? [^"]*"', 'springlength="0 nan"', text, count=1))
-    assert "nan" in file.read_text()
-    assert any("NaN" in words for words in models.import_robot(file).completed.remarks)
-    assert [path.name for path in tmp_path.iterdir()] == ["bad.xml"]
-    assert printed(capfd).err == ""
+@pytest.mark.parametrize(
+    "text", ['{"a": 1.5, "b": [1e5, -0.25]}', '[".5", "1.", "a, ]"]', '"0."', "[1.5e-7, 10]"]
+)
+def test_strict_json_is_read_as_it_is(text, tmp_path):
+    assert read_json(files.saved("toy.json", text)(tmp_path)) == (json.loads(text), [])
+
+
+def test_robots_of_grab_in_matlab(tmp_path):
+    """As its tools nest them; the platform's mass may be one number."""
+    frame, points, pulleys = (np.empty(n, object) for n in (3, 4, 4))
+    frame[:] = [np.array([0.0, 0.0, -1.0]), np.array([0.0, 1.0, 0.0]), np.array([1.0, 0.0, 0.0])]
+    for k, (x, y) in enumerate([(1, -1), (1, 1), (-1, 1), (-1, -1)]):
+        points[k] = np.array([0.1 * x, 0.1 * y, 0.2])
+        pulleys[k] = {"r": 0.03, "CableEnterPosition": [x, y, 1.8], "FixedFrame": frame}
+    platform = {"m": 12.0, "PtoG": [0.0, 0.0, 0.15], "points": points,
+                "InertialMatrix": np.diag([0.2, 0.1, 0.25])}  # fmt: skip
+    robot = {"EndEffector": {"Platform": platform}, "Trasmission": {"Pulley": pulleys}}
+    path = tmp_path / "robot.mat"
+    savemat(path, {"s": robot})
+    assert is_grab_mat(path)
+    draft = read_foreign(path)
+    assert draft.mass == 12.0
+    np.testing.assert_allclose(draft.exit_points()[:, 2], [-1.0, 1.0, 1.8])
+    np.testing.assert_allclose(draft.cables[0].swivel_axis, [1.0, 0.0, 0.0])
+    platform["m"] = [1.0, 2.0]
+    savemat(path, {"s": robot})
+    with pytest.raises(RobotFileError, match=r"Platform.m: found .*; accepted: 1 finite numbers"):
+        read_foreign(path)

@@ -1,9 +1,13 @@
 """Small CASPR models of several links, written from the format's definition."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from pathlib import Path
+
+import numpy as np
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import MultibodyPlant
+
+from cdpr_drake.models.formats.caspr_mechanism import initial_joints, write_mechanism
 
 BOX = "0.02 0.03 0.04 0.001 -0.002 0.003"
 """Moments and products of a body that can be [kg m^2]."""
@@ -90,6 +94,23 @@ class Model:
             f'<cables default_cable_set="basic">{words}</cables>', encoding="utf-8"
         )
         return bodies
+
+
+def pair(model: Model, folder: Path) -> tuple[Path, Path]:
+    """Writes a model; its files of bodies and of cables."""
+    return model.write(folder), folder / f"{model.name}_cables.xml"
+
+
+def at_start(tree):
+    """A plant of the tree's own file, and its context at the initial coordinates."""
+    plant = MultibodyPlant(0.0)
+    Parser(plant).AddModelsFromString(write_mechanism(tree), "xml")
+    plant.Finalize()
+    context, q = plant.CreateDefaultContext(), np.zeros(plant.num_positions())
+    for name, value in initial_joints(tree).items():
+        q[plant.GetJointByName(name).position_start()] = value
+    plant.SetPositions(context, q)
+    return plant, context
 
 
 def two_link() -> Model:

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from functools import cache
+from pathlib import Path
+
 import numpy as np
 import yaml
 
-from cdpr_drake.models.robot_loader import robot_text
+from cdpr_drake.models.robot_exchange import export_robot
+from cdpr_drake.models.robot_loader import load_robot, robot_names, robot_text
 from cdpr_drake.models.robot_schema import Robot
 from tests.models.robots import robot_of
+from tests.motion.small_robots import MOTIONS, small_robot
 
 NAMES = [
     "left-winch",
@@ -130,3 +135,27 @@ UNUSUAL = {
     "arms": robot_with_arms,
 }
 """What makes each robot."""
+
+ALL = [*UNUSUAL, *MOTIONS, *robot_names()]
+"""Names of all robots that go out and in."""
+
+
+@cache
+def made(name: str) -> Robot:
+    """The robot of a name; nobody changes it."""
+    if name in UNUSUAL:
+        return UNUSUAL[name]()
+    return small_robot(name) if name in MOTIONS else load_robot(name)
+
+
+@cache
+def exported(name: str, format: str) -> dict[str, str]:
+    """Its files, made once; nobody changes them."""
+    return export_robot(made(name), format)
+
+
+def written(files: dict[str, str], folder: Path) -> Path:
+    """The first of these files, in a folder with the others."""
+    for name, text in files.items():
+        (folder / name).write_text(text, encoding="utf-8")
+    return folder / next(iter(files))

@@ -19,16 +19,18 @@ from cdpr_drake.models.robot_loader import robot_file, robot_names
 from cdpr_drake.models.robot_schema import Robot
 from tests.models.mechanisms.small_mechanisms import ARM, DIRECTIVES, MECHANISM, link, write_small
 
+pytestmark = pytest.mark.usefixtures("in_this_process")
+
 EXACT = 1e-15
 """Rounding of one rotation by 90 deg and one sum [m]."""
 
 
-def added(mechanism: Mechanism, name: str = "") -> tuple[MultibodyPlant, object]:
+def added(mechanism: Mechanism, name="") -> tuple[MultibodyPlant, object]:
     plant = MultibodyPlant(0.0)
     return plant, add_mechanism(plant, mechanism, name)
 
 
-def test_bodies_home_and_routes_are_those_of_the_file(tmp_path: Path) -> None:
+def test_bodies_home_and_routes_are_those_of_the_file(tmp_path):
     plant, put = added(load_mechanism(write_small(tmp_path)))
     put.finalize()
     np.testing.assert_array_equal(put.home_positions(), [1, 0, 0, 0, 0, 0, 0.5, 0.2])
@@ -44,7 +46,7 @@ def test_bodies_home_and_routes_are_those_of_the_file(tmp_path: Path) -> None:
     np.testing.assert_allclose(routes.ends.linear_weight, 0.003 * 9.81)
 
 
-def test_two_of_one_kind_in_one_plant(tmp_path: Path) -> None:
+def test_two_of_one_kind_in_one_plant(tmp_path):
     # Frames of the world, as block, bear no prefix.
     text, directives = MECHANISM.replace("block", "world"), DIRECTIVES.split("- add_frame")[0]
     mechanism = load_mechanism(write_small(tmp_path, text, directives=directives))
@@ -56,7 +58,7 @@ def test_two_of_one_kind_in_one_plant(tmp_path: Path) -> None:
     assert plant.HasModelInstanceNamed("left::arm")
 
 
-def test_urdf_sdf_and_mjcf_are_read(tmp_path: Path) -> None:
+def test_urdf_sdf_and_mjcf_are_read(tmp_path):
     inertia = "<ixx>0.01</ixx><iyy>0.01</iyy><izz>0.01</izz>"
     sdf = f"""<sdf version="1.9"><model name="arm"><link name="platform"><inertial><mass>1</mass>
 <inertia>{inertia}</inertia></inertial></link><frame name="tip"><pose>0 0 0.1 0 0 0</pose></frame>
@@ -77,9 +79,7 @@ def test_urdf_sdf_and_mjcf_are_read(tmp_path: Path) -> None:
         assert put.routes().count == 1
 
 
-def test_packages_near_the_file_go_before_those_of_ros(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_packages_near_the_file_go_before_those_of_ros(tmp_path, monkeypatch):
     for folder, name in (("here/parts", "parts"), ("ros/parts", "parts"), ("ros/more", "more")):
         where = tmp_path / folder
         where.mkdir(parents=True)
@@ -90,7 +90,7 @@ def test_packages_near_the_file_go_before_those_of_ros(
     assert paths == {"parts": tmp_path / "here/parts", "more": tmp_path / "ros/more"}
 
 
-def test_packages_near_the_file_and_given_ones(tmp_path: Path) -> None:
+def test_packages_near_the_file_and_given_ones(tmp_path):
     package, elsewhere = tmp_path / "parts", tmp_path / "elsewhere"
     for folder in (package / "urdf", elsewhere):
         folder.mkdir(parents=True)
@@ -133,51 +133,48 @@ WRONG = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("old", "new", "words"), WRONG)
-def test_what_is_wrong_is_said_in_one_line(tmp_path: Path, old: str, new: str, words: str) -> None:
-    assert old in MECHANISM
-    path = write_small(tmp_path)
+TWICE = DIRECTIVES.replace("- add_frame", "- add_model: {name: other, file: arm.urdf}\n- add_frame")
+FILES = [
+    ({"arm": "<robot name='arm'><link"}, "which Drake refuses"),
+    ({"directives": "directives: [{add_nothing: {}}]"}, "which Drake refuses"),
+    ({"directives": "directives: [\n"}, "which Drake refuses"),
+    ({"directives": DIRECTIVES.replace("arm.urdf", "package://none/a.urdf")}, "none"),
+    ({"arm": ARM.replace('child link="lower"', 'child link="platform"')}, "arm.dmd.yaml"),
+    ({"arm": ARM.replace('mass value="1.0"', 'mass value="1e20"')}, "found an inertia beyond"),
+    ({"arm": ARM.replace('"lower"', '"::"')}, "which Drake refuses"),
+    ({"arm": ARM.replace(link("lower"), '<link name="lower"/>')}, "moves no mass"),
+]
+
+
+def refusal(path, text=MECHANISM):
     with pytest.raises(RobotFileError) as caught:
-        parse_mechanism(MECHANISM.replace(old, new), path)
-    assert str(caught.value).startswith(str(path))
-    assert words in str(caught.value)
+        parse_mechanism(text, path)
     assert len(str(caught.value).splitlines()) == 1
+    assert str(caught.value).startswith(str(path))
+    return str(caught.value)
 
 
-def test_a_name_that_two_frames_bear(tmp_path: Path) -> None:
-    directives = DIRECTIVES.replace(
-        "- add_frame", "- add_model: {name: other, file: arm.urdf}\n- add_frame"
-    )
-    with pytest.raises(
-        RobotFileError, match="found platform, which 2 bear; accepted: one of arm::"
-    ):
-        load_mechanism(write_small(tmp_path, directives=directives))
+@pytest.mark.parametrize(("old", "new", "words"), WRONG)
+def test_what_is_wrong_is_said_in_one_line(tmp_path, old, new, words):
+    assert old in MECHANISM
+    assert words in refusal(write_small(tmp_path), MECHANISM.replace(old, new))
 
 
-@pytest.mark.parametrize(
-    ("files", "words"),
-    [
-        ({"arm": "<robot name='arm'><link"}, "which Drake refuses"),
-        ({"directives": "directives: [{add_nothing: {}}]"}, "which Drake refuses"),
-        ({"directives": "directives: [\n"}, "which Drake refuses"),
-        ({"directives": DIRECTIVES.replace("arm.urdf", "package://none/a.urdf")}, "none"),
-        ({"arm": ARM.replace('child link="lower"', 'child link="platform"')}, "arm.dmd.yaml"),
-        ({"arm": ARM.replace('mass value="1.0"', 'mass value="1e20"')}, "found an inertia beyond"),
-        ({"arm": ARM.replace('"lower"', '"::"')}, "which Drake refuses"),
-        ({"arm": ARM.replace(link("lower"), '<link name="lower"/>')}, "moves no mass"),
-    ],
-)
-def test_what_drake_refuses_is_one_line(tmp_path: Path, files: dict[str, str], words: str) -> None:
+@pytest.mark.parametrize(("files", "words"), FILES)
+def test_what_drake_refuses_is_one_line(tmp_path, files, words):
     path = write_small(tmp_path, **files)
-    with pytest.raises(RobotFileError) as caught:
-        load_mechanism(path)
-    message = str(caught.value)
+    message = refusal(path)
     assert message.startswith(f"{path}: mechanism: found")
     assert words in message
-    assert len(message.splitlines()) == 1
 
 
-def test_mechanisms_and_robots_are_told_apart(tmp_path: Path) -> None:
+def test_a_name_that_two_frames_bear(tmp_path):
+    words = "found platform, which 2 bear; accepted: one of arm::"
+    with pytest.raises(RobotFileError, match=words):  # of two cables, in a line each
+        load_mechanism(write_small(tmp_path, directives=TWICE))
+
+
+def test_mechanisms_and_robots_are_told_apart(tmp_path):
     assert set(mechanism_names()) == {
         "arm_on_platform", "bm_arm", "cable_arm", "mobile_bases", "two_platforms",
     }  # fmt: skip
@@ -191,13 +188,13 @@ def test_mechanisms_and_robots_are_told_apart(tmp_path: Path) -> None:
         load_mechanism("nothing")
 
 
-def test_a_folder_may_hold_a_mechanism() -> None:
+def test_a_folder_may_hold_a_mechanism():
     folder = robot_file("cable_arm").parent
     assert load_mechanism(folder).name == "cable_arm"
 
 
 @pytest.mark.parametrize("name", mechanism_names())
-def test_shipped_ones_have_their_folder_and_a_readme(name: str) -> None:
+def test_shipped_ones_have_their_folder_and_a_readme(name):
     mechanism, folder = load_mechanism(name), robot_file(name).parent
     assert mechanism.name == folder.name == name
     readme = (folder / "README.md").read_text(encoding="utf-8")

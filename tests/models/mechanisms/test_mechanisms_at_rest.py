@@ -23,6 +23,8 @@ from cdpr_drake.models.mechanism_in_plant import add_mechanism
 from cdpr_drake.models.mechanism_loader import load_mechanism
 from cdpr_drake.systems.robots.route_assembly import add_cables
 
+pytestmark = pytest.mark.usefixtures("in_this_process")
+
 STILL = 1e-9
 """What moves less in a second was at rest [m, rad]: an ulp of a length times E S over an inertia
 accelerates by some 1e-9 m/s^2."""
@@ -38,7 +40,7 @@ JOINTS = tuple(ARM)
 
 
 @pytest.mark.parametrize("name", mechanism_names())
-def test_a_second_of_simulation_does_not_move_it(name: str) -> None:
+def test_a_second_of_simulation_does_not_move_it(name):
     builder = DiagramBuilder()
     plant, _ = AddMultibodyPlantSceneGraph(builder, 0.0)
     added = add_mechanism(plant, load_mechanism(name))
@@ -65,7 +67,7 @@ def test_a_second_of_simulation_does_not_move_it(name: str) -> None:
     np.testing.assert_array_equal(rest.positions, added.home_positions())
 
 
-def test_motors_hold_the_weight_of_the_arm() -> None:
+def test_motors_hold_the_weight_of_the_arm():
     found = hang_mechanism("arm_on_platform")
     held = found.held()
     upper, lower, g = 0.5, 0.3, 9.81
@@ -77,7 +79,7 @@ def test_motors_hold_the_weight_of_the_arm() -> None:
     assert found.as_dict()["held"] == held
 
 
-def test_a_passive_arm_hangs_straight_down() -> None:
+def test_a_passive_arm_hangs_straight_down():
     with pytest.raises(InfeasibleTensionError, match="arm_on_platform::"):
         hang_mechanism("arm_on_platform", held=[], free=[])
     found = hang_mechanism("arm_on_platform", held=[])
@@ -88,7 +90,7 @@ def test_a_passive_arm_hangs_straight_down() -> None:
     assert found.rest.stability == "stable"
 
 
-def test_an_arm_that_stands_upright_is_unstable() -> None:
+def test_an_arm_that_stands_upright_is_unstable():
     up = dict(zip(JOINTS, (2.5, 0.0), strict=True))
     found = hang_mechanism("arm_on_platform", joints=up, held=[])
     q = found.placed.positions(found.rest.positions)
@@ -97,7 +99,7 @@ def test_an_arm_that_stands_upright_is_unstable() -> None:
     assert found.as_dict()["frequencies_hz"][0] is None
 
 
-def test_prestress_or_pose_yields() -> None:
+def test_prestress_or_pose_yields():
     kept = hang_mechanism("cable_arm", prestress=50.0)
     moved = hang_mechanism("cable_arm", prestress=50.0, yields="pose")
     home = kept.placed.plant.GetPositions(kept.placed.plant.CreateDefaultContext())
@@ -106,7 +108,7 @@ def test_prestress_or_pose_yields() -> None:
     assert np.max(np.abs(moved.rest.positions - home)) > 0.1
 
 
-def test_lengths_say_where_it_rests() -> None:
+def test_lengths_say_where_it_rests():
     hung = hang_mechanism("mobile_bases")
     again = hang_mechanism("mobile_bases", hung.rest.unstrained_lengths)
     np.testing.assert_allclose(again.rest.positions, hung.rest.positions, atol=STILL)
@@ -122,13 +124,13 @@ def test_lengths_say_where_it_rests() -> None:
 
 
 @pytest.mark.parametrize("name", mechanism_names())
-def test_tensions_of_least_norm_are_those_of_hang(name: str) -> None:
+def test_tensions_of_least_norm_are_those_of_hang(name):
     tensions = solve_mechanism_tensions(name)
     assert tensions.status == "feasible"
     np.testing.assert_allclose(tensions.tensions, hang_mechanism(name).rest.tensions, atol=SAME)
 
 
-def test_the_weight_has_its_sign() -> None:
+def test_the_weight_has_its_sign():
     # A suspended mechanism tells the sign of the wrench; a fully constrained one does not.
     found = solve_mechanism_tensions("mobile_bases", limits=(0.0, 1000.0))
     J = found.placed.cables.length_jacobian(found.placed.context)
@@ -138,7 +140,7 @@ def test_the_weight_has_its_sign() -> None:
     assert weight[-1] == pytest.approx(-98.1)
 
 
-def test_every_method_balances() -> None:
+def test_every_method_balances():
     found = solve_mechanism_tensions("cable_arm", "all")
     W = -found.placed.cables.length_jacobian(found.placed.context).T
     w = found.placed.cables.other_forces(found.placed.context)
@@ -148,7 +150,7 @@ def test_every_method_balances() -> None:
         assert np.max(np.abs(W @ one.tensions + w)) < 1e-6, one.method
 
 
-def test_bounds_that_give_way_by_the_shortfall_hold_a_mechanism() -> None:
+def test_bounds_that_give_way_by_the_shortfall_hold_a_mechanism():
     least = solve_mechanism_tensions("cable_arm")
     assert least.shortfall is None
     largest = float(np.max(least.tensions))
@@ -161,7 +163,7 @@ def test_bounds_that_give_way_by_the_shortfall_hold_a_mechanism() -> None:
         assert solve_mechanism_tensions("cable_arm", limits=wider).status == status
 
 
-def test_what_no_cable_acts_on_is_said() -> None:
+def test_what_no_cable_acts_on_is_said():
     found = solve_mechanism_tensions("arm_on_platform", held=[])
     assert found.status == "infeasible"
     words = [words for words, _ in found.uncontrolled()]
@@ -173,28 +175,31 @@ def test_what_no_cable_acts_on_is_said() -> None:
         solve_mechanism_tensions("arm_on_platform", "closed_form", held=[])
 
 
-def test_wrong_questions() -> None:
-    with pytest.raises(TensionProblemError, match="all joints held"):
-        solve_mechanism_tensions("cable_arm", held=["shoulder", "elbow"])
-    with pytest.raises(EquilibriumError, match="accepted: one of cable_arm::elbow"):
-        solve_mechanism_tensions("cable_arm", held="knee")
-    for wrong in ("a", [1.0, [2.0]]):
-        with pytest.raises(EquilibriumError, match="joints: found"):
-            hang_mechanism("cable_arm", joints={"elbow": wrong})
-    for wrong in (np.nan, 3.0, [0.1, 0.2]):
-        with pytest.raises(RobotFileError, match=r"home\.joints\.elbow: found"):
-            hang_mechanism("cable_arm", joints={"elbow": wrong})
-    with pytest.raises(InfeasibleTensionError, match="prestress"):
-        hang_mechanism("cable_arm", prestress=[1.0, 2.0])
-    with pytest.raises(InfeasibleTensionError, match="lower <= upper"):
-        hang_mechanism("cable_arm", limits=(5.0, 1.0))
-    with pytest.raises(EquilibriumError, match="model: 'rubber' is unknown"):
-        hang_mechanism("cable_arm", model="rubber")
-    with pytest.raises(TensionProblemError, match="length_scale"):
-        solve_mechanism_tensions("cable_arm", length_scale=0.0)
+HANG, SOLVE = hang_mechanism, solve_mechanism_tensions
 
 
-def test_joints_of_home_can_be_put_elsewhere() -> None:
+@pytest.mark.parametrize(
+    ("ask", "arguments", "error", "words"),
+    [
+        (SOLVE, {"held": ["shoulder", "elbow"]}, TensionProblemError, "all joints held"),
+        (SOLVE, {"held": "knee"}, EquilibriumError, "accepted: one of cable_arm::elbow"),
+        (SOLVE, {"length_scale": 0.0}, TensionProblemError, "length_scale"),
+        (HANG, {"joints": {"elbow": "a"}}, EquilibriumError, "joints: found"),
+        (HANG, {"joints": {"elbow": [1.0, [2.0]]}}, EquilibriumError, "joints: found"),
+        (HANG, {"joints": {"elbow": np.nan}}, RobotFileError, r"home\.joints\.elbow: found"),
+        (HANG, {"joints": {"elbow": 3.0}}, RobotFileError, r"home\.joints\.elbow: found"),
+        (HANG, {"joints": {"elbow": [0.1, 0.2]}}, RobotFileError, r"home\.joints\.elbow: found"),
+        (HANG, {"prestress": [1.0, 2.0]}, InfeasibleTensionError, "prestress"),
+        (HANG, {"limits": (5.0, 1.0)}, InfeasibleTensionError, "lower <= upper"),
+        (HANG, {"model": "rubber"}, EquilibriumError, "model: 'rubber' is unknown"),
+    ],
+)
+def test_wrong_questions(ask, arguments, error, words):
+    with pytest.raises(error, match=words):
+        ask("cable_arm", **arguments)
+
+
+def test_joints_of_home_can_be_put_elsewhere():
     placed = place_mechanism("cable_arm", {"elbow": 1.0})
     assert placed.positions(placed.plant.GetPositions(placed.context)) == {
         "cable_arm::shoulder": [0.2], "cable_arm::elbow": [1.0],

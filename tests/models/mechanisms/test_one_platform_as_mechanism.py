@@ -17,6 +17,8 @@ from cdpr_drake.models.robot_in_plant import platform_inertia
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import Robot
 
+pytestmark = pytest.mark.usefixtures("in_this_process")
+
 SAME = 1e-9
 """Two ways to the same tensions of up to 30 N, by one program [N]."""
 
@@ -71,7 +73,7 @@ cables:
 
 
 @pytest.mark.parametrize("name", ROBOTS)
-def test_its_cables_are_the_same(name: str, tmp_path: Path) -> None:
+def test_its_cables_are_the_same(name, tmp_path):
     robot = load_robot(name)
     placed = place_mechanism(as_mechanism_file(robot, tmp_path))
     body = int(placed.plant.GetBodyByName("platform").index())
@@ -85,7 +87,7 @@ def test_its_cables_are_the_same(name: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["acrobot_fully_constrained", "acrobot_large", "caroca"])
-def test_its_tensions_are_the_same(name: str, tmp_path: Path) -> None:
+def test_its_tensions_are_the_same(name, tmp_path):
     robot, path = load_robot(name), as_mechanism_file(load_robot(name), tmp_path)
     for method in ("quadratic_program", "closed_form"):
         wanted, found = solve_tensions(robot, method=method), solve_mechanism_tensions(path, method)
@@ -93,7 +95,7 @@ def test_its_tensions_are_the_same(name: str, tmp_path: Path) -> None:
         np.testing.assert_allclose(found.tensions, wanted.tensions, rtol=SAME, atol=SAME)
 
 
-def test_it_stays_where_pulleys_are(tmp_path: Path) -> None:
+def test_it_stays_where_pulleys_are(tmp_path):
     robot = load_robot("caroca")
     path = as_mechanism_file(robot, tmp_path)
     over, straight = hang_mechanism(path), hang_mechanism(path, pulleys=False)
@@ -102,7 +104,7 @@ def test_it_stays_where_pulleys_are(tmp_path: Path) -> None:
     assert over.rest.stability == "stable"
 
 
-def test_gravity_may_point_elsewhere(tmp_path: Path) -> None:
+def test_gravity_may_point_elsewhere(tmp_path):
     path = as_mechanism_file(load_robot("acrobot_fully_constrained"), tmp_path)
     text = path.read_text(encoding="utf-8") + "gravity_direction: [0, 2, 0]\n"
     path.write_text(text, encoding="utf-8")

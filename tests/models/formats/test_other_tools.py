@@ -1,0 +1,264 @@
+"""What MuJoCo, Drake and CASPR's formula say of exported files: rest, motion, lengths, warnings."""
+
+import xml.etree.ElementTree as ET
+
+import numpy as np
+import pytest
+from pydrake.multibody.parsing import (
+    LoadModelDirectivesFromString,
+    Parser,
+    ProcessModelDirectives,
+)
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
+from pydrake.systems.framework import DiagramBuilder
+
+from cdpr_drake import models
+from cdpr_drake.errors import InfeasibleTensionError, RobotFileError
+from cdpr_drake.geometry.cable_paths import cable_paths
+from cdpr_drake.models.robot_exchange import export_robot
+from cdpr_drake.models.robot_exports import export_omissions
+from cdpr_drake.models.robot_holding import hold_robot
+from cdpr_drake.models.robot_in_plant import add_robot, find_robot
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.systems.robots.assembly import add_cable_robot
+from tests.models.formats.unusual_robots import ALL, exported, made, written
+
+EXACT = 1e-12
+"""Text has all digits; rotations round a few times."""
+
+AT_REST = 1e-6
+"""Accelerations at rest [m/s^2, rad/s^2]; found: at most 6e-9, by rounding of tensions."""
+
+SAME_MOTION = 1e-9
+"""Two plants of the same bodies: constraints are solved to rounding, inertia and pose have 17
+digits and are turned through angles [m, rad]."""
+
+SMALL = "acrobot_small"
+
+
+def at_home(name):
+    """MuJoCo's model and data, nothing commanded."""
+    mujoco = pytest.importorskip("mujoco")
+    (text,) = exported(name, "mjcf").values()
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    return mujoco, model, data
+
+
+@pytest.mark.parametrize("name", [name for name in ALL if name != "beam"])
+def test_it_is_at_rest_at_home_and_motors_add_nothing(name):
+    """Wherever statics holds it."""
+    robot, (_, _, data) = made(name), at_home(name)
+    assert np.all(data.actuator_force == 0.0)
+    cables, X_WP = robot.cable_set().without_pulleys(), robot.home.transform()
+    why = ""
+    try:
+        hold_robot(robot, X_WP, cables, "elastic")
+    except InfeasibleTensionError as problem:
+        why = f"is no pose of rest, since {problem}"
+    assert export_omissions(robot, "mjcf").get("home", "") == why
+    assert (np.max(np.abs(data.qacc)) < AT_REST) == (why == "")
+
+
+def test_it_stays_at_home():
+    mujoco, model, data = at_home("acrobot_large")
+    robot = made("acrobot_large")
+    ends = robot.home.transform().multiply(robot.anchor_points()) - robot.exit_points()
+    lengths = np.linalg.norm(ends, axis=0)
+    np.testing.assert_allclose(data.ten_length, lengths, atol=EXACT)
+    for _ in range(200):
+        mujoco.mj_step(model, data)
+    np.testing.assert_allclose(data.ten_length, lengths, atol=1e-6)
+
+
+@pytest.mark.parametrize("name", ["cogiro", "caroca_gazebo", "everything", "flat"])
+def test_motors_pull_up_to_the_largest_tension_and_never_push(name):
+    mujoco, model, data = at_home(name)
+    for command, force in ((1e9, 0.0), (-1e9, -made(name).tension_bounds.upper)):
+        data.ctrl[:] = command
+        mujoco.mj_forward(model, data)
+        np.testing.assert_array_equal(data.actuator_force, force)
+
+
+def test_statics_holds_most_robots_of_the_package():
+    names = models.robot_names()
+    assert sum("home" not in export_omissions(made(name), "mjcf") for name in names) >= 21
+
+
+def length_over_caspr_pulley(entry, to, anchor, radius):
+    """Length from the point where the cable enters a pulley that swivels about its way there.
+
+    Source: CASPR, BaseRotatingPulleyAttachment.ComputePulleyLeavingLocation.
+    """
+    normal = np.cross(to, anchor - entry)
+    across = np.cross(normal, to)
+    centre = entry + radius * across / np.linalg.norm(across)
+    share = radius / np.linalg.norm(anchor - centre)
+    side = np.cross(normal / np.linalg.norm(normal), anchor - centre)
+    leaves = centre + share**2 * (anchor - centre) - share * np.sqrt(1.0 - share**2) * side
+    arc = np.arccos((entry - centre) @ (leaves - centre) / radius**2)
+    return np.linalg.norm(anchor - leaves) + radius * arc
+
+
+@pytest.mark.parametrize("name", ["caroca", "ipanema_1", "grab_four"])
+def test_caspr_has_cables_as_long_over_its_pulleys(name):
+    robot = made(name)
+    cables = ET.fromstring(exported(name, "caspr")[f"{name}_cables.xml"].partition("?>")[2])
+    X_WP, found = robot.home.transform(), []
+    for cable in cables.iter("cable_ideal"):
+        pulley, anchor = cable.find("attachments")
+        keys = ("fixed_location", "cable_entry_vector")
+        point, to = (np.array(pulley.findtext(key).split(), float) for key in keys)
+        p_WB = X_WP.multiply(np.array(anchor.findtext("location").split(), float))
+        radius = float(pulley.findtext("pulley_radius"))
+        found.append(length_over_caspr_pulley(point, to, p_WB, radius))
+    np.testing.assert_allclose(found, cable_paths(X_WP, robot.cable_set()).lengths, atol=EXACT)
+
+
+@pytest.mark.parametrize("format", ["sdf", "sdf-drake"])
+def test_sdformat_finds_no_error(format, tmp_path):
+    """By its library, which Drake's parser calls; here all that it warns of is an error."""
+    path = written(exported("caroca", format), tmp_path)
+
+    def parse():
+        plant = MultibodyPlant(0.0)
+        parser = Parser(plant)
+        parser.SetStrictParsing()
+        return len(parser.AddModels(str(path)))
+
+    assert parse() > 0
+    wrong = path.read_text(encoding="utf-8").replace("<mass>", "<mass>x", 1)
+    path.write_text(wrong, encoding="utf-8")
+    with pytest.raises(RuntimeError, match="mass"):
+        parse()
+
+
+@pytest.mark.parametrize("format", ["urdf", "drake", "sdf-drake"])
+def test_drake_reads_exports_without_a_warning(format, tmp_path, caplog):
+    written(exported(SMALL, format), tmp_path)
+    first = next(path for path in tmp_path.iterdir() if path.suffix in (".urdf", ".sdf"))
+    plant = MultibodyPlant(0.0)
+    with caplog.at_level("WARNING"):
+        Parser(plant).AddModels(str(first))
+    assert caplog.messages == []
+
+
+def pulled(add):
+    """Where a platform on rods is after 0.05 s of tensions that differ."""
+    plant = MultibodyPlant(1e-3)
+    add(plant)
+    plant.Finalize()
+    simulator = Simulator(plant)
+    context = simulator.get_mutable_context()
+    joints = [plant.get_joint_actuator(k).joint() for k in plant.GetJointActuatorIndices()]
+    actuation = np.zeros(len(joints))
+    for k, tension in enumerate(np.linspace(2.0, 9.0, 8), start=1):
+        (place,) = [i for i, joint in enumerate(joints) if joint.name().endswith(f"C{k}")]
+        actuation[place] = -tension
+    plant.get_actuation_input_port().FixValue(context, actuation)
+    simulator.AdvanceTo(0.05)
+    pose = plant.EvalBodyPoseInWorld(context, plant.GetBodyByName("platform"))
+    return plant.num_constraints(), pose.GetAsMatrix4()
+
+
+def test_drake_moves_the_chains_as_the_robot_with_rods(tmp_path):
+    robot = made("acrobot_large")
+    path = written(exported("acrobot_large", "sdf-drake"), tmp_path)
+    _, ours = pulled(lambda plant: models.add_ups_robot(plant, robot, np.full(8, 1e-3)))
+    constraints, theirs = pulled(lambda plant: Parser(plant).AddModels(str(path)))
+    assert constraints == 8
+    assert np.max(np.abs(ours - robot.home.transform().GetAsMatrix4())) > 1e-3
+    np.testing.assert_allclose(theirs, ours, atol=SAME_MOTION)
+
+
+def packed(plant, folder):
+    """A finalized plant with the exported package, by a directive of somebody's own."""
+    written(exported(SMALL, "drake"), folder)
+    parser = Parser(plant)
+    parser.package_map().AddPackageXml(str(folder / "package.xml"))
+    uri = f"package://{SMALL}/{SMALL}.dmd.yaml"
+    text = f"directives:\n- add_directives: {{file: '{uri}'}}\n"
+    ProcessModelDirectives(LoadModelDirectivesFromString(text), plant, parser)
+    plant.mutable_gravity_field().set_gravity_vector(made(SMALL).gravity_vector())
+    plant.Finalize()
+    return plant
+
+
+def moved(put):
+    """Where the platform is after a while that begins with a velocity."""
+    robot, builder = made(SMALL), DiagramBuilder()
+    plant = builder.AddSystem(MultibodyPlant(0.0))
+    in_plant = put(plant, robot)
+    blocks = add_cable_robot(builder, in_plant)
+    diagram = builder.Build()
+    context = diagram.CreateDefaultContext()
+    own = plant.GetMyMutableContextFromRoot(context)
+    home = robot.home.transform().GetAsMatrix4()
+    np.testing.assert_allclose(in_plant.pose(own).GetAsMatrix4(), home, rtol=0, atol=SAME_MOTION)
+    blocks.set_at_equilibrium(context, robot.home.transform())
+    plant.SetVelocities(own, in_plant.model_instance, [0.1, 0.2, -0.3, 0.05, -0.1, 0.02])
+    blocks.GetInputPort("cable_velocities").FixValue(
+        blocks.winches.GetMyMutableContextFromRoot(context), np.zeros(len(robot.cables))
+    )
+    simulator = Simulator(diagram, context)
+    ResetIntegratorFromFlags(simulator, "runge_kutta3", 2e-4)
+    simulator.get_mutable_integrator().set_fixed_step_mode(True)
+    simulator.AdvanceTo(0.05)
+    return in_plant.pose(own).GetAsMatrix4()
+
+
+def test_a_robot_that_directives_added_moves_as_one_of_ours(tmp_path):
+    def ours(plant, robot):
+        in_plant = add_robot(plant, robot)
+        plant.Finalize()
+        return in_plant
+
+    theirs = moved(lambda plant, robot: find_robot(packed(plant, tmp_path), robot))
+    np.testing.assert_allclose(theirs, moved(ours), rtol=0, atol=SAME_MOTION)
+
+
+def test_what_is_no_such_robot_is_said(tmp_path):
+    plant, other = packed(MultibodyPlant(0.0), tmp_path), made("caroca")
+    with pytest.raises(RobotFileError, match="found no model instance caroca"):
+        find_robot(plant, other)
+    with pytest.raises(RobotFileError, match="found a platform of"):
+        find_robot(plant, other, SMALL)
+    with pytest.raises(RobotFileError, match="accepted by find_robot: 3R3T"):
+        find_robot(plant, made("planar"), SMALL)
+    text = (tmp_path / f"{SMALL}.urdf").read_text(encoding="utf-8")
+    standing = '<joint name="frame_to_world" type="fixed">'
+    assert standing in text
+    loose = MultibodyPlant(0.0)
+    text = text.replace(standing, standing[:-1] + ' drake_ignore="true">')
+    Parser(loose).AddModelsFromString(text, "urdf")
+    loose.Finalize()
+    with pytest.raises(RobotFileError, match="found 12 velocities"):
+        find_robot(loose, made(SMALL))
+
+
+def test_an_exported_urdf_is_one_tree_with_a_free_platform_at_home(tmp_path):
+    """ROS' parser takes one root link; Drake and MuJoCo take the platform for a free body."""
+    mujoco = pytest.importorskip("mujoco")
+    robot = load_robot("acrobot_large")
+    robot.home.angles_deg = np.array([4.0, -3.0, 8.0])
+    path = written(export_robot(robot, "urdf"), tmp_path)
+    tree = ET.fromstring(path.read_text(encoding="utf-8").partition("?>")[2])
+    ends = [(joint.find("child"), joint.find("parent")) for joint in tree.iter("joint")]
+    parents = {child.get("link"): parent.get("link") for child, parent in ends}
+    links = {link.get("name") for link in tree.iter("link")}
+    assert links - set(parents) == {"world"}
+    assert set(parents.values()) <= links
+    plant = MultibodyPlant(0.0)
+    Parser(plant).AddModels(str(path))
+    plant.Finalize()
+    assert plant.num_positions() == 7
+    assert plant.GetBodyByName("platform").is_floating_base_body()
+    context = plant.CreateDefaultContext()
+    exit_1 = plant.GetBodyByName("exit_C1").EvalPoseInWorld(context).translation()
+    np.testing.assert_allclose(exit_1, robot.exit_points()[:, 0], atol=SAME_MOTION)
+    model, X_WP = mujoco.MjModel.from_xml_path(str(path)), robot.home.transform()
+    q = X_WP.rotation().ToQuaternion().wxyz()
+    np.testing.assert_allclose(model.qpos0, [*X_WP.translation(), *q], atol=SAME_MOTION)
+    assert model.body("platform").mass == pytest.approx(robot.platform.mass)
