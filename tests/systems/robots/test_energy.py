@@ -113,38 +113,6 @@ def test_undamped_cables_keep_the_energy(swing):
         assert max(slack) == most_slack
 
 
-def test_damping_only_takes_energy():
-    block, simulator, context = started(
-        CableRobot, load_robot("acrobot_small"), step=2e-4, X_WP=POSE
-    )
-    put(block, context, moved(POSE, np.array([0.0, 0.0, 0.0, 0.0, 0.0, 5e-3])))
-    energies = [energy(block, context)]
-    for time in np.linspace(0.0, 0.15, 16)[1:]:
-        simulator.AdvanceTo(time)
-        energies.append(energy(block, context))
-    lost = energies[0] - energies[-1]
-    assert lost > 0.0
-    assert np.all(np.diff(energies) < ENERGY_DRIFT * lost)
-
-
-def test_without_gravity_and_taut_cables_momentum_stays():
-    robot = undamped(softer=1e3)
-    robot.gravity = 0.0
-    block = CableRobot(robot, settings_of(model="elastic", pulleys=True))
-    simulator = Simulator(block)
-    context = simulator.get_mutable_context()
-    block.GetInputPort("cable_velocities").FixValue(context, np.full(8, 0.5))  # paid out
-    plant_context = block.plant.GetMyMutableContextFromRoot(context)
-    block.plant.SetVelocities(plant_context, np.array([0.5, -0.3, 0.2, 0.05, 0.1, 0.15]))
-    integrate(block, simulator, 1e-3)
-    start = block.plant.CalcSpatialMomentumInWorldAboutPoint(plant_context, np.zeros(3))
-    simulator.AdvanceTo(0.3)
-    assert np.all(read(block, context, "slack") == 1.0)
-    end = block.plant.CalcSpatialMomentumInWorldAboutPoint(plant_context, np.zeros(3))
-    np.testing.assert_allclose(end.translational(), start.translational(), atol=1e-12)
-    np.testing.assert_allclose(end.rotational(), start.rotational(), atol=1e-9)
-
-
 MOTOR_ENERGY = 1e-5
 """Change of the energy with motors, relative to what the motors put in."""
 

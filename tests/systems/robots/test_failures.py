@@ -18,7 +18,6 @@ from cdpr_drake.models.sensor_catalogue import load_tension_sensor
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.diagrams.visual_servo import build_visual_servo
 from cdpr_drake.systems.loops.loop_choice import diagram_reason
-from cdpr_drake.systems.robots.cable_robot import CableRobot
 from cdpr_drake.systems.robots.compiled_cable_robot import CompiledCableRobot
 from cdpr_drake.systems.robots.failures import Failure, Failures, FailureSettings
 from cdpr_drake.systems.sensors.tension_sensor import TensionSensor
@@ -102,26 +101,6 @@ def test_what_is_left_moves_as_the_robot_without_it(name, mode, model, pulleys, 
         found, expected = found[: 1 - m], expected[: 1 - m]
     assert np.array_equal(found, expected)
     assert not np.allclose(found[:n], at_break[:n], atol=1e-6)
-
-
-def test_the_plant_moves_as_that_of_the_robot_without_it():
-    cable, command = 3, -0.03 * np.linspace(0.5, 1.0, M)
-    keep = np.arange(M) != cable
-    block, simulator, context = started(
-        CableRobot, ROBOT, settings_of(events=breaking(cable)), STEP, command=command
-    )
-    simulator.AdvanceTo(FAIL)
-    other, other_simulator, other_context = started(
-        CableRobot, without(ROBOT, cable), settings_of(), STEP, command=command[keep], held=False
-    )
-    other_context.SetTime(FAIL)
-    plant = other.plant.GetMyMutableContextFromRoot(other_context)
-    other.plant.SetPositionsAndVelocities(plant, read(block, context, "platform_state"))
-    own = other.winches.GetMyMutableContextFromRoot(other_context)
-    other.winches.hold(own, read(block, context, "unstrained_lengths")[keep], np.zeros(M - 1))
-    simulator.AdvanceTo(END)
-    other_simulator.AdvanceTo(END)
-    assert np.array_equal(states(block, context, keep), states(other, other_context))
 
 
 @pytest.mark.parametrize("pulleys", [False, True])

@@ -4,9 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.analysis import Simulator
-from pydrake.systems.framework import DiagramBuilder
 
 from cdpr_drake.analyses.front.statics import solve_static
 from cdpr_drake.analyses.reporting.log_files import column_names
@@ -14,7 +12,6 @@ from cdpr_drake.analyses.simulation.run_summary import summarize
 from cdpr_drake.analyses.simulation.tension_control_run import run_tension_scenario
 from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
 from cdpr_drake.control.task_space import TaskGains
-from cdpr_drake.models.robot_in_plant import add_robot
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import PlatformDamping
 from cdpr_drake.systems.controllers.computed_torque import platform_dynamics
@@ -37,7 +34,7 @@ from cdpr_drake.systems.robots.settings import (
 )
 from cdpr_drake.systems.robots.winches import VelocityWinch
 from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
-from tests.systems.robots.engines import read, settings_of, started
+from tests.systems.robots.engines import read, settings_of
 
 QUICK = "camera.kind=projected"
 
@@ -78,27 +75,6 @@ def test_elastic_cables_are_not_damped():
     assert np.all(block.forces.cable_set().retardation == 0.0)
 
 
-def test_a_sliding_platform_slows_down_as_the_exponential():
-    robot, builder = load_robot("planar"), DiagramBuilder()
-    plant = builder.AddSystem(MultibodyPlant(0.0))
-    in_plant = add_robot(plant, robot)
-    plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, 0.0])
-    plant.Finalize()
-    brake = builder.AddSystem(DampingSettings(translation=2.0, rotation=0.0).block(in_plant))
-    state = plant.get_state_output_port(in_plant.model_instance)
-    builder.Connect(state, brake.get_input_port())
-    builder.Connect(brake.get_output_port(), plant.get_applied_generalized_force_input_port())
-    diagram = builder.Build()
-    context, start = diagram.CreateDefaultContext(), np.array([0.3, 0.1, 0.0])
-    inner = plant.GetMyMutableContextFromRoot(context)
-    plant.SetVelocities(inner, start)
-    simulator = Simulator(diagram, context)
-    simulator.get_mutable_integrator().set_target_accuracy(1e-9)
-    simulator.AdvanceTo(1.0)
-    expected = start * np.exp(-2.0 / robot.platform.mass)
-    np.testing.assert_allclose(plant.GetVelocities(inner), expected, rtol=DECAY, atol=1e-12)
-
-
 def test_rotation_is_braked_by_its_own_number_and_power_is_never_positive():
     how = CableRobotSettings(damping=DampingSettings(translation=2.0, rotation=0.5))
     robot = CableRobot("acrobot_small", how)
@@ -112,12 +88,6 @@ def test_rotation_is_braked_by_its_own_number_and_power_is_never_positive():
     gain = block.D()
     assert np.all(np.linalg.eigvalsh(gain[:, -6:] + gain[:, -6:].T) < 0.0)
     assert np.all(gain[:, :-6] == 0.0)
-
-
-def test_a_hanging_robot_with_damping_rests_where_it_hangs():
-    how = CableRobotSettings(damping=DampingSettings(translation=40.0, rotation=0.8))
-    block, _, context = started(CableRobot, load_robot("caroca"), how)
-    assert np.abs(block.EvalTimeDerivatives(context).CopyToVector()).max() < 1e-6
 
 
 def test_a_scenario_overrides_one_number_and_leaves_the_other():
