@@ -1,6 +1,5 @@
 """Contexts: default and random ones begin at rest, and every episode begins where the first did."""
 
-from dataclasses import dataclass
 from functools import cache
 
 import gymnasium
@@ -44,29 +43,14 @@ LEVEL = RandomPose(position=[0.04, 0.03, 0.0], angles_deg=[0.0, 0.0, 4.0])
 X_WP = RigidTransform([0.02, 0.01, 0.2])
 
 
-@dataclass(frozen=True)
-class Case:
-    robot: str
-    mode: str = "ideal"
-    model: str | None = None
-    pulleys: bool = False
-    creeps: bool = False
-
-    def made(self, kind, **options):
-        robot = load_robot(self.robot)
-        if self.creeps:
-            robot = behaving(robot, creep_stiffness=2.0)
-        return kind(robot, settings_of(self.mode, self.model, self.pulleys), **options)
-
-
 CASES = {
-    "small": Case("acrobot_small"),
-    "sagging": Case("caroca", model="catenary", pulleys=True),
-    "planar": Case("planar"),
-    "point on a plane": Case("maslow_4"),
-    "too few cables": Case("grab_three"),
-    "creeping": Case("acrobot_small", creeps=True),
-    "motors": Case("acrobot_large", "velocity"),
+    "small": ("acrobot_small", settings_of()),
+    "sagging": ("caroca", settings_of(model="catenary", pulleys=True)),
+    "planar": ("planar", settings_of()),
+    "point on a plane": ("maslow_4", settings_of()),
+    "too few cables": ("grab_three", settings_of()),
+    "creeping": (behaving(load_robot("acrobot_small"), creep_stiffness=2.0), settings_of()),
+    "motors": ("acrobot_large", settings_of("velocity")),
 }
 
 
@@ -83,7 +67,7 @@ def moves(block, context, duration=0.05):
 @BY_ENGINE
 @pytest.mark.parametrize("case", CASES)
 def test_default_and_random_contexts_begin_at_rest(case, kind):
-    block = CASES[case].made(kind)
+    block = kind(*CASES[case])
     assert block.not_at_rest == ""
     context = block.CreateDefaultContext()
     assert moves(block, context) < AT_REST
@@ -152,7 +136,7 @@ def test_two_robots_in_one_plant_begin_at_rest_where_the_plant_puts_them(step, s
 @BY_ENGINE
 @pytest.mark.parametrize("case", ["small", "motors", "planar", "point on a plane"])
 def test_monte_carlo_simulations_begin_at_rest_at_drawn_poses(case, kind):
-    block = CASES[case].made(kind, random_pose=LEVEL)
+    block = kind(*CASES[case], random_pose=LEVEL)
 
     def make_simulator(generator):
         simulator = Simulator(block)

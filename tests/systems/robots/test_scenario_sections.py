@@ -184,7 +184,7 @@ def test_what_overrides_the_file_is_said():
 @pytest.mark.parametrize(("seed", "pulleys"), [(0, "true"), (1, "false"), (1, "true")])
 def test_caroca_as_it_ships_converges_on_taut_cables(seed, pulleys):
     """With straight undamped cables: 45 cable seconds of slack, and a limit cycle over pulleys."""
-    items = [QUICK, f"seed={seed}", f"cables.pulleys={pulleys}"]
+    items = [QUICK, f"seed={seed}", f"cables.pulleys={pulleys}", "duration=45.0"]
     summary = summarize(run_scenario(choose_compiled_loop(load_scenario("caroca_pbvs", items))))
     assert summary["outcome"] == "converged"
     assert summary["slack_cable_seconds"] < 1.0
@@ -192,7 +192,7 @@ def test_caroca_as_it_ships_converges_on_taut_cables(seed, pulleys):
 
 
 def test_caroca_without_its_damping_swings_on():
-    scenario = load_scenario("caroca_pbvs", [QUICK, "cables.pulleys=true"])
+    scenario = load_scenario("caroca_pbvs", [QUICK, "cables.pulleys=true", "duration=45.0"])
     scenario = replace(scenario, damping=DampingSettings(translation=0.0, rotation=0.0))
     assert summarize(run_scenario(choose_compiled_loop(scenario)))["outcome"] == "timeout"
 
@@ -236,7 +236,10 @@ def test_torques_are_logged_with_their_units(friction_run):
 
 def test_by_position_lengths_follow_the_integral_of_the_velocities():
     """The position loop lags behind by the speed over its bandwidth, and does not drift."""
-    overrides = [QUICK, "winches.mode=position", "perturbations.slack=[0.01, 0, 0, 0, 0, 0, 0, 0]"]
+    overrides = [
+        QUICK, "winches.mode=position", "perturbations.slack=[0.01, 0, 0, 0, 0, 0, 0, 0]",
+        "integration.engine=compiled",
+    ]  # fmt: skip
     run = run_scenario(load_scenario("acrobot_friction", overrides))
     assert run.outcome.name == "CONVERGED"
     log, law = run.log, run.servo.robot.winch_law()
