@@ -116,36 +116,33 @@ def test_a_live_view_shows_a_plate_that_lies_over_a_tag_at_times(run):
 def test_a_box_out_of_reach_is_missed_and_said_so():
     ended = KIND.run(load_scenario(NAME, [*SHORT, "gripper.reach=1e-6"]))
     assert ended.outcome == Outcome.FAILED
-    assert ended.message.startswith("grasp: the box was out of the gripper's reach; found ") or (
-        "grasp: the box was out of the gripper's reach when it closed; found" in ended.message
-    )
+    assert "grasp: the box was out of the gripper's reach" in ended.message
+    assert "; found " in ended.message
     assert "accepted: at most 0.001 mm" in ended.message
     assert np.allclose(ended.log["X_WB"][0], ended.log["X_WB"][-1], atol=2e-3)
 
 
-@pytest.mark.parametrize(
-    ("overrides", "words"),
-    [
-        (["world.contact=null"], "world.contact: found null"),
-        (["goal.tag.tag_id=0"], "goal.tag.tag_id: found 0, that of the box"),
-        (["workpiece.mass=-1"], "workpiece.mass"),
-        (["workpiece.tag.position=[0.09, 0.0]"], "is not on the box's upper face"),
-        (["goal.tag.position=[0.0, 0.0]"], "the box lies on the tag"),
-        (["goal.pose={position: [2.0, 0.0, 0.11]}"], "goal.pose.position: found [2.0, 0.0, 0.11]"),
-        (["workpiece.pose.angles_deg=[5.0, 0.0, 0.0]"], "workpiece.pose.angles_deg"),
-        (["cover={phase: retreat}"], "cover.phase: found retreat"),
-        (["cover={phase: carry, duration: 30.0}"], "cover.duration: found 30 s"),
-        (["camera.mount=elsewhere"], "camera.mount"),
-        (["robot=planar"], "accepted: one that moves freely"),
-        (["integration.engine=compiled"], "integration.engine"),
-    ],
-)
-def test_what_cannot_be_is_refused_by_its_name(overrides, words):
-    with pytest.raises(ScenarioError) as caught:
-        load_scenario(NAME, overrides)
-    message = str(caught.value)
-    assert words in message
-    assert "accepted" in message or "known" in message
+REFUSALS = {
+    "world.contact: found null": "world.contact=null",
+    "goal.tag.tag_id: found 0, that of the box": "goal.tag.tag_id=0",
+    "workpiece.mass": "workpiece.mass=-1",
+    "is not on the box's upper face": "workpiece.tag.position=[0.09, 0.0]",
+    "the box lies on the tag": "goal.tag.position=[0.0, 0.0]",
+    "goal.pose.position: found [2.0, 0.0, 0.11]": "goal.pose={position: [2.0, 0.0, 0.11]}",
+    "workpiece.pose.angles_deg": "workpiece.pose.angles_deg=[5.0, 0.0, 0.0]",
+    "cover.phase: found retreat": "cover={phase: retreat}",
+    "cover.duration: found 30 s": "cover={phase: carry, duration: 30.0}",
+    "camera.mount": "camera.mount=elsewhere",
+    "accepted: one that moves freely": "robot=planar",
+    "integration.engine": "integration.engine=compiled",
+}
+
+
+@pytest.mark.parametrize("words", REFUSALS)
+def test_what_cannot_be_is_refused_by_its_name(words):
+    with pytest.raises(ScenarioError, match=re.escape(words)) as caught:
+        load_scenario(NAME, [REFUSALS[words]])
+    assert "accepted" in str(caught.value) or "known" in str(caught.value)
 
 
 def test_the_command_refuses_with_exit_code_two(capsys):

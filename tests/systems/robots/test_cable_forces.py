@@ -1,171 +1,105 @@
-"""Cables on a platform: equilibrium, slackness, conservation of energy and momentum."""
+"""Forces of cables and wrenches on a platform: balance, virtual work, slackness, Newton, rest."""
+
+from functools import cache
 
 import numpy as np
 import pytest
-import scipy.linalg
 from pydrake.math import RigidTransform
+from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
+from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.primitives import ConstantVectorSource
 
-from cdpr_drake.cables.elastic_law import cable_stiffness_matrix, elastic_energy
-from cdpr_drake.geometry.poses import pose_error, rotation_from_vector
+from cdpr_drake.analyses.statics.static_query import static_at_pose
+from cdpr_drake.errors import CableGeometryError
+from cdpr_drake.geometry.poses import pose_error, pose_from_angles
 from cdpr_drake.geometry.straight_cables import length_jacobian
-from cdpr_drake.models.robot_in_plant import platform_inertia
+from cdpr_drake.models.robot_in_plant import add_robot, platform_inertia
 from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.systems.robots.cable_forces import CableForces
-from cdpr_drake.systems.robots.cable_robot import CableRobot
+from cdpr_drake.models.robot_statics import tension_problem
+from cdpr_drake.systems.robots.cable_robot import CableRobot, automatic_step, holding_tensions
+from cdpr_drake.systems.robots.compiled_cable_robot import CompiledCableRobot
+from cdpr_drake.systems.robots.settings import (
+    CableRobotSettings,
+    CableSettings,
+    DampingSettings,
+)
+from cdpr_drake.systems.robots.tension_driven_cables import TensionDrivenCables
+from cdpr_drake.tensions.methods import exact_tensions
 from tests.models.representative_robots import REPRESENTATIVE_ROBOTS
+from tests.systems.robots.engines import (
+    BY_ENGINE,
+    POSE,
+    fix_commands,
+    moved,
+    pose,
+    put,
+    read,
+    settings_of,
+    started,
+)
 
 BALANCE = 1e-6
 """Force [N] and moment [N m] left at equilibrium; round-off of lengths (1e-16 m) times the
 stiffness of the cables (up to 3 MN/m) stays a thousand times below."""
 
-ENERGY_DRIFT = 1e-6
-"""Change of the total energy during 5 s without damping, relative to the energy of the motion: what
-the motion has above the equilibrium that it swings about."""
-
-MOTION_DURATION = 5.0
-"""Simulated time of the energy tests [s]."""
+ROUND_OFF = 1e-12
+"""Of a pose with entries of order one."""
 
 FALL_SPEED = 1e-9
 """Round-off of a velocity after 0.1 s of free fall [m/s]; the integrators are exact on it."""
 
-INTEGRATOR_SHARE = 2e-3
-"""Difference of two integrators' platform positions, relative to the vibration's amplitude; their
-step of 0.1 ms is 1/40 of the period of the fastest vibration, 1.5e3 rad/s."""
+SETTLED = 2e-5
+"""The platform settles by the change of the cables' stretch, within a fifth of a second [m]."""
 
-WINDING = 1e-5
-"""Distance [m] and angle [rad] after 2 mm of winding: the Jacobian changes on the way (2 um) and
-the cables, stretched by 7 um, stretch a little differently."""
+AS_NEWTON = 1e-9
+"""Relative error of accelerations: those of the cables are rounded to 1e-16 of forces that are a
+thousand times the wrench, and of the mass matrix's condition."""
 
-POSE = RigidTransform([0.05, -0.08, 0.3])
-"""A pose of ACROBOT's small platform off all symmetries, where all cables are taut."""
+COMMANDED = 1e-9
+"""Acceleration [m/s^2, rad/s^2] left by tensions that hold: the round-off of tensions, 1e-15."""
 
-
-def hanging(robot, X_WP):
-    """The robot's block, a simulator whose context holds it at rest at X_WP, and the tensions."""
-    block = CableRobot(robot)
-    simulator = Simulator(block)
-    context = simulator.get_mutable_context()
-    tensions = block.set_at_equilibrium(context, X_WP)
-    block.GetInputPort("cable_velocities").FixValue(context, np.zeros(len(robot.cables)))
-    return block, simulator, tensions
+WRENCH = np.array([0.3, -0.2, 0.5, 4.0, -3.0, 2.0])
 
 
-def undamped(softer=1.0):
-    """ACROBOT with the small platform, without damping, Young's modulus divided by `softer`."""
+@cache
+def shared(name):
+    """A plant that every test gives a context of its own."""
+    return CableRobot(load_robot(name))
+
+
+def acrobot(retardation_time=None):
     robot = load_robot("acrobot_small")
-    robot.cable.retardation_time = 0.0
-    robot.cable.youngs_modulus /= softer
+    if retardation_time is not None:
+        robot.cable.retardation_time = retardation_time
     return robot
 
 
-def total_energy(block, context):
-    """Kinetic, potential and elastic energy [J]."""
-    plant_context = block.plant.GetMyContextFromRoot(context)
-    lengths, l0 = (
-        block.GetOutputPort(name).Eval(context) for name in ("lengths", "unstrained_lengths")
-    )
-    return (
-        block.plant.CalcKineticEnergy(plant_context)
-        + block.plant.CalcPotentialEnergy(plant_context)
-        + elastic_energy(lengths, l0, block.robot.stiffness())
-    )
-
-
-def put(block, context, X_WP):
-    """Moves the platform, at rest, and leaves the cables' unstrained lengths as they are."""
-    block.in_plant.set_pose(block.plant.GetMyMutableContextFromRoot(context), X_WP)
-
-
-def moved(X_WP, displacement):
-    """X_WP after a small displacement (rotation vector, translation) in W, shape (6,)."""
-    turn = rotation_from_vector(displacement[:3])
-    return RigidTransform(turn @ X_WP.rotation(), X_WP.translation() + displacement[3:])
-
-
-def swing(robot, displacement, integrator, step):
-    """Lets a hanging robot go from a displacement; fixed steps.
-
-    Returns:
-        Largest change of the total energy relative to the energy of the motion, and the largest
-        number of cables that were slack at one of the looks, every 10 ms.
-    """
-    block, simulator, _ = hanging(robot, POSE)
-    context = simulator.get_mutable_context()
-    at_equilibrium = total_energy(block, context)
-    put(block, context, moved(POSE, displacement))
-    start = total_energy(block, context)
-    ResetIntegratorFromFlags(simulator, integrator, step)
-    simulator.get_mutable_integrator().set_fixed_step_mode(True)
-    changes, slack = [], []
-    for time in np.linspace(0.0, MOTION_DURATION, 501)[1:]:
-        simulator.AdvanceTo(time)
-        changes.append(abs(total_energy(block, context) - start))
-        slack.append(np.sum(block.GetOutputPort("slack").Eval(context)))
-    return max(changes) / (start - at_equilibrium), max(slack)
-
-
-def test_ports_are_these():
-    robot = load_robot("planar")
-    cables = CableForces(CableRobot(robot).in_plant)
-    inputs = [cables.get_input_port(i) for i in range(cables.num_input_ports())]
-    outputs = [cables.get_output_port(i) for i in range(cables.num_output_ports())]
-    assert {port.get_name(): port.size() for port in inputs} == {
-        "platform_state": 6,
-        "unstrained_lengths": 4,
-        "unstrained_length_rates": 4,
-    }
-    assert {port.get_name(): port.size() for port in outputs} == {
-        "generalized_force": 3,
-        "tensions": 4,
-        "force_and_drums": 7,
-        "drum_tensions": 4,
-        "lengths": 4,
-        "slack": 4,
-        "surplus_lengths": 4,
-        "sags": 4,
-    }
-
-
-def test_ports_of_the_whole_robot_are_these():
-    block = CableRobot(load_robot("acrobot_small"))
-    assert [block.get_input_port(i).get_name() for i in range(block.num_input_ports())] == [
-        "cable_velocities",
-        "applied_wrench",
-    ]
-    assert {block.get_output_port(i).get_name() for i in range(block.num_output_ports())} == {
-        "platform_state",
-        "X_WP",
-        "tensions",
-        "drum_tensions",
-        "lengths",
-        "slack",
-        "surplus_lengths",
-        "sags",
-        "unstrained_lengths",
-        "unstrained_length_rates",
-        "body_poses",
-        "body_accelerations",
-        "body_velocities",
-        "query_object",
-    }
-    assert block.GetOutputPort("platform_state").size() == 13
-    for name in ("plant", "scene_graph", "cables", "winches", "platform_pose"):
-        assert block.GetSubsystemByName(name).get_name() == name
+def accelerations(block, context):
+    derivatives = block.EvalTimeDerivatives(context).CopyToVector()
+    return derivatives[block.plant.num_positions() :][: block.plant.num_velocities()]
 
 
 @pytest.mark.parametrize("name", REPRESENTATIVE_ROBOTS)
-def test_hanging_tensions_balance_gravity(name):
-    """By the sums of forces and moments, written out, and by the plant's accelerations."""
+def test_a_default_context_hangs_at_home_in_balance(name):
+    """By the sums of forces and moments of straight cables, and by the plant's accelerations."""
     robot = load_robot(name)
-    robot.cable_model = None  # the sums are those of straight cables
-    X_WP = robot.home.transform()
-    block, simulator, tensions = hanging(robot, X_WP)
-    context = simulator.get_context()
+    robot.cable_model = None
+    X_WP, block = robot.home.transform(), CableRobot(robot)
+    context = block.CreateDefaultContext()
+    fix_commands(block, context)
+    assert pose(block, context).IsNearlyEqualTo(X_WP, ROUND_OFF)
+    bodies = block.GetOutputPort("body_poses").Eval(context)
+    assert bodies[int(block.in_plant.body_index)].IsNearlyEqualTo(X_WP, ROUND_OFF)
+    l0, tensions = read(block, context, "unstrained_lengths"), read(block, context, "tensions")
+    held = block.set_at_equilibrium(context, X_WP)
+    np.testing.assert_allclose(held, tensions, rtol=1e-6)
+    np.testing.assert_allclose(held, read(block, context, "tensions"), atol=BALANCE)
+    np.testing.assert_array_equal(read(block, context, "unstrained_lengths"), l0)
 
     anchors = X_WP.multiply(robot.anchor_points())
     pulls = robot.exit_points() - anchors
-    forces = tensions * pulls / np.linalg.norm(pulls, axis=0)
+    forces = held * pulls / np.linalg.norm(pulls, axis=0)
     middle = X_WP.multiply(robot.center_of_mass())
     weight = np.array([0.0, 0.0, -robot.platform.mass * robot.gravity])
     force = np.sum(forces, axis=1) + weight
@@ -174,194 +108,281 @@ def test_hanging_tensions_balance_gravity(name):
         force, moment = force[:2], moment[2:]
     assert np.all(np.abs(force) < BALANCE)
     assert np.all(np.abs(moment) < BALANCE)
-
-    derivatives = block.EvalTimeDerivatives(context).CopyToVector()
-    nv = block.plant.num_velocities()
-    accelerations = derivatives[block.plant.num_positions() :][:nv]
     M = block.plant.CalcMassMatrix(block.plant.GetMyContextFromRoot(context))
-    assert np.all(np.abs(M @ accelerations) < BALANCE)
-
-
-@pytest.mark.parametrize("name", REPRESENTATIVE_ROBOTS)
-def test_tensions_on_the_port_are_those_that_hold_the_platform(name):
-    robot = load_robot(name)
-    block, simulator, tensions = hanging(robot, robot.home.transform())
-    found = block.GetOutputPort("tensions").Eval(simulator.get_context())
-    np.testing.assert_allclose(found, tensions, atol=BALANCE)
+    assert np.all(np.abs(M @ accelerations(block, context)) < BALANCE)
+    Simulator(block, context).AdvanceTo(0.002)
 
 
 @pytest.mark.parametrize("name", ["acrobot_small", "planar"])
-def test_generalized_force_does_the_work_of_the_tensions(name):
+def test_the_force_does_the_work_of_the_tensions_and_poses_are_those_of_the_plant(name):
     """Virtual work: the force on the plant's velocities is -J' t, also away from equilibrium."""
-    robot = load_robot(name)
-    X_WP = robot.home.transform()
-    block, simulator, _ = hanging(robot, X_WP)
-    context = simulator.get_mutable_context()
-    turned = np.array([0.0, 0.0, 0.002, 0.001, -0.002, 0.0])
-    put(block, context, moved(X_WP, turned))
-    cables = block.GetSubsystemByName("cables")
-    own = cables.GetMyContextFromRoot(context)
-    force = cables.GetOutputPort("generalized_force").Eval(own)
-    tensions = cables.GetOutputPort("tensions").Eval(own)
-    J = length_jacobian(moved(X_WP, turned), robot.exit_points(), robot.anchor_points())
-    expected = -J.T @ tensions
+    robot, block = load_robot(name), shared(name)
+    _, _, context = started(block, robot)
+    X_WP = moved(robot.home.transform(), np.array([0.0, 0.0, 0.002, 0.001, -0.002, 0.0]))
+    put(block, context, X_WP)
+    J = length_jacobian(X_WP, robot.exit_points(), robot.anchor_points())
+    expected = -J.T @ read(block, context, "tensions")
     if robot.is_planar():
         expected = expected[[3, 4, 2]]  # the joint's velocities are (x, y, theta)
+    cables = block.GetSubsystemByName("cables")
+    force = read(cables, cables.GetMyContextFromRoot(context), "generalized_force")
     np.testing.assert_allclose(force, expected, rtol=1e-9, atol=BALANCE)
+    far = {
+        "acrobot_small": pose_from_angles(np.array([0.1, -0.2, 0.4]), np.array([0.3, -0.5, 2.0])),
+        "planar": pose_from_angles(np.array([0.1, -0.2, 0.3]), np.array([0.0, 0.0, -2.5])),
+    }[name]
+    put(block, context, far)
+    assert max(pose_error(far, pose(block, context))) < ROUND_OFF
+    body = block.GetOutputPort("body_poses").Eval(context)[int(block.in_plant.body_index)]
+    assert max(pose_error(far, body)) < ROUND_OFF
+
+
+def lengthen(block, context, change):
+    winches = block.GetSubsystemByName("winches")
+    l0 = read(block, context, "unstrained_lengths") + change
+    winches.set_unstrained_lengths(winches.GetMyMutableContextFromRoot(context), l0)
 
 
 def test_a_cable_that_is_too_long_transmits_exactly_nothing():
-    robot = load_robot("acrobot_small")
-    block, simulator, tensions = hanging(robot, POSE)
-    context = simulator.get_mutable_context()
-    l0 = block.GetOutputPort("unstrained_lengths").Eval(context).copy()
-    l0[3] += 0.01
-    winches = block.GetSubsystemByName("winches")
-    winches.set_unstrained_lengths(winches.GetMyMutableContextFromRoot(context), l0)
-    found = block.GetOutputPort("tensions").Eval(context)
-    slack = block.GetOutputPort("slack").Eval(context)
+    block, _, context = started(shared("acrobot_small"), load_robot("acrobot_small"), X_WP=POSE)
+    tensions = read(block, context, "tensions")
+    lengthen(block, context, 0.01 * (np.arange(8) == 3))
+    found = read(block, context, "tensions")
     assert found[3] == 0.0
-    np.testing.assert_array_equal(slack, np.arange(8) == 3)
+    np.testing.assert_array_equal(read(block, context, "slack"), np.arange(8) == 3)
     np.testing.assert_allclose(np.delete(found, 3), np.delete(tensions, 3), atol=BALANCE)
 
 
 def test_a_taut_cable_that_shortens_fast_does_not_push():
     """Damping alone would make the tension negative; a cable cannot push."""
-    robot = load_robot("acrobot_small")
-    robot.cable.retardation_time = 0.1
-    block, simulator, _ = hanging(robot, POSE)
-    context = simulator.get_mutable_context()
+    block, _, context = started(CableRobot, acrobot(0.1), X_WP=POSE)
     plant_context = block.plant.GetMyMutableContextFromRoot(context)
     block.plant.SetVelocities(plant_context, np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.5]))
-    np.testing.assert_array_equal(block.GetOutputPort("tensions").Eval(context), np.zeros(8))
-    np.testing.assert_array_equal(block.GetOutputPort("slack").Eval(context), np.ones(8))
-
-
-@pytest.mark.parametrize("retardation_time", [0.0, 1e-3])
-def test_damping_follows_the_length_rates(retardation_time):
-    """t = E S (strain + T strain rate), the rate from finite differences of the lengths."""
-    robot = load_robot("acrobot_small")
-    robot.cable.retardation_time = retardation_time
-    block, simulator, _ = hanging(robot, POSE)
-    context = simulator.get_mutable_context()
-    V = np.array([0.01, -0.02, 0.015, 1e-3, 2e-3, -1e-3])
-    lengths = []
-    step = 1e-5
-    for share in (-step, step, 0.0):
-        put(block, context, moved(POSE, share * V))
-        lengths.append(block.GetOutputPort("lengths").Eval(context).copy())
-    block.plant.SetVelocities(block.plant.GetMyMutableContextFromRoot(context), V)
-    l0 = block.GetOutputPort("unstrained_lengths").Eval(context)
-    rates = (lengths[1] - lengths[0]) / (2.0 * step)
-    strain, strain_rate = lengths[2] / l0 - 1.0, rates / l0
-    expected = robot.stiffness() * (strain + retardation_time * strain_rate)
-    expected = np.where(strain > 0.0, np.maximum(expected, 0.0), 0.0)
-    np.testing.assert_allclose(
-        block.GetOutputPort("tensions").Eval(context), expected, rtol=1e-6, atol=1e-5
-    )
-
-
-def test_undamped_taut_cables_keep_the_energy():
-    """Cables a thousand times softer; the tensions swing by nearly what they are at rest."""
-    displacement = np.array([0.02, -0.015, 0.03, 0.002, 0.003, -0.003])
-    drift, slack = swing(undamped(softer=1e3), displacement, "runge_kutta5", 5e-4)
-    assert slack == 0
-    assert drift < ENERGY_DRIFT
-
-
-def test_undamped_taut_cables_of_acrobot_keep_the_energy():
-    """The real stiffness, along the slowest vibration, which takes half of the stiff steps."""
-    robot = undamped()
-    J = length_jacobian(POSE, robot.exit_points(), robot.anchor_points())
-    lengths = np.linalg.norm(robot.exit_points() - POSE.multiply(robot.anchor_points()), axis=0)
-    K = cable_stiffness_matrix(J, robot.stiffness(), lengths)
-    M = platform_inertia(robot).CopyToFullMatrix6()
-    shape = scipy.linalg.eigh(K, M)[1][:, 0]
-    displacement = 3e-6 * shape / np.max(np.abs(shape))
-    drift, slack = swing(robot, displacement, "runge_kutta5", 8e-5)
-    assert slack == 0
-    assert drift < ENERGY_DRIFT
-
-
-def test_undamped_cables_that_go_slack_and_catch_keep_the_energy():
-    displacement = np.array([0.2, -0.1, 0.3, 0.01, 0.05, 0.15])
-    # A step across the moment of a catch costs accuracy: hence the smaller steps.
-    drift, slack = swing(undamped(softer=1e4), displacement, "runge_kutta5", 2.5e-4)
-    assert slack == 8
-    assert drift < ENERGY_DRIFT
-
-
-def test_damping_only_takes_energy():
-    robot = load_robot("acrobot_small")
-    block, simulator, _ = hanging(robot, POSE)
-    context = simulator.get_mutable_context()
-    put(block, context, moved(POSE, np.array([0.0, 0.0, 0.0, 0.0, 0.0, 5e-3])))
-    ResetIntegratorFromFlags(simulator, "runge_kutta3", 2e-4)
-    simulator.get_mutable_integrator().set_fixed_step_mode(True)
-    energies = [total_energy(block, context)]
-    for time in np.linspace(0.0, 0.3, 31)[1:]:
-        simulator.AdvanceTo(time)
-        energies.append(total_energy(block, context))
-    lost = energies[0] - energies[-1]
-    assert lost > 0.0
-    assert np.all(np.diff(energies) < ENERGY_DRIFT * lost)
+    np.testing.assert_array_equal(read(block, context, "tensions"), np.zeros(8))
+    np.testing.assert_array_equal(read(block, context, "slack"), np.ones(8))
 
 
 def test_with_slack_cables_the_platform_falls_freely():
     """Momentum grows by m g t, and the turn stays as it is."""
-    robot = load_robot("acrobot_large")
-    block, simulator, _ = hanging(robot, robot.home.transform())
-    context = simulator.get_mutable_context()
-    winches = block.GetSubsystemByName("winches")
-    l0 = block.GetOutputPort("unstrained_lengths").Eval(context)
-    winches.set_unstrained_lengths(winches.GetMyMutableContextFromRoot(context), l0 + 0.5)
+    robot, block = load_robot("acrobot_large"), shared("acrobot_large")
+    _, simulator, context = started(block, robot)
+    lengthen(block, context, 0.5)
     plant_context = block.plant.GetMyMutableContextFromRoot(context)
     block.plant.SetVelocities(plant_context, np.array([0.0, 0.0, 0.0, 0.1, -0.2, 0.3]))
-    ResetIntegratorFromFlags(simulator, "runge_kutta3", 1e-3)
-    simulator.get_mutable_integrator().set_fixed_step_mode(True)
     simulator.AdvanceTo(0.1)
     momentum = block.plant.CalcSpatialMomentumInWorldAboutPoint(plant_context, np.zeros(3))
     expected = 3.5 * np.array([0.1, -0.2, 0.3 - 9.81 * 0.1])
     np.testing.assert_allclose(momentum.translational(), expected, atol=3.5 * FALL_SPEED)
     velocity = block.in_plant.body.EvalSpatialVelocityInWorld(plant_context)
     np.testing.assert_allclose(velocity.rotational(), np.zeros(3), atol=FALL_SPEED)
-    np.testing.assert_array_equal(block.GetOutputPort("tensions").Eval(context), np.zeros(8))
-    np.testing.assert_array_equal(block.GetOutputPort("slack").Eval(context), np.ones(8))
+    np.testing.assert_array_equal(read(block, context, "tensions"), np.zeros(8))
+    np.testing.assert_array_equal(read(block, context, "slack"), np.ones(8))
 
 
-def test_an_explicit_and_an_implicit_integrator_agree():
-    """A damped vibration of taut cables for 0.2 s, by Runge-Kutta 3 and by Radau 3."""
-    ends = []
-    amplitude = 3e-6
-    for integrator in ("runge_kutta3", "radau3"):
-        block, simulator, _ = hanging(load_robot("acrobot_small"), POSE)
-        context = simulator.get_mutable_context()
-        put(block, context, moved(POSE, np.array([0.0, 0.0, 0.0, amplitude, 0.0, amplitude])))
-        ResetIntegratorFromFlags(simulator, integrator, 1e-4)
-        simulator.get_mutable_integrator().set_fixed_step_mode(True)
-        path = []
-        for time in np.linspace(0.0, 0.2, 21)[1:]:
-            simulator.AdvanceTo(time)
-            path.append(block.GetOutputPort("X_WP").Eval(context).translation().copy())
-        assert np.all(block.GetOutputPort("slack").Eval(context) == 0.0)
-        ends.append(np.array(path))
-    moved_by = np.max(np.abs(ends[0] - POSE.translation()))
-    assert moved_by > 0.1 * amplitude
-    assert np.max(np.abs(ends[0] - ends[1])) < INTEGRATOR_SHARE * amplitude
+@BY_ENGINE
+@pytest.mark.parametrize("name", ["acrobot_large", "caroca", "planar", "nist_robocrane"])
+def test_a_wrench_accelerates_as_newton_and_euler_say(kind, name):
+    """At rest without it, so that what it adds is M^-1 w."""
+    robot = load_robot(name)
+    block, _, context = started(kind, robot)
+
+    def acceleration():
+        A = block.GetOutputPort("body_accelerations").Eval(context)[int(block.in_plant.body_index)]
+        return np.concatenate([A.rotational(), A.translational()])
+
+    before = acceleration()
+    block.GetInputPort("applied_wrench").FixValue(context, WRENCH)
+    added = acceleration() - before
+    turned = robot.home.transform().rotation().matrix()
+    R = np.kron(np.eye(2), turned)
+    M = R @ platform_inertia(robot).CopyToFullMatrix6() @ R.T
+    S = robot.motion_type().basis(turned)
+    expected = S @ np.linalg.solve(S.T @ M @ S, S.T @ WRENCH)
+    np.testing.assert_allclose(added, expected, atol=AS_NEWTON * np.abs(expected).max())
 
 
-def test_winding_up_lifts_the_platform_as_far_as_kinematics_say():
-    """Cable velocities J V move the platform by V t, up to the change of the cables' stretch."""
+def test_no_wrench_is_one_of_zeros_to_the_bit():
+    robot, states = load_robot("acrobot_large"), []
+    for wrench in (None, np.zeros(6)):
+        block, simulator, context = started(CompiledCableRobot, robot, wrench=wrench)
+        simulator.AdvanceTo(0.05)
+        states.append(read(block, context, "platform_state"))
+    assert np.array_equal(*states)
+
+
+def test_the_platform_gives_as_its_stiffness_says():
+    """Half the difference of both signs leaves nothing of second order."""
+    robot = load_robot("acrobot_large")
+    how = CableRobotSettings(
+        cables=CableSettings(model="elastic"),
+        damping=DampingSettings(translation=2000.0, rotation=20.0),
+    )
+    small, poses = 1e-3 * WRENCH, []
+    for sign in (1.0, -1.0):
+        block, simulator, context = started(
+            CompiledCableRobot, robot, how, 2e-3, wrench=sign * small, method="semi_implicit"
+        )
+        simulator.AdvanceTo(4.0)
+        poses.append(read(block, context, "platform_state")[:7])
+    half = 0.5 * (poses[0] - poses[1])
+    found = np.concatenate([2.0 * half[1:4], half[4:]])
+    K = static_at_pose(robot, robot.home.transform(), "elastic", False).stiffness
+    expected = np.linalg.solve(K, small)
+    SHARE = 1e-6  # of the deflection: what is left of third order and of the way to rest
+    np.testing.assert_allclose(found, expected, atol=SHARE * np.abs(expected).max())
+
+
+def test_steps_get_shorter_as_the_platform_climbs_and_with_light_motors():
     robot = load_robot("acrobot_small")
-    block, simulator, _ = hanging(robot, POSE)
-    context = simulator.get_mutable_context()
-    V = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.02])
-    J = length_jacobian(POSE, robot.exit_points(), robot.anchor_points())
-    block.GetInputPort("cable_velocities").FixValue(context, J @ V)
-    ResetIntegratorFromFlags(simulator, "runge_kutta3", 1e-3)
-    simulator.get_mutable_integrator().set_fixed_step_mode(True)
-    simulator.AdvanceTo(0.1)
-    wanted = moved(POSE, 0.1 * V)
-    distance, angle = pose_error(wanted, block.GetOutputPort("X_WP").Eval(context))
-    assert distance < WINDING
-    assert angle < WINDING
+    home, motors = robot.home.transform(), settings_of("velocity")
+    steps = [automatic_step(robot, RigidTransform([0, 0, z]), "runge_kutta3") for z in (0.1, 0.8)]
+    assert 0.0 < steps[1] < steps[0]
+    ideal = automatic_step(robot, home, "runge_kutta3")
+    assert automatic_step(robot, home, "runge_kutta3", motors) < ideal
+    robot.winch.inertia = 3e-7
+    assert automatic_step(robot, home, "runge_kutta3", motors) < 0.5 * ideal
+
+
+DRIVEN = {
+    "within friction": ("acrobot_small", "torque", True, 0.0, SETTLED),
+    "without friction": ("acrobot_small", "torque", False, 20.0 * SETTLED, 1.0),
+    "by position": ("caroca", "position", True, 0.0, SETTLED),
+}
+
+
+@pytest.mark.parametrize("case", DRIVEN)
+def test_motors_hold_a_robot_by_friction_or_position_and_torques_alone_do_not(case):
+    """Torques off balance, alternately; within friction motors do not turn at all."""
+    name, mode, friction, least, most = DRIVEN[case]
+    robot, how = load_robot(name), settings_of(mode)
+    uneven = 0.5 * robot.winch_law().friction.static * np.array([1, -1] * 4)
+    if not friction:
+        robot.winch.friction = None
+    step = automatic_step(robot, robot.home.transform(), "runge_kutta3", how)
+    block, simulator, context = started(CableRobot, robot, how, step)
+    if mode == "torque":
+        rho = robot.winch_law().drum.length_per_angle(np.zeros(8))
+        torques = -rho * read(block, context, "drum_tensions") + uneven
+        block.GetInputPort("motor_torques").FixValue(context, torques)
+    angles = read(block, context, "motor_angles")
+    simulator.AdvanceTo(0.2)
+    distance = pose_error(robot.home.transform(), pose(block, context))[0]
+    assert least <= distance < most
+    if case == "within friction":
+        np.testing.assert_array_equal(read(block, context, "motor_angles"), angles)
+
+
+class Bench:
+    """A robot at its home pose with commanded tensions."""
+
+    def __init__(self, name, tensions, push=False, cables=None):
+        builder = DiagramBuilder()
+        self.plant = builder.AddSystem(MultibodyPlant(0.0))
+        self.in_plant = add_robot(self.plant, load_robot(name))
+        self.plant.Finalize()
+        self.cables = builder.AddSystem(TensionDrivenCables(self.in_plant, push, cables))
+        command = builder.AddSystem(ConstantVectorSource(tensions))
+        builder.Connect(command.get_output_port(), self.cables.GetInputPort("tensions"))
+        builder.Connect(
+            self.plant.get_state_output_port(self.in_plant.model_instance),
+            self.cables.GetInputPort("platform_state"),
+        )
+        builder.Connect(
+            self.cables.GetOutputPort("generalized_force"),
+            self.plant.get_applied_generalized_force_input_port(),
+        )
+        self.simulator = Simulator(builder.Build())
+        ResetIntegratorFromFlags(self.simulator, "runge_kutta3", 1e-3).set_fixed_step_mode(True)
+        self.context = self.simulator.get_mutable_context()
+        self.plant_context = self.plant.GetMyMutableContextFromRoot(self.context)
+
+    def out(self, name):
+        return read(self.cables, self.cables.GetMyContextFromRoot(self.context), name)
+
+    def accelerations(self):
+        derivatives = self.plant.EvalTimeDerivatives(self.plant_context).CopyToVector()
+        return derivatives[self.plant.num_positions() :]
+
+    def energy(self):
+        return self.plant.CalcKineticEnergy(self.plant_context) + self.plant.CalcPotentialEnergy(
+            self.plant_context
+        )
+
+
+def home_tensions(name):
+    robot = load_robot(name)
+    return holding_tensions(robot, robot.home.transform(), robot.cable_set(pulleys=False))
+
+
+def test_lengths_do_not_wait_for_tensions():
+    """Otherwise a controller that reads lengths and sets tensions were an algebraic loop."""
+    cables = Bench("caroca", np.zeros(8)).cables
+    tensions = int(cables.GetInputPort("tensions").get_index())
+    waits = {"generalized_force": True, "lengths": False, "length_rates": False, "slack": True}
+    assert waits == {
+        name: cables.HasDirectFeedthrough(tensions, int(cables.GetOutputPort(name).get_index()))
+        for name in waits
+    }
+
+
+@pytest.mark.parametrize("pulleys", [True, False])
+@pytest.mark.parametrize("name", REPRESENTATIVE_ROBOTS)
+def test_commanded_tensions_that_hold_leave_it_at_rest(name, pulleys):
+    robot = load_robot(name)
+    cables = robot.cable_set() if pulleys else None
+    tensions = home_tensions(name)
+    if pulleys:
+        tensions = exact_tensions(tension_problem(robot, robot.home.transform(), cables=cables))
+    found = Bench(name, tensions, cables=cables).accelerations()
+    np.testing.assert_allclose(found, np.zeros_like(found), atol=COMMANDED)
+
+
+@pytest.mark.parametrize(
+    ("name", "pulleys"), [("acrobot_large", True), ("planar", True), ("acrobot_large", False)]
+)
+def test_commanded_tensions_do_the_work_that_the_platform_gains(name, pulleys):
+    """Constant tensions do the work -t' (l(end) - l(start)); rates are derivatives of lengths."""
+    robot = load_robot(name)
+    tensions = home_tensions(name) * np.linspace(1.0, 1.3, len(robot.cables))
+    bench = Bench(name, tensions, cables=robot.cable_set() if pulleys else None)
+    before, lengths, step = bench.energy(), [bench.out("lengths")], 1e-4
+    for time in (0.1 - step, 0.1, 0.1 + step):
+        bench.simulator.AdvanceTo(time)
+        lengths.append(bench.out("lengths"))
+        if time == 0.1:
+            rates = bench.out("length_rates")
+    assert bench.plant.CalcKineticEnergy(bench.plant_context) > 0.0
+    work = -tensions @ (lengths[3] - lengths[0])
+    assert bench.energy() - before == pytest.approx(work, rel=1e-8)
+    # Differences over 1e-4 s, with accelerations' rates of order ten.
+    np.testing.assert_allclose(rates, (lengths[3] - lengths[1]) / (2.0 * step), atol=1e-7)
+
+
+def test_a_cable_does_not_push_and_without_tensions_the_platform_falls():
+    tensions = home_tensions("caroca")
+    tensions[2], tensions[5] = -50.0, 0.0
+    pushed, slack = Bench("caroca", tensions), Bench("caroca", np.maximum(tensions, 0.0))
+    np.testing.assert_array_equal(pushed.out("generalized_force"), slack.out("generalized_force"))
+    np.testing.assert_array_equal(pushed.out("slack"), [0, 0, 1, 0, 0, 1, 0, 0])
+    falling = Bench("caroca", np.full(8, -1.0)).accelerations()
+    np.testing.assert_allclose(falling, [0.0, 0.0, 0.0, 0.0, 0.0, -9.81], atol=COMMANDED)
+
+
+@pytest.mark.parametrize("name", ["caroca", "planar"])
+def test_rods_push(name):
+    """The same force with both signs is nothing, where cables would give that of half of them."""
+    tensions = home_tensions(name)
+    pulled, pushed = (Bench(name, sign * tensions, push=True) for sign in (1.0, -1.0))
+    force = pulled.out("generalized_force")
+    np.testing.assert_array_equal(pushed.out("generalized_force"), -force)
+    np.testing.assert_array_equal(force, Bench(name, tensions).out("generalized_force"))
+    np.testing.assert_array_equal(pushed.out("slack"), np.ones(len(tensions)))
+
+
+def test_an_anchor_point_in_a_groove_is_refused():
+    cables = load_robot("caroca").cable_set()
+    bench = Bench("caroca", home_tensions("caroca"), cables=cables)
+    touching = RigidTransform(cables.p_WA[:, 0] - cables.p_PB[:, 0])
+    bench.in_plant.set_pose(bench.plant_context, touching)
+    with pytest.raises(CableGeometryError, match=r"at 0 s: cable 1: its anchor .* swivel axis"):
+        bench.out("generalized_force")

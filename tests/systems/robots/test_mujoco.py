@@ -15,18 +15,17 @@ import numpy as np
 import pytest
 from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RigidTransform
-from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
 from cdpr_drake.geometry.poses import pose_error, rotation_from_angles
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.robots.cable_robot import CableRobot
-from cdpr_drake.systems.robots.settings import CableRobotSettings, CableSettings
+from tests.systems.robots.engines import place, pose, put, read, settings_of, started
 
 DISTANCE, ANGLE = 1e-4, np.radians(0.01)
-"""How far the engines may part in 2 s [m, rad]. Found: 0.5 um and 8e-4 deg with soft cables, 0.3 um
+"""How far the engines may part [m, rad]. Found: 0.5 um and 8e-4 deg with soft cables, 0.3 um
 and 6e-4 deg with real ones; both by errors of the integrators, which fall as their step does."""
 
-DURATION, LOOKS = 2.0, 40
+DURATION, LOOKS = 0.8, 16
 DISPLACEMENT = np.array([0.1, -0.05, 0.15, 0.02, -0.015, 0.02])
 """From the pose of rest to where it is let go: angles about x, y, z [rad], translation [m]."""
 
@@ -35,12 +34,6 @@ POSES = [
     RigidTransform(rotation_from_angles(np.radians([5.0, -4.0, 8.0])), [-0.1, 0.1, 0.4]),
     RigidTransform([0.1, 0.05, 0.2]),
 ]
-
-
-def acrobot(softer):
-    robot = load_robot("acrobot_small")
-    robot.cable.youngs_modulus /= softer
-    return robot
 
 
 def tendon_model(robot, step):
@@ -69,64 +62,53 @@ def tendon_model(robot, step):
     )
 
 
-def largest_difference(robot, X_WP, displacement, ramp, step):
-    """Runs both engines; returns largest distance, angle, travel and number of slack cables."""
-    block = CableRobot(robot, CableRobotSettings(cables=CableSettings(model="elastic")))
-    simulator = Simulator(block)
-    context = simulator.get_mutable_context()
-    block.set_at_equilibrium(context, X_WP)
+RUNS = {
+    "free": (1e3, 0, 1.0, 0.0),
+    "free, turned": (1e3, 1, 1.0, 0.0),
+    "free, low": (1e3, 2, 1.0, 0.0),
+    "wound up by 2 cm/s": (1e3, 0, 1.0, -0.02),
+    "real stiffness": (1.0, 1, 1e-4, 0.0),
+}
+"""How much softer cables are, the pose of rest, the share of the displacement, the speed [m/s]."""
+
+
+@pytest.mark.parametrize("run", RUNS)
+def test_both_engines_swing_alike(run):
+    """By centimetres, with cables that go slack and catch; by micrometres on taut real ones."""
+    softer, index, share, ramp = RUNS[run]
+    real, step = softer == 1.0, 1e-4 if softer == 1.0 else 2e-4
+    duration = 0.2 if real else DURATION
+    robot, X_WP, displacement = load_robot("acrobot_small"), POSES[index], share * DISPLACEMENT
+    robot.cable.youngs_modulus /= softer
+    block, simulator, context = started(
+        CableRobot, robot, settings_of(model="elastic"), step, X_WP=X_WP
+    )
     start = RigidTransform(
         rotation_from_angles(displacement[:3]) @ X_WP.rotation(),
         X_WP.translation() + displacement[3:],
     )
-    block.in_plant.set_pose(block.plant.GetMyMutableContextFromRoot(context), start)
-    block.GetInputPort("cable_velocities").FixValue(context, ramp)
-    first = block.GetOutputPort("unstrained_lengths").Eval(context).copy()
-    ResetIntegratorFromFlags(simulator, "runge_kutta3", step).set_fixed_step_mode(True)
-
+    put(block, context, start)
+    block.GetInputPort("cable_velocities").FixValue(context, np.full(8, ramp))
+    first = read(block, context, "unstrained_lengths")
     model = tendon_model(robot, step)
     data = mujoco.MjData(model)
     data.qpos[:3] = start.translation()
     data.qpos[3:] = start.rotation().ToQuaternion().wxyz()
-    stiffness, steps = robot.stiffness(), round(DURATION / LOOKS / step)
-    largest = np.zeros(4)
+    stiffness, steps = robot.stiffness(), round(duration / LOOKS / step)
+    travel, slack = 0.0, 0
     for look in range(1, LOOKS + 1):
-        simulator.AdvanceTo(look * DURATION / LOOKS)
+        simulator.AdvanceTo(look * duration / LOOKS)
         for k in range((look - 1) * steps, look * steps):
             l0 = first + ramp * (k + 0.5) * step  # of the middle of the step: second order
             model.tendon_lengthspring[:, 1] = l0
             model.tendon_stiffness.reshape(len(l0), -1)[:, 0] = stiffness / l0
             mujoco.mj_step(model, data)
         q = data.qpos[3:] / np.linalg.norm(data.qpos[3:])
-        X_WP_tendons = RigidTransform(Quaternion(q), data.qpos[:3])
-        X_WP_now = block.GetOutputPort("X_WP").Eval(context)
-        slack = np.sum(block.GetOutputPort("slack").Eval(context))
-        now = [*pose_error(X_WP_now, X_WP_tendons), pose_error(start, X_WP_now)[0], slack]
-        largest = np.maximum(largest, now)
-    return largest
-
-
-@pytest.mark.parametrize("index", range(len(POSES)))
-def test_free_motion_of_centimetres_with_slack_cables(index):
-    found = largest_difference(acrobot(1e3), POSES[index], DISPLACEMENT, np.zeros(8), 2e-4)
-    assert found[0] < DISTANCE
-    assert found[1] < ANGLE
-    assert found[2] > 0.02
-    assert found[3] >= 4
-
-
-def test_a_commanded_ramp_of_the_lengths():
-    """All cables are drawn in by 2 cm/s while the platform swings."""
-    found = largest_difference(acrobot(1e3), POSES[0], DISPLACEMENT, np.full(8, -0.02), 2e-4)
-    assert found[0] < DISTANCE
-    assert found[1] < ANGLE
-    assert found[2] > 0.05
-
-
-def test_the_real_stiffness_while_the_cables_are_taut():
-    found = largest_difference(acrobot(1.0), POSES[1], 1e-4 * DISPLACEMENT, np.zeros(8), 1e-4)
-    assert found[3] == 0
-    assert found[0] < 0.01 * DISTANCE
-    assert found[1] < 0.1 * ANGLE
-    # Not by standing still: it swings by micrometres.
-    assert found[2] > 1e-6
+        tendons = RigidTransform(Quaternion(q), data.qpos[:3])
+        distance, angle = pose_error(pose(block, context), tendons)
+        assert distance < (0.01 if real else 1.0) * DISTANCE
+        assert angle < (0.1 if real else 1.0) * ANGLE
+        travel = max(travel, np.linalg.norm(place(block, context) - start.translation()))
+        slack = max(slack, np.sum(read(block, context, "slack")))
+    assert travel > (1e-6 if real else 0.02)  # not by standing still
+    assert slack == 0 if real else slack >= 4

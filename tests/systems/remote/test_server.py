@@ -1,10 +1,12 @@
-"""Clients that die, are silent, or send nonsense: the run ends, with what was simulated."""
+"""Whatever arrives or ceases, a server waits on, or a run ends with what was simulated."""
 
 import json
 import os
+import socket
 import subprocess
 import sys
 import time
+from contextlib import suppress
 
 import msgpack
 import numpy as np
@@ -27,9 +29,10 @@ from cdpr_drake.systems.remote.messages import (
     vector,
 )
 from cdpr_drake.systems.remote.remote_client import RemoteClient
-from cdpr_drake.systems.remote.remote_driver import Driver, SyncMode
-from cdpr_drake.systems.remote.server_socket import ServerSocket
+from cdpr_drake.systems.remote.remote_driver import Driver, Port, SyncMode
+from cdpr_drake.systems.remote.server_socket import SLICE, ServerSocket
 from cdpr_drake.tensions.methods import distribute
+from tests.systems.remote.message_fuzz import RAW, Sender
 from tests.systems.remote.served import LONG, beside, scenario, server
 
 HOLD = {"tensions": [4.0] * 8}
@@ -46,6 +49,14 @@ def raw(address):
     socket.setsockopt(zmq.RCVTIMEO, round(1e3 * LONG))
     socket.connect(address)
     return socket
+
+
+def driver_of(socket, size=2):
+    """Without a run, and with one port in and out."""
+    port = Port("tensions", size, "N", "commanded")
+    return Driver(
+        socket, {}, [port], [port], pace=SyncMode.LOCK_STEP, timeout=LONG, period=1e-3, services={}
+    )
 
 
 def say(socket, message):
@@ -94,21 +105,36 @@ NONSENSE = {
 }
 
 
-@pytest.mark.parametrize("kind", NONSENSE)
-def test_nonsense_ends_the_run_and_is_named(kind):
+@pytest.mark.parametrize("kind", ["garbage", "missing port", "pushing"])
+def test_nonsense_ends_the_run_with_what_was_simulated(kind):
     last, words = NONSENSE[kind]
     with server() as one, beside(some_steps, raw(one.socket.address), last) as found:
         run = one.run(settings())
     assert run.outcome == Outcome.CLIENT_ENDED
     assert words in run.message
-    assert len(run.message) < 500
-    assert "\n" not in run.message
     assert run.sim_time == pytest.approx(1e-3 * STEPS)
     assert np.all(run.log["tensions"][1:] == 4.0)
     summary = summarize_tension_run(run)
     assert (summary["outcome"], summary["message"]) == ("client_ended", run.message)
     assert summary["remote"]["exchanges"] == STEPS + (kind == "pushing")
     assert isinstance(found[0], bytes)  # who sends nonsense gets a reply
+
+
+@pytest.mark.parametrize("kind", [kind for kind in NONSENSE if kind != "pushing"])
+def test_nonsense_is_named_and_answered(kind):
+    """Pushing is refused by the diagram alone."""
+    last, words = NONSENSE[kind]
+    with server() as one, beside(some_steps, raw(one.socket.address), last, 1) as found:
+        driver = driver_of(one.socket, 8)
+        driver.wait(LONG)
+        assert driver.exchange(0.0, lambda _: np.zeros(8))["tensions"].tolist() == HOLD["tensions"]
+        with pytest.raises(ClientEndedError) as ended:
+            driver.exchange(1e-3, lambda _: np.zeros(8))
+    said = str(ended.value)
+    assert words in said
+    assert len(said) < 500
+    assert "\n" not in said
+    assert isinstance(found[0], bytes)
 
 
 def test_a_message_that_is_too_long_is_not_read():
@@ -249,12 +275,8 @@ def test_strangers_are_answered_and_change_nothing():
 
 
 def test_nobody_comes():
-    with server() as one:
-        driver = Driver(
-            one.socket, {}, [], [], pace=SyncMode.LOCK_STEP, timeout=1.0, period=1.0, services={}
-        )
-        with pytest.raises(ClientEndedError, match=r"within 0\.01 s"):
-            driver.wait(0.01)
+    with server() as one, pytest.raises(ClientEndedError, match=r"within 0\.01 s"):
+        driver_of(one.socket).wait(0.01)
 
 
 def test_nowhere_to_listen():
@@ -335,12 +357,165 @@ def test_stop_before_anybody_drives_is_answered_and_ends_the_wait():
         with RemoteClient(address, codec="json", timeout=LONG) as client:
             return client.stop().end
 
-    with server() as one, beside(stop, one.socket.address) as found:
-        driver = Driver(
-            one.socket, {}, [], [], pace=SyncMode.LOCK_STEP, timeout=1.0, period=1.0, services={}
-        )
-        with pytest.raises(ClientEndedError, match="said stop"):
-            driver.wait(LONG)
+    with (
+        server() as one,
+        beside(stop, one.socket.address) as found,
+        pytest.raises(ClientEndedError, match="said stop"),
+    ):
+        driver_of(one.socket).wait(LONG)
     assert found[0] == {
         "outcome": "client_ended", "message": "the client said stop", "sim_time_s": 0.0
     }  # fmt: skip
+
+
+COUNT = 70
+"""Messages for each pace."""
+
+CONNECTIONS = 2300
+"""More than ZeroMQ keeps events of for who does not read them, some 2000."""
+
+
+@pytest.fixture
+def listening():
+    one = ServerSocket("127.0.0.1", 0, lambda: False)
+    yield one
+    one.close()
+
+
+def knock(one, payload):
+    """Sends bytes that ZeroMQ did not write, and goes."""
+    host, port = one.address.removeprefix("tcp://").split(":")
+    with suppress(ConnectionError), socket.create_connection((host, int(port)), timeout=LONG) as to:
+        to.sendall(payload)
+
+
+def starts(one, before):
+    """Does something as a stranger does, and starts then; the first instant."""
+    before()
+    with RemoteClient(one.address, timeout=LONG) as client:
+        return client.start([])
+
+
+def drive(one, instants=0):
+    """Runs with who comes, until that goes away."""
+    made = driver_of(one)
+    made.wait(LONG)
+    for now in range(instants):
+        made.exchange(float(now), lambda _: None)
+    with pytest.raises(ClientEndedError):
+        made.exchange(float(instants), lambda _: None)
+
+
+@pytest.mark.parametrize("payload", RAW, ids=[repr(each[:12]) for each in RAW])
+def test_bytes_that_are_no_message_do_not_end_a_server_that_waits(listening, payload):
+    with beside(starts, listening, lambda: knock(listening, payload)) as found:
+        drive(listening)
+    assert found[0].time == 0.0
+
+
+def test_who_speaks_an_old_protocol_is_refused_in_words(listening):
+    """As a web page could send it: nobody can be told from others by it, nor be missed."""
+
+    def ask():
+        host, port = listening.address.removeprefix("tcp://").split(":")
+        with socket.create_connection((host, int(port)), timeout=LONG) as to:
+            to.sendall(b"\x01\x00\x10\x00" + b'{"do": "start"}')
+            said = b""
+            while b"ZeroMQ 4" not in said:
+                said += to.recv(1000)
+        with RemoteClient(listening.address, timeout=LONG) as client:
+            client.start([])
+
+    with beside(ask) as found:
+        drive(listening)
+    assert found == [None]
+
+
+def test_many_that_connect_and_go_do_not_make_it_deaf(listening):
+    def knock_often():
+        for _ in range(CONNECTIONS):
+            knock(listening, b"")
+
+    with beside(starts, listening, knock_often) as found:
+        drive(listening)
+    assert found[0].time == 0.0, found
+
+
+def test_the_end_of_an_earlier_connection_is_not_that_of_the_driver_of(listening):
+    """The system gives its number to the next connection."""
+
+    def look():
+        for _ in range(20):
+            with RemoteClient(listening.address, timeout=LONG) as other:
+                other.describe()
+        with RemoteClient(listening.address, timeout=LONG) as client:
+            client.start([])
+            time.sleep(4 * SLICE)  # so that the server looks after it
+            return [client.step(tensions=[1.0, 2.0]).time for _ in range(3)]
+
+    with beside(look) as found:
+        drive(listening, 3)
+    assert found == [[1.0, 2.0, 3.0]]
+
+
+def test_who_has_gone_before_its_start_was_read_is_missed_at_once(listening):
+    """Also if another connection has its number by then; the time-out is half an hour."""
+
+    def start_and_go():
+        import zmq
+
+        with zmq.Context() as context, context.socket(zmq.DEALER) as one:
+            one.connect(listening.address)
+            one.send(b'{"do": "describe"}')
+            one.recv()
+            one.send(b'{"do": "start"}')
+            one.setsockopt(zmq.LINGER, round(1e3 * LONG))
+        for _ in range(3):
+            knock(listening, b"")
+
+    made = driver_of(listening)
+    with beside(start_and_go):
+        made._listen(time.monotonic() + LONG)
+    time.sleep(0.2)  # until the others have come; too short, it only tries less
+    made.wait(LONG)
+    with pytest.raises(ClientEndedError, match="went away"):
+        made.exchange(0.0, lambda _: np.zeros(2))
+
+
+class Flooded:
+    """A socket at which there is always one more message of a stranger."""
+
+    def __init__(self):
+        self.wish = False
+
+    def receive(self, deadline):
+        return [b"stranger"], b"{}"
+
+    def send(self, envelope, payload):
+        return True
+
+    def look(self):
+        if self.wish:
+            raise KeyboardInterrupt
+
+
+def test_strangers_who_never_cease_keep_nobody_waiting():
+    """Neither the time-out nor the request to stop waits for a moment without messages."""
+    with pytest.raises(ClientEndedError, match="no client came"):
+        driver_of(Flooded()).wait(0.01)
+    flooded = Flooded()
+    flooded.wish = True
+    with pytest.raises(KeyboardInterrupt):
+        driver_of(flooded).wait(LONG)
+
+
+@pytest.mark.parametrize("pace", list(SyncMode))
+def test_random_messages_in_every_state(pace):
+    sender = Sender(pace, seed=list(SyncMode).index(pace))
+    for _ in range(COUNT):
+        sender.send()
+    sender.close()
+    states = {key.partition(",")[0] for key in sender.counts}
+    assert {"waiting", "beside a driver", "driving"} <= states
+    assert sender.counts["refused"] > COUNT / 5
+    assert sender.server.ends["the client's message was not accepted"] > COUNT / 10

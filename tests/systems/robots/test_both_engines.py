@@ -1,0 +1,261 @@
+"""The compiled robot moves as the plant does: the plant is the oracle of all robots and options."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pydrake.math import RigidTransform
+
+from cdpr_drake.dynamics.robot_arrays import DAMPING
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_schema import PlatformDamping
+from cdpr_drake.systems.batches.batch_robots import BatchRobots
+from cdpr_drake.systems.loops.robot_motion import RobotMotion
+from cdpr_drake.systems.robots.cable_forces import CREPT
+from cdpr_drake.systems.robots.cable_robot import CableRobot, automatic_step
+from cdpr_drake.systems.robots.compiled_cable_robot import CompiledCableRobot
+from cdpr_drake.systems.robots.compiled_step import StepRule
+from cdpr_drake.systems.robots.failures import Failure
+from cdpr_drake.systems.robots.platform_hysteresis import BENT
+from cdpr_drake.systems.robots.settings import CableRobotSettings
+from tests.motion.small_robots import small_robot
+from tests.systems.robots.engines import (
+    ALL_BEHAVIOUR,
+    SAME_STEPS,
+    behaving,
+    bundled,
+    even_step,
+    place,
+    port_names,
+    read,
+    rubbing,
+    settings_of,
+    started,
+)
+
+LOOKS = 4
+"""Times at which states are compared, without the start; failures begin at the first."""
+
+FORCES = ("tensions", "applied_torques", "friction_torques")
+"""Their differences are relative to the largest."""
+
+STATE = ["platform_state", "unstrained_lengths", "unstrained_length_rates", "lengths", "tensions"]
+MOTORS = ["motor_angles", "applied_torques", "friction_torques"]
+WRENCH = np.array([0.3, -0.2, 0.5, 4.0, -3.0, 2.0])
+TURNING = np.array([0.2, -0.1, 0.3, 0.0, 0.0, 0.0])
+
+
+@dataclass
+class Case:
+    """A robot that moves for a while by a command whose parts differ."""
+
+    robot: object
+    mode: str = "ideal"
+    model: str | None = None
+    pulleys: bool = False
+    damping: float | None = 2.0
+    command: object = None
+    wrench: object = None
+    events: list | None = None
+    duration: float = 0.1
+    step: float | None = None
+    more: list = field(default_factory=list)
+    tolerance: float = SAME_STEPS
+
+    def made(self):
+        robot = self.robot() if callable(self.robot) else load_robot(self.robot)
+        how = settings_of(self.mode, self.model, self.pulleys, self.damping, self.events)
+        command = self.command
+        if command is None:
+            sizes = {"torque": -0.5, "position": -0.01}
+            command = sizes.get(self.mode, -0.02) * np.linspace(0.5, 1.0, len(robot.cables))
+        return robot, how, command
+
+
+def creeping(name, **behaviour):
+    return lambda: behaving(load_robot(name), **behaviour)
+
+
+def creeping_and_rubbing():
+    robot = behaving(load_robot("acrobot_small"), creep_stiffness=0.4, creep_time=0.05)
+    return rubbing(robot, 0.3, 0.5, 0.02)
+
+
+BREAKS = [Failure(kind="cable_breaks", time=0.02, cable=1)]
+FAILING = [
+    Failure(kind="winch_jams", time=0.02, winch=1),
+    Failure(kind="power_lost", time=0.02, winch=3),
+]
+EVENTS = {"duration": 0.08, "step": 1e-4, "damping": None}
+BUNDLES = {"robot": bundled, "damping": 20.0, "duration": 0.02, "step": 1e-4, "tolerance": 1e-8}
+"""Rounding, times what motors with two cables make of it."""
+
+SPEEDS = [0.05, -0.02, 0.03]
+
+CASES = {
+    "straight": Case("acrobot_small", model="kelvin_voigt"),
+    "pulleys, velocity": Case("acrobot_small", "velocity", "elastic", True),
+    "catenary, position": Case("acrobot_small", "position", "catenary", True, wrench=WRENCH),
+    "pulleys, torque": Case("acrobot_large", "torque", "kelvin_voigt", True, step=5e-4),
+    "pushed": Case("acrobot_large", damping=None, wrench=WRENCH, step=1e-4),
+    "catenary": Case("caroca", model="catenary"),
+    "planar": Case("planar"),
+    "planar, velocity": Case("planar", "velocity", "elastic"),
+    "planar, pushed": Case("planar", damping=None, wrench=WRENCH, step=1e-4),
+    "stiffening": Case(
+        creeping("acrobot_small", stiffening=2e-3, expansion=1.2e-5, warmer=15.0), pulleys=True
+    ),
+    "all behaviour": Case(
+        creeping("acrobot_small", **ALL_BEHAVIOUR), "velocity", pulleys=True, more=[CREPT]
+    ),
+    "creeping": Case(
+        creeping("acrobot_large", creep_stiffness=0.4, creep_time=0.05), pulleys=True, more=[CREPT]
+    ),
+    "planar, creeping": Case(
+        creeping("planar", stiffening=2e-3, creep_stiffness=0.4), "velocity", more=[CREPT]
+    ),
+    "rubbing": Case(
+        lambda: rubbing(small_robot("hanging_four"), 0.3, 0.5, 0.02), damping=None,
+        wrench=TURNING, more=[BENT],
+    ),
+    "rubbing in a plane": Case(
+        lambda: rubbing(small_robot("oblique_body"), 0.3, 0.5, 0.02), damping=None,
+        wrench=TURNING, more=[BENT],
+    ),
+    "rubbing, creeping": Case(creeping_and_rubbing, "velocity", wrench=TURNING, more=[BENT, CREPT]),
+    "bundles": Case(**BUNDLES, command=SPEEDS),
+    "bundles, velocity": Case(**BUNDLES, mode="velocity", command=SPEEDS),
+    "bundles, torque": Case(**BUNDLES, mode="torque", command=[-0.15, -0.17, -0.16]),
+    "bundles, position": Case(**BUNDLES, mode="position", command=[0.002, -0.001, 0.0]),
+    "a cable breaks": Case("acrobot_small", events=BREAKS, **EVENTS),
+    "breaks, velocity": Case(
+        "acrobot_small", "velocity", "elastic", True, events=BREAKS, **EVENTS
+    ),
+    "breaks, catenary": Case("caroca", model="catenary", events=BREAKS, **EVENTS),
+    "breaks, planar": Case("planar", events=BREAKS, **EVENTS),
+    "fails, torque": Case("acrobot_small", "torque", command=-0.05, events=FAILING, **EVENTS),
+    "fails, velocity": Case("acrobot_small", "velocity", command=-0.02, events=FAILING, **EVENTS),
+}  # fmt: skip
+
+
+def history(kind, robot, how, names, duration, step, **start):
+    """Rows of the ports at the start and at every look, by port."""
+    block, simulator, context = started(kind, robot, how, step, **start)
+    rows = {name: [read(block, context, name)] for name in names}
+    for k in range(1, LOOKS + 1):
+        simulator.AdvanceTo(duration * k / LOOKS)
+        for name in names:
+            rows[name].append(read(block, context, name))
+    return {name: np.array(values) for name, values in rows.items()}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_it_moves_as_the_plant(name):
+    case = CASES[name]
+    robot, how, command = case.made()
+    longest = case.step or automatic_step(robot, robot.home.transform(), "runge_kutta3", how)
+    step = even_step(case.duration, min(longest, 2e-3), LOOKS)
+    names = STATE + (MOTORS if case.mode != "ideal" else []) + case.more
+    found, expected = (
+        history(kind, robot, how, names, case.duration, step, command=command, wrench=case.wrench)
+        for kind in (CompiledCableRobot, CableRobot)
+    )
+    moves = expected["platform_state"]
+    assert np.max(np.abs(moves[-1] - moves[0])) > 1e-5
+    for port in names:
+        scale = np.max(np.abs(expected[port])) if port in FORCES else 1.0
+        np.testing.assert_allclose(
+            found[port], expected[port], rtol=0.0, atol=case.tolerance * max(scale, 1.0),
+            err_msg=port,
+        )  # fmt: skip
+    for port in case.more:
+        assert np.max(np.abs(expected[port][-1] - expected[port][0])) > 1e-6, port
+    if robot.winch_groups().are_shared():
+        rates = found["unstrained_length_rates"]
+        np.testing.assert_allclose(rates[:, ::2], rates[:, 1::2], atol=1e-12)
+
+
+@given(st.integers(0, 2**32 - 1))
+@settings(max_examples=6)
+def test_robots_and_motions_that_are_drawn_agree(seed):
+    random = np.random.default_rng(seed)
+    robot = load_robot(str(random.choice(["acrobot_small", "acrobot_large", "planar"])))
+    planar = robot.is_planar()
+    in_motion = [1.0, 1.0, 0.0 if planar else 1.0]
+    robot.cable.youngs_modulus *= 10.0 ** random.uniform(-3.0, 0.0)
+    robot.cable.retardation_time = random.uniform(0.0, 1e-3)
+    robot.platform.mass *= random.uniform(0.5, 3.0)
+    for cable in robot.cables:
+        cable.exit_point = cable.exit_point + random.uniform(-0.03, 0.03, 3) * in_motion
+    how = settings_of(pulleys=bool(random.integers(2)) and not planar)
+    home = robot.home.transform()
+    shift = random.uniform(-0.05, 0.05, 3) * in_motion
+    X_WP = RigidTransform(home.rotation(), home.translation() + shift)
+    command = random.uniform(-0.02, 0.02, len(robot.cables))
+    step = even_step(0.06, automatic_step(robot, X_WP, "runge_kutta3", how), LOOKS)
+    found, expected = (
+        history(kind, robot, how, STATE[:-1], 0.06, step, command=command, X_WP=X_WP)
+        for kind in (CompiledCableRobot, CableRobot)
+    )
+    for port, rows in expected.items():
+        scale = 1.0 + np.max(np.abs(rows))
+        np.testing.assert_allclose(found[port], rows, atol=SAME_STEPS * scale, err_msg=port)
+
+
+@pytest.mark.parametrize("mode", ["ideal", "torque", "velocity", "position"])
+def test_ports_are_those_of_the_plant_and_a_few_more(mode):
+    robot, how = load_robot("acrobot_small"), settings_of(mode)
+    inputs, outputs = port_names(CableRobot(robot, how))
+    more_inputs, more_outputs = port_names(CompiledCableRobot(robot, how))
+    command = {"torque": "motor_torques", "position": "commanded_lengths"}
+    assert inputs == [command.get(mode, "cable_velocities"), "applied_wrench"]
+    rates = {"commanded_length_rates"} if mode == "position" else set()
+    assert set(more_inputs) == set(inputs) | rates
+    assert set(more_outputs) == set(outputs) | {"step_errors", "steps"}
+    motors = {"motor_angles", "motor_speeds", "applied_torques", "friction_torques"}
+    assert set(outputs) == (motors if mode != "ideal" else set()) | {
+        "X_WP", "body_accelerations", "body_poses", "body_velocities", "drum_tensions", "lengths",
+        "platform_state", "query_object", "sags", "slack", "surplus_lengths", "tensions",
+        "unstrained_length_rates", "unstrained_lengths",
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "robot",
+    [creeping("acrobot_small", **ALL_BEHAVIOUR), creeping_and_rubbing],
+    ids=["behaving", "rubbing"],
+)
+def test_a_loop_without_a_diagram_moves_as_the_block_does(robot):
+    robot, how = robot(), settings_of(pulleys=True)
+    block, simulator, context = started(CompiledCableRobot, robot, how, 5e-4, command=-0.02)
+    motion = RobotMotion(robot, how, StepRule(max_step=5e-4))
+    motion.begin(motion.resting(robot.home.transform()))
+    motion.command(np.full(8, -0.02))
+    simulator.AdvanceTo(0.02)
+    motion.advance(0.02)
+    np.testing.assert_array_equal(motion.platform_state(), read(block, context, "platform_state"))
+    np.testing.assert_array_equal(motion.cables()[0], read(block, context, "tensions"))
+    assert np.max(np.abs(place(block, context) - robot.home.position)) > 1e-5
+
+
+def test_every_engine_takes_damping_and_model_of_the_file():
+    robot = load_robot("acrobot_small")
+    robot.damping = PlatformDamping(translation=30.0, rotation=0.4)
+    robot.cable_model = "catenary"
+    plant, compiled = CableRobot(robot), CompiledCableRobot(robot)
+    gain = plant.GetSubsystemByName("damping").D()
+    np.testing.assert_array_equal(np.diag(-gain[:, -6:]), [0.4] * 3 + [30.0] * 3)
+    assert plant.forces.model() == "catenary"
+    motion = RobotMotion(robot, CableRobotSettings(), StepRule())
+    batch = BatchRobots(robot, 1)
+    for arrays in (compiled.motion.arrays(), motion._arrays, batch._members[0].arrays):
+        np.testing.assert_array_equal(arrays.body[DAMPING : DAMPING + 2], [30.0, 0.4])
+    assert motion._model == batch._members[0].model == "catenary"
+
+
+def test_kernels_know_nothing_of_drake():
+    folder = Path(__file__).parents[3] / "cdpr_drake" / "dynamics"
+    assert not [path.name for path in folder.glob("*.py") if "pydrake" in path.read_text()]
