@@ -10,7 +10,7 @@ import yaml
 from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
-from cdpr_drake.errors import RobotFileError, ScenarioError
+from cdpr_drake.errors import RobotFileError
 from cdpr_drake.geometry.poses import pose_error, pose_from_angles
 from cdpr_drake.models.camera_catalogue import CameraFault, load_camera
 from cdpr_drake.models.robot_loader import load_robot, robot_file
@@ -135,7 +135,7 @@ def test_noise_costs_with_a_known_lens_what_it_does_without(name):
             np.array([*random.uniform(-0.16, 0.16, 2), random.uniform(0.4, 0.6)]),
             np.array([np.pi + 0.3, 0.2, 0.0]) * [1, random.choice([-1, 1]), 1],
         )
-        for _ in range(200)
+        for _ in range(100)
     ]
     errors = []
     for camera in (IDEAL, with_lens(LENSES[name])):
@@ -216,24 +216,6 @@ def test_a_camera_file_has_principal_point_and_lens(tmp_path):
         assert load_camera(name).pinhole(640, 480).is_ideal
 
 
-@pytest.mark.parametrize(
-    ("more", "words"),
-    [
-        ({"distortion": {"kind": "brown_conrady", "k1": -0.9}},
-         "distortion: found a brown_conrady lens whose image folds over 31.3 deg from the axis"),
-        ({"distortion": {"kind": "fisheye", "p1": 0.1}},
-         "distortion.p1: found 0.1 with kind fisheye; accepted: 0, or k1, k2, k3, k4"),
-        ({"distortion": {"k1": 0.1}}, "distortion.k1: found 0.1 with kind none"),
-        ({"distortion": {"kind": "barrel"}}, "distortion.kind: found barrel"),
-        ({"principal_point": [900.0, 3.0]}, r"principal_point: found \[900, 3\]"),
-    ],
-)  # fmt: skip
-def test_a_camera_file_that_is_none_is_refused(tmp_path, more, words):
-    path = write_camera(tmp_path / "eye.yaml", **more)
-    with pytest.raises(RobotFileError, match=f"eye.yaml.*{words}"):
-        load_camera(str(path))
-
-
 def test_robots_and_scenarios_take_camera_files(tmp_path):
     write_camera(tmp_path / "eye.yaml", distortion={"kind": "fisheye", "k1": -0.02})
     robot = load_robot("acrobot_small")
@@ -252,26 +234,6 @@ def test_robots_and_scenarios_take_camera_files(tmp_path):
     )
     with pytest.raises(RobotFileError, match=r"no_eye\.yaml"):
         load_robot(tmp_path / "mine.yaml")
-
-
-@pytest.mark.parametrize(
-    ("overrides", "words"),
-    [
-        (["camera.distortion={kind: brown_conrady, k1: -0.9}"],
-         "camera.distortion: found a brown"),
-        (["camera.distortion={kind: fisheye, k6: 1}"], "camera.distortion.k6: found 1 with kind"),
-        (["camera.model=webcam"], "camera.model: camera 'webcam' is unknown"),
-        (["perturbations.camera_model=webcam"], "perturbations.camera_model: camera 'webcam'"),
-        (["perturbations.camera_distortion={kind: brown_conrady, k1: -0.9}"],
-         "perturbations.camera_distortion: found a brown"),
-        (["perturbations.camera_distortion={k2: 1}"], "perturbations.camera_distortion.k2: found"),
-        (["camera.kind=rendered", "camera.region=target", "perturbations.camera_model=astra"],
-         "camera.region: found target with a camera that is believed to be another"),
-    ],
-)  # fmt: skip
-def test_scenarios_with_a_lens_that_is_none_are_refused(overrides, words):
-    with pytest.raises(ScenarioError, match=words):
-        load_scenario("acrobot_pbvs", overrides)
 
 
 LOOP = ("camera.kind=projected", "integration.engine=compiled")

@@ -1,4 +1,4 @@
-"""The section camera.pan_tilt: what is refused, what is steady, and that it is needed."""
+"""The section camera.pan_tilt in runs: a steady view of a target that a fixed camera misses."""
 
 import numpy as np
 import pytest
@@ -10,35 +10,10 @@ from cdpr_drake.errors import ScenarioError
 from cdpr_drake.geometry.poses import pose_from_row
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.diagrams.visual_servo import build_visual_servo
-from cdpr_drake.systems.loops.loop_choice import check_loop, diagram_reason
+from cdpr_drake.systems.loops.loop_choice import diagram_reason
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
 
 COMPILED = "integration.engine=compiled"
-
-
-@pytest.mark.parametrize(
-    ("override", "words"),
-    [
-        ("camera.pan_tilt.lower_deg=[80, -75]", "camera.pan_tilt.lower_deg: found (80, -75)"),
-        ("camera.pan_tilt.upper_deg=[200, 75]", "camera.pan_tilt: found limits"),
-        ("camera.pan_tilt.start_deg=[0, 76]", "camera.pan_tilt.start_deg: found (0, 76)"),
-        ("camera.pan_tilt.gain=0", "camera.pan_tilt.gain"),
-        ("target.kind=circles; controller.scheme=circles", "target.kind: found circles"),
-        ("estimator.kind=fusion", "estimator.kind: found fusion with camera.pan_tilt"),
-        ("estimator.compare=[fusion]", "estimator.compare[0]: found fusion"),
-        ("adaptation={}", "adaptation: found a section with camera.pan_tilt"),
-        ("stability={}", "stability: found a section with camera.pan_tilt"),
-        (
-            "camera.kind=rendered; camera.flaws={exposure: 0.01}",
-            "camera.flaws: found images that take time",
-        ),
-        ("integration.loop=compiled", "camera turns on two joints"),
-    ],
-)
-def test_refused_by_name(override, words):
-    with pytest.raises(ScenarioError) as found:
-        check_loop(load_scenario("acrobot_pan_tilt", override.split("; ")))
-    assert words in str(found.value)
 
 
 def test_loops_leave_it_to_a_diagram():

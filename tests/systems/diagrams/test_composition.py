@@ -1,4 +1,4 @@
-"""Robots and servos are added to anybody's builder, and a whole servo is only their composition."""
+"""Robots and servos are added to anybody's builder; robots with shared winches and pulleys."""
 
 import re
 from pathlib import Path
@@ -11,15 +11,21 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import Adder, ConstantVectorSource, MatrixGain
 
 from cdpr_drake.control.task_space import TaskGains
+from cdpr_drake.geometry.cable_paths import cable_paths
+from cdpr_drake.geometry.poses import pose_from_row
 from cdpr_drake.models.robot_copies import moved_robot
 from cdpr_drake.models.robot_in_plant import add_robot
 from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.diagrams.tension_control import TensionControlSettings, add_tension_control
+from cdpr_drake.systems.loops.loop_choice import diagram_reason
 from cdpr_drake.systems.robots.assembly import add_cable_robot
 from cdpr_drake.systems.robots.cable_robot import CableRobot
 from cdpr_drake.systems.robots.settings import CableRobotSettings, CableSettings
 from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
 from tests.messages import printed
+from tests.models.test_platform_pulleys import robot_content
+from tests.systems.diagrams.diagram_cases import PROJECTED, doubled, servo_run, written
 
 ROOT = Path(__file__).parents[3]
 
@@ -40,6 +46,16 @@ def test_the_script_of_the_documentation_runs(capsys):
     assert angle < REACHED[1]
 
 
+def cable_settings(model):
+    return CableRobotSettings(cables=CableSettings(model=model))
+
+
+def hold(builder, block):
+    """Commands drums that stand still."""
+    still = builder.AddSystem(ConstantVectorSource(np.zeros(len(block.robot.cables))))
+    builder.Connect(still.get_output_port(), block.GetInputPort("cable_velocities"))
+
+
 class Two:
     """Two robots in one plant, the second one beside the first, which hang at home."""
 
@@ -55,9 +71,7 @@ class Two:
             add_cable_robot(builder, each, settings, name=each.robot.name) for each in in_plant
         ]
         for block in self.blocks:
-            m = len(block.robot.cables)
-            still = builder.AddSystem(ConstantVectorSource(np.zeros(m)))
-            builder.Connect(still.get_output_port(), block.GetInputPort("cable_velocities"))
+            hold(builder, block)
         self.plant, self.diagram = plant, builder.Build()
         self.context = self.diagram.CreateDefaultContext()
         for block in self.blocks:
@@ -71,20 +85,19 @@ class Two:
 
 @pytest.mark.parametrize("name", ["acrobot_small", "planar"])
 def test_two_robots_in_one_plant_move_as_each_alone(name):
-    settings = CableRobotSettings(cables=CableSettings(model="elastic"))
+    settings = cable_settings("elastic")
     settings.damping.translation = 2.0
-    two = Two(name, settings)
-    robot = load_robot(name)
-    alone = CableRobot(robot, settings)
+    two, robot = Two(name, settings), load_robot(name)
+    alone, home = CableRobot(robot, settings), robot.home.transform()
     context = alone.CreateDefaultContext()
-    alone.set_at_equilibrium(context, robot.home.transform())
+    alone.set_at_equilibrium(context, home)
     alone.GetInputPort("cable_velocities").FixValue(context, np.zeros(len(robot.cables)))
     off = RigidTransform([0.002, -0.001, 0.0])
     for block, shift in zip(two.blocks, ([0.0, 0.0, 0.0], [9.0, 0.0, 0.0]), strict=True):
-        X_WP = RigidTransform(shift) @ off @ robot.home.transform()
-        block.in_plant.set_pose(two.plant.GetMyMutableContextFromRoot(two.context), X_WP)
+        root = two.plant.GetMyMutableContextFromRoot(two.context)
+        block.in_plant.set_pose(root, RigidTransform(shift) @ off @ home)
     own = alone.GetMutableSubsystemContext(alone.plant, context)
-    alone.in_plant.set_pose(own, off @ robot.home.transform())
+    alone.in_plant.set_pose(own, off @ home)
     port = alone.plant.get_generalized_acceleration_output_port(alone.in_plant.model_instance)
     expected = port.Eval(own)
     assert np.max(np.abs(expected)) > 1.0
@@ -92,7 +105,7 @@ def test_two_robots_in_one_plant_move_as_each_alone(name):
         np.testing.assert_allclose(found, expected, rtol=1e-7, atol=SAME)
 
 
-def test_a_force_of_somebody_else_stays():
+def test_a_force_of_another_system_stays():
     force = np.zeros(12)
     force[3] = 3.0  # along x of the first platform
 
@@ -106,53 +119,48 @@ def test_a_force_of_somebody_else_stays():
     np.testing.assert_allclose(M @ change, force, atol=1e-9)
 
 
-def test_lengths_of_straight_cables_ask_for_the_pose_alone():
+RATES, L0 = "unstrained_length_rates", "unstrained_lengths"
+
+
+@pytest.mark.parametrize(
+    ("name", "model", "source", "output", "needs"),
+    [
+        ("acrobot_small", "kelvin_voigt", RATES, "lengths", False),
+        ("acrobot_small", "kelvin_voigt", L0, "lengths", False),
+        ("acrobot_small", "kelvin_voigt", RATES, "tensions", True),
+        ("acrobot_small", "kelvin_voigt", RATES, "surplus_lengths", False),
+        ("acrobot_small", "elastic", RATES, "generalized_force", False),
+        ("caroca", "catenary", L0, "lengths", True),
+        ("caroca", "catenary", RATES, "lengths", False),
+        ("caroca", "catenary", RATES, "tensions", True),
+    ],
+)
+def test_an_output_asks_for_the_drums_only_where_cables_do(name, model, source, output, needs):
     """So that lengths can be fed back to the winches without an algebraic loop."""
-    block = CableRobot(load_robot("acrobot_small"))
-    forces = block.forces
-    rates = forces.GetInputPort("unstrained_length_rates").get_index()
-    l0 = forces.GetInputPort("unstrained_lengths").get_index()
-
-    def needs(port, name):
-        return forces.HasDirectFeedthrough(port, forces.GetOutputPort(name).get_index())
-
-    assert not needs(rates, "lengths")
-    assert not needs(l0, "lengths")
-    assert needs(rates, "tensions")
-    assert not needs(rates, "surplus_lengths")
-    elastic = CableRobot(
-        load_robot("acrobot_small"), CableRobotSettings(cables=CableSettings(model="elastic"))
-    ).forces
-    assert not elastic.HasDirectFeedthrough(rates, 0)
-    sagging = CableRobot(
-        load_robot("caroca"), CableRobotSettings(cables=CableSettings(model="catenary"))
-    ).forces
-    lengths = sagging.GetOutputPort("lengths").get_index()
-    assert sagging.HasDirectFeedthrough(l0, lengths)
-    assert not sagging.HasDirectFeedthrough(rates, lengths)
-    assert sagging.HasDirectFeedthrough(rates, sagging.GetOutputPort("tensions").get_index())
+    forces = CableRobot(load_robot(name), cable_settings(model)).forces
+    ports = forces.GetInputPort(source).get_index(), forces.GetOutputPort(output).get_index()
+    assert forces.HasDirectFeedthrough(*ports) == needs
 
 
 @pytest.mark.parametrize("model", ["kelvin_voigt", "catenary"])
-@pytest.mark.parametrize("output", ["generalized_force", "force_and_drums", "tensions"])
-def test_damped_cables_pull_back_as_they_are_wound(model, output):
+def test_damped_cables_pull_back_as_they_are_wound(model):
     robot = load_robot("caroca")
-    block = CableRobot(robot, CableRobotSettings(cables=CableSettings(model=model)))
+    block = CableRobot(robot, cable_settings(model))
     context = block.CreateDefaultContext()
     block.set_at_equilibrium(context, robot.home.transform())
-    values = []
+    names, values = ("generalized_force", "force_and_drums", "tensions"), []
     for speed in (0.0, -0.2):
         block.GetInputPort("cable_velocities").FixValue(context, np.full(8, speed))
         own = block.GetSubsystemContext(block.forces, context)
-        values.append(block.forces.GetOutputPort(output).Eval(own))
-    assert np.max(np.abs(values[1] - values[0])) > 1.0
+        values.append([block.forces.GetOutputPort(name).Eval(own).copy() for name in names])
+    for name, rests, winds in zip(names, *values, strict=True):
+        assert np.max(np.abs(winds - rests)) > 1.0, name
 
 
 def test_lengths_feed_back_to_the_winches():
     """A proportional winch controller on measured lengths closes a loop that Drake accepts."""
-    robot = load_robot("acrobot_small")
     builder = DiagramBuilder()
-    block = builder.AddNamedSystem("robot", CableRobot(robot))
+    block = builder.AddNamedSystem("robot", CableRobot(load_robot("acrobot_small")))
     gain = builder.AddSystem(MatrixGain(-2.0 * np.eye(8)))
     wanted = builder.AddSystem(ConstantVectorSource(np.ones(8)))
     error = builder.AddSystem(Adder(2, 8))
@@ -176,16 +184,65 @@ def test_tension_control_of_one_robot_beside_another():
     settings = TensionControlSettings(
         trajectory=PoseTrajectory((home, home), (1.0,)), gains=TaskGains(100.0, 20.0)
     )
-    blocks = add_tension_control(builder, controlled, settings, name="dynamic")
+    distributor = add_tension_control(builder, controlled, settings, name="dynamic").distributor
     block = add_cable_robot(builder, hanging, name="beside")
-    still = builder.AddSystem(ConstantVectorSource(np.zeros(8)))
-    builder.Connect(still.get_output_port(), block.GetInputPort("cable_velocities"))
+    hold(builder, block)
     diagram = builder.Build()
     context = diagram.CreateDefaultContext()
     block.set_at_equilibrium(context, block.robot.home.transform())
     controlled.set_pose(plant.GetMyMutableContextFromRoot(context), home)
-    distributor = blocks.distributor
     own = distributor.GetMyMutableContextFromRoot(context)
     own.SetDiscreteState(distributor.EvalUniquePeriodicDiscreteUpdate(own))
     port = plant.get_generalized_acceleration_output_port(controlled.model_instance)
     np.testing.assert_allclose(port.Eval(plant.GetMyContextFromRoot(context)), 0.0, atol=1e-9)
+
+
+SOFT = "cables={stiffness_ratio: 0.01, retardation_time: 0.002}"
+"""A doubled cable shares its load by the stretch of both: stiff ones would not, when turned."""
+
+
+def comes_nearer(log):
+    error = np.linalg.norm(log["error"][:, :3], axis=1)
+    assert error[-1] < 0.75 * error[1]  # 0.69, as of the robot as it is
+
+
+def test_a_doubled_cable_goes_with_its_twin(tmp_path):
+    changes = ["duration=1.5", SOFT, written(tmp_path, doubled())]
+    scenario = load_scenario("acrobot_pbvs", [PROJECTED, *changes])
+    assert "several cables on one winch" in diagram_reason(scenario)
+    log = servo_run("acrobot_pbvs", *changes).log
+    lengths = log["unstrained_lengths"]
+    assert np.ptp(lengths[:, 0]) > 0.01
+    np.testing.assert_allclose(np.diff(lengths[:, 0] - lengths[:, 8]), 0.0, atol=1e-12)
+    comes_nearer(log)
+
+
+@pytest.mark.parametrize("mode", ["velocity", "torque"])
+def test_motors_of_a_doubled_cable_hold_both(mode, tmp_path):
+    changes = ["duration=0.4", f"winches.mode={mode}", "perturbations.slack=null",
+               "torque_control.method=quadratic_program",
+               written(tmp_path, doubled("acrobot_large"))]  # fmt: skip
+    if mode == "velocity":
+        changes.append("torque_control=null")
+    run = servo_run("acrobot_torque_servo", *changes)
+    log, radius = run.log, run.servo.robot.drum().radii(9)[0]
+    torques = log["applied_torques"]
+    np.testing.assert_array_equal(torques[:, 0], torques[:, 8])
+    for k, of in ((1, [1]), (0, [0, 8])):
+        left = torques[-20:, k] + radius * np.mean(log["tensions"][-20:, of].sum(axis=1))
+        assert abs(np.mean(left)) < 0.03, k  # friction, and what accelerates the drum
+    if mode == "torque":
+        wanted = log["wanted_tensions"][-1]
+        assert np.all((wanted >= 1.0) & (wanted <= 60.0))
+        assert np.max(np.abs(log["tensions"][-1] - wanted)[1:8]) < 3.0
+
+
+def test_pulleys_at_the_platform_are_known_to_servo_and_simulation(tmp_path):
+    robot = written(tmp_path, robot_content())
+    changes = ["cables.pulleys=true", "controller.pulleys=true", "duration=1.5", robot]
+    run = servo_run("acrobot_pulleys", *changes)
+    log, cables = run.log, run.servo.robot.cable_set()
+    for row in (0, -1):
+        paths = cable_paths(pose_from_row(log["X_WP"][row]), cables)
+        np.testing.assert_allclose(log["lengths"][row], paths.lengths, atol=1e-12)
+    comes_nearer(log)

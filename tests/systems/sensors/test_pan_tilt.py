@@ -1,5 +1,7 @@
 """A head on two joints: where it looks, how fast it turns, a loop that keeps a target in view."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from pydrake.common.value import Value
@@ -42,27 +44,25 @@ def test_pan_looks_to_the_right_and_tilt_upwards():
     np.testing.assert_allclose(arm.translation(), [1.0 + 0.2 * np.sin(0.5), 0, 0.2 * np.cos(0.5)])
 
 
-def test_by_velocity_it_turns_as_fast_as_it_can_and_stops_at_its_limits():
-    head, own = turned([0.3, -0.2], 1.234)
-    np.testing.assert_allclose(head.GetOutputPort("angles").Eval(own), [0.3702, -0.2468])
-    head, own = turned([2.0, -3.0], 1.0)
-    np.testing.assert_allclose(head.GetOutputPort("angles").Eval(own), [1.0, -0.5])
-    head, own = turned([2.0, -3.0], 5.0)
-    np.testing.assert_allclose(head.GetOutputPort("angles").Eval(own), [np.pi / 2, JOINTS.lower[1]])
-
-
-def test_by_position_it_goes_there_and_stays():
-    head, own = turned([0.4, 9.0], 0.3, "position")
-    np.testing.assert_allclose(head.GetOutputPort("angles").Eval(own), [0.3, 0.15])
-    head, own = turned([0.4, 9.0], 4.0, "position")
-    np.testing.assert_allclose(head.GetOutputPort("angles").Eval(own), [0.4, JOINTS.upper[1]])
+@pytest.mark.parametrize(
+    ("mode", "command", "duration", "angles"),
+    [
+        ("velocity", [0.3, -0.2], 1.234, [0.3702, -0.2468]),
+        ("velocity", [2.0, -3.0], 1.0, [1.0, -0.5]),
+        ("velocity", [2.0, -3.0], 5.0, [np.pi / 2, JOINTS.lower[1]]),
+        ("position", [0.4, 9.0], 0.3, [0.3, 0.15]),
+        ("position", [0.4, 9.0], 4.0, [0.4, JOINTS.upper[1]]),
+    ],
+)
+def test_a_head_turns_as_fast_as_it_can_and_stops_at_its_goal_and_limits(
+    mode, command, duration, angles
+):
+    head, own = turned(command, duration, mode)
+    np.testing.assert_allclose(head.GetOutputPort("angles").Eval(own), angles)
 
 
 def test_encoders_count_and_begin_where_they_believe_zero_to_be():
-    joints = PanTiltJoints(
-        lower=JOINTS.lower, upper=JOINTS.upper, speed=JOINTS.speed, counts_per_turn=1000,
-        zero_error=0.01,
-    )  # fmt: skip
+    joints = replace(JOINTS, counts_per_turn=1000, zero_error=0.01)
     head, own = turned([0.3, 0.2], 0.777, joints=joints, seed=4)
     step = 2.0 * np.pi / 1000
     read = head.GetOutputPort("encoder_angles").Eval(own)
@@ -101,21 +101,6 @@ class Follow(LeafSystem):
         output.SetFromVector(seen * self._gain * np.array([x, -y]))
 
 
-class HeadInWorld(LeafSystem):
-    """X_WC of a camera on the head: X_WP X_PC."""
-
-    def __init__(self):
-        super().__init__()
-        self.DeclareAbstractInputPort("X_WP", Value(RigidTransform()))
-        self.DeclareAbstractInputPort("X_PC", Value(RigidTransform()))
-        self.DeclareAbstractOutputPort("X_WC", lambda: Value(RigidTransform()), self._calc)
-
-    def _calc(self, context, output):
-        output.set_value(
-            self.get_input_port(0).Eval(context) @ self.get_input_port(1).Eval(context)
-        )
-
-
 class Passing(LeafSystem):
     """A target 2 m ahead that passes to the right at 0.2 m/s, facing the platform."""
 
@@ -129,25 +114,22 @@ class Passing(LeafSystem):
 
 
 def test_a_camera_on_it_keeps_a_passing_target_in_the_middle():
-    """X_PC is a signal: the projected camera sits on the head, and its image turns the head."""
+    """The projected camera sits on a head in the world, and its image turns the head."""
     pinhole, gain = Pinhole(640, 480, 500.0, 500.0, 319.5, 239.5), 6.0
     builder = DiagramBuilder()
     head = builder.AddSystem(PanTilt(JOINTS, RigidTransform(), mode="velocity", rate=50.0))
     camera = builder.AddSystem(
         ProjectedCamera(DotTarget(0.1), CameraMounting(RigidTransform()), pinhole, 50.0)
     )
-    world, follow = builder.AddSystem(HeadInWorld()), builder.AddSystem(Follow(pinhole, gain))
+    follow = builder.AddSystem(Follow(pinhole, gain))
     target = builder.AddSystem(Passing())
-    builder.Connect(head.GetOutputPort("X_BH"), world.GetInputPort("X_PC"))
-    builder.Connect(world.GetOutputPort("X_WC"), camera.GetInputPort("X_WP"))
+    builder.Connect(head.GetOutputPort("X_BH"), camera.GetInputPort("X_WP"))
     builder.Connect(target.GetOutputPort("X_WO"), camera.GetInputPort("X_WO"))
     for port in ("corners", "found"):
         builder.Connect(camera.GetOutputPort(port), follow.GetInputPort(port))
     builder.Connect(follow.GetOutputPort("rates"), head.GetInputPort("command"))
-    diagram = builder.Build()
-    simulator = Simulator(diagram)
-    root = simulator.get_mutable_context()
-    world.GetInputPort("X_WP").FixValue(world.GetMyMutableContextFromRoot(root), RigidTransform())
+    simulator = Simulator(builder.Build())
+    root = simulator.get_context()
     simulator.AdvanceTo(4.0)
     angles = head.GetOutputPort("angles").Eval(head.GetMyContextFromRoot(root))
     x = -0.3 + 0.2 * 4.0
@@ -158,8 +140,6 @@ def test_a_camera_on_it_keeps_a_passing_target_in_the_middle():
 
 
 def test_encoders_read_an_offset_and_noise_that_change_with_each_look():
-    from dataclasses import replace
-
     wrong = replace(JOINTS, offset=np.array([0.02, -0.03]), noise=1e-3, counts_per_turn=10**7)
     read = []
     for duration in (0.5001, 0.5101, 0.5101):
