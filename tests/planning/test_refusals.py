@@ -256,7 +256,8 @@ REFUSALS = {
     "limits": (lambda: rails(lower=rail_task().rails.lower[:1]), "other numbers of limits"),
     "no poses": (lambda: rail([]).loads(), "found 0 poses"),
     "at an exit": (lambda: rail([at_an_exit()]).matrices(np.zeros(2)), "cable without length"),
-    "too heavy": (lambda: rail(rail_task().poses, HEAVY).largest_tensions(np.zeros(2)), "no tensions"),
+    "too heavy": (lambda: rail(rail_task().poses, HEAVY).largest_tensions(np.zeros(2)),
+     "no tensions"),
 }  # fmt: skip
 
 
@@ -267,12 +268,6 @@ def test_refusal(call, words):
         call()
     assert isinstance(caught.value, CdprError)
     assert len(str(caught.value).splitlines()) == 1
-
-
-def test_a_tenth_of_the_wrenches_is_resisted():
-    robot = load_robot("acrobot_large")
-    wrenches = SpatialSet(box=np.array([0.0, 0, 0, 0.9, 0, 0]))
-    check_held(path_task(robot, limits(), resist=wrenches), pose(0, 0, 0.2), "start")
 
 
 def test_a_damped_platform_without_own_terms_is_planned():

@@ -136,7 +136,7 @@ def test_it_finds_what_brute_force_finds(goal):
     scale, sign = (1.0, 1.0) if goal == "margin" else (60.0, -1.0)
     assert at == pytest.approx(sign * solution.value, abs=CONVERGED * scale)
     rails = zip(task.rails.lower, task.rails.upper, strict=True)
-    first, second = (np.linspace(a, b, 7) for a, b in rails)
+    first, second = (np.linspace(a, b, 5) for a, b in rails)
     best = max(value(np.array([a, b])) for a in first for b in second)
     assert at >= best - CONVERGED * scale  # no point of the grid is better
     assert at > value(task.rails.at) + 1e-3 * scale  # and it is better than it was

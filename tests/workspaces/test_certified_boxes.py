@@ -153,7 +153,7 @@ BOXES = {
     "static small and turned": (static_turned, 4000, 0.9, 0.0),
     "static straight": (lambda: static("acrobot_large", ends=""), 4000, 0.0, 0.0),
     "static over pulleys at both ends": (
-        lambda: static("acrobot_fully_constrained", CONSTRAINED, ends="AB"), 4000, 0.0, 0.16
+        lambda: static("acrobot_fully_constrained", CONSTRAINED, ends="AB"), 6000, 0.01, 0.16
     ),
     "wrench-feasible planar": (wrench_feasible, 1000, 0.53, 0.19),
     "closure planar": (lambda: closure("planar"), 800, 0.63, 0.15),
@@ -171,9 +171,7 @@ BOXES = {
     "collision, yaw, 0.02 m": (lambda: collision("yaw", 0.02), 8000, 0.63, 0.11),
     "cables and solids": (lambda: convex_interference("none", False), 6000, 0.61, 0.12),
     "cables and solids, yaw": (lambda: convex_interference("yaw", False), 8000, 0.58, 0.09),
-    "cables over pulleys and solids": (
-        lambda: convex_interference("none", True), 6000, 0.6, 0.11
-    ),
+    "cables over pulleys and solids": (lambda: convex_interference("none", True), 6000, 0.6, 0.11),
     "failure, pushed": (failure, 500, 0.05, 0.0),
 }  # fmt: skip
 """Task and box, most boxes, and least shares inside and outside; a proof that says less is worse.

@@ -128,16 +128,12 @@ REFUSALS = {
         "no boxes": (lambda: certify(task(), PLANE, 0), "most_boxes"),
         "no kinds": (lambda: certify([], PLANE), "certify: found 0 kinds; accepted: 1 to 7"),
         "no refining": (lambda: refine(boxes(), task(), PLANE, 0), "most_boxes: found 0"),
-        "other kinds": (
-            lambda: refine(boxes(), [task(), task()], PLANE, 10),
-            "task: found 2 kinds; accepted: those that",
-        ),
-        "reach": (
-            lambda: PathTube(np.zeros((2, 6)), np.full(6, -1.0)), "reach: accepted: six numbers"
-        ),
-        "exit free": (
-            lambda: Surroundings(CASE.cables, np.full(8, 0.001), exit_free=-1.0), "exit_free"
-        ),
+        "other kinds": (lambda: refine(boxes(), [task(), task()], PLANE, 10),
+         "task: found 2 kinds; accepted: those that"),
+        "reach": (lambda: PathTube(np.zeros((2, 6)), np.full(6, -1.0)),
+         "reach: accepted: six numbers"),
+        "exit free": (lambda: Surroundings(CASE.cables, np.full(8, 0.001), exit_free=-1.0),
+         "exit_free"),
         "box of less": (lambda: box_row(np.zeros(3), [1.0, -1.0, 1.0]), "box"),
         "no spare": (lambda: cases_after_breaks(six_cables()), SPARE),
         "no break": (lambda: task(CertifiedKind.SINGLE_FAILURE, six_cables()), SPARE),
