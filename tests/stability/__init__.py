@@ -1,7 +1,1 @@
 """Tests of `cdpr_drake.stability`."""
-
-"""Tests of `cdpr_drake.stability`."""
-
-"""Tests of `cdpr_drake.stability`."""
-
-"""Tests of `cdpr_drake.stability`."""

@@ -1,11 +1,1 @@
 """Tests of `cdpr_drake.workspaces`."""
-
-"""Tests of `cdpr_drake.workspaces`."""
-
-"""Tests of `cdpr_drake.workspaces`."""
-
-"""Tests of `cdpr_drake.workspaces`."""
-
-"""Tests of `cdpr_drake.workspaces`."""
-
-"""Tests of `cdpr_drake.workspaces`."""

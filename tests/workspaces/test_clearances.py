@@ -1,123 +1,82 @@
-"""Distances against Drake's geometry queries, a fine sampling and closed forms."""
+"""Distances of cables and platforms against Drake's queries, fine samples and closed forms."""
 
 import numpy as np
 import pytest
 from pydrake.geometry import Box, Capsule
-from pydrake.math import RigidTransform, RotationMatrix
-from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, CoulombFriction
-from pydrake.multibody.tree import SpatialInertia
-from pydrake.systems.framework import DiagramBuilder
+from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 from scipy.spatial import KDTree
 
-from cdpr_drake.errors import WorkspaceError
+from cdpr_drake.analyses.workspaces.pose_grid import plain
+from cdpr_drake.analyses.workspaces.workspace_question import interference_bodies
 from cdpr_drake.geometry.cable_paths import cable_paths
+from cdpr_drake.geometry.convex_shapes import ConvexShape
 from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
+from cdpr_drake.trajectories.sampled_motion import sampled_motion
 from cdpr_drake.workspaces.cable_distance_kernel import (
     boxes_distance,
     segment_box_distance,
     segments_distance,
 )
-from cdpr_drake.workspaces.cable_interference import Surroundings, beams, box_row, clearances
-from tests.workspaces.workspace_cases import random_poses
+from cdpr_drake.workspaces.cable_interference import (
+    Obstacles,
+    Surroundings,
+    beams,
+    box_row,
+    clearances,
+)
+from cdpr_drake.workspaces.moving_clearances import moving_clearances
+from cdpr_drake.workspaces.moving_robots import MovingRobot, PlannedMotion
+from tests.workspaces.workspace_cases import (
+    DrakeScene,
+    box,
+    capsule,
+    instance,
+    random_poses,
+    random_rotation,
+    robot_case,
+    upright,
+)
 
 ROUNDING = 1e-12
+DRAKE = 1e-6  # Drake's distances of boxes (FCL's iterations) are good to this [m]
+CAPSULE = 1e-4  # those of capsules are too large by up to this: FCL stops at two points [m]
+THIN = 1e-3  # radius of Drake's capsules, which may not be 0 [m]
 
-DRAKE = 1e-6
-"""Drake's distance queries of boxes (FCL's iterations) are good to this [m]."""
-
-CAPSULE = 1e-4
-"""Those of capsules are too large by up to this [m]: they are distances of points that FCL stops
-at."""
-
-THIN = 1e-3
-"""Radius of Drake's capsules [m], which may not be 0."""
+# Pairs.
 
 
-def random_rotation(random):
-    q, _ = np.linalg.qr(random.normal(size=(3, 3)))
-    return q if np.linalg.det(q) > 0 else q[:, [1, 0, 2]]
-
-
-class DrakePair:
-    """Two shapes that float, and Drake's distance between them."""
-
-    def __init__(self, one, other):
-        builder = DiagramBuilder()
-        self.plant, _ = AddMultibodyPlantSceneGraph(builder, 0.0)
-        for name, shape in (("one", one), ("other", other)):
-            body = self.plant.AddRigidBody(name, SpatialInertia.SolidSphereWithMass(1.0, 0.1))
-            friction = CoulombFriction(0.5, 0.5)
-            self.plant.RegisterCollisionGeometry(body, RigidTransform(), shape, name, friction)
-        self.plant.Finalize()
-        self.diagram = builder.Build()
-        self.context = self.diagram.CreateDefaultContext()
-
-    def distance(self, X_one, X_other):
-        context = self.plant.GetMyMutableContextFromRoot(self.context)
-        for name, X in (("one", X_one), ("other", X_other)):
-            self.plant.SetFreeBodyPose(context, self.plant.GetBodyByName(name), X)
-        query = self.plant.get_geometry_query_input_port().Eval(context)
-        (pair,) = query.ComputeSignedDistancePairwiseClosestPoints()
-        return pair.distance
-
-
-def along(p, q):
-    """Pose of a capsule whose axis is the segment p to q."""
-    z = (q - p) / np.linalg.norm(q - p)
-    return RigidTransform(RotationMatrix.MakeFromOneVector(z, 2), 0.5 * (p + q))
-
-
-def test_segments_against_drake():
-    random = np.random.default_rng(0)
-    lengths = (1.3, 0.8)
-    pair = DrakePair(*[Capsule(THIN, length) for length in lengths])
+@pytest.mark.parametrize("kinds", ["segments", "segment and box", "boxes"])
+def test_distances_of_pairs_are_those_of_drake(kinds):
+    random = np.random.default_rng(len(kinds))
+    lengths, sizes = (1.3, 0.8), np.array([[0.5, 0.3, 0.8], [0.2, 0.9, 0.4]])
+    rods = kinds.count("segment") if kinds != "segments" else 2
+    shapes = [
+        Capsule(THIN, length) if k < rods else Box(*size)
+        for k, (length, size) in enumerate(zip(lengths, sizes, strict=True))
+    ]
+    first, second = (instance(shape, RigidTransform(), "it") for shape in shapes)
+    scene, apart, work = DrakeScene([first], [second]), 0, np.empty((2, 3))
     for _ in range(200):
-        p, r = random.uniform(-1, 1, (2, 3))
-        d = random.normal(size=(2, 3))
-        d /= np.linalg.norm(d, axis=1, keepdims=True)
-        q, s = p + lengths[0] * d[0], r + lengths[1] * d[1]
-        theirs = pair.distance(along(p, q), along(r, s)) + 2 * THIN
-        ours = segments_distance(p, q, r, s)
-        if theirs > 2 * THIN:  # below it the capsules overlap, and FCL gives a depth
-            assert theirs - CAPSULE < ours < theirs + DRAKE
-
-
-def test_segments_and_boxes_against_drake():
-    random = np.random.default_rng(1)
-    size = np.array([0.5, 0.3, 0.8])
-    pair = DrakePair(Capsule(THIN, 1.1), Box(*size))
-    seen = 0
-    for _ in range(200):
-        p = random.uniform(-1, 1, 3)
-        d = random.normal(size=3)
-        q = p + 1.1 * d / np.linalg.norm(d)
-        R, middle = random_rotation(random), random.uniform(-0.5, 0.5, 3)
-        theirs = pair.distance(along(p, q), RigidTransform(RotationMatrix(R), middle)) + THIN
-        ours = segment_box_distance(p, q, box_row(middle, size, R))
-        if theirs > THIN:
-            assert theirs - CAPSULE < ours < theirs + DRAKE
-            seen += 1
+        R = [random_rotation(random) for _ in range(2)]
+        p = random.uniform(-0.6, 0.6, (2, 3))
+        X_one, X_other = (RigidTransform(RotationMatrix(R[k]), p[k]) for k in range(2))
+        theirs = scene.distances(X_other.inverse() @ X_one)[0, 0] + rods * THIN
+        axes = [0.5 * length * turn[:, 2] for length, turn in zip(lengths, R, strict=True)]
+        ends = [(at - axis, at + axis) for at, axis in zip(p, axes, strict=True)]
+        rows = [box_row(*parts) for parts in zip(p, sizes, R, strict=True)]
+        if rods == 2:
+            ours = segments_distance(*ends[0], *ends[1])
+        elif rods == 1:
+            ours = segment_box_distance(*ends[0], rows[1])
         else:
-            assert ours <= THIN + DRAKE
-    assert 50 < seen < 200
-
-
-def test_boxes_against_drake():
-    random = np.random.default_rng(2)
-    sizes = np.array([0.5, 0.3, 0.8]), np.array([0.2, 0.9, 0.4])
-    pair, ends = DrakePair(*[Box(*size) for size in sizes]), np.empty((2, 3))
-    seen = 0
-    for _ in range(200):
-        placed = [(random_rotation(random), random.uniform(-0.5, 0.5, 3)) for _ in sizes]
-        theirs = pair.distance(*[RigidTransform(RotationMatrix(R), p) for R, p in placed])
-        rows = [box_row(p, size, R) for (R, p), size in zip(placed, sizes, strict=True)]
-        ours = boxes_distance(*rows, ends)
-        if theirs > 0.0:
-            assert ours == pytest.approx(theirs, abs=DRAKE)
-            seen += 1
-        else:
-            assert ours == 0.0
-    assert 30 < seen < 200
+            ours = boxes_distance(*rows, work)
+        if theirs > rods * THIN:  # below it the capsules overlap, and FCL gives a depth
+            assert theirs - (CAPSULE if rods else DRAKE) < ours < theirs + DRAKE
+            apart += 1
+        elif rods < 2:
+            assert ours <= rods * (THIN + DRAKE)
+    assert 30 < apart < (200 if rods < 2 else 201)
 
 
 @pytest.mark.parametrize(
@@ -149,18 +108,20 @@ def test_segments_of_every_kind(segments, distance):
     ],
 )
 def test_segments_and_a_box_of_every_kind(ends, distance):
-    box = box_row(np.zeros(3), np.full(3, 2.0))
+    cube = box_row(np.zeros(3), np.full(3, 2.0))
     p, q = np.array(ends, float)
-    assert segment_box_distance(p, q, box) == pytest.approx(distance, abs=ROUNDING)
-    assert segment_box_distance(q, p, box) == pytest.approx(distance, abs=ROUNDING)
+    assert segment_box_distance(p, q, cube) == pytest.approx(distance, abs=ROUNDING)
+    assert segment_box_distance(q, p, cube) == pytest.approx(distance, abs=ROUNDING)
+
+
+# Cables and platform of a robot.
 
 
 def acrobot(pulleys=False):
-    robot = load_robot("acrobot_large")
-    cables = robot.cable_set(pulleys)
+    robot, _ = robot_case("acrobot_large")
     size = robot.platform.size
     return robot, Surroundings(
-        cables, np.full(8, 0.001), box_row([0, 0, size[2] / 2], size)[None],
+        robot.cable_set(pulleys), np.full(8, 0.001), box_row([0, 0, size[2] / 2], size)[None],
         beams(robot.frame.lower, robot.frame.upper, robot.frame.beam),
         box_row([0.2, 0.1, 0.5], [0.1, 0.1, 0.1])[None], exit_free=0.02, anchor_free=0.05,
     )  # fmt: skip
@@ -170,29 +131,28 @@ def acrobot(pulleys=False):
 def test_clearances_are_the_least_of_their_parts(pulleys):
     """Against points along the cables, which are never nearer than the truth."""
     robot, around = acrobot(pulleys)
-    positions, rotations = random_poses(robot, 12, seed=1, turn=0.2)
-    found = clearances(around, positions, rotations)
+    positions, rotations = random_poses(robot, 8, seed=1, turn=0.2)
+    gaps = clearances(around, positions, rotations)
     shares = np.linspace(0, 1, 801)
     fine = 1.3 / 800  # between neighbours
-    for k in range(12):
-        X_WP = RigidTransform(RotationMatrix(rotations[k]), positions[k])
-        paths = cable_paths(X_WP, around.cables)
-        B = (positions[k][:, None] + rotations[k] @ around.cables.p_PB).T
+    for k, (position, R) in enumerate(zip(positions, rotations, strict=True)):
+        paths = cable_paths(RigidTransform(RotationMatrix(R), position), around.cables)
+        B = (position[:, None] + R @ around.cables.p_PB).T
         A = B - (paths.u_W * paths.free).T if pulleys else around.cables.p_WA.T
         points = A[:, None] + shares[:, None] * (B - A)[:, None]  # (8, n, 3)
-        near = [KDTree(points[i]).query(points[j])[0].min() for i in range(8) for j in range(i)]
-        assert found[k, 0] <= min(near) - 0.002 + ROUNDING
-        assert found[k, 0] >= min(near) - 0.002 - fine
-        body = np.abs((points - positions[k]) @ rotations[k] - [0, 0, 0.035])
+        trees = [KDTree(cable) for cable in points]
+        near = min(trees[i].query(points[j])[0].min() for i in range(8) for j in range(i))
+        assert near - 0.002 - fine <= gaps[k, 0] <= near - 0.002 + ROUNDING
+        body = np.abs((points - position) @ R - [0, 0, 0.035])
         gap = np.linalg.norm(np.maximum(body - robot.platform.size / 2, 0.0), axis=2)
         gap[np.linalg.norm(points - B[:, None], axis=2) < 0.05] = np.inf
-        assert abs(found[k, 1] - (gap.min() - 0.001)) < fine
-        gap = np.full(points.shape[:2], np.inf)
-        for row in around.fixtures:
-            to = np.linalg.norm(np.maximum(np.abs(points - row[9:12]) - row[12:], 0.0), axis=2)
-            gap = np.minimum(gap, to)
+        assert abs(gaps[k, 1] - (gap.min() - 0.001)) < fine
+        gap = np.min([
+            np.linalg.norm(np.maximum(np.abs(points - row[9:12]) - row[12:], 0.0), axis=2)
+            for row in around.fixtures
+        ], axis=0)  # fmt: skip
         gap[np.linalg.norm(points - A[:, None], axis=2) < 0.02] = np.inf
-        assert abs(found[k, 2] - (gap.min() - 0.001)) < fine
+        assert abs(gaps[k, 2] - (gap.min() - 0.001)) < fine
 
 
 def test_cables_that_share_a_point_are_not_compared():
@@ -204,24 +164,119 @@ def test_cables_that_share_a_point_are_not_compared():
     assert len(Surroundings(joined, np.zeros(8)).pairs()) == 27
 
 
-def test_nothing_to_meet_is_infinitely_far():
+def test_nothing_to_meet_is_infinitely_far_and_what_overlaps_has_no_clearance():
     robot, around = acrobot()
-    alone = Surroundings(around.cables, around.radius)
-    found = clearances(alone, *random_poses(robot, 3))
-    assert np.all(np.isfinite(found[:, 0]))
-    assert np.all(np.isinf(found[:, 1:]))
+    alone = clearances(Surroundings(around.cables, around.radius), *random_poses(robot, 3))
+    assert np.all(np.isfinite(alone[:, 0]))
+    assert np.all(np.isinf(alone[:, 1:]))
+    in_frame = clearances(around, [[0.0, 0.0, 0.6], robot.frame.upper], upright(2))
+    assert in_frame[0, 4] > 0.0
+    assert in_frame[1, 4] == 0.0
 
 
-def test_a_platform_in_the_frame_has_no_clearance():
-    robot, around = acrobot()
-    found = clearances(around, [[0.0, 0.0, 0.6], robot.frame.upper], np.tile(np.eye(3), (2, 1, 1)))
-    assert found[0, 4] > 0.0
-    assert found[1, 4] == 0.0
+@pytest.mark.parametrize("pulleys", [False, True])
+def test_boxes_as_convex_shapes_have_the_clearances_of_boxes(pulleys):
+    robot, _ = robot_case("acrobot_large")
+    turn = random_rotation(np.random.default_rng(1))
+    rows = np.array(
+        [box_row([0.2, 0.1, 0.4], [0.3, 0.2, 0.2], turn), box_row([0, 0, 0], [1, 1, 0.1])]
+    )
+    boxes = interference_bodies(robot, rows, pulleys=pulleys)
+    solids = tuple(ConvexShape.box(row) for row in rows)
+    shapes = interference_bodies(robot, Obstacles(solids=solids), pulleys=pulleys)
+    assert "solids" not in plain(boxes)
+    assert [solid["radius"] for solid in plain(shapes)["solids"]] == [0.0, 0.0]
+    poses = random_poses(robot, 500)
+    one, other = clearances(boxes, *poses), clearances(shapes, *poses)
+    assert other[:, :3] == pytest.approx(one[:, :3], abs=0.0, nan_ok=True)
+    radius = boxes.radius[0]
+    assert np.maximum(other[:, 3], -radius) == pytest.approx(one[:, 3], abs=ROUNDING, nan_ok=True)
+    assert np.maximum(other[:, 4], 0.0) == pytest.approx(one[:, 4], abs=ROUNDING, nan_ok=True)
+    assert np.any(other[:, 3] < -radius)  # signed: deeper than the cable is thick
+    assert np.any(other[:, 4] < 0.0)
 
 
-def test_refuses():
-    _, around = acrobot()
-    with pytest.raises(WorkspaceError, match="exit_free"):
-        Surroundings(around.cables, around.radius, exit_free=-1.0)
-    with pytest.raises(WorkspaceError, match="box"):
-        box_row(np.zeros(3), [1.0, -1.0, 1.0])
+# Another robot that moves.
+
+
+@pytest.fixture(scope="module")
+def other():
+    """A robot that moves and turns, 0.5 m below."""
+    robot = load_robot("acrobot_large")
+    poses = (
+        RigidTransform([0.2, 0.0, 0.2]),
+        RigidTransform(RollPitchYaw(0.1, -0.1, 0.2), [0.0, 0.15, 0.35]),
+        RigidTransform([-0.2, 0.0, 0.2]),
+    )
+    path = PoseTrajectory(poses, (2.0, 1.5))
+    times = np.linspace(0.0, path.end_time, 351)
+    motion = sampled_motion(times, np.array([path.motion(t) for t in times]))
+    X_FW = RigidTransform(RollPitchYaw(0.0, 0.0, 0.4), [0.1, -0.2, -0.5])
+    around = interference_bodies(robot, pulleys=True)
+    return MovingRobot(around, PlannedMotion(motion, X_FW), "it", beams=False)
+
+
+@pytest.mark.parametrize("width", [0.0, 0.1, 0.6, 5.0])
+def test_what_a_robot_sweeps_holds_its_platform_and_cables(other, width):
+    for first in np.random.default_rng(0).uniform(-0.2, 3.6, 2):
+        swept = other.swept(first, first + width)
+        for time in np.linspace(first, first + width, 15):
+            for part, whole in zip(other.at(float(time)), swept, strict=True):
+                hull = ConvexShape(whole.points)
+                for point in part.points:
+                    gap, *_ = ConvexShape(point[np.newaxis]).distance(hull)
+                    assert gap + part.radius <= whole.radius + 1e-9
+
+
+def test_a_span_without_what_it_is_off_is_too_small(other):
+    points = other.around.platform_shapes()[0].points
+    span, off = other.motion.span(0.5, 3.0, points)
+    worst = 0.0
+    hull = ConvexShape(np.concatenate([(X @ points.T).T for X in span.poses]))
+    for time in np.linspace(0.5, 3.0, 60):
+        for point in (other.motion.at(time) @ points.T).T:
+            worst = max(worst, ConvexShape(point[np.newaxis]).distance(hull)[0])
+    assert 1e-4 < worst <= off
+
+
+def test_its_beams_stand_where_its_frame_is(other):
+    there = MovingRobot(other.around, other.motion, "it")
+    assert len(there.at(0.0)) == len(other.at(0.0)) + len(other.around.fixtures)
+    first, last = there.at(0.0)[-1], there.swept(0.0, 9.0)[-1]
+    np.testing.assert_allclose(first.points, last.points)
+    assert other.settled() == pytest.approx(3.5)
+
+
+def as_drake(shape, name):
+    """A capsule, or a box whose corners go through the signs of its axes in order."""
+    if len(shape.points) == 2:
+        return capsule(*shape.points, shape.radius, name)
+    P = shape.points
+    edges = np.array([P[4] - P[0], P[2] - P[0], P[1] - P[0]])
+    sizes = np.linalg.norm(edges, axis=1)
+    return box(box_row(P.mean(axis=0), sizes, (edges / sizes[:, None]).T), name)
+
+
+def test_distances_of_two_robots_are_those_of_drake(other):
+    around = interference_bodies(load_robot("acrobot_large"), pulleys=True)
+    random = np.random.default_rng(1)
+    gaps, drakes = [], []
+    for _ in range(12):
+        time = float(random.uniform(0.0, 3.5))
+        X = RigidTransform([*random.uniform(-0.2, 0.2, 2), random.uniform(0.1, 0.5)])
+        place = X.translation()[np.newaxis], X.rotation().matrix()[np.newaxis]
+        gaps.append(moving_clearances(around, [other], np.array([time]), *place)[0, 0])
+        run = cable_paths(X, around.cables)
+        ends = zip(run.p_WT.T, (run.p_WT + run.free * run.u_W).T, around.radius, strict=True)
+        body = box(around.bodies[0])
+        body.set_pose(X @ body.pose())
+        mine = [*(capsule(*parts, f"c{k}") for k, parts in enumerate(ends)), body]
+        shapes = [as_drake(shape, f"o{k}") for k, shape in enumerate(other.at(time))]
+        theirs = DrakeScene(mine, shapes).distances(RigidTransform()).min(axis=1)
+        drakes.append([theirs[:-1].min(), theirs[-1]])
+    gaps, drakes = np.array(gaps), np.array(drakes)
+    apart = drakes > 0.0
+    np.testing.assert_allclose(gaps[apart], drakes[apart], atol=CAPSULE)
+    assert np.all(gaps[apart] <= drakes[apart] + 1e-9)
+    assert np.all(gaps[~apart] <= CAPSULE)
+    assert np.any(apart)

@@ -11,7 +11,6 @@ from cdpr_drake.geometry.convex_shapes import ConvexShape
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.worlds.motions import JointedBody, PathBody, SteadyBody
 from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
-from cdpr_drake.workspaces import moving_shapes
 from cdpr_drake.workspaces.moving_clearances import moving_clearances
 from cdpr_drake.workspaces.moving_shapes import MovingShape, PoseSpan, swept_shape
 from cdpr_drake.workspaces.timed_cells import PoseRaster, clear_cells
@@ -21,49 +20,47 @@ ROUNDING = 1e-9
 SHAPE = ConvexShape.box_at(np.array([0.1, 0.0, 0.05]), [0.2, 0.1, 0.3])
 
 
-def random_pose(random, far=0.5):
-    return RigidTransform(RollPitchYaw(random.uniform(-1.5, 1.5, 3)), random.uniform(-far, far, 3))
+def random_pose(random):
+    return RigidTransform(RollPitchYaw(random.uniform(-1.5, 1.5, 3)), random.uniform(-0.5, 0.5, 3))
 
 
 def motions(seed):
     random = np.random.default_rng(seed)
     poses = [random_pose(random) for _ in range(4)]
     times = tuple(random.uniform(0.5, 3.0, 3))
-    path = PoseTrajectory(tuple(poses), times)
-    back = PoseTrajectory((*poses, poses[0]), (*times, 1.0))
+
+    def joint(**more):
+        return JointedBody(poses[0], *random.normal(size=(2, 3)), period=2.0, **more)
+
     return {
-        "steady": SteadyBody(poses[0], random.normal(size=3), random.normal(size=3)),
+        "steady": SteadyBody(poses[0], *random.normal(size=(2, 3))),
         "line": SteadyBody(poses[0], random.normal(size=3), np.zeros(3)),
-        "path": PathBody(path),
-        "round": PathBody(back, repeat=True),
-        "swings": JointedBody(poses[0], random.normal(size=3), random.normal(size=3),
-                              rate=0.3, amplitude=1.0, period=2.0),
-        "turns": JointedBody(poses[0], random.normal(size=3), random.normal(size=3),
-                             rate=2.0, amplitude=0.1, period=2.0),
-    }  # fmt: skip
+        "path": PathBody(PoseTrajectory(tuple(poses), times)),
+        "round": PathBody(PoseTrajectory((*poses, poses[0]), (*times, 1.0)), repeat=True),
+        "swings": joint(rate=0.3, amplitude=1.0),
+        "turns": joint(rate=2.0, amplitude=0.1),
+    }
 
 
-def outside(swept, shape, motion, first, last, count=200):
-    """How far what it sweeps sticks out of what is said of it [m]."""
-    worst = -np.inf
-    for t in np.linspace(first, last, count):
-        for point in shape.moved(motion.at(t)).points:
-            gap, *_ = ConvexShape(point[np.newaxis], shape.radius).distance(
-                ConvexShape(swept.points)
-            )
-            worst = max(worst, gap + 2.0 * shape.radius - swept.radius)
-    return worst
+def outside(swept, motion, first, last, count=60):
+    """How far the shape sticks out of what is said that it sweeps [m]."""
+    hull = ConvexShape(swept.points)
+    gaps = [
+        ConvexShape(point[np.newaxis], SHAPE.radius).distance(hull)[0]
+        for t in np.linspace(first, last, count)
+        for point in SHAPE.moved(motion.at(t)).points
+    ]
+    return max(gaps) + 2.0 * SHAPE.radius - swept.radius
 
 
 @pytest.mark.parametrize("kind", ["steady", "line", "path", "round", "swings", "turns"])
 @pytest.mark.parametrize("seed", [0, 1])
 def test_what_is_swept_holds_the_shape_at_all_times(kind, seed):
     motion = motions(seed)[kind]
-    random = np.random.default_rng(seed)
-    for first in random.uniform(0.0, 7.0, 4):
+    for first in np.random.default_rng(seed).uniform(0.0, 7.0, 2):
         for width in (0.0, 0.05, 0.4, 3.0):
             swept = MovingShape(SHAPE, motion, "it").swept(first, first + width)[0]
-            assert outside(swept, SHAPE, motion, first, first + width) <= ROUNDING
+            assert outside(swept, motion, first, first + width) <= ROUNDING
 
 
 def test_a_hull_without_its_bend_is_too_small():
@@ -71,7 +68,7 @@ def test_a_hull_without_its_bend_is_too_small():
     span = motion.span(0.0, 0.4)
     assert span.bend > 0.0
     swept = swept_shape(SHAPE, PoseSpan((span.poses[0], span.poses[-1])))
-    assert outside(swept, SHAPE, motion, 0.0, 0.4) > 1e-3
+    assert outside(swept, motion, 0.0, 0.4) > 1e-3
 
 
 def test_a_line_sweeps_a_hull_that_is_exact():
@@ -81,29 +78,26 @@ def test_a_line_sweeps_a_hull_that_is_exact():
     np.testing.assert_allclose(np.ptp(swept.points, axis=0), [0.7, 0.1, 0.3])
 
 
-def test_when_something_rests():
-    found = {name: motion.settled() for name, motion in motions(0).items()}
-    before, after = (motions(0)["path"].at(found["path"] + by) for by in (0.0, 5.0))
+def test_when_a_motion_rests():
+    path = motions(0)["path"]
+    before, after = (path.at(path.settled() + by) for by in (0.0, 5.0))
     np.testing.assert_allclose(before.GetAsMatrix4(), after.GetAsMatrix4(), atol=1e-12)
-    assert np.isinf(found["steady"])
-    assert np.isinf(found["round"])
+    assert np.isinf(motions(0)["steady"].settled())
+    assert np.isinf(motions(0)["round"].settled())
     assert SteadyBody(RigidTransform(), np.zeros(3), np.zeros(3)).settled() == 0.0
 
 
 @pytest.fixture(scope="module")
 def timed():
     """Cells of a robot among a ball that comes by and a box that turns."""
-    robot = load_robot("acrobot_large")
-    around = interference_bodies(robot, pulleys=True)
+    around = interference_bodies(load_robot("acrobot_large"), pulleys=True)
     size, shape = np.array([0.8, 0.8, 0.4]), (8, 8, 4)
     middle = np.array([0.0, 0.0, 0.4])
     raster = PoseRaster(
         middle - 0.5 * size, size / shape, np.arange(3), np.zeros(6), np.ones(shape, bool)
     )
-    far = 0.6 * size
-    ball = PathBody(PoseTrajectory(
-        (RigidTransform(middle - far), RigidTransform(middle + far)), (4.0,)
-    ))  # fmt: skip
+    ends = (RigidTransform(middle - 0.6 * size), RigidTransform(middle + 0.6 * size))
+    ball = PathBody(PoseTrajectory(ends, (4.0,)))
     spun = JointedBody(
         RigidTransform(middle + np.array([0.3 * size[0], 0, 0])), middle, [0, 0, 1.0], rate=0.8,
         amplitude=0.0, period=1.0,
@@ -115,40 +109,33 @@ def timed():
     return raster, around, things, clear_cells(raster, around, things, 0.01, 6.0, 16)
 
 
-def clearances_in_cells(raster, around, things, cells, which, seed=0, count=3000):
-    random = np.random.default_rng(seed)
-    chosen = np.argwhere(which)
-    assert len(chosen)
+def gaps_in(timed, cells, which, count=2000):
+    """Exact clearances of the timed poses in some of the cells [m]."""
+    raster, around, things, _ = timed
+    random, chosen = np.random.default_rng(0), np.argwhere(which)
     picked = chosen[random.integers(len(chosen), size=count)]
     place = raster.lower + raster.width * (picked[:, :3] + random.uniform(0, 1, (count, 3)))
     times = cells.step * (picked[:, 3] + random.uniform(0, 1, count))
-    R = np.repeat(np.eye(3)[np.newaxis, np.newaxis], count, axis=0)
+    R = np.tile(np.eye(3), (count, 1, 1, 1))
     return np.min(moving_clearances(around, things, times, place[:, np.newaxis], R), axis=(1, 2))
 
 
 def test_clear_cells_are_clear_by_the_exact_checks(timed):
-    raster, around, things, cells = timed
-    assert 0.05 < np.mean(cells.clear) < 0.95  # something is clear, and something is not
-    gaps = clearances_in_cells(raster, around, things, cells, cells.clear)
-    assert np.all(gaps > 0.01)
-    others = clearances_in_cells(raster, around, things, cells, ~cells.clear)
-    assert np.mean(others <= 0.01) > 0.2  # most of what is not clear is near something
+    cells = timed[-1]
+    assert 0.05 < np.mean(cells.clear) < 0.95
+    assert np.all(gaps_in(timed, cells, cells.clear) > 0.01)
+    assert np.mean(gaps_in(timed, cells, ~cells.clear) <= 0.01) > 0.2  # most are near something
 
 
 def test_cells_that_forget_the_motion_are_not_clear(timed, monkeypatch):
     """The same check is red where obstacles are taken as they are in the middle of an interval."""
-    raster, around, things, _ = timed
-    monkeypatch.setattr(
-        moving_shapes.MovingShape, "swept",
-        lambda self, first, last: self.at(0.5 * (first + last)),
-    )  # fmt: skip
-    wrong = clear_cells(raster, around, things, 0.01, 6.0, 16)
+    monkeypatch.setattr(MovingShape, "swept", lambda self, a, b: self.at(0.5 * (a + b)))
+    wrong = clear_cells(*timed[:3], 0.01, 6.0, 16)
     monkeypatch.undo()
-    gaps = clearances_in_cells(raster, around, things, wrong, wrong.clear)
-    assert np.any(gaps <= 0.01)
+    assert np.any(gaps_in(timed, wrong, wrong.clear) <= 0.01)
 
 
-def test_only_proven_cells_are_clear_and_rasters_are_joined(timed):
+def test_only_cells_of_the_raster_are_clear(timed):
     raster, around, things, cells = timed
     inside = np.zeros_like(raster.inside)
     inside[2:5, 1:3, 2] = True
@@ -156,33 +143,33 @@ def test_only_proven_cells_are_clear_and_rasters_are_joined(timed):
     np.testing.assert_array_equal(some.clear, cells.clear & inside[..., np.newaxis])
 
 
-def test_the_earliest_way_is_that_of_a_search_step_by_step(timed):
-    _, _, _, cells = timed
-    random = np.random.default_rng(1)
-    clear = random.uniform(size=(5, 4, 3, 12)) < 0.7
-    clear[0, 0, 0], clear[4, 3, 2] = True, True
-    toy = replace(cells, clear=clear, step=1.0)
-    way = earliest_way(toy, (0, 0, 0), (4, 3, 2), np.zeros(3))
-    # with moves that take no time: what is reached in each interval, flooded
+def flooded(clear, start, goal):
+    """First interval in which moves that take no time get from start to goal."""
     reached = np.zeros(clear.shape[:3], bool)
-    reached[0, 0, 0] = True
-    arrival = None
+    reached[start] = True
     for k in range(clear.shape[3]):
         reached &= clear[..., k]
-        for _ in range(60):
-            grown = reached.copy()
+        before = None
+        while not np.array_equal(before, reached):
+            before = reached.copy()
             for axis in range(3):
-                for side in (-1, 1):
-                    moved = np.roll(reached, side, axis)
-                    edge = [slice(None)] * 3
-                    edge[axis] = 0 if side == 1 else -1
-                    moved[tuple(edge)] = False
-                    grown |= moved
-            reached = grown & clear[..., k]
-        if reached[4, 3, 2] and arrival is None:
-            arrival = float(k)
-    assert (way is None) == (arrival is None)
+                one, back = [slice(None)] * 3, [slice(None)] * 3
+                one[axis], back[axis] = slice(1, None), slice(None, -1)
+                reached[tuple(one)] |= before[tuple(back)]
+                reached[tuple(back)] |= before[tuple(one)]
+            reached &= clear[..., k]
+        if reached[goal]:
+            return float(k)
+    return None
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_the_earliest_way_is_that_of_a_flood(timed, seed):
+    start, goal = (0, 0, 0), (4, 3, 2)
+    clear = np.random.default_rng(seed).uniform(size=(5, 4, 3, 12)) < 0.7
+    clear[start] = clear[goal] = True
+    way = earliest_way(replace(timed[-1], clear=clear, step=1.0), start, goal, np.zeros(3))
     assert way is not None
-    assert way.times[-1] == arrival
+    assert way.times[-1] == flooded(clear, start, goal)
     for low, high in way.seeds():
         assert np.all(clear[tuple(slice(a, b) for a, b in zip(low, high, strict=True))])
