@@ -352,7 +352,7 @@ def test_autodiff_has_the_values_and_the_derivatives_of_differences(name, sags, 
         values = np.array([x + 0.0 * z[0] for x in [*force, *table.ravel()]])
         np.testing.assert_allclose(ExtractValue(values).ravel(), evaluate(start), atol=ROUNDING)
         for exact, e in zip(ExtractGradient(values).T, np.eye(len(start)), strict=True):
-            expected = slope(lambda t, e=e: evaluate(start + t * e), 1e-7)
+            expected = slope(lambda t, e=e, x=start: evaluate(x + t * e), 1e-7)
             largest = max(1e6, np.max(np.abs(expected)))  # what is left of differences
             assert np.max(np.abs(exact - expected)) < 1e-7 * largest
 
