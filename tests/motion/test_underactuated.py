@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import yaml
 
+from cdpr_drake.analyses.front.workspaces import compute_workspace
 from cdpr_drake.analyses.statics.static_query import static_at_lengths, static_at_pose
 from cdpr_drake.cli.app import main
 from cdpr_drake.geometry.cable_paths import cable_paths
@@ -84,9 +85,8 @@ def test_static_finds_the_pose_of_rest_and_its_frequencies(answer):
 
 
 @pytest.mark.parametrize(
-    ("name", "grid"), [("tripod", "3,3,3"), ("upright_body", "3,1,3"), ("lift", "1,1,3")]
+    ("name", "grid"), [("tripod", (3, 3, 3)), ("upright_body", (3, 1, 3)), ("lift", (1, 1, 3))]
 )
-def test_a_workspace_of_points_and_of_an_upright_plane(answer, tmp_path, name, grid):
-    numbers = answer("workspace", name, "--kind", "static", "--json", "--grid", grid,
-                     "--workers", "1", "--out", str(tmp_path / "made"))  # fmt: skip
-    assert 0.0 < numbers["workspaces"]["static"]["pose_share"] <= 1.0
+def test_a_workspace_of_points_and_of_an_upright_plane(name, grid):
+    report = compute_workspace(small_robot(name), "static", grid).as_dict()
+    assert 0.0 < report["workspaces"]["static"]["pose_share"] <= 1.0
