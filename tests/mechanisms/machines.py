@@ -7,6 +7,7 @@ no damping, weight and pulleys; default positions of a plant are the machine's h
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -31,6 +32,9 @@ STIFFNESS = 1e4
 """E S of all cables [N]: soft, so that accelerations a decimetre from home are of sane size."""
 
 X, Y, Z = np.eye(3)
+
+shipped = cache(load_robot)
+"""Robots that nobody here changes."""
 
 Points = dict[str, list[tuple[Any, Any]]]
 """Points of each cable by its name: (body, p) from its exit point to its anchor point."""
@@ -74,7 +78,7 @@ def _robot_points(robot: Any, body: Any, plant: MultibodyPlant) -> Points:
 
 def acrobot_arm(plant: MultibodyPlant) -> Points:
     """ACROBOT, fully constrained, with a driven arm of two joints below its platform."""
-    in_plant = add_robot(plant, load_robot("acrobot_fully_constrained"))
+    in_plant = add_robot(plant, shipped("acrobot_fully_constrained"))
     plant.AddModelInstance("arm")
     upper = add_body(plant, "upper", 0.35, (0.03, 0.03, 0.16), (0.0, 0.004, -0.08))
     lower = add_body(plant, "lower", 0.25, (0.025, 0.03, 0.14), (0.003, 0.0, -0.07))
@@ -89,7 +93,7 @@ def hanging_arm(plant: MultibodyPlant) -> Points:
     What cables push where they should pull leaves a robot that is fully constrained where it is;
     this one falls.
     """
-    in_plant = add_robot(plant, load_robot("acrobot_large"))
+    in_plant = add_robot(plant, shipped("acrobot_large"))
     plant.AddModelInstance("arm")
     upper = add_body(plant, "upper", 0.35, (0.03, 0.03, 0.16), (0.0, 0.0, -0.08))
     lower = add_body(plant, "lower", 0.25, (0.025, 0.03, 0.14), (0.0, 0.0, -0.07))

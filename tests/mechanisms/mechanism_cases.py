@@ -23,11 +23,10 @@ from cdpr_drake.geometry.cable_routes import CableRoute, CableRoutes
 from cdpr_drake.models.plant_cables import PlantCables
 from cdpr_drake.models.plant_rest import hang, moved
 from cdpr_drake.models.robot_in_plant import add_robot
-from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.robots.assembly import add_cable_robot
 from cdpr_drake.systems.robots.route_assembly import add_cables
 from cdpr_drake.systems.robots.settings import CableSettings
-from tests.mechanisms.machines import MACHINES, STANDING, STIFFNESS
+from tests.mechanisms.machines import MACHINES, STANDING, STIFFNESS, shipped
 
 METHODS = ("joints", "bodies")
 PULLEYS = {"pulley_radius": 0.02, "anchor_pulley_radius": 0.015}
@@ -203,7 +202,7 @@ def robot_with_arm():
     """A robot in blocks of its own whose platform carries a hanging arm of 1 kg."""
     builder = DiagramBuilder()
     plant = builder.AddSystem(MultibodyPlant(0.0))
-    in_plant = add_robot(plant, load_robot("acrobot_fully_constrained"))
+    in_plant = add_robot(plant, shipped("acrobot_fully_constrained"))
     inertia = SpatialInertia.SolidBoxWithMass(1.0, 0.02, 0.03, 0.3).Shift([0.0, 0.0, 0.15])
     arm = plant.AddRigidBody("arm", plant.AddModelInstance("arm"), inertia)
     offset = RigidTransform([0.02, 0.0, -0.05])

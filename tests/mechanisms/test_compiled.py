@@ -1,6 +1,7 @@
 """The compiled engine goes the way of the plant; cables between bodies go that of one platform."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -150,10 +151,17 @@ MODELS = {
 }
 
 
+@cache
+def undamped(name):
+    """A robot without damping of its platform, as cables between bodies have no robot's file."""
+    robot = load_robot(name)
+    robot.damping = PlatformDamping()
+    return robot
+
+
 def way_of(name, settings, as_routes):
     """States of plant and winches, and tensions, from a moving start, by either kind of block."""
-    robot, builder = load_robot(name), DiagramBuilder()
-    robot.damping = PlatformDamping()  # cables between bodies have no robot's file
+    robot, builder = undamped(name), DiagramBuilder()
     # E S of 10 kN: at a step of 1 ms the integrator does not hold the cables of the files.
     settings = replace(settings, stiffness_ratio=1e4 / np.max(robot.stiffness()))
     plant = builder.AddNamedSystem("plant", MultibodyPlant(0.0))

@@ -93,7 +93,7 @@ def tracking_error(name, limits, rate):
     diagram = builder.Build()
     context, error = diagram.CreateDefaultContext(), 0.0
     own, of_share = plant.GetMyContextFromRoot(context), share.GetMyContextFromRoot(context)
-    for time in np.linspace(0.0, 1.0, 51)[1:]:
+    for time in np.linspace(0.0, 1.0, 21)[1:]:
         advance(diagram, context, time, 1.0 / rate)
         tensions = share.GetOutputPort("tensions").Eval(of_share)
         assert limits[0] <= np.min(tensions) <= np.max(tensions) <= limits[1]

@@ -16,7 +16,6 @@ from cdpr_drake.geometry.cable_routes import CableRoute, CableRoutes
 from cdpr_drake.models.plant_cables import PlantCables
 from cdpr_drake.models.plant_rest import hang
 from cdpr_drake.models.robot_in_plant import add_robot, carried_bodies
-from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.controllers.correction_laws import ConstantThreshold
 from cdpr_drake.systems.controllers.tension_corrector import TensionCorrector
 from cdpr_drake.systems.monitoring.tension_watch import BreakingLoadWatch
@@ -24,6 +23,7 @@ from cdpr_drake.systems.robots.assembly import add_cable_robot, apply_force
 from cdpr_drake.systems.robots.motor_winch import MotorWinch
 from cdpr_drake.systems.robots.route_assembly import add_cables
 from cdpr_drake.systems.robots.settings import CableRobotSettings, CableSettings
+from tests.mechanisms.machines import shipped
 from tests.mechanisms.mechanism_cases import (
     METHODS,
     Cabled,
@@ -145,7 +145,7 @@ WAYS = {
 
 def accelerations_of_shared_plant(parts):
     """ACROBOT and a load below it in one plant, by add_cables or as a robot of its own."""
-    robot, builder = load_robot("acrobot_large"), DiagramBuilder()
+    robot, builder = shipped("acrobot_large"), DiagramBuilder()
     plant = builder.AddNamedSystem("plant", MultibodyPlant(0.0))
     in_plant = add_robot(plant, robot)
     inertia = SpatialInertia.SolidBoxWithMass(0.5, 0.1, 0.1, 0.1)
@@ -234,7 +234,7 @@ def masts(winches=None, **ends):
 
 def test_motors_hold_a_machine_that_hangs():
     """From torques that are computed from the tensions, to rounding, and only friction damps."""
-    law = load_robot("acrobot_small").winch_law()
+    law = shipped("acrobot_small").winch_law()
     builder, it, blocks, rest = masts(lambda home: MotorWinch(law, "velocity", home))
     zero = builder.AddSystem(ConstantVectorSource(np.zeros(8)))
     builder.Connect(zero.get_output_port(), blocks.GetInputPort("cable_velocities"))
