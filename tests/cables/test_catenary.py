@@ -7,12 +7,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad, solve_ivp
 
 from cdpr_drake.cables.catenary_kernel import free_part, sag_of, stored_energy, stretched_length
-from cdpr_drake.cables.hanging_kernel import (
-    SENSITIVITIES,
-    equations,
-    sagging_cable,
-    solve_catenary,
-)
+from cdpr_drake.cables.hanging_kernel import SENSITIVITIES, equations, sagging_cable, solve_catenary
 from cdpr_drake.geometry.pulley_kernel import tangent
 
 STIFFNESS = 1e6

@@ -21,13 +21,7 @@ from cdpr_drake.systems.robots.tension_driven_routes import TensionDrivenRoutes
 from cdpr_drake.tensions.methods import distribute
 from cdpr_drake.tensions.problem import TensionStatus
 from tests.mechanisms.machines import STANDING
-from tests.mechanisms.mechanism_cases import (
-    DrivenBases,
-    advance,
-    alone,
-    cables_of,
-    machine,
-)
+from tests.mechanisms.mechanism_cases import DrivenBases, advance, alone, cables_of, machine
 
 LIMITS = {"human_arm": (5.0, 400.0)}  # [N]; (1, 300) of all others
 CONTROLLED = tuple(name for name in STANDING if name != "hanging_arm")  # a passive arm is not
