@@ -1,3 +1,1 @@
 """Tests of `cdpr_drake.geometry`."""
-
-"""Tests of `cdpr_drake.geometry`."""

@@ -1,8 +1,5 @@
 """Signed distances of convex shapes against programs, Drake's queries and Qhull."""
 
-import inspect
-import re
-
 import numpy as np
 import pytest
 from pydrake.geometry import (
@@ -19,10 +16,8 @@ from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.solvers import ClarabelSolver, MathematicalProgram
 from scipy.spatial import ConvexHull
 
-from cdpr_drake.errors import CableGeometryError
-from cdpr_drake.geometry import convex_distance_kernel
 from cdpr_drake.geometry.convex_distance_kernel import convex_distance, convex_work
-from cdpr_drake.geometry.convex_shapes import ConvexShape, mesh_vertices, packed
+from cdpr_drake.geometry.convex_shapes import ConvexShape, packed
 from cdpr_drake.workspaces.cable_distance_kernel import (
     boxes_distance,
     segment_box_distance,
@@ -44,20 +39,16 @@ DRAKE_DIGITS = 1e-5
 """FCL, by which Drake finds distances of boxes from each other, stops at 1e-6 relative [m]."""
 
 
-def found(P, Q, function=convex_distance):
-    p, q, n = np.empty(3), np.empty(3), np.empty(3)
-    d = function(P, Q, p, q, n, convex_work(len(P), len(Q)))
-    return d, p, q, n
-
-
-def check(P, Q, function=convex_distance):
+def check(P, Q):
     """All that the kernel promises of itself; returns the distance."""
-    d, p, q, n = found(P, Q, function)
-    assert np.linalg.norm(n) == pytest.approx(1.0, abs=DIGITS)
-    assert np.min(P @ n) - np.max(Q @ n) == pytest.approx(d, abs=DIGITS)
-    assert p - q == pytest.approx(d * n, abs=DIGITS)
-    for points, point in ((P, p), (Q, q)):
-        assert np.max(points @ n) + DIGITS >= point @ n >= np.min(points @ n) - DIGITS
+    p, q, n = np.empty(3), np.empty(3), np.empty(3)
+    d = convex_distance(P, Q, p, q, n, convex_work(len(P), len(Q)))
+    along_P, along_Q = P @ n, Q @ n
+    assert abs(np.linalg.norm(n) - 1.0) < DIGITS
+    assert abs(np.min(along_P) - np.max(along_Q) - d) < DIGITS
+    assert np.max(np.abs(p - q - d * n)) < DIGITS
+    assert np.min(along_P) - DIGITS <= p @ n <= np.max(along_P) + DIGITS
+    assert np.min(along_Q) - DIGITS <= q @ n <= np.max(along_Q) + DIGITS
     return d
 
 
@@ -90,54 +81,25 @@ def random_hulls(random, count):
 
 def test_distances_are_those_of_a_program():
     apart = 0
-    for P, Q in random_hulls(np.random.default_rng(0), 500):
-        d = check(P, Q)
+    for P, Q in random_hulls(np.random.default_rng(0), 200):
+        d, expected = check(P, Q), program_distance(P, Q)
         apart += d > 0.0
-        assert max(d, 0.0) == pytest.approx(program_distance(P, Q), abs=TOUCHING_DIGITS)
-        if d > 0.01:
-            assert d == pytest.approx(program_distance(P, Q), abs=PROGRAM_DIGITS)
-    assert 100 < apart < 400
+        assert abs(max(d, 0.0) - expected) < TOUCHING_DIGITS
+        assert d < 0.01 or abs(d - expected) < PROGRAM_DIGITS
+    assert 40 < apart < 160
 
 
-def check_depths(function, count):
+def test_depths_are_those_of_the_hull_of_all_differences():
     deep = 0
-    for P, Q in random_hulls(np.random.default_rng(1), count):
+    for P, Q in random_hulls(np.random.default_rng(1), 600):
         w = (P[:, np.newaxis] - Q).reshape(-1, 3)
         if np.linalg.matrix_rank(w - w[0], tol=1e-9) < 3:
             continue
         place = np.max(ConvexHull(w).equations[:, 3])  # of the origin, below 0 inside
         if place < 0.0:
             deep += 1
-            assert check(P, Q, function) == pytest.approx(place, abs=DIGITS)
-    assert deep > count // 10
-
-
-def test_depths_are_those_of_the_hull_of_all_differences():
-    check_depths(convex_distance, 2000)
-
-
-@pytest.mark.parametrize(
-    ("old", "new"),
-    [
-        ("if work[row, 6] < depth:", "if work[row, 6] > -1.0 and depth == np.inf:"),
-        ("SAME_PLANE = 1e-12", "SAME_PLANE = -1.0"),
-        ("if _side(work, i, j, k, skipped) > 0.0:", "if skipped == 0:"),
-    ],
-)
-def test_mutants_of_the_kernel_are_found(old, new):
-    source = inspect.getsource(convex_distance_kernel)
-    assert old in source
-    names = {"__name__": "mutant"}
-    exec(re.sub(r"@njit\(.*\)\n", "", source.replace(old, new)), names)
-
-    def try_it():
-        check_depths(names["convex_distance"], 400)
-        for P, Q in random_hulls(np.random.default_rng(0), 300):
-            d = check(P, Q, names["convex_distance"])
-            assert d == pytest.approx(check(P, Q), abs=DIGITS)
-
-    with pytest.raises((AssertionError, ZeroDivisionError)):
-        try_it()
+            assert abs(check(P, Q) - place) < DIGITS
+    assert deep > 60
 
 
 def drake_distance(one, other, X, Y):
@@ -167,39 +129,34 @@ def ours(shape):
 
 
 def test_shapes_are_as_far_apart_as_drake_says():
-    random = np.random.default_rng(2)
+    random, overlapping = np.random.default_rng(2), 0
     shapes = [Box(0.4, 0.3, 0.2), Box(1.0, 0.1, 0.1), Sphere(0.2), Capsule(0.1, 0.5)]
-    overlapping = 0
-    for number in range(400):
+    for number in range(150):
         a, b = (shapes[k] for k in random.integers(0, len(shapes), 2))
-        X, Y = (
-            RigidTransform(
-                RotationMatrix.MakeFromOneVector(random.normal(size=3), 2),
-                random.normal(size=3) * (0.15 if number % 2 else 0.6),
-            )
-            for _ in range(2)
-        )
+        turns = [RotationMatrix.MakeFromOneVector(random.normal(size=3), 2) for _ in range(2)]
+        places = random.normal(size=(2, 3)) * (0.15 if number % 2 else 0.6)
+        X, Y = (RigidTransform(R, place) for R, place in zip(turns, places, strict=True))
         d, p, q, n = ours(a).moved(X).distance(ours(b).moved(Y))
         overlapping += d < 0.0
-        assert p - q == pytest.approx(d * n, abs=DIGITS)
-        assert d == pytest.approx(drake_distance(a, b, X, Y), abs=DRAKE_DIGITS)
-    assert overlapping > 60
+        assert np.max(np.abs(p - q - d * n)) < DIGITS
+        assert abs(d - drake_distance(a, b, X, Y)) < DRAKE_DIGITS
+    assert overlapping > 25
 
 
 def test_boxes_and_segments_are_as_far_apart_as_the_kernels_of_cables_say():
     random = np.random.default_rng(3)
-    for _ in range(500):
+    for _ in range(200):
         turns = [np.linalg.qr(random.normal(size=(3, 3)))[0] for _ in range(2)]
         rows = [box_row(random.normal(size=3), random.uniform(0.0, 1.0, 3), turn) for turn in turns]
         P, Q = (ConvexShape.box(row).points for row in rows)
-        d = check(P, Q)
-        assert max(d, 0.0) == pytest.approx(boxes_distance(*rows, np.empty((2, 3))), abs=DIGITS)
-        cable, other = random.normal(size=(2, 2, 3))
-        d = check(cable, Q)
-        assert max(d, 0.0) == pytest.approx(segment_box_distance(*cable, rows[1]), abs=DIGITS)
-    for _ in range(20_000):  # their difference is flat: no corner may be taken for a fourth
-        cable, other = random.normal(size=(2, 2, 3))
-        assert check(cable, other) == pytest.approx(segments_distance(*cable, *other), abs=DIGITS)
+        cable = random.normal(size=(2, 3))
+        expected = boxes_distance(*rows, np.empty((2, 3))), segment_box_distance(*cable, rows[1])
+        assert abs(max(check(P, Q), 0.0) - expected[0]) < DIGITS
+        assert abs(max(check(cable, Q), 0.0) - expected[1]) < DIGITS
+    for _ in range(5000):  # their difference is flat: no corner may be taken for a fourth
+        segments = random.normal(size=(4, 3))
+        d = check(segments[:2], segments[2:])
+        assert abs(d - segments_distance(*segments)) < DIGITS
 
 
 CUBE = ConvexShape.box_at(np.zeros(3), np.ones(3)).points
@@ -235,14 +192,12 @@ def test_degenerate_hulls(P, Q, distance):
 
 def test_hulls_of_many_points():
     random = np.random.default_rng(4)
-    ball = ConvexShape.mesh((lambda x: x / np.linalg.norm(x, axis=1, keepdims=True))(
-        random.normal(size=(400, 3))
-    ))  # fmt: skip
+    directions = random.normal(size=(400, 3))
+    ball = ConvexShape.mesh(directions / np.linalg.norm(directions, axis=1, keepdims=True))
     assert check(ball.points, ball.points + 3.0 * X) == pytest.approx(1.0, abs=0.05)
     d = check(ball.points, ball.points + 1.5 * X)
     w = (ball.points[:, np.newaxis] - ball.points - 1.5 * X).reshape(-1, 3)
-    hull = ConvexHull(w)
-    assert d == pytest.approx(np.max(hull.equations[:, 3]), abs=DIGITS)
+    assert d == pytest.approx(np.max(ConvexHull(w).equations[:, 3]), abs=DIGITS)
 
 
 def test_shapes_keep_the_corners_of_a_hull_and_move():
@@ -259,27 +214,3 @@ def test_shapes_keep_the_corners_of_a_hull_and_move():
     assert starts.tolist() == [0, 8, 9]
     assert radii.tolist() == [0.1, 0.5]
     assert [array.shape for array in packed([])] == [(0, 3), (1,), (0,)]
-
-
-def test_what_is_no_shape_is_refused_by_name(tmp_path):
-    with pytest.raises(CableGeometryError, match="plate: found 4 vertices in one plane"):
-        ConvexShape.mesh(np.array([X, Y, -X, -Y]), name="plate")
-    with pytest.raises(CableGeometryError, match="plate: found 3 vertices in one plane"):
-        ConvexShape.mesh(np.array([X, Y, -X]), name="plate")
-    with pytest.raises(CableGeometryError, match=r"ball: found radius -1; accepted: >= 0 \[m\]"):
-        ConvexShape.sphere(X, -1.0, "ball")
-    with pytest.raises(CableGeometryError, match=r"shape: found points of shape \(0, 3\)"):
-        ConvexShape(np.zeros((0, 3)))
-    with pytest.raises(CableGeometryError, match="not finite"):
-        ConvexShape(np.array([[np.nan, 0.0, 0.0]]))
-    with pytest.raises(CableGeometryError, match=r"box: found shape \(3,\); accepted: \(15,\)"):
-        ConvexShape.box(X)
-    path = tmp_path / "a.obj"
-    path.write_text("v 0 0 0\nv 1 0 zero\n")
-    with pytest.raises(CableGeometryError, match="line 2: found 'v 1 0 zero'"):
-        mesh_vertices(path)
-    path.write_text("f 1 2 3\n")
-    with pytest.raises(CableGeometryError, match="found no vertices"):
-        mesh_vertices(path)
-    with pytest.raises(CableGeometryError, match="there is no such mesh"):
-        mesh_vertices(tmp_path / "b.obj")

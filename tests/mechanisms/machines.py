@@ -1,14 +1,13 @@
-"""Machines on cables between any bodies: builders of their plants and routes.
+"""Machines on cables between any bodies: plants with points of cables, plausible numbers.
 
-Numbers are chosen for these tests, and plausible. All bodies have mass and three moments of
-inertia, so that engines other than Drake take them too. Cables have no damping, no weight and no
-pulleys; `with_ends` gives them some. Default positions of a plant are the machine's home.
+All bodies have mass and three moments of inertia, so that other engines take them too. Cables have
+no damping, weight and pulleys; default positions of a plant are the machine's home.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -25,78 +24,17 @@ from pydrake.multibody.tree import (
     UniversalJoint,
     WeldJoint,
 )
-from pydrake.systems.framework import Context, DiagramBuilder
 
-from cdpr_drake.geometry.cable_routes import CableRoute, CableRoutes
 from cdpr_drake.models.robot_in_plant import add_robot
 from cdpr_drake.models.robot_loader import load_robot
 
 STIFFNESS = 1e4
-"""E S of all cables [N]: soft, so that states a decimetre from home give accelerations of sane
-size, whose rounding does not hide what is compared."""
+"""E S of all cables [N]: soft, so that accelerations a decimetre from home are of sane size."""
 
 X, Y, Z = np.eye(3)
 
-
-@dataclass(frozen=True, eq=False)
-class Machine:
-    """A machine in a finalized plant.
-
-    Attributes:
-        name: A key of `MACHINES`.
-        plant: The plant; its default positions are the machine's home.
-        routes: Its cables, of the plant; undamped, without weight and pulleys.
-        motors: Names of the joints with actuators.
-        builder: The builder that has the plant, where one was given.
-    """
-
-    name: str
-    plant: MultibodyPlant
-    routes: CableRoutes
-    motors: tuple[str, ...]
-    builder: DiagramBuilder | None
-
-    def set_home(self, context: Context) -> None:
-        """Puts the plant at home, without velocities; context: the plant's."""
-        self.plant.SetPositions(context, self.plant.GetPositions(self.home()))
-        self.plant.SetVelocities(context, np.zeros(self.plant.num_velocities()))
-
-    def home(self) -> Context:
-        """A context of the plant alone, at home."""
-        return self.plant.CreateDefaultContext()
-
-    def with_ends(self, **values: Any) -> CableRoutes:
-        """The cables with other constants, one number for all or an array each."""
-        m = self.routes.count
-        full = {
-            key: np.array(v, float) if np.ndim(v) else np.full(m, float(v))
-            for key, v in values.items()
-        }
-        return self.routes.with_cables(replace(self.routes.ends, **full))
-
-
-def machine(name: str, builder: DiagramBuilder | None = None, time_step: float = 0.0) -> Machine:
-    """A machine by its name in `MACHINES`, in a plant of its own or in one of the builder.
-
-    Args:
-        name: A key of `MACHINES`.
-        builder: Where the plant is added; None: it stands alone.
-        time_step: Of a discrete plant [s]; 0: continuous.
-    """
-    plant = MultibodyPlant(time_step)
-    if builder is not None:
-        plant = builder.AddNamedSystem("plant", plant)
-    points = MACHINES[name](plant)
-    plant.Finalize()
-    routes = CableRoutes.of(
-        plant,
-        [CableRoute(points=p, stiffness=STIFFNESS, name=key) for key, p in points.items()],
-    )
-    motors = tuple(
-        plant.get_joint_actuator(i).joint().name() for i in plant.GetJointActuatorIndices()
-    )
-    return Machine(name, plant, routes, motors, builder)
-
+shipped = cache(load_robot)
+"""Robots that nobody here changes."""
 
 Points = dict[str, list[tuple[Any, Any]]]
 """Points of each cable by its name: (body, p) from its exit point to its anchor point."""
@@ -140,7 +78,7 @@ def _robot_points(robot: Any, body: Any, plant: MultibodyPlant) -> Points:
 
 def acrobot_arm(plant: MultibodyPlant) -> Points:
     """ACROBOT, fully constrained, with a driven arm of two joints below its platform."""
-    in_plant = add_robot(plant, load_robot("acrobot_fully_constrained"))
+    in_plant = add_robot(plant, shipped("acrobot_fully_constrained"))
     plant.AddModelInstance("arm")
     upper = add_body(plant, "upper", 0.35, (0.03, 0.03, 0.16), (0.0, 0.004, -0.08))
     lower = add_body(plant, "lower", 0.25, (0.025, 0.03, 0.14), (0.003, 0.0, -0.07))
@@ -155,7 +93,7 @@ def hanging_arm(plant: MultibodyPlant) -> Points:
     What cables push where they should pull leaves a robot that is fully constrained where it is;
     this one falls.
     """
-    in_plant = add_robot(plant, load_robot("acrobot_large"))
+    in_plant = add_robot(plant, shipped("acrobot_large"))
     plant.AddModelInstance("arm")
     upper = add_body(plant, "upper", 0.35, (0.03, 0.03, 0.16), (0.0, 0.0, -0.08))
     lower = add_body(plant, "lower", 0.25, (0.025, 0.03, 0.14), (0.0, 0.0, -0.07))
@@ -201,11 +139,7 @@ def human_arm(plant: MultibodyPlant) -> Points:
         "back": [(W, (-0.35, -0.08, 1.35)), (upper, (-0.05, 0.06, -0.2))],
         "left": [(W, (0.05, 0.4, 1.4)), (upper, (-0.05, 0.05, -0.18))],
         "right": [(W, (-0.05, -0.4, 1.35)), (upper, (-0.04, -0.06, -0.22))],
-        "biceps": [
-            (W, (0.12, 0.0, 1.42)),
-            (upper, (0.06, 0.0, -0.05)),
-            (fore, (0.04, 0.0, -0.09)),
-        ],
+        "biceps": [(W, (0.12, 0.0, 1.42)), (upper, (0.06, 0.0, -0.05)), (fore, (0.04, 0.0, -0.09))],
         "triceps": [(upper, (-0.06, 0.0, -0.1)), (fore, (-0.08, 0.0, 0.03))],
     }
 
@@ -349,4 +283,3 @@ MACHINES: dict[str, Callable[[MultibodyPlant], Points]] = {
 """Machines by name; all but the zoo stand at home on tensions above 0."""
 
 STANDING = tuple(name for name in MACHINES if name != "zoo")
-"""Machines that stand at home."""

@@ -1,4 +1,4 @@
-"""Cables between bodies beside other blocks: discrete plants, contact, robots in one plant."""
+"""Machines at rest stay; discrete plants, contact, robots, motors and watches share one diagram."""
 
 import numpy as np
 import pytest
@@ -6,221 +6,60 @@ from pydrake.common import RandomGenerator
 from pydrake.geometry import Box, HalfSpace
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, CoulombFriction, MultibodyPlant
-from pydrake.multibody.tree import ScrewJoint, SpatialInertia
-from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
+from pydrake.multibody.tree import SpatialInertia
+from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
 
+from cdpr_drake.errors import InfeasibleTensionError
 from cdpr_drake.geometry.cable_routes import CableRoute, CableRoutes
 from cdpr_drake.models.plant_cables import PlantCables
 from cdpr_drake.models.plant_rest import hang
-from cdpr_drake.models.robot_in_plant import add_robot
-from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.systems.robots.assembly import add_cable_robot
+from cdpr_drake.models.robot_in_plant import add_robot, carried_bodies
+from cdpr_drake.systems.controllers.correction_laws import ConstantThreshold
+from cdpr_drake.systems.controllers.tension_corrector import TensionCorrector
+from cdpr_drake.systems.monitoring.tension_watch import BreakingLoadWatch
+from cdpr_drake.systems.robots.assembly import add_cable_robot, apply_force
+from cdpr_drake.systems.robots.motor_winch import MotorWinch
 from cdpr_drake.systems.robots.route_assembly import add_cables
 from cdpr_drake.systems.robots.settings import CableRobotSettings, CableSettings
-from tests.mechanisms.cabled import METHODS, Cabled
-from tests.mechanisms.machines import machine
+from tests.mechanisms.machines import shipped
+from tests.mechanisms.mechanism_cases import (
+    METHODS,
+    Cabled,
+    DrivenBases,
+    advance,
+    machine,
+    rest_of,
+    robot_with_arm,
+    screw_plant,
+)
 
-AT_REST = 1e-9
-"""How far a machine moves in 0.1 s that starts at rest [m, rad]; found 3e-15."""
-
-SAME = 1e-12
-"""Share by which forces differ whose parts are added in another order; found 1e-16."""
-
+AT_REST = 1e-9  # motion in 0.1 s from rest [m, rad]; found 3e-15
+SAME = 1e-12  # share by which forces differ that are added in another order; found 1e-16
 DRIFT = 1e-4
-"""By which a discrete plant of 1 ms is off a continuous one after 50 ms, from a push of 0.1 m/s
-[m, rad]: its integrator is of first order. Found 1.3e-5, and 3e-6 at half
-the step."""
+"""By which a discrete plant of 1 ms is off after 50 ms from a push of 0.1 m/s [m, rad]: its
+integrator is of first order. Found 1.3e-5, and 3e-6 at half the step."""
+
+steps = pytest.mark.parametrize("time_step", [0.0, 1e-3], ids=["continuous", "discrete"])
 
 
 @pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("time_step", [0.0, 1e-3], ids=["continuous", "discrete"])
+@steps
 @pytest.mark.parametrize("name", ["acrobot_arm", "two_platforms", "mobile_masts"])
 def test_a_machine_at_rest_stays_there(name, method, time_step):
     """Motors hold what `hang` says that they must; bases would roll inward without."""
     cabled = Cabled(name, method, time_step=time_step, ends={"retardation": 1e-3})
     rest = cabled.ports.hang(cabled.context, lower=1.0, upper=60.0)
-    if cabled.plant.num_actuators():
-        assert np.max(np.abs(rest.held)) > 0.1
-        cabled.set_motors(cabled.plant.MakeActuationMatrix().T @ rest.held)
-    simulator = Simulator(cabled.diagram, cabled.context)
-    ResetIntegratorFromFlags(simulator, "runge_kutta3", 1e-3).set_fixed_step_mode(True)
-    simulator.AdvanceTo(0.1)
-    q = cabled.plant.GetPositions(cabled.plant_context)
-    assert np.max(np.abs(q - rest.positions)) < AT_REST
-
-
-def pushed(time_step, method="joints"):
-    cabled = Cabled("hanging_arm", method, time_step=time_step)
-    rest = cabled.ports.hang(cabled.context, lower=1.0, upper=60.0)
-    nv = cabled.plant.num_velocities()
-    cabled.set_state(rest.positions, 0.1 * np.cos(np.arange(nv)))
-    simulator = Simulator(cabled.diagram, cabled.context)
-    ResetIntegratorFromFlags(simulator, "runge_kutta3", 1e-3).set_fixed_step_mode(True)
-    simulator.AdvanceTo(0.05)
-    return cabled.plant.GetPositions(cabled.plant_context)
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_a_discrete_plant_moves_as_a_continuous_one(method):
-    exact, coarse, fine = (pushed(step, method) for step in (0.0, 1e-3, 0.5e-3))
-    assert 0.0 < np.max(np.abs(coarse - exact)) < DRIFT
-    assert np.max(np.abs(fine - exact)) < 0.7 * np.max(np.abs(coarse - exact))
-
-
-@pytest.mark.parametrize("time_step", [0.0, 1e-3], ids=["continuous", "discrete"])
-def test_a_box_is_let_down_on_the_ground(time_step):
-    """Its cables go slack there, and the ground carries it."""
-    builder = DiagramBuilder()
-    plant, _ = AddMultibodyPlantSceneGraph(builder, time_step)
-    plant.set_penetration_allowance(1e-4)
-    box = plant.AddRigidBody("box", SpatialInertia.SolidBoxWithMass(2.0, 0.3, 0.3, 0.2))
-    friction = CoulombFriction(0.8, 0.8)
-    for body, shape in ((box, Box(0.3, 0.3, 0.2)), (plant.world_body(), HalfSpace())):
-        plant.RegisterCollisionGeometry(body, RigidTransform(), shape, "shape", friction)
-    plant.SetDefaultFloatingBaseBodyPose(box, RigidTransform([0.0, 0.0, 0.12]))
-    plant.Finalize()
-    routes = CableRoutes.of(
-        plant,
-        [
-            CableRoute(
-                points=[(plant.world_body(), (3 * x, 3 * y, 1.0)), (box, (x, y, 0.1))],
-                stiffness=5e3, retardation=5e-3,
-            )
-            for x in (-0.15, 0.15) for y in (-0.15, 0.15)
-        ],
-    )  # fmt: skip
-    ports = add_cables(builder, plant, routes)
-    builder.ExportInput(ports.GetInputPort("cable_velocities"), "cable_velocities")
-    diagram = builder.Build()
-    context = diagram.CreateDefaultContext()
-    ports.hang(context)
-    diagram.GetInputPort("cable_velocities").FixValue(context, np.full(4, 0.1))
-    simulator = Simulator(diagram, context)
-    ResetIntegratorFromFlags(simulator, "runge_kutta3", 2e-4).set_fixed_step_mode(True)
-    simulator.AdvanceTo(0.4)
-    z = plant.GetPositions(plant.GetMyContextFromRoot(context))[6]
-    assert abs(z - 0.1) < 1e-3
-    slack = ports.GetOutputPort("slack").Eval(diagram.GetSubsystemContext(ports.forces, context))
-    assert np.all(slack == 1.0)
-
-
-def shared_plant(parts):
-    """ACROBOT and a load below it in one plant, by add_cables or as a robot of its own."""
-    robot, builder = load_robot("acrobot_large"), DiagramBuilder()
-    plant = builder.AddNamedSystem("plant", MultibodyPlant(0.0))
-    in_plant = add_robot(plant, robot)
-    inertia = SpatialInertia.SolidBoxWithMass(0.5, 0.1, 0.1, 0.1)
-    load = plant.AddRigidBody("load", plant.AddModelInstance("load"), inertia)
-    plant.SetDefaultFloatingBaseBodyPose(load, RigidTransform([0.0, 0.0, -0.3]))
-    plant.Finalize()
-    routes = {
-        "robot": CableRoutes.of_cable_set(robot.cable_set(), int(in_plant.body_index)),
-        "load": CableRoutes.of(
-            plant,
-            [
-                CableRoute(points=[(in_plant.body, (x, y, -0.035)), (load, (0.0, 0.0, 0.05))],
-                           stiffness=5e3)
-                for x, y in ((0.08, 0.0), (-0.08, 0.07), (-0.08, -0.07))
-            ],
-        ),
-    }  # fmt: skip
-    settings = CableSettings(pulleys=True, stiffness_ratio=0.03)
-    blocks = []
-    for k, (part, method) in enumerate(parts):
-        if part == "robot" and method == "robot":
-            made = add_cable_robot(
-                builder, in_plant, CableRobotSettings(cables=settings), name=f"part_{k}"
-            )
-        else:
-            made = add_cables(
-                builder, plant, routes[part], settings, method=method, name=f"part_{k}"
-            )
-        m = routes[part].count
-        builder.ExportInput(made.GetInputPort("cable_velocities"), f"velocities_{k}")
-        blocks.append((made, m))
-    diagram = builder.Build()
-    context = diagram.CreateDefaultContext()
-    for k, (made, m) in enumerate(blocks):
-        diagram.GetInputPort(f"velocities_{k}").FixValue(context, np.zeros(m))
-        at = diagram.GetSubsystemContext(made.forces, context)
-        lengths = made.GetOutputPort("lengths").Eval(at)
-        winches = made.winches.GetMyMutableContextFromRoot(context)
-        made.winches.hold(winches, 0.99 * lengths, np.zeros(m))
-    plant_context = plant.GetMyMutableContextFromRoot(context)
-    plant.SetVelocities(plant_context, 0.1 * np.cos(np.arange(plant.num_velocities())))
-    return plant, diagram, context
-
-
-WAYS = {
-    "robot, then cables": [("robot", "robot"), ("load", "joints")],
-    "cables, then robot": [("load", "joints"), ("robot", "robot")],
-    "twice cables": [("robot", "joints"), ("load", "joints")],
-    "both on bodies": [("robot", "bodies"), ("load", "bodies")],
-    "one on bodies": [("robot", "joints"), ("load", "bodies")],
-}
-
-
-def test_robots_and_cables_share_a_plant():
-    """Whoever adds them, forces add up; and it runs."""
-    found = []
-    for parts in WAYS.values():
-        plant, diagram, context = shared_plant(parts)
-        port = plant.get_generalized_acceleration_output_port()
-        found.append(np.array(port.Eval(plant.GetMyContextFromRoot(context))))
-        simulator = Simulator(diagram, context)
-        ResetIntegratorFromFlags(simulator, "runge_kutta3", 2e-4).set_fixed_step_mode(True)
-        simulator.AdvanceTo(0.01)
-    assert np.max(np.abs(found[0])) > 10.0
-    for way, other in zip(WAYS, found, strict=True):
-        assert np.max(np.abs(other - found[0])) < SAME * np.max(np.abs(found[0])), way
-
-
-def screw(method, builder=None):
-    """A nut on a screw that a cable turns, and what add_cables makes of it."""
-    builder = builder or DiagramBuilder()
-    plant = builder.AddSystem(MultibodyPlant(0.0))
-    nut = plant.AddRigidBody("nut", SpatialInertia.SolidBoxWithMass(1.0, 0.2, 0.2, 0.1))
-    plant.AddJoint(ScrewJoint("thread", plant.world_frame(), nut.body_frame(), [0, 0, 1], 0.05, 0))
-    plant.Finalize()
-    routes = CableRoutes.of(
-        plant,
-        [CableRoute(points=[(plant.world_body(), (1.0, 0.5, 0.0)), (nut, (0.1, 0.0, 0.0))],
-                    stiffness=1e3)],
-    )  # fmt: skip
-    return builder, plant, add_cables(builder, plant, routes, method=method)
-
-
-def test_joints_that_are_not_compiled_take_forces_on_bodies_and_say_so():
-    builder, plant, ports = screw("automatic")
-    assert ports.method == "bodies"
-    assert "joint thread: found a ScrewJoint" in ports.why
-    builder.ExportInput(ports.GetInputPort("cable_velocities"), "cable_velocities")
-    diagram = builder.Build()
-    context = diagram.CreateDefaultContext()
-    diagram.GetInputPort("cable_velocities").FixValue(context, np.zeros(1))
-    winches = ports.winches.GetMyMutableContextFromRoot(context)
-    ports.winches.hold(winches, [0.9], [0.0])
-    plant_context = plant.GetMyContextFromRoot(context)
-    force = ports.cables().generalized_force(plant_context, np.array([0.9]))
-    assert abs(force[0]) > 1.0
-    acceleration = plant.get_generalized_acceleration_output_port().Eval(plant_context)
-    M = plant.CalcMassMatrix(plant_context)
-    weight = plant.CalcGravityGeneralizedForces(plant_context)
-    assert abs(M[0, 0] * acceleration[0] - force[0] - weight[0]) < SAME * abs(force[0])
-
-
-def test_bodies_asked_for_need_no_reason():
-    assert Cabled("hanging_arm", "bodies").ports.why == ""
-    assert Cabled("hanging_arm", "automatic").ports.method == "joints"
+    cabled.set_motors(rest.held)
+    assert not cabled.plant.num_actuators() or np.max(np.abs(rest.held)) > 0.1
+    cabled.advance(0.1)
+    np.testing.assert_allclose(cabled.positions(), rest.positions, rtol=0, atol=AT_REST)
 
 
 @pytest.mark.parametrize("name", ["two_platforms", "acrobot_arm"])
 def test_a_rest_that_is_given_is_that_of_default_and_random_contexts(name):
-    it = machine(name)
-    rest = hang(PlantCables(it.plant, it.routes), it.home(), lower=1.0, upper=60.0)
-    builder = DiagramBuilder()
+    builder, rest = DiagramBuilder(), rest_of(name)
     it = machine(name, builder)
     ports = add_cables(builder, it.plant, it.routes, rest=rest)
     still = builder.AddSystem(ConstantVectorSource(np.zeros(it.routes.count)))
@@ -234,4 +73,225 @@ def test_a_rest_that_is_given_is_that_of_default_and_random_contexts(name):
     diagram.SetRandomContext(context, RandomGenerator(2))
     Simulator(diagram, context).AdvanceTo(0.05)
     q = it.plant.GetPositions(it.plant.GetMyContextFromRoot(context))
-    assert np.max(np.abs(q - rest.positions)) < 1e-7
+    np.testing.assert_allclose(q, rest.positions, rtol=0, atol=1e-7)
+
+
+def test_hang_holds_an_arm_on_a_robots_platform():
+    plant, in_plant, blocks, diagram = robot_with_arm()
+    assert carried_bodies(in_plant) == ("arm::arm",)
+    context = diagram.CreateDefaultContext()
+    own = plant.GetMyMutableContextFromRoot(context)
+    plant.GetJointByName("shoulder").set_angle(own, 0.6)
+    routes = CableRoutes.of_cable_set(blocks.forces.cable_set(), int(in_plant.body_index))
+    rest = hang(PlantCables(plant, routes), own)
+    assert rest.stability == "stable"
+    plant.SetPositions(own, rest.positions)
+    winches = blocks.winches.GetMyMutableContextFromRoot(context)
+    blocks.winches.hold(winches, rest.unstrained_lengths, rest.tensions)
+    blocks.GetInputPort("cable_velocities").FixValue(winches, np.zeros(8))
+    advance(diagram, context, 0.5)
+    np.testing.assert_allclose(plant.GetPositions(own), rest.positions, rtol=0, atol=AT_REST)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_discrete_plant_moves_as_a_continuous_one(method):
+    ends, rest = [], rest_of("hanging_arm")
+    for time_step in (0.0, 1e-3, 0.5e-3):
+        cabled = Cabled("hanging_arm", method, time_step=time_step)
+        cabled.set_lengths(rest.unstrained_lengths)
+        cabled.set_state(rest.positions, 0.1 * np.cos(np.arange(cabled.plant.num_velocities())))
+        cabled.advance(0.05)
+        ends.append(cabled.positions())
+    coarse, fine = (np.max(np.abs(q - ends[0])) for q in ends[1:])
+    assert 0.0 < coarse < DRIFT
+    assert fine < 0.7 * coarse
+
+
+@steps
+def test_a_box_is_let_down_on_the_ground(time_step):
+    """Its cables go slack there, and the ground carries it."""
+    builder = DiagramBuilder()
+    plant, _ = AddMultibodyPlantSceneGraph(builder, time_step)
+    plant.set_penetration_allowance(1e-4)
+    box = plant.AddRigidBody("box", SpatialInertia.SolidBoxWithMass(2.0, 0.3, 0.3, 0.2))
+    friction = CoulombFriction(0.8, 0.8)
+    for body, shape in ((box, Box(0.3, 0.3, 0.2)), (plant.world_body(), HalfSpace())):
+        plant.RegisterCollisionGeometry(body, RigidTransform(), shape, "shape", friction)
+    plant.SetDefaultFloatingBaseBodyPose(box, RigidTransform([0.0, 0.0, 0.12]))
+    plant.Finalize()
+    corners = [(x, y) for x in (-0.15, 0.15) for y in (-0.15, 0.15)]
+    points = [[(plant.world_body(), (3 * x, 3 * y, 1.0)), (box, (x, y, 0.1))] for x, y in corners]
+    cables = [CableRoute(points=p, stiffness=5e3, retardation=5e-3) for p in points]
+    ports = add_cables(builder, plant, CableRoutes.of(plant, cables))
+    builder.ExportInput(ports.GetInputPort("cable_velocities"), "cable_velocities")
+    diagram = builder.Build()
+    context = diagram.CreateDefaultContext()
+    ports.hang(context)
+    diagram.GetInputPort("cable_velocities").FixValue(context, np.full(4, 0.1))
+    advance(diagram, context, 0.4, 2e-4)
+    assert abs(plant.GetPositions(plant.GetMyContextFromRoot(context))[6] - 0.1) < 1e-3
+    slack = ports.GetOutputPort("slack").Eval(diagram.GetSubsystemContext(ports.forces, context))
+    assert np.all(slack == 1.0)
+
+
+WAYS = {
+    "robot, then cables": [("robot", "robot"), ("load", "joints")],
+    "cables, then robot": [("load", "joints"), ("robot", "robot")],
+    "twice cables": [("robot", "joints"), ("load", "joints")],
+    "both on bodies": [("robot", "bodies"), ("load", "bodies")],
+    "one on bodies": [("robot", "joints"), ("load", "bodies")],
+}
+
+
+def accelerations_of_shared_plant(parts):
+    """ACROBOT and a load below it in one plant, by add_cables or as a robot of its own."""
+    robot, builder = shipped("acrobot_large"), DiagramBuilder()
+    plant = builder.AddNamedSystem("plant", MultibodyPlant(0.0))
+    in_plant = add_robot(plant, robot)
+    inertia = SpatialInertia.SolidBoxWithMass(0.5, 0.1, 0.1, 0.1)
+    load = plant.AddRigidBody("load", plant.AddModelInstance("load"), inertia)
+    plant.SetDefaultFloatingBaseBodyPose(load, RigidTransform([0.0, 0.0, -0.3]))
+    plant.Finalize()
+    anchor, places = (load, (0.0, 0.0, 0.05)), ((0.08, 0.0), (-0.08, 0.07), (-0.08, -0.07))
+    points = [[(in_plant.body, (x, y, -0.035)), anchor] for x, y in places]
+    routes = {
+        "robot": CableRoutes.of_cable_set(robot.cable_set(), int(in_plant.body_index)),
+        "load": CableRoutes.of(plant, [CableRoute(points=p, stiffness=5e3) for p in points]),
+    }
+    settings, blocks = CableSettings(pulleys=True, stiffness_ratio=0.03), []
+    for part, method in parts:
+        if method == "robot":
+            own = CableRobotSettings(cables=settings)
+            block = add_cable_robot(builder, in_plant, own, name=part)
+        else:
+            block = add_cables(builder, plant, routes[part], settings, method=method, name=part)
+        builder.ExportInput(block.GetInputPort("cable_velocities"), part)
+        blocks.append((part, block))
+    diagram = builder.Build()
+    context = diagram.CreateDefaultContext()
+    for part, block in blocks:
+        still = np.zeros(routes[part].count)
+        diagram.GetInputPort(part).FixValue(context, still)
+        forces = diagram.GetSubsystemContext(block.forces, context)
+        lengths = block.GetOutputPort("lengths").Eval(forces)
+        winches = block.winches.GetMyMutableContextFromRoot(context)
+        block.winches.hold(winches, 0.99 * lengths, still)
+    own = plant.GetMyMutableContextFromRoot(context)
+    plant.SetVelocities(own, 0.1 * np.cos(np.arange(plant.num_velocities())))
+    accelerations = np.array(plant.get_generalized_acceleration_output_port().Eval(own))
+    advance(diagram, context, 0.01, 2e-4)
+    return accelerations
+
+
+def test_robots_and_cables_share_a_plant():
+    """Whoever adds them, forces add up; and it runs."""
+    expected = accelerations_of_shared_plant(WAYS["robot, then cables"])
+    size = np.max(np.abs(expected))
+    assert size > 10.0
+    for way, parts in WAYS.items():
+        accelerations = accelerations_of_shared_plant(parts)
+        np.testing.assert_allclose(accelerations, expected, rtol=0, atol=SAME * size, err_msg=way)
+
+
+def test_joints_that_are_not_compiled_take_forces_on_bodies_and_say_so():
+    builder = DiagramBuilder()
+    plant, routes = screw_plant(builder)
+    ports = add_cables(builder, plant, routes, method="automatic")
+    assert ports.method == "bodies"
+    assert "joint thread: found a ScrewJoint" in ports.why
+    assert Cabled("hanging_arm", "bodies").ports.why == ""
+    assert Cabled("hanging_arm", "automatic").ports.method == "joints"
+    builder.ExportInput(ports.GetInputPort("cable_velocities"), "cable_velocities")
+    diagram = builder.Build()
+    context = diagram.CreateDefaultContext()
+    diagram.GetInputPort("cable_velocities").FixValue(context, np.zeros(1))
+    ports.winches.hold(ports.winches.GetMyMutableContextFromRoot(context), [0.9], [0.0])
+    own = plant.GetMyContextFromRoot(context)
+    force = ports.cables().generalized_force(own, np.array([0.9]))
+    assert abs(force[0]) > 1.0
+    acceleration = plant.get_generalized_acceleration_output_port().Eval(own)
+    inertial = plant.CalcMassMatrix(own) @ acceleration
+    weight = plant.CalcGravityGeneralizedForces(own)
+    np.testing.assert_allclose(inertial - weight, force, rtol=SAME)
+
+
+def masts(winches=None, **ends):
+    """Cables over eyelets on masts, on such winches, at rest, with bases that are held."""
+    builder = DiagramBuilder()
+    it = machine("mobile_masts", builder)
+    routes = it.with_ends(stiffness=2e4, retardation=0.02, **ends)
+    home, _ = PlantCables(it.plant, routes).lengths_and_jacobian(it.home())
+    blocks = add_cables(builder, it.plant, routes, winches=winches and winches(home))
+    rest = hang(PlantCables(it.plant, routes), it.home(), prestress=20.0, lower=5.0)
+    motors = builder.AddSystem(ConstantVectorSource(rest.held))
+    apply_force(builder, it.plant, motors.get_output_port(), name="motors")
+    bases = builder.AddSystem(DrivenBases(it.plant))
+    bases.WAY = 0.0
+    builder.Connect(it.plant.get_state_output_port(), bases.GetInputPort("plant_state"))
+    apply_force(builder, it.plant, bases.GetOutputPort("force"), name="bases")
+    return builder, it, blocks, rest
+
+
+def test_motors_hold_a_machine_that_hangs():
+    """From torques that are computed from the tensions, to rounding, and only friction damps."""
+    law = shipped("acrobot_small").winch_law()
+    builder, it, blocks, rest = masts(lambda home: MotorWinch(law, "velocity", home))
+    zero = builder.AddSystem(ConstantVectorSource(np.zeros(8)))
+    builder.Connect(zero.get_output_port(), blocks.GetInputPort("cable_velocities"))
+    diagram = builder.Build()
+    context = diagram.CreateDefaultContext()
+    blocks.put(context, rest)
+    if blocks.HasInputPort("brakes"):
+        winches = blocks.winches.GetMyMutableContextFromRoot(context)
+        blocks.GetInputPort("brakes").FixValue(winches, np.zeros(8))
+    own = it.plant.GetMyContextFromRoot(context)
+    before = it.plant.GetPositions(own).copy()
+    advance(diagram, context, 0.1, 2.5e-4)
+    np.testing.assert_allclose(it.plant.GetPositions(own), before, rtol=0, atol=1e-8)
+
+
+def test_tension_correction_takes_up_slack_of_a_cable_over_eyelets():
+    builder, _, blocks, rest = masts()
+    law = ConstantThreshold(np.full(8, 10.0), np.full(8, 2e-3))
+    corrector = builder.AddSystem(TensionCorrector(law, 8, 200.0))
+    zero = builder.AddSystem(ConstantVectorSource(np.zeros(8)))
+    for output, port in (
+        (blocks.GetOutputPort("tensions"), corrector.GetInputPort("tensions")),
+        (blocks.GetOutputPort("unstrained_lengths"), corrector.GetInputPort("lengths")),
+        (zero.get_output_port(), corrector.GetInputPort("commanded_velocities")),
+        (corrector.GetOutputPort("cable_velocities"), blocks.GetInputPort("cable_velocities")),
+    ):
+        builder.Connect(output, port)
+    diagram = builder.Build()
+    context = diagram.CreateDefaultContext()
+    blocks.put(context, rest)
+    winches = blocks.winches.GetMyMutableContextFromRoot(context)
+    paid_out = 0.01 * np.eye(8)[0]  # m: more than the cable is stretched by
+    blocks.winches.set_unstrained_lengths(winches, rest.unstrained_lengths + paid_out)
+    forces = blocks.forces.GetMyContextFromRoot(context)
+    assert blocks.GetOutputPort("slack").Eval(forces)[0] == 1.0
+    advance(diagram, context, 0.6, 5e-4)
+    assert blocks.GetOutputPort("tensions").Eval(forces)[0] > 5.0
+
+
+def test_a_breaking_load_bounds_hanging_and_is_watched():
+    loads = np.where(np.arange(8) == 2, 42.0, np.inf)
+    builder, it, blocks, rest = masts(breaking_load=loads)
+    assert rest.tensions[2] > 33.0
+    weaker = PlantCables(it.plant, it.with_ends(breaking_load=np.where(loads < 50, 33.0, loads)))
+    assert hang(weaker, it.home(), prestress=20.0, lower=5.0).tensions[2] <= 33.0
+    weak = PlantCables(it.plant, it.with_ends(breaking_load=0.01))
+    with pytest.raises(InfeasibleTensionError, match=r"0\.01 N"):
+        hang(weak, it.home(), lower=0.0)
+    watch = builder.AddSystem(BreakingLoadWatch(loads, stop=True))
+    builder.Connect(blocks.GetOutputPort("tensions"), watch.GetInputPort("tensions"))
+    diagram = builder.Build()
+    context = diagram.CreateDefaultContext()
+    blocks.put(context, rest)
+    winches = blocks.winches.GetMyMutableContextFromRoot(context)
+    pull = np.where(np.arange(8) == 2, -0.05, 0.0)
+    blocks.GetInputPort("cable_velocities").FixValue(winches, pull)
+    advance(diagram, context, 0.2, 2.5e-4)
+    broken = watch.broken(watch.GetMyContextFromRoot(context))
+    assert 0.0 < broken[2] <= context.get_time() < 0.2
+    assert np.all(np.delete(broken, 2) == -1.0)

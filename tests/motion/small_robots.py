@@ -1,5 +1,7 @@
 """Small robots of each motion type, and with fewer cables than degrees of freedom."""
 
+from copy import deepcopy
+from functools import cache
 from pathlib import Path
 
 import yaml
@@ -86,6 +88,13 @@ def content(name, **changes):
     return made | given | changes
 
 
+@cache
+def _checked(name) -> Robot:
+    return parse_robot(yaml.safe_dump(content(name)), Path(f"{name}.yaml"))
+
+
 def small_robot(name, **changes) -> Robot:
     """One of `MOTIONS`, checked."""
+    if not changes:
+        return deepcopy(_checked(name))
     return parse_robot(yaml.safe_dump(content(name, **changes)), Path(f"{name}.yaml"))

@@ -7,10 +7,10 @@ import pytest
 from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake import models
-from cdpr_drake.errors import RobotFileError
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.poses import pose_error
 from cdpr_drake.models.exit_points import Rail
+from cdpr_drake.models.formats import assumptions
 from cdpr_drake.models.shapes import FrameBeam
 from tests.motion.small_robots import small_robot
 
@@ -22,13 +22,12 @@ HELD = {
     "mjcf": ["pendulum", "tripod", "lift", "slope", "level_point", "upright_point", "upright_body",
              "oblique_body", "tilted_gravity", "hanging_four"],
 }  # fmt: skip
-REFUSED = [
-    ("caspr", "slope", "motions are along axes of W"),
-    ("caspr", "beam", "motions are along axes of W"),
-    ("wcrfx", "upright_body", "or with it along z"),
-    ("mjcf", "beam", "all types but 2R3T"),
-    ("sdf", "tripod", "accepted for sdf: 3R3T"),
-]
+
+
+@pytest.fixture(autouse=True)
+def no_home_search(monkeypatch):
+    """What wcrfx lacks, a home pose, is searched for over 225 poses; other tests look at that."""
+    monkeypatch.setattr(assumptions, "_farthest", lambda *_: (0, 1.0))
 
 
 def through(robot, format, folder):
@@ -59,12 +58,6 @@ def test_out_and_in(format, name, tmp_path):
         cable_paths(X_WP, robot.cable_set()).lengths,
         atol=EXACT,
     )
-
-
-@pytest.mark.parametrize(("format", "name", "words"), REFUSED)
-def test_what_a_format_cannot_hold_is_refused_by_name(format, name, words):
-    with pytest.raises(RobotFileError, match=words):
-        models.export_robot(small_robot(name), format)
 
 
 @pytest.mark.parametrize("format", ["caspr", "wcrfx", "gazebo-yaml", "urdf", "sdf", "sdf-drake"])
@@ -101,15 +94,6 @@ def test_a_world_with_gravity_along_z_is_not_turned():
     assert models.gravity_turn(small_robot("tilted_gravity", gravity=0.0)) is None
 
 
-def test_a_plane_that_is_oblique_in_the_turned_world_is_refused_in_words():
-    robot = small_robot("upright_body", gravity_direction=[0.0, -0.1, -1.0])
-    words = r"with axis .*; accepted for caspr.* in the world that was turned by 5\.71"
-    with pytest.raises(RobotFileError, match=words):
-        models.export_robot(robot, "caspr")
-    in_plane = small_robot("upright_body", gravity_direction=[0.1, 0.0, -1.0])
-    assert "PLANAR_XZ" in "".join(models.export_robot(in_plane, "caspr").values())
-
-
 def test_turned_upside_down_and_back():
     """All of a robot turns: points, axes, rails, beams, cameras of the world, home and frame."""
     robot = small_robot("hanging_four", gravity_direction=[0.0, 0.0, 1.0])
@@ -138,23 +122,21 @@ def test_turned_upside_down_and_back():
 
 
 @pytest.mark.parametrize("name", ["tripod", "upright_point", "oblique_body", "tilted_gravity"])
-def test_mujoco_has_the_same_accelerations(name, tmp_path):
+def test_mujoco_has_the_same_accelerations(name):
+    """Falling, without its cables."""
     mujoco = pytest.importorskip("mujoco")
-    robot = small_robot(name)
+    robot, velocity = small_robot(name), np.zeros(6)
     (text,) = models.export_robot(robot, "mjcf").values()
     model = mujoco.MjModel.from_xml_string(text)
     data = mujoco.MjData(model)
-    model.tendon_stiffness[:] = 0.0  # falling, without its cables
+    model.tendon_stiffness[:] = 0.0
     mujoco.mj_forward(model, data)
-    g = robot.gravity_vector()
     body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, "platform")
-    velocity = np.zeros(6)
     data.qvel[:] = data.qacc
     mujoco.mj_fwdVelocity(model, data)
     mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_XBODY, body, velocity, 0)
-    B = robot.motion_type().basis(robot.home.transform().rotation().matrix())
-    platform = models.rigid_platform(robot)
-    X_WP = robot.home.transform()
+    X_WP, platform = robot.home.transform(), models.rigid_platform(robot)
+    B = robot.motion_type().basis(X_WP.rotation().matrix())
     M = B.T @ platform.mass_matrix(X_WP) @ B
     expected = B @ np.linalg.solve(M, B.T @ platform.weight_wrench(X_WP))
-    np.testing.assert_allclose(velocity, expected, atol=1e-9 * np.linalg.norm(g))
+    np.testing.assert_allclose(velocity, expected, rtol=0, atol=1e-8)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cdpr_drake.geometry.poses import rotation_from_vector
@@ -37,6 +37,7 @@ def holds(found: Interval, value: np.ndarray, slack: float = 0.0) -> bool:
     return bool(np.all((found.low <= value + slack) & (value - slack <= found.high)))
 
 
+@settings(max_examples=60)
 @given(inside(), inside())
 def test_operations_hold_what_numbers_inside_give(
     first: tuple[Interval, np.ndarray], second: tuple[Interval, np.ndarray]
@@ -60,6 +61,7 @@ def test_one_over_what_holds_zero_is_everything() -> None:
     assert found.high == np.inf
 
 
+@settings(max_examples=40)
 @given(st.floats(0.0, np.pi), st.floats(0.0, np.pi))
 def test_cardinal_sines_are_held(a: float, b: float) -> None:
     low, high = min(a, b), max(a, b)
@@ -68,6 +70,7 @@ def test_cardinal_sines_are_held(a: float, b: float) -> None:
         assert holds(found, np.sinc(x / np.pi), ROUNDING)
 
 
+@settings(max_examples=40)
 @given(
     st.lists(st.floats(-0.6, 0.6), min_size=3, max_size=3),
     st.lists(st.floats(-0.3, 0.3), min_size=3, max_size=3),
@@ -89,6 +92,7 @@ def test_a_rotation_without_width_is_narrow() -> None:
     assert np.max(found.high - found.low) < 1e-13
 
 
+@settings(max_examples=25)
 @given(st.integers(0, 10_000))
 def test_a_left_inverse_is_held_and_narrow(seed: int) -> None:
     random = np.random.default_rng(seed)
