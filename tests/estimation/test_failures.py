@@ -173,23 +173,17 @@ def watched(power=1.0, blocked=False):
     return np.array(residuals), torques, watch
 
 
-def test_a_motor_that_does_what_it_is_asked_leaves_nothing():
-    residuals, torques, _ = watched()
+def test_residuals_of_a_motor_are_what_it_lacks_or_what_holds_it():
+    """Nothing where it does what it is asked; without power its torque; where it is blocked what
+    friction does not take."""
+    residuals, torques, watch = watched()
     OF_STEPS = 0.02  # of the torque: speeds grow within a sample
     assert np.max(np.abs(residuals)) < OF_STEPS * np.max(np.abs(torques))
-
-
-def test_without_power_its_torque_is_what_is_missing():
-    residuals, torques, _ = watched(power=0.0)
     fades = np.exp(-BANDWIDTH * 25 * PERIOD)
-    assert residuals[25] == pytest.approx(-torques, rel=2.0 * fades, abs=1e-4)
-
-
-def test_a_drum_that_is_blocked_takes_what_friction_does_not():
-    residuals, torques, watch = watched(blocked=True)
+    assert watched(power=0.0)[0][25] == pytest.approx(-torques, rel=2.0 * fades, abs=1e-4)
     free = torques + RADIUS * np.array([12.0, 14.0])
     held = np.clip(free, -LAW.friction.static, LAW.friction.static)
-    assert residuals[-1] == pytest.approx(-(free - held), rel=1e-3)
+    assert watched(blocked=True)[0][-1] == pytest.approx(-(free - held), rel=1e-3)
     assert np.all(watch.stands(np.zeros(2)))
 
 

@@ -160,20 +160,6 @@ def test_no_image_of_an_unknown_object_tells_the_absolute_pose():
     assert np.all(np.linalg.eigvalsh(belief.covariance[:6, :6] - before) > -1e-9)
 
 
-def test_exact_data_keep_the_exact_pose():
-    belief, X = start_of(START), START
-    for k in range(25):
-        belief = update_image(belief, seen(X), 1e-8 * np.eye(6))
-        counted = lengths(X)[0] - lengths(START)[0]
-        model = lengths(belief.X_WP), lengths(belief.X_WP0)
-        belief = update_lengths(belief, counted, *model, np.full(8, 1e-8))
-        after = WAY.pose((k + 1) * PERIOD)
-        belief = predict(belief, logarithm(X.inverse() @ after) / PERIOD, PERIOD, NOISE, NO_DRIFT)
-        X = after
-    assert max(pose_error(belief.X_WP, X)) < ROUND_OFF
-    assert max(pose_error(belief.X_WO, X_WO)) < ROUND_OFF
-
-
 def run(seed, covariance, points, camera):
     """A noisy way from START to GOAL, with start pose, points and camera believed wrongly.
 

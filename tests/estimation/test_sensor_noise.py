@@ -40,20 +40,19 @@ def test_rounding_is_within_half_a_step(value, resolution):
     assert rounded / resolution == pytest.approx(round(rounded / resolution), abs=1e-6)
 
 
+QUARTER_TURNS = 0.5 * np.pi * np.array([0.0, 1.0, -1.0, 4.0])
+TENSIONS = np.array([-50.0, 10.0, 200.0]), np.full(3, 0.5), np.zeros(3), 0.2, (-25.0, 75.0)
+
+
 @pytest.mark.parametrize(
     ("readings", "expected"),
     [
         (quantized(np.array([0.1234]), 0.0), [0.1234]),
-        (encoder_readings(np.array([0.7, 0.9, -2.3, 7.0]), 4), 0.5 * np.pi * np.array([0, 1, -1, 4])),
-        (
-            tension_readings(
-                np.array([-50.0, 10.0, 200.0]), np.full(3, 0.5), np.zeros(3), 0.2, (-25.0, 75.0)
-            ),
-            [-25.0, 10.4, 75.0],
-        ),
+        (encoder_readings(np.array([0.7, 0.9, -2.3, 7.0]), 4), QUARTER_TURNS),
+        (tension_readings(*TENSIONS), [-25.0, 10.4, 75.0]),
     ],
     ids=["no resolution", "four counts", "range"],
-)  # fmt: skip
+)
 def test_readings_by_hand(readings, expected):
     np.testing.assert_allclose(readings, expected, rtol=1e-7)
 
