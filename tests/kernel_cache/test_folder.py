@@ -9,6 +9,7 @@ import tempfile
 from pathlib import Path
 
 import numba
+import platformdirs
 import pytest
 
 from cdpr_drake.kernel_cache.folder import use_kernel_cache
@@ -94,6 +95,18 @@ def predictable(tmp_path):
 
 def test_the_users_own_choice_counts(chosen, tmp_path):
     assert chosen(own=str(tmp_path / "mine"))[0] == tmp_path / "mine"
+
+
+def test_without_a_home_they_are_below_the_folder_of_temporary_files(
+    chosen, predictable, monkeypatch
+):
+    def no_home(*_):
+        raise RuntimeError("no home")
+
+    monkeypatch.setattr(platformdirs, "user_cache_dir", no_home)
+    folder, said, _ = chosen()
+    assert folder.parent == predictable / "kernels"
+    assert said == []
 
 
 @pytest.mark.parametrize("in_use", [False, True])

@@ -30,14 +30,14 @@ LEGS = np.sqrt([0.26, 0.34, 0.17])
 # Ways of features.
 
 
-@given(st.floats(0.0, 12.0))
-def test_the_straight_way_has_constant_speed(time):
+@given(st.sampled_from([10.0, 0.5]), st.floats(0.0, 1.2) | st.just(0.5))
+def test_the_straight_way_has_constant_speed(duration, share):
     """Servoing thesis (4.5)-(4.7)."""
-    plan = FeaturePlan(FINAL, duration=10.0)
-    s, rate, _ = plan.at(START, plan.time_needed(START), time)
-    expected = START + min(time / 10.0, 1.0) * (FINAL - START)
-    np.testing.assert_allclose(s, expected, atol=ROUND_OFF)
-    np.testing.assert_allclose(rate, 0.1 * (FINAL - START) * (time < 10.0), atol=ROUND_OFF)
+    plan = FeaturePlan(FINAL, duration)
+    s, rate, _ = plan.at(START, plan.time_needed(START), share * duration)
+    np.testing.assert_allclose(s, START + min(share, 1.0) * (FINAL - START), atol=ROUND_OFF)
+    speed = (FINAL - START) / duration * (share < 1.0)
+    np.testing.assert_allclose(rate, speed, atol=ROUND_OFF)
 
 
 def test_the_slowest_feature_sets_the_time_of_each_leg():

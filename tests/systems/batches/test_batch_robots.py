@@ -188,7 +188,7 @@ def test_poses_twists_and_lowest_points():
 
 @pytest.mark.parametrize("name", ["acrobot_small", "planar", "hangprinter_4", "gt_graffiti"])
 def test_a_blow_is_what_is_read(name):
-    batch = BatchRobots(load_robot(name), 3, threads=1)
+    batch = BatchRobots(name, 3, threads=1)
     basis = batch.robot.motion_type().basis(batch.robot.home.transform().rotation().matrix())
     twist = basis @ np.linspace(0.01, 0.02, basis.shape[1])
     batch.set_twists([0, 2], twist)
