@@ -152,8 +152,11 @@ def test_an_imu_at_rest_stays_and_one_in_free_fall_falls(lift, falls):
 
 
 def test_a_late_image_is_of_the_pose_at_its_time():
+    """Or of the oldest that is remembered."""
     half = X_WP @ exponential(0.5 * logarithm(X_WP.inverse() @ BEFORE))
-    for steps, pose, tolerance in ((1.0, BEFORE, 1e-12), (0.0, X_WP, 1e-12), (0.5, half, 1e-9)):
+    for steps, pose, tolerance in (
+        (1.0, BEFORE, 1e-12), (0.0, X_WP, 1e-12), (0.5, half, 1e-9), (3.4, BEFORE, 1e-12)
+    ):  # fmt: skip
         assert max(pose_error(pose_at(belief(), steps)[0], pose)) < tolerance, steps
 
 
