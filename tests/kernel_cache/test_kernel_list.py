@@ -29,14 +29,11 @@ def test_its_kernels_exist_and_follow_those_that_they_call():
         assert max(kernel.calls, default=-1) < kernel.number
         assert kernel.dispatcher().py_func.__module__.startswith("cdpr_drake.")
         assert signature_words(kernel.types()) == kernel.signature
-
-
-def test_what_a_group_needs_calls_what_it_needs():
     assert len(needed_kernels(DEFAULT)) > 40
     for group in group_names():
         kernels = needed_kernels([group])
         numbers = {kernel.number for kernel in kernels}
-        assert all(kernel.calls <= numbers for kernel in kernels)
+        assert all(kernel.calls <= numbers for kernel in kernels), group
 
 
 def test_a_question_about_stability_compiles_nothing_of_moved_objects():

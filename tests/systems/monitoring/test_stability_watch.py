@@ -27,15 +27,15 @@ from cdpr_drake.systems.diagrams.visual_servo import build_visual_servo
 from cdpr_drake.systems.monitoring.stability_watch import StabilityWatch
 from tests.messages import printed
 
-SAME = 1e-9
-"""Two ways to the same margin differ by rounding of the logged quaternions only [-]."""
-
+SAME = 1e-9  # two ways to the same margin differ by rounding of the logged quaternions only [-]
+SLACK = "acrobot_slack_start"
 SHORT = ["camera.kind=projected", "integration.engine=compiled", "duration=1.6"]
+SIGNALS = ("taut_cables", "jacobian_rank", "stability_margin")
 
 
 @pytest.fixture(scope="module")
 def result():
-    return run_scenario(load_scenario("acrobot_slack_start", [*SHORT, "stability={threshold: 1}"]))
+    return run_scenario(load_scenario(SLACK, [*SHORT, "stability={threshold: 1}"]))
 
 
 @pytest.fixture(scope="module")
@@ -46,77 +46,63 @@ def folder(result, tmp_path_factory):
     return path
 
 
-def test_live_signals_are_what_the_log_tells_afterwards(result):
-    after = stability_along(result, 1.0)
-    log = result.log
-    np.testing.assert_array_equal(log["taut_cables"][:, 0], after.taut)
-    np.testing.assert_array_equal(log["jacobian_rank"][:, 0], after.rank)
-    np.testing.assert_allclose(log["stability_margin"][:, 0], after.margin, atol=SAME)
-    assert np.min(after.taut) < 6  # else this says little
-    assert np.min(after.rank) < 6
+@pytest.fixture(scope="module")
+def servo():
+    return build_visual_servo(load_scenario(SLACK, SHORT))
+
+
+def test_live_signals_are_what_log_and_folder_tell_afterwards(result, folder):
+    log, of_folder = result.log, stability_of_folder(folder, 1.0)
+    assert of_folder.as_dict()["freedom"] == 6
+    for along in (stability_along(result, 1.0), of_folder.along):
+        np.testing.assert_array_equal(log["taut_cables"][:, 0], along.taut)
+        np.testing.assert_array_equal(log["jacobian_rank"][:, 0], along.rank)
+        np.testing.assert_allclose(log["stability_margin"][:, 0], along.margin, atol=SAME)
+        assert np.min(along.taut) < 6  # else this says little
+        assert np.min(along.rank) < 6
 
 
 def test_a_summary_takes_them_from_the_log(result):
-    found = summarize(result)
-    log = result.log
-    assert found["least_jacobian_rank"] == np.min(log["jacobian_rank"])
-    assert found["least_stability_margin"] == np.min(log["stability_margin"])
+    summary, log = summarize(result), result.log
+    assert summary["least_jacobian_rank"] == np.min(log["jacobian_rank"])
+    assert summary["least_stability_margin"] == np.min(log["stability_margin"])
     lost = np.diff(log["time"]) * (log["stability_margin"][:-1, 0] <= 0.0)
-    assert found["unstable_s"] == pytest.approx(np.sum(lost))
+    assert summary["unstable_s"] == pytest.approx(np.sum(lost))
 
 
 def test_a_log_without_the_section_has_none_of_it():
-    scenario = load_scenario("acrobot_slack_start", [*SHORT, "duration=0.1"])
-    short = run_scenario(scenario)
+    short = run_scenario(load_scenario(SLACK, [*SHORT, "duration=0.1"]))
     assert "stability_margin" not in short.log
     assert summarize(short)["least_jacobian_rank"] is None
     assert "stability.png" not in run_figures(short)
 
 
-def test_the_block_alone(result):
-    """A servo that believes the truth has the margin 1, as long as its cables hold the platform."""
-    servo = build_visual_servo(load_scenario("acrobot_slack_start", SHORT))
-    watch = StabilityWatch(criterion_of(servo, pulleys=False), threshold=2.0)
-    context = watch.CreateDefaultContext()
-    X_WP = servo.scenario.initial_pose.transform()
-    for name in ("X_WP", "X_WP_estimated"):
-        watch.GetInputPort(name).FixValue(context, X_WP)
-    watch.GetInputPort("slack").FixValue(context, np.ones(8))
-
-    def now(tensions):
-        watch.GetInputPort("tensions").FixValue(context, np.array(tensions, float))
-        names = ("taut_cables", "jacobian_rank", "stability_margin")
-        return [watch.GetOutputPort(name).Eval(context)[0] for name in names]
-
-    assert now([3.0] * 8) == pytest.approx([8.0, 6.0, 1.0])
-    assert now([3.0] * 6 + [1.9, 1.9]) == pytest.approx([6.0, 6.0, 1.0])
-    assert now([3.0] * 5 + [1.9] * 3) == [5.0, 5.0, 0.0]
-    by_flag = StabilityWatch(criterion_of(servo, pulleys=False))
-    other = by_flag.CreateDefaultContext()
-    for name in ("X_WP", "X_WP_estimated"):
-        by_flag.GetInputPort(name).FixValue(other, X_WP)
-    by_flag.GetInputPort("tensions").FixValue(other, np.full(8, 3.0))
-    by_flag.GetInputPort("slack").FixValue(other, np.ones(8))
-    assert by_flag.GetOutputPort("taut_cables").Eval(other)[0] == 0.0
+def signals(servo, tensions, slack, threshold=None, X_WP=None):
+    """What the block says."""
+    watch = StabilityWatch(criterion_of(servo, pulleys=False), threshold=threshold)
+    context, start = watch.CreateDefaultContext(), servo.scenario.initial_pose.transform()
+    watch.GetInputPort("X_WP").FixValue(context, X_WP or start)
+    watch.GetInputPort("X_WP_estimated").FixValue(context, start)
+    watch.GetInputPort("tensions").FixValue(context, np.array(tensions, float))
+    watch.GetInputPort("slack").FixValue(context, np.full(8, float(slack)))
+    return [watch.GetOutputPort(name).Eval(context)[0] for name in SIGNALS]
 
 
-def test_the_block_where_no_cable_can_run():
-    servo = build_visual_servo(load_scenario("acrobot_slack_start", SHORT))
-    watch = StabilityWatch(criterion_of(servo, pulleys=False), threshold=0.0)
-    context = watch.CreateDefaultContext()
+def test_the_block_alone(servo):
+    """A servo that believes the truth has the margin 1, as long as its cables hold the platform.
+    Which are taut a threshold tells or, without one, flags. Where C1 has no length none can run."""
+    assert signals(servo, [3.0] * 8, 1, 2.0) == pytest.approx([8.0, 6.0, 1.0])
+    assert signals(servo, [3.0] * 6 + [1.9] * 2, 1, 2.0) == pytest.approx([6.0, 6.0, 1.0])
+    assert signals(servo, [3.0] * 5 + [1.9] * 3, 1, 2.0) == [5.0, 5.0, 0.0]
+    assert signals(servo, [3.0] * 8, 1)[0] == 0.0
     corner = servo.robot.cable_set().p_WA[:, 0] - servo.robot.cable_set().p_PB[:, 0]
-    watch.GetInputPort("X_WP").FixValue(context, RigidTransform(corner))  # C1 has no length
-    watch.GetInputPort("X_WP_estimated").FixValue(context, servo.scenario.initial_pose.transform())
-    watch.GetInputPort("tensions").FixValue(context, np.ones(8))
-    watch.GetInputPort("slack").FixValue(context, np.zeros(8))
-    assert watch.GetOutputPort("taut_cables").Eval(context)[0] == 8.0
-    assert watch.GetOutputPort("jacobian_rank").Eval(context)[0] == 0.0
-    assert np.isnan(watch.GetOutputPort("stability_margin").Eval(context)[0])
+    at_corner = signals(servo, np.ones(8), 0, 0.0, RigidTransform(corner))
+    np.testing.assert_array_equal(at_corner, [8.0, 0.0, np.nan])
 
 
 def test_a_negative_threshold_is_refused():
     with pytest.raises(ScenarioError, match=r"stability\.threshold: found -1"):
-        load_scenario("acrobot_slack_start", ["stability={threshold: -1}"])
+        load_scenario(SLACK, ["stability={threshold: -1}"])
 
 
 def test_the_figure_is_red_where_rank_is_lost():
@@ -126,22 +112,31 @@ def test_the_figure_is_red_where_rank_is_lost():
     figure = stability_figure("title", StabilityAlong(time, rank + 1.0, rank, margin, 6))
     cables, ranks, margins = figure.axes
     for panel in figure.axes:
-        spans = [patch for patch in panel.patches if patch.get_hatch()]
-        assert len(spans) == 1
-        box = spans[0].get_extents().transformed(panel.transData.inverted())
+        (span,) = (patch for patch in panel.patches if patch.get_hatch())
+        box = span.get_extents().transformed(panel.transData.inverted())
         assert box.x0 == pytest.approx(1.1)
         assert 1.9 <= box.x1 <= 2.1
-    thick = [line for line in ranks.lines if line.get_linewidth() >= 3.0]
-    drawn = thick[0].get_ydata()
-    np.testing.assert_array_equal(np.isfinite(drawn), rank < 6.0)
+    thick = next(line for line in ranks.lines if line.get_linewidth() >= 3.0)
+    np.testing.assert_array_equal(np.isfinite(thick.get_ydata()), rank < 6.0)
     assert "[-]" in cables.get_ylabel()
     assert margins.get_xlabel() == "time [s]"
 
 
-def test_a_folder_gives_the_same_as_its_run(result, folder):
-    found = stability_of_folder(folder, 1.0)
-    np.testing.assert_allclose(found.along.margin, result.log["stability_margin"][:, 0], atol=SAME)
-    assert found.as_dict()["freedom"] == 6
+def command(capsys, *arguments):
+    """Exit code, standard output and standard error."""
+    with pytest.raises(SystemExit) as ended:
+        main(["stability", *map(str, arguments)])
+    return ended.value.code, *printed(capsys)
+
+
+def test_the_command_writes_into_the_folder(folder, capsys):
+    code, out, _ = command(capsys, "--along", folder, "--threshold", "1", "--json")
+    assert code == 0
+    assert json.loads(out) == json.loads((folder / "stability.json").read_text())
+    assert json.loads(out)["least_jacobian_rank"] < 6
+    with np.load(folder / "stability.npz") as arrays:
+        assert set(arrays) == {"time", *SIGNALS}
+    assert (folder / "stability.png").is_file()
 
 
 def test_a_figure_that_fails_costs_nothing_else(folder, tmp_path, capsys, monkeypatch):
@@ -149,25 +144,11 @@ def test_a_figure_that_fails_costs_nothing_else(folder, tmp_path, capsys, monkey
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(Figure, "savefig", full)
-    with pytest.raises(SystemExit) as ended:
-        main(["stability", "--along", str(folder), "--out", str(tmp_path / "o"), "--json"])
-    assert ended.value.code == 3
-    shown, err = printed(capsys)
-    assert json.loads(shown) == json.loads((tmp_path / "o" / "stability.json").read_text())
+    code, out, err = command(capsys, "--along", folder, "--out", tmp_path / "o", "--json")
+    assert code == 3
+    assert json.loads(out) == json.loads((tmp_path / "o" / "stability.json").read_text())
     assert "stability.png: not written: [Errno 28]" in err
     assert (tmp_path / "o" / "stability.npz").is_file()
-
-
-def test_the_command_writes_into_the_folder(folder, capsys):
-    with pytest.raises(SystemExit) as ended:
-        main(["stability", "--along", str(folder), "--threshold", "1", "--json"])
-    assert ended.value.code == 0
-    shown = json.loads(printed(capsys).out)
-    assert shown == json.loads((folder / "stability.json").read_text())
-    assert shown["least_jacobian_rank"] < 6
-    with np.load(folder / "stability.npz") as arrays:
-        assert set(arrays) == {"time", "taut_cables", "jacobian_rank", "stability_margin"}
-    assert (folder / "stability.png").is_file()
 
 
 @pytest.mark.parametrize(
@@ -182,10 +163,9 @@ def test_the_command_writes_into_the_folder(folder, capsys):
 )
 def test_what_the_command_refuses(arguments, words, capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(SystemExit) as ended:
-        main(["stability", *arguments])
-    assert ended.value.code == 2
-    assert words in " ".join(printed(capsys).err.split())
+    code, _, err = command(capsys, *arguments)
+    assert code == 2
+    assert words in " ".join(err.split())
     assert not list(tmp_path.iterdir())
 
 
@@ -203,16 +183,20 @@ def test_joints_of_a_camera_count_by_the_errors_of_their_encoders():
     """As a camera at rest whose mounting is off by that turn; nothing, where they are right."""
     scenario = load_scenario("acrobot_pan_tilt", ["integration.engine=compiled"])
     servo = build_visual_servo(scenario)
-    criterion, turns = run_criterion(servo), scenario.camera.pan_tilt
-    at = servo.block.robot.home.transform()
-    taut = np.ones(8, bool)
-    right = np.radians([[20.0, -10.0], [20.0, -10.0]])
-    same = turned_criterion(criterion, servo.mounting, turns, right)
-    assert same.at(at, at, taut, 0.0)[1] == pytest.approx(criterion.at(at, at, taut, 0.0)[1])
-    wrong = np.radians([[20.0, 0.0], [0.0, 0.0]])
-    turned = turned_criterion(criterion, servo.mounting, turns, wrong)
-    angle = (criterion.camera.inverse() @ turned.camera).rotation().ToAngleAxis().angle()
+    criterion, at = run_criterion(servo), servo.block.robot.home.transform()
+
+    def turned(degrees):
+        joints = np.radians(degrees)
+        return turned_criterion(criterion, servo.mounting, scenario.camera.pan_tilt, joints)
+
+    def margin(criterion):
+        return criterion.at(at, at, np.ones(8, bool), 0.0)[1]
+
+    right = turned([[20.0, -10.0], [20.0, -10.0]])
+    assert margin(right) == pytest.approx(margin(criterion))
+    wrong = turned([[20.0, 0.0], [0.0, 0.0]])
+    angle = (criterion.camera.inverse() @ wrong.camera).rotation().ToAngleAxis().angle()
     assert np.degrees(angle) == pytest.approx(20.0)
-    assert turned.at(at, at, taut, 0.0)[1] < 0.99 * criterion.at(at, at, taut, 0.0)[1]
-    seen = turned.camera @ turned.sees(at, 0.0)
+    assert margin(wrong) < 0.99 * margin(criterion)
+    seen = wrong.camera @ wrong.sees(at, 0.0)
     assert seen.IsNearlyEqualTo(criterion.camera @ criterion.sees(at, 0.0), 1e-12)

@@ -1,5 +1,7 @@
 """Fused beliefs with everything in them, truths that they are wrong about, and differences."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from cdpr_drake.estimation.sensor_filter import (
@@ -21,8 +23,7 @@ from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.poses import exponential, logarithm, pose_from_angles
 from cdpr_drake.models.robot_loader import load_robot
 
-STEP = 1e-6
-"""Of central differences [rad, m]."""
+STEP = 1e-6  # of central differences [rad, m]
 
 ROBOT = load_robot("acrobot_small")
 CABLES = ROBOT.cable_set().without_pulleys()
@@ -52,7 +53,7 @@ def belief(past=1):
     made = remember_pose(made)
     way = logarithm(BEFORE.inverse() @ X_WP)
     made = move(made, way, 1.0, np.full(6, 1e-5))
-    return FusedBelief(**{**made.__dict__, "velocity": np.array([0.1, -0.05, 0.02])})
+    return replace(made, velocity=np.array([0.1, -0.05, 0.02]))
 
 
 def wrong_by(made, d):
@@ -73,13 +74,15 @@ def wrong_by(made, d):
 
 def differences(made, read):
     """Derivatives of a reading of the truth by the errors of a belief, by central differences."""
-    size = len(made.covariance)
-    columns = []
-    for k in range(size):
-        d = np.zeros(size)
-        d[k] = STEP
-        columns.append((read(wrong_by(made, d)) - read(wrong_by(made, -d))) / (2.0 * STEP))
-    return np.array(columns).T
+    steps = STEP * np.eye(len(made.covariance))
+    return np.array([
+        (read(wrong_by(made, d)) - read(wrong_by(made, -d))) / (2.0 * STEP) for d in steps
+    ]).T  # fmt: skip
+
+
+def normalized_error(x, covariance):
+    """Chi-square distributed if the errors x have this covariance."""
+    return x @ np.linalg.solve(covariance, x)
 
 
 def pose_innovation(sight, seen):

@@ -11,6 +11,8 @@ from cdpr_drake.systems.robots.compiled_motion import HELD
 from cdpr_drake.systems.robots.settings import CableRobotSettings, CableSettings, WinchSettings
 
 PERIOD = 0.01
+ROBOT = load_robot("acrobot_small")
+STILL = np.zeros(8)
 
 
 def settings(mode="ideal", model="elastic", pulleys=False, **more):
@@ -20,9 +22,12 @@ def settings(mode="ideal", model="elastic", pulleys=False, **more):
     )
 
 
-def behaving(name="acrobot_small", **behaviour):
+ELASTIC, DAMPED = settings(), settings(model="kelvin_voigt")
+
+
+def behaving(**behaviour):
     """A robot whose cables do more than the elastic law."""
-    robot = load_robot(name)
+    robot = load_robot("acrobot_small")
     robot.cable.behaviour = BehaviourSettings(**behaviour)
     return robot
 
@@ -38,14 +43,12 @@ def varied(robot, count, seed=0):
     return drawn_robots(robot, count, ParameterCovariance.independent(deviations), seed)
 
 
-def alone(robot, how, commands, wrenches=None, rule=None, **inputs):
+def alone(robot, how, commands, wrenches=None, rule=None):
     """State at the end, and tensions, of a robot that moves by itself in a diagram."""
     block = CompiledCableRobot(robot, how, rule=rule, floor=False, command_period=HELD)
     simulator = Simulator(block)
     context = simulator.get_mutable_context()
     block.set_at_equilibrium(context, robot.home.transform())
-    for name, value in inputs.items():
-        block.GetInputPort(name).FixValue(context, value)
     simulator.Initialize()
     for k, command in enumerate(commands):
         block.get_input_port(0).FixValue(context, command)
@@ -57,9 +60,9 @@ def alone(robot, how, commands, wrenches=None, rule=None, **inputs):
     return block.motion.state(own).copy(), np.array(tensions)
 
 
-def alone_by_tensions(robot, how, start, commands):
-    """State at the end of a robot whose tensions are commanded."""
-    block = motion_by_tensions(robot, how.cables.cable_set(robot), command_period=HELD)
+def alone_by_tensions(robot, start, commands):
+    """State at the end of a robot whose tensions are commanded, and these."""
+    block = motion_by_tensions(robot, ELASTIC.cables.cable_set(robot), command_period=HELD)
     simulator = Simulator(block)
     context = simulator.get_mutable_context()
     block.set_state(context, start)
@@ -67,4 +70,4 @@ def alone_by_tensions(robot, how, start, commands):
     for command in commands:
         block.get_input_port(0).FixValue(context, command)
         simulator.AdvanceTo(context.get_time() + PERIOD)
-    return block.state(context).copy()
+    return block.state(context).copy(), commands[-1]
