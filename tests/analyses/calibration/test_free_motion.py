@@ -39,11 +39,15 @@ def spans_words(spans):
 
 @pytest.fixture(scope="module")
 def found(tmp_path_factory):
-    """The command on two fitted swings and one that is held out: exit code, JSON and folder."""
+    """The command on two fitted swings and one that is held out: exit code, JSON and folder.
+
+    Of what is fitted the first 1.2 s are enough.
+    """
     folder = tmp_path_factory.mktemp("swings")
     spans = swings.write(folder / "log.csv", (0, 1, 2))
     believed = swings.believed_file(folder)
-    args = ["identify", believed, str(folder / "log.csv"), "--free", spans_words(spans[:2])]
+    fitted = spans_words((first, first + 1.2) for first, _ in spans[:2])
+    args = ["identify", believed, str(folder / "log.csv"), "--free", fitted]
     args += ["--hold-out", spans_words(spans[2:]), "--out", str(folder / "out"), "--lead", "0.8"]
     args += ["--sigma", f"turn={swings.NOISE['turn']},tension={swings.NOISE['tension']}", "--json"]
     with pytest.raises(SystemExit) as ended:
