@@ -208,10 +208,12 @@ def test_robots_and_motions_that_are_drawn_agree(seed):
 @pytest.mark.parametrize("mode", ["ideal", "torque", "velocity", "position"])
 def test_ports_are_those_of_the_plant_and_a_few_more(mode):
     robot, how = load_robot("acrobot_small"), settings_of(mode)
+    robot.winch.brake_torque = 0.5
     inputs, outputs = port_names(CableRobot(robot, how))
     more_inputs, more_outputs = port_names(CompiledCableRobot(robot, how))
     command = {"torque": "motor_torques", "position": "commanded_lengths"}
-    assert inputs == [command.get(mode, "cable_velocities"), "applied_wrench"]
+    brakes = set() if mode == "ideal" else {"brakes"}
+    assert set(inputs) == {command.get(mode, "cable_velocities"), "applied_wrench"} | brakes
     rates = {"commanded_length_rates"} if mode == "position" else set()
     assert set(more_inputs) == set(inputs) | rates
     assert set(more_outputs) == set(outputs) | {"step_errors", "steps"}

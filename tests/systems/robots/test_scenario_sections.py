@@ -70,9 +70,13 @@ def test_the_simulated_robot_has_the_cables_that_were_asked_for():
     assert np.all(read(block, block.GetMyContextFromRoot(context), "sags") > 1e-3)
 
 
-def test_elastic_cables_are_not_damped():
-    block = CableRobot("acrobot_small", settings_of(model="elastic"))
-    assert np.all(block.forces.cable_set().retardation == 0.0)
+@pytest.mark.parametrize(("model", "damped"), [("elastic", False), ("kelvin_voigt", True)])
+def test_only_damped_cables_wait_for_rates(model, damped):
+    forces = CableRobot("acrobot_small", settings_of(model=model)).forces
+    assert np.all((forces.cable_set().retardation > 0.0) == damped)
+    rates = forces.GetInputPort("unstrained_length_rates").get_index()
+    force = forces.GetOutputPort("generalized_force").get_index()
+    assert forces.HasDirectFeedthrough(rates, force) == damped
 
 
 def test_rotation_is_braked_by_its_own_number_and_power_is_never_positive():
