@@ -117,6 +117,14 @@ def test_fifty_draws_are_looked_at_unless_said_otherwise():
     np.testing.assert_array_equal(margins(PBVS, BASELINE, poses), by[50])
 
 
+def test_perturbations_of_full_size_point_everywhere_alike():
+    d = draw_perturbations(random_poses(1)[0], BASELINE, 8, 2000, 3)[:, :3]
+    V = d / np.linalg.norm(d, axis=1, keepdims=True)
+    np.testing.assert_allclose(np.linalg.norm(d, axis=1), BASELINE.d_theta_bp, rtol=ROUNDING)
+    np.testing.assert_allclose(V.mean(axis=0), 0.0, atol=0.06)  # 4.6 of its standard deviations
+    np.testing.assert_allclose(V.T @ V / len(V), np.eye(3) / 3.0, atol=0.03)
+
+
 def test_poses_may_be_transforms():
     poses = random_poses(4)
     rows = pose_rows([pose_of(row) for row in poses])

@@ -151,9 +151,9 @@ BOXES = {
     "static planar": (lambda: static("planar"), 800, 0.58, 0.15),
     "static planar turned": (lambda: static("planar", turn=0.3), 3000, 0.47, 0.11),
     "static small and turned": (static_turned, 4000, 0.9, 0.0),
-    "static straight": (lambda: static("acrobot_large", ends=""), 4000, 0.0, 0.0),
+    "static straight": (lambda: static("acrobot_large", ends=""), 4000, 0.26, 0.17),
     "static over pulleys at both ends": (
-        lambda: static("acrobot_fully_constrained", CONSTRAINED, ends="AB"), 6000, 0.01, 0.16
+        lambda: static("acrobot_fully_constrained", CONSTRAINED, ends="AB"), 6000, 0.01, 0.23
     ),
     "wrench-feasible planar": (wrench_feasible, 1000, 0.53, 0.19),
     "closure planar": (lambda: closure("planar"), 800, 0.63, 0.15),
