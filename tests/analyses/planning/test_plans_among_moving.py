@@ -45,7 +45,7 @@ def write(folder, content):
 @pytest.fixture(scope="module")
 def sets():
     numbers = [np.concatenate([X.translation(), np.zeros(3)]) for X in (START, GOAL)]
-    settings = ProofSettings(boxes=20_000, cells=2**15)
+    settings = ProofSettings(boxes=6000, cells=2**13)
     return ProvenSets.find(ROBOT, accelerations=0.25, must=numbers, settings=settings)
 
 
@@ -61,8 +61,8 @@ def test_a_plan_waits_for_what_passes_and_all_samples_hold(run, sets):
     assert told["waits"]
     assert told["moving"] == ["boxes[0]"]
     assert sum(told["judged_infeasible"].values()) == 0
-    count, failed = judged_in_time(sets, run.found, run.things, run.around, 5000)
-    assert count == 5000
+    count, failed = judged_in_time(sets, run.found, run.things, run.around, 1000)
+    assert count == 1000
     assert set(failed) >= {"wrench-feasible", "cables off what moves", "platform off what moves"}
     assert sum(failed.values()) == 0
     assert told["lower_bound"] <= told["cost"]
