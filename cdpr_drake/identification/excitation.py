@@ -224,6 +224,9 @@ class _Search:
 
     def piece(self, X: RigidTransform, Y: RigidTransform) -> _Piece | None:
         """The fastest stretch between two poses that keeps the limits; None: none does."""
+        ends = _rows(PoseTrajectory((X, Y), (1.0,)), 1.0)[[0, -1]]  # at rest, however long it takes
+        if not self._pulls(ends, self._regressor(ends) @ self.task.inertial):
+            return None
         duration = self.task.shortest
         while duration <= LONGEST:
             rows = _rows(PoseTrajectory((X, Y), (duration,)), duration)
@@ -231,14 +234,15 @@ class _Search:
                 W = wrench_matrices(rows[:, :13], self.task.cables)
                 if not np.isfinite(W).all():
                     return None
-                Y_ = inertia_regressor(
-                    rotations_of_quaternions(np.ascontiguousarray(rows[:, :4])), rows[:, 7:13],
-                    rows[:, 13:], self.task.gravity,
-                )  # fmt: skip
+                Y_ = self._regressor(rows)
                 if self._pulls(rows, Y_ @ self.task.inertial):
                     return _Piece(duration, self._information(Y_, W) * duration)
             duration *= SLOWER
         return None
+
+    def _regressor(self, rows: Array) -> Array:
+        R = rotations_of_quaternions(np.ascontiguousarray(rows[:, :4]))
+        return inertia_regressor(R, rows[:, 7:13], rows[:, 13:], self.task.gravity)
 
     def _moves(self, rows: Array, duration: float) -> bool:
         """Whether winches are fast enough; accelerations by differences of cable speeds."""
