@@ -24,7 +24,7 @@ WHOLE = (FIRST, DOCS / "tutorial.md")
 """Pages whose runs go on to their end; those of others begin as their page says and last two
 seconds, since each scenario runs to its end where its own room is tested."""
 
-GIVEN = {"--duration", "--compare-reactions"}
+LENGTHS = {"--duration", "--compare-reactions"}
 """Options that say how long a run lasts."""
 
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", re.DOTALL | re.MULTILINE)
@@ -76,7 +76,7 @@ def test_commands_run(page, tmp_path, monkeypatch):
             for line in code.replace("\\\n", " ").splitlines():
                 program, *words = shlex.split(line, comments=True)
                 assert program == "cdpr", line
-                if words[0] == "simulate" and page not in WHOLE and not GIVEN.intersection(words):
+                if words[0] == "simulate" and page not in WHOLE and not LENGTHS.intersection(words):
                     words += ["--duration", "2"]
                 assert exit_code(words) == 0, line
 
