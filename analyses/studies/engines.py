@@ -1,27 +1,39 @@
-"""Runs by the plant and by the compiled engine, and how far they part, as rows of the study.
+"""Study: the plant and the compiled engine beside each other.
 
-`run_pair` runs a scenario by both engines. `commanded_path` runs a robot by one of them, with a
-cable velocity for each period, and `state_distance` says how far two of these part.
+Both run every scenario that ships, taut motions of robots that are drawn, and servos with cables
+that go slack and catch; orders of convergence are measured, and the energy that impacts put in or
+take out. The plant is the reference.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import NullLocator
 from pydrake.math import RigidTransform
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
 from cdpr_drake.analyses.simulation.tension_control_run import TensionRun, run_tension_scenario
 from cdpr_drake.analyses.simulation.visual_servo_run import RunResult, run_scenario
-from cdpr_drake.analyses.studies.framework.runs import Row
+from cdpr_drake.analyses.studies.study import Case, Form, Frame, Study
+from cdpr_drake.analyses.visualization.figure_style import (
+    bar_style,
+    bare_figure,
+    line_style,
+    plain_numbers,
+    styled,
+)
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.poses import pose_rows_distance
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.palette import DASHED, SOLID, nth_look
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
 from cdpr_drake.systems.robots.cable_robot import SEMI_IMPLICIT, CableRobot, automatic_step
@@ -29,10 +41,18 @@ from cdpr_drake.systems.robots.compiled_cable_robot import CompiledCableRobot
 from cdpr_drake.systems.robots.compiled_motion import HELD
 from cdpr_drake.systems.robots.compiled_step import StepRule
 from cdpr_drake.systems.robots.settings import COMPILED, PLANT, CableRobotSettings, CableSettings
-from cdpr_drake.systems.scenarios.files import TENSION_CONTROL, scenario_kind
+from cdpr_drake.systems.scenarios.files import TENSION_CONTROL, robot_scenario_names, scenario_kind
+from cdpr_drake.systems.scenarios.run_settings import has_contact
+
+LONGEST = 120.0
+"""Simulated time after which scenarios of hours are compared [s]."""
+
+QUICK_SCENARIOS = ("acrobot_pbvs", "planar_computed_torque", "planar_pbvs")
+QUICK_DURATION = 0.5
+"""Of scenarios, and of the undamped robot, in the quick form [s]."""
 
 
-def run_pair(name: str, overrides: Sequence[str]) -> Row:
+def run_pair(name: str, overrides: Sequence[str]) -> dict[str, Any]:
     """A scenario, run once by each engine; the camera of a servo is projected.
 
     Returns:
@@ -221,7 +241,7 @@ def taut_velocities(robot: Robot, settings: CableRobotSettings, seed: int) -> Ar
     return np.asarray(np.diff(lengths, axis=0) / TAUT_PERIOD)
 
 
-def taut_row(seed: int) -> Row:
+def taut_row(seed: int) -> dict[str, Any]:
     """A robot that is drawn, on a slow loop with cables taut, by both engines.
 
     Returns:
@@ -271,24 +291,8 @@ class OrderTrial:
     largest: float = 4e-3
     reference: float = 2e-5
 
-    def steps(self) -> list[float]:
-        """The steps [s]."""
-        return [self.largest / 2**k for k in range(STEPS)]
-
-    def row(self) -> Row:
-        """The largest distance to the plant at a small step, distances_m, and the order of
-        convergence between the first step and the last, orders, by method; the former by step."""
-        rule = StepRule(method=EXPLICIT, max_step=self.reference)
-        reference, steps = self._path(CableRobot, rule), self.steps()
-        found: dict[str, list[float]] = {method: [] for method in METHODS}
-        for method, distances in found.items():
-            for step in steps:
-                path = self._path(CompiledCableRobot, StepRule(method=method, max_step=step))
-                distances.append(float(np.max(state_distance(path, reference)[0])))
-        orders = {method: order_of(distances) for method, distances in found.items()}
-        return {"steps_s": steps, "distances_m": found, "orders": orders}
-
-    def _path(self, kind: type[CableRobot | CompiledCableRobot], rule: StepRule) -> Array:
+    def path(self, kind: type[CableRobot | CompiledCableRobot], rule: StepRule) -> Array:
+        """States of the platform by an engine and a rule."""
         robot = load_robot("acrobot_small")
         robot.cable.youngs_modulus /= self.softer
         settings = CableRobotSettings(cables=CableSettings(model=self.model))
@@ -300,9 +304,18 @@ class OrderTrial:
         return states
 
 
-def order_of(errors: Sequence[float]) -> float:
-    """Order of convergence between the first step and the last, each half of the one before."""
-    return float(np.log2(errors[0] / errors[-1]) / (len(errors) - 1))
+def order_row(trial: OrderTrial) -> dict[str, Any]:
+    """The largest distance to the plant at a small step, distances_m, and the order of convergence
+    between the first step and the last, orders, by method; the former by step."""
+    reference = trial.path(CableRobot, StepRule(method=EXPLICIT, max_step=trial.reference))
+    steps = [trial.largest / 2**k for k in range(STEPS)]
+    found: dict[str, list[float]] = {method: [] for method in METHODS}
+    for method, distances in found.items():
+        for step in steps:
+            path = trial.path(CompiledCableRobot, StepRule(method=method, max_step=step))
+            distances.append(float(np.max(state_distance(path, reference)[0])))
+    orders = {m: float(np.log2(d[0] / d[-1]) / (STEPS - 1)) for m, d in found.items()}
+    return {"steps_s": steps, "distances_m": found, "orders": orders}
 
 
 ORDERS = {
@@ -316,7 +329,7 @@ ORDERS = {
 cables, and the first impacts."""
 
 
-def energy_row(step: float, duration: float) -> Row:
+def energy_row(step: float, duration: float) -> dict[str, Any]:
     """ACROBOT on its real cables, undamped and slack at the start, halted.
 
     Args:
@@ -347,3 +360,111 @@ def energy_row(step: float, duration: float) -> Row:
         "slack_cables": int(np.max(np.sum(tensions[EXPLICIT] == 0.0, axis=1))),
         "largest_tension_n": np.max(tensions[EXPLICIT]),
     }
+
+
+def impacts_row(seed: int) -> dict[str, Any]:
+    """A servo with cables paid out by the seed, by both engines."""
+    return run_pair(IMPACTS, [slack_override(seed), f"seed={seed}"])
+
+
+def cases(form: Form) -> Iterator[Case]:
+    """Scenarios, taut motions and impacts over seeds, orders by what cables do, steps."""
+    for name in QUICK_SCENARIOS if form.quick else robot_scenario_names():
+        scenario = load_scenario(name)
+        if has_contact(scenario):
+            continue  # one engine only has contact: there is nothing to compare
+        changes = [f"duration={LONGEST}"] if scenario.duration > LONGEST else []
+        if form.quick and scenario_kind(name) != TENSION_CONTROL:
+            changes = [f"duration={QUICK_DURATION}"]
+        yield Case(
+            keys={"kind": "scenario", "scenario": name}, call=partial(run_pair, name, changes)
+        )
+    yield Case(keys={"kind": "taut"}, call=partial(taut_row), seeds=form.times(30, 3))
+    for name, trial in ORDERS.items():
+        yield Case(keys={"kind": "order", "order": name}, call=partial(order_row, trial))
+    for step in ENERGY_STEPS:
+        duration = QUICK_DURATION if form.quick else ENERGY_DURATION
+        keys = {"kind": "energy", "step_s": step}
+        yield Case(keys=keys, call=partial(energy_row, step, duration))
+    yield Case(keys={"kind": "impacts"}, call=partial(impacts_row), seeds=form.times(200, 2))
+
+
+def scenario_table(rows: Frame) -> Frame:
+    """Scenarios by both engines; paths and ends in um."""
+    some = rows[rows["kind"] == "scenario"]
+    keys = ["scenario", "outcome_plant", "outcome_compiled", "time_plant_s", "time_compiled_s"]
+    sizes = ["distance_m", "final_distance_m", "final_error_plant_m", "final_error_compiled_m"]
+    found = some[[*keys, *sizes, "slack_share"]].copy()
+    found[sizes] *= 1e6
+    return found.rename(columns={name: name.replace("_m", " [um]") for name in sizes})
+
+
+def figure(rows: Frame) -> Figure:
+    """Orders of convergence, and distances of the engines."""
+    drawn = bare_figure((14.0, 13.0), "Compiled engine beside the plant")
+    with styled():
+        axes = drawn.subplot_mosaic([["soft", "names"], ["impacts", "names"], ["energy", "names"]])
+    for name, dash in (("taut", SOLID), ("catching", DASHED)):
+        for row in rows[rows.get("order") == name].to_dict("records"):
+            steps = 1e3 * np.array(row["steps_s"])
+            for k, method in enumerate(METHODS):
+                look = nth_look(k)
+                axes["soft"].loglog(
+                    steps, row["distances_m"][method], linestyle=dash, color=look.color,
+                    marker=look.marker, label=f"{method}, {name}",
+                )  # fmt: skip
+            _name_steps(axes["soft"], steps)
+    axes["soft"].set(
+        xlabel="step [ms]", ylabel="distance to the plant at 0.02 ms [m]", title="soft cables"
+    )
+    kinds = dict([*rows.groupby("kind")])
+    whats = (("distance_m", "on the path"), ("final_distance_m", "at the end"))
+    for k, (what, label) in enumerate(whats):
+        if "scenario" in kinds:
+            some = kinds["scenario"]
+            style = {"height": 0.8 / (k + 1), "label": label, **bar_style(nth_look(k))}
+            axes["names"].barh(some["scenario"], 1e6 * some[what], **style)
+        if "impacts" in kinds:
+            sizes = np.sort(1e6 * kinds["impacts"][what])
+            axes["impacts"].semilogy(sizes, label=label, **line_style(nth_look(k)))
+    if "scenario" in kinds:
+        axes["names"].set(xscale="log", ylim=(-0.8, len(kinds["scenario"]) - 0.2))
+        axes["names"].tick_params(axis="y", labelsize=8)
+        below = {"bbox_to_anchor": (0.5, 0.0), "borderaxespad": 6.0, "fontsize": 8, "ncols": 2}
+        axes["names"].legend(loc="upper center", **below)  # bars fill the axes
+    axes["names"].set(xlabel="distance of the engines [\u00b5m]", title="scenarios that ship")
+    words = {"xlabel": "runs, sorted", "ylabel": "distance of the engines [\u00b5m]"}
+    axes["impacts"].set(**words, title="servo, cables paid out at random")
+    if "energy" in kinds:
+        steps = 1e3 * kinds["energy"]["step_s"].to_numpy()
+        for k, (column, label) in enumerate((("least_gain", "least"), ("largest_gain", "largest"))):
+            style = {"marker": nth_look(k).marker, "label": label, **line_style(nth_look(k))}
+            axes["energy"].semilogx(steps, kinds["energy"][column], **style)
+        _name_steps(axes["energy"], steps)
+    words = {"xlabel": "step [ms]", "ylabel": "change of energy over that of the fall [-]"}
+    axes["energy"].set(**words, title="real stiffness, undamped, runge_kutta3")
+    for name, one in axes.items():
+        if name != "names" and one.get_legend_handles_labels()[0]:
+            one.legend(loc="best", fontsize=8)
+    return drawn
+
+
+def _name_steps(axes: Any, steps: Array) -> None:
+    """Numbers at the steps that were taken, and nowhere else."""
+    axes.set_xticks(steps)
+    axes.xaxis.set_minor_locator(NullLocator())
+    plain_numbers(axes.xaxis)
+
+
+STUDY = Study(
+    name="engines",
+    title="The plant and the compiled engine beside each other",
+    cases=cases,
+    parameters=lambda form: {
+        "methods": METHODS,
+        "energy_steps_s": ENERGY_STEPS,
+        "impacts": IMPACTS,
+    },
+    tables={"Scenarios by both engines": scenario_table},
+    figures={"engines": figure},
+)

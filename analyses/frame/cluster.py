@@ -1,0 +1,306 @@
+"""Jobs on a Dask cluster: small ones in batches, each on a worker that is known.
+
+A batch is bound to a worker, so that a job that kills its process is known and kills no second
+worker unseen, and so that a worker that hangs keeps its own batches only.
+"""
+
+from __future__ import annotations
+
+import logging
+import queue
+import time
+import uuid
+from collections import Counter, deque
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+from typing import Any, TypeVar
+
+from cdpr_drake.analyses.frame.jobs import POLL, FinishedJob, ProcessDied, do_job, portable
+from cdpr_drake.analyses.reporting.provenance import code_version
+from cdpr_drake.blas_threads import one_blas_thread
+from cdpr_drake.errors import SweepError
+from cdpr_drake.kernel_cache.locks import share_compilation
+
+Job = TypeVar("Job")
+Result = TypeVar("Result")
+
+ACCEPTED = (
+    "accepted: the address of a Dask scheduler, such as tcp://host:8786, or its scheduler file, "
+    "such as scheduler.json"
+)
+
+SCHEDULER_TIMEOUT = 5.0
+"""A scheduler answers within this time [s]."""
+
+BATCH_TIME = 1.0
+"""Wanted length of a batch [s]: client and scheduler spend some 10 ms on each."""
+
+BATCHES_AHEAD = 2
+"""Batches of a thread: one that it does and one that waits there."""
+
+LOOK = 1.0
+"""Time between two looks at the workers [s]."""
+
+SILENCE = 30.0
+"""A worker without a heartbeat for so long hangs, or holds the interpreter's lock in a long call;
+others do its batches, too [s]."""
+
+NO_WORKER = 8.0, 300.0
+"""Times without a worker until it is said, and until the command gives up [s]."""
+
+TRIES = 2
+"""A job alone in its batch may lose so many workers before it is taken for the cause."""
+
+
+@dataclass(eq=False)
+class _Batch:
+    """Jobs that one worker does."""
+
+    numbers: list[int]
+    places: dict[str, Any] = field(default_factory=dict)
+    """Futures by address of the worker."""
+
+
+def cluster_jobs(
+    work: Callable[[Job], Result],
+    jobs: Sequence[Job],
+    scheduler: str,
+    *,
+    stop: Callable[[], bool],
+    say: Callable[[str], None],
+    name: str,
+) -> Iterator[FinishedJob[Result]]:
+    """Does jobs on the workers of a Dask cluster; see `jobs.finished_jobs`.
+
+    Workers may come and go. Certificates for tls:// addresses are those of Dask's configuration
+    (`distributed.comm.tls`).
+
+    Args:
+        work: What does a job.
+        jobs: Its arguments.
+        scheduler: Address, or scheduler file, which ends with .json.
+        stop: Asked often.
+        say: Gets the address of the dashboard, and words on workers.
+        name: Of the jobs on the dashboard.
+
+    Raises:
+        SweepError: The scheduler does not answer, or no worker can do the jobs.
+    """
+    with _connected(scheduler) as client:
+        say(f"Dask dashboard: {client.dashboard_link}")
+        yield from _Cluster(client, scheduler, work, jobs, stop, say, name).finished()
+
+
+class _Cluster:
+    """The jobs of one call, and where they are."""
+
+    def __init__(
+        self, client: Any, scheduler: str, work: Callable[[Any], Any], jobs: Sequence[Any],
+        stop: Callable[[], bool], say: Callable[[str], None], name: str,
+    ) -> None:  # fmt: skip
+        self._client, self._scheduler, self._jobs = client, scheduler, jobs
+        self._stop, self._say, self._name = stop, say, name
+        self._call = work
+        self._waiting = deque(range(len(jobs)))
+        self._lone: deque[int] = deque()  # jobs whose worker was lost: each in a batch of its own
+        self._lost: Counter[int] = Counter()
+        self._batches: list[_Batch] = []
+        self._ended: queue.Queue[tuple[_Batch, str, Any]] = queue.Queue()
+        self._refused: dict[str, str] = {}
+        self._threads: dict[str, int] = {}
+        self._heard: dict[str, tuple[float, float]] = {}
+        self._seconds, self._done = 0.0, 0
+        self._looked, self._alone_since, self._told = -LOOK, time.monotonic(), False
+
+    def finished(self) -> Iterator[FinishedJob[Any]]:
+        try:
+            while self._waiting or self._lone or self._batches:
+                self._look()
+                yield from self._missed()
+                if not self._stop():
+                    self._hand_out()
+                elif all(self._hangs(place) for batch in self._batches for place in batch.places):
+                    return
+                with suppress(queue.Empty):
+                    batch, place, future = self._ended.get(timeout=POLL)
+                    yield from self._results(batch, place, future)
+        finally:
+            for batch in self._batches:
+                for future in batch.places.values():
+                    with suppress(Exception):
+                        future.cancel()
+
+    def _look(self) -> None:
+        """Learns which workers there are, and which of them are silent."""
+        now = time.monotonic()
+        if now - self._looked < LOOK:
+            return
+        self._looked = now
+        try:
+            workers = self._client.scheduler_info()["workers"]
+            self._threads = {
+                place: threads for place, threads in self._client.nthreads().items()
+                if place not in self._refused
+            }  # fmt: skip
+        except Exception as problem:
+            raise SweepError(
+                f"{self._scheduler}: the scheduler was lost; what was finished is kept: run again "
+                "to go on"
+            ) from problem
+        for place in self._threads:
+            seen = float(workers.get(place, {}).get("last_seen", 0.0))
+            if place not in self._heard or self._heard[place][0] != seen:
+                self._heard[place] = (seen, now)
+        if self._threads:
+            self._alone_since, self._told = now, False
+            return
+        refusals = "; ".join(f"{place}: {why}" for place, why in self._refused.items())
+        if now - self._alone_since > NO_WORKER[1] or (refusals and not self._batches):
+            raise SweepError(f"{self._scheduler}: no worker can do the jobs. {refusals}".strip())
+        if now - self._alone_since > NO_WORKER[0] and not self._told:
+            self._told = True
+            self._say(f"{self._scheduler}: waits for workers; none is connected")
+
+    def _hangs(self, place: str) -> bool:
+        seen = self._heard.get(place)
+        return seen is None or time.monotonic() - seen[1] > SILENCE
+
+    def _missed(self) -> Iterator[FinishedJob[Any]]:
+        """Takes back what lost workers had; a job that lost several was the cause."""
+        for batch in list(self._batches):
+            for place in [place for place in batch.places if place not in self._threads]:
+                if place in self._refused:
+                    continue
+                del batch.places[place]
+                self._lost.update(batch.numbers)
+                if batch.places:
+                    continue
+                self._batches.remove(batch)
+                for number in batch.numbers:
+                    if len(batch.numbers) == 1 and self._lost[number] >= TRIES:
+                        words = f"its process died {TRIES} times (out of memory?)"
+                        yield FinishedJob(number, problem=ProcessDied(words), place=place)
+                    else:
+                        self._lone.append(number)
+
+    def _hand_out(self) -> None:
+        """Gives each worker that is heard what its threads can do now and next."""
+        load = Counter(place for batch in self._batches for place in batch.places)
+        for place, threads in self._threads.items():
+            while load[place] < BATCHES_AHEAD * threads and not self._hangs(place):
+                batch = self._next(place)
+                if batch is None:
+                    break
+                self._submit(batch, place)
+                load[place] += 1
+
+    def _next(self, place: str) -> _Batch | None:
+        """A new batch, or one whose workers all hang."""
+        if self._lone:
+            numbers = [self._lone.popleft()]
+        elif self._waiting:
+            threads = max(sum(self._threads.values()), 1)
+            seconds = self._seconds / self._done if self._done else BATCH_TIME
+            fair = len(self._waiting) // (2 * BATCHES_AHEAD * threads)
+            size = max(1, min(round(BATCH_TIME / max(seconds, 1e-6)), fair))
+            numbers = [self._waiting.popleft() for _ in range(min(size, len(self._waiting)))]
+        else:
+            hanging = (
+                batch for batch in self._batches
+                if place not in batch.places and all(map(self._hangs, batch.places))
+            )  # fmt: skip
+            return next(hanging, None)
+        batch = _Batch(numbers)
+        self._batches.append(batch)
+        return batch
+
+    def _submit(self, batch: _Batch, place: str) -> None:
+        jobs = [(number, self._jobs[number]) for number in batch.numbers]
+        future = self._client.submit(
+            do_batch, self._call, jobs, code_version(), pure=False, workers=[place],
+            allow_other_workers=False, key=f"{self._name}-{uuid.uuid4()}",
+        )  # fmt: skip
+        batch.places[place] = future
+        future.add_done_callback(lambda ended: self._ended.put((batch, place, ended)))
+
+    def _results(self, batch: _Batch, place: str, future: Any) -> Iterator[FinishedJob[Any]]:
+        if batch not in self._batches or batch.places.get(place) is not future:
+            return
+        try:
+            seconds, finished = future.result(timeout=SCHEDULER_TIMEOUT)
+        except Exception as problem:
+            del batch.places[place]
+            if place in self._threads:  # it cannot do the work: it lacks the package, or a file
+                words = (str(problem) or type(problem).__name__).splitlines()[0][:300]
+                self._refused[place] = words
+                del self._threads[place]
+                self._say(f"worker {place} is not used: {words}")
+            if not batch.places:
+                self._batches.remove(batch)
+                self._waiting.extendleft(reversed(batch.numbers))
+            return
+        self._batches.remove(batch)
+        self._seconds += seconds
+        self._done += len(finished)
+        for one in finished:
+            yield FinishedJob(one.number, one.result, one.problem, place)
+
+
+def do_batch(
+    work: Callable[[Any], Any], jobs: Sequence[tuple[int, Any]], version: str
+) -> tuple[float, list[FinishedJob[Any]]]:
+    """Does some jobs in a process of the cluster; gives the time that they took [s], and them.
+
+    Raises:
+        SweepError: The process has other code, whose numbers could be others.
+    """
+    if code_version() != version:
+        raise SweepError(f"it has cdpr_drake {code_version()}; accepted: {version}, as here")
+    share_compilation()
+    began = time.perf_counter()
+    with one_blas_thread():
+        finished = [portable(do_job(work, job, number)) for number, job in jobs]
+    return time.perf_counter() - began, finished
+
+
+@contextmanager
+def _connected(scheduler: str) -> Iterator[Any]:
+    """A client of a scheduler; Dask's log stays silent: what matters is said here."""
+    if not scheduler.strip():
+        raise SweepError(f"workers: found an empty word; {ACCEPTED}")
+    try:
+        from distributed import Client
+    except ImportError as problem:
+        raise SweepError(
+            f"workers: found {scheduler}, and Dask is not installed; pip install "
+            "'cdpr_drake[cluster]'"
+        ) from problem
+    loggers = [logging.getLogger(name) for name in ("distributed", "asyncio", "tornado")]
+    levels = [logger.level for logger in loggers]
+    for logger in loggers:
+        logger.setLevel(logging.CRITICAL + 1)
+    by_file = scheduler.endswith(".json")
+    where = {"scheduler_file": scheduler} if by_file else {"address": scheduler}
+    try:
+        try:
+            client = Client(timeout=SCHEDULER_TIMEOUT, set_as_default=False, **where)
+        except Exception as problem:
+            words = (str(problem) or type(problem).__name__).splitlines()[0]
+            if "ssl_context" in words:
+                words = (
+                    "no certificates: set DASK_DISTRIBUTED__COMM__TLS__CA_FILE, "
+                    "DASK_DISTRIBUTED__COMM__TLS__CLIENT__CERT and "
+                    "DASK_DISTRIBUTED__COMM__TLS__CLIENT__KEY"
+                )
+            raise SweepError(
+                f"workers: {scheduler} does not answer ({words}); {ACCEPTED}"
+            ) from problem
+        try:
+            yield client
+        finally:
+            with suppress(Exception):
+                client.close(timeout=SCHEDULER_TIMEOUT)
+    finally:
+        for logger, level in zip(loggers, levels, strict=True):
+            logger.setLevel(level)

@@ -1,0 +1,296 @@
+"""Results folders: one writer at a time, files that appear whole, and no file of others removed.
+
+The marker of a folder holds the arguments of what is computed in it, whether the results are
+complete, and the names of the files that this program wrote. The same arguments go on where an
+unfinished folder stands. Other files, and files that changed after the results were complete, are
+refused and never removed.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from itertools import count
+from pathlib import Path
+from typing import Any, Self
+
+from filelock import FileLock, Timeout
+
+from cdpr_drake.errors import OutputFolderError
+from cdpr_drake.version import __version__
+
+MARKER, LOCK, PART = ".cdpr_drake.json", ".cdpr_drake.lock", ".part-"
+"""The marker, the lock, and what the name of a file in the making begins with."""
+
+LONGEST_VALUE = 60
+"""Longer JSON values are not quoted in refusals [characters]."""
+
+
+class Folder:
+    """A results folder that this process writes inside its `with` block.
+
+    Attributes:
+        path: The folder.
+        resumed: True if an earlier process began the same computation and did not complete it.
+    """
+
+    def __init__(
+        self, path: Path, arguments: Mapping[str, Any], overwrite: bool = False, grows: bool = False
+    ) -> None:
+        """Checks the path; nothing is written before the block.
+
+        Args:
+            path: The folder; it need not exist.
+            arguments: All that the results depend on, for JSON.
+            overwrite: True to remove results of other arguments, and complete ones, first.
+            grows: True if complete results of the same arguments may get more, or be read again.
+
+        Raises:
+            OutputFolderError: The path is a file, a mount point, or the working folder or above it.
+        """
+        self.path, self.resumed = Path(path).absolute(), False
+        self._arguments: Any = json.loads(json.dumps(arguments))
+        self._overwrite, self._grows = overwrite, grows
+        self._files: list[str] = []
+        self._lock = FileLock(self.path / LOCK)
+        working, real = Path.cwd(), self.path.resolve()
+        if real == working or real in working.parents or os.path.ismount(real):
+            raise OutputFolderError(
+                f"{path}: found the working folder, one above it or a mount point; accepted: a "
+                "folder of its own"
+            )
+        if self.path.exists() and not self.path.is_dir():
+            raise OutputFolderError(f"{path}: found a file; accepted: a folder")
+
+    def __enter__(self) -> Self:
+        """Locks the folder, and removes older results if `overwrite` says so.
+
+        Raises:
+            OutputFolderError: It holds other files or other results, cannot be written, or another
+                process writes it.
+        """
+        with self.writing():
+            self.path.mkdir(parents=True, exist_ok=True)
+            try:
+                self._lock.acquire(timeout=0)
+            except Timeout:
+                raise OutputFolderError(f"{self.path}: another command writes there") from None
+            try:
+                self._open()
+            except BaseException:
+                self._release()
+                raise
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Unlocks the folder, and removes it if nothing was written."""
+        self._release()
+
+    def _open(self) -> None:
+        foreign = foreign_files(self.path)
+        if foreign:
+            raise OutputFolderError(
+                f"{self.path}: holds files that cdpr did not write, or that changed since: "
+                f"{', '.join(foreign[:3])}; name another folder"
+            )
+        marker = read_marker(self.path)
+        if marker is not None:
+            different = list(differences(marker["arguments"], self._arguments))
+            goes_on = self._grows or not marker["complete"]
+            self.resumed = goes_on and not different and not self._overwrite
+            if not self.resumed and not self._overwrite:
+                words = "; ".join(different[:3]) or "these are complete"
+                raise OutputFolderError(
+                    f"{self.path}: holds other results: {words}; name another folder or allow "
+                    "overwriting"
+                )
+            self._files = marker["files"]
+        for path in list(self.path.iterdir()):
+            if path.name.startswith(PART) or (path.name in self._files and not self.resumed):
+                _remove(path)
+        if not self.resumed:
+            self._files = []
+        self._mark(complete=False)
+
+    def _release(self) -> None:
+        if not self._files and read_marker(self.path) is not None:
+            with suppress(OSError):
+                (self.path / MARKER).unlink()
+        with suppress(OSError):
+            if [path.name for path in self.path.iterdir()] == [LOCK]:
+                (self.path / LOCK).unlink()
+                self.path.rmdir()
+        self._lock.release()
+
+    def claim(self, name: str) -> Path:
+        """The path of a file or folder in it, which is this program's from now on."""
+        if name not in self._files:
+            self._files.append(name)
+            self._mark(complete=False)
+        return self.path / name
+
+    @contextmanager
+    def file(self, name: str) -> Iterator[Path]:
+        """Where to write a file that appears whole, or not at all, when the block ends.
+
+        Args:
+            name: Path below the folder; its first part is what is claimed.
+
+        Raises:
+            OutputFolderError: It cannot be written, for instance on a full disk.
+        """
+        with self.writing():
+            self.claim(Path(name).parts[0])
+            final = self.path / name
+            final.parent.mkdir(exist_ok=True)
+            part = final.with_name(PART + final.name)
+            try:
+                yield part
+                _sync(part)
+                part.replace(final)
+            finally:
+                part.unlink(missing_ok=True)
+
+    def write_text(self, name: str, words: str) -> None:
+        """Writes a text file."""
+        with self.file(name) as part:
+            part.write_text(words, encoding="utf-8")
+
+    def write_json(self, name: str, value: Any) -> None:
+        """Writes numbers and words for other programs; all numbers are finite."""
+        self.write_text(name, json.dumps(value, indent=2, allow_nan=False) + "\n")
+
+    def write_all(
+        self,
+        writers: Mapping[str, Callable[[Path], object]],
+        stop: Callable[[], bool] = lambda: False,
+    ) -> dict[str, str]:
+        """Writes files by name, one of which spoils no other; returns why some were not written."""
+        failed: dict[str, str] = {}
+        for name, write in writers.items():
+            if stop():
+                failed[name] = "not begun, as the command was asked to stop"
+                continue
+            try:
+                with self.file(name) as part:
+                    write(part)
+            except Exception as problem:  # whatever a figure stumbles over
+                failed[name] = (str(problem) or type(problem).__name__).splitlines()[0][:300]
+        return failed
+
+    def complete(self) -> None:
+        """Marks the results as complete."""
+        with self.writing():
+            self._mark(complete=True)
+
+    @contextmanager
+    def writing(self) -> Iterator[None]:
+        """Turns an OSError of the block into OutputFolderError, which says what is kept."""
+        try:
+            yield
+        except OSError as problem:
+            raise OutputFolderError(
+                f"{self.path}: cannot be written: {problem.strerror or problem}; what was finished "
+                "is kept, and the same command goes on"
+            ) from problem
+
+    def _mark(self, complete: bool) -> None:
+        words = json.dumps(
+            {
+                "program": "cdpr_drake", "version": __version__, "complete": complete,
+                "files": self._files, "arguments": self._arguments,
+            },
+            indent=1,
+        )  # fmt: skip
+        part = self.path / (PART + MARKER)
+        part.write_text(words + "\n", encoding="utf-8")
+        _sync(part)
+        part.replace(self.path / MARKER)
+
+
+def read_marker(folder: Path) -> dict[str, Any] | None:
+    """The marker of a results folder; None without one, or if it cannot be read."""
+    try:
+        marker = json.loads((folder / MARKER).read_text(encoding="utf-8"))
+        names = {"complete": bool(marker["complete"]), "files": list(marker["files"])}
+        return {"arguments": marker["arguments"], **names}
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+
+
+def foreign_files(folder: Path) -> list[str]:
+    """Names that this program did not write, or that changed after the results were complete."""
+    marker = read_marker(folder)
+    names = {MARKER, LOCK} if marker is not None else {LOCK}
+    written = [] if marker is None else marker["files"]
+    latest = (folder / MARKER).stat().st_mtime_ns if marker and marker["complete"] else None
+
+    def foreign(path: Path) -> bool:
+        if path.name in names or path.name.startswith(PART):
+            return False
+        changed = latest is not None and path.lstat().st_mtime_ns > latest
+        return path.name not in written or changed
+
+    return [path.name for path in sorted(folder.iterdir()) if foreign(path)]
+
+
+def free_folder(base: Path, arguments: Mapping[str, Any]) -> Path:
+    """The first of base, base-2, ... that is free, or where these arguments go on."""
+    wanted = json.loads(json.dumps(arguments))
+    for number in count(1):
+        path = base if number == 1 else base.with_name(f"{base.name}-{number}")
+        marker = read_marker(path)
+        goes_on = marker is not None and not marker["complete"] and marker["arguments"] == wanted
+        if not path.exists() or (goes_on and not is_locked(path)):
+            return path
+    raise AssertionError
+
+
+def is_locked(folder: Path) -> bool:
+    """True if a process writes a results folder."""
+    lock = FileLock(folder / LOCK)
+    try:
+        lock.acquire(timeout=0)
+    except Timeout:
+        return True
+    lock.release()
+    return False
+
+
+def differences(there: Any, here: Any, key: str = "") -> Iterator[str]:
+    """Words for each place at which two JSON values differ, such as `seed is 1 there, 2 here`."""
+    if isinstance(there, dict) and isinstance(here, dict):
+        for name in {**there, **here}:
+            full = f"{key}.{name}" if key else str(name)
+            if name not in there:
+                yield f"{full} is not there, {_quoted(here[name])} here"
+            elif name not in here:
+                yield f"{full} is {_quoted(there[name])} there, not here"
+            else:
+                yield from differences(there[name], here[name], full)
+    elif isinstance(there, list) and isinstance(here, list) and len(there) == len(here):
+        for index, (first, second) in enumerate(zip(there, here, strict=True)):
+            yield from differences(first, second, f"{key}[{index}]")
+    elif there != here:
+        yield f"{key} is {_quoted(there)} there, {_quoted(here)} here"
+
+
+def _quoted(value: Any) -> str:
+    words = json.dumps(value)
+    return words if len(words) <= LONGEST_VALUE else "another"
+
+
+def _remove(path: Path) -> None:
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path)
+    else:
+        path.unlink()
+
+
+def _sync(path: Path) -> None:
+    """Brings a file's content to the disk before it gets its name."""
+    with path.open("rb") as file:
+        os.fsync(file.fileno())

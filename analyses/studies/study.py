@@ -1,0 +1,467 @@
+"""The frame of studies: cases, the call that measures each, and what is made of the rows.
+
+A case is a call of a module's function, and keys that tell its row from others. A call gives
+numbers, words, lists, tables of names and arrays; names of columns end with their SI unit. Equal
+calls are made once, whichever cases ask for them. Rows are kept as they come, so the same command
+goes on after a kill, on any processes, to the same bytes. Nothing but call and seed may change a
+row; what measures times is measured last, alone.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property, partial
+from importlib import import_module
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+
+from cdpr_drake.analyses.frame.folder import Folder, differences, read_marker
+from cdpr_drake.analyses.frame.follow import NOBODY, Count, Follow
+from cdpr_drake.analyses.frame.jobs import finished_jobs
+from cdpr_drake.analyses.reporting.log_files import finite
+from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
+from cdpr_drake.analyses.studies.facts import Find, MissingRuns, facts_of, judged, scorecard
+from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS, figure_writers
+from cdpr_drake.analyses.workspaces.pose_grid import plain
+from cdpr_drake.errors import CdprError
+from cdpr_drake.schema.typed_yaml import closest
+
+Frame = pd.DataFrame
+Row = Mapping[str, Any]
+Call = partial[Row]
+
+ROWS, ARRAYS, RESULTS = "rows.jsonl", "arrays", "results.json"
+"""Files of a study's folder: a line each row, arrays of rows by digest, and what came out."""
+
+UNITS = {
+    "m": "m", "m2": "m^2", "m3": "m^3", "rad": "rad", "deg": "deg", "px": "px", "s": "s", "n": "N",
+    "n_m": "N m", "n2": "N^2", "m_s": "m/s", "rad_s": "rad/s", "m_s2": "m/s^2", "kg": "kg",
+    "hz": "Hz", "us": "us", "percent": "%",
+}  # fmt: skip
+"""Units by the last words of the names of columns."""
+
+
+@dataclass(frozen=True)
+class Form:
+    """In which form a study is run.
+
+    Attributes:
+        quick: True for a short form, which shows that everything works.
+        seeds: How often what depends on chance is measured; None: as often as the study says.
+        recipe: One of the study's other recipes; empty: its own.
+    """
+
+    quick: bool = False
+    seeds: int | None = None
+    recipe: str = ""
+
+    def times(self, full: int, quick: int = 1, most: int | None = None) -> int:
+        """How often a case that depends on chance is measured."""
+        count = self.seeds or (quick if self.quick else full)
+        return count if most is None else min(count, most)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Case:
+    """A row, or one for each seed.
+
+    Attributes:
+        keys: The row's first columns.
+        call: Gives the other columns; a partial of a module's function with plain arguments.
+        seeds: How often it is called, with seed=0, 1, ...; 0: once, without a seed.
+        alone: True if it measures times.
+    """
+
+    keys: Mapping[str, Any]
+    call: Call
+    seeds: int = 0
+    alone: bool = False
+
+    def calls(self) -> Iterator[tuple[dict[str, Any], Call]]:
+        """Keys and call of each of its rows."""
+        if not self.seeds:
+            yield dict(self.keys), self.call
+        for seed in range(self.seeds):
+            yield {**self.keys, "seed": seed}, partial(self.call, seed=seed)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Study:
+    """A study. Its facts are data: entries of `facts/*.yaml` under its name, or `facts`.
+
+    Attributes:
+        name: Its name for `cdpr study`.
+        title: What it shows, in one line.
+        cases: Gives all cases of a form.
+        source: Where what it repeats is printed.
+        tables: What makes tables of the rows, by title.
+        figures: What draws the rows, by the name of the file.
+        finds: What judges facts that are no comparison, by name.
+        moments: Which number of a curve in time a column is: "end", "largest", "mean" or "first".
+        numbers: Gives more numbers for JSON.
+        parameters: Gives what all cases have in common, for JSON.
+        assumptions: What the source leaves open, and what was chosen.
+        facts: Facts of a study that is not of this package, as an entry of `facts/*.yaml` each.
+        coarse: True if the quick form has coarser grids or shorter runs, so that it judges nothing.
+        recipes: Names of other recipes, see `Form.recipe`.
+    """
+
+    name: str
+    title: str
+    cases: Callable[[Form], Iterable[Case]]
+    source: str = ""
+    tables: Mapping[str, Callable[[Frame], Frame]] = field(default_factory=dict)
+    figures: Mapping[str, Callable[[Frame], Figure]] = field(default_factory=dict)
+    finds: Mapping[str, Find] = field(default_factory=dict)
+    moments: Mapping[str, str] = field(default_factory=dict)
+    numbers: Callable[[Frame], Mapping[str, Any]] | None = None
+    parameters: Callable[[Form], Mapping[str, Any]] = lambda form: {}
+    assumptions: Sequence[str] = ()
+    facts: Sequence[Mapping[str, Any]] = ()
+    coarse: bool = False
+    recipes: Sequence[str] = ()
+
+
+def run_study(
+    study: str | Study, folder: Path | str | None = None, quick: bool = False, *,
+    seeds: int | None = None, recipe: str = "", workers: int | str | None = None,
+    overwrite: bool = False, formats: Sequence[str] = DEFAULT_FORMATS,
+    runs_from: Path | str | None = None, follow: Follow = NOBODY,
+) -> StudyResult:  # fmt: skip
+    """Runs a study, or what of it is not yet in its folder.
+
+    Args:
+        study: Its name, or a study of your own.
+        folder: Results folder, where the same call goes on; None: nothing is kept.
+        quick: The short form, to see that everything works.
+        seeds: How often what depends on chance is measured.
+        recipe: Another recipe, for studies that have some.
+        workers: Processes, a Dask scheduler, or None: one for each processor, for long work.
+        overwrite: True to replace results of other code or another form.
+        formats: Endings of the figures' files.
+        runs_from: Folder of the same study by other code, whose rows of equal calls are taken over.
+        follow: Who follows.
+
+    Raises:
+        CdprError: Study or recipe is unknown, `runs_from` is no folder of it, or the folder holds
+            other results or files, cannot be written, or another command writes there.
+        SweepError: The cluster cannot be used.
+    """
+    one = study_named(study) if isinstance(study, str) else study
+    if recipe and recipe not in one.recipes:
+        accepted = closest(recipe, one.recipes) if one.recipes else "accepted: none, as it has none"
+        raise CdprError(f"recipe: {recipe!r} is unknown for {one.name}; {accepted}")
+    if seeds is not None and seeds < 1:
+        raise CdprError(f"seeds: found {seeds}; accepted: at least 1")
+    form = Form(quick, seeds, recipe)
+    passing = TemporaryDirectory(prefix="cdpr-study-") if folder is None else None
+    where = Path(passing.name) if passing else Path(folder or "")
+    arguments = {"study": one.name, "quick": quick, "recipe": recipe, "code": code_version()}
+    with Folder(where, arguments, overwrite, grows=True) as results, RowStore(results) as rows:
+        if runs_from is not None:
+            rows.take_over(Path(runs_from), arguments)
+        plan = [
+            (keys, call, digest(call), case.alone)
+            for case in one.cases(form) for keys, call in case.calls()
+        ]  # fmt: skip
+        failed = _measure(plan, rows, workers, follow, one.name)
+        found = StudyResult(one, form, rows.in_order(plan), len(plan), rows.taken, failed, passing)
+        if folder is not None:
+            found.undrawn.update(found.write(results, formats, follow.stop))
+            if not found.interrupted and not found.undrawn:
+                results.complete()
+    return found
+
+
+Plan = Sequence[tuple[Mapping[str, Any], Call, str, bool]]
+"""Of each row keys, call, digest, and whether it is measured alone."""
+
+
+def _measure(
+    plan: Plan, rows: RowStore, workers: int | str | None, follow: Follow, name: str
+) -> dict[str, str]:
+    """Measures what lacks, and gives what failed: words by digest."""
+    lacking = {digest: (keys, call, alone) for keys, call, digest, alone in plan}
+    total = len(lacking)
+    lacking = {digest: one for digest, one in lacking.items() if digest not in rows}
+    count, failed = Count(follow, total, total - len(lacking)), dict[str, str]()
+    for alone in (False, True):
+        names = [digest for digest, one in lacking.items() if one[2] == alone]
+        calls = [lacking[digest][1] for digest in names]
+        for finished in finished_jobs(
+            measured, calls, 1 if alone else workers, stop=follow.stop, say=follow.say, name=name
+        ):
+            digest, keys = names[finished.number], lacking[names[finished.number]][0]
+            words = ", ".join(f"{key} {value}" for key, value in keys.items())
+            if finished.problem is None:
+                rows.add(digest, finished.result or {})
+            else:
+                failed[digest] = f"{words}: {finished.words()}"
+                follow.say(failed[digest])
+            count.add(1, words)
+    return failed
+
+
+def measured(call: Call) -> Row:
+    """A row."""
+    return call()
+
+
+def digest(call: Call) -> str:
+    """What a call is known by: its function and arguments.
+
+    Raises:
+        TypeError: An argument has no plain form.
+    """
+    return hashlib.sha256(json.dumps(_plain_call(call)).encode()).hexdigest()[:20]
+
+
+def _plain_call(value: Any) -> Any:
+    if isinstance(value, partial):
+        return [_plain_call(value.func), *map(_plain_call, value.args), _plain_call(value.keywords)]
+    if callable(value) and hasattr(value, "__qualname__"):
+        return f"{value.__module__.rpartition('.')[2]}.{value.__qualname__}"
+    if isinstance(value, Mapping):
+        return {str(key): _plain_call(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain_call(item) for item in value]
+    return plain(value)
+
+
+class Arrays(Mapping[str, np.ndarray]):
+    """Arrays of a row, read when they are asked for."""
+
+    def __init__(self, path: Path) -> None:
+        """Of a file."""
+        self.path = path
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        with np.load(self.path) as file:
+            return np.asarray(file[name])
+
+    def __iter__(self) -> Iterator[str]:
+        with np.load(self.path) as file:
+            return iter(file.files)
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self)
+
+
+class RowStore:
+    """Rows of a folder by the digests of their calls: a line and perhaps a file of arrays each."""
+
+    def __init__(self, folder: Folder) -> None:
+        """Of an open folder."""
+        self.folder, self.taken = folder, 0
+        self.rows = read_rows(folder.path) if folder.resumed else {}
+
+    def __enter__(self) -> RowStore:
+        """Opens the file of rows, without a line that a kill has cut."""
+        whole = "".join(json.dumps([name, row]) + "\n" for name, row in self.rows.items())
+        self.folder.write_text(ROWS, whole)
+        self._file = (self.folder.path / ROWS).open("a", encoding="utf-8")
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._file.close()
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.rows
+
+    def add(self, name: str, row: Row) -> None:
+        """Keeps a row: its arrays first, so that a line means that all is there.
+
+        Raises:
+            OutputFolderError: It cannot be written.
+        """
+        arrays = {key: value for key, value in row.items() if isinstance(value, np.ndarray)}
+        if arrays:
+            with self.folder.file(f"{ARRAYS}/{name}.npz") as part, part.open("wb") as file:
+                np.savez_compressed(file, allow_pickle=False, **arrays)
+        words = plain({key: value for key, value in row.items() if key not in arrays})
+        with self.folder.writing():
+            self._file.write(json.dumps([name, words]) + "\n")
+            self._file.flush()
+        self.rows[name] = words
+
+    def take_over(self, other: Path, arguments: Mapping[str, Any]) -> None:
+        """Takes over rows that other code measured.
+
+        Raises:
+            CdprError: The folder is none of the same study in the same form.
+        """
+        marker = read_marker(other)
+        told = {} if marker is None else {**marker["arguments"], "code": arguments["code"]}
+        if different := list(differences(told, dict(arguments))):
+            raise CdprError(f"runs_from: {other}: {different[0]}; accepted: a folder of this study")
+        for name, row in read_rows(other).items():
+            if name not in self.rows:
+                path = other / ARRAYS / f"{name}.npz"
+                self.add(name, {**row, **(Arrays(path) if path.exists() else {})})
+                self.taken += 1
+
+    def in_order(self, plan: Plan) -> list[dict[str, Any]]:
+        """Rows in the order of the plan, keys first, `arrays` last."""
+        found = []
+        for keys, _, name, _ in plan:
+            if name in self.rows:
+                path = self.folder.path / ARRAYS / f"{name}.npz"
+                there = Arrays(path) if path.exists() else None
+                found.append({**plain(keys), **self.rows[name], "arrays": there})
+        return found
+
+
+def read_rows(folder: Path) -> dict[str, dict[str, Any]]:
+    """Rows of a folder by digest; a line that a kill has cut does not count."""
+    path = folder / ROWS
+    lines = path.read_text(encoding="utf-8").splitlines(keepends=True) if path.exists() else []
+    return dict(json.loads(line) for line in lines if line.endswith("\n"))
+
+
+@dataclass(frozen=True, eq=False)
+class StudyResult:
+    """What a study found.
+
+    Attributes:
+        study: The study.
+        form: In which form it was run.
+        records: Its rows, keys first, `arrays` last.
+        planned: How many rows there are when it is complete.
+        taken: How many of them other code had measured.
+        failed: Words by digest of calls that raised, or whose process died.
+        passing: The folder of rows that are not kept.
+        undrawn: Of files that were not written, the name and why.
+    """
+
+    study: Study
+    form: Form
+    records: Sequence[Mapping[str, Any]]
+    planned: int
+    taken: int = 0
+    failed: Mapping[str, str] = field(default_factory=dict)
+    passing: TemporaryDirectory[str] | None = None
+    undrawn: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def interrupted(self) -> bool:
+        """True if rows lack."""
+        return len(self.records) < self.planned
+
+    @cached_property
+    def rows(self) -> Frame:
+        """The rows as a table; NaN if a row has no such column."""
+        return Frame(self.records)
+
+    @cached_property
+    def statements(self) -> list[dict[str, Any]]:
+        """Facts with verdicts."""
+        study, unjudged = self.study, ""
+        if self.interrupted:
+            unjudged = "interrupted"
+        elif self.form.quick:
+            unjudged = "not judged in the quick form"
+        blind = self.interrupted or (self.form.quick and study.coarse)
+        rows = None if blind or not self.records else with_names_of_tables(self.rows)
+        facts = facts_of(study.name, study.facts)
+        return judged(facts, rows, study.finds, study.moments, unjudged)
+
+    def tables(self) -> dict[str, Frame]:
+        """Tables by title, that of the facts last; those whose rows lack are left out."""
+        found = {}
+        for title, make in self.study.tables.items():
+            try:
+                found[title] = make(self.rows)
+            except (MissingRuns, KeyError):
+                if not self.interrupted and not self.form.quick:
+                    raise
+        if self.statements:
+            columns = ["says", "printed", "found", "verdict", "rule", "why"]
+            found["What has to hold"] = Frame(self.statements, columns=columns)
+        return found
+
+    def drawings(self) -> dict[str, Callable[[], Figure]]:
+        """What draws its figures, by name."""
+        if not self.records:
+            return {}
+        return {name: partial(draw, self.rows) for name, draw in self.study.figures.items()}
+
+    def as_dict(self) -> dict[str, Any]:
+        """Everything for JSON but arrays; what is not finite is null."""
+        study, columns = self.study, [name for name in self.rows if name != "arrays"]
+        numbers = {} if study.numbers is None or self.interrupted else study.numbers(self.rows)
+        told = {
+            "study": study.name, "title": study.title, "source": study.source,
+            "quick": self.form.quick, "interrupted": self.interrupted,
+            "rows": {"done": len(self.records), "of": self.planned},
+            "by_earlier_code": self.taken, "failed": list(self.failed.values()),
+            "versions": package_versions(), "parameters": study.parameters(self.form),
+            "assumptions": list(study.assumptions),
+            "units": {name: unit for name in columns if (unit := unit_of(name))},
+            "runs": [{k: v for k, v in row.items() if k != "arrays"} for row in self.records],
+            "numbers": numbers, "statements": self.statements,
+            "scorecard": scorecard(self.statements), "figures": list(study.figures),
+        }  # fmt: skip
+        result: dict[str, Any] = finite(plain(told))
+        return result
+
+    def write(
+        self, folder: Folder, formats: Sequence[str], stop: Callable[[], bool]
+    ) -> dict[str, str]:
+        """Writes rows, results, tables and figures; gives the files that failed, and why."""
+        rows = self.rows.drop(columns="arrays", errors="ignore")
+        folder.write_text("runs.csv", rows.to_csv(index=False))
+        folder.write_json(RESULTS, self.as_dict())
+        pages = (
+            f"<h3>{title}</h3>\n{table.to_html(index=False, float_format='{:.4g}'.format)}"
+            for title, table in self.tables().items()
+        )
+        folder.write_text("tables.html", "\n".join(pages))
+        return folder.write_all(figure_writers(self.drawings(), formats), stop)
+
+
+def with_names_of_tables(rows: Frame) -> Frame:
+    """With a column "column.name" for each name of the columns that hold tables of names."""
+    more: dict[str, Any] = {}
+    for column in rows:
+        tables = [value for value in rows[column] if isinstance(value, dict)]
+        for name in dict.fromkeys(name for value in tables for name in value):
+            more[f"{column}.{name}"] = [
+                value.get(name, np.nan) if isinstance(value, dict) else np.nan
+                for value in rows[column]
+            ]
+    return pd.concat([rows, Frame(more, rows.index)], axis=1)
+
+
+def unit_of(column: str) -> str:
+    """Unit of a column, from the end of its name; empty without one."""
+    words = column.split("_")
+    endings = ("_".join(words[-count:]) for count in (2, 1) if len(words) > count)
+    return next((UNITS[ending] for ending in endings if ending in UNITS), "")
+
+
+STUDIES = {
+    "tension-methods": "tension_methods", "engines": "engines", "case-4": "caroca_cases",
+    "case-5": "caroca_cases", "case-10": "case_10",
+}  # fmt: skip
+"""Modules of this folder by the names of studies; each has `STUDY`, or `STUDIES` by name."""
+
+
+def study_named(name: str) -> Study:
+    """A study of this package.
+
+    Raises:
+        CdprError: There is none of this name.
+    """
+    if name not in STUDIES:
+        raise CdprError(f"study {name!r} is unknown; {closest(name, STUDIES)}")
+    module = import_module(f"cdpr_drake.analyses.studies.{STUDIES[name]}")
+    found: Study = module.STUDIES[name] if hasattr(module, "STUDIES") else module.STUDY
+    return found
