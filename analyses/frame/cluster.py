@@ -14,6 +14,7 @@ from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, TypeVar
 
 from cdpr_drake.analyses.frame.jobs import POLL, FinishedJob, ProcessDied, do_job, portable
@@ -33,8 +34,8 @@ ACCEPTED = (
 SCHEDULER_TIMEOUT = 5.0
 """A scheduler answers within this time [s]."""
 
-BATCH_TIME = 1.0
-"""Wanted length of a batch [s]: client and scheduler spend some 10 ms on each."""
+BATCH_TIME = 0.1, 1.0
+"""Least and wanted length of a batch [s]: client and scheduler spend some 10 ms on each."""
 
 BATCHES_AHEAD = 2
 """Batches of a thread: one that it does and one that waits there."""
@@ -50,7 +51,7 @@ NO_WORKER = 8.0, 300.0
 """Times without a worker until it is said, and until the command gives up [s]."""
 
 TRIES = 2
-"""A job alone in its batch may lose so many workers before it is taken for the cause."""
+"""A job that is alone on a worker may lose so many of them before it is taken for the cause."""
 
 
 @dataclass(eq=False)
@@ -58,6 +59,8 @@ class _Batch:
     """Jobs that one worker does."""
 
     numbers: list[int]
+    alone: bool = False
+    """True if its worker does nothing else meanwhile."""
     places: dict[str, Any] = field(default_factory=dict)
     """Futures by address of the worker."""
 
@@ -103,7 +106,7 @@ class _Cluster:
         self._stop, self._say, self._name = stop, say, name
         self._call = work
         self._waiting = deque(range(len(jobs)))
-        self._lone: deque[int] = deque()  # jobs whose worker was lost: each in a batch of its own
+        self._suspects: deque[int] = deque()  # jobs that a lost worker had
         self._lost: Counter[int] = Counter()
         self._batches: list[_Batch] = []
         self._ended: queue.Queue[tuple[_Batch, str, Any]] = queue.Queue()
@@ -115,7 +118,7 @@ class _Cluster:
 
     def finished(self) -> Iterator[FinishedJob[Any]]:
         try:
-            while self._waiting or self._lone or self._batches:
+            while self._waiting or self._suspects or self._batches:
                 self._look()
                 yield from self._missed()
                 if not self._stop():
@@ -139,10 +142,7 @@ class _Cluster:
         self._looked = now
         try:
             workers = self._client.scheduler_info()["workers"]
-            self._threads = {
-                place: threads for place, threads in self._client.nthreads().items()
-                if place not in self._refused
-            }  # fmt: skip
+            self._threads = dict(self._client.nthreads())
         except Exception as problem:
             raise SweepError(
                 f"{self._scheduler}: the scheduler was lost; what was finished is kept: run again "
@@ -152,7 +152,7 @@ class _Cluster:
             seen = float(workers.get(place, {}).get("last_seen", 0.0))
             if place not in self._heard or self._heard[place][0] != seen:
                 self._heard[place] = (seen, now)
-        if self._threads:
+        if set(self._threads) - set(self._refused):
             self._alone_since, self._told = now, False
             return
         refusals = "; ".join(f"{place}: {why}" for place, why in self._refused.items())
@@ -170,45 +170,55 @@ class _Cluster:
         """Takes back what lost workers had; a job that lost several was the cause."""
         for batch in list(self._batches):
             for place in [place for place in batch.places if place not in self._threads]:
-                if place in self._refused:
-                    continue
                 del batch.places[place]
-                self._lost.update(batch.numbers)
                 if batch.places:
                     continue
                 self._batches.remove(batch)
-                for number in batch.numbers:
-                    if len(batch.numbers) == 1 and self._lost[number] >= TRIES:
-                        words = f"its process died {TRIES} times (out of memory?)"
-                        yield FinishedJob(number, problem=ProcessDied(words), place=place)
-                    else:
-                        self._lone.append(number)
+                if not batch.alone:
+                    self._suspects.extend(batch.numbers)
+                    continue
+                (number,) = batch.numbers
+                self._lost[number] += 1
+                if self._lost[number] < TRIES:
+                    self._suspects.append(number)
+                else:
+                    words = f"its process died {TRIES} times (out of memory?)"
+                    yield FinishedJob(number, problem=ProcessDied(words), place=place)
 
     def _hand_out(self) -> None:
         """Gives each worker that is heard what its threads can do now and next."""
         load = Counter(place for batch in self._batches for place in batch.places)
+        reserved = {place for batch in self._batches if batch.alone for place in batch.places}
         for place, threads in self._threads.items():
-            while load[place] < BATCHES_AHEAD * threads and not self._hangs(place):
-                batch = self._next(place)
-                if batch is None:
+            if place in reserved or place in self._refused or self._hangs(place):
+                continue
+            if self._suspects:
+                if not load[place]:
+                    batch = _Batch([self._suspects.popleft()], alone=True)
+                    self._batches.append(batch)
+                    self._submit(batch, place)
+                continue
+            while load[place] < BATCHES_AHEAD * threads:
+                following = self._next(place)
+                if following is None:
                     break
-                self._submit(batch, place)
+                self._submit(following, place)
                 load[place] += 1
 
     def _next(self, place: str) -> _Batch | None:
         """A new batch, or one whose workers all hang."""
-        if self._lone:
-            numbers = [self._lone.popleft()]
-        elif self._waiting:
-            threads = max(sum(self._threads.values()), 1)
-            seconds = self._seconds / self._done if self._done else BATCH_TIME
+        if self._waiting:
+            threads = sum(self._threads.values())
+            seconds = self._seconds / self._done if self._done else BATCH_TIME[1]
             fair = len(self._waiting) // (2 * BATCHES_AHEAD * threads)
-            size = max(1, min(round(BATCH_TIME / max(seconds, 1e-6)), fair))
+            least, most = (round(time / max(seconds, 1e-6)) for time in BATCH_TIME)
+            size = max(1, min(most, max(fair, least)))
             numbers = [self._waiting.popleft() for _ in range(min(size, len(self._waiting)))]
         else:
             hanging = (
                 batch for batch in self._batches
                 if place not in batch.places and all(map(self._hangs, batch.places))
+                and not batch.alone
             )  # fmt: skip
             return next(hanging, None)
         batch = _Batch(numbers)
@@ -231,10 +241,10 @@ class _Cluster:
             seconds, finished = future.result(timeout=SCHEDULER_TIMEOUT)
         except Exception as problem:
             del batch.places[place]
-            if place in self._threads:  # it cannot do the work: it lacks the package, or a file
+            # Else the worker was lost with the result.
+            if future.status == "error" and place not in self._refused:
                 words = (str(problem) or type(problem).__name__).splitlines()[0][:300]
                 self._refused[place] = words
-                del self._threads[place]
                 self._say(f"worker {place} is not used: {words}")
             if not batch.places:
                 self._batches.remove(batch)
@@ -281,6 +291,8 @@ def _connected(scheduler: str) -> Iterator[Any]:
     for logger in loggers:
         logger.setLevel(logging.CRITICAL + 1)
     by_file = scheduler.endswith(".json")
+    if by_file and not Path(scheduler).is_file():  # Dask would wait for it without end
+        raise SweepError(f"workers: found no file {scheduler}; {ACCEPTED}")
     where = {"scheduler_file": scheduler} if by_file else {"address": scheduler}
     try:
         try:

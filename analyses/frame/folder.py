@@ -55,6 +55,7 @@ class Folder:
         self._arguments: Any = json.loads(json.dumps(arguments))
         self._overwrite, self._grows = overwrite, grows
         self._files: list[str] = []
+        self._made = self._open_now = False
         self._lock = FileLock(self.path / LOCK)
         working, real = Path.cwd(), self.path.resolve()
         if real == working or real in working.parents or os.path.ismount(real):
@@ -73,6 +74,7 @@ class Folder:
                 process writes it.
         """
         with self.writing():
+            self._made = not self.path.exists()
             self.path.mkdir(parents=True, exist_ok=True)
             try:
                 self._lock.acquire(timeout=0)
@@ -113,16 +115,17 @@ class Folder:
                 _remove(path)
         if not self.resumed:
             self._files = []
+        self._open_now = True
         self._mark(complete=False)
 
     def _release(self) -> None:
-        if not self._files and read_marker(self.path) is not None:
-            with suppress(OSError):
-                (self.path / MARKER).unlink()
         with suppress(OSError):
+            if self._open_now and not self._files:
+                (self.path / MARKER).unlink()
             if [path.name for path in self.path.iterdir()] == [LOCK]:
                 (self.path / LOCK).unlink()
-                self.path.rmdir()
+            if self._made:
+                self.path.rmdir()  # which fails unless it is empty
         self._lock.release()
 
     def claim(self, name: str) -> Path:

@@ -462,14 +462,18 @@ class Source(_Data):
 
 
 def source_of(words: Mapping[str, Any]) -> Source:
-    """A source from a file's content; an entry without `at` is printed in its section.
+    """A source from a file's content.
+
+    The name of a section is its number, and perhaps a colon and its title. An entry without `at` is
+    printed there.
 
     Raises:
         ValueError: An entry is not accepted.
     """
     sections = {
         str(name): [
-            (Fact if "study" in one else Entry)(**{"at": [str(name)], **one}) for one in entries
+            (Fact if "study" in one else Entry)(**{"at": [str(name).partition(":")[0]], **one})
+            for one in entries
         ]
         for name, entries in words["sections"].items()
     }

@@ -1,0 +1,266 @@
+"""The report of a reproduction: all studies, and one page with the facts of all sources.
+
+The page holds its pictures, so that it opens anywhere; printed by a browser it is the PDF.
+"""
+
+from __future__ import annotations
+
+import base64
+import io
+import json
+import shutil
+import subprocess
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import jinja2
+
+from cdpr_drake.analyses.frame.folder import Folder
+from cdpr_drake.analyses.frame.follow import NOBODY, Follow
+from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
+from cdpr_drake.analyses.studies.facts import GOOD, Entry, Fact, sources
+from cdpr_drake.analyses.studies.study import RESULTS, STUDIES, run_study
+from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
+from cdpr_drake.errors import CdprError
+from cdpr_drake.schema.typed_yaml import closest
+
+PAGE, VERDICTS_FILE = "report.html", "facts.json"
+
+VERDICTS = (
+    *dict.fromkeys(GOOD.values()), "in part", "not confirmed", "shown", "cited", "missing",
+    "not judged", "not judged in the quick form", "interrupted", "not run",
+)  # fmt: skip
+"""All verdicts, in the order of the page."""
+
+BROWSERS = ("chromium", "google-chrome", "chrome", "msedge")
+
+COLORS = 64
+"""Colours of a picture in the page: a figure with more looks the same, and takes thrice the room."""
+
+
+@dataclass(frozen=True, eq=False)
+class Reproduction:
+    """All studies, and what sources say beside it.
+
+    Attributes:
+        folder: The results folder, with a folder for each study.
+        quick: True if studies were run in their short forms.
+        chapters: Of each section of a source its title and the rows of its facts and entries.
+        results: What each study wrote; None if it has not run.
+        failed: Words by study, if a study could not run.
+        left: Studies that did not run, or not to the end.
+    """
+
+    folder: Path
+    quick: bool
+    chapters: Sequence[Mapping[str, Any]]
+    results: Mapping[str, dict[str, Any] | None]
+    failed: Mapping[str, str] = field(default_factory=dict)
+    left: Sequence[str] = ()
+
+    @property
+    def page(self) -> Path:
+        """The report."""
+        return self.folder / PAGE
+
+    def facts(self) -> list[dict[str, Any]]:
+        """Rows of facts, each once."""
+        return [row for chapter in self.chapters for row in chapter["rows"] if row["key"]]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Everything for JSON."""
+        return {
+            "quick": self.quick, "code": code_version(), "versions": package_versions(),
+            "facts": self.facts(),
+            "verdicts": {title: dict(count) for title, count in counts_by_source(self.chapters)},
+            "studies": {name: result is not None for name, result in self.results.items()},
+            "failed": dict(self.failed), "left": list(self.left),
+        }  # fmt: skip
+
+
+def reproduce(
+    folder: Path | str, quick: bool = False, only: Sequence[str] | None = None, *,
+    workers: int | str | None = None, overwrite: bool = False,
+    formats: Sequence[str] = DEFAULT_FORMATS, runs_from: Path | str | None = None,
+    against: Path | str | None = None, follow: Follow = NOBODY,
+) -> Reproduction:  # fmt: skip
+    """Runs every study, and writes one page on what sources print beside what is found.
+
+    Studies of the same code are not run again; the same call goes on where it was stopped. A study
+    that cannot run does not end the others.
+
+    Args:
+        folder: Results folder.
+        quick: Studies in their short forms.
+        only: Names of some studies alone; None: all.
+        workers: Processes, a Dask scheduler, or None: one for each processor.
+        overwrite: True to replace results of other code.
+        formats: Endings of the figures' files; the page needs png.
+        runs_from: Folder of a reproduction by other code, whose rows of equal calls are taken over.
+        against: `facts.json` of an older reproduction: the page says which verdicts changed.
+        follow: Who follows.
+
+    Raises:
+        CdprError: A study is unknown, or the folder is not accepted.
+    """
+    names = list(STUDIES) if only is None else list(only)
+    for name in names:
+        if name not in STUDIES:
+            raise CdprError(f"only: study {name!r} is unknown; {closest(name, STUDIES)}")
+    older = {} if against is None else _older(Path(against))
+    arguments = {"reproduction": names, "quick": quick}
+    failed, left = dict[str, str](), list[str]()
+    with Folder(Path(folder), arguments, overwrite, grows=True) as results:
+        for number, name in enumerate(names):
+            if follow.stop():
+                left.append(name)
+                continue
+            words = f"{number + 1}/{len(names)} {name}"
+            told = replace(follow, progress=_named(follow, words))
+            earlier = None if runs_from is None else Path(runs_from) / name
+            try:
+                found = run_study(
+                    name, results.claim(name), quick, workers=workers, overwrite=overwrite,
+                    formats=tuple(dict.fromkeys([*DEFAULT_FORMATS, *formats])),
+                    runs_from=earlier if earlier and earlier.is_dir() else None, follow=told,
+                )  # fmt: skip
+            except CdprError as problem:
+                failed[name] = str(problem)
+                follow.say(f"{name}: {problem}")
+                continue
+            if found.interrupted:
+                left.append(name)
+        report = reproduction_of(results.path, names, quick, failed, left, older)
+        results.write_text(VERDICTS_FILE, _json(_verdicts(report.facts())))
+        results.write_text(PAGE, page_of(report))
+        if not failed and not left:
+            results.complete()
+    return report
+
+
+def _named(follow: Follow, words: str) -> Any:
+    return lambda progress: follow.progress(replace(progress, what=f"{words}: {progress.what}"))
+
+
+def reproduction_of(
+    folder: Path, names: Sequence[str], quick: bool, failed: Mapping[str, str],
+    left: Sequence[str], older: Mapping[str, str],
+) -> Reproduction:  # fmt: skip
+    """What the studies in a folder say of all sources."""
+    results = {name: _read_json(folder / name / RESULTS) for name in names}
+    chapters = []
+    for source in sources():
+        for section, entries in source.sections.items():
+            rows = [_row(folder, entry, results) for entry in entries if entry.studies() & {*names}]
+            for row in rows:
+                row["was"] = older.get(row["key"], row["verdict"])
+            if rows:
+                chapters.append({"source": source.title, "section": section, "rows": rows})
+    return Reproduction(folder, quick, chapters, results, failed, left)
+
+
+def _row(folder: Path, entry: Entry, results: Mapping[str, Any]) -> dict[str, Any]:
+    """A fact or an entry of a source with what came of it."""
+    figures = [name for name in entry.figures if (folder / f"{name}.png").is_file()]
+    row: dict[str, Any] = {
+        "key": "", "says": entry.says, "at": entry.at, "figures": figures, "differs": entry.differs,
+    }  # fmt: skip
+    if not isinstance(entry, Fact):
+        why = entry.cited or entry.missing
+        verdict = "shown" if figures else "not run"
+        verdict = "cited" if entry.cited else "missing" if entry.missing else verdict
+        return {**row, "verdict": verdict, "why": why}
+    row |= {"key": f"{entry.study}/{entry.name}", "basis": entry.basis, "reason": entry.reason}
+    result = results.get(entry.study)
+    judged = () if result is None else (s for s in result["statements"] if s["name"] == entry.name)
+    return row | next(iter(judged), {"verdict": "not run"})
+
+
+def page_of(report: Reproduction) -> str:
+    """The page, with its pictures."""
+    facts = report.facts()
+    loader = jinja2.FileSystemLoader(Path(__file__).parent)
+    templates = jinja2.Environment(
+        loader=loader, autoescape=True, trim_blocks=True, lstrip_blocks=True
+    )
+    tables = {
+        name: (report.folder / name / "tables.html").read_text(encoding="utf-8")
+        for name, result in report.results.items()
+        if result is not None
+    }
+    return templates.get_template("report.html.j2").render(
+        report=report,
+        facts=facts,
+        verdicts=VERDICTS,
+        by_source=counts_by_source(report.chapters),
+        by_chapter=[(_title(c), _counted([c])) for c in report.chapters],
+        failed=[row for row in facts if row["verdict"] in ("in part", "not confirmed")],
+        changed=[row for row in facts if row["was"] != row["verdict"]],
+        versions={**package_versions(), "code": code_version()},
+        picture=_picture,
+        tables=tables,
+        causes=("source", "hardware", "ours"),
+    )
+
+
+def counts_by_source(chapters: Iterable[Mapping[str, Any]]) -> list[tuple[str, Counter[str]]]:
+    """How many facts of each source have which verdict."""
+    sums: dict[str, Counter[str]] = {}
+    for chapter in chapters:
+        sums.setdefault(chapter["source"], Counter()).update(_counted([chapter]))
+    return list(sums.items())
+
+
+def _counted(chapters: Iterable[Mapping[str, Any]]) -> Counter[str]:
+    return Counter(row["verdict"] for c in chapters for row in c["rows"] if row["key"])
+
+
+def _title(chapter: Mapping[str, Any]) -> str:
+    return f"{chapter['source']}, {chapter['section']}"
+
+
+def _verdicts(facts: Iterable[Mapping[str, Any]]) -> dict[str, str]:
+    return {row["key"]: row["verdict"] for row in facts}
+
+
+def _older(path: Path) -> dict[str, str]:
+    file = path / VERDICTS_FILE if path.is_dir() else path
+    found = _read_json(file)
+    if found is None:
+        raise CdprError(f"against: {path}: found no {VERDICTS_FILE}; accepted: a report's folder")
+    return found
+
+
+def _read_json(path: Path) -> dict[str, Any] | None:
+    try:
+        found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        return found
+    except (OSError, ValueError):
+        return None
+
+
+def _json(value: Any) -> str:
+    return json.dumps(value, indent=1) + "\n"
+
+
+def _picture(path: Path) -> str:
+    """A figure as an address that holds it."""
+    from PIL import Image
+
+    file = io.BytesIO()
+    Image.open(path).convert("RGB").quantize(COLORS).save(file, "PNG", optimize=True)
+    return f"data:image/png;base64,{base64.b64encode(file.getvalue()).decode()}"
+
+
+def print_pdf(page: Path) -> Path | None:
+    """Prints a page by a browser of this machine; None without one."""
+    browser = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if browser is None:
+        return None
+    pdf = page.with_suffix(".pdf")
+    options = ["--headless", "--no-sandbox", "--no-pdf-header-footer", f"--print-to-pdf={pdf}"]
+    subprocess.run([browser, *options, page.resolve().as_uri()], check=True, capture_output=True)
+    return pdf

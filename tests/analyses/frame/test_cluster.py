@@ -1,0 +1,125 @@
+"""Jobs on a Dask cluster of this machine: what workers do, lack, or die of."""
+
+import os
+import signal
+import threading
+import time
+from functools import partial
+
+import pytest
+
+from cdpr_drake.analyses.frame import cluster as module
+from cdpr_drake.analyses.frame.jobs import ProcessDied, finished_jobs
+from cdpr_drake.errors import SweepError
+from cdpr_drake.schema.input_files import input_text, inputs_read_once
+from tests.analyses.frame.test_jobs import read, square
+
+distributed = pytest.importorskip("distributed")
+
+
+@pytest.fixture(scope="module")
+def local():
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0", silence_logs=50
+    ) as cluster:
+        yield cluster
+
+
+def test_jobs_come_back_in_few_batches_and_the_dashboard_is_named(local, monkeypatch):
+    sizes, lines = [], []
+    submit = module._Cluster._submit
+    monkeypatch.setattr(
+        module._Cluster, "_submit",
+        lambda self, batch, place: (sizes.append(len(batch.numbers)), submit(self, batch, place)),
+    )  # fmt: skip
+    address = local.scheduler_address
+    finished = list(finished_jobs(square, range(500), address, say=lines.append, name="square"))
+    assert sorted((one.number, one.result) for one in finished) == [(k, k * k) for k in range(500)]
+    assert {one.place for one in finished} == {w.worker_address for w in local.workers.values()}
+    assert len(sizes) < 50
+    assert lines[0].startswith("Dask dashboard: http")
+
+
+def fails(number):
+    if number == 2:
+        raise ValueError("two\nis odd")
+    if number == 4:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return number
+
+
+def test_a_job_that_raises_or_kills_its_worker_is_named_and_others_go_on(local):
+    finished = {one.number: one for one in finished_jobs(fails, range(8), local.scheduler_address)}
+    assert sorted(finished) == list(range(8))
+    assert finished[2].words().startswith("ValueError: two (on worker tcp://")
+    assert isinstance(finished[4].problem, ProcessDied)
+    assert "its process died 2 times" in finished[4].words()
+    assert [finished[k].result for k in (0, 1, 3, 5, 6, 7)] == [0, 1, 3, 5, 6, 7]
+
+
+def wait_and_name(number):
+    time.sleep(0.02)
+    return os.getpid()
+
+
+def test_a_worker_that_hangs_holds_nobody_up(local, monkeypatch):
+    monkeypatch.setattr(module, "SILENCE", 2.0)
+    with distributed.Client(local.scheduler_address, set_as_default=False) as client:
+        ids = list(client.run(os.getpid).values())
+    os.kill(ids[0], signal.SIGSTOP)
+    try:
+        finished = list(finished_jobs(wait_and_name, range(40), local.scheduler_address))
+    finally:
+        os.kill(ids[0], signal.SIGCONT)
+    assert sorted(one.number for one in finished) == list(range(40))
+
+
+def test_jobs_see_files_as_they_were_read_here(local, tmp_path):
+    path = tmp_path / "robot.yaml"
+    path.write_text("mass: 1")
+    with inputs_read_once():
+        input_text(path)
+        path.write_text("mass: 2")
+        jobs = finished_jobs(partial(read, path), [0, 1], local.scheduler_address)
+        assert [one.result for one in jobs] == ["mass: 1", "mass: 1"]
+
+
+def test_workers_with_other_code_are_refused_by_name(local, monkeypatch):
+    monkeypatch.setattr(module, "code_version", lambda: "0.0 of somebody")
+    lines = []
+    with pytest.raises(SweepError, match=r"no worker can do the jobs\. tcp://.*accepted: 0\.0 of"):
+        list(finished_jobs(square, range(3), local.scheduler_address, say=lines.append))
+    assert any("is not used: it has cdpr_drake" in line for line in lines)
+
+
+def test_without_workers_it_says_so_and_gives_up(monkeypatch):
+    monkeypatch.setattr(module, "NO_WORKER", (0.5, 2.0))
+    with distributed.LocalCluster(n_workers=0, dashboard_address=":0", silence_logs=50) as empty:
+        lines = []
+        with pytest.raises(SweepError, match="no worker can do the jobs"):
+            list(finished_jobs(square, [1], empty.scheduler_address, say=lines.append))
+        assert any("waits for workers; none is connected" in line for line in lines)
+
+
+def test_without_workers_a_request_to_stop_ends_it():
+    with distributed.LocalCluster(n_workers=0, dashboard_address=":0", silence_logs=50) as empty:
+        asked = threading.Event()
+        threading.Timer(1.0, asked.set).start()
+        assert list(finished_jobs(square, [1], empty.scheduler_address, stop=asked.is_set)) == []
+
+
+REFUSALS = {
+    "empty": ("", "found an empty word; accepted: the address of a Dask scheduler"),
+    "nobody": ("tcp://127.0.0.1:9", "does not answer"),
+    "no port": ("tcp://localhost", "does not answer"),
+    "no file": ("no_such.json", "found no file no_such.json"),
+    "certificates": ("tls://127.0.0.1:8786", "DASK_DISTRIBUTED__COMM__TLS__CA_FILE"),
+}
+
+
+@pytest.mark.parametrize(("word", "words"), REFUSALS.values(), ids=REFUSALS)
+def test_an_address_is_refused_in_one_line(monkeypatch, word, words):
+    monkeypatch.setattr(module, "SCHEDULER_TIMEOUT", 1.0)
+    with pytest.raises(SweepError, match=words) as caught:
+        list(finished_jobs(square, [1], word))
+    assert len(str(caught.value).splitlines()) == 1
