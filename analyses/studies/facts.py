@@ -294,7 +294,8 @@ class Part(Selection):
         size = getattr(self, self.comparison)
         if size == "than" or self.comparison in ("holds", "same", "largest", "smallest"):
             return ""
-        values = ", ".join(map(str, size if isinstance(size, list) else [size]))
+        sizes = size if isinstance(size, list) else [size]
+        values = ", ".join(f"{x:g}" if isinstance(x, float) else str(x) for x in sizes)
         words = f"{self.comparison.rstrip('_').replace('_', ' ')} {values} {self._unit()}".strip()
         return words + (f" (within {self._nearness()})" if self.comparison == "about" else "")
 

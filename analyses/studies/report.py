@@ -38,7 +38,7 @@ VERDICTS = (
 BROWSERS = ("chromium", "google-chrome", "chrome", "msedge")
 
 COLORS = 64
-"""Colours of a picture in the page: a figure with more looks the same, and takes thrice the room."""
+"""Colours of a picture in the page: one with more looks the same, and takes thrice the room."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,6 +12,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from importlib import import_module
@@ -162,10 +163,14 @@ def run_study(
     if seeds is not None and seeds < 1:
         raise CdprError(f"seeds: found {seeds}; accepted: at least 1")
     form = Form(quick, seeds, recipe)
-    passing = TemporaryDirectory(prefix="cdpr-study-") if folder is None else None
-    where = Path(passing.name) if passing else Path(folder or "")
     arguments = {"study": one.name, "quick": quick, "recipe": recipe, "code": code_version()}
-    with Folder(where, arguments, overwrite, grows=True) as results, RowStore(results) as rows:
+    with ExitStack() as stack:
+        if folder is None:
+            where = Path(stack.enter_context(TemporaryDirectory(prefix="cdpr-study-")), one.name)
+        else:
+            where = Path(folder)
+        results = stack.enter_context(Folder(where, arguments, overwrite, grows=True))
+        rows = stack.enter_context(RowStore(results))
         if runs_from is not None:
             rows.take_over(Path(runs_from), arguments)
         plan = [
@@ -173,7 +178,8 @@ def run_study(
             for case in one.cases(form) for keys, call in case.calls()
         ]  # fmt: skip
         failed = _measure(plan, rows, workers, follow, one.name)
-        found = StudyResult(one, form, rows.in_order(plan), len(plan), rows.taken, failed, passing)
+        records = rows.in_order(plan, in_memory=folder is None)
+        found = StudyResult(one, form, records, len(plan), rows.taken, failed)
         if folder is not None:
             found.undrawn.update(found.write(results, formats, follow.stop))
             if not found.interrupted and not found.undrawn:
@@ -308,14 +314,15 @@ class RowStore:
                 self.add(name, {**row, **(Arrays(path) if path.exists() else {})})
                 self.taken += 1
 
-    def in_order(self, plan: Plan) -> list[dict[str, Any]]:
-        """Rows in the order of the plan, keys first, `arrays` last."""
+    def in_order(self, plan: Plan, in_memory: bool) -> list[dict[str, Any]]:
+        """Rows in the order of the plan, keys first, `arrays` last: in memory, or read later."""
         found = []
         for keys, _, name, _ in plan:
             if name in self.rows:
                 path = self.folder.path / ARRAYS / f"{name}.npz"
-                there = Arrays(path) if path.exists() else None
-                found.append({**plain(keys), **self.rows[name], "arrays": there})
+                arrays = Arrays(path) if path.exists() else None
+                kept = dict(arrays) if arrays and in_memory else arrays
+                found.append({**plain(keys), **self.rows[name], "arrays": kept})
         return found
 
 
@@ -337,7 +344,6 @@ class StudyResult:
         planned: How many rows there are when it is complete.
         taken: How many of them other code had measured.
         failed: Words by digest of calls that raised, or whose process died.
-        passing: The folder of rows that are not kept.
         undrawn: Of files that were not written, the name and why.
     """
 
@@ -347,7 +353,6 @@ class StudyResult:
     planned: int
     taken: int = 0
     failed: Mapping[str, str] = field(default_factory=dict)
-    passing: TemporaryDirectory[str] | None = None
     undrawn: dict[str, str] = field(default_factory=dict)
 
     @property
