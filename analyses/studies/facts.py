@@ -423,8 +423,8 @@ class Fact(Entry):
             held, verdict, words = [], "not judged", [f"judging failed: {problem}"]
         cause = "; ".join(f"{kind}: {reason}" for kind, reason in self.cause.items()) or "not known"
         return {
-            "name": self.name, "says": self.says, "at": self.at, "basis": self.basis,
-            "reason": self.reason,
+            "name": self.name, "words": self.says, "source": ", ".join(self.at),
+            "basis": self.basis, "reason": self.reason,
             "printed": "; ".join(filter(None, (part.print_words() for part in self.parts))),
             "found": "; ".join(words), "verdict": verdict, "held": sum(held), "of": len(held),
             "cause": cause if verdict in ("in part", "not confirmed") else "", "why": self.note,

@@ -388,7 +388,7 @@ class StudyResult:
                 if not self.interrupted and not self.form.quick:
                     raise
         if self.statements:
-            columns = ["says", "printed", "found", "verdict", "rule", "why"]
+            columns = ["words", "printed", "found", "verdict", "rule", "why"]
             found["What has to hold"] = Frame(self.statements, columns=columns)
         return found
 
