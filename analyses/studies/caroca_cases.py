@@ -1,11 +1,11 @@
-"""Studies: cases IV and V of the servoing thesis, PBVS and 2 1/2 D on CAROCA, its first pose badly
-known."""
+"""Studies: cases IV and V of the servoing thesis, CAROCA with a first pose that is badly known."""
 
 from __future__ import annotations
 
 import numpy as np
 from pydrake.math import RigidTransform
 
+from cdpr_drake.analyses.studies.acrobot_cases import OF, experiment_figures
 from cdpr_drake.analyses.studies.framework.caroca_cables import CAROCA_ASSUMPTION, CAROCA_RUN
 from cdpr_drake.analyses.studies.framework.experiments import (
     as_transform,
@@ -14,13 +14,7 @@ from cdpr_drake.analyses.studies.framework.experiments import (
     turned,
 )
 from cdpr_drake.analyses.studies.servo import Configuration, servo_study
-from cdpr_drake.analyses.studies.servo_figures import (
-    components,
-    draw_corner_paths,
-    each,
-    layout,
-    paths_layout,
-)
+from cdpr_drake.analyses.studies.servo_figures import paths_layout
 
 LIFT = 0.133
 """How far all heights are raised so that the tag lies on the ground [m]."""
@@ -49,7 +43,6 @@ AS_PRINTED = (
 )
 """With the printed heights the tag is below our ground: by projected images only."""
 
-OF = ("none", "within", "beyond")
 SERVO = (
     pose_item("initial_pose", START),
     "desired={position: [0, 0, 0.6], angles_deg: [180, 0, 180]}",
@@ -65,20 +58,6 @@ RAISED = (
     "Both printed pairs of poses put the tag 0.133 m below the ground; all heights are raised by "
     "as much.",
 )
-
-
-def three_figures(first: int, robot: str) -> dict[str, object]:
-    """Paths of the tag, errors and cable velocities, without perturbation, with one within and one
-    beyond bounds, as 3.28 to 3.30 and 3.36 to 3.38."""
-    whats = (
-        ("path of the tag in the image, its four corners", draw_corner_paths),
-        ("error e over time", components("error")),
-        ("cable velocities over time", components("cable_velocities", 1e3)),
-    )
-    return {
-        f"figure_3_{first + k}": layout(f"Figure 3.{first + k}: {robot}, {words}", each(draw, OF))
-        for k, (words, draw) in enumerate(whats)
-    }
 
 
 def case_4_configurations() -> tuple[Configuration, ...]:
@@ -115,7 +94,7 @@ STUDIES = {
             "experiment beside.",
             *COMMON,
         ),
-        figures=three_figures(36, "CAROCA"),
+        figures=experiment_figures(36, "CAROCA"),
     ),
     "case-5": servo_study(
         name="case-5",
