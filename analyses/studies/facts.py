@@ -19,7 +19,7 @@ from typing import Any, Literal
 import numpy as np
 import pandas as pd
 import yaml
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 Frame = pd.DataFrame
 
@@ -64,7 +64,7 @@ COMPARISONS = (
 )  # fmt: skip
 
 BOUND_WORDS = {
-    r"at most|not surpass|not exceed|below|less than|under\b|up to|no more than": (
+    r"at most|not surpass|not exceed|below|less than|under \d|up to|no more than": (
         "at_most", "below",
     ),
     r"at least|more than|exceeds|above": ("at_least", "above"),
@@ -471,13 +471,19 @@ def source_of(words: Mapping[str, Any]) -> Source:
     Raises:
         ValueError: An entry is not accepted.
     """
-    sections = {
-        str(name): [
-            (Fact if "study" in one else Entry)(**{"at": [str(name).partition(":")[0]], **one})
-            for one in entries
-        ]
-        for name, entries in words["sections"].items()
-    }
+    sections: dict[str, list[Fact | Entry]] = {}
+    for name, entries in words["sections"].items():
+        sections[str(name)] = []
+        for entry in entries:
+            kind = Fact if "study" in entry else Entry
+            try:
+                one = kind(**{"at": [str(name).partition(":")[0]], **entry})
+            except ValidationError as problem:
+                first = problem.errors()[0]
+                field = ".".join(map(str, first["loc"]))
+                who = entry.get("name", entry.get("says"))
+                raise ValueError(f"{name}: {who}: {field}: {first['msg']}") from problem
+            sections[str(name)].append(one)
     return Source(title=words["title"], sections=sections)
 
 
