@@ -35,6 +35,13 @@ VERDICTS = (
 )  # fmt: skip
 """All verdicts, in the order of the page."""
 
+CAUSES = {
+    "source": "the source leaves out what is needed, or contradicts itself",
+    "hardware": "the prototype has what no model has",
+    "ours": "a choice of ours",
+    "not known": "not known",
+}
+
 BROWSERS = ("chromium", "google-chrome", "chrome", "msedge")
 
 COLORS = 64
@@ -195,15 +202,29 @@ def page_of(report: Reproduction) -> str:
         report=report,
         facts=facts,
         verdicts=VERDICTS,
-        by_source=counts_by_source(report.chapters),
-        by_chapter=[(_title(c), _counted([c])) for c in report.chapters],
-        failed=[row for row in facts if row["verdict"] in ("in part", "not confirmed")],
+        by_source=_count_table(counts_by_source(report.chapters)),
+        by_chapter=_by_chapter(report.chapters),
+        failed=_by_cause(facts),
         changed=[row for row in facts if row["was"] != row["verdict"]],
         versions={**package_versions(), "code": code_version()},
         picture=_picture,
         tables=tables,
-        causes=("source", "hardware", "ours"),
     )
+
+
+def _by_cause(facts: Sequence[Mapping[str, Any]]) -> list[tuple[str, list[Mapping[str, Any]]]]:
+    """Facts that do not hold, by the kind of their cause, in words."""
+    failed = [row for row in facts if row["verdict"] in ("in part", "not confirmed")]
+    groups = [
+        (words, [row for row in failed if row["cause"].startswith(kind)])
+        for kind, words in CAUSES.items()
+    ]
+    return [(words, rows) for words, rows in groups if rows]
+
+
+def _count_table(rows: Sequence[tuple[str, Counter[str]]]) -> dict[str, Any]:
+    """Counts with the verdicts that occur, in their order."""
+    return {"verdicts": [v for v in VERDICTS if any(count[v] for _, count in rows)], "rows": rows}
 
 
 def counts_by_source(chapters: Iterable[Mapping[str, Any]]) -> list[tuple[str, Counter[str]]]:
@@ -218,8 +239,14 @@ def _counted(chapters: Iterable[Mapping[str, Any]]) -> Counter[str]:
     return Counter(row["verdict"] for c in chapters for row in c["rows"] if row["key"])
 
 
-def _title(chapter: Mapping[str, Any]) -> str:
-    return f"{chapter['source']}, {chapter['section']}"
+def _by_chapter(chapters: Sequence[Mapping[str, Any]]) -> list[tuple[str, dict[str, Any]]]:
+    """For each source its title and the counts of its sections that have facts."""
+    titles = dict.fromkeys(chapter["source"] for chapter in chapters)
+    tables = []
+    for title in titles:
+        rows = [(c["section"], _counted([c])) for c in chapters if c["source"] == title]
+        tables.append((title, _count_table([row for row in rows if row[1]])))
+    return tables
 
 
 def _verdicts(facts: Iterable[Mapping[str, Any]]) -> dict[str, str]:
