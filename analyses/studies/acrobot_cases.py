@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -103,6 +102,14 @@ def overshoot(curves: Curves) -> float:
     return float(np.max(beyond) / np.linalg.norm(seen[0]))
 
 
+def turned_numbers(curves: Curves) -> dict[str, float]:
+    """Columns of case III, beside those of every servo."""
+    return {
+        "winding_turns": winding(curves), "radius_least_px": radius(curves, end=False),
+        "radius_end_px": radius(curves, end=True), "overshoot": overshoot(curves),
+    }  # fmt: skip
+
+
 def experiment_figures(first: int, robot: str, of: tuple[str, ...] = OF) -> dict[str, Any]:
     """Paths of the tag, errors and cable velocities, as figures 3.28 to 3.30 and 3.36 to 3.38."""
     panels = (
@@ -178,12 +185,7 @@ STUDIES = {
             turned(85.0, "constant gain"),
         ),
         rendered=("turned_16",),
-        metrics={
-            "winding_turns": winding,
-            "radius_least_px": partial(radius, end=False),
-            "radius_end_px": partial(radius, end=True),
-            "overshoot": overshoot,
-        },
+        metrics=turned_numbers,
         units={
             "winding_turns": "",
             "radius_least_px": "px",

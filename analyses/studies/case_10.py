@@ -21,7 +21,7 @@ from cdpr_drake.analyses.studies.servo_figures import (
     layout,
     paths_layout,
 )
-from cdpr_drake.analyses.studies.slack import OFF, PLAIN, experiments, slack_change, slack_metrics
+from cdpr_drake.analyses.studies.slack import OFF, PLAIN, experiments, slack_change, slack_numbers
 from cdpr_drake.analyses.studies.study import Frame
 from cdpr_drake.arrays import Array
 
@@ -67,6 +67,18 @@ def correcting_share(curves: Curves) -> float:
     steps = np.linalg.norm(np.diff(curves["camera_path"], axis=0), axis=1)
     going = np.cumsum(steps) < 0.95 * np.sum(steps)
     return float(np.mean(np.any(curves["tension_corrections"][1:][going] < 0.0, axis=1)))
+
+
+def case_10_numbers(curves: Curves) -> dict[str, float]:
+    """Columns of this study, beside those of every servo."""
+    return {
+        **slack_numbers(curves, THRESHOLD),
+        "c7_taut_s": first_time(curves, cable=6, below=False),
+        "c3_slack_s": c3_slack(curves),
+        "c3_first_s": first_time(curves, cable=2, below=True),
+        "c1_reading_n": c1_reading(curves),
+        "correcting": correcting_share(curves),
+    }
 
 
 def pair(name: str, words: str, changes: tuple[str, ...], group: str) -> list[Configuration]:
@@ -198,14 +210,7 @@ STUDY = servo_study(
     rendered=("E8",),
     repetitions=10,
     stability=THRESHOLD,
-    metrics={
-        **slack_metrics(THRESHOLD),
-        "c7_taut_s": partial(first_time, cable=6, below=False),
-        "c3_slack_s": c3_slack,
-        "c3_first_s": partial(first_time, cable=2, below=True),
-        "c1_reading_n": c1_reading,
-        "correcting": correcting_share,
-    },
+    metrics=case_10_numbers,
     units={
         "time_to_taut_s": "s",
         "estimate_end_m": "mm",

@@ -83,10 +83,10 @@ def wrong_points(kind: str, name: str, distance: float) -> Configuration:
     return Configuration(f"{kind}_{name}", label, changes, f"{kind} points")
 
 
-def line_length(curves: Mapping[str, Array]) -> float:
+def line_length(curves: Mapping[str, Array]) -> dict[str, float]:
     """Length of the straight line that the pattern's middle should follow in the image [px]."""
     line = curves["image_line"]
-    return float(np.linalg.norm(line[-1] - line[0]))
+    return {"image_line_px": float(np.linalg.norm(line[-1] - line[0]))}
 
 
 def four_figures(chapter: str, first: int, of: Sequence[str], words: str) -> dict[str, Any]:
@@ -149,7 +149,7 @@ STUDIES = {
             wrong_points("exit", "E3", 0.103),
         ),
         rendered=("camera_E1",),
-        metrics={"image_line_px": line_length},
+        metrics=line_length,
         units={"image_line_px": "px"},
         assumptions=ASSUMPTIONS,
         figures={

@@ -26,8 +26,10 @@ from cdpr_drake.systems.cameras.camera_settings import PROJECTED, RENDERED
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.loops.loop_choice import choose_compiled_loop
 
-Metric = Callable[[Mapping[str, Array]], float]
-"""A number of a run's curves, in SI units."""
+Curves = Mapping[str, Array]
+
+Numbers = Callable[[Curves], Mapping[str, Any]]
+"""Gives a study's own columns of a run's curves, in SI units."""
 
 METRICS = {
     "time_s": "s", "position_error_m": "mm", "rotation_error_rad": "deg", "image_max_px": "px",
@@ -83,7 +85,7 @@ class Configuration:
 def servo_cases(
     form: Form, scenario: str, configurations: Sequence[Configuration], *,
     changes: Sequence[str] = (), rendered: Sequence[str] = (), quick: Sequence[str] = (),
-    metrics: Mapping[str, Metric] | None = None, stability: float | None = None,
+    metrics: Numbers | None = None, stability: float | None = None,
     repetitions: int = 5,
 ) -> Iterator[Case]:  # fmt: skip
     """Cases of configurations, rendered ones first, which take longest.
@@ -95,7 +97,7 @@ def servo_cases(
         changes: What all of them share.
         rendered: Names of those that also run once with rendered images.
         quick: Names of those of the quick form; empty: all.
-        metrics: The study's own numbers, by column.
+        metrics: Gives the study's own columns.
         stability: Tension from which a cable counts in the criterion of stability [N]; None: the
             criterion is not followed.
         repetitions: Runs of each.
@@ -108,7 +110,7 @@ def servo_cases(
         for c in some:
             call = partial(
                 servo_run, c.scenario or scenario, (*changes, *c.changes, f"camera.kind={camera}"),
-                dict(metrics or {}), stability, **({"platform": c.platform} if c.platform else {}),
+                metrics, stability, **({"platform": c.platform} if c.platform else {}),
             )  # fmt: skip
             most = 1 if camera == RENDERED else None
             keys = {"configuration": c.name, "group": c.group, "camera": camera}
@@ -118,7 +120,7 @@ def servo_cases(
 
 
 def servo_run(
-    scenario: str, changes: Sequence[str], metrics: Mapping[str, Metric], stability: float | None,
+    scenario: str, changes: Sequence[str], metrics: Numbers | None, stability: float | None,
     seed: int, platform: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:  # fmt: skip
     """Runs a configuration, by the compiled loop where that can do it, which the summary says.
@@ -153,7 +155,7 @@ def servo_run(
         "estimate_max_m": float(np.max(curves["estimate_distance"])),
         "estimate_max_rad": float(np.max(curves["estimate_angle"])),
         "estimate_jump_m": estimate_jump(curves),
-        **{name: metric(curves) for name, metric in metrics.items()},
+        **({} if metrics is None else metrics(curves)),
         "summary": {name: value for name, value in summary.items() if name not in LEFT_OUT},
         "features": list(result.servo.feature_names),
         "stop_position_m": result.servo.scenario.stop.position,

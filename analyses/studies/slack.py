@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from functools import partial
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from cdpr_drake.analyses.studies.facts import MissingRuns
 from cdpr_drake.analyses.studies.servo import Configuration
+from cdpr_drake.analyses.studies.study import Frame
 from cdpr_drake.arrays import Array
+from cdpr_drake.geometry.poses import pose_from_row
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_statics import tension_problem
+from cdpr_drake.tensions.problem import TensionProblem
 
 Curves = Mapping[str, Array]
 
@@ -93,17 +98,51 @@ def correction_travel(curves: Curves) -> float:
     return float(-np.sum(np.diff(curves["time"])[:, None] * curves["tension_corrections"][:-1]))
 
 
-def slack_metrics(threshold: float) -> dict[str, Callable[[Curves], float]]:
-    """What is reported of slack; a cable is taut from a tension of `threshold` [N] on, and slack of
-    the start should be gone after 2 s."""
+def slack_numbers(curves: Curves, threshold: float) -> dict[str, float]:
+    """What is reported of slack; a cable is taut from a tension of `threshold` [N] on.
+
+    Slack of the start should be gone after 2 s.
+    """
     return {
-        "time_to_taut_s": partial(time_to_taut, threshold=threshold),
-        "underactuated_s": underactuated,
-        "least_rank_late": partial(least_after, name="jacobian_rank", time=2.0),
-        "least_margin_late": partial(least_after, name="stability_margin", time=2.0),
-        "least_margin_taut": partial(least_after, name="stability_margin", threshold=threshold),
-        "estimate_end_m": partial(last_value, name="estimate_distance"),
-        "estimate_end_rad": partial(last_value, name="estimate_angle"),
-        "winch_work_j": winch_work, "cable_power_w": cable_power, "chatter_n": chatter,
-        "correction_m": correction_travel,
+        "time_to_taut_s": time_to_taut(curves, threshold),
+        "underactuated_s": underactuated(curves),
+        "least_rank_late": least_after(curves, "jacobian_rank", 2.0),
+        "least_margin_late": least_after(curves, "stability_margin", 2.0),
+        "least_margin_taut": least_after(curves, "stability_margin", threshold=threshold),
+        "estimate_end_m": last_value(curves, "estimate_distance"),
+        "estimate_end_rad": last_value(curves, "estimate_angle"),
+        "winch_work_j": winch_work(curves), "cable_power_w": cable_power(curves),
+        "chatter_n": chatter(curves), "correction_m": correction_travel(curves),
     }  # fmt: skip
+
+
+THRESHOLD = 1.0
+"""Tension below which the thesis counts a cable as slack [N]."""
+
+TENSIONS = {
+    1: (9.4, 7.3, 4.8, 6.1, 2.8, 3.7, 5.7, 5.9), 2: (10.0, 7.8, 3.9, 5.4, 3.1, 4.0, 5.9, 6.1),
+    3: (7.2, 4.5, 7.1, 9.6, 0.0, 0.0, 8.0, 9.4), 4: (9.2, 6.5, 4.6, 6.6, 2.9, 3.0, 6.2, 6.9),
+    5: (7.2, 4.8, 7.6, 9.2, 0.0, 0.0, 7.8, 9.4), 6: (9.4, 6.8, 4.8, 6.6, 2.5, 2.2, 6.4, 7.2),
+    7: (6.8, 4.5, 7.0, 9.5, 0.0, 0.0, 8.1, 9.4), 8: (9.5, 6.1, 5.3, 7.9, 2.8, 2.3, 7.5, 8.4),
+    9: (7.4, 4.8, 7.6, 9.3, 0.0, 0.0, 8.8, 9.5), 10: (8.3, 5.9, 5.2, 7.0, 1.8, 2.1, 6.8, 7.6),
+}  # fmt: skip
+"""Tensions at the end of E1 to E10, table 5.1 [N]."""
+
+
+def holding_problem(row: Array) -> TensionProblem:
+    """Holding the platform at a pose above the threshold, without pulleys, as in the thesis."""
+    robot = load_robot("acrobot_large")
+    cables = robot.cable_set(pulleys=False)
+    return tension_problem(robot, pose_from_row(row), limits=(THRESHOLD, 60.0), cables=cables)
+
+
+def mean_tensions(rows: Frame, name: str) -> Array:
+    """Tensions at the end, means over the runs of a configuration, shape (m,) [N].
+
+    Raises:
+        MissingRuns: It was not run.
+    """
+    tensions = [list(one.values()) for one in rows[rows["configuration"] == name]["end_tension_n"]]
+    if not tensions:
+        raise MissingRuns(name)
+    return np.asarray(np.mean(tensions, axis=0))

@@ -78,14 +78,13 @@ def roughness(curves: Curves) -> float:
     return float(np.sqrt(np.mean(np.diff(curves["cable_velocities"][rows], axis=0) ** 2)))
 
 
-def camera_mean(curves: Curves) -> float:
-    """Mean distance of the camera from its line, over equal times [m]."""
-    return float(np.mean(curves["camera_deviation"]))
-
-
-def camera_spread(curves: Curves) -> float:
-    """Standard deviation of that distance over the run [m]."""
-    return float(np.std(curves["camera_deviation"]))
+def tracking_numbers(curves: Curves) -> dict[str, float]:
+    """Roughness, and the distance of the camera from its line over equal times."""
+    deviation = curves["camera_deviation"]
+    return {
+        "roughness_m_s": roughness(curves), "camera_even_mean_m": float(np.mean(deviation)),
+        "camera_even_spread_m": float(np.std(deviation)),
+    }  # fmt: skip
 
 
 STUDIES = {
@@ -163,11 +162,7 @@ STUDIES = {
             ),
         ),
         rendered=("tracking",),
-        metrics={
-            "roughness_m_s": roughness,
-            "camera_even_mean_m": camera_mean,
-            "camera_even_spread_m": camera_spread,
-        },
+        metrics=tracking_numbers,
         units={
             "roughness_m_s": "mm/s",
             "camera_even_mean_m": "mm",
