@@ -5,9 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from pydrake.math import RigidTransform
 
 from cdpr_drake.dynamics.robot_arrays import DAMPING
 from cdpr_drake.models.robot_loader import load_robot
@@ -21,6 +18,8 @@ from cdpr_drake.systems.robots.compiled_step import StepRule
 from cdpr_drake.systems.robots.failures import Failure
 from cdpr_drake.systems.robots.platform_hysteresis import BENT
 from cdpr_drake.systems.robots.settings import CableRobotSettings
+from tests.models.robots import robot_of
+from tests.models.test_platform_pulleys import robot_content
 from tests.motion.small_robots import small_robot
 from tests.systems.robots.engines import (
     ALL_BEHAVIOUR,
@@ -28,7 +27,6 @@ from tests.systems.robots.engines import (
     behaving,
     bundled,
     even_step,
-    place,
     port_names,
     read,
     rubbing,
@@ -99,6 +97,9 @@ CASES = {
     "straight": Case("acrobot_small", model="kelvin_voigt"),
     "pulleys, velocity": Case("acrobot_small", "velocity", "elastic", True),
     "catenary, position": Case("acrobot_small", "position", "catenary", True, wrench=WRENCH),
+    "pulleys at the platform": Case(
+        lambda: robot_of(robot_content()), pulleys=True, damping=None, duration=0.02, step=1e-4
+    ),
     "pulleys, torque": Case("acrobot_large", "torque", "kelvin_voigt", True, step=5e-4),
     "pushed": Case("acrobot_large", damping=None, wrench=WRENCH, step=1e-4),
     "catenary": Case("caroca", model="catenary"),
@@ -178,33 +179,6 @@ def test_it_moves_as_the_plant(name):
         np.testing.assert_allclose(rates[:, ::2], rates[:, 1::2], atol=1e-12)
 
 
-@given(st.integers(0, 2**32 - 1))
-@settings(max_examples=6)
-def test_robots_and_motions_that_are_drawn_agree(seed):
-    random = np.random.default_rng(seed)
-    robot = load_robot(str(random.choice(["acrobot_small", "acrobot_large", "planar"])))
-    planar = robot.is_planar()
-    in_motion = [1.0, 1.0, 0.0 if planar else 1.0]
-    robot.cable.youngs_modulus *= 10.0 ** random.uniform(-3.0, 0.0)
-    robot.cable.retardation_time = random.uniform(0.0, 1e-3)
-    robot.platform.mass *= random.uniform(0.5, 3.0)
-    for cable in robot.cables:
-        cable.exit_point = cable.exit_point + random.uniform(-0.03, 0.03, 3) * in_motion
-    how = settings_of(pulleys=bool(random.integers(2)) and not planar)
-    home = robot.home.transform()
-    shift = random.uniform(-0.05, 0.05, 3) * in_motion
-    X_WP = RigidTransform(home.rotation(), home.translation() + shift)
-    command = random.uniform(-0.02, 0.02, len(robot.cables))
-    step = even_step(0.06, automatic_step(robot, X_WP, "runge_kutta3", how), LOOKS)
-    found, expected = (
-        history(kind, robot, how, STATE[:-1], 0.06, step, command=command, X_WP=X_WP)
-        for kind in (CompiledCableRobot, CableRobot)
-    )
-    for port, rows in expected.items():
-        scale = 1.0 + np.max(np.abs(rows))
-        np.testing.assert_allclose(found[port], rows, atol=SAME_STEPS * scale, err_msg=port)
-
-
 @pytest.mark.parametrize("mode", ["ideal", "torque", "velocity", "position"])
 def test_ports_are_those_of_the_plant_and_a_few_more(mode):
     robot, how = load_robot("acrobot_small"), settings_of(mode)
@@ -223,24 +197,6 @@ def test_ports_are_those_of_the_plant_and_a_few_more(mode):
         "platform_state", "query_object", "sags", "slack", "surplus_lengths", "tensions",
         "unstrained_length_rates", "unstrained_lengths",
     }  # fmt: skip
-
-
-@pytest.mark.parametrize(
-    "robot",
-    [creeping("acrobot_small", **ALL_BEHAVIOUR), creeping_and_rubbing],
-    ids=["behaving", "rubbing"],
-)
-def test_a_loop_without_a_diagram_moves_as_the_block_does(robot):
-    robot, how = robot(), settings_of(pulleys=True)
-    block, simulator, context = started(CompiledCableRobot, robot, how, 5e-4, command=-0.02)
-    motion = RobotMotion(robot, how, StepRule(max_step=5e-4))
-    motion.begin(motion.resting(robot.home.transform()))
-    motion.command(np.full(8, -0.02))
-    simulator.AdvanceTo(0.02)
-    motion.advance(0.02)
-    np.testing.assert_array_equal(motion.platform_state(), read(block, context, "platform_state"))
-    np.testing.assert_array_equal(motion.cables()[0], read(block, context, "tensions"))
-    assert np.max(np.abs(place(block, context) - robot.home.position)) > 1e-5
 
 
 def test_every_engine_takes_damping_and_model_of_the_file():

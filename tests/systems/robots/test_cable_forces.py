@@ -10,20 +10,13 @@ from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
 
-from cdpr_drake.analyses.statics.static_query import static_at_pose
 from cdpr_drake.errors import CableGeometryError
-from cdpr_drake.geometry.poses import pose_error, pose_from_angles
-from cdpr_drake.geometry.straight_cables import length_jacobian
+from cdpr_drake.geometry.poses import pose_error
 from cdpr_drake.models.robot_in_plant import add_robot, platform_inertia
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_statics import tension_problem
 from cdpr_drake.systems.robots.cable_robot import CableRobot, automatic_step, holding_tensions
 from cdpr_drake.systems.robots.compiled_cable_robot import CompiledCableRobot
-from cdpr_drake.systems.robots.settings import (
-    CableRobotSettings,
-    CableSettings,
-    DampingSettings,
-)
 from cdpr_drake.systems.robots.tension_driven_cables import TensionDrivenCables
 from cdpr_drake.tensions.methods import exact_tensions
 from tests.models.representative_robots import REPRESENTATIVE_ROBOTS
@@ -31,9 +24,7 @@ from tests.systems.robots.engines import (
     BY_ENGINE,
     POSE,
     fix_commands,
-    moved,
     pose,
-    put,
     read,
     settings_of,
     started,
@@ -113,30 +104,6 @@ def test_a_default_context_hangs_at_home_in_balance(name):
     Simulator(block, context).AdvanceTo(0.002)
 
 
-@pytest.mark.parametrize("name", ["acrobot_small", "planar"])
-def test_the_force_does_the_work_of_the_tensions_and_poses_are_those_of_the_plant(name):
-    """Virtual work: the force on the plant's velocities is -J' t, also away from equilibrium."""
-    robot, block = load_robot(name), shared(name)
-    _, _, context = started(block, robot)
-    X_WP = moved(robot.home.transform(), np.array([0.0, 0.0, 0.002, 0.001, -0.002, 0.0]))
-    put(block, context, X_WP)
-    J = length_jacobian(X_WP, robot.exit_points(), robot.anchor_points())
-    expected = -J.T @ read(block, context, "tensions")
-    if robot.is_planar():
-        expected = expected[[3, 4, 2]]  # the joint's velocities are (x, y, theta)
-    cables = block.GetSubsystemByName("cables")
-    force = read(cables, cables.GetMyContextFromRoot(context), "generalized_force")
-    np.testing.assert_allclose(force, expected, rtol=1e-9, atol=BALANCE)
-    far = {
-        "acrobot_small": pose_from_angles(np.array([0.1, -0.2, 0.4]), np.array([0.3, -0.5, 2.0])),
-        "planar": pose_from_angles(np.array([0.1, -0.2, 0.3]), np.array([0.0, 0.0, -2.5])),
-    }[name]
-    put(block, context, far)
-    assert max(pose_error(far, pose(block, context))) < ROUND_OFF
-    body = block.GetOutputPort("body_poses").Eval(context)[int(block.in_plant.body_index)]
-    assert max(pose_error(far, body)) < ROUND_OFF
-
-
 def lengthen(block, context, change):
     winches = block.GetSubsystemByName("winches")
     l0 = read(block, context, "unstrained_lengths") + change
@@ -208,28 +175,6 @@ def test_no_wrench_is_one_of_zeros_to_the_bit():
         simulator.AdvanceTo(0.05)
         states.append(read(block, context, "platform_state"))
     assert np.array_equal(*states)
-
-
-def test_the_platform_gives_as_its_stiffness_says():
-    """Half the difference of both signs leaves nothing of second order."""
-    robot = load_robot("acrobot_large")
-    how = CableRobotSettings(
-        cables=CableSettings(model="elastic"),
-        damping=DampingSettings(translation=2000.0, rotation=20.0),
-    )
-    small, poses = 1e-3 * WRENCH, []
-    for sign in (1.0, -1.0):
-        block, simulator, context = started(
-            CompiledCableRobot, robot, how, 2e-3, wrench=sign * small, method="semi_implicit"
-        )
-        simulator.AdvanceTo(4.0)
-        poses.append(read(block, context, "platform_state")[:7])
-    half = 0.5 * (poses[0] - poses[1])
-    found = np.concatenate([2.0 * half[1:4], half[4:]])
-    K = static_at_pose(robot, robot.home.transform(), "elastic", False).stiffness
-    expected = np.linalg.solve(K, small)
-    SHARE = 1e-6  # of the deflection: what is left of third order and of the way to rest
-    np.testing.assert_allclose(found, expected, atol=SHARE * np.abs(expected).max())
 
 
 def test_steps_get_shorter_as_the_platform_climbs_and_with_light_motors():

@@ -8,6 +8,8 @@ from cdpr_drake.models.robot_statics import rigid_platform
 from cdpr_drake.statics.stiffness import natural_modes, platform_stiffness
 from cdpr_drake.systems.robots.cable_forces import CableForces
 from cdpr_drake.systems.robots.cable_robot import CableRobot
+from tests.models.robots import robot_of
+from tests.models.test_platform_pulleys import robot_content
 from tests.systems.robots.engines import (
     ALL_BEHAVIOUR,
     POSE,
@@ -21,9 +23,6 @@ from tests.systems.robots.engines import (
 DERIVATIVES = 1e-6
 """Central differences against AutoDiff, relative to the largest derivative."""
 
-FREQUENCY = 5e-3
-"""Relative difference of a frequency of the linear model from the one measured in time."""
-
 ELASTIC = settings_of(model="elastic", pulleys=True)
 CATENARY = settings_of(model="catenary", pulleys=True)
 
@@ -32,10 +31,15 @@ def creeping():
     return behaving(load_robot("acrobot_small"), **ALL_BEHAVIOUR)
 
 
+def over_platform_pulleys():
+    return robot_of(robot_content())
+
+
 CASES = {
     "straight": ("acrobot_small", settings_of(), POSE),
     "elastic": ("acrobot_small", ELASTIC, POSE),
     "catenary": ("acrobot_small", CATENARY, POSE),
+    "pulleys at the platform": (over_platform_pulleys, settings_of(pulleys=True), POSE),
     "planar": ("planar", settings_of(), None),
     "planar, elastic": ("planar", ELASTIC, None),
     "planar, catenary": ("planar", CATENARY, None),
