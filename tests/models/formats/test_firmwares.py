@@ -9,7 +9,7 @@ from pydrake.math import RigidTransform
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.models.robot_exchange import export_robot
 from cdpr_drake.models.robot_loader import load_robot
-from tests.models.formats.foreign_files import KLIPPER, MASLOW, REPRAP, saved
+from tests.models.formats.foreign_files import REPRAP, saved
 
 BUILT_UP = (
     REPRAP.replace("Q0.0", "Q0.0356")
@@ -33,28 +33,6 @@ def again(load):
         return load(f"again_{name}", text), text
 
     return exported
-
-
-@pytest.mark.parametrize(
-    ("format", "name", "text"),
-    [
-        ("klipper", "a.cfg", KLIPPER),
-        ("reprapfirmware", "a.g", REPRAP),
-        ("maslow", "a.yaml", MASLOW),
-    ],
-)
-def test_what_is_written_is_read_back(format, name, text, load, again):
-    robot = load(name, text)
-    other, _ = again(robot, format)
-    np.testing.assert_allclose(other.exit_points(), robot.exit_points(), atol=1e-12)
-    assert [cable.name for cable in other.cables] == [cable.name for cable in robot.cables]
-    if format == "klipper":
-        assert robot.winch.rated_cable_speed() == pytest.approx(0.3)
-    if format == "reprapfirmware":
-        np.testing.assert_allclose(robot.stiffness(), 20000.0)
-    if format != "maslow":
-        assert other.winch.gear_ratio == pytest.approx(robot.winch.gear_ratio)
-        assert other.winch.drum_radius == pytest.approx(robot.winch.drum_radius)
 
 
 def test_motors_turn_as_far_as_the_firmware_turns_them(load, again):

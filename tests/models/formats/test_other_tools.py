@@ -4,13 +4,14 @@ import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
+from pydrake.math import RigidTransform
 from pydrake.multibody.parsing import (
     LoadModelDirectivesFromString,
     Parser,
     ProcessModelDirectives,
 )
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
+from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
 from cdpr_drake import models
@@ -60,17 +61,6 @@ def test_it_is_at_rest_at_home_and_motors_add_nothing(name):
         why = f"is no pose of rest, since {problem}"
     assert export_omissions(robot, "mjcf").get("home", "") == why
     assert (np.max(np.abs(data.qacc)) < AT_REST) == (why == "")
-
-
-def test_it_stays_at_home():
-    mujoco, model, data = at_home("acrobot_large")
-    robot = made("acrobot_large")
-    ends = robot.home.transform().multiply(robot.anchor_points()) - robot.exit_points()
-    lengths = np.linalg.norm(ends, axis=0)
-    np.testing.assert_allclose(data.ten_length, lengths, atol=EXACT)
-    for _ in range(200):
-        mujoco.mj_step(model, data)
-    np.testing.assert_allclose(data.ten_length, lengths, atol=1e-6)
 
 
 @pytest.mark.parametrize("name", ["cogiro", "caroca_gazebo", "everything", "flat"])
@@ -186,27 +176,24 @@ def packed(plant, folder):
     return plant
 
 
-def moved(put):
-    """Where the platform is after a while that begins with a velocity."""
+def rates(put):
+    """Of the state in which the platform has left its home pose with a velocity."""
     robot, builder = made(SMALL), DiagramBuilder()
     plant = builder.AddSystem(MultibodyPlant(0.0))
     in_plant = put(plant, robot)
     blocks = add_cable_robot(builder, in_plant)
-    diagram = builder.Build()
-    context = diagram.CreateDefaultContext()
-    own = plant.GetMyMutableContextFromRoot(context)
-    home = robot.home.transform().GetAsMatrix4()
-    np.testing.assert_allclose(in_plant.pose(own).GetAsMatrix4(), home, rtol=0, atol=SAME_MOTION)
-    blocks.set_at_equilibrium(context, robot.home.transform())
+    context = builder.Build().CreateDefaultContext()
+    own, home = plant.GetMyMutableContextFromRoot(context), robot.home.transform()
+    found = in_plant.pose(own).GetAsMatrix4()
+    np.testing.assert_allclose(found, home.GetAsMatrix4(), rtol=0, atol=SAME_MOTION)
+    blocks.set_at_equilibrium(context, home)
+    away = home.translation() + np.array([0.01, 0.02, -0.03])
+    in_plant.set_pose(own, RigidTransform(home.rotation(), away))
     plant.SetVelocities(own, in_plant.model_instance, [0.1, 0.2, -0.3, 0.05, -0.1, 0.02])
-    blocks.GetInputPort("cable_velocities").FixValue(
-        blocks.winches.GetMyMutableContextFromRoot(context), np.zeros(len(robot.cables))
-    )
-    simulator = Simulator(diagram, context)
-    ResetIntegratorFromFlags(simulator, "runge_kutta3", 2e-4)
-    simulator.get_mutable_integrator().set_fixed_step_mode(True)
-    simulator.AdvanceTo(0.05)
-    return in_plant.pose(own).GetAsMatrix4()
+    winches = blocks.winches.GetMyMutableContextFromRoot(context)
+    blocks.GetInputPort("cable_velocities").FixValue(winches, np.zeros(len(robot.cables)))
+    acceleration = plant.get_generalized_acceleration_output_port(in_plant.model_instance)
+    return acceleration.Eval(own)
 
 
 def test_a_robot_that_directives_added_moves_as_one_of_ours(tmp_path):
@@ -215,8 +202,10 @@ def test_a_robot_that_directives_added_moves_as_one_of_ours(tmp_path):
         plant.Finalize()
         return in_plant
 
-    theirs = moved(lambda plant, robot: find_robot(packed(plant, tmp_path), robot))
-    np.testing.assert_allclose(theirs, moved(ours), rtol=0, atol=SAME_MOTION)
+    theirs = rates(lambda plant, robot: find_robot(packed(plant, tmp_path), robot))
+    size = np.max(np.abs(theirs))
+    assert size > 10.0
+    np.testing.assert_allclose(theirs, rates(ours), rtol=0, atol=SAME_MOTION * size)
 
 
 def test_what_is_no_such_robot_is_said(tmp_path):

@@ -18,7 +18,7 @@ from cdpr_drake.models.formats.reading import read_json
 from tests.messages import printed
 from tests.models.formats import foreign_files as files
 from tests.models.formats.foreign_files import ANCHORS, COM, EXITS, HOME, edited, words
-from tests.models.formats.test_refusals import WHOLE, attachment, toy
+from tests.models.formats.test_refusals import FIRST, WHOLE, attachment, toy
 
 pytestmark = pytest.mark.usefixtures("in_this_process")
 
@@ -68,7 +68,7 @@ def test_points_home_lengths_wrench_matrix_and_inertia(kind, tmp_path):
 def limits(low, high):
     """Limits of the toy's joint, which stands off the world's origin."""
     given = "".join(f' {key}="{w}"' for key, w in (("q_min", low), ("q_max", high)) if w)
-    return [('"/>\n      <physical>', f'"{given}/>\n      <physical>'),
+    return [('"/><physical>', f'"{given}/><physical>'),
             ("<location>0 0 0<", "<location>0.1 0.2 0.3<")]  # fmt: skip
 
 
@@ -168,7 +168,7 @@ KEPT = {
                  ("<!DOCTYPE cables [<!ATTLIST cable_set id ID #REQUIRED>]>", LISTED)],
                  {"cables.7.anchor_point": ANCHORS[:, 7]}, [], []),
     "no default": (files.caspr, [(' default_cable_set="second"', ""),
-                   ('<cable_set id="first"/>', "")], {"cables.7.name": "C8"}, [], ["also has"]),
+                   (FIRST, "")], {"cables.7.name": "C8"}, [], ["also has"]),
     "springs": (files.caspr, [("cable_ideal", "cable_linear_spring")], {},
                 ["Cables are of the kind cable_linear_spring; their stiffness was not kept."], []),
     "about the joint": (files.caspr, [('ia ref="com"', 'ia ref="joint"')],
