@@ -303,7 +303,7 @@ def numbers(value):
     return [] if value is None or isinstance(value, str) else np.ravel(value).tolist()
 
 
-@settings(max_examples=60)
+@settings(max_examples=40)
 @given(
     st.sampled_from(number_keys(yaml.safe_load(ROBOT))),
     st.sampled_from([math.nan, math.inf, -math.inf, 0.0, -1.0]) | st.floats(-1e3, 1e3),

@@ -154,7 +154,7 @@ def box_broken(functions, random):
 
 def clearances_broken(functions):
     random = np.random.default_rng(0)
-    return any(pair_broken(functions, random) or box_broken(functions, random) for _ in range(3000))
+    return any(pair_broken(functions, random) or box_broken(functions, random) for _ in range(1500))
 
 
 # Collisions of convex shapes.
@@ -164,7 +164,7 @@ def collisions_broken(functions):
     """True if the judge breaks a promise on random boxes about random shapes."""
     random = np.random.default_rng(0)
     body = ConvexShape.box_at([0, 0, 0.05], [0.2, 0.3, 0.1])
-    for _ in range(3000):
+    for _ in range(1500):
         turn = np.linalg.qr(random.normal(size=(3, 3)))[0]
         other = ConvexShape.box_at(np.zeros(3), random.uniform(0.05, 0.3, 3), turn)
         other = replace(other, radius=random.choice([0.0, 0.05]))
@@ -193,7 +193,7 @@ def pulleys_broken(functions, ends="A", first_order=True):
     """True if a tangent point lies elsewhere than a bound of a box says, where cables run."""
     random = np.random.default_rng(0)
     count = 0
-    for _ in range(750):
+    for _ in range(400):
         exits = random.uniform(-1.0, 1.0, (3, 1)) + np.array([[1.5], [0.0], [1.0]])
         cables = CableSet.make(exits, random.uniform(-0.2, 0.2, (3, 1)), 1.0)
         rows = pulleys_at(cables, ends, random, (0.3, 0.1)).packed()
@@ -227,7 +227,7 @@ def pulleys_broken(functions, ends="A", first_order=True):
                 return True
             if np.linalg.norm(anchor - points[0, 3:]) > known[0, ANCHOR] + TINY:
                 return True
-    assert count > 200
+    assert count > 100
     return False
 
 

@@ -34,7 +34,7 @@ from cdpr_drake.systems.robots.settings import (
 )
 from cdpr_drake.systems.robots.winches import VelocityWinch
 from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
-from tests.systems.robots.engines import read, settings_of
+from tests.systems.robots.engines import settings_of
 
 QUICK = "camera.kind=projected"
 
@@ -48,20 +48,6 @@ def braked():
     robot.damping = PlatformDamping(translation=30.0, rotation=0.4)
     robot.cable_model = "catenary"
     return robot
-
-
-def test_the_simulated_robot_has_the_cables_that_were_asked_for():
-    overrides = [QUICK, "duration=0.2", "cables.model=catenary", "cables.pulleys=true"]
-    servo = build_visual_servo(load_scenario("caroca_pbvs", overrides))
-    cables = servo.cable_robot.GetSubsystemByName("cables")
-    assert cables.model() == "catenary"
-    np.testing.assert_array_equal(cables.cable_set().pulley_radius, 0.075)
-    context = servo.make_context()
-    simulator = Simulator(servo.diagram, context)
-    simulator.get_mutable_integrator().request_initial_step_size_target(1e-4)
-    simulator.AdvanceTo(0.02)
-    block = servo.cable_robot
-    assert np.all(read(block, block.GetMyContextFromRoot(context), "sags") > 1e-3)
 
 
 @pytest.mark.parametrize(("model", "damped"), [("elastic", False), ("kelvin_voigt", True)])
