@@ -296,7 +296,7 @@ def test_boxes_of_several_kinds_are_those_of_each():
         robot, kinds, WorkspaceGrid(axes, np.zeros((1, 3))), asked=request
     )
     search = box_search(question, robot)
-    boxes = certified_boxes(search, 8000)
+    boxes = certified_boxes(search, 4000)
     assert min(check(boxes, search.tasks)) > 50
     verdicts = [
         judge_all([task], boxes.poses, boxes.halves, boxes.proven)[0] for task in search.tasks

@@ -364,7 +364,7 @@ def timed():
     return raster, around, things, clear_cells(raster, around, things, 0.01, 6.0, 16)
 
 
-def gaps_in(timed, cells, which, count=2000):
+def gaps_in(timed, cells, which, count=800):
     """Exact clearances of the timed poses in some of the cells [m]."""
     raster, around, things, _ = timed
     random, chosen = np.random.default_rng(0), np.argwhere(which)

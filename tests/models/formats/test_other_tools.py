@@ -285,6 +285,7 @@ def test_motors_turn_as_far_as_the_firmware_turns_them(load, again):
     """Drums, tackles and build-up against HangprinterKinematics.cpp's k0, k1, k2 [mm]."""
     robot = load("config.g", BUILT_UP)
     assert [cable.mechanical_advantage for cable in robot.cables] == ADVANTAGE.tolist()
+    np.testing.assert_allclose(robot.stiffness(), 20000.0)
     origin, Q = np.linalg.norm(robot.exit_points(), axis=0), 0.0356
     k2 = -ADVANTAGE * Q
     k1 = np.square(R) + Q * ADVANTAGE * 1e3 * origin

@@ -14,6 +14,7 @@ from pydrake.trajectories import PiecewisePolynomial
 
 from cdpr_drake.analyses.simulation.run_summary import summarize
 from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
+from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.sensor_catalogue import load_tension_sensor
 from cdpr_drake.systems.diagrams.load import load_scenario
@@ -26,6 +27,7 @@ from cdpr_drake.systems.sensors.tension_sensor import TensionSensor
 from tests.systems.robots.engines import (
     BY_ENGINE,
     SAME_STEPS,
+    pose,
     read,
     settings_of,
     started,
@@ -38,6 +40,9 @@ STEP, FAIL, END = 1e-4, 0.02, 0.05
 
 GUESSES = 3
 """Where in `simulation_kernel.make_room` solutions of catenaries begin."""
+
+STORED = 1e-9
+"""Relative difference of energies: rounding of a sum that has the weight's energy in it."""
 
 STATES = ("platform_state", "unstrained_lengths", "unstrained_length_rates", "tensions")
 
@@ -99,6 +104,22 @@ def test_what_is_left_moves_as_the_robot_without_it(name, mode, model, pulleys, 
         found, expected = found[: 1 - m], expected[: 1 - m]
     assert np.array_equal(found, expected)
     assert not np.allclose(found[:n], at_break[:n], atol=1e-6)
+
+
+@pytest.mark.parametrize("pulleys", [False, True])
+def test_what_a_cable_had_stored_is_released(pulleys):
+    """Along the groove and then straight: its pulley is gone with it."""
+    how = settings_of("ideal", "elastic", pulleys, events=breaking(4))
+    block, simulator, context = started(CompiledCableRobot, ROBOT, how, 2e-5)
+    simulator.AdvanceTo(FAIL - STEP)
+    own, cables = block.motion.GetMyContextFromRoot(context), block.motion.cable_set()
+    before = block.motion.energy(own)
+    simulator.AdvanceTo(FAIL + 1e-9)
+    l0 = read(block, context, "unstrained_lengths")[4]
+    stretch = cable_paths(pose(block, context), cables).lengths[4] - l0
+    stored = 0.5 * cables.stiffness[4] * stretch**2 / l0
+    assert stored > 0.0
+    assert before - block.motion.energy(own) == pytest.approx(stored, rel=STORED)
 
 
 @BY_ENGINE
