@@ -76,10 +76,8 @@ MODULES = {
     "stability-closed-loop-ibvs": "closed_loops.study",
     "control-stability": "control_stability.study",
     "stability-recipes": "control_stability.all_recipes",
-    "stability-targets": "control_stability.all_targets",
     "stability-ranges": "stability_ranges.study",
     "stability-shapes": "stability_shapes.study",
-    "stability-bounds": "stability_bounds.study",
     "basin": "basin.study",
     "workspaces": "workspaces.study",
     "design": "design",
@@ -93,7 +91,6 @@ MODULES = {
     "schemes": "schemes.study",
     "tagless": "tagless",
     "lenses": "lenses",
-    "slack-cycle": "slack_cycle",
     "failure": "failure",
     "detection": "detection",
     "adaptation": "adaptation",
@@ -114,7 +111,6 @@ MODULES = {
     "case-9-torque": "tension_cases.case_9_torque",
     "case-10": "tension_cases.case_10",
     "tension-tracking": "tension_cases.tension_tracking",
-    "image-width": "image_width",
 }
 """Modules of this room by study, in the order in which the command line lists them.
 

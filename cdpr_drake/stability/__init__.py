@@ -14,7 +14,6 @@ positive definite.
   `criterion_closed_forms` has the cases in which the robot's model is exact.
 * **Verdicts on poses**, of growing weight: sampled, searched, certified, by `judge_stability`. The
   proof behind the last one stands in `quadratic_bounds_kernel`.
-* **Simpler proofs**, to compare it with: `interval_bound` and `lipschitz_bound`.
 
 Source: servoing thesis chapter 3: (3.1), (3.8), (3.26) and 3.4 for the criterion, with e in the
 lever of PBVS as its analysis has it, or the exact matrix, see `OBJECT_POSE_MODELS`; 3.2 and

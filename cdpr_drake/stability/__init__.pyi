@@ -1,8 +1,6 @@
 from .criterion_at_pose_kernel import evaluate as evaluate
 from .desired_view import FixedObject as FixedObject
 from .desired_view import OppositeCorner as OppositeCorner
-from .interval_bound import interval_margins as interval_margins
-from .lipschitz_bound import lipschitz_margins as lipschitz_margins
 from .no_stable_target import stable_target_exists as stable_target_exists
 from .perturbation_bounds import BASELINE as BASELINE
 from .perturbation_samples_kernel import mixed as mixed

@@ -36,7 +36,7 @@ def _image(runs: Runs) -> Finding:
         held=[tracking < 5.0, servo > 5.0 * tracking],
         some=tracking < 5.0,
         why="The largest values come close to the object, where the platform swings by "
-        "millimetres: with this gain the loop is at its limit, see the study slack-cycle, and the "
+        "millimetres: with this gain the loop is at its limit, and the "
         "thesis tells of an error that oscillates. What noise, pulleys and damping contribute is "
         "told in docs/theory/reproduction.md; the prototype's damping is not known. Means: "
         f"{runs.mean('image_mean_px', configuration='tracking'):.1f} px, without "

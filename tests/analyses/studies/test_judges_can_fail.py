@@ -178,7 +178,6 @@ OF_SOURCES = tuple(
     not in (
         "worked-examples",
         "stability-shapes",
-        "stability-targets",
         "workspaces",
         "pick-and-place",
     )

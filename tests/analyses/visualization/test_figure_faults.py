@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from cdpr_drake.analyses.studies.framework.case_panels import draw_path, fit_box
-from cdpr_drake.analyses.studies.stability_bounds.figures import LETTER_APART, _letters_above
 from cdpr_drake.analyses.visualization.figure_style import bare_figure, new_figure, styled
 from cdpr_drake.analyses.visualization.solids import NO_CELL, draw_solid
 from cdpr_drake.palette import nth_look
@@ -117,16 +116,3 @@ def test_a_frame_without_a_solid_says_so():
         axes = figure.add_subplot(projection="3d", computed_zorder=False)
         draw_solid(axes, np.empty((0, 4, 3)), "#3f8f5f", corners, np.array(corners).T)
     assert [text.get_text() for text in axes.texts] == [NO_CELL]
-
-
-def test_letters_of_symbols_on_one_line_do_not_meet():
-    # Of six robots, four take about as long, one of them on a line above.
-    symbols = np.array([[90.0, 100.0], [91.0, 100.0], [91.0, 100.0], [93.0, 100.0],
-                        [200.0, 100.0], [90.0, 127.0]])  # fmt: skip
-    above = _letters_above(symbols)
-    assert len(set(above[:4])) == 4
-    assert above[4] == above[0]
-    letters = symbols + np.transpose([np.zeros(6), above])
-    for number, letter in enumerate(letters):
-        away = np.abs(np.delete(letters, number, axis=0) - letter)
-        assert not np.any(np.all(away < LETTER_APART, axis=1))
