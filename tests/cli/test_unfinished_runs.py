@@ -249,7 +249,7 @@ def end_at_once(*_):
     raise Ended
 
 
-FEW = ("error.png", "tensions.png", "winches.png", "path.png")
+FEW = ("error.png", "velocities.png", "tensions.png", "replay.html")
 
 
 @pytest.fixture
