@@ -4,6 +4,7 @@ import errno
 import re
 import subprocess
 import sys
+from functools import cache
 from importlib import import_module
 from pathlib import Path
 from typing import Annotated, get_origin, get_type_hints
@@ -16,6 +17,7 @@ from cdpr_drake.analyses.installation import LISTED, compilation_steps
 from cdpr_drake.analyses.visualization.robot_gallery import thumbnail
 from cdpr_drake.kernel_cache.kernel_list import group_names
 from cdpr_drake.models.robot_loader import load_robot, robot_names
+from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.scenarios.files import scenario_names
 from tests.cli.commands import ended, refuse, run, told
 
@@ -64,7 +66,8 @@ def test_view_writes_a_page(capsys, here):
     assert (here / "notes.html").read_text() == "years of work"
 
 
-def test_scenarios_lists_all(capsys):
+def test_scenarios_lists_all(capsys, monkeypatch):
+    monkeypatch.setattr("cdpr_drake.cli.scenarios.load_scenario", cache(load_scenario))
     facts = {fact["name"]: fact for fact in told(capsys, "scenarios")}
     assert list(facts) == list(scenario_names())
     assert facts["acrobot_ibvs"]["scheme"] == "ibvs"

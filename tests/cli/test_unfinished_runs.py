@@ -282,7 +282,7 @@ def test_the_same_command_draws_what_is_missing(words, here, monkeypatch, drawn,
     whole = sorted(os.listdir("run"))
     shutil.rmtree("run")
     with monkeypatch.context() as patch:
-        drawn(patch, 2)
+        drawn(patch, 1)
         with pytest.raises(Ended):
             ended(*words)
     there = sorted(os.listdir("run"))
