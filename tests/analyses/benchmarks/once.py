@@ -10,7 +10,8 @@ FEW = 10
 """Calls in a row are no more than these."""
 
 SMALLER = {
-    "identification.POSES": 14, "identification.ROWS": 500, "planning.STATIONS": 60,
+    "identification.POSES": 14, "identification.ROWS": 2000, "planning.STATIONS": 60,
+    "moving_obstacles.SHAPE": (4, 4, 4), "moving_obstacles.STEPS": 8,
     "package.STARTS": {"import cdpr_drake": "import cdpr_drake"},
     "package.BASELINE": "import pydrake",
 }  # fmt: skip
