@@ -41,7 +41,7 @@ async def test_a_field_changes_the_robot_and_its_tensions(user, bench):
     [
         (CASE, "abc", "found abc; accepted: 3 numbers [m]"),
         (CASE, "", "found nothing; accepted: 3 numbers [m]"),
-        (CASE, "nan", "accepted: 3 numbers [m]"),
+        (CASE, "nan", "found nan; accepted: 3 numbers [m]"),
         ("platform-mass", "-1", "platform.mass: found -1; accepted: a number > 0 [kg]"),
         ("tension_bounds-lower", "70", "accepted: lower < upper"),
         ("name", "../x", "accepted: 1 to 64 letters"),
@@ -50,7 +50,6 @@ async def test_a_field_changes_the_robot_and_its_tensions(user, bench):
     ],
 )
 async def test_a_wrong_value_is_said_beside_its_field(user, bench, name, words, said):
-    assert problems(user) == []
     text = bench.robot.text
     type_into(user, f"cell-{name}", words)
     assert any(said in problem for problem in problems(user)), problems(user)
