@@ -9,7 +9,14 @@ from cdpr_drake.analyses.simulation.run_summary import summarize
 from cdpr_drake.analyses.simulation.scenario_kinds import SCENARIO_KINDS
 from cdpr_drake.analyses.simulation.session import RunSession
 from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
-from cdpr_drake.geometry.poses import pose_error, pose_row, pose_rows_distance, rotation_from_vector
+from cdpr_drake.geometry.cable_paths import cable_paths
+from cdpr_drake.geometry.poses import (
+    pose_error,
+    pose_from_row,
+    pose_row,
+    pose_rows_distance,
+    rotation_from_vector,
+)
 from cdpr_drake.models.robot_loader import robot_file
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
@@ -61,8 +68,34 @@ def test_rendered_run_repeats_byte_for_byte(default_run):
         assert values.tobytes() == default_run.log[name][:n].tobytes()
 
 
-def test_rendered_and_projected_runs_follow_the_same_path(default_run):
-    other = run_scenario(projected())
+@pytest.fixture(scope="module")
+def projected_run():
+    return run_scenario(projected())
+
+
+def test_surplus_and_drift_are_those_of_the_log(projected_run):
+    summary, log = summarize(projected_run), projected_run.log
+    row = int(np.argmax(np.max(log["surplus_lengths"], axis=1)))
+    cables = projected_run.servo.cable_robot.forces.cable_set()
+    straight = cable_paths(pose_from_row(log["X_WP"][row]), cables).lengths
+    largest = np.max(log["unstrained_lengths"][row] - straight)
+    assert largest > 0.0
+    assert summary["surplus_over_chord_m"]["max"] == pytest.approx(largest)
+    distance, _ = pose_rows_distance(log["X_WP"], log["X_WP_estimated"])
+    half = log["time"] >= log["time"][-1] / 2.0
+    slope = np.polyfit(log["time"][half], distance[half], 1)[0]
+    assert summary["pose_estimate_drift_m_per_min"] == pytest.approx(60.0 * slope, rel=1e-6)
+
+
+def test_without_noise_the_path_in_the_image_is_straight():
+    """The ideal property of this feature, servoing thesis 1.4.4."""
+    exact = run_scenario(projected("camera.pixel_noise=0.0", "integration.engine=compiled"))
+    assert exact.outcome == Outcome.CONVERGED
+    assert summarize(exact)["image_deviation_px"]["max"] < 0.5
+
+
+def test_rendered_and_projected_runs_follow_the_same_path(default_run, projected_run):
+    other = projected_run
     n = min(len(default_run.log["time"]), len(other.log["time"]))
     apart, _ = pose_rows_distance(default_run.log["X_WP"][:n], other.log["X_WP"][:n])
     # Detection noise of the first images, a pixel tenth on a tag of 65 px, moves the path.
