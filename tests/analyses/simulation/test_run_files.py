@@ -61,36 +61,25 @@ def test_npz_and_csv_hold_the_same_log(run):
     np.testing.assert_array_equal(np.array(rows[1:], float), table)
 
 
-def test_log_files_are_the_same_bytes_for_the_same_seed(run, tmp_path):
+def test_the_written_scenario_runs_again_to_the_same_bytes(run, tmp_path):
     folder, result = run
-    again = run_scenario(result.servo.scenario)
-    write_run_data(tmp_path, again)
-    for name in ("log.npz", "log.csv", "scenario.yaml"):
+    write_run_data(tmp_path, run_scenario(load_scenario(str(folder / "scenario.yaml"))))
+    for name in ("log.npz", "log.csv"):
         assert (folder / name).read_bytes() == (tmp_path / name).read_bytes()
-
-
-def test_written_scenario_runs_again_to_the_same_log(run):
-    folder, result = run
-    again = run_scenario(load_scenario(str(folder / "scenario.yaml")))
-    for name, values in result.log.items():
-        np.testing.assert_array_equal(again.log[name], values)
+    write_run_data(tmp_path, result)
+    assert (folder / "scenario.yaml").read_bytes() == (tmp_path / "scenario.yaml").read_bytes()
 
 
 @pytest.mark.parametrize("name", FIGURES)
 def test_figure_is_a_picture_with_something_in_it(run, name):
     picture = cv2.imread(str(run[0] / f"{name}.png"))
-    assert picture.shape[0] > 400
-    assert picture.shape[1] > 800
+    assert np.all(picture.shape > np.array([400, 800, 2]))
     assert np.std(picture) > 5.0
-
-
-def test_replay_needs_no_server(run):
-    page = (run[0] / "replay.html").read_text()
-    assert 'src="http' not in page
 
 
 def test_replay_shows_what_the_film_shows_and_where_the_target_should_be(run):
     page = (run[0] / "replay.html").read_text()
+    assert 'src="http' not in page  # no server is needed
     (words,) = re.findall(r'id="cdpr-data">(.*?)</script>', page, re.DOTALL)
     camera, servo = json.loads(words)["camera"], run[1].servo
     times = [time for time, _ in camera["images"]]
@@ -115,8 +104,10 @@ def test_replay_holds_the_motion(run, tmp_path):
 
 def test_film_has_a_frame_per_image(run):
     film = cv2.VideoCapture(str(run[0] / "camera.mp4"))
-    assert film.get(cv2.CAP_PROP_FRAME_COUNT) == 11
-    assert film.get(cv2.CAP_PROP_FRAME_WIDTH) == 640
+    frames, width = (
+        film.get(what) for what in (cv2.CAP_PROP_FRAME_COUNT, cv2.CAP_PROP_FRAME_WIDTH)
+    )
+    assert (frames, width) == (11, 640)
     found, frame = film.read()
     assert found
     assert np.std(frame) > 5.0

@@ -78,12 +78,8 @@ def test_a_loop_that_cannot_be_looked_into_is_refused():
 def test_marks_are_drawn_where_they_are(scenario):
     loaded = load_scenario(scenario)
     model = servo_model(loaded, load_robot(loaded.robot))
-    marks = model.target.project(
-        model.X_CO(loaded.initial_pose.transform(), 0.0),
-        model.pinhole,
-        0.0,
-        np.random.default_rng(),
-    )
+    X_CO = model.X_CO(loaded.initial_pose.transform(), 0.0)
+    marks = model.target.project(X_CO, model.pinhole, 0.0, np.random.default_rng())
     jpeg = MarksPicture(model).jpeg(marks, None)
     image = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR).astype(int)
     assert image.shape[1] <= 640
