@@ -33,5 +33,7 @@ def test_the_limit_is_four_of_the_spread_that_is_there():
     for spread in (2.0, 5.0):
         wild = np.append(spread * residuals, np.full(1000, 1e6))  # a hundredth is off
         assert huber_limit(wild) == pytest.approx(HUBER * spread, rel=0.03)
+    rest = np.array([-30.0, -3.0, 0.0, 2.0, 9.0])
+    assert huber_limit(rest) == pytest.approx(4.0 * 1.4826 * 3.0)  # by the median of what is off
     # Sigmas that were given too large, or nothing to judge them by, make none smaller.
     assert huber_limit(0.1 * residuals) == HUBER == huber_limit(np.zeros(0)) == 4.0
