@@ -11,7 +11,7 @@ from cdpr_drake.analyses.calibration.calibrated_robots import calibration_model
 from cdpr_drake.analyses.calibration.calibration_report import calibration_dict
 from cdpr_drake.analyses.calibration.calibration_request import CalibrationTask, Sigmas
 from cdpr_drake.analyses.calibration.calibration_task import calibrate
-from cdpr_drake.analyses.calibration.log_file import CalibrationLog, read_log
+from cdpr_drake.analyses.calibration.log_file import CalibrationLog
 from cdpr_drake.calibration.stations import Point, Stations
 from cdpr_drake.geometry.poses import pose_error, pose_from_angles
 from cdpr_drake.models.robot_loader import load_robot
@@ -122,36 +122,6 @@ def test_residuals_beyond_three_sigmas_are_a_misfit_without_outliers_too():
     assert found.result.status == "misfit"
     assert found.misfit[0].startswith("residuals are ")
     assert calibrate(replace(task, sigmas=logs.SIGMAS), log).misfit == ()
-
-
-TILTED = "C1_length_m,roll_deg,pitch_deg,yaw_deg\n1,10,20,30\n1,,,\n"
-
-
-@pytest.fixture
-def written(tmp_path):
-    def write(text):
-        path = tmp_path / "log.csv"
-        path.write_text(text)
-        return read_log(path, ["C1", "C2"])
-
-    return write
-
-
-def test_roll_pitch_and_yaw_without_a_position_are_an_inclination(written):
-    log = written(TILTED)
-    assert log.poses is None
-    np.testing.assert_allclose(log.tilts[0], np.radians([10.0, 20.0, 30.0]))
-    assert np.isnan(log.tilts[1]).all()
-    alone = written("C1_length_m,pitch_rad\n1,0.2\n")
-    np.testing.assert_allclose(alone.tilts, [[np.nan, 0.2, np.nan]])
-
-
-def test_other_rotations_without_a_position_are_one_too(written):
-    half = np.radians(15.0)
-    log = written(f"C1_length_m,qw,qx,qy,qz\n1,{np.cos(half)},{np.sin(half)},0,0\n")
-    np.testing.assert_allclose(log.tilts, [[np.radians(30.0), 0.0, 0.0]], atol=1e-12)
-    log = written("C1_length_m,phi_deg,theta_deg,psi_deg\n1,0,0,40\n")
-    np.testing.assert_allclose(log.tilts, [[0.0, 0.0, np.radians(40.0)]], atol=1e-12)
 
 
 def test_an_inclinometer_holds_what_lengths_leave_open():
