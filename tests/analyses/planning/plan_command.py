@@ -1,5 +1,7 @@
 """`cdpr plan` in this process."""
 
+import json
+
 import pytest
 
 from cdpr_drake.cli.app import main
@@ -12,3 +14,16 @@ def run(capsys, *words):
         main(["plan", *words])
     out, err = printed(capsys)
     return end.value.code, out, err
+
+
+def planned(folder, *words):
+    """The summary of a plan that is written into a folder."""
+    with pytest.raises(SystemExit) as end:
+        main(["plan", *words, "--out", str(folder), "--json"])
+    assert end.value.code == 0
+    return json.loads((folder / "summary.json").read_text())
+
+
+def drawn(folder, *names):
+    """Whether there are figures with something in them."""
+    return all((folder / f"{name}.png").stat().st_size > 10_000 for name in names)

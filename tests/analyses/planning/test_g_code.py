@@ -209,7 +209,10 @@ G3 X-100 Y-50 R50
 def test_feeds_are_speeds_of_their_pieces(tmp_path, corners):
     file = tmp_path / "slot.nc"
     file.write_text(SLOT)
-    run = plan_path("acrobot_large", file, {"tensions": (1.0, 60.0)}, corners=corners, stations=300)
+    run, free = (
+        plan_path("acrobot_large", file, {"tensions": (1.0, 60.0), **more}, corners=corners,
+                  stations=300) for more in ({}, {"feeds": False})
+    )  # fmt: skip
     samples, path = run.samples, run.plan.path
     way = np.linalg.norm(path.points(samples.parameters)[:, 10:13], axis=1) * samples.speeds
     most = path.largest_speeds(samples.parameters)
@@ -217,13 +220,6 @@ def test_feeds_are_speeds_of_their_pieces(tmp_path, corners):
     assert np.max(way / most) < 1.0 + 2e-3
     assert np.max(samples.uses[:, 3]) == pytest.approx(np.max(way / most))
     assert np.mean(samples.active()["speed of Po"]) > 0.5
-    free = plan_path(
-        "acrobot_large",
-        file,
-        {"tensions": (1.0, 60.0), "feeds": False},
-        corners=corners,
-        stations=300,
-    )
     assert free.plan.duration < 0.8 * run.plan.duration
     assert free.plan.path.speeds is None
     assert (len(path.rests) == 3) == (corners == "rest")

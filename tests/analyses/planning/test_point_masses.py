@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from pydrake.math import RigidTransform
 
 import cdpr_drake as cdpr
 from cdpr_drake.analyses.planning.cable_streams import cable_stream
@@ -38,13 +39,16 @@ CASES = {
 }
 
 
+def poses(places):
+    return [RigidTransform(p) for p in places]
+
+
 @pytest.fixture(scope="module", params=CASES)
 def case(request):
     """A plan, and the axes of W along which its platform moves."""
     robot, places, axes = CASES[request.param]
     robot = cdpr.load_robot(robot) if isinstance(robot, str) else robot()
-    poses = [cdpr.Pose(position=np.array(p), angles_deg=np.zeros(3)).transform() for p in places]
-    return cdpr.plan_path(robot, poses), list(axes)
+    return cdpr.plan_path(robot, poses(places)), list(axes)
 
 
 def test_tensions_of_a_plan_move_the_mass_as_newton_says(case):
@@ -76,8 +80,7 @@ def test_tensions_of_a_plan_move_the_mass_as_newton_says(case):
 
 def test_a_fine_stream_keeps_cables_taut_and_a_coarse_one_does_not():
     robot, places, _ = CASES["a wall"]
-    poses = [cdpr.Pose(position=np.array(p), angles_deg=np.zeros(3)).transform() for p in places]
-    run = cdpr.plan_path(robot, poses, {"cable_speed": 1.0, "cable_acceleration": 4.0})
+    run = cdpr.plan_path(robot, poses(places), {"cable_speed": 1.0, "cable_acceleration": 4.0})
     fine, coarse = cable_stream(run, 2000.0), cable_stream(run, 10.0)
     assert fine.check.keeps_taut
     assert not coarse.check.keeps_taut
@@ -93,10 +96,10 @@ def test_blocks_and_tackles_turn_the_motor_further():
     tackled = replace(
         robot, cables=[replace(cable, mechanical_advantage=2.0) for cable in robot.cables]
     )
-    poses = [cdpr.Pose(position=np.array(p), angles_deg=np.zeros(3)).transform() for p in places]
     asked = {"cable_speed": 0.05}
-    plain, twice = (cable_stream(cdpr.plan_path(one, poses, asked), 20.0)
-                    for one in (robot, tackled))  # fmt: skip
+    plain, twice = (
+        cable_stream(cdpr.plan_path(one, poses(places), asked), 20.0) for one in (robot, tackled)
+    )
     np.testing.assert_allclose(twice.motor_angles, 2.0 * plain.motor_angles, rtol=1e-12)
 
 
