@@ -34,7 +34,7 @@ SHORT = ["camera.kind=projected", "duration=0.1"]
 OBJ = "v -0.05 -0.05 -0.04\nv {x} 0 0\nv 0 0.1 0\nv 0 0 0.04\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
 
 
-def write_robot(file, mass=1.5):
+def write_robot(file, mass="1.5"):
     text = robot_file("acrobot_small").read_text()
     assert "  mass: 1.5\n" in text
     file.write_text(text.replace("  mass: 1.5\n", f"  mass: {mass}\n"))
@@ -114,9 +114,8 @@ def test_meshes_cameras_and_other_tools_files_are_read_once(tmp_path):
 def test_platform_meshes_are_those_that_were_read(tmp_path):
     mesh = tmp_path / "body.obj"
     mesh.write_text(OBJ.format(x=0.04))
-    file = write_robot(tmp_path / "mine.yaml")
-    shape = "  shape: {kind: mesh, file: body.obj, scale: 0.5, position: [0, 0, 0.035]}\n"
-    file.write_text(file.read_text().replace("  mass: 1.5\n", f"  mass: 1.5\n{shape}", 1))
+    shape = "shape: {kind: mesh, file: body.obj, scale: 0.5, position: [0, 0, 0.035]}"
+    file = write_robot(tmp_path / "mine.yaml", f"1.5\n  {shape}")
     with inputs_read_once():
         shape = load_robot(file).platform.shape
         first = shape.extent(np.zeros(3))[1]
