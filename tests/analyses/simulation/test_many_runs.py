@@ -3,6 +3,7 @@
 import csv
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -26,6 +27,7 @@ from cdpr_drake.geometry.poses import pose_from_angles, pose_row
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.diagrams.load import load_scenario
 from tests.analyses.simulation.run_by_hand import run_by_hand
+from tests.analyses.simulation.test_inputs_read_once import write_robot
 from tests.figure_faults import figure_faults
 
 SHORT = [
@@ -41,8 +43,9 @@ def without_times(record):
 
 
 @pytest.fixture(scope="module")
-def scenario():
-    return load_scenario("acrobot_pbvs", SHORT)
+def scenario(tmp_path_factory):
+    file = write_robot(tmp_path_factory.mktemp("robot") / "mine.yaml")
+    return load_scenario("acrobot_pbvs", [*SHORT, f"robot={file}"])
 
 
 @pytest.fixture(scope="module")
@@ -50,9 +53,20 @@ def runs(scenario):
     return run_many(with_seeds(scenario, [3, 0, 7]), workers=1, keep_traces=True)
 
 
-def test_processes_give_the_same_results_in_the_same_order(scenario, runs):
-    seen = []
-    again = run_many(with_seeds(scenario, [3, 0, 7]), workers=2, on_progress=seen.append)
+@pytest.mark.parametrize("workers", [1, 2])
+def test_who_runs_them_and_edits_of_the_robot_meanwhile_change_nothing(workers, scenario, runs):
+    file, seen = Path(scenario.robot), []
+
+    def edit(progress):
+        seen.append(progress)
+        write_robot(file, "1.95")
+
+    asked = with_seeds(scenario, [3, 0, 7])
+    try:
+        again = run_many(asked, workers, edit)
+        (heavy,) = run_many(asked[:1], 1).records
+    finally:
+        write_robot(file)
     assert [record.seed for record in again.records] == [3, 0, 7]
     for one, other in zip(runs.records, again.records, strict=True):
         assert without_times(one) == without_times(other)
@@ -61,6 +75,8 @@ def test_processes_give_the_same_results_in_the_same_order(scenario, runs):
     assert all(p.total == 3 for p in seen)
     assert not again.records[0].traces
     assert not again.interrupted
+    # So that the edit would have been seen.
+    assert heavy.summary["tension_n"] != runs.records[0].summary["tension_n"]
 
 
 def test_seeds_make_runs_differ(runs):
