@@ -12,13 +12,7 @@ from cdpr_drake.calibration.parameters import model_difference, moved_model
 from cdpr_drake.calibration.pose_search import robust_costs
 from cdpr_drake.calibration.program import CalibrationProgram
 from cdpr_drake.errors import CalibrationError
-from tests.calibration.bench import (
-    camera_program,
-    poses,
-    start_readings,
-    true_model,
-    wrong_model,
-)
+from tests.calibration.bench import camera_program, poses, start_readings, true_model, wrong_model
 
 SURE = 1e-4
 """Probability with which a test on random numbers may fail; seeds are fixed."""

@@ -16,14 +16,7 @@ from cdpr_drake.calibration.program import CalibrationProgram
 from cdpr_drake.calibration.stations import Point, Stations
 from cdpr_drake.geometry.cable_paths import cable_jacobian, cable_paths
 from cdpr_drake.winches.drum import Drum
-from tests.calibration.bench import (
-    PINHOLE,
-    TARGETS,
-    nearby,
-    poses,
-    start_readings,
-    true_model,
-)
+from tests.calibration.bench import PINHOLE, TARGETS, nearby, poses, start_readings, true_model
 
 STEP = 1e-6
 SLOPES = 2e-7

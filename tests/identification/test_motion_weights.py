@@ -19,16 +19,7 @@ from cdpr_drake.identification.samples import (
     wrench_matrix_slopes,
 )
 from tests.identification import free_motions
-from tests.identification.free_motions import (
-    CASES,
-    NOISE,
-    G,
-    believed,
-    body,
-    cables,
-    log,
-    moved,
-)
+from tests.identification.free_motions import CASES, NOISE, G, believed, body, cables, log, moved
 
 BANDWIDTH = 8.0
 SEEDS = 4

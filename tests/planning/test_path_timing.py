@@ -22,13 +22,7 @@ from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import PlatformDamping
 from cdpr_drake.planning.failures import check_held, not_held, stuck
 from cdpr_drake.planning.limits import MotionLimits
-from cdpr_drake.planning.path_task import (
-    ACTIVE,
-    MotionSamples,
-    PathTask,
-    sample_motion,
-    samples_at,
-)
+from cdpr_drake.planning.path_task import ACTIVE, MotionSamples, PathTask, sample_motion, samples_at
 from cdpr_drake.planning.path_timing import plan_along_path
 from cdpr_drake.planning.path_timing_program import PathTimingProgram, task_asks
 from cdpr_drake.planning.resistance import resistance_bounds, resisted, resisted_along, row_count

@@ -16,11 +16,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.analysis import Simulator
 from scipy.spatial.transform import Rotation
 
-from cdpr_drake.analyses.calibration.free_motion import (
-    FreeMotionTask,
-    FreeSigmas,
-    fit_free_motion,
-)
+from cdpr_drake.analyses.calibration.free_motion import FreeMotionTask, FreeSigmas, fit_free_motion
 from cdpr_drake.analyses.calibration.log_file import CalibrationLog
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.poses import pose_row

@@ -14,10 +14,7 @@ from cdpr_drake.analyses.calibration.free_motion_model import (
 )
 from cdpr_drake.analyses.calibration.free_motion_report import freely_moved_robot
 from cdpr_drake.analyses.calibration.free_motion_samples import cut, recorded_turns
-from cdpr_drake.analyses.calibration.free_motion_sensor import (
-    sensed_tensions,
-    unsensed_tensions,
-)
+from cdpr_drake.analyses.calibration.free_motion_sensor import sensed_tensions, unsensed_tensions
 from cdpr_drake.cables.models import ELASTIC
 from cdpr_drake.errors import IdentificationError
 from cdpr_drake.geometry.cable_paths import cable_paths

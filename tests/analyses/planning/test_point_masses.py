@@ -78,18 +78,6 @@ def test_tensions_of_a_plan_move_the_mass_as_newton_says(case):
     assert largest <= limits[1]
 
 
-def test_a_fine_stream_keeps_cables_taut_and_a_coarse_one_does_not():
-    robot, places, _ = CASES["a wall"]
-    run = cdpr.plan_path(robot, poses(places), {"cable_speed": 1.0, "cable_acceleration": 4.0})
-    fine, coarse = cable_stream(run, 2000.0), cable_stream(run, 10.0)
-    assert fine.check.keeps_taut
-    assert not coarse.check.keeps_taut
-    radius = run.robot.winch.drum_radius + run.robot.cable.diameter / 2.0
-    np.testing.assert_allclose(
-        fine.motor_angles * radius, fine.lengths - fine.zero_lengths, rtol=0.02, atol=1e-9
-    )
-
-
 def test_blocks_and_tackles_turn_the_motor_further():
     robot, places, _ = CASES["a board"]
     robot = cdpr.load_robot(robot)

@@ -62,7 +62,7 @@ def test_a_region_of_interest_says_how_many_images_were_whole():
 
 
 def test_rendered_run_repeats_byte_for_byte(default_run):
-    again = run_scenario(load_scenario("acrobot_pbvs", ["duration=2.0"]))
+    again = run_scenario(load_scenario("acrobot_pbvs", ["duration=0.5"]))
     n = len(again.log["time"])
     for name, values in again.log.items():
         assert values.tobytes() == default_run.log[name][:n].tobytes()
@@ -70,7 +70,7 @@ def test_rendered_run_repeats_byte_for_byte(default_run):
 
 @pytest.fixture(scope="module")
 def projected_run():
-    return run_scenario(projected())
+    return run_scenario(projected("integration.engine=compiled"))
 
 
 def test_surplus_and_drift_are_those_of_the_log(projected_run):
@@ -103,7 +103,7 @@ def test_rendered_and_projected_runs_follow_the_same_path(default_run, projected
 
 
 def test_projected_run_repeats_byte_for_byte_and_depends_on_the_seed():
-    first, again, other = (run_scenario(projected("duration=3.0", s)) for s in
+    first, again, other = (run_scenario(projected("duration=0.5", s)) for s in
                            ("seed=5", "seed=5", "seed=6"))  # fmt: skip
     for name, values in first.log.items():
         assert values.tobytes() == again.log[name].tobytes()
