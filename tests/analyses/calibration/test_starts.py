@@ -20,7 +20,7 @@ from tests.analyses.calibration import logs, spoiled_log
 
 @pytest.fixture(scope="module")
 def found():
-    return spoiled_log.calibrated(0)
+    return spoiled_log.calibrated(spoiled_log.first_pose(0))
 
 
 def test_a_log_with_bad_readings_ends_in_the_right_minimum(found):
@@ -30,7 +30,7 @@ def test_a_log_with_bad_readings_ends_in_the_right_minimum(found):
 
 
 def test_another_start_ends_in_the_same_minimum(found):
-    other = spoiled_log.calibrated(1)
+    other = spoiled_log.calibrated(spoiled_log.first_pose(1))
     assert spoiled_log.wrong_rows(other) == []
     assert other.result.robust_cost == pytest.approx(found.result.robust_cost, abs=1e-3)
 
@@ -84,32 +84,23 @@ def turned_round():
     """Swivel angles of the other sign."""
     poses, log, _ = spoiled_log.recorded()
     true = Point(calibration_model(spoiled_log.ROBOT), Stations.at(poses)).numbers
-    mirrored = replace(
-        log, lengths=true[:, :, 0] - true[0, :, 0], swivels=true[0, :, 2] - true[:, :, 2]
-    )
-    task = CalibrationTask(
-        spoiled_log.ROBOT, ("length_offsets",), sigmas=spoiled_log.SIGMAS, start=poses[0],
-        rest=False,
-    )  # fmt: skip
-    return calibrate(task, mirrored)
+    lengths, swivels = true[:, :, 0] - true[0, :, 0], true[0, :, 2] - true[:, :, 2]
+    return spoiled_log.calibrated(poses[0], replace(log, lengths=lengths, swivels=swivels))
 
 
 def test_swivels_of_the_other_sign_are_a_misfit(turned_round):
     assert turned_round.result.status == "misfit"
     dropped = turned_round.result.residuals["swivel angles"].dropped
-    assert any(
-        f"{dropped} of 80 swivel angles do not fit: sign or zero?" in words
-        for words in turned_round.misfit
-    )
+    words = f"{dropped} of 80 swivel angles do not fit: sign or zero?"
+    assert any(words in said for said in turned_round.misfit)
     worst = turned_round.result.largest[0]
     assert f"row {worst.pose + 1}, {worst.what}" in turned_round.misfit[-1]
     said = calibration_dict(turned_round)
     assert said["status"] == "misfit"
     assert said["misfit_factor"] == 3.0
     first = said["largest_residuals"][0]
-    assert (first["row"], first["measurement"], first["unit"]) == (
-        worst.pose + 1, worst.what, worst.unit,
-    )  # fmt: skip
+    told = (first["row"], first["measurement"], first["unit"])
+    assert told == (worst.pose + 1, worst.what, worst.unit)
 
 
 def test_residuals_beyond_three_sigmas_are_a_misfit_without_outliers_too():
