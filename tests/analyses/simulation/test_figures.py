@@ -70,16 +70,22 @@ def test_axes_have_units(result, draw):
             assert "[" in label, f"{label!r} has no unit"
 
 
+def legend(axes):
+    return [text.get_text() for text in axes.get_legend().get_texts()]
+
+
+def logged(result, **changes):
+    return replace(result, log={**result.log, **changes})
+
+
 def test_cables_are_in_the_legend(result):
     axes = run_figures.cable_curves_figure(result, "tensions").axes[0]
-    labels = [words.get_text() for words in axes.get_legend().get_texts()]
-    assert labels[:4] == ["C1", "C2", "C3", "C4"]
+    assert legend(axes)[:4] == ["C1", "C2", "C3", "C4"]
 
 
 def test_no_panel_is_empty_where_nobody_looked(result):
     """An open loop has no feature error; its panels once were empty."""
-    blind = replace(result, log={**result.log, "gain": np.zeros_like(result.log["gain"])})
-    figure = run_figures.error_figure(blind)
+    figure = run_figures.error_figure(logged(result, gain=0.0 * result.log["gain"]))
     assert figure_faults(figure) == []
     assert len(figure.axes) == 2
     assert all(len(axes.lines) == 1 for axes in figure.axes)
@@ -87,34 +93,24 @@ def test_no_panel_is_empty_where_nobody_looked(result):
 
 
 def test_a_target_that_was_never_found_leaves_no_empty_panel(result):
-    unseen = replace(result, log={**result.log, "found": np.zeros_like(result.log["found"])})
-    figure = run_figures.image_path_figure(unseen)
+    figure = run_figures.image_path_figure(logged(result, found=0.0 * result.log["found"]))
     assert figure_faults(figure) == []
     (image,) = figure.axes
-    assert [text.get_text() for text in image.get_legend().get_texts()] == ["desired"]
+    assert legend(image) == ["desired"]
     assert "never found" in figure.get_suptitle()
 
 
-def test_times_without_the_target_are_shaded_and_said(result):
+@pytest.mark.parametrize(("rows", "begins"), [((5, 9), 0.1), ((0, 9), 0.02), ((0, 0), None)])
+def test_times_without_the_target_are_shaded_and_said(result, rows, begins):
+    """Not before the first image: 0.02 s of every run were shaded once, too narrow to be seen."""
     gain = result.log["gain"].copy()
-    gain[5:9] = 0.0
-    figure = run_figures.error_figure(replace(result, log={**result.log, "gain": gain}))
+    gain[slice(*rows)] = 0.0
+    figure = run_figures.error_figure(logged(result, gain=gain))
     assert figure_faults(figure) == []
-    words = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
-    assert "target not seen" in words
-
-
-def test_before_the_first_image_nothing_is_shaded(result):
-    """Of every run 0.02 s were shaded, too narrow to be seen, and the legend named them."""
-    axes = run_figures.error_figure(result).axes[0]
-    assert "target not seen" not in [text.get_text() for text in axes.get_legend().get_texts()]
-    assert not axes.patches
-    gain = result.log["gain"].copy()
-    gain[:9] = 0.0
-    axes = run_figures.error_figure(replace(result, log={**result.log, "gain": gain})).axes[0]
-    (shade,) = axes.patches
-    assert shade.get_x() == pytest.approx(0.02)
-    assert shade.get_width() == pytest.approx(8 * 0.02)
+    axes = figure.axes[0]
+    assert ("target not seen" in legend(axes)) == (begins is not None)
+    ends = [(shade.get_x(), shade.get_x() + shade.get_width()) for shade in axes.patches]
+    assert ends == ([] if begins is None else [pytest.approx((begins, 0.18))])
 
 
 def test_every_run_has_its_figures_in_the_formats_asked_for(result):
