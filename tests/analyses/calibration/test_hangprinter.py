@@ -166,10 +166,8 @@ def test_half_the_readings_of_one_motor_off_are_no_calibration():
     assert calibrated(log, outliers=True).result.status == "misfit"
 
 
-@pytest.mark.parametrize("cable", ["A", "C"])
-def test_a_motor_that_turns_the_other_way_is_named(cable):
+def test_a_motor_that_turns_the_other_way_is_named():
     log = read()
-    log.angles[:, "ABCD".index(cable)] *= -1.0
+    log.angles[:, 0] *= -1.0
     found = calibrated(log, bounds={"tracker.[xyz]": 1e-3})
-    words = f"all fits with the sign of the motor angles of {cable} turned"
-    assert found.misfit[0] == words
+    assert found.misfit[0] == "all fits with the sign of the motor angles of A turned"

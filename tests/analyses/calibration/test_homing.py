@@ -62,9 +62,9 @@ def resting():
                          lengths + random.uniform(-0.1, 0.1, 3), X_WP)
         for _ in range(20)
     ]  # fmt: skip
-    taut = [rest for rest in rests if np.min(rest.tensions) > TAUT]
+    taut = [rest for rest in rests if np.min(rest.tensions) > TAUT][:LEAST]
     poses = [rest.X_WP for rest in taut]
-    assert len(poses) >= LEAST
+    assert len(poses) == LEAST
     numbers = Point(model, Stations.at(poses)).numbers
     return poses, np.array([rest.tensions for rest in taut]), numbers[:, :, 0], numbers[:, :, 2]
 
@@ -126,7 +126,8 @@ def test_three_cables_without_tension_sensors_find_where_they_began(resting):
 
 def test_swivels_whose_sign_is_turned_are_named(homing):
     robot, log, _ = homing
-    found = cdpr.calibrate(robot, replace(log, swivels=-log.swivels), sigmas={"swivels": 3e-3})
+    turned = replace(log, swivels=-log.swivels)
+    found = cdpr.calibrate(robot, turned, sigmas={"swivels": 3e-3}, outliers=False)
     assert found.result.status == "misfit"
     assert "swivel angles fit with the sign turned" in found.misfit[0]
     assert int(found.misfit[0].split()[0]) > 0.9 * log.swivels.size

@@ -37,7 +37,7 @@ def scenes():
         ("blind4", "-swivel of cable 1", "the sign of the swivel angles of C1 turned"),
         ("blind4", "50 % of rows, mixed, x 1.05", "times what fits the other rows"),
         ("blind4", "30 % of rows, the first, x 1.05", "are 1.049 times what fits the other rows"),
-        ("blind4", "cables 1, 2 swapped", "length of C1 and length of C2 exchanged"),
+        ("tracked8", "cables 1, 2 swapped", "length of C1 and length of C2 exchanged"),
         ("tracked8", "-pitch of tracker", "readings of tracker, turn y do not fit"),
         ("tracked8", "10 % of rows, mixed, x 1.05", "times what fits the other rows"),
         ("tracked8", "half of all lengths x 1.05", "do not fit"),
