@@ -16,10 +16,22 @@ def run(capsys, *words):
     return end.value.code, out, err
 
 
-def planned(folder, *words):
-    """The summary of a plan that is written into a folder."""
-    with pytest.raises(SystemExit) as end:
-        main(["plan", *words, "--out", str(folder), "--json"])
+WRITES = "cdpr_drake.cli.plan.write_pictures"
+"""What a test of a command without its figures makes do nothing."""
+
+
+def undrawn(*_):
+    """No picture, and none that failed."""
+    return {}
+
+
+def planned(folder, *words, pictures=True):
+    """The summary of a plan that is written into a folder, with figures or without."""
+    with pytest.MonkeyPatch.context() as patch:
+        if not pictures:
+            patch.setattr(WRITES, undrawn)
+        with pytest.raises(SystemExit) as end:
+            main(["plan", *words, "--out", str(folder), "--json"])
     assert end.value.code == 0
     return json.loads((folder / "summary.json").read_text())
 

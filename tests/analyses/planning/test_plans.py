@@ -141,7 +141,10 @@ def test_the_command_plans_and_writes(tmp_path, capsys):
 def test_the_command_plans_a_motion_that_resists(tmp_path, capsys):
     wrenches = write(tmp_path / "push.yaml", "box: [0, 0, 0.2, 10, 6, 0]\n")
     words = ["planar", "--waypoints", "-0.1,0.1,0.3;0.2,0.1,0.3", "--stations", "100", "--no-track"]
-    told = planned(tmp_path / "out", *words, "--resist", str(wrenches))
+    folder = tmp_path / "out"
+    _, out, _ = run(capsys, *words, "--resist", str(wrenches), "--out", str(folder))
+    assert "resists 8 wrenches" in out
+    told = json.loads((folder / "summary.json").read_text())
     resisted = told["resist"]
     assert len(resisted["corners"]) == 8
     assert resisted["worst"]["least_margin"] == pytest.approx(
@@ -151,9 +154,7 @@ def test_the_command_plans_a_motion_that_resists(tmp_path, capsys):
     assert "deg" in resisted["worst"]["pose"]
     assert resisted["largest_share_between_stations"] < 1.002
     assert told["arguments"]["resist"] == str(wrenches)
-    assert drawn(tmp_path / "out", "resistance")
-    _, out, _ = run(capsys, *words, "--resist", str(wrenches), "--out", str(tmp_path / "two"))
-    assert "resists 8 wrenches" in out
+    assert drawn(folder, "resistance")
     without = planned(tmp_path / "without", *words)
     assert "resist" not in without
     assert not (tmp_path / "without" / "resistance.png").exists()

@@ -9,9 +9,9 @@ from pydrake.math import RigidTransform
 
 import cdpr_drake as cdpr
 from cdpr_drake.analyses.planning.cable_streams import cable_stream
-from cdpr_drake.cli.app import main
 from cdpr_drake.errors import PlanningError, RobotFileError
-from tests.messages import printed
+from tests.analyses.planning.plan_command import WRITES, undrawn
+from tests.analyses.planning.plan_command import run as run_plan
 
 NEWTON = 1e-9
 """Share of the largest tension: sums of a few forces in doubles."""
@@ -91,15 +91,14 @@ def test_blocks_and_tackles_turn_the_motor_further():
     np.testing.assert_allclose(twice.motor_angles, 2.0 * plain.motor_angles, rtol=1e-12)
 
 
-def test_the_command_streams_g_code_of_a_router(tmp_path, capsys):
+def test_the_command_streams_g_code_of_a_router(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(WRITES, undrawn)
     (tmp_path / "a.gcode").write_text(G_CODE)
     out = tmp_path / "out"
-    args = ["plan", "maslow_4", "--path", str(tmp_path / "a.gcode"), "--stream", "20"]
-    with pytest.raises(SystemExit) as ended:
-        main([*args, "--stations", "150", "--out", str(out)])
-    assert ended.value.code == 0
-    said = printed(capsys)
-    assert "not tracked: computed torque moves bodies alone" in said.err
+    args = ["maslow_4", "--path", str(tmp_path / "a.gcode"), "--stream", "20"]
+    code, _, err = run_plan(capsys, *args, "--stations", "150", "--out", str(out))
+    assert code == 0
+    assert "not tracked: computed torque moves bodies alone" in err
     stream = json.loads((out / "stream.json").read_text())
     assert stream["keeps_taut"]
     rows = np.genfromtxt(out / "lengths.csv", delimiter=",", names=True)

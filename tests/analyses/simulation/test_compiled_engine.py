@@ -22,7 +22,7 @@ COMPILED = "integration.engine=compiled"
 PROJECTED = "camera.kind=projected"
 
 SAME_PATH = 1e-6
-"""Distance of paths over a second in which cables go slack and catch [m]; the engines take steps of
+"""Distance of paths in which cables go slack and catch [m]; the engines take steps of
 the same length, but not at the same times."""
 
 SAME_TENSIONS_PATH = 1e-12
@@ -45,7 +45,7 @@ def by_both(run, name, *overrides):
     [("acrobot_pbvs", ()), ("acrobot_friction", ("winches.mode=position",)), ("planar_pbvs", ())],
 )
 def test_a_servo_takes_the_same_path(name, overrides):
-    plant, compiled, apart = by_both(run_scenario, name, PROJECTED, "duration=1.0", *overrides)
+    plant, compiled, apart = by_both(run_scenario, name, PROJECTED, "duration=0.6", *overrides)
     assert plant.outcome == compiled.outcome == Outcome.TIMEOUT
     assert np.max(np.ptp(plant.log["X_WP"][:, 4:], axis=0)) > 0.01
     assert apart < SAME_PATH
@@ -124,7 +124,7 @@ def test_the_plant_is_what_nobody_asked_otherwise():
 
 def test_commanded_tensions_lead_the_platform_the_same_way():
     plant, compiled, apart = by_both(
-        run_tension_scenario, "acrobot_computed_torque", "duration=1.5"
+        run_tension_scenario, "acrobot_computed_torque", "duration=0.6"
     )
     assert apart < SAME_TENSIONS_PATH
     np.testing.assert_allclose(plant.log["lengths"], compiled.log["lengths"], atol=1e-12)

@@ -38,12 +38,14 @@ from cdpr_drake.systems.sensors.sensor_settings import (
 from cdpr_drake.trajectories.pose_trajectory import SteadyMotion
 from tests.figure_faults import figure_faults
 
+SHORT = ("camera.kind=projected", "integration.engine=compiled")
+
 # Figures carry titles, units and legends.
 
 
 @pytest.fixture(scope="module")
 def result():
-    return run_scenario(load_scenario("planar_pbvs", ["camera.kind=projected", "duration=0.4"]))
+    return run_scenario(load_scenario("planar_pbvs", [*SHORT, "duration=0.4"]))
 
 
 def curves(of):
@@ -124,7 +126,7 @@ def test_every_run_has_its_figures_in_the_formats_asked_for(result):
 
 @pytest.fixture(scope="module")
 def run():
-    overrides = ["camera.kind=projected", "duration=0.6", "winches.kind=motor"]
+    overrides = [*SHORT, "duration=0.6", "winches.kind=motor"]
     return run_scenario(load_scenario("acrobot_sensors", overrides))
 
 

@@ -118,7 +118,7 @@ def test_timeout():
 
 def test_target_lost_stops_the_cables():
     # The tag behind the wall of the room is never seen.
-    result = run_scenario(projected("target.pose.position=[9.0, 9.0, 0.0]", "stop.target_lost=0.4"))
+    result = run_scenario(projected("target.pose.position=[9.0, 9.0, 0.0]", "stop.target_lost=0.2"))
     assert result.outcome == Outcome.TARGET_LOST
     assert np.all(result.log["cable_velocities"] == 0.0)
     summary = summarize(result)
@@ -140,6 +140,7 @@ def test_diverged_when_the_platform_leaves_the_frame(tmp_path):
             "target.pose={position: [-0.0631, 0, 0]}",
             "camera.pixel_noise=0",
             f"robot={low}",
+            "integration.engine=compiled",
         )
     )
     assert result.outcome == Outcome.DIVERGED

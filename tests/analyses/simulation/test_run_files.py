@@ -15,6 +15,8 @@ from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
 from cdpr_drake.analyses.visualization.replay import write_replay
 from cdpr_drake.systems.diagrams.load import load_scenario
 
+SHORT = ("camera.kind=projected", "integration.engine=compiled")
+
 SUMMARY_KEYS = {
     "scenario", "robot", "controller", "estimator", "camera", "seed", "outcome", "sim_time_s",
     "wall_time_s", "realtime_factor", "final_position_error_m", "final_rotation_error_rad",
@@ -32,7 +34,7 @@ def write_run(folder, result, video=False):
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
     folder = tmp_path_factory.mktemp("run")
-    result = run_scenario(load_scenario("acrobot_pbvs", ["camera.kind=projected", "duration=0.4"]))
+    result = run_scenario(load_scenario("acrobot_pbvs", [*SHORT, "duration=0.4"]))
     write_run(folder, result, video=True)
     return folder, result
 
@@ -122,7 +124,7 @@ def test_film_has_a_frame_per_image(run):
     ],
 )
 def test_other_schemes_leave_the_same_files_with_their_own_columns(name, expected, tmp_path):
-    result = run_scenario(load_scenario(name, ["camera.kind=projected", "duration=0.1"]))
+    result = run_scenario(load_scenario(name, [*SHORT, "duration=0.1"]))
     write_run(tmp_path, result, video=name == "acrobot_circles")
     for figure in FIGURES:
         assert (tmp_path / f"{figure}.png").stat().st_size > 0
