@@ -84,7 +84,7 @@ def test_poses_that_are_off_do_not_take_the_mass_away(off, unknown):
 
 
 NO_WORSE = 1.2
-"""Times the error of equal weights, or the standard error, root mean square over logs, that chance
+"""Times the error of equal weights, or the standard error, whichever is larger, that chance
 may make of weights that are as good."""
 
 LOST = 0.3
@@ -117,19 +117,16 @@ def badly_tracked(poses, time, kind, seed):
 @pytest.mark.parametrize("kind", ["slow", "quicker", "constant", "stretches"])
 @pytest.mark.parametrize(("case", "mass"), [(4, 12.992), (6, 3.0), (8, 12.992)])
 def test_weights_are_no_worse_than_equal_ones_where_poses_are_off(case, mass, kind):
-    masses, centres = [], []
-    for seed in (0, 1):
-        time, poses, tensions = log(case, seed, **{**NOISE, "place": 2e-5, "angle": 4e-5})
-        poses = badly_tracked(poses, time, kind, seed)
-        true = replace(body(case), mass=mass, inertia=body(case).inertia * mass / 13.0)
-        samples = sample_motion(time, poses, tensions * mass / 13.0, cables(case), BANDWIDTH)
-        made = program(samples, case, replace(true, mass=0.8 * mass), ("mass", "center_of_mass"))
-        found, (m, *mc) = made.Solve(), with_equal_weights(samples, case)
-        off, center = found.values[1:4] - true.center_of_mass, np.array(mc) / m
-        masses.append([found.model.mass - mass, m - mass, found.std[0]])
-        centres.append([*map(np.linalg.norm, (off, center - true.center_of_mass, found.std[1:4]))])
-    for errors in (masses, centres):
-        weighted, equal, told = np.sqrt(np.mean(np.square(errors), axis=0))
+    time, poses, tensions = log(case, 0, **{**NOISE, "place": 2e-5, "angle": 4e-5})
+    poses = badly_tracked(poses, time, kind, 0)
+    true = replace(body(case), mass=mass, inertia=body(case).inertia * mass / 13.0)
+    samples = sample_motion(time, poses, tensions * mass / 13.0, cables(case), BANDWIDTH)
+    made = program(samples, case, replace(true, mass=0.8 * mass), ("mass", "center_of_mass"))
+    found, (m, *mc) = made.Solve(), with_equal_weights(samples, case)
+    off, center = found.values[1:4] - true.center_of_mass, np.array(mc) / m
+    masses = np.abs([found.model.mass - mass, m - mass, found.std[0]])
+    centres = [*map(np.linalg.norm, (off, center - true.center_of_mass, found.std[1:4]))]
+    for weighted, equal, told in (masses, centres):
         assert weighted < NO_WORSE * max(equal, told)
         assert weighted < LOST * equal or kind != "stretches"
 
