@@ -146,7 +146,7 @@ def test_an_end_worse_than_its_start_is_refused(monkeypatch):
 
 def test_snopt_finds_no_better_parameters():
     start = wrong_model(true_model(), 0.002, 0.0, np.random.default_rng(1))
-    program = tracker_program(start, ["exit_points"], count=6)
+    program = tracker_program(start, ["exit_points"], count=4)
     program.AddPrior(["exit_points"], 0.01)
     result = program.Solve(outliers=False)
     prog = program.prog()
