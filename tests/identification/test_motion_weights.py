@@ -1,4 +1,4 @@
-"""Weights of the platform's equations, by numbers of cables, and fits that miss them."""
+"""Weights of the platform's equations, fits that miss them, and the cost of outliers."""
 
 from dataclasses import replace
 
@@ -12,6 +12,7 @@ from cdpr_drake.identification.correlated_noise import CorrelatedNoise
 from cdpr_drake.identification.program import IdentificationProgram
 from cdpr_drake.identification.regressor import inertia_regressor, regressor_slopes
 from cdpr_drake.identification.result import MISFIT, MISFIT_FACTOR
+from cdpr_drake.identification.robust_cost import HUBER, huber_cost, huber_limit, huber_weights
 from cdpr_drake.identification.samples import (
     LEAST_POSE,
     LEAST_TENSION,
@@ -20,6 +21,8 @@ from cdpr_drake.identification.samples import (
 )
 from tests.identification import free_motions
 from tests.identification.free_motions import CASES, NOISE, G, believed, body, cables, log, moved
+
+# Weights of the platform's equations, by numbers of cables, and fits that miss them.
 
 BANDWIDTH = 8.0
 SEEDS = 4
@@ -256,3 +259,39 @@ def test_a_prior_that_contradicts_the_log_is_said():
     sigmas = (found.model.mass - 10.0) / 0.01
     assert any(f"up to {sigmas:.3g} of their" in words for words in found.remarks)
     assert (found.last_step > 0.1) == any("still moved" in words for words in found.remarks)
+
+
+# The cost of residuals that may be outliers: squares, then linear, and weights that lead down.
+
+STEP = 1e-6
+DIFFERENCE = 1e-8
+"""Of a central difference of a cost of up to 100 by a step of 1e-6."""
+
+
+def test_the_cost_is_square_up_to_the_limit_and_linear_beyond():
+    np.testing.assert_allclose(huber_cost(np.array([-3.0, 2.0]), 4.0), 13.0)
+    at = [huber_cost(np.array([x]), 4.0) for x in (4.0, 5.0, -6.0, 104.0)]
+    np.testing.assert_allclose(at, [16.0, 24.0, 32.0, 816.0])
+
+
+@pytest.mark.parametrize("x", [-20.0, -4.5, -3.9, 0.5, 3.9, 4.1, 12.0])
+def test_weights_are_those_of_its_slope(x):
+    """The cost's derivative is that of weighted squares, 2 w x."""
+    ahead, behind = (huber_cost(np.array([x + s]), 4.0) for s in (STEP, -STEP))
+    slope = (ahead - behind) / (2.0 * STEP)
+    assert 2.0 * huber_weights(np.array([x]), 4.0)[0] * x == pytest.approx(slope, rel=DIFFERENCE)
+
+
+def test_what_fits_exactly_counts_in_full():
+    np.testing.assert_array_equal(huber_weights(np.array([0.0, -4.0]), 4.0), [1.0, 1.0])
+
+
+def test_the_limit_is_four_of_the_spread_that_is_there():
+    residuals = np.random.default_rng(2).normal(size=100_000)
+    for spread in (2.0, 5.0):
+        wild = np.append(spread * residuals, np.full(1000, 1e6))  # a hundredth is off
+        assert huber_limit(wild) == pytest.approx(HUBER * spread, rel=0.03)
+    rest = np.array([-30.0, -3.0, 0.0, 2.0, 9.0])
+    assert huber_limit(rest) == pytest.approx(4.0 * 1.4826 * 3.0)  # by the median of what is off
+    # Sigmas that were given too large, or nothing to judge them by, make none smaller.
+    assert huber_limit(0.1 * residuals) == HUBER == huber_limit(np.zeros(0)) == 4.0
