@@ -36,7 +36,7 @@ def write(folder, content):
 @pytest.fixture(scope="module")
 def sets():
     numbers = [np.concatenate([X.translation(), np.zeros(3)]) for X in (START, GOAL)]
-    settings = ProofSettings(boxes=3000, cells=2**12)
+    settings = ProofSettings(boxes=6000, cells=2**13)
     return ProvenSets.find(ROBOT, accelerations=0.25, must=numbers, settings=settings)
 
 
