@@ -41,12 +41,12 @@ def spans_words(spans):
 def found(tmp_path_factory):
     """The command on two fitted swings and one that is held out: exit code, JSON and folder.
 
-    Of what is fitted the first 1.2 s are enough.
+    Of what is fitted the first 0.8 s are enough.
     """
     folder = tmp_path_factory.mktemp("swings")
     spans = swings.write(folder / "log.csv", (0, 1, 2))
     believed = swings.believed_file(folder)
-    fitted = spans_words((first, first + 1.2) for first, _ in spans[:2])
+    fitted = spans_words((first, first + 0.8) for first, _ in spans[:2])
     args = ["identify", believed, str(folder / "log.csv"), "--free", fitted]
     args += ["--hold-out", spans_words(spans[2:]), "--out", str(folder / "out"), "--lead", "0.8"]
     args += ["--sigma", f"turn={swings.NOISE['turn']},tension={swings.NOISE['tension']}", "--json"]
