@@ -17,13 +17,7 @@ import pytest
 
 from cdpr_drake.analyses.studies.catalogue import STUDIES
 from cdpr_drake.analyses.studies.framework.runs import Run, Runs, unit_of
-from cdpr_drake.analyses.studies.framework.statement import (
-    FITTED,
-    GOOD,
-    TEST,
-    Finding,
-    statement,
-)
+from cdpr_drake.analyses.studies.framework.statement import FITTED, GOOD, TEST, Finding, statement
 from cdpr_drake.analyses.studies.framework.study import Form
 from cdpr_drake.analyses.studies.stability_ranges.question import unit_of_limit
 

@@ -31,8 +31,7 @@ def run(name, outcome="converged", end=None, **metrics):
 
 
 @pytest.mark.parametrize(
-    ("errors", "expected"),
-    [((0.004, 0.0041), "not testable"), ((0.004, 0.012), "not confirmed")],
+    ("errors", "expected"), [((0.004, 0.0041), "not testable"), ((0.004, 0.012), "not confirmed")]
 )
 def test_an_accuracy_below_the_threshold_at_which_runs_end_confirms_nothing(errors, expected):
     names = ("none", "within")

@@ -13,10 +13,7 @@ import yaml
 from cdpr_drake.analyses.simulation.run_stability import stability_along
 from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
 from cdpr_drake.analyses.studies.closed_loops.loops import SETTINGS, loop_setup, perturbation_of
-from cdpr_drake.analyses.studies.framework.servo_models import (
-    perturbed_scenario,
-    perturbed_servo,
-)
+from cdpr_drake.analyses.studies.framework.servo_models import perturbed_scenario, perturbed_servo
 from cdpr_drake.geometry.poses import pose_from_angles, pose_row
 from cdpr_drake.systems.diagrams.load import load_scenario
 

@@ -4,11 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from cdpr_drake.analyses.reporting.statements import (
-    IN_PART,
-    NOT_CONFIRMED,
-    NOT_IN_QUICK,
-)
+from cdpr_drake.analyses.reporting.statements import IN_PART, NOT_CONFIRMED, NOT_IN_QUICK
 from cdpr_drake.analyses.studies.control_stability.statements import CHECKS
 from cdpr_drake.analyses.studies.control_stability.study import STUDY
 from cdpr_drake.analyses.studies.control_stability.tables import SHARE

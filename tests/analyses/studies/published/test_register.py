@@ -17,10 +17,7 @@ from cdpr_drake.analyses.studies.published.register import (
 REGISTERS = {register.name: register for register in published_registers()}
 
 LISTED = {
-    "gazebo_thesis": {
-        "Figure": {"1": 3, "2": 5, "3": 2, "4": 4, "5": 5, "6": 21},
-        "Table": {},
-    },
+    "gazebo_thesis": {"Figure": {"1": 3, "2": 5, "3": 2, "4": 4, "5": 5, "6": 21}, "Table": {}},
     "servoing_thesis": {
         "Figure": {"1": 23, "2": 18, "3": 44, "4": 8, "5": 26, "A": 25},
         "Table": {"1": 1, "2": 1, "3": 1, "5": 1, "A": 18},

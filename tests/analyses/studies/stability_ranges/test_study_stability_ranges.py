@@ -14,11 +14,7 @@ import pytest
 from cdpr_drake.analyses.reporting.progress import StudySession, WorkProgress
 from cdpr_drake.analyses.reporting.statements import CONFIRMED, IN_PART, NOT_CONFIRMED
 from cdpr_drake.analyses.studies.framework.runs import Run, Runs
-from cdpr_drake.analyses.studies.framework.statement import (
-    MET_CONSTRUCTION,
-    Check,
-    judged,
-)
+from cdpr_drake.analyses.studies.framework.statement import MET_CONSTRUCTION, Check, judged
 from cdpr_drake.analyses.studies.framework.study import Form, StudyResult
 from cdpr_drake.analyses.studies.stability_ranges import robot_limits
 from cdpr_drake.analyses.studies.stability_ranges.question import (

@@ -8,12 +8,7 @@ import numpy as np
 import pytest
 
 from cdpr_drake.analyses.reporting.progress import StudySession
-from cdpr_drake.analyses.reporting.statements import (
-    CONFIRMED,
-    IN_PART,
-    NOT_CONFIRMED,
-    NOT_TESTABLE,
-)
+from cdpr_drake.analyses.reporting.statements import CONFIRMED, IN_PART, NOT_CONFIRMED, NOT_TESTABLE
 from cdpr_drake.analyses.studies.framework.runs import Run, Runs
 from cdpr_drake.analyses.studies.framework.statement import MET_FITTED
 from cdpr_drake.analyses.studies.framework.study import Form

@@ -267,8 +267,7 @@ def test_the_share_of_a_run_that_is_corrected_counts_until_the_camera_is_there()
 
 
 @pytest.mark.parametrize(
-    ("lost", "verdict"),
-    [((), "not confirmed"), (("E9",), "confirmed"), (("E9", "E10"), "in part")],
+    ("lost", "verdict"), [((), "not confirmed"), (("E9",), "confirmed"), (("E9", "E10"), "in part")]
 )
 def test_which_experiment_fails(lost, verdict):
     names = [*PLAIN, *CORRECTED]

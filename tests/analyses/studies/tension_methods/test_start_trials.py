@@ -60,8 +60,7 @@ def spec(**changes):
 
 @pytest.mark.parametrize("balance", [WRENCH, FORCE])
 @pytest.mark.parametrize(
-    ("method", "applied"),
-    [("quadratic_program", Applied.HELD), ("pseudo_inverse", Applied.PUSHED)],
+    ("method", "applied"), [("quadratic_program", Applied.HELD), ("pseudo_inverse", Applied.PUSHED)]
 )
 def test_the_first_tensions_are_gain_times_start_error(balance, method, applied):
     """1 kg that starts 0.1 m below its goal at gain 100: 9.81 N and 10 N, upwards."""
