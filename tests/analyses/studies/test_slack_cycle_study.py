@@ -1,11 +1,10 @@
 """The study of the cycle of slack: its prediction beside theory, and its words on made-up runs."""
 
-from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.reporting.progress import StudySession
 from cdpr_drake.analyses.studies.framework.study import Case
 from cdpr_drake.analyses.studies.slack_cycle import (
     CABLES,
@@ -16,6 +15,7 @@ from cdpr_drake.analyses.studies.slack_cycle import (
     measure,
     swing,
 )
+from tests.analyses.studies.made_up_studies import made, verdicts
 
 MASS, OMEGA, RATE = 150.0, 15.0, 25.0
 """A mode such as that of CAROCA [kg, rad/s, Hz]."""
@@ -24,19 +24,14 @@ FIRST_ORDER = 0.05
 """What the formula of one mode leaves out, of second order in its rates per frequency."""
 
 
-def one_mode(rows=6):
-    """Six equal modes that follow their commands."""
-    K = MASS * OMEGA**2 * np.eye(rows)
-    none = np.zeros((rows, rows))
-    return LinearLoop(
-        M=MASS * np.eye(rows), K=K, C=none, per_command=K, per_rate=none,
-        slowest_hz=OMEGA / (2.0 * np.pi),
-    )  # fmt: skip
-
-
 @pytest.mark.parametrize(("gain", "damping"), [(0.5, 30.0), (1.5, 100.0), (1.5, 400.0)])
 def test_a_mode_grows_at_the_rate_of_the_formula(gain, damping):
-    loop = replace(one_mode(), C=damping * np.eye(6))  # turns are damped alike
+    """Six equal modes, of which turns are damped as places are, that follow their commands."""
+    one, K = np.eye(6), MASS * OMEGA**2 * np.eye(6)
+    loop = LinearLoop(
+        M=MASS * one, K=K, C=damping * one, per_command=K, per_rate=0.0 * one,
+        slowest_hz=OMEGA / (2.0 * np.pi),
+    )  # fmt: skip
     expected = 0.5 * (gain * np.cos(0.5 * OMEGA / RATE) - damping / MASS)
     pole = loop.growth(0.0, gain, RATE)
     if expected > -0.5 * gain:  # else the servo's own slow pole is the one that decays last
@@ -65,12 +60,10 @@ def test_swing_of_a_drifting_sine():
 
 
 def test_a_run_with_little_damping_cycles_and_one_with_matching_cables_does_not():
-    found = {
-        name: measure(Case(name=name, keys={"cables": name, "damping": 40.0, "gain": 2.25}), 0)
-        for name in ("sagging", MATCHED)
-    }
     for name, expected in (("sagging", True), (MATCHED, False)):
-        assert (found[name]["cycles"], found[name]["predicted"]) == (expected, expected)
+        keys = {"cables": name, "damping": 40.0, "gain": 2.25}
+        found = measure(Case(name=name, keys=keys), 0)
+        assert (found["cycles"], found["predicted"]) == (expected, expected), name
 
 
 def made_up(case, seed, wrong=False):
@@ -83,23 +76,11 @@ def made_up(case, seed, wrong=False):
     }  # fmt: skip
 
 
-def wrong(case, seed):
-    return made_up(case, seed, wrong=True)
-
-
-def verdicts(measured):
-    found = replace(STUDY, measure=measured)(False, StudySession(workers=1))
-    return {one.name: one.verdict for one in found.statements}
-
-
-def test_statements_tell_right_predictions_from_wrong_ones():
-    assert set(verdicts(made_up).values()) == {"confirmed"}
-    assert verdicts(wrong)["boundary"] == "not confirmed"
-    assert verdicts(wrong)["matched"] == "not confirmed"
-
-
-def test_figure_has_a_map_of_each_kind_of_cables(tmp_path):
-    found = replace(STUDY, measure=made_up)(False, StudySession(workers=1))
+def test_statements_tell_right_predictions_from_wrong_ones_and_are_drawn(tmp_path):
+    found = made(STUDY, made_up, quick=False)
+    assert set(verdicts(found).values()) == {"confirmed"}
+    wrong = verdicts(made(STUDY, partial(made_up, wrong=True), quick=False))
+    assert wrong["boundary"] == wrong["matched"] == "not confirmed"
     assert len(found.tables()) > 0
     found.write(tmp_path)
     assert (tmp_path / "slack_cycle.png").is_file()

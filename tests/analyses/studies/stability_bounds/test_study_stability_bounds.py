@@ -10,33 +10,15 @@ import pytest
 from cdpr_drake.analyses.reporting.statements import CONFIRMED, IN_PART, NOT_CONFIRMED
 from cdpr_drake.analyses.studies.framework.runs import Run, Runs
 from cdpr_drake.analyses.studies.framework.study import Form
+from cdpr_drake.analyses.studies.stability_bounds import figures
+from cdpr_drake.analyses.studies.stability_bounds import questions as asked
 from cdpr_drake.analyses.studies.stability_bounds import statements as said
-from cdpr_drake.analyses.studies.stability_bounds.figures import (
-    NOTHING,
-    maps_figure,
-    shares_figure,
-    tightness,
-    tightness_figure,
-)
-from cdpr_drake.analyses.studies.stability_bounds.questions import (
-    COSTS,
-    METHODS,
-    QUICK_SCALES,
-    ROBOTS,
-    SCALES,
-    SHARES,
-    THESIS,
-    bounds_task,
-    cases,
-    reduce,
-    servo_case,
-)
 from cdpr_drake.analyses.studies.stability_bounds.study import STUDY, costs_table, shares_table
 from cdpr_drake.stability.perturbation_bounds import PerturbationBounds
 from cdpr_drake.stability.verdict import judge_stability
 from tests.figure_faults import figure_faults
 
-QUICK = {case.name: case for case in cases(Form(quick=True))}
+QUICK = {case.name: case for case in asked.cases(Form(quick=True))}
 
 EXACT = 1e-9
 """Of rotations and places that are added and taken away again."""
@@ -52,8 +34,8 @@ def case_of(robot: str, scale: float) -> Any:
 def arrays(robot: str, scale: float, **changed: Any) -> dict[str, np.ndarray]:
     """Everything stable at D_b / 4; the simple proofs prove nothing at D_b."""
     count = case_of(robot, scale).items
-    simple = np.full(count, scale < THESIS)
-    found = {name: np.ones(count, bool) for name in METHODS}
+    simple = np.full(count, scale < asked.THESIS)
+    found = {name: np.ones(count, bool) for name in asked.METHODS}
     found |= {"lipschitz": simple, "interval": simple, "unstable": np.zeros(count, bool)}
     found |= {"arrived": np.ones((count, K), bool), "falls": np.full((count, K), 0.5)}
     found |= {"contradicts": np.zeros((count, K), bool)}
@@ -63,20 +45,20 @@ def arrays(robot: str, scale: float, **changed: Any) -> dict[str, np.ndarray]:
     return found
 
 
-def made_up(robot: str = "caroca", scale: float = THESIS, **changed: Any) -> Runs:
+def made_up(robot: str = "caroca", scale: float = asked.THESIS, **changed: Any) -> Runs:
     """All rows, with something changed at the first pose of a robot under some bounds."""
     rows = []
-    for one in ROBOTS:
-        for s in QUICK_SCALES:
+    for one in asked.ROBOTS:
+        for s in asked.QUICK_SCALES:
             case = case_of(one, s)
             here = changed if (one, s) == (robot, scale) else {}
-            row = reduce(case, arrays(one, s, **here))
+            row = asked.reduce(case, arrays(one, s, **here))
             rows.append(Run(case.name, None, case.keys, row, {}))
-    for n, one in enumerate(ROBOTS):
-        times = {name: 1e-3 * (k + 1 + n) for k, name in enumerate(METHODS)}
+    for n, one in enumerate(asked.ROBOTS):
+        times = {name: 1e-3 * (k + 1 + n) for k, name in enumerate(asked.METHODS)}
         times |= {"lipschitz": 1e-6, "certified": 2e-3, "simulated": 4e-3, "cut": 0.07}
         others = dict.fromkeys(("cut_percent", "uncut_percent", "certified_sample_percent"), 50.0)
-        keys = {"experiment": COSTS, "robot": one, "scale": THESIS}
+        keys = {"experiment": asked.COSTS, "robot": one, "scale": asked.THESIS}
         rows.append(Run(f"{one}, costs", None, keys, {"seconds": times, **others}, {}))
     return Runs(rows)
 
@@ -92,15 +74,15 @@ def test_all_hold_of_rows_without_a_fault() -> None:
 
 @pytest.mark.parametrize("proof", ["certified", "lipschitz", "interval"])
 def test_one_false_claim_is_enough(proof: str) -> None:
-    runs = made_up(scale=QUICK_SCALES[0], unstable=True, **{proof: True})
+    runs = made_up(scale=asked.QUICK_SCALES[0], unstable=True, **{proof: True})
     others = [name for name in ("certified", "lipschitz", "interval") if name != proof]
     assert verdict(said._no_false_claims, runs) == NOT_CONFIRMED
-    alone = made_up(scale=QUICK_SCALES[0], unstable=True, **dict.fromkeys(others, False))
+    alone = made_up(scale=asked.QUICK_SCALES[0], unstable=True, **dict.fromkeys(others, False))
     assert verdict(said._no_false_claims, alone) == IN_PART
 
 
 def test_a_bound_that_proves_more_than_the_certificate_is_told() -> None:
-    runs = made_up("planar", QUICK_SCALES[0], certified=False)
+    runs = made_up("planar", asked.QUICK_SCALES[0], certified=False)
     assert verdict(said._certificate_proves_most, runs) == IN_PART
 
 
@@ -115,7 +97,7 @@ def test_one_loop_that_ends_elsewhere_is_told() -> None:
     runs = made_up(arrived=[True, False, True])
     found = said._arrives_from_certified.judge(runs)
     assert (found.verdict, found.held, found.of) == (IN_PART, 3, 4)
-    poses = case_of("caroca", THESIS).items
+    poses = case_of("caroca", asked.THESIS).items
     assert f"caroca: {K * poses - 1} of {K * poses}" in found.found
 
 
@@ -123,7 +105,7 @@ def test_a_dear_certificate_is_told() -> None:
     runs = made_up()
     dear = [
         Run(run.case, None, run.keys, {"seconds": {**run["seconds"], "certified": 5e-3}}, {})
-        if run["experiment"] == COSTS
+        if run["experiment"] == asked.COSTS
         else run
         for run in runs
     ]
@@ -132,8 +114,8 @@ def test_a_dear_certificate_is_told() -> None:
 
 def test_the_way_ends_in_the_middle_of_the_box() -> None:
     """There is no error there, and the printed lever and the exact one are the same."""
-    for robot in ROBOTS:
-        case, grid = servo_case(robot), bounds_task(robot, THESIS, True).grid
+    for robot in asked.ROBOTS:
+        case, grid = asked.servo_case(robot), asked.bounds_task(robot, asked.THESIS, True).grid
         middle = (grid.lower + grid.upper) / 2.0
         for place in (middle, grid.lower):
             p_WC = place + case.X_PC.translation()
@@ -145,7 +127,7 @@ def test_the_way_ends_in_the_middle_of_the_box() -> None:
 
 
 def test_the_task_says_what_the_methods_say_whatever_the_chunk() -> None:
-    task = bounds_task("planar", 1 / 4, True)
+    task = asked.bounds_task("planar", 1 / 4, True)
     whole, tail = task(38, 44), task(41, 44)
     assert whole["falls"].shape == (6, task.loops + 1)
     for name, values in tail.items():
@@ -159,16 +141,16 @@ def test_the_task_says_what_the_methods_say_whatever_the_chunk() -> None:
 
 
 def test_bounds_are_those_of_the_thesis_times_a_scale() -> None:
-    for robot in ROBOTS:
+    for robot in asked.ROBOTS:
         bounds: PerturbationBounds = case_of(robot, 1 / 4).task.bounds
         assert bounds.r_bp == pytest.approx(0.03 / 4)
         assert bounds.exits == bounds.anchors == "common"
-    assert len(list(cases(Form()))) == 8 * len(ROBOTS)
+    assert len(list(asked.cases(Form()))) == 8 * len(asked.ROBOTS)
 
 
 def test_rows_have_shares_of_cells() -> None:
-    case = case_of("planar", THESIS)
-    row = reduce(case, arrays("planar", THESIS, sampled=False))
+    case = case_of("planar", asked.THESIS)
+    row = asked.reduce(case, arrays("planar", asked.THESIS, sampled=False))
     cells = (len(row["x_m"]) - 1) * (len(row["y_m"]) - 1)
     assert row["sampled_percent"] == pytest.approx(100.0 * (1.0 - 1.0 / cells))
     assert row["full_m2"] == pytest.approx(0.96**2)
@@ -176,10 +158,10 @@ def test_rows_have_shares_of_cells() -> None:
 
 
 def test_maps_have_a_panel_for_every_robot_and_method() -> None:
-    figure = maps_figure(made_up())
+    figure = figures.maps_figure(made_up())
     assert figure_faults(figure) == []
     titles = [axes.get_title() for axes in figure.axes if axes.get_title()]
-    assert len(titles) == len(ROBOTS) * len(METHODS)
+    assert len(titles) == len(asked.ROBOTS) * len(asked.METHODS)
     assert titles[0] == "sampled\n100.0 %, 1 ms"
     assert "Lipschitz\n0.0 %" in titles[4]
     bar = figure.axes[-1]
@@ -188,9 +170,9 @@ def test_maps_have_a_panel_for_every_robot_and_method() -> None:
 
 def test_tightness_is_a_quotient_of_bounds() -> None:
     runs = made_up()
-    assert tightness(runs, "caroca", "certified") == 1.0
-    assert tightness(runs, "caroca", "lipschitz") == 0.25
-    figure = tightness_figure(runs)
+    assert figures.tightness(runs, "caroca", "certified") == 1.0
+    assert figures.tightness(runs, "caroca", "lipschitz") == 0.25
+    figure = figures.tightness_figure(runs)
     assert figure_faults(figure) == []
     (panel,) = figure.axes
     drawn = sorted({float(line.get_ydata()[0]) for line in panel.lines})
@@ -198,23 +180,22 @@ def test_tightness_is_a_quotient_of_bounds() -> None:
 
 
 def test_no_quotient_of_two_scales_is_drawn_as_none() -> None:
-    assert min(SCALES) / max(SCALES) > NOTHING
+    assert min(asked.SCALES) / max(asked.SCALES) > figures.NOTHING
 
 
 def test_shares_are_drawn_against_bounds() -> None:
-    figure = shares_figure(made_up())
+    figure = figures.shares_figure(made_up())
     assert figure_faults(figure) == []
     panels = figure.axes
-    assert len(panels) == len(ROBOTS)
+    assert len(panels) == len(asked.ROBOTS)
     lines = {line.get_label(): line for line in panels[0].lines}
     assert list(lines["Lipschitz"].get_ydata()) == [100.0, 0.0]
 
 
 def test_tables_have_a_row_for_every_robot_and_bounds() -> None:
     runs = made_up()
-    assert shares_table(runs).row_count == len(ROBOTS) * len(QUICK_SCALES)
-    assert costs_table(runs).row_count == 2 * len(ROBOTS)
+    assert shares_table(runs).row_count == len(asked.ROBOTS) * len(asked.QUICK_SCALES)
+    assert costs_table(runs).row_count == 2 * len(asked.ROBOTS)
     assert STUDY.names_of_checks()[0] == "no_false_claims"
-    assert [case.alone for case in cases(Form()) if case.keys["experiment"] == SHARES] == (
-        [False] * 7 * len(ROBOTS)
-    )
+    shares = [case for case in asked.cases(Form()) if case.keys["experiment"] == asked.SHARES]
+    assert [case.alone for case in shares] == [False] * 7 * len(asked.ROBOTS)

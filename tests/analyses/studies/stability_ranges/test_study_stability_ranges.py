@@ -16,15 +16,9 @@ from cdpr_drake.analyses.reporting.statements import CONFIRMED, IN_PART, NOT_CON
 from cdpr_drake.analyses.studies.framework.runs import Run, Runs
 from cdpr_drake.analyses.studies.framework.statement import MET_CONSTRUCTION, Check, judged
 from cdpr_drake.analyses.studies.framework.study import Form, StudyResult
-from cdpr_drake.analyses.studies.stability_ranges import robot_limits
-from cdpr_drake.analyses.studies.stability_ranges.question import (
-    NESTED,
-    SECTIONS,
-    bisected,
-    falls,
-    found,
-    published,
-)
+from cdpr_drake.analyses.studies.stability_ranges import question, robot_limits
+from cdpr_drake.analyses.studies.stability_ranges import single_errors as single
+from cdpr_drake.analyses.studies.stability_ranges.question import found
 from cdpr_drake.analyses.studies.stability_ranges.robot_limits import (
     LimitedRobot,
     RangeSearch,
@@ -32,13 +26,6 @@ from cdpr_drake.analyses.studies.stability_ranges.robot_limits import (
     camera_at,
 )
 from cdpr_drake.analyses.studies.stability_ranges.robots import PLANAR_OTHERS, SPATIAL_OTHERS
-from cdpr_drake.analyses.studies.stability_ranges.single_errors import (
-    FULL_VOLUME,
-    KNOWN,
-    LOWER_CORNER,
-    NO_TURN,
-    SAMPLED,
-)
 from cdpr_drake.analyses.studies.stability_ranges.study import STUDY, cases
 from cdpr_drake.errors import OutputFolderError
 from cdpr_drake.stability.criterion_closed_forms import planar_margin
@@ -54,15 +41,15 @@ def quick() -> StudyResult:
 
 
 def test_bisection_finds_the_last_multiple() -> None:
-    assert bisected(lambda x: x < 0.735, 2.0, 0.01) == pytest.approx(0.73)
-    assert bisected(lambda x: True, 2.0, 0.01) == 2.0
-    assert bisected(lambda x: False, 2.0, 0.01) == 0.0
+    assert question.bisected(lambda x: x < 0.735, 2.0, 0.01) == pytest.approx(0.73)
+    assert question.bisected(lambda x: True, 2.0, 0.01) == 2.0
+    assert question.bisected(lambda x: False, 2.0, 0.01) == 0.0
 
 
 @pytest.mark.parametrize("quick_form", [False, True])
 def test_questions_pickle_and_are_of_all_sections(quick_form: bool) -> None:
     questions = STUDY.plan(Form(quick_form))
-    assert {one.keys["section"] for one in questions} == set(SECTIONS)
+    assert {one.keys["section"] for one in questions} == set(question.SECTIONS)
     for one in questions:
         assert " " not in one.name
         assert pickle.loads(pickle.dumps(one)).name == one.name
@@ -121,7 +108,7 @@ def test_larger_limits_are_not_easier() -> None:
 def test_quick_form_answers_everything(quick: StudyResult, tmp_path: Path) -> None:
     assert not quick.interrupted
     assert len(quick.statements) == len(STUDY.checks) == 21
-    assert len(quick.tables()) == len(SECTIONS) + 2
+    assert len(quick.tables()) == len(question.SECTIONS) + 2
     assert quick.write(tmp_path) == {}
     assert {path.stem for path in tmp_path.glob("*.png")} == set(STUDY.figures)
     told = json.loads((tmp_path / "results.json").read_text())
@@ -137,17 +124,17 @@ def test_published_numbers(quick: StudyResult) -> None:
     by_name = {run.case: run for run in quick.runs}
     assert found(by_name["planar-I"]) == pytest.approx(2.0, abs=2e-3)
     assert 6.0 <= found(by_name["planar-II-5-0.5-0.3"]) < 8.0
-    assert published(by_name["planar-II-0.5-0.3-0.2"]) == 61.0
+    assert question.published(by_name["planar-II-0.5-0.3-0.2"]) == 61.0
     assert 61.0 <= found(by_name["planar-II-0.5-0.3-0.2"]) < 65.0
-    full = by_name["single-r_pc-0.2"][SAMPLED]
-    assert full == pytest.approx(FULL_VOLUME, abs=1e-3)
+    full = by_name["single-r_pc-0.2"][single.SAMPLED]
+    assert full == pytest.approx(single.FULL_VOLUME, abs=1e-3)
     assert by_name["single-r_pc-1"]["certified_m3"] == full
     assert by_name["single-d_theta_pc_deg-40"]["searched_m3"] == full
-    assert 0.2 * full < by_name["single-d_theta_pc_deg-55"][SAMPLED] < 0.7 * full
-    assert by_name["single-d_theta_pc_deg-65"][SAMPLED] == 0.0
+    assert 0.2 * full < by_name["single-d_theta_pc_deg-55"][single.SAMPLED] < 0.7 * full
+    assert by_name["single-d_theta_pc_deg-65"][single.SAMPLED] == 0.0
     turned = by_name["single-d_theta_s_deg-90"]
-    assert turned[SAMPLED] == 0.0
-    assert turned[NO_TURN] == turned[KNOWN] == full
+    assert turned[single.SAMPLED] == 0.0
+    assert turned[single.NO_TURN] == turned[single.KNOWN] == full
 
 
 def checked(name: str) -> Check:
@@ -180,7 +167,7 @@ def row(case: str, keys: dict[str, object], *values: float) -> Runs:
 def test_orders_that_hold_by_construction_say_so(name: str, quick: StudyResult) -> None:
     said = next(one for one in quick.statements if one.name == name)
     assert said.verdict == CONFIRMED
-    assert said.why == NESTED
+    assert said.why == question.NESTED
 
 
 def test_missing_questions_are_no_verdict() -> None:
@@ -189,9 +176,9 @@ def test_missing_questions_are_no_verdict() -> None:
 
 
 def test_falls() -> None:
-    assert falls(row("r", {}, 3.0, 2.0, 2.0))
-    assert not falls(row("r", {}, 2.0, 2.0))
-    assert not falls(row("r", {}, 3.0, 1.0, 2.0))
+    assert question.falls(row("r", {}, 3.0, 2.0, 2.0))
+    assert not question.falls(row("r", {}, 2.0, 2.0))
+    assert not question.falls(row("r", {}, 3.0, 1.0, 2.0))
 
 
 def test_a_stopped_study_continues(tmp_path: Path) -> None:
@@ -275,8 +262,8 @@ def test_each_part_of_the_turned_camera_can_fail(
 ) -> None:
     rows = [
         Run(f"single-{k}", None,
-            {"section": SECTIONS[-1], "group": "d_theta_pc_deg", "sought": "workspace"},
-            {SAMPLED: volume, "searched_m3": volume, LOWER_CORNER: volume})
+            {"section": question.SECTIONS[-1], "group": "d_theta_pc_deg", "sought": "workspace"},
+            {single.SAMPLED: volume, "searched_m3": volume, single.LOWER_CORNER: volume})
         for k, volume in enumerate(volumes)
     ]  # fmt: skip
     said = checked("camera_turn").find(Runs(rows))

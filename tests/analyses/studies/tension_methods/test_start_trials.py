@@ -5,18 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.studies.tension_methods.start_experiments import (
-    ERRORS,
-    GAINS,
-    LAUNCH,
-    ON_PATH,
-    PRINTED,
-    QUICK_TIME,
-    RATES,
-    START_ERROR,
-    path_of,
-    start_trials,
-)
+from cdpr_drake.analyses.studies.tension_methods import start_experiments as planned
 from cdpr_drake.analyses.studies.tension_methods.start_trial import (
     NOTHING,
     STATIC,
@@ -42,7 +31,7 @@ HOME = np.array(load_robot("caroca_gazebo").home.position)
 
 def spec(**changes):
     settings = {
-        "experiment": START_ERROR,
+        "experiment": planned.START_ERROR,
         "robot": "caroca_gazebo",
         "path": (HOME, HOME),
         "leg": 1.0,
@@ -130,33 +119,35 @@ def test_a_platform_that_nothing_holds_is_lost():
 
 
 def test_the_plan_is_what_was_written_before():
-    specs = start_trials(quick=False)
-    some = [one for one in specs if one.experiment == START_ERROR]
+    specs = planned.start_trials(quick=False)
+    some = [one for one in specs if one.experiment == planned.START_ERROR]
     made = {(one.method, one.gain, one.start, one.rate, one.balance, one.duration) for one in some}
     assert made == {
         (method, gain, start, rate, balance, 100.0)
-        for method in PRINTED
-        for gain in GAINS
-        for start in ("0.3 m", "0.4 m", "0.5 m", "0.6 m", LAUNCH)
-        for rate in RATES
+        for method in planned.PRINTED
+        for gain in planned.GAINS
+        for start in ("0.3 m", "0.4 m", "0.5 m", "0.6 m", planned.LAUNCH)
+        for rate in planned.RATES
         for balance in (WRENCH, FORCE)
     }
     pulses = [one for one in specs if one.between]
     assert {(one.start, one.between) for one in pulses} == {
-        (start, between) for start in (ON_PATH, LAUNCH) for between in (NOTHING, STATIC)
+        (start, between)
+        for start in (planned.ON_PATH, planned.LAUNCH)
+        for between in (NOTHING, STATIC)
     }
     assert {(one.balance, one.rate) for one in pulses} == {(FORCE, 100.0)}
     assert len({one.name() for one in specs}) == len(specs)
     for one in some:
-        if one.start != LAUNCH:
+        if one.start != planned.LAUNCH:
             assert one.start_error() == pytest.approx(float(one.start.split()[0]))
         way = np.cross(one.position - one.path[0], HOME - one.path[0])
         np.testing.assert_allclose(way, np.zeros(3), atol=1e-12)
-    assert ERRORS == (0.3, 0.4, 0.5, 0.6)
-    np.testing.assert_allclose(path_of("closed_form")[0], [0.0, -2.0, 1.8])
+    assert planned.ERRORS == (0.3, 0.4, 0.5, 0.6)
+    np.testing.assert_allclose(planned.path_of("closed_form")[0], [0.0, -2.0, 1.8])
 
 
 def test_the_short_form_is_short():
-    specs = start_trials(quick=True)
+    specs = planned.start_trials(quick=True)
     assert len(specs) == 12
-    assert {one.duration for one in specs} == {QUICK_TIME}
+    assert {one.duration for one in specs} == {planned.QUICK_TIME}
