@@ -16,6 +16,13 @@ def verdicts(found):
     return {one.name: one.verdict_words for one in found.statements}
 
 
+def check_tables_are_made(found):
+    """None is left out, and none is empty."""
+    tables = found.tables()
+    assert all(table.row_count for table in tables)
+    assert "not made" not in {str(column.header) for table in tables for column in table.columns}
+
+
 def check_told_apart_and_written(study, made_up, folder):
     """All statements hold of good rows, and none of contrary ones; of both a figure is written."""
     for wrong, verdict in ((False, "confirmed"), (True, "not confirmed")):
