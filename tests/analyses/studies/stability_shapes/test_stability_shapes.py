@@ -1,6 +1,7 @@
 """Shapes of workspaces: what is asked for, verdicts on made-up shapes, a run that goes on."""
 
 import json
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
