@@ -1,7 +1,5 @@
 """The machinery on tiny studies of the catalogue's type: resuming, failing, missing, the page."""
 
-from __future__ import annotations
-
 import json
 import shutil
 import signal

@@ -1,7 +1,5 @@
 """What does not hold has a cause: a check of a source names its own before it is run."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest
@@ -53,7 +51,7 @@ def test_printed_numbers_name_why_they_may_differ(name):
 
 def judged(held, why=""):
     @statement("It holds.", cause=SOURCE, why="It is not printed.")
-    def check(runs: Runs) -> Finding:
+    def check(runs):
         return Finding(found="so", held=held, why=why)
 
     return check.judge(Runs(()))

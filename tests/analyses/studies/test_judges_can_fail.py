@@ -7,8 +7,6 @@ between rows, and made alike. What physics alone decides is not found so:
 `CONSTRUCTION` is for that.
 """
 
-from __future__ import annotations
-
 import zlib
 from functools import cache
 

@@ -1,7 +1,5 @@
 """Where servos converge from: starts, loops, judges of made-up rows, pictures."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The scan of the camera's targets: closed forms, the study's own rows, ranges, and judges."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Variants of the recipe: what each changes, and that one command evaluates and continues one."""
 
-from __future__ import annotations
-
 import json
 from collections import Counter
 from dataclasses import replace

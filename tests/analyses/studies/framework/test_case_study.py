@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 
 from cdpr_drake.analyses.reporting.deferred_figures import NothingToDraw
 from cdpr_drake.analyses.reporting.progress import StudySession
@@ -26,27 +25,27 @@ from tests.analyses.studies.made_runs import CASE_STUDIES, made_run
 
 
 @statement("The error is small.")
-def error_is_small(runs: Runs) -> Finding:
+def error_is_small(runs):
     error = runs.largest("position_error_m", configuration="plain")
     return Finding(found=f"{error:.2f} m", held=[error < 0.01])
 
 
 @statement("The other is lost.")
-def needs_what_the_quick_form_lacks(runs: Runs) -> Finding:
+def needs_what_the_quick_form_lacks(runs):
     return Finding(found=runs.counted("outcome", configuration="turned"), held=[True])
 
 
-def curve(runs: Runs, configuration: str = "plain") -> Figure:
+def curve(runs, configuration="plain"):
     figure, axes = new_figure(1, 1, (3.0, 2.0), "A curve")
     axes.plot(runs(configuration=configuration).rows[0]["error"])
     return figure
 
 
-def bad(runs: Runs) -> Figure:
+def bad(runs):
     raise ValueError("no such colour\nat all")
 
 
-def of_the_other(runs: Runs) -> Figure:
+def of_the_other(runs):
     return curve(runs, "turned")
 
 

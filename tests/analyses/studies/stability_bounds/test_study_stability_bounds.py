@@ -1,9 +1,5 @@
 """Stability workspaces in several ways: what is asked, judges of made-up rows, pictures."""
 
-from __future__ import annotations
-
-from typing import Any
-
 import numpy as np
 import pytest
 
@@ -27,11 +23,11 @@ K = 3
 """Loops of a made-up pose: two drawn, one worst."""
 
 
-def case_of(robot: str, scale: float) -> Any:
+def case_of(robot, scale):
     return QUICK[f"{robot}, D_b times {scale:g}"]
 
 
-def arrays(robot: str, scale: float, **changed: Any) -> dict[str, np.ndarray]:
+def arrays(robot, scale, **changed):
     """Everything stable at D_b / 4; the simple proofs prove nothing at D_b."""
     count = case_of(robot, scale).items
     simple = np.full(count, scale < asked.THESIS)
@@ -45,7 +41,7 @@ def arrays(robot: str, scale: float, **changed: Any) -> dict[str, np.ndarray]:
     return found
 
 
-def made_up(robot: str = "caroca", scale: float = asked.THESIS, **changed: Any) -> Runs:
+def made_up(robot="caroca", scale=asked.THESIS, **changed):
     """All rows, with something changed at the first pose of a robot under some bounds."""
     rows = []
     for one in asked.ROBOTS:
@@ -63,17 +59,17 @@ def made_up(robot: str = "caroca", scale: float = asked.THESIS, **changed: Any) 
     return Runs(rows)
 
 
-def verdict(check: Any, runs: Runs) -> str:
+def verdict(check, runs):
     return str(check.judge(runs).verdict)
 
 
-def test_all_hold_of_rows_without_a_fault() -> None:
+def test_all_hold_of_rows_without_a_fault():
     for check in said.CHECKS:
         assert verdict(check, made_up()) == CONFIRMED, check.name
 
 
 @pytest.mark.parametrize("proof", ["certified", "lipschitz", "interval"])
-def test_one_false_claim_is_enough(proof: str) -> None:
+def test_one_false_claim_is_enough(proof):
     runs = made_up(scale=asked.QUICK_SCALES[0], unstable=True, **{proof: True})
     others = [name for name in ("certified", "lipschitz", "interval") if name != proof]
     assert verdict(said._no_false_claims, runs) == NOT_CONFIRMED
@@ -81,19 +77,19 @@ def test_one_false_claim_is_enough(proof: str) -> None:
     assert verdict(said._no_false_claims, alone) == IN_PART
 
 
-def test_a_bound_that_proves_more_than_the_certificate_is_told() -> None:
+def test_a_bound_that_proves_more_than_the_certificate_is_told():
     runs = made_up("planar", asked.QUICK_SCALES[0], certified=False)
     assert verdict(said._certificate_proves_most, runs) == IN_PART
 
 
-def test_loops_that_contradict_a_certificate_are_told() -> None:
+def test_loops_that_contradict_a_certificate_are_told():
     assert verdict(said._falls_where_certified, made_up(falls=-0.1)) == IN_PART
     assert verdict(said._falls_where_certified, made_up(contradicts=True)) == IN_PART
     uncertified = made_up(falls=-0.1, certified=False)
     assert verdict(said._falls_where_certified, uncertified) == CONFIRMED
 
 
-def test_one_loop_that_ends_elsewhere_is_told() -> None:
+def test_one_loop_that_ends_elsewhere_is_told():
     runs = made_up(arrived=[True, False, True])
     found = said._arrives_from_certified.judge(runs)
     assert (found.verdict, found.held, found.of) == (IN_PART, 3, 4)
@@ -101,7 +97,7 @@ def test_one_loop_that_ends_elsewhere_is_told() -> None:
     assert f"caroca: {K * poses - 1} of {K * poses}" in found.found
 
 
-def test_a_dear_certificate_is_told() -> None:
+def test_a_dear_certificate_is_told():
     runs = made_up()
     dear = [
         Run(run.case, None, run.keys, {"seconds": {**run["seconds"], "certified": 5e-3}}, {})
@@ -112,7 +108,7 @@ def test_a_dear_certificate_is_told() -> None:
     assert verdict(said._proofs_are_cheap, Runs(dear)) == IN_PART
 
 
-def test_the_way_ends_in_the_middle_of_the_box() -> None:
+def test_the_way_ends_in_the_middle_of_the_box():
     """There is no error there, and the printed lever and the exact one are the same."""
     for robot in asked.ROBOTS:
         case, grid = asked.servo_case(robot), asked.bounds_task(robot, asked.THESIS, True).grid
@@ -126,7 +122,7 @@ def test_the_way_ends_in_the_middle_of_the_box() -> None:
             assert rows.error[0] == pytest.approx(way, abs=EXACT)
 
 
-def test_the_task_says_what_the_methods_say_whatever_the_chunk() -> None:
+def test_the_task_says_what_the_methods_say_whatever_the_chunk():
     task = asked.bounds_task("planar", 1 / 4, True)
     whole, tail = task(38, 44), task(41, 44)
     assert whole["falls"].shape == (6, task.loops + 1)
@@ -140,7 +136,7 @@ def test_the_task_says_what_the_methods_say_whatever_the_chunk() -> None:
     assert not np.any(whole["contradicts"])
 
 
-def test_bounds_are_those_of_the_thesis_times_a_scale() -> None:
+def test_bounds_are_those_of_the_thesis_times_a_scale():
     for robot in asked.ROBOTS:
         bounds: PerturbationBounds = case_of(robot, 1 / 4).task.bounds
         assert bounds.r_bp == pytest.approx(0.03 / 4)
@@ -148,7 +144,7 @@ def test_bounds_are_those_of_the_thesis_times_a_scale() -> None:
     assert len(list(asked.cases(Form()))) == 8 * len(asked.ROBOTS)
 
 
-def test_rows_have_shares_of_cells() -> None:
+def test_rows_have_shares_of_cells():
     case = case_of("planar", asked.THESIS)
     row = asked.reduce(case, arrays("planar", asked.THESIS, sampled=False))
     cells = (len(row["x_m"]) - 1) * (len(row["y_m"]) - 1)
@@ -157,7 +153,7 @@ def test_rows_have_shares_of_cells() -> None:
     assert row["searched_percent"] == 100.0
 
 
-def test_maps_have_a_panel_for_every_robot_and_method() -> None:
+def test_maps_have_a_panel_for_every_robot_and_method():
     figure = figures.maps_figure(made_up())
     assert figure_faults(figure) == []
     titles = [axes.get_title() for axes in figure.axes if axes.get_title()]
@@ -168,7 +164,7 @@ def test_maps_have_a_panel_for_every_robot_and_method() -> None:
     assert [text.get_text() for text in bar.get_xticklabels()] == ["none", "1/4", "1"]
 
 
-def test_tightness_is_a_quotient_of_bounds() -> None:
+def test_tightness_is_a_quotient_of_bounds():
     runs = made_up()
     assert figures.tightness(runs, "caroca", "certified") == 1.0
     assert figures.tightness(runs, "caroca", "lipschitz") == 0.25
@@ -179,11 +175,11 @@ def test_tightness_is_a_quotient_of_bounds() -> None:
     assert drawn == [0.25, 1.0]
 
 
-def test_no_quotient_of_two_scales_is_drawn_as_none() -> None:
+def test_no_quotient_of_two_scales_is_drawn_as_none():
     assert min(asked.SCALES) / max(asked.SCALES) > figures.NOTHING
 
 
-def test_shares_are_drawn_against_bounds() -> None:
+def test_shares_are_drawn_against_bounds():
     figure = figures.shares_figure(made_up())
     assert figure_faults(figure) == []
     panels = figure.axes
@@ -192,7 +188,7 @@ def test_shares_are_drawn_against_bounds() -> None:
     assert list(lines["Lipschitz"].get_ydata()) == [100.0, 0.0]
 
 
-def test_tables_have_a_row_for_every_robot_and_bounds() -> None:
+def test_tables_have_a_row_for_every_robot_and_bounds():
     runs = made_up()
     assert shares_table(runs).row_count == len(asked.ROBOTS) * len(asked.QUICK_SCALES)
     assert costs_table(runs).row_count == 2 * len(asked.ROBOTS)

@@ -1,12 +1,9 @@
 """The study of stability ranges: its questions, what it finds, that it runs, stops and writes."""
 
-from __future__ import annotations
-
 import json
 import math
 import pickle
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,8 +11,8 @@ import pytest
 from cdpr_drake.analyses.reporting.progress import StudySession, WorkProgress
 from cdpr_drake.analyses.reporting.statements import CONFIRMED, IN_PART, NOT_CONFIRMED
 from cdpr_drake.analyses.studies.framework.runs import Run, Runs
-from cdpr_drake.analyses.studies.framework.statement import MET_CONSTRUCTION, Check, judged
-from cdpr_drake.analyses.studies.framework.study import Form, StudyResult
+from cdpr_drake.analyses.studies.framework.statement import MET_CONSTRUCTION, judged
+from cdpr_drake.analyses.studies.framework.study import Form
 from cdpr_drake.analyses.studies.stability_ranges import question, robot_limits
 from cdpr_drake.analyses.studies.stability_ranges import single_errors as single
 from cdpr_drake.analyses.studies.stability_ranges.question import found
@@ -35,19 +32,19 @@ STEP = 0.01
 
 
 @pytest.fixture(scope="module")
-def quick() -> StudyResult:
+def quick():
     """The quick form."""
     return STUDY(True, StudySession(workers=1))
 
 
-def test_bisection_finds_the_last_multiple() -> None:
+def test_bisection_finds_the_last_multiple():
     assert question.bisected(lambda x: x < 0.735, 2.0, 0.01) == pytest.approx(0.73)
     assert question.bisected(lambda x: True, 2.0, 0.01) == 2.0
     assert question.bisected(lambda x: False, 2.0, 0.01) == 0.0
 
 
 @pytest.mark.parametrize("quick_form", [False, True])
-def test_questions_pickle_and_are_of_all_sections(quick_form: bool) -> None:
+def test_questions_pickle_and_are_of_all_sections(quick_form):
     questions = STUDY.plan(Form(quick_form))
     assert {one.keys["section"] for one in questions} == set(question.SECTIONS)
     for one in questions:
@@ -55,7 +52,7 @@ def test_questions_pickle_and_are_of_all_sections(quick_form: bool) -> None:
         assert pickle.loads(pickle.dumps(one)).name == one.name
 
 
-def test_limits_of_the_object_alone_are_those_of_the_closed_form() -> None:
+def test_limits_of_the_object_alone_are_those_of_the_closed_form():
     # With an exact robot and camera the limit is 2 m, whatever the platform and e.
     limits = RobotLimits(place=0.3, psi=30.0, error=1.0)
     found = RangeSearch(LimitedRobot("planar", coarse=True)).largest(limits, ("r_s",), 3.0, STEP)
@@ -69,7 +66,7 @@ def test_limits_of_the_object_alone_are_those_of_the_closed_form() -> None:
     assert limit - 2.0 * STEP < found < limit + STEP
 
 
-def test_samples_lie_within_limits_and_on_their_edges() -> None:
+def test_samples_lie_within_limits_and_on_their_edges():
     limits = replace(SPATIAL_OTHERS, psi=40.0, phi=20.0, theta=10.0, place=0.2)
     poses, errors = LimitedRobot("acrobot_small").samples(limits)
     assert len(poses) == len(errors) == 9 * 3 * 3 * 7 * 7
@@ -85,7 +82,7 @@ def test_samples_lie_within_limits_and_on_their_edges() -> None:
     assert planar[:, 1:3] == pytest.approx(0.0)
 
 
-def test_mirrored_places_stand_for_all() -> None:
+def test_mirrored_places_stand_for_all():
     limits = replace(PLANAR_OTHERS, place=0.4, r_bp=0.05)
     for r_bp in (0.04, 0.05, 0.06, 0.07):
         some = RangeSearch(LimitedRobot("planar", mirrored=True))
@@ -93,7 +90,7 @@ def test_mirrored_places_stand_for_all() -> None:
         assert some.stable(replace(limits, r_bp=r_bp)) == every.stable(replace(limits, r_bp=r_bp))
 
 
-def test_larger_limits_are_not_easier() -> None:
+def test_larger_limits_are_not_easier():
     robot = LimitedRobot("planar", camera_at(0.03, 0.0, 20.0), coarse=True)
     names = ("place", "error", "r_B", "r_pc", "d_theta_pc", "r_s", "d_theta_bp")
     reference = RangeSearch(robot).largest(PLANAR_OTHERS, ("r_bp",), 0.4, STEP)
@@ -105,7 +102,7 @@ def test_larger_limits_are_not_easier() -> None:
     assert certified <= reference
 
 
-def test_quick_form_answers_everything(quick: StudyResult, tmp_path: Path) -> None:
+def test_quick_form_answers_everything(quick, tmp_path):
     assert not quick.interrupted
     assert len(quick.statements) == len(STUDY.checks) == 21
     assert len(quick.tables()) == len(question.SECTIONS) + 2
@@ -120,7 +117,7 @@ def test_quick_form_answers_everything(quick: StudyResult, tmp_path: Path) -> No
                     assert run[f"{less}_{unit}"] <= run[f"{more}_{unit}"]
 
 
-def test_published_numbers(quick: StudyResult) -> None:
+def test_published_numbers(quick):
     by_name = {run.case: run for run in quick.runs}
     assert found(by_name["planar-I"]) == pytest.approx(2.0, abs=2e-3)
     assert 6.0 <= found(by_name["planar-II-5-0.5-0.3"]) < 8.0
@@ -137,11 +134,11 @@ def test_published_numbers(quick: StudyResult) -> None:
     assert turned[single.NO_TURN] == turned[single.KNOWN] == full
 
 
-def checked(name: str) -> Check:
+def checked(name):
     return next(check for check in STUDY.checks if check.name == name)
 
 
-def test_statements_follow_from_the_runs(quick: StudyResult) -> None:
+def test_statements_follow_from_the_runs(quick):
     said = {one.name: one.verdict for one in quick.statements}
     assert said["vision_alone"] == MET_CONSTRUCTION
     assert said["camera_turn"] == IN_PART
@@ -158,30 +155,30 @@ def test_statements_follow_from_the_runs(quick: StudyResult) -> None:
     assert checked("smaller_range").judge(Runs(changed)).verdict == NOT_CONFIRMED
 
 
-def row(case: str, keys: dict[str, object], *values: float) -> Runs:
+def row(case, keys, *values):
     """Runs of a case's group, in which so much was found."""
     return Runs([Run(f"{case}{k}", None, keys, {"searched_m": x}) for k, x in enumerate(values)])
 
 
 @pytest.mark.parametrize("name", ["smaller_range", "anchor_error", "turn_and_tilt"])
-def test_orders_that_hold_by_construction_say_so(name: str, quick: StudyResult) -> None:
+def test_orders_that_hold_by_construction_say_so(name, quick):
     said = next(one for one in quick.statements if one.name == name)
     assert said.verdict == CONFIRMED
     assert said.why == question.NESTED
 
 
-def test_missing_questions_are_no_verdict() -> None:
+def test_missing_questions_are_no_verdict():
     (said,) = judged([checked("smaller_range")], Runs([], lambda: STUDY.planned(Form())))
     assert said.found.startswith("runs are missing")
 
 
-def test_falls() -> None:
+def test_falls():
     assert question.falls(row("r", {}, 3.0, 2.0, 2.0))
     assert not question.falls(row("r", {}, 2.0, 2.0))
     assert not question.falls(row("r", {}, 3.0, 1.0, 2.0))
 
 
-def test_a_stopped_study_continues(tmp_path: Path) -> None:
+def test_a_stopped_study_continues(tmp_path):
     few = replace(STUDY, cases=lambda form: list(cases(form))[:8])
     seen: list[WorkProgress] = []
     first = few(
@@ -196,9 +193,7 @@ def test_a_stopped_study_continues(tmp_path: Path) -> None:
     assert len(second.runs) == 8
 
 
-def test_a_folder_of_other_questions_is_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_folder_of_other_questions_is_refused(tmp_path, monkeypatch):
     few = replace(STUDY, cases=lambda form: list(cases(form))[:2])
     few(True, StudySession(folder=tmp_path, should_stop=lambda: True, workers=1))
     monkeypatch.setattr(robot_limits, "TURN_STEP", 5.0)
@@ -212,7 +207,7 @@ CAMERA_PLACES = {
 }  # fmt: skip
 
 
-def cameras(**limits: float) -> Runs:
+def cameras(**limits):
     """Runs of cameras at these places; `limits` differ from 0.1 m."""
     rows = []
     for name, (x, y, turn) in CAMERA_PLACES.items():
@@ -235,14 +230,12 @@ def cameras(**limits: float) -> Runs:
         ({"on_an_edge": 0.08, "turned_90_deg": 0.12}, 0, 2),
     ],
 )
-def test_one_step_of_the_search_is_no_effect_of_the_camera(
-    limits: dict[str, float], held: int, of: int
-) -> None:
+def test_one_step_of_the_search_is_no_effect_of_the_camera(limits, held, of):
     said = checked("planar_camera_place").judge(cameras(**limits))
     assert (said.held, said.of) == (held, of)
 
 
-def test_cameras_are_compared_by_steps_finer_than_what_counts() -> None:
+def test_cameras_are_compared_by_steps_finer_than_what_counts():
     steps = [one.data.args[4] for one in STUDY.plan(Form()) if one.keys["group"] == "camera"]
     assert len(steps) == 6
     assert max(steps) <= 0.01 * 0.1 / 5.0
@@ -257,9 +250,7 @@ def test_cameras_are_compared_by_steps_finer_than_what_counts() -> None:
         ((0.9, 1.014, 0.1), (False, False, False)),
     ],
 )
-def test_each_part_of_the_turned_camera_can_fail(
-    volumes: tuple[float, ...], held: tuple[bool, ...]
-) -> None:
+def test_each_part_of_the_turned_camera_can_fail(volumes, held):
     rows = [
         Run(f"single-{k}", None,
             {"section": question.SECTIONS[-1], "group": "d_theta_pc_deg", "sought": "workspace"},
