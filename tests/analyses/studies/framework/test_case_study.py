@@ -49,23 +49,17 @@ def of_the_other(runs):
     return curve(runs, "turned")
 
 
+TURNED = (
+    "perturbations.camera_pose.angles_deg=[0, 0, 20]",
+    "perturbations.camera_pose.position=[0, 0, 0]",
+)
+
 SHORT = configuration_study(
     Plan(
-        name="short",
-        title="Two short runs",
-        scenario="acrobot_pbvs",
-        changes=("duration=0.4",),
+        name="short", title="Two short runs", scenario="acrobot_pbvs", changes=("duration=0.4",),
         configurations=(
             Configuration("plain", "plain", published={"outcome": "converged", "time_s": "7"}),
-            Configuration(
-                "turned",
-                "turned camera",
-                (
-                    "perturbations.camera_pose.angles_deg=[0, 0, 20]",
-                    "perturbations.camera_pose.position=[0, 0, 0]",
-                ),
-                group="other",
-            ),
+            Configuration("turned", "turned camera", TURNED, group="other"),
         ),
         quick=("plain",),
         layouts={"figure_1": paths_layout("Of the other", ("turned",))},
@@ -74,7 +68,7 @@ SHORT = configuration_study(
     repetitions=2,
     checks=(error_is_small, needs_what_the_quick_form_lacks),
     drawings={"bad": bad, "of_the_other": of_the_other, "curve": curve},
-)
+)  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -90,15 +84,12 @@ def quick():
     return SHORT(quick=True, session=StudySession(workers=1))
 
 
-def test_every_configuration_runs_with_every_seed(result):
-    found, _, _ = result
-    done = [(run["configuration"], run.seed) for run in found.runs]
+def test_every_configuration_runs_with_every_seed_and_they_differ(result):
+    runs = result[0].runs
+    done = [(run["configuration"], run.seed) for run in runs]
     assert done == [("plain", 0), ("plain", 1), ("turned", 0), ("turned", 1)]
-    assert found.runs.counts("outcome") == {"timeout": 4}
-
-
-def test_configurations_differ_and_seeds_differ(result):
-    errors = [run["error"][-1] for run in result[0].runs]
+    assert runs.counts("outcome") == {"timeout": 4}
+    errors = [run["error"][-1] for run in runs]
     assert not np.allclose(errors[0], errors[2], atol=1e-3)
     assert 0.0 < np.abs(errors[0] - errors[1]).max() < 0.05
 
@@ -147,16 +138,14 @@ def test_figures_whose_runs_are_missing_are_not_drawn(quick):
     assert drawings["curve"]().axes
 
 
-@pytest.mark.parametrize("name", ["cable_tensions", "stability"])
-def test_what_traces_do_not_have_is_not_drawn(result, name):
-    plan = replace(SHORT.cases, stability=1.0)
-    with pytest.raises(MissingRuns):
-        case_figures(plan)[name](result[0].runs)
-
-
-def test_bars_of_what_no_run_measures_are_no_failure(result):
+def test_what_traces_do_not_have_and_no_run_measures_is_not_drawn(result):
+    runs = result[0].runs
+    drawings = case_figures(replace(SHORT.cases, stability=1.0))
+    for name in ("cable_tensions", "stability"):
+        with pytest.raises(MissingRuns):
+            drawings[name](runs)
     unmeasured = {metric: None for metric, _, _ in BARS["estimates"]}
-    bare = [replace(run, measured={**run.measured, **unmeasured}) for run in result[0].runs]
+    bare = [replace(run, measured={**run.measured, **unmeasured}) for run in runs]
     with pytest.raises(NothingToDraw):
         case_figures(SHORT.cases)["estimates"](Runs(bare))
 
@@ -181,9 +170,6 @@ def test_tables_show_published_beside_found(result):
         "Published | here (mean over the runs, +- half of the range)",
         "What the servoing thesis states",
     ]
-
-
-def test_printed_numbers_are_those_of_the_cases():
     numbers = [(one.configuration, one.metric, one.printed) for one in SHORT.cases.published()]
     assert numbers == [("plain", "outcome", "converged"), ("plain", "time_s", "7")]
 
