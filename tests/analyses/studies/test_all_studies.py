@@ -27,8 +27,8 @@ from cdpr_drake.analyses.studies.framework.study import Form
 from cdpr_drake.analyses.studies.stability_ranges.question import unit_of_limit
 
 # Columns, keys and values that studies ask for: a misspelt one fails here, without a run. A name
-# that is asked of runs has to be written where nothing is asked, too: where a row is made, or a case
-# planned. Names that are put together there are listed.
+# that is asked of runs has to be written where nothing is asked, too: where a row is made, or a
+# case planned. Names that are put together there are listed.
 
 ROOT = Path(__file__).parents[3]
 ROOMS = ("analyses", "systems", "models", "cdpr_drake")
