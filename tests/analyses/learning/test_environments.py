@@ -16,11 +16,9 @@ from gymnasium.utils.env_checker import check_env
 import cdpr_drake as cdpr
 import cdpr_drake.gym
 from cdpr_drake.analyses.benchmarks.learning import learning_rows
-from cdpr_drake.analyses.learning.environments import RobotVectorEnv
 from cdpr_drake.analyses.learning.task_table import TASKS, make_task
 from cdpr_drake.cli.app import main
 from cdpr_drake.errors import CdprError
-from cdpr_drake.gym import STEPS
 from cdpr_drake.models.robot_loader import robot_names
 from cdpr_drake.vision.apriltags import TagTarget
 from tests.analyses.benchmarks.once import without_repeats
@@ -35,6 +33,7 @@ ACTIONS = ("rates", "tensions", "twist")
 
 def test_every_task_is_registered_with_its_steps():
     assert {name: kind.steps for name, kind in TASKS.items()} == cdpr_drake.gym.STEPS
+    assert cdpr.environment_names() == NAMES
     for name in NAMES:
         assert gymnasium.spec(name).max_episode_steps == TASKS[name[5:-3]].steps
 
@@ -151,22 +150,24 @@ def test_any_robot_takes_part(name, robot):
 
 
 @pytest.mark.parametrize(
-    ("options", "words"),
+    ("name", "options", "words"),
     [
-        ({"robot": "arm_on_platform"}, "arm_on_platform"),
-        ({"action": "torques"}, "action: found 'torques'"),
-        ({"speed": 1.0}, "found option 'speed'; accepted: robot, action"),
-        ({"randomise": {"weight": 1.0}}, "randomise: found 'weight'"),
-        ({"randomise": {"mass": -1.0}}, "randomise: mass: found -1.0"),
-        ({"period": 0.0}, "period: found 0.0"),
-        ({"turn_deg": 200.0}, "turn_deg: found 200.0"),
-        ({"winches": "motor", "action": "tensions"}, "winches: found motor"),
-        ({"render_mode": "human"}, "render_mode: found 'human'; accepted: null, rgb_array"),
+        ("Reech", {}, "Reach"),
+        ("Reach", {"count": 0}, "count: found 0; accepted: 1 or more"),
+        ("Reach", {"robot": "arm_on_platform"}, "arm_on_platform"),
+        ("Reach", {"action": "torques"}, "action: found 'torques'"),
+        ("Reach", {"speed": 1.0}, "found option 'speed'; accepted: robot, action"),
+        ("Reach", {"randomise": {"weight": 1.0}}, "randomise: found 'weight'"),
+        ("Reach", {"randomise": {"mass": -1.0}}, "randomise: mass: found -1.0"),
+        ("Reach", {"period": 0.0}, "period: found 0.0"),
+        ("Reach", {"turn_deg": 200.0}, "turn_deg: found 200.0"),
+        ("Reach", {"winches": "motor", "action": "tensions"}, "winches: found motor"),
+        ("Reach", {"render_mode": "human"}, "found 'human'; accepted: null, rgb_array"),
     ],
 )
-def test_what_is_not_accepted_is_said_in_one_line(options, words):
+def test_what_is_not_accepted_is_said_in_one_line(name, options, words):
     with pytest.raises(CdprError) as problem:
-        RobotVectorEnv("Reach", 2, **options)
+        cdpr.make_environment(name, **({"count": 2} | options))
     assert words in str(problem.value)
     assert "\n" not in str(problem.value)
 
@@ -205,29 +206,12 @@ def run(capsys, *words):
     return code, printed(capsys)
 
 
-def test_names_are_those_of_gymnasium():
-    assert cdpr.environment_names() == [f"cdpr/{name}-v0" for name in STEPS]
-
-
 def test_one_and_many_by_short_and_long_name():
     env = cdpr.make_environment("Reach", action="twist")
     envs = cdpr.make_environment("cdpr/Reach-v0", 3, action="twist")
     one, many = env.reset(seed=5)[0], envs.reset(seed=5)[0]
     assert many.shape == (3, *one.shape)
     np.testing.assert_array_equal(many[0], one)
-
-
-@pytest.mark.parametrize(
-    ("name", "how", "words"),
-    [
-        ("Reech", {}, "Reach"),
-        ("Reach", {"count": 0}, "count: found 0; accepted: 1 or more"),
-        ("Reach", {"speed": 1.0}, "option 'speed'"),
-    ],
-)
-def test_what_cannot_be_made(name, how, words):
-    with pytest.raises(CdprError, match=words):
-        cdpr.make_environment(name, **how)
 
 
 def test_without_gymnasium_it_says_what_to_install(monkeypatch):
