@@ -233,7 +233,9 @@ class Cluster:
     for."""
 
     def __init__(self, folder):
-        self.folder, self.address, self.scheduler, self.workers = folder, "", None, []
+        self.folder, self.address, self.scheduler, self.started = folder, "", None, 0
+        self.workers = {}
+        """By the names that the scheduler has of them."""
 
     def begin(self):
         self.address, file = "", self.folder / "scheduler.json"
@@ -253,19 +255,20 @@ class Cluster:
         if self.scheduler is None or self.scheduler.poll() is not None:
             self.end()
             self.begin()
-        self.workers = [worker for worker in self.workers if worker.poll() is None]
-        while len(self.workers) < count:
-            self.workers.append(
-                _dask(
-                    "distributed.cli.dask_worker", "--no-nanny", "--nthreads", "1",
-                    "--no-dashboard", "--local-directory", str(self.folder), self.address,
-                )
+        alive = {name: one for name, one in self.workers.items() if one.poll() is None}
+        while len(alive) < count:
+            self.started += 1
+            name = f"worker {self.started}"
+            alive[name] = _dask(
+                "distributed.cli.dask_worker", "--no-nanny", "--nthreads", "1", "--no-dashboard",
+                "--name", name, "--local-directory", str(self.folder), self.address,
             )  # fmt: skip
-        wait_for_workers(self.address, {worker.pid for worker in self.workers})
-        return self.address, self.workers
+        self.workers = alive
+        wait_for_workers(self.address, set(alive))
+        return self.address, list(alive.values())
 
     def end(self):
-        for process in (*self.workers, *([self.scheduler] if self.scheduler else [])):
+        for process in (*self.workers.values(), *([self.scheduler] if self.scheduler else [])):
             process.kill()
             process.wait()
 
@@ -284,14 +287,17 @@ def cluster(cluster_of_all, monkeypatch):
     return cluster_of_all
 
 
-def wait_for_workers(address, pids):
-    """Until a scheduler knows these processes and no others."""
+def wait_for_workers(address, names):
+    """Until a scheduler knows these workers and no others.
+
+    It is asked, and not the workers: one that was killed may be known for a moment, and never
+    answers.
+    """
     from distributed import Client
 
     deadline = time.monotonic() + PATIENCE
     with Client(address, timeout=PATIENCE, set_as_default=False) as client:
-        # One that was killed may be known for a moment.
-        while set(client.run(os.getpid, on_error="return").values()) != pids:
+        while names != {one["name"] for one in client.scheduler_info()["workers"].values()}:
             assert time.monotonic() < deadline
             time.sleep(0.05)
 

@@ -63,30 +63,36 @@ def verdict(check, runs):
     return str(check.judge(runs).verdict)
 
 
-def test_all_hold_of_rows_without_a_fault():
-    for check in said.CHECKS:
-        assert verdict(check, made_up()) == CONFIRMED, check.name
+@pytest.fixture(scope="module")
+def faultless():
+    return made_up()
 
 
-@pytest.mark.parametrize("proof", ["certified", "lipschitz", "interval"])
-def test_one_false_claim_is_enough(proof):
-    runs = made_up(scale=asked.QUICK_SCALES[0], unstable=True, **{proof: True})
-    others = [name for name in ("certified", "lipschitz", "interval") if name != proof]
-    assert verdict(said._no_false_claims, runs) == NOT_CONFIRMED
-    alone = made_up(scale=asked.QUICK_SCALES[0], unstable=True, **dict.fromkeys(others, False))
-    assert verdict(said._no_false_claims, alone) == IN_PART
+@pytest.mark.parametrize("check", said.CHECKS, ids=lambda check: check.name)
+def test_all_hold_of_rows_without_a_fault(check, faultless):
+    assert verdict(check, faultless) == CONFIRMED
 
 
-def test_a_bound_that_proves_more_than_the_certificate_is_told():
-    runs = made_up("planar", asked.QUICK_SCALES[0], certified=False)
-    assert verdict(said._certificate_proves_most, runs) == IN_PART
+PROOFS = {"certified", "lipschitz", "interval"}
+LEAST = asked.QUICK_SCALES[0]
 
 
-def test_loops_that_contradict_a_certificate_are_told():
-    assert verdict(said._falls_where_certified, made_up(falls=-0.1)) == IN_PART
-    assert verdict(said._falls_where_certified, made_up(contradicts=True)) == IN_PART
-    uncertified = made_up(falls=-0.1, certified=False)
-    assert verdict(said._falls_where_certified, uncertified) == CONFIRMED
+@pytest.mark.parametrize(
+    ("check", "where", "changed", "expected"),
+    [
+        *((said._no_false_claims, ("caroca", LEAST), {"unstable": True, proof: True}, NOT_CONFIRMED)
+          for proof in sorted(PROOFS)),
+        *((said._no_false_claims, ("caroca", LEAST),
+           {"unstable": True} | dict.fromkeys(PROOFS - {proof}, False), IN_PART)
+          for proof in sorted(PROOFS)),
+        (said._certificate_proves_most, ("planar", LEAST), {"certified": False}, IN_PART),
+        (said._falls_where_certified, (), {"falls": -0.1}, IN_PART),
+        (said._falls_where_certified, (), {"contradicts": True}, IN_PART),
+        (said._falls_where_certified, (), {"falls": -0.1, "certified": False}, CONFIRMED),
+    ],
+)  # fmt: skip
+def test_one_fault_is_enough(check, where, changed, expected):
+    assert verdict(check, made_up(*where, **changed)) == expected
 
 
 def test_one_loop_that_ends_elsewhere_is_told():
@@ -97,13 +103,12 @@ def test_one_loop_that_ends_elsewhere_is_told():
     assert f"caroca: {K * poses - 1} of {K * poses}" in found.found
 
 
-def test_a_dear_certificate_is_told():
-    runs = made_up()
+def test_a_dear_certificate_is_told(faultless):
     dear = [
         Run(run.case, None, run.keys, {"seconds": {**run["seconds"], "certified": 5e-3}}, {})
         if run["experiment"] == asked.COSTS
         else run
-        for run in runs
+        for run in faultless
     ]
     assert verdict(said._proofs_are_cheap, Runs(dear)) == IN_PART
 
@@ -153,8 +158,8 @@ def test_rows_have_shares_of_cells():
     assert row["searched_percent"] == 100.0
 
 
-def test_maps_have_a_panel_for_every_robot_and_method():
-    figure = figures.maps_figure(made_up())
+def test_maps_have_a_panel_for_every_robot_and_method(faultless):
+    figure = figures.maps_figure(faultless)
     assert figure_faults(figure) == []
     titles = [axes.get_title() for axes in figure.axes if axes.get_title()]
     assert len(titles) == len(asked.ROBOTS) * len(asked.METHODS)
@@ -164,11 +169,10 @@ def test_maps_have_a_panel_for_every_robot_and_method():
     assert [text.get_text() for text in bar.get_xticklabels()] == ["none", "1/4", "1"]
 
 
-def test_tightness_is_a_quotient_of_bounds():
-    runs = made_up()
-    assert figures.tightness(runs, "caroca", "certified") == 1.0
-    assert figures.tightness(runs, "caroca", "lipschitz") == 0.25
-    figure = figures.tightness_figure(runs)
+def test_tightness_is_a_quotient_of_bounds(faultless):
+    assert figures.tightness(faultless, "caroca", "certified") == 1.0
+    assert figures.tightness(faultless, "caroca", "lipschitz") == 0.25
+    figure = figures.tightness_figure(faultless)
     assert figure_faults(figure) == []
     (panel,) = figure.axes
     drawn = sorted({float(line.get_ydata()[0]) for line in panel.lines})
@@ -179,8 +183,8 @@ def test_no_quotient_of_two_scales_is_drawn_as_none():
     assert min(asked.SCALES) / max(asked.SCALES) > figures.NOTHING
 
 
-def test_shares_are_drawn_against_bounds():
-    figure = figures.shares_figure(made_up())
+def test_shares_are_drawn_against_bounds(faultless):
+    figure = figures.shares_figure(faultless)
     assert figure_faults(figure) == []
     panels = figure.axes
     assert len(panels) == len(asked.ROBOTS)
@@ -188,10 +192,9 @@ def test_shares_are_drawn_against_bounds():
     assert list(lines["Lipschitz"].get_ydata()) == [100.0, 0.0]
 
 
-def test_tables_have_a_row_for_every_robot_and_bounds():
-    runs = made_up()
-    assert shares_table(runs).row_count == len(asked.ROBOTS) * len(asked.QUICK_SCALES)
-    assert costs_table(runs).row_count == 2 * len(asked.ROBOTS)
+def test_tables_have_a_row_for_every_robot_and_bounds(faultless):
+    assert shares_table(faultless).row_count == len(asked.ROBOTS) * len(asked.QUICK_SCALES)
+    assert costs_table(faultless).row_count == 2 * len(asked.ROBOTS)
     assert STUDY.names_of_checks()[0] == "no_false_claims"
     shares = [case for case in asked.cases(Form()) if case.keys["experiment"] == asked.SHARES]
     assert [case.alone for case in shares] == [False] * 7 * len(asked.ROBOTS)
