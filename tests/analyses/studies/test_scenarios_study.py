@@ -2,7 +2,6 @@
 
 import json
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -53,13 +52,12 @@ def made_up(case, seed):
     return ended(row, wanted, shipped.duration)
 
 
-@cache
-def ran(name):
-    """The study's row of a scenario, and the run that it made: two tests ask for the same.
+def ran(name, items):
+    """The study's row of a scenario, and the run that it made.
 
     With what makes what its title names happen soon, where it has that; then its own length counts.
     """
-    known, (_, items), kept = SCENARIO_KINDS[scenario_kind(name)], TITLES[name], []
+    known, kept = SCENARIO_KINDS[scenario_kind(name)], []
 
     def run(scenario, session):
         result = known.run(scenario, session)
@@ -87,19 +85,16 @@ def told(kind, scenario, result):
 
 
 @pytest.mark.parametrize("name", scenario_names())
-def test_what_the_title_names_happens(name):
-    _, run = ran(name)
-    for check in TITLES[name][0]:
-        assert check(run), (name, check.__name__, run.summary["outcome"])
-
-
-@pytest.mark.parametrize("name", scenario_names())
-def test_every_scenario_ends_as_its_file_says(name):
-    """With projected targets; what only a diagram can do is cut after a second."""
-    row, _ = ran(name)
+def test_every_scenario_ends_as_its_file_says_and_does_what_its_title_names(name):
+    """With projected targets; what only a diagram can do is cut after a second, or after as long as
+    what the title names takes."""
+    checks, items = TITLES[name]
+    row, run = ran(name, items)
     assert row["expected"] is not None
     assert row["as_expected"], (row["outcome"], row["message"])
     assert row["close_enough"] is not False, (row["distance_share"], row["angle_share"])
+    for check in checks:
+        assert check(run), (name, check.__name__, run.summary["outcome"])
 
 
 def test_one_that_loses_its_target_is_named(tmp_path):
