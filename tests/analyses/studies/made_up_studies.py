@@ -1,8 +1,10 @@
 """Studies whose measurement is made up: whether statements can fail, and what is written."""
 
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 
+from cdpr_drake.analyses.reporting.deferred_figures import NothingToDraw
 from cdpr_drake.analyses.reporting.progress import StudySession
 
 
@@ -14,6 +16,18 @@ def made(study, made_up, quick=True, seeds=None):
 def verdicts(found):
     """Of the statements of a study, by name: with how many parts hold where it is in part."""
     return {one.name: one.verdict_words for one in found.statements}
+
+
+def with_figures(found, *names):
+    """A study that writes some of its figures, and names of all that it draws: to lay all of them
+    out takes long."""
+    drawn = set()
+    for name, draw in found.drawings().items():
+        with suppress(NothingToDraw):
+            assert draw().axes
+            drawn.add(name)
+    figures = {name: found.study.figures[name] for name in names}
+    return replace(found, study=replace(found.study, figures=figures)), drawn
 
 
 def check_tables_are_made(found):

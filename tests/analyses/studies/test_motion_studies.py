@@ -22,6 +22,7 @@ from cdpr_drake.analyses.studies.framework.study import Form
 from cdpr_drake.analyses.studies.planning import statements as planned
 from cdpr_drake.analyses.studies.planning import study as planning
 from cdpr_drake.analyses.studies.proven_paths import measured as searched
+from cdpr_drake.analyses.studies.proven_paths import sampled_planners
 from cdpr_drake.analyses.studies.proven_paths import study as proving
 from cdpr_drake.analyses.studies.proven_paths.problems import SPECS, Spec, scene_of
 from cdpr_drake.analyses.studies.proven_paths.sampled_planners import (
@@ -269,7 +270,7 @@ def test_costs_of_the_tree_are_lengths_of_its_ways():
     assert lengths[0] >= lengths[1] >= lengths[2]
 
 
-def test_the_quick_problem_is_what_is_said():
+def test_the_quick_problem_is_what_is_said(monkeypatch):
     scene = scene_of("caroca", "wall")
     start, goal = scene.ends[0]
     line = start[:3] + np.linspace(0.0, 1.0, 200)[:, np.newaxis] * (goal - start)[:3]
@@ -277,6 +278,7 @@ def test_the_quick_problem_is_what_is_said():
     assert scene.wrong(np.array([start[:3], goal[:3]])) == 0
     cases = proving.STUDY.plan(Form(quick=True))
     assert [case.keys["kind"] for case in cases] == [PROBLEM, SAMPLED]
+    monkeypatch.setattr(sampled_planners, "OMPL_SECONDS", 0.5)
     problem, sampled = (proving.measure(case, 0) for case in cases)
     assert problem["status"] == searched.FOUND
     assert problem["infeasible"] == 0 < problem["samples"]
