@@ -65,12 +65,15 @@ def ran(name, items):
         return result
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setitem(SCENARIO_KINDS, scenario_kind(name), replace(known, run=run))
+        changed = replace(known, run=run)
         if items:
             assert any(item.startswith("duration=") for item in items)
+            known.check(as_run(name, True))
+            changed = replace(changed, check=lambda scenario: None)
             overrides = [*quick_overrides(name), *items]
             patch.setattr(scenarios, "quick_overrides", lambda name: overrides)
             patch.setattr(scenarios, "QUICK_DIAGRAM", np.inf)
+        patch.setitem(SCENARIO_KINDS, scenario_kind(name), changed)
         return measure(case_of(name), 0), *kept
 
 
