@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -39,8 +40,12 @@ def case_of(name, short=True):
 
 
 def made_up(case, seed):
+    return ending_well(case.keys["scenario"])
+
+
+@cache
+def ending_well(name):
     """What is found where all end as expected, at half of the errors, but one as `LOST` does."""
-    name = case.keys["scenario"]
     shipped = load_scenario(name)
     wanted = shipped.expected
     row = {
