@@ -84,7 +84,7 @@ def test_each_part_of_what_ships_counts(worse):
     assert shipped.of == len(module.QUICK_SCENARIOS)
 
 
-def test_it_runs_what_the_form_says():
+def test_it_runs_what_the_form_says(monkeypatch):
     quick = made(STUDY, same).runs.counts("kind")
     assert quick == {
         "scenario": len(module.QUICK_SCENARIOS), "taut": module.QUICK_MOTIONS,
@@ -92,7 +92,9 @@ def test_it_runs_what_the_form_says():
         "impacts": module.QUICK_RUNS,
     }  # fmt: skip
     assert made(STUDY, same, seeds=4).runs.counts("kind") == quick | {"taut": 4, "impacts": 4}
+    monkeypatch.setattr(module, "robot_scenario_names", lambda: ("planar_pbvs", "acrobot_pbvs"))
     full = {case.name: case for case in STUDY.plan(Form())}
+    assert "scenario planar_pbvs" in full
     assert STUDY.count(full["impacts"], Form()) == 200
     assert STUDY.count(full["taut motions"], Form()) == 30
     assert STUDY.count(full["energy 0.0001 s"], Form()) == 1
@@ -120,7 +122,8 @@ def test_an_order_is_that_of_a_power():
     np.testing.assert_allclose([pairs.order_of(steps**p) for p in (1.0, 2.0, 3.0)], [1.0, 2.0, 3.0])
 
 
-def test_a_row_does_not_depend_on_the_others():
+def test_a_row_does_not_depend_on_the_others(monkeypatch):
+    monkeypatch.setattr(pairs, "TAUT_DURATION", 1.0)
     assert pairs.taut_row(1) == pairs.taut_row(1) != pairs.taut_row(0)
     assert pairs.slack_override(3) == pairs.slack_override(3) != pairs.slack_override(4)
     pair = pairs.run_pair("planar_pbvs", ["duration=0.1"])
