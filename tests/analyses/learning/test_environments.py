@@ -236,10 +236,10 @@ def test_without_gymnasium_it_says_what_to_install(monkeypatch):
 
 
 def test_the_command_lists_them_and_draws_one(capsys, tmp_path):
-    code, (out, _) = run(capsys, "--json", "--robot", "caroca")
+    code, (out, _) = run(capsys, "--json", "--robot", "planar")
     found = json.loads(out)
     assert (code, [one["name"] for one in found]) == (0, cdpr.environment_names())
-    assert {one["robot"] for one in found} == {"caroca"}
+    assert {one["robot"] for one in found} == {"planar"}
     picture = tmp_path / "reach.png"
     code, (out, _) = run(capsys, "Reach", "--picture", str(picture))
     assert code == 0

@@ -38,11 +38,12 @@ def check_tables_are_made(found):
 
 
 def check_told_apart_and_written(study, made_up, folder):
-    """All statements hold of good rows, and none of contrary ones; of both a figure is written."""
+    """All statements hold of good rows, and none of contrary ones; of both a figure is drawn."""
+    name = study.name.replace("-", "_")
     for wrong, verdict in ((False, "confirmed"), (True, "not confirmed")):
         found = made(study, partial(made_up, wrong=wrong))
         assert {one.verdict for one in found.statements} == {verdict}
         assert len(found.tables()) > 0
-        (folder / verdict).mkdir()
-        assert not found.write(folder / verdict)
-        assert (folder / verdict / f"{study.name.replace('-', '_')}.png").is_file()
+        assert with_figures(found)[1] == {name} == set(study.figures)
+    assert not found.write(folder)
+    assert (folder / f"{name}.png").is_file()

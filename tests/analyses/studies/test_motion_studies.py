@@ -1,6 +1,7 @@
 """Studies of planned motions, of proven paths and of picking and placing."""
 
 import json
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -276,6 +277,8 @@ def test_the_quick_problem_is_what_is_said(monkeypatch):
     line = start[:3] + np.linspace(0.0, 1.0, 200)[:, np.newaxis] * (goal - start)[:3]
     assert scene.wrong(line) > 0
     assert scene.wrong(np.array([start[:3], goal[:3]])) == 0
+    effort = replace(proving.QUICK_EFFORT, boxes=12_000, cells=2**14)
+    monkeypatch.setattr(proving, "QUICK_EFFORT", effort)
     cases = proving.STUDY.plan(Form(quick=True))
     assert [case.keys["kind"] for case in cases] == [PROBLEM, SAMPLED]
     monkeypatch.setattr(sampled_planners, "OMPL_SECONDS", 0.5)

@@ -37,6 +37,7 @@ def quick():
     """The quick form, in which every pose is looked at less hard."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(robot_limits, "OPTIONS", replace(robot_limits.OPTIONS, draws=10, searches=1))
+        patch.setattr(single, "DRAWS", 100)
         return STUDY(True, StudySession(workers=1))
 
 
