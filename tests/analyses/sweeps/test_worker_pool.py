@@ -78,7 +78,7 @@ def test_a_process_that_dies_costs_its_own_job_only():
 @pytest.mark.parametrize(("workers", "most"), [(1, 1), (2, 2)])
 def test_processes_that_keep_memory_are_replaced_and_no_job_is_lost(monkeypatch, workers, most):
     """Each start of the study of basins left 0.2 MB: 14,000 of them filled a machine."""
-    size, jobs = 20_000_000, 4
+    size, jobs = 20_000_000, 6
 
     def hosts(most_growth):
         monkeypatch.setattr(worker_pool, "MOST_GROWTH", most_growth)
