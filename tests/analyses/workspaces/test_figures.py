@@ -1,26 +1,37 @@
-"""Figures of stability workspaces show what there is: every cell, every curve, every exit point."""
+"""What figures of workspaces show: every cell, curve and exit point, cables as they are held."""
 
+import json
+import re
 from dataclasses import replace
 
 import matplotlib.colors
 import numpy as np
 import pytest
 from matplotlib.collections import QuadMesh
+from matplotlib.colors import to_rgba
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from cdpr_drake.analyses.studies.control_stability.figures import table_figure
 from cdpr_drake.analyses.studies.framework.runs import Run, Runs
 from cdpr_drake.analyses.studies.framework.summary import COARSE, FULL
 from cdpr_drake.analyses.studies.published.stability_tables import TABLES
+from cdpr_drake.analyses.visualization.replay import robot_picture
 from cdpr_drake.analyses.workspaces.stability_figures import (
     COLORS,
     MOST_PLANES,
     curves_figure,
     even_choice,
-    planes_figure,
     solids_figure,
 )
+from cdpr_drake.analyses.workspaces.stability_figures import planes_figure as stability_planes
 from cdpr_drake.analyses.workspaces.stability_results import StabilityWorkspaces
+from cdpr_drake.analyses.workspaces.workspace_figures import OUTSIDE, planes_figure
+from cdpr_drake.analyses.workspaces.workspace_question import (
+    WorkspaceRequest,
+    make_workspace_question,
+)
+from cdpr_drake.analyses.workspaces.workspace_results import robot_workspace
+from cdpr_drake.analyses.workspaces.workspace_scene import workspace_page
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.stability.verdict import VERDICTS
 from cdpr_drake.workspaces.pose_grid import grid_by_count
@@ -57,7 +68,7 @@ def meshes(figure):
 def test_planes_show_frame_exit_points_and_the_box_of_the_grid():
     """A grid whose points are all alike was a plain square, with one number at its ticks."""
     robot = load_robot("acrobot_large")
-    figure = planes_figure(workspaces((5, 5, 3)), robot=robot)
+    figure = stability_planes(workspaces((5, 5, 3)), robot=robot)
     assert not figure_faults(figure)
     for axes in figure.axes:
         box, frame, exits = axes.lines
@@ -84,7 +95,7 @@ def test_planes_show_frame_exit_points_and_the_box_of_the_grid():
     ],
 )
 def test_planes_show_every_point_as_a_cell(counts, across, up, panels):
-    figure = planes_figure(workspaces(counts))
+    figure = stability_planes(workspaces(counts))
     assert figure_faults(figure) == []
     found = meshes(figure)
     assert len(found) == panels
@@ -101,7 +112,7 @@ def test_planes_show_every_point_as_a_cell(counts, across, up, panels):
 @pytest.mark.parametrize("counts", [(7, 1, 6), (1, 7, 6), (4, 3, 1)])
 def test_cells_are_coloured_by_their_own_points(counts):
     stable = np.random.default_rng(0).random((1, 1, *counts)) < 0.5
-    (mesh,) = meshes(planes_figure(workspaces(counts, stable)))
+    (mesh,) = meshes(stability_planes(workspaces(counts, stable)))
     wanted = [COLORS["SZ" if one else "S"] for one in np.squeeze(stable).T.ravel()]
     np.testing.assert_allclose(mesh.get_facecolors(), matplotlib.colors.to_rgba_array(wanted))
 
@@ -112,17 +123,16 @@ def test_planes_are_evenly_spaced_and_a_selection_is_said():
         assert len(chosen) <= MOST_PLANES
         assert len(set(np.diff(chosen))) <= 1
         assert 0 <= chosen[0] <= chosen[-1] < count
-    figure = planes_figure(workspaces((3, 3, 16)))
+    figure = stability_planes(workspaces((3, 3, 16)))
     assert len(meshes(figure)) == 16
     assert "planes" not in figure.get_suptitle()
-    assert figure_faults(figure) == []
-    figure = planes_figure(workspaces((3, 3, 25)))
+    figure = stability_planes(workspaces((3, 3, 25)))
     assert figure_faults(figure) == []
     assert f"{len(meshes(figure))} of 25 planes" in figure.get_suptitle()
 
 
 def test_ticks_of_a_square_plane_are_alike():
-    figure = planes_figure(workspaces((9, 7, 4)))
+    figure = stability_planes(workspaces((9, 7, 4)))
     assert figure_faults(figure) == []
     panel = figure.axes[0]
     np.testing.assert_allclose(panel.get_xticks(), [-0.5, 0.0, 0.5], atol=1e-12)
@@ -158,7 +168,7 @@ def test_curves_that_lie_on_each_other_can_both_be_seen():
 
 
 def test_titles_have_formulas_in_the_place_of_what_a_terminal_prints():
-    title = planes_figure(workspaces((5, 5, 3))).get_suptitle()
+    title = stability_planes(workspaces((5, 5, 3))).get_suptitle()
     assert "$L_s$ with $[e_t]_\\times$" in " ".join(title.split())
 
 
@@ -200,3 +210,104 @@ def test_tables_tell_verdicts_apart_and_say_that_a_grid_is_coarse(quick):
         assert len({line.get_linestyle() for line in lines}) == len(VERDICTS)
         sizes = [line.get_markersize() for line in lines]
         assert sizes == sorted(sizes, reverse=True)
+
+
+def small_workspace(robot, counts=(3, 2, 2), **asked):
+    grid = grid_by_count([-0.3, -0.2, 0.2], [0.3, 0.2, 0.4], counts)
+    question = make_workspace_question(
+        robot, ["static"], grid, ["capacity-margin"], asked=WorkspaceRequest(**asked)
+    )
+    return robot_workspace(question).workspace
+
+
+def notes_of(pictures, folder):
+    (write,) = pictures.values()
+    page = folder / "page.html"
+    write(page)
+    (words,) = re.findall(r'id="cdpr-data">(.*?)</script>', page.read_text(), re.DOTALL)
+    return json.loads(words)
+
+
+def test_a_held_robot_is_drawn_with_its_tensions(tmp_path):
+    """All cables were red and the legend had nothing but slack."""
+    robot = load_robot("acrobot_large")
+    pictures, note = workspace_page(small_workspace("acrobot_large"), robot)
+    notes = notes_of(pictures, tmp_path)
+    held = robot_picture(robot)
+    assert held.problem == note == ""
+    assert notes["scale"] > robot.tension_limits()[0]
+    assert notes["slack"]
+    assert notes["lines"] == []
+
+
+def test_a_robot_that_is_not_held_has_plain_cables_and_says_so(tmp_path):
+    """No tensions within 1000 to 1001 N hold it: neither a scale nor slack is said."""
+    workspace = small_workspace("acrobot_large", limits=(1000.0, 1001.0))
+    pictures, note = workspace_page(workspace, load_robot("acrobot_large"))
+    notes = notes_of(pictures, tmp_path)
+    assert "no tensions within 1000..1001 N" in note
+    assert notes["scale"] == 0.0
+    assert notes["slack"] is None
+    assert [words for words, _ in notes["lines"]] == ["cables, tensions unknown"]
+
+
+@pytest.mark.parametrize(
+    ("measure", "counts"),
+    [
+        *((None, counts) for counts in ((3, 2, 2), (5, 4, 1), (1, 3, 4), (4, 1, 1))),
+        *(("capacity-margin", counts) for counts in ((3, 2, 2), (4, 1, 1))),
+    ],
+)
+def test_planes_paint_the_grid_and_nothing_beside(measure, counts):
+    """Cells of points on the border were painted half a step beyond the grid's box."""
+    workspace = small_workspace("acrobot_large", counts)
+    figure = planes_figure(workspace, measure)
+    assert figure_faults(figure) == []
+    lower, upper = np.array([-0.3, -0.2, 0.2]), np.array([0.3, 0.2, 0.4])
+    painted = [axes for axes in figure.axes if axes.get_title().partition(" ")[0] in tuple("xyz")]
+    assert painted
+    across, up = (
+        "xyz".index(next(filter(None, (getattr(axes, name)() for axes in painted)))[0])
+        for name in ("get_xlabel", "get_ylabel")
+    )
+    for axes in painted:
+        (mesh,) = [one for one in axes.collections if hasattr(one, "get_coordinates")]
+        corners = mesh.get_coordinates().reshape(-1, 2)
+        for k, column in ((across, corners[:, 0]), (up, corners[:, 1])):
+            if counts[k] > 1:
+                assert column.min() == pytest.approx(lower[k])
+                assert column.max() == pytest.approx(upper[k])
+
+
+@pytest.mark.parametrize("measure", [None, "capacity-margin"])
+def test_planes_show_the_frame_the_exit_points_and_the_box_of_the_grid(measure):
+    robot = load_robot("acrobot_large")
+    figure = planes_figure(small_workspace("acrobot_large"), measure, robot)
+    assert figure_faults(figure) == []
+    axes = figure.axes[0]
+    drawn = {line.get_label(): np.array(line.get_data()) for line in axes.lines}
+    np.testing.assert_array_equal(drawn["exit points of the cables"], robot.exit_points()[:2])
+    np.testing.assert_allclose(drawn["frame"].min(axis=1), robot.frame.lower[:2])
+    np.testing.assert_allclose(drawn["box of the grid"].max(axis=1), [0.3, 0.2])
+    low, high = np.transpose([axes.get_xlim(), axes.get_ylim()])
+    for points in drawn.values():
+        assert np.all(low < points.T)
+        assert np.all(high > points.T)
+    told = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert {*drawn} <= {*told}
+
+
+def test_planes_of_a_measure_say_where_there_is_no_number():
+    """A plane without a pose inside was an empty panel."""
+    workspace = small_workspace("acrobot_large")
+    held = workspace.inside("static").copy()
+    assert held.any(axis=(0, 1, 2))[1]
+    held[..., 0] = False
+    workspace = replace(workspace, holds={"static": held})
+    figure = planes_figure(workspace, "capacity-margin")
+    assert figure_faults(figure) == []
+    assert "outside" in [text.get_text() for text in figure.legends[0].get_texts()]
+    (mesh,) = [one for one in figure.axes[0].collections if hasattr(one, "get_coordinates")]
+    assert np.all(np.ma.getmaskarray(mesh.get_array()))
+    painted = mesh.to_rgba(mesh.get_array())
+    np.testing.assert_allclose(painted.reshape(-1, 4)[0], to_rgba(OUTSIDE))

@@ -1,17 +1,24 @@
-"""One perturbation means the same to the criterion, the scenario and the kinematic loop."""
+"""One perturbation means the same to criterion, scenario and kinematic loop; loops with slack."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
+import yaml
 from pydrake.math import RigidTransform, RotationMatrix
 
+from cdpr_drake.analyses.simulation.run_stability import stability_along
+from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
 from cdpr_drake.analyses.studies.closed_loops.kinematic_servo import REACHED, STEP, kinematic_path
+from cdpr_drake.analyses.studies.closed_loops.loops import SETTINGS as LOOP_SETTINGS
+from cdpr_drake.analyses.studies.closed_loops.loops import loop_setup, perturbation_of
 from cdpr_drake.analyses.studies.framework.servo_models import (
     Perturbation,
     perturbed_scenario,
     perturbed_servo,
 )
 from cdpr_drake.geometry.poses import pose_from_angles, pose_row
-from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_loader import load_robot, robot_file
 from cdpr_drake.stability.desired_view import FixedObject
 from cdpr_drake.stability.perturbation_bounds import BASELINE, vector_size
 from cdpr_drake.stability.perturbation_samples_kernel import draw_perturbations
@@ -106,14 +113,7 @@ def test_the_error_falls_wherever_the_criterion_holds(scheme, seed):
 
 def test_a_camera_mounted_the_wrong_way_round_does_not_converge():
     """What the criterion refuses, and rightly so."""
-    turned = Perturbation(
-        RotationMatrix(),
-        np.zeros(3),
-        RotationMatrix.MakeZRotation(np.pi * 0.9),
-        np.zeros(3),
-        np.zeros((3, 8)),
-        np.zeros((3, 8)),
-    )
+    turned = replace(NONE, camera_turn=RotationMatrix.MakeZRotation(np.pi * 0.9))
     servo = servo_of(turned)
     assert servo.margin(START) < 0.0
     path = kinematic_path(servo, START)
@@ -124,3 +124,62 @@ def test_no_perturbation_believes_the_truth():
     X = RigidTransform(RotationMatrix.MakeZRotation(0.3), [1.0, 2.0, 3.0])
     assert NONE.platform(X).IsNearlyEqualTo(X, ROUNDING)
     assert NONE.camera(X).IsNearlyEqualTo(X, ROUNDING)
+
+
+# A loop that ends hanging on five cables arrives with tension management, if the mass is in the
+# middle of the platform's box. With the fitted centre of mass of the robot's file, 30 mm below, the
+# same loop arrives by itself, on six cables.
+
+SCHEME = "pbvs-line"
+HANGING = pose_from_angles(
+    np.array([0.07004729, -0.28586191, 1.0559333]),
+    np.radians([10.97339115, 10.825974, -29.56824256]),
+)
+"""0.1 m below the exit points, where slack moves between cables at once."""
+
+LONG_ENOUGH = 16.0
+"""With tension management it arrives within 14 s; without, it hangs on five cables [s]."""
+
+
+@pytest.fixture(scope="module")
+def robots(tmp_path_factory):
+    """The robot as it is, and the file of one with its mass in the middle of the box."""
+    content = yaml.safe_load(robot_file("acrobot_large").read_text(encoding="utf-8"))
+    content["platform"]["center_of_mass"] = [0.0, 0.0, 0.035]
+    path = tmp_path_factory.mktemp("middle") / "robot.yaml"
+    path.write_text(yaml.safe_dump(content), encoding="utf-8")
+    return {"fitted": "acrobot_large", "middle": path}
+
+
+@pytest.fixture(scope="module")
+def worst():
+    """The worst errors that a search finds at the start, as in the study."""
+    setup = loop_setup(SCHEME)
+    found = perturbation_of(setup, pose_row(HANGING), worst=True)
+    # Stable, says the criterion, which takes every cable as taut.
+    assert perturbed_servo(setup.scenario, found).margin(HANGING) > 0.0
+    return found
+
+
+@pytest.mark.parametrize(
+    ("mass", "managed", "expected", "taut"),
+    [
+        ("middle", "{threshold: [1.0], gain: 0.003}", "CONVERGED", 8),
+        ("middle", "null", "TIMEOUT", 5),
+        ("fitted", "null", "CONVERGED", 6),
+    ],
+)
+def test_whether_a_loop_with_slack_arrives(robots, worst, mass, managed, expected, taut):
+    items = [
+        *LOOP_SETTINGS, f"robot={robots[mass]}", f"controller.scheme={SCHEME}",
+        f"duration={LONG_ENOUGH}", "integration.engine=compiled", f"tension_management={managed}",
+    ]  # fmt: skip
+    made = perturbed_scenario(load_scenario("acrobot_pbvs", items), HANGING, worst)
+    made.estimator.kind, made.sensors.tracker = "shifted", "ideal"
+    result = run_scenario(made)
+    along = stability_along(result)
+    assert (result.outcome.name, along.taut[-1]) == (expected, taut)
+    if taut == 8:
+        assert along.underactuated_time() < 2.0
+    if taut == 5:
+        assert along.underactuated_time() > 0.5 * LONG_ENOUGH

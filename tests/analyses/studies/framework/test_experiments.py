@@ -1,17 +1,25 @@
-"""Poses beside a pose: sizes and axes are those asked for, and items load as they were meant."""
+"""Poses beside a pose, and how wrongly a model has the points of its cables."""
 
 import numpy as np
+import pytest
 import yaml
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from cdpr_drake.analyses.studies.case_studies import case_1, case_1_ends
 from cdpr_drake.analyses.studies.framework.experiments import (
+    POINT_ERROR,
     as_transform,
     between,
     pose_item,
     turned,
+    wrong_points,
 )
+from cdpr_drake.analyses.studies.framework.study import Form
+from cdpr_drake.analyses.studies.fusion import slack_trials
+from cdpr_drake.analyses.studies.tension_cases import case_9, case_9_torque
 from cdpr_drake.geometry.poses import pose_error
+from cdpr_drake.systems.diagrams.load import load_scenario
 
 ROUNDING = 1e-9
 """Items carry nine digits; poses here are of the order of 1 m and 1 rad."""
@@ -48,3 +56,24 @@ def test_an_item_means_the_pose(pose):
     assert key == "initial_pose"
     again = as_transform((tuple(value["position"]), tuple(value["angles_deg"])))
     assert again.IsNearlyEqualTo(X, 10.0 * ROUNDING)
+
+
+@pytest.mark.parametrize("scenario", ["acrobot_open_loop", "acrobot_mobile_robot"])
+def test_scenarios_with_manufacturing_errors_have_the_same(scenario):
+    wrong = load_scenario(scenario).perturbations
+    assert (wrong.exit_points, wrong.anchor_points) == (POINT_ERROR, POINT_ERROR)
+
+
+@pytest.mark.parametrize("study", [case_9.STUDY, case_9_torque.STUDY])
+def test_every_case_with_slack_has_the_same(study):
+    for case in study.plan(Form()):
+        assert set(wrong_points()) <= set(case.changes), case.name
+
+
+def test_case_1_and_fusion_have_the_same():
+    assert set(case_1_ends.POINTS) == set(wrong_points())
+    assert set(wrong_points()) <= set(slack_trials.WRONG)
+    following = [case for case in case_1.STUDY.plan(Form()) if case.keys["group"] == case_1.MOVING]
+    assert following
+    for case in following:
+        assert set(wrong_points()) <= set(case.changes), case.name
