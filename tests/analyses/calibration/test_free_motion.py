@@ -7,6 +7,7 @@ import pytest
 from pydrake.math import RigidTransform
 from scipy.spatial.transform import Rotation
 
+from cdpr_drake.analyses.calibration.free_motion import SMALL, steps_within
 from cdpr_drake.analyses.calibration.free_motion_balance import PULLED
 from cdpr_drake.analyses.calibration.free_motion_model import FREE_GROUPS, FreeMotionModel
 from cdpr_drake.analyses.calibration.free_motion_report import dominant_frequency
@@ -167,6 +168,16 @@ def test_states_a_time_earlier_are_those_of_the_motion():
     off = turns.inv() * Rotation.from_quat(true[:, [1, 2, 3, 0]])
     assert np.max(off[1:].magnitude()) < HERMITE_TOLERANCE
     assert np.max(np.abs(places[1:] - true[1:, 4:7])) < HERMITE_TOLERANCE
+
+
+def test_steps_for_slopes_stay_within_bounds():
+    """A retardation time near zero would become negative, which no cable has."""
+    x, least, largest = np.array([[1e-7, 0.5, 1.0], [0.0, 0.0, 0.0], [1.0, 1.0, 1.0]])
+    down, up = steps_within(x, least, largest)
+    assert down == pytest.approx([1e-7, SMALL, SMALL])
+    assert up == pytest.approx([SMALL, SMALL, 0.0])
+    assert np.all(x - down >= least)
+    assert np.all(x + up <= largest)
 
 
 def test_dominant_frequency_is_that_of_a_sine():
